@@ -1,0 +1,1 @@
+//! Estimators and statistics on triangular factors

@@ -1,0 +1,1 @@
+//! Robot files and logs: URDF, DH tables in TOML, CSV

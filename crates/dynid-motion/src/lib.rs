@@ -1,0 +1,1 @@
+//! Motion and effort signals: logs, clocks, filters, kernels, trajectories
