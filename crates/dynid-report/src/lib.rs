@@ -1,1 +1,32 @@
-//! The one-file HTML report
+//! The report: one HTML file that tells a customer what was identified and how far it can be trusted.
+//!
+//! Fill a [`ReportData`], call [`render`], write the text to a file. The crate knows nothing of models or
+//! estimators, and the page needs nothing but a browser: no network, no second file.
+//!
+//! # Why the plots are our own
+//!
+//! Measured against the needs (offline, zoomable, printable, under 4 MB with the data of a 7-axis log):
+//!
+//! | choice | bytes in the page before data | verdict |
+//! |---|---|---|
+//! | `plotly` 0.14.1, embedded | 4.65 MB | over the limit by itself |
+//! | `charming` 0.6.0 | 1.03 MB | its HTML renderer loads the script from a network address; the copy of the script it ships is reachable only through its server-side feature, which embeds a JavaScript engine |
+//! | `template/plot.js` | 13 kB | drawn as SVG: zoom, pan, read-out, prints as vectors |
+//!
+//! The curves are drawn by the script from decimated series (least and greatest sample of each bucket), the small
+//! still pictures (histogram, autocorrelation, 95 % interval) by Rust, so that they are there without a script too.
+
+mod data;
+mod drawing;
+mod error;
+mod number;
+mod page;
+mod series;
+
+pub use data::{
+    BaseParameter, Check, Chosen, Fact, InputFile, Joint, JointDelay, JointQuality, JointSeries, Ladder,
+    LogReport, LogRole, LogSeries, Observation, Origin, ParameterVerdict, Provenance, Quality, ReportData,
+    Robot, Rung, StandardParameter, Status, UnidentifiableColumn, Value, Verdict, Warning,
+};
+pub use error::ReportError;
+pub use page::render;

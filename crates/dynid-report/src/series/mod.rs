@@ -1,0 +1,9 @@
+//! Time series on their way to the page: checked, decimated, written compactly; and what the residual looks like.
+
+mod decimation;
+mod encoding;
+mod payload;
+mod residual;
+
+pub(crate) use payload::{PointBudget, log_payload, median_step};
+pub(crate) use residual::{Autocorrelation, ResidualSummary, residual, summarise};
