@@ -1,1 +1,31 @@
-//! Motion and effort signals: logs, clocks, filters, kernels, trajectories
+//! Motion and effort signals: everything that needs the record alone.
+//!
+//! A [`Log`] is what was recorded; [`clock`] puts it on a uniform grid; [`spikes`] removes single outliers;
+//! [`spectrum`] finds the sensor noise and the excited band, and [`cutoff`] the cut-off frequencies they allow;
+//! [`filter`], [`difference`], [`kernel`] and [`shift`] form states, regression rows and delays; [`mask`] says which
+//! samples may be used. [`textbook`] is the plain route (zero-phase Butterworth, central differences, decimation),
+//! [`trajectory`] holds the excitation trajectories.
+//!
+//! Units: s, Hz, rad (or m), rad/s, N m (or N). Signals are slices of `f64` on a uniform grid of `rate_hz`.
+//! Every function that takes data from outside checks that it is finite and returns a typed error if not, so that
+//! no result holds a NaN.
+
+pub mod clock;
+pub mod cutoff;
+pub mod difference;
+pub mod filter;
+pub mod kernel;
+pub mod log;
+pub mod mask;
+pub mod median;
+pub mod shift;
+pub mod signal;
+pub mod spectrum;
+pub mod spikes;
+pub mod textbook;
+pub mod trajectory;
+
+pub use clock::{ClockError, ClockReport, ClockSettings, UniformLog};
+pub use kernel::Kernel;
+pub use log::{Channel, JointSignals, Log, LogError};
+pub use signal::SignalError;
