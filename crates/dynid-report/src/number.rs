@@ -32,7 +32,7 @@ pub(crate) fn with_std(value: f64, std: f64) -> (String, String) {
     let place = exponent(std, 2) - 1;
     let largest = if value == 0.0 { exponent(std, 2) } else { exponent(value, 2).max(exponent(std, 2)) };
     let digits = (largest - place + 1).clamp(2, 8);
-    if (-4..6).contains(&largest) {
+    if (-3..6).contains(&largest) {
         let decimals = (digits - 1 - largest).max(0) as usize;
         let std_text = if digits == 8 { significant(std, 2) } else { format!("{std:.decimals$}") };
         (unsigned_zero(format!("{value:.decimals$}")), std_text)
@@ -42,12 +42,23 @@ pub(crate) fn with_std(value: f64, std: f64) -> (String, String) {
     }
 }
 
+/// All digits of `value` if they are at most six (a chosen 0.25 is not 0.2500), else four.
+pub(crate) fn shortest(value: f64) -> String {
+    let scientific = format!("{value:e}");
+    let Some((mantissa, _)) = scientific.split_once('e') else { return significant(value, 4) };
+    match mantissa.chars().filter(char::is_ascii_digit).count() {
+        digits @ ..=6 if (-3..6).contains(&exponent(value, digits)) => value.to_string(),
+        ..=6 => scientific,
+        _ => significant(value, 4),
+    }
+}
+
 /// A count with narrow spaces between groups of three digits.
 pub(crate) fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut text = String::new();
     for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i) % 3 == 0 && digits.len() > 4 {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) && digits.len() > 4 {
             text.push('\u{202f}');
         }
         text.push(digit);
@@ -60,9 +71,13 @@ pub(crate) fn fixed(value: f64, decimals: usize) -> String {
     if value.is_finite() { unsigned_zero(format!("{value:.decimals$}")) } else { NOT_FINITE.to_owned() }
 }
 
-/// `kg m^2` as `kg m²`.
+/// `kg m^2` as `kg m²`, never broken over two lines.
 pub(crate) fn unit(unit: &str) -> String {
-    unit.replace("^-1", "⁻¹").replace("^-2", "⁻²").replace("^2", "²").replace("^3", "³")
+    unit.replace(' ', "\u{a0}")
+        .replace("^-1", "⁻¹")
+        .replace("^-2", "⁻²")
+        .replace("^2", "²")
+        .replace("^3", "³")
 }
 
 /// Decimal exponent of `value` after rounding to `digits`, so that 9.9996 counts as 10.
@@ -113,6 +128,23 @@ mod tests {
         ];
         for ((value, std), (value_text, std_text)) in cases {
             assert_eq!(with_std(value, std), (value_text.to_owned(), std_text.to_owned()));
+        }
+    }
+
+    #[test]
+    fn a_chosen_number_is_printed_as_chosen() {
+        let cases = [
+            (0.0, "0"),
+            (0.25, "0.25"),
+            (-15.0, "-15"),
+            (500_000.0, "500000"),
+            (3.2e-6, "3.2e-6"),
+            (1e9, "1e9"),
+            (std::f64::consts::PI, "3.142"),
+            (f64::INFINITY, "not finite"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(shortest(value), text);
         }
     }
 

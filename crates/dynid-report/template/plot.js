@@ -211,7 +211,12 @@
       if (!entry.target.drawn) draw(entry.target);
     }
   }, { rootMargin: "400px" });
-  figures.forEach(function (figure) { observer.observe(figure); });
+  for (const figure of figures) {
+    // The observer reports after the first frame; what is on the first screen is drawn into it.
+    const box = figure.getBoundingClientRect();
+    if (box.height > 0 && box.top < window.innerHeight) { visible.add(figure); draw(figure); }
+    observer.observe(figure);
+  }
   let pending = 0;
   window.addEventListener("resize", function () { clearTimeout(pending); pending = setTimeout(redraw, 100); });
   window.addEventListener("beforeprint", function () {

@@ -18,16 +18,24 @@
     rows.forEach(function (row, i) { row.rank = i; });
     for (const heading of table.tHead.rows[0].cells) {
       if (heading.hasAttribute("data-fixed")) continue;
-      const button = document.createElement("button");
-      button.type = "button";
-      button.append(...heading.childNodes);
-      heading.append(button);
-      button.addEventListener("click", function () {
+      // Not a <button>: browsers leave those out of headings repeated on later printed pages.
+      const handle = document.createElement("span");
+      handle.tabIndex = 0;
+      handle.setAttribute("role", "button");
+      handle.append(...heading.childNodes);
+      heading.append(handle);
+      const sort = function () {
         const direction = heading.getAttribute("aria-sort") === "ascending" ? -1 : 1;
         for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
         heading.setAttribute("aria-sort", direction === 1 ? "ascending" : "descending");
         const numeric = heading.classList.contains("n");
         body.append(...rows.slice().sort(compare(numeric, heading.cellIndex, direction)));
+      };
+      handle.addEventListener("click", sort);
+      handle.addEventListener("keydown", function (event) {
+        if (event.key !== "Enter" && event.key !== " ") return;
+        event.preventDefault();
+        sort();
       });
     }
   }

@@ -9,7 +9,7 @@ use dynid_report::{
 };
 
 /// A report of `joints` joints, its training log having `samples` samples at 1 kHz.
-pub fn report(joints: usize, samples: usize) -> ReportData {
+pub(crate) fn report(joints: usize, samples: usize) -> ReportData {
     ReportData {
         title: "Identification of demo-arm".into(),
         verdict: verdict(),
@@ -106,7 +106,7 @@ fn verdict() -> Verdict {
             check(Status::Ok, "Excitation", 38.21, "", "below 100", "Condition number with unit columns: every parameter left a clear trace in the log."),
             check(Status::Ok, "Physical consistency", 3.2e-6, "kg m^2", "above 0", "Least eigenvalue of all pseudo-inertias: masses and inertias could be real, simulation will not blow up."),
             check(Status::Warn, "Whiteness of the residual", 0.41, "", "below 0.3", "Autocorrelation of joint_4's residual after 0.1 s: a slow effect is missing from its friction model."),
-            check(Status::Fail, "Velocity coverage of joint_6", 31.0, "%", "above 50 %", "The log reached 31 % of the joint's rated speed: its viscous friction is extrapolated beyond that."),
+            check(Status::Warn, "Velocity coverage of joint_6", 31.0, "%", "above 50 %", "The log reached 31 % of the joint's rated speed: its viscous friction is extrapolated beyond that."),
         ],
     }
 }
@@ -195,8 +195,8 @@ fn effort(time_s: &[f64], j: usize, seed: u64) -> JointSeries {
                 + 0.1 * (TAU * 1.1 * t).sin())
         })
         .collect();
-    let memory = if j == 3 { 0.98 } else { 0.7 };
-    let mut coloured = 0.0;
+    let memory: f64 = if j == 3 { 0.98 } else { 0.7 };
+    let mut coloured: f64 = 0.0;
     let measured = predicted
         .iter()
         .map(|p| {

@@ -1,5 +1,6 @@
 //! Templates and the filters they print numbers with.
 
+use minijinja::syntax::SyntaxConfig;
 use minijinja::value::{Value, ValueKind};
 use minijinja::{Environment, UndefinedBehavior};
 
@@ -24,8 +25,7 @@ const TEMPLATES: [(&str, &str); 9] = [
 pub(super) fn environment() -> Result<Environment<'static>, minijinja::Error> {
     let mut environment = Environment::new();
     environment.set_undefined_behavior(UndefinedBehavior::SemiStrict);
-    environment.set_trim_blocks(true);
-    environment.set_lstrip_blocks(true);
+    environment.set_syntax(SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build()?);
     for (name, source) in TEMPLATES {
         environment.add_template(name, source)?;
     }
@@ -37,7 +37,9 @@ pub(super) fn environment() -> Result<Environment<'static>, minijinja::Error> {
         environment.add_global(name, Value::from_safe_string(asset.to_owned()));
     }
     environment.add_filter("number", |value: &Value| print(value, |v| number::significant(v, 4)));
-    environment.add_filter("percent", |value: &Value| print(value, |v| number::significant(v, 3)));
+    environment.add_filter("percent", |value: &Value, digits: usize| {
+        print(value, |v| number::significant(v, digits))
+    });
     environment
         .add_filter("fixed", |value: &Value, decimals: usize| print(value, |v| number::fixed(v, decimals)));
     environment.add_filter("milli", |value: &Value| print(value, |v| number::fixed(v * 1e3, 3)));
@@ -73,18 +75,11 @@ fn setting(value: &Value) -> String {
         ValueKind::Number if value.is_integer() => {
             u64::try_from(value.clone()).map_or_else(|_| value.to_string(), number::count)
         }
-        ValueKind::Number => print(value, setting_number),
+        ValueKind::Number => print(value, number::shortest),
         ValueKind::Bool => if value.is_true() { "yes" } else { "no" }.to_owned(),
         ValueKind::String => value.to_string(),
         _ => UNDEFINED.to_owned(),
     }
-}
-
-/// Shortest decimal form where that is short (a chosen 0.25 is not 0.2500), else four digits.
-fn setting_number(value: f64) -> String {
-    let shortest = value.to_string();
-    let short = value.is_finite() && shortest.chars().filter(char::is_ascii_digit).count() <= 6;
-    if short { shortest } else { number::significant(value, 4) }
 }
 
 /// What a column is sorted by; empty where the number is undefined.

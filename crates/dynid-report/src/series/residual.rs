@@ -60,9 +60,12 @@ pub(crate) fn summarise(residual: &[f64], step_s: f64) -> Option<ResidualSummary
     let mean = finite.iter().map(|e| e / samples as f64).sum::<f64>();
     let centred: Vec<f64> = finite.iter().map(|e| e - mean).collect();
     let energy: f64 = centred.iter().map(|e| e * e).sum();
-    let std = (energy / samples as f64).sqrt();
-    let autocorrelation = (samples >= 8 && energy > 0.0 && energy.is_finite())
-        .then(|| autocorrelation(&centred, energy, step_s));
+    // A spread within the rounding error of the mean is none.
+    let largest = finite.iter().fold(0.0, |largest: f64, e| largest.max(e.abs()));
+    let spread = (energy / samples as f64).sqrt();
+    let std = if spread <= samples as f64 * f64::EPSILON * largest { 0.0 } else { spread };
+    let autocorrelation =
+        (samples >= 8 && std > 0.0 && energy.is_finite()).then(|| autocorrelation(&centred, energy, step_s));
     Some(ResidualSummary { samples, mean, std, histogram: histogram(&finite, std), autocorrelation })
 }
 
