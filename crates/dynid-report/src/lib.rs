@@ -11,7 +11,7 @@
 //! |---|---|---|
 //! | `plotly` 0.14.1, embedded | 4.65 MB | over the limit by itself |
 //! | `charming` 0.6.0 | 1.03 MB | its HTML renderer loads the script from a network address; the copy of the script it ships is reachable only through its server-side feature, which embeds a JavaScript engine |
-//! | `template/plot.js` | 15 kB | drawn as SVG: zoom, pan, read-out, prints as vectors |
+//! | `template/plot.js` | 12 kB | drawn as SVG: zoom, pan, read-out, prints as vectors |
 //!
 //! The curves are drawn by the script from decimated series (least and greatest sample of each bucket), the small
 //! still pictures (histogram, autocorrelation, 95 % interval) by Rust, so that they are there without a script too.

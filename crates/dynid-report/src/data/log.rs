@@ -56,7 +56,7 @@ pub struct JointQuality {
 pub struct Quality {
     /// Root mean square of `e`, in the joint's effort unit.
     pub rms: Option<f64>,
-    /// RMS over the range (or whichever scale the estimator documents) of the measured effort, %.
+    /// RMS over the spread of the measured effort (standard deviation or range, as the caller documents), %.
     pub nrmse_percent: Option<f64>,
     /// Coefficient of determination, `1 - sum e^2 / sum (measured - mean)^2`.
     pub r2: Option<f64>,

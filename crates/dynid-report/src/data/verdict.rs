@@ -9,11 +9,11 @@ use super::Value;
 #[serde(rename_all = "lowercase")]
 pub enum Status {
     /// As it should be.
-    #[default]
     Ok,
     /// Usable, with the caution given.
     Warn,
-    /// Not to be relied on.
+    /// Not to be relied on; the default, so that a verdict nobody filled in never reads as passed.
+    #[default]
     Fail,
 }
 
