@@ -1,11 +1,32 @@
 //! Mechanisms, joint elements, inverse dynamics, regressors and base parameters.
+//!
+//! A [`Description`] (what a robot file says) becomes a checked [`Mechanism`]; [`Dynamics`] runs its recursions over any
+//! [`Scalar`]; a [`RobotModel`] adds joint elements and is the [`EffortModel`] that estimators see; [`BaseParameters`]
+//! names what of it can be identified.
+//!
+//! Units are SI, angles rad. Standard parameters are about the joint frame in the axes of the file.
 
+pub mod base_parameters;
 pub mod description;
+pub mod dynamics;
+pub mod effort_model;
+pub mod element;
 pub mod inertia;
+pub mod mechanism;
+pub mod parameter;
+mod random_motion;
+mod robot_model;
 pub mod scalar;
 pub mod spatial;
 
+pub use base_parameters::{BaseParameters, BaseSettings};
 pub use description::{Description, JointDescription, JointKind, Limits, LinkDescription, Mimic};
+pub use dynamics::{Dynamics, DynamicsWorkspace, Energy, MotionBlock, State};
+pub use effort_model::{EffortModel, Output, RegressorBlock, RegressorLayout};
 pub use inertia::Inertia;
+pub use mechanism::{Body, Joint, Mechanism, MechanismError, MechanismWarning};
+pub use parameter::{Owner, Parameter, ParameterTable, ShapeParameter};
+pub use random_motion::RandomMotion;
+pub use robot_model::RobotModel;
 pub use scalar::Scalar;
 pub use spatial::{Mat3, Placement, Vec3};

@@ -1,5 +1,15 @@
 //! Number types that the dynamics recursion runs on.
 
+mod dispatch;
+mod dual;
+mod lanes;
+mod sine;
+
+pub use dispatch::{LANES, LaneTask, run_on_lanes};
+pub(crate) use dispatch::{FusedTask, run_fused};
+pub use dual::Dual;
+pub use lanes::Lanes;
+
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
@@ -7,6 +17,12 @@ use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 pub trait Scalar:
     Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self> + AddAssign
 {
+    /// The same kind of number with fused multiply-add, for code that runs where the processor has it.
+    type Fused: Scalar;
+    /// As its fused twin.
+    fn fuse(self) -> Self::Fused;
+    /// Back from the fused twin.
+    fn unfuse(fused: Self::Fused) -> Self;
     /// A constant.
     fn from_f64(value: f64) -> Self;
     /// Sine and cosine of an angle in rad.
@@ -35,12 +51,21 @@ pub trait Scalar:
 }
 
 impl Scalar for f64 {
+    type Fused = Lanes<1, true>;
+    #[inline(always)]
+    fn fuse(self) -> Lanes<1, true> {
+        Lanes([self])
+    }
+    #[inline(always)]
+    fn unfuse(fused: Lanes<1, true>) -> Self {
+        fused.0[0]
+    }
     #[inline(always)]
     fn from_f64(value: f64) -> Self {
         value
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        f64::sin_cos(self)
+        sine::sin_cos(self)
     }
 }

@@ -1,0 +1,95 @@
+//! Time per sample of inverse dynamics and regressor, alone and over blocks of lanes.
+
+#![expect(missing_docs, reason = "benchmarks are not an interface")]
+
+use divan::{Bencher, black_box, counter::ItemsCount};
+use dynid_model::*;
+
+fn main() {
+    divan::main();
+}
+
+/// Serial arms of 6 and 7 revolute joints, and a tree of 32 (a trunk of 2 with five limbs of 6).
+fn robot(joints: usize) -> Mechanism {
+    let mut d = Description::new("bench");
+    d.links.push(LinkDescription { name: "l0".into(), inertia: None });
+    for k in 1..=joints {
+        let parent = if joints > 7 && k > 2 && (k - 3) % 6 == 0 { 2 } else { k - 1 };
+        let angle = [0.0, 1.57, -1.57][k % 3];
+        d.links.push(LinkDescription {
+            name: format!("l{k}"),
+            inertia: Some(Inertia([3.0, 0.1, 0.2, 0.3, 0.5, 0.01, 0.02, 0.6, 0.03, 0.7])),
+        });
+        d.joints.push(JointDescription {
+            name: format!("j{k}"),
+            parent: format!("l{parent}"),
+            child: format!("l{k}"),
+            kind: JointKind::Revolute,
+            placement: Placement::from_xyz_rpy([0.1, 0.02 * k as f64, 0.3], [angle, 0.3, 0.1]),
+            axis: if k % 2 == 0 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] },
+            limits: Limits::default(),
+            mimic: None,
+        });
+    }
+    d.build().expect("the bench robot is sound")
+}
+
+const ROBOTS: [usize; 3] = [6, 7, 32];
+const BLOCK: usize = 64;
+
+#[divan::bench(args = ROBOTS)]
+fn inverse_dynamics(bencher: Bencher<'_, '_>, joints: usize) {
+    let mechanism = robot(joints);
+    let dynamics = Dynamics::new(&mechanism);
+    let phi = mechanism.inertia_vector();
+    let mut work = dynamics.workspace();
+    let (q, dq, ddq) = (vec![0.3; joints], vec![0.7; joints], vec![-0.4; joints]);
+    let mut effort = vec![0.0; joints];
+    bencher.bench_local(|| {
+        let state = State { q: black_box(&q), dq: &dq, ddq: &ddq, gravity: None };
+        dynamics.inverse_dynamics(&state, &phi, &mut work, &mut effort);
+        black_box(effort[0])
+    });
+}
+
+#[divan::bench(args = ROBOTS)]
+fn regressor(bencher: Bencher<'_, '_>, joints: usize) {
+    let mechanism = robot(joints);
+    let dynamics = Dynamics::new(&mechanism);
+    let mut work = dynamics.workspace();
+    let (q, dq, ddq) = (vec![0.3; joints], vec![0.7; joints], vec![-0.4; joints]);
+    let mut y = vec![0.0; joints * 10 * joints];
+    bencher.bench_local(|| {
+        let state = State { q: black_box(&q), dq: &dq, ddq: &ddq, gravity: None };
+        dynamics.regressor(&state, &mut work, &mut y);
+        black_box(y[0])
+    });
+}
+
+#[divan::bench(args = ROBOTS)]
+fn inverse_dynamics_lanes(bencher: Bencher<'_, '_>, joints: usize) {
+    let mechanism = robot(joints);
+    let dynamics = Dynamics::new(&mechanism);
+    let phi = mechanism.inertia_vector();
+    let motion = RandomMotion::new(&mechanism, &[], BLOCK, 1);
+    let mut effort = vec![0.0; joints * BLOCK];
+    motion.with_block(|block| {
+        bencher.counter(ItemsCount::new(BLOCK)).bench_local(|| {
+            dynamics.inverse_dynamics_block(black_box(block), &phi, BLOCK, &mut effort);
+            black_box(effort[0])
+        });
+    });
+}
+
+#[divan::bench(args = ROBOTS)]
+fn regressor_lanes(bencher: Bencher<'_, '_>, joints: usize) {
+    let model = RobotModel::new(robot(joints), vec![]);
+    let motion = RandomMotion::new(model.mechanism(), &[], BLOCK, 1);
+    let mut out = RegressorBlock::new(model.layout().clone(), BLOCK);
+    motion.with_block(|block| {
+        bencher.counter(ItemsCount::new(BLOCK)).bench_local(|| {
+            model.regressor(black_box(block), &[], &mut out);
+            black_box(out.column(0, 0)[0])
+        });
+    });
+}

@@ -1,0 +1,312 @@
+//! Base parameters: the combinations of standard parameters that motion and effort can reveal (Gautier 1991).
+
+mod expression;
+
+use faer::Mat;
+
+use crate::dynamics::MotionBlock;
+use crate::effort_model::{EffortModel, RegressorBlock};
+use crate::mechanism::Mechanism;
+use crate::parameter::ParameterTable;
+use crate::random_motion::RandomMotion;
+
+/// Settings of the structural analysis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BaseSettings {
+    /// A column is dependent if less than this share of its length is left after projection on the kept columns.
+    ///
+    /// Rotations that a file gives with 5 to 12 digits leave shares of up to 1e-9; true parameters of robots start at
+    /// about 1e-3. Default 1e-7.
+    pub tolerance: f64,
+    /// Random states; 0: enough for a stack three times as tall as wide, at least 100. Default 0.
+    pub states: usize,
+    /// Seed of the random states.
+    pub seed: u64,
+    /// Columns to keep if possible, first choice first; the others follow in the default order (parameters that are
+    /// not [`fold_first`](crate::Parameter::fold_first) in column order, then those that are).
+    pub preferred: Vec<usize>,
+}
+
+impl Default for BaseSettings {
+    fn default() -> Self {
+        BaseSettings { tolerance: 1e-7, states: 0, seed: 1, preferred: Vec::new() }
+    }
+}
+
+/// Gap in the singular values at the rank decision (columns scaled to unit length).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RankGap {
+    /// Largest singular value.
+    pub largest: f64,
+    /// Last one counted.
+    pub kept: f64,
+    /// First one not counted; `None` at full rank.
+    pub dropped: Option<f64>,
+}
+
+impl RankGap {
+    /// Ratio of the singular values on both sides of the decision; infinite at full rank. Below 1e4 the decision is
+    /// doubtful.
+    pub fn ratio(&self) -> f64 {
+        self.dropped.map_or(f64::INFINITY, |d| self.kept / d.max(f64::MIN_POSITIVE))
+    }
+}
+
+/// Which standard parameters are kept, which are folded into them and how: `β = K x`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BaseParameters {
+    /// Columns that are kept, ascending: base parameter `i` is column `kept[i]` plus what is folded into it.
+    pub kept: Vec<usize>,
+    /// Columns that depend on kept ones, ascending.
+    pub folded: Vec<usize>,
+    /// Columns that are zero for every motion: these parameters never act.
+    pub zero: Vec<usize>,
+    /// `folded.len()` columns of `kept.len()` factors: `W[:, folded[j]] = Σ factors[j][i] W[:, kept[i]]`.
+    pub factors: Vec<Vec<f64>>,
+    /// Gap at the rank decision.
+    pub gap: RankGap,
+    parameters: usize,
+}
+
+impl BaseParameters {
+    /// Analyses an effort model of a mechanism on random states. `shape` are the model's shape parameters.
+    pub fn of(model: &dyn EffortModel, mechanism: &Mechanism, shape: &[f64], settings: &BaseSettings) -> Self {
+        let columns = model.layout().parameters();
+        let states = match settings.states {
+            0 => 100.max((3 * columns).div_ceil(model.outputs().len())),
+            n => n,
+        };
+        let motion = RandomMotion::new(mechanism, model.channels(), states, settings.seed);
+        motion.with_block(|block| Self::on_motion(model, block, shape, settings))
+    }
+
+    /// Analyses an effort model on given motion.
+    pub fn on_motion(
+        model: &dyn EffortModel,
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        settings: &BaseSettings,
+    ) -> Self {
+        let layout = model.layout().clone();
+        let mut block = RegressorBlock::new(layout.clone(), motion.samples);
+        model.regressor(motion, shape, &mut block);
+        let rows = layout.outputs() * motion.samples;
+        let mut stacked = vec![vec![0.0; rows]; layout.parameters()];
+        for output in 0..layout.outputs() {
+            for (k, &column) in layout.columns(output).iter().enumerate() {
+                stacked[column][output * motion.samples..][..motion.samples]
+                    .copy_from_slice(block.column(output, k));
+            }
+        }
+        Self::of_columns(stacked, model.parameters(), settings)
+    }
+
+    /// Analyses the columns of a stacked regressor.
+    fn of_columns(mut stacked: Vec<Vec<f64>>, table: &ParameterTable, settings: &BaseSettings) -> Self {
+        let rows = stacked.first().map_or(0, Vec::len);
+        let norms: Vec<f64> = stacked.iter().map(|c| dot(c, c).sqrt()).collect();
+        let largest = norms.iter().fold(0.0_f64, |m, n| m.max(*n));
+        let silent = |c: usize| norms[c] <= 1e-12 * largest || norms[c] == 0.0;
+        for (column, norm) in stacked.iter_mut().zip(&norms) {
+            if *norm > 0.0 {
+                column.iter_mut().for_each(|x| *x /= norm);
+            }
+        }
+        let zero: Vec<usize> = (0..stacked.len()).filter(|c| silent(*c)).collect();
+        let order = preference(table, &settings.preferred).into_iter().filter(|c| !silent(*c));
+        let active: Vec<usize> = (0..stacked.len()).filter(|c| !silent(*c)).collect();
+        let singular = singular_values(rows, &active, &stacked);
+
+        let mut projection = Projection::default();
+        let mut kept = Vec::new();
+        let mut folded = Vec::new();
+        for column in order {
+            let (coefficients, residual) = projection.project(&stacked[column]);
+            let left = dot(&residual, &residual).sqrt();
+            if left > settings.tolerance {
+                projection.keep(coefficients, residual, left);
+                kept.push(column);
+            } else {
+                folded.push((column, coefficients));
+            }
+        }
+        let rank = kept.len();
+        let gap = RankGap {
+            largest: singular.first().copied().unwrap_or(0.0),
+            kept: if rank > 0 { singular[rank - 1] } else { 0.0 },
+            dropped: singular.get(rank).copied(),
+        };
+
+        // Kept columns ascending from here on.
+        let mut position: Vec<usize> = (0..rank).collect();
+        position.sort_by_key(|k| kept[*k]);
+        let mut folded: Vec<(usize, Vec<f64>)> = folded
+            .into_iter()
+            .map(|(column, coefficients)| {
+                let scaled = projection.solve(coefficients);
+                let factor = |k: &usize| {
+                    let value = scaled.get(*k).copied().unwrap_or(0.0);
+                    // Undo the scaling; drop what is rounding.
+                    if value.abs() < 1e-10 { 0.0 } else { value * norms[column] / norms[kept[*k]] }
+                };
+                (column, position.iter().map(factor).collect())
+            })
+            .collect();
+        folded.sort_by_key(|(column, _)| *column);
+        kept.sort_unstable();
+        let (folded, factors) = folded.into_iter().unzip();
+        BaseParameters { kept, folded, zero, factors, gap, parameters: stacked.len() }
+    }
+
+    /// Number of base parameters.
+    pub fn len(&self) -> usize {
+        self.kept.len()
+    }
+
+    /// True if nothing can be identified.
+    pub fn is_empty(&self) -> bool {
+        self.kept.is_empty()
+    }
+
+    /// Base values `β = K x` of a full parameter vector.
+    ///
+    /// # Panics
+    /// If `x` has the wrong length.
+    pub fn values(&self, x: &[f64]) -> Vec<f64> {
+        assert_eq!(x.len(), self.parameters, "length of the parameter vector");
+        let mut values: Vec<f64> = self.kept.iter().map(|c| x[*c]).collect();
+        for (column, factors) in self.folded.iter().zip(&self.factors) {
+            for (value, factor) in values.iter_mut().zip(factors) {
+                *value += factor * x[*column];
+            }
+        }
+        values
+    }
+
+    /// Regrouping matrix `K`, row-major, `len() × parameters`.
+    pub fn matrix(&self) -> Vec<f64> {
+        let mut k = vec![0.0; self.len() * self.parameters];
+        for (row, column) in self.kept.iter().enumerate() {
+            k[row * self.parameters + column] = 1.0;
+        }
+        for (column, factors) in self.folded.iter().zip(&self.factors) {
+            for (row, factor) in factors.iter().enumerate() {
+                k[row * self.parameters + column] = *factor;
+            }
+        }
+        k
+    }
+
+    /// The parameter vector with base values `beta` that is nearest to `prior`, in the metric in which parameter `i`
+    /// may move by `scale[i]`: `min ‖(x - prior) / scale‖` subject to `K x = beta`.
+    ///
+    /// Parameters that never act keep their prior.
+    ///
+    /// # Panics
+    /// If lengths differ from what they should be.
+    pub fn nearest(&self, beta: &[f64], prior: &[f64], scale: &[f64]) -> Vec<f64> {
+        assert_eq!(beta.len(), self.len(), "length of beta");
+        assert_eq!(prior.len(), self.parameters, "length of prior");
+        assert_eq!(scale.len(), self.parameters, "length of scale");
+        let n = self.len();
+        let missing: Vec<f64> = beta.iter().zip(self.values(prior)).map(|(b, p)| b - p).collect();
+        // x = prior + S² Kᵀ y with (K S² Kᵀ) y = missing; the kept part is diagonal, so this is well conditioned.
+        let mut gram = Mat::<f64>::zeros(n, n);
+        for (i, c) in self.kept.iter().enumerate() {
+            gram[(i, i)] += scale[*c] * scale[*c];
+        }
+        for (column, factors) in self.folded.iter().zip(&self.factors) {
+            let weight = scale[*column] * scale[*column];
+            for i in 0..n {
+                if factors[i] != 0.0 {
+                    for j in 0..n {
+                        gram[(i, j)] += weight * factors[i] * factors[j];
+                    }
+                }
+            }
+        }
+        use faer::linalg::solvers::Solve;
+        let rhs = Mat::from_fn(n, 1, |i, _| missing[i]);
+        let y = gram.full_piv_lu().solve(&rhs);
+        let mut x = prior.to_vec();
+        for (i, c) in self.kept.iter().enumerate() {
+            x[*c] += scale[*c] * scale[*c] * y[(i, 0)];
+        }
+        for (column, factors) in self.folded.iter().zip(&self.factors) {
+            let pull: f64 = factors.iter().enumerate().map(|(i, f)| f * y[(i, 0)]).sum();
+            x[*column] += scale[*column] * scale[*column] * pull;
+        }
+        x
+    }
+}
+
+/// Columns in the order in which they are offered: preferred, then ordinary, then those to be folded.
+fn preference(table: &ParameterTable, preferred: &[usize]) -> Vec<usize> {
+    let mut order: Vec<usize> = preferred.to_vec();
+    let mut rest: Vec<usize> = (0..table.linear.len()).filter(|c| !preferred.contains(c)).collect();
+    rest.sort_by_key(|c| table.linear[*c].fold_first);
+    order.extend(rest);
+    order
+}
+
+fn singular_values(rows: usize, active: &[usize], columns: &[Vec<f64>]) -> Vec<f64> {
+    let matrix = Mat::from_fn(rows, active.len(), |i, j| columns[active[j]][i]);
+    matrix.singular_values().unwrap_or_else(|_| vec![f64::NAN; active.len().min(rows)])
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // Four partial sums: fixed order, and independent chains for the processor.
+    let mut sums = [0.0; 4];
+    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in a4.zip(b4) {
+        for k in 0..4 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    sums[0] + sums[1] + (sums[2] + sums[3]) + rest
+}
+
+/// Gram-Schmidt with every projection done twice, which keeps the directions orthogonal to rounding.
+#[derive(Default)]
+struct Projection {
+    directions: Vec<Vec<f64>>,
+    /// Column `k` of the triangular factor: coefficients on directions `0..k`, then the length left.
+    triangle: Vec<Vec<f64>>,
+}
+
+impl Projection {
+    fn project(&self, column: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let mut residual = column.to_vec();
+        let mut coefficients = vec![0.0; self.directions.len()];
+        for _ in 0..2 {
+            for (coefficient, direction) in coefficients.iter_mut().zip(&self.directions) {
+                let along = dot(direction, &residual);
+                *coefficient += along;
+                for (r, d) in residual.iter_mut().zip(direction) {
+                    *r -= along * d;
+                }
+            }
+        }
+        (coefficients, residual)
+    }
+
+    fn keep(&mut self, mut coefficients: Vec<f64>, mut residual: Vec<f64>, length: f64) {
+        residual.iter_mut().for_each(|x| *x /= length);
+        coefficients.push(length);
+        self.directions.push(residual);
+        self.triangle.push(coefficients);
+    }
+
+    /// Factors on the kept columns from coefficients on the directions: back substitution.
+    fn solve(&self, mut coefficients: Vec<f64>) -> Vec<f64> {
+        for k in (0..coefficients.len()).rev() {
+            coefficients[k] /= self.triangle[k][k];
+            let x = coefficients[k];
+            for (c, t) in coefficients[..k].iter_mut().zip(&self.triangle[k]) {
+                *c -= t * x;
+            }
+        }
+        coefficients
+    }
+}

@@ -1,0 +1,175 @@
+//! Effort models: effort that is linear in most of its parameters.
+
+use std::sync::Arc;
+
+use crate::dynamics::MotionBlock;
+use crate::parameter::ParameterTable;
+
+/// Which columns of the regressor can differ from zero, row by row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RegressorLayout {
+    /// For every output: the parameter columns that act on it, ascending within the rigid body and the elements.
+    columns: Vec<Vec<usize>>,
+    /// For every output: its first slot.
+    first_slot: Vec<usize>,
+    slots: usize,
+    parameters: usize,
+}
+
+impl RegressorLayout {
+    /// From the acting columns of every output and the number of parameters.
+    pub fn new(columns: Vec<Vec<usize>>, parameters: usize) -> Self {
+        let mut slots = 0;
+        let first_slot = columns
+            .iter()
+            .map(|c| {
+                slots += c.len();
+                slots - c.len()
+            })
+            .collect();
+        RegressorLayout { columns, first_slot, slots, parameters }
+    }
+
+    /// Number of outputs.
+    pub fn outputs(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Number of parameters (columns of the whole regressor).
+    pub fn parameters(&self) -> usize {
+        self.parameters
+    }
+
+    /// Parameter columns that act on an output.
+    pub fn columns(&self, output: usize) -> &[usize] {
+        &self.columns[output]
+    }
+
+    /// Slot of a parameter column in an output's row, if it acts there.
+    pub(crate) fn slot(&self, output: usize, column: usize) -> Option<usize> {
+        self.columns[output].iter().position(|c| *c == column).map(|k| self.first_slot[output] + k)
+    }
+
+    pub(crate) fn first_slot(&self, output: usize) -> usize {
+        self.first_slot[output]
+    }
+
+    /// Number of entries per sample.
+    pub fn slots(&self) -> usize {
+        self.slots
+    }
+}
+
+/// Regressor and known effort of a block of samples, stored column after column:
+/// `effort(output) = Σ columns · linear + offset(output)`.
+#[derive(Debug, Clone)]
+pub struct RegressorBlock {
+    layout: Arc<RegressorLayout>,
+    capacity: usize,
+    samples: usize,
+    data: Vec<f64>,
+    offset: Vec<f64>,
+}
+
+impl RegressorBlock {
+    /// Room for `capacity` samples.
+    pub fn new(layout: Arc<RegressorLayout>, capacity: usize) -> Self {
+        // A stride that is a multiple of the page size would map all columns to the same cache sets.
+        let capacity = if capacity.is_multiple_of(64) { capacity + 8 } else { capacity };
+        let data = vec![0.0; layout.slots * capacity];
+        let offset = vec![0.0; layout.outputs() * capacity];
+        RegressorBlock { layout, capacity, samples: 0, data, offset }
+    }
+
+    /// The layout.
+    pub fn layout(&self) -> &RegressorLayout {
+        &self.layout
+    }
+
+    /// Number of samples in the block.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// Distance between columns in [`RegressorBlock::rows`].
+    pub fn stride(&self) -> usize {
+        self.capacity
+    }
+
+    /// Entries of the `k`-th acting column of an output, one per sample.
+    pub fn column(&self, output: usize, k: usize) -> &[f64] {
+        let slot = self.layout.first_slot[output] + k;
+        &self.data[slot * self.capacity..][..self.samples]
+    }
+
+    /// All acting columns of an output, [`RegressorBlock::stride`] apart.
+    pub fn rows(&self, output: usize) -> &[f64] {
+        let first = self.layout.first_slot[output] * self.capacity;
+        &self.data[first..first + self.layout.columns[output].len() * self.capacity]
+    }
+
+    /// The part of an output's effort that does not depend on linear parameters.
+    pub fn offset(&self, output: usize) -> &[f64] {
+        &self.offset[output * self.capacity..][..self.samples]
+    }
+
+    /// Effort of an output for given linear parameters: `W linear + offset`.
+    pub fn effort(&self, output: usize, linear: &[f64]) -> Vec<f64> {
+        let mut effort = self.offset(output).to_vec();
+        for (k, column) in self.layout.columns[output].iter().enumerate() {
+            let factor = linear[*column];
+            if factor != 0.0 {
+                for (e, w) in effort.iter_mut().zip(self.column(output, k)) {
+                    *e += w * factor;
+                }
+            }
+        }
+        effort
+    }
+
+    pub(crate) fn start(&mut self, layout: &Arc<RegressorLayout>, samples: usize) {
+        assert_eq!(*self.layout, **layout, "block of another model");
+        assert!(samples <= self.capacity, "{samples} samples in a block of {}", self.capacity);
+        self.samples = samples;
+        for output in 0..self.layout.outputs() {
+            self.offset[output * self.capacity..][..samples].fill(0.0);
+        }
+    }
+
+    pub(crate) fn data_mut(&mut self) -> &mut [f64] {
+        &mut self.data
+    }
+
+    pub(crate) fn slot_mut(&mut self, slot: usize) -> &mut [f64] {
+        &mut self.data[slot * self.capacity..][..self.samples]
+    }
+}
+
+/// An output of an effort model: one drive or joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Output {
+    /// Name of the joint (with a suffix for the six efforts of a floating joint).
+    pub name: String,
+    /// Unit of the effort.
+    pub unit: &'static str,
+}
+
+/// A model whose effort is linear in most of its parameters:
+/// `effort = W(motion; shape) · linear + offset(motion; shape)`.
+pub trait EffortModel: Send + Sync {
+    /// Outputs in the order of the regressor's rows.
+    fn outputs(&self) -> &[Output];
+    /// Linear and shape parameters.
+    fn parameters(&self) -> &ParameterTable;
+    /// Which columns act on which output.
+    fn layout(&self) -> &Arc<RegressorLayout>;
+    /// Names of the extra channels that a motion block must hold.
+    fn channels(&self) -> &[String];
+    /// Number of entries of the position vector, number of rates.
+    fn dimensions(&self) -> (usize, usize);
+    /// Fills `out` with the regressor and the offset of all samples of a block.
+    ///
+    /// # Panics
+    /// If the block is larger than `out`, a channel is missing or `shape` has the wrong length.
+    fn regressor(&self, motion: &MotionBlock<'_>, shape: &[f64], out: &mut RegressorBlock);
+}

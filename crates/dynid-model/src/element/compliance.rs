@@ -1,0 +1,72 @@
+//! Efforts that depend on position.
+
+use super::friction::EFFORT;
+use super::{ElementColumns, JointElement, JointInfo};
+use crate::dynamics::MotionBlock;
+use crate::parameter::Parameter;
+
+/// Linear spring `k (q - q₀) = k q - (k q₀)`, two columns `[q, -1]` for `k` and `k q₀`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spring {
+    /// Rate it acts on.
+    pub rate: usize,
+}
+
+/// Torque that repeats `cycles` times a turn: `A cos(n q) + B sin(n q)`, two columns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CyclicTorque {
+    /// Rate it acts on.
+    pub rate: usize,
+    /// Repetitions per turn `n`: 1, a tooth count, a number of pole pairs.
+    pub cycles: f64,
+}
+
+impl JointElement for Spring {
+    fn rates(&self) -> Vec<usize> {
+        vec![self.rate]
+    }
+    fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
+        let joint = &joints[self.rate];
+        vec![
+            joint.parameter("k", ["N m/rad", "N/m"], Some(0.0)),
+            joint.parameter("kq0", EFFORT, None),
+        ]
+    }
+    fn entries(&self) -> Vec<(usize, usize)> {
+        vec![(self.rate, 0), (self.rate, 1)]
+    }
+    fn fill(
+        &self,
+        joints: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        _: &[f64],
+        out: &mut ElementColumns<'_>,
+    ) {
+        out.map(0, motion.position(joints[self.rate].position), |q| q);
+        out.column(1).fill(-1.0);
+    }
+}
+
+impl JointElement for CyclicTorque {
+    fn rates(&self) -> Vec<usize> {
+        vec![self.rate]
+    }
+    fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
+        let joint = &joints[self.rate];
+        vec![joint.parameter("ca", EFFORT, None), joint.parameter("cb", EFFORT, None)]
+    }
+    fn entries(&self) -> Vec<(usize, usize)> {
+        vec![(self.rate, 0), (self.rate, 1)]
+    }
+    fn fill(
+        &self,
+        joints: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        _: &[f64],
+        out: &mut ElementColumns<'_>,
+    ) {
+        let q = motion.position(joints[self.rate].position);
+        out.map(0, q, |q| (self.cycles * q).cos());
+        out.map(1, q, |q| (self.cycles * q).sin());
+    }
+}

@@ -1,0 +1,107 @@
+//! Friction that is linear in its parameters, and the constant offset.
+
+use super::{ElementColumns, JointElement, JointInfo, sign};
+use crate::dynamics::MotionBlock;
+use crate::parameter::Parameter;
+
+pub(super) const EFFORT: [&str; 2] = ["N m", "N"];
+pub(super) const VISCOUS: [&str; 2] = ["N m s/rad", "N s/m"];
+
+/// Coulomb friction `F_c s(v)`, one column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coulomb {
+    /// Rate it acts on.
+    pub rate: usize,
+}
+
+/// Viscous friction `F_v v`, one column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Viscous {
+    /// Rate it acts on.
+    pub rate: usize,
+}
+
+/// Constant effort `F_o`, one column: zero of the current or torque sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Offset {
+    /// Rate it acts on.
+    pub rate: usize,
+}
+
+/// Friction with a law of its own for each direction: `F_c⁺ + F_v⁺ v` for `v > 0`, `-F_c⁻ + F_v⁻ v` for `v < 0`, 0 at rest.
+/// Four columns. Together with [`Offset`] its Coulomb columns are collinear: use one or the other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AsymmetricFriction {
+    /// Rate it acts on.
+    pub rate: usize,
+}
+
+impl JointElement for Coulomb {
+    fn rates(&self) -> Vec<usize> {
+        vec![self.rate]
+    }
+    fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
+        vec![joints[self.rate].parameter("fc", EFFORT, Some(0.0))]
+    }
+    fn entries(&self) -> Vec<(usize, usize)> {
+        vec![(self.rate, 0)]
+    }
+    fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
+        out.map(0, motion.rate(self.rate), sign);
+    }
+}
+
+impl JointElement for Viscous {
+    fn rates(&self) -> Vec<usize> {
+        vec![self.rate]
+    }
+    fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
+        vec![joints[self.rate].parameter("fv", VISCOUS, Some(0.0))]
+    }
+    fn entries(&self) -> Vec<(usize, usize)> {
+        vec![(self.rate, 0)]
+    }
+    fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
+        out.map(0, motion.rate(self.rate), |v| v);
+    }
+}
+
+impl JointElement for Offset {
+    fn rates(&self) -> Vec<usize> {
+        vec![self.rate]
+    }
+    fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
+        vec![joints[self.rate].parameter("fo", EFFORT, None)]
+    }
+    fn entries(&self) -> Vec<(usize, usize)> {
+        vec![(self.rate, 0)]
+    }
+    fn fill(&self, _: &[JointInfo], _: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
+        out.column(0).fill(1.0);
+    }
+}
+
+impl JointElement for AsymmetricFriction {
+    fn rates(&self) -> Vec<usize> {
+        vec![self.rate]
+    }
+    fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
+        let joint = &joints[self.rate];
+        vec![
+            joint.parameter("fcp", EFFORT, Some(0.0)),
+            joint.parameter("fcn", EFFORT, Some(0.0)),
+            joint.parameter("fvp", VISCOUS, Some(0.0)),
+            joint.parameter("fvn", VISCOUS, Some(0.0)),
+        ]
+    }
+    fn entries(&self) -> Vec<(usize, usize)> {
+        (0..4).map(|k| (self.rate, k)).collect()
+    }
+    fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
+        let v = motion.rate(self.rate);
+        out.map(0, v, |v| if v > 0.0 { 1.0 } else { 0.0 });
+        out.map(1, v, |v| if v < 0.0 { -1.0 } else { 0.0 });
+        out.map(2, v, |v| v.max(0.0));
+        out.map(3, v, |v| v.min(0.0));
+    }
+}

@@ -1,0 +1,102 @@
+//! What acts at a joint besides rigid bodies (spec/elements.md).
+//!
+//! Efforts count on the drive's side of the balance: `effort of the drive = rigid bodies + Σ elements`, so friction is
+//! positive for positive speed. `s(v)` is the sign with `s(0) = 0`.
+
+mod compliance;
+mod drive;
+mod friction;
+mod rotor;
+mod transmission;
+
+pub use compliance::{CyclicTorque, Spring};
+pub use drive::{DriveGain, current_channel};
+pub use friction::{AsymmetricFriction, Coulomb, Offset, Viscous};
+pub use rotor::RotorInertia;
+pub use transmission::{CoupledWrist, Transmission};
+
+use crate::dynamics::MotionBlock;
+use crate::parameter::{Owner, Parameter, ShapeParameter};
+
+/// An output as elements see it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointInfo {
+    /// Joint name.
+    pub name: String,
+    /// Number in joint order, from 1.
+    pub number: usize,
+    /// Index in the position vector.
+    pub position: usize,
+    /// The joint slides instead of turning.
+    pub slides: bool,
+}
+
+impl JointInfo {
+    /// A linear parameter of this joint. `units`: for joints that turn and for joints that slide.
+    pub fn parameter(&self, symbol: &str, units: [&'static str; 2], lower: Option<f64>) -> Parameter {
+        Parameter {
+            name: format!("{}.{symbol}", self.name),
+            symbol: format!("{symbol}{}", self.number),
+            unit: units[usize::from(self.slides)],
+            owner: Owner::Joint(self.name.clone()),
+            prior: None,
+            lower,
+            upper: None,
+            fold_first: false,
+        }
+    }
+}
+
+/// Columns that an element fills, one per entry of [`JointElement::entries`].
+#[derive(Debug)]
+pub struct ElementColumns<'a> {
+    pub(crate) data: &'a mut [f64],
+    pub(crate) slots: &'a [usize],
+    pub(crate) stride: usize,
+    pub(crate) samples: usize,
+}
+
+impl ElementColumns<'_> {
+    /// The column of an entry, one number per sample.
+    pub fn column(&mut self, entry: usize) -> &mut [f64] {
+        &mut self.data[self.slots[entry] * self.stride..][..self.samples]
+    }
+
+    /// Fills the column of an entry from one signal.
+    pub fn map(&mut self, entry: usize, signal: &[f64], f: impl Fn(f64) -> f64) {
+        for (to, x) in self.column(entry).iter_mut().zip(signal) {
+            *to = f(*x);
+        }
+    }
+}
+
+/// An element that acts on one or more joints, linear in most of its parameters.
+pub trait JointElement: std::fmt::Debug + Send + Sync {
+    /// Rates that it acts on.
+    fn rates(&self) -> Vec<usize>;
+    /// Linear parameters. `joints`: one per rate of the mechanism.
+    fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter>;
+    /// Shape parameters; none by default.
+    fn shape(&self, _joints: &[JointInfo]) -> Vec<ShapeParameter> {
+        Vec::new()
+    }
+    /// Which of its linear parameters act on which rate: `(rate, parameter)`.
+    fn entries(&self) -> Vec<(usize, usize)>;
+    /// Extra channels that it reads.
+    fn channels(&self, _joints: &[JointInfo]) -> Vec<String> {
+        Vec::new()
+    }
+    /// Fills the columns of all entries.
+    fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, shape: &[f64], out: &mut ElementColumns<'_>);
+}
+
+/// Sign with `s(0) = 0`.
+pub fn sign(v: f64) -> f64 {
+    if v > 0.0 {
+        1.0
+    } else if v < 0.0 {
+        -1.0
+    } else {
+        0.0
+    }
+}

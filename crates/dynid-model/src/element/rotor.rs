@@ -1,0 +1,29 @@
+//! Rotor inertia reflected to the joint.
+
+use super::{ElementColumns, JointElement, JointInfo};
+use crate::dynamics::MotionBlock;
+use crate::parameter::Parameter;
+
+/// Reflected rotor inertia `I_a q̈` on its own joint, `I_a = n² J` (gyroscopic coupling neglected), one column.
+///
+/// Degenerate: on a joint whose axis stays fixed in space it merges with the link's moment of inertia about that axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RotorInertia {
+    /// Rate it acts on.
+    pub rate: usize,
+}
+
+impl JointElement for RotorInertia {
+    fn rates(&self) -> Vec<usize> {
+        vec![self.rate]
+    }
+    fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
+        vec![joints[self.rate].parameter("Ia", ["kg m²", "kg"], Some(0.0))]
+    }
+    fn entries(&self) -> Vec<(usize, usize)> {
+        vec![(self.rate, 0)]
+    }
+    fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
+        out.map(0, motion.acceleration(self.rate), |a| a);
+    }
+}

@@ -1,0 +1,87 @@
+//! Random states of a mechanism, for questions about structure that need no log.
+
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::description::JointKind;
+use crate::dynamics::MotionBlock;
+use crate::mechanism::Mechanism;
+
+/// Motion that owns its samples; see [`MotionBlock`] for the layout (`stride = samples`).
+#[derive(Debug, Clone, PartialEq)]
+pub struct RandomMotion {
+    samples: usize,
+    q: Vec<f64>,
+    dq: Vec<f64>,
+    ddq: Vec<f64>,
+    channels: Vec<(String, Vec<f64>)>,
+}
+
+impl RandomMotion {
+    /// Uniform positions inside the limits (±π and ±1 m where the file states none), rates in ±2, accelerations in ±5,
+    /// extra channels in ±1; unit quaternions for floating joints. The same seed gives the same numbers.
+    pub fn new(mechanism: &Mechanism, channels: &[String], samples: usize, seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut q = Vec::new();
+        let mut uniform = |range: f64, count: usize| -> Vec<f64> {
+            (0..count).map(|_| rng.random_range(-range..=range)).collect()
+        };
+        let rates = mechanism.rates();
+        let dq = uniform(2.0, rates * samples);
+        let ddq = uniform(5.0, rates * samples);
+        let channels = channels.iter().map(|c| (c.clone(), uniform(1.0, samples))).collect();
+        for body in mechanism.bodies() {
+            if mechanism.follows().is_some() && body.joint.mimic.is_some() {
+                continue;
+            }
+            if body.joint.kind == JointKind::Floating {
+                q.extend(floating_positions(&mut rng, samples));
+                continue;
+            }
+            let reach = if body.joint.kind == JointKind::Prismatic { 1.0 } else { std::f64::consts::PI };
+            let (low, high) = match body.joint.limits.position {
+                Some((low, high)) if high > low && body.joint.kind != JointKind::Continuous => {
+                    (low.max(-4.0 * reach), high.min(4.0 * reach))
+                }
+                _ => (-reach, reach),
+            };
+            let (low, high) = if high > low { (low, high) } else { (-reach, reach) };
+            q.extend((0..samples).map(|_| rng.random_range(low..=high)));
+        }
+        RandomMotion { samples, q, dq, ddq, channels }
+    }
+
+    /// Runs `work` on all samples as one block.
+    pub fn with_block<T>(&self, work: impl FnOnce(&MotionBlock<'_>) -> T) -> T {
+        let channels: Vec<(&str, &[f64])> =
+            self.channels.iter().map(|(n, v)| (n.as_str(), v.as_slice())).collect();
+        work(&MotionBlock {
+            samples: self.samples,
+            stride: self.samples,
+            q: &self.q,
+            dq: &self.dq,
+            ddq: &self.ddq,
+            gravity: None,
+            channels: &channels,
+        })
+    }
+}
+
+fn floating_positions(rng: &mut impl Rng, samples: usize) -> Vec<f64> {
+    let mut q = vec![0.0; 7 * samples];
+    for s in 0..samples {
+        let mut quaternion = [0.0; 4];
+        let mut norm: f64 = 0.0;
+        while !(0.1..=1.0).contains(&norm) {
+            quaternion = std::array::from_fn(|_| rng.random_range(-1.0..=1.0));
+            norm = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();
+        }
+        for k in 0..3 {
+            q[k * samples + s] = rng.random_range(-1.0..=1.0);
+        }
+        for (k, x) in quaternion.iter().enumerate() {
+            q[(3 + k) * samples + s] = x / norm;
+        }
+    }
+    q
+}

@@ -1,0 +1,308 @@
+//! The effort model of a robot: rigid bodies and joint elements.
+
+use std::sync::Arc;
+
+use crate::description::JointKind;
+use crate::dynamics::{Dynamics, MotionBlock, Slots};
+use crate::effort_model::{EffortModel, Output, RegressorBlock, RegressorLayout};
+use crate::element::{ElementColumns, JointElement, JointInfo};
+use crate::inertia::{PARAMETER_NAMES, PARAMETER_UNITS};
+use crate::mechanism::{Body, Mechanism};
+use crate::parameter::{Owner, Parameter, ParameterTable};
+
+#[derive(Debug)]
+struct PlacedElement {
+    element: Box<dyn JointElement>,
+    /// Slot of every entry.
+    slots: Vec<usize>,
+    /// First of its shape parameters.
+    first_shape: usize,
+    shapes: usize,
+}
+
+/// Joint-level regressor of a mechanism with coupled joints, folded into coordinates afterwards.
+#[derive(Debug)]
+struct CoupledRegressor {
+    dynamics: Dynamics,
+    slots: Slots,
+    slot_count: usize,
+    /// `(joint slot, slot, ratio)` of the first of ten entries.
+    folds: Vec<(usize, usize, f64)>,
+}
+
+/// Rigid bodies of a [`Mechanism`] plus elements at its joints.
+///
+/// Columns: ten standard parameters per body in file order, then the elements' parameters in the order given.
+#[derive(Debug)]
+pub struct RobotModel {
+    mechanism: Mechanism,
+    dynamics: Dynamics,
+    joints: Vec<JointInfo>,
+    outputs: Vec<Output>,
+    parameters: ParameterTable,
+    layout: Arc<RegressorLayout>,
+    slots: Slots,
+    coupled: Option<CoupledRegressor>,
+    elements: Vec<PlacedElement>,
+    channels: Vec<String>,
+}
+
+impl RobotModel {
+    /// Combines a mechanism with joint elements.
+    ///
+    /// # Panics
+    /// If an element names a rate that the mechanism does not have.
+    pub fn new(mechanism: Mechanism, elements: Vec<Box<dyn JointElement>>) -> Self {
+        let dynamics = Dynamics::new(&mechanism);
+        let joints = joint_infos(&mechanism);
+        let outputs = mechanism
+            .rate_names()
+            .into_iter()
+            .zip(mechanism.effort_units())
+            .map(|(name, unit)| Output { name, unit })
+            .collect();
+
+        let acting = acting_bodies(&mechanism);
+        let mut linear = inertial_parameters(&mechanism);
+        let mut columns: Vec<Vec<usize>> = acting
+            .iter()
+            .map(|bodies| bodies.iter().flat_map(|b| 10 * b..10 * b + 10).collect())
+            .collect();
+        let mut shape = Vec::new();
+        let mut channels: Vec<String> = Vec::new();
+        let mut first_column = Vec::with_capacity(elements.len());
+        let mut first_shape = Vec::with_capacity(elements.len());
+        for element in &elements {
+            first_column.push(linear.len());
+            first_shape.push(shape.len());
+            for (rate, parameter) in element.entries() {
+                assert!(rate < columns.len(), "element acts on rate {rate} of {}", columns.len());
+                columns[rate].push(linear.len() + parameter);
+            }
+            linear.extend(element.parameters(&joints));
+            shape.extend(element.shape(&joints));
+            for channel in element.channels(&joints) {
+                if !channels.contains(&channel) {
+                    channels.push(channel);
+                }
+            }
+        }
+        let layout = Arc::new(RegressorLayout::new(columns, linear.len()));
+        let first_slot = |rate: usize, body: usize| {
+            layout.slot(rate, 10 * body).map_or_else(|| unreachable!("body {body} does not act on rate {rate}"), |s| s)
+        };
+        let (slots, coupled) = match mechanism.follows() {
+            None => (Slots::new(&dynamics, first_slot), None),
+            Some(_) => {
+                let coupled = CoupledRegressor::new(&mechanism, first_slot);
+                (Slots::new(&dynamics, |_, _| 0), Some(coupled))
+            }
+        };
+        let elements = elements
+            .into_iter()
+            .enumerate()
+            .map(|(k, element)| {
+                let slots = element
+                    .entries()
+                    .iter()
+                    .filter_map(|(rate, parameter)| layout.slot(*rate, first_column[k] + parameter))
+                    .collect();
+                let shapes = element.shape(&joints).len();
+                PlacedElement { element, slots, first_shape: first_shape[k], shapes }
+            })
+            .collect();
+        RobotModel {
+            dynamics,
+            joints,
+            outputs,
+            parameters: ParameterTable { linear, shape },
+            layout,
+            slots,
+            coupled,
+            elements,
+            channels,
+            mechanism,
+        }
+    }
+
+    /// The mechanism.
+    pub fn mechanism(&self) -> &Mechanism {
+        &self.mechanism
+    }
+
+    /// Joints as elements see them, one per rate.
+    pub fn joints(&self) -> &[JointInfo] {
+        &self.joints
+    }
+}
+
+impl EffortModel for RobotModel {
+    fn outputs(&self) -> &[Output] {
+        &self.outputs
+    }
+
+    fn parameters(&self) -> &ParameterTable {
+        &self.parameters
+    }
+
+    fn layout(&self) -> &Arc<RegressorLayout> {
+        &self.layout
+    }
+
+    fn channels(&self) -> &[String] {
+        &self.channels
+    }
+
+    fn dimensions(&self) -> (usize, usize) {
+        (self.mechanism.positions(), self.mechanism.rates())
+    }
+
+    fn regressor(&self, motion: &MotionBlock<'_>, shape: &[f64], out: &mut RegressorBlock) {
+        assert_eq!(shape.len(), self.parameters.shape.len(), "length of shape");
+        out.start(&self.layout, motion.samples);
+        let stride = out.stride();
+        match &self.coupled {
+            None => self.dynamics.regressor_block(motion, &self.slots, stride, out.data_mut()),
+            Some(coupled) => coupled.fill(&self.mechanism, motion, &self.layout, out),
+        }
+        for placed in &self.elements {
+            let mut columns = ElementColumns {
+                data: out.data_mut(),
+                slots: &placed.slots,
+                stride,
+                samples: motion.samples,
+            };
+            let own = &shape[placed.first_shape..placed.first_shape + placed.shapes];
+            placed.element.fill(&self.joints, motion, own, &mut columns);
+        }
+    }
+}
+
+impl CoupledRegressor {
+    fn new(mechanism: &Mechanism, first_slot: impl Fn(usize, usize) -> usize) -> Self {
+        let follows = mechanism.follows().unwrap_or(&[]);
+        let dynamics = Dynamics::new(mechanism).uncoupled();
+        let mut folds = Vec::new();
+        let mut first = std::collections::HashMap::new();
+        for (body, _) in mechanism.bodies().iter().enumerate() {
+            for rate in ancestor_rates(mechanism, body) {
+                let joint_slot = 10 * folds.len();
+                first.insert((rate, body), joint_slot);
+                let f = follows[rate];
+                folds.push((joint_slot, first_slot(f.coordinate, body), f.ratio));
+            }
+        }
+        let slots = Slots::new(&dynamics, |rate, body| first[&(rate, body)]);
+        CoupledRegressor { dynamics, slots, slot_count: 10 * folds.len(), folds }
+    }
+
+    fn fill(
+        &self,
+        mechanism: &Mechanism,
+        motion: &MotionBlock<'_>,
+        layout: &RegressorLayout,
+        out: &mut RegressorBlock,
+    ) {
+        let n = motion.samples;
+        let joint = mechanism.expand_block(motion);
+        let block = MotionBlock {
+            samples: n,
+            stride: n,
+            q: &joint[0],
+            dq: &joint[1],
+            ddq: &joint[2],
+            gravity: None,
+            channels: &[],
+        };
+        let gravity: Option<Vec<f64>> = motion
+            .gravity
+            .map(|g| (0..3).flat_map(|c| g[c * motion.stride..][..n].iter().copied()).collect());
+        let block = MotionBlock { gravity: gravity.as_deref(), ..block };
+        let mut rows = vec![0.0; self.slot_count * n];
+        self.dynamics.regressor_block(&block, &self.slots, n, &mut rows);
+        for output in 0..layout.outputs() {
+            let first = layout.first_slot(output);
+            for slot in first..first + layout.columns(output).len() {
+                out.slot_mut(slot).fill(0.0);
+            }
+        }
+        for (from, to, ratio) in &self.folds {
+            for c in 0..10 {
+                for (t, v) in out.slot_mut(to + c).iter_mut().zip(&rows[(from + c) * n..]) {
+                    *t += ratio * v;
+                }
+            }
+        }
+    }
+}
+
+fn joint_infos(mechanism: &Mechanism) -> Vec<JointInfo> {
+    let owners = mechanism.rate_bodies();
+    let names = mechanism.rate_names();
+    let mut position = 0;
+    let mut last = usize::MAX;
+    let mut out = Vec::with_capacity(names.len());
+    for (k, name) in names.into_iter().enumerate() {
+        let joint = &mechanism.bodies()[owners[k]].joint;
+        if owners[k] != last {
+            position = out.last().map_or(0, |j: &JointInfo| {
+                j.position + mechanism.bodies()[last].joint.positions()
+            });
+            last = owners[k];
+        }
+        out.push(JointInfo { name, number: k + 1, position, slides: joint.kind == JointKind::Prismatic });
+    }
+    out
+}
+
+fn ancestor_rates(mechanism: &Mechanism, body: usize) -> Vec<usize> {
+    let mut rates = Vec::new();
+    let mut next = Some(body);
+    while let Some(b) = next {
+        let body: &Body = &mechanism.bodies()[b];
+        rates.extend(body.rate..body.rate + body.joint.rates());
+        next = body.parent;
+    }
+    rates
+}
+
+/// For every coordinate, the bodies that it moves, in file order.
+fn acting_bodies(mechanism: &Mechanism) -> Vec<Vec<usize>> {
+    let mut acting = vec![Vec::new(); mechanism.rates()];
+    for body in 0..mechanism.bodies().len() {
+        for rate in ancestor_rates(mechanism, body) {
+            let coordinate = mechanism.follows().map_or(rate, |f| f[rate].coordinate);
+            if acting[coordinate].last() != Some(&body) {
+                acting[coordinate].push(body);
+            }
+        }
+    }
+    acting
+}
+
+fn inertial_parameters(mechanism: &Mechanism) -> Vec<Parameter> {
+    let mut out = Vec::with_capacity(mechanism.inertial_parameters());
+    for (b, body) in mechanism.bodies().iter().enumerate() {
+        let number = b + 1;
+        let axis = body.joint.axis.0;
+        let along = (0..3).max_by(|i, j| axis[*i].abs().total_cmp(&axis[*j].abs())).unwrap_or(2);
+        // With the axis along z this folds Iyy, mz and m, the textbook choice for modified DH frames.
+        let folded = match body.joint.kind {
+            JointKind::Prismatic | JointKind::Floating => [usize::MAX; 3],
+            _ => [0, 1 + along, [4, 7, 9][(along + 2) % 3]],
+        };
+        for c in 0..10 {
+            out.push(Parameter {
+                name: format!("{}.{}", body.name, PARAMETER_NAMES[c]),
+                symbol: format!("{}{number}", PARAMETER_NAMES[c]),
+                unit: PARAMETER_UNITS[c],
+                owner: Owner::Link(body.name.clone()),
+                prior: body.stated.then_some(body.inertia.0[c]),
+                lower: (c == 0).then_some(0.0),
+                upper: None,
+                fold_first: folded.contains(&c),
+            });
+        }
+    }
+    out
+}

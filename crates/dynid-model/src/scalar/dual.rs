@@ -1,0 +1,88 @@
+//! Dual numbers: a value with its directional derivatives.
+
+use std::array::from_fn;
+use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+
+use super::Scalar;
+
+/// `value + Σₖ derivativeₖ εₖ` with `εᵢ εⱼ = 0`: exact first derivatives in `N` directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dual<const N: usize> {
+    /// The value.
+    pub value: f64,
+    /// Derivatives along the `N` directions.
+    pub derivative: [f64; N],
+}
+
+impl<const N: usize> Dual<N> {
+    /// A variable: derivative 1 along direction `direction`.
+    pub fn variable(value: f64, direction: usize) -> Self {
+        Dual { value, derivative: from_fn(|k| if k == direction { 1.0 } else { 0.0 }) }
+    }
+}
+
+impl<const N: usize> Scalar for Dual<N> {
+    type Fused = Self;
+    #[inline(always)]
+    fn fuse(self) -> Self {
+        self
+    }
+    #[inline(always)]
+    fn unfuse(fused: Self) -> Self {
+        fused
+    }
+    #[inline(always)]
+    fn from_f64(value: f64) -> Self {
+        Dual { value, derivative: [0.0; N] }
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        let (s, c) = Scalar::sin_cos(self.value);
+        (
+            Dual { value: s, derivative: self.derivative.map(|d| c * d) },
+            Dual { value: c, derivative: self.derivative.map(|d| -s * d) },
+        )
+    }
+}
+
+impl<const N: usize> Add for Dual<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Dual { value: self.value + o.value, derivative: from_fn(|k| self.derivative[k] + o.derivative[k]) }
+    }
+}
+
+impl<const N: usize> Sub for Dual<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Dual { value: self.value - o.value, derivative: from_fn(|k| self.derivative[k] - o.derivative[k]) }
+    }
+}
+
+impl<const N: usize> Mul for Dual<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, o: Self) -> Self {
+        Dual {
+            value: self.value * o.value,
+            derivative: from_fn(|k| self.derivative[k] * o.value + self.value * o.derivative[k]),
+        }
+    }
+}
+
+impl<const N: usize> Neg for Dual<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Dual { value: -self.value, derivative: self.derivative.map(|d| -d) }
+    }
+}
+
+impl<const N: usize> AddAssign for Dual<N> {
+    #[inline(always)]
+    fn add_assign(&mut self, o: Self) {
+        *self = *self + o;
+    }
+}

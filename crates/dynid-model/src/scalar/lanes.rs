@@ -1,0 +1,105 @@
+//! Several samples at a time.
+
+use std::array::from_fn;
+use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+
+use super::Scalar;
+use super::sine::sin_cos_lanes;
+
+/// `N` numbers that move in step, one sample each.
+///
+/// With `FUSED`, [`Scalar::mul_add`] rounds once. Use it only inside a function compiled for a processor with fused
+/// multiply-add: elsewhere every call goes through a slow library routine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lanes<const N: usize, const FUSED: bool>(pub [f64; N]);
+
+impl<const N: usize, const FUSED: bool> Lanes<N, FUSED> {
+    /// Reads `N` consecutive numbers.
+    #[inline(always)]
+    pub fn load(from: &[f64]) -> Self {
+        let from = &from[..N];
+        Lanes(from_fn(|k| from[k]))
+    }
+
+    /// Writes `N` consecutive numbers.
+    #[inline(always)]
+    pub fn store(self, to: &mut [f64]) {
+        to[..N].copy_from_slice(&self.0);
+    }
+}
+
+impl<const N: usize, const FUSED: bool> Scalar for Lanes<N, FUSED> {
+    type Fused = Self;
+    #[inline(always)]
+    fn fuse(self) -> Self {
+        self
+    }
+    #[inline(always)]
+    fn unfuse(fused: Self) -> Self {
+        fused
+    }
+    #[inline(always)]
+    fn from_f64(value: f64) -> Self {
+        Lanes([value; N])
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        let (s, c) = sin_cos_lanes::<N, FUSED>(self.0);
+        (Lanes(s), Lanes(c))
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        if FUSED {
+            Lanes(from_fn(|k| self.0[k].mul_add(factor.0[k], term.0[k])))
+        } else {
+            self * factor + term
+        }
+    }
+    #[inline(always)]
+    fn mul_sub(self, factor: Self, term: Self) -> Self {
+        if FUSED {
+            Lanes(from_fn(|k| self.0[k].mul_add(factor.0[k], -term.0[k])))
+        } else {
+            self * factor - term
+        }
+    }
+}
+
+impl<const N: usize, const FUSED: bool> Add for Lanes<N, FUSED> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Lanes(from_fn(|k| self.0[k] + o.0[k]))
+    }
+}
+
+impl<const N: usize, const FUSED: bool> Sub for Lanes<N, FUSED> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Lanes(from_fn(|k| self.0[k] - o.0[k]))
+    }
+}
+
+impl<const N: usize, const FUSED: bool> Mul for Lanes<N, FUSED> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, o: Self) -> Self {
+        Lanes(from_fn(|k| self.0[k] * o.0[k]))
+    }
+}
+
+impl<const N: usize, const FUSED: bool> Neg for Lanes<N, FUSED> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Lanes(from_fn(|k| -self.0[k]))
+    }
+}
+
+impl<const N: usize, const FUSED: bool> AddAssign for Lanes<N, FUSED> {
+    #[inline(always)]
+    fn add_assign(&mut self, o: Self) {
+        *self = *self + o;
+    }
+}
