@@ -24,6 +24,7 @@ pub mod spectrum;
 pub mod spikes;
 pub mod textbook;
 pub mod trajectory;
+pub mod velocity;
 
 pub use clock::{ClockError, ClockReport, ClockSettings, UniformLog};
 pub use kernel::Kernel;

@@ -20,7 +20,8 @@ pub struct TextbookSettings {
     pub order: usize,
     /// Keep every so many samples. Default `None`: keep all.
     pub decimation: Option<usize>,
-    /// Anti-alias every signal before decimating (otherwise samples are only picked). Default false.
+    /// Anti-alias every signal before decimating (otherwise samples are only picked). The first sample after the trim
+    /// is kept either way. Default false.
     pub anti_alias: bool,
     /// Time cut from either end after filtering, s. Default 1.
     pub trim_s: f64,

@@ -1,6 +1,8 @@
 //! Fixtures from SciPy 1.17 (`butter`, `cheby1`, `sosfiltfilt`, `decimate`, `welch`), all on the signal of [`source`].
 
-use dynid_motion::filter::{Sections, anti_alias, butterworth, chebyshev, decimate, forward_backward, pick};
+use dynid_motion::filter::{
+    Alignment, Sections, anti_alias, butterworth, chebyshev, decimate, forward_backward, pick,
+};
 use dynid_motion::spectrum::{velocity_noise, welch};
 
 fn source(samples: usize) -> Vec<f64> {
@@ -124,7 +126,7 @@ fn zero_phase_butterworth() {
 #[test]
 fn decimation() {
     check(
-        &decimate(&source(60), 5).unwrap(),
+        &decimate(&source(60), 5, Alignment::First).unwrap(),
         &[
             0.2975570029263504,
             0.2179335575305805,
@@ -142,7 +144,7 @@ fn decimation() {
         1e-10,
     );
     check(
-        &pick(&decimate(&source(300), 10).unwrap(), 3, 0),
+        &pick(&decimate(&source(300), 10, Alignment::First).unwrap(), 3, 0),
         &[
             0.29472947784552866,
             1.2921173093133176,
@@ -157,10 +159,12 @@ fn decimation() {
         ],
         1e-10,
     );
-    assert_eq!(decimate(&source(5), 1).unwrap(), source(5));
-    assert!(decimate(&source(27), 2).is_err());
-    assert!(decimate(&source(60), 0).is_err());
-    assert_eq!(pick(&anti_alias(&source(60), 7).unwrap(), 7, 59 % 7).len(), 9);
+    assert_eq!(decimate(&source(5), 1, Alignment::First).unwrap(), source(5));
+    assert!(decimate(&source(27), 2, Alignment::First).is_err());
+    assert!(decimate(&source(60), 0, Alignment::First).is_err());
+    let smooth = anti_alias(&source(60), 7).unwrap();
+    let last = decimate(&source(60), 7, Alignment::Last).unwrap();
+    assert_eq!((last.len(), last[8]), (9, smooth[59]));
 }
 
 /// The weakest bins are 1e-7 of the strongest, whose rounding leaks into them.

@@ -3,13 +3,24 @@
 use super::{chebyshev, forward_backward};
 use crate::signal::{SignalError, check_finite};
 
-/// Anti-alias filter and every `factor`-th sample from the first, as SciPy's and (but for the first sample kept)
-/// MATLAB's `decimate`.
-///
-/// MATLAB aligns on the last sample: `pick(&anti_alias(x, k)?, k, (x.len() - 1) % k)`. Factor 1 returns the signal.
-/// Fails as [`anti_alias`] does.
-pub fn decimate(signal: &[f64], factor: usize) -> Result<Vec<f64>, SignalError> {
-    Ok(pick(&anti_alias(signal, factor)?, factor, 0))
+/// Which sample survives decimation for certain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Alignment {
+    /// The first, as in SciPy's `decimate`.
+    #[default]
+    First,
+    /// The last, as in MATLAB's `decimate`; the first kept is `(samples - 1) % factor`.
+    Last,
+}
+
+/// Anti-alias filter and every `factor`-th sample. Factor 1 returns the signal. Fails as [`anti_alias`] does.
+pub fn decimate(signal: &[f64], factor: usize, alignment: Alignment) -> Result<Vec<f64>, SignalError> {
+    let filtered = anti_alias(signal, factor)?;
+    let first = match alignment {
+        Alignment::First => 0,
+        Alignment::Last => filtered.len().saturating_sub(1) % factor,
+    };
+    Ok(pick(&filtered, factor, first))
 }
 
 /// Zero-phase Chebyshev type I low-pass, order 8, 0.05 dB, ending at `0.8 / factor` of Nyquist.

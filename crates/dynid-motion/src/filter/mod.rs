@@ -9,6 +9,6 @@ pub mod zero_phase;
 
 pub use butterworth::butterworth;
 pub use chebyshev::chebyshev;
-pub use decimate::{anti_alias, decimate, pick};
+pub use decimate::{Alignment, anti_alias, decimate, pick};
 pub use sections::{Section, Sections};
 pub use zero_phase::forward_backward;
