@@ -1,1 +1,33 @@
-//! Estimators and statistics on triangular factors
+//! Estimators and statistics on triangular factors.
+//!
+//! A log enters through triangular factors [`Factor`], one per group of rows (a joint, or a joint of one log)
+//! and time block. Everything quadratic then works on factors, never on samples:
+//!
+//! | question | module |
+//! |---|---|
+//! | reduce rows of `[W y]`, merge, scale, choose columns | [`factor`] |
+//! | which columns are excited, which depend on others | [`rank`] |
+//! | ordinary, weighted and ridge least squares | [`linear`] |
+//! | covariance that survives filtering | [`covariance`] |
+//! | held-out error over folds of blocks | [`folds`] |
+//! | which parameters a model can do without | [`elimination`] |
+//! | whether residuals are white | [`whiteness`] |
+//! | how well a prediction matches a measurement | [`metrics`] |
+//!
+//! Notation: `W` is the regressor (rows × `p` columns), `y` the effort, `x` the parameters,
+//! `(R, z, ρ, N)` a factor. Results do not depend on the number of threads.
+
+pub mod covariance;
+pub mod distribution;
+pub mod elimination;
+pub mod factor;
+pub mod folds;
+pub mod linear;
+pub mod metrics;
+pub mod rank;
+mod triangular;
+pub mod whiteness;
+
+pub use factor::{Factor, FactorBuilder, FactorError};
+/// Dense matrix of results (column-major, indexed `m[(row, column)]`).
+pub use faer::Mat;

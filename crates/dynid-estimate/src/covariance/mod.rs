@@ -1,0 +1,57 @@
+//! Covariance of an estimate that stays true when filtering or model error correlate the residuals.
+//!
+//! The model-based `C = (RᵀR)⁻¹` assumes independent residuals and is too small for filtered logs. The jackknife
+//! over time blocks is the default; the block sandwich and the HAC estimator are second opinions.
+//! All work on independent columns: select [`crate::linear::LinearSolution::kept`] first.
+
+mod hac;
+mod jackknife;
+mod sandwich;
+
+pub use hac::{andrews_lag, hac_bartlett, hac_lag};
+pub use jackknife::{Jackknife, MIN_BLOCKS, jackknife};
+pub use sandwich::block_sandwich;
+
+use crate::factor::Factor;
+use crate::linear::merge_weighted;
+use faer::Mat;
+
+/// Time blocks of the weighted problem: the factors of all groups of a block merged with weights `1/σ_j`.
+///
+/// `groups[j][b]`: factor of group `j` (a joint) in time block `b`; `variances[j] = σ_j²`; `columns`: the columns
+/// to keep. Panics unless there is one variance per group and each group has the same number of blocks.
+pub fn weighted_blocks(groups: &[Vec<Factor>], variances: &[f64], columns: &[usize]) -> Vec<Factor> {
+    assert_eq!(groups.len(), variances.len(), "one variance per group");
+    let blocks = groups.first().map_or(0, Vec::len);
+    assert!(groups.iter().all(|g| g.len() == blocks), "every group has every time block");
+    (0..blocks)
+        .map(|b| {
+            let selected: Vec<Factor> = groups.iter().map(|g| g[b].select(columns)).collect();
+            merge_weighted(&selected, variances)
+        })
+        .collect()
+}
+
+/// Variance inflation `κ = max(1, median_i V_ii/C_ii)`: by how much `model` understates `robust`.
+///
+/// The effective number of samples is `N/κ`. `None` for empty matrices or without a positive `C_ii`.
+pub fn variance_inflation(robust: &Mat<f64>, model: &Mat<f64>) -> Option<f64> {
+    let mut ratios: Vec<f64> = (0..model.nrows())
+        .filter(|&i| model[(i, i)] > 0.0)
+        .map(|i| robust[(i, i)] / model[(i, i)])
+        .collect();
+    ratios.sort_unstable_by(f64::total_cmp);
+    let middle = ratios.len() / 2;
+    let median = match ratios.len() {
+        0 => return None,
+        n if n % 2 == 1 => ratios[middle],
+        _ => 0.5 * (ratios[middle - 1] + ratios[middle]),
+    };
+    Some(median.max(1.0))
+}
+
+/// `C Ω C` for symmetric matrices, symmetric to the last bit.
+fn sandwich(bread: &Mat<f64>, filling: &Mat<f64>) -> Mat<f64> {
+    let product = bread * filling * bread;
+    crate::triangular::symmetric_from(bread.nrows(), |i, j| 0.5 * (product[(i, j)] + product[(j, i)]))
+}

@@ -1,0 +1,25 @@
+//! Sandwich covariance with block sums of scores.
+
+use super::sandwich;
+use crate::factor::Factor;
+use crate::triangular::{gram_inverse, symmetric_from};
+use faer::Mat;
+
+/// `V = B/(B-1) · C (Σ_b s_b s_bᵀ) C` with block scores `s_b = R_bᵀ(z_b - R_b x)` and `C = (RᵀR)⁻¹`.
+///
+/// `blocks`: weighted factors of the time blocks in independent columns; `x` their joint least-squares solution.
+/// `None` with fewer than two blocks.
+///
+/// Source: Newey & West 1987, with the block as the unit of dependence.
+pub fn block_sandwich(blocks: &[Factor], x: &[f64]) -> Option<Mat<f64>> {
+    let count = blocks.len();
+    if count < 2 {
+        return None;
+    }
+    let merged = Factor::merge(&blocks.iter().collect::<Vec<_>>());
+    let scores: Vec<Vec<f64>> = blocks.iter().map(|b| b.score(x)).collect();
+    let correction = count as f64 / (count - 1) as f64;
+    let filling =
+        symmetric_from(x.len(), |i, j| correction * scores.iter().map(|s| s[i] * s[j]).sum::<f64>());
+    Some(sandwich(&gram_inverse(&merged.r_matrix()), &filling))
+}

@@ -1,0 +1,156 @@
+//! Weighted least squares with one residual variance per group of rows.
+
+use super::ols::{LinearSolution, ols};
+use crate::factor::Factor;
+use crate::triangular::inverse;
+
+/// Settings of [`wls`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct WlsSettings {
+    /// Stop when no `σ_j²` changes by more than this, relative. Default 1e-6.
+    pub tolerance: f64,
+    /// Most passes. Default 20; three to five are typical.
+    pub max_passes: usize,
+    /// Least `σ_j` as a share of the root mean square effort of the group, for logs without noise. Default 1e-9.
+    pub floor: f64,
+}
+
+impl Default for WlsSettings {
+    fn default() -> Self {
+        Self { tolerance: 1e-6, max_passes: 20, floor: 1e-9 }
+    }
+}
+
+/// What weighted least squares found about one group.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupVariance {
+    /// `σ_j² = rss_j/(N_j - ℓ_j)`, effort².
+    pub variance: f64,
+    /// Leverage `ℓ_j = ‖R_j R⁻¹‖_F²/σ_j²`; over all groups they sum to the rank.
+    pub leverage: f64,
+    /// Residual sum of squares of the group, effort².
+    pub rss: f64,
+    /// Rows `N_j`.
+    pub rows: usize,
+    /// Whether the variance could not be told from the residual: at the floor, or no row beyond the leverage.
+    pub at_floor: bool,
+}
+
+/// Weighted least-squares estimate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WlsEstimate {
+    /// Solution of the merged factor weighted by `1/σ_j`; its rss is in units of the variances, and `C` of
+    /// [`LinearSolution::unit_covariance`] is the model-based covariance.
+    pub solution: LinearSolution,
+    /// One entry per group, in the order given.
+    pub groups: Vec<GroupVariance>,
+    /// Passes made.
+    pub passes: usize,
+    /// Whether the variances settled within the tolerance.
+    pub converged: bool,
+    /// Merged weighted factor of all columns.
+    pub factor: Factor,
+}
+
+impl WlsEstimate {
+    /// Weights `1/σ_j` per group.
+    pub fn weights(&self) -> Vec<f64> {
+        self.groups.iter().map(|g| 1.0 / g.variance.sqrt()).collect()
+    }
+}
+
+/// Weighted least squares, `min Σ_j ‖y_j - W_j x‖²/σ_j²`, with variances estimated along the way.
+///
+/// `groups`: one factor per group (a joint, or a joint of one log), all in the same columns. Starting from
+/// `σ_j = 1`, each pass solves the merged weighted factor and renews `σ_j² = rss_j/(N_j - ℓ_j)` by the exact
+/// leverage of the group instead of a common `p/n`. A group without half a degree of freedom keeps its variance,
+/// a group of zero effort takes its floor from the group of largest effort.
+///
+/// Panics on an empty list or unequal columns. Rank deficiency is reported in the solution.
+pub fn wls(groups: &[Factor], settings: &WlsSettings) -> WlsEstimate {
+    let mut variances = vec![1.0; groups.len()];
+    let mut passes = 0;
+    loop {
+        let factor = merge_weighted(groups, &variances);
+        let solution = ols(&factor);
+        let found = group_variances(groups, &variances, &solution, settings.floor);
+        passes += 1;
+        let change = found
+            .iter()
+            .zip(&variances)
+            .map(|(g, old)| (g.variance - old).abs() / g.variance)
+            .fold(0.0, f64::max);
+        let converged = change <= settings.tolerance;
+        if converged || passes >= settings.max_passes {
+            return finish(groups, found, passes, converged, settings.floor);
+        }
+        variances = found.iter().map(|g| g.variance).collect();
+    }
+}
+
+/// Merges groups weighted by `1/σ_j`, in the order given.
+pub(crate) fn merge_weighted(groups: &[Factor], variances: &[f64]) -> Factor {
+    let weighted: Vec<Factor> =
+        groups.iter().zip(variances).map(|(f, v)| f.scaled(1.0 / v.sqrt())).collect();
+    Factor::merge(&weighted.iter().collect::<Vec<_>>())
+}
+
+fn group_variances(
+    groups: &[Factor],
+    variances: &[f64],
+    solution: &LinearSolution,
+    floor: f64,
+) -> Vec<GroupVariance> {
+    let inverse = inverse(&solution.factor.r_matrix());
+    let fallback = match groups.iter().map(mean_square).fold(0.0, f64::max) {
+        0.0 => 1.0,
+        largest => largest,
+    };
+    groups
+        .iter()
+        .zip(variances)
+        .map(|(group, &variance)| {
+            let product = group.select(&solution.kept).r_matrix() * &inverse;
+            let leverage = product.norm_l2().powi(2) / variance;
+            let rows = group.rows();
+            let rss = group.rss(&solution.x);
+            let mean_square = match mean_square(group) {
+                0.0 => fallback,
+                positive => positive,
+            };
+            let least = floor * floor * mean_square;
+            let freedom = rows as f64 - leverage;
+            let estimate = if freedom >= 0.5 { rss / freedom } else { variance };
+            GroupVariance {
+                variance: estimate.max(least),
+                leverage,
+                rss,
+                rows,
+                at_floor: freedom < 0.5 || estimate <= least,
+            }
+        })
+        .collect()
+}
+
+fn mean_square(group: &Factor) -> f64 {
+    group.effort_norm().powi(2) / group.rows().max(1) as f64
+}
+
+fn finish(
+    groups: &[Factor],
+    found: Vec<GroupVariance>,
+    passes: usize,
+    converged: bool,
+    floor: f64,
+) -> WlsEstimate {
+    let variances: Vec<f64> = found.iter().map(|g| g.variance).collect();
+    let factor = merge_weighted(groups, &variances);
+    let solution = ols(&factor);
+    let last = group_variances(groups, &variances, &solution, floor);
+    let groups = found
+        .into_iter()
+        .zip(last)
+        .map(|(used, now)| GroupVariance { variance: used.variance, ..now })
+        .collect();
+    WlsEstimate { solution, groups, passes, converged, factor }
+}
