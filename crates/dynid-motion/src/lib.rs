@@ -4,11 +4,11 @@
 //! [`spectrum`] finds the sensor noise and the excited band, and [`cutoff`] the cut-off frequencies they allow;
 //! [`filter`], [`difference`], [`kernel`] and [`shift`] form states, regression rows and delays; [`mask`] says which
 //! samples may be used. [`textbook`] is the plain route (zero-phase Butterworth, central differences, decimation),
-//! [`trajectory`] holds the excitation trajectories.
+//! [`velocity`] judges a measured velocity, [`trajectory`] holds the excitation trajectories.
 //!
 //! Units: s, Hz, rad (or m), rad/s, N m (or N). Signals are slices of `f64` on a uniform grid of `rate_hz`.
 //! Every function that takes data from outside checks that it is finite and returns a typed error if not, so that
-//! no result holds a NaN.
+//! no result holds a NaN (unless values are so large, beyond some 1e150, that their squares overflow).
 
 pub mod clock;
 pub mod cutoff;

@@ -111,6 +111,15 @@ impl Default for NoiseSettings {
     }
 }
 
+impl NoiseSettings {
+    fn check(&self, rate_hz: f64) -> Result<(), SignalError> {
+        check_positive("rate_hz", rate_hz)?;
+        check_positive("floor_bias", self.floor_bias)?;
+        check_positive("crossing_factor", self.crossing_factor)?;
+        check_positive("noise_power", self.noise_power)
+    }
+}
+
 /// White noise of a measured position and the band in which the signal stands above it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PositionNoise {
@@ -142,7 +151,7 @@ pub fn position_noise(
     settings: &NoiseSettings,
 ) -> Result<PositionNoise, SignalError> {
     check_signal(position, 16)?;
-    check_positive("rate_hz", rate_hz)?;
+    settings.check(rate_hz)?;
     let bend: Vec<f64> = position.windows(3).map(|w| w[2] - 2.0 * w[1] + w[0]).collect();
     let spectrum = welch(&bend, rate_hz, segment_length(bend.len(), settings))?
         .scaled(|f| if f > 0.0 { (2.0 * (PI * f / rate_hz).sin()).powi(-4) } else { 0.0 });
@@ -180,7 +189,7 @@ pub fn effort_noise(
     settings: &NoiseSettings,
 ) -> Result<EffortNoise, SignalError> {
     check_signal(effort, 16)?;
-    check_positive("rate_hz", rate_hz)?;
+    settings.check(rate_hz)?;
     let steps: Vec<f64> = effort.windows(2).map(|w| w[1] - w[0]).collect();
     let spectrum = welch(&steps, rate_hz, segment_length(steps.len(), settings))?
         .scaled(|f| if f > 0.0 { (2.0 * (PI * f / rate_hz).sin()).powi(-2) } else { 0.0 });
