@@ -42,7 +42,10 @@ pub fn backward_elimination(factor: &Factor, effective_rows: f64) -> Vec<PathSte
     backward_elimination_with(factor, effective_rows, |_, solution| {
         let freedom = solution.rows as f64 - solution.kept.len() as f64;
         let variance = solution.rss / freedom.max(1.0);
-        rss_increase(solution).into_iter().map(|d| if variance > 0.0 { d / variance } else { f64::INFINITY }).collect()
+        rss_increase(solution)
+            .into_iter()
+            .map(|d| if variance > 0.0 { d / variance } else { f64::INFINITY })
+            .collect()
     })
 }
 

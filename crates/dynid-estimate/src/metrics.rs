@@ -45,7 +45,9 @@ pub enum MetricsError {
         found: usize,
     },
     /// A value is NaN or infinite.
-    #[error("channel {channel}, sample {sample}: expected finite effort, found measured {measured}, predicted {predicted}")]
+    #[error(
+        "channel {channel}, sample {sample}: expected finite effort, found measured {measured}, predicted {predicted}"
+    )]
     NotFinite {
         /// Channel, counted from 0.
         channel: usize,
@@ -128,7 +130,8 @@ mod tests {
 
     #[test]
     fn figures_follow_their_definitions() {
-        let fit = fit(&[[1.0, 3.0, 5.0, -1.0], [2.0, 0.0, 0.0, 0.0]], &[[1.0, 2.0, 5.0, 0.0], [2.0; 4]]).unwrap();
+        let fit =
+            fit(&[[1.0, 3.0, 5.0, -1.0], [2.0, 0.0, 0.0, 0.0]], &[[1.0, 2.0, 5.0, 0.0], [2.0; 4]]).unwrap();
         let first = fit.channels[0];
         assert_eq!(first.rms, Some(0.5_f64.sqrt()));
         assert_eq!(first.nrmse, Some(0.5_f64.sqrt() / 6.0));

@@ -15,7 +15,8 @@ fn autocorrelation_about(signal: &[f64], mean: f64, lags: usize) -> Option<Vec<f
     if signal.len() <= lags || energy.is_nan() || energy <= 0.0 {
         return None;
     }
-    let shifted = |lag: usize| signal[lag..].iter().zip(signal).map(|(a, b)| (a - mean) * (b - mean)).sum::<f64>();
+    let shifted =
+        |lag: usize| signal[lag..].iter().zip(signal).map(|(a, b)| (a - mean) * (b - mean)).sum::<f64>();
     Some((1..=lags).map(|lag| shifted(lag) / energy).collect())
 }
 

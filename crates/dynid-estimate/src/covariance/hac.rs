@@ -61,6 +61,5 @@ pub fn andrews_lag(scores: &Mat<f64>, unit_covariance: &Mat<f64>) -> Option<usiz
         numerator += share * 4.0 * a * a / ((1.0 - a).powi(6) * (1.0 + a).powi(2));
         denominator += share / (1.0 - a).powi(4);
     }
-    (denominator > 0.0)
-        .then(|| (1.1447 * (numerator / denominator * samples as f64).cbrt()).ceil() as usize)
+    (denominator > 0.0).then(|| (1.1447 * (numerator / denominator * samples as f64).cbrt()).ceil() as usize)
 }

@@ -36,10 +36,8 @@ pub fn weighted_blocks(groups: &[Vec<Factor>], variances: &[f64], columns: &[usi
 ///
 /// The effective number of samples is `N/κ`. `None` for empty matrices or without a positive `C_ii`.
 pub fn variance_inflation(robust: &Mat<f64>, model: &Mat<f64>) -> Option<f64> {
-    let mut ratios: Vec<f64> = (0..model.nrows())
-        .filter(|&i| model[(i, i)] > 0.0)
-        .map(|i| robust[(i, i)] / model[(i, i)])
-        .collect();
+    let mut ratios: Vec<f64> =
+        (0..model.nrows()).filter(|&i| model[(i, i)] > 0.0).map(|i| robust[(i, i)] / model[(i, i)]).collect();
     ratios.sort_unstable_by(f64::total_cmp);
     let middle = ratios.len() / 2;
     let median = match ratios.len() {

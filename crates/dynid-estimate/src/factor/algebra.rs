@@ -35,9 +35,8 @@ impl Factor {
     pub fn select(&self, columns: &[usize]) -> Factor {
         assert!(columns.iter().all(|&c| c < self.columns), "selected columns exist");
         let mut builder = FactorBuilder::with_chunk_rows(columns.len(), self.height());
-        builder.stack(self.height(), |i, j| {
-            self.triangle[(i, columns.get(j).copied().unwrap_or(self.columns))]
-        });
+        builder
+            .stack(self.height(), |i, j| self.triangle[(i, columns.get(j).copied().unwrap_or(self.columns))]);
         self.with_remainder(builder)
     }
 

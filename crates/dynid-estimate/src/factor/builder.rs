@@ -27,7 +27,9 @@ pub enum FactorError {
         found: f64,
     },
     /// The slice of regressor values does not fit the stated shape.
-    #[error("regressor block of {columns} columns and {rows} rows at stride {stride}: expected {expected} values, found {found}")]
+    #[error(
+        "regressor block of {columns} columns and {rows} rows at stride {stride}: expected {expected} values, found {found}"
+    )]
     BlockShape {
         /// Columns of the factor.
         columns: usize,
@@ -118,7 +120,12 @@ impl FactorBuilder {
     /// `regressor[c * stride + i]` is column `c` of row `i`; `effort[i]` its effort, and `effort.len()` the number
     /// of rows. Fails if `regressor` is too short or a value is not finite; rows before the first offending
     /// chunk stay consumed, so drop the builder or [`Self::take`] after a failure.
-    pub fn push_block(&mut self, regressor: &[f64], stride: usize, effort: &[f64]) -> Result<(), FactorError> {
+    pub fn push_block(
+        &mut self,
+        regressor: &[f64],
+        stride: usize,
+        effort: &[f64],
+    ) -> Result<(), FactorError> {
         let rows = effort.len();
         let expected = if rows == 0 || self.columns == 0 { 0 } else { (self.columns - 1) * stride + rows };
         if regressor.len() < expected || (stride < rows && self.columns > 1) {

@@ -66,7 +66,9 @@ impl Factor {
 
     /// `z` (`p` entries, padded by zeros), in the unit of effort.
     pub fn z(&self) -> Vec<f64> {
-        (0..self.columns).map(|i| if i < self.height() { self.triangle[(i, self.columns)] } else { 0.0 }).collect()
+        (0..self.columns)
+            .map(|i| if i < self.height() { self.triangle[(i, self.columns)] } else { 0.0 })
+            .collect()
     }
 
     /// `ρ ≥ 0`, in the unit of effort; the least residual norm when `R` has full rank.

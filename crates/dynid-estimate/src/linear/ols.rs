@@ -87,5 +87,15 @@ pub fn ols(factor: &Factor) -> LinearSolution {
         x[column] = value;
     }
     let rss = reduced.rho() * reduced.rho();
-    LinearSolution { x, kept, dropped, rss, rows: factor.rows(), condition, condition_scaled, rank, factor: reduced }
+    LinearSolution {
+        x,
+        kept,
+        dropped,
+        rss,
+        rows: factor.rows(),
+        condition,
+        condition_scaled,
+        rank,
+        factor: reduced,
+    }
 }

@@ -90,8 +90,7 @@ pub fn wls(groups: &[Factor], settings: &WlsSettings) -> WlsEstimate {
 
 /// Merges groups weighted by `1/σ_j`, in the order given.
 pub(crate) fn merge_weighted(groups: &[Factor], variances: &[f64]) -> Factor {
-    let weighted: Vec<Factor> =
-        groups.iter().zip(variances).map(|(f, v)| f.scaled(1.0 / v.sqrt())).collect();
+    let weighted: Vec<Factor> = groups.iter().zip(variances).map(|(f, v)| f.scaled(1.0 / v.sqrt())).collect();
     Factor::merge(&weighted.iter().collect::<Vec<_>>())
 }
 

@@ -42,8 +42,7 @@ pub fn base_columns(factor: &Factor, preference: &[usize]) -> BaseColumns {
     let unit = scaled_triangle(factor, &report.column_norms);
     let largest = report.singular_values.first().copied().unwrap_or(0.0);
     let tolerance = rank_tolerance(factor.rows(), columns, largest);
-    let excited: Vec<usize> =
-        preference.iter().copied().filter(|&c| report.column_norms[c] > 0.0).collect();
+    let excited: Vec<usize> = preference.iter().copied().filter(|&c| report.column_norms[c] > 0.0).collect();
 
     let mut kept = independent_in_order(&unit, &excited, tolerance);
     let fell_back_to_pivoting = kept.len() != report.rank;

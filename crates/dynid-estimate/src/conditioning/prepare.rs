@@ -1,0 +1,121 @@
+//! From a log to clean uniform signals with known noise.
+
+use dynid_model::EffortModel;
+use dynid_motion::clock::{self, ClockReport};
+use dynid_motion::spectrum::{EffortNoise, PositionNoise, effort_noise, position_noise};
+use dynid_motion::{Channel, Log, spikes};
+use rayon::prelude::*;
+
+use super::{ConditioningError, ConditioningSettings};
+
+/// A log on a uniform grid without spikes, joints in the order of the model's outputs.
+#[derive(Debug, Clone)]
+pub struct PreparedLog {
+    /// Name of the log.
+    pub name: String,
+    /// Time of the first sample, s.
+    pub start: f64,
+    /// Sample rate, Hz.
+    pub rate_hz: f64,
+    /// Per output: position, rad or m.
+    pub position: Vec<Vec<f64>>,
+    /// Per output: effort, N m or N.
+    pub effort: Vec<Vec<f64>>,
+    /// Extra channels.
+    pub channels: Vec<Channel>,
+    /// Per sample: false inside a gap of the clock.
+    pub usable: Vec<bool>,
+    /// Per output: noise and band of the position.
+    pub position_noise: Vec<PositionNoise>,
+    /// Per output: noise of the effort.
+    pub effort_noise: Vec<EffortNoise>,
+    /// Per output: spikes removed from position and effort.
+    pub spikes: Vec<(usize, usize)>,
+    /// Per output: whether the joint moves in this log.
+    pub moves: Vec<bool>,
+    /// What was found about the clock.
+    pub clock: ClockReport,
+}
+
+impl PreparedLog {
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.usable.len()
+    }
+
+    /// Duration, s.
+    pub fn duration(&self) -> f64 {
+        self.samples() as f64 / self.rate_hz
+    }
+}
+
+/// Puts a log on a uniform grid, removes spikes, measures noise and band.
+///
+/// Fails if a joint of the model is not logged, its effort never changes, a channel is missing, or the clock is beyond
+/// repair.
+pub fn prepare(
+    log: &Log,
+    model: &dyn EffortModel,
+    settings: &ConditioningSettings,
+) -> Result<PreparedLog, ConditioningError> {
+    let mut uniform = clock::uniform(log, &settings.clock)?;
+    for channel in model.channels() {
+        if !uniform.channels.iter().any(|c| c.name == *channel) {
+            return Err(ConditioningError::MissingChannel { log: uniform.name, channel: channel.clone() });
+        }
+    }
+    let mut joints = Vec::with_capacity(model.outputs().len());
+    for output in model.outputs() {
+        let Some(index) = uniform.joints.iter().position(|j| j.name == output.name) else {
+            return Err(ConditioningError::MissingJoint { log: uniform.name, joint: output.name.clone() });
+        };
+        let joint = uniform.joints.swap_remove(index);
+        if joint.effort_is_constant() {
+            return Err(ConditioningError::ConstantEffort { log: uniform.name, joint: joint.name });
+        }
+        joints.push(joint);
+    }
+    if !joints.iter().any(dynid_motion::JointSignals::moves) {
+        return Err(ConditioningError::NothingMoves { log: uniform.name });
+    }
+    let rate_hz = uniform.rate_hz;
+    let done: Vec<_> = joints
+        .into_par_iter()
+        .map(|mut joint| {
+            let moves = joint.moves();
+            let mut counts = (0, 0);
+            if settings.remove_spikes {
+                let p = spikes::remove(&mut joint.position, &settings.position_spikes)?;
+                let e = spikes::remove(&mut joint.effort, &settings.effort_spikes)?;
+                let count = |r: &spikes::SpikeReport| if r.removed { r.flagged.len() } else { 0 };
+                counts = (count(&p), count(&e));
+            }
+            let position = position_noise(&joint.position, rate_hz, &settings.noise)?;
+            let effort = effort_noise(&joint.effort, rate_hz, &settings.noise)?;
+            Ok((joint, moves, counts, position, effort))
+        })
+        .collect::<Result<_, ConditioningError>>()?;
+    let mut out = PreparedLog {
+        name: uniform.name,
+        start: uniform.start,
+        rate_hz,
+        position: Vec::new(),
+        effort: Vec::new(),
+        channels: uniform.channels,
+        usable: uniform.usable,
+        position_noise: Vec::new(),
+        effort_noise: Vec::new(),
+        spikes: Vec::new(),
+        moves: Vec::new(),
+        clock: uniform.report,
+    };
+    for (joint, moves, counts, position, effort) in done {
+        out.position.push(joint.position);
+        out.effort.push(joint.effort);
+        out.spikes.push(counts);
+        out.moves.push(moves);
+        out.position_noise.push(position);
+        out.effort_noise.push(effort);
+    }
+    Ok(out)
+}

@@ -1,0 +1,227 @@
+//! Rows of the regression: columns and efforts through the compact kernels.
+
+use dynid_model::{EffortModel, RegressorBlock};
+use dynid_motion::{Kernel, SignalError};
+use rayon::prelude::*;
+
+use super::states::{Masks, States};
+use super::{ConditioningError, ConditioningSettings, PreparedLog};
+
+/// Which regressor columns a pass keeps, per output.
+#[derive(Debug, Clone)]
+pub(crate) struct KeptColumns {
+    /// Per output: positions within the output's acting columns.
+    pub(crate) local: Vec<Vec<usize>>,
+    /// Per output: positions within the base columns.
+    pub(crate) global: Vec<Vec<usize>>,
+    /// Number of base columns.
+    pub(crate) total: usize,
+}
+
+impl KeptColumns {
+    pub(crate) fn new(model: &dyn EffortModel, kept: &[usize]) -> Self {
+        let layout = model.layout();
+        let (mut local, mut global) = (Vec::new(), Vec::new());
+        for output in 0..layout.outputs() {
+            let (mut l, mut g) = (Vec::new(), Vec::new());
+            for (k, column) in layout.columns(output).iter().enumerate() {
+                if let Ok(position) = kept.binary_search(column) {
+                    l.push(k);
+                    g.push(position);
+                }
+            }
+            local.push(l);
+            global.push(g);
+        }
+        KeptColumns { local, global, total: kept.len() }
+    }
+}
+
+/// Kernels of one pass over one log, widest first.
+#[derive(Debug, Clone)]
+pub(crate) struct Kernels {
+    pub(crate) kernels: Vec<Kernel>,
+    /// Samples beyond the kernel that the state filter reaches: to edges and gaps, to reversals.
+    outer: usize,
+    inner: usize,
+}
+
+impl Kernels {
+    pub(crate) fn new(scales_hz: &[f64], states: &States, extra_reach: usize) -> Result<Self, SignalError> {
+        let kernels =
+            scales_hz.iter().map(|f| Kernel::new(*f, states.rate_hz)).collect::<Result<Vec<_>, _>>()?;
+        let reach = |parts: f64| (parts * states.rate_hz / states.cutoff_hz).ceil() as usize;
+        Ok(Kernels { kernels, outer: reach(1.0) + extra_reach, inner: reach(0.5) })
+    }
+
+    /// Rungs at which the row of a scale is used at a centre: usable there, and no wider kernel is.
+    fn used(&self, masks: &Masks, scale: usize, centre: usize) -> u8 {
+        let bits = |k: usize| {
+            masks.usable(centre, self.kernels[k].half_width(), self.outer, self.inner)
+        };
+        let own = bits(scale);
+        (0..scale).fold(own, |b, wider| if b == 0 { 0 } else { b & !bits(wider) })
+    }
+
+    /// Share of samples at which some kernel is usable, per rung.
+    pub(crate) fn coverage(&self, masks: &Masks, samples: usize) -> Vec<f64> {
+        let mut counts = vec![0usize; masks.rungs()];
+        let step = (samples / 4096).max(1);
+        let mut probes = 0usize;
+        for centre in (0..samples).step_by(step) {
+            probes += 1;
+            let last = self.kernels.len() - 1;
+            let bits = masks.usable(centre, self.kernels[last].half_width(), self.outer, self.inner);
+            for (rung, count) in counts.iter_mut().enumerate() {
+                *count += usize::from(bits >> rung & 1 == 1);
+            }
+        }
+        counts.iter().map(|c| *c as f64 / probes.max(1) as f64).collect()
+    }
+}
+
+/// A batch of rows of one output at one scale.
+pub(crate) struct RowBatch<'a> {
+    pub(crate) scale: usize,
+    /// Centres of the rows, ascending.
+    pub(crate) centres: &'a [usize],
+    /// Rungs at which each row is used.
+    pub(crate) rungs: &'a [u8],
+    /// Kept regressor columns, then probe columns, column-major with stride `centres.len()`; the model's known offset is
+    /// the last column.
+    pub(crate) columns: &'a [f64],
+    /// Half width of the kernel.
+    pub(crate) half_width: usize,
+}
+
+/// Takes the rows of one output; one per output, so that outputs run in parallel with the same result.
+pub(crate) trait RowConsumer: Send {
+    fn take(&mut self, output: usize, batch: &RowBatch<'_>) -> Result<(), ConditioningError>;
+}
+
+/// What a pass runs over.
+pub(crate) struct Pass<'a> {
+    pub(crate) model: &'a dyn EffortModel,
+    pub(crate) shape: &'a [f64],
+    pub(crate) columns: &'a KeptColumns,
+    pub(crate) log: &'a PreparedLog,
+    pub(crate) states: &'a States,
+    pub(crate) masks: &'a [Masks],
+    pub(crate) kernels: &'a Kernels,
+    /// Only rows used at one of these rungs are computed, per output.
+    pub(crate) wanted: &'a [u8],
+    /// Also form the probe columns |v|, Stribeck and tanh of the output's speed.
+    pub(crate) probes: bool,
+}
+
+/// Number of probe columns.
+pub(crate) const PROBES: usize = 3;
+
+/// Samples whose regressor is held at a time, beyond the kernels' reach.
+const BLOCK: usize = 2048;
+
+impl Pass<'_> {
+    /// Runs through the log once and hands every row to the consumer of its output, in time order for each scale.
+    pub(crate) fn run<C: RowConsumer>(&self, consumers: &mut [C]) -> Result<(), ConditioningError> {
+        let samples = self.states.samples;
+        let reach = self.kernels.kernels[0].half_width();
+        let block = BLOCK.max(6 * reach);
+        let mut regressor = RegressorBlock::new(self.model.layout().clone(), block + 2 * reach);
+        let mut start = 0;
+        while start < samples {
+            let end = (start + block).min(samples);
+            let range = start.saturating_sub(reach)..(end + reach).min(samples);
+            self.states.with_block(range.clone(), &self.log.channels, |motion| {
+                self.model.regressor(motion, self.shape, &mut regressor);
+            });
+            consumers
+                .par_iter_mut()
+                .enumerate()
+                .map(|(output, consumer)| {
+                    self.output_rows(output, start..end, range.start, &regressor, consumer)
+                })
+                .collect::<Result<Vec<()>, _>>()?;
+            start = end;
+        }
+        Ok(())
+    }
+
+    fn output_rows<C: RowConsumer>(
+        &self,
+        output: usize,
+        centres_in: std::ops::Range<usize>,
+        first: usize,
+        regressor: &RegressorBlock,
+        consumer: &mut C,
+    ) -> Result<(), ConditioningError> {
+        let probes = if self.probes { self.probe_columns(output, first, regressor.samples()) } else { vec![] };
+        let mut centres = Vec::new();
+        let mut rungs = Vec::new();
+        let mut columns = Vec::new();
+        for (scale, kernel) in self.kernels.kernels.iter().enumerate() {
+            centres.clear();
+            rungs.clear();
+            let spacing = kernel.spacing();
+            let from = centres_in.start.div_ceil(spacing) * spacing;
+            for centre in (from..centres_in.end).step_by(spacing) {
+                let used = self.kernels.used(&self.masks[output], scale, centre) & self.wanted[output];
+                if used != 0 {
+                    centres.push(centre);
+                    rungs.push(used);
+                }
+            }
+            if centres.is_empty() {
+                continue;
+            }
+            let local = &self.columns.local[output];
+            columns.clear();
+            columns.resize((local.len() + probes.len() + 1) * centres.len(), 0.0);
+            let sources = local
+                .iter()
+                .map(|k| regressor.column(output, *k))
+                .chain(probes.iter().map(Vec::as_slice))
+                .chain([regressor.offset(output)]);
+            for (source, out) in sources.zip(columns.chunks_exact_mut(centres.len())) {
+                kernel.apply_block(source, first, &centres, out);
+            }
+            consumer.take(
+                output,
+                &RowBatch {
+                    scale,
+                    centres: &centres,
+                    rungs: &rungs,
+                    columns: &columns,
+                    half_width: kernel.half_width(),
+                },
+            )?;
+        }
+        Ok(())
+    }
+
+    /// `|v|`, `s(v) exp(-(v/v_s)²)` and `tanh(v/v_c)` with `v_s`, `v_c` a quarter and the whole of the rms speed: enough to
+    /// tell whether a kernel or a missing friction shape spoils a fit.
+    fn probe_columns(&self, output: usize, first: usize, samples: usize) -> Vec<Vec<f64>> {
+        let all = self.states.velocity(output);
+        let scale = dynid_motion::signal::rms(all).max(f64::MIN_POSITIVE);
+        let v = &all[first..first + samples];
+        let map = |f: &dyn Fn(f64) -> f64| v.iter().map(|v| f(v / scale)).collect::<Vec<f64>>();
+        vec![
+            map(&f64::abs),
+            map(&|u| dynid_model::element::sign(u) * (-(4.0 * u).powi(2)).exp()),
+            map(&f64::tanh),
+        ]
+    }
+}
+
+/// All masks of a log, one per output.
+pub(crate) fn masks(
+    log: &PreparedLog,
+    states: &States,
+    model: &dyn EffortModel,
+    settings: &ConditioningSettings,
+) -> Vec<Masks> {
+    (0..model.outputs().len())
+        .into_par_iter()
+        .map(|output| Masks::new(log, states, model, output, settings))
+        .collect()
+}

@@ -1,0 +1,75 @@
+//! Settings of the conditioning; every threshold of spec/conditioning.md with its default.
+
+use dynid_motion::clock::ClockSettings;
+use dynid_motion::cutoff::CutoffSettings;
+use dynid_motion::spectrum::NoiseSettings;
+use dynid_motion::spikes::SpikeSettings;
+
+/// How a log is brought from samples to regression rows. `None` means: found from the data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConditioningSettings {
+    /// Cut-off of the widest kernel, Hz. Default: found.
+    pub kernel_hz: Option<f64>,
+    /// Cut-off of the state filter, Hz. Default: found.
+    pub state_hz: Option<f64>,
+    /// Delay of the motion behind the logged effort, in samples. Default: found.
+    pub delay_samples: Option<f64>,
+    /// Reversal mask of every joint, as a share of the joint's rms speed; negative: no mask. Default: found.
+    pub reversal_mask: Option<f64>,
+    /// Rungs of the reversal ladder, ascending. Default 0, 0.03, 0.06, 0.12, 0.25.
+    pub ladder: Vec<f64>,
+    /// Speeds below this many standard deviations of velocity noise count as reversal. Default 4.
+    pub stick_sigma: f64,
+    /// Time blocks for choices by held-out error. Default 8.
+    pub folds: usize,
+    /// A kernel whose held-out loss exceeds the best by this factor is rejected. Default 2.5.
+    pub kernel_veto: f64,
+    /// A joint keeps a mask only if this share of its samples stays usable. Default 0.25.
+    pub least_usable: f64,
+    /// A change of one joint's mask must gain this share of the loss, and one standard error. Default 0.002.
+    pub mask_gain: f64,
+    /// Mean and standard deviation of the prior on the delay, samples. Default 0.5, 1.
+    pub delay_prior: (f64, f64),
+    /// Remove spikes. Default true.
+    pub remove_spikes: bool,
+    /// Order of the state filter (Butterworth, run forward and backward). Default 4.
+    pub state_order: usize,
+    /// Length of the time blocks behind standard deviations, s; at most 64 blocks per log. Default 1.
+    pub block_s: f64,
+    /// Clock.
+    pub clock: ClockSettings,
+    /// Spikes in efforts.
+    pub effort_spikes: SpikeSettings,
+    /// Spikes in positions.
+    pub position_spikes: SpikeSettings,
+    /// Noise and band.
+    pub noise: NoiseSettings,
+    /// Limits of cut-offs.
+    pub cutoff: CutoffSettings,
+}
+
+impl Default for ConditioningSettings {
+    fn default() -> Self {
+        ConditioningSettings {
+            kernel_hz: None,
+            state_hz: None,
+            delay_samples: None,
+            reversal_mask: None,
+            ladder: vec![0.0, 0.03, 0.06, 0.12, 0.25],
+            stick_sigma: 4.0,
+            folds: 8,
+            kernel_veto: 2.5,
+            least_usable: 0.25,
+            mask_gain: 0.002,
+            delay_prior: (0.5, 1.0),
+            remove_spikes: true,
+            state_order: 4,
+            block_s: 1.0,
+            clock: ClockSettings::default(),
+            effort_spikes: SpikeSettings::default(),
+            position_spikes: SpikeSettings::position(),
+            noise: NoiseSettings::default(),
+            cutoff: CutoffSettings::default(),
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! States of a log at the state cut-off, and which samples spoil a row.
+
+use dynid_model::{EffortModel, MotionBlock};
+use dynid_motion::difference::central;
+use dynid_motion::filter::{butterworth, forward_backward};
+use dynid_motion::mask::near_reversal;
+use dynid_motion::signal::rms;
+use dynid_motion::spectrum::velocity_noise;
+use rayon::prelude::*;
+
+use super::{ConditioningError, ConditioningSettings, PreparedLog};
+
+/// Filtered positions, their derivatives, and efforts through the same filter.
+#[derive(Debug, Clone)]
+pub struct States {
+    /// Number of samples.
+    pub samples: usize,
+    /// Sample rate, Hz.
+    pub rate_hz: f64,
+    /// Cut-off of the state filter, Hz.
+    pub cutoff_hz: f64,
+    /// Positions, output after output.
+    pub q: Vec<f64>,
+    /// Velocities.
+    pub dq: Vec<f64>,
+    /// Accelerations.
+    pub ddq: Vec<f64>,
+    /// Per output: effort through the state filter.
+    pub effort: Vec<Vec<f64>>,
+    /// Per output: standard deviation of the velocity that comes from position noise.
+    pub velocity_sigma: Vec<f64>,
+}
+
+impl States {
+    /// States of a prepared log: zero-phase Butterworth at `cutoff_hz`, central differences.
+    pub fn new(
+        log: &PreparedLog,
+        cutoff_hz: f64,
+        settings: &ConditioningSettings,
+    ) -> Result<States, ConditioningError> {
+        let filter = butterworth(settings.state_order, cutoff_hz, log.rate_hz)?;
+        let per_joint = (0..log.position.len())
+            .into_par_iter()
+            .map(|j| {
+                let q = forward_backward(&filter, &log.position[j])?;
+                let dq = central(&q, log.rate_hz)?;
+                let ddq = central(&dq, log.rate_hz)?;
+                let effort = forward_backward(&filter, &log.effort[j])?;
+                let floor = log.position_noise[j].floor_psd;
+                let sigma = velocity_noise(floor, settings.state_order, cutoff_hz, log.rate_hz)?;
+                Ok((q, dq, ddq, effort, sigma))
+            })
+            .collect::<Result<Vec<_>, ConditioningError>>()?;
+        let mut states = States {
+            samples: log.samples(),
+            rate_hz: log.rate_hz,
+            cutoff_hz,
+            q: Vec::new(),
+            dq: Vec::new(),
+            ddq: Vec::new(),
+            effort: Vec::new(),
+            velocity_sigma: Vec::new(),
+        };
+        for (q, dq, ddq, effort, sigma) in per_joint {
+            states.q.extend(q);
+            states.dq.extend(dq);
+            states.ddq.extend(ddq);
+            states.effort.push(effort);
+            states.velocity_sigma.push(sigma);
+        }
+        Ok(states)
+    }
+
+    /// Velocity of an output.
+    pub fn velocity(&self, output: usize) -> &[f64] {
+        &self.dq[output * self.samples..][..self.samples]
+    }
+
+    /// A run of samples as a motion block. `channels`: whole channels of the log.
+    pub fn with_block<T>(
+        &self,
+        range: std::ops::Range<usize>,
+        channels: &[dynid_motion::Channel],
+        work: impl FnOnce(&MotionBlock<'_>) -> T,
+    ) -> T {
+        let channels: Vec<(&str, &[f64])> =
+            channels.iter().map(|c| (c.name.as_str(), &c.values[range.clone()])).collect();
+        work(&MotionBlock {
+            samples: range.len(),
+            stride: self.samples,
+            q: &self.q[range.start..],
+            dq: &self.dq[range.start..],
+            ddq: &self.ddq[range.start..],
+            gravity: None,
+            channels: &channels,
+        })
+    }
+
+    /// Velocity noise and rms speed of a combination of rates.
+    fn combined(&self, speed: &[(usize, f64)]) -> (Vec<f64>, f64) {
+        let mut v = vec![0.0; self.samples];
+        let mut variance = 0.0;
+        for (rate, factor) in speed {
+            for (v, x) in v.iter_mut().zip(self.velocity(*rate)) {
+                *v += factor * x;
+            }
+            variance += (factor * self.velocity_sigma[*rate]).powi(2);
+        }
+        (v, variance.sqrt())
+    }
+}
+
+/// Running counts of bad samples, so that any window is judged by two look-ups.
+#[derive(Debug, Clone)]
+pub(crate) struct BadSamples(Vec<u32>);
+
+impl BadSamples {
+    pub(crate) fn new(bad: impl Iterator<Item = bool>) -> Self {
+        let mut count = 0;
+        let mut counts = vec![0];
+        counts.extend(bad.map(|b| {
+            count += u32::from(b);
+            count
+        }));
+        BadSamples(counts)
+    }
+
+    /// True if no bad sample and no end of the record lies within `reach` of `centre`.
+    pub(crate) fn clean(&self, centre: usize, reach: usize) -> bool {
+        let samples = self.0.len() - 1;
+        centre >= reach && centre + reach < samples && self.0[centre - reach] == self.0[centre + reach + 1]
+    }
+
+    /// True if no bad sample lies within `reach` of `centre`; the record's ends do not count.
+    fn quiet(&self, centre: usize, reach: usize) -> bool {
+        let end = (centre + reach + 1).min(self.0.len() - 1);
+        self.0[centre.saturating_sub(reach)] == self.0[end]
+    }
+}
+
+/// For one output of one log: bad samples of the clock, and of reversal at every rung of the ladder.
+#[derive(Debug, Clone)]
+pub(crate) struct Masks {
+    clock: BadSamples,
+    /// First entry: no reversal mask; then one per rung.
+    reversal: Vec<Option<BadSamples>>,
+}
+
+impl Masks {
+    pub(crate) fn new(
+        log: &PreparedLog,
+        states: &States,
+        model: &dyn EffortModel,
+        output: usize,
+        settings: &ConditioningSettings,
+    ) -> Self {
+        let speeds: Vec<(Vec<f64>, f64, f64)> = model
+            .reversal_speeds(output)
+            .iter()
+            .map(|speed| {
+                let (v, sigma) = states.combined(speed);
+                let scale = rms(&v);
+                (v, sigma, scale)
+            })
+            .collect();
+        let mut reversal = vec![None];
+        for level in &settings.ladder {
+            let mut bad = vec![false; states.samples];
+            for (v, sigma, scale) in &speeds {
+                let threshold = (settings.stick_sigma * sigma).max(level * scale);
+                for (b, n) in bad.iter_mut().zip(near_reversal(v, threshold)) {
+                    *b |= n;
+                }
+            }
+            reversal.push(Some(BadSamples::new(bad.into_iter())));
+        }
+        Masks { clock: BadSamples::new(log.usable.iter().map(|u| !u)), reversal }
+    }
+
+    /// Number of rungs, counting "no mask".
+    pub(crate) fn rungs(&self) -> usize {
+        self.reversal.len()
+    }
+
+    /// Rungs (as bits) at which a row centred here with this kernel reach may be used. `outer`: reach of the state filter
+    /// to edges and gaps, `inner`: to reversals, samples beyond the kernel.
+    pub(crate) fn usable(&self, centre: usize, half_width: usize, outer: usize, inner: usize) -> u8 {
+        if !self.clock.clean(centre, half_width + outer) {
+            return 0;
+        }
+        let mut bits = 1;
+        for (rung, bad) in self.reversal.iter().enumerate().skip(1) {
+            match bad {
+                Some(bad) if bad.quiet(centre, half_width + inner) => bits |= 1 << rung,
+                _ => break,
+            }
+        }
+        bits
+    }
+}
