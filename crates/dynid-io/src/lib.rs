@@ -1,1 +1,22 @@
-//! Robot files and logs: URDF, DH tables in TOML, CSV
+//! Robot files and logs: URDF, robots in TOML (DH tables or body trees), CSV logs and states.
+//!
+//! Every door checks what it lets in: numbers are finite, names are unique, sizes are bounded. A fault becomes one
+//! typed error whose `Display` is one line (file, line, column or row, expected, found) and whose `hint()` says what
+//! to do about it. Whether links and joints form a mechanism is decided by `dynid_model`, not here.
+
+pub mod columns;
+pub mod csv;
+mod excerpt;
+pub mod output;
+pub mod robot;
+mod source;
+pub mod states;
+pub mod toml_robot;
+pub mod urdf;
+
+pub use columns::{ColumnMapping, GuessOptions, MappingError, MappingSpec, Signals};
+pub use csv::{LogFileError, ReadOptions, Table};
+pub use output::OutputError;
+pub use robot::{Place, RobotFileError};
+pub use states::{StateJoint, States, StatesError};
+pub use toml_robot::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, RobotFile, SettingValue};

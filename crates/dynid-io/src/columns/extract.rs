@@ -1,0 +1,121 @@
+//! Signals in SI out of a table.
+
+use super::{ColumnMapping, ColumnUse, MappingError, Signal, TimeSource};
+use crate::csv::Table;
+
+/// Clocks beyond this magnitude count from an epoch and are shifted to start at zero, s.
+const EPOCH_CLOCK: f64 = 1e6;
+
+/// Signals of the logged joints in SI. Lists are joint by joint, each with one value per sample.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Signals {
+    /// Logged joints in joint order.
+    pub joints: Vec<String>,
+    /// Their indices among the robot's joints.
+    pub indices: Vec<usize>,
+    /// Joints of the robot without a log.
+    pub not_logged: Vec<String>,
+    /// Time, s, minus `time_origin`.
+    pub time: Vec<f64>,
+    /// Time that was subtracted, s: the first stamp of a clock beyond 1e6 s, else 0. The difference is taken before the
+    /// conversion; what an `f64` of the raw stamp resolves (256 ns for nanoseconds since 1970) is all there is.
+    pub time_origin: f64,
+    /// Position, rad or m.
+    pub position: Vec<Vec<f64>>,
+    /// Velocity, rad/s or m/s.
+    pub velocity: Option<Vec<Vec<f64>>>,
+    /// Acceleration, rad/s² or m/s².
+    pub acceleration: Option<Vec<Vec<f64>>>,
+    /// Effort, N m or N.
+    pub effort: Option<Vec<Vec<f64>>>,
+    /// Temperature, °C.
+    pub temperature: Option<Vec<Vec<f64>>>,
+    /// Other columns.
+    pub channels: Vec<(String, Vec<f64>)>,
+}
+
+impl ColumnMapping {
+    /// Takes the signals out of a table, converted to SI.
+    ///
+    /// # Errors
+    /// [`MappingError::UnknownColumn`] if the mapping was made for another header, [`MappingError::Overflow`] if a
+    /// conversion leaves the range of numbers.
+    pub fn extract(&self, table: &Table) -> Result<Signals, MappingError> {
+        let (time, time_origin) = self.time(table)?;
+        let indices: Vec<usize> =
+            self.position.iter().enumerate().filter(|(_, p)| p.is_some()).map(|(k, _)| k).collect();
+        let optional = |signal, columns: &Option<Vec<Option<ColumnUse>>>| {
+            columns.as_ref().map(|c| per_joint(table, signal, c)).transpose()
+        };
+        let channels = self
+            .channels
+            .iter()
+            .map(|(name, column)| Ok((name.clone(), convert(table, &format!("channel `{name}`"), column)?)));
+        Ok(Signals {
+            joints: indices.iter().map(|k| self.joints[*k].clone()).collect(),
+            not_logged: self.not_logged().into_iter().map(str::to_owned).collect(),
+            position: per_joint(table, Signal::Position, &self.position)?,
+            velocity: optional(Signal::Velocity, &self.velocity)?,
+            acceleration: optional(Signal::Acceleration, &self.acceleration)?,
+            effort: optional(Signal::Effort, &self.effort)?,
+            temperature: optional(Signal::Temperature, &self.temperature)?,
+            channels: channels.collect::<Result<_, _>>()?,
+            indices,
+            time,
+            time_origin,
+        })
+    }
+
+    fn time(&self, table: &Table) -> Result<(Vec<f64>, f64), MappingError> {
+        match &self.time {
+            TimeSource::Rate(rate) => Ok(((0..table.rows).map(|k| k as f64 / rate).collect(), 0.0)),
+            TimeSource::Column(column) => {
+                let raw = raw_column(table, "time", column)?;
+                let first = raw.first().copied().unwrap_or(0.0);
+                let start = column.factor * first + column.offset;
+                if start.abs() <= EPOCH_CLOCK {
+                    return Ok((convert(table, "time", column)?, 0.0));
+                }
+                Ok((raw.iter().map(|t| (t - first) * column.factor).collect(), start))
+            }
+        }
+    }
+}
+
+fn per_joint(
+    table: &Table,
+    signal: Signal,
+    columns: &[Option<ColumnUse>],
+) -> Result<Vec<Vec<f64>>, MappingError> {
+    columns.iter().flatten().map(|c| convert(table, &signal.to_string(), c)).collect()
+}
+
+fn raw_column<'t>(table: &'t Table, signal: &str, column: &ColumnUse) -> Result<&'t [f64], MappingError> {
+    match table.header.get(column.column) {
+        Some(name) if *name == column.name => Ok(&table.columns[column.column]),
+        _ => Err(MappingError::UnknownColumn {
+            signal: signal.to_owned(),
+            column: column.name.clone(),
+            header: table.header.clone(),
+            meant: None,
+        }),
+    }
+}
+
+fn convert(table: &Table, signal: &str, column: &ColumnUse) -> Result<Vec<f64>, MappingError> {
+    let raw = raw_column(table, signal, column)?;
+    let values: Vec<f64> = if column.factor == 1.0 && column.offset == 0.0 {
+        raw.to_vec()
+    } else {
+        raw.iter().map(|x| column.factor * x + column.offset).collect()
+    };
+    match values.iter().position(|x| !x.is_finite()) {
+        None => Ok(values),
+        Some(k) => Err(MappingError::Overflow {
+            signal: signal.to_owned(),
+            column: column.name.clone(),
+            row: table.first_row + k,
+            found: values[k],
+        }),
+    }
+}

@@ -1,0 +1,124 @@
+//! Names by which logs call their signals.
+
+use std::fmt;
+
+/// A kind of column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Signal {
+    /// Time.
+    Time,
+    /// Joint position.
+    Position,
+    /// Joint velocity.
+    Velocity,
+    /// Joint acceleration.
+    Acceleration,
+    /// Joint effort.
+    Effort,
+    /// Temperature of the joint.
+    Temperature,
+}
+
+impl fmt::Display for Signal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Signal::Time => "time",
+            Signal::Position => "position",
+            Signal::Velocity => "velocity",
+            Signal::Acceleration => "acceleration",
+            Signal::Effort => "effort",
+            Signal::Temperature => "temperature",
+        })
+    }
+}
+
+/// Names of time columns.
+pub(super) const TIME_NAMES: [&str; 4] = ["t", "time", "timestamp", "stamp"];
+
+/// Names of a signal in groups; a group is looked at only if the ones before it matched nothing.
+pub(super) fn names(signal: Signal) -> &'static [&'static [&'static str]] {
+    match signal {
+        Signal::Time => &[&TIME_NAMES],
+        Signal::Position => &[&["q", "pos", "position", "joint_position"], &["qm", "motor_position"]],
+        Signal::Velocity => &[&["dq", "qd", "v", "vel", "velocity", "joint_velocity"]],
+        Signal::Acceleration => &[&["ddq", "qdd", "a", "acc", "acceleration", "joint_acceleration"]],
+        Signal::Effort => &[&["tau", "effort", "torque", "joint_torque", "joint_effort"], &["u"]],
+        Signal::Temperature => &[&["temp", "temperature", "t"]],
+    }
+}
+
+/// Names of motor currents, used for effort if drive gains are given.
+pub(super) const CURRENT_NAMES: [&str; 4] = ["i", "im", "current", "motor_current"];
+
+/// A column name taken apart: `Q1 [deg]` has stem `q1` and unit `deg`.
+pub(super) struct ColumnName<'a> {
+    pub(super) raw: &'a str,
+    /// Possible readings: the whole name, and for `time_ms` also without the unit.
+    readings: Vec<(String, Option<&'a str>)>,
+}
+
+/// Units that may follow a name after `_`.
+const SUFFIX_UNITS: [&str; 20] = [
+    "s", "sec", "ms", "us", "ns", "rad", "deg", "rev", "m", "mm", "rads", "rpm", "nm", "mnm", "n", "a", "ma",
+    "c", "degc", "k",
+];
+
+impl<'a> ColumnName<'a> {
+    pub(super) fn new(raw: &'a str) -> Self {
+        let name = raw.trim();
+        let bracketed = name
+            .strip_suffix(']')
+            .and_then(|n| n.rsplit_once('['))
+            .or_else(|| name.strip_suffix(')').and_then(|n| n.rsplit_once('(')))
+            .filter(|(stem, inner)| !stem.is_empty() && !inner.trim().bytes().all(|b| b.is_ascii_digit()));
+        let readings = match bracketed {
+            Some((stem, unit)) => vec![(stem.trim().trim_end_matches('_').to_lowercase(), Some(unit.trim()))],
+            None => {
+                let mut readings = vec![(name.to_lowercase(), None)];
+                if let Some((stem, unit)) = name.rsplit_once('_')
+                    && SUFFIX_UNITS.contains(&unit.to_lowercase().as_str())
+                {
+                    readings.push((stem.to_lowercase(), Some(unit)));
+                }
+                readings
+            }
+        };
+        ColumnName { raw, readings }
+    }
+
+    /// The unit of the first reading that `accept` takes; `Some(None)`: taken, no unit.
+    pub(super) fn reading(&self, accept: impl Fn(&str) -> bool) -> Option<Option<&'a str>> {
+        self.readings.iter().find(|(stem, _)| accept(stem)).map(|(_, unit)| *unit)
+    }
+}
+
+/// True if a log's column of this name holds times: `t`, `Time`, `timestamp [ns]`, `time_ms`, ...
+pub fn is_time_name(column: &str) -> bool {
+    ColumnName::new(column).reading(|stem| TIME_NAMES.contains(&stem)).is_some()
+}
+
+/// True if `stem` means `name` of the joint: `q_arm`, `arm_q`, `arm.q`, `q.arm`, ...
+pub(super) fn names_joint(stem: &str, name: &str, joint: &str) -> bool {
+    let joint = joint.to_lowercase();
+    let separated = |first: &str, second: &str| {
+        stem.strip_prefix(first)
+            .and_then(|rest| rest.strip_suffix(second))
+            .is_some_and(|between| matches!(between, "_" | "." | "/" | " " | "-"))
+    };
+    separated(name, &joint) || separated(&joint, name)
+}
+
+/// The number in `q3`, `q_3`, `q[3]`, `q(3)`, `q.3`.
+pub(super) fn number_of(stem: &str, name: &str) -> Option<usize> {
+    let rest = stem.strip_prefix(name)?;
+    let digits = rest
+        .strip_prefix('[')
+        .and_then(|r| r.strip_suffix(']'))
+        .or_else(|| rest.strip_prefix('(').and_then(|r| r.strip_suffix(')')))
+        .or_else(|| rest.strip_prefix(['_', '.', ' ']))
+        .unwrap_or(rest);
+    if digits.is_empty() || !digits.bytes().all(|b| b.is_ascii_digit()) {
+        return None;
+    }
+    digits.parse().ok()
+}

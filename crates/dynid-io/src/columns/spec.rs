@@ -1,0 +1,344 @@
+//! Columns as a configuration states them.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use super::error::MappingError;
+use super::guess::{Finder, GuessOptions, PerJointColumns};
+use super::names::{ColumnName, Signal};
+use super::units::{Conversion, conversion};
+use super::{ColumnMapping, ColumnUse, TimeSource};
+use crate::excerpt::closest;
+
+/// An explicit mapping; signals that it does not mention are found by name as in [`ColumnMapping::guess`].
+#[derive(Clone, Debug, Default, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct MappingSpec {
+    /// Time column.
+    pub time: Option<SignalSpec>,
+    /// Sampling rate, Hz, in place of a time column.
+    pub rate_hz: Option<f64>,
+    /// Positions.
+    pub position: Option<SignalSpec>,
+    /// Velocities.
+    pub velocity: Option<SignalSpec>,
+    /// Accelerations.
+    pub acceleration: Option<SignalSpec>,
+    /// Efforts, or currents with `scale` = drive gain in N m/A.
+    pub effort: Option<SignalSpec>,
+    /// Temperatures.
+    pub temperature: Option<SignalSpec>,
+    /// Other columns, by the names to give them.
+    pub channels: BTreeMap<String, ChannelSpec>,
+    /// Drive gains for current columns found by name, N m/A or N/A, one per joint.
+    pub current_gains: Option<Vec<f64>>,
+    /// Allow joints without columns. Default: off.
+    pub allow_unlogged: bool,
+    /// Accept a log without effort. Default: off.
+    pub allow_no_effort: bool,
+}
+
+/// Columns of one signal: their names alone, or with unit, scale and offset.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(
+    untagged,
+    expecting = "a pattern such as \"q{}\", a list of columns, a table joint -> column, or { columns, unit, scale, offset }"
+)]
+pub enum SignalSpec {
+    /// `{ columns, unit, scale, offset }`: `value = scale · unit · raw + offset`.
+    Full(FullSignal),
+    /// Columns in the unit that their names state, else SI.
+    Names(ColumnNames),
+}
+
+/// Columns with unit, scale and offset.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct FullSignal {
+    /// Columns.
+    pub columns: ColumnNames,
+    /// Unit of the columns. Default: the one in the column's name, else SI.
+    pub unit: Option<Units>,
+    /// Factor per joint, such as a drive gain in N m/A, a gear ratio or -1. Default: 1.
+    pub scale: Option<PerJoint>,
+    /// Offset per joint, added last, SI. Default: 0.
+    pub offset: Option<PerJoint>,
+}
+
+/// Names of a signal's columns.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(untagged)]
+pub enum ColumnNames {
+    /// A pattern: `{}` is the number of the joint (from 1; from 0 if that column exists), `{joint}` its name.
+    Pattern(String),
+    /// One name per joint in joint order; an empty one: not logged.
+    List(Vec<String>),
+    /// Joint to column; joints left out are not logged.
+    Table(BTreeMap<String, String>),
+}
+
+/// One unit for all columns or one per joint.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(untagged)]
+pub enum Units {
+    /// The same for all.
+    One(String),
+    /// One per joint.
+    List(Vec<String>),
+}
+
+/// One number for all joints or one per joint.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(untagged)]
+pub enum PerJoint {
+    /// The same for all.
+    One(f64),
+    /// One per joint.
+    List(Vec<f64>),
+    /// Joint to number; joints left out keep the default.
+    Table(BTreeMap<String, f64>),
+}
+
+/// A column besides the joints' signals: `value = scale · raw + offset`.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct ChannelSpec {
+    /// Column.
+    pub column: String,
+    /// Factor. Default: 1.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// Offset. Default: 0.
+    #[serde(default)]
+    pub offset: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl ColumnMapping {
+    /// Assigns columns as a configuration says, and the rest by name.
+    ///
+    /// # Errors
+    /// [`MappingError`].
+    pub fn from_spec(header: &[String], joints: &[String], spec: &MappingSpec) -> Result<Self, MappingError> {
+        let finder = Finder::new(header, joints);
+        let resolver = Resolver { header, joints };
+        let time = match &spec.time {
+            Some(time) if spec.rate_hz.is_none() => resolver.time(time)?,
+            _ => finder.time(spec.rate_hz)?,
+        };
+        let position = match &spec.position {
+            Some(stated) => {
+                let position = resolver.signal(Signal::Position, stated)?;
+                finder.check_positions(&position, spec.allow_unlogged)?;
+                position
+            }
+            None => finder.position(spec.allow_unlogged)?,
+        };
+        let logged: Vec<bool> = position.iter().map(Option::is_some).collect();
+        let optional = |signal, stated: &Option<SignalSpec>| {
+            let columns = match stated {
+                Some(stated) => Some(resolver.signal(signal, stated)?),
+                None => finder.find(signal)?,
+            };
+            finder.covering(signal, columns, &logged)
+        };
+        let effort = if spec.effort.is_some() {
+            optional(Signal::Effort, &spec.effort)?
+        } else {
+            let options = GuessOptions {
+                current_gains: spec.current_gains.clone(),
+                allow_no_effort: spec.allow_no_effort,
+                ..GuessOptions::default()
+            };
+            finder.effort(&options, &logged)?
+        };
+        let channels = spec.channels.iter().map(|(name, channel)| resolver.channel(name, channel));
+        let mapping = ColumnMapping {
+            joints: joints.to_vec(),
+            velocity: optional(Signal::Velocity, &spec.velocity)?,
+            acceleration: optional(Signal::Acceleration, &spec.acceleration)?,
+            temperature: optional(Signal::Temperature, &spec.temperature)?,
+            effort,
+            channels: channels.collect::<Result<_, _>>()?,
+            time,
+            position,
+        };
+        mapping.check_shared()?;
+        Ok(mapping)
+    }
+}
+
+struct Resolver<'a> {
+    header: &'a [String],
+    joints: &'a [String],
+}
+
+impl Resolver<'_> {
+    fn column(&self, signal: &str, name: &str) -> Result<usize, MappingError> {
+        self.header.iter().position(|h| h == name).ok_or_else(|| MappingError::UnknownColumn {
+            signal: signal.to_owned(),
+            column: name.to_owned(),
+            header: self.header.to_vec(),
+            meant: closest(name, self.header).map(str::to_owned),
+        })
+    }
+
+    fn channel(&self, name: &str, stated: &ChannelSpec) -> Result<(String, ColumnUse), MappingError> {
+        let owner = format!("channel `{name}`");
+        let column = self.column(&owner, &stated.column)?;
+        check_scale(&owner, stated.scale)?;
+        check_offset(&owner, stated.offset)?;
+        let use_ =
+            ColumnUse { column, name: stated.column.clone(), factor: stated.scale, offset: stated.offset };
+        Ok((name.to_owned(), use_))
+    }
+
+    fn time(&self, stated: &SignalSpec) -> Result<TimeSource, MappingError> {
+        let alone = Resolver { header: self.header, joints: &["time".to_owned()] };
+        let mut columns = alone.signal(Signal::Time, stated)?;
+        match columns.pop().flatten() {
+            Some(column) => Ok(TimeSource::Column(column)),
+            None => Err(MappingError::Count { signal: Signal::Time, what: "columns", expected: 1, found: 0 }),
+        }
+    }
+
+    fn signal(&self, signal: Signal, stated: &SignalSpec) -> Result<PerJointColumns, MappingError> {
+        let plain;
+        let full = match stated {
+            SignalSpec::Full(full) => full,
+            SignalSpec::Names(columns) => {
+                plain = FullSignal { columns: columns.clone(), unit: None, scale: None, offset: None };
+                &plain
+            }
+        };
+        let owner = signal.to_string();
+        let names = self.names(signal, &full.columns)?;
+        let scales = self.numbers(signal, "scale", full.scale.as_ref(), 1.0)?;
+        let offsets = self.numbers(signal, "offset", full.offset.as_ref(), 0.0)?;
+        let units = self.units(signal, full.unit.as_ref())?;
+        let mut columns = Vec::with_capacity(names.len());
+        for (k, name) in names.into_iter().enumerate() {
+            let Some(name) = name else {
+                columns.push(None);
+                continue;
+            };
+            let column = self.column(&owner, &name)?;
+            check_scale(&owner, scales[k])?;
+            check_offset(&owner, offsets[k])?;
+            let in_name = ColumnName::new(&name).reading(|_| true).flatten();
+            let conversion = match units[k].or(in_name) {
+                Some(unit) => conversion(signal, unit, &name)?,
+                None => Conversion::IDENTITY,
+            };
+            if conversion.current && full.scale.is_none() {
+                return Err(MappingError::NoGain { column: name });
+            }
+            columns.push(Some(ColumnUse {
+                column,
+                factor: conversion.factor * scales[k],
+                offset: conversion.offset * scales[k] + offsets[k],
+                name,
+            }));
+        }
+        Ok(columns)
+    }
+
+    fn names(&self, signal: Signal, stated: &ColumnNames) -> Result<Vec<Option<String>>, MappingError> {
+        let n = self.joints.len();
+        match stated {
+            ColumnNames::Pattern(pattern) => {
+                if n > 1 && !pattern.contains("{}") && !pattern.contains("{joint}") {
+                    let what = "columns (a pattern needs `{}` or `{joint}`)";
+                    return Err(MappingError::Count { signal, what, expected: n, found: 1 });
+                }
+                let numbered = |k: usize| pattern.replace("{}", &k.to_string());
+                let has = |k: usize| self.header.contains(&numbered(k));
+                let from = usize::from(!(pattern.contains("{}") && has(0) && !has(n)));
+                let named = self.joints.iter().enumerate();
+                Ok(named.map(|(k, joint)| Some(numbered(k + from).replace("{joint}", joint))).collect())
+            }
+            ColumnNames::List(list) if list.len() == n => {
+                Ok(list.iter().map(|c| (!c.is_empty()).then(|| c.clone())).collect())
+            }
+            ColumnNames::List(list) => {
+                Err(MappingError::Count { signal, what: "columns", expected: n, found: list.len() })
+            }
+            ColumnNames::Table(table) => {
+                self.check_joints(signal, table.keys())?;
+                Ok(self.joints.iter().map(|j| table.get(j).cloned()).collect())
+            }
+        }
+    }
+
+    fn numbers(
+        &self,
+        signal: Signal,
+        what: &'static str,
+        stated: Option<&PerJoint>,
+        default: f64,
+    ) -> Result<Vec<f64>, MappingError> {
+        let n = self.joints.len();
+        match stated {
+            None => Ok(vec![default; n]),
+            Some(PerJoint::One(x)) => Ok(vec![*x; n]),
+            Some(PerJoint::List(list)) if list.len() == n => Ok(list.clone()),
+            Some(PerJoint::List(list)) => {
+                Err(MappingError::Count { signal, what, expected: n, found: list.len() })
+            }
+            Some(PerJoint::Table(table)) => {
+                self.check_joints(signal, table.keys())?;
+                Ok(self.joints.iter().map(|j| table.get(j).copied().unwrap_or(default)).collect())
+            }
+        }
+    }
+
+    fn units<'u>(
+        &self,
+        signal: Signal,
+        stated: Option<&'u Units>,
+    ) -> Result<Vec<Option<&'u str>>, MappingError> {
+        let n = self.joints.len();
+        match stated {
+            None => Ok(vec![None; n]),
+            Some(Units::One(unit)) => Ok(vec![Some(unit); n]),
+            Some(Units::List(list)) if list.len() == n => Ok(list.iter().map(|u| Some(u.as_str())).collect()),
+            Some(Units::List(list)) => {
+                Err(MappingError::Count { signal, what: "units", expected: n, found: list.len() })
+            }
+        }
+    }
+
+    fn check_joints<'n>(
+        &self,
+        signal: Signal,
+        mut names: impl Iterator<Item = &'n String>,
+    ) -> Result<(), MappingError> {
+        match names.find(|n| !self.joints.contains(n)) {
+            None => Ok(()),
+            Some(joint) => {
+                let meant = closest(joint, self.joints).map(str::to_owned);
+                Err(MappingError::UnknownJoint { signal, joint: joint.clone(), meant })
+            }
+        }
+    }
+}
+
+fn check_scale(owner: &str, scale: f64) -> Result<(), MappingError> {
+    if scale.is_finite() && scale != 0.0 {
+        return Ok(());
+    }
+    let expected = "a finite number that is not zero";
+    Err(MappingError::Number { owner: owner.to_owned(), what: "scale", expected, found: scale })
+}
+
+fn check_offset(owner: &str, offset: f64) -> Result<(), MappingError> {
+    if offset.is_finite() {
+        return Ok(());
+    }
+    let expected = "a finite number";
+    Err(MappingError::Number { owner: owner.to_owned(), what: "offset", expected, found: offset })
+}

@@ -1,0 +1,249 @@
+//! Faults of logs.
+
+use std::io;
+
+use thiserror::Error;
+
+/// Why a log was refused. Rows are data rows counted from 1, lines are lines of the (decompressed) text.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum LogFileError {
+    /// The operating system would not give the file.
+    #[error("{file}: cannot be read: {error}")]
+    Unreadable {
+        /// File.
+        file: String,
+        /// Reason.
+        error: io::Error,
+    },
+    /// The gzip stream ends too early.
+    #[error("{file}: expected a whole gzip file, found its end after line {line}")]
+    TruncatedGzip {
+        /// File.
+        file: String,
+        /// Last whole line.
+        line: usize,
+    },
+    /// The gzip stream is damaged.
+    #[error("{file}: expected a gzip file, found a damaged stream after line {line}: {reason}")]
+    DamagedGzip {
+        /// File.
+        file: String,
+        /// Last whole line.
+        line: usize,
+        /// What the decoder says.
+        reason: String,
+    },
+    /// More text than the cap.
+    #[error("{file}: expected at most {limit} bytes of text, found more after line {line}")]
+    TooLarge {
+        /// File.
+        file: String,
+        /// Cap, bytes.
+        limit: u64,
+        /// Last whole line.
+        line: usize,
+    },
+    /// A compression ratio that no log has.
+    #[error("{file}: expected text compressed at most {limit}:1, found more after line {line}")]
+    Bomb {
+        /// File.
+        file: String,
+        /// Largest ratio.
+        limit: u64,
+        /// Last whole line.
+        line: usize,
+    },
+    /// A line longer than the cap.
+    #[error("{file}: line {line}: expected at most {limit} bytes, found more")]
+    LongLine {
+        /// File.
+        file: String,
+        /// Line.
+        line: usize,
+        /// Cap, bytes.
+        limit: usize,
+    },
+    /// The file is not text.
+    #[error("{file}: expected text, found {found}")]
+    NotText {
+        /// File.
+        file: String,
+        /// What it looks like.
+        found: &'static str,
+    },
+    /// No header.
+    #[error("{file}: expected a header and rows of numbers, found an empty file")]
+    Empty {
+        /// File.
+        file: String,
+    },
+    /// A header and nothing else.
+    #[error("{file}: expected rows of numbers after the header (line {line}), found none")]
+    NoRows {
+        /// File.
+        file: String,
+        /// Line of the header.
+        line: usize,
+    },
+    /// The first row holds numbers.
+    #[error("{file}: line {line}: expected column names, found numbers `{found}`")]
+    MissingHeader {
+        /// File.
+        file: String,
+        /// Line.
+        line: usize,
+        /// The row.
+        found: String,
+    },
+    /// Too many columns.
+    #[error("{file}: line {line}: expected at most {limit} columns, found {found}")]
+    TooManyColumns {
+        /// File.
+        file: String,
+        /// Line of the header.
+        line: usize,
+        /// Cap.
+        limit: usize,
+        /// Columns.
+        found: usize,
+    },
+    /// Two columns with one name.
+    #[error(
+        "{file}: line {line}: expected every column name once, found `{name}` in columns {first} and {second}"
+    )]
+    DuplicateColumn {
+        /// File.
+        file: String,
+        /// Line of the header.
+        line: usize,
+        /// Name.
+        name: String,
+        /// First column, from 1.
+        first: usize,
+        /// Second column, from 1.
+        second: usize,
+    },
+    /// A row with another number of fields than the header.
+    #[error("{file}: row {row} (line {line}): expected {expected} fields as in the header, found {found}")]
+    FieldCount {
+        /// File.
+        file: String,
+        /// Data row.
+        row: usize,
+        /// Line.
+        line: usize,
+        /// Columns of the header.
+        expected: usize,
+        /// Fields of the row.
+        found: usize,
+    },
+    /// A field that is not a number.
+    #[error("{file}: row {row} (line {line}), column `{column}`: expected a number, found `{found}`")]
+    NotANumber {
+        /// File.
+        file: String,
+        /// Data row.
+        row: usize,
+        /// Line.
+        line: usize,
+        /// Column name.
+        column: String,
+        /// The field.
+        found: String,
+    },
+    /// NaN or infinity.
+    #[error("{file}: row {row} (line {line}), column `{column}`: expected a finite number, found `{found}`")]
+    NotFinite {
+        /// File.
+        file: String,
+        /// Data row.
+        row: usize,
+        /// Line.
+        line: usize,
+        /// Column name.
+        column: String,
+        /// The field.
+        found: String,
+    },
+    /// A number larger than any signal.
+    #[error(
+        "{file}: row {row} (line {line}), column `{column}`: expected a magnitude up to {limit:e}, found `{found}`"
+    )]
+    TooBig {
+        /// File.
+        file: String,
+        /// Data row.
+        row: usize,
+        /// Line.
+        line: usize,
+        /// Column name.
+        column: String,
+        /// Cap.
+        limit: f64,
+        /// The field.
+        found: String,
+    },
+    /// A row range that the log does not have.
+    #[error("{file}: rows {first} to {last}: expected a range within the log's rows, found {found}")]
+    RowRange {
+        /// File.
+        file: String,
+        /// First row asked for.
+        first: usize,
+        /// Last row asked for.
+        last: usize,
+        /// What is wrong.
+        found: String,
+    },
+    /// A column that shall be ignored does not exist.
+    #[error("{file}: column `{column}` to be ignored: expected a column of the header, found none")]
+    UnknownIgnored {
+        /// File.
+        file: String,
+        /// Name.
+        column: String,
+    },
+}
+
+impl LogFileError {
+    /// What to do about it.
+    pub fn hint(&self) -> Option<String> {
+        use LogFileError as E;
+        let hint = match self {
+            E::Unreadable { error, .. } if error.kind() == io::ErrorKind::NotFound => {
+                "check the path of the log"
+            }
+            E::Unreadable { .. } => "check that the path is a file and may be read",
+            E::TruncatedGzip { .. } => "the file is cut off: copy or record it again",
+            E::DamagedGzip { .. } => "test it with `gzip -t`; copy or record it again",
+            E::TooLarge { .. } => "split the log, read a range of rows, or raise the cap on the text's size",
+            E::Bomb { .. } => "this is not a log; if it is, decompress it first",
+            E::LongLine { .. } => "the file has no line ends where a CSV has them",
+            E::NotText { .. } => "export the log as CSV in UTF-8",
+            E::Empty { .. } => "the first line names the columns, such as `t,q1,q2,tau1,tau2`",
+            E::NoRows { .. } => "the recording may have failed",
+            E::MissingHeader { .. } => "add a first line with names, such as `t,q1,q2,tau1,tau2`",
+            E::TooManyColumns { .. } => "check the delimiter",
+            E::DuplicateColumn { .. } => "rename one of them",
+            E::FieldCount { found, expected, .. } if found < expected => {
+                "the row is cut off, or the delimiter differs from the header's"
+            }
+            E::FieldCount { .. } => "a decimal comma or a comma inside a field splits it",
+            E::NotANumber { found, .. } if found.is_empty() => {
+                "a value is missing: fill it or remove the row, or ignore the column"
+            }
+            E::NotANumber { found, .. } if is_decimal_comma(found) => "use a point as decimal mark",
+            E::NotANumber { .. } => "correct the field, or ignore the column if it is not a signal",
+            E::NotFinite { .. } => "remove the row or limit the range of rows, or ignore the column",
+            E::TooBig { .. } => "a sentinel or a damaged value: remove the row, or ignore the column",
+            E::RowRange { .. } => "rows are counted from 1 after the header, the last one included",
+            E::UnknownIgnored { .. } => "use a name of the header",
+        };
+        Some(hint.to_owned())
+    }
+}
+
+fn is_decimal_comma(field: &str) -> bool {
+    field.contains(',') && field.replacen(',', ".", 1).parse::<f64>().is_ok()
+}

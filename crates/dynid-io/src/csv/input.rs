@@ -1,0 +1,112 @@
+//! Bytes of a log, decompressed if need be, within bounds.
+
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek};
+use std::path::Path;
+
+use flate2::read::MultiGzDecoder;
+
+/// Buffer between the file and the decoder, bytes.
+const BUFFER_BYTES: usize = 1 << 16;
+
+/// What stops the reading of bytes.
+pub(super) enum InputFault {
+    /// The operating system.
+    Unreadable(io::Error),
+    /// The gzip stream ends early.
+    Truncated,
+    /// The gzip stream is damaged.
+    Damaged(io::Error),
+    /// More text than allowed.
+    TooLarge,
+    /// Compressed harder than allowed.
+    Bomb,
+}
+
+/// Bounds of the text.
+#[derive(Clone, Copy)]
+pub(super) struct Bounds {
+    pub(super) max_bytes: u64,
+    pub(super) max_ratio: u64,
+    pub(super) ratio_grace: u64,
+}
+
+pub(super) struct Input {
+    stream: Stream,
+    bounds: Bounds,
+    text_bytes: u64,
+}
+
+enum Stream {
+    Plain(File),
+    Gzip(Box<MultiGzDecoder<Counted>>),
+}
+
+/// Counts the compressed bytes.
+struct Counted {
+    inner: BufReader<File>,
+    bytes: u64,
+}
+
+impl Read for Counted {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let n = self.inner.read(buffer)?;
+        self.bytes += n as u64;
+        Ok(n)
+    }
+}
+
+impl Input {
+    /// Opens a file; gzip is told by its first two bytes.
+    pub(super) fn open(path: &Path, bounds: Bounds) -> io::Result<Self> {
+        let mut file = File::open(path)?;
+        if file.metadata()?.is_dir() {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
+        let mut magic = Vec::with_capacity(2);
+        (&mut file).take(2).read_to_end(&mut magic)?;
+        file.rewind()?;
+        let stream = if magic == [0x1f, 0x8b] {
+            let inner = BufReader::with_capacity(BUFFER_BYTES, file);
+            Stream::Gzip(Box::new(MultiGzDecoder::new(Counted { inner, bytes: 0 })))
+        } else {
+            Stream::Plain(file)
+        };
+        Ok(Input { stream, bounds, text_bytes: 0 })
+    }
+
+    /// Reads text into the buffer; 0 at the end.
+    pub(super) fn read(&mut self, buffer: &mut [u8]) -> Result<usize, InputFault> {
+        let n = loop {
+            let result = match &mut self.stream {
+                Stream::Plain(file) => file.read(buffer),
+                Stream::Gzip(decoder) => decoder.read(buffer),
+            };
+            match (result, &self.stream) {
+                (Ok(n), _) => break n,
+                (Err(e), _) if e.kind() == io::ErrorKind::Interrupted => {}
+                (Err(e), Stream::Plain(_)) => return Err(InputFault::Unreadable(e)),
+                (Err(e), Stream::Gzip(_)) => {
+                    return Err(match e.kind() {
+                        io::ErrorKind::UnexpectedEof => InputFault::Truncated,
+                        io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData | io::ErrorKind::Other => {
+                            InputFault::Damaged(e)
+                        }
+                        _ => InputFault::Unreadable(e),
+                    });
+                }
+            }
+        };
+        self.text_bytes += n as u64;
+        if self.text_bytes > self.bounds.max_bytes {
+            return Err(InputFault::TooLarge);
+        }
+        if let Stream::Gzip(decoder) = &self.stream
+            && self.text_bytes > self.bounds.ratio_grace
+            && self.text_bytes / decoder.get_ref().bytes.max(1) >= self.bounds.max_ratio
+        {
+            return Err(InputFault::Bomb);
+        }
+        Ok(n)
+    }
+}

@@ -1,0 +1,12 @@
+//! Logs as CSV, plain or gzip-compressed.
+
+mod error;
+mod input;
+mod lines;
+mod number;
+mod read;
+mod write;
+
+pub use error::LogFileError;
+pub use read::{Delimiter, ReadOptions, Table, read};
+pub use write::{RowWriter, write};

@@ -1,0 +1,138 @@
+//! The writer of states, efforts and logs.
+
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+
+use crate::output::{AtomicFile, OutputError};
+
+/// Writes columns under a header; see [`RowWriter`].
+///
+/// # Errors
+/// [`OutputError`]; nothing is left behind.
+pub fn write<H: AsRef<str>, C: AsRef<[f64]>>(
+    path: impl AsRef<Path>,
+    header: &[H],
+    columns: &[C],
+) -> Result<(), OutputError> {
+    let file = path.as_ref().display().to_string();
+    if header.len() != columns.len() {
+        let (expected, found) = (header.len(), columns.len());
+        return Err(OutputError::Shape { file, what: "columns".to_owned(), expected, found });
+    }
+    let rows = columns.first().map_or(0, |c| c.as_ref().len());
+    if let Some((name, column)) = header.iter().zip(columns).find(|(_, c)| c.as_ref().len() != rows) {
+        let what = format!("rows of column `{}`", name.as_ref());
+        return Err(OutputError::Shape { file, what, expected: rows, found: column.as_ref().len() });
+    }
+    let mut writer = RowWriter::create(path, header)?;
+    let mut row = vec![0.0; columns.len()];
+    for k in 0..rows {
+        for (x, column) in row.iter_mut().zip(columns) {
+            *x = column.as_ref()[k];
+        }
+        writer.row(&row)?;
+    }
+    writer.finish()
+}
+
+/// Writes rows one by one into a temporary file that [`RowWriter::finish`] renames to its name.
+///
+/// Numbers are written in the shortest form that reads back to the same `f64`; names ending in `.gz` are compressed.
+/// Dropped unfinished, the file is removed.
+pub struct RowWriter {
+    sink: Sink,
+    file: String,
+    header: Vec<String>,
+    rows: usize,
+}
+
+enum Sink {
+    Plain(BufWriter<AtomicFile>),
+    Gzip(Box<GzEncoder<BufWriter<AtomicFile>>>),
+}
+
+impl RowWriter {
+    /// Opens the temporary file and writes the header.
+    ///
+    /// # Errors
+    /// [`OutputError::Unwritable`].
+    pub fn create<H: AsRef<str>>(path: impl AsRef<Path>, header: &[H]) -> Result<Self, OutputError> {
+        let path = path.as_ref();
+        let buffered = BufWriter::with_capacity(1 << 16, AtomicFile::create(path)?);
+        let gzip = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+        let sink = if gzip {
+            Sink::Gzip(Box::new(GzEncoder::new(buffered, Compression::default())))
+        } else {
+            Sink::Plain(buffered)
+        };
+        let header: Vec<String> = header.iter().map(|h| h.as_ref().to_owned()).collect();
+        let mut writer = RowWriter { sink, file: path.display().to_string(), header, rows: 0 };
+        let line = writer.header.iter().map(|h| quoted(h)).collect::<Vec<_>>().join(",") + "\n";
+        writer.put(line.as_bytes())?;
+        Ok(writer)
+    }
+
+    /// Writes a row.
+    ///
+    /// # Errors
+    /// [`OutputError`]: another number of values than the header has names, a value that is not finite, a failed write.
+    pub fn row(&mut self, values: &[f64]) -> Result<(), OutputError> {
+        self.rows += 1;
+        if values.len() != self.header.len() {
+            let (file, what) = (self.file.clone(), format!("values of row {}", self.rows));
+            return Err(OutputError::Shape { file, what, expected: self.header.len(), found: values.len() });
+        }
+        let mut line = String::with_capacity(20 * values.len());
+        for (k, x) in values.iter().enumerate() {
+            if !x.is_finite() {
+                let (file, column) = (self.file.clone(), self.header[k].clone());
+                return Err(OutputError::NotFinite { file, row: self.rows, column, found: *x });
+            }
+            if k > 0 {
+                line.push(',');
+            }
+            push_shortest(&mut line, *x);
+        }
+        line.push('\n');
+        self.put(line.as_bytes())
+    }
+
+    /// Makes the file appear under its name.
+    ///
+    /// # Errors
+    /// [`OutputError::Unwritable`].
+    pub fn finish(self) -> Result<(), OutputError> {
+        let fault = |error| OutputError::Unwritable { file: self.file.clone(), error };
+        let buffered = match self.sink {
+            Sink::Plain(buffered) => buffered,
+            Sink::Gzip(encoder) => encoder.finish().map_err(fault)?,
+        };
+        buffered.into_inner().map_err(|e| fault(e.into_error()))?.finish()
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> Result<(), OutputError> {
+        let written = match &mut self.sink {
+            Sink::Plain(sink) => sink.write_all(bytes),
+            Sink::Gzip(sink) => sink.write_all(bytes),
+        };
+        written.map_err(|error| OutputError::Unwritable { file: self.file.clone(), error })
+    }
+}
+
+/// The shortest decimal form of a finite number, with an exponent where zeros would fill the field.
+fn push_shortest(line: &mut String, x: f64) {
+    use std::fmt::Write;
+    let plain = x == 0.0 || (1e-5..1e16).contains(&x.abs());
+    let _ = if plain { write!(line, "{x}") } else { write!(line, "{x:e}") };
+}
+
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"', ';', '\t', '\n', '\r', '#']) {
+        format!("\"{}\"", name.replace('"', "\"\"").replace(['\n', '\r'], " "))
+    } else {
+        name.to_owned()
+    }
+}

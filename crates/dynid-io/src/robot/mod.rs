@@ -1,0 +1,35 @@
+//! Robot files of any kind: the door that looks at the file and picks the reader.
+
+mod error;
+
+use std::path::Path;
+
+pub use error::{Place, RobotFileError};
+
+use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
+use crate::toml_robot::{self, ElementSpec, RobotFile};
+use crate::urdf;
+
+/// Reads a robot file: `.urdf` and `.xml` as URDF, `.toml` as TOML, anything else by its first character.
+///
+/// A URDF carries no element list, so its [`ElementSpec`] is empty.
+///
+/// # Errors
+/// [`RobotFileError`]: the file cannot be read, is too large, or is not a robot.
+pub fn read(path: impl AsRef<Path>) -> Result<RobotFile, RobotFileError> {
+    let path = path.as_ref();
+    let text = read_text(path, MAX_ROBOT_FILE_BYTES)?;
+    let name = path.display().to_string();
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let is_xml = match extension.as_str() {
+        "urdf" | "xml" => true,
+        "toml" => false,
+        "xacro" => return Err(RobotFileError::Xacro { at: Place::start(&name), found: name }),
+        _ => text.trim_start().starts_with('<'),
+    };
+    if is_xml {
+        Ok(RobotFile::plain(urdf::parse(&text, &name)?, ElementSpec::default()))
+    } else {
+        toml_robot::parse(&text, &name)
+    }
+}

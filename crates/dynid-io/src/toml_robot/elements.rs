@@ -1,0 +1,176 @@
+//! What a robot file says about elements at joints, in plain words and numbers.
+//!
+//! Which elements exist and which settings they take is decided by those who build them.
+
+use serde::Deserialize;
+use toml::Value;
+
+use super::Source;
+use super::schema::RobotToml;
+use crate::excerpt::excerpt;
+use crate::robot::RobotFileError;
+
+/// Elements, their settings, and transmissions that couple joints.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ElementSpec {
+    /// Elements of every moving joint: `[defaults] elements`.
+    pub defaults: Vec<String>,
+    /// Elements of single joints in place of the defaults: `[element.<joint>] elements`.
+    pub per_joint: Vec<(String, Vec<String>)>,
+    /// Settings of elements: the other keys of `[element.<joint>]`.
+    pub settings: Vec<ElementSetting>,
+    /// Couplings: `[[coupling]]`.
+    pub couplings: Vec<CouplingSpec>,
+}
+
+/// One setting: `[element.j1] stribeck = { vs = { start = 0.04 } }` has element `stribeck`, key `vs.start`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ElementSetting {
+    /// Joint.
+    pub joint: String,
+    /// Element.
+    pub element: String,
+    /// Path of keys joined by points; empty if the element's key holds the value itself.
+    pub key: String,
+    /// Value.
+    pub value: SettingValue,
+}
+
+/// Value of an element's setting.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SettingValue {
+    /// Number, finite.
+    Number(f64),
+    /// Text.
+    Text(String),
+    /// True or false.
+    Flag(bool),
+    /// Numbers, all finite.
+    Numbers(Vec<f64>),
+    /// Texts.
+    Texts(Vec<String>),
+}
+
+/// A transmission: `q_motor = matrix · q_joint`, `effort_joint = matrixᵀ · effort_motor`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CouplingSpec {
+    /// Names of the motors, one per row.
+    pub motors: Vec<String>,
+    /// Joints, one per column.
+    pub joints: Vec<String>,
+    /// Rows of the matrix.
+    pub matrix: Vec<Vec<f64>>,
+    /// Which parameters stand for the motors' side (spec/elements.md section 5).
+    pub form: CouplingForm,
+}
+
+/// Parameters of a coupling.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum CouplingForm {
+    /// One inertia, viscous and Coulomb parameter per motor, carried through the matrix.
+    #[default]
+    Strict,
+    /// Three extra columns beside the direct terms of the joints, as in the literature on the TX40.
+    Columns,
+}
+
+pub(super) fn build(
+    source: &Source<'_>,
+    robot: &RobotToml,
+    joints: &[&str],
+) -> Result<ElementSpec, RobotFileError> {
+    let mut spec = ElementSpec { defaults: robot.defaults.elements.clone(), ..ElementSpec::default() };
+    for (joint, table) in &robot.element {
+        source.known("element", "joint", joint, joints)?;
+        let offset = table.span().start;
+        for (element, value) in table.get_ref() {
+            if element == "elements" {
+                let list = value.as_array().and_then(|a| texts(a));
+                let list = list.ok_or_else(|| {
+                    let owner = format!("element.{joint}");
+                    source.value(offset, &owner, "elements", "a list of names", &value.to_string())
+                })?;
+                spec.per_joint.push((joint.clone(), list));
+            } else {
+                let mut path = Path { source, offset, joint, element, out: &mut spec.settings };
+                path.flatten("", value)?;
+            }
+        }
+    }
+    for coupling in &robot.coupling {
+        let (offset, c) = (coupling.span().start, coupling.get_ref());
+        for joint in &c.joints {
+            source.known("coupling", "joint", joint, joints)?;
+        }
+        let rows_fit = c.matrix.len() == c.motors.len();
+        if c.motors.is_empty() || !rows_fit || c.matrix.iter().any(|r| r.len() != c.joints.len()) {
+            let expected = format!("{} rows (motors) of {} numbers (joints)", c.motors.len(), c.joints.len());
+            let rows: Vec<usize> = c.matrix.iter().map(Vec::len).collect();
+            let found = format!("rows of {rows:?} numbers");
+            return Err(source.value(offset, "coupling", "matrix", &expected, &found));
+        }
+        spec.couplings.push(CouplingSpec {
+            motors: c.motors.clone(),
+            joints: c.joints.clone(),
+            matrix: c.matrix.iter().map(|r| r.iter().map(|x| x.0).collect()).collect(),
+            form: c.form,
+        });
+    }
+    Ok(spec)
+}
+
+fn texts(list: &[Value]) -> Option<Vec<String>> {
+    list.iter().map(|v| v.as_str().map(str::to_owned)).collect()
+}
+
+fn number(value: &Value) -> Option<f64> {
+    let x = value.as_float().or_else(|| value.as_integer().map(|i| i as f64))?;
+    x.is_finite().then_some(x)
+}
+
+/// Flattens nested tables of settings.
+struct Path<'a, 'o> {
+    source: &'a Source<'a>,
+    offset: usize,
+    joint: &'a str,
+    element: &'a str,
+    out: &'o mut Vec<ElementSetting>,
+}
+
+impl Path<'_, '_> {
+    fn flatten(&mut self, key: &str, value: &Value) -> Result<(), RobotFileError> {
+        let setting = match value {
+            // TOML's parser bounds the nesting, and with it this recursion.
+            Value::Table(table) => {
+                for (inner, value) in table {
+                    let path = if key.is_empty() { inner.clone() } else { format!("{key}.{inner}") };
+                    self.flatten(&path, value)?;
+                }
+                return Ok(());
+            }
+            Value::Integer(_) | Value::Float(_) => number(value).map(SettingValue::Number),
+            Value::String(text) => Some(SettingValue::Text(text.clone())),
+            Value::Boolean(flag) => Some(SettingValue::Flag(*flag)),
+            Value::Array(list) => {
+                let numbers: Option<Vec<f64>> = list.iter().map(number).collect();
+                numbers.map(SettingValue::Numbers).or_else(|| texts(list).map(SettingValue::Texts))
+            }
+            Value::Datetime(_) => None,
+        };
+        let Some(setting) = setting else {
+            let owner = format!("element.{}", excerpt(self.joint));
+            let field =
+                if key.is_empty() { self.element.to_owned() } else { format!("{}.{key}", self.element) };
+            let expected = "finite numbers, texts, true or false, or lists of numbers or texts";
+            return Err(self.source.value(self.offset, &owner, &field, expected, &value.to_string()));
+        };
+        self.out.push(ElementSetting {
+            joint: self.joint.to_owned(),
+            element: self.element.to_owned(),
+            key: key.to_owned(),
+            value: setting,
+        });
+        Ok(())
+    }
+}

@@ -1,0 +1,237 @@
+//! Robots in TOML: DH tables, body trees, or a URDF with an element list.
+
+mod bodies;
+mod dh;
+mod elements;
+mod number;
+mod schema;
+
+use std::path::Path;
+
+use dynid_model::{Description, Inertia, Mat3, Vec3};
+
+pub use elements::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, SettingValue};
+
+use crate::excerpt::{closest, excerpt};
+use crate::robot::{Place, RobotFileError};
+use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
+use crate::urdf;
+use schema::{BodyInertia, RobotToml};
+
+/// A robot file: the mechanism and what the file says about the elements at its joints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RobotFile {
+    /// Links and joints.
+    pub description: Description,
+    /// Elements, their settings and couplings.
+    pub elements: ElementSpec,
+    /// Actuated joints; `None` if the file does not say (all of them).
+    pub actuated: Option<Vec<String>>,
+    /// Home position of joints, rad or m, sorted by name.
+    pub home: Vec<(String, f64)>,
+    /// Path of the URDF that holds the tree, if the file is a URDF or refers to one.
+    pub urdf: Option<String>,
+}
+
+impl RobotFile {
+    /// A description without anything besides.
+    pub fn plain(description: Description, elements: ElementSpec) -> Self {
+        RobotFile { description, elements, actuated: None, home: Vec::new(), urdf: None }
+    }
+}
+
+/// Reads a robot in TOML of at most 64 MiB. See [`parse`].
+///
+/// # Errors
+/// [`RobotFileError`].
+pub fn read(path: impl AsRef<Path>) -> Result<RobotFile, RobotFileError> {
+    let path = path.as_ref();
+    parse(&read_text(path, MAX_ROBOT_FILE_BYTES)?, &path.display().to_string())
+}
+
+/// Reads a robot in TOML; `source_name` stands in messages, and its folder is where `urdf = "..."` is looked for.
+///
+/// One of three forms: `joint = [..]` (DH rows, see below), `body = [..]` (a tree), `urdf = "file"`. Lengths m, angles
+/// rad or text such as `"90deg"`. Keys of every form: `schema` (1), `name`, `gravity` (m/s², base axes),
+/// `floating_base`, `couple_mimics`, `actuated`, `home`, `[defaults]`, `[element.<joint>]`, `[[coupling]]`. Unknown keys
+/// are errors.
+///
+/// DH rows (`dh = "modified"` or `"standard"`): `name`, `link` (default `link<k>`), `a`, `alpha`, `d`, `offset`, `kind`
+/// (`revolute`, `continuous`, `prismatic`), `limits`, and the inertia as `phi` (order m, mx, my, mz, Ixx, Ixy, Ixz, Iyy,
+/// Iyz, Izz about the joint frame) or `mass`, `com`, `inertia_com`; axis z. The first parent is the link `base`.
+///
+/// - Modified (Craig 1986): `P_i = Rx(alpha) Tx(a) Tz(d) Rz(offset)` with `a`, `alpha` of index i-1 in row i;
+///   prismatic: `P_i = Rx(alpha) Tx(a) Rz(theta) Tz(offset)`.
+/// - Standard: `T_i = Rz(q + offset) Tz(d) Tx(a) Rx(alpha)`. The joint frame is the table's frame i-1 turned by its angle:
+///   `P_1 = Rz(offset_1)`, `P_{i+1} = Tz(d_i) Tx(a_i) Rx(alpha_i) Rz(offset_{i+1})`; prismatic:
+///   `P_i = (previous tail) Rz(theta_i) Tz(offset_i)`, tail `Tx(a_i) Rx(alpha_i)`. Inertias are about the joint frame;
+///   `frame = "distal"` states them about the table's frame i, and they are shifted by the tail. The last tail is the
+///   massless fixed link `tool`.
+/// - `tool = { xyz, rpy }` adds a massless fixed link `tool` to the last link (behind the tail, if there is one).
+///
+/// # Errors
+/// [`RobotFileError`] with line and column. `loop` and `floating` are refused as not supported yet.
+pub fn parse(text: &str, source_name: &str) -> Result<RobotFile, RobotFileError> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let robot: RobotToml = toml::from_str(text).map_err(|e| syntax(text, source_name, &e))?;
+    let source = Source { text, file: source_name };
+    for (key, value) in [("loop", &robot.loops), ("floating", &robot.floating)] {
+        if let Some(value) = value {
+            let (at, key) = (source.place(value.span().start), key.to_owned());
+            return Err(RobotFileError::Unsupported { at, key, feature: "loops" });
+        }
+    }
+    let mut urdf_path = None;
+    let mut description = match (&robot.joint, &robot.body, &robot.urdf) {
+        (Some(rows), None, None) => dh::build(&source, &robot, rows)?,
+        (None, Some(bodies), None) => bodies::build(&source, bodies)?,
+        (None, None, Some(file)) => {
+            let folder = Path::new(source_name).parent().unwrap_or(Path::new(""));
+            let path = folder.join(file.get_ref());
+            urdf_path = Some(path.display().to_string());
+            urdf::read(path)?
+        }
+        (None, None, None) => {
+            let expected = "one of the keys `joint`, `body`, `urdf`".to_owned();
+            return Err(RobotFileError::Missing { at: source.place(0), owner: "robot".to_owned(), expected });
+        }
+        _ => {
+            let at = source.place(0);
+            let what = "a description (one of the keys `joint`, `body`, `urdf`)".to_owned();
+            return Err(RobotFileError::Repeated { at, owner: "robot".to_owned(), what });
+        }
+    };
+    check_dh_keys(&source, &robot)?;
+    if let Some(name) = &robot.name {
+        description.name.clone_from(name);
+    }
+    if let Some(gravity) = robot.gravity {
+        description.gravity = gravity.map(|x| x.0);
+    }
+    description.floating_base = robot.floating_base;
+    description.couple_mimics = robot.couple_mimics;
+    let joints: Vec<&str> = description.joints.iter().map(|j| j.name.as_str()).collect();
+    let elements = elements::build(&source, &robot, &joints)?;
+    for name in robot.actuated.iter().flatten() {
+        source.known("actuated", "joint", name, &joints)?;
+    }
+    let mut home = Vec::new();
+    for (name, value) in robot.home.iter().flatten() {
+        source.known("home", "joint", name, &joints)?;
+        home.push((name.clone(), value.0));
+    }
+    Ok(RobotFile { elements, actuated: robot.actuated, home, urdf: urdf_path, description })
+}
+
+/// `dh` and `tool` belong to DH tables.
+fn check_dh_keys(source: &Source<'_>, robot: &RobotToml) -> Result<(), RobotFileError> {
+    let dh = robot.dh.as_ref().map(|x| ("dh", x.span().start));
+    let tool = robot.tool.as_ref().map(|x| ("tool", x.span().start));
+    match dh.or(tool) {
+        Some((key, offset)) if robot.joint.is_none() => Err(RobotFileError::Value {
+            at: source.place(offset),
+            owner: "robot".to_owned(),
+            field: key.to_owned(),
+            expected: "this key only beside DH rows (`joint = [..]`)".to_owned(),
+            found: key.to_owned(),
+        }),
+        _ => Ok(()),
+    }
+}
+
+fn syntax(text: &str, file: &str, error: &toml::de::Error) -> RobotFileError {
+    let at = Place::of(file, text, error.span().map_or(0, |s| s.start));
+    let message = error.message().lines().collect::<Vec<_>>().join("; ");
+    RobotFileError::Syntax { at, message }
+}
+
+/// The text that spans refer to.
+struct Source<'a> {
+    text: &'a str,
+    file: &'a str,
+}
+
+impl Source<'_> {
+    fn place(&self, offset: usize) -> Place {
+        Place::of(self.file, self.text, offset)
+    }
+
+    fn value(&self, offset: usize, owner: &str, field: &str, expected: &str, found: &str) -> RobotFileError {
+        RobotFileError::Value {
+            at: self.place(offset),
+            owner: owner.to_owned(),
+            field: field.to_owned(),
+            expected: expected.to_owned(),
+            found: excerpt(found),
+        }
+    }
+
+    fn known(
+        &self,
+        context: &str,
+        kind: &'static str,
+        name: &str,
+        known: &[&str],
+    ) -> Result<(), RobotFileError> {
+        if known.contains(&name) {
+            return Ok(());
+        }
+        Err(RobotFileError::UnknownName {
+            file: self.file.to_owned(),
+            context: context.to_owned(),
+            kind,
+            name: excerpt(name),
+            meant: closest(name, known).map(str::to_owned),
+        })
+    }
+
+    /// The inertia that a row or body states: `phi`, or `mass`, `com`, `inertia_com`, or neither.
+    fn inertia(
+        &self,
+        offset: usize,
+        owner: &str,
+        stated: &BodyInertia,
+    ) -> Result<Option<Inertia>, RobotFileError> {
+        let missing = |expected: &str| RobotFileError::Missing {
+            at: self.place(offset),
+            owner: owner.to_owned(),
+            expected: expected.to_owned(),
+        };
+        let inertia = match (&stated.phi, &stated.mass, &stated.com, &stated.inertia_com) {
+            (None, None, None, None) => return Ok(None),
+            (Some(phi), None, None, None) => Inertia(phi.map(|x| x.0)),
+            (Some(_), ..) => {
+                let (at, owner) = (self.place(offset), owner.to_owned());
+                let what = "an inertia (`phi`, or `mass` with `com` and `inertia_com`)".to_owned();
+                return Err(RobotFileError::Repeated { at, owner, what });
+            }
+            (None, Some(mass), com, tensor) => {
+                let [xx, xy, xz, yy, yz, zz] = tensor.unwrap_or_default().map(|x| x.0);
+                let tensor = Mat3::from_rows([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
+                Inertia::from_com(mass.0, Vec3(com.unwrap_or_default().map(|x| x.0)), &tensor)
+            }
+            (None, None, ..) => return Err(missing("`mass` beside `com` and `inertia_com`")),
+        };
+        if inertia.0.iter().all(|x| x.is_finite()) {
+            Ok(Some(inertia))
+        } else {
+            Err(self.value(offset, owner, "inertia", "numbers that do not overflow", "too large numbers"))
+        }
+    }
+
+    /// Names of rows or bodies, each once.
+    fn unique<'n>(
+        &self,
+        kind: &'static str,
+        names: impl Iterator<Item = (usize, &'n str)>,
+    ) -> Result<(), RobotFileError> {
+        let mut seen = std::collections::HashMap::new();
+        for (offset, name) in names {
+            if let Some(first) = seen.insert(name, offset) {
+                let (at, first_line) = (self.place(offset), self.place(first).line);
+                return Err(RobotFileError::Duplicate { at, kind, name: excerpt(name), first_line });
+            }
+        }
+        Ok(())
+    }
+}

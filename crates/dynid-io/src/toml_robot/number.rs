@@ -1,0 +1,72 @@
+//! Finite numbers and angles in TOML.
+
+use std::fmt;
+
+use serde::de::{Deserialize, Deserializer, Error, Unexpected, Visitor};
+
+/// A finite number.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Number(pub(super) f64);
+
+/// A finite number, or an angle as text with its unit; rad.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Angle(pub(super) f64);
+
+/// Visits numbers; with `angles` also texts such as `"90deg"`.
+struct NumberVisitor {
+    angles: bool,
+}
+
+impl Visitor<'_> for NumberVisitor {
+    type Value = f64;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.angles {
+            "a finite number (rad, m) or an angle like \"90deg\""
+        } else {
+            "a finite number"
+        })
+    }
+
+    fn visit_f64<E: Error>(self, x: f64) -> Result<f64, E> {
+        if x.is_finite() { Ok(x) } else { Err(E::invalid_value(Unexpected::Float(x), &self)) }
+    }
+
+    fn visit_i64<E: Error>(self, x: i64) -> Result<f64, E> {
+        Ok(x as f64)
+    }
+
+    fn visit_u64<E: Error>(self, x: u64) -> Result<f64, E> {
+        Ok(x as f64)
+    }
+
+    fn visit_str<E: Error>(self, text: &str) -> Result<f64, E> {
+        let angle = if self.angles { angle(text) } else { None };
+        angle.ok_or_else(|| E::invalid_value(Unexpected::Str(text), &self))
+    }
+}
+
+/// `"90deg"`, `"-90 deg"`, `"1.5rad"` in rad.
+fn angle(text: &str) -> Option<f64> {
+    let text = text.trim();
+    let (number, degrees) = match (text.strip_suffix("deg"), text.strip_suffix("rad")) {
+        (Some(number), _) => (number, true),
+        (None, Some(number)) => (number, false),
+        (None, None) => return None,
+    };
+    let x: f64 = number.trim().parse().ok()?;
+    let x = if degrees { x.to_radians() } else { x };
+    x.is_finite().then_some(x)
+}
+
+impl<'de> Deserialize<'de> for Number {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(NumberVisitor { angles: false }).map(Number)
+    }
+}
+
+impl<'de> Deserialize<'de> for Angle {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(NumberVisitor { angles: true }).map(Angle)
+    }
+}

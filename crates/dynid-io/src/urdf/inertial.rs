@@ -1,0 +1,44 @@
+//! `<inertial>` as text.
+
+use dynid_model::Inertia;
+
+/// Centre of mass (m) and tensor about it (kg m²), as URDF states a body.
+pub(super) struct Inertial {
+    mass: f64,
+    com: [f64; 3],
+    tensor: [[f64; 3]; 3],
+}
+
+impl Inertial {
+    /// Splits the parameters about the frame origin; `Err` says why URDF cannot state them.
+    pub(super) fn of(inertia: &Inertia) -> Result<Self, String> {
+        if !inertia.0.iter().all(|x| x.is_finite()) {
+            return Err("a parameter is not finite".to_owned());
+        }
+        let split = match inertia.about_com() {
+            Some((com, about_com)) => Inertial { mass: inertia.mass(), com: com.0, tensor: about_com.rows() },
+            None if inertia.first_moment().0 == [0.0; 3] => {
+                Inertial { mass: 0.0, com: [0.0; 3], tensor: inertia.tensor().rows() }
+            }
+            None => return Err("it has a first moment but no mass, so no centre of mass".to_owned()),
+        };
+        let finite = split.com.iter().chain(split.tensor.iter().flatten()).all(|x| x.is_finite());
+        finite.then_some(split).ok_or_else(|| "its centre of mass is too far away for a number".to_owned())
+    }
+
+    /// The element over several lines; the first line is not indented, the others by `indent` and two spaces a level.
+    pub(super) fn element(&self, indent: &str, newline: &str) -> String {
+        let Inertial { mass, com: [x, y, z], tensor: [[xx, xy, xz], [_, yy, yz], [_, _, zz]] } = self;
+        [
+            "<inertial>".to_owned(),
+            format!("{indent}  <origin xyz=\"{x:?} {y:?} {z:?}\" rpy=\"0 0 0\"/>"),
+            format!("{indent}  <mass value=\"{mass:?}\"/>"),
+            format!(
+                "{indent}  <inertia ixx=\"{xx:?}\" ixy=\"{xy:?}\" ixz=\"{xz:?}\" iyy=\"{yy:?}\" iyz=\"{yz:?}\" \
+                 izz=\"{zz:?}\"/>"
+            ),
+            format!("{indent}</inertial>"),
+        ]
+        .join(newline)
+    }
+}
