@@ -146,6 +146,7 @@ fn broken_toml_robots() {
     let dh = "dh = \"modified\"\n";
     let cases: Vec<(String, Vec<&str>, &str)> = vec![
         (String::new(), vec!["r.toml:1:1", "`joint`, `body`, `urdf`"], "add"),
+        (format!("home = {}", "[".repeat(100_000)), vec!["r.toml:1:"], ""),
         ("name = ".into(), vec!["r.toml:1:"], ""),
         ("nmae = \"x\"".into(), vec!["r.toml:1:1", "unknown field `nmae`"], "misspelt"),
         ("schema = 2".into(), vec!["r.toml:1:10", "expected 1, found 2"], ""),
