@@ -5,6 +5,7 @@
 //!
 //! | question | module |
 //! |---|---|
+//! | from logs to rows: kernel, mask, delay | [`conditioning`] |
 //! | reduce rows of `[W y]`, merge, scale, choose columns | [`factor`] |
 //! | which columns are excited, which depend on others | [`rank`] |
 //! | ordinary, weighted and ridge least squares | [`linear`] |
@@ -17,6 +18,7 @@
 //! Notation: `W` is the regressor (rows × `p` columns), `y` the effort, `x` the parameters,
 //! `(R, z, ρ, N)` a factor. Results do not depend on the number of threads.
 
+pub mod conditioning;
 pub mod covariance;
 pub mod distribution;
 pub mod elimination;

@@ -167,6 +167,11 @@ pub trait EffortModel: Send + Sync {
     fn channels(&self) -> &[String];
     /// Number of entries of the position vector, number of rates.
     fn dimensions(&self) -> (usize, usize);
+    /// Speeds whose change of sign spoils rows of an output: combinations `Σ factor · rate` that a sign is taken of.
+    /// By default the output's own rate.
+    fn reversal_speeds(&self, output: usize) -> Vec<Vec<(usize, f64)>> {
+        vec![vec![(output, 1.0)]]
+    }
     /// Fills `out` with the regressor and the offset of all samples of a block.
     ///
     /// # Panics

@@ -157,6 +157,18 @@ impl EffortModel for RobotModel {
         (self.mechanism.positions(), self.mechanism.rates())
     }
 
+    fn reversal_speeds(&self, output: usize) -> Vec<Vec<(usize, f64)>> {
+        let mut speeds = vec![vec![(output, 1.0)]];
+        for placed in &self.elements {
+            for speed in placed.element.reversal_speeds() {
+                if speed.iter().any(|(rate, _)| *rate == output) {
+                    speeds.push(speed);
+                }
+            }
+        }
+        speeds
+    }
+
     fn regressor(&self, motion: &MotionBlock<'_>, shape: &[f64], out: &mut RegressorBlock) {
         assert_eq!(shape.len(), self.parameters.shape.len(), "length of shape");
         out.start(&self.layout, motion.samples);

@@ -86,6 +86,10 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     fn channels(&self, _joints: &[JointInfo]) -> Vec<String> {
         Vec::new()
     }
+    /// Combinations `Σ factor · rate`, besides single rates, whose sign the element takes.
+    fn reversal_speeds(&self) -> Vec<Vec<(usize, f64)>> {
+        Vec::new()
+    }
     /// Fills the columns of all entries.
     fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, shape: &[f64], out: &mut ElementColumns<'_>);
 }

@@ -48,6 +48,12 @@ impl JointElement for Transmission {
             .map(|(j, k)| (self.joints[j], k))
             .collect()
     }
+    fn reversal_speeds(&self) -> Vec<Vec<(usize, f64)>> {
+        (0..self.motors.len())
+            .map(|m| self.acting(m).into_iter().map(|j| (self.joints[j], self.matrix[m][j])).collect())
+            .filter(|speed: &Vec<(usize, f64)>| speed.len() > 1)
+            .collect()
+    }
     fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         let mut entry = 0;
         for (m, row) in self.matrix.iter().enumerate() {
@@ -98,6 +104,9 @@ impl JointElement for CoupledWrist {
     }
     fn entries(&self) -> Vec<(usize, usize)> {
         (0..3).flat_map(|k| [(self.a, k), (self.b, k)]).collect()
+    }
+    fn reversal_speeds(&self) -> Vec<Vec<(usize, f64)>> {
+        vec![vec![(self.a, self.ratio), (self.b, 1.0)]]
     }
     fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         let k = self.ratio;

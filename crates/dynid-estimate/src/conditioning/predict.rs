@@ -1,0 +1,41 @@
+//! Effort that a fitted model predicts on a log.
+
+use dynid_model::{EffortModel, RegressorBlock};
+use dynid_motion::shift;
+
+use super::states::States;
+use super::{ConditioningError, ConditioningSettings, PreparedLog};
+
+/// Predicted effort of every output at every sample of a log: states at `state_hz`, effort model, then the logged effort's
+/// lead of `delay_samples`.
+///
+/// `linear`: all linear parameters of the model.
+pub fn predict(
+    model: &dyn EffortModel,
+    shape: &[f64],
+    linear: &[f64],
+    log: &PreparedLog,
+    state_hz: f64,
+    delay_samples: f64,
+    settings: &ConditioningSettings,
+) -> Result<Vec<Vec<f64>>, ConditioningError> {
+    const BLOCK: usize = 2048;
+    let cutoff = state_hz.min(settings.cutoff.state_rate * log.rate_hz);
+    let states = States::new(log, cutoff, settings)?;
+    let outputs = model.outputs().len();
+    let mut predicted = vec![Vec::with_capacity(log.samples()); outputs];
+    let mut block = RegressorBlock::new(model.layout().clone(), BLOCK);
+    for start in (0..log.samples()).step_by(BLOCK) {
+        let range = start..(start + BLOCK).min(log.samples());
+        states.with_block(range, &log.channels, |motion| model.regressor(motion, shape, &mut block));
+        for (output, out) in predicted.iter_mut().enumerate() {
+            out.extend(block.effort(output, linear));
+        }
+    }
+    if delay_samples != 0.0 {
+        for p in &mut predicted {
+            *p = shift::shift(p, delay_samples)?.values;
+        }
+    }
+    Ok(predicted)
+}

@@ -1,0 +1,230 @@
+//! Fits for choices: one pass over the logs, then any number of fits with other masks, delays and columns.
+
+use super::gram::{Classes, Gram, GramConsumer, Group, Lags, RowClass, rss, solve};
+use super::rows::{KeptColumns, Kernels, PROBES, Pass, masks};
+use super::states::States;
+use super::{ConditioningError, ConditioningSettings, PreparedLog};
+use dynid_model::EffortModel;
+use dynid_motion::cutoff::{kernel_scales, state_cutoff};
+
+/// Sums of one kernel candidate.
+pub(crate) struct Trial {
+    pub(crate) kernel_hz: f64,
+    pub(crate) state_hz: Vec<f64>,
+    pub(crate) scales_hz: Vec<f64>,
+    pub(crate) lags: Lags,
+    columns: KeptColumns,
+    /// Per output.
+    classes: Vec<Classes>,
+    /// Per output and rung: share of samples that stay usable.
+    pub(crate) coverage: Vec<Vec<f64>>,
+    folds: usize,
+}
+
+/// What a fit uses.
+#[derive(Debug, Clone)]
+pub(crate) struct Choice {
+    /// Per output: rung of the mask ladder, 0 = no mask.
+    pub(crate) rung: Vec<usize>,
+    /// Delay, samples.
+    pub(crate) delay: f64,
+    /// With the probe columns.
+    pub(crate) rich: bool,
+    /// With one unknown per output for the rest of the delay.
+    pub(crate) free_delay: bool,
+}
+
+impl Trial {
+    /// Runs over all logs with one kernel.
+    #[expect(clippy::too_many_arguments, reason = "one call site; the arguments are the whole problem")]
+    pub(crate) fn new(
+        model: &dyn EffortModel,
+        shape: &[f64],
+        kept: &[usize],
+        logs: &[PreparedLog],
+        kernel_hz: f64,
+        crossing_hz: f64,
+        delay_limits: (f64, f64),
+        settings: &ConditioningSettings,
+    ) -> Result<Trial, ConditioningError> {
+        let columns = KeptColumns::new(model, kept);
+        let outputs = model.outputs().len();
+        let mut classes: Vec<Classes> = vec![Classes::new(); outputs];
+        let mut coverage: Vec<Vec<f64>> = vec![Vec::new(); outputs];
+        let mut state_hz = Vec::new();
+        let slowest = logs.iter().map(|l| l.rate_hz).fold(f64::INFINITY, f64::min);
+        let scales_hz = scales(kernel_hz, crossing_hz, slowest, settings);
+        let lags = Lags::new(delay_limits.0, delay_limits.1, kernel_hz, slowest);
+        let total: f64 = logs.iter().map(|l| l.samples() as f64).sum();
+        for log in logs {
+            let cutoff = state_hz_of(kernel_hz, crossing_hz, log.rate_hz, settings);
+            state_hz.push(cutoff);
+            let states = States::new(log, cutoff, settings)?;
+            let masks = masks(log, &states, model, settings);
+            let kernels = Kernels::new(&scales_hz, &states, lags.reach())?;
+            for (output, mask) in masks.iter().enumerate() {
+                let share = log.samples() as f64 / total;
+                let own = kernels.coverage(mask, log.samples());
+                coverage[output].resize(own.len(), 0.0);
+                for (c, o) in coverage[output].iter_mut().zip(own) {
+                    *c += share * o;
+                }
+            }
+            let mut consumers: Vec<GramConsumer<'_>> = (0..outputs)
+                .map(|j| GramConsumer::new(log, &states.effort[j], &kernels.kernels, lags, settings.folds))
+                .collect();
+            let wanted = vec![u8::MAX; outputs];
+            Pass {
+                model,
+                shape,
+                columns: &columns,
+                log,
+                states: &states,
+                masks: &masks,
+                kernels: &kernels,
+                wanted: &wanted,
+                probes: true,
+            }
+            .run(&mut consumers)?;
+            for (all, consumer) in classes.iter_mut().zip(consumers) {
+                for (class, gram) in consumer.classes {
+                    all.entry(class).or_insert_with(|| Gram::zero(gram.size)).add(&gram);
+                }
+            }
+        }
+        Ok(Trial {
+            kernel_hz,
+            state_hz,
+            scales_hz,
+            lags,
+            columns,
+            classes,
+            coverage,
+            folds: settings.folds,
+        })
+    }
+
+    pub(crate) fn outputs(&self) -> usize {
+        self.classes.len()
+    }
+
+    /// Rows without a mask, over all outputs.
+    pub(crate) fn rows(&self) -> f64 {
+        self.classes.iter().flat_map(|c| c.values()).map(|g| g.rows).sum()
+    }
+
+    pub(crate) fn folds(&self) -> usize {
+        self.folds
+    }
+
+    /// The strictest rung of an output, not stricter than asked for, that keeps the wanted share of samples.
+    pub(crate) fn allowed(&self, output: usize, rung: usize, least: f64) -> usize {
+        (0..=rung).rev().find(|r| self.coverage[output][*r] >= least).unwrap_or(0)
+    }
+
+    /// Number of unknowns: base columns, then per output the probes, then per output the rest of the delay.
+    fn unknowns(&self, choice: &Choice) -> usize {
+        let outputs = self.outputs();
+        self.columns.total
+            + if choice.rich { PROBES * outputs } else { 0 }
+            + if choice.free_delay { outputs } else { 0 }
+    }
+
+    /// Index of the unknown that is the rest of an output's delay.
+    fn delay_unknown(&self, choice: &Choice, output: usize) -> usize {
+        self.columns.total + if choice.rich { PROBES * self.outputs() } else { 0 } + output
+    }
+
+    /// Columns and unknowns of an output under a choice.
+    fn columns_of(&self, output: usize, choice: &Choice) -> (Vec<Vec<(usize, f64)>>, Vec<usize>) {
+        let own = self.columns.global[output].len();
+        let mut columns: Vec<Vec<(usize, f64)>> = (0..own).map(|k| vec![(k, 1.0)]).collect();
+        let mut unknowns = self.columns.global[output].clone();
+        if choice.rich {
+            for k in 0..PROBES {
+                columns.push(vec![(own + k, 1.0)]);
+                unknowns.push(self.columns.total + PROBES * output + k);
+            }
+        }
+        let (value, slope) = self.lags.weights(choice.delay);
+        let place = |w: Vec<(usize, f64)>, sign: f64| -> Vec<(usize, f64)> {
+            w.into_iter().map(|(k, f)| (own + PROBES + k, sign * f)).collect()
+        };
+        if choice.free_delay {
+            columns.push(place(slope, -1.0));
+            unknowns.push(self.delay_unknown(choice, output));
+        }
+        columns.push(place(value, 1.0));
+        (columns, unknowns)
+    }
+
+    fn sum(&self, output: usize, rung: usize, keep: impl Fn(&RowClass) -> bool) -> Vec<Option<Gram>> {
+        let mut sums: Vec<Option<Gram>> = vec![None; self.scales_hz.len()];
+        for (class, gram) in &self.classes[output] {
+            if class.rungs >> rung & 1 == 1 && keep(class) {
+                match &mut sums[class.scale] {
+                    Some(sum) => sum.add(gram),
+                    none => *none = Some(gram.clone()),
+                }
+            }
+        }
+        sums
+    }
+
+    /// Weighted fit on all time blocks but one (or on all).
+    pub(crate) fn fit(&self, choice: &Choice, without: Option<usize>) -> Vec<f64> {
+        let mut groups = Vec::new();
+        for output in 0..self.outputs() {
+            let (columns, unknowns) = self.columns_of(output, choice);
+            for gram in self.sum(output, choice.rung[output], |c| Some(c.fold) != without).iter().flatten() {
+                groups.push(Group { gram: gram.combined(&columns), unknowns: unknowns.clone() });
+            }
+        }
+        solve(&groups, self.unknowns(choice), 3).0
+    }
+
+    /// Mean square residual of every output on the scored rows of one time block at the rungs given; `None` without rows.
+    pub(crate) fn score(&self, choice: &Choice, x: &[f64], rows_at: &[usize], fold: usize) -> Vec<Option<f64>> {
+        (0..self.outputs())
+            .map(|output| {
+                let (columns, unknowns) = self.columns_of(output, choice);
+                let (mut sum, mut rows) = (0.0, 0.0);
+                for gram in self.sum(output, rows_at[output], |c| c.scored && c.fold == fold).iter().flatten() {
+                    sum += rss(&gram.combined(&columns), &unknowns, x);
+                    rows += gram.rows;
+                }
+                (rows > 0.0).then(|| sum / rows)
+            })
+            .collect()
+    }
+
+    /// Rest of the delay of every output, samples.
+    pub(crate) fn delay_rests(&self, choice: &Choice, without: Option<usize>) -> Vec<f64> {
+        let x = self.fit(choice, without);
+        (0..self.outputs()).map(|output| x[self.delay_unknown(choice, output)]).collect()
+    }
+}
+
+/// State cut-off of a log for a kernel.
+pub(crate) fn state_hz_of(
+    kernel_hz: f64,
+    crossing_hz: f64,
+    rate_hz: f64,
+    settings: &ConditioningSettings,
+) -> f64 {
+    settings
+        .state_hz
+        .map_or_else(|| state_cutoff(kernel_hz, crossing_hz, rate_hz, &settings.cutoff), |f| f)
+        .min(settings.cutoff.state_rate * rate_hz)
+}
+
+/// Kernel cut-offs used together.
+pub(crate) fn scales(
+    kernel_hz: f64,
+    crossing_hz: f64,
+    rate_hz: f64,
+    settings: &ConditioningSettings,
+) -> Vec<f64> {
+    let state = state_hz_of(kernel_hz, crossing_hz, rate_hz, settings);
+    kernel_scales(kernel_hz, state, rate_hz, &settings.cutoff)
+}
