@@ -1,4 +1,5 @@
 //! The same rows give the same bits, however they are portioned and whatever the thread count.
+#![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use dynid_estimate::covariance::jackknife;
 use dynid_estimate::folds::{FoldSettings, cross_validate};

@@ -1,4 +1,5 @@
 //! Identities of factors on random rows, and what bad rows are answered.
+#![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use dynid_estimate::linear::{WlsSettings, ols, wls};
 use dynid_estimate::rank::{base_columns, numerical_rank};

@@ -1,4 +1,5 @@
 //! `estimation_covariance.json`: covariance estimators and Ljung-Box on one correlated record.
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "in tests a panic is the report")]
 
 mod golden;
 

@@ -1,4 +1,5 @@
 //! `estimation_reduction.json`: reduction, rank, weighted least squares, jackknife, folds, elimination, ridge.
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "in tests a panic is the report")]
 
 mod golden;
 

@@ -3,6 +3,7 @@
 //! Data and certified values: NIST/ITL StRD (<https://www.itl.nist.gov/div898/strd/>), a work of the United States
 //! Government in the public domain. The tables were checked by solving each problem in rational arithmetic:
 //! all certified values agree to the digits NIST gives.
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "in tests a panic is the report")]
 
 use dynid_estimate::FactorBuilder;
 use dynid_estimate::linear::ols;

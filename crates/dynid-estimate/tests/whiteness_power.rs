@@ -1,4 +1,5 @@
 //! In-band whiteness: how often white and coloured residuals of a filtered, decimated log are rejected.
+#![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use dynid_estimate::whiteness::{InBandSettings, correlation_length, in_band_whiteness, ljung_box};
 use rand::SeedableRng;

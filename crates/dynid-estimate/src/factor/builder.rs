@@ -7,7 +7,7 @@ use faer::{Mat, Par};
 use std::ops::Range;
 
 /// Rows stacked under the current triangle before it is renewed, unless chosen otherwise.
-pub const DEFAULT_CHUNK_ROWS: usize = 1024;
+pub const DEFAULT_CHUNK_ROWS: usize = 2048;
 
 /// Width of the panels of Householder reflectors.
 const PANEL: usize = 16;
