@@ -1,1 +1,28 @@
-//! Dynamic identification of robots and mechanisms: the pipeline from a robot file and a log to a model
+//! Dynamic identification of robots and mechanisms: the pipeline from a robot file and a log to a model.
+//!
+//! [`identify()`] runs it; [`Estimate`] is what it leaves behind. The rooms below are re-exported as [`model`], [`motion`],
+//! [`estimators`], [`io`] and [`report`].
+
+pub mod agreement;
+pub mod config;
+pub mod elements;
+mod error;
+pub mod estimate;
+pub mod identify;
+pub mod logs;
+pub mod robot;
+
+pub use config::Config;
+pub use error::Error;
+pub use estimate::Estimate;
+pub use identify::{Identification, Step, identify};
+pub use robot::{Robot, RobotOptions};
+
+pub use dynid_estimate as estimators;
+pub use dynid_io as io;
+pub use dynid_model as model;
+pub use dynid_motion as motion;
+pub use dynid_report as report;
+
+/// Version of the program.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -258,8 +258,15 @@ pub(crate) fn masks(
         return (at(rung), Vec::new());
     }
     let ladder: Vec<Vec<f64>> = (0..rungs).map(|r| score(at(r))).collect();
-    let best = (0..rungs).min_by(|a, b| mean(&ladder[*a]).total_cmp(&mean(&ladder[*b]))).unwrap_or(0);
-    let smallest = mean(&ladder[best]).max(f64::MIN_POSITIVE);
+    let smallest = ladder.iter().map(|l| mean(l)).fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE);
+    // Rows are worth keeping: a stricter rung has to prove its gain, block by block.
+    let wins = |from: &[f64], to: &[f64], sigmas: f64| {
+        let gains: Vec<f64> = from.iter().zip(to).map(|(a, b)| a - b).collect();
+        from.len() == to.len()
+            && mean(&gains) > sigmas * error(&gains)
+            && mean(&gains) > settings.mask_gain * mean(from)
+    };
+    let best = (1..rungs).fold(0, |best, r| if wins(&ladder[best], &ladder[r], settings.mask_sigma.0) { r } else { best });
     let table = (0..rungs)
         .map(|r| MaskTrial {
             level: (r > 0).then(|| settings.ladder[r - 1]),
@@ -280,11 +287,7 @@ pub(crate) fn masks(
             let mut changed = current.clone();
             changed[output] = rung;
             let values = score(changed.clone());
-            if values.len() != current_losses.len() {
-                continue;
-            }
-            let gains: Vec<f64> = current_losses.iter().zip(&values).map(|(a, b)| a - b).collect();
-            if mean(&gains) > error(&gains) && mean(&gains) > settings.mask_gain * mean(&current_losses) {
+            if wins(&current_losses, &values, settings.mask_sigma.1) {
                 current = changed;
                 current_losses = values;
             }

@@ -103,6 +103,7 @@ pub fn reduce(
     choices: &Conditioning,
     settings: &ConditioningSettings,
 ) -> Result<Vec<ReducedGroup>, ConditioningError> {
+    let settings = &super::with_given_mask(settings);
     let columns = KeptColumns::new(model, kept);
     let outputs = model.outputs().len();
     let wanted: Vec<u8> = choices.rung.iter().map(|r| 1 << r).collect();

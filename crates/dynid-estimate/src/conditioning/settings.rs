@@ -26,8 +26,11 @@ pub struct ConditioningSettings {
     pub kernel_veto: f64,
     /// A joint keeps a mask only if this share of its samples stays usable. Default 0.25.
     pub least_usable: f64,
-    /// A change of one joint's mask must gain this share of the loss, and one standard error. Default 0.002.
+    /// A stricter mask must gain this share of the loss. Default 0.002.
     pub mask_gain: f64,
+    /// And this many standard errors of the gain over time blocks: for all joints together, for one joint. The second is
+    /// larger because many joints and rungs are tried. Default 1, 2.
+    pub mask_sigma: (f64, f64),
     /// Mean and standard deviation of the prior on the delay, samples. Default 0.5, 1.
     pub delay_prior: (f64, f64),
     /// Remove spikes. Default true.
@@ -61,6 +64,7 @@ impl Default for ConditioningSettings {
             kernel_veto: 2.5,
             least_usable: 0.25,
             mask_gain: 0.002,
+            mask_sigma: (1.0, 2.0),
             delay_prior: (0.5, 1.0),
             remove_spikes: true,
             state_order: 4,

@@ -1,0 +1,127 @@
+//! Predicted against measured effort on a log.
+
+use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, predict};
+use dynid_estimate::metrics::{Fit, fit};
+use dynid_model::EffortModel;
+use dynid_motion::filter::{butterworth, forward_backward};
+
+use crate::Error;
+use crate::estimate::FitValues;
+
+/// How prediction and measurement are brought together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alignment {
+    /// Cut-off of the states, Hz.
+    pub state_hz: f64,
+    /// Lead of the logged effort before the motion, samples.
+    pub delay_samples: f64,
+    /// Cut-off of the filter that both pass for the filtered figures, Hz.
+    pub filter_hz: f64,
+}
+
+/// Predicted and measured effort of a log with their agreement.
+#[derive(Debug, Clone)]
+pub struct Agreement {
+    /// Log.
+    pub name: String,
+    /// Time of the first sample, s.
+    pub start: f64,
+    /// Sample rate, Hz.
+    pub rate_hz: f64,
+    /// Per output: measured effort.
+    pub measured: Vec<Vec<f64>>,
+    /// Per output: predicted effort.
+    pub predicted: Vec<Vec<f64>>,
+    /// Per sample: counted (not near an end or a gap of the clock).
+    pub counted: Vec<bool>,
+    /// On raw effort.
+    pub raw: Fit,
+    /// Through the same zero-phase Butterworth filter of order 4.
+    pub filtered: Fit,
+    /// The same without aligning by the delay.
+    pub filtered_unaligned: Fit,
+    /// Cut-off of that filter, Hz.
+    pub filter_hz: f64,
+}
+
+/// Cut from both ends before figures are formed, in periods of the lower of the two cut-offs.
+const EDGE_PERIODS: f64 = 1.0;
+
+/// Predicts a log with given parameters and compares with the measured effort.
+///
+/// Samples within one period of the filter's cut-off from an end or a gap do not count.
+///
+/// # Errors
+/// [`Error::Conditioning`], [`Error::TooShort`].
+pub fn compare(
+    model: &dyn EffortModel,
+    values: &[f64],
+    log: &PreparedLog,
+    alignment: &Alignment,
+    settings: &ConditioningSettings,
+) -> Result<Agreement, Error> {
+    let state_hz = alignment.state_hz;
+    let filter_hz = alignment.filter_hz.min(0.4 * log.rate_hz);
+    let run = |delay: f64| predict(model, &[], values, log, state_hz, delay, settings);
+    let predicted = run(alignment.delay_samples)?;
+    let unaligned = run(0.0)?;
+    let margin = (EDGE_PERIODS * log.rate_hz / filter_hz.min(state_hz)).ceil() as usize;
+    let mut bad: Vec<bool> = log.usable.iter().map(|u| !u).collect();
+    bad = dynid_motion::mask::dilate(&bad, margin);
+    dynid_motion::mask::merge(&mut bad, &dynid_motion::mask::edges(log.samples(), margin));
+    let counted: Vec<bool> = bad.iter().map(|b| !b).collect();
+    if !counted.contains(&true) {
+        return Err(Error::TooShort {
+            file: log.name.clone(),
+            message: format!("{:.2} s leave no sample between the filter's edges", log.duration()),
+        });
+    }
+    let filter = butterworth(4, filter_hz, log.rate_hz).map_err(conditioning)?;
+    let filtered = |signals: &[Vec<f64>]| {
+        signals
+            .iter()
+            .map(|s| forward_backward(&filter, s).map_err(conditioning))
+            .collect::<Result<Vec<_>, _>>()
+    };
+    let pick = |signals: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        signals
+            .iter()
+            .map(|s| s.iter().zip(&counted).filter(|(_, c)| **c).map(|(x, _)| *x).collect())
+            .collect()
+    };
+    let agree = |measured: &[Vec<f64>], predicted: &[Vec<f64>]| {
+        fit(&pick(measured), &pick(predicted)).map_err(|e| Error::TooShort {
+            file: log.name.clone(),
+            message: e.to_string(),
+        })
+    };
+    let measured_filtered = filtered(&log.effort)?;
+    Ok(Agreement {
+        name: log.name.clone(),
+        start: log.start,
+        rate_hz: log.rate_hz,
+        raw: agree(&log.effort, &predicted)?,
+        filtered: agree(&measured_filtered, &filtered(&predicted)?)?,
+        filtered_unaligned: agree(&measured_filtered, &filtered(&unaligned)?)?,
+        measured: log.effort.clone(),
+        predicted,
+        counted,
+        filter_hz,
+    })
+}
+
+fn conditioning(e: dynid_motion::SignalError) -> Error {
+    Error::Conditioning(e.into())
+}
+
+impl From<&Fit> for FitValues {
+    fn from(fit: &Fit) -> Self {
+        FitValues {
+            rms: fit.channels.iter().map(|c| c.rms).collect(),
+            nrmse: fit.channels.iter().map(|c| c.nrmse).collect(),
+            r2: fit.channels.iter().map(|c| c.r2).collect(),
+            relative_error_per_joint: fit.channels.iter().map(|c| c.relative_error).collect(),
+            relative_error: fit.relative_error,
+        }
+    }
+}

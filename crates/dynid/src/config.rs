@@ -1,0 +1,279 @@
+//! The configuration of a run, a TOML file.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use dynid_estimate::conditioning::{ConditioningSettings, TextbookRoute};
+use dynid_io::{CouplingForm, MappingSpec};
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+
+/// What is to be identified from which logs, and how. Every key but `robot` and `log` has a default.
+#[derive(Debug, Clone, Default, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Robot file (URDF or TOML), relative to the configuration.
+    pub robot: PathBuf,
+    /// Output folder, relative to the configuration. Default `dynid-out`.
+    pub out: Option<PathBuf>,
+    /// Seed of everything random (states of the structural analysis). Default 1.
+    pub seed: Option<u64>,
+    /// Gravity in base axes, m/s². Default: the robot file's, else 0 0 -9.81.
+    pub gravity: Option<[f64; 3]>,
+    /// Couple mimic joints to their leaders. Default false.
+    pub couple_mimics: Option<bool>,
+    /// Joints held at a position, rad or m; their links are merged.
+    pub locked: BTreeMap<String, f64>,
+    /// Elements per joint.
+    pub elements: ElementsConfig,
+    /// Couplings of joints, besides those of the robot file.
+    pub coupling: Vec<CouplingConfig>,
+    /// Columns of all logs; a log may bring its own.
+    pub columns: MappingSpec,
+    /// Logs hold motor positions and motor efforts behind a transmission matrix.
+    pub motor_side: Option<MotorSide>,
+    /// Conditioning.
+    pub conditioning: ConditioningConfig,
+    /// Estimator.
+    pub estimator: EstimatorConfig,
+    /// Columns to keep as base parameters where there is a choice, by name (`link2.Izz`) or symbol (`Izz2`).
+    pub preferred: Vec<String>,
+    /// Logs to identify from.
+    pub log: Vec<LogConfig>,
+    /// Logs to validate on.
+    pub validation: Vec<LogConfig>,
+}
+
+/// Elements at joints.
+#[derive(Debug, Clone, Default, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct ElementsConfig {
+    /// For every joint about which nothing else is said.
+    pub default: Option<Vec<String>>,
+    /// For single joints.
+    pub joint: BTreeMap<String, Vec<String>>,
+}
+
+/// Motor-side inertia and friction of joints that share motors; see the robot file's `[[coupling]]`.
+#[derive(Debug, Clone, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct CouplingConfig {
+    /// Motors, one per row.
+    pub motors: Vec<String>,
+    /// Joints, one per column.
+    pub joints: Vec<String>,
+    /// Transmission matrix, motor speeds from joint speeds.
+    pub matrix: Vec<Vec<f64>>,
+    /// `strict` (one inertia and friction per motor) or `columns` (three coupling terms beside the joints' own).
+    #[serde(default)]
+    pub form: CouplingForm,
+}
+
+/// Transmission between the motors that a log records and the joints: `q_motor = matrix · (q - offset)`,
+/// `effort_joint = matrixᵀ · effort_motor`.
+#[derive(Debug, Clone, Default, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct MotorSide {
+    /// Transmission matrix, one row per motor, one column per joint.
+    pub matrix: Vec<Vec<f64>>,
+    /// Joint position at motor position zero, rad or m. Default: zeros.
+    pub offset: Vec<f64>,
+}
+
+/// One log file.
+#[derive(Debug, Clone, Default, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct LogConfig {
+    /// CSV or CSV.gz, relative to the configuration.
+    pub path: PathBuf,
+    /// First and last data row, from 1, both included. Default: all.
+    pub rows: Option<(usize, usize)>,
+    /// First and last part of the record to use, as shares of its rows, e.g. `[0.0, 0.7]`. Default: all.
+    pub part: Option<(f64, f64)>,
+    /// Columns of this log in place of the run's.
+    pub columns: Option<MappingSpec>,
+}
+
+/// Which way from samples to rows.
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum Route {
+    /// States at a high cut-off, then one compact kernel over columns and effort; everything found from the data.
+    #[default]
+    Compact,
+    /// Zero-phase Butterworth, central differences, decimation.
+    Textbook,
+}
+
+/// Settings of the conditioning; those left out are found from the data.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct ConditioningConfig {
+    /// Route. Default `compact`.
+    pub route: Route,
+    /// Cut-off of the widest kernel, Hz; on the textbook route the cut-off of the filter (default 10).
+    pub kernel_hz: Option<f64>,
+    /// Cut-off of the state filter, Hz.
+    pub state_hz: Option<f64>,
+    /// Delay of the motion behind the logged effort, samples.
+    pub delay_samples: Option<f64>,
+    /// Reversal mask as a share of rms speed; negative: none.
+    pub reversal_mask: Option<f64>,
+    /// Remove spikes. Default true.
+    pub remove_spikes: Option<bool>,
+    /// Length of the time blocks behind standard deviations, s. Default 1.
+    pub block_s: Option<f64>,
+    /// Textbook route: keep every n-th row.
+    pub decimation: Option<usize>,
+    /// Textbook route: filter columns and effort before rows are dropped (MATLAB's `decimate`). Default false.
+    pub parallel_filter: Option<bool>,
+    /// Textbook route: filter the effort like the positions. Default true.
+    pub filter_effort: Option<bool>,
+    /// Textbook route: cut from both ends, s. Default 0.2.
+    pub trim_s: Option<f64>,
+}
+
+/// Least-squares weighting.
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Ordinary least squares: all rows alike.
+    Ols,
+    /// Weighted by a residual variance per joint (and per log and kernel scale), estimated along the way.
+    #[default]
+    Wls,
+}
+
+/// Settings of the estimator.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct EstimatorConfig {
+    /// Method. Default `wls`.
+    pub method: Method,
+}
+
+impl Config {
+    /// Reads a configuration; paths in it become relative to its folder.
+    ///
+    /// # Errors
+    /// [`Error::Read`], [`Error::Config`] with the line.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| Error::Read { file: path.to_owned(), source })?;
+        let mut config = Self::parse(&text, &path.display().to_string())?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        config.robot = folder.join(&config.robot);
+        config.out = config.out.map(|o| folder.join(o));
+        for log in config.log.iter_mut().chain(&mut config.validation) {
+            log.path = folder.join(&log.path);
+        }
+        Ok(config)
+    }
+
+    /// Parses a configuration.
+    ///
+    /// # Errors
+    /// [`Error::Config`] with the line.
+    pub fn parse(text: &str, file: &str) -> Result<Self, Error> {
+        let config: Config = toml::from_str(text).map_err(|e| Error::Config {
+            file: file.to_owned(),
+            line: e.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count()),
+            message: e.message().lines().next().unwrap_or_default().to_owned(),
+        })?;
+        let missing = |what: &str| Error::Config {
+            file: file.to_owned(),
+            line: None,
+            message: format!("expected {what}"),
+        };
+        if config.robot.as_os_str().is_empty() {
+            return Err(missing("`robot = \"file\"`"));
+        }
+        if config.log.is_empty() {
+            return Err(missing("at least one `[[log]]` with a `path`"));
+        }
+        for log in config.log.iter().chain(&config.validation) {
+            if log.path.as_os_str().is_empty() {
+                return Err(missing("a `path` in every `[[log]]` and `[[validation]]`"));
+            }
+        }
+        config.check()?;
+        Ok(config)
+    }
+
+    /// Checks that every number makes sense.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub fn check(&self) -> Result<(), Error> {
+        let c = &self.conditioning;
+        for (name, value) in [("kernel_hz", c.kernel_hz), ("state_hz", c.state_hz), ("block_s", c.block_s)] {
+            if let Some(x) = value
+                && !(x.is_finite() && x > 0.0)
+            {
+                return Err(setting(name, "a positive number", x));
+            }
+        }
+        for (name, value) in [("delay_samples", c.delay_samples), ("reversal_mask", c.reversal_mask)] {
+            if let Some(x) = value
+                && !(x.is_finite() && x.abs() <= 1e4)
+            {
+                return Err(setting(name, "a number of moderate size", x));
+            }
+        }
+        if let Some(x) = c.trim_s
+            && !(x.is_finite() && x >= 0.0)
+        {
+            return Err(setting("trim_s", "a number that is not negative", x));
+        }
+        if c.decimation == Some(0) {
+            return Err(setting("decimation", "at least 1", 0));
+        }
+        if let Some(g) = self.gravity
+            && !g.iter().all(|x| x.is_finite())
+        {
+            return Err(setting("gravity", "three finite numbers", format!("{g:?}")));
+        }
+        for log in self.log.iter().chain(&self.validation) {
+            if let Some((a, b)) = log.part
+                && !(0.0..1.0).contains(&a) | !(b > a && b <= 1.0)
+            {
+                return Err(setting("part", "two increasing shares between 0 and 1", format!("[{a}, {b}]")));
+            }
+        }
+        Ok(())
+    }
+
+    /// Settings of the compact route.
+    pub fn conditioning_settings(&self) -> ConditioningSettings {
+        let c = &self.conditioning;
+        let defaults = ConditioningSettings::default();
+        ConditioningSettings {
+            kernel_hz: c.kernel_hz,
+            state_hz: c.state_hz,
+            delay_samples: c.delay_samples,
+            reversal_mask: c.reversal_mask,
+            remove_spikes: c.remove_spikes.unwrap_or(defaults.remove_spikes),
+            block_s: c.block_s.unwrap_or(defaults.block_s),
+            ..defaults
+        }
+    }
+
+    /// Settings of the textbook route.
+    pub fn textbook_route(&self) -> TextbookRoute {
+        let c = &self.conditioning;
+        let defaults = TextbookRoute::default();
+        TextbookRoute {
+            cutoff_hz: c.kernel_hz.unwrap_or(defaults.cutoff_hz),
+            decimation: c.decimation,
+            parallel_filter: c.parallel_filter.unwrap_or(defaults.parallel_filter),
+            filter_effort: c.filter_effort.unwrap_or(defaults.filter_effort),
+            trim_s: c.trim_s.unwrap_or(defaults.trim_s),
+            ..defaults
+        }
+    }
+}
+
+fn setting(name: &str, expected: &str, found: impl ToString) -> Error {
+    Error::Setting { name: name.to_owned(), expected: expected.to_owned(), found: found.to_string() }
+}

@@ -1,0 +1,218 @@
+//! Joint elements by name.
+
+use dynid_io::{CouplingForm, CouplingSpec, ElementSpec, SettingValue};
+use dynid_model::element::{
+    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, JointElement, Offset, RotorInertia,
+    Spring, Transmission, Viscous,
+};
+use dynid_model::{JointKind, Mechanism};
+
+use crate::Error;
+
+/// Element names that a robot file or a configuration may use.
+pub const NAMES: [&str; 8] =
+    ["coulomb", "viscous", "offset", "asymmetric", "rotor", "spring", "cyclic", "drive_gain"];
+
+/// Elements of a joint about which nothing is said.
+pub const DEFAULTS: [&str; 4] = ["coulomb", "viscous", "offset", "rotor"];
+
+/// Which elements act at which joints of a mechanism, by name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ElementPlan {
+    /// Per rate of the mechanism: element names; empty for a floating base.
+    pub per_rate: Vec<Vec<String>>,
+    /// Couplings.
+    pub couplings: Vec<CouplingSpec>,
+    /// Settings of elements.
+    spec: ElementSpec,
+}
+
+impl ElementPlan {
+    /// Elements as the robot file (or the configuration) says; joints about which nothing is said get [`DEFAULTS`] if
+    /// they move.
+    ///
+    /// `moves`: whether the logs move the joint of each rate.
+    pub fn new(
+        mechanism: &Mechanism,
+        spec: &ElementSpec,
+        default: Option<&[String]>,
+        moves: impl Fn(usize) -> bool,
+    ) -> Result<Self, Error> {
+        let names = mechanism.rate_names();
+        let owners = mechanism.rate_bodies();
+        for (joint, _) in &spec.per_joint {
+            if !names.contains(joint) {
+                return Err(Error::UnknownJoint { name: joint.clone(), known: names });
+            }
+        }
+        let defaults: Vec<String> = match default {
+            Some(list) => list.to_vec(),
+            None if !spec.defaults.is_empty() => spec.defaults.clone(),
+            None => DEFAULTS.map(str::to_owned).to_vec(),
+        };
+        let per_rate = names
+            .iter()
+            .enumerate()
+            .map(|(rate, name)| {
+                if mechanism.bodies()[owners[rate]].joint.kind == JointKind::Floating {
+                    return Vec::new();
+                }
+                match spec.per_joint.iter().find(|(joint, _)| joint == name) {
+                    Some((_, list)) => list.clone(),
+                    None if moves(rate) => defaults.clone(),
+                    None => Vec::new(),
+                }
+            })
+            .collect();
+        Ok(ElementPlan { per_rate, couplings: spec.couplings.clone(), spec: spec.clone() })
+    }
+
+    /// A plan with given names per rate, as an estimate file records it.
+    pub fn recorded(per_rate: Vec<Vec<String>>, couplings: Vec<CouplingSpec>, spec: ElementSpec) -> Self {
+        ElementPlan { per_rate, couplings, spec }
+    }
+
+    /// Settings of the elements.
+    pub fn settings(&self) -> &[dynid_io::ElementSetting] {
+        &self.spec.settings
+    }
+
+    /// Builds the elements in joint order, couplings last.
+    pub fn build(&self, mechanism: &Mechanism) -> Result<Vec<Box<dyn JointElement>>, Error> {
+        let names = mechanism.rate_names();
+        let mut out: Vec<Box<dyn JointElement>> = Vec::new();
+        for (rate, list) in self.per_rate.iter().enumerate() {
+            for name in list {
+                out.push(self.element(name, rate, &names[rate])?);
+            }
+        }
+        for coupling in &self.couplings {
+            out.push(build_coupling(coupling, &names)?);
+        }
+        Ok(out)
+    }
+
+    fn element(&self, name: &str, rate: usize, joint: &str) -> Result<Box<dyn JointElement>, Error> {
+        Ok(match name {
+            "coulomb" => Box::new(Coulomb { rate }),
+            "viscous" => Box::new(Viscous { rate }),
+            "offset" => Box::new(Offset { rate }),
+            "asymmetric" => Box::new(AsymmetricFriction { rate }),
+            "rotor" => Box::new(RotorInertia { rate }),
+            "spring" => Box::new(Spring { rate }),
+            "drive_gain" => Box::new(DriveGain { rate }),
+            "cyclic" => {
+                let cycles = self.number(joint, "cyclic", "cycles").unwrap_or(1.0);
+                if cycles <= 0.0 {
+                    return Err(Error::ElementSetting {
+                        element: name.to_owned(),
+                        joint: joint.to_owned(),
+                        fault: format!("`cycles` must be positive, found {cycles}"),
+                    });
+                }
+                Box::new(CyclicTorque { rate, cycles })
+            }
+            _ => return Err(Error::UnknownElement { name: name.to_owned(), joint: joint.to_owned() }),
+        })
+    }
+
+    fn number(&self, joint: &str, element: &str, key: &str) -> Option<f64> {
+        self.spec.settings.iter().find_map(|s| match s.value {
+            SettingValue::Number(x) if s.joint == joint && s.element == element && s.key == key => Some(x),
+            _ => None,
+        })
+    }
+
+    /// Values that the robot file states for element parameters: `(parameter name, value)`.
+    ///
+    /// `[element.j1] rotor = { inertia = 0.4 }` states `j1.Ia`; `coulomb = { effort = .. }`, `viscous = { coefficient = .. }`
+    /// and `offset = { effort = .. }` state `fc`, `fv`, `fo`.
+    pub fn stated_values(&self) -> Vec<(String, f64)> {
+        self.spec
+            .settings
+            .iter()
+            .filter_map(|s| {
+                let symbol = match (s.element.as_str(), s.key.as_str()) {
+                    ("rotor", "inertia") => "Ia",
+                    ("coulomb", "effort") => "fc",
+                    ("viscous", "coefficient") => "fv",
+                    ("offset", "effort") => "fo",
+                    _ => return None,
+                };
+                match s.value {
+                    SettingValue::Number(x) => Some((format!("{}.{symbol}", s.joint), x)),
+                    _ => None,
+                }
+            })
+            .collect()
+    }
+}
+
+fn build_coupling(coupling: &CouplingSpec, names: &[String]) -> Result<Box<dyn JointElement>, Error> {
+    let fault = |fault: String| Error::Coupling { joints: coupling.joints.join(", "), fault };
+    let rates = coupling
+        .joints
+        .iter()
+        .map(|j| {
+            names
+                .iter()
+                .position(|n| n == j)
+                .ok_or_else(|| Error::UnknownJoint { name: j.clone(), known: names.to_vec() })
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let square = coupling.matrix.len() == rates.len() && coupling.matrix.iter().all(|r| r.len() == rates.len());
+    if !square || coupling.motors.len() != rates.len() {
+        return Err(fault(format!("expected a {0} x {0} matrix and {0} motors", rates.len())));
+    }
+    if inverse(&coupling.matrix).is_none() {
+        return Err(fault("the transmission matrix is singular".to_owned()));
+    }
+    match coupling.form {
+        CouplingForm::Strict => Ok(Box::new(Transmission {
+            joints: rates,
+            matrix: coupling.matrix.clone(),
+            motors: coupling.motors.clone(),
+        })),
+        CouplingForm::Columns => {
+            let [a, b] = rates[..] else {
+                return Err(fault("the form `columns` couples two joints".to_owned()));
+            };
+            let m = &coupling.matrix;
+            if m[0][1] != 0.0 || m[1][0] == 0.0 {
+                return Err(fault(
+                    "the form `columns` expects the second motor to turn with the first joint: matrix [[r1, 0], [c, r2]]"
+                        .to_owned(),
+                ));
+            }
+            Ok(Box::new(CoupledWrist { a, b, ratio: m[1][0] / m[1][1] }))
+        }
+    }
+}
+
+/// Inverse of a small square matrix by Gauss-Jordan elimination with pivoting; `None` if it is singular to rounding.
+pub(crate) fn inverse(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+    let n = matrix.len();
+    let mut m: Vec<Vec<f64>> = matrix
+        .iter()
+        .enumerate()
+        .map(|(r, row)| row.iter().copied().chain((0..n).map(|c| if c == r { 1.0 } else { 0.0 })).collect())
+        .collect();
+    let largest = matrix.iter().flatten().fold(0.0_f64, |a, x| a.max(x.abs()));
+    for k in 0..n {
+        let pivot = (k..n).max_by(|a, b| m[*a][k].abs().total_cmp(&m[*b][k].abs()))?;
+        if m[pivot][k].abs() <= 1e-12 * largest {
+            return None;
+        }
+        m.swap(pivot, k);
+        let scale = m[k][k];
+        m[k].iter_mut().for_each(|x| *x /= scale);
+        let row = m[k].clone();
+        for (r, other) in m.iter_mut().enumerate() {
+            let factor = other[k];
+            if r != k && factor != 0.0 {
+                other.iter_mut().zip(&row).for_each(|(x, y)| *x -= factor * y);
+            }
+        }
+    }
+    Some(m.into_iter().map(|row| row[n..].to_vec()).collect())
+}

@@ -1,0 +1,186 @@
+//! One error type for the pipeline, made of those of the rooms below.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why a run could not be done. [`Error::hint`] says what a user can do about it.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A robot file cannot be read.
+    #[error(transparent)]
+    RobotFile(#[from] dynid_io::RobotFileError),
+    /// The robot's structure is impossible.
+    #[error("{file}: {source}")]
+    Mechanism {
+        /// Robot file.
+        file: String,
+        /// The fault.
+        source: dynid_model::MechanismError,
+    },
+    /// A log cannot be read.
+    #[error(transparent)]
+    LogFile(#[from] dynid_io::LogFileError),
+    /// Columns of a log do not fit the robot.
+    #[error("{file}: {source}")]
+    Columns {
+        /// Log file.
+        file: String,
+        /// The fault.
+        source: dynid_io::MappingError,
+    },
+    /// Signals of a log contradict each other.
+    #[error(transparent)]
+    Log(#[from] dynid_motion::LogError),
+    /// A states table cannot be read.
+    #[error(transparent)]
+    States(#[from] dynid_io::StatesError),
+    /// Positions look like degrees although radians are said.
+    #[error("{file}: joint `{joint}`: position {largest:.1} rad {}: these look like degrees", limit.map_or_else(|| "is more than two turns".to_owned(), |l| format!("is far beyond the limit of {l:.2} rad")))]
+    Degrees {
+        /// Log file.
+        file: String,
+        /// Joint.
+        joint: String,
+        /// Largest position found.
+        largest: f64,
+        /// Limit of the robot file, rad.
+        limit: Option<f64>,
+    },
+    /// A log cannot be conditioned.
+    #[error(transparent)]
+    Conditioning(#[from] dynid_estimate::conditioning::ConditioningError),
+    /// An element name is unknown.
+    #[error("unknown element `{name}` for joint `{joint}`, expected one of {}", crate::elements::NAMES.join(", "))]
+    UnknownElement {
+        /// The name.
+        name: String,
+        /// The joint.
+        joint: String,
+    },
+    /// An element setting is wrong.
+    #[error("element `{element}` of joint `{joint}`: {fault}")]
+    ElementSetting {
+        /// Element.
+        element: String,
+        /// Joint.
+        joint: String,
+        /// What is wrong.
+        fault: String,
+    },
+    /// A coupling is wrong.
+    #[error("coupling of joints {joints}: {fault}")]
+    Coupling {
+        /// Joints.
+        joints: String,
+        /// What is wrong.
+        fault: String,
+    },
+    /// A joint that the run names does not exist.
+    #[error("no joint is named `{name}`, the robot has {}", known.join(", "))]
+    UnknownJoint {
+        /// The name.
+        name: String,
+        /// Joints of the robot.
+        known: Vec<String>,
+    },
+    /// A configuration file cannot be parsed.
+    #[error("{file}{}: {message}", line.map_or_else(String::new, |l| format!(":{l}")))]
+    Config {
+        /// File.
+        file: String,
+        /// Line, from 1.
+        line: Option<usize>,
+        /// What is wrong.
+        message: String,
+    },
+    /// A setting has a value that makes no sense.
+    #[error("setting `{name}`: expected {expected}, found {found}")]
+    Setting {
+        /// Name.
+        name: String,
+        /// What is accepted.
+        expected: String,
+        /// What was given.
+        found: String,
+    },
+    /// The mechanism cannot be identified from joint logs.
+    #[error("{0}")]
+    Unsupported(String),
+    /// No usable rows.
+    #[error("{file}: {message}")]
+    TooShort {
+        /// Log.
+        file: String,
+        /// What is missing.
+        message: String,
+    },
+    /// An estimate file cannot be read.
+    #[error("{file}: not an estimate: {message}")]
+    EstimateFile {
+        /// File.
+        file: String,
+        /// What is wrong.
+        message: String,
+    },
+    /// A file cannot be read.
+    #[error("{}: {source}", file.display())]
+    Read {
+        /// File.
+        file: PathBuf,
+        /// Cause.
+        source: std::io::Error,
+    },
+    /// An output cannot be written.
+    #[error(transparent)]
+    Output(#[from] dynid_io::OutputError),
+    /// The report cannot be rendered.
+    #[error("report: {0}")]
+    Report(#[from] dynid_report::ReportError),
+}
+
+impl Error {
+    /// What a user can do about it.
+    pub fn hint(&self) -> Option<String> {
+        use dynid_estimate::conditioning::ConditioningError as C;
+        use dynid_model::MechanismError as M;
+        match self {
+            Error::RobotFile(e) => e.hint(),
+            Error::LogFile(e) => e.hint(),
+            Error::Columns { source, .. } => source.hint(),
+            Error::States(e) => e.hint(),
+            Error::Output(e) => e.hint(),
+            Error::Degrees { .. } => Some(
+                "state the unit: `q1[deg]` in the header, or `[columns] position = { columns = \"q{}\", unit = \"deg\" }`"
+                    .to_owned(),
+            ),
+            Error::Mechanism { source, .. } => Some(match source {
+                M::Cycle { .. } => "cut the loop: a URDF is a tree".to_owned(),
+                M::ManyRoots { .. } => "join the roots by fixed joints, or remove links that hang on nothing".to_owned(),
+                M::ZeroAxis { .. } => "give <axis xyz=\"..\"/> a direction such as 0 0 1".to_owned(),
+                M::MissingLink { .. } => "add the link, or correct its name in the joint".to_owned(),
+                M::TwoParents { .. } => "a link hangs on one joint only; remove one of the two".to_owned(),
+                M::NothingMoves { .. } => "a model needs at least one joint that is not fixed".to_owned(),
+                M::TooManyJoints { .. } => "lock joints that do not move, or split the robot".to_owned(),
+                _ => return None,
+            }),
+            Error::Conditioning(C::NothingMoves { .. }) => {
+                Some("a model of motion needs motion: check the columns, or record an excitation trajectory".to_owned())
+            }
+            Error::Conditioning(C::ConstantEffort { .. }) => {
+                Some("check that the effort column is the measured torque or current of this joint".to_owned())
+            }
+            Error::Conditioning(C::NoRows { .. }) => {
+                Some("record a longer motion, or set a higher `kernel_hz`".to_owned())
+            }
+            Error::Conditioning(C::Clock(_)) => {
+                Some("check the time column; `rate_hz` in [columns] states a sample rate instead".to_owned())
+            }
+            Error::Conditioning(C::Signal(_)) => Some("record a longer log, or set cut-offs below half the sample rate".to_owned()),
+            Error::UnknownElement { .. } => Some("elements are listed under [defaults] or [element.<joint>]".to_owned()),
+            Error::Unsupported(_) | Error::EstimateFile { .. } => None,
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! From log files to checked logs.
+
+use std::path::Path;
+
+use dynid_io::{ColumnMapping, MappingSpec, ReadOptions, Signals};
+use dynid_model::{JointKind, Mechanism};
+use dynid_motion::{Channel, JointSignals, Log};
+use sha2::{Digest, Sha256};
+
+use crate::Error;
+use crate::config::{LogConfig, MotorSide};
+
+/// A log that was read, with what was read besides signals.
+#[derive(Debug, Clone)]
+pub struct LoadedLog {
+    /// Signals.
+    pub log: Log,
+    /// Joints of the robot without columns.
+    pub not_logged: Vec<String>,
+    /// How columns were understood: signal, column names.
+    pub columns: Vec<(String, String)>,
+}
+
+/// Reads a log for a mechanism.
+///
+/// # Errors
+/// [`Error::LogFile`], [`Error::Columns`], [`Error::Log`], [`Error::Degrees`].
+pub fn load(
+    config: &LogConfig,
+    mechanism: &Mechanism,
+    run_columns: &MappingSpec,
+    motor_side: Option<&MotorSide>,
+) -> Result<LoadedLog, Error> {
+    let file = config.path.display().to_string();
+    let options = ReadOptions { rows: config.rows, ..ReadOptions::default() };
+    let table = dynid_io::csv::read(&config.path, &options)?;
+    let spec = config.columns.as_ref().unwrap_or(run_columns);
+    let joints = mechanism.rate_names();
+    let named = |source| Error::Columns { file: file.clone(), source };
+    let mapping = ColumnMapping::from_spec(&table.header, &joints, spec).map_err(named)?;
+    let mut signals = mapping.extract(&table).map_err(named)?;
+    drop(table);
+    if let Some(transmission) = motor_side {
+        to_joint_side(&mut signals, transmission)?;
+    }
+    check_degrees(&signals, mechanism, &file)?;
+    let log = assemble(&file, &signals)?;
+    let log = match config.part {
+        None => log,
+        Some((from, to)) => {
+            let rows = log.rows() as f64;
+            log.slice((from * rows).round() as usize..(to * rows).round() as usize)?
+        }
+    };
+    Ok(LoadedLog { log, not_logged: signals.not_logged.clone(), columns: describe(&mapping) })
+}
+
+/// Turns motor positions and efforts into those of the joints.
+fn to_joint_side(signals: &mut Signals, transmission: &MotorSide) -> Result<(), Error> {
+    let n = signals.joints.len();
+    let matrix = &transmission.matrix;
+    let setting = |expected: String, found: String| Error::Setting {
+        name: "motor_side".to_owned(),
+        expected,
+        found,
+    };
+    if matrix.len() != n || matrix.iter().any(|row| row.len() != n) {
+        let widths: Vec<usize> = matrix.iter().map(Vec::len).collect();
+        return Err(setting(format!("a matrix of {n} rows of {n}"), format!("rows of {widths:?}")));
+    }
+    if !matrix.iter().flatten().all(|x| x.is_finite()) {
+        return Err(setting("finite numbers".to_owned(), format!("{matrix:?}")));
+    }
+    if !transmission.offset.is_empty() && transmission.offset.len() != n {
+        return Err(setting(format!("{n} offsets"), transmission.offset.len().to_string()));
+    }
+    let inverse = crate::elements::inverse(matrix)
+        .ok_or_else(|| setting("a regular matrix".to_owned(), "a singular one".to_owned()))?;
+    let offset = |j: usize| transmission.offset.get(j).copied().unwrap_or(0.0);
+    signals.position = combine(&signals.position, &inverse, offset);
+    signals.velocity = signals.velocity.as_ref().map(|v| combine(v, &inverse, |_| 0.0));
+    let transposed: Vec<Vec<f64>> = (0..n).map(|j| matrix.iter().map(|row| row[j]).collect()).collect();
+    signals.effort = signals.effort.as_ref().map(|e| combine(e, &transposed, |_| 0.0));
+    Ok(())
+}
+
+fn combine(signals: &[Vec<f64>], matrix: &[Vec<f64>], offset: impl Fn(usize) -> f64) -> Vec<Vec<f64>> {
+    let samples = signals.first().map_or(0, Vec::len);
+    matrix
+        .iter()
+        .enumerate()
+        .map(|(j, row)| {
+            let mut out = vec![offset(j); samples];
+            for (factor, signal) in row.iter().zip(signals).filter(|(f, _)| **f != 0.0) {
+                for (o, x) in out.iter_mut().zip(signal) {
+                    *o += factor * x;
+                }
+            }
+            out
+        })
+        .collect()
+}
+
+fn assemble(file: &str, signals: &Signals) -> Result<Log, Error> {
+    let take = |list: &Option<Vec<Vec<f64>>>, k: usize| list.as_ref().map(|l| l[k].clone());
+    let joints = signals
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(k, name)| JointSignals {
+            name: name.clone(),
+            position: signals.position[k].clone(),
+            velocity: take(&signals.velocity, k),
+            effort: take(&signals.effort, k).unwrap_or_default(),
+        })
+        .collect();
+    let channels =
+        signals.channels.iter().map(|(name, values)| Channel { name: name.clone(), values: values.clone() });
+    Ok(Log::new(file, signals.time.clone(), joints, channels.collect())?)
+}
+
+fn check_degrees(signals: &Signals, mechanism: &Mechanism, file: &str) -> Result<(), Error> {
+    let owners = mechanism.rate_bodies();
+    let turning: Vec<usize> = (0..signals.joints.len())
+        .filter(|k| mechanism.bodies()[owners[signals.indices[*k]]].joint.kind != JointKind::Prismatic)
+        .collect();
+    let positions: Vec<Vec<f64>> = turning.iter().map(|k| signals.position[*k].clone()).collect();
+    let limits: Vec<_> =
+        turning.iter().map(|k| mechanism.bodies()[owners[signals.indices[*k]]].joint.limits).collect();
+    match dynid_io::columns::degrees_suspected(&positions, &limits) {
+        None => Ok(()),
+        Some(evidence) => Err(Error::Degrees {
+            file: file.to_owned(),
+            joint: signals.joints[turning[evidence.joint]].clone(),
+            largest: evidence.largest,
+            limit: evidence.limit,
+        }),
+    }
+}
+
+fn describe(mapping: &ColumnMapping) -> Vec<(String, String)> {
+    let list = |columns: &[Option<dynid_io::columns::ColumnUse>]| {
+        columns.iter().flatten().map(|c| c.name.as_str()).collect::<Vec<_>>().join(" ")
+    };
+    let mut out = vec![(
+        "time".to_owned(),
+        match &mapping.time {
+            dynid_io::columns::TimeSource::Column(c) => c.name.clone(),
+            dynid_io::columns::TimeSource::Rate(r) => format!("{r} Hz"),
+        },
+    )];
+    out.push(("position".to_owned(), list(&mapping.position)));
+    if let Some(effort) = &mapping.effort {
+        out.push(("effort".to_owned(), list(effort)));
+    }
+    for (name, column) in &mapping.channels {
+        out.push((name.clone(), column.name.clone()));
+    }
+    out
+}
+
+/// SHA-256 of a file, hexadecimal.
+///
+/// # Errors
+/// [`Error::Read`].
+pub fn sha256(path: &Path) -> Result<String, Error> {
+    let read_error = |source| Error::Read { file: path.to_owned(), source };
+    let mut file = std::fs::File::open(path).map_err(read_error)?;
+    let mut hasher = Sha256::new();
+    std::io::copy(&mut file, &mut hasher).map_err(read_error)?;
+    Ok(hasher.finalize().iter().map(|b| format!("{b:02x}")).collect())
+}
