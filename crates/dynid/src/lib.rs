@@ -8,9 +8,17 @@ pub mod config;
 pub mod elements;
 mod error;
 pub mod estimate;
+mod export;
 pub mod identify;
+pub mod inspect;
 pub mod logs;
+pub mod predict;
+mod report_data;
+mod result;
 pub mod robot;
+pub mod simulate;
+pub mod validate;
+pub mod verdict;
 
 pub use config::Config;
 pub use error::Error;

@@ -1,0 +1,258 @@
+//! Arguments.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Identifies the dynamic parameters of robots and mechanisms from logs of motion and effort.
+#[derive(Debug, Parser)]
+#[command(name = "dynid", version, about, propagate_version = true)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Show a robot's tree, its parameters and which combinations of them can be identified.
+    Inspect(InspectArgs),
+    /// Effort and regressor rows at given states.
+    Regressor(RegressorArgs),
+    /// Identify a robot from logs: writes estimate.json, report.html and an updated robot file.
+    Identify(Box<IdentifyArgs>),
+    /// Effort of an identified model at given states.
+    Predict(PredictArgs),
+    /// Make a virtual log by inverse dynamics.
+    Simulate(SimulateArgs),
+    /// Compare an identified model with other logs.
+    Validate(ValidateArgs),
+}
+
+/// How a robot file is read.
+#[derive(Debug, Args)]
+pub(crate) struct RobotArgs {
+    /// Robot file: URDF, or TOML with DH rows or bodies.
+    pub(crate) robot: PathBuf,
+    /// Put a floating joint under the root link.
+    #[arg(long)]
+    pub(crate) floating_base: bool,
+    /// Let mimic joints follow their leaders (default: every joint is a coordinate of its own).
+    #[arg(long)]
+    pub(crate) couple_mimics: bool,
+    /// Hold a joint at a position, rad or m.
+    #[arg(long, value_name = "JOINT=POSITION", value_parser = joint_value)]
+    pub(crate) lock: Vec<(String, f64)>,
+    /// Gravity in base axes, m/s² (default: the robot file's, else 0,0,-9.81).
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    pub(crate) gravity: Option<[f64; 3]>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct InspectArgs {
+    #[command(flatten)]
+    pub(crate) robot: RobotArgs,
+    /// Elements at every joint, comma separated (default: the robot file's, else none: rigid bodies alone).
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub(crate) elements: Option<Vec<String>>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RegressorArgs {
+    #[command(flatten)]
+    pub(crate) robot: RobotArgs,
+    /// States: CSV with q, dq, ddq (`q_<joint>` or `q1..`), optional gx, gy, gz.
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) states: PathBuf,
+    /// Give base columns instead of standard ones.
+    #[arg(long)]
+    pub(crate) base: bool,
+    /// Print JSON (joints, columns, effort, regressor); without it only efforts, as CSV.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum RouteArg {
+    /// States at a high cut-off, one compact kernel; everything found from the data.
+    Compact,
+    /// Zero-phase Butterworth, central differences, decimation.
+    Textbook,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum MethodArg {
+    /// Ordinary least squares.
+    Ols,
+    /// Weighted least squares.
+    Wls,
+}
+
+/// How log columns are understood.
+#[derive(Debug, Args)]
+pub(crate) struct LogArgs {
+    /// Sample rate for logs without a time column, Hz.
+    #[arg(long, value_name = "HZ")]
+    pub(crate) rate_hz: Option<f64>,
+    /// Drive gains for current columns, N m/A, one per joint.
+    #[arg(long, value_name = "K1,K2,..", value_delimiter = ',')]
+    pub(crate) gains: Option<Vec<f64>>,
+    /// Hold joints without columns still at zero instead of refusing the log.
+    #[arg(long)]
+    pub(crate) allow_unlogged: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct IdentifyArgs {
+    /// Configuration (TOML), or a robot file together with --log.
+    pub(crate) input: PathBuf,
+    /// Log to identify from, CSV or CSV.gz; repeat for several.
+    #[arg(long, value_name = "LOG")]
+    pub(crate) log: Vec<PathBuf>,
+    /// Log to validate on; repeat for several.
+    #[arg(long, value_name = "LOG")]
+    pub(crate) validate: Vec<PathBuf>,
+    /// Output folder (default: dynid-out).
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) columns: LogArgs,
+    /// Elements at every joint that moves, comma separated (default: coulomb,viscous,offset,rotor).
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub(crate) elements: Option<Vec<String>>,
+    /// Hold a joint at a position, rad or m.
+    #[arg(long, value_name = "JOINT=POSITION", value_parser = joint_value)]
+    pub(crate) lock: Vec<(String, f64)>,
+    /// Let mimic joints follow their leaders.
+    #[arg(long)]
+    pub(crate) couple_mimics: bool,
+    /// Gravity in base axes, m/s².
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    pub(crate) gravity: Option<[f64; 3]>,
+    /// Way from samples to rows.
+    #[arg(long, value_enum)]
+    pub(crate) route: Option<RouteArg>,
+    /// Estimator.
+    #[arg(long, value_enum)]
+    pub(crate) estimator: Option<MethodArg>,
+    /// Cut-off of the widest kernel (textbook route: of the filter), Hz.
+    #[arg(long, value_name = "HZ")]
+    pub(crate) kernel_hz: Option<f64>,
+    /// Cut-off of the state filter, Hz.
+    #[arg(long, value_name = "HZ")]
+    pub(crate) state_hz: Option<f64>,
+    /// Delay of the motion behind the logged effort, samples.
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) delay_samples: Option<f64>,
+    /// Reversal mask, share of rms speed; negative: none.
+    #[arg(long, value_name = "SHARE", allow_hyphen_values = true)]
+    pub(crate) reversal_mask: Option<f64>,
+    /// Textbook route: keep every n-th row.
+    #[arg(long, value_name = "N")]
+    pub(crate) decimation: Option<usize>,
+    /// Parameters to keep as base parameters where there is a choice, comma separated.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub(crate) prefer: Vec<String>,
+    /// Seed.
+    #[arg(long)]
+    pub(crate) seed: Option<u64>,
+    /// Print the estimate as JSON to stdout as well.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Say only what went wrong.
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct PredictArgs {
+    /// estimate.json
+    pub(crate) estimate: PathBuf,
+    /// States: CSV with q, dq, ddq, optional gx, gy, gz.
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) states: PathBuf,
+    /// Output CSV (default: stdout).
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SimulateArgs {
+    #[command(flatten)]
+    pub(crate) robot: RobotArgs,
+    /// Settings of the virtual log, TOML.
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) config: Option<PathBuf>,
+    /// Length, s.
+    #[arg(long, value_name = "S")]
+    pub(crate) duration: Option<f64>,
+    /// Sample rate, Hz.
+    #[arg(long, value_name = "HZ")]
+    pub(crate) rate_hz: Option<f64>,
+    /// Noise of the effort, share of its rms.
+    #[arg(long, value_name = "SHARE")]
+    pub(crate) effort_noise: Option<f64>,
+    /// Encoder resolution, bits per turn; 0: exact.
+    #[arg(long, value_name = "BITS")]
+    pub(crate) encoder_bits: Option<u32>,
+    /// Seed of trajectory and noise.
+    #[arg(long)]
+    pub(crate) seed: Option<u64>,
+    /// Output log, CSV or CSV.gz.
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) out: PathBuf,
+    /// Also write the true states and efforts.
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) clean: Option<PathBuf>,
+    /// Also write the true parameters, JSON.
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) truth: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ValidateArgs {
+    /// estimate.json
+    pub(crate) estimate: PathBuf,
+    /// Log to compare with; repeat for several.
+    #[arg(long, value_name = "LOG", required = true)]
+    pub(crate) log: Vec<PathBuf>,
+    /// First and last data row of the logs, from 1.
+    #[arg(long, value_name = "FIRST:LAST", value_parser = row_range)]
+    pub(crate) rows: Option<(usize, usize)>,
+    #[command(flatten)]
+    pub(crate) columns: LogArgs,
+    /// Configuration whose [columns] and [motor_side] the logs follow.
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) config: Option<PathBuf>,
+    /// Cut-off of the filter for the filtered figures, Hz (default: the kernel's).
+    #[arg(long, value_name = "HZ")]
+    pub(crate) filter_hz: Option<f64>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+fn joint_value(text: &str) -> Result<(String, f64), String> {
+    let (joint, value) = text.split_once('=').ok_or("expected JOINT=POSITION")?;
+    let value: f64 = value.parse().map_err(|_| format!("expected a number after `=`, found `{value}`"))?;
+    if value.is_finite() { Ok((joint.to_owned(), value)) } else { Err("expected a finite number".to_owned()) }
+}
+
+fn vector(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> = text
+        .split(',')
+        .map(|x| x.trim().parse().map_err(|_| format!("expected three numbers X,Y,Z, found `{text}`")))
+        .collect::<Result<_, _>>()?;
+    <[f64; 3]>::try_from(numbers)
+        .ok()
+        .filter(|v| v.iter().all(|x| x.is_finite()))
+        .ok_or_else(|| format!("expected three finite numbers X,Y,Z, found `{text}`"))
+}
+
+fn row_range(text: &str) -> Result<(usize, usize), String> {
+    let fault = || format!("expected FIRST:LAST, found `{text}`");
+    let (first, last) = text.split_once(':').ok_or_else(fault)?;
+    Ok((first.parse().map_err(|_| fault())?, last.parse().map_err(|_| fault())?))
+}

@@ -1,0 +1,67 @@
+//! `dynid inspect`.
+
+use std::fmt::Write;
+
+use dynid::inspect::{Inspection, inspect};
+
+use super::{load_robot, table};
+use crate::args::InspectArgs;
+use crate::message::{Failure, data, json, note};
+
+pub(crate) fn run(args: &InspectArgs) -> Result<u8, Failure> {
+    let robot = load_robot(&args.robot)?;
+    let inspection = inspect(&robot, args.elements.as_deref())?;
+    if args.json {
+        json(&inspection)?;
+    } else {
+        for warning in &inspection.warnings {
+            note(&format!("warning: {warning}"));
+        }
+        data(&text(&inspection))?;
+    }
+    Ok(0)
+}
+
+fn text(i: &Inspection) -> String {
+    let mut out = String::new();
+    let _ = writeln!(
+        out,
+        "{}: {} moving joints on `{}`, gravity {:?} m/s²\n",
+        i.robot,
+        i.joints.len(),
+        i.base_link,
+        i.gravity
+    );
+    let rows: Vec<Vec<String>> = i
+        .joints
+        .iter()
+        .map(|j| {
+            vec![
+                j.number.to_string(),
+                j.name.clone(),
+                j.kind.clone(),
+                j.parent.clone(),
+                j.link.clone(),
+                table::number(j.mass),
+                j.elements.join(","),
+            ]
+        })
+        .collect();
+    out.push_str(&table::aligned(&["#", "joint", "kind", "parent", "link", "mass kg", "elements"], &rows));
+    let (kept, dropped) = i.rank_gap;
+    let gap = dropped.map_or_else(|| "full rank".to_owned(), |d| format!("gap {kept:.1e} to {d:.1e}"));
+    let _ = writeln!(
+        out,
+        "\n{} base parameters out of {} standard ones ({gap}); numbers in symbols are those of the joints",
+        i.base_parameter_count, i.standard_parameters
+    );
+    let width = i.base_parameters.iter().map(|b| b.name.chars().count()).max().unwrap_or(0);
+    for (k, b) in i.base_parameters.iter().enumerate() {
+        let pad = " ".repeat(width - b.name.chars().count());
+        let _ = writeln!(out, "{:4}  {}{pad}  {}  [{}]", k + 1, b.name, b.expression, b.unit);
+    }
+    if !i.never_seen.is_empty() {
+        let _ = writeln!(out, "\nnever seen in any effort: {}", i.never_seen.join(", "));
+    }
+    out
+}

@@ -1,0 +1,34 @@
+//! One file per command.
+
+pub(crate) mod identify;
+pub(crate) mod inspect;
+pub(crate) mod predict;
+pub(crate) mod regressor;
+pub(crate) mod simulate;
+mod table;
+pub(crate) mod validate;
+
+use dynid::{Robot, RobotOptions};
+
+use crate::args::{LogArgs, RobotArgs};
+use crate::message::Failure;
+
+fn load_robot(args: &RobotArgs) -> Result<Robot, Failure> {
+    let options = RobotOptions {
+        gravity: args.gravity,
+        couple_mimics: args.couple_mimics,
+        floating_base: args.floating_base,
+        locked: args.lock.clone(),
+    };
+    Ok(Robot::load(&args.robot, &options)?)
+}
+
+fn apply_log_args(spec: &mut dynid::io::MappingSpec, args: &LogArgs) {
+    if args.rate_hz.is_some() {
+        spec.rate_hz = args.rate_hz;
+    }
+    if args.gains.is_some() {
+        spec.current_gains.clone_from(&args.gains);
+    }
+    spec.allow_unlogged |= args.allow_unlogged;
+}

@@ -1,0 +1,50 @@
+//! `dynid predict`.
+
+use std::fmt::Write;
+
+use dynid::Estimate;
+use dynid::io::{ReadOptions, states};
+use dynid::model::EffortModel;
+use dynid::predict::efforts;
+use dynid::robot::state_joints;
+
+use crate::args::PredictArgs;
+use crate::message::{Failure, data, note};
+
+pub(crate) fn run(args: &PredictArgs) -> Result<u8, Failure> {
+    let estimate = Estimate::read(&args.estimate)?;
+    let model = estimate.effort_model(&args.estimate)?;
+    if !model.channels().is_empty() {
+        return Err(Failure::Usage(format!(
+            "the model reads the channels {}, which a states table does not hold",
+            model.channels().join(", ")
+        )));
+    }
+    let states = states::read(&args.states, &state_joints(model.mechanism()), &ReadOptions::default())?;
+    let effort = efforts(&model, &estimate.values(), &states);
+    match &args.out {
+        None => data(&csv_text(&estimate.joints, &effort))?,
+        Some(path) => {
+            dynid::io::csv::write(path, &header(&estimate.joints), &effort)?;
+            note(&format!("{} rows written to {}", states.rows, path.display()));
+        }
+    }
+    Ok(0)
+}
+
+fn header(joints: &[String]) -> Vec<String> {
+    joints.iter().map(|j| format!("effort_{j}")).collect()
+}
+
+/// Efforts as CSV, one row per state.
+pub(super) fn csv_text(joints: &[String], effort: &[Vec<f64>]) -> String {
+    let mut out = header(joints).join(",");
+    out.push('\n');
+    for row in 0..effort.first().map_or(0, Vec::len) {
+        for (k, column) in effort.iter().enumerate() {
+            let _ = write!(out, "{}{}", if k > 0 { "," } else { "" }, column[row]);
+        }
+        out.push('\n');
+    }
+    out
+}

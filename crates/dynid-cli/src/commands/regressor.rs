@@ -1,0 +1,46 @@
+//! `dynid regressor`.
+
+use dynid::io::{ReadOptions, states};
+use dynid::model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
+use dynid::predict::{efforts, regressors};
+use serde::Serialize;
+
+use super::load_robot;
+use super::predict::csv_text;
+use crate::args::RegressorArgs;
+use crate::message::{Failure, data, json};
+
+#[derive(Serialize)]
+struct Output {
+    joints: Vec<String>,
+    columns: Vec<String>,
+    effort: Vec<Vec<f64>>,
+    regressor: Vec<Vec<Vec<f64>>>,
+}
+
+pub(crate) fn run(args: &RegressorArgs) -> Result<u8, Failure> {
+    let robot = load_robot(&args.robot)?;
+    let states = states::read(&args.states, &robot.state_joints(), &ReadOptions::default())?;
+    let model = RobotModel::new(robot.mechanism.clone(), Vec::new());
+    let effort = efforts(&model, &model.parameters().prior(), &states);
+    let joints: Vec<String> = model.outputs().iter().map(|o| o.name.clone()).collect();
+    if !args.json {
+        data(&csv_text(&joints, &effort))?;
+        return Ok(0);
+    }
+    let base = args
+        .base
+        .then(|| BaseParameters::of(&model, model.mechanism(), &[], &BaseSettings::default()));
+    let table = &model.parameters().linear;
+    let columns = match &base {
+        None => table.iter().map(|p| p.name.clone()).collect(),
+        Some(base) => base.kept.iter().map(|c| table[*c].name.clone()).collect(),
+    };
+    json(&Output {
+        columns,
+        effort: (0..states.rows).map(|s| effort.iter().map(|e| e[s]).collect()).collect(),
+        regressor: regressors(&model, base.as_ref(), &states),
+        joints,
+    })?;
+    Ok(0)
+}

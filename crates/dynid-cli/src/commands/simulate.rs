@@ -1,0 +1,56 @@
+//! `dynid simulate`.
+
+use std::path::Path;
+
+use dynid::io::csv;
+use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
+
+use super::load_robot;
+use crate::args::SimulateArgs;
+use crate::message::{Failure, note};
+
+pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
+    let robot = load_robot(&args.robot)?;
+    let mut settings = match &args.config {
+        None => SimulateSettings::default(),
+        Some(path) => read_settings(path)?,
+    };
+    settings.duration_s = args.duration.unwrap_or(settings.duration_s);
+    settings.rate_hz = args.rate_hz.unwrap_or(settings.rate_hz);
+    settings.effort_noise = args.effort_noise.unwrap_or(settings.effort_noise);
+    settings.encoder_bits = args.encoder_bits.unwrap_or(settings.encoder_bits);
+    settings.seed = args.seed.unwrap_or(settings.seed);
+    let log = simulate(&robot, &settings)?;
+    write(&args.out, &log, &[("q", &log.position), ("tau", &log.effort)])?;
+    note(&format!("{} samples of {} joints written to {}", log.time.len(), log.joints.len(), args.out.display()));
+    if let Some(path) = &args.clean {
+        let [q, dq, ddq, tau] = &log.clean;
+        write(path, &log, &[("q", q), ("dq", dq), ("ddq", ddq), ("tau", tau)])?;
+    }
+    if let Some(path) = &args.truth {
+        let truth: serde_json::Map<String, serde_json::Value> =
+            log.truth.iter().map(|(n, v)| (n.clone(), (*v).into())).collect();
+        let text = serde_json::to_string_pretty(&truth).map_err(|e| Failure::Output(e.into()))?;
+        dynid::io::output::write_atomically(path, (text + "\n").as_bytes())?;
+    }
+    Ok(0)
+}
+
+fn read_settings(path: &Path) -> Result<SimulateSettings, Failure> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|source| dynid::Error::Read { file: path.to_owned(), source })?;
+    Ok(SimulateSettings::parse(&text, &path.display().to_string())?)
+}
+
+fn write(path: &Path, log: &SimulatedLog, signals: &[(&str, &Vec<Vec<f64>>)]) -> Result<(), Failure> {
+    let mut header = vec!["t".to_owned()];
+    let mut columns: Vec<&[f64]> = vec![&log.time];
+    for (name, signal) in signals {
+        for (joint, values) in log.joints.iter().zip(*signal) {
+            header.push(format!("{name}_{joint}"));
+            columns.push(values);
+        }
+    }
+    csv::write(path, &header, &columns)?;
+    Ok(())
+}

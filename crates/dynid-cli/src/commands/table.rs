@@ -1,0 +1,72 @@
+//! Aligned tables of numbers for people.
+
+use dynid::estimate::FitValues;
+
+/// A number with four significant digits, or a dash.
+pub(super) fn number(x: Option<f64>) -> String {
+    match x {
+        None => "-".to_owned(),
+        Some(0.0) => "0".to_owned(),
+        Some(x) => {
+            let magnitude = x.abs().log10().floor() as i32;
+            if (-4..5).contains(&magnitude) {
+                let decimals = (3 - magnitude).max(0) as usize;
+                format!("{x:.decimals$}")
+            } else {
+                format!("{x:.3e}")
+            }
+        }
+    }
+}
+
+/// Rows under a header, columns right-aligned but for the first.
+pub(super) fn aligned(header: &[&str], rows: &[Vec<String>]) -> String {
+    let width = |c: usize| {
+        rows.iter()
+            .map(|r| r[c].chars().count())
+            .chain([header[c].chars().count()])
+            .max()
+            .unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..header.len()).map(width).collect();
+    let line = |cells: &[String]| {
+        let mut out = String::new();
+        for (c, (cell, w)) in cells.iter().zip(&widths).enumerate() {
+            let pad = " ".repeat(w - cell.chars().count());
+            if c == 0 {
+                out.push_str(cell);
+                out.push_str(&pad);
+            } else {
+                out.push_str("  ");
+                out.push_str(&pad);
+                out.push_str(cell);
+            }
+        }
+        out.trim_end().to_owned() + "\n"
+    };
+    let mut out = line(&header.iter().map(|h| (*h).to_owned()).collect::<Vec<_>>());
+    for row in rows {
+        out.push_str(&line(row));
+    }
+    out
+}
+
+/// Per-joint figures of a log, raw beside filtered.
+pub(super) fn agreement(joints: &[String], raw: &FitValues, filtered: &FitValues) -> String {
+    let percent = |x: Option<f64>| x.map(|x| 100.0 * x);
+    let rows: Vec<Vec<String>> = joints
+        .iter()
+        .enumerate()
+        .map(|(j, name)| {
+            vec![
+                name.clone(),
+                number(raw.rms[j]),
+                number(filtered.rms[j]),
+                number(percent(filtered.nrmse[j])),
+                number(filtered.r2[j]),
+                number(filtered.relative_error_per_joint[j]),
+            ]
+        })
+        .collect();
+    aligned(&["joint", "rms raw", "rms filtered", "nrmse %", "R²", "relative error %"], &rows)
+}

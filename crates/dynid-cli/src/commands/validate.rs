@@ -1,0 +1,52 @@
+//! `dynid validate`.
+
+use dynid::config::{Config, LogConfig};
+use dynid::estimate::{Estimate, FitValues};
+use dynid::validate::{log_fit, validate};
+
+use super::{apply_log_args, table};
+use crate::args::ValidateArgs;
+use crate::message::{Failure, data, json};
+
+pub(crate) fn run(args: &ValidateArgs) -> Result<u8, Failure> {
+    let estimate = Estimate::read(&args.estimate)?;
+    let (mut columns, motor_side) = match &args.config {
+        None => (dynid::io::MappingSpec::default(), None),
+        Some(path) => {
+            let config = Config::read(path)?;
+            (config.columns, config.motor_side)
+        }
+    };
+    apply_log_args(&mut columns, &args.columns);
+    if let Some(hz) = args.filter_hz
+        && !(hz.is_finite() && hz > 0.0)
+    {
+        return Err(Failure::Usage(format!("--filter-hz: expected a positive number, found {hz}")));
+    }
+    let logs: Vec<LogConfig> = args
+        .log
+        .iter()
+        .map(|path| LogConfig { path: path.clone(), rows: args.rows, ..LogConfig::default() })
+        .collect();
+    let agreements =
+        validate(&estimate, &args.estimate, &logs, &columns, motor_side.as_ref(), args.filter_hz)?;
+    let fits: Vec<_> = agreements.iter().map(log_fit).collect();
+    if args.json {
+        json(&fits)?;
+        return Ok(0);
+    }
+    let mut out = String::new();
+    for fit in &fits {
+        out.push_str(&format!(
+            "{}: relative error {} % raw, {} % filtered at {:.1} Hz\n",
+            fit.log,
+            table::number(fit.raw.relative_error),
+            table::number(fit.filtered.relative_error),
+            fit.filter_hz
+        ));
+        let (raw, filtered): (&FitValues, &FitValues) = (&fit.raw, &fit.filtered);
+        out.push_str(&table::agreement(&estimate.joints, raw, filtered));
+    }
+    data(&out)?;
+    Ok(0)
+}

@@ -1,0 +1,61 @@
+//! Messages for people, and how a run ends.
+
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+/// Why a command ended early.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// Bad input, with a hint.
+    Input(dynid::Error),
+    /// Bad usage that the argument parser cannot see.
+    Usage(String),
+    /// The reader of our output has gone: not an error.
+    Closed,
+    /// Output cannot be written.
+    Output(io::Error),
+}
+
+impl<E: Into<dynid::Error>> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Failure::Input(error.into())
+    }
+}
+
+impl Failure {
+    /// Tells the user and gives the exit code.
+    pub(crate) fn report(self) -> ExitCode {
+        let (text, hint) = match self {
+            Failure::Closed => return ExitCode::SUCCESS,
+            Failure::Input(error) => (error.to_string(), error.hint()),
+            Failure::Usage(text) => (text, Some("see `dynid help`".to_owned())),
+            Failure::Output(error) => (format!("output: {error}"), None),
+        };
+        let mut err = io::stderr().lock();
+        // Nothing is left to be done if stderr itself is gone.
+        let _ = writeln!(err, "error: {text}");
+        if let Some(hint) = hint {
+            let _ = writeln!(err, "hint: {hint}");
+        }
+        ExitCode::from(2)
+    }
+}
+
+/// Writes data to stdout.
+pub(crate) fn data(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    written.map_err(|e| if e.kind() == io::ErrorKind::BrokenPipe { Failure::Closed } else { Failure::Output(e) })
+}
+
+/// Writes a line for people to stderr.
+pub(crate) fn note(text: &str) {
+    // A closed stderr is the user's choice.
+    let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
+/// JSON text with a newline.
+pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    let text = serde_json::to_string(value).map_err(|e| Failure::Output(e.into()))?;
+    data(&(text + "\n"))
+}

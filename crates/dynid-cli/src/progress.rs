@@ -1,0 +1,45 @@
+//! A progress line for long work, on terminals only.
+
+use std::io::IsTerminal;
+use std::time::Duration;
+
+use dynid::Step;
+use dynid::estimators::conditioning::Stage;
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Shows what is being worked on; silent unless stderr is a terminal.
+pub(crate) struct Progress(ProgressBar);
+
+impl Progress {
+    pub(crate) fn new(quiet: bool) -> Self {
+        if quiet || !std::io::stderr().is_terminal() {
+            return Progress(ProgressBar::hidden());
+        }
+        let bar = ProgressBar::new_spinner();
+        if let Ok(style) = ProgressStyle::with_template("{spinner} [{elapsed}] {msg}") {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(Duration::from_millis(120));
+        Progress(bar)
+    }
+
+    pub(crate) fn step(&self, step: Step) {
+        self.0.set_message(match step {
+            Step::Read(file) => format!("reading {file}"),
+            Step::Structure => "finding base parameters".to_owned(),
+            Step::Conditioning(Stage::Kernel(k, n)) => format!("summing rows, kernel {} of {n}", k + 1),
+            Step::Conditioning(Stage::Veto) => "choosing the kernel".to_owned(),
+            Step::Conditioning(Stage::Mask) => "choosing the reversal mask".to_owned(),
+            Step::Conditioning(Stage::Delay) => "estimating the delay".to_owned(),
+            Step::Fit => "fitting".to_owned(),
+            Step::Covariance => "standard deviations".to_owned(),
+            Step::Validate(log) => format!("predicting {log}"),
+        });
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}

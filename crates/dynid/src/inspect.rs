@@ -1,0 +1,126 @@
+//! What a robot file holds and what of it can be identified.
+
+use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
+use serde::Serialize;
+
+use crate::Error;
+use crate::elements::ElementPlan;
+use crate::robot::Robot;
+
+/// Structure of a robot.
+#[derive(Debug, Clone, Serialize)]
+pub struct Inspection {
+    /// Robot name.
+    pub robot: String,
+    /// Root link.
+    pub base_link: String,
+    /// Gravity, m/s².
+    pub gravity: [f64; 3],
+    /// Moving joints in file order.
+    pub joints: Vec<JointRow>,
+    /// Number of standard parameters, elements included.
+    pub standard_parameters: usize,
+    /// Number of base parameters.
+    pub base_parameter_count: usize,
+    /// Base parameters: name and regrouping.
+    pub base_parameters: Vec<BaseRow>,
+    /// Parameters that never act.
+    pub never_seen: Vec<String>,
+    /// Gap of the singular values at the rank decision: last counted, first not counted.
+    pub rank_gap: (f64, Option<f64>),
+    /// Oddities.
+    pub warnings: Vec<String>,
+}
+
+/// One moving joint.
+#[derive(Debug, Clone, Serialize)]
+pub struct JointRow {
+    /// Number that symbols carry.
+    pub number: usize,
+    /// Joint.
+    pub name: String,
+    /// Kind.
+    pub kind: String,
+    /// Moving link.
+    pub link: String,
+    /// Link it hangs on.
+    pub parent: String,
+    /// Links welded to the moving link.
+    pub fixed_links: Vec<String>,
+    /// Axis in the joint frame.
+    pub axis: [f64; 3],
+    /// Mass of the moving body as stated, kg.
+    pub mass: Option<f64>,
+    /// Elements.
+    pub elements: Vec<String>,
+}
+
+/// One base parameter.
+#[derive(Debug, Clone, Serialize)]
+pub struct BaseRow {
+    /// Kept parameter.
+    pub name: String,
+    /// Regrouping.
+    pub expression: String,
+    /// Unit.
+    pub unit: String,
+}
+
+/// Analyses a robot with the given elements per joint (`None`: those of its file, else none: rigid bodies alone).
+///
+/// # Errors
+/// [`Error::UnknownElement`].
+pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection, Error> {
+    let mechanism = &robot.mechanism;
+    let none: &[String] = &[];
+    let default = elements.or(if robot.elements.defaults.is_empty() { Some(none) } else { None });
+    let plan = ElementPlan::new(mechanism, &robot.elements, default, |_| true)?;
+    let model = RobotModel::new(mechanism.clone(), plan.build(mechanism)?);
+    let base = BaseParameters::of(&model, mechanism, &[], &BaseSettings::default());
+    let table = model.parameters();
+    let expressions = base.expressions(table);
+    let names = mechanism.rate_names();
+    let joints = mechanism
+        .bodies()
+        .iter()
+        .enumerate()
+        .map(|(k, body)| JointRow {
+            number: k + 1,
+            name: body.joint.name.clone(),
+            kind: format!("{:?}", body.joint.kind).split(' ').next().unwrap_or_default().to_lowercase(),
+            link: body.name.clone(),
+            parent: body.parent.map_or_else(
+                || mechanism.base_link().to_owned(),
+                |p| mechanism.bodies()[p].name.clone(),
+            ),
+            fixed_links: body.fixed_links.iter().map(|l| l.name.clone()).collect(),
+            axis: body.joint.axis.0,
+            mass: body.stated.then(|| body.inertia.mass()),
+            elements: names
+                .iter()
+                .position(|n| *n == body.joint.name)
+                .map_or_else(Vec::new, |rate| plan.per_rate[rate].clone()),
+        })
+        .collect();
+    Ok(Inspection {
+        robot: mechanism.name().to_owned(),
+        base_link: mechanism.base_link().to_owned(),
+        gravity: mechanism.gravity().0,
+        joints,
+        standard_parameters: table.linear.len(),
+        base_parameter_count: base.len(),
+        base_parameters: base
+            .kept
+            .iter()
+            .zip(expressions)
+            .map(|(c, expression)| BaseRow {
+                name: table.linear[*c].name.clone(),
+                expression,
+                unit: table.linear[*c].unit.to_owned(),
+            })
+            .collect(),
+        never_seen: base.zero.iter().map(|c| table.linear[*c].name.clone()).collect(),
+        rank_gap: (base.gap.kept, base.gap.dropped),
+        warnings: robot.warnings.clone(),
+    })
+}

@@ -1,0 +1,64 @@
+//! Efforts and regressors at given states.
+
+use dynid_io::States;
+use dynid_model::{BaseParameters, EffortModel, MotionBlock, RegressorBlock, RobotModel};
+
+/// Channel-after-channel copy of a states table.
+struct Flat {
+    rows: usize,
+    q: Vec<f64>,
+    dq: Vec<f64>,
+    ddq: Vec<f64>,
+    gravity: Option<Vec<f64>>,
+}
+
+impl Flat {
+    fn new(states: &States) -> Self {
+        Flat {
+            rows: states.rows,
+            q: states.position.concat(),
+            dq: states.velocity.concat(),
+            ddq: states.acceleration.concat(),
+            gravity: states.gravity.as_ref().map(|g| g.concat()),
+        }
+    }
+
+    fn regressor(&self, model: &RobotModel) -> RegressorBlock {
+        let mut block = RegressorBlock::new(model.layout().clone(), self.rows);
+        let motion = MotionBlock {
+            samples: self.rows,
+            stride: self.rows,
+            q: &self.q,
+            dq: &self.dq,
+            ddq: &self.ddq,
+            gravity: self.gravity.as_deref(),
+            channels: &[],
+        };
+        model.regressor(&motion, &[], &mut block);
+        block
+    }
+}
+
+/// Effort of every output at every state, for given linear parameters.
+pub fn efforts(model: &RobotModel, values: &[f64], states: &States) -> Vec<Vec<f64>> {
+    let block = Flat::new(states).regressor(model);
+    (0..model.outputs().len()).map(|output| block.effort(output, values)).collect()
+}
+
+/// Regressor at every state: `rows[state][output][column]`, in standard columns or, with `base`, in base columns.
+pub fn regressors(model: &RobotModel, base: Option<&BaseParameters>, states: &States) -> Vec<Vec<Vec<f64>>> {
+    let block = Flat::new(states).regressor(model);
+    let layout = model.layout();
+    let columns: Vec<usize> = base.map_or_else(|| (0..layout.parameters()).collect(), |b| b.kept.clone());
+    let mut out = vec![vec![vec![0.0; columns.len()]; layout.outputs()]; states.rows];
+    for output in 0..layout.outputs() {
+        for (k, column) in layout.columns(output).iter().enumerate() {
+            if let Ok(position) = columns.binary_search(column) {
+                for (state, value) in block.column(output, k).iter().enumerate() {
+                    out[state][output][position] = *value;
+                }
+            }
+        }
+    }
+    out
+}

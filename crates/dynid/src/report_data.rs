@@ -1,0 +1,376 @@
+//! The report's content from an identification and its result file.
+
+use dynid_report as report;
+use dynid_report::{Fact, Status, Value};
+
+use crate::Error;
+use crate::agreement::Agreement;
+use crate::config::{Config, Method};
+use crate::estimate::{Choice, Estimate};
+use crate::identify::Identification;
+use crate::result::short_name;
+
+impl Identification {
+    /// The report as one HTML page.
+    ///
+    /// # Errors
+    /// [`Error::Report`].
+    pub fn report(&self, config: &Config, estimate: &Estimate) -> Result<String, Error> {
+        Ok(report::render(&self.report_data(config, estimate))?)
+    }
+
+    /// The report's content.
+    pub fn report_data(&self, config: &Config, estimate: &Estimate) -> report::ReportData {
+        use dynid_model::EffortModel;
+        let mechanism = self.model.mechanism();
+        let owners = mechanism.rate_bodies();
+        report::ReportData {
+            title: format!("Identification of {}", estimate.robot),
+            verdict: verdict(estimate),
+            warnings: estimate
+                .verdict
+                .warnings
+                .iter()
+                .map(|w| report::Warning { message: w.clone(), ..Default::default() })
+                .chain(self.unphysical_bodies().into_iter().map(|(body, fault)| report::Warning {
+                    message: format!("the identified body `{body}` {fault}"),
+                    hint: "its split of base parameters into standard ones is not physical; predictions are not affected"
+                        .to_owned(),
+                }))
+                .collect(),
+            robot: report::Robot {
+                name: estimate.robot.clone(),
+                file: Some(config.robot.display().to_string()),
+                facts: vec![
+                    Fact::new("moving joints", mechanism.bodies().len(), ""),
+                    Fact::new("standard parameters, elements included", estimate.parameters.len(), ""),
+                    Fact::new("base parameters", estimate.base_parameters.len(), ""),
+                    Fact::new("gravity", format!("{:?}", mechanism.gravity().0), "m/s^2"),
+                ],
+            },
+            joints: self
+                .model
+                .outputs()
+                .iter()
+                .enumerate()
+                .map(|(k, o)| report::Joint {
+                    name: o.name.clone(),
+                    effort_unit: o.unit.to_owned(),
+                    kind: format!("{:?}", mechanism.bodies()[owners[k]].joint.kind).to_lowercase(),
+                    elements: self.plan.per_rate[k].clone(),
+                })
+                .collect(),
+            logs: self
+                .training
+                .iter()
+                .enumerate()
+                .map(|(k, a)| self.log_report(a, report::LogRole::Training, Some(k)))
+                .chain(self.validation.iter().map(|a| self.log_report(a, report::LogRole::Validation, None)))
+                .collect(),
+            estimation: vec![
+                Fact::new(
+                    "estimator",
+                    match config.estimator.method {
+                        Method::Ols => "ordinary least squares",
+                        Method::Wls => "weighted least squares, one residual variance per log, joint and kernel",
+                    },
+                    "",
+                ),
+                Fact::new("passes", self.fit.passes, ""),
+                Fact::new("converged", self.fit.converged, ""),
+                Fact::new(
+                    "standard deviations",
+                    if self.jackknife.is_some() {
+                        "jackknife over time blocks"
+                    } else {
+                        "white residuals (too few time blocks for a jackknife)"
+                    },
+                    "",
+                ),
+                Fact::new("time blocks", self.blocks, ""),
+                Fact::new("every identified body physical", estimate.feasible, ""),
+            ],
+            base_parameters: estimate
+                .base_parameters
+                .iter()
+                .map(|b| report::BaseParameter {
+                    name: b.name.clone(),
+                    expression: b.expression.clone(),
+                    unit: b.unit.clone(),
+                    value: b.value,
+                    std: b.std,
+                    relative_std_percent: b.rel_std,
+                    verdict: None,
+                })
+                .collect(),
+            standard_parameters: estimate
+                .parameters
+                .iter()
+                .map(|p| report::StandardParameter {
+                    owner: p.link.clone().or_else(|| p.joint.clone()).unwrap_or_default(),
+                    name: p.name.rsplit('.').next().unwrap_or(&p.name).to_owned(),
+                    unit: p.unit.clone(),
+                    value: Some(p.value),
+                    std: p.std,
+                    prior: p.prior,
+                    verdict: match p.verdict.as_str() {
+                        "seen in the data" => Some(report::ParameterVerdict::SeenInData),
+                        "not identifiable" => Some(report::ParameterVerdict::NotIdentifiable),
+                        _ => Some(report::ParameterVerdict::CarriedByPrior),
+                    },
+                })
+                .collect(),
+            observation: report::Observation {
+                rows: Some(estimate.rows as u64),
+                columns: Some(estimate.base_parameters.len() as u64),
+                rank: Some(estimate.rank.excited as u64),
+                structural_rank: Some(estimate.rank.structural as u64),
+                rank_tolerance: Some(self.fit.solution.rank.tolerance),
+                condition_number: estimate.condition_number,
+                condition_number_scaled: estimate.condition_number_scaled,
+            },
+            unidentifiable: estimate
+                .rank
+                .never_seen
+                .iter()
+                .map(|n| (n, "acts on no effort, whatever the motion"))
+                .chain(estimate.rank.not_excited.iter().map(|n| (n, "not excited by these logs")))
+                .map(|(name, reason)| report::UnidentifiableColumn {
+                    name: name.clone(),
+                    reason: reason.to_owned(),
+                })
+                .collect(),
+            conditioning: estimate.conditioning.choices.iter().map(chosen).collect(),
+            ladders: self.ladders(),
+            delays: self.delays(),
+            provenance: report::Provenance {
+                version: estimate.provenance.version.clone(),
+                inputs: estimate
+                    .provenance
+                    .inputs
+                    .iter()
+                    .map(|i| report::InputFile {
+                        path: i.path.clone(),
+                        kind: i.kind.clone(),
+                        sha256: Some(i.sha256.clone()),
+                    })
+                    .collect(),
+                seed: Some(estimate.provenance.seed),
+                settings: settings_facts(&estimate.provenance.settings),
+            },
+        }
+    }
+
+    fn log_report(&self, a: &Agreement, role: report::LogRole, training: Option<usize>) -> report::LogReport {
+        let percent = |x: Option<f64>| x.map(|x| 100.0 * x);
+        let quality = |f: &dynid_estimate::metrics::ChannelFit| report::Quality {
+            rms: f.rms,
+            nrmse_percent: percent(f.nrmse),
+            r2: f.r2,
+            relative_error_percent: f.relative_error,
+        };
+        let samples = a.counted.len();
+        let facts = training.map_or_else(Vec::new, |k| {
+            self.columns[k].iter().map(|(s, c)| Fact::new(format!("column of {s}"), c.as_str(), "")).collect()
+        });
+        report::LogReport {
+            name: short_name(&a.name),
+            role,
+            samples: Some(samples as u64),
+            samples_used: Some(a.counted.iter().filter(|c| **c).count() as u64),
+            duration_s: Some(samples as f64 / a.rate_hz),
+            sample_rate_hz: Some(a.rate_hz),
+            facts,
+            quality: a
+                .raw
+                .channels
+                .iter()
+                .zip(&a.filtered.channels)
+                .map(|(raw, filtered)| report::JointQuality {
+                    raw: quality(raw),
+                    filtered: quality(filtered),
+                })
+                .collect(),
+            relative_error_raw_percent: a.raw.relative_error,
+            relative_error_filtered_percent: a.filtered.relative_error,
+            series: Some(report::LogSeries {
+                time_s: (0..samples).map(|s| a.start + s as f64 / a.rate_hz).collect(),
+                description: format!(
+                    "Measured effort as logged; predicted effort from states filtered at {:.1} Hz, aligned by the \
+                     identified delay of {:.2} samples. Filtered figures: both through a zero-phase filter of {:.1} Hz.",
+                    self.state_hz, self.delay_samples, a.filter_hz
+                ),
+                joints: a
+                    .measured
+                    .iter()
+                    .zip(&a.predicted)
+                    .map(|(m, p)| report::JointSeries {
+                        measured: m.clone(),
+                        predicted: Some(p.clone()),
+                        used: Some(a.counted.clone()),
+                    })
+                    .collect(),
+            }),
+        }
+    }
+
+    fn ladders(&self) -> Vec<report::Ladder> {
+        let Some(c) = &self.conditioning else { return Vec::new() };
+        let mut out = Vec::new();
+        if c.kernel_trials.len() > 1 {
+            out.push(report::Ladder {
+                title: "Kernel cut-off".to_owned(),
+                explanation: "Held-out error with the smaller of the losses for linear and for rich friction. Noise sets the \
+                              cut-off; the highest one within the veto is kept."
+                    .to_owned(),
+                quantity: "cut-off".to_owned(),
+                unit: "Hz".to_owned(),
+                loss_name: "held-out loss, relative".to_owned(),
+                loss_unit: String::new(),
+                rungs: c
+                    .kernel_trials
+                    .iter()
+                    .map(|t| report::Rung {
+                        value: Value::Number(t.kernel_hz),
+                        loss: Some(t.loss.min(t.loss_rich)),
+                        chosen: t.kernel_hz == c.kernel_hz,
+                        ..Default::default()
+                    })
+                    .collect(),
+            });
+        }
+        if c.mask_trials.len() > 1 {
+            out.push(report::Ladder {
+                title: "Reversal mask (the same for all joints)".to_owned(),
+                explanation: "Held-out error when samples slower than a share of the joint's rms speed are left out. Single \
+                              joints may then deviate where that pays."
+                    .to_owned(),
+                quantity: "share of rms speed".to_owned(),
+                unit: String::new(),
+                loss_name: "held-out loss, relative".to_owned(),
+                loss_unit: String::new(),
+                rungs: c
+                    .mask_trials
+                    .iter()
+                    .map(|t| report::Rung {
+                        value: t.level.map_or_else(|| Value::Text("no mask".to_owned()), Value::Number),
+                        loss: Some(t.loss),
+                        loss_std_error: Some(t.standard_error),
+                        kept_percent: Some(100.0 * t.kept),
+                        chosen: c.mask.iter().filter(|m| **m == t.level).count() * 2 > c.mask.len(),
+                    })
+                    .collect(),
+            });
+        }
+        out
+    }
+
+    fn delays(&self) -> Vec<report::JointDelay> {
+        let (Some(c), Some(log)) = (&self.conditioning, self.logs.first()) else { return Vec::new() };
+        let seconds = |samples: f64| samples / log.rate_hz;
+        c.delay
+            .per_output
+            .iter()
+            .map(|(delay, error)| report::JointDelay {
+                delay_s: (!c.delay.given && *error < 100.0).then(|| seconds(*delay)),
+                interval_s: (!c.delay.given && *error < 100.0)
+                    .then(|| [seconds(delay - 1.96 * error), seconds(delay + 1.96 * error)]),
+                applied_s: Some(seconds(c.delay.samples)),
+            })
+            .collect()
+    }
+}
+
+fn status(word: &str) -> Status {
+    match word {
+        "ok" => Status::Ok,
+        "warn" => Status::Warn,
+        _ => Status::Fail,
+    }
+}
+
+fn verdict(estimate: &Estimate) -> report::Verdict {
+    let v = &estimate.verdict;
+    let best = estimate.validation.first().map_or(&estimate.fit.filtered, |f| &f.filtered);
+    let mut sentences = Vec::new();
+    if let Some(error) = best.relative_error {
+        let on = estimate.validation.first().map_or_else(
+            || "the training logs (there was no validation log: this is not a test)".to_owned(),
+            |f| short_name(&f.log),
+        );
+        sentences.push(format!("On {on}, filtered alike, prediction and measurement differ by {error:.2} % of the effort."));
+    }
+    if estimate.rank.excited < estimate.rank.structural {
+        sentences.push(format!(
+            "{} parameter combinations are not excited by these logs and keep the robot file's values.",
+            estimate.rank.structural - estimate.rank.excited
+        ));
+    }
+    for check in v.checks.iter().filter(|c| c.status != "ok") {
+        sentences.push(format!("{}: {}.", capital(&check.name), check.meaning));
+    }
+    report::Verdict {
+        status: status(&v.status),
+        headline: v.headline.clone(),
+        sentences,
+        checks: v
+            .checks
+            .iter()
+            .map(|c| report::Check {
+                status: status(&c.status),
+                name: c.name.clone(),
+                value: c.value.map_or(Value::Undefined, Value::Number),
+                unit: c.unit.clone(),
+                limit: c.limit.clone(),
+                meaning: c.meaning.clone(),
+            })
+            .collect(),
+    }
+}
+
+fn capital(text: &str) -> String {
+    let mut chars = text.chars();
+    chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
+}
+
+fn chosen(choice: &Choice) -> report::Chosen {
+    report::Chosen {
+        name: choice.name.clone(),
+        value: json_value(&choice.value),
+        unit: choice.unit.clone(),
+        origin: match choice.origin.as_str() {
+            "given" => report::Origin::User,
+            "found" => report::Origin::Automatic,
+            _ => report::Origin::Default,
+        },
+        reason: choice.reason.clone(),
+    }
+}
+
+fn json_value(value: &serde_json::Value) -> Value {
+    match value {
+        serde_json::Value::Null => Value::Text("none".to_owned()),
+        serde_json::Value::Bool(b) => Value::Flag(*b),
+        serde_json::Value::Number(n) => match n.as_u64() {
+            Some(count) => Value::Count(count),
+            None => n.as_f64().map_or(Value::Undefined, Value::Number),
+        },
+        serde_json::Value::String(s) => Value::Text(s.clone()),
+        serde_json::Value::Array(list) => Value::Text(
+            list.iter()
+                .map(|x| x.as_f64().map_or_else(|| x.to_string(), |x| format!("{x:.2}")))
+                .collect::<Vec<_>>()
+                .join(", "),
+        ),
+        other => Value::Text(other.to_string()),
+    }
+}
+
+/// Settings that differ from "not given", as lines.
+fn settings_facts(settings: &serde_json::Value) -> Vec<Fact> {
+    let Some(map) = settings.as_object() else { return Vec::new() };
+    map.iter()
+        .filter(|(_, v)| !v.is_null())
+        .map(|(name, v)| Fact::new(name.clone(), v.to_string(), ""))
+        .collect()
+}

@@ -1,0 +1,358 @@
+//! From an identification to its result file.
+
+use dynid_model::{EffortModel, Inertia, Owner};
+use serde_json::json;
+
+use crate::Error;
+use crate::agreement::Agreement;
+use crate::config::{Config, Route};
+use crate::estimate::{
+    BaseValue, Choice, ConditioningRecord, Estimate, FitSummary, FitValues, InputRecord, LogFit, ModelRecord,
+    ParameterValue, Provenance, RankStatus, SCHEMA,
+};
+use crate::identify::Identification;
+use crate::logs::sha256;
+use crate::verdict;
+
+impl Identification {
+    /// The result file of this identification.
+    ///
+    /// # Errors
+    /// [`Error::Read`] if an input file cannot be hashed any more.
+    pub fn estimate(&self, config: &Config) -> Result<Estimate, Error> {
+        let solution = &self.fit.solution;
+        let finite = |x: f64| x.is_finite().then_some(x);
+        let (_, verdict) = verdict::judge(self);
+        let mut model = ModelRecord::new(&self.robot.file.description, self.model.mechanism(), &self.plan);
+        model.state_hz = self.state_hz;
+        model.kernel_hz = self.kernel_hz;
+        let names = |columns: &[usize]| -> Vec<String> {
+            columns.iter().map(|c| self.model.parameters().linear[*c].name.clone()).collect()
+        };
+        let not_excited: Vec<usize> = solution.dropped.iter().map(|c| self.base.kept[*c]).collect();
+        Ok(Estimate {
+            schema: SCHEMA,
+            robot: self.model.mechanism().name().to_owned(),
+            joints: self.model.outputs().iter().map(|o| o.name.clone()).collect(),
+            samples: self.samples(),
+            rows: self.rows,
+            condition_number: finite(solution.condition),
+            condition_number_scaled: finite(solution.condition_scaled),
+            rank: RankStatus {
+                structural: self.base.len(),
+                excited: solution.kept.len(),
+                structural_gap: finite(self.base.gap.ratio()),
+                not_excited: names(&not_excited),
+                never_seen: names(&self.base.zero),
+            },
+            parameters: self.parameter_values(),
+            base_parameters: self.base_values(),
+            feasible: self.unphysical_bodies().is_empty(),
+            fit: self.fit_summary(),
+            validation: self.validation.iter().map(log_fit).collect(),
+            verdict,
+            conditioning: self.conditioning_record(config),
+            model,
+            provenance: provenance(config)?,
+        })
+    }
+
+    /// Links whose identified inertia no body could have, with the reason.
+    pub fn unphysical_bodies(&self) -> Vec<(String, &'static str)> {
+        self.model
+            .mechanism()
+            .bodies()
+            .iter()
+            .zip(self.inertias())
+            .filter_map(|(body, inertia)| inertia.physical_fault().map(|fault| (body.name.clone(), fault)))
+            .collect()
+    }
+
+    /// Identified inertia of every body, in body order.
+    pub fn inertias(&self) -> Vec<Inertia> {
+        self.values
+            .chunks_exact(10)
+            .take(self.model.mechanism().bodies().len())
+            .map(|ten| {
+                let mut phi = [0.0; 10];
+                phi.copy_from_slice(ten);
+                Inertia(phi)
+            })
+            .collect()
+    }
+
+    fn parameter_values(&self) -> Vec<ParameterValue> {
+        let deviations = self.standard_deviations();
+        let folded = |c: usize| {
+            self.base.folded.contains(&c)
+                || self
+                    .base
+                    .kept
+                    .binary_search(&c)
+                    .is_ok_and(|k| self.base.factors.iter().any(|f| f[k] != 0.0))
+        };
+        self.model
+            .parameters()
+            .linear
+            .iter()
+            .enumerate()
+            .map(|(c, p)| {
+                let own = self.base.kept.binary_search(&c).ok().filter(|_| !folded(c));
+                let std = own.and_then(|k| deviations[k].0);
+                let value = self.values[c];
+                let verdict = if self.base.zero.contains(&c) {
+                    "not identifiable"
+                } else if std.is_some() {
+                    "seen in the data"
+                } else if folded(c) {
+                    "only in combination"
+                } else {
+                    "not excited"
+                };
+                let (link, joint) = match &p.owner {
+                    Owner::Link(name) => (Some(name.clone()), None),
+                    Owner::Joint(name) => (None, Some(name.clone())),
+                };
+                ParameterValue {
+                    name: p.name.clone(),
+                    link,
+                    joint,
+                    unit: p.unit.to_owned(),
+                    value,
+                    std,
+                    rel_std: relative(Some(value), std),
+                    verdict: verdict.to_owned(),
+                    prior: self.stated[c],
+                }
+            })
+            .collect()
+    }
+
+    fn base_values(&self) -> Vec<BaseValue> {
+        let table = self.model.parameters();
+        let expressions = self.base.expressions(table);
+        let values = self.base.values(&self.values);
+        self.standard_deviations()
+            .into_iter()
+            .enumerate()
+            .map(|(k, (std, white))| {
+                let p = &table.linear[self.base.kept[k]];
+                let value = std.map(|_| values[k]);
+                BaseValue {
+                    name: p.name.clone(),
+                    expression: expressions[k].clone(),
+                    unit: p.unit.to_owned(),
+                    value,
+                    std,
+                    std_white: white,
+                    rel_std: relative(value, std),
+                }
+            })
+            .collect()
+    }
+
+    fn fit_summary(&self) -> FitSummary {
+        // One log is shown as it is; of several, the worst joint by joint would mislead, so errors are pooled.
+        let pooled = |pick: &dyn Fn(&Agreement) -> FitValues| -> FitValues {
+            let all: Vec<(FitValues, usize)> =
+                self.training.iter().map(|a| (pick(a), a.counted.iter().filter(|c| **c).count())).collect();
+            pool(&all)
+        };
+        FitSummary {
+            raw: pooled(&|a| FitValues::from(&a.raw)),
+            filtered: pooled(&|a| FitValues::from(&a.filtered)),
+            filter_hz: self.kernel_hz,
+        }
+    }
+
+    fn conditioning_record(&self, config: &Config) -> ConditioningRecord {
+        let delay = self.conditioning.as_ref().map(|c| &c.delay);
+        ConditioningRecord {
+            route: match config.conditioning.route {
+                Route::Compact => "compact".to_owned(),
+                Route::Textbook => "textbook".to_owned(),
+            },
+            choices: self.choices(config),
+            delay_samples: self.delay_samples,
+            delay_half_width: delay.map(|d| d.half_width),
+            delay_per_joint: delay.map_or_else(Vec::new, |d| d.per_output.clone()),
+            kernel_trials: self.conditioning.as_ref().map_or_else(Vec::new, |c| {
+                c.kernel_trials.iter().map(|t| (t.kernel_hz, t.loss, t.loss_rich)).collect()
+            }),
+            mask_trials: self.conditioning.as_ref().map_or_else(Vec::new, |c| {
+                c.mask_trials.iter().map(|t| (t.level, t.loss, t.standard_error, t.kept)).collect()
+            }),
+            residual_ratio: self.residual_ratio.clone(),
+        }
+    }
+
+    /// Every choice of the conditioning with its reason.
+    pub fn choices(&self, config: &Config) -> Vec<Choice> {
+        let mut out = Vec::new();
+        let mut add = |name: &str, value: serde_json::Value, unit: &str, origin: &str, reason: String| {
+            out.push(Choice {
+                name: name.to_owned(),
+                value,
+                unit: unit.to_owned(),
+                origin: origin.to_owned(),
+                reason,
+            });
+        };
+        let given = |set: bool| if set { "given" } else { "found" };
+        for log in &self.logs {
+            let name = short_name(&log.name);
+            let resampled = if log.clock.resampled { "resampled on a uniform grid" } else { "used as it is" };
+            add(
+                &format!("sample rate of {name}"),
+                json!(log.rate_hz),
+                "Hz",
+                given(config.columns.rate_hz.is_some()),
+                format!("median step; jitter {:.2e} of a sample, {} gaps: {resampled}", log.clock.jitter, log.clock.gaps.len()),
+            );
+            let spikes: usize = log.spikes.iter().map(|s| s.0 + s.1).sum();
+            add(
+                &format!("spikes removed from {name}"),
+                json!(spikes),
+                "samples",
+                "found",
+                "isolated runs far outside the running median; chatter and steps at reversal stay".to_owned(),
+            );
+        }
+        let Some(c) = &self.conditioning else {
+            let route = config.textbook_route();
+            add("filter cut-off", json!(route.cutoff_hz), "Hz", given(config.conditioning.kernel_hz.is_some()), "textbook route: zero-phase Butterworth on positions and efforts".to_owned());
+            for log in &self.logs {
+                add("decimation", json!(route.factor(log.rate_hz)), "", given(route.decimation.is_some()), "about five rows per period of the cut-off".to_owned());
+            }
+            return out;
+        };
+        let noise: Vec<f64> = self.logs.iter().flat_map(|l| l.position_noise.iter().map(|n| n.sigma)).collect();
+        let largest_noise = noise.iter().copied().fold(0.0, f64::max);
+        add(
+            "kernel cut-off",
+            json!(c.kernel_hz),
+            "Hz",
+            given(config.conditioning.kernel_hz.is_some()),
+            format!(
+                "highest cut-off (limit {:.2} Hz from position noise up to {largest_noise:.1e} rad, crossing {:.1} Hz, excited band {:.2} Hz) that held-out blocks do not speak against",
+                c.limit.limit_hz, c.limit.crossing_hz, c.limit.excited_band_hz
+            ),
+        );
+        add(
+            "kernels used together",
+            json!(c.scales_hz),
+            "Hz",
+            "found",
+            "narrower kernels fill what the widest cannot reach between reversals".to_owned(),
+        );
+        add(
+            "state cut-off",
+            json!(self.state_hz),
+            "Hz",
+            given(config.conditioning.state_hz.is_some()),
+            "states are filtered well above the kernel, so that signs of velocity stay sharp".to_owned(),
+        );
+        add(
+            "delay of the effort",
+            json!(c.delay.samples),
+            "samples",
+            given(c.delay.given),
+            match c.delay.chi_squared {
+                _ if c.delay.given => "as given".to_owned(),
+                Some(chi) => format!("fitted with the parameters, ± {:.3} (95 %), joints agree with χ²/dof {chi:.2}", c.delay.half_width),
+                None => format!("fitted with the parameters, ± {:.3} (95 %)", c.delay.half_width),
+            },
+        );
+        for (output, mask) in self.model.outputs().iter().zip(c.mask.iter().zip(&c.usable)) {
+            add(
+                &format!("reversal mask of {}", output.name),
+                mask.0.map_or(json!(null), |m| json!(m)),
+                "of rms speed",
+                given(config.conditioning.reversal_mask.is_some()),
+                format!("held-out error over the ladder of masks; {:.0} % of the samples stay", 100.0 * mask.1),
+            );
+        }
+        out
+    }
+}
+
+pub(crate) fn short_name(path: &str) -> String {
+    std::path::Path::new(path).file_name().map_or_else(|| path.to_owned(), |n| n.to_string_lossy().into_owned())
+}
+
+/// The figures of one log as the result file holds them.
+pub fn log_fit(a: &Agreement) -> LogFit {
+    LogFit {
+        log: a.name.clone(),
+        raw: FitValues::from(&a.raw),
+        filtered: FitValues::from(&a.filtered),
+        filter_hz: a.filter_hz,
+        filtered_unaligned: FitValues::from(&a.filtered_unaligned),
+    }
+}
+
+fn pool(all: &[(FitValues, usize)]) -> FitValues {
+    let [(only, _)] = all else {
+        let joints = all.first().map_or(0, |(f, _)| f.rms.len());
+        let total: usize = all.iter().map(|(_, n)| n).sum();
+        let mean_square = |j: usize| -> Option<f64> {
+            let sum = all.iter().try_fold(0.0, |s, (f, n)| Some(s + f.rms[j]?.powi(2) * *n as f64))?;
+            (total > 0).then(|| (sum / total as f64).sqrt())
+        };
+        // Range, R² and relative errors have no meaning across logs with different motions; the log-by-log figures do.
+        let weighted = |pick: &dyn Fn(&FitValues) -> Option<f64>| -> Option<f64> {
+            let sum = all.iter().try_fold(0.0, |s, (f, n)| Some(s + pick(f)? * *n as f64))?;
+            (total > 0).then(|| sum / total as f64)
+        };
+        return FitValues {
+            rms: (0..joints).map(mean_square).collect(),
+            nrmse: (0..joints).map(|j| weighted(&|f| f.nrmse[j])).collect(),
+            r2: (0..joints).map(|j| weighted(&|f| f.r2[j])).collect(),
+            relative_error_per_joint: (0..joints)
+                .map(|j| weighted(&|f| f.relative_error_per_joint[j]))
+                .collect(),
+            relative_error: weighted(&|f| f.relative_error),
+        };
+    };
+    only.clone()
+}
+
+fn relative(value: Option<f64>, std: Option<f64>) -> Option<f64> {
+    let (value, std) = (value?, std?);
+    (value.abs() >= 2.0 * std && value != 0.0).then(|| 100.0 * std / value.abs())
+}
+
+fn provenance(config: &Config) -> Result<Provenance, Error> {
+    let mut inputs = vec![InputRecord {
+        path: config.robot.display().to_string(),
+        kind: "robot".to_owned(),
+        sha256: sha256(&config.robot)?,
+    }];
+    for (kind, logs) in [("log", &config.log), ("validation", &config.validation)] {
+        for log in logs {
+            inputs.push(InputRecord {
+                path: log.path.display().to_string(),
+                kind: kind.to_owned(),
+                sha256: sha256(&log.path)?,
+            });
+        }
+    }
+    let rows = |l: &crate::config::LogConfig| json!({ "path": l.path, "rows": l.rows, "part": l.part });
+    let settings = json!({
+        "gravity": config.gravity,
+        "couple_mimics": config.couple_mimics.unwrap_or(false),
+        "locked": config.locked,
+        "elements": { "default": config.elements.default, "joint": config.elements.joint },
+        "conditioning": config.conditioning,
+        "estimator": config.estimator,
+        "preferred": config.preferred,
+        "log": config.log.iter().map(rows).collect::<Vec<_>>(),
+        "validation": config.validation.iter().map(rows).collect::<Vec<_>>(),
+    });
+    Ok(Provenance {
+        version: crate::VERSION.to_owned(),
+        inputs,
+        settings,
+        seed: config.seed.unwrap_or(1),
+    })
+}

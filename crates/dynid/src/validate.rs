@@ -1,0 +1,46 @@
+//! An estimate on other logs.
+
+use std::path::Path;
+
+use dynid_estimate::conditioning::{ConditioningSettings, prepare};
+use dynid_io::MappingSpec;
+use dynid_model::EffortModel;
+
+use crate::Error;
+use crate::agreement::{Agreement, Alignment, compare};
+use crate::config::{LogConfig, MotorSide};
+use crate::estimate::Estimate;
+use crate::logs;
+pub use crate::result::log_fit;
+
+/// Predicts logs by an estimate and compares.
+///
+/// `filter_hz`: cut-off of the filter for the filtered figures; `None`: the estimate's kernel cut-off.
+///
+/// # Errors
+/// [`Error`]: bad input.
+pub fn validate(
+    estimate: &Estimate,
+    file: &Path,
+    logs: &[LogConfig],
+    columns: &MappingSpec,
+    motor_side: Option<&MotorSide>,
+    filter_hz: Option<f64>,
+) -> Result<Vec<Agreement>, Error> {
+    let model = estimate.effort_model(file)?;
+    let values = estimate.values();
+    let settings = ConditioningSettings::default();
+    let alignment = Alignment {
+        state_hz: estimate.model.state_hz,
+        delay_samples: estimate.conditioning.delay_samples,
+        filter_hz: filter_hz.unwrap_or(estimate.model.kernel_hz),
+    };
+    logs.iter()
+        .map(|log| {
+            let loaded = logs::load(log, model.mechanism(), columns, motor_side)?;
+            let prepared = prepare(&loaded.log, &model, &settings)?;
+            compare(&model, &values, &prepared, &alignment, &settings)
+        })
+        .inspect(|_| debug_assert_eq!(model.outputs().len(), estimate.joints.len()))
+        .collect()
+}

@@ -1,0 +1,244 @@
+//! What an identification is worth, in plain words.
+
+use crate::estimate::{CheckResult, Verdict};
+use crate::identify::Identification;
+
+/// How bad a check came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Status {
+    /// As it should be.
+    Ok,
+    /// Usable, with a reservation.
+    Warn,
+    /// Not to be trusted.
+    Fail,
+}
+
+impl Status {
+    /// `ok`, `warn` or `fail`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Status::Ok => "ok",
+            Status::Warn => "warn",
+            Status::Fail => "fail",
+        }
+    }
+
+    fn of(good: bool, tolerable: bool) -> Self {
+        match (good, tolerable) {
+            (true, _) => Status::Ok,
+            (false, true) => Status::Warn,
+            (false, false) => Status::Fail,
+        }
+    }
+}
+
+fn check(
+    status: Status,
+    name: &str,
+    value: Option<f64>,
+    unit: &str,
+    limit: &str,
+    meaning: impl Into<String>,
+) -> (Status, CheckResult) {
+    let result = CheckResult {
+        status: status.word().to_owned(),
+        name: name.to_owned(),
+        value,
+        unit: unit.to_owned(),
+        limit: limit.to_owned(),
+        meaning: meaning.into(),
+    };
+    (status, result)
+}
+
+/// Judges an identification (spec/conditioning.md section 11).
+///
+/// A failure is: rank doubtful, most parameters not excited, or a prediction that explains less than half of the effort
+/// on some joint that moves. A warning is anything that should make a user look.
+pub fn judge(id: &Identification) -> (Status, Verdict) {
+    let mut checks = vec![excitation(id), rank_gap(id), condition(id), training_fit(id)];
+    if !id.validation.is_empty() {
+        checks.push(validation_fit(id));
+    }
+    checks.extend(residual(id));
+    checks.extend(delay(id));
+    checks.extend(mask(id));
+    checks.push(blocks(id));
+    let status = checks.iter().map(|(s, _)| *s).max().unwrap_or(Status::Ok);
+    let relative = |a: &[crate::agreement::Agreement]| {
+        a.iter().filter_map(|v| v.filtered.relative_error).fold(f64::NAN, f64::max)
+    };
+    let (error, on) = if id.validation.is_empty() {
+        (relative(&id.training), "the training logs")
+    } else {
+        (relative(&id.validation), "logs it has not seen")
+    };
+    let reservation = match status {
+        Status::Ok => "All checks passed.",
+        Status::Warn => "Some checks call for a look.",
+        Status::Fail => "It should not be used without a look at the failed checks.",
+    };
+    let headline = format!(
+        "{} of {} base parameters identified; the model predicts {on} within {error:.1} % of the effort. {reservation}",
+        id.fit.solution.kept.len(),
+        id.base.len(),
+    );
+    let verdict = Verdict {
+        status: status.word().to_owned(),
+        headline,
+        checks: checks.into_iter().map(|(_, c)| c).collect(),
+        warnings: id.warnings.clone(),
+    };
+    (status, verdict)
+}
+
+fn excitation(id: &Identification) -> (Status, CheckResult) {
+    let (kept, all) = (id.fit.solution.kept.len(), id.base.len());
+    check(
+        Status::of(kept == all, 2 * kept > all),
+        "excitation",
+        Some(kept as f64),
+        "",
+        &format!("all {all} base parameters"),
+        if kept == all {
+            "the logs excite every parameter combination that this robot can reveal".to_owned()
+        } else {
+            format!("the logs leave {} combinations unexcited; these keep the robot file's values", all - kept)
+        },
+    )
+}
+
+fn rank_gap(id: &Identification) -> (Status, CheckResult) {
+    let gap = id.base.gap.ratio();
+    check(
+        Status::of(gap >= 1e4, gap >= 1e2),
+        "structural rank gap",
+        gap.is_finite().then_some(gap),
+        "",
+        "at least 1e4",
+        "how clearly the robot's geometry separates what can be identified from what cannot",
+    )
+}
+
+fn condition(id: &Identification) -> (Status, CheckResult) {
+    let condition = id.fit.solution.condition_scaled;
+    check(
+        Status::of(condition < 100.0, condition < 1000.0),
+        "condition number (scaled columns)",
+        condition.is_finite().then_some(condition),
+        "",
+        "below 100",
+        "how strongly errors of the effort are amplified; a better excitation trajectory lowers it",
+    )
+}
+
+fn worst_r2(agreements: &[crate::agreement::Agreement]) -> Option<f64> {
+    agreements
+        .iter()
+        .flat_map(|a| a.filtered.channels.iter().filter_map(|c| c.r2))
+        .fold(None, |m: Option<f64>, x| Some(m.map_or(x, |m| m.min(x))))
+}
+
+fn fit_check(name: &str, agreements: &[crate::agreement::Agreement], where_: &str) -> (Status, CheckResult) {
+    let worst = worst_r2(agreements);
+    let r2 = worst.unwrap_or(f64::NAN);
+    check(
+        Status::of(r2 >= 0.9, r2 >= 0.5),
+        name,
+        worst,
+        "",
+        "R² of every joint at least 0.9",
+        format!("share of the effort's variance explained on {where_}, worst joint"),
+    )
+}
+
+fn training_fit(id: &Identification) -> (Status, CheckResult) {
+    fit_check("fit on training logs", &id.training, "the logs it was fitted to")
+}
+
+fn validation_fit(id: &Identification) -> (Status, CheckResult) {
+    fit_check("prediction of validation logs", &id.validation, "logs it has not seen")
+}
+
+fn residual(id: &Identification) -> Option<(Status, CheckResult)> {
+    let worst = id.residual_ratio.iter().flatten().copied().fold(None, |m: Option<f64>, x| {
+        Some(m.map_or(x, |m| m.max(x)))
+    })?;
+    Some(check(
+        Status::of(worst < 2.0, true),
+        "residual against sensor noise",
+        Some(worst),
+        "",
+        "below 2 on every joint",
+        if worst < 2.0 {
+            "what the model leaves over is sensor noise"
+        } else {
+            "the residual is larger than sensor noise: something acts that the model does not hold (friction shape, \
+             elasticity, ripple); standard deviations do not cover it"
+        },
+    ))
+}
+
+fn delay(id: &Identification) -> Option<(Status, CheckResult)> {
+    let delay = &id.conditioning.as_ref()?.delay;
+    if delay.given {
+        return None;
+    }
+    let chi = delay.chi_squared.unwrap_or(0.0);
+    Some(check(
+        Status::of(!delay.at_limit && chi < 3.0, true),
+        "delay of the effort",
+        Some(delay.samples),
+        "samples",
+        "off the limits of the search, joints in agreement (χ²/dof below 3)",
+        if delay.at_limit {
+            "the delay ran into the limit of the search: it is not a measurement".to_owned()
+        } else if chi >= 3.0 {
+            format!("the joints disagree about the delay (χ²/dof {chi:.1}): a missing friction shape biases it")
+        } else {
+            format!("lead of the logged effort before the motion, ± {:.2} samples (95 %)", delay.half_width)
+        },
+    ))
+}
+
+fn mask(id: &Identification) -> Option<(Status, CheckResult)> {
+    let trials = &id.conditioning.as_ref()?.mask_trials;
+    let masked: Vec<f64> = trials.iter().filter(|t| t.level.is_some()).map(|t| t.loss).collect();
+    let least = masked.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = masked.iter().copied().fold(0.0, f64::max);
+    if masked.len() < 2 {
+        return None;
+    }
+    let spread = 100.0 * (most / least - 1.0);
+    Some(check(
+        Status::of(spread < 5.0, true),
+        "sensitivity to the reversal mask",
+        Some(spread),
+        "%",
+        "below 5 %",
+        if spread < 5.0 {
+            "the result does not depend on how much of the motion near reversal is left out"
+        } else {
+            "held-out error depends on how much of the motion near reversal is left out: low-speed friction is not \
+             what the model says"
+        },
+    ))
+}
+
+fn blocks(id: &Identification) -> (Status, CheckResult) {
+    check(
+        Status::of(id.blocks >= 20, true),
+        "time blocks behind the standard deviations",
+        Some(id.blocks as f64),
+        "",
+        "at least 20",
+        if id.blocks >= 20 {
+            "standard deviations come from leaving out one block of time at a time, so coloured residuals are covered"
+        } else if id.jackknife.is_some() {
+            "few blocks: the standard deviations are themselves uncertain"
+        } else {
+            "the logs are too short for standard deviations that survive coloured residuals; those shown assume white ones"
+        },
+    )
+}
