@@ -1,6 +1,6 @@
 //! Virtual logs by inverse dynamics: trajectory, elements, noise, encoder, seeded.
 
-use dynid_model::{EffortModel, MotionBlock, RegressorBlock, RobotModel};
+use dynid_model::{EffortModel, MotionBlock, RandomMotion, RegressorBlock, RobotModel};
 use dynid_motion::trajectory::Fourier;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -91,7 +91,8 @@ pub struct SimulatedLog {
 /// Runs a random Fourier trajectory within the robot's limits through its inverse dynamics.
 ///
 /// Link inertias and stated element values come from the robot file; elements without a stated value get one that is
-/// typical for the joint's effort: Coulomb 10 % and viscous 10 % (at full speed) of the largest rigid effort, no offset.
+/// typical for the joint: Coulomb 10 % and viscous 10 % (at the speed limit) of the largest rigid effort over random
+/// states, no offset, no rotor. It does not depend on the trajectory, so logs of one robot have one truth.
 ///
 /// # Errors
 /// [`Error::Setting`], [`Error::Unsupported`].
@@ -120,7 +121,7 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
         signals
     };
     let at = sample(0.0);
-    let values = truth(&model, &plan, settings, &at, samples)?;
+    let values = truth(&model, &plan, settings)?;
     let clean_effort = efforts(&model, &values, &at, samples);
     // The logged effort belongs to the motion that follows it.
     let led = efforts(&model, &values, &sample(settings.delay_samples), samples);
@@ -252,22 +253,18 @@ fn efforts(model: &RobotModel, values: &[f64], signals: &[Vec<f64>; 3], samples:
     (0..model.outputs().len()).map(|output| block.effort(output, values)).collect()
 }
 
-fn truth(
-    model: &RobotModel,
-    plan: &ElementPlan,
-    settings: &SimulateSettings,
-    signals: &[Vec<f64>; 3],
-    samples: usize,
-) -> Result<Vec<f64>, Error> {
+/// Seed of the states that typical friction is scaled by: the same robot always gets the same truth.
+const TYPICAL_SEED: u64 = 1;
+
+fn truth(model: &RobotModel, plan: &ElementPlan, settings: &SimulateSettings) -> Result<Vec<f64>, Error> {
     let table = model.parameters();
     let mut values = table.prior();
-    let rigid = efforts(model, &values, signals, samples);
+    let peaks = typical_efforts(model, &values);
+    let owners = model.mechanism().rate_bodies();
     let mut given: Vec<(String, f64)> = Vec::new();
     for (j, joint) in model.joints().iter().enumerate() {
-        let peak = rigid[j].iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        let speed =
-            signals[1][j * samples..][..samples].iter().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
-        for (symbol, value) in [("fc", 0.1 * peak), ("fv", 0.1 * peak / speed)] {
+        let speed = model.mechanism().bodies()[owners[j]].joint.limits.velocity.unwrap_or(2.0);
+        for (symbol, value) in [("fc", 0.1 * peaks[j]), ("fv", 0.1 * peaks[j] / speed)] {
             given.push((format!("{}.{symbol}", joint.name), value));
         }
     }
@@ -284,4 +281,15 @@ fn truth(
         values[column] = *value;
     }
     Ok(values)
+}
+
+/// Largest rigid effort of every joint over random states.
+fn typical_efforts(model: &RobotModel, values: &[f64]) -> Vec<f64> {
+    const STATES: usize = 100;
+    let motion = RandomMotion::new(model.mechanism(), model.channels(), STATES, TYPICAL_SEED);
+    let mut block = RegressorBlock::new(model.layout().clone(), STATES);
+    motion.with_block(|m| model.regressor(m, &[], &mut block));
+    (0..model.outputs().len())
+        .map(|j| block.effort(j, values).iter().fold(0.0_f64, |m, x| m.max(x.abs())))
+        .collect()
 }
