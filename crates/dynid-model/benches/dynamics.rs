@@ -1,7 +1,5 @@
 //! Time per sample of inverse dynamics and regressor, alone and over blocks of lanes.
 
-#![expect(missing_docs, reason = "benchmarks are not an interface")]
-
 use divan::{Bencher, black_box, counter::ItemsCount};
 use dynid_model::*;
 

@@ -70,7 +70,12 @@ pub struct BaseParameters {
 
 impl BaseParameters {
     /// Analyses an effort model of a mechanism on random states. `shape` are the model's shape parameters.
-    pub fn of(model: &dyn EffortModel, mechanism: &Mechanism, shape: &[f64], settings: &BaseSettings) -> Self {
+    pub fn of(
+        model: &dyn EffortModel,
+        mechanism: &Mechanism,
+        shape: &[f64],
+        settings: &BaseSettings,
+    ) -> Self {
         let columns = model.layout().parameters();
         let states = match settings.states {
             0 => 100.max((3 * columns).div_ceil(model.outputs().len())),

@@ -27,8 +27,7 @@ impl Inertia {
     ///
     /// `I = I_c + m ((c·c) 1 - c cᵀ)`, `h = m c` (spec/mechanisms.md section 3).
     pub fn from_com(mass: f64, com: Vec3<f64>, about_com: &Mat3<f64>) -> Self {
-        let tensor = *about_com
-            + (Mat3::identity() * com.dot(com) + Mat3::outer(com, com) * -1.0) * mass;
+        let tensor = *about_com + (Mat3::identity() * com.dot(com) + Mat3::outer(com, com) * -1.0) * mass;
         Inertia::from_parts(mass, com.scale(mass), &tensor)
     }
 
@@ -138,11 +137,9 @@ fn symmetric_eigenvalues(matrix: &Mat3<f64>) -> [f64; 3] {
                 row[p] = c * x - s * y;
                 row[q] = s * x + c * y;
             }
-            for k in 0..3 {
-                let (x, y) = (a[p][k], a[q][k]);
-                a[p][k] = c * x - s * y;
-                a[q][k] = s * x + c * y;
-            }
+            let (x, y) = (a[p], a[q]);
+            a[p] = std::array::from_fn(|k| c * x[k] - s * y[k]);
+            a[q] = std::array::from_fn(|k| s * x[k] + c * y[k]);
         }
     }
     [a[0][0], a[1][1], a[2][2]]

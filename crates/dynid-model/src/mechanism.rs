@@ -129,13 +129,17 @@ pub enum MechanismWarning {
         fault: &'static str,
     },
     /// A moving link and all that is fixed to it state no inertia.
-    #[error("body `{body}` states no inertia: its parameters are unknown, taken as zero where a value is needed")]
+    #[error(
+        "body `{body}` states no inertia: its parameters are unknown, taken as zero where a value is needed"
+    )]
     NotStated {
         /// Name of the moving link.
         body: String,
     },
     /// A mimic joint is treated as a coordinate of its own.
-    #[error("joint `{joint}` mimics `{of}` in the file; it is treated as independent (ask for coupled mimic joints to change this)")]
+    #[error(
+        "joint `{joint}` mimics `{of}` in the file; it is treated as independent (ask for coupled mimic joints to change this)"
+    )]
     MimicIndependent {
         /// The mimic joint.
         joint: String,
@@ -444,10 +448,13 @@ impl Description {
     /// Fails if a name is not that of a moving joint with one coordinate.
     pub fn lock(&mut self, joints: &[(String, f64)]) -> Result<(), MechanismError> {
         for (name, position) in joints {
-            let known = || self.joints.iter().filter(|j| j.kind != JointKind::Fixed).map(|j| j.name.clone()).collect();
-            let found = self.joints.iter().position(|j| {
-                j.name == *name && !matches!(j.kind, JointKind::Fixed | JointKind::Floating)
-            });
+            let known = || {
+                self.joints.iter().filter(|j| j.kind != JointKind::Fixed).map(|j| j.name.clone()).collect()
+            };
+            let found = self
+                .joints
+                .iter()
+                .position(|j| j.name == *name && !matches!(j.kind, JointKind::Fixed | JointKind::Floating));
             let Some(index) = found else {
                 return Err(MechanismError::UnknownJoint { name: name.clone(), known: known() });
             };
@@ -566,7 +573,8 @@ fn graph(d: &Description, links: &HashMap<&str, usize>) -> Result<Graph, Mechani
 fn build(d: &Description) -> Result<Mechanism, MechanismError> {
     let links = check_names_and_numbers(d)?;
     let Graph { children, root } = graph(d, &links)?;
-    let moving = d.joints.iter().filter(|j| j.kind != JointKind::Fixed).count() + usize::from(d.floating_base);
+    let moving =
+        d.joints.iter().filter(|j| j.kind != JointKind::Fixed).count() + usize::from(d.floating_base);
     if moving > MAX_MOVING_JOINTS {
         return Err(MechanismError::TooManyJoints { found: moving });
     }
@@ -695,7 +703,10 @@ fn warnings(bodies: &[Body], coupled: bool) -> Vec<MechanismWarning> {
         if let Some(mimic) = &body.joint.mimic
             && !coupled
         {
-            out.push(MechanismWarning::MimicIndependent { joint: body.joint.name.clone(), of: mimic.of.clone() });
+            out.push(MechanismWarning::MimicIndependent {
+                joint: body.joint.name.clone(),
+                of: mimic.of.clone(),
+            });
         }
     }
     out
@@ -721,11 +732,8 @@ fn couple(bodies: &[Body]) -> Result<Option<Vec<Follow>>, MechanismError> {
         let (mut leader, mut ratio, mut offset) = (k, 1.0, 0.0);
         let mut steps = 0;
         while let Some(mimic) = &bodies[leader].joint.mimic {
-            let fault = |fault| MechanismError::Mimic {
-                joint: body.joint.name.clone(),
-                of: mimic.of.clone(),
-                fault,
-            };
+            let fault =
+                |fault| MechanismError::Mimic { joint: body.joint.name.clone(), of: mimic.of.clone(), fault };
             offset += ratio * mimic.offset;
             ratio *= mimic.ratio;
             leader = *by_name.get(mimic.of.as_str()).ok_or_else(|| fault("which is no moving joint"))?;
@@ -738,7 +746,10 @@ fn couple(bodies: &[Body]) -> Result<Option<Vec<Follow>>, MechanismError> {
             }
         }
         if !(ratio.is_finite() && offset.is_finite()) {
-            return Err(MechanismError::NotFinite { what: "mimic ratio or offset", name: body.joint.name.clone() });
+            return Err(MechanismError::NotFinite {
+                what: "mimic ratio or offset",
+                name: body.joint.name.clone(),
+            });
         }
         let first = coordinate[&leader];
         for r in 0..body.joint.rates() {

@@ -64,10 +64,8 @@ impl RobotModel {
 
         let acting = acting_bodies(&mechanism);
         let mut linear = inertial_parameters(&mechanism);
-        let mut columns: Vec<Vec<usize>> = acting
-            .iter()
-            .map(|bodies| bodies.iter().flat_map(|b| 10 * b..10 * b + 10).collect())
-            .collect();
+        let mut columns: Vec<Vec<usize>> =
+            acting.iter().map(|bodies| bodies.iter().flat_map(|b| 10 * b..10 * b + 10).collect()).collect();
         let mut shape = Vec::new();
         let mut channels: Vec<String> = Vec::new();
         let mut first_column = Vec::with_capacity(elements.len());
@@ -89,7 +87,9 @@ impl RobotModel {
         }
         let layout = Arc::new(RegressorLayout::new(columns, linear.len()));
         let first_slot = |rate: usize, body: usize| {
-            layout.slot(rate, 10 * body).map_or_else(|| unreachable!("body {body} does not act on rate {rate}"), |s| s)
+            layout
+                .slot(rate, 10 * body)
+                .unwrap_or_else(|| unreachable!("body {body} does not act on rate {rate}"))
         };
         let (slots, coupled) = match mechanism.follows() {
             None => (Slots::new(&dynamics, first_slot), None),
@@ -257,9 +257,8 @@ fn joint_infos(mechanism: &Mechanism) -> Vec<JointInfo> {
     for (k, name) in names.into_iter().enumerate() {
         let joint = &mechanism.bodies()[owners[k]].joint;
         if owners[k] != last {
-            position = out.last().map_or(0, |j: &JointInfo| {
-                j.position + mechanism.bodies()[last].joint.positions()
-            });
+            position =
+                out.last().map_or(0, |j: &JointInfo| j.position + mechanism.bodies()[last].joint.positions());
             last = owners[k];
         }
         out.push(JointInfo { name, number: k + 1, position, slides: joint.kind == JointKind::Prismatic });

@@ -127,11 +127,7 @@ impl<S: Scalar> Mat3<S> {
     #[inline(always)]
     pub fn transpose(&self) -> Self {
         let [a, b, c] = self.0;
-        Mat3([
-            Vec3([a.0[0], b.0[0], c.0[0]]),
-            Vec3([a.0[1], b.0[1], c.0[1]]),
-            Vec3([a.0[2], b.0[2], c.0[2]]),
-        ])
+        Mat3([Vec3([a.0[0], b.0[0], c.0[0]]), Vec3([a.0[1], b.0[1], c.0[1]]), Vec3([a.0[2], b.0[2], c.0[2]])])
     }
 }
 
@@ -182,20 +178,20 @@ impl Mat3<f64> {
     /// Rotation from roll, pitch, yaw (rad): `Rz(yaw) Ry(pitch) Rx(roll)`, the convention of URDF.
     pub fn from_rpy(rpy: [f64; 3]) -> Self {
         let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Vec3);
-        Mat3::rotation(z, rpy[2])
-            .mul_mat(&Mat3::rotation(y, rpy[1]))
-            .mul_mat(&Mat3::rotation(x, rpy[0]))
+        Mat3::rotation(z, rpy[2]).mul_mat(&Mat3::rotation(y, rpy[1])).mul_mat(&Mat3::rotation(x, rpy[0]))
     }
 
-    /// Roll, pitch, yaw (rad) of a rotation: the inverse of [`Mat3::from_rpy`], with yaw 0 at gimbal lock.
+    /// Roll, pitch, yaw (rad) of a rotation: [`Mat3::from_rpy`] of them is this matrix to rounding, also next to gimbal
+    /// lock.
+    ///
+    /// There yaw is as good as arbitrary; taking roll from what remains after yaw and pitch makes up for whatever it is.
     pub fn to_rpy(&self) -> [f64; 3] {
         let m = self.rows();
+        let yaw = m[1][0].atan2(m[0][0]);
         let pitch = (-m[2][0]).atan2(m[0][0].hypot(m[1][0]));
-        if pitch.cos().abs() > 1e-9 {
-            [m[2][1].atan2(m[2][2]), pitch, m[1][0].atan2(m[0][0])]
-        } else {
-            [(-m[1][2]).atan2(m[1][1]), pitch, 0.0]
-        }
+        let (s, c) = yaw.sin_cos();
+        let roll = (s * m[0][2] - c * m[1][2]).atan2(c * m[1][1] - s * m[0][1]);
+        [roll, pitch, yaw]
     }
 }
 

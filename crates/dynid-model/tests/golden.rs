@@ -1,5 +1,7 @@
 //! Dynamics and base parameters against golden numbers and against each other.
 
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+
 use std::path::PathBuf;
 
 use dynid_model::element::{
@@ -339,12 +341,16 @@ fn linear_elements_follow_their_laws() {
     check_close(&e, &numbers(&c["effort"]), 0.0, 1e-12, "cyclic");
 }
 
-fn six_joint_effort(elements: Vec<Box<dyn JointElement>>, dq: &[f64], ddq: &[f64], values: &[f64]) -> Vec<f64> {
+fn six_joint_effort(
+    elements: Vec<Box<dyn JointElement>>,
+    dq: &[f64],
+    ddq: &[f64],
+    values: &[f64],
+) -> Vec<f64> {
     let model = RobotModel::new(modified_dh(&INDY7).build().unwrap(), elements);
     let mut linear = vec![0.0; 60];
     linear.extend_from_slice(values);
-    let motion =
-        MotionBlock { samples: 1, stride: 1, q: &[0.0; 6], dq, ddq, gravity: None, channels: &[] };
+    let motion = MotionBlock { samples: 1, stride: 1, q: &[0.0; 6], dq, ddq, gravity: None, channels: &[] };
     let mut block = RegressorBlock::new(model.layout().clone(), 1);
     model.regressor(&motion, &[], &mut block);
     (0..6).map(|j| block.effort(j, &linear)[0]).collect()

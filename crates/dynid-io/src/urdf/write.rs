@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use dynid_model::{Description, JointDescription, JointKind, LinkDescription, Mat3};
+use dynid_model::{Description, JointDescription, JointKind, LinkDescription};
 use quick_xml::escape::escape;
 
 use super::inertial::Inertial;
@@ -64,7 +64,7 @@ fn write_joint(out: &mut String, joint: &JointDescription) -> Result<(), RobotFi
         return Err(unwritable("its placement or axis is not finite"));
     }
     let [x, y, z] = joint.placement.translation.0;
-    let [roll, pitch, yaw] = roll_pitch_yaw(&joint.placement.rotation);
+    let [roll, pitch, yaw] = joint.placement.rotation.to_rpy();
     let _ = writeln!(out, "  <joint name=\"{}\" type=\"{kind}\">", escape(joint.name.as_str()));
     let _ = writeln!(out, "    <origin xyz=\"{x:?} {y:?} {z:?}\" rpy=\"{roll:?} {pitch:?} {yaw:?}\"/>");
     let _ = writeln!(out, "    <parent link=\"{}\"/>", escape(joint.parent.as_str()));
@@ -99,16 +99,4 @@ fn write_limit(out: &mut String, joint: &JointDescription) {
     // URDF demands both; zero reads back as "not stated".
     let _ = write!(out, " effort=\"{:?}\"", limits.effort.unwrap_or(0.0));
     let _ = writeln!(out, " velocity=\"{:?}\"/>", limits.velocity.unwrap_or(0.0));
-}
-
-/// Roll, pitch, yaw (rad) with `Rz(yaw) Ry(pitch) Rx(roll)` equal to the rotation to rounding, also next to gimbal lock.
-///
-/// There yaw is as good as arbitrary; taking roll from what remains after yaw and pitch makes up for whatever it is.
-fn roll_pitch_yaw(rotation: &Mat3<f64>) -> [f64; 3] {
-    let m = rotation.rows();
-    let yaw = m[1][0].atan2(m[0][0]);
-    let pitch = (-m[2][0]).atan2(m[0][0].hypot(m[1][0]));
-    let (s, c) = yaw.sin_cos();
-    let roll = (s * m[0][2] - c * m[1][2]).atan2(c * m[1][1] - s * m[0][1]);
-    [roll, pitch, yaw]
 }

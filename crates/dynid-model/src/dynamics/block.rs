@@ -60,8 +60,9 @@ impl Slots {
     pub(crate) fn new(dynamics: &Dynamics, first: impl Fn(usize, usize) -> usize) -> Self {
         let mut by_axis = vec![0; dynamics.tree.axis_rate.len()];
         for node in &dynamics.tree.nodes {
-            for k in node.first_axis..node.first_axis + node.inherited + node.rates {
-                by_axis[k] = first(dynamics.tree.axis_rate[k], node.body);
+            let rates = &dynamics.tree.axis_rate[node.carried()];
+            for (slot, rate) in by_axis[node.carried()].iter_mut().zip(rates) {
+                *slot = first(*rate, node.body);
             }
         }
         Slots { by_axis }
@@ -83,7 +84,13 @@ fn groups(samples: usize) -> impl Iterator<Item = usize> {
 }
 
 #[inline(always)]
-fn load_all<S: Scalar>(from: &[f64], stride: usize, sample: usize, to: &mut [S], load: &impl Fn(&[f64]) -> S) {
+fn load_all<S: Scalar>(
+    from: &[f64],
+    stride: usize,
+    sample: usize,
+    to: &mut [S],
+    load: &impl Fn(&[f64]) -> S,
+) {
     for (c, value) in to.iter_mut().enumerate() {
         *value = load(&from[c * stride + sample..]);
     }
@@ -218,7 +225,8 @@ impl Dynamics {
             load_all(motion.q, motion.stride, sample, &mut q, &|from| from[0]);
             load_all(motion.dq, motion.stride, sample, &mut dq, &|from| from[0]);
             load_all(motion.ddq, motion.stride, sample, &mut ddq, &|from| from[0]);
-            let gravity = motion.gravity.is_some().then(|| load_gravity(self, motion, sample, &|from| from[0]));
+            let gravity =
+                motion.gravity.is_some().then(|| load_gravity(self, motion, sample, &|from| from[0]));
             work(sample, &State { q: &q, dq: &dq, ddq: &ddq, gravity });
         }
     }

@@ -47,11 +47,8 @@ pub(crate) fn sweep<S: Scalar>(
         let phi = &inertias[10 * node.body..10 * node.body + 10];
         let at = |c: usize| phi[node.columns[c]];
         let h = Vec3([at(1), at(2), at(3)]);
-        let tensor = Mat3([
-            Vec3([at(4), at(5), at(6)]),
-            Vec3([at(5), at(7), at(8)]),
-            Vec3([at(6), at(8), at(9)]),
-        ]);
+        let tensor =
+            Mat3([Vec3([at(4), at(5), at(6)]), Vec3([at(5), at(7), at(8)]), Vec3([at(6), at(8), at(9)])]);
         let force = motion.acceleration.scale_add(phi[0], motion.gradient.mul_vec(h));
         let moment = tensor.mul_vec(motion.alpha)
             + motion.omega.cross(tensor.mul_vec(motion.omega))

@@ -11,8 +11,8 @@ mod motion;
 mod regressor;
 mod tree;
 
-pub(crate) use block::Slots;
 pub use block::MotionBlock;
+pub(crate) use block::Slots;
 pub use energy::Energy;
 
 use crate::mechanism::{Follow, Mechanism};
@@ -100,8 +100,9 @@ impl Dynamics {
         let bodies = mechanism.bodies().len();
         let mut dense_slots = vec![0; tree.axis_rate.len()];
         for node in &tree.nodes {
-            for k in node.first_axis..node.first_axis + node.inherited + node.rates {
-                dense_slots[k] = tree.axis_rate[k] * 10 * bodies + 10 * node.body;
+            let rates = &tree.axis_rate[node.carried()];
+            for (slot, rate) in dense_slots[node.carried()].iter_mut().zip(rates) {
+                *slot = rate * 10 * bodies + 10 * node.body;
             }
         }
         Dynamics {
@@ -138,11 +139,7 @@ impl Dynamics {
                 inertias: vec![S::zero().fuse(); 10 * self.bodies],
                 effort: vec![S::zero().fuse(); self.tree.rates],
             },
-            joint_state: [
-                vec![S::zero(); joint_positions],
-                vec![S::zero(); joints],
-                vec![S::zero(); joints],
-            ],
+            joint_state: [vec![S::zero(); joint_positions], vec![S::zero(); joints], vec![S::zero(); joints]],
             joint_effort: vec![S::zero(); joints],
             joint_regressor: vec![S::zero(); joints * 10 * self.bodies],
         }
@@ -188,7 +185,8 @@ impl Dynamics {
             if node.rates == 1 {
                 // Positions and rates of coupled mechanisms are numbered alike up to the extra entry of quaternions.
                 let shift = self.quaternions_before(f.coordinate);
-                q[node.position] = state.q[f.coordinate + shift] * S::from_f64(f.ratio) + S::from_f64(f.offset);
+                q[node.position] =
+                    state.q[f.coordinate + shift] * S::from_f64(f.ratio) + S::from_f64(f.offset);
             } else {
                 let from = f.coordinate + self.quaternions_before(f.coordinate);
                 q[node.position..node.position + 7].copy_from_slice(&state.q[from..from + 7]);

@@ -61,6 +61,13 @@ pub(crate) struct Tree {
     pub(crate) axis_rate: Vec<usize>,
 }
 
+impl Node {
+    /// Places of the axes that this node carries: ancestors' first, own last.
+    pub(crate) fn carried(&self) -> std::ops::Range<usize> {
+        self.first_axis..self.first_axis + self.inherited + self.rates
+    }
+}
+
 impl Tree {
     pub(crate) fn new(mechanism: &Mechanism) -> Self {
         let bodies = mechanism.bodies();
@@ -92,7 +99,9 @@ impl Tree {
             let first_axis = axis_rate.len();
             if let Some(p) = parent {
                 let parent: &Node = &nodes[p];
-                axis_rate.extend_from_within(parent.first_axis..parent.first_axis + parent.inherited + parent.rates);
+                axis_rate.extend_from_within(
+                    parent.first_axis..parent.first_axis + parent.inherited + parent.rates,
+                );
             }
             let inherited = axis_rate.len() - first_axis;
             axis_rate.extend(body.rate..body.rate + joint.rates());

@@ -27,21 +27,12 @@ impl JointElement for Spring {
     }
     fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
         let joint = &joints[self.rate];
-        vec![
-            joint.parameter("k", ["N m/rad", "N/m"], Some(0.0)),
-            joint.parameter("kq0", EFFORT, None),
-        ]
+        vec![joint.parameter("k", ["N m/rad", "N/m"], Some(0.0)), joint.parameter("kq0", EFFORT, None)]
     }
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0), (self.rate, 1)]
     }
-    fn fill(
-        &self,
-        joints: &[JointInfo],
-        motion: &MotionBlock<'_>,
-        _: &[f64],
-        out: &mut ElementColumns<'_>,
-    ) {
+    fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         out.map(0, motion.position(joints[self.rate].position), |q| q);
         out.column(1).fill(-1.0);
     }
@@ -58,13 +49,7 @@ impl JointElement for CyclicTorque {
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0), (self.rate, 1)]
     }
-    fn fill(
-        &self,
-        joints: &[JointInfo],
-        motion: &MotionBlock<'_>,
-        _: &[f64],
-        out: &mut ElementColumns<'_>,
-    ) {
+    fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         let q = motion.position(joints[self.rate].position);
         out.map(0, q, |q| (self.cycles * q).cos());
         out.map(1, q, |q| (self.cycles * q).sin());

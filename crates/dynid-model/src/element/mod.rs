@@ -91,7 +91,13 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
         Vec::new()
     }
     /// Fills the columns of all entries.
-    fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, shape: &[f64], out: &mut ElementColumns<'_>);
+    fn fill(
+        &self,
+        joints: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        out: &mut ElementColumns<'_>,
+    );
 }
 
 /// Sign with `s(0) = 0`.

@@ -42,9 +42,7 @@ impl JointElement for Transmission {
     }
     fn entries(&self) -> Vec<(usize, usize)> {
         (0..self.motors.len())
-            .flat_map(|m| {
-                self.acting(m).into_iter().flat_map(move |j| (0..3).map(move |k| (j, 3 * m + k)))
-            })
+            .flat_map(|m| self.acting(m).into_iter().flat_map(move |j| (0..3).map(move |k| (j, 3 * m + k))))
             .map(|(j, k)| (self.joints[j], k))
             .collect()
     }

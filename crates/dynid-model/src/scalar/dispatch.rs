@@ -60,9 +60,9 @@ pub fn run_on_lanes(task: impl LaneTask) {
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
 fn run_avx2(task: impl LaneTask) {
-    task.run(|from| Lanes::<LANES, true>::load(from), |lanes, to| lanes.store(to));
+    task.run(Lanes::<LANES, true>::load, |lanes, to| lanes.store(to));
 }
 
 fn run_plain(task: impl LaneTask) {
-    task.run(|from| Lanes::<LANES, false>::load(from), |lanes, to| lanes.store(to));
+    task.run(Lanes::<LANES, false>::load, |lanes, to| lanes.store(to));
 }

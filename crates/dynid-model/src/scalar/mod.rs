@@ -5,8 +5,8 @@ mod dual;
 mod lanes;
 mod sine;
 
-pub use dispatch::{LANES, LaneTask, run_on_lanes};
 pub(crate) use dispatch::{FusedTask, run_fused};
+pub use dispatch::{LANES, LaneTask, run_on_lanes};
 pub use dual::Dual;
 pub use lanes::Lanes;
 

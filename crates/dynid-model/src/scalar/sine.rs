@@ -17,7 +17,7 @@ const ROUND: f64 = 6_755_399_441_055_744.0;
 
 const SINE: [f64; 6] = [
     -1.666_666_666_666_663_2e-1,
-    8.333_333_333_322_489e-3,
+    8.333_333_333_322_49e-3,
     -1.984_126_982_985_795e-4,
     2.755_731_370_707_006_8e-6,
     -2.505_076_025_340_686e-8,
@@ -71,13 +71,12 @@ fn sin_cos_reduced<const FUSED: bool>(x: f64) -> (f64, f64) {
 pub(super) fn sin_cos_lanes<const N: usize, const FUSED: bool>(x: [f64; N]) -> ([f64; N], [f64; N]) {
     let mut s = [0.0; N];
     let mut c = [0.0; N];
-    let mut largest = 0.0;
+    let mut within = true;
     for k in 0..N {
         (s[k], c[k]) = sin_cos_reduced::<FUSED>(x[k]);
-        // NaN fails this comparison the other way round, hence `!(<=)` below.
-        largest = if x[k].abs() <= largest { largest } else { x[k].abs() };
+        within &= x[k].abs() <= REDUCTION_LIMIT;
     }
-    if !(largest <= REDUCTION_LIMIT) {
+    if !within {
         for k in 0..N {
             (s[k], c[k]) = x[k].sin_cos();
         }
@@ -125,5 +124,8 @@ mod tests {
         assert_eq!((s[1], c[1]), 1e300_f64.sin_cos());
         assert_eq!((s[2], c[2]), 1.0_f64.sin_cos());
         assert!(s[3].is_nan() && c[3].is_nan());
+        // A NaN in one lane must not hide a huge argument in another.
+        let (s, c) = sin_cos_lanes::<4, false>([1e300, f64::NAN, 1.0, 2.0]);
+        assert_eq!((s[0], c[0]), 1e300_f64.sin_cos());
     }
 }
