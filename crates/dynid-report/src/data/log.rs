@@ -56,7 +56,7 @@ pub struct JointQuality {
 pub struct Quality {
     /// Root mean square of `e`, in the joint's effort unit.
     pub rms: Option<f64>,
-    /// RMS over the spread of the measured effort (standard deviation or range, as the caller documents), %.
+    /// RMS over the range (largest minus smallest) of the measured effort, %.
     pub nrmse_percent: Option<f64>,
     /// Coefficient of determination, `1 - sum e^2 / sum (measured - mean)^2`.
     pub r2: Option<f64>,
