@@ -219,6 +219,8 @@ pub struct ConditioningRecord {
     pub kernel_trials: Vec<(f64, f64, f64)>,
     /// Reversal ladder: share of rms speed (absent: no mask), relative loss, its standard error, share of samples kept.
     pub mask_trials: Vec<(Option<f64>, f64, f64, f64)>,
+    /// RMS of the fit's own rows, per joint.
+    pub row_rms: Vec<Option<f64>>,
     /// Residual against what sensor noise explains, per joint.
     pub residual_ratio: Vec<Option<f64>>,
 }
@@ -327,8 +329,8 @@ impl Estimate {
     /// # Errors
     /// [`Error::Read`], [`Error::EstimateFile`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| Error::Read { file: path.to_owned(), source })?;
+        let text =
+            std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
         let fault = |message: String| Error::EstimateFile { file: path.display().to_string(), message };
         let estimate: Estimate = serde_json::from_str(&text).map_err(|e| fault(e.to_string()))?;
         if estimate.schema != SCHEMA {

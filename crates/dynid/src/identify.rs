@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use dynid_estimate::conditioning::{
-    Conditioning, ConditioningSettings, PreparedLog, ReducedGroup, Stage, condition, predict, prepare, reduce,
-    reduce_textbook,
+    Conditioning, ConditioningSettings, PreparedLog, ReducedGroup, Stage, condition, predict, prepare,
+    reduce, reduce_textbook,
 };
 use dynid_estimate::covariance::{MIN_BLOCKS, jackknife, weighted_blocks};
 use dynid_estimate::linear::{WlsEstimate, WlsSettings, wls};
@@ -68,6 +68,8 @@ pub struct Identification {
     pub residual_ratio: Vec<Option<f64>>,
     /// Rows of the final fit.
     pub rows: usize,
+    /// Per joint: RMS of the fit's own rows (filtered and thinned as the fit saw them), in the effort's unit.
+    pub row_rms: Vec<Option<f64>>,
     /// State cut-off for predictions, Hz.
     pub state_hz: f64,
     /// Kernel (or filter) cut-off, Hz.
@@ -107,10 +109,12 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     let (robot, loaded) = read_logs(config, &config.log, robot, &mut progress)?;
     let plan = plan_elements(config, &robot, &loaded)?;
     let model = RobotModel::new(robot.mechanism.clone(), plan.build(&robot.mechanism)?);
-    let prepared = loaded
-        .iter()
-        .map(|l| Ok(prepare(&l.log, &model, &settings)?))
-        .collect::<Result<Vec<_>, Error>>()?;
+    let prepared =
+        loaded.iter().map(|l| Ok(prepare(&l.log, &model, &settings)?)).collect::<Result<Vec<_>, Error>>()?;
+
+    for log in &prepared {
+        config.check_cutoffs(&log.name, log.rate_hz)?;
+    }
 
     progress(Step::Structure);
     let base_settings = BaseSettings {
@@ -177,6 +181,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
             (cutoff, cutoff, 0.0)
         }
     };
+    let row_rms = row_rms(&groups, &fit.solution.x, base.len());
     let residual_ratio = residual_ratios(&groups, &fit, &prepared, kernel_hz);
     let mut warnings = robot.warnings.clone();
     warnings.extend(log_warnings(&model, &prepared));
@@ -193,6 +198,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         stated,
         residual_ratio,
         rows,
+        row_rms,
         state_hz,
         kernel_hz,
         delay_samples,
@@ -394,6 +400,20 @@ fn parameter_scales(model: &RobotModel) -> Vec<f64> {
     scales
 }
 
+fn row_rms(groups: &[ReducedGroup], x: &[f64], columns: usize) -> Vec<Option<f64>> {
+    let outputs = groups.iter().map(|g| g.output + 1).max().unwrap_or(0);
+    (0..outputs)
+        .map(|output| {
+            let (mut rss, mut rows) = (0.0, 0);
+            for group in groups.iter().filter(|g| g.output == output) {
+                rss += group.merged(columns).rss(x);
+                rows += group.rows();
+            }
+            (rows > 0).then(|| (rss / rows as f64).sqrt())
+        })
+        .collect()
+}
+
 fn residual_ratios(
     groups: &[ReducedGroup],
     fit: &WlsEstimate,
@@ -425,7 +445,8 @@ fn residual_ratios(
 fn log_warnings(model: &RobotModel, logs: &[PreparedLog]) -> Vec<String> {
     let mut out = Vec::new();
     for log in logs {
-        let name = Path::new(&log.name).file_name().map_or_else(|| log.name.clone(), |n| n.to_string_lossy().into());
+        let name =
+            Path::new(&log.name).file_name().map_or_else(|| log.name.clone(), |n| n.to_string_lossy().into());
         if log.clock.dropped > 0 {
             out.push(format!(
                 "{name}: {} rows dropped because their time does not advance (first: row {})",

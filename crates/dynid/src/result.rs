@@ -182,6 +182,7 @@ impl Identification {
             mask_trials: self.conditioning.as_ref().map_or_else(Vec::new, |c| {
                 c.mask_trials.iter().map(|t| (t.level, t.loss, t.standard_error, t.kept)).collect()
             }),
+            row_rms: self.row_rms.clone(),
             residual_ratio: self.residual_ratio.clone(),
         }
     }
@@ -207,7 +208,11 @@ impl Identification {
                 json!(log.rate_hz),
                 "Hz",
                 given(config.columns.rate_hz.is_some()),
-                format!("median step; jitter {:.2e} of a sample, {} gaps: {resampled}", log.clock.jitter, log.clock.gaps.len()),
+                format!(
+                    "median step; jitter {:.2e} of a sample, {} gaps: {resampled}",
+                    log.clock.jitter,
+                    log.clock.gaps.len()
+                ),
             );
             let spikes: usize = log.spikes.iter().map(|s| s.0 + s.1).sum();
             add(
@@ -220,13 +225,26 @@ impl Identification {
         }
         let Some(c) = &self.conditioning else {
             let route = config.textbook_route();
-            add("filter cut-off", json!(route.cutoff_hz), "Hz", given(config.conditioning.kernel_hz.is_some()), "textbook route: zero-phase Butterworth on positions and efforts".to_owned());
+            add(
+                "filter cut-off",
+                json!(route.cutoff_hz),
+                "Hz",
+                given(config.conditioning.kernel_hz.is_some()),
+                "textbook route: zero-phase Butterworth on positions and efforts".to_owned(),
+            );
             for log in &self.logs {
-                add("decimation", json!(route.factor(log.rate_hz)), "", given(route.decimation.is_some()), "about five rows per period of the cut-off".to_owned());
+                add(
+                    "decimation",
+                    json!(route.factor(log.rate_hz)),
+                    "",
+                    given(route.decimation.is_some()),
+                    "about five rows per period of the cut-off".to_owned(),
+                );
             }
             return out;
         };
-        let noise: Vec<f64> = self.logs.iter().flat_map(|l| l.position_noise.iter().map(|n| n.sigma)).collect();
+        let noise: Vec<f64> =
+            self.logs.iter().flat_map(|l| l.position_noise.iter().map(|n| n.sigma)).collect();
         let largest_noise = noise.iter().copied().fold(0.0, f64::max);
         add(
             "kernel cut-off",
@@ -259,7 +277,10 @@ impl Identification {
             given(c.delay.given),
             match c.delay.chi_squared {
                 _ if c.delay.given => "as given".to_owned(),
-                Some(chi) => format!("fitted with the parameters, ± {:.3} (95 %), joints agree with χ²/dof {chi:.2}", c.delay.half_width),
+                Some(chi) => format!(
+                    "fitted with the parameters, ± {:.3} (95 %), joints agree with χ²/dof {chi:.2}",
+                    c.delay.half_width
+                ),
                 None => format!("fitted with the parameters, ± {:.3} (95 %)", c.delay.half_width),
             },
         );
@@ -269,7 +290,10 @@ impl Identification {
                 mask.0.map_or(json!(null), |m| json!(m)),
                 "of rms speed",
                 given(config.conditioning.reversal_mask.is_some()),
-                format!("held-out error over the ladder of masks; {:.0} % of the samples stay", 100.0 * mask.1),
+                format!(
+                    "held-out error over the ladder of masks; {:.0} % of the samples stay",
+                    100.0 * mask.1
+                ),
             );
         }
         out
@@ -277,7 +301,9 @@ impl Identification {
 }
 
 pub(crate) fn short_name(path: &str) -> String {
-    std::path::Path::new(path).file_name().map_or_else(|| path.to_owned(), |n| n.to_string_lossy().into_owned())
+    std::path::Path::new(path)
+        .file_name()
+        .map_or_else(|| path.to_owned(), |n| n.to_string_lossy().into_owned())
 }
 
 /// The figures of one log as the result file holds them.
@@ -349,10 +375,5 @@ fn provenance(config: &Config) -> Result<Provenance, Error> {
         "log": config.log.iter().map(rows).collect::<Vec<_>>(),
         "validation": config.validation.iter().map(rows).collect::<Vec<_>>(),
     });
-    Ok(Provenance {
-        version: crate::VERSION.to_owned(),
-        inputs,
-        settings,
-        seed: config.seed.unwrap_or(1),
-    })
+    Ok(Provenance { version: crate::VERSION.to_owned(), inputs, settings, seed: config.seed.unwrap_or(1) })
 }
