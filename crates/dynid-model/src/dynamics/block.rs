@@ -126,9 +126,18 @@ impl LaneTask for RegressorTask<'_> {
             load_all(motion.dq, motion.stride, sample, &mut dq, &load);
             load_all(motion.ddq, motion.stride, sample, &mut ddq, &load);
             let gravity = load_gravity(dynamics, motion, sample, &load);
-            regressor::sweep(tree, (&q, &dq, &ddq), gravity, &slots.by_axis, &mut work, |slot, value| {
-                store(value, &mut out[slot * stride + sample..]);
-            });
+            regressor::sweep(
+                tree,
+                (&q, &dq, &ddq),
+                gravity,
+                &slots.by_axis,
+                &mut work,
+                |slot, columns, entries| {
+                    for (column, value) in columns.iter().zip(&entries) {
+                        store(*value, &mut out[(slot + column) * stride + sample..]);
+                    }
+                },
+            );
         }
     }
 }
@@ -147,7 +156,7 @@ impl LaneTask for InverseDynamicsTask<'_> {
         let InverseDynamicsTask { dynamics, motion, inertias, stride, effort } = self;
         let tree = &dynamics.tree;
         let mut work = inverse_dynamics::InverseDynamicsWorkspace::<S>::new(tree);
-        let inertias: Vec<S> = inertias.iter().map(|x| S::from_f64(*x)).collect();
+        work.load_inertias(tree, inertias, S::from_f64);
         let mut q = vec![S::zero(); tree.positions];
         let mut dq = vec![S::zero(); tree.rates];
         let mut ddq = vec![S::zero(); tree.rates];
@@ -157,7 +166,7 @@ impl LaneTask for InverseDynamicsTask<'_> {
             load_all(motion.dq, motion.stride, sample, &mut dq, &load);
             load_all(motion.ddq, motion.stride, sample, &mut ddq, &load);
             let gravity = load_gravity(dynamics, motion, sample, &load);
-            inverse_dynamics::sweep(tree, &inertias, (&q, &dq, &ddq), gravity, &mut work, &mut out);
+            inverse_dynamics::sweep(tree, (&q, &dq, &ddq), gravity, &mut work, &mut out);
             for (k, value) in out.iter().enumerate() {
                 store(*value, &mut effort[k * stride + sample..]);
             }
@@ -211,8 +220,10 @@ impl Dynamics {
         self.each_sample(motion, |sample, state| {
             let gravity = self.gravity_of(state);
             let q = (state.q, state.dq, state.ddq);
-            regressor::sweep(&self.tree, q, gravity, &slots.by_axis, &mut work, |slot, value| {
-                out[slot * stride + sample] = value;
+            regressor::sweep(&self.tree, q, gravity, &slots.by_axis, &mut work, |slot, columns, entries| {
+                for (column, value) in columns.iter().zip(&entries) {
+                    out[(slot + column) * stride + sample] = *value;
+                }
             });
         });
     }

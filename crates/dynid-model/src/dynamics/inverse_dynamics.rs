@@ -1,6 +1,6 @@
 //! Inverse dynamics: efforts from motion (recursive Newton-Euler, spec/mechanisms.md section 5).
 
-use super::motion::{BodyMotion, placement, step};
+use super::motion::{BodyMotion, Turns, placement, step};
 use super::tree::{Motion, Tree};
 use crate::scalar::Scalar;
 use crate::spatial::{Mat3, Vec3};
@@ -8,6 +8,9 @@ use crate::spatial::{Mat3, Vec3};
 /// Reusable memory of the two sweeps.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct InverseDynamicsWorkspace<S> {
+    turns: Turns<S>,
+    /// Standard parameters of every node in internal axes.
+    inertias: Vec<[S; 10]>,
     motions: Vec<BodyMotion<S>>,
     placements: Vec<(Mat3<S>, Vec3<S>)>,
     forces: Vec<(Vec3<S>, Vec3<S>)>,
@@ -16,9 +19,23 @@ pub(crate) struct InverseDynamicsWorkspace<S> {
 impl<S: Scalar> InverseDynamicsWorkspace<S> {
     pub(crate) fn new(tree: &Tree) -> Self {
         InverseDynamicsWorkspace {
+            turns: Turns::new(tree),
+            inertias: vec![[S::zero(); 10]; tree.nodes.len()],
             motions: vec![BodyMotion::ground(Vec3::zero()); tree.nodes.len()],
             placements: vec![(Mat3::zero(), Vec3::zero()); tree.nodes.len()],
             forces: vec![(Vec3::zero(), Vec3::zero()); tree.nodes.len()],
+        }
+    }
+
+    /// Takes the inertias of the sweeps to come: ten numbers per body in file order and file frames.
+    #[inline(always)]
+    pub(crate) fn load_inertias<T: Copy>(&mut self, tree: &Tree, inertias: &[T], number: impl Fn(T) -> S) {
+        let (bodies, _) = inertias.as_chunks::<10>();
+        for (node, internal) in tree.nodes.iter().zip(&mut self.inertias) {
+            let file = &bodies[node.body];
+            for (to, column) in internal.iter_mut().zip(&node.columns) {
+                *to = number(file[*column]);
+            }
         }
     }
 
@@ -28,11 +45,10 @@ impl<S: Scalar> InverseDynamicsWorkspace<S> {
     }
 }
 
-/// Writes the effort of every joint rate. `inertias`: ten numbers per body in file order and file frames.
+/// Writes the effort of every joint rate for the inertias loaded into the workspace.
 #[inline(always)]
 pub(crate) fn sweep<S: Scalar>(
     tree: &Tree,
-    inertias: &[S],
     state: (&[S], &[S], &[S]),
     gravity: Vec3<S>,
     work: &mut InverseDynamicsWorkspace<S>,
@@ -40,16 +56,15 @@ pub(crate) fn sweep<S: Scalar>(
 ) {
     let (q, dq, ddq) = state;
     let ground = BodyMotion::ground(gravity);
+    work.turns.fill(tree, q);
     for (index, node) in tree.nodes.iter().enumerate() {
-        let (rotation, origin) = placement(node, q);
+        let (rotation, origin) = placement(node, &work.turns, q);
         let parent = node.parent.map_or(&ground, |p| &work.motions[p]);
         let motion = step(node, (&rotation, origin), parent, dq, ddq);
-        let phi = &inertias[10 * node.body..10 * node.body + 10];
-        let at = |c: usize| phi[node.columns[c]];
-        let h = Vec3([at(1), at(2), at(3)]);
-        let tensor =
-            Mat3([Vec3([at(4), at(5), at(6)]), Vec3([at(5), at(7), at(8)]), Vec3([at(6), at(8), at(9)])]);
-        let force = motion.acceleration.scale_add(phi[0], motion.gradient.mul_vec(h));
+        let [mass, hx, hy, hz, xx, xy, xz, yy, yz, zz] = work.inertias[index];
+        let h = Vec3([hx, hy, hz]);
+        let tensor = Mat3([Vec3([xx, xy, xz]), Vec3([xy, yy, yz]), Vec3([xz, yz, zz])]);
+        let force = motion.acceleration.scale_add(mass, motion.gradient.mul_vec(h));
         let moment = tensor.mul_vec(motion.alpha)
             + motion.omega.cross(tensor.mul_vec(motion.omega))
             + h.cross(motion.acceleration);

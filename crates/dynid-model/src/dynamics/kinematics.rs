@@ -1,6 +1,6 @@
 //! Forward kinematics.
 
-use super::motion::placement;
+use super::motion::{Turns, placement};
 use super::{Dynamics, DynamicsWorkspace, State};
 use crate::spatial::{Mat3, Placement, Vec3};
 
@@ -18,10 +18,12 @@ impl Dynamics {
         } else {
             q
         };
+        let mut turns = Turns::new(&self.tree);
+        turns.fill(&self.tree, q);
         let mut internal: Vec<Placement> = Vec::with_capacity(self.tree.nodes.len());
         let mut frames = vec![Placement::identity(); self.tree.nodes.len()];
         for node in &self.tree.nodes {
-            let (rotation, translation) = placement(node, q);
+            let (rotation, translation) = placement(node, &turns, q);
             let local = Placement { rotation, translation };
             let global = node.parent.map_or(local, |p| internal[p].then(&local));
             let mut columns = [Vec3::zero(); 3];

@@ -76,7 +76,6 @@ struct FusedWorkspace<F> {
     inverse: InverseDynamicsWorkspace<F>,
     regressor: RegressorWorkspace<F>,
     state: [Vec<F>; 3],
-    inertias: Vec<F>,
     effort: Vec<F>,
 }
 
@@ -136,7 +135,6 @@ impl Dynamics {
                 regressor: RegressorWorkspace::new(&self.tree),
                 state: [self.tree.positions, self.tree.rates, self.tree.rates]
                     .map(|n| vec![S::zero().fuse(); n]),
-                inertias: vec![S::zero().fuse(); 10 * self.bodies],
                 effort: vec![S::zero().fuse(); self.tree.rates],
             },
             joint_state: [vec![S::zero(); joint_positions], vec![S::zero(); joints], vec![S::zero(); joints]],
@@ -343,13 +341,13 @@ fn fuse_all<S: Scalar>(from: &[S], to: &mut [S::Fused]) {
 impl<S: Scalar> FusedTask for EffortTask<'_, S> {
     #[inline(always)]
     fn fused(self) {
-        let FusedWorkspace { inverse, state: [q, dq, ddq], inertias, effort, .. } = &mut self.work.fused;
+        let FusedWorkspace { inverse, state: [q, dq, ddq], effort, .. } = &mut self.work.fused;
         fuse_all(self.state.0, q);
         fuse_all(self.state.1, dq);
         fuse_all(self.state.2, ddq);
-        fuse_all(self.inertias, inertias);
+        inverse.load_inertias(self.tree, self.inertias, S::fuse);
         let gravity = Vec3(self.gravity.0.map(S::fuse));
-        inverse_dynamics::sweep(self.tree, inertias, (q, dq, ddq), gravity, inverse, effort);
+        inverse_dynamics::sweep(self.tree, (q, dq, ddq), gravity, inverse, effort);
         for (to, from) in self.effort.iter_mut().zip(effort) {
             *to = S::unfuse(*from);
         }
@@ -357,7 +355,8 @@ impl<S: Scalar> FusedTask for EffortTask<'_, S> {
 
     fn plain(self) {
         let inverse = &mut self.work.inverse;
-        inverse_dynamics::sweep(self.tree, self.inertias, self.state, self.gravity, inverse, self.effort);
+        inverse.load_inertias(self.tree, self.inertias, |x| x);
+        inverse_dynamics::sweep(self.tree, self.state, self.gravity, inverse, self.effort);
     }
 }
 
@@ -379,16 +378,36 @@ impl<S: Scalar> FusedTask for RegressorTask<'_, S> {
         fuse_all(self.state.2, ddq);
         let gravity = Vec3(self.gravity.0.map(S::fuse));
         let y = self.y;
-        regressor::sweep(self.tree, (q, dq, ddq), gravity, self.slots, regressor, |slot, value| {
-            y[slot] = S::unfuse(value);
-        });
+        regressor::sweep(
+            self.tree,
+            (q, dq, ddq),
+            gravity,
+            self.slots,
+            regressor,
+            |slot, columns, entries| {
+                let row = &mut y[slot..slot + 10];
+                for (column, entry) in columns.iter().zip(&entries) {
+                    row[*column] = S::unfuse(*entry);
+                }
+            },
+        );
     }
 
     fn plain(self) {
         let y = self.y;
         let regressor = &mut self.work.regressor;
-        regressor::sweep(self.tree, self.state, self.gravity, self.slots, regressor, |slot, value| {
-            y[slot] = value;
-        });
+        regressor::sweep(
+            self.tree,
+            self.state,
+            self.gravity,
+            self.slots,
+            regressor,
+            |slot, columns, entries| {
+                let row = &mut y[slot..slot + 10];
+                for (column, entry) in columns.iter().zip(&entries) {
+                    row[*column] = *entry;
+                }
+            },
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! The outward recursion: rotations, velocities and accelerations of all bodies (spec/mechanisms.md section 4).
 
-use super::tree::{Motion, Node};
+use super::tree::{Motion, Node, Tree};
 use crate::scalar::Scalar;
 use crate::spatial::{Mat3, Vec3};
 
@@ -42,17 +42,39 @@ fn gradient<S: Scalar>(omega: Vec3<S>, alpha: Vec3<S>) -> Mat3<S> {
     ])
 }
 
+/// Sines and cosines of all joint angles.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Turns<S> {
+    angles: Vec<S>,
+    sin_cos: Vec<(S, S)>,
+}
+
+impl<S: Scalar> Turns<S> {
+    pub(crate) fn new(tree: &Tree) -> Self {
+        let n = tree.turns.len();
+        Turns { angles: vec![S::zero(); n], sin_cos: vec![(S::zero(), S::zero()); n] }
+    }
+
+    #[inline(always)]
+    pub(crate) fn fill(&mut self, tree: &Tree, q: &[S]) {
+        for (angle, (position, sign)) in self.angles.iter_mut().zip(&tree.turns) {
+            *angle = q[*position] * S::from_f64(*sign);
+        }
+        S::sin_cos_all(&self.angles, &mut self.sin_cos);
+    }
+}
+
 /// Rotation and origin of a body in its parent.
 #[inline(always)]
-pub(crate) fn placement<S: Scalar>(node: &Node, q: &[S]) -> (Mat3<S>, Vec3<S>) {
+pub(crate) fn placement<S: Scalar>(node: &Node, turns: &Turns<S>, q: &[S]) -> (Mat3<S>, Vec3<S>) {
     let origin = Vec3::constant(node.origin.0);
     match node.motion {
-        Motion::RevoluteZ { sign } => {
-            let (s, c) = (q[node.position] * S::from_f64(sign)).sin_cos();
+        Motion::RevoluteZ { .. } => {
+            let (s, c) = turns.sin_cos[node.turn];
             let [x, y, z] = Mat3::constant(&node.fixed).0;
             (Mat3([x.scale_add(c, y.scale(s)), y.scale_add(c, x.scale(-s)), z]), origin)
         }
-        Motion::Revolute => (turned(node, q[node.position]), origin),
+        Motion::Revolute => (turned(node, turns.sin_cos[node.turn]), origin),
         Motion::Prismatic => {
             let rotation = Mat3::constant(&node.fixed);
             let along = rotation.mul_vec(Vec3::constant(node.axis.0));
@@ -60,8 +82,8 @@ pub(crate) fn placement<S: Scalar>(node: &Node, q: &[S]) -> (Mat3<S>, Vec3<S>) {
         }
         Motion::Helical { pitch } => {
             let along = Mat3::constant(&node.fixed).mul_vec(Vec3::constant(node.axis.0));
-            let angle = q[node.position];
-            (turned(node, angle), along.scale_add(angle * S::from_f64(pitch), origin))
+            let slide = q[node.position] * S::from_f64(pitch);
+            (turned(node, turns.sin_cos[node.turn]), along.scale_add(slide, origin))
         }
         Motion::Floating => {
             let q = &q[node.position..node.position + 7];
@@ -74,8 +96,7 @@ pub(crate) fn placement<S: Scalar>(node: &Node, q: &[S]) -> (Mat3<S>, Vec3<S>) {
 
 /// `A0 + cos q A1 + sin q A2` with the constants of the node.
 #[inline(always)]
-fn turned<S: Scalar>(node: &Node, angle: S) -> Mat3<S> {
-    let (s, c) = angle.sin_cos();
+fn turned<S: Scalar>(node: &Node, (s, c): (S, S)) -> Mat3<S> {
     let [a0, a1, a2] = &node.around;
     Mat3::constant(a0) + Mat3::constant(a1) * c + Mat3::constant(a2) * s
 }

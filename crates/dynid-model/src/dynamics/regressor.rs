@@ -3,7 +3,7 @@
 //! The axis of every coordinate is carried outward into the axes of every body that it moves; an entry is then one
 //! inner product with the body's own motion, and nothing is carried back to the base.
 
-use super::motion::{BodyMotion, placement, step};
+use super::motion::{BodyMotion, Turns, placement, step};
 use super::tree::{Motion, Node, Tree};
 use crate::scalar::Scalar;
 use crate::spatial::Vec3;
@@ -11,6 +11,7 @@ use crate::spatial::Vec3;
 /// Reusable memory of the outward sweep.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct RegressorWorkspace<S> {
+    turns: Turns<S>,
     motions: Vec<BodyMotion<S>>,
     /// Angular and linear part of the unit motion of a coordinate, in axes of the body.
     axes: Vec<(Vec3<S>, Vec3<S>)>,
@@ -19,16 +20,17 @@ pub(crate) struct RegressorWorkspace<S> {
 impl<S: Scalar> RegressorWorkspace<S> {
     pub(crate) fn new(tree: &Tree) -> Self {
         RegressorWorkspace {
+            turns: Turns::new(tree),
             motions: vec![BodyMotion::ground(Vec3::zero()); tree.nodes.len()],
             axes: vec![(Vec3::zero(), Vec3::zero()); tree.axis_rate.len()],
         }
     }
 }
 
-/// Computes all entries that can differ from zero and hands them to `put(slot, value)`.
+/// Computes all entries that can differ from zero and hands them to `put(slot, columns, entries)`, ten at a time.
 ///
 /// `slots[k]` is the place of the first of the ten entries of carried axis `k` (row: the axis' rate, columns: the
-/// body's parameters); the entry of parameter `c` of the file's frame goes to `slots[k] + c`.
+/// body's parameters); entry `c` belongs to parameter `columns[c]` of the file's frame.
 #[inline(always)]
 pub(crate) fn sweep<S: Scalar>(
     tree: &Tree,
@@ -36,25 +38,27 @@ pub(crate) fn sweep<S: Scalar>(
     gravity: Vec3<S>,
     slots: &[usize],
     work: &mut RegressorWorkspace<S>,
-    mut put: impl FnMut(usize, S),
+    mut put: impl FnMut(usize, &[usize; 10], [S; 10]),
 ) {
     let (q, dq, ddq) = state;
     let ground = BodyMotion::ground(gravity);
+    work.turns.fill(tree, q);
     for (index, node) in tree.nodes.iter().enumerate() {
-        let (rotation, origin) = placement(node, q);
+        let (rotation, origin) = placement(node, &work.turns, q);
         let parent = node.parent.map_or(&ground, |p| &work.motions[p]);
         let motion = step(node, (&rotation, origin), parent, dq, ddq);
         let tensor = TensorRows::new(motion.omega, motion.alpha);
+        let slots = &slots[node.carried()];
+        let (carried_by_others, axes) = work.axes.split_at_mut(node.first_axis);
+        let axes = &mut axes[..slots.len()];
         if let Some(p) = node.parent {
-            let from = tree.nodes[p].first_axis;
-            for k in 0..node.inherited {
-                let (z, v) = work.axes[from + k];
-                let carried = (rotation.tr_mul_vec(z), rotation.tr_mul_vec(v + z.cross(origin)));
-                work.axes[node.first_axis + k] = carried;
-                general_row(node, &motion, &tensor, carried, slots[node.first_axis + k], &mut put);
+            let inherited = &carried_by_others[tree.nodes[p].carried()];
+            for ((axis, (z, v)), slot) in axes.iter_mut().zip(inherited).zip(slots) {
+                *axis = (rotation.tr_mul_vec(*z), rotation.tr_mul_vec(*v + z.cross(origin)));
+                put(*slot, &node.columns, general_row(&motion, &tensor, *axis));
             }
         }
-        own_rows(node, &motion, &tensor, slots, work, &mut put);
+        own_rows(node, &motion, &tensor, &slots[node.inherited..], &mut axes[node.inherited..], &mut put);
         work.motions[index] = motion;
     }
 }
@@ -65,71 +69,60 @@ fn own_rows<S: Scalar>(
     motion: &BodyMotion<S>,
     tensor: &TensorRows<S>,
     slots: &[usize],
-    work: &mut RegressorWorkspace<S>,
-    put: &mut impl FnMut(usize, S),
+    axes: &mut [(Vec3<S>, Vec3<S>)],
+    put: &mut impl FnMut(usize, &[usize; 10], [S; 10]),
 ) {
-    let first = node.first_axis + node.inherited;
     let axis = Vec3::constant(node.axis.0);
-    match node.motion {
+    let columns = &node.columns;
+    let own = match node.motion {
         Motion::RevoluteZ { sign } => {
-            work.axes[first] = (axis, Vec3::zero());
+            axes[0] = (axis, Vec3::zero());
             let s = S::from_f64(sign);
             let [ax, ay, _] = motion.acceleration.0;
-            let row = [S::zero(), ay * s, -ax * s, S::zero()];
-            let slot = slots[first];
-            for (c, value) in row.into_iter().enumerate() {
-                put(slot + node.columns[c], value);
-            }
-            for c in 0..6 {
-                put(slot + node.columns[4 + c], tensor.columns[c].0[2] * s);
-            }
-        }
-        Motion::Revolute => {
-            let own = (axis, Vec3::zero());
-            work.axes[first] = own;
-            general_row(node, motion, tensor, own, slots[first], put);
-        }
-        Motion::Prismatic => {
-            let own = (Vec3::zero(), axis);
-            work.axes[first] = own;
-            general_row(node, motion, tensor, own, slots[first], put);
-        }
-        Motion::Helical { pitch } => {
-            let own = (axis, axis.scale(S::from_f64(pitch)));
-            work.axes[first] = own;
-            general_row(node, motion, tensor, own, slots[first], put);
+            let [xx, xy, xz, yy, yz, zz] = &tensor.columns;
+            let row = [
+                S::zero(),
+                ay * s,
+                -ax * s,
+                S::zero(),
+                xx.0[2] * s,
+                xy.0[2] * s,
+                xz.0[2] * s,
+                yy.0[2] * s,
+                yz.0[2] * s,
+                zz.0[2] * s,
+            ];
+            put(slots[0], columns, row);
+            return;
         }
         Motion::Floating => {
-            for k in 0..6 {
+            for (k, (carried, slot)) in axes.iter_mut().zip(slots).enumerate() {
                 let mut unit = Vec3::zero();
                 unit.0[k % 3] = S::one();
-                let own = if k < 3 { (Vec3::zero(), unit) } else { (unit, Vec3::zero()) };
-                work.axes[first + k] = own;
-                general_row(node, motion, tensor, own, slots[first + k], put);
+                *carried = if k < 3 { (Vec3::zero(), unit) } else { (unit, Vec3::zero()) };
+                put(*slot, columns, general_row(motion, tensor, *carried));
             }
+            return;
         }
-    }
+        Motion::Revolute => (axis, Vec3::zero()),
+        Motion::Prismatic => (Vec3::zero(), axis),
+        Motion::Helical { pitch } => (axis, axis.scale(S::from_f64(pitch))),
+    };
+    axes[0] = own;
+    put(slots[0], columns, general_row(motion, tensor, own));
 }
 
 /// `[v·a | Bᵀv + a × z | Cᵀz]`.
 #[inline(always)]
 fn general_row<S: Scalar>(
-    node: &Node,
     motion: &BodyMotion<S>,
     tensor: &TensorRows<S>,
     (z, v): (Vec3<S>, Vec3<S>),
-    slot: usize,
-    put: &mut impl FnMut(usize, S),
-) {
+) -> [S; 10] {
     let a = motion.acceleration;
-    put(slot, v.dot(a));
-    let moment = motion.gradient.tr_mul_vec(v) + a.cross(z);
-    for c in 0..3 {
-        put(slot + node.columns[1 + c], moment.0[c]);
-    }
-    for c in 0..6 {
-        put(slot + node.columns[4 + c], tensor.columns[c].dot(z));
-    }
+    let [hx, hy, hz] = (motion.gradient.tr_mul_vec(v) + a.cross(z)).0;
+    let [xx, xy, xz, yy, yz, zz] = &tensor.columns;
+    [v.dot(a), hx, hy, hz, xx.dot(z), xy.dot(z), xz.dot(z), yy.dot(z), yz.dot(z), zz.dot(z)]
 }
 
 /// Columns of `C`: the moment per entry of the inertia tensor, `I α + ω × I ω = C (Ixx Ixy Ixz Iyy Iyz Izz)`.

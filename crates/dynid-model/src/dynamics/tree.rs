@@ -45,6 +45,8 @@ pub(crate) struct Node {
     pub(crate) columns: [usize; 10],
     /// Internal axis → axis of the file's frame.
     pub(crate) axes: [usize; 3],
+    /// Place of its angle in [`Tree::turns`], if it turns by one.
+    pub(crate) turn: usize,
     /// First carried axis in the workspace; ancestors' rates from the root on, own rates last.
     pub(crate) first_axis: usize,
     /// Number of rates of all ancestors.
@@ -59,6 +61,8 @@ pub(crate) struct Tree {
     pub(crate) positions: usize,
     /// For each carried axis of each node: the joint rate that it belongs to.
     pub(crate) axis_rate: Vec<usize>,
+    /// Position entry and sign of every angle.
+    pub(crate) turns: Vec<(usize, f64)>,
 }
 
 impl Node {
@@ -74,6 +78,7 @@ impl Tree {
         let mut node_of_body = vec![usize::MAX; bodies.len()];
         let mut nodes: Vec<Node> = Vec::with_capacity(bodies.len());
         let mut axis_rate = Vec::new();
+        let mut turns = Vec::new();
         for &b in mechanism.sweep() {
             let body = &bodies[b];
             let joint = &body.joint;
@@ -106,6 +111,12 @@ impl Tree {
             let inherited = axis_rate.len() - first_axis;
             axis_rate.extend(body.rate..body.rate + joint.rates());
             node_of_body[b] = nodes.len();
+            let turn = turns.len();
+            match motion {
+                Motion::RevoluteZ { sign } => turns.push((body.position, sign)),
+                Motion::Revolute | Motion::Helical { .. } => turns.push((body.position, 1.0)),
+                Motion::Prismatic | Motion::Floating => {}
+            }
             nodes.push(Node {
                 parent,
                 motion,
@@ -119,11 +130,18 @@ impl Tree {
                 body: b,
                 columns: renamed_columns(axes),
                 axes,
+                turn,
                 first_axis,
                 inherited,
             });
         }
-        Tree { nodes, rates: mechanism.joint_rates(), positions: mechanism.joint_positions(), axis_rate }
+        Tree {
+            nodes,
+            rates: mechanism.joint_rates(),
+            positions: mechanism.joint_positions(),
+            axis_rate,
+            turns,
+        }
     }
 }
 

@@ -48,6 +48,26 @@ impl<const N: usize, const FUSED: bool> Scalar for Lanes<N, FUSED> {
         (Lanes(s), Lanes(c))
     }
     #[inline(always)]
+    fn sin_cos_all(angles: &[Self], out: &mut [(Self, Self)]) {
+        if N > 1 {
+            for (angle, pair) in angles.iter().zip(out) {
+                *pair = angle.sin_cos();
+            }
+            return;
+        }
+        // A single sample has no lanes of its own: joints stand in for them.
+        for (angles, pairs) in angles.chunks(4).zip(out.chunks_mut(4)) {
+            let mut four = [0.0; 4];
+            for (x, angle) in four.iter_mut().zip(angles) {
+                *x = angle.0[0];
+            }
+            let (s, c) = sin_cos_lanes::<4, FUSED>(four);
+            for (pair, (s, c)) in pairs.iter_mut().zip(s.into_iter().zip(c)) {
+                *pair = (Lanes([s; N]), Lanes([c; N]));
+            }
+        }
+    }
+    #[inline(always)]
     fn mul_add(self, factor: Self, term: Self) -> Self {
         if FUSED {
             Lanes(from_fn(|k| self.0[k].mul_add(factor.0[k], term.0[k])))

@@ -27,6 +27,13 @@ pub trait Scalar:
     fn from_f64(value: f64) -> Self;
     /// Sine and cosine of an angle in rad.
     fn sin_cos(self) -> (Self, Self);
+    /// Sines and cosines of several angles, the same numbers as one by one.
+    #[inline(always)]
+    fn sin_cos_all(angles: &[Self], out: &mut [(Self, Self)]) {
+        for (angle, pair) in angles.iter().zip(out) {
+            *pair = angle.sin_cos();
+        }
+    }
 
     /// Zero.
     #[inline(always)]

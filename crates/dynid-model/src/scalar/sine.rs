@@ -1,7 +1,7 @@
 //! Sine and cosine without branches, so that lanes stay in step.
 //!
 //! Cody & Waite reduction by `π/2` in three parts, then the minimax polynomials of fdlibm (Sun Microsystems 1993) on
-//! `[-π/4, π/4]`. Error below 2 units in the last place for `|x| <= 1e5`; larger or non-finite arguments go to the
+//! `[-π/4, π/4]`. Error below 2 units in the last place for `|x| <= 1e5`; larger arguments go to the
 //! standard library.
 
 /// Beyond this the three-part reduction starts to lose digits.
@@ -71,17 +71,27 @@ fn sin_cos_reduced<const FUSED: bool>(x: f64) -> (f64, f64) {
 pub(super) fn sin_cos_lanes<const N: usize, const FUSED: bool>(x: [f64; N]) -> ([f64; N], [f64; N]) {
     let mut s = [0.0; N];
     let mut c = [0.0; N];
-    let mut within = true;
+    let mut largest = 0.0;
     for k in 0..N {
         (s[k], c[k]) = sin_cos_reduced::<FUSED>(x[k]);
-        within &= x[k].abs() <= REDUCTION_LIMIT;
+        // Passes over NaN, so that it hides no huge argument in another lane.
+        largest = if x[k].abs() > largest { x[k].abs() } else { largest };
     }
-    if !within {
-        for k in 0..N {
+    if largest > REDUCTION_LIMIT {
+        beyond_reduction(&x, &mut s, &mut c);
+    }
+    (s, c)
+}
+
+/// Replaces the lanes concerned, and only these, so that no lane's bits depend on its neighbours.
+#[cold]
+#[inline(never)]
+fn beyond_reduction<const N: usize>(x: &[f64; N], s: &mut [f64; N], c: &mut [f64; N]) {
+    for k in 0..N {
+        if x[k].abs() > REDUCTION_LIMIT {
             (s[k], c[k]) = x[k].sin_cos();
         }
     }
-    (s, c)
 }
 
 #[inline(always)]
@@ -122,7 +132,7 @@ mod tests {
         assert_eq!((s, c), 1e12_f64.sin_cos());
         let (s, c) = sin_cos_lanes::<4, false>([0.0, 1e300, 1.0, f64::NAN]);
         assert_eq!((s[1], c[1]), 1e300_f64.sin_cos());
-        assert_eq!((s[2], c[2]), 1.0_f64.sin_cos());
+        assert_eq!((s[2], c[2]), sin_cos(1.0));
         assert!(s[3].is_nan() && c[3].is_nan());
         // A NaN in one lane must not hide a huge argument in another.
         let (s, c) = sin_cos_lanes::<4, false>([1e300, f64::NAN, 1.0, 2.0]);
