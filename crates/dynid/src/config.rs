@@ -159,8 +159,8 @@ impl Config {
     /// # Errors
     /// [`Error::Read`], [`Error::Config`] with the line.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| Error::Read { file: path.to_owned(), source })?;
+        let text =
+            std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
         let mut config = Self::parse(&text, &path.display().to_string())?;
         let folder = path.parent().unwrap_or(Path::new(""));
         config.robot = folder.join(&config.robot);
@@ -234,11 +234,40 @@ impl Config {
         {
             return Err(setting("gravity", "three finite numbers", format!("{g:?}")));
         }
+        for coupling in &self.coupling {
+            if !coupling.matrix.iter().flatten().all(|x| x.is_finite()) {
+                return Err(Error::Coupling {
+                    joints: coupling.joints.join(", "),
+                    fault: format!("expected finite numbers in the matrix, found {:?}", coupling.matrix),
+                });
+            }
+        }
+        for (joint, position) in &self.locked {
+            if !position.is_finite() {
+                return Err(setting(&format!("locked.{joint}"), "a finite number", position));
+            }
+        }
         for log in self.log.iter().chain(&self.validation) {
             if let Some((a, b)) = log.part
                 && !(0.0..1.0).contains(&a) | !(b > a && b <= 1.0)
             {
                 return Err(setting("part", "two increasing shares between 0 and 1", format!("[{a}, {b}]")));
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks the given cut-offs against the sample rate of a log.
+    ///
+    /// # Errors
+    /// [`Error::Cutoff`].
+    pub fn check_cutoffs(&self, file: &str, rate_hz: f64) -> Result<(), Error> {
+        let c = &self.conditioning;
+        for (name, value) in [("kernel_hz", c.kernel_hz), ("state_hz", c.state_hz)] {
+            if let Some(found) = value
+                && found >= 0.5 * rate_hz
+            {
+                return Err(Error::Cutoff { file: file.to_owned(), name: name.to_owned(), rate_hz, found });
             }
         }
         Ok(())

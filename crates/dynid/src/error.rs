@@ -105,6 +105,20 @@ pub enum Error {
         /// What was given.
         found: String,
     },
+    /// A cut-off that a log's sample rate does not allow.
+    #[error(
+        "{file}: setting `{name}`: expected less than half the sample rate of {rate_hz} Hz, found {found} Hz"
+    )]
+    Cutoff {
+        /// Log file.
+        file: String,
+        /// Name.
+        name: String,
+        /// Sample rate of the log, Hz.
+        rate_hz: f64,
+        /// What was given, Hz.
+        found: f64,
+    },
     /// The mechanism cannot be identified from joint logs.
     #[error("{0}")]
     Unsupported(String),
@@ -125,7 +139,7 @@ pub enum Error {
         message: String,
     },
     /// A file cannot be read.
-    #[error("{}: {source}", file.display())]
+    #[error("{}: cannot be read: {source}", file.display())]
     Read {
         /// File.
         file: PathBuf,
@@ -178,8 +192,20 @@ impl Error {
                 Some("check the time column; `rate_hz` in [columns] states a sample rate instead".to_owned())
             }
             Error::Conditioning(C::Signal(_)) => Some("record a longer log, or set cut-offs below half the sample rate".to_owned()),
-            Error::UnknownElement { .. } => Some("elements are listed under [defaults] or [element.<joint>]".to_owned()),
-            Error::Unsupported(_) | Error::EstimateFile { .. } => None,
+            Error::UnknownElement { .. } => Some(
+                "elements are given by --elements, under [elements] in a configuration, under [defaults] and \
+                 [element.<joint>] in a robot file"
+                    .to_owned(),
+            ),
+            Error::EstimateFile { .. } => {
+                Some("an estimate is the estimate.json that `dynid identify` writes".to_owned())
+            }
+            Error::Read { source, .. } => Some(match source.kind() {
+                std::io::ErrorKind::NotFound => "check the path".to_owned(),
+                _ => "check that the path is a text file and may be read".to_owned(),
+            }),
+            Error::TooShort { .. } => Some("record a longer motion".to_owned()),
+            Error::Cutoff { .. } => Some("set a cut-off below half the sample rate".to_owned()),
             _ => None,
         }
     }

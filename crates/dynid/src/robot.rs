@@ -59,11 +59,7 @@ impl Robot {
         })?;
         let mechanism = file.description.build().map_err(named)?;
         let mut warnings: Vec<String> = mechanism.warnings().iter().map(ToString::to_string).collect();
-        warnings.extend(
-            locked.iter().map(|(joint, position)| {
-                MechanismWarning::Locked { joint: joint.clone(), position: *position }.to_string()
-            }),
-        );
+        warnings.extend(held(locked));
         let mut elements = file.elements.clone();
         let known = mechanism.rate_names();
         elements.per_joint.retain(|(joint, _)| known.contains(joint));
@@ -86,6 +82,26 @@ impl Robot {
     pub fn state_joints(&self) -> Vec<dynid_io::StateJoint> {
         state_joints(&self.mechanism)
     }
+}
+
+/// Locked joints in words, those at one position together: a mobile robot may have dozens.
+fn held(locked: &[(String, f64)]) -> Vec<String> {
+    let mut at: Vec<(f64, Vec<&str>)> = Vec::new();
+    for (joint, position) in locked {
+        match at.iter_mut().find(|(p, _)| p == position) {
+            Some((_, joints)) => joints.push(joint),
+            None => at.push((*position, vec![joint])),
+        }
+    }
+    at.into_iter()
+        .map(|(position, joints)| match joints[..] {
+            [joint] => MechanismWarning::Locked { joint: joint.to_owned(), position }.to_string(),
+            _ => format!(
+                "joints {} are held at {position}",
+                joints.iter().map(|j| format!("`{j}`")).collect::<Vec<_>>().join(", ")
+            ),
+        })
+        .collect()
 }
 
 /// Coordinates of a mechanism as a states table names them.

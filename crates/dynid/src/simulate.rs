@@ -100,7 +100,9 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
     check(settings)?;
     let mechanism = &robot.mechanism;
     if mechanism.positions() != mechanism.rates() {
-        return Err(Error::Unsupported("a floating base has no joint log: simulate the arm alone".to_owned()));
+        return Err(Error::Unsupported(
+            "a floating base has no joint log: simulate the arm alone".to_owned(),
+        ));
     }
     let plan = ElementPlan::new(mechanism, &robot.elements, None, |_| true)?;
     let model = RobotModel::new(mechanism.clone(), plan.build(mechanism)?);
@@ -278,6 +280,9 @@ fn truth(model: &RobotModel, plan: &ElementPlan, settings: &SimulateSettings) ->
         let Some(column) = table.column(name) else {
             return Err(setting("values", "names of parameters such as `j1.fc`", name));
         };
+        if !value.is_finite() {
+            return Err(setting(&format!("values.{name}"), "a finite number", value));
+        }
         values[column] = *value;
     }
     Ok(values)

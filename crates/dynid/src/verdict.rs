@@ -69,18 +69,24 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
     let relative = |a: &[crate::agreement::Agreement]| {
         a.iter().filter_map(|v| v.filtered.relative_error).fold(f64::NAN, f64::max)
     };
-    let (error, on) = if id.validation.is_empty() {
-        (relative(&id.training), "the training logs")
+    let (error, agrees) = if id.validation.is_empty() {
+        (relative(&id.training), "reproduces the training logs")
     } else {
-        (relative(&id.validation), "logs it has not seen")
+        (relative(&id.validation), "predicts logs it has not seen")
+    };
+    let named = |level: Status| {
+        let names = checks.iter().filter(|(s, _)| *s == level).map(|(_, c)| c.name.as_str());
+        names.collect::<Vec<_>>().join(", ")
     };
     let reservation = match status {
-        Status::Ok => "All checks passed.",
-        Status::Warn => "Some checks call for a look.",
-        Status::Fail => "It should not be used without a look at the failed checks.",
+        Status::Ok => "All checks passed.".to_owned(),
+        Status::Warn => format!("These checks call for a look: {}.", named(Status::Warn)),
+        Status::Fail => {
+            format!("It should not be used without a look at the failed checks: {}.", named(Status::Fail))
+        }
     };
     let headline = format!(
-        "{} of {} base parameters identified; the model predicts {on} within {error:.1} % of the effort. {reservation}",
+        "{} of {} base parameters identified; the model {agrees} within {error:.1} % of the effort. {reservation}",
         id.fit.solution.kept.len(),
         id.base.len(),
     );
@@ -104,7 +110,10 @@ fn excitation(id: &Identification) -> (Status, CheckResult) {
         if kept == all {
             "the logs excite every parameter combination that this robot can reveal".to_owned()
         } else {
-            format!("the logs leave {} combinations unexcited; these keep the robot file's values", all - kept)
+            match all - kept {
+                1 => "the logs leave one combination unexcited; it keeps the robot file's value".to_owned(),
+                n => format!("the logs leave {n} combinations unexcited; these keep the robot file's values"),
+            }
         },
     )
 }
@@ -162,9 +171,12 @@ fn validation_fit(id: &Identification) -> (Status, CheckResult) {
 }
 
 fn residual(id: &Identification) -> Option<(Status, CheckResult)> {
-    let worst = id.residual_ratio.iter().flatten().copied().fold(None, |m: Option<f64>, x| {
-        Some(m.map_or(x, |m| m.max(x)))
-    })?;
+    let worst = id
+        .residual_ratio
+        .iter()
+        .flatten()
+        .copied()
+        .fold(None, |m: Option<f64>, x| Some(m.map_or(x, |m| m.max(x))))?;
     Some(check(
         Status::of(worst < 2.0, true),
         "residual against sensor noise",
@@ -195,7 +207,9 @@ fn delay(id: &Identification) -> Option<(Status, CheckResult)> {
         if delay.at_limit {
             "the delay ran into the limit of the search: it is not a measurement".to_owned()
         } else if chi >= 3.0 {
-            format!("the joints disagree about the delay (χ²/dof {chi:.1}): a missing friction shape biases it")
+            format!(
+                "the joints disagree about the delay (χ²/dof {chi:.1}): a missing friction shape biases it"
+            )
         } else {
             format!("lead of the logged effort before the motion, ± {:.2} samples (95 %)", delay.half_width)
         },
