@@ -71,11 +71,7 @@ fn trajectories() -> Vec<Fourier> {
 }
 
 /// Calls `work` with blocks of motion and the efforts of known parameters.
-fn blocks(
-    model: &RobotModel,
-    samples: usize,
-    mut work: impl FnMut(&RegressorBlock, &[Vec<f64>]),
-) {
+fn blocks(model: &RobotModel, samples: usize, mut work: impl FnMut(&RegressorBlock, &[Vec<f64>])) {
     let trajectories = trajectories();
     let truth: Vec<f64> = (0..84).map(|k| 1.0 + 0.1 * f64::from(k % 7)).collect();
     let mut block = RegressorBlock::new(model.layout().clone(), BLOCK);

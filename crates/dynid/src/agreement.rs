@@ -90,10 +90,8 @@ pub fn compare(
             .collect()
     };
     let agree = |measured: &[Vec<f64>], predicted: &[Vec<f64>]| {
-        fit(&pick(measured), &pick(predicted)).map_err(|e| Error::TooShort {
-            file: log.name.clone(),
-            message: e.to_string(),
-        })
+        fit(&pick(measured), &pick(predicted))
+            .map_err(|e| Error::TooShort { file: log.name.clone(), message: e.to_string() })
     };
     let measured_filtered = filtered(&log.effort)?;
     Ok(Agreement {

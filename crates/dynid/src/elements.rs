@@ -160,7 +160,8 @@ fn build_coupling(coupling: &CouplingSpec, names: &[String]) -> Result<Box<dyn J
                 .ok_or_else(|| Error::UnknownJoint { name: j.clone(), known: names.to_vec() })
         })
         .collect::<Result<Vec<_>, _>>()?;
-    let square = coupling.matrix.len() == rates.len() && coupling.matrix.iter().all(|r| r.len() == rates.len());
+    let square =
+        coupling.matrix.len() == rates.len() && coupling.matrix.iter().all(|r| r.len() == rates.len());
     if !square || coupling.motors.len() != rates.len() {
         return Err(fault(format!("expected a {0} x {0} matrix and {0} motors", rates.len())));
     }

@@ -45,8 +45,9 @@ impl Identification {
             })
             .collect();
         let source = match &self.robot.file.urdf {
-            Some(path) => std::fs::read_to_string(path)
-                .map_err(|source| Error::Read { file: path.into(), source })?,
+            Some(path) => {
+                std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.into(), source })?
+            }
             None => urdf::from_description(&self.robot.file.description)?,
         };
         Ok(urdf::edit(&source, &self.robot.path.display().to_string(), &links, &joints)?)

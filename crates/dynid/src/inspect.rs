@@ -89,10 +89,9 @@ pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection,
             name: body.joint.name.clone(),
             kind: format!("{:?}", body.joint.kind).split(' ').next().unwrap_or_default().to_lowercase(),
             link: body.name.clone(),
-            parent: body.parent.map_or_else(
-                || mechanism.base_link().to_owned(),
-                |p| mechanism.bodies()[p].name.clone(),
-            ),
+            parent: body
+                .parent
+                .map_or_else(|| mechanism.base_link().to_owned(), |p| mechanism.bodies()[p].name.clone()),
             fixed_links: body.fixed_links.iter().map(|l| l.name.clone()).collect(),
             axis: body.joint.axis.0,
             mass: body.stated.then(|| body.inertia.mass()),

@@ -59,11 +59,8 @@ pub fn load(
 fn to_joint_side(signals: &mut Signals, transmission: &MotorSide) -> Result<(), Error> {
     let n = signals.joints.len();
     let matrix = &transmission.matrix;
-    let setting = |expected: String, found: String| Error::Setting {
-        name: "motor_side".to_owned(),
-        expected,
-        found,
-    };
+    let setting =
+        |expected: String, found: String| Error::Setting { name: "motor_side".to_owned(), expected, found };
     if matrix.len() != n || matrix.iter().any(|row| row.len() != n) {
         let widths: Vec<usize> = matrix.iter().map(Vec::len).collect();
         return Err(setting(format!("a matrix of {n} rows of {n}"), format!("rows of {widths:?}")));

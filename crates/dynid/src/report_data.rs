@@ -298,7 +298,9 @@ fn verdict(estimate: &Estimate) -> report::Verdict {
             || "the training logs (there was no validation log: this is not a test)".to_owned(),
             |f| short_name(&f.log),
         );
-        sentences.push(format!("On {on}, filtered alike, prediction and measurement differ by {error:.2} % of the effort."));
+        sentences.push(format!(
+            "On {on}, filtered alike, prediction and measurement differ by {error:.2} % of the effort."
+        ));
     }
     if estimate.rank.excited < estimate.rank.structural {
         sentences.push(format!(

@@ -35,7 +35,8 @@ path = "{data}/oracles/logs/{log}/train.csv.gz"
             let truth = table.column(&format!("tau{}", j + 1)).unwrap();
             let moving: Vec<usize> =
                 (0..table.rows).filter(|s| states.velocity[j][*s].abs() > 0.02).collect();
-            let error = moving.iter().map(|s| (truth[*s] - predicted[*s]).powi(2)).sum::<f64>() / moving.len() as f64;
+            let error =
+                moving.iter().map(|s| (truth[*s] - predicted[*s]).powi(2)).sum::<f64>() / moving.len() as f64;
             let scale = truth.iter().map(|t| t * t).sum::<f64>() / table.rows as f64;
             sum += error / scale;
         }

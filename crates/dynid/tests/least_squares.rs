@@ -55,7 +55,8 @@ fn indy7_least_squares() {
     };
     let (q, dq, ddq, tau) = (flat("q"), flat("qd"), flat("qdd"), flat("tau"));
     let n = q.len() / 6;
-    let motion = MotionBlock { samples: n, stride: n, q: &q, dq: &dq, ddq: &ddq, gravity: None, channels: &[] };
+    let motion =
+        MotionBlock { samples: n, stride: n, q: &q, dq: &dq, ddq: &ddq, gravity: None, channels: &[] };
     let mut block = RegressorBlock::new(model.layout().clone(), n);
     model.regressor(&motion, &[], &mut block);
     let factors: Vec<Factor> = (0..6)
@@ -73,7 +74,8 @@ fn indy7_least_squares() {
             builder.finish()
         })
         .collect();
-    let golden = |key: &str| -> Vec<f64> { g[key].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect() };
+    let golden =
+        |key: &str| -> Vec<f64> { g[key].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect() };
     let check = |x: &[f64], expected: &[f64], what: &str| {
         let scale = expected.iter().fold(0.0_f64, |m, e| m.max(e.abs()));
         for (k, (i, e)) in order.iter().zip(expected).enumerate() {
@@ -89,10 +91,8 @@ fn indy7_least_squares() {
     assert!((plain.condition / condition - 1.0).abs() < 1e-6, "{} {condition}", plain.condition);
 
     // The golden estimate reweights once, with sigma_i² = rss_i / (M - 58/6) of the unweighted solution.
-    let weighted: Vec<Factor> = factors
-        .iter()
-        .map(|f| f.scaled(1.0 / (f.rss(&plain.x) / (n as f64 - 58.0 / 6.0)).sqrt()))
-        .collect();
+    let weighted: Vec<Factor> =
+        factors.iter().map(|f| f.scaled(1.0 / (f.rss(&plain.x) / (n as f64 - 58.0 / 6.0)).sqrt())).collect();
     let once = ols(&Factor::merge(&weighted.iter().collect::<Vec<_>>()));
     check(&once.x, &golden("wls"), "wls");
 
