@@ -126,26 +126,8 @@ impl FactorBuilder {
         stride: usize,
         effort: &[f64],
     ) -> Result<(), FactorError> {
-        let rows = effort.len();
-        let expected = if rows == 0 || self.columns == 0 { 0 } else { (self.columns - 1) * stride + rows };
-        if regressor.len() < expected || (stride < rows && self.columns > 1) {
-            return Err(FactorError::BlockShape {
-                columns: self.columns,
-                rows,
-                stride,
-                expected: expected.max(self.columns * rows),
-                found: regressor.len(),
-            });
-        }
-        let columns = self.columns;
-        self.push_with(rows, |column, range, out| {
-            if column < columns {
-                let start = column * stride;
-                out.copy_from_slice(&regressor[start + range.start..start + range.end]);
-            } else {
-                out.copy_from_slice(&effort[range]);
-            }
-        })
+        let fill = block_rows(self.columns, regressor, stride, effort)?;
+        self.push_with(effort.len(), fill)
     }
 
     /// Appends one row: `regressor` with `p` entries, and its effort.
@@ -171,13 +153,7 @@ impl FactorBuilder {
             for column in 0..=self.columns {
                 let out = &mut self.buffer.col_as_slice_mut(column)[self.filled..self.filled + taken];
                 fill(column, start..start + taken, out);
-                if let Some(offset) = first_not_finite(out) {
-                    return Err(FactorError::NotFinite {
-                        row: self.rows + offset,
-                        column: (column < self.columns).then_some(column),
-                        found: out[offset],
-                    });
-                }
+                require_finite(out, self.rows, (column < self.columns).then_some(column))?;
             }
             self.filled += taken;
             self.rows += taken;
@@ -257,6 +233,48 @@ fn canonical(buffer: &Mat<f64>, height: usize, columns: usize) -> (Mat<f64>, f64
         if j < k { 0.0 } else { sign * buffer[(i, j)] }
     });
     (triangle, remainder)
+}
+
+/// Filler for `push_with` that copies a column-major block, checked for its shape.
+pub(super) fn block_rows<'a>(
+    columns: usize,
+    regressor: &'a [f64],
+    stride: usize,
+    effort: &'a [f64],
+) -> Result<impl FnMut(usize, Range<usize>, &mut [f64]) + 'a, FactorError> {
+    let rows = effort.len();
+    let expected = if rows == 0 || columns == 0 { 0 } else { (columns - 1) * stride + rows };
+    if regressor.len() < expected || (stride < rows && columns > 1) {
+        return Err(FactorError::BlockShape {
+            columns,
+            rows,
+            stride,
+            expected: expected.max(columns * rows),
+            found: regressor.len(),
+        });
+    }
+    Ok(move |column: usize, range: Range<usize>, out: &mut [f64]| {
+        if column < columns {
+            let start = column * stride;
+            out.copy_from_slice(&regressor[start + range.start..start + range.end]);
+        } else {
+            out.copy_from_slice(&effort[range]);
+        }
+    })
+}
+
+/// Fails if a value is not finite; `values` are those of `column` from row `first_row` on.
+pub(super) fn require_finite(
+    values: &[f64],
+    first_row: usize,
+    column: Option<usize>,
+) -> Result<(), FactorError> {
+    match first_not_finite(values) {
+        Some(offset) => {
+            Err(FactorError::NotFinite { row: first_row + offset, column, found: values[offset] })
+        }
+        None => Ok(()),
+    }
 }
 
 fn first_not_finite(values: &[f64]) -> Option<usize> {
