@@ -53,10 +53,9 @@ pub fn regressors(model: &RobotModel, base: Option<&BaseParameters>, states: &St
     let mut out = vec![vec![vec![0.0; columns.len()]; layout.outputs()]; states.rows];
     for output in 0..layout.outputs() {
         for (k, column) in layout.columns(output).iter().enumerate() {
-            if let Ok(position) = columns.binary_search(column) {
-                for (state, value) in block.column(output, k).iter().enumerate() {
-                    out[state][output][position] = *value;
-                }
+            let Ok(position) = columns.binary_search(column) else { continue };
+            for (state, value) in out.iter_mut().zip(block.column(output, k)) {
+                state[output][position] = *value;
             }
         }
     }

@@ -3,6 +3,8 @@
 //! Metric M2 of the data's README: RMS over joints of (RMS of true effort minus prediction at the true states where
 //! |dq| > 0.02) relative to the RMS of the true effort.
 
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
+
 #[expect(dead_code, reason = "each test binary uses its part")]
 mod support;
 

@@ -1,5 +1,7 @@
 //! Ordinary and weighted least squares of the Indy7 against golden numbers, through the effort model and the reduction.
 
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
+
 use std::path::PathBuf;
 
 use dynid::estimators::linear::{WlsSettings, ols, wls};

@@ -266,7 +266,8 @@ pub(crate) fn masks(
             && mean(&gains) > sigmas * error(&gains)
             && mean(&gains) > settings.mask_gain * mean(from)
     };
-    let best = (1..rungs).fold(0, |best, r| if wins(&ladder[best], &ladder[r], settings.mask_sigma.0) { r } else { best });
+    let best = (1..rungs)
+        .fold(0, |best, r| if wins(&ladder[best], &ladder[r], settings.mask_sigma.0) { r } else { best });
     let table = (0..rungs)
         .map(|r| MaskTrial {
             level: (r > 0).then(|| settings.ladder[r - 1]),

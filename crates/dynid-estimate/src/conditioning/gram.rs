@@ -101,17 +101,17 @@ impl Lags {
     }
 
     /// Weights of the kept efforts that give the effort `delay` samples earlier, and their derivative per sample.
-    pub(crate) fn weights(&self, delay: f64) -> (Vec<(usize, f64)>, Vec<(usize, f64)>) {
+    pub(crate) fn weights(&self, delay: f64) -> [Vec<(usize, f64)>; 2] {
         let position = delay / self.step as f64 - self.first as f64;
         let base = (position.floor() as i64).clamp(2, self.count as i64 - 4);
         let fraction = position - base as f64;
         let value = dynid_motion::shift::lagrange(fraction);
         let slope = dynid_motion::shift::lagrange_derivative(fraction);
         let at = |k: usize| (base as usize + k) - 2;
-        (
+        [
             (0..6).map(|k| (at(k), value[k])).collect(),
             (0..6).map(|k| (at(k), slope[k] / self.step as f64)).collect(),
-        )
+        ]
     }
 }
 
@@ -218,9 +218,8 @@ pub(crate) fn solve(groups: &[Group], unknowns: usize, passes: usize) -> (Vec<f6
             let freedom = group.gram.rows * (1.0 - share.min(0.9));
             let y = group.gram.size - 1;
             let least = 1e-18 * group.gram.at(y, y) / group.gram.rows.max(1.0);
-            *variance = (rss(&group.gram, &group.unknowns, &x) / freedom.max(1.0))
-                .max(least)
-                .max(f64::MIN_POSITIVE);
+            *variance =
+                (rss(&group.gram, &group.unknowns, &x) / freedom.max(1.0)).max(least).max(f64::MIN_POSITIVE);
         }
     }
     (x, variances)

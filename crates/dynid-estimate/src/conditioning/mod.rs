@@ -70,7 +70,9 @@ pub enum ConditioningError {
         log: String,
     },
     /// No row is left.
-    #[error("no usable row is left: the logs are too short for a kernel of {kernel_hz:.3} Hz, expected at least {expected:.2} s of uninterrupted motion, found {found:.2} s")]
+    #[error(
+        "no usable row is left: the logs are too short for a kernel of {kernel_hz:.3} Hz, expected at least {expected:.2} s of uninterrupted motion, found {found:.2} s"
+    )]
     NoRows {
         /// Kernel cut-off, Hz.
         kernel_hz: f64,
@@ -145,16 +147,8 @@ pub fn condition(
     let mut trials = Vec::with_capacity(candidates.len());
     for (k, kernel_hz) in candidates.iter().enumerate() {
         progress(Stage::Kernel(k, candidates.len()));
-        let trial = Trial::new(
-            model,
-            shape,
-            kept,
-            logs,
-            *kernel_hz,
-            limit.crossing_hz,
-            delay_limits,
-            settings,
-        )?;
+        let trial =
+            Trial::new(model, shape, kept, logs, *kernel_hz, limit.crossing_hz, delay_limits, settings)?;
         if trial.rows() > 0.0 {
             trials.push(trial);
         }

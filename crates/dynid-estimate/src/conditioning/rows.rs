@@ -56,9 +56,7 @@ impl Kernels {
 
     /// Rungs at which the row of a scale is used at a centre: usable there, and no wider kernel is.
     fn used(&self, masks: &Masks, scale: usize, centre: usize) -> u8 {
-        let bits = |k: usize| {
-            masks.usable(centre, self.kernels[k].half_width(), self.outer, self.inner)
-        };
+        let bits = |k: usize| masks.usable(centre, self.kernels[k].half_width(), self.outer, self.inner);
         let own = bits(scale);
         (0..scale).fold(own, |b, wider| if b == 0 { 0 } else { b & !bits(wider) })
     }
@@ -154,7 +152,8 @@ impl Pass<'_> {
         regressor: &RegressorBlock,
         consumer: &mut C,
     ) -> Result<(), ConditioningError> {
-        let probes = if self.probes { self.probe_columns(output, first, regressor.samples()) } else { vec![] };
+        let probes =
+            if self.probes { self.probe_columns(output, first, regressor.samples()) } else { vec![] };
         let mut centres = Vec::new();
         let mut rungs = Vec::new();
         let mut columns = Vec::new();

@@ -89,8 +89,8 @@ pub fn reduce_textbook(
             let effort: Vec<f64> = thin(&effort)?.iter().zip(offset).map(|(e, o)| e - o).collect();
             let thinned =
                 local.iter().map(|k| thin(regressor.column(output, *k))).collect::<Result<Vec<_>, _>>()?;
-            let per_block =
-                ((settings.block_s * log.rate_hz / factor as f64).ceil() as usize).max(effort.len().div_ceil(64));
+            let per_block = ((settings.block_s * log.rate_hz / factor as f64).ceil() as usize)
+                .max(effort.len().div_ceil(64));
             let mut blocks = Vec::new();
             let mut builder = FactorBuilder::with_chunk_rows(local.len(), 256);
             let mut row = vec![0.0; local.len()];

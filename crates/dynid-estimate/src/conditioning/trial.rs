@@ -92,16 +92,7 @@ impl Trial {
                 }
             }
         }
-        Ok(Trial {
-            kernel_hz,
-            state_hz,
-            scales_hz,
-            lags,
-            columns,
-            classes,
-            coverage,
-            folds: settings.folds,
-        })
+        Ok(Trial { kernel_hz, state_hz, scales_hz, lags, columns, classes, coverage, folds: settings.folds })
     }
 
     pub(crate) fn outputs(&self) -> usize {
@@ -146,7 +137,7 @@ impl Trial {
                 unknowns.push(self.columns.total + PROBES * output + k);
             }
         }
-        let (value, slope) = self.lags.weights(choice.delay);
+        let [value, slope] = self.lags.weights(choice.delay);
         let place = |w: Vec<(usize, f64)>, sign: f64| -> Vec<(usize, f64)> {
             w.into_iter().map(|(k, f)| (own + PROBES + k, sign * f)).collect()
         };
@@ -184,12 +175,19 @@ impl Trial {
     }
 
     /// Mean square residual of every output on the scored rows of one time block at the rungs given; `None` without rows.
-    pub(crate) fn score(&self, choice: &Choice, x: &[f64], rows_at: &[usize], fold: usize) -> Vec<Option<f64>> {
+    pub(crate) fn score(
+        &self,
+        choice: &Choice,
+        x: &[f64],
+        rows_at: &[usize],
+        fold: usize,
+    ) -> Vec<Option<f64>> {
         (0..self.outputs())
             .map(|output| {
                 let (columns, unknowns) = self.columns_of(output, choice);
                 let (mut sum, mut rows) = (0.0, 0.0);
-                for gram in self.sum(output, rows_at[output], |c| c.scored && c.fold == fold).iter().flatten() {
+                for gram in self.sum(output, rows_at[output], |c| c.scored && c.fold == fold).iter().flatten()
+                {
                     sum += rss(&gram.combined(&columns), &unknowns, x);
                     rows += gram.rows;
                 }
@@ -214,7 +212,7 @@ pub(crate) fn state_hz_of(
 ) -> f64 {
     settings
         .state_hz
-        .map_or_else(|| state_cutoff(kernel_hz, crossing_hz, rate_hz, &settings.cutoff), |f| f)
+        .unwrap_or_else(|| state_cutoff(kernel_hz, crossing_hz, rate_hz, &settings.cutoff))
         .min(settings.cutoff.state_rate * rate_hz)
 }
 

@@ -8,7 +8,7 @@ use dynid::estimators::conditioning::prepare;
 use dynid::identify::{Identification, identify};
 
 /// Folder of shared data, or `None` with a note.
-pub fn data() -> Option<PathBuf> {
+pub(crate) fn data() -> Option<PathBuf> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     if path.is_dir() {
         return Some(path);
@@ -18,7 +18,7 @@ pub fn data() -> Option<PathBuf> {
 }
 
 /// Identifies by a configuration in which `{data}` stands for the data folder.
-pub fn run(text: &str) -> Option<(Config, Identification)> {
+pub(crate) fn run(text: &str) -> Option<(Config, Identification)> {
     let data = data()?;
     let config = Config::parse(&text.replace("{data}", &data.display().to_string()), "test").unwrap();
     let identification = identify(&config, |_| {}).unwrap();
@@ -26,7 +26,7 @@ pub fn run(text: &str) -> Option<(Config, Identification)> {
 }
 
 /// Agreement on the first validation log through a filter of the given cut-off.
-pub fn on_validation(config: &Config, id: &Identification, filter_hz: f64) -> Agreement {
+pub(crate) fn on_validation(config: &Config, id: &Identification, filter_hz: f64) -> Agreement {
     let log = dynid::logs::load(
         &config.validation[0],
         &id.robot.mechanism,
@@ -40,12 +40,12 @@ pub fn on_validation(config: &Config, id: &Identification, filter_hz: f64) -> Ag
 }
 
 /// Geometric mean of ratios.
-pub fn geometric_mean(ratios: impl Iterator<Item = f64>) -> f64 {
+pub(crate) fn geometric_mean(ratios: impl Iterator<Item = f64>) -> f64 {
     let logs: Vec<f64> = ratios.map(f64::ln).collect();
     (logs.iter().sum::<f64>() / logs.len() as f64).exp()
 }
 
 /// RMS per joint.
-pub fn rms(fit: &dynid::estimators::metrics::Fit) -> Vec<f64> {
+pub(crate) fn rms(fit: &dynid::estimators::metrics::Fit) -> Vec<f64> {
     fit.channels.iter().map(|c| c.rms.unwrap()).collect()
 }
