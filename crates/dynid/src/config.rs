@@ -197,7 +197,12 @@ impl Config {
                 return Err(missing("a `path` in every `[[log]]` and `[[validation]]`"));
             }
         }
-        config.check()?;
+        config.check().map_err(|e| match e {
+            Error::Setting { .. } => {
+                Error::Config { file: file.to_owned(), line: None, message: e.to_string() }
+            }
+            other => other,
+        })?;
         Ok(config)
     }
 

@@ -48,6 +48,28 @@ pub enum Error {
         /// Limit of the robot file, rad.
         limit: Option<f64>,
     },
+    /// A position that no joint reaches.
+    #[error("{file}: joint `{joint}`: expected positions up to {limit:e} rad or m, found {largest:e}")]
+    FarPosition {
+        /// Log file.
+        file: String,
+        /// Joint.
+        joint: String,
+        /// Largest position accepted, rad or m.
+        limit: f64,
+        /// Largest position found.
+        largest: f64,
+    },
+    /// Numbered columns for more joints than the robot moves.
+    #[error("{file}: position: expected {expected} numbered columns, one per moving joint, found one more: `{column}`")]
+    SurplusColumn {
+        /// Log file.
+        file: String,
+        /// Moving joints.
+        expected: usize,
+        /// The first column too many.
+        column: String,
+    },
     /// A log cannot be conditioned.
     #[error(transparent)]
     Conditioning(#[from] dynid_estimate::conditioning::ConditioningError),
@@ -106,9 +128,7 @@ pub enum Error {
         found: String,
     },
     /// A cut-off that a log's sample rate does not allow.
-    #[error(
-        "{file}: setting `{name}`: expected less than half the sample rate of {rate_hz} Hz, found {found} Hz"
-    )]
+    #[error("{file}: setting `{name}`: expected less than {:.3} Hz (half the sample rate), found {found} Hz", 0.5 * rate_hz)]
     Cutoff {
         /// Log file.
         file: String,
@@ -187,6 +207,16 @@ impl Error {
             }
             Error::Conditioning(C::NoRows { .. }) => {
                 Some("record a longer motion, or set a higher `kernel_hz`".to_owned())
+            }
+            Error::FarPosition { .. } => Some(
+                "encoder counts need a scale: `[columns] position = { columns = \"q{}\", scale = .. }`".to_owned(),
+            ),
+            Error::SurplusColumn { .. } => Some(
+                "the log belongs to another robot, or joints are locked: say which column is which joint's under [columns]"
+                    .to_owned(),
+            ),
+            Error::Conditioning(C::Clock(dynid_motion::ClockError::TooFewSamples { .. })) => {
+                Some("record a longer log; samples whose time does not advance do not count".to_owned())
             }
             Error::Conditioning(C::Clock(_)) => {
                 Some("check the time column; `rate_hz` in [columns] states a sample rate instead".to_owned())

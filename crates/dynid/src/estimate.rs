@@ -329,10 +329,9 @@ impl Estimate {
     /// # Errors
     /// [`Error::Read`], [`Error::EstimateFile`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
+        let text = std::fs::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
         let fault = |message: String| Error::EstimateFile { file: path.display().to_string(), message };
-        let estimate: Estimate = serde_json::from_str(&text).map_err(|e| fault(e.to_string()))?;
+        let estimate: Estimate = serde_json::from_slice(&text).map_err(|e| fault(e.to_string()))?;
         if estimate.schema != SCHEMA {
             return Err(fault(format!("expected schema {SCHEMA}, found {}", estimate.schema)));
         }
@@ -353,7 +352,8 @@ impl Estimate {
     /// [`Error::EstimateFile`] if the record contradicts itself.
     pub fn effort_model(&self, file: &Path) -> Result<RobotModel, Error> {
         let fault = |message: String| Error::EstimateFile { file: file.display().to_string(), message };
-        let mechanism = self.model.description(&self.robot)?.build().map_err(|e| fault(e.to_string()))?;
+        let description = self.model.description(&self.robot).map_err(&fault)?;
+        let mechanism = description.build().map_err(|e| fault(e.to_string()))?;
         let plan = self.model.plan();
         if plan.per_rate.len() != mechanism.rates() {
             return Err(fault(format!(
@@ -421,7 +421,7 @@ impl ModelRecord {
         }
     }
 
-    fn description(&self, name: &str) -> Result<Description, Error> {
+    fn description(&self, name: &str) -> Result<Description, String> {
         let mut d = Description::new(name);
         d.gravity = self.gravity;
         d.floating_base = self.floating_base;
@@ -484,7 +484,7 @@ fn joint_record(j: &JointDescription) -> JointRecord {
     }
 }
 
-fn joint_description(j: &JointRecord) -> Result<JointDescription, Error> {
+fn joint_description(j: &JointRecord) -> Result<JointDescription, String> {
     let kind = match (j.kind.as_str(), j.pitch) {
         ("revolute", _) => JointKind::Revolute,
         ("continuous", _) => JointKind::Continuous,
@@ -492,12 +492,7 @@ fn joint_description(j: &JointRecord) -> Result<JointDescription, Error> {
         ("helical", Some(pitch)) => JointKind::Helical { pitch },
         ("floating", _) => JointKind::Floating,
         ("fixed", _) => JointKind::Fixed,
-        (other, _) => {
-            return Err(Error::EstimateFile {
-                file: j.name.clone(),
-                message: format!("joint kind `{other}`"),
-            });
-        }
+        (other, _) => return Err(format!("joint `{}`: unknown kind `{other}`", j.name)),
     };
     Ok(JointDescription {
         name: j.name.clone(),

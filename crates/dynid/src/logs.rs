@@ -24,7 +24,8 @@ pub struct LoadedLog {
 /// Reads a log for a mechanism.
 ///
 /// # Errors
-/// [`Error::LogFile`], [`Error::Columns`], [`Error::Log`], [`Error::Degrees`].
+/// [`Error::LogFile`], [`Error::Columns`], [`Error::SurplusColumn`], [`Error::Setting`], [`Error::Log`],
+/// [`Error::Degrees`], [`Error::FarPosition`].
 pub fn load(
     config: &LogConfig,
     mechanism: &Mechanism,
@@ -38,12 +39,17 @@ pub fn load(
     let joints = mechanism.rate_names();
     let named = |source| Error::Columns { file: file.clone(), source };
     let mapping = ColumnMapping::from_spec(&table.header, &joints, spec).map_err(named)?;
+    if spec.position.is_none() {
+        check_surplus(&mapping, &joints, &table.header, &file)?;
+    }
+    check_gains(spec, joints.len())?;
     let mut signals = mapping.extract(&table).map_err(named)?;
     drop(table);
     if let Some(transmission) = motor_side {
         to_joint_side(&mut signals, transmission)?;
     }
     check_degrees(&signals, mechanism, &file)?;
+    check_reach(&signals, &file)?;
     let log = assemble(&file, &signals)?;
     let log = match config.part {
         None => log,
@@ -132,6 +138,48 @@ fn check_degrees(signals: &Signals, mechanism: &Mechanism, file: &str) -> Result
             largest: evidence.largest,
             limit: evidence.limit,
         }),
+    }
+}
+
+/// Largest position that is taken for one, rad or m: beyond any cable drum or track, below encoder counts.
+const LARGEST_POSITION: f64 = 1e6;
+
+fn check_reach(signals: &Signals, file: &str) -> Result<(), Error> {
+    for (joint, position) in signals.joints.iter().zip(&signals.position) {
+        let largest = position.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        if largest > LARGEST_POSITION {
+            let (file, joint) = (file.to_owned(), joint.clone());
+            return Err(Error::FarPosition { file, joint, limit: LARGEST_POSITION, largest });
+        }
+    }
+    Ok(())
+}
+
+/// Refuses `q1..q7` for six joints: which of the seven is not the robot's, numbers do not tell.
+fn check_surplus(
+    mapping: &ColumnMapping,
+    joints: &[String],
+    header: &[String],
+    file: &str,
+) -> Result<(), Error> {
+    let (Some(Some(last)), Some(joint)) = (mapping.position.last(), joints.last()) else { return Ok(()) };
+    let stem = last.name.trim_end_matches(|c: char| c.is_ascii_digit());
+    let Ok(number) = last.name[stem.len()..].parse::<u32>() else { return Ok(()) };
+    let column = format!("{stem}{}", u64::from(number) + 1);
+    if last.name.contains(joint.as_str()) || !header.contains(&column) {
+        return Ok(());
+    }
+    Err(Error::SurplusColumn { file: file.to_owned(), expected: joints.len(), column })
+}
+
+fn check_gains(spec: &MappingSpec, joints: usize) -> Result<(), Error> {
+    match &spec.current_gains {
+        Some(gains) if gains.len() != joints => Err(Error::Setting {
+            name: "current_gains".to_owned(),
+            expected: format!("{joints} drive gains, one per joint"),
+            found: gains.len().to_string(),
+        }),
+        _ => Ok(()),
     }
 }
 

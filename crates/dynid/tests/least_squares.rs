@@ -1,6 +1,6 @@
 //! Ordinary and weighted least squares of the Indy7 against golden numbers, through the effort model and the reduction.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
+#![expect(clippy::unwrap_used, reason = "a test may stop")]
 
 use std::path::PathBuf;
 

@@ -3,7 +3,6 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
 
-#[expect(dead_code, reason = "each test binary uses its part")]
 mod support;
 
 use support::{data, geometric_mean, on_validation, rms, run};
