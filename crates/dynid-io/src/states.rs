@@ -98,7 +98,7 @@ impl StatesError {
                     .to_owned(),
             ),
             StatesError::Surplus { .. } => {
-                Some("the states belong to another robot; use names by joint to pick columns".to_owned())
+                Some("the states belong to another robot, or to this one with a floating base (--floating-base); use names by joint to pick columns".to_owned())
             }
             StatesError::Quaternion { .. } => Some("normalise it; its order is qx, qy, qz, qw".to_owned()),
         }
