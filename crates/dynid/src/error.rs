@@ -61,7 +61,9 @@ pub enum Error {
         largest: f64,
     },
     /// Numbered columns for more joints than the robot moves.
-    #[error("{file}: position: expected {expected} numbered columns, one per moving joint, found one more: `{column}`")]
+    #[error(
+        "{file}: position: expected {expected} numbered columns, one per moving joint, found one more: `{column}`"
+    )]
     SurplusColumn {
         /// Log file.
         file: String,
