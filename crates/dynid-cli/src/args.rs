@@ -51,7 +51,7 @@ pub(crate) struct RobotArgs {
 pub(crate) struct InspectArgs {
     #[command(flatten)]
     pub(crate) robot: RobotArgs,
-    /// Elements at every joint, comma separated (default: the robot file's, else none: rigid bodies alone).
+    /// Elements at every joint, comma separated; `none`: rigid bodies alone (default: the robot file's, else none).
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub(crate) elements: Option<Vec<String>>,
     /// Print JSON.
@@ -94,7 +94,7 @@ pub(crate) enum MethodArg {
 #[derive(Debug, Args)]
 pub(crate) struct LogArgs {
     /// Sample rate for logs without a time column, Hz.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate_hz: Option<f64>,
     /// Drive gains for current columns, N m/A, one per joint.
     #[arg(long, value_name = "K1,K2,..", value_delimiter = ',')]
@@ -119,7 +119,8 @@ pub(crate) struct IdentifyArgs {
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) columns: LogArgs,
-    /// Elements at every joint that moves, comma separated (default: coulomb,viscous,offset,rotor).
+    /// Elements at every joint that moves, comma separated; `none`: rigid bodies alone (default: the robot file's, else
+    /// coulomb,viscous,offset,rotor).
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub(crate) elements: Option<Vec<String>>,
     /// Hold a joint at a position, rad or m.
@@ -138,10 +139,10 @@ pub(crate) struct IdentifyArgs {
     #[arg(long, value_enum)]
     pub(crate) estimator: Option<MethodArg>,
     /// Cut-off of the widest kernel (textbook route: of the filter), Hz.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) kernel_hz: Option<f64>,
     /// Cut-off of the state filter, Hz.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) state_hz: Option<f64>,
     /// Delay of the motion behind the logged effort, samples.
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
@@ -186,13 +187,13 @@ pub(crate) struct SimulateArgs {
     #[arg(long, value_name = "FILE.toml")]
     pub(crate) config: Option<PathBuf>,
     /// Length, s.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) duration: Option<f64>,
     /// Sample rate, Hz.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate_hz: Option<f64>,
     /// Noise of the effort, share of its rms.
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub(crate) effort_noise: Option<f64>,
     /// Encoder resolution, bits per turn; 0: exact.
     #[arg(long, value_name = "BITS")]
@@ -227,7 +228,7 @@ pub(crate) struct ValidateArgs {
     #[arg(long, value_name = "FILE.toml")]
     pub(crate) config: Option<PathBuf>,
     /// Cut-off of the filter for the filtered figures, Hz (default: the kernel's).
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) filter_hz: Option<f64>,
     /// Print JSON.
     #[arg(long)]

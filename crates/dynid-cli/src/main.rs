@@ -6,6 +6,7 @@
 mod args;
 mod commands;
 mod message;
+mod outputs;
 mod progress;
 
 use std::process::ExitCode;

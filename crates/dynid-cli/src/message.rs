@@ -8,8 +8,8 @@ use std::process::ExitCode;
 pub(crate) enum Failure {
     /// Bad input, with a hint.
     Input(dynid::Error),
-    /// Bad usage that the argument parser cannot see.
-    Usage(String),
+    /// Bad usage that the argument parser cannot see: what is wrong, what to do about it.
+    Usage(String, &'static str),
     /// The reader of our output has gone: not an error.
     Closed,
     /// Output cannot be written.
@@ -28,7 +28,7 @@ impl Failure {
         let (text, hint) = match self {
             Failure::Closed => return ExitCode::SUCCESS,
             Failure::Input(error) => (error.to_string(), error.hint()),
-            Failure::Usage(text) => (text, Some("see `dynid help`".to_owned())),
+            Failure::Usage(text, hint) => (text, Some(hint.to_owned())),
             Failure::Output(error) => (format!("output: {error}"), None),
         };
         let mut err = io::stderr().lock();
@@ -45,7 +45,8 @@ impl Failure {
 pub(crate) fn data(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-    written.map_err(|e| if e.kind() == io::ErrorKind::BrokenPipe { Failure::Closed } else { Failure::Output(e) })
+    written
+        .map_err(|e| if e.kind() == io::ErrorKind::BrokenPipe { Failure::Closed } else { Failure::Output(e) })
 }
 
 /// Writes a line for people to stderr.

@@ -4,18 +4,26 @@ use std::path::{Path, PathBuf};
 
 use dynid::config::{Config, LogConfig, Method, Route};
 use dynid::estimate::Estimate;
+use dynid::identify;
+use dynid::io::OutputError;
 use dynid::io::output::write_atomically;
-use dynid::{Error, identify};
 
-use super::{apply_log_args, table};
+use super::{apply_log_args, element_names, table};
 use crate::args::{IdentifyArgs, MethodArg, RouteArg};
 use crate::message::{Failure, data, note};
+use crate::outputs;
 use crate::progress::Progress;
 
 const DEFAULT_OUT: &str = "dynid-out";
 
 pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     let config = configuration(args)?;
+    let out = config.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
+    let robot = config.robot.file_stem().map_or_else(|| "robot".into(), |s| s.to_string_lossy().into_owned());
+    let files = ["estimate.json", "report.html", &format!("{robot}.urdf")].map(|name| out.join(name));
+    let logs = config.log.iter().chain(&config.validation).map(|log| log.path.as_path());
+    let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).collect();
+    outputs::check_folder(&out, &files, &inputs)?;
     let progress = Progress::new(args.quiet);
     let identification = identify(&config, |step| progress.step(step))?;
     let estimate = identification.estimate(&config)?;
@@ -23,36 +31,37 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     let urdf = identification.urdf()?;
     drop(progress);
 
-    let out = config.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
-    std::fs::create_dir_all(&out).map_err(|source| Error::Read { file: out.clone(), source })?;
-    let robot = config.robot.file_stem().map_or_else(|| "robot".into(), |s| s.to_string_lossy().into_owned());
-    let files = [
-        (out.join("estimate.json"), estimate.to_json()),
-        (out.join("report.html"), report),
-        (out.join(format!("{robot}.urdf")), urdf),
-    ];
-    for (path, text) in &files {
+    std::fs::create_dir_all(&out)
+        .map_err(|error| OutputError::Unwritable { file: out.display().to_string(), error })?;
+    for (path, text) in files.iter().zip([&estimate.to_json(), &report, &urdf]) {
         write_atomically(path, text.as_bytes())?;
     }
+    let failed = estimate.verdict.status == "fail";
     if !args.quiet {
-        summary(&estimate, &files.map(|(path, _)| path));
+        summary(&estimate, &files);
+    } else if failed {
+        note(&verdict(&estimate));
     }
     if args.json {
         data(&estimate.to_json())?;
     }
-    Ok(if estimate.verdict.status == "fail" { 1 } else { 0 })
+    Ok(u8::from(failed))
 }
 
 /// The configuration file with flags over it, or one made of flags alone.
 fn configuration(args: &IdentifyArgs) -> Result<Config, Failure> {
     let plain = |path: &Path| LogConfig { path: path.to_owned(), ..LogConfig::default() };
     let mut config = if args.log.is_empty() {
-        let name = args.input.display();
-        let extension = args.input.extension().map(|e| e.to_string_lossy().to_lowercase());
-        if matches!(extension.as_deref(), Some("urdf" | "xml")) {
-            return Err(Failure::Usage(format!("{name} is a robot file: add --log LOG, or give a configuration")));
-        }
-        Config::read(&args.input)?
+        Config::read(&args.input).map_err(|error| match dynid::io::robot::read(&args.input) {
+            Ok(_) => Failure::Usage(
+                format!(
+                    "{}: expected a configuration, found a robot file without --log",
+                    args.input.display()
+                ),
+                "add --log LOG, or give a configuration",
+            ),
+            Err(_) => error.into(),
+        })?
     } else {
         Config {
             robot: args.input.clone(),
@@ -65,7 +74,7 @@ fn configuration(args: &IdentifyArgs) -> Result<Config, Failure> {
         config.out.clone_from(&args.out);
     }
     if args.elements.is_some() {
-        config.elements.default.clone_from(&args.elements);
+        config.elements.default = element_names(args.elements.as_deref());
     }
     apply_log_args(&mut config.columns, &args.columns);
     config.locked.extend(args.lock.iter().cloned());
@@ -102,7 +111,10 @@ fn summary(estimate: &Estimate, files: &[PathBuf]) {
     for choice in &estimate.conditioning.choices {
         let value = match &choice.value {
             serde_json::Value::Number(n) => table::number(n.as_f64()),
-            serde_json::Value::Null => "none".to_owned(),
+            serde_json::Value::Null => {
+                note(&format!("  {} = none ({}: {})", choice.name, choice.origin, choice.reason));
+                continue;
+            }
             serde_json::Value::Array(list) => {
                 list.iter().map(|x| table::number(x.as_f64())).collect::<Vec<_>>().join(" ")
             }
@@ -127,11 +139,17 @@ fn summary(estimate: &Estimate, files: &[PathBuf]) {
     }
     note("\nchecks:");
     for check in &estimate.verdict.checks {
-        let value = check.value.map_or_else(String::new, |v| format!(" {} {}", table::number(Some(v)), check.unit));
-        note(&format!("  [{}] {}:{} ({}): {}", check.status, check.name, value, check.limit, check.meaning));
+        let value =
+            check.value.map_or_else(String::new, |v| format!("{} {}", table::number(Some(v)), check.unit));
+        let value = value.trim_end();
+        note(&format!("  [{}] {}: {value} ({}): {}", check.status, check.name, check.limit, check.meaning));
     }
-    note(&format!("\n{}: {}", estimate.verdict.status, estimate.verdict.headline));
+    note(&format!("\n{}", verdict(estimate)));
     for file in files {
         note(&format!("written: {}", file.display()));
     }
+}
+
+fn verdict(estimate: &Estimate) -> String {
+    format!("{}: {}", estimate.verdict.status, estimate.verdict.headline)
 }

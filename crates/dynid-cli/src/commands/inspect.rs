@@ -4,13 +4,13 @@ use std::fmt::Write;
 
 use dynid::inspect::{Inspection, inspect};
 
-use super::{load_robot, table};
+use super::{element_names, load_robot, table};
 use crate::args::InspectArgs;
 use crate::message::{Failure, data, json, note};
 
 pub(crate) fn run(args: &InspectArgs) -> Result<u8, Failure> {
     let robot = load_robot(&args.robot)?;
-    let inspection = inspect(&robot, args.elements.as_deref())?;
+    let inspection = inspect(&robot, element_names(args.elements.as_deref()).as_deref())?;
     if args.json {
         json(&inspection)?;
     } else {

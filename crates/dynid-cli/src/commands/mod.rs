@@ -23,6 +23,11 @@ fn load_robot(args: &RobotArgs) -> Result<Robot, Failure> {
     Ok(Robot::load(&args.robot, &options)?)
 }
 
+/// Names of elements from the command line; `none` stands for an empty list.
+fn element_names(names: Option<&[String]>) -> Option<Vec<String>> {
+    names.map(|list| if list == ["none"] { Vec::new() } else { list.to_vec() })
+}
+
 fn apply_log_args(spec: &mut dynid::io::MappingSpec, args: &LogArgs) {
     if args.rate_hz.is_some() {
         spec.rate_hz = args.rate_hz;

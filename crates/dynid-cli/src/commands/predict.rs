@@ -10,15 +10,23 @@ use dynid::robot::state_joints;
 
 use crate::args::PredictArgs;
 use crate::message::{Failure, data, note};
+use crate::outputs;
 
 pub(crate) fn run(args: &PredictArgs) -> Result<u8, Failure> {
+    if let Some(out) = &args.out {
+        outputs::check_files(&[("--out", out)], &[&args.estimate, &args.states])?;
+    }
     let estimate = Estimate::read(&args.estimate)?;
     let model = estimate.effort_model(&args.estimate)?;
     if !model.channels().is_empty() {
-        return Err(Failure::Usage(format!(
-            "the model reads the channels {}, which a states table does not hold",
-            model.channels().join(", ")
-        )));
+        return Err(Failure::Usage(
+            format!(
+                "{}: the model reads the channels {}, which a states table does not hold",
+                args.estimate.display(),
+                model.channels().join(", ")
+            ),
+            "use `dynid validate` with a log that holds them",
+        ));
     }
     let states = states::read(&args.states, &state_joints(model.mechanism()), &ReadOptions::default())?;
     let effort = efforts(&model, &estimate.values(), &states);

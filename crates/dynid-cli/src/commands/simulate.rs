@@ -1,6 +1,6 @@
 //! `dynid simulate`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use dynid::io::csv;
 use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
@@ -8,8 +8,17 @@ use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
 use super::load_robot;
 use crate::args::SimulateArgs;
 use crate::message::{Failure, note};
+use crate::outputs;
 
 pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
+    let files: Vec<(&str, &Path)> =
+        [("--out", Some(&args.out)), ("--clean", args.clean.as_ref()), ("--truth", args.truth.as_ref())]
+            .into_iter()
+            .filter_map(|(argument, path)| Some((argument, path?.as_path())))
+            .collect();
+    let inputs: Vec<&Path> =
+        std::iter::once(&args.robot.robot).chain(&args.config).map(PathBuf::as_path).collect();
+    outputs::check_files(&files, &inputs)?;
     let robot = load_robot(&args.robot)?;
     let mut settings = match &args.config {
         None => SimulateSettings::default(),
@@ -22,7 +31,12 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
     settings.seed = args.seed.unwrap_or(settings.seed);
     let log = simulate(&robot, &settings)?;
     write(&args.out, &log, &[("q", &log.position), ("tau", &log.effort)])?;
-    note(&format!("{} samples of {} joints written to {}", log.time.len(), log.joints.len(), args.out.display()));
+    note(&format!(
+        "{} samples of {} joints written to {}",
+        log.time.len(),
+        log.joints.len(),
+        args.out.display()
+    ));
     if let Some(path) = &args.clean {
         let [q, dq, ddq, tau] = &log.clean;
         write(path, &log, &[("q", q), ("dq", dq), ("ddq", ddq), ("tau", tau)])?;

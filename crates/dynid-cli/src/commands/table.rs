@@ -2,11 +2,11 @@
 
 use dynid::estimate::FitValues;
 
-/// A number with four significant digits, or a dash.
+/// A number with four significant digits, or a dash; whole numbers without decimals.
 pub(super) fn number(x: Option<f64>) -> String {
     match x {
         None => "-".to_owned(),
-        Some(0.0) => "0".to_owned(),
+        Some(x) if x.fract() == 0.0 && x.abs() < 1e6 => format!("{x:.0}"),
         Some(x) => {
             let magnitude = x.abs().log10().floor() as i32;
             if (-4..5).contains(&magnitude) {
@@ -22,11 +22,7 @@ pub(super) fn number(x: Option<f64>) -> String {
 /// Rows under a header, columns right-aligned but for the first.
 pub(super) fn aligned(header: &[&str], rows: &[Vec<String>]) -> String {
     let width = |c: usize| {
-        rows.iter()
-            .map(|r| r[c].chars().count())
-            .chain([header[c].chars().count()])
-            .max()
-            .unwrap_or(0)
+        rows.iter().map(|r| r[c].chars().count()).chain([header[c].chars().count()]).max().unwrap_or(0)
     };
     let widths: Vec<usize> = (0..header.len()).map(width).collect();
     let line = |cells: &[String]| {

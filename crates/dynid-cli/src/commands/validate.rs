@@ -21,7 +21,10 @@ pub(crate) fn run(args: &ValidateArgs) -> Result<u8, Failure> {
     if let Some(hz) = args.filter_hz
         && !(hz.is_finite() && hz > 0.0)
     {
-        return Err(Failure::Usage(format!("--filter-hz: expected a positive number, found {hz}")));
+        return Err(Failure::Usage(
+            format!("--filter-hz: expected a positive number, found {hz}"),
+            "leave it out to use the estimate's kernel cut-off",
+        ));
     }
     let logs: Vec<LogConfig> = args
         .log
