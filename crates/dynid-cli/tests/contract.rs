@@ -285,6 +285,27 @@ fn a_log_of_noise_ends_with_exit_code_1_and_says_so() {
 }
 
 #[test]
+fn a_clock_in_milliseconds_that_is_taken_for_seconds_draws_a_warning() {
+    let folder = logs();
+    let log = read(folder.path(), "train.csv");
+    let mut slow = log.lines().next().unwrap().to_owned() + "\n";
+    for (row, line) in log.lines().skip(1).enumerate() {
+        slow += &format!("{},{}\n", 10 * row, line.split_once(',').unwrap().1);
+    }
+    std::fs::write(folder.path().join("slow.csv"), slow).unwrap();
+    let output = dynid()
+        .current_dir(folder.path())
+        .args(["identify", "arm.urdf", "--log", "slow.csv", "--out", "slow"])
+        .output()
+        .unwrap();
+    assert!(
+        text(&output.stderr).contains("warning: slow.csv: a sample rate of 0.1 Hz"),
+        "{}",
+        text(&output.stderr)
+    );
+}
+
+#[test]
 fn json_goes_to_stdout_alone_and_is_what_the_file_holds() {
     let folder = logs();
     let output = run(folder.path(), &[&IDENTIFY[..], &["--json", "--quiet"]].concat(), 0);

@@ -442,11 +442,20 @@ fn residual_ratios(
         .collect()
 }
 
+/// Sample rate below which a log of a robot is suspected of another unit of time, Hz.
+const SLOWEST_HZ: f64 = 10.0;
+
 fn log_warnings(model: &RobotModel, logs: &[PreparedLog]) -> Vec<String> {
     let mut out = Vec::new();
     for log in logs {
         let name =
             Path::new(&log.name).file_name().map_or_else(|| log.name.clone(), |n| n.to_string_lossy().into());
+        if log.rate_hz < SLOWEST_HZ {
+            out.push(format!(
+                "{name}: a sample rate of {} Hz: if the time column is in milliseconds, say so (unit \"ms\"), or state `rate_hz`",
+                log.rate_hz
+            ));
+        }
         if log.clock.dropped > 0 {
             out.push(format!(
                 "{name}: {} rows dropped because their time does not advance (first: row {})",
