@@ -7,7 +7,7 @@ use std::process::ExitCode;
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// Bad input, with a hint.
-    Input(dynid::Error),
+    Input(Box<dynid::Error>),
     /// Bad usage that the argument parser cannot see: what is wrong, what to do about it.
     Usage(String, &'static str),
     /// The reader of our output has gone: not an error.
@@ -18,7 +18,7 @@ pub(crate) enum Failure {
 
 impl<E: Into<dynid::Error>> From<E> for Failure {
     fn from(error: E) -> Self {
-        Failure::Input(error.into())
+        Failure::Input(Box::new(error.into()))
     }
 }
 
