@@ -15,7 +15,7 @@ use crate::Error;
 pub struct Config {
     /// Robot file (URDF or TOML), relative to the configuration.
     pub robot: PathBuf,
-    /// Output folder, relative to the configuration. Default `dynid-out`.
+    /// Output folder, relative to the configuration. Without it the program writes to `dynid-out` in the current folder.
     pub out: Option<PathBuf>,
     /// Seed of everything random (states of the structural analysis). Default 1.
     pub seed: Option<u64>,
