@@ -15,6 +15,9 @@ pub struct Alignment {
     pub state_hz: f64,
     /// Lead of the logged effort before the motion, samples.
     pub delay_samples: f64,
+    /// Sample rate that the lead was found at, Hz. A lead of samples (a held command) and one of time (transport) part
+    /// ways at another rate, so logs whose rate differs by more than 5 % are not aligned.
+    pub delay_rate_hz: f64,
     /// Cut-off of the filter that both pass for the filtered figures, Hz.
     pub filter_hz: f64,
 }
@@ -63,7 +66,8 @@ pub fn compare(
     let state_hz = alignment.state_hz;
     let filter_hz = alignment.filter_hz.min(0.4 * log.rate_hz);
     let run = |delay: f64| predict(model, &[], values, log, state_hz, delay, settings);
-    let predicted = run(alignment.delay_samples)?;
+    let same_rate = (log.rate_hz / alignment.delay_rate_hz - 1.0).abs() <= 0.05;
+    let predicted = run(if same_rate { alignment.delay_samples } else { 0.0 })?;
     let unaligned = run(0.0)?;
     let margin = (EDGE_PERIODS * log.rate_hz / filter_hz.min(state_hz)).ceil() as usize;
     let mut bad: Vec<bool> = log.usable.iter().map(|u| !u).collect();

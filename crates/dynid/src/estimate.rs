@@ -211,6 +211,8 @@ pub struct ConditioningRecord {
     pub choices: Vec<Choice>,
     /// Delay of the motion behind the logged effort, samples.
     pub delay_samples: f64,
+    /// Sample rate that the delay was found at, Hz.
+    pub delay_rate_hz: f64,
     /// Half width of its 95 % interval, samples.
     pub delay_half_width: Option<f64>,
     /// Per joint: delay and standard error, samples.

@@ -76,6 +76,8 @@ pub struct Identification {
     pub kernel_hz: f64,
     /// Delay used, samples.
     pub delay_samples: f64,
+    /// Sample rate of the training logs, Hz; the delay is not applied to logs of another rate.
+    pub delay_rate_hz: f64,
     /// Agreement on the training logs.
     pub training: Vec<Agreement>,
     /// Agreement on the validation logs.
@@ -202,6 +204,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         state_hz,
         kernel_hz,
         delay_samples,
+        delay_rate_hz: prepared[0].rate_hz,
         training: Vec::new(),
         validation: Vec::new(),
         warnings,
@@ -237,6 +240,7 @@ impl Identification {
             &agreement::Alignment {
                 state_hz: self.state_hz,
                 delay_samples: self.delay_samples,
+                delay_rate_hz: self.delay_rate_hz,
                 filter_hz: self.kernel_hz,
             },
             &self.settings,

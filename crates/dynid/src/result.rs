@@ -174,6 +174,7 @@ impl Identification {
             },
             choices: self.choices(config),
             delay_samples: self.delay_samples,
+            delay_rate_hz: self.delay_rate_hz,
             delay_half_width: delay.map(|d| d.half_width),
             delay_per_joint: delay.map_or_else(Vec::new, |d| d.per_output.clone()),
             kernel_trials: self.conditioning.as_ref().map_or_else(Vec::new, |c| {
@@ -222,6 +223,18 @@ impl Identification {
                 "found",
                 "isolated runs far outside the running median; chatter and steps at reversal stay".to_owned(),
             );
+        }
+        for (log, columns) in self.logs.iter().zip(&self.columns) {
+            let name = short_name(&log.name);
+            for (signal, used) in columns {
+                add(
+                    &format!("{signal} columns of {name}"),
+                    json!(used),
+                    "",
+                    given(config.columns != dynid_io::MappingSpec::default()),
+                    "by the names in the header unless the configuration says otherwise".to_owned(),
+                );
+            }
         }
         let Some(c) = &self.conditioning else {
             let route = config.textbook_route();

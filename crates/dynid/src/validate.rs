@@ -33,6 +33,7 @@ pub fn validate(
     let alignment = Alignment {
         state_hz: estimate.model.state_hz,
         delay_samples: estimate.conditioning.delay_samples,
+        delay_rate_hz: estimate.conditioning.delay_rate_hz,
         filter_hz: filter_hz.unwrap_or(estimate.model.kernel_hz),
     };
     logs.iter()

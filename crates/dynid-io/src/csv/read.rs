@@ -39,9 +39,9 @@ pub struct ReadOptions {
     pub max_magnitude: f64,
     /// Largest size of the (decompressed) text, bytes. Default: 8 GiB.
     pub max_bytes: u64,
-    /// Largest compression ratio, from `ratio_grace` on. Default: 1000.
+    /// Largest compression ratio, from `ratio_grace` on. Default: 200; logs reach 5 to 20.
     pub max_ratio: u64,
-    /// Size of the decompressed text up to which any ratio is allowed, bytes. Default: 256 MiB.
+    /// Size of the decompressed text up to which any ratio is allowed, bytes. Default: 64 MiB.
     pub ratio_grace: u64,
 }
 
@@ -53,8 +53,8 @@ impl Default for ReadOptions {
             ignore: Vec::new(),
             max_magnitude: 1e12,
             max_bytes: 8 << 30,
-            max_ratio: 1000,
-            ratio_grace: 256 << 20,
+            max_ratio: 200,
+            ratio_grace: 64 << 20,
         }
     }
 }

@@ -35,7 +35,12 @@ pub(crate) fn on_validation(config: &Config, id: &Identification, filter_hz: f64
     )
     .unwrap();
     let prepared = prepare(&log.log, &id.model, &id.settings).unwrap();
-    let alignment = Alignment { state_hz: id.state_hz, delay_samples: id.delay_samples, filter_hz };
+    let alignment = Alignment {
+        state_hz: id.state_hz,
+        delay_samples: id.delay_samples,
+        delay_rate_hz: id.delay_rate_hz,
+        filter_hz,
+    };
     compare(&id.model, &id.values, &prepared, &alignment, &id.settings).unwrap()
 }
 
