@@ -385,7 +385,7 @@ fn parameter_scales(model: &RobotModel) -> Vec<f64> {
             .fold(0.05, f64::max);
         let com = body.inertia.about_com().map_or(0.0, |(c, _)| c.norm());
         let size = reach.max(com);
-        let mass = masses[b].max(0.1 * mean);
+        let mass = if masses[b] > 0.0 { masses[b] } else { 0.1 * mean };
         of_body.push(0.5 * mass * size * size);
         scales.push(0.5 * mass);
         scales.extend([0.5 * mass * size; 3]);

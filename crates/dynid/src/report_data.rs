@@ -32,11 +32,6 @@ impl Identification {
                 .warnings
                 .iter()
                 .map(|w| report::Warning { message: w.clone(), ..Default::default() })
-                .chain(self.unphysical_bodies().into_iter().map(|(body, fault)| report::Warning {
-                    message: format!("the identified body `{body}` {fault}"),
-                    hint: "its split of base parameters into standard ones is not physical; predictions are not affected"
-                        .to_owned(),
-                }))
                 .collect(),
             robot: report::Robot {
                 name: estimate.robot.clone(),
@@ -72,7 +67,9 @@ impl Identification {
                     "estimator",
                     match config.estimator.method {
                         Method::Ols => "ordinary least squares",
-                        Method::Wls => "weighted least squares, one residual variance per log, joint and kernel",
+                        Method::Wls => {
+                            "weighted least squares, one residual variance per log, joint and kernel"
+                        }
                     },
                     "",
                 ),

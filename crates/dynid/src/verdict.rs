@@ -94,9 +94,19 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
         status: status.word().to_owned(),
         headline,
         checks: checks.into_iter().map(|(_, c)| c).collect(),
-        warnings: id.warnings.clone(),
+        warnings: id.warnings.iter().cloned().chain(unphysical(id)).collect(),
     };
     (status, verdict)
+}
+
+/// Bodies whose split of base values into standard parameters no body could have.
+fn unphysical(id: &Identification) -> impl Iterator<Item = String> {
+    id.unphysical_bodies().into_iter().map(|(body, fault)| {
+        format!(
+            "the identified body `{body}` {fault}: the split of what is seen into its ten parameters is not physical; \
+             predictions are not affected, but a simulator may refuse the robot file"
+        )
+    })
 }
 
 fn excitation(id: &Identification) -> (Status, CheckResult) {
