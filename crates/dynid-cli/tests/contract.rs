@@ -577,3 +577,21 @@ fn regressor_agrees_with_another_library_on_ur5() {
 fn regressor_agrees_with_another_library_on_a_quadruped_with_a_floating_base() {
     check_oracle("solo12.urdf", "solo12_ff_oracle.json", &["--floating-base"]);
 }
+
+#[test]
+fn elements_that_need_a_channel_are_refused_by_simulate() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = folder.path().join("robot.toml");
+    let text =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/indy7.toml")).unwrap();
+    std::fs::write(&robot, text.replace("\"rotor\"]", "\"rotor\", \"drive_gain\"]")).unwrap();
+    let out = folder.path().join("log.csv");
+    let run = assert_cmd::Command::cargo_bin("dynid")
+        .unwrap()
+        .args(["simulate", &robot.display().to_string(), "--out", &out.display().to_string()])
+        .assert()
+        .code(2);
+    let message = String::from_utf8_lossy(&run.get_output().stderr).into_owned();
+    assert!(message.starts_with("error: ") && message.contains("current_j1"), "{message}");
+    assert!(!out.exists());
+}

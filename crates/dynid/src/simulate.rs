@@ -106,6 +106,12 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
     }
     let plan = ElementPlan::new(mechanism, &robot.elements, None, |_| true)?;
     let model = RobotModel::new(mechanism.clone(), plan.build(mechanism)?);
+    if !model.channels().is_empty() {
+        return Err(Error::Unsupported(format!(
+            "elements that read the channels {} cannot be simulated: inverse dynamics makes no such channel",
+            model.channels().join(", ")
+        )));
+    }
     let n = mechanism.rates();
     let samples = (settings.duration_s * settings.rate_hz).round() as usize + 1;
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
