@@ -132,6 +132,9 @@ pub enum Stage {
 /// Finds kernel, delay and masks for prepared logs.
 ///
 /// `kept`: base columns of the model, ascending. `progress` is told what is being worked on.
+///
+/// # Panics
+/// If the ladder has more than 7 rungs or there are fewer than 2 folds.
 pub fn condition(
     model: &dyn EffortModel,
     shape: &[f64],
@@ -141,6 +144,8 @@ pub fn condition(
     mut progress: impl FnMut(Stage),
 ) -> Result<Conditioning, ConditioningError> {
     let settings = &with_given_mask(settings);
+    assert!(settings.ladder.len() <= 7, "rungs are bits of a byte, and one stands for no mask");
+    assert!(settings.folds >= 2, "held-out error needs two time blocks");
     let limit = choose::limit(logs, settings)?;
     let candidates = choose::candidates(&limit, settings);
     let delay_limits = choose::delay_limits(logs, settings);

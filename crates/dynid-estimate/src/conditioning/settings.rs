@@ -16,7 +16,7 @@ pub struct ConditioningSettings {
     pub delay_samples: Option<f64>,
     /// Reversal mask of every joint, as a share of the joint's rms speed; negative: no mask. Default: found.
     pub reversal_mask: Option<f64>,
-    /// Rungs of the reversal ladder, ascending. Default 0, 0.03, 0.06, 0.12, 0.25.
+    /// Rungs of the reversal ladder, ascending, at most 7. Default 0, 0.03, 0.06, 0.12, 0.25.
     pub ladder: Vec<f64>,
     /// Speeds below this many standard deviations of velocity noise count as reversal. Default 4.
     pub stick_sigma: f64,

@@ -3,8 +3,7 @@
 use dynid_model::{EffortModel, MotionBlock};
 use dynid_motion::difference::central;
 use dynid_motion::filter::{butterworth, forward_backward};
-use dynid_motion::mask::near_reversal;
-use dynid_motion::signal::rms;
+use dynid_motion::mask::{near_reversal, reversal_threshold};
 use dynid_motion::spectrum::velocity_noise;
 use rayon::prelude::*;
 
@@ -96,7 +95,7 @@ impl States {
         })
     }
 
-    /// Velocity noise and rms speed of a combination of rates.
+    /// A combination of rates and the standard deviation of its noise.
     fn combined(&self, speed: &[(usize, f64)]) -> (Vec<f64>, f64) {
         let mut v = vec![0.0; self.samples];
         let mut variance = 0.0;
@@ -154,20 +153,13 @@ impl Masks {
         output: usize,
         settings: &ConditioningSettings,
     ) -> Self {
-        let speeds: Vec<(Vec<f64>, f64, f64)> = model
-            .reversal_speeds(output)
-            .iter()
-            .map(|speed| {
-                let (v, sigma) = states.combined(speed);
-                let scale = rms(&v);
-                (v, sigma, scale)
-            })
-            .collect();
+        let speeds: Vec<(Vec<f64>, f64)> =
+            model.reversal_speeds(output).iter().map(|speed| states.combined(speed)).collect();
         let mut reversal = vec![None];
         for level in &settings.ladder {
             let mut bad = vec![false; states.samples];
-            for (v, sigma, scale) in &speeds {
-                let threshold = (settings.stick_sigma * sigma).max(level * scale);
+            for (v, sigma) in &speeds {
+                let threshold = reversal_threshold(v, *sigma, settings.stick_sigma, *level);
                 for (b, n) in bad.iter_mut().zip(near_reversal(v, threshold)) {
                     *b |= n;
                 }
@@ -196,5 +188,34 @@ impl Masks {
             }
         }
         bits
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 200 samples, clock bad at 40, reversal between 99 and 100; kernel 3, state filter 5 to edges, 3 to reversals.
+    fn rows(rung: usize) -> Vec<usize> {
+        let masks = Masks {
+            clock: BadSamples::new((0..200).map(|n| n == 40)),
+            reversal: vec![None, Some(BadSamples::new((0..200).map(|n| n == 99 || n == 100)))],
+        };
+        (0..200).filter(|n| masks.usable(*n, 3, 5, 3) >> rung & 1 == 1).collect()
+    }
+
+    #[test]
+    fn rows_keep_their_distance_from_edges_gaps_and_reversals() {
+        let without_mask: Vec<usize> = (8..32).chain(49..192).collect();
+        assert_eq!(rows(0), without_mask);
+        let with_mask: Vec<usize> = (8..32).chain(49..93).chain(107..192).collect();
+        assert_eq!(rows(1), with_mask);
+    }
+
+    #[test]
+    fn a_record_shorter_than_a_kernel_has_no_row() {
+        let masks = Masks { clock: BadSamples::new([false; 15].into_iter()), reversal: vec![None] };
+        assert!((0..15).all(|n| masks.usable(n, 3, 5, 3) == 0));
+        assert_eq!(masks.usable(7, 3, 4, 3), 1);
     }
 }
