@@ -19,6 +19,7 @@
 //! `(R, z, ρ, N)` a factor. Results do not depend on the number of threads.
 
 pub mod conditioning;
+pub mod consistent;
 pub mod covariance;
 pub mod distribution;
 pub mod elimination;

@@ -1,6 +1,7 @@
 //! Standard inertial parameters of a rigid body.
 
 use crate::spatial::{Mat3, Placement, Vec3};
+use crate::symmetric::{self, Square};
 
 /// Number of standard inertial parameters of one body.
 pub const PARAMETERS_PER_BODY: usize = 10;
@@ -88,6 +89,53 @@ impl Inertia {
         Inertia(sum)
     }
 
+    /// Pseudo-inertia `P = [[Σ, h], [hᵀ, m]]` with `Σ = ½ tr(I) 1 - I` (the second moments of mass), kg m², kg m, kg.
+    ///
+    /// Positive semidefinite exactly if some mass distribution has these parameters; a bijection between ten parameters
+    /// and symmetric 4 × 4 matrices (Wensing, Kim & Slotine 2018, eq. 19; spec/estimation.md section 5.1).
+    pub fn pseudo_inertia(&self) -> Square<4> {
+        let [m, x, y, z, xx, xy, xz, yy, yz, zz] = self.0;
+        [
+            [0.5 * (yy + zz - xx), -xy, -xz, x],
+            [-xy, 0.5 * (xx + zz - yy), -yz, y],
+            [-xz, -yz, 0.5 * (xx + yy - zz), z],
+            [x, y, z, m],
+        ]
+    }
+
+    /// The parameters with this pseudo-inertia: `Ixx = Σ22 + Σ33, …, Ixy = -Σ12`.
+    pub fn from_pseudo_inertia(p: &Square<4>) -> Self {
+        let s = p;
+        Inertia([
+            s[3][3],
+            s[0][3],
+            s[1][3],
+            s[2][3],
+            s[1][1] + s[2][2],
+            -s[0][1],
+            -s[0][2],
+            s[0][0] + s[2][2],
+            -s[1][2],
+            s[0][0] + s[1][1],
+        ])
+    }
+
+    /// Spatial inertia `B = [[I, S(h)ᵀ], [S(h), m 1]]` about the frame origin, `S` the cross-product matrix.
+    ///
+    /// Positive definite exactly if the mass and the tensor about the centre of mass are; weaker than the pseudo-inertia,
+    /// which demands the triangle inequality as well (Sousa & Cortesão 2014).
+    pub fn spatial_inertia(&self) -> Square<6> {
+        let [m, x, y, z, xx, xy, xz, yy, yz, zz] = self.0;
+        [
+            [xx, xy, xz, 0.0, z, -y],
+            [xy, yy, yz, -z, 0.0, x],
+            [xz, yz, zz, y, -x, 0.0],
+            [0.0, -z, y, m, 0.0, 0.0],
+            [z, 0.0, -x, 0.0, m, 0.0],
+            [-y, x, 0.0, 0.0, 0.0, m],
+        ]
+    }
+
     /// Why no mass distribution could have these parameters, or `None` if one could.
     ///
     /// Checks mass > 0 and that the 4 × 4 pseudo-inertia `[[½ tr(I) 1 - I, h], [hᵀ, m]]` is positive semidefinite up to
@@ -102,8 +150,7 @@ impl Inertia {
             return Some("has a negative mass");
         }
         let scale = self.tensor().0.iter().map(|c| c.norm()).fold(0.0, f64::max);
-        let moments = symmetric_eigenvalues(&about_com);
-        let [a, b, c] = moments;
+        let ([a, b, c], _) = symmetric::eigen(&about_com.rows());
         let margin = -1e-9 * scale.max(f64::MIN_POSITIVE);
         if a.min(b).min(c) < margin {
             Some("has a negative principal moment of inertia")
@@ -113,34 +160,4 @@ impl Inertia {
             None
         }
     }
-}
-
-/// Eigenvalues of a symmetric 3 × 3 matrix by Jacobi rotations.
-fn symmetric_eigenvalues(matrix: &Mat3<f64>) -> [f64; 3] {
-    let mut a = matrix.rows();
-    for _ in 0..32 {
-        let off = a[0][1].abs() + a[0][2].abs() + a[1][2].abs();
-        if off <= f64::MIN_POSITIVE {
-            break;
-        }
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q] == 0.0 {
-                continue;
-            }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
-            let t = if theta == 0.0 { 1.0 } else { t };
-            let c = 1.0 / t.hypot(1.0);
-            let s = t * c;
-            for row in &mut a {
-                let (x, y) = (row[p], row[q]);
-                row[p] = c * x - s * y;
-                row[q] = s * x + c * y;
-            }
-            let (x, y) = (a[p], a[q]);
-            a[p] = std::array::from_fn(|k| c * x[k] - s * y[k]);
-            a[q] = std::array::from_fn(|k| s * x[k] + c * y[k]);
-        }
-    }
-    [a[0][0], a[1][1], a[2][2]]
 }

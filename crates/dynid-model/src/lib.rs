@@ -18,6 +18,7 @@ mod random_motion;
 mod robot_model;
 pub mod scalar;
 pub mod spatial;
+pub mod symmetric;
 
 pub use base_parameters::{BaseParameters, BaseSettings};
 pub use description::{Description, JointDescription, JointKind, Limits, LinkDescription, Mimic};

@@ -1,0 +1,148 @@
+//! A start that meets the bounds, or the bounds that exclude each other (spec/estimation.md section 5.7).
+
+use dynid_model::symmetric::trace;
+use faer::Mat;
+
+use super::cone::{LINK, Ray};
+use super::interior;
+use super::problem::{Bound, Problem, ProblemError};
+use super::program::Program;
+
+/// Bounds must leave this much room, in whitened units.
+const ROOM: f64 = 1e-9;
+/// Multipliers above this share of the largest belong to the conflict.
+const SHARE: f64 = 0.01;
+/// Pull towards the prior while a start is sought.
+const PULL: f64 = 1e-8;
+
+/// A strictly consistent start.
+pub(super) struct Start {
+    pub xi: Vec<f64>,
+    pub iterations: usize,
+}
+
+/// The prior, or where it breaks a bound a point found by minimising the largest violation.
+pub(super) fn start<const N: usize>(program: &Program<N>, problem: &Problem) -> Result<Start, ProblemError> {
+    contradiction(&problem.bounds)?;
+    let xi = inside(program);
+    let bounds = &program.rays[program.lower.len()..];
+    let worst = bounds.iter().map(|r| -r.slack(&xi)).fold(f64::NEG_INFINITY, f64::max);
+    // A start that barely meets a bound is as bad as one that does not.
+    if worst < -0.05 {
+        return Ok(Start { xi, iterations: 0 });
+    }
+    let n = program.unknowns();
+    let relaxed = relaxed(program);
+    let mut first = xi;
+    first.push(worst.max(0.0) + 1.0);
+    // (s + 1)² against 1 decides. A start needs most of the room there is and no more: the optimum itself lies on the
+    // boundary. Names of a conflict need multipliers that have settled.
+    let tolerance = |objective: f64| match objective - 1.0 {
+        excess if excess < 0.0 => (-0.1 * excess).max(1e-9),
+        excess => (1e-4 * excess).max(1e-9),
+    };
+    let ended = interior::solve(&relaxed, &first, &tolerance);
+    let violation = ended.xi[n];
+    if violation > -ROOM {
+        return Err(ProblemError::Infeasible { conflict: conflict(program, problem, &ended), violation });
+    }
+    Ok(Start { xi: ended.xi[..n].to_vec(), iterations: ended.iterations })
+}
+
+/// The prior, moved inside the links' and scalars' own limits.
+fn inside<const N: usize>(program: &Program<N>) -> Vec<f64> {
+    let mut xi = program.centre.clone();
+    for cone in &program.cones {
+        // The prior is the unit matrix; the floor may be anything.
+        let lift = 1.0 + trace(&cone.floor) / N as f64;
+        for x in &mut xi[cone.first..cone.first + LINK] {
+            *x *= lift;
+        }
+        while dynid_model::symmetric::least_eigenvalue(&cone.slack(&xi)) < 0.1 {
+            xi[cone.first..cone.first + LINK].iter_mut().for_each(|x| *x *= 2.0);
+        }
+    }
+    for (k, least) in &program.lower {
+        xi[*k] = xi[*k].max(least + 1.0);
+    }
+    xi
+}
+
+/// `min (s + 1)² + pull` with every bound relaxed by `s`: the bounds can be met exactly if the optimum has `s < 0`.
+fn relaxed<const N: usize>(program: &Program<N>) -> Program<N> {
+    let n = program.unknowns();
+    let rays = program.rays.iter().enumerate().map(|(k, ray)| {
+        let mut terms = ray.terms.clone();
+        if k >= program.lower.len() {
+            terms.push((n, -1.0));
+        }
+        Ray { terms, upper: ray.upper }
+    });
+    let mut weight = vec![PULL; n];
+    weight.push(0.0);
+    let mut centre = program.centre.clone();
+    centre.push(0.0);
+    let mut scalars = program.scalars.clone();
+    scalars.push(n);
+    Program {
+        a: Mat::from_fn(1, n + 1, |_, j| if j == n { 1.0 } else { 0.0 }),
+        b: vec![-1.0],
+        weight,
+        centre,
+        entropy: 0.0,
+        cones: program.cones.clone(),
+        rays: rays.collect(),
+        lower: program.lower.clone(),
+        scalars,
+    }
+}
+
+/// Names of the bounds, and of links and scalars whose own limits matter, by the size of their multipliers.
+fn conflict<const N: usize>(
+    program: &Program<N>,
+    problem: &Problem,
+    ended: &interior::Outcome,
+) -> Vec<String> {
+    let (own, bounds) = ended.multipliers.split_at(program.cones.len() + program.lower.len());
+    let largest = bounds.iter().copied().fold(0.0, f64::max);
+    let mut names: Vec<String> = problem
+        .bounds
+        .iter()
+        .zip(bounds)
+        .filter(|(_, y)| **y > SHARE * largest)
+        .map(|(bound, _)| bound.name.clone())
+        .collect();
+    let positive = problem.scalars.iter().filter(|s| s.nonnegative);
+    let links = problem.links.iter().map(|l| format!("link `{}` is a physical body", l.name));
+    let limits = links.chain(positive.map(|s| format!("`{}` is not negative", s.name)));
+    names.extend(limits.zip(own).filter(|(_, y)| **y > SHARE * largest).map(|(name, _)| name));
+    names
+}
+
+/// Pairs of bounds on the same combination that leave nothing between them.
+fn contradiction(bounds: &[Bound]) -> Result<(), ProblemError> {
+    let normal = |bound: &Bound| {
+        let mut terms = bound.terms.clone();
+        terms.sort_by_key(|(column, _)| *column);
+        terms
+    };
+    for (i, first) in bounds.iter().enumerate() {
+        let terms = normal(first);
+        for second in &bounds[..i] {
+            let others = normal(second);
+            if terms.len() != others.len() || others[0].1 == 0.0 {
+                continue;
+            }
+            let ratio = -terms[0].1 / others[0].1;
+            let opposite = terms
+                .iter()
+                .zip(&others)
+                .all(|(a, b)| a.0 == b.0 && (a.1 + ratio * b.1).abs() <= 1e-12 * a.1.abs());
+            if ratio > 0.0 && opposite && first.upper + ratio * second.upper < 0.0 {
+                let (first, second) = (second.name.clone(), first.name.clone());
+                return Err(ProblemError::Contradiction { first, second });
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,145 @@
+//! The convex program in whitened unknowns.
+
+use dynid_model::symmetric::{cholesky, lower_inverse, product, transpose};
+use faer::Mat;
+use faer::linalg::solvers::SolveLstsq;
+
+use super::cone::{Lmi, Ray};
+
+/// `min F(ξ) = ‖A ξ - b‖² + Σ w (ξ - ξ0)² + γ Σ_i D(X_i | 1)` over matrix inequalities and half-lines.
+#[derive(Debug)]
+pub(super) struct Program<const N: usize> {
+    pub a: Mat<f64>,
+    pub b: Vec<f64>,
+    /// `w`, one per unknown.
+    pub weight: Vec<f64>,
+    /// `ξ0`.
+    pub centre: Vec<f64>,
+    /// `γ`.
+    pub entropy: f64,
+    pub cones: Vec<Lmi<N>>,
+    /// Lower limits of scalars in the order of `lower`, then the bounds.
+    pub rays: Vec<Ray>,
+    /// Scalars with a lower limit.
+    pub lower: Vec<(usize, f64)>,
+    /// Unknowns that belong to no link.
+    pub scalars: Vec<usize>,
+}
+
+impl<const N: usize> Program<N> {
+    pub(super) fn unknowns(&self) -> usize {
+        self.a.ncols()
+    }
+
+    /// Number of bounds.
+    pub(super) fn bounds(&self) -> usize {
+        self.rays.len() - self.lower.len()
+    }
+
+    /// Sum of the sizes of all cones.
+    pub(super) fn order(&self) -> usize {
+        N * self.cones.len() + self.rays.len()
+    }
+
+    /// `A ξ - b`.
+    fn residual(&self, xi: &[f64]) -> Vec<f64> {
+        let mut out: Vec<f64> = self.b.iter().map(|b| -b).collect();
+        for (k, x) in xi.iter().enumerate() {
+            for (o, a) in out.iter_mut().zip(self.a.col(k).iter()) {
+                *o += a * x;
+            }
+        }
+        out
+    }
+
+    /// `‖A ξ - b‖²`.
+    pub(super) fn fit(&self, xi: &[f64]) -> f64 {
+        self.residual(xi).iter().map(|r| r * r).sum()
+    }
+
+    /// `F`; `None` where the entropic distance is infinite.
+    pub(super) fn objective(&self, xi: &[f64]) -> Option<f64> {
+        let pull: f64 =
+            xi.iter().zip(&self.centre).zip(&self.weight).map(|((x, c), w)| w * (x - c) * (x - c)).sum();
+        let mut value = self.fit(xi) + pull;
+        if self.entropy > 0.0 {
+            for cone in &self.cones {
+                let x = cone.matrix(xi);
+                let l = cholesky(&x)?;
+                let log_det: f64 = (0..N).map(|i| 2.0 * l[i][i].ln()).sum();
+                value += self.entropy * (dynid_model::symmetric::trace(&x) - log_det - N as f64);
+            }
+        }
+        Some(value)
+    }
+
+    /// `∇F`; `None` where the entropic distance is infinite.
+    pub(super) fn gradient(&self, xi: &[f64]) -> Option<Vec<f64>> {
+        let residual = self.residual(xi);
+        let mut gradient: Vec<f64> = (0..self.unknowns())
+            .map(|k| {
+                let along: f64 = self.a.col(k).iter().zip(&residual).map(|(a, r)| a * r).sum();
+                2.0 * (along + self.weight[k] * (xi[k] - self.centre[k]))
+            })
+            .collect();
+        if self.entropy > 0.0 {
+            for cone in &self.cones {
+                let inverse = lower_inverse(&cholesky(&cone.matrix(xi))?);
+                let mut slope = product(&transpose(&inverse), &inverse);
+                for (i, row) in slope.iter_mut().enumerate() {
+                    row.iter_mut().for_each(|x| *x = -*x);
+                    row[i] += 1.0;
+                }
+                for (g, s) in gradient[cone.first..].iter_mut().zip(cone.adjoint(&slope)) {
+                    *g += self.entropy * s;
+                }
+            }
+        }
+        Some(gradient)
+    }
+
+    /// `2 AᵀA + 2 diag w`.
+    pub(super) fn quadratic(&self) -> Mat<f64> {
+        let mut h = self.a.transpose() * &self.a;
+        h *= faer::Scale(2.0);
+        for (k, w) in self.weight.iter().enumerate() {
+            h[(k, k)] += 2.0 * w;
+        }
+        h
+    }
+
+    /// Minimum of the quadratic part without constraints, by QR of `[A; √w 1]`.
+    pub(super) fn unconstrained(&self) -> Vec<f64> {
+        let (rows, n) = (self.a.nrows(), self.unknowns());
+        // Counted from ξ0, so that unseen directions are exactly the prior's.
+        let residual = self.residual(&self.centre);
+        let stack = Mat::from_fn(rows + n, n, |i, j| match i.checked_sub(rows) {
+            None => self.a[(i, j)],
+            Some(k) if k == j => self.weight[k].sqrt(),
+            Some(_) => 0.0,
+        });
+        let rhs = Mat::from_fn(rows + n, 1, |i, _| if i < rows { -residual[i] } else { 0.0 });
+        let change = stack.qr().solve_lstsq(&rhs);
+        self.centre.iter().enumerate().map(|(k, c)| c + change[(k, 0)]).collect()
+    }
+
+    /// `min ‖A ξ - b‖²` over all `ξ`, by column-pivoted QR of `[A]`.
+    pub(super) fn least_fit(&self) -> f64 {
+        let qr = self.a.col_piv_qr();
+        let r = qr.R();
+        let size = r.nrows().min(r.ncols());
+        let threshold = self.a.nrows().max(self.unknowns()) as f64 * f64::EPSILON * r.norm_max();
+        let rank = (0..size).take_while(|k| r[(*k, *k)].abs() > threshold).count();
+        let b = Mat::from_fn(self.b.len(), 1, |i, _| self.b[i]);
+        let q = qr.compute_thin_Q();
+        let seen = q.subcols(0, rank);
+        let left = &b - seen * (seen.transpose() * &b);
+        left.col(0).squared_norm_l2()
+    }
+
+    /// Whether every constraint holds with room to spare.
+    pub(super) fn strictly_feasible(&self, xi: &[f64]) -> bool {
+        self.cones.iter().all(|c| cholesky(&c.slack(xi)).is_some())
+            && self.rays.iter().all(|r| r.slack(xi) > 0.0)
+    }
+}
