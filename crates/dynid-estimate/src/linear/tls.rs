@@ -1,0 +1,144 @@
+//! Total least squares with exact columns.
+
+use crate::factor::Factor;
+use crate::rank::numerical_rank;
+use crate::triangular::solve_upper;
+use faer::Mat;
+
+/// `s_min/s_{min-1}` above which the smallest singular value is not told from the next.
+const LARGEST_RATIO: f64 = 0.99;
+
+/// Last entry of the singular vector below which the solution lies at infinity.
+const LEAST_LAST_ENTRY: f64 = 1e-6;
+
+/// Standard deviations of the errors of the columns of `[W y]`, up to one common factor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TlsNoise {
+    /// One per column of `W`, in its unit; zero: the column is exact (a constant, the sign of a commanded velocity).
+    pub columns: Vec<f64>,
+    /// Of the effort, positive.
+    pub effort: f64,
+}
+
+/// Solution of [`tls`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct TlsSolution {
+    /// `p` parameters; those of dropped columns are zero.
+    pub x: Vec<f64>,
+    /// Independent columns the solution uses, ascending.
+    pub kept: Vec<usize>,
+    /// Unexcited and dependent columns left out, ascending.
+    pub dropped: Vec<usize>,
+    /// `σ² = s_min²/(N - p)`: square of the common factor of the stated standard deviations, 1 where they hold
+    /// absolutely. `None` without a degree of freedom.
+    pub variance: Option<f64>,
+    /// Singular values of the trailing block `[W_noisy y]` left after the exact columns are eliminated, in units of
+    /// the stated standard deviations, descending.
+    pub singular_values: Vec<f64>,
+    /// Number `N` of rows.
+    pub rows: usize,
+}
+
+/// Total least squares has no unique solution: no parameters could be told from others.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TlsRefusal {
+    /// The two smallest singular values agree, so every combination of their vectors fits as well.
+    #[error(
+        "total least squares has no unique solution: the two smallest singular values have ratio {ratio:.4}, expected at most 0.99"
+    )]
+    RepeatedSingularValue {
+        /// `s_min/s_{min-1}`.
+        ratio: f64,
+    },
+    /// The smallest singular value belongs to the columns alone, so that no finite parameters reach it.
+    #[error(
+        "total least squares has no finite solution: the effort's share in the last singular vector is {share:.1e}, expected at least 1e-6"
+    )]
+    EffortNotInvolved {
+        /// `|v_end|`.
+        share: f64,
+    },
+    /// The decomposition of the trailing block failed, which takes numbers beyond the range of double precision.
+    #[error("the singular values of the noisy columns could not be computed")]
+    Decomposition,
+}
+
+/// Total least squares where some columns are exact:
+/// `min Σ_k (e_k²/s_y² + Σ_c E_kc²/s_c²)` subject to `(W - E) x = y - e`, no error in columns of `s_c = 0`.
+///
+/// Columns are divided by their stated standard deviation (exact ones by their norm), ordered exact, noisy, effort, and
+/// triangularised again from the factor. Of the trailing block of noisy columns and effort, the last right singular
+/// vector `v` gives `x_n = -v_{1..}/v_end`; the exact columns follow by back substitution. Without a noisy column it is
+/// ordinary least squares. Errors must be independent between rows and columns, and alike in all rows.
+///
+/// Dependent and unexcited columns are dropped as in [`super::ols`]. Fails with [`TlsRefusal`] if the solution is not
+/// unique. Panics unless there is one standard deviation per column, none negative, and that of the effort positive.
+///
+/// Source: Golub, Hoffman & Stewart 1987; Van Huffel & Vandewalle 1991, section 3.5.
+pub fn tls(factor: &Factor, noise: &TlsNoise) -> Result<TlsSolution, TlsRefusal> {
+    assert_eq!(noise.columns.len(), factor.columns(), "one standard deviation per column");
+    assert!(noise.columns.iter().all(|s| *s >= 0.0 && s.is_finite()), "standard deviations are not negative");
+    assert!(noise.effort > 0.0 && noise.effort.is_finite(), "the effort has noise");
+    let kept = numerical_rank(factor).independent;
+    let dropped: Vec<usize> = (0..factor.columns()).filter(|c| kept.binary_search(c).is_err()).collect();
+    let (exact, noisy): (Vec<usize>, Vec<usize>) = kept.iter().partition(|c| noise.columns[**c] == 0.0);
+    let order = [exact.clone(), noisy.clone()].concat();
+    let ordered = factor.select(&order);
+    let (p, first) = (order.len(), exact.len());
+    let (r, z) = (ordered.r_matrix(), ordered.z());
+    let norms = factor.column_norms();
+    let scales: Vec<f64> = order
+        .iter()
+        .map(|&c| if noise.columns[c] == 0.0 { norms[c] } else { noise.columns[c] } / noise.effort)
+        .collect();
+
+    let size = p - first + 1;
+    let trailing = Mat::from_fn(size, size, |i, j| {
+        let (row, column) = (first + i, first + j);
+        match (row < p, column < p) {
+            (true, true) => r[(row, column)] / scales[column],
+            (true, false) => z[row],
+            (false, true) => 0.0,
+            (false, false) => ordered.rho(),
+        }
+    });
+    let (noisy_x, singular_values) = last_singular_vector(&trailing)?;
+    let mut scaled = vec![0.0; p];
+    scaled[first..].copy_from_slice(&noisy_x);
+    let top = Mat::from_fn(first, first, |i, j| r[(i, j)] / scales[j]);
+    let right = Mat::from_fn(first, 1, |i, _| {
+        z[i] - (first..p).map(|j| r[(i, j)] / scales[j] * scaled[j]).sum::<f64>()
+    });
+    let exact_x = solve_upper(&top, &right);
+    (0..first).for_each(|i| scaled[i] = exact_x[(i, 0)]);
+
+    let mut x = vec![0.0; factor.columns()];
+    for ((&column, value), scale) in order.iter().zip(&scaled).zip(&scales) {
+        x[column] = value / scale;
+    }
+    // The block was formed in the effort's unit; singular values are stated in units of standard deviations.
+    let singular_values: Vec<f64> = singular_values.iter().map(|s| s / noise.effort).collect();
+    let least = singular_values.last().copied().unwrap_or(0.0);
+    let variance = (factor.rows() > p).then(|| least * least / (factor.rows() - p) as f64);
+    Ok(TlsSolution { x, kept, dropped, variance, singular_values, rows: factor.rows() })
+}
+
+/// `-v_{1..}/v_end` of the last right singular vector of a square block, and all singular values, descending.
+fn last_singular_vector(block: &Mat<f64>) -> Result<(Vec<f64>, Vec<f64>), TlsRefusal> {
+    let size = block.nrows();
+    let decomposition = block.svd().map_err(|_| TlsRefusal::Decomposition)?;
+    let values: Vec<f64> = decomposition.S().column_vector().iter().copied().collect();
+    if size > 1 {
+        let ratio = values[size - 1] / values[size - 2];
+        if ratio.is_nan() || ratio > LARGEST_RATIO {
+            return Err(TlsRefusal::RepeatedSingularValue { ratio });
+        }
+    }
+    let vector = decomposition.V().col(size - 1);
+    let last = vector[size - 1];
+    if last.abs() < LEAST_LAST_ENTRY {
+        return Err(TlsRefusal::EffortNotInvolved { share: last.abs() });
+    }
+    Ok(((0..size - 1).map(|i| -vector[i] / last).collect(), values))
+}
