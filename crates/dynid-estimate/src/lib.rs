@@ -8,6 +8,7 @@
 //! | from logs to rows: kernel, mask, delay | [`conditioning`] |
 //! | reduce rows of `[W y]`, merge, scale, choose columns | [`factor`] |
 //! | which columns are excited, which depend on others | [`rank`] |
+//! | one time block or group of a log, and its rows again | [`groups`], [`rows`] |
 //! | ordinary, weighted and ridge least squares | [`linear`] |
 //! | covariance that survives filtering | [`covariance`] |
 //! | held-out error over folds of blocks | [`folds`] |
@@ -25,9 +26,11 @@ pub mod distribution;
 pub mod elimination;
 pub mod factor;
 pub mod folds;
+pub mod groups;
 pub mod linear;
 pub mod metrics;
 pub mod rank;
+pub mod rows;
 mod triangular;
 pub mod whiteness;
 

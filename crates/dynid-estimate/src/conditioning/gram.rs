@@ -8,8 +8,9 @@ use std::collections::BTreeMap;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
+use super::PreparedLog;
 use super::rows::{RowBatch, RowConsumer};
-use super::{ConditioningError, PreparedLog};
+use crate::rows::RowsError;
 
 /// `Xᵀ X` of rows `[W, probes, efforts at lags]`.
 #[derive(Debug, Clone)]
@@ -138,7 +139,7 @@ impl<'a> GramConsumer<'a> {
 }
 
 impl RowConsumer for GramConsumer<'_> {
-    fn take(&mut self, _output: usize, batch: &RowBatch<'_>) -> Result<(), ConditioningError> {
+    fn take(&mut self, _output: usize, batch: &RowBatch<'_>) -> Result<(), RowsError> {
         let n = batch.centres.len();
         let width = batch.columns.len() / n;
         let size = width - 1 + self.lags.count;

@@ -6,6 +6,7 @@
 
 mod choose;
 mod gram;
+mod log_rows;
 mod predict;
 mod prepare;
 mod reduce;
@@ -15,13 +16,15 @@ mod states;
 mod textbook;
 mod trial;
 
+pub use crate::groups::ReducedGroup;
 pub use choose::{DelayEstimate, KernelTrial, MaskTrial};
+pub use log_rows::LogRows;
 pub use predict::predict;
 pub use prepare::{PreparedLog, prepare};
-pub use reduce::{ReducedGroup, reduce};
+pub use reduce::reduce;
 pub use settings::ConditioningSettings;
 pub use states::States;
-pub use textbook::{TextbookRoute, reduce_textbook};
+pub use textbook::{TextbookRoute, reduce_textbook, textbook_rows};
 
 use dynid_model::EffortModel;
 use dynid_motion::cutoff::KernelLimit;

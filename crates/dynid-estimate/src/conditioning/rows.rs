@@ -5,7 +5,8 @@ use dynid_motion::{Kernel, SignalError};
 use rayon::prelude::*;
 
 use super::states::{Masks, States};
-use super::{ConditioningError, ConditioningSettings, PreparedLog};
+use super::{ConditioningSettings, PreparedLog};
+use crate::rows::RowsError;
 
 /// Which regressor columns a pass keeps, per output.
 #[derive(Debug, Clone)]
@@ -94,7 +95,7 @@ pub(crate) struct RowBatch<'a> {
 
 /// Takes the rows of one output; one per output, so that outputs run in parallel with the same result.
 pub(crate) trait RowConsumer: Send {
-    fn take(&mut self, output: usize, batch: &RowBatch<'_>) -> Result<(), ConditioningError>;
+    fn take(&mut self, output: usize, batch: &RowBatch<'_>) -> Result<(), RowsError>;
 }
 
 /// What a pass runs over.
@@ -120,7 +121,7 @@ const BLOCK: usize = 2048;
 
 impl Pass<'_> {
     /// Runs through the log once and hands every row to the consumer of its output, in time order for each scale.
-    pub(crate) fn run<C: RowConsumer>(&self, consumers: &mut [C]) -> Result<(), ConditioningError> {
+    pub(crate) fn run<C: RowConsumer>(&self, consumers: &mut [C]) -> Result<(), RowsError> {
         let samples = self.states.samples;
         let reach = self.kernels.kernels[0].half_width();
         let block = BLOCK.max(6 * reach);
@@ -151,7 +152,7 @@ impl Pass<'_> {
         first: usize,
         regressor: &RegressorBlock,
         consumer: &mut C,
-    ) -> Result<(), ConditioningError> {
+    ) -> Result<(), RowsError> {
         let probes =
             if self.probes { self.probe_columns(output, first, regressor.samples()) } else { vec![] };
         let mut centres = Vec::new();

@@ -3,10 +3,12 @@
 use dynid_model::{EffortModel, RegressorBlock};
 use dynid_motion::filter::{anti_alias, butterworth, forward_backward, pick};
 
+use super::reduce::unusable_row;
 use super::rows::KeptColumns;
 use super::states::States;
-use super::{ConditioningError, ConditioningSettings, PreparedLog, ReducedGroup};
-use crate::factor::FactorBuilder;
+use super::{ConditioningError, ConditioningSettings, PreparedLog};
+use crate::groups::ReducedGroup;
+use crate::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
 
 /// Settings of the textbook route.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,10 +57,38 @@ pub fn reduce_textbook(
     route: &TextbookRoute,
     settings: &ConditioningSettings,
 ) -> Result<Vec<ReducedGroup>, ConditioningError> {
+    let mut groups = Vec::new();
+    for one in logs.iter().enumerate() {
+        let rows = rows_of(model, shape, kept, std::iter::once(one), route, settings)?;
+        groups.extend(reduce_rows(&rows).map_err(|e| unusable_row(&rows, e))?);
+    }
+    Ok(groups)
+}
+
+/// Rows of all logs by the textbook route, in memory; one group per log and output, in that order.
+pub fn textbook_rows(
+    model: &dyn EffortModel,
+    shape: &[f64],
+    kept: &[usize],
+    logs: &[PreparedLog],
+    route: &TextbookRoute,
+    settings: &ConditioningSettings,
+) -> Result<MemoryRows, ConditioningError> {
+    rows_of(model, shape, kept, logs.iter().enumerate(), route, settings)
+}
+
+fn rows_of<'a>(
+    model: &dyn EffortModel,
+    shape: &[f64],
+    kept: &[usize],
+    logs: impl Iterator<Item = (usize, &'a PreparedLog)>,
+    route: &TextbookRoute,
+    settings: &ConditioningSettings,
+) -> Result<MemoryRows, ConditioningError> {
     let columns = KeptColumns::new(model, kept);
     let settings = ConditioningSettings { state_order: route.order, ..settings.clone() };
-    let mut groups = Vec::new();
-    for (l, log) in logs.iter().enumerate() {
+    let mut out = MemoryRows::new();
+    for (l, log) in logs {
         let cutoff = route.cutoff_hz.min(settings.cutoff.state_rate * log.rate_hz);
         let states = States::new(log, cutoff, &settings)?;
         let filter = butterworth(route.order, cutoff, log.rate_hz)?;
@@ -90,31 +120,33 @@ pub fn reduce_textbook(
             let thinned =
                 local.iter().map(|k| thin(regressor.column(output, *k))).collect::<Result<Vec<_>, _>>()?;
             let per_block = ((settings.block_s * log.rate_hz / factor as f64).ceil() as usize)
-                .max(effort.len().div_ceil(64));
-            let mut blocks = Vec::new();
-            let mut builder = FactorBuilder::with_chunk_rows(local.len(), 256);
-            let mut row = vec![0.0; local.len()];
-            for (k, y) in effort.iter().enumerate() {
-                if k > 0 && k % per_block.max(1) == 0 {
-                    blocks.push(builder.take());
-                }
-                if !usable[k] {
-                    continue;
-                }
-                for (r, column) in row.iter_mut().zip(&thinned) {
-                    *r = column[k];
-                }
-                builder.push_row(&row, *y).map_err(|source| ConditioningError::Rows { output, source })?;
-            }
-            blocks.push(builder.take());
-            groups.push(ReducedGroup {
+                .max(effort.len().div_ceil(64))
+                .max(1);
+            let group = out.add_group(GroupShape {
                 log: l,
                 output,
                 scale: 0,
                 columns: columns.global[output].clone(),
-                blocks,
+                blocks: effort.len().div_ceil(per_block).max(1),
             });
+            for start in (0..effort.len()).step_by(per_block) {
+                let end = (start + per_block).min(effort.len());
+                let used: Vec<usize> = (start..end).filter(|k| usable[*k]).collect();
+                let of = |signal: &[f64]| used.iter().map(|k| signal[*k]).collect::<Vec<f64>>();
+                let samples: Vec<usize> = used.iter().map(|k| inside.start + k * factor).collect();
+                let regressor: Vec<f64> = thinned.iter().flat_map(|column| of(column)).collect();
+                out.push(
+                    group,
+                    &Rows {
+                        block: start / per_block,
+                        samples: &samples,
+                        regressor: &regressor,
+                        stride: used.len(),
+                        effort: &of(&effort),
+                    },
+                );
+            }
         }
     }
-    Ok(groups)
+    Ok(out)
 }

@@ -85,7 +85,8 @@ impl Trial {
                 wanted: &wanted,
                 probes: true,
             }
-            .run(&mut consumers)?;
+            .run(&mut consumers)
+            .map_err(|e| ConditioningError::Rows { output: e.group, source: e.source })?;
             for (all, consumer) in classes.iter_mut().zip(consumers) {
                 for (class, gram) in consumer.classes {
                     all.entry(class).or_insert_with(|| Gram::zero(gram.size)).add(&gram);
