@@ -9,7 +9,7 @@
 //! | reduce rows of `[W y]`, merge, scale, choose columns | [`factor`] |
 //! | which columns are excited, which depend on others | [`rank`] |
 //! | one time block or group of a log, and its rows again | [`groups`], [`rows`] |
-//! | ordinary, weighted and ridge least squares | [`linear`] |
+//! | every linear estimator through one call | [`linear::estimate`] |
 //! | covariance that survives filtering | [`covariance`] |
 //! | held-out error over folds of blocks | [`folds`] |
 //! | which parameters a model can do without | [`elimination`] |

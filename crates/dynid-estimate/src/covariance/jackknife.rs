@@ -46,33 +46,65 @@ impl Jackknife {
 ///
 /// Source: Efron & Stein 1981; Shao & Wu 1989 for blocks.
 pub fn jackknife(blocks: &[Factor], x: &[f64]) -> Option<Jackknife> {
+    jackknife_with(blocks, None, x)
+}
+
+/// As [`jackknife`], with rows that are never left out, such as those of a prior.
+///
+/// `x`: joint solution of the blocks and the fixed rows.
+pub fn jackknife_with(blocks: &[Factor], fixed: Option<&Factor>, x: &[f64]) -> Option<Jackknife> {
+    // Centred at x, the solution without a block is d_b itself, free of cancellation.
+    let centred: Vec<Factor> = blocks.iter().map(|b| b.centred(x)).collect();
+    let fixed = fixed.map(|f| f.centred(x));
+    let norms = Factor::merge(&blocks.iter().chain(&fixed).collect::<Vec<_>>()).column_norms();
+    leave_out(&centred, fixed.as_ref(), x.len(), |rest| change_without(rest, &norms))
+}
+
+/// Jackknife of an estimator that is not least squares: solved again without each block.
+///
+/// `refit` maps the merged factor of the remaining blocks to the estimate, or `None` where there is none: such a block
+/// counts as indispensable and as no change, so the covariance understates.
+pub fn jackknife_by(
+    blocks: &[Factor],
+    x: &[f64],
+    refit: impl Fn(&Factor) -> Option<Vec<f64>> + Sync,
+) -> Option<Jackknife> {
+    leave_out(blocks, None, x.len(), |rest| match refit(rest) {
+        Some(without) => (without.iter().zip(x).map(|(w, x)| w - x).collect(), false),
+        None => (vec![0.0; x.len()], true),
+    })
+}
+
+fn leave_out(
+    blocks: &[Factor],
+    fixed: Option<&Factor>,
+    parameters: usize,
+    change: impl Fn(&Factor) -> (Vec<f64>, bool) + Sync,
+) -> Option<Jackknife> {
     let count = blocks.len();
     if count < 2 {
         return None;
     }
-    // Centred at x, the solution without a block is d_b itself, free of cancellation.
-    let centred: Vec<Factor> = blocks.iter().map(|b| b.centred(x)).collect();
-    let before = running_merges(centred.iter());
-    let mut after = running_merges(centred.iter().rev());
+    let before = running_merges(fixed, blocks.iter());
+    let mut after = running_merges(None, blocks.iter().rev());
     after.reverse();
-    let norms = Factor::merge(&[&before[count - 1], &blocks[count - 1]]).column_norms();
-
-    let outcomes: Vec<(Vec<f64>, bool)> = (0..count)
-        .into_par_iter()
-        .map(|b| change_without(&Factor::merge(&[&before[b], &after[b]]), &norms))
-        .collect();
+    let outcomes: Vec<(Vec<f64>, bool)> =
+        (0..count).into_par_iter().map(|b| change(&Factor::merge(&[&before[b], &after[b]]))).collect();
     let indispensable = (0..count).filter(|&b| outcomes[b].1).collect();
     let changes: Vec<Vec<f64>> = outcomes.into_iter().map(|(change, _)| change).collect();
     let correction = (count - 1) as f64 / count as f64;
     let covariance =
-        symmetric_from(x.len(), |i, j| correction * changes.iter().map(|d| d[i] * d[j]).sum::<f64>());
+        symmetric_from(parameters, |i, j| correction * changes.iter().map(|d| d[i] * d[j]).sum::<f64>());
     Some(Jackknife { covariance, changes, indispensable })
 }
 
-/// Merges of the factors before each one: entry `b` holds factors `0..b`.
-fn running_merges<'a>(factors: impl ExactSizeIterator<Item = &'a Factor>) -> Vec<Factor> {
+/// Merges of the factors before each one: entry `b` holds the fixed rows and factors `0..b`.
+fn running_merges<'a>(
+    fixed: Option<&Factor>,
+    factors: impl ExactSizeIterator<Item = &'a Factor>,
+) -> Vec<Factor> {
     let mut merges = Vec::with_capacity(factors.len());
-    let mut running: Option<Factor> = None;
+    let mut running = fixed.cloned();
     for factor in factors {
         let before = running.take().unwrap_or_else(|| Factor::empty(factor.columns()));
         running = Some(Factor::merge(&[&before, factor]));

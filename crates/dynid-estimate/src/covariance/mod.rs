@@ -9,8 +9,8 @@ mod jackknife;
 mod sandwich;
 
 pub use hac::{andrews_lag, hac_bartlett, hac_lag};
-pub use jackknife::{Jackknife, MIN_BLOCKS, jackknife};
-pub use sandwich::block_sandwich;
+pub use jackknife::{Jackknife, MIN_BLOCKS, jackknife, jackknife_by, jackknife_with};
+pub use sandwich::{block_sandwich, block_sandwich_with};
 
 use crate::factor::Factor;
 use crate::linear::merge_weighted;
@@ -49,7 +49,7 @@ pub fn variance_inflation(robust: &Mat<f64>, model: &Mat<f64>) -> Option<f64> {
 }
 
 /// `C Ω C` for symmetric matrices, symmetric to the last bit.
-fn sandwich(bread: &Mat<f64>, filling: &Mat<f64>) -> Mat<f64> {
+pub(crate) fn sandwich(bread: &Mat<f64>, filling: &Mat<f64>) -> Mat<f64> {
     let product = bread * filling * bread;
     crate::triangular::symmetric_from(bread.nrows(), |i, j| 0.5 * (product[(i, j)] + product[(j, i)]))
 }

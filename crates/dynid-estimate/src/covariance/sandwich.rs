@@ -12,11 +12,17 @@ use faer::Mat;
 ///
 /// Source: Newey & West 1987, with the block as the unit of dependence.
 pub fn block_sandwich(blocks: &[Factor], x: &[f64]) -> Option<Mat<f64>> {
+    block_sandwich_with(blocks, None, x)
+}
+
+/// As [`block_sandwich`], with rows that belong to no block, such as those of a prior: they add to `C` but have no
+/// score of their own, being fixed numbers.
+pub fn block_sandwich_with(blocks: &[Factor], fixed: Option<&Factor>, x: &[f64]) -> Option<Mat<f64>> {
     let count = blocks.len();
     if count < 2 {
         return None;
     }
-    let merged = Factor::merge(&blocks.iter().collect::<Vec<_>>());
+    let merged = Factor::merge(&blocks.iter().chain(fixed).collect::<Vec<_>>());
     let scores: Vec<Vec<f64>> = blocks.iter().map(|b| b.score(x)).collect();
     let correction = count as f64 / (count - 1) as f64;
     let filling =

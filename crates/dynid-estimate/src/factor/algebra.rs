@@ -73,6 +73,40 @@ impl Factor {
         factor
     }
 
+    /// Factor of `[W, W x + share (y - W x)]`: every residual at `x` multiplied by `share`, scores likewise.
+    ///
+    /// Panics unless `x` has `p` entries and `share` is finite.
+    pub fn with_residual_scaled(&self, x: &[f64], share: f64) -> Factor {
+        assert!(share.is_finite(), "shares are finite");
+        let mut factor = self.centred(x);
+        for i in 0..factor.height() {
+            factor.triangle[(i, self.columns)] *= share;
+        }
+        factor.rho *= share.abs();
+        factor.centred(&x.iter().map(|v| -v).collect::<Vec<_>>())
+    }
+
+    /// Factor of `[W + r gᵀ, y + r gᵀx]` with the residuals `r = y - W x`, which stay the residuals at `x`.
+    ///
+    /// Panics unless `x` and `g` have `p` entries.
+    pub fn with_residual_in_columns(&self, x: &[f64], g: &[f64]) -> Factor {
+        assert_eq!(g.len(), self.columns, "one share of the residual per column");
+        let mut residual = self.reduced_residual(x);
+        residual.push(self.rho);
+        let in_effort: f64 = g.iter().zip(x).map(|(g, x)| g * x).sum();
+        let height = self.height();
+        let mut builder = FactorBuilder::with_chunk_rows(self.columns, height + 1);
+        builder.stack(height + 1, |i, j| {
+            let own = match (i < height, j == self.columns) {
+                (true, _) => self.triangle[(i, j)],
+                (false, true) => self.rho,
+                (false, false) => 0.0,
+            };
+            own + residual[i] * g.get(j).copied().unwrap_or(in_effort)
+        });
+        Factor { rows: self.rows, ..builder.finish() }
+    }
+
     /// Factor of `W` and `y` with the rows `D x ≈ D x0` added below, `D = diag(weights)`.
     ///
     /// The added rows do not count as samples. Panics unless both slices have `p` finite entries.

@@ -1,12 +1,17 @@
 //! Linear least squares on factors: ordinary, weighted by group, with a quadratic prior, and total.
 
+mod estimate;
 mod extended;
+mod irls;
+mod method;
 mod ols;
 mod ridge;
 mod tls;
 mod wls;
 
+pub use estimate::{GroupFit, LinearEstimate, estimate};
 pub use extended::ols_extended;
+pub use method::{IrlsSettings, LinearError, LinearMethod, LinearSettings, VarianceSharing};
 pub use ols::{LinearSolution, ols};
 pub use ridge::{RidgeSolution, ridge};
 pub use tls::{TlsNoise, TlsRefusal, TlsSolution, tls};

@@ -1,6 +1,9 @@
 //! Total least squares with exact columns.
 
+use super::method::LinearSettings;
+use super::ols::ols;
 use crate::factor::Factor;
+use crate::groups::ReducedGroup;
 use crate::rank::numerical_rank;
 use crate::triangular::solve_upper;
 use faer::Mat;
@@ -141,4 +144,93 @@ fn last_singular_vector(block: &Mat<f64>) -> Result<(Vec<f64>, Vec<f64>), TlsRef
         return Err(TlsRefusal::EffortNotInvolved { share: last.abs() });
     }
     Ok(((0..size - 1).map(|i| -vector[i] / last).collect(), values))
+}
+
+/// What the residual of a group tells of the errors of its columns: `E{W error | r} = -r gᵀ`.
+pub(super) struct ColumnErrors {
+    /// Variance of a residual over that of the effort, `1 + Σ_c x_c² s_c²/s_y²` over the columns that act.
+    pub(super) d: f64,
+    x: Vec<f64>,
+    /// `g_c = x_c s_c²/(s_y² d)`.
+    g: Vec<f64>,
+}
+
+impl ColumnErrors {
+    pub(super) fn new(noise: &TlsNoise, group: &ReducedGroup, x: &[f64]) -> Self {
+        let ratio = |c: usize| (noise.columns[c] / noise.effort).powi(2);
+        let d = 1.0 + group.columns.iter().map(|&c| ratio(c) * x[c] * x[c]).sum::<f64>();
+        ColumnErrors {
+            d,
+            x: group.columns.iter().map(|&c| x[c]).collect(),
+            g: group.columns.iter().map(|&c| ratio(c) * x[c] / d).collect(),
+        }
+    }
+
+    /// The group with columns freed of these errors; its residuals at `x` stay.
+    pub(super) fn removed(&self, group: &ReducedGroup) -> ReducedGroup {
+        let blocks = group.blocks.iter().map(|b| b.with_residual_in_columns(&self.x, &self.g)).collect();
+        ReducedGroup { columns: group.columns.clone(), blocks, ..*group }
+    }
+}
+
+/// Solution of [`tls_groups`].
+pub(super) struct GroupedTls {
+    pub(super) x: Vec<f64>,
+    pub(super) kept: Vec<usize>,
+    pub(super) passes: usize,
+    pub(super) converged: bool,
+    /// Whether one singular value decomposition of all rows holds the solution.
+    pub(super) alike: bool,
+}
+
+/// Change of `x`, relative to its standard deviation, at which the iteration over groups stops.
+const GROUPED_TOLERANCE: f64 = 1e-9;
+
+/// Total least squares over groups that different noisy columns act on, `min Σ_j rss_j(x)/d_j(x)`.
+///
+/// Where all noisy columns act on all groups this is [`tls`] of the merged rows. Otherwise it is iterated from least
+/// squares: columns freed of the errors that the residuals at `x` tell, rows divided by `√d_j`, solved again. A fixed
+/// point is stationary.
+pub(super) fn tls_groups(
+    groups: &[ReducedGroup],
+    factors: &[Factor],
+    total: usize,
+    noise: &TlsNoise,
+    settings: &LinearSettings,
+) -> Result<GroupedTls, TlsRefusal> {
+    let all = Factor::merge(&factors.iter().collect::<Vec<_>>());
+    let noisy: Vec<usize> = (0..total).filter(|&c| noise.columns[c] > 0.0).collect();
+    if groups.iter().all(|g| noisy.iter().all(|c| g.columns.contains(c))) {
+        let TlsSolution { x, kept, .. } = tls(&all, noise)?;
+        return Ok(GroupedTls { x, kept, passes: 1, converged: true, alike: true });
+    }
+    let start = ols(&all);
+    let (mut x, kept) = (start.x, start.kept);
+    for passes in 1..=settings.irls.max_passes {
+        let corrected: Vec<Factor> = groups
+            .iter()
+            .map(|group| {
+                let errors = ColumnErrors::new(noise, group, &x);
+                errors.removed(group).merged(total).scaled(1.0 / errors.d.sqrt())
+            })
+            .collect();
+        let solution = ols(&Factor::merge(&corrected.iter().collect::<Vec<_>>()).select(&kept));
+        let unit = solution.unit_covariance();
+        let variance = solution.residual_variance().unwrap_or(1.0);
+        let mut moved = 0.0_f64;
+        for (i, &k) in solution.kept.iter().enumerate() {
+            let step = (solution.x[k] - x[kept[k]]).abs();
+            if step > 0.0 {
+                moved = moved.max(step / (variance * unit[(i, i)]).sqrt().max(f64::EPSILON * step));
+            }
+        }
+        for (&column, value) in kept.iter().zip(&solution.x) {
+            x[column] = *value;
+        }
+        if moved < GROUPED_TOLERANCE || passes == settings.irls.max_passes {
+            let converged = moved < GROUPED_TOLERANCE;
+            return Ok(GroupedTls { x, kept, passes, converged, alike: false });
+        }
+    }
+    Ok(GroupedTls { x, kept, passes: 0, converged: false, alike: false })
 }

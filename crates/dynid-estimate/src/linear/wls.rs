@@ -68,12 +68,33 @@ impl WlsEstimate {
 ///
 /// Panics on an empty list or unequal columns. Rank deficiency is reported in the solution.
 pub fn wls(groups: &[Factor], settings: &WlsSettings) -> WlsEstimate {
+    let classes: Vec<usize> = (0..groups.len()).collect();
+    wls_with(groups, &classes, None, settings)
+}
+
+/// Rows `(x - x0)_i/scale_i` that hold every solution near a prior, whatever the weights of the groups.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct PriorRows {
+    /// `√κ/scale_i`.
+    pub(super) weights: Vec<f64>,
+    pub(super) x0: Vec<f64>,
+}
+
+/// As [`wls`], groups of the same class sharing one variance, and with prior rows.
+///
+/// `classes`: one index below the number of groups per group.
+pub(super) fn wls_with(
+    groups: &[Factor],
+    classes: &[usize],
+    prior: Option<&PriorRows>,
+    settings: &WlsSettings,
+) -> WlsEstimate {
     let mut variances = vec![1.0; groups.len()];
     let mut passes = 0;
     loop {
         let factor = merge_weighted(groups, &variances);
-        let solution = ols(&factor);
-        let found = group_variances(groups, &variances, &solution, settings.floor);
+        let solution = solve(&factor, prior);
+        let found = group_variances(groups, classes, &variances, &solution, settings.floor);
         passes += 1;
         let change = found
             .iter()
@@ -82,10 +103,30 @@ pub fn wls(groups: &[Factor], settings: &WlsSettings) -> WlsEstimate {
             .fold(0.0, f64::max);
         let converged = change <= settings.tolerance;
         if converged || passes >= settings.max_passes {
-            return finish(groups, found, passes, converged, settings.floor);
+            let variances: Vec<f64> = found.iter().map(|g| g.variance).collect();
+            let factor = merge_weighted(groups, &variances);
+            let solution = solve(&factor, prior);
+            let last = group_variances(groups, classes, &variances, &solution, settings.floor);
+            let groups = found
+                .into_iter()
+                .zip(last)
+                .map(|(used, now)| GroupVariance { variance: used.variance, ..now })
+                .collect();
+            return WlsEstimate { solution, groups, passes, converged, factor };
         }
         variances = found.iter().map(|g| g.variance).collect();
     }
+}
+
+/// Least squares on a weighted factor, with the prior rows if there are any; the rss is that of the samples.
+fn solve(factor: &Factor, prior: Option<&PriorRows>) -> LinearSolution {
+    let Some(PriorRows { weights, x0 }) = prior else { return ols(factor) };
+    let mut solution = ols(&factor.with_prior_rows(weights, x0).centred(x0));
+    solution.x.iter_mut().zip(x0).for_each(|(d, x0)| *d += x0);
+    let origin: Vec<f64> = solution.kept.iter().map(|&c| -x0[c]).collect();
+    solution.factor = solution.factor.centred(&origin);
+    solution.rss = factor.rss(&solution.x);
+    solution
 }
 
 /// Merges groups weighted by `1/σ_j`, in the order given.
@@ -96,60 +137,59 @@ pub(crate) fn merge_weighted(groups: &[Factor], variances: &[f64]) -> Factor {
 
 fn group_variances(
     groups: &[Factor],
+    classes: &[usize],
     variances: &[f64],
     solution: &LinearSolution,
     floor: f64,
 ) -> Vec<GroupVariance> {
     let inverse = inverse(&solution.factor.r_matrix());
-    let fallback = match groups.iter().map(mean_square).fold(0.0, f64::max) {
-        0.0 => 1.0,
-        largest => largest,
-    };
-    groups
+    let found: Vec<(f64, f64)> = groups
         .iter()
         .zip(variances)
-        .map(|(group, &variance)| {
+        .map(|(group, variance)| {
             let product = group.select(&solution.kept).r_matrix() * &inverse;
-            let leverage = product.norm_l2().powi(2) / variance;
-            let rows = group.rows();
-            let rss = group.rss(&solution.x);
-            let mean_square = match mean_square(group) {
-                0.0 => fallback,
-                positive => positive,
-            };
-            let least = floor * floor * mean_square;
-            let freedom = rows as f64 - leverage;
-            let estimate = if freedom >= 0.5 { rss / freedom } else { variance };
+            (product.norm_l2().powi(2) / variance, group.rss(&solution.x))
+        })
+        .collect();
+    let least = floors(groups, classes, floor);
+    (0..groups.len())
+        .map(|g| {
+            let of_class = || (0..groups.len()).filter(|k| classes[*k] == classes[g]);
+            let rss: f64 = of_class().map(|k| found[k].1).sum();
+            let freedom: f64 = of_class().map(|k| groups[k].rows() as f64 - found[k].0).sum();
+            let estimate = if freedom >= 0.5 { rss / freedom } else { variances[g] };
             GroupVariance {
-                variance: estimate.max(least),
-                leverage,
-                rss,
-                rows,
-                at_floor: freedom < 0.5 || estimate <= least,
+                variance: estimate.max(least[g]),
+                leverage: found[g].0,
+                rss: found[g].1,
+                rows: groups[g].rows(),
+                at_floor: freedom < 0.5 || estimate <= least[g],
             }
         })
         .collect()
 }
 
-fn mean_square(group: &Factor) -> f64 {
-    group.effort_norm().powi(2) / group.rows().max(1) as f64
+/// Least variance of each group's class, `(floor · rms effort)²`; a class of zero effort takes that of the group of
+/// largest effort.
+pub(super) fn floors(groups: &[Factor], classes: &[usize], floor: f64) -> Vec<f64> {
+    let fallback =
+        match groups.iter().map(|g| mean_square(g.effort_norm().powi(2), g.rows())).fold(0.0, f64::max) {
+            0.0 => 1.0,
+            largest => largest,
+        };
+    (0..groups.len())
+        .map(|g| {
+            let of_class = || groups.iter().zip(classes).filter(|(_, c)| **c == classes[g]).map(|(f, _)| f);
+            let energy: f64 = of_class().map(|f| f.effort_norm().powi(2)).sum();
+            let mean_square = match mean_square(energy, of_class().map(Factor::rows).sum()) {
+                0.0 => fallback,
+                positive => positive,
+            };
+            floor * floor * mean_square
+        })
+        .collect()
 }
 
-fn finish(
-    groups: &[Factor],
-    found: Vec<GroupVariance>,
-    passes: usize,
-    converged: bool,
-    floor: f64,
-) -> WlsEstimate {
-    let variances: Vec<f64> = found.iter().map(|g| g.variance).collect();
-    let factor = merge_weighted(groups, &variances);
-    let solution = ols(&factor);
-    let last = group_variances(groups, &variances, &solution, floor);
-    let groups = found
-        .into_iter()
-        .zip(last)
-        .map(|(used, now)| GroupVariance { variance: used.variance, ..now })
-        .collect();
-    WlsEstimate { solution, groups, passes, converged, factor }
+fn mean_square(energy: f64, rows: usize) -> f64 {
+    energy / rows.max(1) as f64
 }

@@ -1,0 +1,382 @@
+//! Every linear estimator through one call, with one result.
+
+use super::irls::{Irls, Loss, Start, irls};
+use super::method::{LinearError, LinearMethod, LinearSettings};
+use super::ols::{LinearSolution, ols};
+use super::tls::{ColumnErrors, TlsNoise, tls, tls_groups};
+use super::wls::{PriorRows, WlsEstimate, floors, wls_with};
+use crate::covariance::{Jackknife, block_sandwich_with, jackknife_by, jackknife_with};
+use crate::factor::Factor;
+use crate::groups::{ReducedGroup, time_blocks};
+use crate::rows::{MemoryRows, RowSource};
+use faer::Mat;
+
+/// What an estimator found about one group of rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupFit {
+    /// Index of the log.
+    pub log: usize,
+    /// Index of the output.
+    pub output: usize,
+    /// Index of the kernel scale.
+    pub scale: usize,
+    /// Residual variance `σ_j²` (for robust losses the square of the scale), effort².
+    pub variance: f64,
+    /// Factor by which the group's reduced rows enter the weighted blocks, `√curvature/σ_j`.
+    pub weight: f64,
+    /// Leverage `‖W_j R⁻¹‖_F²/σ_j²` of the group, of the least-squares start for robust losses.
+    pub leverage: f64,
+    /// Residual sum of squares of all rows at the estimate, unweighted, effort².
+    pub rss: f64,
+    /// Rows.
+    pub rows: usize,
+    /// Whether the variance could not be told from the residuals.
+    pub at_floor: bool,
+    /// Share of rows weighed down: `ω < 1` for Huber, `ω < 1/2` for Tukey, 0 otherwise.
+    pub down_weighted: f64,
+    /// Share of rows without any weight.
+    pub rejected: f64,
+    /// `mean ψ'/mean ω` of a robust loss: what the curvature of the loss is, of that of the weighted squares. 1 otherwise.
+    pub curvature: f64,
+}
+
+/// Estimate of any [`LinearMethod`].
+///
+/// Ordinary least squares on [`Self::factor`] (with the prior rows of a ridge) gives `x` back, and the scores of
+/// [`Self::blocks`] are those of the estimator. Covariance, bootstrap, elimination, folds and constrained estimators
+/// therefore need not know the method.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearEstimate {
+    /// The method.
+    pub method: LinearMethod,
+    /// All `p` parameters. Dropped ones are zero, or at the prior for a ridge.
+    pub x: Vec<f64>,
+    /// Solution of the merged weighted factor: kept and dropped columns, rank, conditioning, `C`.
+    pub solution: LinearSolution,
+    /// One entry per group, in the order given.
+    pub groups: Vec<GroupFit>,
+    /// Rows as the estimator weighs them within each group, in the unit of effort: multiplied by `√ω` for robust losses,
+    /// freed of the columns' errors for total least squares, unchanged otherwise.
+    pub reduced: Vec<ReducedGroup>,
+    /// Merged weighted factor of all columns, without prior rows.
+    pub factor: Factor,
+    /// Weighted time blocks, log after log, all groups of a block merged, in all columns; none without rows.
+    pub blocks: Vec<Factor>,
+    /// Passes made, of the last loss for robust ones.
+    pub passes: usize,
+    /// Whether they settled within the tolerance.
+    pub converged: bool,
+    /// Loss `Σ ρ(r/ŝ)` at the start of every pass with frozen scales; empty without a robust loss.
+    pub losses: Vec<f64>,
+    prior: Option<Factor>,
+    /// Time blocks as given, for total least squares solved again without a block; else none.
+    given_blocks: Vec<Factor>,
+}
+
+impl LinearEstimate {
+    /// Parameters of the kept columns.
+    pub fn kept_x(&self) -> Vec<f64> {
+        self.solution.kept.iter().map(|&c| self.x[c]).collect()
+    }
+
+    /// [`Self::blocks`] in the kept columns.
+    pub fn kept_blocks(&self) -> Vec<Factor> {
+        self.kept(&self.blocks)
+    }
+
+    /// Rows of the prior of a ridge in the kept columns, which belong to no block; `None` for the other methods.
+    pub fn kept_prior(&self) -> Option<Factor> {
+        self.prior.as_ref().map(|p| self.without_dropped(p))
+    }
+
+    fn kept(&self, blocks: &[Factor]) -> Vec<Factor> {
+        blocks.iter().map(|b| self.without_dropped(b)).collect()
+    }
+
+    /// In the kept columns, the others being fixed at their value in `x`.
+    fn without_dropped(&self, factor: &Factor) -> Factor {
+        if self.solution.dropped.is_empty() {
+            return factor.clone();
+        }
+        let mut fixed = self.x.clone();
+        self.solution.kept.iter().for_each(|&c| fixed[c] = 0.0);
+        factor.centred(&fixed).select(&self.solution.kept)
+    }
+
+    /// Weights of the groups in the blocks.
+    pub fn weights(&self) -> Vec<f64> {
+        self.groups.iter().map(|g| g.weight).collect()
+    }
+
+    /// Covariance of the kept columns if all residuals were independent.
+    ///
+    /// `C = (RᵀR)⁻¹` for the squared losses; `C (Σ_j τ_j J_j) C` for robust ones, with the information `J_j` of each group
+    /// and the mean square `τ_j` of its weighted residuals, `E ψ²/E ψ'`.
+    pub fn model_covariance(&self) -> Mat<f64> {
+        let unit = self.solution.unit_covariance();
+        if !self.method.needs_rows() {
+            return unit;
+        }
+        let p = self.solution.kept.len();
+        let mut filling = Mat::zeros(p, p);
+        for (fit, group) in self.groups.iter().zip(&self.reduced) {
+            let weighted = self.without_dropped(&group.merged(self.x.len()).scaled(fit.weight));
+            let freedom = (fit.rows as f64 - fit.leverage).max(1.0);
+            let tau = weighted.rss(&self.kept_x()) / freedom;
+            let r = weighted.r_matrix();
+            filling += faer::Scale(tau) * (r.transpose() * &r);
+        }
+        crate::covariance::sandwich(&unit, &filling)
+    }
+
+    /// Delete-a-block jackknife with weights fixed; `None` with fewer than two blocks. Total least squares is solved
+    /// again without each block where the noisy columns act on all groups; elsewhere, and in the block sandwich and the
+    /// bootstrap, the linear step is taken, which understates the spread by the share of noise in the columns.
+    pub fn jackknife(&self) -> Option<Jackknife> {
+        if let (LinearMethod::Tls(noise), false) = (&self.method, self.given_blocks.is_empty()) {
+            let kept_noise = TlsNoise {
+                columns: self.solution.kept.iter().map(|&c| noise.columns[c]).collect(),
+                effort: noise.effort,
+            };
+            return jackknife_by(&self.kept(&self.given_blocks), &self.kept_x(), |rest| {
+                tls(rest, &kept_noise).ok().filter(|s| s.dropped.is_empty()).map(|s| s.x)
+            });
+        }
+        jackknife_with(&self.kept_blocks(), self.kept_prior().as_ref(), &self.kept_x())
+    }
+
+    /// Sandwich covariance from block scores, as a second opinion; `None` with fewer than two blocks.
+    pub fn block_sandwich(&self) -> Option<Mat<f64>> {
+        block_sandwich_with(&self.kept_blocks(), self.kept_prior().as_ref(), &self.kept_x())
+    }
+}
+
+/// Estimates the parameters of all `total` columns.
+///
+/// `groups`: factors of all groups and time blocks, from [`crate::conditioning::reduce`] or
+/// [`crate::rows::reduce_rows`]; `rows`: the same groups' rows, needed by robust losses only
+/// ([`LinearMethod::needs_rows`]) and kept in memory where [`super::IrlsSettings::memory`] allows.
+///
+/// Rank deficiency and the iteration limit are statuses of the estimate.
+///
+/// # Errors
+/// [`LinearError`]: no groups, a method whose entries do not fit the columns, missing or unusable rows, or no unique
+/// total least-squares solution.
+pub fn estimate(
+    groups: &[ReducedGroup],
+    rows: Option<&dyn RowSource>,
+    total: usize,
+    method: &LinearMethod,
+    settings: &LinearSettings,
+) -> Result<LinearEstimate, LinearError> {
+    if groups.is_empty() {
+        return Err(LinearError::NoGroups);
+    }
+    method.check(total)?;
+    let factors: Vec<Factor> = groups.iter().map(|g| g.merged(total)).collect();
+    let classes = match method {
+        LinearMethod::Ols | LinearMethod::Tls(_) => vec![0; groups.len()],
+        _ => settings.sharing.classes(groups),
+    };
+    let prior = match method {
+        LinearMethod::Ridge { prior, scale, kappa } => {
+            Some(PriorRows { weights: scale.iter().map(|s| kappa.sqrt() / s).collect(), x0: prior.clone() })
+        }
+        _ => None,
+    };
+    let start = wls_with(&factors, &classes, prior.as_ref(), &settings.wls);
+    match method {
+        LinearMethod::Ols | LinearMethod::Wls | LinearMethod::Ridge { .. } => {
+            let prior = prior.map(|p| Factor::empty(total).with_prior_rows(&p.weights, &p.x0));
+            Ok(squared(groups, total, method, start, prior))
+        }
+        LinearMethod::Tls(noise) => total_least_squares(groups, &factors, total, noise, start, settings),
+        LinearMethod::Huber | LinearMethod::Tukey => {
+            let source = rows.ok_or(LinearError::NeedsRows)?;
+            check_rows(groups, source)?;
+            let memory = MemoryRows::collect(source, settings.irls.memory)?;
+            let source = memory.as_ref().map_or(source, |m| m as &dyn RowSource);
+            robust(groups, &factors, source, total, method, settings, &classes, start)
+        }
+    }
+}
+
+fn check_rows(groups: &[ReducedGroup], source: &dyn RowSource) -> Result<(), LinearError> {
+    let shapes = source.groups();
+    let same = shapes.len() == groups.len()
+        && shapes.iter().zip(groups).all(|(s, g)| {
+            (s.log, s.output, s.scale, &s.columns, s.blocks)
+                == (g.log, g.output, g.scale, &g.columns, g.blocks.len())
+        });
+    if same { Ok(()) } else { Err(LinearError::OtherRows { expected: groups.len(), found: shapes.len() }) }
+}
+
+fn group_fits(groups: &[ReducedGroup], start: &WlsEstimate) -> Vec<GroupFit> {
+    let of = |(group, found): (&ReducedGroup, &super::GroupVariance)| GroupFit {
+        log: group.log,
+        output: group.output,
+        scale: group.scale,
+        variance: found.variance,
+        weight: 1.0 / found.variance.sqrt(),
+        leverage: found.leverage,
+        rss: found.rss,
+        rows: found.rows,
+        at_floor: found.at_floor,
+        down_weighted: 0.0,
+        rejected: 0.0,
+        curvature: 1.0,
+    };
+    groups.iter().zip(&start.groups).map(of).collect()
+}
+
+fn squared(
+    groups: &[ReducedGroup],
+    total: usize,
+    method: &LinearMethod,
+    start: WlsEstimate,
+    prior: Option<Factor>,
+) -> LinearEstimate {
+    let fits = group_fits(groups, &start);
+    let weights: Vec<f64> = fits.iter().map(|g| g.weight).collect();
+    LinearEstimate {
+        method: method.clone(),
+        x: start.solution.x.clone(),
+        solution: start.solution,
+        groups: fits,
+        reduced: groups.to_vec(),
+        factor: start.factor,
+        blocks: time_blocks(groups, &weights, total),
+        passes: start.passes,
+        converged: start.converged,
+        losses: Vec::new(),
+        prior,
+        given_blocks: Vec::new(),
+    }
+}
+
+fn total_least_squares(
+    groups: &[ReducedGroup],
+    factors: &[Factor],
+    total: usize,
+    noise: &TlsNoise,
+    start: WlsEstimate,
+    settings: &LinearSettings,
+) -> Result<LinearEstimate, LinearError> {
+    let mut fits = group_fits(groups, &start);
+    let found = tls_groups(groups, factors, total, noise, settings)?;
+    let errors = |group: &ReducedGroup| ColumnErrors::new(noise, group, &found.x);
+    let sum: f64 = groups.iter().zip(factors).map(|(g, f)| f.rss(&found.x) / errors(g).d).sum();
+    let freedom = factors.iter().map(Factor::rows).sum::<usize>() as f64 - found.kept.len() as f64;
+    let variance = if freedom >= 1.0 { sum / freedom } else { 0.0 };
+    let variance = variance.max(floors(factors, &vec![0; factors.len()], settings.wls.floor)[0]);
+    for ((fit, group), factor) in fits.iter_mut().zip(groups).zip(factors) {
+        fit.variance = variance * errors(group).d;
+        (fit.weight, fit.rss) = (1.0 / fit.variance.sqrt(), factor.rss(&found.x));
+    }
+    let reduced = groups.iter().map(|g| errors(g).removed(g)).collect();
+    let method = LinearMethod::Tls(noise.clone());
+    let mut estimate = assemble(method, found.x, &found.kept, fits, reduced);
+    (estimate.passes, estimate.converged) = (found.passes, found.converged);
+    if found.alike {
+        estimate.given_blocks = time_blocks(groups, &vec![1.0; groups.len()], total);
+    }
+    Ok(estimate)
+}
+
+#[expect(clippy::too_many_arguments, reason = "one call site; the arguments are the whole problem")]
+fn robust(
+    groups: &[ReducedGroup],
+    factors: &[Factor],
+    source: &dyn RowSource,
+    total: usize,
+    method: &LinearMethod,
+    settings: &LinearSettings,
+    classes: &[usize],
+    start: WlsEstimate,
+) -> Result<LinearEstimate, LinearError> {
+    let mut fits = group_fits(groups, &start);
+    let given: Vec<Option<f64>> = fits
+        .iter()
+        .map(|f| (f.at_floor || (f.rows as f64) < 2.0 * f.leverage).then(|| f.variance.sqrt()))
+        .collect();
+    let floors: Vec<f64> = floors(factors, classes, settings.wls.floor).iter().map(|v| v.sqrt()).collect();
+    let begin = |x: Vec<f64>| Start {
+        x,
+        kept: start.solution.kept.clone(),
+        classes,
+        floors: floors.clone(),
+        given: given.clone(),
+        total,
+    };
+    let huber =
+        irls(source, Loss::Huber(settings.irls.huber), begin(start.solution.x.clone()), &settings.irls)?;
+    let found = match method {
+        LinearMethod::Tukey => {
+            let after = irls(source, Loss::Tukey(settings.irls.tukey), begin(huber.x), &settings.irls)?;
+            Irls { converged: after.converged && huber.converged, ..after }
+        }
+        _ => huber,
+    };
+    let Irls { x, kept, groups: weighted, scales, tallies, passes, converged, losses } = found;
+    for (k, fit) in fits.iter_mut().enumerate() {
+        let tally = &tallies[k];
+        fit.variance = scales[k] * scales[k];
+        fit.curvature = tally.curvature();
+        fit.weight = fit.curvature.sqrt() / scales[k];
+        fit.rss = factors[k].rss(&x);
+        (fit.down_weighted, fit.rejected) = (tally.down_weighted(), tally.rejected());
+    }
+    // The score ψ stays, the curvature becomes that of the loss: weight √c, residual over c.
+    let bent: Vec<ReducedGroup> = weighted
+        .iter()
+        .zip(&fits)
+        .map(|(group, fit)| {
+            let own: Vec<f64> = group.columns.iter().map(|&c| x[c]).collect();
+            let blocks =
+                group.blocks.iter().map(|b| b.with_residual_scaled(&own, 1.0 / fit.curvature)).collect();
+            ReducedGroup { columns: group.columns.clone(), blocks, ..*group }
+        })
+        .collect();
+    let estimate = assemble(method.clone(), x, &kept, fits, bent);
+    Ok(LinearEstimate { passes, converged, losses, ..estimate })
+}
+
+/// Estimate from rows whose least-squares solution on the kept columns is `x`.
+fn assemble(
+    method: LinearMethod,
+    x: Vec<f64>,
+    kept: &[usize],
+    groups: Vec<GroupFit>,
+    reduced: Vec<ReducedGroup>,
+) -> LinearEstimate {
+    let total = x.len();
+    let weights: Vec<f64> = groups.iter().map(|g| g.weight).collect();
+    let blocks = time_blocks(&reduced, &weights, total);
+    let factor = Factor::merge(&blocks.iter().collect::<Vec<_>>());
+    let mut solution = ols(&factor);
+    if solution.kept != kept {
+        let restricted = ols(&factor.select(kept));
+        let names = |of: &[usize]| of.iter().map(|&k| kept[k]).collect::<Vec<_>>();
+        solution = LinearSolution {
+            x: x.clone(),
+            kept: names(&restricted.kept),
+            dropped: (0..total).filter(|c| !names(&restricted.kept).contains(c)).collect(),
+            ..restricted
+        };
+    }
+    solution.x.clone_from(&x);
+    LinearEstimate {
+        method,
+        x,
+        solution,
+        groups,
+        reduced,
+        factor,
+        blocks,
+        passes: 1,
+        converged: true,
+        losses: Vec::new(),
+        prior: None,
+        given_blocks: Vec::new(),
+    }
+}
