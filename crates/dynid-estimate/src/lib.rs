@@ -27,6 +27,7 @@ pub mod elimination;
 pub mod factor;
 pub mod folds;
 pub mod groups;
+pub mod held_out;
 pub mod linear;
 pub mod metrics;
 pub mod rank;

@@ -38,7 +38,7 @@ pub(crate) fn listed<S: AsRef<str>>(names: &[S], most: usize) -> String {
 }
 
 /// The entry of `known` that is closest to `name`, if it is close enough to be a slip of the pen.
-pub(crate) fn closest<'a, S: AsRef<str>>(name: &str, known: &'a [S]) -> Option<&'a str> {
+pub fn closest<'a, S: AsRef<str>>(name: &str, known: &'a [S]) -> Option<&'a str> {
     let most = (name.chars().count() / 3).clamp(1, 3);
     known
         .iter()

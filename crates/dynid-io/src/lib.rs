@@ -16,6 +16,7 @@ pub mod urdf;
 
 pub use columns::{ColumnMapping, GuessOptions, MappingError, MappingSpec, Signals};
 pub use csv::{LogFileError, ReadOptions, Table};
+pub use excerpt::closest;
 pub use output::OutputError;
 pub use robot::{Place, RobotFileError};
 pub use states::{StateJoint, States, StatesError};

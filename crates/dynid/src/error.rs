@@ -109,6 +109,30 @@ pub enum Error {
         /// Joints of the robot.
         known: Vec<String>,
     },
+    /// A link that a bound names is no moving link of the robot.
+    #[error("no moving link is named `{name}`{}, the robot has {}", welded_to.as_ref().map_or_else(String::new, |l| format!(" (it is welded to `{l}`)")), known.join(", "))]
+    UnknownLink {
+        /// The name.
+        name: String,
+        /// The link that it is welded to, if it is.
+        welded_to: Option<String>,
+        /// Moving links of the robot.
+        known: Vec<String>,
+    },
+    /// A parameter that the run names does not exist.
+    #[error("no parameter is named `{name}`{}", meant.as_ref().map_or_else(String::new, |m| format!(", did you mean `{m}`?")))]
+    UnknownParameter {
+        /// The name.
+        name: String,
+        /// A name that looks like it.
+        meant: Option<String>,
+    },
+    /// The linear estimator has no estimate.
+    #[error("estimator: {0}")]
+    Linear(#[from] dynid_estimate::linear::LinearError),
+    /// No physically consistent parameters meet the bounds.
+    #[error("consistent estimate: {0}")]
+    Consistency(#[from] dynid_estimate::consistent::ProblemError),
     /// A configuration file cannot be parsed.
     #[error("{file}{}: {message}", line.map_or_else(String::new, |l| format!(":{l}")))]
     Config {
@@ -180,6 +204,8 @@ impl Error {
     /// What a user can do about it.
     pub fn hint(&self) -> Option<String> {
         use dynid_estimate::conditioning::ConditioningError as C;
+        use dynid_estimate::consistent::ProblemError as P;
+        use dynid_estimate::linear::LinearError as L;
         use dynid_model::MechanismError as M;
         match self {
             Error::RobotFile(e) => e.hint(),
@@ -237,6 +263,18 @@ impl Error {
                 _ => "check that the path is a text file and may be read".to_owned(),
             }),
             Error::TooShort { .. } => Some("record a longer motion".to_owned()),
+            Error::UnknownLink { .. } => {
+                Some("a bound is for a moving link, which stands for everything welded to it".to_owned())
+            }
+            Error::UnknownParameter { .. } => {
+                Some("`dynid inspect ROBOT` lists links and joints; parameters are `<link>.Izz`, `<joint>.fc`".to_owned())
+            }
+            Error::Consistency(P::Contradiction { .. } | P::Infeasible { .. }) => {
+                Some("drop or widen one of the bounds under [[bound]]".to_owned())
+            }
+            Error::Linear(L::Tls(_)) => Some(
+                "use `wls`, or state larger noise only for columns that have it under [estimator] column_noise".to_owned(),
+            ),
             Error::Cutoff { .. } => Some("set a cut-off below half the sample rate".to_owned()),
             _ => None,
         }
