@@ -2,6 +2,8 @@
 
 mod expression;
 
+pub use expression::{linear_combination, significant};
+
 use faer::Mat;
 
 use crate::dynamics::MotionBlock;

@@ -10,43 +10,69 @@ impl BaseParameters {
     pub fn expressions(&self, table: &ParameterTable) -> Vec<String> {
         (0..self.len())
             .map(|i| {
-                let terms = self
+                let kept = (1.0, table.linear[self.kept[i]].symbol.as_str());
+                let folded = self
                     .folded
                     .iter()
                     .zip(&self.factors)
                     .filter(|(_, factors)| factors[i] != 0.0)
                     .map(|(column, factors)| (factors[i], table.linear[*column].symbol.as_str()));
-                expression(&table.linear[self.kept[i]].symbol, terms)
+                linear_combination(std::iter::once(kept).chain(folded), 6, " ")
             })
             .collect()
     }
 }
 
-fn expression<'a>(kept: &str, terms: impl Iterator<Item = (f64, &'a str)>) -> String {
-    let mut groups: Vec<(f64, Vec<&str>)> = Vec::new();
+/// Relative difference up to which numbers are equal.
+const TIE: f64 = 1e-9;
+
+/// A sum of multiples of symbols as people write it: `mx2 + 0.45 (m3 + m4) - mz3`.
+///
+/// `terms`: factor and symbol, none of the factors zero. Factors carry `digits` significant digits at most; terms whose
+/// factors then read alike stand in brackets together. Plain sums come first, then groups in the order met. `times`
+/// stands between a factor and what it multiplies. Empty without terms.
+pub fn linear_combination<'a>(
+    terms: impl Iterator<Item = (f64, &'a str)>,
+    digits: usize,
+    times: &str,
+) -> String {
+    struct Group<'a> {
+        factor: f64,
+        size: String,
+        symbols: Vec<&'a str>,
+    }
+    let mut groups: Vec<Group<'_>> = Vec::new();
     for (factor, symbol) in terms {
-        let same = |g: f64| (g - factor).abs() <= 1e-9 * factor.abs();
-        match groups.iter_mut().find(|(g, _)| same(*g)) {
-            Some((_, symbols)) => symbols.push(symbol),
-            None => groups.push((factor, vec![symbol])),
+        let size = significant(factor.abs(), digits);
+        let alike = |g: &&mut Group<'_>| {
+            (g.factor < 0.0) == (factor < 0.0)
+                && (g.size == size || (g.factor - factor).abs() <= TIE * factor.abs())
+        };
+        match groups.iter_mut().find(alike) {
+            Some(group) => group.symbols.push(symbol),
+            None => groups.push(Group { factor, size, symbols: vec![symbol] }),
         }
     }
-    // Plain sums first, then factors in the order met.
-    groups.sort_by_key(|(factor, _)| (factor.abs() - 1.0).abs() > 1e-9);
-    let mut text = kept.to_owned();
-    for (factor, symbols) in groups {
-        text.push_str(if factor < 0.0 { " - " } else { " + " });
-        let size = factor.abs();
-        let plain = (size - 1.0).abs() <= 1e-9;
+    groups.sort_by_key(|g| g.size != "1");
+    let mut text = String::new();
+    for Group { factor, size, symbols } in groups {
+        let negative = factor < 0.0;
+        let sign = match (negative, text.is_empty()) {
+            (false, true) => "",
+            (true, true) => "-",
+            (false, false) => " + ",
+            (true, false) => " - ",
+        };
+        text.push_str(sign);
+        let plain = size == "1";
         if !plain {
-            text.push_str(&digits(size));
-            text.push(' ');
+            text.push_str(&size);
+            text.push_str(times);
         }
         if symbols.len() == 1 {
             text.push_str(symbols[0]);
         } else if plain {
-            let separator = if factor < 0.0 { " - " } else { " + " };
-            text.push_str(&symbols.join(separator));
+            text.push_str(&symbols.join(if negative { " - " } else { " + " }));
         } else {
             text.push('(');
             text.push_str(&symbols.join(" + "));
@@ -56,13 +82,18 @@ fn expression<'a>(kept: &str, terms: impl Iterator<Item = (f64, &'a str)>) -> St
     text
 }
 
-/// At most six significant digits, without trailing zeros.
-fn digits(x: f64) -> String {
+/// At most `digits` significant digits (whole numbers below a million keep all of theirs), without trailing zeros. Ties
+/// round away from zero, also those that rounding has moved by up to 1e-9: equal lengths shall read alike.
+pub fn significant(x: f64, digits: usize) -> String {
+    let (x, last) = (x * (1.0 + TIE), digits.max(1) - 1);
+    if x == 0.0 {
+        return "0".to_owned();
+    }
     let magnitude = x.abs().log10().floor() as i32;
     if !(-4..6).contains(&magnitude) {
-        return format!("{x:.5e}");
+        return format!("{x:.last$e}");
     }
-    let decimals = (5 - magnitude).max(0) as usize;
+    let decimals = (last as i32 - magnitude).max(0) as usize;
     let text = format!("{x:.decimals$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
@@ -73,18 +104,41 @@ mod tests {
 
     #[test]
     fn groups_equal_factors_and_signs() {
-        let terms =
-            [(1.0, "Ia1"), (1.0, "Iyy2"), (0.2025, "m3"), (0.2025, "m4"), (-0.45, "mz3"), (-1.0, "mz4")];
+        let terms = [
+            (1.0, "Izz1"),
+            (1.0, "Ia1"),
+            (1.0, "Iyy2"),
+            (0.2025, "m3"),
+            (0.2025, "m4"),
+            (-0.45, "mz3"),
+            (-1.0, "mz4"),
+        ];
         assert_eq!(
-            expression("Izz1", terms.into_iter()),
+            linear_combination(terms.into_iter(), 6, " "),
             "Izz1 + Ia1 + Iyy2 - mz4 + 0.2025 (m3 + m4) - 0.45 mz3"
         );
     }
 
     #[test]
+    fn rounding_does_not_split_a_tie() {
+        let (above, below) = (0.1835 * (1.0 + 1e-15), 0.1835 * (1.0 - 1e-15));
+        for terms in [[(above, "m5"), (below, "m6")], [(below, "m5"), (above, "m6")]] {
+            assert_eq!(linear_combination(terms.into_iter(), 3, "·"), "0.184·(m5 + m6)");
+        }
+    }
+
+    #[test]
     fn factors_are_short() {
-        assert_eq!(digits(0.20251225), "0.202512");
-        assert_eq!(digits(12.0), "12");
-        assert_eq!(digits(0.001575), "0.001575");
+        assert_eq!(significant(0.20251225, 6), "0.202512");
+        assert_eq!(significant(12.0, 6), "12");
+        assert_eq!(significant(0.001575, 6), "0.001575");
+        assert_eq!(significant(0.20251225, 3), "0.203");
+    }
+
+    #[test]
+    fn a_sum_may_begin_with_any_sign_and_factor() {
+        let terms = [(-0.45, "m3"), (-0.4502, "m4"), (2.0, "Ia1")];
+        assert_eq!(linear_combination(terms.into_iter(), 3, "·"), "-0.45·(m3 + m4) + 2·Ia1");
+        assert_eq!(linear_combination([].into_iter(), 3, "·"), "");
     }
 }
