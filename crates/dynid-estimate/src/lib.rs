@@ -14,6 +14,8 @@
 //! | held-out error over folds of blocks | [`folds`] |
 //! | which parameters a model can do without | [`elimination`] |
 //! | whether residuals are white | [`whiteness`] |
+//! | which parameters the data determine, and which the prior | [`identifiability`] |
+//! | symmetric matrices made positive definite | [`definite`] |
 //! | how well a prediction matches a measurement | [`metrics`] |
 //!
 //! Notation: `W` is the regressor (rows × `p` columns), `y` the effort, `x` the parameters,
@@ -22,12 +24,14 @@
 pub mod conditioning;
 pub mod consistent;
 pub mod covariance;
+pub mod definite;
 pub mod distribution;
 pub mod elimination;
 pub mod factor;
 pub mod folds;
 pub mod groups;
 pub mod held_out;
+pub mod identifiability;
 pub mod linear;
 pub mod metrics;
 pub mod rank;

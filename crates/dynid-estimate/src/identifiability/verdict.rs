@@ -1,0 +1,102 @@
+//! From shares to words.
+
+/// Least achieved share of what is seen in the data.
+const SEEN: f64 = 0.90;
+/// Least structural limit of what is identifiable at all; also the limit above which nothing but noise is in the way.
+const IDENTIFIABLE: f64 = 0.10;
+/// A gap between structural limit and achieved share that speaks of missing excitation.
+const EXCITATION_GAP: f64 = 0.3;
+
+/// What a value rests on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Verdict {
+    /// The log removes at least 90 % of the prior variance.
+    Seen,
+    /// Neither the one nor the other: the prior decides at least part of the value.
+    CarriedByPrior(Carried),
+    /// No motion of this robot could remove 10 % of the prior variance.
+    NotIdentifiable,
+}
+
+/// Why a value is carried by the prior.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Carried {
+    /// It acts only together with others (structural limit below 0.9): no motion separates them. The log may miss
+    /// excitation besides; see [`Carried::lacks_excitation`].
+    OnlyInCombination,
+    /// Another motion would reveal it, the logged one does not.
+    NotExcited,
+    /// The logged motion would reveal it if there were less noise or more of it.
+    TooNoisy,
+}
+
+impl Carried {
+    /// Whether the logged motion misses most of what some motion could reveal: `p - s ≥ 0.3` and `l < 0.9`.
+    pub fn lacks_excitation(achieved: f64, log_limit: f64, structural_limit: f64) -> bool {
+        structural_limit - achieved >= EXCITATION_GAP && log_limit < SEEN
+    }
+}
+
+/// The verdict from achieved share `s`, limit of the log `l` and structural limit `p`.
+///
+/// Seen if `s ≥ 0.9`; else not identifiable if `p < 0.1`; else carried by the prior: only in combination if `p < 0.9`,
+/// too noisy if `l ≥ 0.9`, not excited otherwise. The last holds the rest where `p - s < 0.3` as well: with `p ≥ 0.9` and
+/// `l < 0.9` it is the motion that keeps the share below 0.9.
+pub fn verdict(achieved: f64, log_limit: f64, structural_limit: f64) -> Verdict {
+    if achieved >= SEEN {
+        Verdict::Seen
+    } else if structural_limit < IDENTIFIABLE {
+        Verdict::NotIdentifiable
+    } else if structural_limit < SEEN {
+        Verdict::CarriedByPrior(Carried::OnlyInCombination)
+    } else if log_limit >= SEEN {
+        Verdict::CarriedByPrior(Carried::TooNoisy)
+    } else {
+        Verdict::CarriedByPrior(Carried::NotExcited)
+    }
+}
+
+impl Verdict {
+    /// `seen in the data`, `carried by the prior` or `not identifiable`.
+    pub fn words(self) -> &'static str {
+        match self {
+            Verdict::Seen => "seen in the data",
+            Verdict::CarriedByPrior(_) => "carried by the prior",
+            Verdict::NotIdentifiable => "not identifiable",
+        }
+    }
+
+    /// `only in combination`, `not excited` or `too noisy`, where the prior carries the value.
+    pub fn reason(self) -> Option<&'static str> {
+        match self {
+            Verdict::CarriedByPrior(Carried::OnlyInCombination) => Some("only in combination"),
+            Verdict::CarriedByPrior(Carried::NotExcited) => Some("not excited"),
+            Verdict::CarriedByPrior(Carried::TooNoisy) => Some("too noisy"),
+            Verdict::Seen | Verdict::NotIdentifiable => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_of_verdicts() {
+        use Carried::*;
+        use Verdict::*;
+        for (s, l, p, expected) in [
+            (0.90, 0.95, 1.0, Seen),
+            (0.8999, 0.8999, 0.8999, CarriedByPrior(OnlyInCombination)),
+            (0.0, 0.0, 0.0999, NotIdentifiable),
+            (0.0, 0.0, 0.1, CarriedByPrior(OnlyInCombination)),
+            (0.5, 0.89, 0.95, CarriedByPrior(NotExcited)),
+            (0.5, 0.90, 0.95, CarriedByPrior(TooNoisy)),
+            (0.8, 0.85, 0.95, CarriedByPrior(NotExcited)),
+        ] {
+            assert_eq!(verdict(s, l, p), expected, "s {s}, l {l}, p {p}");
+        }
+        assert!(Carried::lacks_excitation(0.1, 0.2, 0.5));
+        assert!(!Carried::lacks_excitation(0.3, 0.3, 0.5));
+    }
+}
