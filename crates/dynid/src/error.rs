@@ -22,6 +22,9 @@ pub enum Error {
     /// A log cannot be read.
     #[error(transparent)]
     LogFile(#[from] dynid_io::LogFileError),
+    /// The inertias of a robot file cannot serve as a prior.
+    #[error(transparent)]
+    Prior(#[from] crate::prior::PriorError),
     /// Columns of a log do not fit the robot.
     #[error("{file}: {source}")]
     Columns {
@@ -213,6 +216,9 @@ impl Error {
             Error::Columns { source, .. } => source.hint(),
             Error::States(e) => e.hint(),
             Error::Output(e) => e.hint(),
+            Error::Prior(_) => Some(
+                "correct the mass; a link without an inertia gets a default body as its prior".to_owned(),
+            ),
             Error::Degrees { .. } => Some(
                 "state the unit: `q1[deg]` in the header, or `[columns] position = { columns = \"q{}\", unit = \"deg\" }`"
                     .to_owned(),

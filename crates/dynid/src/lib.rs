@@ -3,6 +3,7 @@
 //! [`identify()`] runs it; [`Estimate`] is what it leaves behind. The rooms below are re-exported as [`model`], [`motion`],
 //! [`estimators`], [`io`] and [`report`].
 
+pub mod advice;
 pub mod agreement;
 pub mod config;
 pub mod elements;
@@ -13,6 +14,7 @@ pub mod identify;
 pub mod inspect;
 pub mod logs;
 pub mod predict;
+pub mod prior;
 mod report_data;
 mod result;
 pub mod robot;

@@ -1,0 +1,196 @@
+//! Rows of a motion, counted as the fit counts those of a log.
+
+use dynid_estimate::{Factor, FactorBuilder};
+use dynid_model::{BaseParameters, EffortModel, MotionBlock, RegressorBlock, RobotModel};
+use dynid_motion::Kernel;
+use dynid_motion::mask::{dilate, near_reversal};
+use dynid_motion::signal::rms;
+
+use super::motions::{Course, Motion, MotionSettings, Reach};
+
+/// Rows are formed at cut-offs up to this, Hz; the motions hold nothing above.
+const MOST_HZ: f64 = 8.0;
+/// Samples per period of the cut-off.
+const OVERSAMPLING: f64 = 16.0;
+/// Share of the rms speed that counts as reversal at least, where an output has dry friction.
+const LEAST_MASK: f64 = 0.03;
+
+/// How the fit counts rows.
+///
+/// A row is the mean of regressor and effort under a kernel of cut-off `f`, a quarter of `1/f` apart; of several kernels
+/// the widest that reaches no masked sample is used. Here rows of cut-offs above 8 Hz are formed at 8 Hz and weigh
+/// `√(f/8)` times as much, the same information since the motions hold nothing above. The variance of a row grows with its
+/// cut-off, `σ_j² f/f_widest`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitRows {
+    /// Cut-offs of the kernels, Hz, widest kernel (lowest cut-off) first; the filter's on the textbook route.
+    pub scales_hz: Vec<f64>,
+    /// Per output: standard deviation of the residual of the widest kernel's rows, N m or N. `None`: no such row, and
+    /// rows of this output do not count in the motions either.
+    pub sigma: Vec<Option<f64>>,
+    /// Per output: reversal mask as a share of the rms speed; `None`: no mask. Outputs with dry friction are masked below
+    /// 3 % even then: in friction at rest no model is to be trusted, so standing still gives no row.
+    pub mask: Vec<Option<f64>>,
+}
+
+/// Reduces motions of one model to factors in its base columns.
+pub(super) struct CandidateRows<'a> {
+    model: &'a RobotModel,
+    rows: &'a FitRows,
+    duration_s: f64,
+    reach: Vec<Reach>,
+    /// Kernels at the cut-offs in use.
+    kernels: Vec<Kernel>,
+    rate_hz: f64,
+    /// Per output: places of the base columns within the acting ones, and their numbers.
+    local: Vec<Vec<usize>>,
+    global: Vec<Vec<usize>>,
+    /// Per output: takes the sign of a speed.
+    dry: Vec<bool>,
+    total: usize,
+}
+
+impl<'a> CandidateRows<'a> {
+    pub(super) fn new(
+        model: &'a RobotModel,
+        base: &BaseParameters,
+        rows: &'a FitRows,
+        settings: &MotionSettings,
+    ) -> Self {
+        let layout = model.layout();
+        assert!(
+            rows.sigma.len() == layout.outputs() && rows.mask.len() == layout.outputs(),
+            "one sigma and one mask per output"
+        );
+        let mut cutoffs: Vec<f64> = rows.scales_hz.iter().map(|f| f.min(MOST_HZ)).collect();
+        cutoffs.dedup();
+        let rate_hz = OVERSAMPLING * cutoffs.iter().copied().fold(0.0, f64::max);
+        let (mut local, mut global) = (Vec::new(), Vec::new());
+        for output in 0..layout.outputs() {
+            let acting = layout.columns(output).iter().enumerate();
+            let kept = acting.filter_map(|(k, column)| Some((k, base.kept.binary_search(column).ok()?)));
+            let (l, g): (Vec<usize>, Vec<usize>) = kept.unzip();
+            local.push(l);
+            global.push(g);
+        }
+        CandidateRows {
+            reach: Reach::of(model.mechanism(), settings),
+            dry: dry_outputs(model),
+            kernels: cutoffs.iter().filter_map(|f| Kernel::new(*f, rate_hz).ok()).collect(),
+            model,
+            rows,
+            duration_s: settings.duration_s,
+            rate_hz,
+            local,
+            global,
+            total: base.len(),
+        }
+    }
+
+    /// Factor of a motion, weighted by `1/σ_j`; `None` without any row.
+    pub(super) fn reduce(&self, motion: &Motion) -> Option<Factor> {
+        let widest = self.kernels.first()?;
+        let samples = (self.duration_s * self.rate_hz).round() as usize;
+        let [q, dq, ddq] = self.signals(motion, samples, widest.cutoff_hz());
+        let block =
+            MotionBlock { samples, stride: samples, q: &q, dq: &dq, ddq: &ddq, gravity: None, channels: &[] };
+        let mut regressor = RegressorBlock::new(self.model.layout().clone(), samples);
+        self.model.regressor(&block, &self.model.parameters().shape_start(), &mut regressor);
+        let factors: Vec<Factor> =
+            (0..self.local.len()).filter_map(|output| self.output_rows(output, &block, &regressor)).collect();
+        (!factors.is_empty()).then(|| Factor::merge(&factors.iter().collect::<Vec<_>>()))
+    }
+
+    fn output_rows(
+        &self,
+        output: usize,
+        motion: &MotionBlock<'_>,
+        regressor: &RegressorBlock,
+    ) -> Option<Factor> {
+        let sigma = self.rows.sigma[output].filter(|s| s.is_finite() && *s > 0.0)?;
+        let bad = self.masked(output, motion);
+        let local = &self.local[output];
+        let mut builder = FactorBuilder::with_chunk_rows(local.len(), 256);
+        let mut taken = vec![false; motion.samples];
+        for kernel in &self.kernels {
+            let touched = dilate(&bad, kernel.half_width());
+            let centres: Vec<usize> =
+                kernel.centres(motion.samples).into_iter().filter(|c| !touched[*c] && !taken[*c]).collect();
+            // Variance per row σ² f/f_widest, and f/f_row rows for each one formed.
+            let weight = (self.rows.scales_hz[0] / kernel.cutoff_hz()).sqrt() / sigma;
+            let filled = builder.push_with(centres.len(), |column, range, out| match local.get(column) {
+                Some(k) => {
+                    kernel.apply_block(regressor.column(output, *k), 0, &centres[range], out);
+                    out.iter_mut().for_each(|x| *x *= weight);
+                }
+                None => out.fill(0.0),
+            });
+            filled.ok()?;
+            for (c, taken) in taken.iter_mut().enumerate() {
+                let inside = c >= kernel.half_width() && c + kernel.half_width() < motion.samples;
+                *taken |= inside && !touched[c];
+            }
+        }
+        (builder.rows() > 0).then(|| builder.finish().embed(self.total, &self.global[output]))
+    }
+
+    /// Samples of an output that are too near to a reversal.
+    fn masked(&self, output: usize, motion: &MotionBlock<'_>) -> Vec<bool> {
+        let mut bad = vec![false; motion.samples];
+        let level = match self.rows.mask[output] {
+            _ if self.dry[output] => self.rows.mask[output].unwrap_or(0.0).max(LEAST_MASK),
+            Some(level) => level,
+            None => return bad,
+        };
+        for speed in self.model.reversal_speeds(output) {
+            let mut v = vec![0.0; motion.samples];
+            for (rate, factor) in &speed {
+                v.iter_mut().zip(motion.rate(*rate)).for_each(|(v, x)| *v += factor * x);
+            }
+            let threshold = level * rms(&v);
+            let rests = self.dry[output];
+            for ((b, near), v) in bad.iter_mut().zip(near_reversal(&v, threshold)).zip(&v) {
+                *b |= near || (rests && *v == 0.0);
+            }
+        }
+        bad
+    }
+
+    fn signals(&self, motion: &Motion, samples: usize, cutoff_hz: f64) -> [Vec<f64>; 3] {
+        let mut signals = [const { Vec::new() }; 3];
+        for (rate, reach) in self.reach.iter().enumerate() {
+            let course = match motion.rates.iter().position(|r| *r == rate) {
+                Some(member) => Course::new(motion.kind, reach, member, cutoff_hz),
+                None => Course::rest(reach),
+            };
+            for s in 0..samples {
+                let point = course.at(s as f64 / self.rate_hz);
+                signals[0].push(point.position);
+                signals[1].push(point.velocity);
+                signals[2].push(point.acceleration);
+            }
+        }
+        signals
+    }
+}
+
+/// Outputs whose effort jumps when all speeds change their sign.
+fn dry_outputs(model: &RobotModel) -> Vec<bool> {
+    const CREEP: f64 = 1e-9;
+    let n = model.mechanism().rates();
+    // Two samples: creeping forward and backward.
+    let dq: Vec<f64> = (0..n).flat_map(|_| [CREEP, -CREEP]).collect();
+    let zero = vec![0.0; 2 * n];
+    let block =
+        MotionBlock { samples: 2, stride: 2, q: &zero, dq: &dq, ddq: &zero, gravity: None, channels: &[] };
+    let mut regressor = RegressorBlock::new(model.layout().clone(), 2);
+    model.regressor(&block, &model.parameters().shape_start(), &mut regressor);
+    (0..n)
+        .map(|output| {
+            (0..model.layout().columns(output).len()).any(|k| {
+                let column = regressor.column(output, k);
+                (column[0] - column[1]).abs() > 1e-3
+            })
+        })
+        .collect()
+}

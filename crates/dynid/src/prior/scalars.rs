@@ -1,0 +1,162 @@
+//! Prior standard deviations of element parameters, by what their columns do.
+
+use dynid_model::{Dynamics, EffortModel, MotionBlock, RandomMotion, RegressorBlock, RobotModel, State};
+
+/// Random states behind the figures.
+const STATES: usize = 64;
+const SEED: u64 = 1;
+/// Share of the effort that friction, an offset or a ripple may have.
+const EFFORT_SHARE: f64 = 0.1;
+/// Share of the mass matrix that a rotor may have.
+const ROTOR_SHARE: f64 = 0.2;
+/// Effort limits count up to this multiple of the logged effort.
+const LIMIT_OF_LOGGED: f64 = 10.0;
+
+/// Speed limit of a joint for priors and motions: as stated, at most 4π rad/s (2 m/s); 2 rad/s (0.5 m/s) by default.
+pub(crate) fn speed_limit(slides: bool, stated: Option<f64>) -> f64 {
+    let (default, most) = if slides { (0.5, 2.0) } else { (2.0, 4.0 * std::f64::consts::PI) };
+    stated.filter(|v| v.is_finite() && *v > 0.0).map_or(default, |v| v.min(most))
+}
+
+/// Standard deviations of the parameters behind the links'. `inertias`: ten prior values per body.
+pub(super) fn standard_deviations(
+    model: &RobotModel,
+    inertias: &[f64],
+    stated: &[Option<f64>],
+    logged: &[f64],
+) -> Vec<f64> {
+    let table = &model.parameters().linear;
+    if table.len() == inertias.len() {
+        return Vec::new();
+    }
+    let probe = Probe::new(model, inertias);
+    let efforts: Vec<f64> = (0..logged.len()).map(|j| probe.effort(model, j, logged[j])).collect();
+    (inertias.len()..table.len())
+        .map(|column| {
+            let known = stated[column].unwrap_or(0.0).abs();
+            if let (Some(low), Some(high)) = (table[column].lower, table[column].upper)
+                && high > low
+            {
+                return (high - low) / 3.0;
+            }
+            let inertial = probe.least(column, &probe.accelerated, &probe.mass);
+            if let Some(mass) = inertial {
+                return known.max(ROTOR_SHARE * mass);
+            }
+            let largest = probe.least(column, &probe.moving, &efforts).unwrap_or(1.0);
+            (0.5 * known).max(EFFORT_SHARE * largest)
+        })
+        .collect()
+}
+
+/// What random states say about a model.
+struct Probe {
+    /// Per output and parameter: largest entry of the column at unit accelerations, at rest entries taken away.
+    accelerated: Vec<Vec<f64>>,
+    /// Per output and parameter: largest entry of the column at the velocity limits.
+    moving: Vec<Vec<f64>>,
+    /// Per rate: mean diagonal entry of the mass matrix of the prior bodies.
+    mass: Vec<f64>,
+    /// Per rate: largest effort of the prior bodies.
+    rigid: Vec<f64>,
+}
+
+impl Probe {
+    fn new(model: &RobotModel, inertias: &[f64]) -> Self {
+        let mechanism = model.mechanism();
+        let owners = mechanism.rate_bodies();
+        let limits: Vec<f64> = model
+            .joints()
+            .iter()
+            .zip(&owners)
+            .map(|(joint, body)| speed_limit(joint.slides, mechanism.bodies()[*body].joint.limits.velocity))
+            .collect();
+        // Channels are currents: one ampere.
+        let one = vec![1.0; STATES];
+        let channels: Vec<(&str, &[f64])> =
+            model.channels().iter().map(|c| (c.as_str(), one.as_slice())).collect();
+        RandomMotion::new(mechanism, &[], STATES, SEED).with_block(|motion| {
+            let zero = vec![0.0; motion.dq.len()];
+            let sign = |x: &f64| if *x < 0.0 { -1.0 } else { 1.0 };
+            let unit: Vec<f64> = motion.ddq.iter().map(sign).collect();
+            let fast: Vec<f64> =
+                motion.dq.iter().enumerate().map(|(k, x)| sign(x) * limits[k / motion.stride]).collect();
+            let columns = |dq: &[f64], ddq: &[f64]| -> RegressorBlock {
+                let mut block = RegressorBlock::new(model.layout().clone(), STATES);
+                let motion = MotionBlock { dq, ddq, channels: &channels, ..*motion };
+                model.regressor(&motion, &model.parameters().shape_start(), &mut block);
+                block
+            };
+            let (rest, accelerated) = (columns(&zero, &zero), columns(&zero, &unit));
+            let moving = columns(&fast, &zero);
+            let (mass, rigid) = rigid_bodies(model, motion, inertias);
+            Probe {
+                accelerated: largest(model, |output, k, s| {
+                    accelerated.column(output, k)[s] - rest.column(output, k)[s]
+                }),
+                moving: largest(model, |output, k, s| moving.column(output, k)[s]),
+                mass,
+                rigid,
+            }
+        })
+    }
+
+    /// `min_j scale_j / c_j` over the outputs on which a column acts.
+    fn least(&self, column: usize, entries: &[Vec<f64>], scale: &[f64]) -> Option<f64> {
+        let ratios = entries.iter().zip(scale).filter(|(e, _)| e[column] > 0.0).map(|(e, s)| s / e[column]);
+        ratios.reduce(f64::min)
+    }
+
+    /// Size of the effort of an output, N m or N; positive.
+    fn effort(&self, model: &RobotModel, output: usize, logged: f64) -> f64 {
+        let mechanism = model.mechanism();
+        let owner = mechanism.rate_bodies()[output];
+        let positive = |x: &f64| x.is_finite() && *x > 0.0;
+        let limit = mechanism.bodies()[owner].joint.limits.effort.filter(positive);
+        let logged = Some(logged).filter(positive);
+        let effort = match (limit, logged) {
+            (Some(limit), Some(logged)) => limit.min(LIMIT_OF_LOGGED * logged),
+            (Some(limit), None) => limit,
+            (None, Some(logged)) => logged,
+            (None, None) => self.rigid[output],
+        };
+        if positive(&effort) { effort } else { 1.0 }
+    }
+}
+
+/// Per output and parameter the largest size over the states of an entry `(output, place, state)`.
+fn largest(model: &RobotModel, entry: impl Fn(usize, usize, usize) -> f64) -> Vec<Vec<f64>> {
+    let layout = model.layout();
+    (0..layout.outputs())
+        .map(|output| {
+            let mut sizes = vec![0.0; layout.parameters()];
+            for (k, column) in layout.columns(output).iter().enumerate() {
+                sizes[*column] = (0..STATES).map(|s| entry(output, k, s).abs()).fold(0.0, f64::max);
+            }
+            sizes
+        })
+        .collect()
+}
+
+/// Mean diagonal of the mass matrix, and largest efforts over the states.
+fn rigid_bodies(model: &RobotModel, motion: &MotionBlock<'_>, inertias: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let dynamics = Dynamics::new(model.mechanism());
+    let mut work = dynamics.workspace::<f64>();
+    let n = dynamics.rates();
+    let (mut mass, mut rigid) = (vec![0.0; n], vec![0.0_f64; n]);
+    let mut effort = vec![0.0; n];
+    let at = |signal: &[f64], s: usize| -> Vec<f64> {
+        signal.chunks(motion.stride).map(|channel| channel[s]).collect()
+    };
+    for s in 0..motion.samples {
+        let (q, dq, ddq) = (at(motion.q, s), at(motion.dq, s), at(motion.ddq, s));
+        let matrix = dynamics.mass_matrix(&q, inertias, &mut work);
+        let state = State { q: &q, dq: &dq, ddq: &ddq, gravity: None };
+        dynamics.inverse_dynamics(&state, inertias, &mut work, &mut effort);
+        for j in 0..n {
+            mass[j] += matrix[j * n + j] / motion.samples as f64;
+            rigid[j] = rigid[j].max(effort[j].abs());
+        }
+    }
+    (mass, rigid)
+}
