@@ -161,6 +161,13 @@ fn what_never_moves_is_never_seen_whatever_the_prior() {
     );
 }
 
+#[test]
+fn a_model_in_which_nothing_acts_has_verdicts_all_the_same() {
+    let found = assess(&Factor::empty(0), 1.0, &Mat::zeros(0, 2), &[1.0, 2.0]);
+    assert!(found.base.is_empty() && found.excited == 0);
+    assert!(found.parameters.iter().all(|a| a.verdict == Verdict::NotIdentifiable && a.hidden == 1.0));
+}
+
 /// Two columns that the motion ties together: their difference is rounding, and however wide the prior and however good
 /// the data, neither is seen.
 #[test]

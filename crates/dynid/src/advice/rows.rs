@@ -194,3 +194,77 @@ fn dry_outputs(model: &RobotModel) -> Vec<bool> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use dynid_model::element::{Coulomb, JointElement, Offset};
+    use dynid_model::{
+        BaseSettings, Description, Inertia, JointDescription, JointKind, Limits, LinkDescription, Placement,
+    };
+
+    use super::*;
+    use crate::advice::MotionKind;
+
+    fn pendulum(elements: Vec<Box<dyn JointElement>>) -> RobotModel {
+        let mut d = Description::new("pendulum");
+        d.gravity = [0.0, -9.81, 0.0];
+        let inertia = Inertia([1.0, 0.3, 0.0, 0.0, 0.1, 0.0, 0.0, 0.1, 0.0, 0.1]);
+        d.links.push(LinkDescription { name: "base".into(), inertia: None });
+        d.links.push(LinkDescription { name: "arm".into(), inertia: Some(inertia) });
+        d.joints.push(JointDescription {
+            name: "j".into(),
+            parent: "base".into(),
+            child: "arm".into(),
+            kind: JointKind::Revolute,
+            placement: Placement::identity(),
+            axis: [0.0, 0.0, 1.0],
+            limits: Limits::default(),
+            mimic: None,
+        });
+        RobotModel::new(d.build().unwrap(), elements)
+    }
+
+    /// Information `Σ w²` on a constant effort.
+    fn offset_information(model: &RobotModel, scales_hz: &[f64], motion: &Motion) -> Option<f64> {
+        let base = BaseParameters::of(model, model.mechanism(), &[], &BaseSettings::default());
+        let rows = FitRows { scales_hz: scales_hz.to_vec(), sigma: vec![Some(0.5)], mask: vec![None] };
+        let reduction = CandidateRows::new(model, &base, &rows, &MotionSettings::default());
+        let offset = model.parameters().column("j.fo").unwrap();
+        let place = base.kept.binary_search(&offset).unwrap();
+        Some(reduction.reduce(motion)?.column_norms()[place].powi(2))
+    }
+
+    /// `4 f` rows a second of variance σ², over the time in which a whole kernel fits, also where `f` is above what rows
+    /// are formed at.
+    #[test]
+    fn rows_count_as_in_a_fit() {
+        let model = pendulum(vec![Box::new(Offset { rate: 0 })]);
+        let slow = Motion { kind: MotionKind::Slow, rates: vec![0] };
+        for hz in [2.0, 5.0, 8.0, 20.0] {
+            let formed = f64::min(hz, MOST_HZ);
+            let kernel = Kernel::new(formed, OVERSAMPLING * formed).unwrap();
+            let whole = 10.0 - (2 * kernel.half_width() + 1) as f64 / (OVERSAMPLING * formed);
+            let expected = 4.0 * hz * whole / 0.25;
+            let found = offset_information(&model, &[hz], &slow).unwrap();
+            // One row more or less of 4·10·formed.
+            assert!(
+                (found / expected - 1.0).abs() < 1.0 / (40.0 * formed - 40.0),
+                "{hz}: {found} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn dry_friction_at_rest_gives_no_rows() {
+        let rest = Motion { kind: MotionKind::Slow, rates: vec![] };
+        let dry = pendulum(vec![Box::new(Offset { rate: 0 }), Box::new(Coulomb { rate: 0 })]);
+        assert_eq!(offset_information(&dry, &[5.0], &rest), None);
+        let smooth = pendulum(vec![Box::new(Offset { rate: 0 })]);
+        assert!(offset_information(&smooth, &[5.0], &rest).is_some());
+        // Narrower kernels add rows between reversals where the widest reaches one.
+        let fast = Motion { kind: MotionKind::Fast, rates: vec![0] };
+        let wide = offset_information(&dry, &[1.0], &fast);
+        let both = offset_information(&dry, &[1.0, 4.0], &fast);
+        assert!(both > wide, "{both:?} against {wide:?}");
+    }
+}
