@@ -28,7 +28,7 @@ impl Identification {
             }
         }
         let value = |joint: &str, symbol: &str| {
-            self.model.parameters().column(&format!("{joint}.{symbol}")).map(|c| self.values[c])
+            self.model.parameters().column(&format!("{joint}.{symbol}")).map(|c| self.values()[c])
         };
         let joints: Vec<JointDynamics> = mechanism
             .bodies()

@@ -4,18 +4,22 @@ use std::path::Path;
 
 use dynid_estimate::conditioning::{
     Conditioning, ConditioningSettings, PreparedLog, ReducedGroup, Stage, condition, predict, prepare,
-    reduce, reduce_textbook,
 };
-use dynid_estimate::covariance::{MIN_BLOCKS, jackknife, weighted_blocks};
-use dynid_estimate::linear::{WlsEstimate, WlsSettings, wls};
-use dynid_estimate::{Factor, Mat};
+use dynid_estimate::identifiability::VisibleSpace;
+use dynid_estimate::linear::LinearEstimate;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
 
 use crate::Error;
+use crate::advice::{self, FitRows};
 use crate::agreement::{self, Agreement};
-use crate::config::{Config, LogConfig, Method, Route};
+use crate::config::{Config, LogConfig, Route};
+use crate::consistency::{self, Consistent};
 use crate::elements::ElementPlan;
+use crate::estimate::LogFit;
+use crate::fitting::{self, Fitted};
 use crate::logs::{self, LoadedLog};
+use crate::prior::{self, Prior};
+use crate::trust::{Evidence, Trust};
 use crate::robot::{Robot, RobotOptions};
 
 /// What is being worked on, for progress displays.
@@ -27,10 +31,12 @@ pub enum Step {
     Structure,
     /// A step of the conditioning.
     Conditioning(Stage),
-    /// Final fit.
+    /// Final fit with its covariance.
     Fit,
-    /// Covariance.
-    Covariance,
+    /// Physically consistent standard parameters.
+    Consistency,
+    /// Verdicts and motions that would help.
+    Trust,
     /// Predicting a log.
     Validate(String),
 }
@@ -52,16 +58,14 @@ pub struct Identification {
     pub columns: Vec<Vec<(String, String)>>,
     /// Choices of the compact route; `None` on the textbook route.
     pub conditioning: Option<Conditioning>,
-    /// Weighted (or ordinary) least squares in the base columns.
-    pub fit: WlsEstimate,
-    /// Covariance for white residuals, of the kept columns of the fit.
-    pub white: Mat<f64>,
-    /// Jackknife covariance over time blocks, if there are enough of them.
-    pub jackknife: Option<Mat<f64>>,
-    /// Number of time blocks.
-    pub blocks: usize,
-    /// All linear parameters: base values as identified, split as near as possible to the robot file.
-    pub values: Vec<f64>,
+    /// What is known about the parameters without logs.
+    pub prior: Prior,
+    /// The fit in the base columns.
+    pub fitted: Fitted,
+    /// Standard parameters, physically consistent unless told otherwise.
+    pub consistent: Consistent,
+    /// How far each parameter can be trusted.
+    pub trust: Trust,
     /// Values stated by robot file, in parameter order.
     pub stated: Vec<Option<f64>>,
     /// Per joint: residual of the widest kernel against what sensor noise explains.
@@ -82,6 +86,8 @@ pub struct Identification {
     pub training: Vec<Agreement>,
     /// Agreement on the validation logs.
     pub validation: Vec<Agreement>,
+    /// Figures of the unconstrained parameters on the validation logs, where a constraint changed them.
+    pub validation_unconstrained: Vec<LogFit>,
     /// Warnings, in words.
     pub warnings: Vec<String>,
     /// Settings of the conditioning.
@@ -129,53 +135,23 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         return Err(Error::Unsupported("no parameter of this robot acts on any effort".to_owned()));
     }
 
-    let (conditioning, groups) = match config.conditioning.route {
-        Route::Compact => {
-            let found = condition(&model, &[], &base.kept, &prepared, &settings, |stage| {
-                progress(Step::Conditioning(stage));
-            })?;
-            progress(Step::Fit);
-            let groups = reduce(&model, &[], &base.kept, &prepared, &found, &settings)?;
-            (Some(found), groups)
-        }
-        Route::Textbook => {
-            progress(Step::Fit);
-            let route = config.textbook_route();
-            (None, reduce_textbook(&model, &[], &base.kept, &prepared, &route, &settings)?)
-        }
-    };
-    let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
-    if rows <= base.len() {
-        return Err(Error::TooShort {
-            file: config.log[0].path.display().to_string(),
-            message: format!(
-                "{rows} usable rows for {} parameters, expected more rows than parameters",
-                base.len()
-            ),
-        });
-    }
-    let fit = fit(config.estimator.method, &groups, base.len());
-
-    progress(Step::Covariance);
-    let white = fit.solution.unit_covariance();
-    let blocks = time_blocks(&groups, &fit, base.len());
-    let jackknife = (blocks.len() >= MIN_BLOCKS)
-        .then(|| {
-            let kept: Vec<f64> = fit.solution.kept.iter().map(|c| fit.solution.x[*c]).collect();
-            jackknife(&blocks, &kept)
-        })
-        .flatten()
-        .map(|j| j.covariance);
-
     let stated = stated_values(&model, &plan);
-    let prior: Vec<f64> = stated.iter().map(|v| v.unwrap_or(0.0)).collect();
-    // Base parameters that the logs do not excite keep the robot file's value.
-    let mut beta = base.values(&prior);
-    for c in &fit.solution.kept {
-        beta[*c] = fit.solution.x[*c];
-    }
-    let values = base.nearest(&beta, &prior, &parameter_scales(&model));
+    let prior = prior::of(&model, &stated, &effort_sizes(&prepared), &config.robot.display().to_string())?;
+    let regrouping = advice::regrouping(&base);
+    let space = VisibleSpace::new(&regrouping, &prior.std);
 
+    let conditioning = match config.conditioning.route {
+        Route::Compact => Some(condition(&model, &[], &base.kept, &prepared, &settings, |stage| {
+            progress(Step::Conditioning(stage));
+        })?),
+        Route::Textbook => None,
+    };
+    progress(Step::Fit);
+    let source = fitting::rows(config, &model, &base.kept, &prepared, conditioning.as_ref(), &settings)?;
+    let (fitted, groups) = fitting::fit(config, &model, &base, &prior, &space, &*source)?;
+    drop(source);
+    progress(Step::Consistency);
+    let consistent = consistency::consistent(config, &model, &base, &regrouping, &prior, &fitted, &groups)?;
     let (state_hz, kernel_hz, delay_samples) = match &conditioning {
         Some(c) => (c.state_hz.iter().copied().fold(f64::INFINITY, f64::min), c.kernel_hz, c.delay.samples),
         None => {
@@ -183,20 +159,33 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
             (cutoff, cutoff, 0.0)
         }
     };
-    let row_rms = row_rms(&groups, &fit.solution.x, base.len());
-    let residual_ratio = residual_ratios(&groups, &fit, &prepared, kernel_hz);
+    progress(Step::Trust);
+    let trust = Evidence {
+        model: &model,
+        base: &base,
+        regrouping: &regrouping,
+        space: &space,
+        prior: &prior,
+        fitted: &fitted,
+        consistent: &consistent,
+        rows: &fit_rows(&fitted.estimate, conditioning.as_ref(), kernel_hz),
+    }
+    .trust();
+    let row_rms = row_rms(&groups, &fitted.estimate.x, base.len());
+    let residual_ratio = residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
     let mut warnings = robot.warnings.clone();
+    warnings.extend(prior.warnings.iter().cloned());
     warnings.extend(log_warnings(&model, &prepared));
+    let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
     let mut out = Identification {
         plan,
         base,
         columns: loaded.into_iter().map(|l| l.columns).collect(),
         conditioning,
-        fit,
-        white,
-        jackknife,
-        blocks: blocks.len(),
-        values,
+        prior,
+        fitted,
+        consistent,
+        trust,
         stated,
         residual_ratio,
         rows,
@@ -207,6 +196,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         delay_rate_hz: prepared[0].rate_hz,
         training: Vec::new(),
         validation: Vec::new(),
+        validation_unconstrained: Vec::new(),
         warnings,
         settings,
         logs: Vec::new(),
@@ -215,27 +205,46 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     };
     for log in &prepared {
         progress(Step::Validate(log.name.clone()));
-        out.training.push(out.agreement(log)?);
+        out.training.push(out.agreement(out.values(), log)?);
     }
     out.logs = prepared;
     for log in &config.validation {
         progress(Step::Validate(log.path.display().to_string()));
         let loaded = logs::load(log, &out.robot.mechanism, &config.columns, config.motor_side.as_ref())?;
         let prepared = prepare(&loaded.log, &out.model, &out.settings)?;
-        out.validation.push(out.agreement(&prepared)?);
+        out.validation.push(out.agreement(out.values(), &prepared)?);
+        if out.consistent.constrained() {
+            let unconstrained = out.agreement(&out.consistent.unconstrained, &prepared)?;
+            out.validation_unconstrained.push(crate::result::log_fit(&unconstrained));
+        }
     }
     Ok(out)
 }
 
 impl Identification {
-    /// Predicts a log and compares.
+    /// Standard parameters to use, in column order.
+    pub fn values(&self) -> &[f64] {
+        &self.consistent.values
+    }
+
+    /// The linear fit in base columns.
+    pub fn fit(&self) -> &LinearEstimate {
+        &self.fitted.estimate
+    }
+
+    /// Number of time blocks behind the standard deviations.
+    pub fn blocks(&self) -> usize {
+        self.fitted.estimate.blocks.len()
+    }
+
+    /// Predicts a log by given standard parameters and compares.
     ///
     /// # Errors
     /// [`Error::Conditioning`].
-    pub fn agreement(&self, log: &PreparedLog) -> Result<Agreement, Error> {
+    pub fn agreement(&self, values: &[f64], log: &PreparedLog) -> Result<Agreement, Error> {
         agreement::compare(
             &self.model,
-            &self.values,
+            values,
             log,
             &agreement::Alignment {
                 state_hz: self.state_hz,
@@ -252,15 +261,15 @@ impl Identification {
     /// # Errors
     /// [`Error::Conditioning`].
     pub fn predict(&self, log: &PreparedLog) -> Result<Vec<Vec<f64>>, Error> {
-        Ok(predict(&self.model, &[], &self.values, log, self.state_hz, self.delay_samples, &self.settings)?)
+        Ok(predict(&self.model, &[], self.values(), log, self.state_hz, self.delay_samples, &self.settings)?)
     }
 
     /// Standard deviations of all base parameters: reported and white; `None` where a column was dropped.
     pub fn standard_deviations(&self) -> Vec<(Option<f64>, Option<f64>)> {
         let mut out = vec![(None, None); self.base.len()];
-        for (k, c) in self.fit.solution.kept.iter().enumerate() {
-            let white = self.white[(k, k)].max(0.0).sqrt();
-            let reported = self.jackknife.as_ref().map_or(white, |v| v[(k, k)].max(0.0).sqrt());
+        for (k, c) in self.fit().solution.kept.iter().enumerate() {
+            let white = self.fitted.white[(k, k)].max(0.0).sqrt();
+            let reported = self.fitted.covariance()[(k, k)].max(0.0).sqrt();
             out[*c] = (Some(reported), Some(white));
         }
         out
@@ -328,33 +337,6 @@ fn preferred_columns(config: &Config, model: &RobotModel) -> Result<Vec<usize>, 
         .collect()
 }
 
-fn fit(method: Method, groups: &[ReducedGroup], columns: usize) -> WlsEstimate {
-    let factors: Vec<Factor> = groups.iter().map(|g| g.merged(columns)).collect();
-    match method {
-        Method::Wls => wls(&factors, &WlsSettings::default()),
-        // One group: one variance for all rows.
-        Method::Ols => wls(&[Factor::merge(&factors.iter().collect::<Vec<_>>())], &WlsSettings::default()),
-    }
-}
-
-/// Weighted factors of the time blocks of all logs, all joints of a block merged.
-fn time_blocks(groups: &[ReducedGroup], fit: &WlsEstimate, columns: usize) -> Vec<Factor> {
-    let logs = groups.iter().map(|g| g.log + 1).max().unwrap_or(0);
-    let mut out = Vec::new();
-    for log in 0..logs {
-        let (mut factors, mut variances) = (Vec::new(), Vec::new());
-        for (k, group) in groups.iter().enumerate().filter(|(_, g)| g.log == log) {
-            // A single variance belongs to all groups alike.
-            variances.push(fit.groups[if fit.groups.len() == 1 { 0 } else { k }].variance);
-            factors.push(group.blocks.iter().map(|b| b.embed(columns, &group.columns)).collect::<Vec<_>>());
-        }
-        out.extend(
-            weighted_blocks(&factors, &variances, &fit.solution.kept).into_iter().filter(|b| b.rows() > 0),
-        );
-    }
-    out
-}
-
 /// What the robot file states: link inertias, element values.
 fn stated_values(model: &RobotModel, plan: &ElementPlan) -> Vec<Option<f64>> {
     let table = model.parameters();
@@ -367,41 +349,36 @@ fn stated_values(model: &RobotModel, plan: &ElementPlan) -> Vec<Option<f64>> {
     stated
 }
 
-/// By how much a parameter may differ from the robot file: half the mass, and the moments that this mass has at the
-/// size of the link (spec/estimation.md section 6).
-fn parameter_scales(model: &RobotModel) -> Vec<f64> {
-    let mechanism = model.mechanism();
-    let masses: Vec<f64> = mechanism.bodies().iter().map(|b| b.inertia.mass().max(0.0)).collect();
-    let mean = masses.iter().sum::<f64>() / masses.len().max(1) as f64;
-    let mean = if mean > 0.0 { mean } else { 5.0 };
-    let mut scales = Vec::with_capacity(model.parameters().linear.len());
-    let mut of_body = Vec::new();
-    for (b, body) in mechanism.bodies().iter().enumerate() {
-        let reach = mechanism
-            .bodies()
-            .iter()
-            .filter(|child| child.parent == Some(b))
-            .map(|child| child.joint.placement.translation.norm())
-            .fold(0.05, f64::max);
-        let com = body.inertia.about_com().map_or(0.0, |(c, _)| c.norm());
-        let size = reach.max(com);
-        let mass = if masses[b] > 0.0 { masses[b] } else { 0.1 * mean };
-        of_body.push(0.5 * mass * size * size);
-        scales.push(0.5 * mass);
-        scales.extend([0.5 * mass * size; 3]);
-        scales.extend([0.5 * mass * size * size; 6]);
+/// Per output, the effort that 99 % of the samples of all logs stay below.
+fn effort_sizes(logs: &[PreparedLog]) -> Vec<f64> {
+    let outputs = logs.first().map_or(0, |l| l.effort.len());
+    (0..outputs)
+        .map(|j| {
+            let mut sizes: Vec<f64> = logs.iter().flat_map(|l| l.effort[j].iter().map(|e| e.abs())).collect();
+            let last = sizes.len().saturating_sub(1);
+            if sizes.is_empty() {
+                return 0.0;
+            }
+            *sizes.select_nth_unstable_by(last * 99 / 100, f64::total_cmp).1
+        })
+        .collect()
+}
+
+/// How the fit counts rows, for motions that are proposed.
+fn fit_rows(fit: &LinearEstimate, conditioning: Option<&Conditioning>, kernel_hz: f64) -> FitRows {
+    let outputs = fit.groups.iter().map(|g| g.output + 1).max().unwrap_or(0);
+    let sigma = (0..outputs)
+        .map(|output| {
+            // Of several logs the noisiest decides.
+            let own = fit.groups.iter().filter(|g| g.output == output && g.scale == 0 && g.rows > 0);
+            own.map(|g| g.variance.sqrt()).reduce(f64::max)
+        })
+        .collect();
+    FitRows {
+        scales_hz: conditioning.map_or_else(|| vec![kernel_hz], |c| c.scales_hz.clone()),
+        mask: conditioning.map_or_else(|| vec![None; outputs], |c| c.mask.clone()),
+        sigma,
     }
-    let owners = mechanism.rate_bodies();
-    for parameter in &model.parameters().linear[scales.len()..] {
-        let body = model
-            .joints()
-            .iter()
-            .position(|j| matches!(&parameter.owner, dynid_model::Owner::Joint(n) if *n == j.name))
-            .map_or(0, |rate| owners[rate]);
-        // Only rotor inertias share a base parameter with links; the scale of the others has no effect.
-        scales.push(of_body[body].max(1e-3));
-    }
-    scales
 }
 
 fn row_rms(groups: &[ReducedGroup], x: &[f64], columns: usize) -> Vec<Option<f64>> {
@@ -420,7 +397,7 @@ fn row_rms(groups: &[ReducedGroup], x: &[f64], columns: usize) -> Vec<Option<f64
 
 fn residual_ratios(
     groups: &[ReducedGroup],
-    fit: &WlsEstimate,
+    fit: &LinearEstimate,
     logs: &[PreparedLog],
     kernel_hz: f64,
 ) -> Vec<Option<f64>> {

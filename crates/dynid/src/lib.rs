@@ -5,11 +5,14 @@
 
 pub mod advice;
 pub mod agreement;
+pub mod bounds;
 pub mod config;
+pub mod consistency;
 pub mod elements;
 mod error;
 pub mod estimate;
 mod export;
+pub mod fitting;
 pub mod identify;
 pub mod inspect;
 pub mod logs;
@@ -19,6 +22,7 @@ mod report_data;
 mod result;
 pub mod robot;
 pub mod simulate;
+pub mod trust;
 pub mod validate;
 pub mod verdict;
 

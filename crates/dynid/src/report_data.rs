@@ -73,18 +73,18 @@ impl Identification {
                     },
                     "",
                 ),
-                Fact::new("passes", self.fit.passes, ""),
-                Fact::new("converged", self.fit.converged, ""),
+                Fact::new("passes", self.fit().passes, ""),
+                Fact::new("converged", self.fit().converged, ""),
                 Fact::new(
                     "standard deviations",
-                    if self.jackknife.is_some() {
+                    if self.fitted.jackknife.is_some() {
                         "jackknife over time blocks"
                     } else {
                         "white residuals (too few time blocks for a jackknife)"
                     },
                     "",
                 ),
-                Fact::new("time blocks", self.blocks, ""),
+                Fact::new("time blocks", self.blocks(), ""),
                 Fact::new("every identified body physical", estimate.feasible, ""),
             ],
             base_parameters: estimate
@@ -122,7 +122,7 @@ impl Identification {
                 columns: Some(estimate.base_parameters.len() as u64),
                 rank: Some(estimate.rank.excited as u64),
                 structural_rank: Some(estimate.rank.structural as u64),
-                rank_tolerance: Some(self.fit.solution.rank.tolerance),
+                rank_tolerance: Some(self.fit().solution.rank.tolerance),
                 condition_number: estimate.condition_number,
                 condition_number_scaled: estimate.condition_number_scaled,
             },

@@ -20,7 +20,7 @@ impl Identification {
     /// # Errors
     /// [`Error::Read`] if an input file cannot be hashed any more.
     pub fn estimate(&self, config: &Config) -> Result<Estimate, Error> {
-        let solution = &self.fit.solution;
+        let solution = &self.fit().solution;
         let finite = |x: f64| x.is_finite().then_some(x);
         let (_, verdict) = verdict::judge(self);
         let mut model = ModelRecord::new(&self.robot.file.description, self.model.mechanism(), &self.plan);
@@ -70,7 +70,7 @@ impl Identification {
 
     /// Identified inertia of every body, in body order.
     pub fn inertias(&self) -> Vec<Inertia> {
-        self.values
+        self.values()
             .chunks_exact(10)
             .take(self.model.mechanism().bodies().len())
             .map(|ten| {
@@ -99,7 +99,7 @@ impl Identification {
             .map(|(c, p)| {
                 let own = self.base.kept.binary_search(&c).ok().filter(|_| !folded(c));
                 let std = own.and_then(|k| deviations[k].0);
-                let value = self.values[c];
+                let value = self.values()[c];
                 let verdict = if self.base.zero.contains(&c) {
                     "not identifiable"
                 } else if std.is_some() {
@@ -131,7 +131,7 @@ impl Identification {
     fn base_values(&self) -> Vec<BaseValue> {
         let table = self.model.parameters();
         let expressions = self.base.expressions(table);
-        let values = self.base.values(&self.values);
+        let values = self.base.values(self.values());
         self.standard_deviations()
             .into_iter()
             .enumerate()

@@ -87,7 +87,7 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
     };
     let headline = format!(
         "{} of {} base parameters identified; the model {agrees} within {error:.1} % of the effort. {reservation}",
-        id.fit.solution.kept.len(),
+        id.fit().solution.kept.len(),
         id.base.len(),
     );
     let verdict = Verdict {
@@ -110,7 +110,7 @@ fn unphysical(id: &Identification) -> impl Iterator<Item = String> {
 }
 
 fn excitation(id: &Identification) -> (Status, CheckResult) {
-    let (kept, all) = (id.fit.solution.kept.len(), id.base.len());
+    let (kept, all) = (id.fit().solution.kept.len(), id.base.len());
     check(
         Status::of(kept == all, 2 * kept > all),
         "excitation",
@@ -142,7 +142,7 @@ fn rank_gap(id: &Identification) -> (Status, CheckResult) {
 }
 
 fn condition(id: &Identification) -> (Status, CheckResult) {
-    let condition = id.fit.solution.condition_scaled;
+    let condition = id.fit().solution.condition_scaled;
     check(
         Status::of(condition < 100.0, condition < 1000.0),
         "condition number (scaled columns)",
@@ -261,14 +261,14 @@ fn mask(id: &Identification) -> Option<(Status, CheckResult)> {
 
 fn blocks(id: &Identification) -> (Status, CheckResult) {
     check(
-        Status::of(id.blocks >= 20, true),
+        Status::of(id.blocks() >= 20, true),
         "time blocks behind the standard deviations",
-        Some(id.blocks as f64),
+        Some(id.blocks() as f64),
         "",
         "at least 20",
-        if id.blocks >= 20 {
+        if id.blocks() >= 20 {
             "standard deviations come from leaving out one block of time at a time, so coloured residuals are covered"
-        } else if id.jackknife.is_some() {
+        } else if id.fitted.jackknife.is_some() {
             "few blocks: the standard deviations are themselves uncertain"
         } else {
             "the logs are too short for standard deviations that survive coloured residuals; those shown assume white ones"

@@ -5,10 +5,12 @@
 //! All work on independent columns: select [`crate::linear::LinearSolution::kept`] first.
 
 mod hac;
+mod inflation;
 mod jackknife;
 mod sandwich;
 
 pub use hac::{andrews_lag, hac_bartlett, hac_lag};
+pub use inflation::output_inflation;
 pub use jackknife::{Jackknife, MIN_BLOCKS, jackknife, jackknife_by, jackknife_with};
 pub use sandwich::{block_sandwich, block_sandwich_with};
 

@@ -15,10 +15,12 @@
 //! they are next to the prior, so that no verdict rests on rounding.
 
 mod combination;
+mod posterior;
 mod space;
 mod verdict;
 
 pub use combination::{Combination, visible_combinations};
+pub use posterior::{Posterior, excited_regrouping, posterior};
 pub use space::VisibleSpace;
 pub use verdict::{Carried, Verdict, verdict};
 
