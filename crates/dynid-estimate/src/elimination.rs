@@ -1,5 +1,9 @@
 //! Backward elimination of parameters the data do not ask for.
 
+mod prune;
+
+pub use prune::{PruneSettings, PruneStep, Pruning, prune};
+
 use crate::factor::Factor;
 use crate::folds::HeldOutError;
 use crate::linear::{LinearSolution, ols};
@@ -73,7 +77,11 @@ pub fn backward_elimination_with(
         assert_eq!(values.len(), columns.len(), "one statistic per column");
         let weakest = (0..columns.len()).min_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(0);
         path.push(PathStep {
-            bic: bayesian_information(&solution, effective_rows),
+            bic: bayesian_information(
+                solution.rss / solution.rows as f64,
+                solution.kept.len(),
+                effective_rows,
+            ),
             x: solution.x,
             rss: solution.rss,
             weakest: columns[weakest],
@@ -86,9 +94,9 @@ pub fn backward_elimination_with(
     path
 }
 
-fn bayesian_information(solution: &LinearSolution, effective_rows: f64) -> f64 {
-    effective_rows * (solution.rss / solution.rows as f64).ln()
-        + solution.kept.len() as f64 * effective_rows.ln()
+/// `N_eff ln(rss/N) + k ln N_eff`.
+fn bayesian_information(mean_square: f64, parameters: usize, effective_rows: f64) -> f64 {
+    effective_rows * mean_square.ln() + parameters as f64 * effective_rows.ln()
 }
 
 /// Index of the smallest model within one standard error of the least held-out error.
@@ -97,8 +105,15 @@ fn bayesian_information(solution: &LinearSolution, effective_rows: f64) -> f64 {
 ///
 /// Source: Breiman et al. 1984 (one-standard-error rule).
 pub fn within_one_standard_error(path: &[PathStep], errors: &[Option<HeldOutError>]) -> Option<usize> {
-    let known = || errors.iter().take(path.len()).enumerate().filter_map(|(i, e)| e.as_ref().map(|e| (i, e)));
+    smallest_within_one_standard_error(&errors[..errors.len().min(path.len())], |i| path[i].columns.len())
+}
+
+fn smallest_within_one_standard_error(
+    errors: &[Option<HeldOutError>],
+    size: impl Fn(usize) -> usize,
+) -> Option<usize> {
+    let known = || errors.iter().enumerate().filter_map(|(i, e)| e.as_ref().map(|e| (i, e)));
     let (_, best) = known().min_by(|a, b| a.1.mean.total_cmp(&b.1.mean))?;
     let limit = best.mean + best.standard_error;
-    known().filter(|(_, e)| e.mean <= limit).min_by_key(|(i, _)| path[*i].columns.len()).map(|(i, _)| i)
+    known().filter(|(_, e)| e.mean <= limit).min_by_key(|(i, _)| size(*i)).map(|(i, _)| i)
 }

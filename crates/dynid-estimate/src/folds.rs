@@ -66,7 +66,7 @@ impl CrossValidation {
     }
 }
 
-fn held_out_error(errors: impl Iterator<Item = f64>) -> Option<HeldOutError> {
+pub(crate) fn held_out_error(errors: impl Iterator<Item = f64>) -> Option<HeldOutError> {
     let errors: Vec<f64> = errors.collect();
     let count = errors.len() as f64;
     if errors.is_empty() {

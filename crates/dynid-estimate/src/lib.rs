@@ -37,6 +37,7 @@ pub mod metrics;
 pub mod rank;
 pub mod rows;
 mod triangular;
+mod whitened;
 pub mod whiteness;
 
 pub use factor::{Factor, FactorBuilder, FactorError};

@@ -1,0 +1,111 @@
+//! Time blocks in the coordinates in which the whole problem is orthonormal.
+//!
+//! With `R` of the merged blocks, `Q_b = R_b R⁻¹` satisfy `Σ Q_bᵀQ_b = 1`. Sums of `Q_bᵀQ_b` over other sets of blocks are
+//! then conditioned as the statistics of the log are, not as its parameters: forming them loses no digits that matter,
+//! where the same sums of `R_bᵀR_b` would lose twice those of the condition number.
+
+use crate::factor::Factor;
+use crate::rank::numerical_rank;
+use crate::triangular::{inverse, symmetric_from};
+use faer::linalg::solvers::{Llt, Solve};
+use faer::{Mat, Side};
+
+/// Least squared pivot at which a set of blocks still counts as exciting every direction.
+const LEAST_PIVOT: f64 = 1e-10;
+
+/// Weight of the ridge that stands in for directions a set of blocks does not excite.
+const FALLBACK_RIDGE: f64 = 1e-8;
+
+/// One time block: `q = R_b R⁻¹`, and its effort `z`, `ρ`.
+#[derive(Debug, Clone)]
+pub(crate) struct WhitenedBlock {
+    pub(crate) q: Mat<f64>,
+    pub(crate) z: Vec<f64>,
+    pub(crate) rho: f64,
+    pub(crate) rows: usize,
+}
+
+impl WhitenedBlock {
+    fn new(factor: &Factor, inverse: &Mat<f64>) -> Self {
+        let height = factor.height();
+        let triangle = Mat::from_fn(height, factor.columns(), |i, j| factor.r(i, j));
+        let mut z = factor.z();
+        z.truncate(height);
+        WhitenedBlock { q: triangle * inverse, z, rho: factor.rho(), rows: factor.rows() }
+    }
+
+    /// `z - q d`.
+    pub(crate) fn residual(&self, d: &[f64]) -> Vec<f64> {
+        let mut out = self.z.clone();
+        for (j, value) in d.iter().enumerate() {
+            for (r, q) in out.iter_mut().zip(self.q.col(j).iter()) {
+                *r -= q * value;
+            }
+        }
+        out
+    }
+
+    /// `qᵀ v`.
+    pub(crate) fn transposed(&self, v: &[f64]) -> Vec<f64> {
+        (0..self.q.ncols()).map(|j| self.q.col(j).iter().zip(v).map(|(q, v)| q * v).sum()).collect()
+    }
+
+    /// `qᵀ q`.
+    pub(crate) fn gram(&self) -> Mat<f64> {
+        self.q.transpose() * &self.q
+    }
+}
+
+/// Blocks, rows outside all blocks, and `R⁻¹` of all of them; `None` if the columns are dependent or there is no block.
+pub(crate) struct Whitened {
+    pub(crate) merged: Factor,
+    pub(crate) inverse: Mat<f64>,
+    pub(crate) blocks: Vec<WhitenedBlock>,
+    pub(crate) fixed: Option<WhitenedBlock>,
+}
+
+impl Whitened {
+    pub(crate) fn new(blocks: &[Factor], fixed: Option<&Factor>) -> Option<Self> {
+        if blocks.is_empty() {
+            return None;
+        }
+        let merged = Factor::merge(&blocks.iter().chain(fixed).collect::<Vec<_>>());
+        if numerical_rank(&merged).rank < merged.columns() {
+            return None;
+        }
+        let inverse = inverse(&merged.r_matrix());
+        let blocks = blocks.iter().map(|b| WhitenedBlock::new(b, &inverse)).collect();
+        let fixed = fixed.map(|f| WhitenedBlock::new(f, &inverse));
+        Some(Whitened { merged, inverse, blocks, fixed })
+    }
+}
+
+/// Cholesky factor of a sum of Gram matrices, and whether it took a ridge.
+pub(crate) fn cholesky(gram: &Mat<f64>) -> Option<(Llt<f64>, bool)> {
+    if let Ok(factor) = gram.llt(Side::Lower) {
+        let l = factor.L();
+        if (0..gram.nrows()).all(|i| l[(i, i)] * l[(i, i)] > LEAST_PIVOT) {
+            return Some((factor, false));
+        }
+    }
+    let ridged =
+        symmetric_from(gram.nrows(), |i, j| gram[(i, j)] + if i == j { FALLBACK_RIDGE } else { 0.0 });
+    ridged.llt(Side::Lower).ok().map(|factor| (factor, true))
+}
+
+/// Solution of a Cholesky factor.
+pub(crate) fn solve(factor: &Llt<f64>, right: &[f64]) -> Vec<f64> {
+    let x = factor.solve(&Mat::from_fn(right.len(), 1, |i, _| right[i]));
+    (0..right.len()).map(|i| x[(i, 0)]).collect()
+}
+
+/// `U v` with `U` upper triangular.
+pub(crate) fn upper_times(u: &Mat<f64>, v: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; v.len()];
+    for (j, value) in v.iter().enumerate() {
+        for (o, u) in out.iter_mut().zip(u.col(j).iter()).take(j + 1) {
+            *o += u * value;
+        }
+    }
+    out
+}
