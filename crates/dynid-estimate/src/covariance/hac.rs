@@ -16,23 +16,42 @@ const LARGEST_AR1: f64 = 0.97;
 ///
 /// Source: Newey & West 1987.
 pub fn hac_bartlett(scores: &Mat<f64>, unit_covariance: &Mat<f64>, lag: usize) -> Option<Mat<f64>> {
-    let (samples, p) = (scores.nrows(), scores.ncols());
-    assert!(unit_covariance.nrows() == p && unit_covariance.ncols() == p, "C is p × p");
+    hac_bartlett_logs(std::slice::from_ref(scores), unit_covariance, &[lag])
+}
+
+/// As [`hac_bartlett`], over several logs that are independent of each other: `Ω = Σ_l Ω_l`, `T = Σ_l T_l`.
+///
+/// `lags`: one per log. `None` unless `T > p`. Panics unless there is one lag per log and all have `p` columns.
+pub fn hac_bartlett_logs(logs: &[Mat<f64>], unit_covariance: &Mat<f64>, lags: &[usize]) -> Option<Mat<f64>> {
+    let p = unit_covariance.nrows();
+    assert!(unit_covariance.ncols() == p && logs.iter().all(|l| l.ncols() == p), "C is p × p");
+    assert_eq!(logs.len(), lags.len(), "one lag per log");
+    let samples: usize = logs.iter().map(Mat::nrows).sum();
     if samples <= p {
         return None;
     }
-    let autocovariance = |shift: usize| {
-        scores.subrows(shift, samples - shift).transpose() * scores.subrows(0, samples - shift)
-    };
-    let mut filling = autocovariance(0);
-    for shift in 1..=lag.min(samples - 1) {
-        let weight = 1.0 - shift as f64 / (lag + 1) as f64;
-        let gamma = autocovariance(shift);
-        filling += symmetric_from(p, |i, j| weight * (gamma[(i, j)] + gamma[(j, i)]));
+    let mut filling = Mat::zeros(p, p);
+    for (scores, lag) in logs.iter().zip(lags) {
+        filling += bartlett_sum(scores, *lag);
     }
     let correction = samples as f64 / (samples - p) as f64;
     let covariance = sandwich(unit_covariance, &filling);
     Some(symmetric_from(p, |i, j| correction * covariance[(i, j)]))
+}
+
+/// `Γ_0 + Σ_i (1 - i/(S+1)) (Γ_i + Γ_iᵀ)`.
+fn bartlett_sum(scores: &Mat<f64>, lag: usize) -> Mat<f64> {
+    let samples = scores.nrows();
+    let autocovariance = |shift: usize| {
+        scores.subrows(shift, samples - shift).transpose() * scores.subrows(0, samples - shift)
+    };
+    let mut sum = autocovariance(0);
+    for shift in 1..=lag.min(samples.saturating_sub(1)) {
+        let weight = 1.0 - shift as f64 / (lag + 1) as f64;
+        let gamma = autocovariance(shift);
+        sum += symmetric_from(scores.ncols(), |i, j| weight * (gamma[(i, j)] + gamma[(j, i)]));
+    }
+    sum
 }
 
 /// Bartlett lag from the filter, `S = max(⌈2 f_s/f_c⌉, 4)`: residuals stay correlated for about a period of the

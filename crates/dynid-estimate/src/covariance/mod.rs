@@ -1,17 +1,24 @@
 //! Covariance of an estimate that stays true when filtering or model error correlate the residuals.
 //!
 //! The model-based `C = (RᵀR)⁻¹` assumes independent residuals and is too small for filtered logs. The jackknife
-//! over time blocks is the default; the block sandwich and the HAC estimator are second opinions.
+//! over time blocks is the default; the block sandwich, the HAC estimator and the block bootstrap are second opinions.
 //! All work on independent columns: select [`crate::linear::LinearSolution::kept`] first.
 
+mod block_length;
+mod bootstrap;
 mod hac;
 mod inflation;
 mod jackknife;
+mod row_scores;
 mod sandwich;
 
 pub use hac::{andrews_lag, hac_bartlett, hac_lag};
 pub use inflation::output_inflation;
+pub use block_length::{BlockLength, BlockLengthSettings, BlockLengthStatus, ResidualSignal, block_length};
+pub use bootstrap::{Bootstrap, BootstrapSettings, bootstrap};
+pub use hac::{andrews_lag, hac_bartlett, hac_bartlett_logs, hac_lag};
 pub use jackknife::{Jackknife, MIN_BLOCKS, jackknife, jackknife_by, jackknife_with};
+pub use row_scores::{RowScores, row_scores};
 pub use sandwich::{block_sandwich, block_sandwich_with};
 
 use crate::factor::Factor;

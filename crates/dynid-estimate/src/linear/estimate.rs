@@ -69,6 +69,7 @@ pub struct LinearEstimate {
     /// Loss `Σ ρ(r/ŝ)` at the start of every pass with frozen scales; empty without a robust loss.
     pub losses: Vec<f64>,
     prior: Option<Factor>,
+    loss: Option<Loss>,
     /// Time blocks as given, for total least squares solved again without a block; else none.
     given_blocks: Vec<Factor>,
 }
@@ -106,6 +107,12 @@ impl LinearEstimate {
     /// Weights of the groups in the blocks.
     pub fn weights(&self) -> Vec<f64> {
         self.groups.iter().map(|g| g.weight).collect()
+    }
+
+    /// `ψ(r/ŝ)/ŝ` of a residual of a group: what its row of the regressor is multiplied by in the score.
+    pub(crate) fn row_score(&self, group: usize, residual: f64) -> f64 {
+        let variance = self.groups[group].variance;
+        self.loss.map_or(1.0, |loss| loss.weight(residual / variance.sqrt())) * residual / variance
     }
 
     /// Covariance of the kept columns if all residuals were independent.
@@ -250,6 +257,7 @@ fn squared(
         converged: start.converged,
         losses: Vec::new(),
         prior,
+        loss: None,
         given_blocks: Vec::new(),
     }
 }
@@ -308,11 +316,12 @@ fn robust(
         given: given.clone(),
         total,
     };
-    let huber =
-        irls(source, Loss::Huber(settings.irls.huber), begin(start.solution.x.clone()), &settings.irls)?;
+    let mut loss = Loss::Huber(settings.irls.huber);
+    let huber = irls(source, loss, begin(start.solution.x.clone()), &settings.irls)?;
     let found = match method {
         LinearMethod::Tukey => {
-            let after = irls(source, Loss::Tukey(settings.irls.tukey), begin(huber.x), &settings.irls)?;
+            loss = Loss::Tukey(settings.irls.tukey);
+            let after = irls(source, loss, begin(huber.x), &settings.irls)?;
             Irls { converged: after.converged && huber.converged, ..after }
         }
         _ => huber,
@@ -338,7 +347,7 @@ fn robust(
         })
         .collect();
     let estimate = assemble(method.clone(), x, &kept, fits, bent);
-    Ok(LinearEstimate { passes, converged, losses, ..estimate })
+    Ok(LinearEstimate { passes, converged, losses, loss: Some(loss), ..estimate })
 }
 
 /// Estimate from rows whose least-squares solution on the kept columns is `x`.
@@ -377,6 +386,7 @@ fn assemble(
         converged: true,
         losses: Vec::new(),
         prior: None,
+        loss: None,
         given_blocks: Vec::new(),
     }
 }

@@ -21,7 +21,7 @@ pub(super) enum Loss {
 
 impl Loss {
     /// Weight `ω(u) = ψ(u)/u`.
-    fn weight(self, u: f64) -> f64 {
+    pub(super) fn weight(self, u: f64) -> f64 {
         match self {
             Loss::Huber(c) => (c / u.abs()).min(1.0),
             Loss::Tukey(c) => (1.0 - (u / c).powi(2)).max(0.0).powi(2),
