@@ -88,6 +88,22 @@ pub(crate) enum MethodArg {
     Ols,
     /// Weighted least squares.
     Wls,
+    /// Huber's loss, for some per cent of gross errors.
+    Huber,
+    /// Tukey's biweight: gross errors lose all influence.
+    Tukey,
+    /// Weighted, with the robot file as a Gaussian prior.
+    Ridge,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum ConsistencyArg {
+    /// Bodies with a mass distribution (4 x 4 pseudo-inertia).
+    PseudoInertia,
+    /// Positive mass and inertia, triangle inequality or not (6 x 6 spatial inertia).
+    SpatialInertia,
+    /// Any numbers.
+    None,
 }
 
 /// How log columns are understood.
@@ -138,6 +154,9 @@ pub(crate) struct IdentifyArgs {
     /// Estimator.
     #[arg(long, value_enum)]
     pub(crate) estimator: Option<MethodArg>,
+    /// Which bodies the standard parameters may describe [default: pseudo-inertia].
+    #[arg(long, value_enum)]
+    pub(crate) consistency: Option<ConsistencyArg>,
     /// Cut-off of the widest kernel (textbook route: of the filter), Hz.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) kernel_hz: Option<f64>,

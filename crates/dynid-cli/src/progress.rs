@@ -32,7 +32,8 @@ impl Progress {
             Step::Conditioning(Stage::Mask) => "choosing the reversal mask".to_owned(),
             Step::Conditioning(Stage::Delay) => "estimating the delay".to_owned(),
             Step::Fit => "fitting".to_owned(),
-            Step::Covariance => "standard deviations".to_owned(),
+            Step::Consistency => "making bodies physical".to_owned(),
+            Step::Trust => "judging parameters".to_owned(),
             Step::Validate(log) => format!("predicting {log}"),
         });
     }

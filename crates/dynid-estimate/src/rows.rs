@@ -5,8 +5,10 @@
 //! ([`crate::conditioning::LogRows`]).
 
 mod memory;
+mod residuals;
 
 pub use memory::MemoryRows;
+pub use residuals::{GroupResiduals, row_residuals};
 
 use crate::factor::{Factor, FactorBuilder, FactorError};
 use crate::groups::ReducedGroup;

@@ -77,7 +77,10 @@ fn body(link: &str, model: &RobotModel) -> Result<usize, Error> {
     let bodies = model.mechanism().bodies();
     bodies.iter().position(|b| b.name == link).ok_or_else(|| Error::UnknownLink {
         name: link.to_owned(),
-        welded_to: bodies.iter().find(|b| b.fixed_links.iter().any(|f| f.name == link)).map(|b| b.name.clone()),
+        welded_to: bodies
+            .iter()
+            .find(|b| b.fixed_links.iter().any(|f| f.name == link))
+            .map(|b| b.name.clone()),
         known: bodies.iter().map(|b| b.name.clone()).collect(),
     })
 }

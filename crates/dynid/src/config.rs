@@ -211,7 +211,8 @@ pub struct EstimatorConfig {
     pub consistency: Consistency,
     /// Distance from the robot file. Default `quadratic`.
     pub prior: PriorDistance,
-    /// Weight of that distance: residual variances per squared whitened unit (default 1e-8) or per nat (default 1).
+    /// Weight of that distance, residual variances per squared whitened unit or per nat. Default: as large as noise allows
+    /// (the fit may rise by a tenth of what noise takes up), at most that of a Gaussian prior.
     pub prior_weight: Option<f64>,
 }
 

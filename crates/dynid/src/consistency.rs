@@ -2,7 +2,8 @@
 
 use dynid_estimate::conditioning::ReducedGroup;
 use dynid_estimate::consistent::{
-    Bound, ConsistentEstimate, Form, LinkPrior, Problem, ScalarPrior, Settings, Status, estimate,
+    Bound, ConsistentEstimate, Form, LinkPrior, Problem, ProblemError, ScalarPrior, Settings, Status,
+    estimate,
 };
 use dynid_estimate::folds::FoldSettings;
 use dynid_estimate::held_out::{Comparison, compare};
@@ -26,6 +27,10 @@ pub const CONSISTENT: usize = 1;
 pub struct Consistent {
     /// The estimate; `None` if no consistency was asked for.
     pub estimate: Option<ConsistentEstimate>,
+    /// Weight of the distance from the prior in use.
+    pub prior_weight: f64,
+    /// How much of the estimate's price is due to that weight, in residual variances.
+    pub price_of_prior: f64,
     /// Errors of the unconstrained and the consistent estimate on the same held-out folds of the training logs.
     pub held_out: Comparison,
     /// Standard parameters without constraints: base values as identified, split as near as possible to the prior.
@@ -71,11 +76,25 @@ pub(crate) fn consistent(
     let settings = settings(config);
     let Some(settings) = settings else {
         let held_out = compare(groups, &weights, base.len(), &folds, &[&linear]);
-        return Ok(Consistent { estimate: None, held_out, values: unconstrained.clone(), unconstrained });
+        return Ok(Consistent {
+            estimate: None,
+            prior_weight: 0.0,
+            price_of_prior: 0.0,
+            held_out,
+            values: unconstrained.clone(),
+            unconstrained,
+        });
     };
     let bounds = bounds::rows(&config.bound, model)?;
     let problem = |factor: &Factor| problem(model, regrouping, factor, prior, &bounds);
-    let found = estimate(&problem(&fitted.estimate.factor), &settings)?;
+    let whole = problem(&fitted.estimate.factor);
+    let (found, settings, pull) = match config.estimator.prior_weight {
+        Some(_) => (estimate(&whole, &settings)?, settings, 0.0),
+        None => {
+            let chance = fitted.inflation * solution.kept.len() as f64;
+            pulled(&whole, &settings, fitted.inflation, PULL * chance)?
+        }
+    };
     let constrained = |training: &Factor| -> Vec<f64> {
         // The whole problem was feasible and bounds do not depend on data, so that no fold can fail.
         estimate(&problem(training), &settings).map_or_else(|_| linear(training), |e| base.values(&e.x))
@@ -83,7 +102,56 @@ pub(crate) fn consistent(
     let both: [&dynid_estimate::held_out::Estimator<'_>; 2] =
         if found.status == Status::Unconstrained { [&linear, &linear] } else { [&linear, &constrained] };
     let held_out = compare(groups, &weights, base.len(), &folds, &both);
-    Ok(Consistent { values: found.x.clone(), estimate: Some(found), held_out, unconstrained })
+    let weight =
+        if settings.entropic_weight > 0.0 { settings.entropic_weight } else { settings.prior_weight };
+    Ok(Consistent {
+        values: found.x.clone(),
+        estimate: Some(found),
+        prior_weight: weight,
+        price_of_prior: pull,
+        held_out,
+        unconstrained,
+    })
+}
+
+/// The pull towards the prior may raise the weighted residual by this share of what noise takes up, `κ` per base parameter.
+const PULL: f64 = 0.1;
+/// Weights between the least and that of a Gaussian prior, on a logarithmic scale, are narrowed down to this ratio.
+const RATIO: f64 = 2.0;
+
+/// The estimate as near to the prior as noise allows: the largest prior weight, up to that of a Gaussian prior (`κ`), which
+/// raises the fit by no more than `budget`.
+///
+/// With the least weight, an active constraint lets unseen masses grow without limit for the sake of changes of fit far
+/// below noise. Returns the settings found and the rise of the fit.
+fn pulled(
+    problem: &Problem,
+    settings: &Settings,
+    inflation: f64,
+    budget: f64,
+) -> Result<(ConsistentEstimate, Settings, f64), ProblemError> {
+    let with = |weight: f64| match settings.entropic_weight > 0.0 {
+        true => Settings { entropic_weight: weight, ..settings.clone() },
+        false => Settings { prior_weight: weight, ..settings.clone() },
+    };
+    let (mut low, mut high) = (Settings::default().prior_weight, inflation.max(1.0));
+    let mut best = estimate(problem, &with(low))?;
+    let least = best.fit;
+    let strongest = estimate(problem, &with(high))?;
+    if strongest.fit <= least + budget {
+        return Ok((strongest.clone(), with(high), strongest.fit - least));
+    }
+    while high > RATIO * low {
+        let middle = (low * high).sqrt();
+        let found = estimate(problem, &with(middle))?;
+        if found.fit <= least + budget {
+            (low, best) = (middle, found);
+        } else {
+            high = middle;
+        }
+    }
+    let rise = best.fit - least;
+    Ok((best, with(low), rise))
 }
 
 fn settings(config: &Config) -> Option<Settings> {
@@ -95,7 +163,9 @@ fn settings(config: &Config) -> Option<Settings> {
     let weight = config.estimator.prior_weight;
     let defaults = Settings { form, ..Settings::default() };
     Some(match config.estimator.prior {
-        PriorDistance::Quadratic => Settings { prior_weight: weight.unwrap_or(defaults.prior_weight), ..defaults },
+        PriorDistance::Quadratic => {
+            Settings { prior_weight: weight.unwrap_or(defaults.prior_weight), ..defaults }
+        }
         PriorDistance::Entropic => Settings { entropic_weight: weight.unwrap_or(1.0), ..defaults },
     })
 }
@@ -113,7 +183,11 @@ fn problem(
         .iter()
         .zip(&prior.bodies)
         .enumerate()
-        .map(|(b, (body, prior))| LinkPrior { name: body.name.clone(), first_column: 10 * b, prior: prior.inertia })
+        .map(|(b, (body, prior))| LinkPrior {
+            name: body.name.clone(),
+            first_column: 10 * b,
+            prior: prior.inertia,
+        })
         .collect();
     let mut bounds = bounds.to_vec();
     let mut scalars = Vec::new();

@@ -39,8 +39,23 @@ pub struct Estimate {
     pub parameters: Vec<ParameterValue>,
     /// Base parameters.
     pub base_parameters: Vec<BaseValue>,
-    /// Whether every link could be a physical body; nothing here enforces it.
+    /// Whether every link could be a physical body.
     pub feasible: bool,
+    /// Physical consistency of the standard parameters and what it costs; absent if none was asked for.
+    #[serde(default)]
+    pub consistency: Option<ConsistencyRecord>,
+    /// Errors on held-out folds of the training logs.
+    #[serde(default)]
+    pub held_out: HeldOutRecord,
+    /// How the residuals bear on the precision.
+    #[serde(default)]
+    pub precision: PrecisionRecord,
+    /// Models with fewer base parameters.
+    #[serde(default)]
+    pub pruning: Option<PruningRecord>,
+    /// Motions that would reveal what these logs do not, most helpful first, a sentence each.
+    #[serde(default)]
+    pub motions_that_would_help: Vec<String>,
     /// Fit on the training logs: raw effort; `filtered` the same through the filter at `filter_hz`.
     pub fit: FitSummary,
     /// Validation, log by log.
@@ -83,14 +98,41 @@ pub struct ParameterValue {
     pub joint: Option<String>,
     /// Unit.
     pub unit: String,
-    /// Value.
+    /// Value, physically consistent with the link's other parameters.
     pub value: f64,
-    /// Standard deviation, if the parameter is identified by itself.
+    /// Value from data and robot file without constraints.
+    #[serde(default)]
+    pub unconstrained: Option<f64>,
+    /// Standard deviation of that, if the parameter is seen in the data.
     pub std: Option<f64>,
     /// Relative standard deviation, percent.
     pub rel_std: Option<f64>,
-    /// `seen in the data`, `only in combination` or `not identifiable`.
+    /// 95 % interval around the unconstrained value, cut to where the parameter can lie; if seen in the data.
+    #[serde(default)]
+    pub interval: Option<(f64, f64)>,
+    /// The interval is wide: beyond 30 % of the value or of the deviation that was thought possible beforehand.
+    #[serde(default)]
+    pub wide: bool,
+    /// A constraint moved the value by more than a standard deviation.
+    #[serde(default)]
+    pub at_boundary: bool,
+    /// `seen in the data`, `carried by the prior` or `not identifiable`.
     pub verdict: String,
+    /// For what is carried by the prior: `only in combination`, `not excited` or `too noisy`.
+    #[serde(default)]
+    pub reason: Option<String>,
+    /// Share of the prior variance that the logs remove, 0 to 1.
+    #[serde(default)]
+    pub share: Option<f64>,
+    /// Share that any motion of the robot could remove.
+    #[serde(default)]
+    pub possible_share: Option<f64>,
+    /// What the data see of a parameter that acts only together with others.
+    #[serde(default)]
+    pub combination: Option<String>,
+    /// The motion that would help.
+    #[serde(default)]
+    pub advice: Option<String>,
     /// Value of the robot file.
     pub prior: Option<f64>,
 }
@@ -104,14 +146,137 @@ pub struct BaseValue {
     pub expression: String,
     /// Unit.
     pub unit: String,
-    /// Value; absent if the logs do not excite it.
+    /// Value as identified, without constraints; absent if the logs do not excite it.
     pub value: Option<f64>,
+    /// Value of the physically consistent parameters.
+    #[serde(default)]
+    pub consistent_value: Option<f64>,
+    /// 95 % half width.
+    #[serde(default)]
+    pub half_width: Option<f64>,
+    /// `seen in the data` or `carried by the prior`.
+    #[serde(default)]
+    pub verdict: Option<String>,
+    /// Share of the prior variance that the logs remove, 0 to 1.
+    #[serde(default)]
+    pub share: Option<f64>,
     /// Standard deviation (jackknife over time blocks where there are at least 10, else white residuals).
     pub std: Option<f64>,
     /// Standard deviation for white residuals.
     pub std_white: Option<f64>,
     /// Relative standard deviation, percent; absent where the value is below two standard deviations.
     pub rel_std: Option<f64>,
+}
+
+/// Physical consistency.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct ConsistencyRecord {
+    /// `pseudo-inertia` or `spatial-inertia`.
+    pub form: String,
+    /// `unconstrained` (no constraint matters), `optimal` or `stalled` (consistent, but the gap is above the tolerance).
+    pub status: String,
+    /// What consistency costs in fit: increase of the weighted sum of squares, in residual variances.
+    pub price: f64,
+    /// That increase over what the same number of parameters would take up by chance, `price / (variance inflation ·
+    /// base parameters)`; around 1 is no more than noise.
+    pub price_over_chance: Option<f64>,
+    /// Weight of the distance from the robot file, as given or as large as noise allows.
+    pub prior_weight: f64,
+    /// How much of the price is due to that weight.
+    pub price_of_prior: f64,
+    /// No consistent parameters (with whitened sizes up to ten times these) have an objective lower by more than this.
+    pub gap: f64,
+    /// Iterations of the interior-point method.
+    pub iterations: usize,
+    /// Least eigenvalue of the links' pseudo-inertias in units of the prior's; at least 1e-6.
+    pub least_eigenvalue: f64,
+    /// Constraints that hold the estimate back, in words.
+    pub active: Vec<String>,
+    /// Figures of the unconstrained parameters on the validation logs; empty where no constraint matters.
+    pub validation_unconstrained: Vec<LogFit>,
+}
+
+/// Errors on held-out folds of time of the training logs, rows as the fit sees them.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct HeldOutRecord {
+    /// Number of folds.
+    pub folds: usize,
+    /// RMS per joint, in the effort's unit, without constraints.
+    pub rms: Vec<Option<f64>>,
+    /// Its standard error over the folds.
+    pub rms_standard_error: Vec<Option<f64>>,
+    /// RMS per joint of the physically consistent estimate.
+    pub rms_consistent: Vec<Option<f64>>,
+    /// `100 ‖residual‖ / ‖effort‖` over all joints without constraints, percent.
+    pub relative_error: Option<f64>,
+    /// The same of the physically consistent estimate, percent.
+    pub relative_error_consistent: Option<f64>,
+}
+
+/// What the residuals say about the standard deviations.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct PrecisionRecord {
+    /// By how much coloured residuals inflate the variances that white ones would give (median over base parameters).
+    pub variance_inflation: f64,
+    /// The same per joint.
+    pub variance_inflation_per_joint: Vec<Option<f64>>,
+    /// Number of time blocks behind the standard deviations.
+    pub blocks: usize,
+    /// Their length, s.
+    pub block_s: f64,
+    /// Length that the correlation of the residuals asks for, s.
+    pub wanted_block_s: f64,
+    /// Per training log and joint: test of whiteness inside the band of the kernel.
+    pub whiteness: Vec<Vec<Option<WhitenessRecord>>>,
+}
+
+/// Cumulative periodogram test.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct WhitenessRecord {
+    /// Largest distance from a straight line.
+    pub distance: f64,
+    /// Threshold at 5 %.
+    pub threshold: f64,
+    /// White noise is rejected.
+    pub rejected: bool,
+    /// Frequency of the largest peak, Hz.
+    pub dominant_hz: f64,
+}
+
+/// Backward elimination of base parameters.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct PruningRecord {
+    /// All models, from the whole one down to one parameter.
+    pub path: Vec<PruningStep>,
+    /// Number of parameters of the smallest model within one standard error of the least held-out error.
+    pub essential: Option<usize>,
+    /// Names of its parameters.
+    pub essential_parameters: Vec<String>,
+    /// Number of parameters of the model of least BIC.
+    pub least_bic: usize,
+    /// Number of parameters of the first model in which every parameter is significant.
+    pub all_significant: Option<usize>,
+    /// Threshold of that test.
+    pub threshold: f64,
+}
+
+/// One model of a backward elimination.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct PruningStep {
+    /// Number of parameters.
+    pub parameters: usize,
+    /// Parameter that goes next.
+    pub next: String,
+    /// Its test statistic, `value² / variance`.
+    pub statistic: Option<f64>,
+    /// Weighted residual sum of squares.
+    pub rss: f64,
+    /// Bayesian information criterion.
+    pub bic: Option<f64>,
+    /// Mean held-out squared error in residual variances.
+    pub held_out: Option<f64>,
+    /// Its standard error.
+    pub held_out_standard_error: Option<f64>,
 }
 
 /// Per-joint agreement, in the effort's unit.

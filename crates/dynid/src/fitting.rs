@@ -1,18 +1,23 @@
 //! The linear fit of a run: method, weights, covariance.
 
 use dynid_estimate::conditioning::{
-    Conditioning, ConditioningSettings, LogRows, PreparedLog, textbook_rows,
+    Conditioning, ConditioningSettings, LogRows, PreparedLog, ReducedGroup, textbook_rows,
 };
-use dynid_estimate::covariance::{MIN_BLOCKS, output_inflation, variance_inflation};
+use dynid_estimate::covariance::{
+    BlockLength, BlockLengthSettings, MIN_BLOCKS, ResidualSignal, block_length, output_inflation,
+    variance_inflation,
+};
 use dynid_estimate::identifiability::VisibleSpace;
 use dynid_estimate::linear::{
     LinearEstimate, LinearMethod, LinearSettings, TlsNoise, VarianceSharing, estimate,
 };
-use dynid_estimate::rows::{RowSource, reduce_rows};
+use dynid_estimate::rows::{GroupResiduals, RowSource, reduce_rows, row_residuals};
+use dynid_estimate::whiteness::{InBandSettings, InBandWhiteness, raw_in_band_whiteness};
 use dynid_estimate::{Factor, Mat};
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
 
 use crate::Error;
+use crate::agreement::Agreement;
 use crate::bounds;
 use crate::config::{Config, EstimatorConfig, Method, Variances};
 use crate::prior::Prior;
@@ -35,6 +40,10 @@ pub struct Fitted {
     pub inflation_per_output: Vec<Option<f64>>,
     /// Weighted factor of all base columns, deflated by `κ` (joint by joint where joints differ).
     pub information: Factor,
+    /// Length of time blocks that the residuals ask for.
+    pub block_length: BlockLength,
+    /// Length of the time blocks in use, s.
+    pub block_s: f64,
 }
 
 impl Fitted {
@@ -59,7 +68,7 @@ pub(crate) fn rows<'a>(
     })
 }
 
-/// Fits the base parameters.
+/// Fits the base parameters; with the estimate come the groups of rows that it was made from.
 ///
 /// # Errors
 /// [`Error::TooShort`], [`Error::Linear`], [`Error::UnknownParameter`].
@@ -70,7 +79,7 @@ pub(crate) fn fit(
     prior: &Prior,
     space: &VisibleSpace,
     source: &dyn RowSource,
-) -> Result<(Fitted, Vec<dynid_estimate::conditioning::ReducedGroup>), Error> {
+) -> Result<(LinearEstimate, Vec<ReducedGroup>), Error> {
     let groups = reduce_rows(source).map_err(|e| conditioning_fault(source, e))?;
     let rows: usize = groups.iter().map(|g| g.rows()).sum();
     if rows <= base.len() {
@@ -92,19 +101,95 @@ pub(crate) fn fit(
         ..LinearSettings::default()
     };
     let estimate = estimate(&groups, Some(source), base.len(), &method, &settings)?;
+    Ok((estimate, groups))
+}
+
+/// Residuals of the widest kernel's rows.
+pub(crate) struct RowResiduals {
+    /// Log, output and residuals.
+    groups: Vec<(usize, usize, GroupResiduals)>,
+}
+
+/// Residuals of the rows of the widest kernel.
+///
+/// # Errors
+/// [`Error::Conditioning`].
+pub(crate) fn residuals(source: &dyn RowSource, estimate: &LinearEstimate) -> Result<RowResiduals, Error> {
+    let all = row_residuals(source, &estimate.x).map_err(|e| conditioning_fault(source, e))?;
+    let widest = source.groups().iter().zip(all).filter(|(shape, _)| shape.scale == 0);
+    Ok(RowResiduals { groups: widest.map(|(shape, r)| (shape.log, shape.output, r)).collect() })
+}
+
+impl RowResiduals {
+    /// Whether raw residuals of a training log are white below the kernel's cut-off, per output; only samples near a row
+    /// count.
+    pub(crate) fn whiteness(
+        &self,
+        log: usize,
+        agreement: &Agreement,
+        kernel_hz: f64,
+    ) -> Vec<Option<InBandWhiteness>> {
+        (0..agreement.measured.len())
+            .map(|output| {
+                let (_, _, rows) = self.groups.iter().find(|(l, o, _)| (*l, *o) == (log, output))?;
+                let samples = agreement.counted.len();
+                let covered = rows.coverage(samples);
+                let residual: Vec<f64> = (0..samples)
+                    .map(|s| match covered[s] && agreement.counted[s] {
+                        true => agreement.measured[output][s] - agreement.predicted[output][s],
+                        false => 0.0,
+                    })
+                    .collect();
+                raw_in_band_whiteness(&residual, agreement.rate_hz, kernel_hz, &InBandSettings::default())
+            })
+            .collect()
+    }
+}
+
+/// Covariance from time blocks that are long enough for the residuals found.
+///
+/// Blocks are merged until they are five correlation times long, but never to fewer than [`MIN_BLOCKS`]; `fixed`: they stay
+/// as they are.
+pub(crate) fn with_precision(
+    estimate: LinearEstimate,
+    residuals: &RowResiduals,
+    logs: &[PreparedLog],
+    fixed: bool,
+) -> Fitted {
+    let grids: Vec<(usize, f64, Vec<f64>)> = residuals
+        .groups
+        .iter()
+        .filter_map(|(log, _, rows)| {
+            let (step, grid) = rows.on_grid()?;
+            Some((*log, logs[*log].rate_hz / step as f64, grid))
+        })
+        .collect();
+    let signals: Vec<ResidualSignal<'_>> = grids
+        .iter()
+        .map(|(log, rate_hz, residual)| ResidualSignal { log: *log, rate_hz: *rate_hz, residual })
+        .collect();
+    let wanted = block_length(&signals, &BlockLengthSettings::default());
+    let duration: f64 = logs.iter().map(PreparedLog::duration).sum();
+    let block_s = duration / estimate.blocks.len().max(1) as f64;
+    let most = (estimate.blocks.len() / MIN_BLOCKS).max(1);
+    let factor = if fixed { 1 } else { ((wanted.seconds / block_s).ceil() as usize).clamp(1, most) };
+    let estimate = estimate.with_longer_blocks(factor);
     let white = estimate.model_covariance();
-    let jackknife = (estimate.blocks.len() >= MIN_BLOCKS)
-        .then(|| estimate.jackknife())
-        .flatten()
-        .map(|j| j.covariance);
-    let inflation =
-        jackknife.as_ref().and_then(|v| variance_inflation(v, &white)).unwrap_or(1.0);
+    let jackknife =
+        (estimate.blocks.len() >= MIN_BLOCKS).then(|| estimate.jackknife()).flatten().map(|j| j.covariance);
+    let inflation = jackknife.as_ref().and_then(|v| variance_inflation(v, &white)).unwrap_or(1.0);
     let per_output = output_inflation(&estimate.reduced, &estimate.weights(), &estimate.x);
     let information = information(&estimate, inflation, &per_output);
-    Ok((
-        Fitted { white, jackknife, inflation, inflation_per_output: per_output, information, estimate },
-        groups,
-    ))
+    Fitted {
+        white,
+        jackknife,
+        inflation,
+        inflation_per_output: per_output,
+        information,
+        block_length: wanted,
+        block_s: block_s * factor as f64,
+        estimate,
+    }
 }
 
 fn conditioning_fault(source: &dyn RowSource, e: dynid_estimate::rows::RowsError) -> Error {

@@ -5,8 +5,10 @@ use std::path::Path;
 use dynid_estimate::conditioning::{
     Conditioning, ConditioningSettings, PreparedLog, ReducedGroup, Stage, condition, predict, prepare,
 };
+use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::identifiability::VisibleSpace;
 use dynid_estimate::linear::LinearEstimate;
+use dynid_estimate::whiteness::InBandWhiteness;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
 
 use crate::Error;
@@ -19,8 +21,8 @@ use crate::estimate::LogFit;
 use crate::fitting::{self, Fitted};
 use crate::logs::{self, LoadedLog};
 use crate::prior::{self, Prior};
-use crate::trust::{Evidence, Trust};
 use crate::robot::{Robot, RobotOptions};
+use crate::trust::{Evidence, Trust};
 
 /// What is being worked on, for progress displays.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,6 +90,10 @@ pub struct Identification {
     pub validation: Vec<Agreement>,
     /// Figures of the unconstrained parameters on the validation logs, where a constraint changed them.
     pub validation_unconstrained: Vec<LogFit>,
+    /// Per training log and output: whether the raw residuals are white inside the kernel's band.
+    pub whiteness: Vec<Vec<Option<InBandWhiteness>>>,
+    /// Models with fewer and fewer base parameters, and how well they do.
+    pub pruning: Option<Pruning>,
     /// Warnings, in words.
     pub warnings: Vec<String>,
     /// Settings of the conditioning.
@@ -148,8 +154,10 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     };
     progress(Step::Fit);
     let source = fitting::rows(config, &model, &base.kept, &prepared, conditioning.as_ref(), &settings)?;
-    let (fitted, groups) = fitting::fit(config, &model, &base, &prior, &space, &*source)?;
+    let (fit, groups) = fitting::fit(config, &model, &base, &prior, &space, &*source)?;
+    let residuals = fitting::residuals(&*source, &fit)?;
     drop(source);
+    let fitted = fitting::with_precision(fit, &residuals, &prepared, config.conditioning.block_s.is_some());
     progress(Step::Consistency);
     let consistent = consistency::consistent(config, &model, &base, &regrouping, &prior, &fitted, &groups)?;
     let (state_hz, kernel_hz, delay_samples) = match &conditioning {
@@ -160,6 +168,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         }
     };
     progress(Step::Trust);
+    let pruning =
+        prune(&fitted.estimate.kept_blocks(), &fitted.estimate.solution.kept, &PruneSettings::default());
     let trust = Evidence {
         model: &model,
         base: &base,
@@ -197,15 +207,19 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         training: Vec::new(),
         validation: Vec::new(),
         validation_unconstrained: Vec::new(),
+        whiteness: Vec::new(),
+        pruning,
         warnings,
         settings,
         logs: Vec::new(),
         robot,
         model,
     };
-    for log in &prepared {
+    for (l, log) in prepared.iter().enumerate() {
         progress(Step::Validate(log.name.clone()));
-        out.training.push(out.agreement(out.values(), log)?);
+        let agreement = out.agreement(out.values(), log)?;
+        out.whiteness.push(residuals.whiteness(l, &agreement, kernel_hz));
+        out.training.push(agreement);
     }
     out.logs = prepared;
     for log in &config.validation {

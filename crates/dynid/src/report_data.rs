@@ -67,9 +67,11 @@ impl Identification {
                     "estimator",
                     match config.estimator.method {
                         Method::Ols => "ordinary least squares",
-                        Method::Wls => {
-                            "weighted least squares, one residual variance per log, joint and kernel"
-                        }
+                        Method::Wls => "weighted least squares, residual variances found along the way",
+                        Method::Huber => "Huber's loss, scales found along the way",
+                        Method::Tukey => "Tukey's biweight, scales found along the way",
+                        Method::Ridge => "weighted least squares with the robot file as Gaussian prior",
+                        Method::Tls => "total least squares",
                     },
                     "",
                 ),

@@ -1,14 +1,18 @@
 //! From an identification to its result file.
 
+use dynid_estimate::consistent::Status as ConsistentStatus;
+use dynid_estimate::whiteness::InBandWhiteness;
 use dynid_model::{EffortModel, Inertia, Owner};
 use serde_json::json;
 
 use crate::Error;
 use crate::agreement::Agreement;
-use crate::config::{Config, Route};
+use crate::config::{Config, Consistency, Route};
+use crate::consistency::{CONSISTENT, UNCONSTRAINED};
 use crate::estimate::{
-    BaseValue, Choice, ConditioningRecord, Estimate, FitSummary, FitValues, InputRecord, LogFit, ModelRecord,
-    ParameterValue, Provenance, RankStatus, SCHEMA,
+    BaseValue, Choice, ConditioningRecord, ConsistencyRecord, Estimate, FitSummary, FitValues, HeldOutRecord,
+    InputRecord, LogFit, ModelRecord, ParameterValue, PrecisionRecord, Provenance, PruningRecord,
+    PruningStep, RankStatus, SCHEMA, WhitenessRecord,
 };
 use crate::identify::Identification;
 use crate::logs::sha256;
@@ -48,6 +52,11 @@ impl Identification {
             parameters: self.parameter_values(),
             base_parameters: self.base_values(),
             feasible: self.unphysical_bodies().is_empty(),
+            consistency: self.consistency_record(config),
+            held_out: self.held_out_record(),
+            precision: self.precision_record(),
+            pruning: self.pruning_record(),
+            motions_that_would_help: self.trust.motions.clone(),
             fit: self.fit_summary(),
             validation: self.validation.iter().map(log_fit).collect(),
             verdict,
@@ -82,46 +91,36 @@ impl Identification {
     }
 
     fn parameter_values(&self) -> Vec<ParameterValue> {
-        let deviations = self.standard_deviations();
-        let folded = |c: usize| {
-            self.base.folded.contains(&c)
-                || self
-                    .base
-                    .kept
-                    .binary_search(&c)
-                    .is_ok_and(|k| self.base.factors.iter().any(|f| f[k] != 0.0))
-        };
         self.model
             .parameters()
             .linear
             .iter()
+            .zip(&self.trust.parameters)
             .enumerate()
-            .map(|(c, p)| {
-                let own = self.base.kept.binary_search(&c).ok().filter(|_| !folded(c));
-                let std = own.and_then(|k| deviations[k].0);
-                let value = self.values()[c];
-                let verdict = if self.base.zero.contains(&c) {
-                    "not identifiable"
-                } else if std.is_some() {
-                    "seen in the data"
-                } else if folded(c) {
-                    "only in combination"
-                } else {
-                    "not excited"
-                };
+            .map(|(c, (p, trust))| {
                 let (link, joint) = match &p.owner {
                     Owner::Link(name) => (Some(name.clone()), None),
                     Owner::Joint(name) => (None, Some(name.clone())),
                 };
+                let value = self.values()[c];
                 ParameterValue {
                     name: p.name.clone(),
                     link,
                     joint,
                     unit: p.unit.to_owned(),
                     value,
-                    std,
-                    rel_std: relative(Some(value), std),
-                    verdict: verdict.to_owned(),
+                    unconstrained: Some(trust.unconstrained),
+                    std: trust.std,
+                    rel_std: relative(Some(value), trust.std),
+                    interval: trust.interval,
+                    wide: trust.wide,
+                    at_boundary: trust.at_boundary,
+                    verdict: trust.assessment.verdict.words().to_owned(),
+                    reason: trust.assessment.verdict.reason().map(str::to_owned),
+                    share: Some(trust.assessment.achieved),
+                    possible_share: Some(trust.assessment.structural_limit),
+                    combination: trust.combination.clone(),
+                    advice: trust.advice.clone(),
                     prior: self.stated[c],
                 }
             })
@@ -131,24 +130,121 @@ impl Identification {
     fn base_values(&self) -> Vec<BaseValue> {
         let table = self.model.parameters();
         let expressions = self.base.expressions(table);
-        let values = self.base.values(self.values());
+        let consistent = self.base.values(self.values());
         self.standard_deviations()
             .into_iter()
             .enumerate()
             .map(|(k, (std, white))| {
                 let p = &table.linear[self.base.kept[k]];
-                let value = std.map(|_| values[k]);
+                let value = std.map(|_| self.fit().x[k]);
                 BaseValue {
                     name: p.name.clone(),
                     expression: expressions[k].clone(),
                     unit: p.unit.to_owned(),
                     value,
+                    consistent_value: Some(consistent[k]),
+                    half_width: self.trust.base_half_width[k],
+                    verdict: Some(self.trust.base[k].verdict.words().to_owned()),
+                    share: Some(self.trust.base[k].achieved),
                     std,
                     std_white: white,
                     rel_std: relative(value, std),
                 }
             })
             .collect()
+    }
+
+    fn consistency_record(&self, config: &Config) -> Option<ConsistencyRecord> {
+        let found = self.consistent.estimate.as_ref()?;
+        let chance = self.fitted.inflation * self.fit().solution.kept.len() as f64;
+        Some(ConsistencyRecord {
+            form: match config.estimator.consistency {
+                Consistency::SpatialInertia => "spatial-inertia".to_owned(),
+                _ => "pseudo-inertia".to_owned(),
+            },
+            status: match found.status {
+                ConsistentStatus::Unconstrained => "unconstrained".to_owned(),
+                ConsistentStatus::Optimal => "optimal".to_owned(),
+                ConsistentStatus::Stalled => "stalled".to_owned(),
+            },
+            price: found.price(),
+            price_over_chance: (chance > 0.0).then(|| found.price() / chance),
+            prior_weight: self.consistent.prior_weight,
+            price_of_prior: self.consistent.price_of_prior,
+            gap: found.gap,
+            iterations: found.iterations,
+            least_eigenvalue: found.least_eigenvalue,
+            active: found.active.iter().map(ToString::to_string).collect(),
+            validation_unconstrained: self.validation_unconstrained.clone(),
+        })
+    }
+
+    fn held_out_record(&self) -> HeldOutRecord {
+        let found = &self.consistent.held_out;
+        let outputs = 0..self.model.outputs().len();
+        let consistent = if self.consistent.estimate.is_some() { CONSISTENT } else { UNCONSTRAINED };
+        if found.folds.is_empty() {
+            return HeldOutRecord::default();
+        }
+        HeldOutRecord {
+            folds: found.folds.len(),
+            rms: outputs.clone().map(|j| found.rms(UNCONSTRAINED, j)).collect(),
+            rms_standard_error: outputs.clone().map(|j| found.rms_standard_error(UNCONSTRAINED, j)).collect(),
+            rms_consistent: outputs.map(|j| found.rms(consistent, j)).collect(),
+            relative_error: found.relative(UNCONSTRAINED).map(|x| 100.0 * x),
+            relative_error_consistent: found.relative(consistent).map(|x| 100.0 * x),
+        }
+    }
+
+    fn precision_record(&self) -> PrecisionRecord {
+        let record = |w: &InBandWhiteness| WhitenessRecord {
+            distance: w.distance,
+            threshold: w.threshold,
+            rejected: w.rejected(),
+            dominant_hz: w.dominant_frequency,
+        };
+        PrecisionRecord {
+            variance_inflation: self.fitted.inflation,
+            variance_inflation_per_joint: self.fitted.inflation_per_output.clone(),
+            blocks: self.blocks(),
+            block_s: self.fitted.block_s,
+            wanted_block_s: self.fitted.block_length.seconds,
+            whiteness: self
+                .whiteness
+                .iter()
+                .map(|log| log.iter().map(|w| w.as_ref().map(record)).collect())
+                .collect(),
+        }
+    }
+
+    fn pruning_record(&self) -> Option<PruningRecord> {
+        let found = self.pruning.as_ref()?;
+        let table = &self.model.parameters().linear;
+        let name = |column: &usize| table[self.base.kept[*column]].name.clone();
+        let finite = |x: f64| x.is_finite().then_some(x);
+        let size = |index: usize| found.path[index].columns.len();
+        Some(PruningRecord {
+            path: found
+                .path
+                .iter()
+                .map(|step| PruningStep {
+                    parameters: step.columns.len(),
+                    next: name(&step.weakest),
+                    statistic: finite(step.statistic),
+                    rss: step.rss,
+                    bic: finite(step.bic),
+                    held_out: step.held_out.as_ref().map(|h| h.mean),
+                    held_out_standard_error: step.held_out.as_ref().map(|h| h.standard_error),
+                })
+                .collect(),
+            essential: found.chosen.map(size),
+            essential_parameters: found
+                .chosen
+                .map_or_else(Vec::new, |index| found.path[index].columns.iter().map(name).collect()),
+            least_bic: size(found.least_bic),
+            all_significant: found.all_significant.map(size),
+            threshold: found.threshold,
+        })
     }
 
     fn fit_summary(&self) -> FitSummary {
@@ -384,6 +480,7 @@ fn provenance(config: &Config) -> Result<Provenance, Error> {
         "elements": { "default": config.elements.default, "joint": config.elements.joint },
         "conditioning": config.conditioning,
         "estimator": config.estimator,
+        "bound": config.bound,
         "preferred": config.preferred,
         "log": config.log.iter().map(rows).collect::<Vec<_>>(),
         "validation": config.validation.iter().map(rows).collect::<Vec<_>>(),

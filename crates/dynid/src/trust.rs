@@ -73,8 +73,7 @@ impl Evidence<'_> {
         let quantile = self.quantile();
         let base_half_width = self.base_deviations().into_iter().map(|s| s.map(|s| quantile * s)).collect();
         let joints: Vec<String> = self.model.outputs().iter().map(|o| o.name.clone()).collect();
-        let symbols: Vec<&str> =
-            self.model.parameters().linear.iter().map(|p| p.symbol.as_str()).collect();
+        let symbols: Vec<&str> = self.model.parameters().linear.iter().map(|p| p.symbol.as_str()).collect();
         let mut trust = Trust {
             parameters: Vec::new(),
             base: assessed.base.clone(),

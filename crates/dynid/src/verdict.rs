@@ -1,5 +1,10 @@
 //! What an identification is worth, in plain words.
 
+use dynid_estimate::consistent::Status as ConsistentStatus;
+use dynid_estimate::identifiability::Verdict as ParameterVerdict;
+use dynid_estimate::whiteness::InBandWhiteness;
+
+use crate::consistency::{CONSISTENT, UNCONSTRAINED};
 use crate::estimate::{CheckResult, Verdict};
 use crate::identify::Identification;
 
@@ -65,6 +70,8 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
     checks.extend(delay(id));
     checks.extend(mask(id));
     checks.push(blocks(id));
+    checks.extend(consistency(id));
+    checks.extend(whiteness(id));
     let status = checks.iter().map(|(s, _)| *s).max().unwrap_or(Status::Ok);
     let relative = |a: &[crate::agreement::Agreement]| {
         a.iter().filter_map(|v| v.filtered.relative_error).fold(f64::NAN, f64::max)
@@ -85,9 +92,9 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
             format!("It should not be used without a look at the failed checks: {}.", named(Status::Fail))
         }
     };
+    let seen = id.trust.base.iter().filter(|a| a.verdict == ParameterVerdict::Seen).count();
     let headline = format!(
-        "{} of {} base parameters identified; the model {agrees} within {error:.1} % of the effort. {reservation}",
-        id.fit().solution.kept.len(),
+        "{seen} of {} base parameters seen in the data; the model {agrees} within {error:.1} % of the effort. {reservation}",
         id.base.len(),
     );
     let verdict = Verdict {
@@ -260,18 +267,97 @@ fn mask(id: &Identification) -> Option<(Status, CheckResult)> {
 }
 
 fn blocks(id: &Identification) -> (Status, CheckResult) {
+    let fitted = &id.fitted;
+    let wanted = fitted.block_length.seconds;
+    let short = wanted > 1.01 * fitted.block_s;
     check(
-        Status::of(id.blocks() >= 20, true),
+        Status::of(id.blocks() >= 20 && !short, true),
         "time blocks behind the standard deviations",
         Some(id.blocks() as f64),
         "",
-        "at least 20",
-        if id.blocks() >= 20 {
-            "standard deviations come from leaving out one block of time at a time, so coloured residuals are covered"
-        } else if id.fitted.jackknife.is_some() {
-            "few blocks: the standard deviations are themselves uncertain"
-        } else {
+        "at least 20, each five correlation times of the residual long",
+        if fitted.jackknife.is_none() {
             "the logs are too short for standard deviations that survive coloured residuals; those shown assume white ones"
+                .to_owned()
+        } else if short {
+            format!(
+                "the residuals stay correlated for so long that independent blocks would take {wanted:.1} s each, found {:.1} s: \
+                 the log is too short for honest intervals, those shown are somewhat too narrow",
+                fitted.block_s
+            )
+        } else if id.blocks() >= 20 {
+            "standard deviations come from leaving out one block of time at a time, so coloured residuals are covered"
+                .to_owned()
+        } else {
+            "few blocks: the standard deviations are themselves uncertain".to_owned()
         },
     )
+}
+
+/// Held-out error may rise by this much before consistency counts as dear, percent.
+const CHEAP: f64 = 2.0;
+/// Beyond this the robot file or the model contradicts the data, percent.
+const DEAR: f64 = 10.0;
+
+fn consistency(id: &Identification) -> Option<(Status, CheckResult)> {
+    let found = id.consistent.estimate.as_ref()?;
+    let held_out = &id.consistent.held_out;
+    let rise = match (held_out.relative(UNCONSTRAINED), held_out.relative(CONSISTENT)) {
+        (Some(free), Some(consistent)) if free > 0.0 => Some(100.0 * (consistent / free - 1.0)),
+        _ => None,
+    };
+    let cost = rise.unwrap_or(0.0);
+    let active = || found.active.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+    Some(check(
+        Status::of(cost <= CHEAP && found.status != ConsistentStatus::Stalled, cost <= DEAR),
+        "price of physical consistency",
+        rise,
+        "%",
+        "held-out error rises by at most 2 %",
+        if found.status == ConsistentStatus::Unconstrained {
+            "the parameters that fit best belong to bodies that can exist".to_owned()
+        } else if found.status == ConsistentStatus::Stalled {
+            format!(
+                "the parameters are consistent, but a better fit by up to {:.2e} residual variances is not ruled out",
+                found.gap
+            )
+        } else if cost <= CHEAP {
+            format!("bodies that can exist fit about as well as any numbers; held at a limit: {}", active())
+        } else {
+            format!(
+                "the best fit asks for bodies that cannot exist: something in the model or in the log is wrong where these \
+                 limits act: {}",
+                active()
+            )
+        },
+    ))
+}
+
+fn whiteness(id: &Identification) -> Option<(Status, CheckResult)> {
+    let tested: Vec<(usize, &InBandWhiteness)> = id
+        .whiteness
+        .iter()
+        .flat_map(|log| log.iter().enumerate().filter_map(|(j, w)| w.as_ref().map(|w| (j, w))))
+        .collect();
+    let ratio = |w: &InBandWhiteness| w.distance / w.threshold;
+    let (joint, worst) = tested.into_iter().max_by(|a, b| ratio(a.1).total_cmp(&ratio(b.1)))?;
+    let robust = id.fitted.jackknife.is_some();
+    Some(check(
+        Status::of(!worst.rejected() || robust, true),
+        "whiteness of the residuals",
+        Some(ratio(worst)),
+        "",
+        "largest distance of the cumulative periodogram below its 5 % threshold (1), or robust intervals",
+        if !worst.rejected() {
+            "inside the band of the fit the residuals look like white noise".to_owned()
+        } else {
+            let joint = dynid_model::EffortModel::outputs(&id.model)[joint].name.clone();
+            let shown = if robust { "; the ones shown are robust" } else { "" };
+            format!(
+                "the residual of `{joint}` is coloured, most at {:.2} Hz: standard deviations of plain least squares are not \
+                 to be believed{shown}. Intervals cover noise, not errors of the model",
+                worst.dominant_frequency
+            )
+        },
+    ))
 }

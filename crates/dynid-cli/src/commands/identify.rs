@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use dynid::config::{Config, LogConfig, Method, Route};
+use dynid::config::{Config, Consistency, LogConfig, Method, Route};
 use dynid::estimate::Estimate;
 use dynid::identify;
 use dynid::io::OutputError;
 use dynid::io::output::write_atomically;
 
 use super::{apply_log_args, element_names, table};
-use crate::args::{IdentifyArgs, MethodArg, RouteArg};
+use crate::args::{ConsistencyArg, IdentifyArgs, MethodArg, RouteArg};
 use crate::message::{Failure, data, note};
 use crate::outputs;
 use crate::progress::Progress;
@@ -93,6 +93,15 @@ fn configuration(args: &IdentifyArgs) -> Result<Config, Failure> {
     match args.estimator {
         Some(MethodArg::Ols) => config.estimator.method = Method::Ols,
         Some(MethodArg::Wls) => config.estimator.method = Method::Wls,
+        Some(MethodArg::Huber) => config.estimator.method = Method::Huber,
+        Some(MethodArg::Tukey) => config.estimator.method = Method::Tukey,
+        Some(MethodArg::Ridge) => config.estimator.method = Method::Ridge,
+        None => {}
+    }
+    match args.consistency {
+        Some(ConsistencyArg::PseudoInertia) => config.estimator.consistency = Consistency::PseudoInertia,
+        Some(ConsistencyArg::SpatialInertia) => config.estimator.consistency = Consistency::SpatialInertia,
+        Some(ConsistencyArg::None) => config.estimator.consistency = Consistency::None,
         None => {}
     }
     c.kernel_hz = args.kernel_hz.or(c.kernel_hz);

@@ -30,7 +30,9 @@ fn inflation(groups: &[ReducedGroup], weights: &[f64], x: &[f64], output: usize)
         for b in 0..of_log.iter().map(|(g, _)| g.blocks.len()).max().unwrap_or(0) {
             let parts: Vec<Factor> = of_log
                 .iter()
-                .filter_map(|(g, w)| g.blocks.get(b).filter(|f| f.rows() > 0).map(|f| f.scaled(*w).centred(&values)))
+                .filter_map(|(g, w)| {
+                    g.blocks.get(b).filter(|f| f.rows() > 0).map(|f| f.scaled(*w).centred(&values))
+                })
                 .collect();
             if !parts.is_empty() {
                 blocks.push(Factor::merge(&parts.iter().collect::<Vec<_>>()));

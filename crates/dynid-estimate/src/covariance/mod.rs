@@ -12,11 +12,10 @@ mod jackknife;
 mod row_scores;
 mod sandwich;
 
-pub use hac::{andrews_lag, hac_bartlett, hac_lag};
-pub use inflation::output_inflation;
 pub use block_length::{BlockLength, BlockLengthSettings, BlockLengthStatus, ResidualSignal, block_length};
 pub use bootstrap::{Bootstrap, BootstrapSettings, bootstrap};
 pub use hac::{andrews_lag, hac_bartlett, hac_bartlett_logs, hac_lag};
+pub use inflation::output_inflation;
 pub use jackknife::{Jackknife, MIN_BLOCKS, jackknife, jackknife_by, jackknife_with};
 pub use row_scores::{RowScores, row_scores};
 pub use sandwich::{block_sandwich, block_sandwich_with};

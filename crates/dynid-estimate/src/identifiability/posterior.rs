@@ -47,9 +47,8 @@ pub fn posterior(
     let solved = factor.solve(&rows);
     // Gain in units of the prior deviations, p × k.
     let gain = Mat::from_fn(p, k, |j, i| solved[(i, j)] * scale[i]);
-    let missing: Vec<f64> = (0..k)
-        .map(|i| estimate[i] - (0..p).map(|j| regrouping[(i, j)] * prior[j]).sum::<f64>())
-        .collect();
+    let missing: Vec<f64> =
+        (0..k).map(|i| estimate[i] - (0..p).map(|j| regrouping[(i, j)] * prior[j]).sum::<f64>()).collect();
     let left = Mat::<f64>::identity(p, p) - &gain * &whitened;
     let noise = &gain * covariance;
     let mut out = Posterior { mean: Vec::with_capacity(p), std: Vec::with_capacity(p) };

@@ -75,6 +75,25 @@ pub struct LinearEstimate {
 }
 
 impl LinearEstimate {
+    /// The same estimate with time blocks `factor` times as long, for residuals that stay correlated beyond a block.
+    ///
+    /// Panics if `factor` is zero.
+    pub fn with_longer_blocks(mut self, factor: usize) -> LinearEstimate {
+        if factor == 1 {
+            return self;
+        }
+        let total = self.x.len();
+        let weights = self.weights();
+        self.reduced = self.reduced.iter().map(|g| g.coarsened(factor)).collect();
+        self.blocks = time_blocks(&self.reduced, &weights, total);
+        if !self.given_blocks.is_empty() {
+            let merged =
+                self.given_blocks.chunks(factor).map(|c| Factor::merge(&c.iter().collect::<Vec<_>>()));
+            self.given_blocks = merged.collect();
+        }
+        self
+    }
+
     /// Parameters of the kept columns.
     pub fn kept_x(&self) -> Vec<f64> {
         self.solution.kept.iter().map(|&c| self.x[c]).collect()
