@@ -2,7 +2,8 @@
 
 use crate::factor::Factor;
 use crate::linear::ols;
-use crate::triangular::symmetric_from;
+use crate::rank::certainly_full_rank;
+use crate::triangular::{solve, symmetric_from};
 use faer::Mat;
 use rayon::prelude::*;
 
@@ -114,6 +115,9 @@ fn running_merges<'a>(
 }
 
 fn change_without(rest: &Factor, norms: &[f64]) -> (Vec<f64>, bool) {
+    if certainly_full_rank(rest) {
+        return (solve(rest), false);
+    }
     let solution = ols(rest);
     if solution.dropped.is_empty() {
         return (solution.x, false);

@@ -82,6 +82,18 @@ pub fn numerical_rank(factor: &Factor) -> RankReport {
     }
 }
 
+/// Whether [`numerical_rank`] must find full rank, told by an inverse instead of singular values: `1/‖A⁻¹‖_F` bounds the
+/// least singular value of the scaled triangle `A` from below, `√p` the largest from above.
+pub(crate) fn certainly_full_rank(factor: &Factor) -> bool {
+    let norms = factor.column_norms();
+    if factor.height() < factor.columns() || norms.contains(&0.0) {
+        return false;
+    }
+    let inverse = crate::triangular::inverse(&scaled_triangle(factor, &norms));
+    let largest = (factor.columns() as f64).sqrt();
+    1.0 / inverse.norm_l2() > rank_tolerance(factor.rows(), factor.columns(), largest)
+}
+
 /// `τ = 100 ε max(rows, columns) σ_1`.
 pub(crate) fn rank_tolerance(rows: usize, columns: usize, largest: f64) -> f64 {
     100.0 * f64::EPSILON * rows.max(columns) as f64 * largest
