@@ -8,12 +8,13 @@
 
 mod arm;
 
-use arm::{Arm, CUT_OFF_HZ, RATE_HZ};
+use arm::{Arm, CUT_OFF_HZ, JOINTS, RATE_HZ};
 use dynid_estimate::Mat;
 use dynid_estimate::covariance::{row_scores, variance_inflation};
 use dynid_estimate::distribution::t_quantile;
 use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate};
 use dynid_estimate::rows::reduce_rows;
+use dynid_estimate::whiteness::{InBandSettings, raw_in_band_whiteness};
 use rayon::prelude::*;
 
 /// Shares of true base parameters inside their 95 % interval, and the mean variance inflation.
@@ -74,7 +75,35 @@ fn check(seconds: f64, logs: u64) {
 
 #[test]
 fn intervals_of_a_few_logs_hold_the_truth() {
-    check(30.0, 80);
+    check(30.0, 50);
+}
+
+/// Raw residuals of a fit lack what its parameters took up; the in-band test must not mistake that for colour.
+#[test]
+fn raw_residuals_of_a_fit_are_judged_fairly() {
+    let arm = Arm::new(30.0);
+    let share = |tau: f64| {
+        const LOGS: u64 = 40;
+        let rejected: usize = (0..LOGS)
+            .into_par_iter()
+            .map(|seed| {
+                let groups = reduce_rows(&arm.log(seed, tau)).unwrap();
+                let p = arm.truth.len();
+                let found =
+                    estimate(&groups, None, p, &LinearMethod::Wls, &LinearSettings::default()).unwrap();
+                let rejects = |joint: &usize| {
+                    let residual = arm.raw_residual(*joint, seed, tau, &found.x);
+                    let settings = InBandSettings::default();
+                    raw_in_band_whiteness(&residual, RATE_HZ, CUT_OFF_HZ, &settings).unwrap().rejected()
+                };
+                (0..JOINTS).filter(rejects).count()
+            })
+            .sum();
+        rejected as f64 / (LOGS * JOINTS as u64) as f64
+    };
+    let (null, power) = (share(0.0), share(0.05));
+    println!("raw in-band whiteness after a fit: null {null:.3}, power {power:.3}");
+    assert!(null <= 0.07 && power >= 0.90, "null {null}, power {power}");
 }
 
 /// The full count, at both lengths of the specification.

@@ -129,6 +129,23 @@ fn ridge_is_that_of_the_weighted_factor() {
 }
 
 #[test]
+fn longer_blocks_hold_the_same_rows() {
+    let groups = reduce_rows(&noisy(8)).unwrap();
+    for (factor, sizes) in [
+        (1, vec![1; 15]),
+        (2, vec![2, 2, 2, 2, 2, 2, 2, 1]),
+        (4, vec![4, 4, 4, 3]),
+        (7, vec![7, 8]),
+        (40, vec![15]),
+    ] {
+        let coarse = groups[0].coarsened(factor);
+        assert_eq!(coarse.blocks.iter().map(|b| b.rows() / 40).collect::<Vec<_>>(), sizes);
+        let (a, b) = (coarse.merged(COLUMNS), groups[0].merged(COLUMNS));
+        check_close(&ols(&a).x, &ols(&b).x, 1e-12);
+    }
+}
+
+#[test]
 fn columns_without_rows_stay_at_a_prior_and_are_dropped_without_one() {
     let mut normal = Normal::new(5, 0);
     let mut builder = FactorBuilder::new(2);

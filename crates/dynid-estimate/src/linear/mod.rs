@@ -3,14 +3,16 @@
 mod estimate;
 mod extended;
 mod irls;
+mod linear_estimate;
 mod method;
 mod ols;
 mod ridge;
 mod tls;
 mod wls;
 
-pub use estimate::{GroupFit, LinearEstimate, estimate};
+pub use estimate::estimate;
 pub use extended::ols_extended;
+pub use linear_estimate::{GroupFit, LinearEstimate};
 pub use method::{IrlsSettings, LinearError, LinearMethod, LinearSettings, VarianceSharing};
 pub use ols::{LinearSolution, ols};
 pub use ridge::{RidgeSolution, ridge};

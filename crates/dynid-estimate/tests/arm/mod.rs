@@ -91,6 +91,9 @@ pub(crate) struct Arm {
     pub(crate) truth: Vec<f64>,
     samples: usize,
     filter: Sections,
+    /// Raw regressor of all standard parameters, and the base columns among them.
+    raw: RegressorBlock,
+    kept: Vec<usize>,
     /// Per joint: base columns that act.
     acting: Vec<Vec<usize>>,
     /// Per joint: column-major regressor and effort.
@@ -124,7 +127,17 @@ impl Arm {
             acting.push(names);
             rows.push((regressor, effort));
         }
-        Arm { truth, samples, filter, acting, rows }
+        Arm { truth, samples, filter, raw: block, kept: base.kept, acting, rows }
+    }
+
+    /// Measured minus predicted raw effort of a joint of [`Self::log`] at an estimate of the base parameters.
+    pub(crate) fn raw_residual(&self, joint: usize, seed: u64, tau: f64, x: &[f64]) -> Vec<f64> {
+        let mut error = vec![0.0; self.raw.layout().parameters()];
+        for (column, (x, truth)) in self.kept.iter().zip(x.iter().zip(&self.truth)) {
+            error[*column] = x - truth;
+        }
+        let noise = noise(joint, self.samples, seed, tau);
+        noise.iter().zip(self.raw.effort(joint, &error)).map(|(n, e)| n - e).collect()
     }
 
     /// One log: noise of correlation time `tau` (0: white) on the raw efforts, filtered and thinned with them, in blocks

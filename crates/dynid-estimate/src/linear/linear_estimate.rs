@@ -1,0 +1,176 @@
+//! The result that every linear estimator shares.
+
+use super::irls::Loss;
+use super::method::LinearMethod;
+use super::ols::LinearSolution;
+use super::tls::{TlsNoise, tls};
+use crate::covariance::{Jackknife, block_sandwich_with, jackknife_by, jackknife_with};
+use crate::factor::Factor;
+use crate::groups::{ReducedGroup, time_blocks};
+use faer::Mat;
+
+/// What an estimator found about one group of rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupFit {
+    /// Index of the log.
+    pub log: usize,
+    /// Index of the output.
+    pub output: usize,
+    /// Index of the kernel scale.
+    pub scale: usize,
+    /// Residual variance `σ_j²` (for robust losses the square of the scale), effort².
+    pub variance: f64,
+    /// Factor by which the group's reduced rows enter the weighted blocks, `√curvature/σ_j`.
+    pub weight: f64,
+    /// Leverage `‖W_j R⁻¹‖_F²/σ_j²` of the group, of the least-squares start for robust losses.
+    pub leverage: f64,
+    /// Residual sum of squares of all rows at the estimate, unweighted, effort².
+    pub rss: f64,
+    /// Rows.
+    pub rows: usize,
+    /// Whether the variance could not be told from the residuals.
+    pub at_floor: bool,
+    /// Share of rows weighed down: `ω < 1` for Huber, `ω < 1/2` for Tukey, 0 otherwise.
+    pub down_weighted: f64,
+    /// Share of rows without any weight.
+    pub rejected: f64,
+    /// `mean ψ'/mean ω` of a robust loss: what the curvature of the loss is, of that of the weighted squares. 1 otherwise.
+    pub curvature: f64,
+}
+
+/// Estimate of any [`LinearMethod`].
+///
+/// Ordinary least squares on [`Self::factor`] (with the prior rows of a ridge) gives `x` back, and the scores of
+/// [`Self::blocks`] are those of the estimator. Covariance, bootstrap, elimination, folds and constrained estimators
+/// therefore need not know the method.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearEstimate {
+    /// The method.
+    pub method: LinearMethod,
+    /// All `p` parameters. Dropped ones are zero, or at the prior for a ridge.
+    pub x: Vec<f64>,
+    /// Solution of the merged weighted factor: kept and dropped columns, rank, conditioning, `C`.
+    pub solution: LinearSolution,
+    /// One entry per group, in the order given.
+    pub groups: Vec<GroupFit>,
+    /// Rows as the estimator weighs them within each group, in the unit of effort: multiplied by `√ω` for robust losses,
+    /// freed of the columns' errors for total least squares, unchanged otherwise.
+    pub reduced: Vec<ReducedGroup>,
+    /// Merged weighted factor of all columns, without prior rows.
+    pub factor: Factor,
+    /// Weighted time blocks, log after log, all groups of a block merged, in all columns; none without rows.
+    pub blocks: Vec<Factor>,
+    /// Passes made, of the last loss for robust ones.
+    pub passes: usize,
+    /// Whether they settled within the tolerance.
+    pub converged: bool,
+    /// Loss `Σ ρ(r/ŝ)` at the start of every pass with frozen scales; empty without a robust loss.
+    pub losses: Vec<f64>,
+    pub(super) prior: Option<Factor>,
+    pub(super) loss: Option<Loss>,
+    /// Time blocks as given, for total least squares solved again without a block; else none.
+    pub(super) given_blocks: Vec<Factor>,
+}
+
+impl LinearEstimate {
+    /// The same estimate with time blocks `factor` times as long, for residuals that stay correlated beyond a block.
+    ///
+    /// Panics if `factor` is zero.
+    pub fn with_longer_blocks(mut self, factor: usize) -> LinearEstimate {
+        if factor == 1 {
+            return self;
+        }
+        let total = self.x.len();
+        let weights = self.weights();
+        self.reduced = self.reduced.iter().map(|g| g.coarsened(factor)).collect();
+        self.blocks = time_blocks(&self.reduced, &weights, total);
+        if !self.given_blocks.is_empty() {
+            // Unweighted, as they were given.
+            let merged = self.given_blocks.chunks(factor).map(|c| Factor::merge(&c.iter().collect::<Vec<_>>()));
+            self.given_blocks = merged.collect();
+        }
+        self
+    }
+
+    /// Parameters of the kept columns.
+    pub fn kept_x(&self) -> Vec<f64> {
+        self.solution.kept.iter().map(|&c| self.x[c]).collect()
+    }
+
+    /// [`Self::blocks`] in the kept columns.
+    pub fn kept_blocks(&self) -> Vec<Factor> {
+        self.kept(&self.blocks)
+    }
+
+    /// Rows of the prior of a ridge in the kept columns, which belong to no block; `None` for the other methods.
+    pub fn kept_prior(&self) -> Option<Factor> {
+        self.prior.as_ref().map(|p| self.without_dropped(p))
+    }
+
+    fn kept(&self, blocks: &[Factor]) -> Vec<Factor> {
+        blocks.iter().map(|b| self.without_dropped(b)).collect()
+    }
+
+    /// In the kept columns, the others being fixed at their value in `x`.
+    fn without_dropped(&self, factor: &Factor) -> Factor {
+        if self.solution.dropped.is_empty() {
+            return factor.clone();
+        }
+        let mut fixed = self.x.clone();
+        self.solution.kept.iter().for_each(|&c| fixed[c] = 0.0);
+        factor.centred(&fixed).select(&self.solution.kept)
+    }
+
+    /// Weights of the groups in the blocks.
+    pub fn weights(&self) -> Vec<f64> {
+        self.groups.iter().map(|g| g.weight).collect()
+    }
+
+    /// `ψ(r/ŝ)/ŝ` of a residual of a group: what its row of the regressor is multiplied by in the score.
+    pub(crate) fn row_score(&self, group: usize, residual: f64) -> f64 {
+        let variance = self.groups[group].variance;
+        self.loss.map_or(1.0, |loss| loss.weight(residual / variance.sqrt())) * residual / variance
+    }
+
+    /// Covariance of the kept columns if all residuals were independent.
+    ///
+    /// `C = (RᵀR)⁻¹` for the squared losses; `C (Σ_j τ_j J_j) C` for robust ones, with the information `J_j` of each group
+    /// and the mean square `τ_j` of its weighted residuals, `E ψ²/E ψ'`.
+    pub fn model_covariance(&self) -> Mat<f64> {
+        let unit = self.solution.unit_covariance();
+        if !self.method.needs_rows() {
+            return unit;
+        }
+        let p = self.solution.kept.len();
+        let mut filling = Mat::zeros(p, p);
+        for (fit, group) in self.groups.iter().zip(&self.reduced) {
+            let weighted = self.without_dropped(&group.merged(self.x.len()).scaled(fit.weight));
+            let freedom = (fit.rows as f64 - fit.leverage).max(1.0);
+            let tau = weighted.rss(&self.kept_x()) / freedom;
+            let r = weighted.r_matrix();
+            filling += faer::Scale(tau) * (r.transpose() * &r);
+        }
+        crate::covariance::sandwich(&unit, &filling)
+    }
+
+    /// Delete-a-block jackknife with weights fixed; `None` with fewer than two blocks. Total least squares is solved
+    /// again without each block where the noisy columns act on all groups; elsewhere, and in the block sandwich and the
+    /// bootstrap, the linear step is taken, which understates the spread by the share of noise in the columns.
+    pub fn jackknife(&self) -> Option<Jackknife> {
+        if let (LinearMethod::Tls(noise), false) = (&self.method, self.given_blocks.is_empty()) {
+            let kept_noise = TlsNoise {
+                columns: self.solution.kept.iter().map(|&c| noise.columns[c]).collect(),
+                effort: noise.effort,
+            };
+            return jackknife_by(&self.kept(&self.given_blocks), &self.kept_x(), |rest| {
+                tls(rest, &kept_noise).ok().filter(|s| s.dropped.is_empty()).map(|s| s.x)
+            });
+        }
+        jackknife_with(&self.kept_blocks(), self.kept_prior().as_ref(), &self.kept_x())
+    }
+
+    /// Sandwich covariance from block scores, as a second opinion; `None` with fewer than two blocks.
+    pub fn block_sandwich(&self) -> Option<Mat<f64>> {
+        block_sandwich_with(&self.kept_blocks(), self.kept_prior().as_ref(), &self.kept_x())
+    }
+}
