@@ -1,4 +1,4 @@
-//! Robot files and logs: URDF, robots in TOML (DH tables or body trees), CSV logs and states.
+//! Robot files and logs: URDF, robots in TOML (DH tables or body trees), MJCF (written), CSV logs and states.
 //!
 //! Every door checks what it lets in: numbers are finite, names are unique, sizes are bounded. A fault becomes one
 //! typed error whose `Display` is one line (file, line, column or row, expected, found) and whose `hint()` says what
@@ -7,6 +7,7 @@
 pub mod columns;
 pub mod csv;
 mod excerpt;
+pub mod mjcf;
 pub mod output;
 pub mod robot;
 mod source;

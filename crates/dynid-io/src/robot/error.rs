@@ -195,9 +195,11 @@ pub enum RobotFileError {
         /// A close name that exists.
         meant: Option<String>,
     },
-    /// A description holds something that URDF cannot say.
-    #[error("{what} `{name}`: cannot be written as URDF: {reason}")]
+    /// A description holds something that a format cannot say.
+    #[error("{what} `{name}`: cannot be written as {format}: {reason}")]
     Unwritable {
+        /// `URDF` or `MJCF`.
+        format: &'static str,
         /// `link` or `joint`.
         what: &'static str,
         /// Its name.

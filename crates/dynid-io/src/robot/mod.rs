@@ -28,7 +28,8 @@ pub fn read(path: impl AsRef<Path>) -> Result<RobotFile, RobotFileError> {
         _ => text.trim_start().starts_with('<'),
     };
     if is_xml {
-        Ok(RobotFile::plain(urdf::parse(&text, &name)?, ElementSpec::default()))
+        let plain = RobotFile::plain(urdf::parse(&text, &name)?, ElementSpec::default());
+        Ok(RobotFile { urdf: Some(name), ..plain })
     } else {
         toml_robot::parse(&text, &name)
     }

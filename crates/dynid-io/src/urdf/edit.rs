@@ -159,7 +159,12 @@ impl<'a> Editor<'a> {
         kept: &[Attribute],
         indent: &str,
     ) -> Result<Option<String>, RobotFileError> {
-        let unwritable = |what, reason| RobotFileError::Unwritable { what, name: this.name.clone(), reason };
+        let unwritable = |what, reason| RobotFileError::Unwritable {
+            format: "URDF",
+            what,
+            name: this.name.clone(),
+            reason,
+        };
         match this.edit {
             Edit::Link(None) => Ok(None),
             Edit::Link(Some(inertia)) => {

@@ -1,17 +1,17 @@
-//! `<inertial>` as text.
+//! A body about its centre of mass, and `<inertial>` as text.
 
 use dynid_model::Inertia;
 
-/// Centre of mass (m) and tensor about it (kg m²), as URDF states a body.
-pub(super) struct Inertial {
-    mass: f64,
-    com: [f64; 3],
-    tensor: [[f64; 3]; 3],
+/// Centre of mass (m) and tensor about it (kg m²) in link axes, as URDF and MJCF state a body.
+pub(crate) struct Inertial {
+    pub(crate) mass: f64,
+    pub(crate) com: [f64; 3],
+    pub(crate) tensor: [[f64; 3]; 3],
 }
 
 impl Inertial {
-    /// Splits the parameters about the frame origin; `Err` says why URDF cannot state them.
-    pub(super) fn of(inertia: &Inertia) -> Result<Self, String> {
+    /// Splits the parameters about the frame origin; `Err` says why they cannot be stated that way.
+    pub(crate) fn of(inertia: &Inertia) -> Result<Self, String> {
         if !inertia.0.iter().all(|x| x.is_finite()) {
             return Err("a parameter is not finite".to_owned());
         }

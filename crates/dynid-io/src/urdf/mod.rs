@@ -1,11 +1,13 @@
 //! URDF: reading, editing in place, writing.
 
+mod dynamics;
 mod edit;
-mod inertial;
+pub(crate) mod inertial;
 mod read;
 mod write;
-mod xml;
+pub(crate) mod xml;
 
+pub use dynamics::dynamics;
 pub use edit::{JointDynamics, edit};
 pub use read::{parse, read};
 pub use write::from_description;

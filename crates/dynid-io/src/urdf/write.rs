@@ -36,6 +36,7 @@ fn write_link(out: &mut String, link: &LinkDescription) -> Result<(), RobotFileE
         return Ok(());
     };
     let inertial = Inertial::of(inertia).map_err(|reason| RobotFileError::Unwritable {
+        format: "URDF",
         what: "link",
         name: link.name.clone(),
         reason,
@@ -47,6 +48,7 @@ fn write_link(out: &mut String, link: &LinkDescription) -> Result<(), RobotFileE
 
 fn write_joint(out: &mut String, joint: &JointDescription) -> Result<(), RobotFileError> {
     let unwritable = |reason: &str| RobotFileError::Unwritable {
+        format: "URDF",
         what: "joint",
         name: joint.name.clone(),
         reason: reason.to_owned(),
@@ -89,7 +91,9 @@ fn write_joint(out: &mut String, joint: &JointDescription) -> Result<(), RobotFi
 
 fn write_limit(out: &mut String, joint: &JointDescription) {
     let limits = &joint.limits;
-    if limits.position.is_none() && limits.velocity.is_none() && limits.effort.is_none() {
+    let stated = limits.position.is_some() || limits.velocity.is_some() || limits.effort.is_some();
+    // Other readers refuse a prismatic joint without the element; without positions it reads back as "no limit".
+    if !stated && joint.kind != JointKind::Prismatic {
         return;
     }
     out.push_str("    <limit");

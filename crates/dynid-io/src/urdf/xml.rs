@@ -19,7 +19,7 @@ const MAX_ELEMENTS: usize = 5_000_000;
 const MAX_ATTRIBUTES: usize = 256;
 
 /// An opening, closing or self-closing tag.
-pub(super) enum Tag<'a> {
+pub(crate) enum Tag<'a> {
     /// `<a ..>` or `<a ../>`.
     Open {
         /// Name and attributes.
@@ -33,15 +33,15 @@ pub(super) enum Tag<'a> {
 
 /// One attribute with its entities resolved.
 #[derive(Clone, Debug)]
-pub(super) struct Attribute {
-    pub(super) name: String,
-    pub(super) value: String,
+pub(crate) struct Attribute {
+    pub(crate) name: String,
+    pub(crate) value: String,
     /// Byte offset of the attribute in the text.
-    pub(super) offset: usize,
+    pub(crate) offset: usize,
 }
 
 /// A reader of tags that checks nesting, bounds and leftovers of xacro.
-pub(super) struct Tags<'a> {
+pub(crate) struct Tags<'a> {
     reader: Reader<&'a [u8]>,
     text: &'a str,
     file: &'a str,
@@ -51,13 +51,13 @@ pub(super) struct Tags<'a> {
 }
 
 impl<'a> Tags<'a> {
-    pub(super) fn new(text: &'a str, file: &'a str) -> Self {
+    pub(crate) fn new(text: &'a str, file: &'a str) -> Self {
         let mut reader = Reader::from_str(text);
         reader.config_mut().allow_dangling_amp = true;
         Tags { reader, text, file, open: Vec::new(), elements: 0, root_seen: false }
     }
 
-    pub(super) fn place(&self, offset: usize) -> Place {
+    pub(crate) fn place(&self, offset: usize) -> Place {
         Place::of(self.file, self.text, offset)
     }
 
@@ -66,12 +66,12 @@ impl<'a> Tags<'a> {
     }
 
     /// Number of elements that are open now.
-    pub(super) fn depth(&self) -> usize {
+    pub(crate) fn depth(&self) -> usize {
         self.open.len()
     }
 
     /// The next tag and its bytes, or `None` at the end of a well-formed document.
-    pub(super) fn next(&mut self) -> Result<Option<(Range<usize>, Tag<'a>)>, RobotFileError> {
+    pub(crate) fn next(&mut self) -> Result<Option<(Range<usize>, Tag<'a>)>, RobotFileError> {
         loop {
             let from = self.reader.buffer_position() as usize;
             let event = self
@@ -140,7 +140,7 @@ impl<'a> Tags<'a> {
     }
 
     /// The attributes of an opening tag that begins at `offset`.
-    pub(super) fn attributes(
+    pub(crate) fn attributes(
         &self,
         start: &BytesStart<'_>,
         offset: usize,

@@ -1,0 +1,288 @@
+//! A [`Description`] as MJCF.
+
+use std::collections::{HashMap, HashSet};
+use std::fmt::Write;
+
+use dynid_model::mechanism::ROOT_JOINT;
+use dynid_model::{Description, Inertia, JointDescription, JointKind, Mat3, Placement, Vec3};
+use quick_xml::escape::escape;
+
+use super::JointParameters;
+use super::quaternion::quaternion;
+use crate::robot::RobotFileError;
+use crate::urdf::inertial::Inertial;
+
+/// Name of the body that every MJCF has.
+const WORLD: &str = "world";
+
+/// Writes links, joints and gravity as MJCF, numbers in the shortest form that reads back to the same `f64`.
+///
+/// - Links are bodies under their own names, one inside the other as joints say; a link on a fixed joint is a body
+///   without joint. A root link called `world` is MJCF's own world body.
+/// - `<inertial>`: centre of mass and `fullinertia` about it (order xx yy zz xy xz yz) in link axes; none for massless
+///   links, and none for links that do not move if no body could have the stated one (MuJoCo would refuse the file).
+/// - Joints: `hinge` (revolute, continuous), `slide` (prismatic), `freejoint`; `ref` is 0, so `qpos` is the position of
+///   the description. `range` from the limits of revolute and prismatic joints, `damping`, `frictionloss`, `armature`
+///   from `joints` (joints that are not named there: 0).
+/// - A mimic joint follows its leader by `<equality><joint polycoef="offset ratio 0 0 0"/>`.
+/// - One `<motor>` of gear 1 per joint under the joint's name, its `ctrlrange` the limit of the effort; none for mimic
+///   joints if the description couples them.
+/// - No geometry. `compiler angle="radian" balanceinertia="false"`, `option gravity`.
+///
+/// # Errors
+/// [`RobotFileError::Unwritable`]: a helical joint, a floating joint that is not at the origin of the world, a second
+/// link called `world`, a mimic joint without a leader of one coordinate, a body with a first moment but no mass,
+/// numbers that are not finite. A graph that is no tree is the fault of [`Description::build`]; what does not hang on
+/// the root is not written.
+pub fn from_description(
+    description: &Description,
+    joints: &[JointParameters],
+) -> Result<String, RobotFileError> {
+    let writer = Writer {
+        description,
+        parameters: joints.iter().map(|p| (p.joint.as_str(), p)).collect(),
+        by_name: description.joints.iter().map(|j| (j.name.as_str(), j)).collect(),
+    };
+    let [x, y, z] = description.gravity;
+    let mut out = String::from("<?xml version=\"1.0\"?>\n");
+    let _ = writeln!(out, "<mujoco model=\"{}\">", escape(description.name.as_str()));
+    out.push_str("  <compiler angle=\"radian\" balanceinertia=\"false\"/>\n");
+    let _ = writeln!(out, "  <option gravity=\"{x:?} {y:?} {z:?}\"/>");
+    out.push_str("  <worldbody>\n");
+    writer.bodies(&mut out)?;
+    out.push_str("  </worldbody>\n");
+    writer.equalities(&mut out)?;
+    writer.motors(&mut out);
+    out.push_str("</mujoco>\n");
+    Ok(out)
+}
+
+/// What is still to be written, last first.
+enum Pending<'a> {
+    Body { link: &'a str, joint: Option<&'a JointDescription>, depth: usize, moves: bool },
+    Close { depth: usize },
+}
+
+struct Writer<'a> {
+    description: &'a Description,
+    parameters: HashMap<&'a str, &'a JointParameters>,
+    by_name: HashMap<&'a str, &'a JointDescription>,
+}
+
+impl<'a> Writer<'a> {
+    fn bodies(&self, out: &mut String) -> Result<(), RobotFileError> {
+        let d = self.description;
+        let mut children: HashMap<&str, Vec<&JointDescription>> = HashMap::new();
+        for joint in &d.joints {
+            children.entry(joint.parent.as_str()).or_default().push(joint);
+        }
+        let inertia: HashMap<&str, Option<Inertia>> =
+            d.links.iter().map(|l| (l.name.as_str(), l.inertia)).collect();
+        let owned: HashSet<&str> = d.joints.iter().map(|j| j.child.as_str()).collect();
+        let Some(root) = d.links.iter().map(|l| l.name.as_str()).find(|l| !owned.contains(l)) else {
+            return Ok(());
+        };
+        let root_is_world = root == WORLD && !d.floating_base;
+        let on = |link: &str| children.get(link).into_iter().flatten().rev().copied();
+        let body = |joint: &'a JointDescription, depth, moves| Pending::Body {
+            link: &joint.child,
+            joint: Some(joint),
+            depth,
+            moves: moves || joint.kind != JointKind::Fixed,
+        };
+        // A free joint must hang on the world itself.
+        let at_world = |j: &JointDescription| root_is_world || j.kind == JointKind::Floating;
+        let mut pending: Vec<Pending<'a>> =
+            on(root).filter(|j| at_world(j)).map(|j| body(j, 2, false)).collect();
+        if !root_is_world {
+            pending.push(Pending::Body { link: root, joint: None, depth: 2, moves: d.floating_base });
+        }
+        while let Some(next) = pending.pop() {
+            match next {
+                Pending::Close { depth } => {
+                    let _ = writeln!(out, "{:1$}</body>", "", 2 * depth);
+                }
+                Pending::Body { link, joint, depth, moves } => {
+                    self.open_body(out, link, joint, depth)?;
+                    self.inertial(out, link, inertia.get(link).copied().flatten(), moves, depth + 1)?;
+                    self.joint(out, joint, depth + 1)?;
+                    pending.push(Pending::Close { depth });
+                    let inside = on(link).filter(|j| link != root || !at_world(j));
+                    pending.extend(inside.map(|j| body(j, depth + 1, moves)));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn open_body(
+        &self,
+        out: &mut String,
+        link: &str,
+        joint: Option<&JointDescription>,
+        depth: usize,
+    ) -> Result<(), RobotFileError> {
+        if link == WORLD {
+            let reason = "MJCF keeps this name for the world; rename the link".to_owned();
+            return Err(unwritable("link", link, reason));
+        }
+        let _ = write!(out, "{:1$}<body name=\"{2}\"", "", 2 * depth, escape(link));
+        if let Some(joint) = joint {
+            if !joint.placement.is_finite() {
+                return Err(unwritable("joint", &joint.name, "its placement is not finite".to_owned()));
+            }
+            let [x, y, z] = joint.placement.translation.0;
+            if [x, y, z] != [0.0; 3] {
+                let _ = write!(out, " pos=\"{x:?} {y:?} {z:?}\"");
+            }
+            if joint.placement.rotation != Mat3::identity() {
+                let [w, x, y, z] = quaternion(&joint.placement.rotation);
+                let _ = write!(out, " quat=\"{w:?} {x:?} {y:?} {z:?}\"");
+            }
+        }
+        out.push_str(">\n");
+        Ok(())
+    }
+
+    fn inertial(
+        &self,
+        out: &mut String,
+        link: &str,
+        inertia: Option<Inertia>,
+        moves: bool,
+        depth: usize,
+    ) -> Result<(), RobotFileError> {
+        let Some(inertia) = inertia else { return Ok(()) };
+        if inertia == Inertia::default() || (!moves && inertia.physical_fault().is_some()) {
+            return Ok(());
+        }
+        let Inertial { mass, com: [x, y, z], tensor: [[xx, xy, xz], [_, yy, yz], [_, _, zz]] } =
+            Inertial::of(&inertia).map_err(|reason| unwritable("link", link, reason))?;
+        let _ = writeln!(
+            out,
+            "{:1$}<inertial pos=\"{x:?} {y:?} {z:?}\" mass=\"{mass:?}\" \
+             fullinertia=\"{xx:?} {yy:?} {zz:?} {xy:?} {xz:?} {yz:?}\"/>",
+            "",
+            2 * depth
+        );
+        Ok(())
+    }
+
+    fn joint(
+        &self,
+        out: &mut String,
+        joint: Option<&JointDescription>,
+        depth: usize,
+    ) -> Result<(), RobotFileError> {
+        let indent = 2 * depth;
+        let Some(joint) = joint else {
+            if self.description.floating_base {
+                let _ = writeln!(out, "{:indent$}<freejoint name=\"{ROOT_JOINT}\"/>", "");
+            }
+            return Ok(());
+        };
+        let refuse = |reason: &str| Err(unwritable("joint", &joint.name, reason.to_owned()));
+        let kind = match joint.kind {
+            JointKind::Fixed => return Ok(()),
+            JointKind::Helical { .. } => return refuse("MJCF has no helical joints"),
+            JointKind::Floating => {
+                let at_world = depth == 3 && joint.placement == Placement::identity();
+                if !at_world || self.description.floating_base {
+                    return refuse(
+                        "a free joint of MJCF moves a body in the world: hang it on the root link",
+                    );
+                }
+                let _ = writeln!(out, "{:indent$}<freejoint name=\"{}\"/>", "", escape(joint.name.as_str()));
+                return Ok(());
+            }
+            JointKind::Revolute | JointKind::Continuous => "hinge",
+            JointKind::Prismatic => "slide",
+        };
+        let norm = Vec3(joint.axis).norm();
+        if !(norm.is_finite() && norm > 0.0) {
+            return refuse("its axis has no direction");
+        }
+        let [x, y, z] = if norm == 1.0 { joint.axis } else { joint.axis.map(|a| a / norm) };
+        let name = escape(joint.name.as_str());
+        let _ =
+            write!(out, "{:indent$}<joint name=\"{name}\" type=\"{kind}\" axis=\"{x:?} {y:?} {z:?}\"", "");
+        if let Some((low, high)) = joint.limits.position
+            && joint.kind != JointKind::Continuous
+            && low < high
+        {
+            let _ = write!(out, " range=\"{low:?} {high:?}\"");
+        }
+        if let Some(p) = self.parameters.get(joint.name.as_str()) {
+            let entries =
+                [("damping", p.damping), ("frictionloss", p.friction_loss), ("armature", p.armature)];
+            for (key, value) in entries {
+                if !value.is_finite() {
+                    return refuse(&format!("{key} is not finite"));
+                }
+                if value != 0.0 {
+                    let _ = write!(out, " {key}=\"{value:?}\"");
+                }
+            }
+        }
+        out.push_str("/>\n");
+        Ok(())
+    }
+
+    fn equalities(&self, out: &mut String) -> Result<(), RobotFileError> {
+        let followers = || {
+            self.description
+                .joints
+                .iter()
+                .filter(|j| scalar(j.kind))
+                .filter_map(|j| Some((j, j.mimic.as_ref()?)))
+        };
+        if followers().next().is_none() {
+            return Ok(());
+        }
+        out.push_str("  <equality>\n");
+        for (joint, mimic) in followers() {
+            let leader = self.by_name.get(mimic.of.as_str()).filter(|l| scalar(l.kind));
+            if leader.is_none() || !mimic.ratio.is_finite() || !mimic.offset.is_finite() {
+                let reason = format!("it follows `{}`, which is no joint with one coordinate", mimic.of);
+                return Err(unwritable("joint", &joint.name, reason));
+            }
+            let _ = writeln!(
+                out,
+                "    <joint joint1=\"{}\" joint2=\"{}\" polycoef=\"{:?} {:?} 0 0 0\"/>",
+                escape(joint.name.as_str()),
+                escape(mimic.of.as_str()),
+                mimic.offset,
+                mimic.ratio
+            );
+        }
+        out.push_str("  </equality>\n");
+        Ok(())
+    }
+
+    fn motors(&self, out: &mut String) {
+        let d = self.description;
+        let driven: Vec<_> =
+            d.joints.iter().filter(|j| scalar(j.kind) && !(d.couple_mimics && j.mimic.is_some())).collect();
+        if driven.is_empty() {
+            return;
+        }
+        out.push_str("  <actuator>\n");
+        for joint in driven {
+            let name = escape(joint.name.as_str());
+            let _ = write!(out, "    <motor name=\"{name}\" joint=\"{name}\"");
+            if let Some(effort) = joint.limits.effort.filter(|e| e.is_finite() && *e > 0.0) {
+                let _ = write!(out, " ctrlrange=\"{:?} {effort:?}\"", -effort);
+            }
+            out.push_str("/>\n");
+        }
+        out.push_str("  </actuator>\n");
+    }
+}
+
+fn unwritable(what: &'static str, name: &str, reason: String) -> RobotFileError {
+    RobotFileError::Unwritable { format: "MJCF", what, name: name.to_owned(), reason }
+}
+
+fn scalar(kind: JointKind) -> bool {
+    !matches!(kind, JointKind::Fixed | JointKind::Floating)
+}
