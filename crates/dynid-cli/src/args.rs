@@ -26,6 +26,8 @@ pub(crate) enum Command {
     Simulate(SimulateArgs),
     /// Compare an identified model with other logs.
     Validate(ValidateArgs),
+    /// Put identified parameters into a robot file: URDF, MJCF or JSON, read back and checked before it is written.
+    Export(ExportArgs),
 }
 
 /// How a robot file is read.
@@ -252,6 +254,35 @@ pub(crate) struct ValidateArgs {
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ExportArgs {
+    /// estimate.json
+    pub(crate) estimate: PathBuf,
+    /// Robot file that was identified (default: the path that the estimate names).
+    #[arg(long, value_name = "FILE")]
+    pub(crate) robot: Option<PathBuf>,
+    /// Write a URDF: inertias, viscous and Coulomb friction; a URDF is edited in place, all else stays byte for byte.
+    #[arg(long, value_name = "FILE.urdf")]
+    pub(crate) urdf: Option<PathBuf>,
+    /// Write an MJCF for MuJoCo: the same, rotor inertias, gravity, a motor per joint.
+    #[arg(long, value_name = "FILE.xml")]
+    pub(crate) mjcf: Option<PathBuf>,
+    /// Write links and joints as compact JSON.
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) json: Option<PathBuf>,
+    /// Log to compare efforts on, CSV or CSV.gz; repeat for several (default: random states within the limits).
+    #[arg(long, value_name = "LOG")]
+    pub(crate) log: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) columns: LogArgs,
+    /// Configuration whose [columns] and [motor_side] the logs follow.
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) config: Option<PathBuf>,
+    /// Write links that no body could be all the same; simulators refuse them.
+    #[arg(long)]
+    pub(crate) allow_unphysical: bool,
 }
 
 fn joint_value(text: &str) -> Result<(String, f64), String> {

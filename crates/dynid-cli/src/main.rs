@@ -32,6 +32,7 @@ fn main() -> ExitCode {
         Command::Predict(args) => commands::predict::run(&args),
         Command::Simulate(args) => commands::simulate::run(&args),
         Command::Validate(args) => commands::validate::run(&args),
+        Command::Export(args) => commands::export::run(&args),
     };
     match outcome {
         Ok(code) => ExitCode::from(code),

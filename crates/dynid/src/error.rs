@@ -198,6 +198,9 @@ pub enum Error {
     /// An output cannot be written.
     #[error(transparent)]
     Output(#[from] dynid_io::OutputError),
+    /// A robot is not exported.
+    #[error(transparent)]
+    Export(#[from] crate::export::ExportError),
     /// The report cannot be rendered.
     #[error("report: {0}")]
     Report(#[from] dynid_report::ReportError),
@@ -213,6 +216,7 @@ impl Error {
         match self {
             Error::RobotFile(e) => e.hint(),
             Error::LogFile(e) => e.hint(),
+            Error::Export(e) => e.hint(),
             Error::Columns { source, .. } => source.hint(),
             Error::States(e) => e.hint(),
             Error::Output(e) => e.hint(),

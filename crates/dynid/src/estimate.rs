@@ -588,7 +588,7 @@ impl ModelRecord {
         }
     }
 
-    fn description(&self, name: &str) -> Result<Description, String> {
+    pub(crate) fn description(&self, name: &str) -> Result<Description, String> {
         let mut d = Description::new(name);
         d.gravity = self.gravity;
         d.floating_base = self.floating_base;

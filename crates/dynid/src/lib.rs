@@ -11,7 +11,7 @@ pub mod consistency;
 pub mod elements;
 mod error;
 pub mod estimate;
-mod export;
+pub mod export;
 pub mod fitting;
 pub mod identify;
 pub mod inspect;

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use dynid::config::{Config, Consistency, LogConfig, Method, Route};
 use dynid::estimate::Estimate;
-use dynid::identify;
 use dynid::io::OutputError;
 use dynid::io::output::write_atomically;
+use dynid::{Error, identify};
 
-use super::{apply_log_args, element_names, table};
+use super::{apply_log_args, element_names, export, table};
 use crate::args::{ConsistencyArg, IdentifyArgs, MethodArg, RouteArg};
 use crate::message::{Failure, data, note};
 use crate::outputs;
@@ -28,19 +28,30 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     let identification = identify(&config, |step| progress.step(step))?;
     let estimate = identification.estimate(&config)?;
     let report = identification.report(&config, &estimate)?;
-    let urdf = identification.urdf()?;
+    let urdf = match identification.urdf() {
+        Ok(exported) => Ok(exported),
+        // What a URDF cannot state is no reason to lose the identification.
+        Err(reason @ (Error::RobotFile(_) | Error::Export(_))) => Err(reason),
+        Err(error) => return Err(error.into()),
+    };
     drop(progress);
 
     std::fs::create_dir_all(&out)
         .map_err(|error| OutputError::Unwritable { file: out.display().to_string(), error })?;
-    for (path, text) in files.iter().zip([&estimate.to_json(), &report, &urdf]) {
+    let texts = [Some(&estimate.to_json()), Some(&report), urdf.as_ref().ok().map(|u| &u.text)];
+    let written: Vec<(&PathBuf, &String)> =
+        files.iter().zip(texts).filter_map(|(path, text)| Some((path, text?))).collect();
+    for (path, text) in &written {
         write_atomically(path, text.as_bytes())?;
     }
     let failed = estimate.verdict.status == "fail";
     if !args.quiet {
-        summary(&estimate, &files);
+        summary(&estimate, written.iter().map(|(path, _)| path.as_path()));
     } else if failed {
         note(&verdict(&estimate));
+    }
+    if !args.quiet || urdf.is_err() {
+        export::tell(&files[2], &urdf);
     }
     if args.json {
         data(&estimate.to_json())?;
@@ -112,7 +123,7 @@ fn configuration(args: &IdentifyArgs) -> Result<Config, Failure> {
     Ok(config)
 }
 
-fn summary(estimate: &Estimate, files: &[PathBuf]) {
+fn summary<'a>(estimate: &Estimate, files: impl Iterator<Item = &'a Path>) {
     for warning in &estimate.verdict.warnings {
         note(&format!("warning: {warning}"));
     }

@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub(crate) mod export;
 pub(crate) mod identify;
 pub(crate) mod inspect;
 pub(crate) mod predict;

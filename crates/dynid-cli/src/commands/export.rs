@@ -1,0 +1,131 @@
+//! `dynid export`.
+
+use std::path::{Path, PathBuf};
+
+use dynid::config::{Config, LogConfig};
+use dynid::estimate::Estimate;
+use dynid::export::{CheckStates, Exported, IdentifiedRobot, RobotExport, Source, json};
+use dynid::io::MappingSpec;
+use dynid::io::output::write_atomically;
+use dynid::logs::sha256;
+
+use super::apply_log_args;
+use crate::args::ExportArgs;
+use crate::message::{Failure, note};
+use crate::outputs;
+
+pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
+    let outputs: Vec<(&str, &Path)> =
+        [("--urdf", &args.urdf), ("--mjcf", &args.mjcf), ("--json", &args.json)]
+            .into_iter()
+            .filter_map(|(argument, path)| Some((argument, path.as_deref()?)))
+            .collect();
+    if outputs.is_empty() {
+        return Err(Failure::Usage(
+            "nothing to write: expected at least one of --urdf, --mjcf, --json".to_owned(),
+            "for example `dynid export dynid-out/estimate.json --urdf robot.urdf`",
+        ));
+    }
+    let estimate = Estimate::read(&args.estimate)?;
+    let robot = robot_file(args, &estimate)?;
+    let inputs: Vec<&Path> = [&args.estimate, &robot]
+        .into_iter()
+        .chain(&args.log)
+        .chain(&args.config)
+        .map(PathBuf::as_path)
+        .collect();
+    outputs::check_files(&outputs, &inputs)?;
+
+    let identified = estimate.identified_robot(&args.estimate)?;
+    let states = states(args, &estimate, &identified)?;
+    let source = Source::read(&robot)?;
+    if let Some(record) = estimate.robot_file()
+        && sha256(&robot)? != record.sha256
+    {
+        note(&format!("warning: {} has changed since it was identified", robot.display()));
+    }
+    let export = RobotExport::new(identified.identified(), &source)?;
+    if !args.allow_unphysical {
+        export.require_physical()?;
+    }
+    for fault in export.faults() {
+        note(&format!("warning: link `{}` {}: simulators refuse such a robot", fault.link, fault.fault));
+    }
+    let exported = outputs
+        .iter()
+        .map(|(argument, path)| {
+            let exported = match *argument {
+                "--urdf" => export.urdf(&states),
+                "--mjcf" => export.mjcf(&states),
+                _ => json(&identified.identified(), &states),
+            };
+            Ok((*path, exported?))
+        })
+        .collect::<Result<Vec<_>, Failure>>()?;
+    for (path, exported) in &exported {
+        write_atomically(path, exported.text.as_bytes())?;
+    }
+    for (path, exported) in &exported {
+        note(&format!(
+            "written: {} (read back: effort within {:.1e} over {})",
+            path.display(),
+            exported.difference,
+            states.describe()
+        ));
+        notes(exported);
+    }
+    Ok(0)
+}
+
+/// Tells what `identify` did with its robot file.
+pub(super) fn tell(path: &Path, exported: &Result<Exported, dynid::Error>) {
+    match exported {
+        Ok(exported) => notes(exported),
+        Err(reason) => note(&format!("not written: {}: {reason}", path.display())),
+    }
+}
+
+fn notes(exported: &Exported) {
+    for line in &exported.notes {
+        note(&format!("  {line}"));
+    }
+}
+
+fn robot_file(args: &ExportArgs, estimate: &Estimate) -> Result<PathBuf, Failure> {
+    const HINT: &str = "say where it is: --robot FILE";
+    if let Some(path) = &args.robot {
+        return Ok(path.clone());
+    }
+    let Some(record) = estimate.robot_file() else {
+        let text = format!("{}: names no robot file", args.estimate.display());
+        return Err(Failure::Usage(text, HINT));
+    };
+    let path = PathBuf::from(&record.path);
+    if !path.is_file() {
+        let text = format!("{}: robot file `{}` is not there", args.estimate.display(), record.path);
+        return Err(Failure::Usage(text, HINT));
+    }
+    Ok(path)
+}
+
+fn states(
+    args: &ExportArgs,
+    estimate: &Estimate,
+    identified: &IdentifiedRobot,
+) -> Result<CheckStates, Failure> {
+    let model = identified.identified().model;
+    if args.log.is_empty() {
+        return Ok(CheckStates::random(model));
+    }
+    let (mut columns, motor_side) = match &args.config {
+        None => (MappingSpec::default(), None),
+        Some(path) => {
+            let config = Config::read(path)?;
+            (config.columns, config.motor_side)
+        }
+    };
+    apply_log_args(&mut columns, &args.columns);
+    let logs: Vec<LogConfig> =
+        args.log.iter().map(|path| LogConfig { path: path.clone(), ..LogConfig::default() }).collect();
+    Ok(CheckStates::read(model, estimate.model.state_hz, &logs, &columns, motor_side.as_ref())?)
+}

@@ -1,0 +1,92 @@
+//! What is exported, and the robot file that it goes into.
+
+use std::path::{Path, PathBuf};
+
+use dynid_io::RobotFile;
+use dynid_model::{Description, Inertia, RobotModel};
+
+use crate::Error;
+use crate::estimate::{Estimate, InputRecord};
+use crate::identify::Identification;
+
+/// A robot with identified parameters, whatever they come from.
+#[derive(Debug, Clone, Copy)]
+pub struct Identified<'a> {
+    /// The robot as it was identified; joints that were held are fixed.
+    pub description: &'a Description,
+    /// Its effort model.
+    pub model: &'a RobotModel,
+    /// Linear parameters of the model.
+    pub values: &'a [f64],
+}
+
+/// The same, as an estimate file holds it.
+#[derive(Debug)]
+pub struct IdentifiedRobot {
+    description: Description,
+    model: RobotModel,
+    values: Vec<f64>,
+}
+
+impl IdentifiedRobot {
+    /// What the functions of this module take.
+    pub fn identified(&self) -> Identified<'_> {
+        Identified { description: &self.description, model: &self.model, values: self.values() }
+    }
+}
+
+impl Estimate {
+    /// The identified robot; `file` stands in messages.
+    ///
+    /// # Errors
+    /// [`Error::EstimateFile`] if the record contradicts itself.
+    pub fn identified_robot(&self, file: &Path) -> Result<IdentifiedRobot, Error> {
+        let model = self.effort_model(file)?;
+        let description = self
+            .model
+            .description(&self.robot)
+            .map_err(|message| Error::EstimateFile { file: file.display().to_string(), message })?;
+        Ok(IdentifiedRobot { description, model, values: self.values() })
+    }
+
+    /// The robot file that was identified, if the estimate names it.
+    pub fn robot_file(&self) -> Option<&InputRecord> {
+        self.provenance.inputs.iter().find(|i| i.kind == "robot")
+    }
+}
+
+/// A robot file that identified parameters go into.
+#[derive(Debug, Clone)]
+pub struct Source {
+    pub(super) path: PathBuf,
+    pub(super) file: RobotFile,
+    /// Text of the URDF that holds the tree, if one does.
+    pub(super) urdf: Option<String>,
+}
+
+impl Source {
+    /// Reads a robot file (URDF or TOML) and the URDF that it may refer to.
+    ///
+    /// # Errors
+    /// [`Error::RobotFile`], [`Error::Read`].
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let file = dynid_io::robot::read(path)?;
+        let text = |path: &String| {
+            std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.into(), source })
+        };
+        let urdf = file.urdf.as_ref().map(text).transpose()?;
+        Ok(Source { path: path.to_owned(), file, urdf })
+    }
+}
+
+impl Identification {
+    /// The identified robot, for [`RobotExport`](super::RobotExport) and [`json`](super::json()).
+    pub fn identified(&self) -> Identified<'_> {
+        Identified { description: &self.robot.file.description, model: &self.model, values: self.values() }
+    }
+}
+
+/// Inertias of the bodies at the head of a parameter vector.
+pub(super) fn inertias(values: &[f64]) -> impl Iterator<Item = Inertia> {
+    values.chunks_exact(10).map(|ten| Inertia(std::array::from_fn(|k| ten[k])))
+}

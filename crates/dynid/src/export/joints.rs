@@ -1,0 +1,121 @@
+//! Which identified element has a place in which format.
+
+use dynid_io::mjcf::JointParameters;
+use dynid_model::{EffortModel, Owner, RobotModel};
+
+/// A file format.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Format {
+    Urdf,
+    Mjcf,
+}
+
+impl Format {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Format::Urdf => "URDF",
+            Format::Mjcf => "MJCF",
+        }
+    }
+}
+
+/// What a format states about the joints.
+pub(super) struct JointValues {
+    /// Per joint that has friction or a rotor that the format has a place for.
+    pub(super) joints: Vec<JointParameters>,
+    /// Linear parameters of the model with everything zero that the format does not state.
+    pub(super) values: Vec<f64>,
+    /// In words.
+    pub(super) notes: Vec<String>,
+}
+
+/// Splits the values of a model into what a format states and what it leaves out.
+///
+/// `fc`, `fv` become friction and damping, of asymmetric friction the means of both directions; `Ia` is armature in
+/// MJCF and has no place in URDF. Negative values, which simulators refuse, are stated as 0.
+pub(super) fn split(model: &RobotModel, values: &[f64], format: Format) -> JointValues {
+    let table = model.parameters();
+    let bodies = 10 * model.mechanism().bodies().len();
+    let mut kept = values[..bodies].to_vec();
+    kept.resize(values.len(), 0.0);
+    let mut out = JointValues { joints: Vec::new(), values: kept, notes: Vec::new() };
+    for joint in model.joints() {
+        let column = |symbol: &str| table.column(&format!("{}.{symbol}", joint.name));
+        let mut state = |symbol: &str, what: &str, unit_of: usize, value: f64| {
+            if value < 0.0 {
+                out.notes.push(format!(
+                    "{what} of `{}` is negative ({value:.4e} {}), which simulators refuse: written as 0, so the effort of the file lacks it",
+                    joint.name, table.linear[unit_of].unit
+                ));
+            }
+            let value = value.max(0.0);
+            for direction in ["", "p", "n"] {
+                if let Some(c) = column(&format!("{symbol}{direction}")) {
+                    out.values[c] = value;
+                }
+            }
+            value
+        };
+        let mut friction = |symbol: &str, what: &str| {
+            let single = column(symbol);
+            let both = column(&format!("{symbol}p")).zip(column(&format!("{symbol}n")));
+            match (single, both) {
+                (Some(c), _) => Some(state(symbol, what, c, values[c])),
+                (None, Some((p, n))) => Some(state(symbol, what, p, 0.5 * (values[p] + values[n]))),
+                (None, None) => None,
+            }
+        };
+        let friction_loss = friction("fc", "Coulomb friction");
+        let damping = friction("fv", "viscous friction");
+        let armature = match format {
+            Format::Mjcf => friction("Ia", "rotor inertia"),
+            Format::Urdf => None,
+        };
+        if friction_loss.or(damping).or(armature).is_some() {
+            out.joints.push(JointParameters {
+                joint: joint.name.clone(),
+                damping: damping.unwrap_or(0.0),
+                friction_loss: friction_loss.unwrap_or(0.0),
+                armature: armature.unwrap_or(0.0),
+            });
+        }
+    }
+    out.notes.extend(left_out(model, values, format));
+    out
+}
+
+/// What a format has no place for, one line per kind of element.
+fn left_out(model: &RobotModel, values: &[f64], format: Format) -> Vec<String> {
+    let bodies = 10 * model.mechanism().bodies().len();
+    let mut kinds: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (parameter, value) in model.parameters().linear.iter().zip(values).skip(bodies) {
+        let Owner::Joint(joint) = &parameter.owner else { continue };
+        // Couplings name their parameters by motors.
+        let own = parameter.name.strip_prefix(joint.as_str()).and_then(|s| s.strip_prefix('.'));
+        let kind = match own {
+            Some("fc" | "fv") => continue,
+            Some("fcp" | "fcn" | "fvp" | "fvn") => "difference of friction between the directions",
+            Some("Ia") if format == Format::Mjcf => continue,
+            Some("Ia") => "rotor inertia (armature in MJCF)",
+            Some("fo") => "offset",
+            Some("k" | "kq0") => "spring",
+            Some("ca" | "cb") => "cyclic effort",
+            Some("K") => "drive gain",
+            _ => "coupling and other elements",
+        };
+        if *value == 0.0 {
+            continue;
+        }
+        match kinds.iter_mut().find(|(k, _)| *k == kind) {
+            Some((_, joints)) if joints.last() == Some(&joint.as_str()) => {}
+            Some((_, joints)) => joints.push(joint),
+            None => kinds.push((kind, vec![joint])),
+        }
+    }
+    kinds
+        .into_iter()
+        .map(|(kind, joints)| {
+            format!("left out, {} has no place for it: {kind} of {}", format.name(), joints.join(", "))
+        })
+        .collect()
+}

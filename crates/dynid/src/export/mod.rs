@@ -1,0 +1,245 @@
+//! Identified parameters back into a robot file: URDF, MJCF, JSON, each read back before it is handed out.
+//!
+//! | identified | URDF | MJCF |
+//! |---|---|---|
+//! | inertia of a link | `<inertial>`: centre of mass, tensor about it, link axes | `<inertial>` with `fullinertia` |
+//! | viscous friction `fv` | `<dynamics damping>` | `damping` |
+//! | Coulomb friction `fc` | `<dynamics friction>` | `frictionloss` |
+//! | rotor inertia `Ia` | no place | `armature` |
+//! | offset, spring, cyclic effort, couplings | no place | left out |
+//! | gravity | no place | `<option gravity>` |
+//!
+//! **Welded links.** A log shows the body that moves as one: a moving link with everything on fixed joints behind it.
+//! Links on fixed joints keep the inertia of the robot file and the moving link gets the difference, as long as that is a
+//! possible body; so a tool or sensor can be taken off later with the mass the file states. Where the difference is
+//! impossible (the file's values are too far off), the moving link carries the whole body and the others state mass 0.
+//! They do not lose their `<inertial>`: loaders make up what is missing (MuJoCo fills in a body of water's density from
+//! the link's geometry, PyBullet 1 kg). Efforts are the same either way. Joints that were held still for the
+//! identification stay joints, and the links behind them keep the robot file's inertia.
+//!
+//! **Check.** What is handed out has been read back from its text, and the efforts of the two models differ by at most
+//! [`READ_BACK_LIMIT`] of the joint's largest effort.
+
+mod bodies;
+mod error;
+mod identified;
+mod joints;
+mod json;
+mod read_back;
+
+use dynid_io::mjcf::{self, JointParameters};
+use dynid_io::urdf::{self, JointDynamics};
+use dynid_model::mechanism::ROOT_JOINT;
+use dynid_model::{Description, Inertia, JointKind};
+
+use crate::Error;
+use crate::identify::Identification;
+
+use bodies::Shares;
+pub use error::{ExportError, LinkFault};
+use identified::inertias;
+pub use identified::{Identified, IdentifiedRobot, Source};
+use joints::{Format, JointValues};
+pub use json::{JointJson, LinkJson, OtherJson, ROBOT_JSON_SCHEMA, RobotJson, json};
+pub use read_back::{CheckStates, READ_BACK_LIMIT};
+
+/// Text that is ready to be written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exported {
+    /// The file's text.
+    pub text: String,
+    /// Largest difference of effort after reading the text back, relative to the joint's largest effort.
+    pub difference: f64,
+    /// What a user should know: shares of welded links, what was left out, negative friction.
+    pub notes: Vec<String>,
+}
+
+/// Identified parameters laid out on the links and joints of a robot file.
+#[derive(Debug)]
+pub struct RobotExport<'a> {
+    identified: Identified<'a>,
+    source: &'a Source,
+    /// The robot file's tree with identified inertias; held joints move.
+    description: Description,
+    held: Vec<(String, f64)>,
+    links: Vec<(String, Inertia)>,
+    faults: Vec<LinkFault>,
+    notes: Vec<String>,
+}
+
+impl<'a> RobotExport<'a> {
+    /// Lays parameters out on a robot file.
+    ///
+    /// # Errors
+    /// [`Error::Export`]: the file is another robot's; [`Error::Mechanism`]: it is none.
+    pub fn new(identified: Identified<'a>, source: &'a Source) -> Result<Self, Error> {
+        let mechanism = identified.model.mechanism();
+        let mut description = source.file.description.clone();
+        description.gravity = mechanism.gravity().0;
+        description.couple_mimics = mechanism.follows().is_some();
+        description.floating_base = mechanism.bodies().iter().any(|b| b.joint.name == ROOT_JOINT);
+        let file = source.path.display().to_string();
+        let other = |fault: String| ExportError::OtherRobot { file: file.clone(), fault };
+        let held = held_joints(&description, identified.description).map_err(other)?;
+
+        let mut still = description.clone();
+        let named = |source| Error::Mechanism { file: file.clone(), source };
+        still.lock(&held).map_err(named)?;
+        let target = still.build().map_err(named)?;
+        let all = inertias(identified.values).collect::<Vec<_>>();
+        let shared = target
+            .bodies()
+            .iter()
+            .map(|body| {
+                let found = mechanism.bodies().iter().position(|b| b.joint.name == body.joint.name);
+                let same = found.filter(|b| mechanism.bodies()[*b].name == body.name);
+                same.map(|b| all[b])
+                    .ok_or_else(|| other(format!("joint `{}` was not identified", body.joint.name)))
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        if let Some(missing) = mechanism.bodies().iter().find(|b| target.joint_index(&b.joint.name).is_err())
+        {
+            return Err(other(format!("it has no moving joint `{}`", missing.joint.name)).into());
+        }
+        let Shares { links, faults, notes } = bodies::share(&target, &still, &held, &shared);
+        for (name, inertia) in &links {
+            if let Some(link) = description.links.iter_mut().find(|l| l.name == *name) {
+                link.inertia = Some(*inertia);
+            }
+        }
+        Ok(RobotExport { identified, source, description, held, links, faults, notes })
+    }
+
+    /// Links that no body could be: simulators refuse them.
+    pub fn faults(&self) -> &[LinkFault] {
+        &self.faults
+    }
+
+    /// Refuses a robot with impossible links.
+    ///
+    /// # Errors
+    /// [`ExportError::Unphysical`].
+    pub fn require_physical(&self) -> Result<(), ExportError> {
+        if self.faults.is_empty() {
+            return Ok(());
+        }
+        Err(ExportError::Unphysical { links: self.faults.clone() })
+    }
+
+    /// URDF: a URDF is edited in place, so comments, meshes, order and unknown elements stay byte for byte; a robot from
+    /// TOML is written anew.
+    ///
+    /// # Errors
+    /// [`Error::RobotFile`]: URDF cannot state the robot; [`Error::Export`]: see [`ExportError::ReadBack`].
+    pub fn urdf(&self, states: &CheckStates) -> Result<Exported, Error> {
+        let JointValues { joints, values, notes } =
+            joints::split(self.identified.model, self.identified.values, Format::Urdf);
+        let source = match &self.source.urdf {
+            Some(text) => text.clone(),
+            None => urdf::from_description(&self.description)?,
+        };
+        let name = self.source.path.display().to_string();
+        let links: Vec<_> = self.links.iter().map(|(link, i)| (link.clone(), Some(*i))).collect();
+        let dynamics: Vec<_> = joints
+            .iter()
+            .map(|p| JointDynamics { joint: p.joint.clone(), damping: p.damping, friction: p.friction_loss })
+            .collect();
+        let text = urdf::edit(&source, &name, &links, &dynamics)?;
+
+        let mut read = urdf::parse(&text, "exported URDF")?;
+        read.gravity = self.description.gravity;
+        read.floating_base = self.description.floating_base;
+        let stated = urdf::dynamics(&text, "exported URDF")?;
+        let ours = |d: &&JointDynamics| joints.iter().any(|p| p.joint == d.joint);
+        let found: Vec<JointParameters> = stated
+            .iter()
+            .filter(ours)
+            .map(|d| JointParameters {
+                joint: d.joint.clone(),
+                damping: d.damping,
+                friction_loss: d.friction,
+                armature: 0.0,
+            })
+            .collect();
+        let mut notes = [self.notes.clone(), notes].concat();
+        let others = stated.iter().filter(|d| !ours(d) && (d.damping != 0.0 || d.friction != 0.0));
+        let others: Vec<&str> = others.map(|d| d.joint.as_str()).collect();
+        if !others.is_empty() {
+            notes.push(format!("friction not identified, left as in the file: {}", others.join(", ")));
+        }
+        if self.description.gravity != dynid_model::description::STANDARD_GRAVITY {
+            notes.push(format!(
+                "left out, URDF has no place for it: gravity {:?} m/s²",
+                self.description.gravity
+            ));
+        }
+        self.checked(Format::Urdf, text, (read, &found), &values, notes, states)
+    }
+
+    /// MJCF, written anew; see [`dynid_io::mjcf::from_description`].
+    ///
+    /// # Errors
+    /// [`Error::RobotFile`]: MJCF cannot state the robot; [`Error::Export`]: see [`ExportError::ReadBack`].
+    pub fn mjcf(&self, states: &CheckStates) -> Result<Exported, Error> {
+        let JointValues { joints, values, notes } =
+            joints::split(self.identified.model, self.identified.values, Format::Mjcf);
+        let text = mjcf::from_description(&self.description, &joints)?;
+        let read = mjcf::parse(&text, "exported MJCF")?;
+        let notes = [self.notes.clone(), notes].concat();
+        self.checked(Format::Mjcf, text, (read.description, &read.joints), &values, notes, states)
+    }
+
+    /// Compares what was read back with the model, of which only `values` have a place in the format.
+    fn checked(
+        &self,
+        format: Format,
+        text: String,
+        (read, joints): (Description, &[JointParameters]),
+        values: &[f64],
+        notes: Vec<String>,
+        states: &CheckStates,
+    ) -> Result<Exported, Error> {
+        let model = self.identified.model;
+        let (back, stated) = read_back::compile(read, joints, &self.held, model).map_err(|fault| {
+            ExportError::OtherRobot { file: format!("exported {}", format.name()), fault }
+        })?;
+        let difference = read_back::largest_difference((model, values), (&back, &stated), states);
+        Ok(Exported { text, difference: read_back::judge(format.name(), difference)?, notes })
+    }
+}
+
+/// Joints of a robot file that were held for the identification, and where; `Err` names a joint that is not the same.
+fn held_joints(file: &Description, recorded: &Description) -> Result<Vec<(String, f64)>, String> {
+    let mut held = Vec::new();
+    for joint in file.joints.iter().filter(|j| j.kind != JointKind::Fixed) {
+        match recorded.joints.iter().find(|j| j.name == joint.name) {
+            None => return Err(format!("the estimate knows no joint `{}`", joint.name)),
+            Some(r) if r.kind == JointKind::Fixed => {
+                held.push((joint.name.clone(), bodies::held_position(joint, r)));
+            }
+            Some(_) => {}
+        }
+    }
+    Ok(held)
+}
+
+impl Identification {
+    /// URDF of the robot with identified inertias and friction, checked on the training logs; links that no body could
+    /// be are written as they are and named in the notes.
+    ///
+    /// # Errors
+    /// As [`Source::read`], [`RobotExport::new`] and [`RobotExport::urdf`].
+    pub fn urdf(&self) -> Result<Exported, Error> {
+        let source = Source::read(&self.robot.path)?;
+        let export = RobotExport::new(self.identified(), &source)?;
+        let states = CheckStates::logs(&self.logs, self.state_hz, &self.settings)?;
+        let mut exported = export.urdf(&states)?;
+        exported.notes.extend(
+            export
+                .faults()
+                .iter()
+                .map(|f| format!("link `{}` {}: simulators refuse such a robot", f.link, f.fault)),
+        );
+        Ok(exported)
+    }
+}

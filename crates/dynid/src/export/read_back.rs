@@ -1,0 +1,177 @@
+//! Whether a written robot gives the identified effort.
+
+use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, States, prepare};
+use dynid_io::MappingSpec;
+use dynid_io::mjcf::JointParameters;
+use dynid_model::element::{Coulomb, JointElement, RotorInertia, Viscous};
+use dynid_model::{Description, EffortModel, MotionBlock, RandomMotion, RegressorBlock, RobotModel};
+use dynid_motion::Channel;
+
+use super::error::ExportError;
+use crate::Error;
+use crate::config::{LogConfig, MotorSide};
+
+/// Random states of a check without logs.
+const STATES: usize = 1000;
+/// Their seed: the same robot is always checked at the same states.
+const SEED: u64 = 1;
+/// Samples that are evaluated at once.
+const BLOCK: usize = 256;
+/// Blocks of a log that are evaluated, evenly spread.
+const BLOCKS: usize = 64;
+
+/// States at which an exported robot is compared with the identified model.
+#[derive(Debug)]
+pub struct CheckStates(Kind);
+
+#[derive(Debug)]
+enum Kind {
+    Random(RandomMotion),
+    Logs(Vec<(States, Vec<Channel>)>),
+}
+
+impl CheckStates {
+    /// A thousand seeded random states within the limits of the model's joints (±π rad, ±1 m where there are none;
+    /// rates within ±2, accelerations within ±5).
+    pub fn random(model: &RobotModel) -> Self {
+        CheckStates(Kind::Random(RandomMotion::new(model.mechanism(), model.channels(), STATES, SEED)))
+    }
+
+    /// States of logs, positions filtered at `state_hz`: up to 64 runs of 256 samples from each, evenly spread.
+    ///
+    /// # Errors
+    /// [`Error::Conditioning`]: a log is too short for the filter.
+    pub fn logs(logs: &[PreparedLog], state_hz: f64, settings: &ConditioningSettings) -> Result<Self, Error> {
+        let states = logs.iter().map(|log| {
+            let cutoff = state_hz.min(settings.cutoff.state_rate * log.rate_hz);
+            Ok((States::new(log, cutoff, settings)?, log.channels.clone()))
+        });
+        Ok(CheckStates(Kind::Logs(states.collect::<Result<_, Error>>()?)))
+    }
+
+    /// States of log files, at the state cut-off of an estimate.
+    ///
+    /// # Errors
+    /// As [`validate`](crate::validate::validate()).
+    pub fn read(
+        model: &RobotModel,
+        state_hz: f64,
+        logs: &[LogConfig],
+        columns: &MappingSpec,
+        motor_side: Option<&MotorSide>,
+    ) -> Result<Self, Error> {
+        let settings = ConditioningSettings::default();
+        let prepared = logs.iter().map(|log| {
+            let loaded = crate::logs::load(log, model.mechanism(), columns, motor_side)?;
+            Ok(prepare(&loaded.log, model, &settings)?)
+        });
+        Self::logs(&prepared.collect::<Result<Vec<_>, Error>>()?, state_hz, &settings)
+    }
+
+    /// The states in words.
+    pub fn describe(&self) -> String {
+        match &self.0 {
+            Kind::Random(_) => format!("{STATES} random states"),
+            Kind::Logs(logs) => {
+                let samples: usize =
+                    logs.iter().map(|(s, _)| starts(s.samples).map(|r| r.len()).sum::<usize>()).sum();
+                format!("{samples} states of the log{}", if logs.len() == 1 { "" } else { "s" })
+            }
+        }
+    }
+
+    fn for_each_block(&self, mut work: impl FnMut(&MotionBlock<'_>)) {
+        match &self.0 {
+            Kind::Random(motion) => motion.with_block(work),
+            Kind::Logs(logs) => {
+                for (states, channels) in logs {
+                    for range in starts(states.samples) {
+                        states.with_block(range, channels, &mut work);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Runs of a log that are looked at.
+fn starts(samples: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
+    let step = samples.div_ceil(BLOCKS).max(BLOCK);
+    (0..samples).step_by(step).map(move |from| from..(from + BLOCK).min(samples))
+}
+
+/// A model of what was read back, its joints in the order of another model, with the values that the file states.
+///
+/// `held`: joints of the file that the other model holds still. `Err` says why the two are different robots.
+pub(super) fn compile(
+    mut description: Description,
+    joints: &[JointParameters],
+    held: &[(String, f64)],
+    like: &RobotModel,
+) -> Result<(RobotModel, Vec<f64>), String> {
+    let order = |name: &str| like.mechanism().bodies().iter().position(|b| b.joint.name == name);
+    description.couple_mimics = like.mechanism().follows().is_some();
+    description.lock(held).map_err(|e| e.to_string())?;
+    description.joints.sort_by_key(|j| order(&j.name).unwrap_or(usize::MAX));
+    let mechanism = description.build().map_err(|e| e.to_string())?;
+    let rates = mechanism.rate_names();
+    if rates != like.mechanism().rate_names() {
+        return Err(format!(
+            "expected the moving joints {}, found {}",
+            like.mechanism().rate_names().join(", "),
+            rates.join(", ")
+        ));
+    }
+    let mut values = mechanism.inertia_vector();
+    let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
+    for p in joints {
+        let Some(rate) = rates.iter().position(|r| *r == p.joint) else { continue };
+        elements.push(Box::new(Viscous { rate }));
+        elements.push(Box::new(Coulomb { rate }));
+        elements.push(Box::new(RotorInertia { rate }));
+        values.extend([p.damping, p.friction_loss, p.armature]);
+    }
+    Ok((RobotModel::new(mechanism, elements), values))
+}
+
+/// Largest difference of effort between two models of the same coordinates, joint by joint relative to the largest effort
+/// of the joint (of all joints, times 1e-6, if that is more: a joint may need no effort at all).
+pub(super) fn largest_difference(
+    (a, a_values): (&RobotModel, &[f64]),
+    (b, b_values): (&RobotModel, &[f64]),
+    states: &CheckStates,
+) -> f64 {
+    let outputs = a.outputs().len();
+    let (mut largest, mut difference) = (vec![0.0_f64; outputs], vec![0.0_f64; outputs]);
+    let room = if matches!(states.0, Kind::Random(_)) { STATES } else { BLOCK };
+    let mut blocks = [a, b].map(|model| RegressorBlock::new(model.layout().clone(), room));
+    let shapes = [a, b].map(|model| model.parameters().shape_start());
+    states.for_each_block(|motion| {
+        for (model, (block, shape)) in [a, b].into_iter().zip(blocks.iter_mut().zip(&shapes)) {
+            model.regressor(motion, shape, block);
+        }
+        for output in 0..outputs {
+            let (x, y) = (blocks[0].effort(output, a_values), blocks[1].effort(output, b_values));
+            for (x, y) in x.iter().zip(&y) {
+                largest[output] = largest[output].max(x.abs());
+                let d = (x - y).abs();
+                // A number that is not finite is a difference too.
+                difference[output] = if d.is_finite() { difference[output].max(d) } else { f64::INFINITY };
+            }
+        }
+    });
+    let floor = 1e-6 * largest.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    difference.iter().zip(&largest).map(|(d, l)| d / l.max(floor)).fold(0.0, f64::max)
+}
+
+/// Largest difference that passes: text, centres of mass and frames cost a few digits of sixteen, an error far more.
+pub const READ_BACK_LIMIT: f64 = 1e-9;
+
+/// Accepts a difference or says what is wrong.
+pub(super) fn judge(format: &'static str, difference: f64) -> Result<f64, ExportError> {
+    if difference <= READ_BACK_LIMIT {
+        Ok(difference)
+    } else {
+        Err(ExportError::ReadBack { format, difference })
+    }
+}
