@@ -86,7 +86,8 @@ impl LinearEstimate {
         self.blocks = time_blocks(&self.reduced, &weights, total);
         if !self.given_blocks.is_empty() {
             // Unweighted, as they were given.
-            let merged = self.given_blocks.chunks(factor).map(|c| Factor::merge(&c.iter().collect::<Vec<_>>()));
+            let merged =
+                self.given_blocks.chunks(factor).map(|c| Factor::merge(&c.iter().collect::<Vec<_>>()));
             self.given_blocks = merged.collect();
         }
         self

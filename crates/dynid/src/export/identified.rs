@@ -31,7 +31,7 @@ pub struct IdentifiedRobot {
 impl IdentifiedRobot {
     /// What the functions of this module take.
     pub fn identified(&self) -> Identified<'_> {
-        Identified { description: &self.description, model: &self.model, values: self.values() }
+        Identified { description: &self.description, model: &self.model, values: &self.values }
     }
 }
 
