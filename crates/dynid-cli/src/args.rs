@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use dynid::estimate::Split;
 
 /// Identifies the dynamic parameters of robots and mechanisms from logs of motion and effort.
 #[derive(Debug, Parser)]
@@ -188,10 +189,27 @@ pub(crate) struct IdentifyArgs {
     pub(crate) quiet: bool,
 }
 
+/// Which of an estimate's parameters.
+#[derive(Debug, Args)]
+pub(crate) struct SplitArgs {
+    /// Use the physically consistent parameters, as robot files state them, in place of those identified without
+    /// constraints.
+    #[arg(long)]
+    pub(crate) consistent: bool,
+}
+
+impl SplitArgs {
+    pub(crate) fn of(&self) -> Split {
+        if self.consistent { Split::Consistent } else { Split::Identified }
+    }
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct PredictArgs {
     /// estimate.json
     pub(crate) estimate: PathBuf,
+    #[command(flatten)]
+    pub(crate) split: SplitArgs,
     /// States: CSV with q, dq, ddq, optional gx, gy, gz.
     #[arg(long, value_name = "FILE.csv")]
     pub(crate) states: PathBuf,
@@ -237,6 +255,8 @@ pub(crate) struct SimulateArgs {
 pub(crate) struct ValidateArgs {
     /// estimate.json
     pub(crate) estimate: PathBuf,
+    #[command(flatten)]
+    pub(crate) split: SplitArgs,
     /// Log to compare with; repeat for several.
     #[arg(long, value_name = "LOG", required = true)]
     pub(crate) log: Vec<PathBuf>,

@@ -53,6 +53,18 @@ impl Comparison {
         (each.len() > 1).then(|| (spread / (n - 1.0) / n).sqrt())
     }
 
+    /// Mean over outputs of an estimator's sum of squared residuals, relative to that of another; `None` without folds or
+    /// where the other fits exactly.
+    pub fn loss(&self, estimator: usize, reference: usize) -> Option<f64> {
+        let outputs = self.folds.first()?.rows.len();
+        let sum = |e: usize, j: usize| -> f64 { self.folds.iter().map(|f| f.squares[e][j]).sum() };
+        let ratios: Vec<f64> = (0..outputs)
+            .filter(|j| sum(reference, *j) > 0.0)
+            .map(|j| sum(estimator, j) / sum(reference, j))
+            .collect();
+        (!ratios.is_empty()).then(|| ratios.iter().sum::<f64>() / ratios.len() as f64)
+    }
+
     /// Relative error of an estimator over all outputs and folds, `‖residual‖/‖effort‖`; `None` without effort.
     pub fn relative(&self, estimator: usize) -> Option<f64> {
         let squares: f64 = self.folds.iter().flat_map(|f| &f.squares[estimator]).sum();

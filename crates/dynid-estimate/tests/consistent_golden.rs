@@ -44,7 +44,14 @@ fn problem(g: &Value) -> Problem {
             nonnegative: nonnegative[k] == 1.0,
         })
         .collect();
-    Problem { r: matrix(&g["R"]), z: vector(&g["z"]), links, scalars, bounds: Vec::new() }
+    Problem {
+        r: matrix(&g["R"]),
+        z: vector(&g["z"]),
+        links,
+        scalars,
+        bounds: Vec::new(),
+        prior_std: Vec::new(),
+    }
 }
 
 #[test]
@@ -168,8 +175,14 @@ fn indy7_projections_onto_feasible_bodies() {
     for (c, case) in g["cases"].as_array().unwrap().iter().enumerate() {
         let target = vector(&case["target"]);
         let z: Vec<f64> = target.iter().map(|t| weight * t).collect();
-        let problem =
-            Problem { r: r.clone(), z, links: links.clone(), scalars: scalars.clone(), bounds: Vec::new() };
+        let problem = Problem {
+            r: r.clone(),
+            z,
+            links: links.clone(),
+            scalars: scalars.clone(),
+            bounds: Vec::new(),
+            prior_std: Vec::new(),
+        };
         for (form, key) in [(Form::SpatialInertia, "bl"), (Form::PseudoInertia, "pseudo_inertia")] {
             let settings = Settings { form, margin: Margin::Absolute(1e-6), ..Settings::default() };
             let found = estimate(&problem, &settings).unwrap();

@@ -185,7 +185,7 @@ pub enum Consistency {
 #[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 pub enum PriorDistance {
-    /// Squared distance of whitened pseudo-inertias.
+    /// Squared distance in units of the prior standard deviations (half the mass, and the moments that go with it).
     #[default]
     Quadratic,
     /// Entropic (Bregman log-det) divergence, the same in every frame and unit.
@@ -211,8 +211,8 @@ pub struct EstimatorConfig {
     pub consistency: Consistency,
     /// Distance from the robot file. Default `quadratic`.
     pub prior: PriorDistance,
-    /// Weight of that distance, residual variances per squared whitened unit or per nat. Default: as large as noise allows
-    /// (the fit may rise by a tenth of what noise takes up), at most that of a Gaussian prior.
+    /// Weight of that distance, residual variances per squared deviation or per nat. Default: as large as held-out folds
+    /// allow, at most that of a Gaussian prior.
     pub prior_weight: Option<f64>,
 }
 

@@ -2,11 +2,11 @@
 
 use dynid_estimate::conditioning::ReducedGroup;
 use dynid_estimate::consistent::{
-    Bound, ConsistentEstimate, Form, LinkPrior, Problem, ProblemError, ScalarPrior, Settings, Status,
-    estimate,
+    Bound, ConsistentEstimate, Form, LinkPrior, Problem, ScalarPrior, Settings, estimate,
 };
 use dynid_estimate::folds::FoldSettings;
-use dynid_estimate::held_out::{Comparison, compare};
+use dynid_estimate::held_out::{Comparison, Estimator, compare};
+use dynid_estimate::identifiability::{excited_regrouping, posterior};
 use dynid_estimate::linear::ols;
 use dynid_estimate::{Factor, Mat};
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
@@ -19,34 +19,57 @@ use crate::prior::Prior;
 
 /// Index of the unconstrained estimate in [`Consistent::held_out`].
 pub const UNCONSTRAINED: usize = 0;
-/// Index of the consistent estimate in [`Consistent::held_out`].
-pub const CONSISTENT: usize = 1;
+
+/// Weights of the prior that are tried, as shares of that of a Gaussian prior, strongest first.
+const LADDER: [f64; 6] = [1.0, 1e-1, 1e-2, 1e-4, 1e-6, 1e-8];
+/// The strongest prior is taken whose mean squared held-out error is within this share of the least.
+const TOLERANCE: f64 = 0.005;
+
+/// A weight of the prior with what it does on held-out folds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PriorTrial {
+    /// Weight: residual variances per squared whitened unit, or per nat.
+    pub weight: f64,
+    /// Mean over joints of the squared held-out error, relative to that without constraints; `None` without folds.
+    pub loss: Option<f64>,
+}
 
 /// Standard parameters of all links and elements.
 #[derive(Debug, Clone)]
 pub struct Consistent {
     /// The estimate; `None` if no consistency was asked for.
     pub estimate: Option<ConsistentEstimate>,
-    /// Weight of the distance from the prior in use.
-    pub prior_weight: f64,
-    /// How much of the estimate's price is due to that weight, in residual variances.
-    pub price_of_prior: f64,
-    /// Errors of the unconstrained and the consistent estimate on the same held-out folds of the training logs.
+    /// Weights of the distance from the prior that were tried; one if it was given.
+    pub prior_trials: Vec<PriorTrial>,
+    /// Index of the weight in use.
+    pub chosen: usize,
+    /// Errors of the unconstrained and of the consistent estimates (one per trial) on the same held-out folds of the
+    /// training logs.
     pub held_out: Comparison,
     /// Standard parameters without constraints: base values as identified, split as near as possible to the prior.
+    /// Predictions use these.
     pub unconstrained: Vec<f64>,
-    /// Standard parameters to use.
+    /// Standard parameters of bodies that can exist; the same as [`Self::unconstrained`] if no consistency was asked for.
     pub values: Vec<f64>,
 }
 
 impl Consistent {
-    /// Whether a constraint changed the estimate.
+    /// Whether the estimate differs from the unconstrained one by more than its split.
     pub fn constrained(&self) -> bool {
-        self.estimate.as_ref().is_some_and(|e| e.status != Status::Unconstrained)
+        self.estimate.as_ref().is_some_and(|e| e.price() > 0.0)
+    }
+
+    /// Index of the consistent estimate in [`Self::held_out`].
+    pub fn consistent(&self) -> usize {
+        if self.estimate.is_some() { 1 + self.chosen } else { UNCONSTRAINED }
     }
 }
 
 /// Estimates consistent standard parameters from a fit in base columns.
+///
+/// The distance from the prior decides what the data do not see. Its weight is the largest, up to that of a Gaussian prior
+/// (`κ`), that held-out folds do not speak against: with a vanishing one, unseen masses grow without limit for the sake of
+/// changes of fit far below noise.
 ///
 /// # Errors
 /// [`Error::Consistency`], [`Error::UnknownLink`], [`Error::UnknownParameter`].
@@ -59,115 +82,91 @@ pub(crate) fn consistent(
     fitted: &Fitted,
     groups: &[ReducedGroup],
 ) -> Result<Consistent, Error> {
-    let solution = &fitted.estimate.solution;
     let prior_base = base.values(&prior.values);
-    // Base parameters that the logs do not excite keep the prior's value.
-    let mut beta = prior_base.clone();
-    for c in &solution.kept {
-        beta[*c] = fitted.estimate.x[*c];
-    }
-    let unconstrained = base.nearest(&beta, &prior.values, &prior.std);
     let linear = |training: &Factor| -> Vec<f64> {
+        // Base parameters that a fold does not excite keep the prior's value.
         let change = ols(&training.centred(&prior_base)).x;
         change.iter().zip(&prior_base).map(|(d, b)| d + b).collect()
     };
+    let unconstrained = unconstrained(regrouping, prior, fitted)
+        .unwrap_or_else(|| base.nearest(&linear(&fitted.estimate.factor), &prior.values, &prior.std));
     let weights = fitted.estimate.weights();
     let folds = FoldSettings::default();
-    let settings = settings(config);
-    let Some(settings) = settings else {
+    let Some(form) = form(config) else {
         let held_out = compare(groups, &weights, base.len(), &folds, &[&linear]);
+        let values = unconstrained.clone();
         return Ok(Consistent {
             estimate: None,
-            prior_weight: 0.0,
-            price_of_prior: 0.0,
+            prior_trials: Vec::new(),
+            chosen: 0,
             held_out,
-            values: unconstrained.clone(),
             unconstrained,
+            values,
         });
     };
     let bounds = bounds::rows(&config.bound, model)?;
     let problem = |factor: &Factor| problem(model, regrouping, factor, prior, &bounds);
+    let trials: Vec<f64> = match config.estimator.prior_weight {
+        Some(weight) => vec![weight],
+        None => LADDER.iter().map(|share| share * fitted.inflation).collect(),
+    };
+    let settings: Vec<Settings> = trials
+        .iter()
+        .map(|weight| match config.estimator.prior {
+            PriorDistance::Quadratic => Settings { form, gaussian_weight: *weight, ..Settings::default() },
+            PriorDistance::Entropic => Settings { form, entropic_weight: *weight, ..Settings::default() },
+        })
+        .collect();
     let whole = problem(&fitted.estimate.factor);
-    let (found, settings, pull) = match config.estimator.prior_weight {
-        Some(_) => (estimate(&whole, &settings)?, settings, 0.0),
-        None => {
-            let chance = fitted.inflation * solution.kept.len() as f64;
-            pulled(&whole, &settings, fitted.inflation, PULL * chance)?
-        }
-    };
-    let constrained = |training: &Factor| -> Vec<f64> {
-        // The whole problem was feasible and bounds do not depend on data, so that no fold can fail.
-        estimate(&problem(training), &settings).map_or_else(|_| linear(training), |e| base.values(&e.x))
-    };
-    let both: [&dynid_estimate::held_out::Estimator<'_>; 2] =
-        if found.status == Status::Unconstrained { [&linear, &linear] } else { [&linear, &constrained] };
-    let held_out = compare(groups, &weights, base.len(), &folds, &both);
-    let weight =
-        if settings.entropic_weight > 0.0 { settings.entropic_weight } else { settings.prior_weight };
+    // Before the folds, so that contradictory bounds are found once and named.
+    let first = estimate(&whole, &settings[0])?;
+    let constrained: Vec<Box<Estimator<'_>>> = settings
+        .iter()
+        .map(|settings| {
+            // The whole problem was feasible and bounds do not depend on data, so that no fold can fail.
+            let solve = |training: &Factor| {
+                estimate(&problem(training), settings)
+                    .map_or_else(|_| linear(training), |e| base.values(&e.x))
+            };
+            Box::new(solve) as Box<Estimator<'_>>
+        })
+        .collect();
+    let mut all: Vec<&Estimator<'_>> = vec![&linear];
+    all.extend(constrained.iter().map(AsRef::as_ref));
+    let held_out = compare(groups, &weights, base.len(), &folds, &all);
+    let losses: Vec<Option<f64>> = (0..trials.len()).map(|k| held_out.loss(1 + k, UNCONSTRAINED)).collect();
+    let least = losses.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+    let chosen = losses.iter().position(|l| l.is_none_or(|l| l <= (1.0 + TOLERANCE) * least)).unwrap_or(0);
+    let found = if chosen == 0 { first } else { estimate(&whole, &settings[chosen])? };
     Ok(Consistent {
         values: found.x.clone(),
         estimate: Some(found),
-        prior_weight: weight,
-        price_of_prior: pull,
+        prior_trials: trials
+            .into_iter()
+            .zip(losses)
+            .map(|(weight, loss)| PriorTrial { weight, loss })
+            .collect(),
+        chosen,
         held_out,
         unconstrained,
     })
 }
 
-/// The pull towards the prior may raise the weighted residual by this share of what noise takes up, `κ` per base parameter.
-const PULL: f64 = 0.1;
-/// Weights between the least and that of a Gaussian prior, on a logarithmic scale, are narrowed down to this ratio.
-const RATIO: f64 = 2.0;
-
-/// The estimate as near to the prior as noise allows: the largest prior weight, up to that of a Gaussian prior (`κ`), which
-/// raises the fit by no more than `budget`.
-///
-/// With the least weight, an active constraint lets unseen masses grow without limit for the sake of changes of fit far
-/// below noise. Returns the settings found and the rise of the fit.
-fn pulled(
-    problem: &Problem,
-    settings: &Settings,
-    inflation: f64,
-    budget: f64,
-) -> Result<(ConsistentEstimate, Settings, f64), ProblemError> {
-    let with = |weight: f64| match settings.entropic_weight > 0.0 {
-        true => Settings { entropic_weight: weight, ..settings.clone() },
-        false => Settings { prior_weight: weight, ..settings.clone() },
-    };
-    let (mut low, mut high) = (Settings::default().prior_weight, inflation.max(1.0));
-    let mut best = estimate(problem, &with(low))?;
-    let least = best.fit;
-    let strongest = estimate(problem, &with(high))?;
-    if strongest.fit <= least + budget {
-        return Ok((strongest.clone(), with(high), strongest.fit - least));
-    }
-    while high > RATIO * low {
-        let middle = (low * high).sqrt();
-        let found = estimate(problem, &with(middle))?;
-        if found.fit <= least + budget {
-            (low, best) = (middle, found);
-        } else {
-            high = middle;
-        }
-    }
-    let rise = best.fit - least;
-    Ok((best, with(low), rise))
+/// Base values as identified, split as near as possible to the prior in units of its standard deviations.
+fn unconstrained(regrouping: &Mat<f64>, prior: &Prior, fitted: &Fitted) -> Option<Vec<f64>> {
+    let fit = &fitted.estimate;
+    let excited = excited_regrouping(&fit.factor, &fit.solution.kept, regrouping);
+    let split =
+        posterior(&excited, &fit.kept_x(), &fitted.white, 0.0, &fitted.white, &prior.values, &prior.std);
+    split.map(|p| p.mean)
 }
 
-fn settings(config: &Config) -> Option<Settings> {
-    let form = match config.estimator.consistency {
-        Consistency::PseudoInertia => Form::PseudoInertia,
-        Consistency::SpatialInertia => Form::SpatialInertia,
-        Consistency::None => return None,
-    };
-    let weight = config.estimator.prior_weight;
-    let defaults = Settings { form, ..Settings::default() };
-    Some(match config.estimator.prior {
-        PriorDistance::Quadratic => {
-            Settings { prior_weight: weight.unwrap_or(defaults.prior_weight), ..defaults }
-        }
-        PriorDistance::Entropic => Settings { entropic_weight: weight.unwrap_or(1.0), ..defaults },
-    })
+fn form(config: &Config) -> Option<Form> {
+    match config.estimator.consistency {
+        Consistency::PseudoInertia => Some(Form::PseudoInertia),
+        Consistency::SpatialInertia => Some(Form::SpatialInertia),
+        Consistency::None => None,
+    }
 }
 
 /// `R = R_β K` in standard columns with the priors of links and elements.
@@ -207,5 +206,12 @@ fn problem(
         bounds.extend(p.lower.filter(|l| *l != 0.0).map(|l| limit("≥", -1.0, l)));
         bounds.extend(p.upper.map(|u| limit("≤", 1.0, u)));
     }
-    Problem { r: factor.r_matrix() * regrouping, z: factor.z(), links, scalars, bounds }
+    Problem {
+        r: factor.r_matrix() * regrouping,
+        z: factor.z(),
+        links,
+        scalars,
+        bounds,
+        prior_std: prior.std.clone(),
+    }
 }

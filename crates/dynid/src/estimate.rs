@@ -70,6 +70,16 @@ pub struct Estimate {
     pub provenance: Provenance,
 }
 
+/// Which standard parameters stand for the base values.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Split {
+    /// Base values exactly as identified; not every link need be a body that can exist.
+    #[default]
+    Identified,
+    /// Bodies that can exist, as robot files state them.
+    Consistent,
+}
+
 /// Rank of the log.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct RankStatus {
@@ -100,7 +110,8 @@ pub struct ParameterValue {
     pub unit: String,
     /// Value, physically consistent with the link's other parameters.
     pub value: f64,
-    /// Value from data and robot file without constraints.
+    /// Value without constraints: base values as identified, split as near as possible to the robot file. Predictions use
+    /// it.
     #[serde(default)]
     pub unconstrained: Option<f64>,
     /// Standard deviation of that, if the parameter is seen in the data.
@@ -180,10 +191,10 @@ pub struct ConsistencyRecord {
     /// That increase over what the same number of parameters would take up by chance, `price / (variance inflation ·
     /// base parameters)`; around 1 is no more than noise.
     pub price_over_chance: Option<f64>,
-    /// Weight of the distance from the robot file, as given or as large as noise allows.
+    /// Weight of the distance from the robot file, as given or as large as held-out folds allow.
     pub prior_weight: f64,
-    /// How much of the price is due to that weight.
-    pub price_of_prior: f64,
+    /// Weights tried, each with its squared held-out error relative to that without constraints (mean over joints).
+    pub prior_trials: Vec<(f64, Option<f64>)>,
     /// No consistent parameters (with whitened sizes up to ten times these) have an objective lower by more than this.
     pub gap: f64,
     /// Iterations of the interior-point method.
@@ -192,8 +203,10 @@ pub struct ConsistencyRecord {
     pub least_eigenvalue: f64,
     /// Constraints that hold the estimate back, in words.
     pub active: Vec<String>,
-    /// Figures of the unconstrained parameters on the validation logs; empty where no constraint matters.
-    pub validation_unconstrained: Vec<LogFit>,
+    /// Figures of the consistent parameters on the training logs; empty where they predict as those without constraints.
+    pub training: Vec<LogFit>,
+    /// The same on the validation logs.
+    pub validation: Vec<LogFit>,
 }
 
 /// Errors on held-out folds of time of the training logs, rows as the fit sees them.
@@ -539,8 +552,11 @@ impl Estimate {
     }
 
     /// Values of all linear parameters.
-    pub fn values(&self) -> Vec<f64> {
-        self.parameters.iter().map(|p| p.value).collect()
+    pub fn values(&self, split: Split) -> Vec<f64> {
+        match split {
+            Split::Identified => self.parameters.iter().map(|p| p.unconstrained.unwrap_or(p.value)).collect(),
+            Split::Consistent => self.parameters.iter().map(|p| p.value).collect(),
+        }
     }
 }
 

@@ -84,12 +84,14 @@ pub struct Identification {
     pub delay_samples: f64,
     /// Sample rate of the training logs, Hz; the delay is not applied to logs of another rate.
     pub delay_rate_hz: f64,
-    /// Agreement on the training logs.
+    /// Agreement of the parameters as identified on the training logs.
     pub training: Vec<Agreement>,
-    /// Agreement on the validation logs.
+    /// The same on the validation logs.
     pub validation: Vec<Agreement>,
-    /// Figures of the unconstrained parameters on the validation logs, where a constraint changed them.
-    pub validation_unconstrained: Vec<LogFit>,
+    /// Figures of the consistent parameters on the training logs, where they predict differently.
+    pub training_consistent: Vec<LogFit>,
+    /// The same on the validation logs.
+    pub validation_consistent: Vec<LogFit>,
     /// Per training log and output: whether the raw residuals are white inside the kernel's band.
     pub whiteness: Vec<Vec<Option<InBandWhiteness>>>,
     /// Models with fewer and fewer base parameters, and how well they do.
@@ -206,7 +208,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         delay_rate_hz: prepared[0].rate_hz,
         training: Vec::new(),
         validation: Vec::new(),
-        validation_unconstrained: Vec::new(),
+        training_consistent: Vec::new(),
+        validation_consistent: Vec::new(),
         whiteness: Vec::new(),
         pruning,
         warnings,
@@ -217,8 +220,12 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     };
     for (l, log) in prepared.iter().enumerate() {
         progress(Step::Validate(log.name.clone()));
-        let agreement = out.agreement(out.values(), log)?;
+        let agreement = out.agreement(out.identified_values(), log)?;
         out.whiteness.push(residuals.whiteness(l, &agreement, kernel_hz));
+        if out.consistent.constrained() {
+            let consistent = out.agreement(out.consistent_values(), log)?;
+            out.training_consistent.push(crate::result::log_fit(&consistent));
+        }
         out.training.push(agreement);
     }
     out.logs = prepared;
@@ -226,18 +233,24 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         progress(Step::Validate(log.path.display().to_string()));
         let loaded = logs::load(log, &out.robot.mechanism, &config.columns, config.motor_side.as_ref())?;
         let prepared = prepare(&loaded.log, &out.model, &out.settings)?;
-        out.validation.push(out.agreement(out.values(), &prepared)?);
+        out.validation.push(out.agreement(out.identified_values(), &prepared)?);
         if out.consistent.constrained() {
-            let unconstrained = out.agreement(&out.consistent.unconstrained, &prepared)?;
-            out.validation_unconstrained.push(crate::result::log_fit(&unconstrained));
+            let consistent = out.agreement(out.consistent_values(), &prepared)?;
+            out.validation_consistent.push(crate::result::log_fit(&consistent));
         }
     }
     Ok(out)
 }
 
 impl Identification {
-    /// Standard parameters to use, in column order.
-    pub fn values(&self) -> &[f64] {
+    /// Standard parameters that predict as identified, in column order: base values of the fit, split as near as possible to
+    /// the robot file. Not every link need be a body that can exist.
+    pub fn identified_values(&self) -> &[f64] {
+        &self.consistent.unconstrained
+    }
+
+    /// Standard parameters of bodies that can exist, in column order: what goes into robot files.
+    pub fn consistent_values(&self) -> &[f64] {
         &self.consistent.values
     }
 
@@ -270,12 +283,20 @@ impl Identification {
         )
     }
 
-    /// Predicted effort on a prepared log, per output.
+    /// Predicted effort on a prepared log as identified, per output.
     ///
     /// # Errors
     /// [`Error::Conditioning`].
     pub fn predict(&self, log: &PreparedLog) -> Result<Vec<Vec<f64>>, Error> {
-        Ok(predict(&self.model, &[], self.values(), log, self.state_hz, self.delay_samples, &self.settings)?)
+        Ok(predict(
+            &self.model,
+            &[],
+            self.identified_values(),
+            log,
+            self.state_hz,
+            self.delay_samples,
+            &self.settings,
+        )?)
     }
 
     /// Standard deviations of all base parameters: reported and white; `None` where a column was dropped.

@@ -8,7 +8,7 @@ use serde_json::json;
 use crate::Error;
 use crate::agreement::Agreement;
 use crate::config::{Config, Consistency, Route};
-use crate::consistency::{CONSISTENT, UNCONSTRAINED};
+use crate::consistency::UNCONSTRAINED;
 use crate::estimate::{
     BaseValue, Choice, ConditioningRecord, ConsistencyRecord, Estimate, FitSummary, FitValues, HeldOutRecord,
     InputRecord, LogFit, ModelRecord, ParameterValue, PrecisionRecord, Provenance, PruningRecord,
@@ -79,7 +79,7 @@ impl Identification {
 
     /// Identified inertia of every body, in body order.
     pub fn inertias(&self) -> Vec<Inertia> {
-        self.values()
+        self.consistent_values()
             .chunks_exact(10)
             .take(self.model.mechanism().bodies().len())
             .map(|ten| {
@@ -102,7 +102,7 @@ impl Identification {
                     Owner::Link(name) => (Some(name.clone()), None),
                     Owner::Joint(name) => (None, Some(name.clone())),
                 };
-                let value = self.values()[c];
+                let value = self.consistent_values()[c];
                 ParameterValue {
                     name: p.name.clone(),
                     link,
@@ -130,7 +130,7 @@ impl Identification {
     fn base_values(&self) -> Vec<BaseValue> {
         let table = self.model.parameters();
         let expressions = self.base.expressions(table);
-        let consistent = self.base.values(self.values());
+        let consistent = self.base.values(self.consistent_values());
         self.standard_deviations()
             .into_iter()
             .enumerate()
@@ -169,20 +169,21 @@ impl Identification {
             },
             price: found.price(),
             price_over_chance: (chance > 0.0).then(|| found.price() / chance),
-            prior_weight: self.consistent.prior_weight,
-            price_of_prior: self.consistent.price_of_prior,
+            prior_weight: self.consistent.prior_trials[self.consistent.chosen].weight,
+            prior_trials: self.consistent.prior_trials.iter().map(|t| (t.weight, t.loss)).collect(),
             gap: found.gap,
             iterations: found.iterations,
             least_eigenvalue: found.least_eigenvalue,
             active: found.active.iter().map(ToString::to_string).collect(),
-            validation_unconstrained: self.validation_unconstrained.clone(),
+            training: self.training_consistent.clone(),
+            validation: self.validation_consistent.clone(),
         })
     }
 
     fn held_out_record(&self) -> HeldOutRecord {
         let found = &self.consistent.held_out;
         let outputs = 0..self.model.outputs().len();
-        let consistent = if self.consistent.estimate.is_some() { CONSISTENT } else { UNCONSTRAINED };
+        let consistent = self.consistent.consistent();
         if found.folds.is_empty() {
             return HeldOutRecord::default();
         }

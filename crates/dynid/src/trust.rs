@@ -22,9 +22,9 @@ pub const CONFIDENCE: f64 = 0.95;
 pub struct ParameterTrust {
     /// Shares and verdict.
     pub assessment: Assessment,
-    /// Value from data and prior without constraints, in the parameter's unit.
+    /// Value without constraints, split as near as possible to the prior, in the parameter's unit.
     pub unconstrained: f64,
-    /// Standard deviation of that; `None` unless the parameter is seen in the data.
+    /// Standard deviation of that, the prior's doubt about the split included; `None` unless the parameter is seen in the data.
     pub std: Option<f64>,
     /// 95 % interval around it, cut to where the parameter can lie; `None` unless seen in the data.
     pub interval: Option<(f64, f64)>,
@@ -117,7 +117,7 @@ impl Evidence<'_> {
             &excited_regrouping(&fit.factor, &fit.solution.kept, self.regrouping),
             &fit.kept_x(),
             &self.fitted.white,
-            self.fitted.inflation,
+            0.0,
             self.fitted.covariance(),
             &self.prior.values,
             &self.prior.std,
@@ -128,7 +128,7 @@ impl Evidence<'_> {
             .map(|j| {
                 let assessment = assessed.parameters[j].clone();
                 let seen = assessment.verdict == Verdict::Seen;
-                let unconstrained = after.as_ref().map_or(self.consistent.unconstrained[j], |a| a.mean[j]);
+                let unconstrained = self.consistent.unconstrained[j];
                 let std = after.as_ref().map(|a| a.std[j]).filter(|_| seen);
                 let lower = table.linear[j].lower.unwrap_or(f64::NEG_INFINITY);
                 let interval = std.map(|s| {

@@ -9,18 +9,20 @@ use dynid_model::EffortModel;
 use crate::Error;
 use crate::agreement::{Agreement, Alignment, compare};
 use crate::config::{LogConfig, MotorSide};
-use crate::estimate::Estimate;
+use crate::estimate::{Estimate, Split};
 use crate::logs;
 pub use crate::result::log_fit;
 
 /// Predicts logs by an estimate and compares.
 ///
+/// `split`: by the parameters as identified, or by the physically consistent ones.
 /// `filter_hz`: cut-off of the filter for the filtered figures; `None`: the estimate's kernel cut-off.
 ///
 /// # Errors
 /// [`Error`]: bad input.
 pub fn validate(
     estimate: &Estimate,
+    split: Split,
     file: &Path,
     logs: &[LogConfig],
     columns: &MappingSpec,
@@ -28,7 +30,7 @@ pub fn validate(
     filter_hz: Option<f64>,
 ) -> Result<Vec<Agreement>, Error> {
     let model = estimate.effort_model(file)?;
-    let values = estimate.values();
+    let values = estimate.values(split);
     let settings = ConditioningSettings::default();
     let alignment = Alignment {
         state_hz: estimate.model.state_hz,

@@ -4,7 +4,7 @@ use dynid_estimate::consistent::Status as ConsistentStatus;
 use dynid_estimate::identifiability::Verdict as ParameterVerdict;
 use dynid_estimate::whiteness::InBandWhiteness;
 
-use crate::consistency::{CONSISTENT, UNCONSTRAINED};
+use crate::consistency::UNCONSTRAINED;
 use crate::estimate::{CheckResult, Verdict};
 use crate::identify::Identification;
 
@@ -302,7 +302,7 @@ const DEAR: f64 = 10.0;
 fn consistency(id: &Identification) -> Option<(Status, CheckResult)> {
     let found = id.consistent.estimate.as_ref()?;
     let held_out = &id.consistent.held_out;
-    let rise = match (held_out.relative(UNCONSTRAINED), held_out.relative(CONSISTENT)) {
+    let rise = match (held_out.relative(UNCONSTRAINED), held_out.relative(id.consistent.consistent())) {
         (Some(free), Some(consistent)) if free > 0.0 => Some(100.0 * (consistent / free - 1.0)),
         _ => None,
     };

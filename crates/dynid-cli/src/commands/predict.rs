@@ -29,7 +29,7 @@ pub(crate) fn run(args: &PredictArgs) -> Result<u8, Failure> {
         ));
     }
     let states = states::read(&args.states, &state_joints(model.mechanism()), &ReadOptions::default())?;
-    let effort = efforts(&model, &estimate.values(), &states);
+    let effort = efforts(&model, &estimate.values(args.split.of()), &states);
     match &args.out {
         None => data(&csv_text(&estimate.joints, &effort))?,
         Some(path) => {

@@ -31,8 +31,9 @@ pub(crate) fn run(args: &ValidateArgs) -> Result<u8, Failure> {
         .iter()
         .map(|path| LogConfig { path: path.clone(), rows: args.rows, ..LogConfig::default() })
         .collect();
+    let split = args.split.of();
     let agreements =
-        validate(&estimate, &args.estimate, &logs, &columns, motor_side.as_ref(), args.filter_hz)?;
+        validate(&estimate, split, &args.estimate, &logs, &columns, motor_side.as_ref(), args.filter_hz)?;
     let fits: Vec<_> = agreements.iter().map(log_fit).collect();
     if args.json {
         json(&fits)?;

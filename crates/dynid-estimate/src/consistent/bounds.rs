@@ -87,6 +87,7 @@ fn relaxed<const N: usize>(program: &Program<N>) -> Program<N> {
     Program {
         a: Mat::from_fn(1, n + 1, |_, j| if j == n { 1.0 } else { 0.0 }),
         b: vec![-1.0],
+        data_rows: 1,
         weight,
         centre,
         entropy: 0.0,

@@ -1,6 +1,6 @@
 //! Physically consistent estimates: standard parameters that a body can have, fitted to a factor.
 //!
-//! `min ‖R x - z‖² + δ ‖ξ - ξ0‖² + γ Σ_i D(P_i | P0_i)` over standard parameters `x` such that every link's
+//! `min ‖R x - z‖² + δ ‖ξ - ξ0‖² + w Σ ((x_j - x0_j)/σ0_j)² + γ Σ_i D(P_i | P0_i)` over standard parameters `x` such that every link's
 //! pseudo-inertia `P_i ⪰ ε P0_i` (or its weaker 6 × 6 form), friction and rotor inertias stay above `ε`, and linear
 //! bounds hold. `ξ` are whitened parameters: `svec(L⁻¹ P L⁻ᵀ)` of each link with `P0 = L Lᵀ`, scalars divided by their
 //! scale. The problem is convex; [`estimate`] solves it by a primal-dual interior-point method and returns, with the

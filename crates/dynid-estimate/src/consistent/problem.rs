@@ -32,6 +32,9 @@ pub struct Settings {
     /// Weight `δ` of the squared whitened distance to the prior. Default 1e-8: fills what the data do not see, costs
     /// nothing that they do.
     pub prior_weight: f64,
+    /// Weight `w` of a Gaussian prior `Σ ((x_j - x0_j)/σ0_j)²` with the deviations of [`Problem::prior_std`]; 1 takes them
+    /// at their word. Default 0.
+    pub gaussian_weight: f64,
     /// Weight `γ` of the entropic distance to the prior, residual variances per nat. Default 0.
     pub entropic_weight: f64,
     /// Margin. Default `Relative(1e-6)`.
@@ -43,6 +46,7 @@ impl Default for Settings {
         Settings {
             form: Form::PseudoInertia,
             prior_weight: 1e-8,
+            gaussian_weight: 0.0,
             entropic_weight: 0.0,
             margin: Margin::Relative(1e-6),
         }
@@ -99,6 +103,8 @@ pub struct Problem {
     pub scalars: Vec<ScalarPrior>,
     /// Bounds.
     pub bounds: Vec<Bound>,
+    /// Prior standard deviations, one per column, positive; needed with a [`Settings::gaussian_weight`] only.
+    pub prior_std: Vec<f64>,
 }
 
 /// Why a problem has no consistent estimate.
@@ -179,6 +185,16 @@ impl Problem {
         let (delta, gamma) = (settings.prior_weight, settings.entropic_weight);
         number("prior weight", "a positive number", delta, delta.is_finite() && delta > 0.0)?;
         number("entropic weight", "a number that is not negative", gamma, gamma.is_finite() && gamma >= 0.0)?;
+        let w = settings.gaussian_weight;
+        number("Gaussian weight", "a number that is not negative", w, w.is_finite() && w >= 0.0)?;
+        if w > 0.0 && self.prior_std.len() != self.columns() {
+            let what = "prior standard deviations".to_owned();
+            return Err(ProblemError::Shape { what, expected: self.columns(), found: self.prior_std.len() });
+        }
+        for (j, s) in self.prior_std.iter().enumerate() {
+            let what = format!("prior standard deviation of column {j}");
+            number(&what, "a positive number", *s, s.is_finite() && *s > 0.0)?;
+        }
         let (Margin::Relative(margin) | Margin::Absolute(margin)) = settings.margin;
         number("margin", "a number in [0, 1)", margin, (0.0..1.0).contains(&margin))?;
         if gamma > 0.0 && settings.form != Form::PseudoInertia {

@@ -11,6 +11,8 @@ use super::cone::{Lmi, Ray};
 pub(super) struct Program<const N: usize> {
     pub a: Mat<f64>,
     pub b: Vec<f64>,
+    /// Rows of `A` that are data; those below are a Gaussian prior's.
+    pub data_rows: usize,
     /// `w`, one per unknown.
     pub weight: Vec<f64>,
     /// `ξ0`.
@@ -52,16 +54,17 @@ impl<const N: usize> Program<N> {
         out
     }
 
-    /// `‖A ξ - b‖²`.
+    /// `‖A ξ - b‖²` of the data.
     pub(super) fn fit(&self, xi: &[f64]) -> f64 {
-        self.residual(xi).iter().map(|r| r * r).sum()
+        self.residual(xi)[..self.data_rows].iter().map(|r| r * r).sum()
     }
 
     /// `F`; `None` where the entropic distance is infinite.
     pub(super) fn objective(&self, xi: &[f64]) -> Option<f64> {
         let pull: f64 =
             xi.iter().zip(&self.centre).zip(&self.weight).map(|((x, c), w)| w * (x - c) * (x - c)).sum();
-        let mut value = self.fit(xi) + pull;
+        let rows: f64 = self.residual(xi).iter().map(|r| r * r).sum();
+        let mut value = rows + pull;
         if self.entropy > 0.0 {
             for cone in &self.cones {
                 let x = cone.matrix(xi);
@@ -123,14 +126,14 @@ impl<const N: usize> Program<N> {
         self.centre.iter().enumerate().map(|(k, c)| c + change[(k, 0)]).collect()
     }
 
-    /// `min ‖A ξ - b‖²` over all `ξ`, by column-pivoted QR of `[A]`.
+    /// `min ‖A ξ - b‖²` of the data over all `ξ`, by column-pivoted QR.
     pub(super) fn least_fit(&self) -> f64 {
-        let qr = self.a.col_piv_qr();
+        let qr = self.a.subrows(0, self.data_rows).col_piv_qr();
         let r = qr.R();
         let size = r.nrows().min(r.ncols());
-        let threshold = self.a.nrows().max(self.unknowns()) as f64 * f64::EPSILON * r.norm_max();
+        let threshold = self.data_rows.max(self.unknowns()) as f64 * f64::EPSILON * r.norm_max();
         let rank = (0..size).take_while(|k| r[(*k, *k)].abs() > threshold).count();
-        let b = Mat::from_fn(self.b.len(), 1, |i, _| self.b[i]);
+        let b = Mat::from_fn(self.data_rows, 1, |i, _| self.b[i]);
         let q = qr.compute_thin_Q();
         let seen = q.subcols(0, rank);
         let left = &b - seen * (seen.transpose() * &b);

@@ -160,31 +160,50 @@ impl Whitening {
         out
     }
 
-    /// The problem in whitened unknowns.
-    pub(super) fn program<const N: usize>(&self, problem: &Problem, settings: &Settings) -> Program<N>
-    where
-        Self: ConeOf<N>,
-    {
-        let mut a = Mat::zeros(problem.r.nrows(), self.columns);
+    /// `R T`: rows that act on `x` as rows that act on `ξ`.
+    fn whitened_columns(&self, rows: &Mat<f64>) -> Mat<f64> {
+        let mut a = Mat::zeros(rows.nrows(), self.columns);
         for link in &self.links {
             for (j, unit) in link.units.iter().enumerate() {
                 let mut column = a.col_mut(link.first + j);
                 for (k, u) in unit.iter().enumerate() {
                     if *u != 0.0 {
-                        column += faer::Scale(*u) * problem.r.col(link.first + k);
+                        column += faer::Scale(*u) * rows.col(link.first + k);
                     }
                 }
             }
         }
         for (column, scale) in &self.scalars {
             let mut to = a.col_mut(*column);
-            to += faer::Scale(*scale) * problem.r.col(*column);
+            to += faer::Scale(*scale) * rows.col(*column);
         }
+        a
+    }
+
+    /// The problem in whitened unknowns.
+    pub(super) fn program<const N: usize>(&self, problem: &Problem, settings: &Settings) -> Program<N>
+    where
+        Self: ConeOf<N>,
+    {
         let mut prior = vec![0.0; self.columns];
         for link in &self.links {
             prior[link.first..link.first + LINK].copy_from_slice(&link.prior.0);
         }
         problem.scalars.iter().for_each(|s| prior[s.column] = s.prior);
+        let data_rows = problem.r.nrows();
+        let mut b = problem.z.clone();
+        let rows = if settings.gaussian_weight > 0.0 {
+            let weight: Vec<f64> =
+                problem.prior_std.iter().map(|s| settings.gaussian_weight.sqrt() / s).collect();
+            b.extend(weight.iter().zip(&prior).map(|(w, x)| w * x));
+            &Mat::from_fn(data_rows + self.columns, self.columns, |i, j| match i.checked_sub(data_rows) {
+                None => problem.r[(i, j)],
+                Some(k) if k == j => weight[j],
+                Some(_) => 0.0,
+            })
+        } else {
+            &problem.r
+        };
         let least = |scale: f64| match settings.margin {
             Margin::Relative(margin) => margin,
             Margin::Absolute(margin) => margin / scale,
@@ -201,8 +220,9 @@ impl Whitening {
             rays.push(Ray { terms, upper: bound.upper / length });
         }
         Program {
-            a,
-            b: problem.z.clone(),
+            a: self.whitened_columns(rows),
+            b,
+            data_rows,
             weight: vec![settings.prior_weight; self.columns],
             centre: self.whitened(&prior),
             entropy: settings.entropic_weight,

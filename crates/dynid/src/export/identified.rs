@@ -6,7 +6,7 @@ use dynid_io::RobotFile;
 use dynid_model::{Description, Inertia, RobotModel};
 
 use crate::Error;
-use crate::estimate::{Estimate, InputRecord};
+use crate::estimate::{Estimate, InputRecord, Split};
 use crate::identify::Identification;
 
 /// A robot with identified parameters, whatever they come from.
@@ -46,7 +46,7 @@ impl Estimate {
             .model
             .description(&self.robot)
             .map_err(|message| Error::EstimateFile { file: file.display().to_string(), message })?;
-        Ok(IdentifiedRobot { description, model, values: self.values() })
+        Ok(IdentifiedRobot { description, model, values: self.values(Split::Consistent) })
     }
 
     /// The robot file that was identified, if the estimate names it.
@@ -82,7 +82,11 @@ impl Source {
 impl Identification {
     /// The identified robot, for [`RobotExport`](super::RobotExport) and [`json`](super::json()).
     pub fn identified(&self) -> Identified<'_> {
-        Identified { description: &self.robot.file.description, model: &self.model, values: self.values() }
+        Identified {
+            description: &self.robot.file.description,
+            model: &self.model,
+            values: self.consistent_values(),
+        }
     }
 }
 

@@ -9,6 +9,9 @@ const SEED: u64 = 1;
 const EFFORT_SHARE: f64 = 0.1;
 /// Share of the mass matrix that a rotor may have.
 const ROTOR_SHARE: f64 = 0.2;
+/// A drive is taken to reach the velocity limit against its own rotor in about this time with all its effort, s. Behind large
+/// ratios the rotor is many times the links that the joint moves, so that the mass matrix says nothing about it.
+const STARTING_S: f64 = 0.1;
 /// Effort limits count up to this multiple of the logged effort.
 const LIMIT_OF_LOGGED: f64 = 10.0;
 
@@ -31,6 +34,7 @@ pub(super) fn standard_deviations(
     }
     let probe = Probe::new(model, inertias);
     let efforts: Vec<f64> = (0..logged.len()).map(|j| probe.effort(model, j, logged[j])).collect();
+    let starting: Vec<f64> = efforts.iter().zip(&probe.limits).map(|(e, v)| STARTING_S * e / v).collect();
     (inertias.len()..table.len())
         .map(|column| {
             let known = stated[column].unwrap_or(0.0).abs();
@@ -41,7 +45,8 @@ pub(super) fn standard_deviations(
             }
             let inertial = probe.least(column, &probe.accelerated, &probe.mass);
             if let Some(mass) = inertial {
-                return known.max(ROTOR_SHARE * mass);
+                let starting = probe.least(column, &probe.accelerated, &starting).unwrap_or(0.0);
+                return known.max(ROTOR_SHARE * mass).max(starting);
             }
             let largest = probe.least(column, &probe.moving, &efforts).unwrap_or(1.0);
             (0.5 * known).max(EFFORT_SHARE * largest)
@@ -59,6 +64,8 @@ struct Probe {
     mass: Vec<f64>,
     /// Per rate: largest effort of the prior bodies.
     rigid: Vec<f64>,
+    /// Per rate: velocity limit.
+    limits: Vec<f64>,
 }
 
 impl Probe {
@@ -97,6 +104,7 @@ impl Probe {
                 moving: largest(model, |output, k, s| moving.column(output, k)[s]),
                 mass,
                 rigid,
+                limits: limits.clone(),
             }
         })
     }

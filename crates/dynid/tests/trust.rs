@@ -1,0 +1,169 @@
+//! Verdicts against the truth of a simulated log, and physically consistent parameters on recorded logs.
+
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
+
+#[expect(dead_code, reason = "each test binary uses its part")]
+mod support;
+
+use dynid::estimators::distribution::t_quantile;
+use dynid::estimators::identifiability::Verdict;
+use dynid::identify::Identification;
+use dynid::model::EffortModel;
+use support::{data, run};
+
+/// True value of every linear parameter: bodies of `truth.urdf`, elements of `truth.json`.
+fn truth(id: &Identification, folder: &str) -> Vec<f64> {
+    let folder = data().unwrap().join("oracles/logs").join(folder);
+    let robot = dynid::Robot::load(&folder.join("truth.urdf"), &dynid::RobotOptions::default()).unwrap();
+    let mut values = robot.mechanism.inertia_vector();
+    let text = std::fs::read_to_string(folder.join("truth.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let table = id.model.parameters();
+    for p in &table.linear[values.len()..] {
+        let (joint, symbol) = p.name.rsplit_once('.').unwrap();
+        let number = id.model.outputs().iter().position(|o| o.name == joint).unwrap();
+        let key = match symbol {
+            "fc" => "frictionloss",
+            "fv" => "damping",
+            "fo" => "offset",
+            "Ia" => "armature",
+            other => panic!("no truth for {other}"),
+        };
+        values.push(json[key][number].as_f64().unwrap());
+    }
+    values
+}
+
+/// "Seen in the data" is a promise: the truth lies in the 99 % interval of at least 95 % of these parameters, and nothing is
+/// called seen that no motion reveals.
+#[test]
+fn what_is_called_seen_is_right() {
+    let Some((_, id)) = run(r#"
+robot = "{data}/oracles/logs/ur5_dev/nominal.urdf"
+[[log]]
+path = "{data}/oracles/logs/ur5_dev/train.csv.gz"
+"#)
+    else {
+        return;
+    };
+    let truth = truth(&id, "ur5_dev");
+    let table = id.model.parameters();
+    let quantile = t_quantile(0.995, id.blocks() as f64 - 1.0).unwrap();
+    let (mut seen, mut right) = (0, 0);
+    for (c, trust) in id.trust.parameters.iter().enumerate() {
+        assert!(trust.assessment.achieved <= trust.assessment.structural_limit + 1e-9);
+        if trust.assessment.verdict != Verdict::Seen {
+            assert_eq!(trust.std, None, "{}", table.linear[c].name);
+            continue;
+        }
+        assert!(
+            !id.base.zero.contains(&c) && trust.assessment.structural_limit >= 0.9,
+            "{}",
+            table.linear[c].name
+        );
+        let std = trust.std.unwrap();
+        let distance = (trust.unconstrained - truth[c]).abs() / std;
+        seen += 1;
+        right += usize::from(distance <= quantile);
+        if distance > quantile {
+            println!(
+                "outside: {} {:.5} truth {:.5}, {distance:.1} standard deviations",
+                table.linear[c].name, trust.unconstrained, truth[c]
+            );
+        }
+    }
+    let beta = id.base.values(&truth);
+    let (mut base_seen, mut base_right) = (0, 0);
+    for (k, assessment) in id.trust.base.iter().enumerate() {
+        if assessment.verdict == Verdict::Seen {
+            let std = id.standard_deviations()[k].0.unwrap();
+            let distance = (id.fit().x[k] - beta[k]).abs() / std;
+            base_seen += 1;
+            base_right += usize::from(distance <= quantile);
+            if distance > quantile {
+                println!(
+                    "outside: base {} {distance:.1} standard deviations",
+                    table.linear[id.base.kept[k]].name
+                );
+            }
+        }
+    }
+    println!(
+        "standard parameters: {right} of {seen} seen; base parameters: {base_right} of {base_seen} seen"
+    );
+    assert!(seen >= 40 && right as f64 >= 0.95 * f64::from(seen));
+    assert!(base_seen >= 55 && base_right as f64 >= 0.95 * f64::from(base_seen));
+}
+
+/// Configurations of recorded logs whose unconstrained fit asks for impossible bodies or negative rotor inertias.
+const TX40: &str = r#"
+robot = "{data}/staubli-tx40/tx40.urdf"
+[columns]
+rate_hz = 5000
+position = "qm{}"
+effort = { columns = "im{}" }
+[motor_side]
+matrix = [
+  [32.0, 0, 0, 0, 0, 0], [0, 32.0, 0, 0, 0, 0], [0, 0, 45.0, 0, 0, 0],
+  [0, 0, 0, -48.0, 0, 0], [0, 0, 0, 0, 45.0, 0], [0, 0, 0, 0, 32.0, 32.0],
+]
+offset = [0, -1.5707963267948966, 1.5707963267948966, 0, 0, 0]
+[[coupling]]
+motors = ["m5", "m6"]
+joints = ["joint_5", "joint_6"]
+matrix = [[45.0, 0.0], [32.0, 32.0]]
+form = "columns"
+[[log]]
+path = "{data}/staubli-tx40/motor_log.csv.gz"
+part = [0.0, 0.6]
+[[validation]]
+path = "{data}/staubli-tx40/motor_log.csv.gz"
+part = [0.6, 1.0]
+"#;
+const UR10: &str = r#"
+robot = "{data}/ur10-unisa/ur10_kinematics.urdf"
+[[log]]
+path = "{data}/ur10-unisa/exciting_trajectory.csv.gz"
+part = [0.0, 0.7]
+[[validation]]
+path = "{data}/ur10-unisa/exciting_trajectory.csv.gz"
+part = [0.7, 1.0]
+"#;
+const PANDA: &str = r#"
+robot = "{data}/panda-gaz2019/panda_kinematics.urdf"
+[elements]
+default = ["coulomb", "viscous", "offset"]
+[[log]]
+path = "{data}/panda-gaz2019/exciting_trajectory.csv.gz"
+part = [0.0, 0.7]
+[[validation]]
+path = "{data}/panda-gaz2019/exciting_trajectory.csv.gz"
+part = [0.7, 1.0]
+"#;
+
+/// Ratio of the consistent to the unconstrained error on held-out folds and on the validation part.
+fn price(name: &str, id: &Identification) -> (f64, f64) {
+    let held_out = &id.consistent.held_out;
+    let folds = held_out.relative(id.consistent.consistent()).unwrap() / held_out.relative(0).unwrap();
+    let part = id.validation_consistent[0].filtered.relative_error.unwrap()
+        / id.validation[0].filtered.relative_error.unwrap();
+    let estimate = id.consistent.estimate.as_ref().unwrap();
+    println!(
+        "{name}: consistent over unconstrained error {folds:.3} on held-out folds, {part:.3} on the last part; gap {:.1e}, {} iterations",
+        estimate.gap, estimate.iterations
+    );
+    (folds, part)
+}
+
+#[test]
+fn recorded_logs_give_bodies_that_can_exist_at_a_stated_price() {
+    for (name, text) in [("panda-gaz2019", PANDA), ("staubli-tx40", TX40), ("ur10-unisa", UR10)] {
+        let Some((_, id)) = run(text) else { return };
+        assert_eq!(id.unphysical_bodies(), [], "{name}");
+        for (c, p) in id.model.parameters().linear.iter().enumerate() {
+            assert!(p.lower.is_none_or(|l| id.consistent_values()[c] > l), "{name}: {}", p.name);
+        }
+        let (folds, part) = price(name, &id);
+        assert!(folds < 1.02 && part < 1.05, "{name}: {folds} {part}");
+    }
+}
