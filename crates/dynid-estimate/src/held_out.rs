@@ -65,6 +65,14 @@ impl Comparison {
         (!ratios.is_empty()).then(|| ratios.iter().sum::<f64>() / ratios.len() as f64)
     }
 
+    /// Share of the mean square effort of an output that an estimator explains, `1 - ‖residual‖²/‖effort‖²`; `None` without
+    /// effort.
+    pub fn explained(&self, estimator: usize, output: usize) -> Option<f64> {
+        let squares: f64 = self.folds.iter().map(|f| f.squares[estimator][output]).sum();
+        let effort: f64 = self.folds.iter().map(|f| f.effort[output]).sum();
+        (effort > 0.0).then(|| 1.0 - squares / effort)
+    }
+
     /// Relative error of an estimator over all outputs and folds, `‖residual‖/‖effort‖`; `None` without effort.
     pub fn relative(&self, estimator: usize) -> Option<f64> {
         let squares: f64 = self.folds.iter().flat_map(|f| &f.squares[estimator]).sum();

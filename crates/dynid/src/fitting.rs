@@ -25,6 +25,9 @@ use crate::prior::Prior;
 /// Joints whose variance inflation differs by more than this are deflated one by one.
 const UNEQUAL: f64 = 2.0;
 
+/// Variance inflation of rows that count for nothing.
+const TRACE: f64 = 1e12;
+
 /// The fit of the base parameters with what its residuals say about its precision.
 #[derive(Debug)]
 pub struct Fitted {
@@ -38,8 +41,6 @@ pub struct Fitted {
     pub inflation: f64,
     /// The same joint by joint, where it can be told.
     pub inflation_per_output: Vec<Option<f64>>,
-    /// Weighted factor of all base columns, deflated by `κ` (joint by joint where joints differ).
-    pub information: Factor,
     /// Length of time blocks that the residuals ask for.
     pub block_length: BlockLength,
     /// Length of the time blocks in use, s.
@@ -50,6 +51,41 @@ impl Fitted {
     /// The covariance to report: jackknife, or for too few blocks that of white residuals.
     pub fn covariance(&self) -> &Mat<f64> {
         self.jackknife.as_ref().unwrap_or(&self.white)
+    }
+
+    /// Weighted factor of all base columns with every joint's rows deflated by `κ`, joint by joint where joints differ.
+    ///
+    /// Rows of an output that the model does not explain (`explained[output]` is false) count for nothing: whatever its
+    /// effort consists of may pass for a parameter. They keep a trace of weight, so that what they could have shown is "too
+    /// noisy", not "not excited".
+    pub(crate) fn information(&self, explained: &[bool]) -> Factor {
+        let estimate = &self.estimate;
+        let known: Vec<f64> = self.inflation_per_output.iter().flatten().copied().collect();
+        let least = known.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = known.iter().copied().fold(1.0, f64::max);
+        let equal = known.len() < 2 || most <= UNEQUAL * least;
+        if equal && explained.iter().all(|e| *e) {
+            return estimate.factor.scaled(1.0 / self.inflation.sqrt());
+        }
+        // Joint by joint, scaled so that together they make up the inflation found for all.
+        let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
+        let inflation = |output: usize| -> f64 {
+            if !explained[output] {
+                return TRACE;
+            }
+            match self.inflation_per_output[output].filter(|_| !equal) {
+                Some(own) => (own * self.inflation / mean).max(1.0),
+                None => self.inflation,
+            }
+        };
+        let total = estimate.x.len();
+        let parts: Vec<Factor> = estimate
+            .reduced
+            .iter()
+            .zip(estimate.weights())
+            .map(|(group, weight)| group.merged(total).scaled(weight / inflation(group.output).sqrt()))
+            .collect();
+        Factor::merge(&parts.iter().collect::<Vec<_>>())
     }
 }
 
@@ -179,13 +215,11 @@ pub(crate) fn with_precision(
         (estimate.blocks.len() >= MIN_BLOCKS).then(|| estimate.jackknife()).flatten().map(|j| j.covariance);
     let inflation = jackknife.as_ref().and_then(|v| variance_inflation(v, &white)).unwrap_or(1.0);
     let per_output = output_inflation(&estimate.reduced, &estimate.weights(), &estimate.x);
-    let information = information(&estimate, inflation, &per_output);
     Fitted {
         white,
         jackknife,
         inflation,
         inflation_per_output: per_output,
-        information,
         block_length: wanted,
         block_s: block_s * factor as f64,
         estimate,
@@ -228,27 +262,4 @@ fn method(
             LinearMethod::Tls(TlsNoise { columns, effort: config.effort_noise.unwrap_or(1.0) })
         }
     })
-}
-
-/// The weighted factor with every joint's rows deflated by its variance inflation.
-fn information(estimate: &LinearEstimate, inflation: f64, per_output: &[Option<f64>]) -> Factor {
-    let known: Vec<f64> = per_output.iter().flatten().copied().collect();
-    let least = known.iter().copied().fold(f64::INFINITY, f64::min);
-    let most = known.iter().copied().fold(1.0, f64::max);
-    if known.len() < 2 || most <= UNEQUAL * least {
-        return estimate.factor.scaled(1.0 / inflation.sqrt());
-    }
-    // Joint by joint, scaled so that together they make up the inflation found for all.
-    let mean = known.iter().sum::<f64>() / known.len() as f64;
-    let total = estimate.x.len();
-    let parts: Vec<Factor> = estimate
-        .reduced
-        .iter()
-        .zip(estimate.weights())
-        .map(|(group, weight)| {
-            let own = (per_output[group.output].unwrap_or(mean) * inflation / mean).max(1.0);
-            group.merged(total).scaled(weight / own.sqrt())
-        })
-        .collect();
-    Factor::merge(&parts.iter().collect::<Vec<_>>())
 }

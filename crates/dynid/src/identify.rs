@@ -66,6 +66,8 @@ pub struct Identification {
     pub fitted: Fitted,
     /// Standard parameters, physically consistent unless told otherwise.
     pub consistent: Consistent,
+    /// Per output: whether the model explains at least half of the effort, on every log and on held-out folds.
+    pub explained: Vec<bool>,
     /// How far each parameter can be trusted.
     pub trust: Trust,
     /// Values stated by robot file, in parameter order.
@@ -169,20 +171,6 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
             (cutoff, cutoff, 0.0)
         }
     };
-    progress(Step::Trust);
-    let pruning =
-        prune(&fitted.estimate.kept_blocks(), &fitted.estimate.solution.kept, &PruneSettings::default());
-    let trust = Evidence {
-        model: &model,
-        base: &base,
-        regrouping: &regrouping,
-        space: &space,
-        prior: &prior,
-        fitted: &fitted,
-        consistent: &consistent,
-        rows: &fit_rows(&fitted.estimate, conditioning.as_ref(), kernel_hz),
-    }
-    .trust();
     let row_rms = row_rms(&groups, &fitted.estimate.x, base.len());
     let residual_ratio = residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
     let mut warnings = robot.warnings.clone();
@@ -197,7 +185,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         prior,
         fitted,
         consistent,
-        trust,
+        trust: Trust::default(),
+        explained: Vec::new(),
         stated,
         residual_ratio,
         rows,
@@ -211,7 +200,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         training_consistent: Vec::new(),
         validation_consistent: Vec::new(),
         whiteness: Vec::new(),
-        pruning,
+        pruning: None,
         warnings,
         settings,
         logs: Vec::new(),
@@ -239,6 +228,21 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
             out.validation_consistent.push(crate::result::log_fit(&consistent));
         }
     }
+    progress(Step::Trust);
+    out.explained = explained(out.training.iter().chain(&out.validation), &out.consistent);
+    out.pruning = prune(&out.fit().kept_blocks(), &out.fit().solution.kept, &PruneSettings::default());
+    out.trust = Evidence {
+        model: &out.model,
+        base: &out.base,
+        regrouping: &regrouping,
+        space: &space,
+        prior: &out.prior,
+        fitted: &out.fitted,
+        consistent: &out.consistent,
+        rows: &fit_rows(out.fit(), out.conditioning.as_ref(), kernel_hz),
+        explained: &out.explained,
+    }
+    .trust();
     Ok(out)
 }
 
@@ -395,6 +399,30 @@ fn effort_sizes(logs: &[PreparedLog]) -> Vec<f64> {
                 return 0.0;
             }
             *sizes.select_nth_unstable_by(last * 99 / 100, f64::total_cmp).1
+        })
+        .collect()
+}
+
+/// Share of an effort that a model must explain for its residual to count as noise: of its variance on every log,
+/// and of its mean square on held-out folds.
+const EXPLAINED: f64 = 0.5;
+
+fn explained<'a>(
+    agreements: impl Iterator<Item = &'a Agreement> + Clone,
+    consistent: &Consistent,
+) -> Vec<bool> {
+    let outputs = agreements.clone().next().map_or(0, |a| a.filtered.channels.len());
+    let held_out = |j: usize| {
+        let share = |estimator| consistent.held_out.explained(estimator, j);
+        // Whichever estimator does better: a log that is too short for one is no fault of the joint.
+        share(consistency::UNCONSTRAINED).into_iter().chain(share(consistent.consistent())).reduce(f64::max)
+    };
+    // An effort that never changes has no R² and nothing to explain.
+    (0..outputs)
+        .map(|j| {
+            let logs = agreements.clone().filter_map(|a| a.filtered.channels[j].r2);
+            logs.chain(if consistent.held_out.folds.is_empty() { None } else { held_out(j) })
+                .all(|x| x >= EXPLAINED)
         })
         .collect()
 }

@@ -39,7 +39,7 @@ pub struct ParameterTrust {
 }
 
 /// What is known about all parameters.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Trust {
     /// Standard parameters, in column order.
     pub parameters: Vec<ParameterTrust>,
@@ -61,12 +61,14 @@ pub(crate) struct Evidence<'a> {
     pub fitted: &'a Fitted,
     pub consistent: &'a Consistent,
     pub rows: &'a FitRows,
+    /// Per output: whether the model explains its effort.
+    pub explained: &'a [bool],
 }
 
 impl Evidence<'_> {
     /// Verdicts of all parameters.
     pub(crate) fn trust(&self) -> Trust {
-        let information = &self.fitted.information;
+        let information = &self.fitted.information(self.explained);
         let assessed = self.space.assess(information, 1.0);
         let present = Present { space: self.space, information, inflation: 1.0, assessed: &assessed };
         let advice = advise(self.model, self.base, &present, self.rows, &MotionSettings::default());

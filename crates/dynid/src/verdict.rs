@@ -66,6 +66,7 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
     if !id.validation.is_empty() {
         checks.push(validation_fit(id));
     }
+    checks.extend(explained(id));
     checks.extend(residual(id));
     checks.extend(delay(id));
     checks.extend(mask(id));
@@ -188,6 +189,26 @@ fn validation_fit(id: &Identification) -> (Status, CheckResult) {
     fit_check("prediction of validation logs", &id.validation, "logs it has not seen")
 }
 
+fn explained(id: &Identification) -> Option<(Status, CheckResult)> {
+    let outputs = dynid_model::EffortModel::outputs(&id.model);
+    let poor: Vec<&str> =
+        outputs.iter().zip(&id.explained).filter(|(_, e)| !**e).map(|(o, _)| o.name.as_str()).collect();
+    (!poor.is_empty()).then(|| {
+        check(
+            Status::Warn,
+            "joints that the model does not explain",
+            Some(poor.len() as f64),
+            "",
+            "none: at least half of the effort of every joint explained, on all logs and on held-out folds",
+            format!(
+                "the effort of `{}` is mostly something else than this model (poor current sensing, friction at rest, a wrong \
+                 column?): its rows count for nothing in the verdicts, so that what only they could show stays with the prior",
+                poor.join("`, `")
+            ),
+        )
+    })
+}
+
 fn residual(id: &Identification) -> Option<(Status, CheckResult)> {
     let worst = id
         .residual_ratio
@@ -307,7 +328,11 @@ fn consistency(id: &Identification) -> Option<(Status, CheckResult)> {
         _ => None,
     };
     let cost = rise.unwrap_or(0.0);
-    let active = || found.active.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+    let active = || {
+        let mut names: Vec<String> = found.active.iter().map(|a| format!("`{}`", a.name())).collect();
+        names.dedup();
+        names.join(", ")
+    };
     Some(check(
         Status::of(cost <= CHEAP && found.status != ConsistentStatus::Stalled, cost <= DEAR),
         "price of physical consistency",
