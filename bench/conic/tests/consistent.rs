@@ -1,4 +1,4 @@
-//! Two solvers that share no code, one set of problems.
+//! Two solvers that share the definition of a body and nothing else, on one set of problems.
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 #[path = "../../../crates/dynid-estimate/tests/random_problem/mod.rs"]
@@ -274,6 +274,12 @@ fn figures(mut values: Vec<f64>) -> String {
     format!("median {:.1e}, 95 % {:.1e}, most {:.1e}", at(0.5), at(0.95), at(1.0))
 }
 
+fn counts(ends: impl Iterator<Item = String>) -> String {
+    let mut counts = BTreeMap::new();
+    ends.for_each(|end| *counts.entry(end).or_insert(0) += 1);
+    format!("{counts:?}")
+}
+
 /// Both solvers on a thousand problems of any noise: `cargo test --release -- --ignored --nocapture`.
 #[test]
 #[ignore = "a survey; the ordinary run checks the moderate ones"]
@@ -289,9 +295,9 @@ fn a_thousand_problems() {
     let pairs: Vec<(bool, Pair)> = (0..1000).into_par_iter().map(solve).collect();
     for (what, wanted) in [("moderate noise", true), ("little noise", false)] {
         let pairs: Vec<&Pair> = pairs.iter().filter(|(m, _)| *m == wanted).map(|(_, p)| p).collect();
-        let mut ends = BTreeMap::new();
-        pairs.iter().for_each(|p| *ends.entry(format!("{:?}", p.theirs.status)).or_insert(0) += 1);
-        println!("{what}: {} problems, theirs end {ends:?}", pairs.len());
+        println!("{what}: {} problems", pairs.len());
+        println!("  ours end {}", counts(pairs.iter().map(|p| format!("{:?}", p.ours.status))));
+        println!("  theirs end {}", counts(pairs.iter().map(|p| format!("{:?}", p.theirs.status))));
         println!("  ours above theirs: {}", figures(pairs.iter().map(|p| p.relative()).collect()));
         println!("  theirs above ours: {}", figures(pairs.iter().map(|p| -p.relative()).collect()));
         println!("  iterations ours {}", figures(pairs.iter().map(|p| p.ours.iterations as f64).collect()));
