@@ -251,6 +251,7 @@ fn both_solvers_meet_the_reference_numbers() {
             links: (0..2).map(link).collect(),
             scalars: (0..scale.len()).map(scalar).collect(),
             bounds: given.collect(),
+            prior_std: Vec::new(),
         };
         let settings = Settings {
             prior_weight: number("delta"),

@@ -17,7 +17,9 @@ fn run(seeds: std::ops::Range<u64>, settings: &Settings) -> Vec<(usize, Status, 
             let (problem, _) = random_problem(seed, None);
             let found = estimate(&problem, settings).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
             assert!(found.x.iter().all(|x| x.is_finite()), "seed {seed}: {found:?}");
-            assert!(found.least_eigenvalue >= 1e-6, "seed {seed}: {}", found.least_eigenvalue);
+            // An eigenvalue is known to rounding of the largest one.
+            let rounding = 10.0 * f64::EPSILON * found.largest_trace;
+            assert!(found.least_eigenvalue >= 1e-6 - rounding, "seed {seed}: {}", found.least_eigenvalue);
             assert!(
                 found.gap.is_finite() && found.gap >= -1e-9 * found.objective,
                 "seed {seed}: {}",
@@ -49,7 +51,7 @@ fn run(seeds: std::ops::Range<u64>, settings: &Settings) -> Vec<(usize, Status, 
                 let value: f64 = bound.terms.iter().map(|(c, f)| f * found.x[*c]).sum();
                 assert!(value <= bound.upper + 1e-9 * bound.upper.abs(), "seed {seed}: {}", bound.name);
             }
-            let noise = 1e-13 * problem.z.iter().map(|z| z * z).sum::<f64>();
+            let noise = 1e-14 * problem.z.iter().map(|z| z * z).sum::<f64>();
             let tolerance = (1e-6 * (found.objective - found.unconstrained_fit)).max(1e-6).max(noise);
             (found.iterations, found.status, found.gap / tolerance)
         })

@@ -55,7 +55,8 @@ pub struct ConsistentEstimate {
     pub status: Status,
     /// Interior-point iterations, phase I included; 0 if unconstrained.
     pub iterations: usize,
-    /// Least `λ_min(X_i)` over the links, `X_i = L⁻¹ P_i L⁻ᵀ` (or the 6 × 6 form whitened alike): at least the margin.
+    /// Least `λ_min(X_i)` over the links, `X_i = L⁻¹ P_i L⁻ᵀ` (or the 6 × 6 form whitened alike): at least the margin, to
+    /// rounding of the largest.
     pub least_eigenvalue: f64,
     /// Largest `tr X_i` over the links; above 100 the prior is off by two orders of magnitude.
     pub largest_trace: f64,
@@ -102,7 +103,7 @@ where
     }
     let least = program.objective(&free).unwrap_or(f64::INFINITY).min(f64::MAX);
     let tolerance = |objective: f64| {
-        let noise = 1e-13 * problem.z.iter().map(|z| z * z).sum::<f64>();
+        let noise = 1e-14 * problem.z.iter().map(|z| z * z).sum::<f64>();
         (1e-6 * (objective - least)).max(1e-6).max(noise)
     };
     let mut ended = interior::solve(&program, &start.xi, &tolerance);
