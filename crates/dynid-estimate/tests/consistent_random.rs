@@ -51,7 +51,7 @@ fn run(seeds: std::ops::Range<u64>, settings: &Settings) -> Vec<(usize, Status, 
                 let value: f64 = bound.terms.iter().map(|(c, f)| f * found.x[*c]).sum();
                 assert!(value <= bound.upper + 1e-9 * bound.upper.abs(), "seed {seed}: {}", bound.name);
             }
-            let noise = 1e-14 * problem.z.iter().map(|z| z * z).sum::<f64>();
+            let noise = 2e-14 * problem.z.iter().map(|z| z * z).sum::<f64>();
             let tolerance = (1e-6 * (found.objective - found.unconstrained_fit)).max(1e-6).max(noise);
             (found.iterations, found.status, found.gap / tolerance)
         })

@@ -103,7 +103,7 @@ where
     }
     let least = program.objective(&free).unwrap_or(f64::INFINITY).min(f64::MAX);
     let tolerance = |objective: f64| {
-        let noise = 1e-14 * problem.z.iter().map(|z| z * z).sum::<f64>();
+        let noise = 2e-14 * problem.z.iter().map(|z| z * z).sum::<f64>();
         (1e-6 * (objective - least)).max(1e-6).max(noise)
     };
     let mut ended = interior::solve(&program, &start.xi, &tolerance);
