@@ -192,15 +192,14 @@ pub(crate) struct IdentifyArgs {
 /// Which of an estimate's parameters.
 #[derive(Debug, Args)]
 pub(crate) struct SplitArgs {
-    /// Use the physically consistent parameters, as robot files state them, in place of those identified without
-    /// constraints.
+    /// Use the parameters fitted without constraints in place of the physically consistent ones.
     #[arg(long)]
-    pub(crate) consistent: bool,
+    pub(crate) unconstrained: bool,
 }
 
 impl SplitArgs {
     pub(crate) fn of(&self) -> Split {
-        if self.consistent { Split::Consistent } else { Split::Identified }
+        if self.unconstrained { Split::Unconstrained } else { Split::Consistent }
     }
 }
 

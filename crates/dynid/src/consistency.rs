@@ -46,8 +46,7 @@ pub struct Consistent {
     /// Errors of the unconstrained and of the consistent estimates (one per trial) on the same held-out folds of the
     /// training logs.
     pub held_out: Comparison,
-    /// Standard parameters without constraints: base values as identified, split as near as possible to the prior.
-    /// Predictions use these.
+    /// Standard parameters without constraints: base values as fitted, split as near as possible to the prior.
     pub unconstrained: Vec<f64>,
     /// Standard parameters of bodies that can exist; the same as [`Self::unconstrained`] if no consistency was asked for.
     pub values: Vec<f64>,
@@ -152,7 +151,7 @@ pub(crate) fn consistent(
     })
 }
 
-/// Base values as identified, split as near as possible to the prior in units of its standard deviations.
+/// Base values as fitted, split as near as possible to the prior in units of its standard deviations.
 fn unconstrained(regrouping: &Mat<f64>, prior: &Prior, fitted: &Fitted) -> Option<Vec<f64>> {
     let fit = &fitted.estimate;
     let excited = excited_regrouping(&fit.factor, &fit.solution.kept, regrouping);

@@ -73,11 +73,11 @@ pub struct Estimate {
 /// Which standard parameters stand for the base values.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Split {
-    /// Base values exactly as identified; not every link need be a body that can exist.
-    #[default]
-    Identified,
     /// Bodies that can exist, as robot files state them.
+    #[default]
     Consistent,
+    /// Base values exactly as fitted; not every link need be a body that can exist.
+    Unconstrained,
 }
 
 /// Rank of the log.
@@ -110,8 +110,7 @@ pub struct ParameterValue {
     pub unit: String,
     /// Value, physically consistent with the link's other parameters.
     pub value: f64,
-    /// Value without constraints: base values as identified, split as near as possible to the robot file. Predictions use
-    /// it.
+    /// Value without constraints: base values as fitted, split as near as possible to the robot file.
     #[serde(default)]
     pub unconstrained: Option<f64>,
     /// Standard deviation of that, if the parameter is seen in the data.
@@ -203,10 +202,10 @@ pub struct ConsistencyRecord {
     pub least_eigenvalue: f64,
     /// Constraints that hold the estimate back, in words.
     pub active: Vec<String>,
-    /// Figures of the consistent parameters on the training logs; empty where they predict as those without constraints.
-    pub training: Vec<LogFit>,
+    /// Figures of the parameters without constraints on the training logs; empty where they predict the same.
+    pub training_unconstrained: Vec<LogFit>,
     /// The same on the validation logs.
-    pub validation: Vec<LogFit>,
+    pub validation_unconstrained: Vec<LogFit>,
 }
 
 /// Errors on held-out folds of time of the training logs, rows as the fit sees them.
@@ -554,7 +553,9 @@ impl Estimate {
     /// Values of all linear parameters.
     pub fn values(&self, split: Split) -> Vec<f64> {
         match split {
-            Split::Identified => self.parameters.iter().map(|p| p.unconstrained.unwrap_or(p.value)).collect(),
+            Split::Unconstrained => {
+                self.parameters.iter().map(|p| p.unconstrained.unwrap_or(p.value)).collect()
+            }
             Split::Consistent => self.parameters.iter().map(|p| p.value).collect(),
         }
     }

@@ -86,14 +86,14 @@ pub struct Identification {
     pub delay_samples: f64,
     /// Sample rate of the training logs, Hz; the delay is not applied to logs of another rate.
     pub delay_rate_hz: f64,
-    /// Agreement of the parameters as identified on the training logs.
+    /// Agreement on the training logs.
     pub training: Vec<Agreement>,
     /// The same on the validation logs.
     pub validation: Vec<Agreement>,
-    /// Figures of the consistent parameters on the training logs, where they predict differently.
-    pub training_consistent: Vec<LogFit>,
+    /// Figures of the unconstrained parameters on the training logs, where they predict differently.
+    pub training_unconstrained: Vec<LogFit>,
     /// The same on the validation logs.
-    pub validation_consistent: Vec<LogFit>,
+    pub validation_unconstrained: Vec<LogFit>,
     /// Per training log and output: whether the raw residuals are white inside the kernel's band.
     pub whiteness: Vec<Vec<Option<InBandWhiteness>>>,
     /// Models with fewer and fewer base parameters, and how well they do.
@@ -197,8 +197,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         delay_rate_hz: prepared[0].rate_hz,
         training: Vec::new(),
         validation: Vec::new(),
-        training_consistent: Vec::new(),
-        validation_consistent: Vec::new(),
+        training_unconstrained: Vec::new(),
+        validation_unconstrained: Vec::new(),
         whiteness: Vec::new(),
         pruning: None,
         warnings,
@@ -209,11 +209,11 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     };
     for (l, log) in prepared.iter().enumerate() {
         progress(Step::Validate(log.name.clone()));
-        let agreement = out.agreement(out.identified_values(), log)?;
+        let agreement = out.agreement(out.values(), log)?;
         out.whiteness.push(residuals.whiteness(l, &agreement, kernel_hz));
         if out.consistent.constrained() {
-            let consistent = out.agreement(out.consistent_values(), log)?;
-            out.training_consistent.push(crate::result::log_fit(&consistent));
+            let free = out.agreement(out.unconstrained_values(), log)?;
+            out.training_unconstrained.push(crate::result::log_fit(&free));
         }
         out.training.push(agreement);
     }
@@ -222,10 +222,10 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         progress(Step::Validate(log.path.display().to_string()));
         let loaded = logs::load(log, &out.robot.mechanism, &config.columns, config.motor_side.as_ref())?;
         let prepared = prepare(&loaded.log, &out.model, &out.settings)?;
-        out.validation.push(out.agreement(out.identified_values(), &prepared)?);
+        out.validation.push(out.agreement(out.values(), &prepared)?);
         if out.consistent.constrained() {
-            let consistent = out.agreement(out.consistent_values(), &prepared)?;
-            out.validation_consistent.push(crate::result::log_fit(&consistent));
+            let free = out.agreement(out.unconstrained_values(), &prepared)?;
+            out.validation_unconstrained.push(crate::result::log_fit(&free));
         }
     }
     progress(Step::Trust);
@@ -247,15 +247,15 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
 }
 
 impl Identification {
-    /// Standard parameters that predict as identified, in column order: base values of the fit, split as near as possible to
-    /// the robot file. Not every link need be a body that can exist.
-    pub fn identified_values(&self) -> &[f64] {
-        &self.consistent.unconstrained
+    /// Standard parameters of bodies that can exist (unless no consistency was asked for), in column order: what predictions
+    /// use and what goes into robot files.
+    pub fn values(&self) -> &[f64] {
+        &self.consistent.values
     }
 
-    /// Standard parameters of bodies that can exist, in column order: what goes into robot files.
-    pub fn consistent_values(&self) -> &[f64] {
-        &self.consistent.values
+    /// Standard parameters without constraints: base values exactly as fitted, split as near as possible to the robot file.
+    pub fn unconstrained_values(&self) -> &[f64] {
+        &self.consistent.unconstrained
     }
 
     /// The linear fit in base columns.
@@ -287,20 +287,12 @@ impl Identification {
         )
     }
 
-    /// Predicted effort on a prepared log as identified, per output.
+    /// Predicted effort on a prepared log, per output.
     ///
     /// # Errors
     /// [`Error::Conditioning`].
     pub fn predict(&self, log: &PreparedLog) -> Result<Vec<Vec<f64>>, Error> {
-        Ok(predict(
-            &self.model,
-            &[],
-            self.identified_values(),
-            log,
-            self.state_hz,
-            self.delay_samples,
-            &self.settings,
-        )?)
+        Ok(predict(&self.model, &[], self.values(), log, self.state_hz, self.delay_samples, &self.settings)?)
     }
 
     /// Standard deviations of all base parameters: reported and white; `None` where a column was dropped.

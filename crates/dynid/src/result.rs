@@ -79,7 +79,7 @@ impl Identification {
 
     /// Identified inertia of every body, in body order.
     pub fn inertias(&self) -> Vec<Inertia> {
-        self.consistent_values()
+        self.values()
             .chunks_exact(10)
             .take(self.model.mechanism().bodies().len())
             .map(|ten| {
@@ -102,7 +102,7 @@ impl Identification {
                     Owner::Link(name) => (Some(name.clone()), None),
                     Owner::Joint(name) => (None, Some(name.clone())),
                 };
-                let value = self.consistent_values()[c];
+                let value = self.values()[c];
                 ParameterValue {
                     name: p.name.clone(),
                     link,
@@ -130,7 +130,7 @@ impl Identification {
     fn base_values(&self) -> Vec<BaseValue> {
         let table = self.model.parameters();
         let expressions = self.base.expressions(table);
-        let consistent = self.base.values(self.consistent_values());
+        let consistent = self.base.values(self.values());
         self.standard_deviations()
             .into_iter()
             .enumerate()
@@ -175,8 +175,8 @@ impl Identification {
             iterations: found.iterations,
             least_eigenvalue: found.least_eigenvalue,
             active: found.active.iter().map(ToString::to_string).collect(),
-            training: self.training_consistent.clone(),
-            validation: self.validation_consistent.clone(),
+            training_unconstrained: self.training_unconstrained.clone(),
+            validation_unconstrained: self.validation_unconstrained.clone(),
         })
     }
 

@@ -15,7 +15,7 @@ pub use crate::result::log_fit;
 
 /// Predicts logs by an estimate and compares.
 ///
-/// `split`: by the parameters as identified, or by the physically consistent ones.
+/// `split`: by the physically consistent parameters, or by those without constraints.
 /// `filter_hz`: cut-off of the filter for the filtered figures; `None`: the estimate's kernel cut-off.
 ///
 /// # Errors

@@ -31,7 +31,7 @@ path = "{data}/oracles/logs/{log}/train.csv.gz"
         let table = csv::read(&path, &ReadOptions::default()).unwrap();
         let joints = id.robot.state_joints();
         let states = dynid::io::states::from_table(&table, &joints).unwrap();
-        let predicted = efforts(&id.model, id.identified_values(), &states);
+        let predicted = efforts(&id.model, id.values(), &states);
         let mut sum = 0.0;
         for (j, predicted) in predicted.iter().enumerate() {
             let truth = table.column(&format!("tau{}", j + 1)).unwrap();

@@ -145,8 +145,8 @@ part = [0.7, 1.0]
 fn price(name: &str, id: &Identification) -> (f64, f64) {
     let held_out = &id.consistent.held_out;
     let folds = held_out.relative(id.consistent.consistent()).unwrap() / held_out.relative(0).unwrap();
-    let part = id.validation_consistent[0].filtered.relative_error.unwrap()
-        / id.validation[0].filtered.relative_error.unwrap();
+    let part = id.validation[0].filtered.relative_error.unwrap()
+        / id.validation_unconstrained[0].filtered.relative_error.unwrap();
     let estimate = id.consistent.estimate.as_ref().unwrap();
     println!(
         "{name}: consistent over unconstrained error {folds:.3} on held-out folds, {part:.3} on the last part; gap {:.1e}, {} iterations",
@@ -161,7 +161,7 @@ fn recorded_logs_give_bodies_that_can_exist_at_a_stated_price() {
         let Some((_, id)) = run(text) else { return };
         assert_eq!(id.unphysical_bodies(), [], "{name}");
         for (c, p) in id.model.parameters().linear.iter().enumerate() {
-            assert!(p.lower.is_none_or(|l| id.consistent_values()[c] > l), "{name}: {}", p.name);
+            assert!(p.lower.is_none_or(|l| id.values()[c] > l), "{name}: {}", p.name);
         }
         let (folds, part) = price(name, &id);
         assert!(folds < 1.02 && part < 1.05, "{name}: {folds} {part}");

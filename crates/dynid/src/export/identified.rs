@@ -82,11 +82,7 @@ impl Source {
 impl Identification {
     /// The identified robot, for [`RobotExport`](super::RobotExport) and [`json`](super::json()).
     pub fn identified(&self) -> Identified<'_> {
-        Identified {
-            description: &self.robot.file.description,
-            model: &self.model,
-            values: self.consistent_values(),
-        }
+        Identified { description: &self.robot.file.description, model: &self.model, values: self.values() }
     }
 }
 

@@ -41,7 +41,7 @@ pub(crate) fn on_validation(config: &Config, id: &Identification, filter_hz: f64
         delay_rate_hz: id.delay_rate_hz,
         filter_hz,
     };
-    compare(&id.model, id.identified_values(), &prepared, &alignment, &id.settings).unwrap()
+    compare(&id.model, id.values(), &prepared, &alignment, &id.settings).unwrap()
 }
 
 /// Geometric mean of ratios.
