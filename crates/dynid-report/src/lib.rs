@@ -24,9 +24,11 @@ mod page;
 mod series;
 
 pub use data::{
-    BaseParameter, Check, Chosen, Fact, InputFile, Joint, JointDelay, JointQuality, JointSeries, Ladder,
-    LogReport, LogRole, LogSeries, Observation, Origin, ParameterVerdict, Provenance, Quality, ReportData,
-    Robot, Rung, StandardParameter, Status, UnidentifiableColumn, Value, Verdict, Warning,
+    BaseParameter, Check, Chosen, Consistency, ConsistencyStatus, Fact, HeldOut, HeldOutJoint, InputFile,
+    Joint, JointDelay, JointQuality, JointSeries, Ladder, Limit, LogReport, LogRole, LogSeries, LogWhiteness,
+    Observation, Origin, OwnerKind, ParameterVerdict, Precision, Provenance, Pruning, PruningStep, Quality,
+    ReportData, Robot, Rung, StandardParameter, Status, UnidentifiableColumn, ValidationPrice, Value,
+    Verdict, Warning, Whiteness,
 };
 pub use error::ReportError;
 pub use page::render;

@@ -42,6 +42,22 @@ pub(crate) fn with_std(value: f64, std: f64) -> (String, String) {
     }
 }
 
+/// Ends of an interval to the same place, its half width having two digits.
+pub(crate) fn interval(low: f64, high: f64) -> (String, String) {
+    let half = 0.5 * (high - low);
+    (with_std(low, half).0, with_std(high, half).0)
+}
+
+/// A share of a whole in percent, rounded down, so that 100 % is said of a whole alone.
+pub(crate) fn share(share: f64) -> String {
+    // A share that was computed may miss its whole per cent by rounding.
+    if share.is_finite() {
+        format!("{:.0} %", (100.0 * share.max(0.0) + 1e-9).floor())
+    } else {
+        NOT_FINITE.to_owned()
+    }
+}
+
 /// All digits of `value` if they are at most six (a chosen 0.25 is not 0.2500), else four.
 pub(crate) fn shortest(value: f64) -> String {
     let scientific = format!("{value:e}");
@@ -145,6 +161,22 @@ mod tests {
         ];
         for (value, text) in cases {
             assert_eq!(shortest(value), text);
+        }
+    }
+
+    #[test]
+    fn an_interval_shows_two_digits_of_its_width() {
+        let text = |low: &str, high: &str| (low.to_owned(), high.to_owned());
+        assert_eq!(interval(0.415867, 0.432785), text("0.4159", "0.4328"));
+        assert_eq!(interval(-12.0, 1.0), text("-12.0", "1.0"));
+        assert_eq!(interval(0.0, 0.0), text("0", "0"));
+    }
+
+    #[test]
+    fn a_share_is_never_rounded_up_to_the_whole() {
+        for (value, text) in [(0.0, "0 %"), (-1e-17, "0 %"), (0.29, "29 %"), (0.9999, "99 %"), (1.0, "100 %")]
+        {
+            assert_eq!(share(value), text);
         }
     }
 

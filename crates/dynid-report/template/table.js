@@ -39,18 +39,68 @@
       });
     }
   }
+  // Rows of several bodies: a heading, rows with a verdict, and explanations that follow the row they belong to.
+  function apply(table) {
+    const state = table.state;
+    let count = 0;
+    for (const group of state.groups) {
+      let any = false;
+      for (const row of group.rows) {
+        const visible = state.words.every(function (word) { return row.text.includes(word); }) &&
+          (!state.verdict || row.element.dataset.verdict === state.verdict);
+        row.element.hidden = !visible;
+        if (row.more) row.more.hidden = !visible || !state.explained;
+        any = any || visible;
+        count += visible;
+      }
+      if (group.heading) group.heading.hidden = !any;
+    }
+    const found = document.querySelector('[data-found="' + table.id + '"]');
+    if (found) found.textContent = state.words.length || state.verdict ? count + " of " + state.all : "";
+  }
+  for (const table of document.querySelectorAll("table.sortable, table.trust")) {
+    const groups = Array.from(table.tBodies, function (body) {
+      const group = { heading: null, rows: [] };
+      for (const element of body.rows) {
+        if (element.classList.contains("owner")) group.heading = element;
+        else if (element.classList.contains("more")) group.rows[group.rows.length - 1].more = element;
+        else group.rows.push({ element: element, more: null });
+      }
+      for (const row of group.rows) {
+        const parts = [group.heading, row.element, row.more].filter(Boolean);
+        row.text = parts.map(function (part) { return part.textContent; }).join(" ").toLowerCase();
+      }
+      return group;
+    });
+    const all = groups.reduce(function (sum, group) { return sum + group.rows.length; }, 0);
+    table.state = { groups: groups, all: all, words: [], verdict: "", explained: true };
+  }
   for (const input of document.querySelectorAll("input[data-table]")) {
-    const rows = Array.from(document.getElementById(input.dataset.table).tBodies[0].rows);
-    const found = document.querySelector('[data-found="' + input.dataset.table + '"]');
-    const text = rows.map(function (row) { return row.textContent.toLowerCase(); });
+    const table = document.getElementById(input.dataset.table);
     input.addEventListener("input", function () {
-      const words = input.value.toLowerCase().split(/\s+/).filter(Boolean);
-      let count = 0;
-      rows.forEach(function (row, i) {
-        row.hidden = !words.every(function (word) { return text[i].includes(word); });
-        count += !row.hidden;
-      });
-      found.textContent = words.length ? count + " of " + rows.length : "";
+      table.state.words = input.value.toLowerCase().split(/\s+/).filter(Boolean);
+      apply(table);
     });
   }
+  for (const filter of document.querySelectorAll(".filter[data-table]")) {
+    const table = document.getElementById(filter.dataset.table);
+    filter.addEventListener("click", function (event) {
+      const button = event.target.closest("button");
+      if (!button) return;
+      if ("explanations" in button.dataset) {
+        table.state.explained = !table.state.explained;
+        button.setAttribute("aria-pressed", String(table.state.explained));
+      } else {
+        table.state.verdict = button.dataset.show;
+        for (const other of filter.querySelectorAll("[data-show]")) other.setAttribute("aria-pressed", String(other === button));
+      }
+      apply(table);
+    });
+  }
+  // Paper cannot unfold.
+  const unfolded = [];
+  window.addEventListener("beforeprint", function () {
+    for (const fold of document.querySelectorAll("details.fold:not([open])")) { fold.open = true; unfolded.push(fold); }
+  });
+  window.addEventListener("afterprint", function () { for (const fold of unfolded.splice(0)) fold.open = false; });
 })();

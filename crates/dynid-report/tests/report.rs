@@ -4,9 +4,10 @@
 mod synthetic;
 
 use dynid_report::{
-    BaseParameter, Check, Chosen, Fact, InputFile, Joint, JointDelay, JointQuality, JointSeries, Ladder,
-    LogReport, LogSeries, ReportData, ReportError, Rung, StandardParameter, UnidentifiableColumn, Verdict,
-    Warning, render,
+    BaseParameter, Check, Chosen, Consistency, Fact, HeldOut, HeldOutJoint, InputFile, Joint, JointDelay,
+    JointQuality, JointSeries, Ladder, Limit, LogReport, LogSeries, LogWhiteness, Precision, Pruning,
+    PruningStep, ReportData, ReportError, Rung, StandardParameter, UnidentifiableColumn, ValidationPrice,
+    Verdict, Warning, render,
 };
 
 const HOSTILE: &str = "</script><script>alert('x')</script><img src=\"https://example.org/x.png\">&";
@@ -55,7 +56,33 @@ fn hollow(text: &str) -> ReportData {
             unit: text(),
             ..Default::default()
         }],
-        standard_parameters: vec![StandardParameter { owner: text(), name: text(), ..Default::default() }],
+        standard_parameters: vec![StandardParameter {
+            owner: text(),
+            name: text(),
+            unit: text(),
+            reason: text(),
+            combination: text(),
+            advice: text(),
+            ..Default::default()
+        }],
+        motions: vec![text()],
+        consistency: Some(Consistency {
+            form: text(),
+            limits: vec![Limit { owner: text(), text: text(), ..Default::default() }],
+            validation: vec![ValidationPrice { log: text(), ..Default::default() }],
+            ..Default::default()
+        }),
+        held_out: HeldOut { folds: 1, joints: vec![HeldOutJoint::default()], ..Default::default() },
+        precision: Some(Precision {
+            variance_inflation_per_joint: vec![None],
+            whiteness: vec![LogWhiteness { log: text(), joints: vec![None] }],
+            ..Default::default()
+        }),
+        pruning: Some(Pruning {
+            path: vec![PruningStep { parameters: 1, next: text(), ..Default::default() }],
+            essential_parameters: vec![text()],
+            ..Default::default()
+        }),
         unidentifiable: vec![UnidentifiableColumn { name: text(), reason: text() }],
         conditioning: vec![Chosen { name: text(), reason: text(), ..Default::default() }],
         ladders: vec![Ladder {
@@ -84,12 +111,16 @@ fn every_section_and_its_numbers_are_there() {
     for section in [
         "verdict",
         "warnings",
+        "trust",
+        "motions",
         "system",
         "quality",
+        "consistency",
+        "precision",
         "effort",
         "residuals",
         "base",
-        "standard",
+        "essential",
         "identifiability",
         "conditioning",
         "provenance",
@@ -102,10 +133,88 @@ fn every_section_and_its_numbers_are_there() {
     assert_eq!(page.matches("<svg class=\"small\"").count(), 36);
     assert_eq!(page.matches("<svg class=\"interval").count(), 54);
     assert_eq!(page.matches("aria-label=\"95 % interval").count(), 54);
-    for word in ["CAUTION", "held-out RMS", "seen in data", "data (automatic)", "20260401", "0.400 to 0.600"]
-    {
+    for word in ["CAUTION", "held-out RMS", "data (automatic)", "20260401", "0.400 to 0.600"] {
         assert!(page.contains(word), "{word}");
     }
+}
+
+/// The row of a parameter of `owner` in the table of standard parameters, with what is said below it.
+fn standard_row<'a>(page: &'a str, owner: &str, name: &str) -> &'a str {
+    let table = between(page, "<table id=\"standard-table\"", "</table>")[0];
+    let group = between(table, "<tr class=\"owner\">", "</tbody>");
+    let group = group.iter().find(|g| g.contains(&format!(">{owner} <span>"))).expect("the owner has rows");
+    let rows = between(group, "<tr data-verdict=", "<tr data-verdict=");
+    rows.iter().find(|r| r.contains(&format!("<td>{name}</td>"))).expect("the parameter has a row")
+}
+
+#[test]
+fn every_parameter_says_how_far_it_can_be_trusted() {
+    let page = render(&synthetic::report(6, 500)).unwrap();
+    // 9 + 6 * 3 + 3 * 5 of 78: all of the first link but Izz, and three of the other links.
+    for text in ["all 78", "seen 54", "carried 15", "not identifiable 9"] {
+        assert!(page.contains(&format!(">{text}</button>")), "{text}");
+    }
+    assert!(page.contains("aria-label=\"54 seen in the data, 15 carried by the prior, 9 not identifiable\""));
+
+    let seen = standard_row(&page, "link_2", "mx");
+    for text in ["\"seen_in_data\"", "0.293 to 0.317", "data 96 %"] {
+        assert!(seen.contains(text), "{text} in {seen}");
+    }
+    assert!(!seen.contains("class=\"more\"") && !seen.contains("class=\"flag\""));
+    let carried = standard_row(&page, "link_3", "m");
+    for text in
+        ["\"carried_by_prior\"", "only in combination", "data 37 %", "The data see mx3 + 0.45·m4 = 3.87"]
+    {
+        assert!(carried.contains(text), "{text} in {carried}");
+    }
+    assert!(standard_row(&page, "link_3", "Iyy").contains("Fast motion of joint joint_3 would raise Iyy3"));
+    assert!(standard_row(&page, "link_1", "m").contains("\"not_identifiable\""));
+    assert!(standard_row(&page, "link_3", "Ixy").contains(">wide</span>"));
+    let held = standard_row(&page, "joint_2", "fv");
+    for text in [">at the boundary</span>", ">outside</span>", "The data alone prefer 4.23"] {
+        assert!(held.contains(text), "{text} in {held}");
+    }
+}
+
+#[test]
+fn motions_consistency_and_precision_are_told_in_words() {
+    let mut data = synthetic::report(6, 500);
+    let page = render(&data).unwrap();
+    assert!(page.contains("<li>Fast motion of joints joint_4 and joint_5 together"));
+    assert!(page.contains("<b>It costs next to nothing.</b>") && page.contains("(+0.8 %)"));
+    assert!(
+        page.contains(
+            "<dt>link_5</dt><dd>no thickness along its x axis; no thickness along (0.19, 0.94, 0.30)"
+        )
+    );
+    assert_eq!(page.matches("<svg class=\"pairbar\"").count(), 6 + 2);
+    assert!(page.contains("<b>6.20 times</b>") && page.contains("are 2.5 times as large"));
+    assert!(page.contains("(2 of 6 residuals are coloured). Those shown are robust."));
+
+    data.held_out.consistent_percent = Some(6.0);
+    data.precision.as_mut().unwrap().wanted_block_s = Some(4.0);
+    let page = render(&data).unwrap();
+    assert!(
+        page.contains("<b>It is dear.</b>")
+            && page.contains("too narrow: the residuals ask for blocks of 4.0 s")
+    );
+
+    data.precision.as_mut().unwrap().robust = false;
+    data.consistency = None;
+    let page = render(&data).unwrap();
+    assert!(page.contains("The standard deviations shown are not to be believed"));
+    assert!(page.contains("No consistency was asked for") && !page.contains("<svg class=\"pairbar\""));
+}
+
+#[test]
+fn the_path_of_smaller_models_is_drawn_with_its_choice() {
+    let page = render(&synthetic::report(6, 500)).unwrap();
+    assert_eq!(page.matches("<svg class=\"path\"").count(), 2);
+    assert_eq!(page.matches("<circle class=\"chosen\"").count(), 2);
+    assert!(page.contains("<b>36 of 54 are essential:</b>"));
+    assert!(page.contains("<title>36 parameters: 1.300 ± 0.10</title>"));
+    assert!(between(&page, "Essential parameters</h3>", "</p>")[0].contains("<code>Izz1</code>"));
+    assert_eq!(page.matches("<tr class=\"chosen\"><td class=\"n\">36</td>").count(), 1);
 }
 
 #[test]
@@ -175,6 +284,7 @@ fn undefined_numbers_are_dashes_and_wrong_ones_are_named() {
     assert!(!page.contains("none<") && !page.contains("NaN<") && !page.contains("undefined<"));
     assert!(page.contains("No prediction to subtract") || page.contains("No residuals"));
     let standard = page.split("id=\"standard-table\"").nth(1).unwrap().split("</table>").next().unwrap();
+    // Value, interval, verdict with its reason, share, robot file.
     assert_eq!(standard.matches(">-</td>").count(), 4);
 
     data.standard_parameters[0].value = Some(f64::NAN);
@@ -210,6 +320,10 @@ fn lists_of_the_wrong_length_are_refused_with_their_place() {
     assert!(matches!(render(&few), Err(ReportError::Length { expected: 2, found: 1, .. })));
     few.delays.clear();
     assert!(render(&few).is_ok());
+    few.precision.as_mut().unwrap().whiteness[0].joints.pop();
+    assert_eq!(render(&few).unwrap_err().to_string(), "log \"fourier-a\", whiteness: 1 entries, expected 2");
+    few.held_out.joints.pop();
+    assert!(render(&few).unwrap_err().to_string().starts_with("held-out errors: 1 entries"));
 }
 
 #[test]

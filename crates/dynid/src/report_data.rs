@@ -1,5 +1,7 @@
 //! The report's content from an identification and its result file.
 
+mod trust;
+
 use dynid_report as report;
 use dynid_report::{Fact, Status, Value};
 
@@ -89,36 +91,13 @@ impl Identification {
                 Fact::new("time blocks", self.blocks(), ""),
                 Fact::new("every identified body physical", estimate.feasible, ""),
             ],
-            base_parameters: estimate
-                .base_parameters
-                .iter()
-                .map(|b| report::BaseParameter {
-                    name: b.name.clone(),
-                    expression: b.expression.clone(),
-                    unit: b.unit.clone(),
-                    value: b.value,
-                    std: b.std,
-                    relative_std_percent: b.rel_std,
-                    verdict: None,
-                })
-                .collect(),
-            standard_parameters: estimate
-                .parameters
-                .iter()
-                .map(|p| report::StandardParameter {
-                    owner: p.link.clone().or_else(|| p.joint.clone()).unwrap_or_default(),
-                    name: p.name.rsplit('.').next().unwrap_or(&p.name).to_owned(),
-                    unit: p.unit.clone(),
-                    value: Some(p.value),
-                    std: p.std,
-                    prior: p.prior,
-                    verdict: match p.verdict.as_str() {
-                        "seen in the data" => Some(report::ParameterVerdict::SeenInData),
-                        "not identifiable" => Some(report::ParameterVerdict::NotIdentifiable),
-                        _ => Some(report::ParameterVerdict::CarriedByPrior),
-                    },
-                })
-                .collect(),
+            base_parameters: trust::base_parameters(estimate),
+            standard_parameters: self.standard_parameters(estimate),
+            motions: estimate.motions_that_would_help.clone(),
+            consistency: self.consistency_report(estimate),
+            held_out: trust::held_out(estimate),
+            precision: Some(self.precision_report(estimate)),
+            pruning: trust::pruning(estimate),
             observation: report::Observation {
                 rows: Some(estimate.rows as u64),
                 columns: Some(estimate.base_parameters.len() as u64),
@@ -307,9 +286,6 @@ fn verdict(estimate: &Estimate) -> report::Verdict {
             estimate.rank.structural - estimate.rank.excited
         ));
     }
-    for check in v.checks.iter().filter(|c| c.status != "ok") {
-        sentences.push(format!("{}: {}.", capital(&check.name), check.meaning));
-    }
     report::Verdict {
         status: status(&v.status),
         headline: v.headline.clone(),
@@ -327,11 +303,6 @@ fn verdict(estimate: &Estimate) -> report::Verdict {
             })
             .collect(),
     }
-}
-
-fn capital(text: &str) -> String {
-    let mut chars = text.chars();
-    chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
 }
 
 fn chosen(choice: &Choice) -> report::Chosen {

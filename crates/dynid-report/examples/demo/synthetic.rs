@@ -5,8 +5,11 @@ use std::f64::consts::TAU;
 use dynid_report::{
     BaseParameter, Check, Chosen, Fact, InputFile, Joint, JointDelay, JointQuality, JointSeries, Ladder,
     LogReport, LogRole, LogSeries, Observation, Origin, ParameterVerdict, Provenance, Quality, ReportData,
-    Robot, Rung, StandardParameter, Status, UnidentifiableColumn, Verdict, Warning,
+    Robot, Rung, Status, UnidentifiableColumn, Verdict, Warning,
 };
+
+#[path = "trust.rs"]
+mod trust;
 
 /// A report of `joints` joints, its training log having `samples` samples at 1 kHz.
 pub(crate) fn report(joints: usize, samples: usize) -> ReportData {
@@ -37,7 +40,12 @@ pub(crate) fn report(joints: usize, samples: usize) -> ReportData {
             Fact::new("Least eigenvalue of the pseudo-inertias", 3.2e-6, "kg m^2"),
         ],
         base_parameters: base_parameters(joints),
-        standard_parameters: standard_parameters(joints),
+        standard_parameters: trust::standard_parameters(joints),
+        motions: trust::motions(),
+        consistency: Some(trust::consistency()),
+        held_out: trust::held_out(joints),
+        precision: Some(trust::precision(joints)),
+        pruning: Some(trust::pruning(joints)),
         observation: Observation {
             rows: Some((joints * samples) as u64 * 9 / 10),
             columns: Some(13 * joints as u64),
@@ -250,46 +258,15 @@ fn base_parameters(joints: usize) -> Vec<BaseParameter> {
                 unit: unit.into(),
                 value: Some(value),
                 std: Some(relative / 100.0 * value.abs()),
+                half_width: Some(2.05 * relative / 100.0 * value.abs()),
                 relative_std_percent: Some(relative),
-                verdict: Some(ParameterVerdict::SeenInData),
-            }
-        })
-        .collect()
-}
-
-fn standard_parameters(joints: usize) -> Vec<StandardParameter> {
-    let rows = [
-        ("m", "kg", 4.1),
-        ("mx", "kg m", 0.61),
-        ("my", "kg m", -0.02),
-        ("mz", "kg m", 0.11),
-        ("Ixx", "kg m^2", 0.021),
-        ("Ixy", "kg m^2", 0.0004),
-        ("Ixz", "kg m^2", -0.002),
-        ("Iyy", "kg m^2", 0.094),
-        ("Iyz", "kg m^2", 0.0001),
-        ("Izz", "kg m^2", 0.097),
-        ("Ia", "kg m^2", 0.31),
-        ("fc", "N m", 6.41),
-        ("fv", "N m s", 9.2),
-    ];
-    (1..=joints)
-        .flat_map(|n| rows.iter().enumerate().map(move |(k, row)| (n, k, row)))
-        .map(|(n, k, &(name, unit, value))| {
-            let verdict = match (n, k) {
-                (1, 0..=8) => ParameterVerdict::NotIdentifiable,
-                (_, 0 | 3 | 7) => ParameterVerdict::CarriedByPrior,
-                _ => ParameterVerdict::SeenInData,
-            };
-            let seen = verdict == ParameterVerdict::SeenInData;
-            StandardParameter {
-                owner: if k < 10 { format!("link_{n}") } else { format!("joint_{n}") },
-                name: name.into(),
-                unit: unit.into(),
-                value: Some(value / n as f64),
-                std: seen.then_some(0.02 * f64::abs(value)),
-                prior: (k < 10).then_some(1.1 * value / n as f64),
-                verdict: Some(verdict),
+                consistent_value: Some(value * (1.0 + relative / 400.0)),
+                verdict: Some(if relative < 100.0 {
+                    ParameterVerdict::SeenInData
+                } else {
+                    ParameterVerdict::CarriedByPrior
+                }),
+                share: Some(if relative < 100.0 { 0.97 } else { 0.71 }),
             }
         })
         .collect()

@@ -11,15 +11,21 @@
 //! - every text may hold any character: the page escapes it.
 
 mod conditioning;
+mod consistency;
 mod log;
 mod parameters;
+mod precision;
 mod provenance;
+mod pruning;
 mod verdict;
 
 pub use conditioning::{Chosen, JointDelay, Ladder, Observation, Origin, Rung, UnidentifiableColumn};
+pub use consistency::{Consistency, ConsistencyStatus, HeldOut, HeldOutJoint, Limit, ValidationPrice};
 pub use log::{JointQuality, JointSeries, LogReport, LogRole, LogSeries, Quality};
-pub use parameters::{BaseParameter, ParameterVerdict, StandardParameter};
+pub use parameters::{BaseParameter, OwnerKind, ParameterVerdict, StandardParameter};
+pub use precision::{LogWhiteness, Precision, Whiteness};
 pub use provenance::{InputFile, Provenance};
+pub use pruning::{Pruning, PruningStep};
 pub use verdict::{Check, Status, Verdict, Warning};
 
 use serde::Serialize;
@@ -47,6 +53,16 @@ pub struct ReportData {
     pub base_parameters: Vec<BaseParameter>,
     /// Parameters per link and joint.
     pub standard_parameters: Vec<StandardParameter>,
+    /// Motions that would reveal what the logs do not, most helpful first, a sentence each.
+    pub motions: Vec<String>,
+    /// Physical consistency and its price; `None` if none was asked for.
+    pub consistency: Option<Consistency>,
+    /// Errors on held-out parts of the training logs.
+    pub held_out: HeldOut,
+    /// How the residuals bear on the precision.
+    pub precision: Option<Precision>,
+    /// Models with fewer base parameters.
+    pub pruning: Option<Pruning>,
     /// Size, rank and condition of the observation matrix.
     pub observation: Observation,
     /// Columns of the observation matrix that no motion of this mechanism can excite.

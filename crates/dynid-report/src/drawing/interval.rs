@@ -7,16 +7,16 @@ const HEIGHT: f64 = 16.0;
 /// Left and right end of the axis in units of `|value|`.
 const AXIS: [f64; 2] = [-1.0, 3.0];
 
-/// `value +- 1.96 std` on an axis from `-|value|` to `3 |value|`, mirrored for negative values: the tick is zero,
+/// `value +- half_width` on an axis from `-|value|` to `3 |value|`, mirrored for negative values: the tick is zero,
 /// the dot the estimate, and an interval that reaches the tick belongs to a parameter that may be zero.
 ///
 /// One axis for all parameters would hide most of them, their units and magnitudes spanning many decades. Ends
-/// beyond the axis are drawn as arrows. Empty unless both numbers are finite, `value != 0` and `std >= 0`.
-pub(crate) fn interval_svg(value: f64, std: f64) -> String {
-    if !(value.is_finite() && std.is_finite() && value != 0.0 && std >= 0.0) {
+/// beyond the axis are drawn as arrows. Empty unless both numbers are finite, `value != 0` and `half_width >= 0`.
+pub(crate) fn interval_svg(value: f64, half_width: f64) -> String {
+    if !(value.is_finite() && half_width.is_finite() && value != 0.0 && half_width >= 0.0) {
         return String::new();
     }
-    let half = 1.96 * std / value.abs();
+    let half = half_width / value.abs();
     let x = |u: f64| (u.clamp(AXIS[0], AXIS[1]) - AXIS[0]) / (AXIS[1] - AXIS[0]) * (WIDTH - 10.0) + 5.0;
     let (low, high, middle) = (x(1.0 - half), x(1.0 + half), HEIGHT / 2.0);
     let class = if half < 1.0 { "sure" } else { "unsure" };
@@ -30,8 +30,8 @@ pub(crate) fn interval_svg(value: f64, std: f64) -> String {
         class = class,
         width = WIDTH,
         height = HEIGHT,
-        a = significant(value - 1.96 * std, 4),
-        b = significant(value + 1.96 * std, 4),
+        a = significant(value - half_width, 4),
+        b = significant(value + half_width, 4),
         middle = middle,
         right = WIDTH - 5.0,
         zero = x(0.0),
@@ -55,21 +55,21 @@ mod tests {
 
     #[test]
     fn only_an_interval_that_excludes_zero_is_sure() {
-        assert!(interval_svg(-2.0, 0.5).contains("interval sure"));
-        assert!(interval_svg(-2.0, 1.1).contains("interval unsure"));
-        assert!(interval_svg(1.0, 0.1).contains("95 % interval 0.8040 to 1.196"));
+        assert!(interval_svg(-2.0, 1.9).contains("interval sure"));
+        assert!(interval_svg(-2.0, 2.1).contains("interval unsure"));
+        assert!(interval_svg(1.0, 0.25).contains("95 % interval 0.7500 to 1.250"));
     }
 
     #[test]
     fn ends_beyond_the_axis_become_arrows() {
-        assert_eq!(interval_svg(1.0, 0.2).matches("arrow").count(), 0);
+        assert_eq!(interval_svg(1.0, 0.4).matches("arrow").count(), 0);
         assert_eq!(interval_svg(1.0, 1e9).matches("arrow").count(), 2);
     }
 
     #[test]
     fn an_undefined_interval_is_not_drawn() {
-        for (value, std) in [(0.0, 1.0), (f64::NAN, 1.0), (1.0, f64::INFINITY), (1.0, -1.0)] {
-            assert_eq!(interval_svg(value, std), "");
+        for (value, half_width) in [(0.0, 1.0), (f64::NAN, 1.0), (1.0, f64::INFINITY), (1.0, -1.0)] {
+            assert_eq!(interval_svg(value, half_width), "");
         }
     }
 }

@@ -1,12 +1,16 @@
 //! Small still pictures, as inline SVG without any text from outside.
 
 mod autocorrelation;
+mod bars;
 mod histogram;
 mod interval;
+mod path;
 
 pub(crate) use autocorrelation::autocorrelation_svg;
+pub(crate) use bars::{counts_svg, meter_svg, pair_svg};
 pub(crate) use histogram::histogram_svg;
 pub(crate) use interval::interval_svg;
+pub(crate) use path::{PathMarks, PathPoint, ceiling, fewest, path_svg};
 
 /// Size and margins of the two residual pictures, in pixels at full size.
 mod frame {

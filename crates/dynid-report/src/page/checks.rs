@@ -6,6 +6,13 @@ use crate::error::ReportError;
 pub(super) fn check(data: &ReportData) -> Result<(), ReportError> {
     let joints = data.joints.len();
     per_joint("delays", data.delays.len(), joints)?;
+    per_joint("held-out errors", data.held_out.joints.len(), joints)?;
+    if let Some(precision) = &data.precision {
+        per_joint("variance inflation", precision.variance_inflation_per_joint.len(), joints)?;
+        for log in &precision.whiteness {
+            per_joint(&format!("log {:?}, whiteness", log.log), log.joints.len(), joints)?;
+        }
+    }
     for log in &data.logs {
         per_joint(&format!("log {:?}, quality", log.name), log.quality.len(), joints)?;
         if let Some(series) = &log.series {

@@ -4,7 +4,9 @@ use minijinja::context;
 use minijinja::value::{Serde, Value};
 use serde::Serialize;
 
+use super::pruning::pruning;
 use super::script_data::script_json;
+use super::trust::{limits_by_owner, trust};
 use crate::data::{Fact, JointQuality, LogReport, LogRole, LogSeries, ReportData};
 use crate::drawing::{autocorrelation_svg, histogram_svg};
 use crate::error::ReportError;
@@ -24,7 +26,13 @@ pub(super) fn context(data: &ReportData) -> Result<Value, ReportError> {
         logs => Serde(logs),
         estimation => Serde(&data.estimation),
         base_parameters => Serde(&data.base_parameters),
-        standard_parameters => Serde(&data.standard_parameters),
+        trust => Serde(trust(data)),
+        motions => Serde(&data.motions),
+        consistency => Serde(&data.consistency),
+        limits_by_owner => Serde(limits_by_owner(data.consistency.as_ref())),
+        held_out => Serde(&data.held_out),
+        precision => Serde(&data.precision),
+        pruning => Serde(data.pruning.as_ref().map(pruning)),
         observation => Serde(&data.observation),
         unidentifiable => Serde(&data.unidentifiable),
         conditioning => Serde(&data.conditioning),

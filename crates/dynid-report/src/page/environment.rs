@@ -4,16 +4,21 @@ use minijinja::syntax::SyntaxConfig;
 use minijinja::value::{Value, ValueKind};
 use minijinja::{Environment, UndefinedBehavior};
 
-use crate::drawing::interval_svg;
+use super::prose::{prose, sentence};
+use crate::drawing::{interval_svg, meter_svg, pair_svg};
 use crate::number::{self, UNDEFINED};
 
 pub(super) const PAGE: &str = "page.html";
 
 /// Every name ends in `.html`, which switches automatic escaping on.
-const TEMPLATES: [(&str, &str); 9] = [
+const TEMPLATES: [(&str, &str); 13] = [
     (PAGE, include_str!("../../template/page.html")),
     ("macros.html", include_str!("../../template/macros.html")),
     ("verdict.html", include_str!("../../template/verdict.html")),
+    ("trust.html", include_str!("../../template/trust.html")),
+    ("consistency.html", include_str!("../../template/consistency.html")),
+    ("precision.html", include_str!("../../template/precision.html")),
+    ("essential.html", include_str!("../../template/essential.html")),
     ("system.html", include_str!("../../template/system.html")),
     ("quality.html", include_str!("../../template/quality.html")),
     ("effort.html", include_str!("../../template/effort.html")),
@@ -51,11 +56,19 @@ pub(super) fn environment() -> Result<Environment<'static>, minijinja::Error> {
     environment.add_filter("sort_key", sort_key);
     environment.add_filter("value_to_std", |value: &Value, std: &Value| beside_std(value, std).0);
     environment.add_filter("std_of", |std: &Value, value: &Value| beside_std(value, std).1);
-    environment.add_filter("interval", |value: &Value, std: &Value| {
-        Value::from_safe_string(match (real(value), real(std)) {
-            (Some(value), Some(std)) => interval_svg(value, std),
-            _ => String::new(),
-        })
+    environment.add_filter("value_in_interval", value_in_interval);
+    environment.add_filter("interval_ends", interval_ends);
+    environment.add_filter("share", |value: &Value| print(value, number::share));
+    environment.add_filter("prose", |text: &str| Value::from_safe_string(prose(text)));
+    environment.add_filter("sentence", |text: &str| Value::from_safe_string(sentence(text)));
+    environment.add_filter("interval", |value: &Value, half_width: &Value| {
+        picture(real(value).zip(real(half_width)), |(value, half_width)| interval_svg(value, half_width))
+    });
+    environment.add_filter("meter", |value: &Value, full: f64, mark: &Value| {
+        picture(real(value), |value| meter_svg(value, full, real(mark)))
+    });
+    environment.add_filter("pair", |upper: &Value, lower: &Value| {
+        picture(real(upper).zip(real(lower)), |(upper, lower)| pair_svg(upper, lower))
     });
     Ok(environment)
 }
@@ -85,6 +98,33 @@ fn setting(value: &Value) -> String {
 /// What a column is sorted by; empty where the number is undefined.
 fn sort_key(value: &Value) -> String {
     real(value).filter(|v| v.is_finite()).map_or_else(String::new, |v| format!("{v:e}"))
+}
+
+fn picture<T>(numbers: Option<T>, draw: impl Fn(T) -> String) -> Value {
+    Value::from_safe_string(numbers.map_or_else(String::new, draw))
+}
+
+fn ends(interval: &Value) -> Option<(f64, f64)> {
+    let end = |index: usize| interval.get_item_by_index(index).ok().as_ref().and_then(real);
+    Some((end(0)?, end(1)?))
+}
+
+/// The value to the place that the width of its interval asks for.
+fn value_in_interval(value: &Value, interval: &Value) -> String {
+    match (real(value), ends(interval)) {
+        (Some(value), Some((low, high))) => number::with_std(value, 0.5 * (high - low)).0,
+        _ => print(value, |v| number::significant(v, 4)),
+    }
+}
+
+fn interval_ends(interval: &Value) -> String {
+    ends(interval).map_or_else(
+        || UNDEFINED.to_owned(),
+        |(low, high)| {
+            let (low, high) = number::interval(low, high);
+            format!("{low} to {high}")
+        },
+    )
 }
 
 fn beside_std(value: &Value, std: &Value) -> (String, String) {

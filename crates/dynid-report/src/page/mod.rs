@@ -3,7 +3,10 @@
 mod checks;
 mod context;
 mod environment;
+mod prose;
+mod pruning;
 mod script_data;
+mod trust;
 
 use crate::data::ReportData;
 use crate::error::ReportError;
