@@ -171,7 +171,11 @@ fn every_parameter_says_how_far_it_can_be_trusted() {
     assert!(standard_row(&page, "link_1", "m").contains("\"not_identifiable\""));
     assert!(standard_row(&page, "link_3", "Ixy").contains(">wide</span>"));
     let held = standard_row(&page, "joint_2", "fv");
-    for text in [">at the boundary</span>", ">outside</span>", "The data alone prefer 4.23"] {
+    for text in [
+        ">at the boundary</span>",
+        ">outside</span>",
+        "Without limits, data and robot file together say 4.23",
+    ] {
         assert!(held.contains(text), "{text} in {held}");
     }
 }
@@ -188,6 +192,7 @@ fn motions_consistency_and_precision_are_told_in_words() {
         )
     );
     assert_eq!(page.matches("<svg class=\"pairbar\"").count(), 6 + 2);
+    assert!(page.contains("the fit gives way by 9.30 residual variances"));
     assert!(page.contains("<b>6.20 times</b>") && page.contains("are 2.5 times as large"));
     assert!(page.contains("(2 of 6 residuals are coloured). Those shown are robust."));
 
