@@ -32,9 +32,9 @@ pub enum PriorError {
 /// moments of inertia `0.5 m0 ℓ²`. Parameters of elements, by what their columns do (so couplings and new elements need
 /// no rule of their own), with the largest entry `c_j` of the column in the row of joint `j`:
 ///
-/// - those that act with acceleration (rotor and motor inertias): `max(|stated|, 0.2 min_j M_jj/c_j, 0.1 s min_j
+/// - those that act with acceleration (rotor and motor inertias): `max(|stated|, 0.2 min_j M_jj/c_j, 0.03 s min_j
 ///   e_j/(v_j c_j))`, `c_j` at unit accelerations, `M_jj` the entry of the mass matrix averaged over random postures, `v_j`
-///   the velocity limit: a drive takes about a tenth of a second to start its own rotor;
+///   the velocity limit: a drive takes about 0.03 s to start its own rotor;
 /// - one with both bounds: a third of its range;
 /// - all others: `max(0.5 |stated|, 0.1 min_j e_j/c_j)`, `c_j` at the velocity limits and anywhere in the position range.
 ///   For Coulomb friction, offset, cyclic torques and the preload of a spring that is a tenth of the effort `e_j`; for viscous

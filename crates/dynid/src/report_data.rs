@@ -217,6 +217,7 @@ impl Identification {
                     .collect(),
             });
         }
+        out.extend(self.prior_ladder());
         if c.mask_trials.len() > 1 {
             out.push(report::Ladder {
                 title: "Reversal mask (the same for all joints)".to_owned(),
@@ -241,6 +242,31 @@ impl Identification {
             });
         }
         out
+    }
+
+    fn prior_ladder(&self) -> Option<report::Ladder> {
+        let (trials, chosen) = (&self.consistent.prior_trials, self.consistent.chosen);
+        (trials.len() > 1).then(|| report::Ladder {
+            title: "Pull towards the robot file".to_owned(),
+            explanation: "Squared held-out error of the physically consistent parameters, relative to that without constraints \
+                          (mean over joints), when deviations from the robot file are weighted more or less. The strongest \
+                          pull within half a per cent of the least error is kept."
+                .to_owned(),
+            quantity: "weight".to_owned(),
+            unit: String::new(),
+            loss_name: "held-out loss, relative".to_owned(),
+            loss_unit: String::new(),
+            rungs: trials
+                .iter()
+                .enumerate()
+                .map(|(k, t)| report::Rung {
+                    value: Value::Number(t.weight),
+                    loss: t.loss,
+                    chosen: k == chosen,
+                    ..Default::default()
+                })
+                .collect(),
+        })
     }
 
     fn delays(&self) -> Vec<report::JointDelay> {

@@ -138,12 +138,16 @@ impl Evidence<'_> {
                     (low.max(lower), high.max(lower))
                 });
                 let value = self.consistent.values[j];
+                // Of what no motion separates from others, "no motion would" says nothing new.
+                let in_combination = assessment.verdict
+                    == Verdict::CarriedByPrior(Carried::OnlyInCombination)
+                    && !advice.suggestions.iter().any(|s| s.parameter == j);
                 let moved = (value - unconstrained).abs();
                 ParameterTrust {
                     wide: std.is_some_and(|s| assessment.is_wide(value, quantile * s)),
-                    at_boundary: self.constrained(j) && std.is_none_or(|s| moved > s),
+                    at_boundary: self.constrained(j) && std.is_some_and(|s| moved > s),
                     combination: self.combination(j, &assessment, symbols, trust, &lengths),
-                    advice: advice.sentence(j, joints, symbols[j]),
+                    advice: advice.sentence(j, joints, symbols[j]).filter(|_| !in_combination),
                     assessment,
                     unconstrained,
                     std,

@@ -205,8 +205,8 @@ fn prior_deviations_follow_mass_size_and_limits() {
     close(std("j1.fo"), 5.0);
     close(std("j1.fv"), 5.0 / 3.0);
     // The entry of the mass matrix of the last joint does not depend on the posture.
-    // A tenth of a second at 50 N m up to the velocity limit is more than a fifth of the mass matrix.
-    close(std("j2.Ia"), 0.1 * 50.0 / 3.0);
+    // 0.03 s at 50 N m up to the velocity limit is more than a fifth of the mass matrix.
+    close(std("j2.Ia"), 0.03 * 50.0 / 3.0);
     close(std("j2.kq0"), 5.0);
     assert!((2.0..2.1).contains(&std("j2.k")), "{}: a tenth of 50 N m at up to 2.5 rad", std("j2.k"));
     assert_eq!(prior.bodies.iter().map(|b| b.origin).collect::<Vec<_>>(), [Origin::Stated; 2]);

@@ -88,7 +88,6 @@ pub(super) fn consistency() -> Consistency {
         price: Some(41.8),
         price_over_chance: Some(0.42),
         prior_weight: Some(1.05),
-        price_of_prior: Some(9.3),
         gap: Some(2.5e-5),
         least_eigenvalue: Some(1.0e-6),
         limits: vec![

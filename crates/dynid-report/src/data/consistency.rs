@@ -29,8 +29,6 @@ pub struct Consistency {
     pub price_over_chance: Option<f64>,
     /// Weight of the distance from the prior.
     pub prior_weight: Option<f64>,
-    /// Part of `price` that is due to that weight.
-    pub price_of_prior: Option<f64>,
     /// Certified gap: no consistent parameters have an objective lower by more than this, in residual variances.
     pub gap: Option<f64>,
     /// Least eigenvalue of the links' pseudo-inertias in units of the prior's.

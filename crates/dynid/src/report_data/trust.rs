@@ -23,7 +23,6 @@ impl Identification {
             price: Some(record.price),
             price_over_chance: record.price_over_chance,
             prior_weight: Some(record.prior_weight),
-            price_of_prior: Some(record.price_of_prior),
             gap: Some(record.gap),
             least_eigenvalue: Some(record.least_eigenvalue),
             limits: active.iter().map(|a| self.limit(a)).collect(),
