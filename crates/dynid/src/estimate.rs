@@ -238,6 +238,9 @@ pub struct PrecisionRecord {
     pub block_s: f64,
     /// Length that the correlation of the residuals asks for, s.
     pub wanted_block_s: f64,
+    /// Correlation time of the residuals, s: per training log and joint, log after log.
+    #[serde(default)]
+    pub correlation_s: Vec<Option<f64>>,
     /// Per training log and joint: test of whiteness inside the band of the kernel.
     pub whiteness: Vec<Vec<Option<WhitenessRecord>>>,
 }

@@ -210,6 +210,7 @@ impl Identification {
             blocks: self.blocks(),
             block_s: self.fitted.block_s,
             wanted_block_s: self.fitted.block_length.seconds,
+            correlation_s: self.fitted.block_length.correlation_s.clone(),
             whiteness: self
                 .whiteness
                 .iter()

@@ -65,6 +65,7 @@ pub struct ResidualSignal<'a> {
 
 /// Length of time blocks, `max(1 s, 5 τ)` with the correlation time `τ` of the worst joint.
 ///
+/// `τ` is the first lag at which the autocorrelation is below the level plus `1/√n`, the standard error of `n` white samples.
 /// Autocorrelations are taken about zero over pairs of samples that both count. Unfiltered residuals will not do: white
 /// sensor noise hides the slow colour that the filter passes.
 pub fn block_length(signals: &[ResidualSignal<'_>], settings: &BlockLengthSettings) -> BlockLength {
@@ -73,7 +74,10 @@ pub fn block_length(signals: &[ResidualSignal<'_>], settings: &BlockLengthSettin
         .map(|s| {
             let longest = s.residual.len() / 4;
             let correlations = counted_autocorrelation(s.residual, longest)?;
-            let first = correlations.iter().position(|r| r.abs() < settings.level);
+            let counted = s.residual.iter().filter(|r| **r != 0.0).count() as f64;
+            // One standard error of white noise: of many joints one would else ask for long blocks by chance.
+            let level = settings.level + 1.0 / counted.sqrt();
+            let first = correlations.iter().position(|r| r.abs() < level);
             Some(first.map_or(longest, |lag| lag + 1) as f64 / s.rate_hz)
         })
         .collect();
