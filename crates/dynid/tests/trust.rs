@@ -222,3 +222,73 @@ part = [0.7, 1.0]
     assert!(check.status == "warn" && check.meaning.contains("arm_6_joint"), "{}", check.meaning);
     assert_eq!(id.unphysical_bodies(), []);
 }
+
+/// A row of the published tables: name, penalty-based set, set by linear matrix inequalities.
+fn published(folder: &std::path::Path) -> Vec<(String, [f64; 2])> {
+    let text = std::fs::read_to_string(folder.join("published_feasible_parameters.csv")).unwrap();
+    let number = |field: &str| field.parse().unwrap_or(0.0);
+    text.lines()
+        .skip(1)
+        .map(|line| {
+            let fields: Vec<&str> = line.split(',').collect();
+            (fields[0].to_owned(), [number(fields[1]), number(fields[2])])
+        })
+        .collect()
+}
+
+/// Effort predicted by the two published sets of link parameters with the published friction, filtered like ours and on the
+/// same part of the record, against the consistent estimate's.
+#[test]
+fn panda_beats_both_published_parameter_sets() {
+    use dynid::model::{Inertia, Mat3, RobotModel, Vec3};
+    const FRICTION: [[f64; 7]; 3] = [
+        [0.54615, 0.87224, 0.64068, 1.2794, 0.83904, 0.30301, 0.56489],
+        [5.1181, 9.0657, 10.136, 5.5903, 8.3469, 17.133, 10.336],
+        [0.039533, 0.025882, -0.04607, 0.036194, 0.026226, -0.021047, 0.0035526],
+    ];
+    let Some((config, id)) = run(PANDA) else { return };
+    let ours = support::on_validation(&config, &id, 5.0);
+    let table = published(&data().unwrap().join("panda-gaz2019"));
+    let rigid = RobotModel::new(id.robot.mechanism.clone(), Vec::new());
+    for (set, name) in [(0, "penalty-based"), (1, "linear matrix inequalities")] {
+        let get = |key: String| table.iter().find(|(n, _)| *n == key).map_or(0.0, |(_, v)| v[set]);
+        let values: Vec<f64> = (1..=7)
+            .flat_map(|i| {
+                let entry = |a: &str| get(format!("I{i}{a}"));
+                let tensor = Mat3::from_rows([
+                    [entry("xx"), entry("xy"), entry("xz")],
+                    [entry("xy"), entry("yy"), entry("yz")],
+                    [entry("xz"), entry("yz"), entry("zz")],
+                ]);
+                let com = ["x", "y", "z"].map(|a| get(format!("c{i}{a}")));
+                Inertia::from_com(get(format!("m{i}")), Vec3(com), &tensor).0
+            })
+            .collect();
+        let log = &config.validation[0];
+        let loaded = dynid::logs::load(log, &id.robot.mechanism, &config.columns, None).unwrap();
+        let mut prepared =
+            dynid::estimators::conditioning::prepare(&loaded.log, &rigid, &id.settings).unwrap();
+        let filter = dynid::motion::filter::butterworth(4, 5.0, prepared.rate_hz).unwrap();
+        for j in 0..7 {
+            let [a, b, c] = [0, 1, 2].map(|k| FRICTION[k][j]);
+            let q = dynid::motion::filter::forward_backward(&filter, &prepared.position[j]).unwrap();
+            let sigmoid = |v: f64| a / (1.0 + (-b * (v + c)).exp()) - a / (1.0 + (-b * c).exp());
+            for s in 0..q.len() {
+                let (before, after) = (s.saturating_sub(1), (s + 1).min(q.len() - 1));
+                let speed = (q[after] - q[before]) * prepared.rate_hz / (after - before) as f64;
+                prepared.effort[j][s] -= sigmoid(speed);
+            }
+        }
+        let alignment = dynid::agreement::Alignment {
+            state_hz: id.state_hz,
+            delay_samples: 0.0,
+            delay_rate_hz: id.delay_rate_hz,
+            filter_hz: 5.0,
+        };
+        let theirs =
+            dynid::agreement::compare(&rigid, &values, &prepared, &alignment, &id.settings).unwrap();
+        let (a, b) = (support::rms(&ours.filtered), support::rms(&theirs.filtered));
+        println!("{name}: ours {a:.3?}, theirs {b:.3?}");
+        assert!(a.iter().zip(&b).all(|(ours, theirs)| ours < theirs), "{name}");
+    }
+}
