@@ -76,8 +76,8 @@ fn python() -> Option<PathBuf> {
 
 /// Identifies a robot from a simulated log, puts other values into the estimate, exports, and compares.
 ///
-/// `change`: a new value for a parameter by name and simulated truth.
-fn check(python: &Path, name: &str, robot: &Path, change: impl Fn(&str, f64) -> f64) {
+/// `change`: a new value for a parameter by name, identified value and simulated truth.
+fn check(python: &Path, name: &str, robot: &Path, change: impl Fn(&str, f64, f64) -> f64) {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let robot = robot.to_str().unwrap();
@@ -94,7 +94,8 @@ fn check(python: &Path, name: &str, robot: &Path, change: impl Fn(&str, f64) -> 
     let (mut estimate, truth) = (read("out/estimate.json"), read("truth.json"));
     for p in estimate["parameters"].as_array_mut().unwrap() {
         let name = p["name"].as_str().unwrap().to_owned();
-        p["value"] = change(&name, truth[&name].as_f64().unwrap()).into();
+        let identified = p["value"].as_f64().unwrap();
+        p["value"] = change(&name, identified, truth[&name].as_f64().unwrap()).into();
     }
     std::fs::write(at.join("estimate.json"), estimate.to_string()).unwrap();
     run(at, &["predict", "estimate.json", "--states", "states.csv", "--out", "effort.csv"], 0);
@@ -110,7 +111,7 @@ fn check(python: &Path, name: &str, robot: &Path, change: impl Fn(&str, f64) -> 
 }
 
 /// Rotors and offsets besides what the robot file's truth holds, and one joint whose friction came out negative.
-fn lively(name: &str, truth: f64) -> f64 {
+fn lively(name: &str, _: f64, truth: f64) -> f64 {
     match name.rsplit('.').next() {
         Some("Ia") => 0.15,
         Some("fo") => -0.4,
@@ -132,12 +133,13 @@ fn pinocchio_and_mujoco_give_the_effort_of_the_estimate() {
         path
     };
     check(&python, "two links", &robot("arm.urdf", TWO_LINKS), lively);
-    check(&python, "indy7", &robot("indy7.toml", &indy7()), |_, truth| truth);
+    check(&python, "indy7", &robot("indy7.toml", &indy7()), |_, _, truth| truth);
+    check(&python, "indy7 as identified", &robot("indy7.toml", &indy7()), |_, identified, _| identified);
     let welded = robot("welded.urdf", WELDED);
     check(&python, "welded links that keep the file", &welded, lively);
     // A ram lighter than the file's tool: the tool has no share left.
-    check(&python, "welded links without mass", &welded, |name, truth| {
-        if name.starts_with("ram.") { 0.3 * truth } else { lively(name, truth) }
+    check(&python, "welded links without mass", &welded, |name, identified, truth| {
+        if name.starts_with("ram.") { 0.3 * truth } else { lively(name, identified, truth) }
     });
     let oracles = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/oracles");
     if !oracles.is_dir() {
@@ -145,6 +147,8 @@ fn pinocchio_and_mujoco_give_the_effort_of_the_estimate() {
         return;
     }
     for robot in ["ur5", "iiwa14", "panda"] {
-        check(&python, robot, &oracles.join(format!("{robot}.urdf")), lively);
+        let file = oracles.join(format!("{robot}.urdf"));
+        check(&python, robot, &file, lively);
+        check(&python, &format!("{robot} as identified"), &file, |_, identified, _| identified);
     }
 }

@@ -285,8 +285,7 @@ fn panda_beats_both_published_parameter_sets() {
             delay_rate_hz: id.delay_rate_hz,
             filter_hz: 5.0,
         };
-        let theirs =
-            dynid::agreement::compare(&rigid, &values, &prepared, &alignment, &id.settings).unwrap();
+        let theirs = dynid::agreement::compare(&rigid, &values, &prepared, &alignment, &id.settings).unwrap();
         let (a, b) = (support::rms(&ours.filtered), support::rms(&theirs.filtered));
         println!("{name}: ours {a:.3?}, theirs {b:.3?}");
         assert!(a.iter().zip(&b).all(|(ours, theirs)| ours < theirs), "{name}");
