@@ -164,6 +164,17 @@ fn summary<'a>(estimate: &Estimate, files: impl Iterator<Item = &'a Path>) {
         let value = value.trim_end();
         note(&format!("  [{}] {}: {value} ({}): {}", check.status, check.name, check.limit, check.meaning));
     }
+    let count = |verdict: &str| estimate.parameters.iter().filter(|p| p.verdict == verdict).count();
+    note(&format!(
+        "\nparameters: {} of {} seen in the data, {} carried by the prior, {} not identifiable (one by one in the report)",
+        count("seen in the data"),
+        estimate.parameters.len(),
+        count("carried by the prior"),
+        count("not identifiable"),
+    ));
+    for motion in &estimate.motions_that_would_help {
+        note(&format!("  {motion}"));
+    }
     note(&format!("\n{}", verdict(estimate)));
     for file in files {
         note(&format!("written: {}", file.display()));
