@@ -1,0 +1,158 @@
+//! Configurations of a run: keys, files, columns, elements, conditioning.
+
+use crate::harness::{CONFIG, RUN, case, check, config};
+
+#[test]
+fn are_refused() {
+    let top = |more: &str| format!("{more}\n{CONFIG}");
+    check(&[
+        case("other", "", "identify gone.toml", &["gone.toml", "No such file"], "path"),
+        case("bad.toml", "", RUN, &["bad.toml", "robot"], ""),
+        case("bad.toml", "[[log]]\npath = \"log.csv\"\n", RUN, &["bad.toml", "robot"], ""),
+        case("bad.toml", "robot = \"robot.urdf\"\n", RUN, &["bad.toml", "[[log]]"], ""),
+        case(
+            "bad.toml",
+            "robot = \"gone.urdf\"\n[[log]]\npath = \"log.csv\"\n",
+            RUN,
+            &["gone.urdf", "No such file"],
+            "path",
+        ),
+        case("bad.toml", config("rows = [1, 2"), RUN, &["bad.toml:5"], ""),
+        case("bad.toml", b"\xff\xfe\x00robot".to_vec(), RUN, &["bad.toml"], ""),
+        case("bad.toml", config("speed = 3\n"), RUN, &["bad.toml:5", "`speed`", "`path`"], ""),
+        case(
+            "bad.toml",
+            config("[conditioning]\nkernel = 3\n"),
+            RUN,
+            &["bad.toml:6", "`kernel`", "`kernel_hz`"],
+            "",
+        ),
+        case("bad.toml", config("[conditioning]\nkernel_hz = \"wide\"\n"), RUN, &["bad.toml:6", "wide"], ""),
+        case(
+            "bad.toml",
+            config("[conditioning]\nkernel_hz = -5\n"),
+            RUN,
+            &["bad.toml", "kernel_hz", "positive", "-5"],
+            "",
+        ),
+        case(
+            "bad.toml",
+            config("[conditioning]\nkernel_hz = 80\n"),
+            RUN,
+            &["kernel_hz", "log.csv", "50", "80"],
+            "sample rate",
+        ),
+        case(
+            "bad.toml",
+            config("[conditioning]\nstate_hz = 80\n"),
+            RUN,
+            &["state_hz", "log.csv", "50", "80"],
+            "sample rate",
+        ),
+        case(
+            "bad.toml",
+            config("[conditioning]\nroute = \"textbook\"\nkernel_hz = 80\n"),
+            RUN,
+            &["kernel_hz", "log.csv", "50", "80"],
+            "sample rate",
+        ),
+        case(
+            "bad.toml",
+            config("[conditioning]\nroute = \"scenic\"\n"),
+            RUN,
+            &["bad.toml:6", "scenic", "textbook"],
+            "",
+        ),
+        case("bad.toml", config("[conditioning]\ndelay_samples = nan\n"), RUN, &["delay_samples", "NaN"], ""),
+        case(
+            "bad.toml",
+            config("[conditioning]\ndecimation = 0\n"),
+            RUN,
+            &["decimation", "at least 1", "0"],
+            "",
+        ),
+        case(
+            "bad.toml",
+            config("part = [0.7, 0.2]\n"),
+            RUN,
+            &["bad.toml", "part", "increasing", "0.7, 0.2"],
+            "",
+        ),
+        case("bad.toml", config("part = [0.0, 0.001]\n"), RUN, &["log.csv"], ""),
+        case("bad.toml", config("rows = [500, 100]\n"), RUN, &["log.csv", "rows 500 to 100"], "counted"),
+        case("bad.toml", config("rows = [1, 100000]\n"), RUN, &["log.csv", "rows 1 to 100000"], "counted"),
+        case(
+            "bad.toml",
+            config("[columns]\nposition = \"angle{}\"\n"),
+            RUN,
+            &["log.csv", "position", "`angle1`"],
+            "header",
+        ),
+        case(
+            "bad.toml",
+            config("[columns]\nposition = { columns = \"q_{joint}\", unit = \"furlong\" }\n"),
+            RUN,
+            &["log.csv", "furlong"],
+            "unit",
+        ),
+        case(
+            "bad.toml",
+            config("[columns]\neffort = { columns = \"tau_{joint}\", scale = [1, 2, 3] }\n"),
+            RUN,
+            &["log.csv", "expected 2", "found 3"],
+            "one entry per joint",
+        ),
+        case("bad.toml", config("[columns]\nrate_hz = -100\n"), RUN, &["rate", "-100"], ""),
+        case(
+            "bad.toml",
+            config("[columns]\nvelocity = { shoulder = \"q_shoulder\", wrist = \"q_elbow\" }\n"),
+            RUN,
+            &["velocity", "`wrist`"],
+            "joint names",
+        ),
+        case("bad.toml", config("[locked]\nwrist = 0.0\n"), RUN, &["`wrist`", "shoulder, elbow"], ""),
+        case(
+            "bad.toml",
+            config("[elements.joint]\nwrist = [\"coulomb\"]\n"),
+            RUN,
+            &["`wrist`", "shoulder, elbow"],
+            "",
+        ),
+        case(
+            "bad.toml",
+            config("[elements]\ndefault = [\"columb\"]\n"),
+            RUN,
+            &["`columb`", "coulomb"],
+            "elements",
+        ),
+        case("bad.toml", top("preferred = [\"m9\"]"), RUN, &["preferred", "m9"], ""),
+        case("bad.toml", top("gravity = [0, 0]"), RUN, &["bad.toml:1", "3"], ""),
+        case("bad.toml", top("gravity = [0, 0, inf]"), RUN, &["gravity", "finite", "inf"], ""),
+        case(
+            "bad.toml",
+            config("[motor_side]\nmatrix = [[1, 2], [2, 4]]\n"),
+            RUN,
+            &["motor_side", "singular"],
+            "",
+        ),
+        case("bad.toml", config("[motor_side]\nmatrix = [[1, 2]]\n"), RUN, &["motor_side", "2 rows"], ""),
+        case(
+            "bad.toml",
+            config(
+                "[[coupling]]\nmotors = [\"a\", \"b\"]\njoints = [\"shoulder\", \"elbow\"]\nmatrix = [[1, 1], [1, 1]]\n",
+            ),
+            RUN,
+            &["coupling", "shoulder, elbow", "singular"],
+            "",
+        ),
+        case(
+            "bad.toml",
+            config(
+                "[[coupling]]\nmotors = [\"a\", \"b\"]\njoints = [\"shoulder\", \"elbow\"]\nmatrix = [[1, 0], [nan, 1]]\n",
+            ),
+            RUN,
+            &["coupling", "shoulder, elbow", "finite"],
+            "",
+        ),
+    ]);
+}

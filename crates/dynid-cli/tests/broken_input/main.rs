@@ -1,0 +1,13 @@
+//! Broken input gets exit code 2, one message that says where and what, at most one hint, and leaves nothing behind.
+
+mod configurations;
+mod csv;
+mod estimates_and_states;
+mod harness;
+mod log_files;
+mod log_signals;
+mod outputs_and_usage;
+mod robots_in_toml;
+mod robots_in_urdf;
+#[path = "../support/mod.rs"]
+mod support;
