@@ -58,14 +58,19 @@ fn both(
 ) {
     let (lower, upper) = with_room(range);
     if upper.is_finite() {
-        let name = format!("{what} ≤ {} {unit}", range.1);
+        let name = format!("{what} ≤ {} {unit}", number(range.1));
         out.push(Bound { name, terms: terms(upper), upper: right(upper) });
     }
     if lower.is_finite() {
-        let name = format!("{what} ≥ {} {unit}", range.0);
+        let name = format!("{what} ≥ {} {unit}", number(range.0));
         let terms = terms(lower).into_iter().map(|(column, factor)| (column, -factor)).collect();
         out.push(Bound { name, terms, upper: -right(lower) });
     }
+}
+
+/// As the user may have written it, but never with hundreds of digits.
+fn number(x: f64) -> String {
+    if x == 0.0 || (1e-4..1e6).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
 }
 
 fn with_room((lower, upper): (f64, f64)) -> (f64, f64) {

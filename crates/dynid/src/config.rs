@@ -5,9 +5,13 @@ use std::path::{Path, PathBuf};
 
 use dynid_estimate::conditioning::{ConditioningSettings, TextbookRoute};
 use dynid_io::{CouplingForm, MappingSpec};
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::Error;
+
+/// Limits beyond this are a slip or were meant to be infinite, whatever the unit.
+const LARGEST_LIMIT: f64 = 1e9;
 
 /// What is to be identified from which logs, and how. Every key but `robot` and `log` has a default.
 #[derive(Debug, Clone, Default, Deserialize, PartialEq)]
@@ -20,6 +24,7 @@ pub struct Config {
     /// Seed of everything random (states of the structural analysis). Default 1.
     pub seed: Option<u64>,
     /// Gravity in base axes, m/s². Default: the robot file's, else 0 0 -9.81.
+    #[serde(deserialize_with = "exactly")]
     pub gravity: Option<[f64; 3]>,
     /// Couple mimic joints to their leaders. Default false.
     pub couple_mimics: Option<bool>,
@@ -90,8 +95,10 @@ pub struct LogConfig {
     /// CSV or CSV.gz, relative to the configuration.
     pub path: PathBuf,
     /// First and last data row, from 1, both included. Default: all.
+    #[serde(deserialize_with = "pair")]
     pub rows: Option<(usize, usize)>,
     /// First and last part of the record to use, as shares of its rows, e.g. `[0.0, 0.7]`. Default: all.
+    #[serde(deserialize_with = "pair")]
     pub part: Option<(f64, f64)>,
     /// Columns of this log in place of the run's.
     pub columns: Option<MappingSpec>,
@@ -217,23 +224,28 @@ pub struct EstimatorConfig {
 }
 
 /// Bounds that the consistent estimate must meet: on the total mass and on the centre of mass of one or more links, or
-/// on any parameter. `[lower, upper]`; `-inf` and `inf` leave a side open.
+/// on any parameter. `[lower, upper]`; `-inf` and `inf` leave a side open; finite limits are at most 1e9 in size.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct BoundConfig {
     /// Moving links; a link stands for everything welded to it.
     pub links: Vec<String>,
     /// Sum of their masses, kg.
+    #[serde(deserialize_with = "pair")]
     pub mass: Option<(f64, f64)>,
     /// Centre of mass of a single link along x of its frame, m.
+    #[serde(deserialize_with = "pair")]
     pub com_x: Option<(f64, f64)>,
     /// The same along y, m.
+    #[serde(deserialize_with = "pair")]
     pub com_y: Option<(f64, f64)>,
     /// The same along z, m.
+    #[serde(deserialize_with = "pair")]
     pub com_z: Option<(f64, f64)>,
     /// A parameter, by name such as `joint1.fc`.
     pub parameter: Option<String>,
     /// Its range, in its unit.
+    #[serde(deserialize_with = "pair")]
     pub range: Option<(f64, f64)>,
 }
 
@@ -241,7 +253,7 @@ impl Config {
     /// Reads a configuration; paths in it become relative to its folder.
     ///
     /// # Errors
-    /// [`Error::Read`], [`Error::Config`] with the line.
+    /// [`Error::Read`], and as [`Config::parse`].
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text =
             std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
@@ -258,7 +270,7 @@ impl Config {
     /// Parses a configuration.
     ///
     /// # Errors
-    /// [`Error::Config`] with the line.
+    /// [`Error::Config`] with the line; [`Error::InFile`] with what [`Config::check`] finds.
     pub fn parse(text: &str, file: &str) -> Result<Self, Error> {
         let config: Config = toml::from_str(text).map_err(|e| Error::Config {
             file: file.to_owned(),
@@ -281,19 +293,14 @@ impl Config {
                 return Err(missing("a `path` in every `[[log]]` and `[[validation]]`"));
             }
         }
-        config.check().map_err(|e| match e {
-            Error::Setting { .. } => {
-                Error::Config { file: file.to_owned(), line: None, message: e.to_string() }
-            }
-            other => other,
-        })?;
+        config.check().map_err(|e| Error::InFile { file: file.to_owned(), source: Box::new(e) })?;
         Ok(config)
     }
 
     /// Checks that every number makes sense.
     ///
     /// # Errors
-    /// [`Error::Setting`].
+    /// [`Error::Setting`], [`Error::Coupling`].
     pub fn check(&self) -> Result<(), Error> {
         let c = &self.conditioning;
         for (name, value) in [("kernel_hz", c.kernel_hz), ("state_hz", c.state_hz), ("block_s", c.block_s)] {
@@ -454,19 +461,57 @@ impl BoundConfig {
         };
         if !complete {
             let expected = "`links` with `mass` (or, for one link, `com_x`, `com_y`, `com_z`), or `parameter` with `range`";
-            return Err(setting("bound", expected, "another set of keys"));
+            return Err(setting("bound", expected, self.keys()));
+        }
+        let twice = self.links.iter().enumerate().find(|(k, link)| self.links[..*k].contains(link));
+        if let Some((_, link)) = twice {
+            return Err(setting("bound.links", "every link once", format!("`{link}` twice")));
         }
         for (key, (lower, upper)) in self.ranges() {
-            let open = lower == f64::NEG_INFINITY && upper == f64::INFINITY;
-            if lower.is_nan() || upper.is_nan() || lower > upper || open {
+            // Infinity as lower limit, or minus infinity as upper one, admits no number.
+            let possible = lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY;
+            if !possible || !(lower.is_finite() || upper.is_finite()) {
+                let of = self.parameter.as_ref().map_or_else(|| self.links.join("`, `"), Clone::clone);
                 let expected = "[lower, upper] with lower not above upper and one of them finite";
-                return Err(setting(&format!("bound.{key}"), expected, format!("[{lower}, {upper}]")));
+                let found = format!("[{lower}, {upper}] for `{of}`");
+                return Err(setting(&format!("bound.{key}"), expected, found));
+            }
+            if let Some(x) = [lower, upper].into_iter().find(|x| x.is_finite() && x.abs() > LARGEST_LIMIT) {
+                let expected = format!("limits up to {LARGEST_LIMIT:e}, or `-inf` and `inf`");
+                return Err(setting(&format!("bound.{key}"), &expected, format!("{x:e}")));
             }
         }
         Ok(())
+    }
+
+    /// The keys that are given, as a user would say it.
+    fn keys(&self) -> String {
+        let links = match self.links.len() {
+            0 => None,
+            1 => Some("`links` with one link".to_owned()),
+            n => Some(format!("`links` with {n} links")),
+        };
+        let parameter = self.parameter.as_ref().map(|_| "`parameter`".to_owned());
+        let ranges = self.ranges().map(|(key, _)| format!("`{key}`"));
+        let keys: Vec<String> = links.into_iter().chain(parameter).chain(ranges).collect();
+        if keys.is_empty() { "none of them".to_owned() } else { keys.join(", ") }
     }
 }
 
 fn setting(name: &str, expected: &str, found: impl ToString) -> Error {
     Error::Setting { name: name.to_owned(), expected: expected.to_owned(), found: found.to_string() }
+}
+
+/// A list of just so many entries; serde's own arrays and tuples pass over surplus ones.
+fn exactly<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
+    deserializer: D,
+) -> Result<Option<[T; N]>, D::Error> {
+    let list = Vec::<T>::deserialize(deserializer)?;
+    <[T; N]>::try_from(list)
+        .map(Some)
+        .map_err(|list| D::Error::custom(format!("expected a list of {N} numbers, found {}", list.len())))
+}
+
+fn pair<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<Option<(T, T)>, D::Error> {
+    Ok(exactly(deserializer)?.map(|[lower, upper]| (lower, upper)))
 }

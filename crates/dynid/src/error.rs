@@ -113,7 +113,7 @@ pub enum Error {
         known: Vec<String>,
     },
     /// A link that a bound names is no moving link of the robot.
-    #[error("no moving link is named `{name}`{}, the robot has {}", welded_to.as_ref().map_or_else(String::new, |l| format!(" (it is welded to `{l}`)")), known.join(", "))]
+    #[error("no moving link is named `{name}`{}, the robot has {}", welded_or_meant(name, welded_to.as_deref(), known), known.join(", "))]
     UnknownLink {
         /// The name.
         name: String,
@@ -145,6 +145,14 @@ pub enum Error {
         line: Option<usize>,
         /// What is wrong.
         message: String,
+    },
+    /// What a file says makes no sense.
+    #[error("{file}: {source}")]
+    InFile {
+        /// File.
+        file: String,
+        /// What is wrong.
+        source: Box<Error>,
     },
     /// A setting has a value that makes no sense.
     #[error("setting `{name}`: expected {expected}, found {found}")]
@@ -256,6 +264,9 @@ impl Error {
             Error::Conditioning(C::Clock(dynid_motion::ClockError::TooFewSamples { .. })) => {
                 Some("record a longer log; samples whose time does not advance do not count".to_owned())
             }
+            Error::Log(dynid_motion::LogError::TooFewRows { .. }) => {
+                Some("record a longer log, or widen its `rows` or `part`".to_owned())
+            }
             Error::Conditioning(C::Clock(_)) => {
                 Some("check the time column; `rate_hz` in [columns] states a sample rate instead".to_owned())
             }
@@ -274,19 +285,50 @@ impl Error {
             }),
             Error::TooShort { .. } => Some("record a longer motion".to_owned()),
             Error::UnknownLink { .. } => {
-                Some("a bound is for a moving link, which stands for everything welded to it".to_owned())
+                Some("[[bound]] is for moving links; each stands for everything welded to it".to_owned())
             }
             Error::UnknownParameter { .. } => {
                 Some("`dynid inspect ROBOT` lists links and joints; parameters are `<link>.Izz`, `<joint>.fc`".to_owned())
             }
             Error::Consistency(P::Contradiction { .. } | P::Infeasible { .. }) => {
-                Some("drop or widen one of the bounds under [[bound]]".to_owned())
+                Some("drop or widen one of the bounds under [[bound]]; limits are in kg, m and the parameter's unit".to_owned())
             }
             Error::Linear(L::Tls(_)) => Some(
                 "use `wls`, or state larger noise only for columns that have it under [estimator] column_noise".to_owned(),
             ),
+            Error::InFile { source, .. } => source.hint(),
+            Error::Setting { name, .. } => setting_hint(name).map(str::to_owned),
             Error::Cutoff { .. } => Some("set a cut-off below half the sample rate".to_owned()),
             _ => None,
         }
     }
+}
+
+/// Why a link does not move, or which one was meant.
+fn welded_or_meant(name: &str, welded_to: Option<&str>, known: &[String]) -> String {
+    match (welded_to, dynid_io::closest(name, known)) {
+        (Some(link), _) => format!(" (it is welded to `{link}`)"),
+        (None, Some(link)) => format!(" (did you mean `{link}`?)"),
+        (None, None) => String::new(),
+    }
+}
+
+/// What a user can do about a setting that makes no sense.
+fn setting_hint(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "bound" => {
+            "for example `links = [\"forearm\"]`, `mass = [0.5, 2.0]`; one entry of [[bound]] for each subject"
+        }
+        "bound.links" => "the total mass counts a link as often as it is named",
+        "consistency" => "drop the bounds, or `none`: only a consistent estimate is bounded",
+        "prior" => "use `consistency = \"pseudo-inertia\"`, or leave `prior` out",
+        "prior_weight" => "leave it out: held-out folds then say how much the robot file may count",
+        "ridge_weight" => "leave it out: 1 is a Gaussian prior; less trusts the robot file less",
+        "effort_noise" => "state it under [estimator], in N m or N",
+        _ if name.starts_with("bound.") => "`-inf` and `inf` leave one side open: `mass = [0.5, inf]`",
+        _ if name.starts_with("column_noise.") => {
+            "a name of `dynid inspect ROBOT` among the base parameters with a standard deviation; 0: exact"
+        }
+        _ => return None,
+    })
 }

@@ -255,7 +255,10 @@ fn method(
                 let kept = base.kept.binary_search(&column).map_err(|_| Error::Setting {
                     name: format!("column_noise.{name}"),
                     expected: "the name of a base parameter".to_owned(),
-                    found: format!("{}, which is folded into others", model.parameters().linear[column].name),
+                    found: format!(
+                        "{}, which acts only together with others or not at all",
+                        model.parameters().linear[column].name
+                    ),
                 })?;
                 columns[kept] = *noise;
             }

@@ -127,6 +127,15 @@ fn are_refused() {
         ),
         case("bad.toml", top("preferred = [\"m9\"]"), RUN, &["preferred", "m9"], ""),
         case("bad.toml", top("gravity = [0, 0]"), RUN, &["bad.toml:1", "3"], ""),
+        case("bad.toml", top("gravity = [0, 0, 0, -9.81]"), RUN, &["bad.toml:1", "3 numbers", "found 4"], ""),
+        case("bad.toml", config("rows = [1, 500, 900]\n"), RUN, &["bad.toml:5", "2 numbers", "found 3"], ""),
+        case(
+            "bad.toml",
+            config("part = [0.0, 0.3, 0.7]\n"),
+            RUN,
+            &["bad.toml:5", "2 numbers", "found 3"],
+            "",
+        ),
         case("bad.toml", top("gravity = [0, 0, inf]"), RUN, &["gravity", "finite", "inf"], ""),
         case(
             "bad.toml",

@@ -59,6 +59,8 @@ pub(crate) fn sound() -> &'static Sound {
 pub(crate) struct Case {
     /// Name and bytes of the broken file.
     file: (&'static str, Vec<u8>),
+    /// Name and bytes of a file that the broken one needs.
+    beside: Option<(&'static str, Vec<u8>)>,
     /// Arguments, separated by spaces.
     args: &'static str,
     /// What the message must hold.
@@ -75,7 +77,14 @@ pub(crate) fn case(
     message: &'static [&'static str],
     hint: &'static str,
 ) -> Case {
-    Case { file: (name, bytes.into()), args, message, hint }
+    Case { file: (name, bytes.into()), beside: None, args, message, hint }
+}
+
+impl Case {
+    /// Puts another file beside the broken one.
+    pub(crate) fn beside(self, name: &'static str, bytes: impl Into<Vec<u8>>) -> Case {
+        Case { beside: Some((name, bytes.into())), ..self }
+    }
 }
 
 /// Every file and folder below a folder with its bytes.
@@ -107,7 +116,9 @@ fn faults(case: &Case) -> Vec<String> {
     put("states.csv", sound().states.as_bytes());
     put("estimate.json", sound().estimate.as_bytes());
     put("config.toml", CONFIG.as_bytes());
-    put(case.file.0, &case.file.1);
+    for (name, bytes) in std::iter::once(&case.file).chain(&case.beside) {
+        put(name, bytes);
+    }
     let before = listing(folder.path());
     let output = dynid().current_dir(folder.path()).args(case.args.split(' ')).output().unwrap();
     let mut faults = Vec::new();

@@ -1,8 +1,10 @@
 //! Broken input gets exit code 2, one message that says where and what, at most one hint, and leaves nothing behind.
 
+mod bounds;
 mod configurations;
 mod csv;
 mod estimates_and_states;
+mod estimators;
 mod harness;
 mod log_files;
 mod log_signals;
@@ -11,3 +13,4 @@ mod robots_in_toml;
 mod robots_in_urdf;
 #[path = "../support/mod.rs"]
 mod support;
+mod validation_logs;

@@ -153,7 +153,7 @@ pub enum ProblemError {
     #[error("an entropic prior needs the pseudo-inertia form")]
     EntropicForm,
     /// Two bounds exclude each other.
-    #[error("`{first}` contradicts `{second}`")]
+    #[error("{first} contradicts {second}")]
     Contradiction {
         /// One of them.
         first: String,
