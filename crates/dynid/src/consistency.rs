@@ -12,7 +12,6 @@ use dynid_estimate::{Factor, Mat};
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
 
 use crate::Error;
-use crate::bounds;
 use crate::config::{Config, Consistency, PriorDistance};
 use crate::fitting::Fitted;
 use crate::prior::Prior;
@@ -71,13 +70,15 @@ impl Consistent {
 /// changes of fit far below noise.
 ///
 /// # Errors
-/// [`Error::Consistency`], [`Error::UnknownLink`], [`Error::UnknownParameter`].
+/// [`Error::Consistency`].
+#[expect(clippy::too_many_arguments, reason = "one call site; the arguments are the whole problem")]
 pub(crate) fn consistent(
     config: &Config,
     model: &RobotModel,
     base: &BaseParameters,
     regrouping: &Mat<f64>,
     prior: &Prior,
+    bounds: &[Bound],
     fitted: &Fitted,
     groups: &[ReducedGroup],
 ) -> Result<Consistent, Error> {
@@ -103,8 +104,7 @@ pub(crate) fn consistent(
             values,
         });
     };
-    let bounds = bounds::rows(&config.bound, model)?;
-    let problem = |factor: &Factor| problem(model, regrouping, factor, prior, &bounds);
+    let problem = |factor: &Factor| problem(model, regrouping, factor, prior, bounds);
     let trials: Vec<f64> = match config.estimator.prior_weight {
         Some(weight) => vec![weight],
         None => LADDER.iter().map(|share| share * fitted.inflation).collect(),

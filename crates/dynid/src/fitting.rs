@@ -107,27 +107,24 @@ pub(crate) fn rows<'a>(
 /// Fits the base parameters; with the estimate come the groups of rows that it was made from.
 ///
 /// # Errors
-/// [`Error::TooShort`], [`Error::Linear`], [`Error::UnknownParameter`].
+/// [`Error::TooShort`], [`Error::Linear`].
 pub(crate) fn fit(
     config: &Config,
-    model: &RobotModel,
-    base: &BaseParameters,
-    prior: &Prior,
-    space: &VisibleSpace,
+    columns: usize,
+    method: &LinearMethod,
     source: &dyn RowSource,
 ) -> Result<(LinearEstimate, Vec<ReducedGroup>), Error> {
     let groups = reduce_rows(source).map_err(|e| conditioning_fault(source, e))?;
     let rows: usize = groups.iter().map(|g| g.rows()).sum();
-    if rows <= base.len() {
+    if rows <= columns {
         return Err(Error::TooShort {
             file: config.log[0].path.display().to_string(),
             message: format!(
                 "{rows} usable rows for {} parameters, expected more rows than parameters",
-                base.len()
+                columns
             ),
         });
     }
-    let method = method(&config.estimator, model, base, prior, space)?;
     let settings = LinearSettings {
         sharing: match config.estimator.variances {
             Variances::Group => VarianceSharing::Group,
@@ -136,7 +133,7 @@ pub(crate) fn fit(
         },
         ..LinearSettings::default()
     };
-    let estimate = estimate(&groups, Some(source), base.len(), &method, &settings)?;
+    let estimate = estimate(&groups, Some(source), columns, method, &settings)?;
     Ok((estimate, groups))
 }
 
@@ -231,7 +228,11 @@ fn conditioning_fault(source: &dyn RowSource, e: dynid_estimate::rows::RowsError
     Error::Conditioning(dynid_estimate::conditioning::ConditioningError::Rows { output, source: e.source })
 }
 
-fn method(
+/// The linear estimator that a run asks for.
+///
+/// # Errors
+/// [`Error::UnknownParameter`], [`Error::Setting`].
+pub(crate) fn method(
     config: &EstimatorConfig,
     model: &RobotModel,
     base: &BaseParameters,

@@ -14,6 +14,7 @@ use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
 use crate::Error;
 use crate::advice::{self, FitRows};
 use crate::agreement::{self, Agreement};
+use crate::bounds;
 use crate::config::{Config, LogConfig, Route};
 use crate::consistency::{self, Consistent};
 use crate::elements::ElementPlan;
@@ -150,6 +151,10 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     let regrouping = advice::regrouping(&base);
     let space = VisibleSpace::new(&regrouping, &prior.std);
 
+    // Names that do not exist are told before the long work.
+    let bounds = bounds::rows(&config.bound, &model)?;
+    let method = fitting::method(&config.estimator, &model, &base, &prior, &space)?;
+
     let conditioning = match config.conditioning.route {
         Route::Compact => Some(condition(&model, &[], &base.kept, &prepared, &settings, |stage| {
             progress(Step::Conditioning(stage));
@@ -158,12 +163,13 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     };
     progress(Step::Fit);
     let source = fitting::rows(config, &model, &base.kept, &prepared, conditioning.as_ref(), &settings)?;
-    let (fit, groups) = fitting::fit(config, &model, &base, &prior, &space, &*source)?;
+    let (fit, groups) = fitting::fit(config, base.len(), &method, &*source)?;
     let residuals = fitting::residuals(&*source, &fit)?;
     drop(source);
     let fitted = fitting::with_precision(fit, &residuals, &prepared, config.conditioning.block_s.is_some());
     progress(Step::Consistency);
-    let consistent = consistency::consistent(config, &model, &base, &regrouping, &prior, &fitted, &groups)?;
+    let consistent =
+        consistency::consistent(config, &model, &base, &regrouping, &prior, &bounds, &fitted, &groups)?;
     let (state_hz, kernel_hz, delay_samples) = match &conditioning {
         Some(c) => (c.state_hz.iter().copied().fold(f64::INFINITY, f64::min), c.kernel_hz, c.delay.samples),
         None => {

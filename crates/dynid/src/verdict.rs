@@ -323,11 +323,23 @@ const DEAR: f64 = 10.0;
 fn consistency(id: &Identification) -> Option<(Status, CheckResult)> {
     let found = id.consistent.estimate.as_ref()?;
     let held_out = &id.consistent.held_out;
-    let rise = match (held_out.relative(UNCONSTRAINED), held_out.relative(id.consistent.consistent())) {
+    let rise = |free: Option<f64>, consistent: Option<f64>| match (free, consistent) {
         (Some(free), Some(consistent)) if free > 0.0 => Some(100.0 * (consistent / free - 1.0)),
         _ => None,
     };
-    let cost = rise.unwrap_or(0.0);
+    let folds = rise(held_out.relative(UNCONSTRAINED), held_out.relative(id.consistent.consistent()));
+    let logs = id.validation_unconstrained.iter().zip(&id.validation);
+    let logs =
+        logs.filter_map(|(free, with)| rise(free.filtered.relative_error, with.filtered.relative_error));
+    let validation = logs.reduce(f64::max);
+    let cost = folds.into_iter().chain(validation).fold(f64::NEG_INFINITY, f64::max);
+    let rise = cost.is_finite().then_some(cost);
+    let each = match (folds, validation) {
+        (Some(folds), Some(logs)) => {
+            format!(" ({folds:+.1} % on held-out folds, {logs:+.1} % on validation logs)")
+        }
+        _ => String::new(),
+    };
     let active = || {
         let mut names: Vec<String> = found.active.iter().map(|a| format!("`{}`", a.name())).collect();
         names.dedup();
@@ -338,7 +350,7 @@ fn consistency(id: &Identification) -> Option<(Status, CheckResult)> {
         "price of physical consistency",
         rise,
         "%",
-        "held-out error rises by at most 2 %",
+        "error on held-out folds and on validation logs rises by at most 2 %",
         if found.status == ConsistentStatus::Unconstrained {
             "the parameters that fit best belong to bodies that can exist".to_owned()
         } else if found.status == ConsistentStatus::Stalled {
@@ -347,11 +359,14 @@ fn consistency(id: &Identification) -> Option<(Status, CheckResult)> {
                 found.gap
             )
         } else if cost <= CHEAP {
-            format!("bodies that can exist fit about as well as any numbers; held at a limit: {}", active())
+            format!(
+                "bodies that can exist do about as well as any numbers{each}; held at a limit: {}",
+                active()
+            )
         } else {
             format!(
-                "the best fit asks for bodies that cannot exist: something in the model or in the log is wrong where these \
-                 limits act: {}",
+                "bodies that can exist do worse than numbers without constraints{each}: chance, or something in the model or \
+                 in the log is wrong where these limits act: {}",
                 active()
             )
         },

@@ -32,7 +32,8 @@ pub(super) fn start<const N: usize>(program: &Program<N>, problem: &Problem) -> 
         return Ok(Start { xi, iterations: 0 });
     }
     let n = program.unknowns();
-    let relaxed = relaxed(program);
+    // However far the bounds are, the pull must not outweigh a violation.
+    let relaxed = relaxed(program, PULL / (1.0 + worst.max(0.0)).powi(2));
     let mut first = xi;
     first.push(worst.max(0.0) + 1.0);
     // (s + 1)² against 1 decides. A start needs most of the room there is and no more: the optimum itself lies on the
@@ -69,7 +70,7 @@ fn inside<const N: usize>(program: &Program<N>) -> Vec<f64> {
 }
 
 /// `min (s + 1)² + pull` with every bound relaxed by `s`: the bounds can be met exactly if the optimum has `s < 0`.
-fn relaxed<const N: usize>(program: &Program<N>) -> Program<N> {
+fn relaxed<const N: usize>(program: &Program<N>, pull: f64) -> Program<N> {
     let n = program.unknowns();
     let rays = program.rays.iter().enumerate().map(|(k, ray)| {
         let mut terms = ray.terms.clone();
@@ -78,7 +79,7 @@ fn relaxed<const N: usize>(program: &Program<N>) -> Program<N> {
         }
         Ray { terms, upper: ray.upper }
     });
-    let mut weight = vec![PULL; n];
+    let mut weight = vec![pull; n];
     weight.push(0.0);
     let mut centre = program.centre.clone();
     centre.push(0.0);
