@@ -83,21 +83,23 @@ impl Comparison {
 
 /// Runs every estimator on every fold.
 ///
-/// `groups`: factors of all groups and time blocks; `weights`: one per group, fixed; `total`: number of base columns.
-/// Blocks are counted over all logs, those next to a fold are left out of its training set as
-/// [`FoldSettings::dropped_neighbours`] says. Residuals are of the rows as they are, not weighted.
+/// `groups`: factors of all groups and time blocks, of the rows as they are; `training`: the same as the estimator weighs
+/// rows within a group (such as [`crate::linear::LinearEstimate::reduced`]), which differs for robust losses; `weights`: one
+/// per group, fixed; `total`: number of base columns. Blocks are counted over all logs, those next to a fold are left out
+/// of its training set as [`FoldSettings::dropped_neighbours`] says. Residuals are of the rows as they are.
 ///
 /// # Panics
-/// Unless there is one weight per group.
+/// Unless there is one weight per group, and both lists have the same groups and blocks.
 pub fn compare(
     groups: &[ReducedGroup],
+    training: &[ReducedGroup],
     weights: &[f64],
     total: usize,
     settings: &FoldSettings,
     estimators: &[&Estimator<'_>],
 ) -> Comparison {
-    let blocks = time_blocks(groups, weights, total);
-    let places = places(groups);
+    let blocks = time_blocks(training, weights, total);
+    let places = places(training);
     assert_eq!(blocks.len(), places.len(), "time blocks are the blocks with rows, log after log");
     let outputs = groups.iter().map(|g| g.output + 1).max().unwrap_or(0);
     let folds = contiguous_folds(blocks.len(), settings.folds)

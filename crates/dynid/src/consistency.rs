@@ -91,9 +91,11 @@ pub(crate) fn consistent(
     let unconstrained = unconstrained(regrouping, prior, fitted)
         .unwrap_or_else(|| base.nearest(&linear(&fitted.estimate.factor), &prior.values, &prior.std));
     let weights = fitted.estimate.weights();
+    let training = &fitted.estimate.reduced;
+    let groups: Vec<ReducedGroup> = groups.iter().map(|g| g.coarsened(fitted.merged_blocks)).collect();
     let folds = FoldSettings::default();
     let Some(form) = form(config) else {
-        let held_out = compare(groups, &weights, base.len(), &folds, &[&linear]);
+        let held_out = compare(&groups, training, &weights, base.len(), &folds, &[&linear]);
         let values = unconstrained.clone();
         return Ok(Consistent {
             estimate: None,
@@ -132,7 +134,7 @@ pub(crate) fn consistent(
         .collect();
     let mut all: Vec<&Estimator<'_>> = vec![&linear];
     all.extend(constrained.iter().map(AsRef::as_ref));
-    let held_out = compare(groups, &weights, base.len(), &folds, &all);
+    let held_out = compare(&groups, training, &weights, base.len(), &folds, &all);
     let losses: Vec<Option<f64>> = (0..trials.len()).map(|k| held_out.loss(1 + k, UNCONSTRAINED)).collect();
     let least = losses.iter().flatten().copied().fold(f64::INFINITY, f64::min);
     let chosen = losses.iter().position(|l| l.is_none_or(|l| l <= (1.0 + TOLERANCE) * least)).unwrap_or(0);

@@ -45,6 +45,8 @@ pub struct Fitted {
     pub block_length: BlockLength,
     /// Length of the time blocks in use, s.
     pub block_s: f64,
+    /// How many blocks of the rows make up one of these.
+    pub merged_blocks: usize,
 }
 
 impl Fitted {
@@ -219,6 +221,7 @@ pub(crate) fn with_precision(
         inflation_per_output: per_output,
         block_length: wanted,
         block_s: block_s * factor as f64,
+        merged_blocks: factor,
         estimate,
     }
 }

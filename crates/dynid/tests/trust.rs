@@ -269,14 +269,14 @@ fn panda_beats_both_published_parameter_sets() {
         let mut prepared =
             dynid::estimators::conditioning::prepare(&loaded.log, &rigid, &id.settings).unwrap();
         let filter = dynid::motion::filter::butterworth(4, 5.0, prepared.rate_hz).unwrap();
-        for j in 0..7 {
-            let [a, b, c] = [0, 1, 2].map(|k| FRICTION[k][j]);
+        for (j, effort) in prepared.effort.iter_mut().enumerate() {
+            let [a, b, c] = FRICTION.map(|row| row[j]);
             let q = dynid::motion::filter::forward_backward(&filter, &prepared.position[j]).unwrap();
             let sigmoid = |v: f64| a / (1.0 + (-b * (v + c)).exp()) - a / (1.0 + (-b * c).exp());
-            for s in 0..q.len() {
+            for (s, e) in effort.iter_mut().enumerate() {
                 let (before, after) = (s.saturating_sub(1), (s + 1).min(q.len() - 1));
                 let speed = (q[after] - q[before]) * prepared.rate_hz / (after - before) as f64;
-                prepared.effort[j][s] -= sigmoid(speed);
+                *e -= sigmoid(speed);
             }
         }
         let alignment = dynid::agreement::Alignment {

@@ -72,7 +72,7 @@ impl std::fmt::Display for ActiveConstraint {
                 write!(f, "link `{link}`: a principal moment of inertia about the centre of mass vanishes")
             }
             Self::AtZero { parameter } => write!(f, "`{parameter}`: at its lower limit"),
-            Self::AtBound { bound } => write!(f, "bound `{bound}`: met with equality"),
+            Self::AtBound { bound } => write!(f, "{bound}: met with equality"),
         }
     }
 }
