@@ -185,7 +185,7 @@ fn motions_consistency_and_precision_are_told_in_words() {
     let mut data = synthetic::report(6, 500);
     let page = render(&data).unwrap();
     assert!(page.contains("<li>Fast motion of joints joint_4 and joint_5 together"));
-    assert!(page.contains("<b>It costs next to nothing.</b>") && page.contains("(+0.8 %)"));
+    assert!(page.contains("<b>It costs next to nothing on held-out stretches.</b>") && page.contains("(+0.8 %)"));
     assert!(
         page.contains(
             "<dt>link_5</dt><dd>no thickness along its x axis; no thickness along (0.19, 0.94, 0.30)"
