@@ -185,14 +185,16 @@ fn motions_consistency_and_precision_are_told_in_words() {
     let mut data = synthetic::report(6, 500);
     let page = render(&data).unwrap();
     assert!(page.contains("<li>Fast motion of joints joint_4 and joint_5 together"));
-    assert!(page.contains("<b>It costs next to nothing on held-out stretches.</b>") && page.contains("(+0.8 %)"));
+    assert!(
+        page.contains("<b>It costs next to nothing on held-out stretches.</b>") && page.contains("(+0.8 %)")
+    );
     assert!(
         page.contains(
             "<dt>link_5</dt><dd>no thickness along its x axis; no thickness along (0.19, 0.94, 0.30)"
         )
     );
     assert_eq!(page.matches("<svg class=\"pairbar\"").count(), 6 + 2);
-    assert!(page.contains("the fit gives way by 9.30 residual variances"));
+    assert!(page.contains("as strongly as held-out folds of the log allow"));
     assert!(page.contains("<b>6.20 times</b>") && page.contains("are 2.5 times as large"));
     assert!(page.contains("(2 of 6 residuals are coloured). Those shown are robust."));
 
