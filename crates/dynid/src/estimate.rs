@@ -1,17 +1,20 @@
 //! The result file `estimate.json`: stable keys, added to but never renamed.
 
+mod model;
+mod trust;
+
+pub use model::{CouplingRecord, JointRecord, LinkRecord, ModelRecord};
+pub use trust::{
+    ConsistencyRecord, HeldOutRecord, PrecisionRecord, PruningRecord, PruningStep, WhitenessRecord,
+};
+
 use std::path::Path;
 
-use dynid_io::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, SettingValue};
-use dynid_model::{
-    Description, Inertia, JointDescription, JointKind, Limits, LinkDescription, Mat3, Mechanism, Mimic,
-    Placement, RobotModel, Vec3,
-};
+use dynid_model::RobotModel;
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
 use crate::Error;
-use crate::elements::ElementPlan;
 
 /// Version of the file's layout.
 pub const SCHEMA: u32 = 1;
@@ -178,122 +181,6 @@ pub struct BaseValue {
     pub rel_std: Option<f64>,
 }
 
-/// Physical consistency.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct ConsistencyRecord {
-    /// `pseudo-inertia` or `spatial-inertia`.
-    pub form: String,
-    /// `unconstrained` (no constraint matters), `optimal` or `stalled` (consistent, but the gap is above the tolerance).
-    pub status: String,
-    /// What consistency costs in fit: increase of the weighted sum of squares, in residual variances.
-    pub price: f64,
-    /// That increase over what the same number of parameters would take up by chance, `price / (variance inflation ·
-    /// base parameters)`; around 1 is no more than noise.
-    pub price_over_chance: Option<f64>,
-    /// Weight of the distance from the robot file, as given or as large as held-out folds allow.
-    pub prior_weight: f64,
-    /// Weights tried, each with its squared held-out error relative to that without constraints (mean over joints).
-    pub prior_trials: Vec<(f64, Option<f64>)>,
-    /// No consistent parameters (with whitened sizes up to ten times these) have an objective lower by more than this.
-    pub gap: f64,
-    /// Iterations of the interior-point method.
-    pub iterations: usize,
-    /// Least eigenvalue of the links' pseudo-inertias in units of the prior's; at least 1e-6.
-    pub least_eigenvalue: f64,
-    /// Constraints that hold the estimate back, in words.
-    pub active: Vec<String>,
-    /// Figures of the parameters without constraints on the training logs; empty where they predict the same.
-    pub training_unconstrained: Vec<LogFit>,
-    /// The same on the validation logs.
-    pub validation_unconstrained: Vec<LogFit>,
-}
-
-/// Errors on held-out folds of time of the training logs, rows as the fit sees them.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct HeldOutRecord {
-    /// Number of folds.
-    pub folds: usize,
-    /// RMS per joint, in the effort's unit, without constraints.
-    pub rms: Vec<Option<f64>>,
-    /// Its standard error over the folds.
-    pub rms_standard_error: Vec<Option<f64>>,
-    /// RMS per joint of the physically consistent estimate.
-    pub rms_consistent: Vec<Option<f64>>,
-    /// `100 ‖residual‖ / ‖effort‖` over all joints without constraints, percent.
-    pub relative_error: Option<f64>,
-    /// The same of the physically consistent estimate, percent.
-    pub relative_error_consistent: Option<f64>,
-}
-
-/// What the residuals say about the standard deviations.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct PrecisionRecord {
-    /// By how much coloured residuals inflate the variances that white ones would give (median over base parameters).
-    pub variance_inflation: f64,
-    /// The same per joint.
-    pub variance_inflation_per_joint: Vec<Option<f64>>,
-    /// Number of time blocks behind the standard deviations.
-    pub blocks: usize,
-    /// Their length, s.
-    pub block_s: f64,
-    /// Length that the correlation of the residuals asks for, s.
-    pub wanted_block_s: f64,
-    /// Correlation time of the residuals, s: per training log and joint, log after log.
-    #[serde(default)]
-    pub correlation_s: Vec<Option<f64>>,
-    /// Per training log and joint: test of whiteness inside the band of the kernel.
-    pub whiteness: Vec<Vec<Option<WhitenessRecord>>>,
-}
-
-/// Cumulative periodogram test.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct WhitenessRecord {
-    /// Largest distance from a straight line.
-    pub distance: f64,
-    /// Threshold at 5 %.
-    pub threshold: f64,
-    /// White noise is rejected.
-    pub rejected: bool,
-    /// Frequency of the largest peak, Hz.
-    pub dominant_hz: f64,
-}
-
-/// Backward elimination of base parameters.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct PruningRecord {
-    /// All models, from the whole one down to one parameter.
-    pub path: Vec<PruningStep>,
-    /// Number of parameters of the smallest model within one standard error of the least held-out error.
-    pub essential: Option<usize>,
-    /// Names of its parameters.
-    pub essential_parameters: Vec<String>,
-    /// Number of parameters of the model of least BIC.
-    pub least_bic: usize,
-    /// Number of parameters of the first model in which every parameter is significant.
-    pub all_significant: Option<usize>,
-    /// Threshold of that test.
-    pub threshold: f64,
-}
-
-/// One model of a backward elimination.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct PruningStep {
-    /// Number of parameters.
-    pub parameters: usize,
-    /// Parameter that goes next.
-    pub next: String,
-    /// Its test statistic, `value² / variance`.
-    pub statistic: Option<f64>,
-    /// Weighted residual sum of squares.
-    pub rss: f64,
-    /// Bayesian information criterion.
-    pub bic: Option<f64>,
-    /// Mean held-out squared error in residual variances.
-    pub held_out: Option<f64>,
-    /// Its standard error.
-    pub held_out_standard_error: Option<f64>,
-}
-
 /// Per-joint agreement, in the effort's unit.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct FitValues {
@@ -407,80 +294,6 @@ pub struct ConditioningRecord {
     pub residual_ratio: Vec<Option<f64>>,
 }
 
-/// Robot, elements and settings that predictions need.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct ModelRecord {
-    /// Gravity, m/s².
-    pub gravity: [f64; 3],
-    /// Floating base under the root link.
-    pub floating_base: bool,
-    /// Mimic joints follow their leaders.
-    pub couple_mimics: bool,
-    /// Links: name, and the inertia of the robot file.
-    pub links: Vec<LinkRecord>,
-    /// Joints.
-    pub joints: Vec<JointRecord>,
-    /// Element names per effort.
-    pub elements: Vec<Vec<String>>,
-    /// Couplings.
-    pub couplings: Vec<CouplingRecord>,
-    /// Numeric settings of elements: joint, element, key, value.
-    pub element_settings: Vec<(String, String, String, f64)>,
-    /// Cut-off of the state filter, Hz.
-    pub state_hz: f64,
-    /// Cut-off of the widest kernel, Hz.
-    pub kernel_hz: f64,
-}
-
-/// A link.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct LinkRecord {
-    /// Name.
-    pub name: String,
-    /// Ten standard parameters, if the file states them.
-    pub phi: Option<[f64; 10]>,
-}
-
-/// A joint.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct JointRecord {
-    /// Name.
-    pub name: String,
-    /// Parent link.
-    pub parent: String,
-    /// Child link.
-    pub child: String,
-    /// Kind.
-    pub kind: String,
-    /// Pitch of a helical joint, m/rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pitch: Option<f64>,
-    /// Rows of the rotation parent ← joint.
-    pub rotation: [[f64; 3]; 3],
-    /// Origin in the parent, m.
-    pub translation: [f64; 3],
-    /// Axis.
-    pub axis: [f64; 3],
-    /// Position limits.
-    pub position_limits: Option<(f64, f64)>,
-    /// Leader, ratio and offset of a mimic joint.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mimic: Option<(String, f64, f64)>,
-}
-
-/// A coupling.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct CouplingRecord {
-    /// Motors.
-    pub motors: Vec<String>,
-    /// Joints.
-    pub joints: Vec<String>,
-    /// Matrix.
-    pub matrix: Vec<Vec<f64>>,
-    /// `strict` or `columns`.
-    pub form: String,
-}
-
 /// Where a result comes from.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Provenance {
@@ -562,133 +375,4 @@ impl Estimate {
             Split::Consistent => self.parameters.iter().map(|p| p.value).collect(),
         }
     }
-}
-
-impl ModelRecord {
-    /// Records a description and what acts at its joints.
-    pub fn new(description: &Description, mechanism: &Mechanism, plan: &ElementPlan) -> Self {
-        let links = description
-            .links
-            .iter()
-            .map(|l| LinkRecord { name: l.name.clone(), phi: l.inertia.map(|i| i.0) })
-            .collect();
-        let joints = description.joints.iter().map(joint_record).collect();
-        let couplings = plan
-            .couplings
-            .iter()
-            .map(|c| CouplingRecord {
-                motors: c.motors.clone(),
-                joints: c.joints.clone(),
-                matrix: c.matrix.clone(),
-                form: match c.form {
-                    CouplingForm::Strict => "strict".to_owned(),
-                    CouplingForm::Columns => "columns".to_owned(),
-                },
-            })
-            .collect();
-        let element_settings = plan
-            .settings()
-            .iter()
-            .filter_map(|s| match s.value {
-                SettingValue::Number(x) => Some((s.joint.clone(), s.element.clone(), s.key.clone(), x)),
-                _ => None,
-            })
-            .collect();
-        ModelRecord {
-            gravity: mechanism.gravity().0,
-            floating_base: description.floating_base,
-            couple_mimics: description.couple_mimics,
-            links,
-            joints,
-            elements: plan.per_rate.clone(),
-            couplings,
-            element_settings,
-            state_hz: 0.0,
-            kernel_hz: 0.0,
-        }
-    }
-
-    pub(crate) fn description(&self, name: &str) -> Result<Description, String> {
-        let mut d = Description::new(name);
-        d.gravity = self.gravity;
-        d.floating_base = self.floating_base;
-        d.couple_mimics = self.couple_mimics;
-        d.links = self
-            .links
-            .iter()
-            .map(|l| LinkDescription { name: l.name.clone(), inertia: l.phi.map(Inertia) })
-            .collect();
-        d.joints = self.joints.iter().map(joint_description).collect::<Result<_, _>>()?;
-        Ok(d)
-    }
-
-    fn plan(&self) -> ElementPlan {
-        let couplings = self
-            .couplings
-            .iter()
-            .map(|c| CouplingSpec {
-                motors: c.motors.clone(),
-                joints: c.joints.clone(),
-                matrix: c.matrix.clone(),
-                form: if c.form == "columns" { CouplingForm::Columns } else { CouplingForm::Strict },
-            })
-            .collect();
-        let settings = self
-            .element_settings
-            .iter()
-            .map(|(joint, element, key, value)| ElementSetting {
-                joint: joint.clone(),
-                element: element.clone(),
-                key: key.clone(),
-                value: SettingValue::Number(*value),
-            })
-            .collect();
-        let spec = ElementSpec { settings, ..ElementSpec::default() };
-        ElementPlan::recorded(self.elements.clone(), couplings, spec)
-    }
-}
-
-fn joint_record(j: &JointDescription) -> JointRecord {
-    let (kind, pitch) = match j.kind {
-        JointKind::Revolute => ("revolute", None),
-        JointKind::Continuous => ("continuous", None),
-        JointKind::Prismatic => ("prismatic", None),
-        JointKind::Helical { pitch } => ("helical", Some(pitch)),
-        JointKind::Floating => ("floating", None),
-        JointKind::Fixed => ("fixed", None),
-    };
-    JointRecord {
-        name: j.name.clone(),
-        parent: j.parent.clone(),
-        child: j.child.clone(),
-        kind: kind.to_owned(),
-        pitch,
-        rotation: j.placement.rotation.rows(),
-        translation: j.placement.translation.0,
-        axis: j.axis,
-        position_limits: j.limits.position,
-        mimic: j.mimic.as_ref().map(|m| (m.of.clone(), m.ratio, m.offset)),
-    }
-}
-
-fn joint_description(j: &JointRecord) -> Result<JointDescription, String> {
-    let kind = match (j.kind.as_str(), j.pitch) {
-        ("revolute", _) => JointKind::Revolute,
-        ("continuous", _) => JointKind::Continuous,
-        ("prismatic", _) => JointKind::Prismatic,
-        ("helical", Some(pitch)) => JointKind::Helical { pitch },
-        ("floating", _) => JointKind::Floating,
-        ("fixed", _) => JointKind::Fixed,
-        (other, _) => return Err(format!("joint `{}`: unknown kind `{other}`", j.name)),
-    };
-    Ok(JointDescription {
-        name: j.name.clone(),
-        parent: j.parent.clone(),
-        child: j.child.clone(),
-        kind,
-        placement: Placement { rotation: Mat3::from_rows(j.rotation), translation: Vec3(j.translation) },
-        axis: j.axis,
-        limits: Limits { position: j.position_limits, ..Limits::default() },
-        mimic: j.mimic.clone().map(|(of, ratio, offset)| Mimic { of, ratio, offset }),
-    })
 }

@@ -1,5 +1,7 @@
 //! The main job: from a robot file and logs to an identified model.
 
+mod figures;
+
 use std::path::Path;
 
 use dynid_estimate::conditioning::{
@@ -12,7 +14,7 @@ use dynid_estimate::whiteness::InBandWhiteness;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
 
 use crate::Error;
-use crate::advice::{self, FitRows};
+use crate::advice;
 use crate::agreement::{self, Agreement};
 use crate::bounds;
 use crate::config::{Config, LogConfig, Route};
@@ -177,8 +179,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
             (cutoff, cutoff, 0.0)
         }
     };
-    let row_rms = row_rms(&groups, &fitted.estimate.x, base.len());
-    let residual_ratio = residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
+    let row_rms = figures::row_rms(&groups, &fitted.estimate.x, base.len());
+    let residual_ratio = figures::residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
     let mut warnings = robot.warnings.clone();
     warnings.extend(prior.warnings.iter().cloned());
     warnings.extend(log_warnings(&model, &prepared));
@@ -235,7 +237,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         }
     }
     progress(Step::Trust);
-    out.explained = explained(out.training.iter().chain(&out.validation), &out.consistent);
+    out.explained = figures::explained(out.training.iter().chain(&out.validation), &out.consistent);
     out.pruning = prune(&out.fit().kept_blocks(), &out.fit().solution.kept, &PruneSettings::default());
     out.trust = Evidence {
         model: &out.model,
@@ -245,7 +247,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         prior: &out.prior,
         fitted: &out.fitted,
         consistent: &out.consistent,
-        rows: &fit_rows(out.fit(), out.conditioning.as_ref(), kernel_hz),
+        rows: &figures::fit_rows(out.fit(), out.conditioning.as_ref(), kernel_hz),
         explained: &out.explained,
     }
     .trust();
@@ -397,89 +399,6 @@ fn effort_sizes(logs: &[PreparedLog]) -> Vec<f64> {
                 return 0.0;
             }
             *sizes.select_nth_unstable_by(last * 99 / 100, f64::total_cmp).1
-        })
-        .collect()
-}
-
-/// Share of an effort that a model must explain for its residual to count as noise: of its variance on every log,
-/// and of its mean square on held-out folds.
-const EXPLAINED: f64 = 0.5;
-
-fn explained<'a>(
-    agreements: impl Iterator<Item = &'a Agreement> + Clone,
-    consistent: &Consistent,
-) -> Vec<bool> {
-    let outputs = agreements.clone().next().map_or(0, |a| a.filtered.channels.len());
-    let held_out = |j: usize| {
-        let share = |estimator| consistent.held_out.explained(estimator, j);
-        // Whichever estimator does better: a log that is too short for one is no fault of the joint.
-        share(consistency::UNCONSTRAINED).into_iter().chain(share(consistent.consistent())).reduce(f64::max)
-    };
-    // An effort that never changes has no R² and nothing to explain.
-    (0..outputs)
-        .map(|j| {
-            let logs = agreements.clone().filter_map(|a| a.filtered.channels[j].r2);
-            logs.chain(if consistent.held_out.folds.is_empty() { None } else { held_out(j) })
-                .all(|x| x >= EXPLAINED)
-        })
-        .collect()
-}
-
-/// How the fit counts rows, for motions that are proposed.
-fn fit_rows(fit: &LinearEstimate, conditioning: Option<&Conditioning>, kernel_hz: f64) -> FitRows {
-    let outputs = fit.groups.iter().map(|g| g.output + 1).max().unwrap_or(0);
-    let sigma = (0..outputs)
-        .map(|output| {
-            // Of several logs the noisiest decides.
-            let own = fit.groups.iter().filter(|g| g.output == output && g.scale == 0 && g.rows > 0);
-            own.map(|g| g.variance.sqrt()).reduce(f64::max)
-        })
-        .collect();
-    FitRows {
-        scales_hz: conditioning.map_or_else(|| vec![kernel_hz], |c| c.scales_hz.clone()),
-        mask: conditioning.map_or_else(|| vec![None; outputs], |c| c.mask.clone()),
-        sigma,
-    }
-}
-
-fn row_rms(groups: &[ReducedGroup], x: &[f64], columns: usize) -> Vec<Option<f64>> {
-    let outputs = groups.iter().map(|g| g.output + 1).max().unwrap_or(0);
-    (0..outputs)
-        .map(|output| {
-            let (mut rss, mut rows) = (0.0, 0);
-            for group in groups.iter().filter(|g| g.output == output) {
-                rss += group.merged(columns).rss(x);
-                rows += group.rows();
-            }
-            (rows > 0).then(|| (rss / rows as f64).sqrt())
-        })
-        .collect()
-}
-
-fn residual_ratios(
-    groups: &[ReducedGroup],
-    fit: &LinearEstimate,
-    logs: &[PreparedLog],
-    kernel_hz: f64,
-) -> Vec<Option<f64>> {
-    let outputs = groups.iter().map(|g| g.output + 1).max().unwrap_or(0);
-    let spread = 0.265 / kernel_hz;
-    (0..outputs)
-        .map(|output| {
-            let (mut found, mut expected) = (0.0, 0.0);
-            for (k, group) in groups.iter().enumerate() {
-                if group.output != output || group.scale != 0 || fit.groups.len() != groups.len() {
-                    continue;
-                }
-                let log = &logs[group.log];
-                let noise = log.effort_noise[output].sigma;
-                let passed = 1.0 / (2.0 * std::f64::consts::PI.sqrt() * spread * log.rate_hz);
-                let rows = group.rows() as f64;
-                found += rows * fit.groups[k].variance;
-                expected += rows * noise * noise * passed;
-            }
-            // A pre-smoothed effort has no noise floor to compare with.
-            (expected > 1e-10 * found && found > 0.0).then(|| (found / expected).sqrt())
         })
         .collect()
 }

@@ -1,0 +1,217 @@
+//! Estimator and bounds of a run.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Config, pair, setting};
+use crate::Error;
+
+/// Limits beyond this are a slip or were meant to be infinite, whatever the unit.
+const LARGEST_LIMIT: f64 = 1e9;
+
+/// Linear estimator.
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Ordinary least squares: all rows alike.
+    Ols,
+    /// Weighted by residual variances that are estimated along the way, shared as [`EstimatorConfig::variances`] says.
+    #[default]
+    Wls,
+    /// Huber's loss: for some per cent of gross errors.
+    Huber,
+    /// Tukey's biweight: gross errors lose all influence.
+    Tukey,
+    /// Weighted, with the robot file as a Gaussian prior.
+    Ridge,
+    /// Total least squares: columns with errors of their own, see [`EstimatorConfig::column_noise`].
+    Tls,
+}
+
+/// Which rows share a residual variance.
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum Variances {
+    /// One per joint, log and kernel scale.
+    #[default]
+    Group,
+    /// One per joint and log.
+    JointAndLog,
+    /// One per joint.
+    Joint,
+}
+
+/// Which bodies the standard parameters may describe.
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum Consistency {
+    /// Some mass distribution has them (4 x 4 pseudo-inertia).
+    #[default]
+    PseudoInertia,
+    /// Positive mass and inertia about the centre of mass, triangle inequality or not (6 x 6 spatial inertia).
+    SpatialInertia,
+    /// Any numbers: base values as identified, split as near as possible to the robot file.
+    None,
+}
+
+/// How distance from the robot file is measured in directions that the data do not see.
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum PriorDistance {
+    /// Squared distance in units of the prior standard deviations (half the mass, and the moments that go with it).
+    #[default]
+    Quadratic,
+    /// Entropic (Bregman log-det) divergence, the same in every frame and unit.
+    Entropic,
+}
+
+/// Settings of the estimator.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct EstimatorConfig {
+    /// Method. Default `wls`.
+    pub method: Method,
+    /// Which rows share a residual variance. Default `group`.
+    pub variances: Variances,
+    /// Weight of the robot file in `ridge`; 1 means a Gaussian prior. Default 1.
+    pub ridge_weight: Option<f64>,
+    /// For `tls`: standard deviation of the errors of base columns, by name of the kept parameter, in the column's unit.
+    /// Columns not named are exact.
+    pub column_noise: BTreeMap<String, f64>,
+    /// For `tls`: standard deviation of the effort, in the effort's unit.
+    pub effort_noise: Option<f64>,
+    /// Which bodies the standard parameters may describe. Default `pseudo-inertia`.
+    pub consistency: Consistency,
+    /// Distance from the robot file. Default `quadratic`.
+    pub prior: PriorDistance,
+    /// Weight of that distance, residual variances per squared deviation or per nat. Default: as large as held-out folds
+    /// allow, at most that of a Gaussian prior.
+    pub prior_weight: Option<f64>,
+}
+
+/// Bounds that the consistent estimate must meet: on the total mass and on the centre of mass of one or more links, or
+/// on any parameter. `[lower, upper]`; `-inf` and `inf` leave a side open; finite limits are at most 1e9 in size.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct BoundConfig {
+    /// Moving links; a link stands for everything welded to it.
+    pub links: Vec<String>,
+    /// Sum of their masses, kg.
+    #[serde(deserialize_with = "pair")]
+    pub mass: Option<(f64, f64)>,
+    /// Centre of mass of a single link along x of its frame, m.
+    #[serde(deserialize_with = "pair")]
+    pub com_x: Option<(f64, f64)>,
+    /// The same along y, m.
+    #[serde(deserialize_with = "pair")]
+    pub com_y: Option<(f64, f64)>,
+    /// The same along z, m.
+    #[serde(deserialize_with = "pair")]
+    pub com_z: Option<(f64, f64)>,
+    /// A parameter, by name such as `joint1.fc`.
+    pub parameter: Option<String>,
+    /// Its range, in its unit.
+    #[serde(deserialize_with = "pair")]
+    pub range: Option<(f64, f64)>,
+}
+
+impl Config {
+    pub(super) fn check_estimator(&self) -> Result<(), Error> {
+        let e = &self.estimator;
+        let weights = [
+            ("ridge_weight", e.ridge_weight),
+            ("prior_weight", e.prior_weight),
+            ("effort_noise", e.effort_noise),
+        ];
+        for (name, value) in weights {
+            if let Some(x) = value
+                && !(x.is_finite() && x > 0.0)
+            {
+                return Err(setting(name, "a positive number", x));
+            }
+        }
+        for (name, x) in &e.column_noise {
+            if !(x.is_finite() && *x >= 0.0) {
+                return Err(setting(&format!("column_noise.{name}"), "a number that is not negative", x));
+            }
+        }
+        if e.method == Method::Tls && e.effort_noise.is_none() {
+            return Err(setting(
+                "effort_noise",
+                "the standard deviation of the effort, which `tls` needs",
+                "nothing",
+            ));
+        }
+        if e.prior == PriorDistance::Entropic && e.consistency == Consistency::SpatialInertia {
+            return Err(setting("prior", "`quadratic` with the 6 x 6 form", "`entropic`"));
+        }
+        if e.consistency == Consistency::None && !self.bound.is_empty() {
+            return Err(setting(
+                "consistency",
+                "`pseudo-inertia` or `spatial-inertia`, as there are bounds",
+                "`none`",
+            ));
+        }
+        self.bound.iter().try_for_each(BoundConfig::check)
+    }
+}
+
+impl BoundConfig {
+    /// Every range of the entry with its key.
+    pub fn ranges(&self) -> impl Iterator<Item = (&'static str, (f64, f64))> {
+        let all = [
+            ("mass", self.mass),
+            ("com_x", self.com_x),
+            ("com_y", self.com_y),
+            ("com_z", self.com_z),
+            ("range", self.range),
+        ];
+        all.into_iter().filter_map(|(key, range)| Some((key, range?)))
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let complete = match (&self.parameter, self.links.len()) {
+            (Some(_), 0) => self.ranges().all(|(key, _)| key == "range") && self.range.is_some(),
+            (None, 1) => self.range.is_none() && self.ranges().next().is_some(),
+            (None, 2..) => self.ranges().all(|(key, _)| key == "mass") && self.mass.is_some(),
+            _ => false,
+        };
+        if !complete {
+            let expected = "`links` with `mass` (or, for one link, `com_x`, `com_y`, `com_z`), or `parameter` with `range`";
+            return Err(setting("bound", expected, self.keys()));
+        }
+        let twice = self.links.iter().enumerate().find(|(k, link)| self.links[..*k].contains(link));
+        if let Some((_, link)) = twice {
+            return Err(setting("bound.links", "every link once", format!("`{link}` twice")));
+        }
+        for (key, (lower, upper)) in self.ranges() {
+            // Infinity as lower limit, or minus infinity as upper one, admits no number.
+            let possible = lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY;
+            if !possible || !(lower.is_finite() || upper.is_finite()) {
+                let of = self.parameter.as_ref().map_or_else(|| self.links.join("`, `"), Clone::clone);
+                let expected = "[lower, upper] with lower not above upper and one of them finite";
+                let found = format!("[{lower}, {upper}] for `{of}`");
+                return Err(setting(&format!("bound.{key}"), expected, found));
+            }
+            if let Some(x) = [lower, upper].into_iter().find(|x| x.is_finite() && x.abs() > LARGEST_LIMIT) {
+                let expected = format!("limits up to {LARGEST_LIMIT:e}, or `-inf` and `inf`");
+                return Err(setting(&format!("bound.{key}"), &expected, format!("{x:e}")));
+            }
+        }
+        Ok(())
+    }
+
+    /// The keys that are given, as a user would say it.
+    fn keys(&self) -> String {
+        let links = match self.links.len() {
+            0 => None,
+            1 => Some("`links` with one link".to_owned()),
+            n => Some(format!("`links` with {n} links")),
+        };
+        let parameter = self.parameter.as_ref().map(|_| "`parameter`".to_owned());
+        let ranges = self.ranges().map(|(key, _)| format!("`{key}`"));
+        let keys: Vec<String> = links.into_iter().chain(parameter).chain(ranges).collect();
+        if keys.is_empty() { "none of them".to_owned() } else { keys.join(", ") }
+    }
+}

@@ -1,0 +1,213 @@
+//! The model in the result file, from which efforts can be predicted again.
+
+use dynid_io::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, SettingValue};
+use dynid_model::{
+    Description, Inertia, JointDescription, JointKind, Limits, LinkDescription, Mat3, Mechanism, Mimic,
+    Placement, Vec3,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::elements::ElementPlan;
+
+/// Robot, elements and settings that predictions need.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct ModelRecord {
+    /// Gravity, m/s².
+    pub gravity: [f64; 3],
+    /// Floating base under the root link.
+    pub floating_base: bool,
+    /// Mimic joints follow their leaders.
+    pub couple_mimics: bool,
+    /// Links: name, and the inertia of the robot file.
+    pub links: Vec<LinkRecord>,
+    /// Joints.
+    pub joints: Vec<JointRecord>,
+    /// Element names per effort.
+    pub elements: Vec<Vec<String>>,
+    /// Couplings.
+    pub couplings: Vec<CouplingRecord>,
+    /// Numeric settings of elements: joint, element, key, value.
+    pub element_settings: Vec<(String, String, String, f64)>,
+    /// Cut-off of the state filter, Hz.
+    pub state_hz: f64,
+    /// Cut-off of the widest kernel, Hz.
+    pub kernel_hz: f64,
+}
+
+/// A link.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct LinkRecord {
+    /// Name.
+    pub name: String,
+    /// Ten standard parameters, if the file states them.
+    pub phi: Option<[f64; 10]>,
+}
+
+/// A joint.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct JointRecord {
+    /// Name.
+    pub name: String,
+    /// Parent link.
+    pub parent: String,
+    /// Child link.
+    pub child: String,
+    /// Kind.
+    pub kind: String,
+    /// Pitch of a helical joint, m/rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pitch: Option<f64>,
+    /// Rows of the rotation parent ← joint.
+    pub rotation: [[f64; 3]; 3],
+    /// Origin in the parent, m.
+    pub translation: [f64; 3],
+    /// Axis.
+    pub axis: [f64; 3],
+    /// Position limits.
+    pub position_limits: Option<(f64, f64)>,
+    /// Leader, ratio and offset of a mimic joint.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mimic: Option<(String, f64, f64)>,
+}
+
+/// A coupling.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct CouplingRecord {
+    /// Motors.
+    pub motors: Vec<String>,
+    /// Joints.
+    pub joints: Vec<String>,
+    /// Matrix.
+    pub matrix: Vec<Vec<f64>>,
+    /// `strict` or `columns`.
+    pub form: String,
+}
+
+impl ModelRecord {
+    /// Records a description and what acts at its joints.
+    pub fn new(description: &Description, mechanism: &Mechanism, plan: &ElementPlan) -> Self {
+        let links = description
+            .links
+            .iter()
+            .map(|l| LinkRecord { name: l.name.clone(), phi: l.inertia.map(|i| i.0) })
+            .collect();
+        let joints = description.joints.iter().map(joint_record).collect();
+        let couplings = plan
+            .couplings
+            .iter()
+            .map(|c| CouplingRecord {
+                motors: c.motors.clone(),
+                joints: c.joints.clone(),
+                matrix: c.matrix.clone(),
+                form: match c.form {
+                    CouplingForm::Strict => "strict".to_owned(),
+                    CouplingForm::Columns => "columns".to_owned(),
+                },
+            })
+            .collect();
+        let element_settings = plan
+            .settings()
+            .iter()
+            .filter_map(|s| match s.value {
+                SettingValue::Number(x) => Some((s.joint.clone(), s.element.clone(), s.key.clone(), x)),
+                _ => None,
+            })
+            .collect();
+        ModelRecord {
+            gravity: mechanism.gravity().0,
+            floating_base: description.floating_base,
+            couple_mimics: description.couple_mimics,
+            links,
+            joints,
+            elements: plan.per_rate.clone(),
+            couplings,
+            element_settings,
+            state_hz: 0.0,
+            kernel_hz: 0.0,
+        }
+    }
+
+    pub(crate) fn description(&self, name: &str) -> Result<Description, String> {
+        let mut d = Description::new(name);
+        d.gravity = self.gravity;
+        d.floating_base = self.floating_base;
+        d.couple_mimics = self.couple_mimics;
+        d.links = self
+            .links
+            .iter()
+            .map(|l| LinkDescription { name: l.name.clone(), inertia: l.phi.map(Inertia) })
+            .collect();
+        d.joints = self.joints.iter().map(joint_description).collect::<Result<_, _>>()?;
+        Ok(d)
+    }
+
+    pub(super) fn plan(&self) -> ElementPlan {
+        let couplings = self
+            .couplings
+            .iter()
+            .map(|c| CouplingSpec {
+                motors: c.motors.clone(),
+                joints: c.joints.clone(),
+                matrix: c.matrix.clone(),
+                form: if c.form == "columns" { CouplingForm::Columns } else { CouplingForm::Strict },
+            })
+            .collect();
+        let settings = self
+            .element_settings
+            .iter()
+            .map(|(joint, element, key, value)| ElementSetting {
+                joint: joint.clone(),
+                element: element.clone(),
+                key: key.clone(),
+                value: SettingValue::Number(*value),
+            })
+            .collect();
+        let spec = ElementSpec { settings, ..ElementSpec::default() };
+        ElementPlan::recorded(self.elements.clone(), couplings, spec)
+    }
+}
+
+fn joint_record(j: &JointDescription) -> JointRecord {
+    let (kind, pitch) = match j.kind {
+        JointKind::Revolute => ("revolute", None),
+        JointKind::Continuous => ("continuous", None),
+        JointKind::Prismatic => ("prismatic", None),
+        JointKind::Helical { pitch } => ("helical", Some(pitch)),
+        JointKind::Floating => ("floating", None),
+        JointKind::Fixed => ("fixed", None),
+    };
+    JointRecord {
+        name: j.name.clone(),
+        parent: j.parent.clone(),
+        child: j.child.clone(),
+        kind: kind.to_owned(),
+        pitch,
+        rotation: j.placement.rotation.rows(),
+        translation: j.placement.translation.0,
+        axis: j.axis,
+        position_limits: j.limits.position,
+        mimic: j.mimic.as_ref().map(|m| (m.of.clone(), m.ratio, m.offset)),
+    }
+}
+
+fn joint_description(j: &JointRecord) -> Result<JointDescription, String> {
+    let kind = match (j.kind.as_str(), j.pitch) {
+        ("revolute", _) => JointKind::Revolute,
+        ("continuous", _) => JointKind::Continuous,
+        ("prismatic", _) => JointKind::Prismatic,
+        ("helical", Some(pitch)) => JointKind::Helical { pitch },
+        ("floating", _) => JointKind::Floating,
+        ("fixed", _) => JointKind::Fixed,
+        (other, _) => return Err(format!("joint `{}`: unknown kind `{other}`", j.name)),
+    };
+    Ok(JointDescription {
+        name: j.name.clone(),
+        parent: j.parent.clone(),
+        child: j.child.clone(),
+        kind,
+        placement: Placement { rotation: Mat3::from_rows(j.rotation), translation: Vec3(j.translation) },
+        axis: j.axis,
+        limits: Limits { position: j.position_limits, ..Limits::default() },
+        mimic: j.mimic.clone().map(|(of, ratio, offset)| Mimic { of, ratio, offset }),
+    })
+}
