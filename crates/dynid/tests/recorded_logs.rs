@@ -5,7 +5,7 @@
 
 mod support;
 
-use support::{data, geometric_mean, on_validation, rms, run};
+use support::{PANDA, TX40, UR10, data, geometric_mean, on_validation, rms, run};
 
 /// Runs a set and requires the geometric mean over joints of the RMS ratio to the baseline to stay below `limit`.
 /// Prediction and effort are not aligned by the delay here, as in the baseline.
@@ -27,24 +27,7 @@ fn check(name: &str, text: &str, parameters: usize, filter_hz: f64, baseline: &[
 
 #[test]
 fn panda() {
-    check(
-        "panda-gaz2019",
-        r#"
-robot = "{data}/panda-gaz2019/panda_kinematics.urdf"
-[elements]
-default = ["coulomb", "viscous", "offset"]
-[[log]]
-path = "{data}/panda-gaz2019/exciting_trajectory.csv.gz"
-part = [0.0, 0.7]
-[[validation]]
-path = "{data}/panda-gaz2019/exciting_trajectory.csv.gz"
-part = [0.7, 1.0]
-"#,
-        64,
-        5.0,
-        &[0.139, 0.162, 0.121, 0.176, 0.077, 0.047, 0.057],
-        1.0,
-    );
+    check("panda-gaz2019", PANDA, 64, 5.0, &[0.139, 0.162, 0.121, 0.176, 0.077, 0.047, 0.057], 1.0);
 }
 
 #[test]
@@ -74,57 +57,12 @@ rows = [500, 4460]
 
 #[test]
 fn staubli_tx40_with_its_coupled_wrist() {
-    check(
-        "staubli-tx40",
-        r#"
-robot = "{data}/staubli-tx40/tx40.urdf"
-[columns]
-rate_hz = 5000
-position = "qm{}"
-effort = { columns = "im{}" }
-[motor_side]
-matrix = [
-  [32.0, 0, 0, 0, 0, 0], [0, 32.0, 0, 0, 0, 0], [0, 0, 45.0, 0, 0, 0],
-  [0, 0, 0, -48.0, 0, 0], [0, 0, 0, 0, 45.0, 0], [0, 0, 0, 0, 32.0, 32.0],
-]
-offset = [0, -1.5707963267948966, 1.5707963267948966, 0, 0, 0]
-[[coupling]]
-motors = ["m5", "m6"]
-joints = ["joint_5", "joint_6"]
-matrix = [[45.0, 0.0], [32.0, 32.0]]
-form = "columns"
-[[log]]
-path = "{data}/staubli-tx40/motor_log.csv.gz"
-part = [0.0, 0.6]
-[[validation]]
-path = "{data}/staubli-tx40/motor_log.csv.gz"
-part = [0.6, 1.0]
-"#,
-        61,
-        40.0,
-        &[4.15, 5.69, 3.69, 1.40, 2.15, 1.29],
-        1.0,
-    );
+    check("staubli-tx40", TX40, 61, 40.0, &[4.15, 5.69, 3.69, 1.40, 2.15, 1.29], 1.0);
 }
 
 #[test]
 fn ur10_unisa() {
-    check(
-        "ur10-unisa",
-        r#"
-robot = "{data}/ur10-unisa/ur10_kinematics.urdf"
-[[log]]
-path = "{data}/ur10-unisa/exciting_trajectory.csv.gz"
-part = [0.0, 0.7]
-[[validation]]
-path = "{data}/ur10-unisa/exciting_trajectory.csv.gz"
-part = [0.7, 1.0]
-"#,
-        58,
-        5.0,
-        &[3.57, 3.78, 2.34, 0.907, 0.481, 1.08],
-        1.0,
-    );
+    check("ur10-unisa", UR10, 58, 5.0, &[3.57, 3.78, 2.34, 0.907, 0.481, 1.08], 1.0);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use dynid::estimators::distribution::t_quantile;
 use dynid::estimators::identifiability::Verdict;
 use dynid::identify::Identification;
 use dynid::model::EffortModel;
-use support::{data, run};
+use support::{PANDA, TX40, UR10, data, run};
 
 /// True value of every linear parameter: bodies of `truth.urdf`, elements of `truth.json`.
 fn truth(id: &Identification, folder: &str) -> Vec<f64> {
@@ -94,52 +94,6 @@ path = "{data}/oracles/logs/ur5_dev/train.csv.gz"
     assert!(seen >= 40 && right as f64 >= 0.95 * f64::from(seen));
     assert!(base_seen >= 55 && base_right as f64 >= 0.95 * f64::from(base_seen));
 }
-
-/// Configurations of recorded logs whose unconstrained fit asks for impossible bodies or negative rotor inertias.
-const TX40: &str = r#"
-robot = "{data}/staubli-tx40/tx40.urdf"
-[columns]
-rate_hz = 5000
-position = "qm{}"
-effort = { columns = "im{}" }
-[motor_side]
-matrix = [
-  [32.0, 0, 0, 0, 0, 0], [0, 32.0, 0, 0, 0, 0], [0, 0, 45.0, 0, 0, 0],
-  [0, 0, 0, -48.0, 0, 0], [0, 0, 0, 0, 45.0, 0], [0, 0, 0, 0, 32.0, 32.0],
-]
-offset = [0, -1.5707963267948966, 1.5707963267948966, 0, 0, 0]
-[[coupling]]
-motors = ["m5", "m6"]
-joints = ["joint_5", "joint_6"]
-matrix = [[45.0, 0.0], [32.0, 32.0]]
-form = "columns"
-[[log]]
-path = "{data}/staubli-tx40/motor_log.csv.gz"
-part = [0.0, 0.6]
-[[validation]]
-path = "{data}/staubli-tx40/motor_log.csv.gz"
-part = [0.6, 1.0]
-"#;
-const UR10: &str = r#"
-robot = "{data}/ur10-unisa/ur10_kinematics.urdf"
-[[log]]
-path = "{data}/ur10-unisa/exciting_trajectory.csv.gz"
-part = [0.0, 0.7]
-[[validation]]
-path = "{data}/ur10-unisa/exciting_trajectory.csv.gz"
-part = [0.7, 1.0]
-"#;
-const PANDA: &str = r#"
-robot = "{data}/panda-gaz2019/panda_kinematics.urdf"
-[elements]
-default = ["coulomb", "viscous", "offset"]
-[[log]]
-path = "{data}/panda-gaz2019/exciting_trajectory.csv.gz"
-part = [0.0, 0.7]
-[[validation]]
-path = "{data}/panda-gaz2019/exciting_trajectory.csv.gz"
-part = [0.7, 1.0]
-"#;
 
 /// Ratio of the consistent to the unconstrained error on held-out folds and on the validation part.
 fn price(name: &str, id: &Identification) -> (f64, f64) {

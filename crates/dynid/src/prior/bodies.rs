@@ -168,34 +168,14 @@ fn repaired(inertia: Inertia, next_joint: f64) -> Option<(Inertia, Origin)> {
 
 /// Pseudo-inertia `[[Σ, h], [hᵀ, m]]`, `Σ = ½ tr(I) 1 - I`, with lengths divided by `size` (kg).
 fn scaled_pseudo_inertia(inertia: &Inertia, size: f64) -> Mat<f64> {
-    let [m, mx, my, mz, xx, xy, xz, yy, yz, zz] = inertia.0;
-    let half_trace = 0.5 * (xx + yy + zz);
-    let (one, two) = (1.0 / size, 1.0 / (size * size));
-    let rows = [
-        [(half_trace - xx) * two, -xy * two, -xz * two, mx * one],
-        [-xy * two, (half_trace - yy) * two, -yz * two, my * one],
-        [-xz * two, -yz * two, (half_trace - zz) * two, mz * one],
-        [mx * one, my * one, mz * one, m],
-    ];
-    Mat::from_fn(4, 4, |i, j| rows[i][j])
+    let (p, scale) = (inertia.pseudo_inertia(), [size, size, size, 1.0]);
+    Mat::from_fn(4, 4, |i, j| p[i][j] / (scale[i] * scale[j]))
 }
 
 fn from_scaled_pseudo_inertia(p: &Mat<f64>, size: f64) -> Inertia {
-    let sigma = |i: usize, j: usize| p[(i, j)] * size * size;
-    let (s0, s1, s2) = (sigma(0, 0), sigma(1, 1), sigma(2, 2));
-    let h = |i: usize| p[(i, 3)] * size;
-    Inertia([
-        p[(3, 3)],
-        h(0),
-        h(1),
-        h(2),
-        s1 + s2,
-        -sigma(0, 1),
-        -sigma(0, 2),
-        s0 + s2,
-        -sigma(1, 2),
-        s0 + s1,
-    ])
+    let scale = [size, size, size, 1.0];
+    let whole = std::array::from_fn(|i| std::array::from_fn(|j| p[(i, j)] * (scale[i] * scale[j])));
+    Inertia::from_pseudo_inertia(&whole)
 }
 
 #[cfg(test)]

@@ -7,6 +7,56 @@ use dynid::agreement::{Agreement, Alignment, compare};
 use dynid::estimators::conditioning::prepare;
 use dynid::identify::{Identification, identify};
 
+/// Panda with torque sensors, later 30 % kept back.
+pub(crate) const PANDA: &str = r#"
+robot = "{data}/panda-gaz2019/panda_kinematics.urdf"
+[elements]
+default = ["coulomb", "viscous", "offset"]
+[[log]]
+path = "{data}/panda-gaz2019/exciting_trajectory.csv.gz"
+part = [0.0, 0.7]
+[[validation]]
+path = "{data}/panda-gaz2019/exciting_trajectory.csv.gz"
+part = [0.7, 1.0]
+"#;
+
+/// Staubli TX40 with its coupled wrist: motor-side log, later 40 % kept back.
+pub(crate) const TX40: &str = r#"
+robot = "{data}/staubli-tx40/tx40.urdf"
+[columns]
+rate_hz = 5000
+position = "qm{}"
+effort = { columns = "im{}" }
+[motor_side]
+matrix = [
+  [32.0, 0, 0, 0, 0, 0], [0, 32.0, 0, 0, 0, 0], [0, 0, 45.0, 0, 0, 0],
+  [0, 0, 0, -48.0, 0, 0], [0, 0, 0, 0, 45.0, 0], [0, 0, 0, 0, 32.0, 32.0],
+]
+offset = [0, -1.5707963267948966, 1.5707963267948966, 0, 0, 0]
+[[coupling]]
+motors = ["m5", "m6"]
+joints = ["joint_5", "joint_6"]
+matrix = [[45.0, 0.0], [32.0, 32.0]]
+form = "columns"
+[[log]]
+path = "{data}/staubli-tx40/motor_log.csv.gz"
+part = [0.0, 0.6]
+[[validation]]
+path = "{data}/staubli-tx40/motor_log.csv.gz"
+part = [0.6, 1.0]
+"#;
+
+/// UR10 of the University of Salerno, later 30 % kept back.
+pub(crate) const UR10: &str = r#"
+robot = "{data}/ur10-unisa/ur10_kinematics.urdf"
+[[log]]
+path = "{data}/ur10-unisa/exciting_trajectory.csv.gz"
+part = [0.0, 0.7]
+[[validation]]
+path = "{data}/ur10-unisa/exciting_trajectory.csv.gz"
+part = [0.7, 1.0]
+"#;
+
 /// Folder of shared data, or `None` with a note.
 pub(crate) fn data() -> Option<PathBuf> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
