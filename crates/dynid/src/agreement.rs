@@ -35,6 +35,8 @@ pub struct Agreement {
     pub measured: Vec<Vec<f64>>,
     /// Per output: predicted effort.
     pub predicted: Vec<Vec<f64>>,
+    /// Per output: the joint moves in this log.
+    pub moves: Vec<bool>,
     /// Per sample: counted (not near an end or a gap of the clock).
     pub counted: Vec<bool>,
     /// On raw effort.
@@ -107,6 +109,7 @@ pub fn compare(
         filtered_unaligned: agree(&measured_filtered, &filtered(&unaligned)?)?,
         measured: log.effort.clone(),
         predicted,
+        moves: log.moves.clone(),
         counted,
         filter_hz,
     })

@@ -69,7 +69,8 @@ pub struct Identification {
     pub fitted: Fitted,
     /// Standard parameters, physically consistent unless told otherwise.
     pub consistent: Consistent,
-    /// Per output: whether the model explains at least half of the effort, on every log and on held-out folds.
+    /// Per output: whether the model explains at least half of the effort, on every log in which the joint
+    /// moves and on held-out folds.
     pub explained: Vec<bool>,
     /// How far each parameter can be trusted.
     pub trust: Trust,

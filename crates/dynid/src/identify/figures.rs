@@ -7,8 +7,8 @@ use crate::advice::FitRows;
 use crate::agreement::Agreement;
 use crate::consistency::{self, Consistent};
 
-/// Share of an effort that a model must explain for its residual to count as noise: of its variance on every log,
-/// and of its mean square on held-out folds.
+/// Share of an effort that a model must explain for its residual to count as noise: of its variance on every log
+/// in which the joint moves, and of its mean square on held-out folds.
 const EXPLAINED: f64 = 0.5;
 
 pub(super) fn explained<'a>(
@@ -24,7 +24,8 @@ pub(super) fn explained<'a>(
     // An effort that never changes has no R² and nothing to explain.
     (0..outputs)
         .map(|j| {
-            let logs = agreements.clone().filter_map(|a| a.filtered.channels[j].r2);
+            let moving = agreements.clone().filter(|a| a.moves[j]);
+            let logs = moving.filter_map(|a| a.filtered.channels[j].r2);
             logs.chain(if consistent.held_out.folds.is_empty() { None } else { held_out(j) })
                 .all(|x| x >= EXPLAINED)
         })
