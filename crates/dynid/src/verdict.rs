@@ -199,7 +199,7 @@ fn explained(id: &Identification) -> Option<(Status, CheckResult)> {
             "joints that the model does not explain",
             Some(poor.len() as f64),
             "",
-            "none: at least half of the effort of every joint explained, on all logs and on held-out folds",
+            "none: at least half of the effort of every joint explained, on logs that move it and on held-out folds",
             format!(
                 "the effort of `{}` is mostly something else than this model (poor current sensing, friction at rest, a wrong \
                  column?): its rows count for nothing in the verdicts, so that what only they could show stays with the prior",
