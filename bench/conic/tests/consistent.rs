@@ -283,7 +283,7 @@ fn counts(ends: impl Iterator<Item = String>) -> String {
 
 /// Both solvers on a thousand problems of any noise: `cargo test --release -- --ignored --nocapture`.
 #[test]
-#[ignore = "a survey; the ordinary run checks the moderate ones"]
+#[ignore = "a survey of 1000 problems that measures and prints; the ordinary run checks the moderate ones"]
 fn a_thousand_problems() {
     let settings = Settings::default();
     let solve = |seed: u64| {

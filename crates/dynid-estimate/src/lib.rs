@@ -15,7 +15,6 @@
 //! | which parameters a model can do without | [`elimination`] |
 //! | whether residuals are white | [`whiteness`] |
 //! | which parameters the data determine, and which the prior | [`identifiability`] |
-//! | symmetric matrices made positive definite | [`definite`] |
 //! | how well a prediction matches a measurement | [`metrics`] |
 //!
 //! Notation: `W` is the regressor (rows × `p` columns), `y` the effort, `x` the parameters,
@@ -24,7 +23,6 @@
 pub mod conditioning;
 pub mod consistent;
 pub mod covariance;
-pub mod definite;
 pub mod distribution;
 pub mod elimination;
 pub mod factor;

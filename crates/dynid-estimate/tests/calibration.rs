@@ -108,7 +108,7 @@ fn raw_residuals_of_a_fit_are_judged_fairly() {
 
 /// The full count, at both lengths of the specification.
 #[test]
-#[ignore = "takes some minutes"]
+#[ignore = "takes some minutes; the ordinary run does fewer logs"]
 fn intervals_of_a_thousand_logs_hold_the_truth() {
     check(60.0, 1000);
     check(20.0, 1000);

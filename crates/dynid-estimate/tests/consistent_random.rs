@@ -99,7 +99,7 @@ fn random_problems_in_the_weaker_form_and_with_entropic_prior() {
 
 /// The whole ten thousand: `cargo test --release -p dynid-estimate --test consistent_random -- --ignored --nocapture`.
 #[test]
-#[ignore = "takes minutes; the ordinary run does the first 300"]
+#[ignore = "takes half a minute on two cores; the ordinary run does the first 300"]
 fn ten_thousand_random_problems() {
     let outcomes = run(0..10_000, &Settings::default());
     summary("pseudo-inertia", &outcomes);

@@ -130,6 +130,39 @@ pub fn least_eigenvalue<const N: usize>(a: &Square<N>) -> f64 {
     eigen(a).0[0]
 }
 
+/// A symmetric matrix whose small eigenvalues were raised.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Raised<const N: usize> {
+    /// The matrix with the raised eigenvalues.
+    pub matrix: Square<N>,
+    /// Eigenvalues before, ascending.
+    pub eigenvalues: [f64; N],
+    /// How many of them were raised.
+    pub raised: usize,
+}
+
+/// Raises the eigenvalues of a symmetric matrix that are at most `zero · λ_max` to `share · λ_max`; eigenvectors stay.
+///
+/// Without an eigenvalue to raise the matrix comes back as it is. `None` if no eigenvalue is positive or an entry is not
+/// finite. Panics unless `0 ≤ zero ≤ share`.
+pub fn raise_eigenvalues<const N: usize>(matrix: &Square<N>, zero: f64, share: f64) -> Option<Raised<N>> {
+    assert!(0.0 <= zero && zero <= share, "the floor lies above what counts as zero");
+    if matrix.iter().flatten().any(|x| !x.is_finite()) {
+        return None;
+    }
+    let (eigenvalues, vectors) = eigen(matrix);
+    let largest = *eigenvalues.last().filter(|x| **x > 0.0)?;
+    let raised = eigenvalues.iter().filter(|v| **v <= zero * largest).count();
+    if raised == 0 {
+        return Some(Raised { matrix: *matrix, eigenvalues, raised });
+    }
+    let mut lifted = [[0.0; N]; N];
+    for (k, value) in eigenvalues.iter().enumerate() {
+        lifted[k][k] = if k < raised { share * largest } else { *value };
+    }
+    Some(Raised { matrix: congruence(&vectors, &lifted), eigenvalues, raised })
+}
+
 /// Singular values `d` and right singular vectors `v` (columns) of a square matrix: columns of `a v` are orthogonal
 /// with lengths `d`.
 ///
@@ -211,6 +244,26 @@ mod tests {
         close(&congruence(&v, &diagonal), &A, 1e-14);
         close(&product(&transpose(&v), &v), &identity(), 1e-15);
         assert!(d.is_sorted() && (d.iter().sum::<f64>() - trace(&A)).abs() < 1e-14);
+    }
+
+    #[test]
+    fn raises_what_is_not_positive_and_nothing_else() {
+        // Eigenvalues 3 (along (1, 1)) and -1 (along (1, -1)).
+        let found = raise_eigenvalues(&[[1.0, 2.0], [2.0, 1.0]], 1e-9, 1e-3).unwrap();
+        assert_eq!(found.raised, 1);
+        assert!((found.eigenvalues[0] + 1.0).abs() < 1e-14 && (found.eigenvalues[1] - 3.0).abs() < 1e-14);
+        let (low, high) = (3e-3, 3.0);
+        assert!((found.matrix[0][0] - 0.5 * (high + low)).abs() < 1e-14);
+        assert!((found.matrix[0][1] - 0.5 * (high - low)).abs() < 1e-14);
+
+        let good = [[2.0, 0.5, 0.5], [0.5, 2.0, 0.5], [0.5, 0.5, 2.0]];
+        assert_eq!(raise_eigenvalues(&good, 1e-9, 1e-3).unwrap().matrix, good);
+    }
+
+    #[test]
+    fn nothing_positive_cannot_be_repaired() {
+        assert_eq!(raise_eigenvalues(&[[0.0; 3]; 3], 0.0, 1e-3), None);
+        assert_eq!(raise_eigenvalues(&[[f64::NAN]], 0.0, 1e-3), None);
     }
 
     #[test]

@@ -1,7 +1,6 @@
 //! A prior body for every moving link: as stated, repaired, or invented.
 
-use dynid_estimate::Mat;
-use dynid_estimate::definite::raise_eigenvalues;
+use dynid_model::symmetric::{Square, raise_eigenvalues};
 use dynid_model::{Body, Inertia, Mat3, Mechanism, Vec3};
 
 use super::PriorError;
@@ -167,14 +166,14 @@ fn repaired(inertia: Inertia, next_joint: f64) -> Option<(Inertia, Origin)> {
 }
 
 /// Pseudo-inertia `[[Σ, h], [hᵀ, m]]`, `Σ = ½ tr(I) 1 - I`, with lengths divided by `size` (kg).
-fn scaled_pseudo_inertia(inertia: &Inertia, size: f64) -> Mat<f64> {
+fn scaled_pseudo_inertia(inertia: &Inertia, size: f64) -> Square<4> {
     let (p, scale) = (inertia.pseudo_inertia(), [size, size, size, 1.0]);
-    Mat::from_fn(4, 4, |i, j| p[i][j] / (scale[i] * scale[j]))
+    std::array::from_fn(|i| std::array::from_fn(|j| p[i][j] / (scale[i] * scale[j])))
 }
 
-fn from_scaled_pseudo_inertia(p: &Mat<f64>, size: f64) -> Inertia {
+fn from_scaled_pseudo_inertia(p: &Square<4>, size: f64) -> Inertia {
     let scale = [size, size, size, 1.0];
-    let whole = std::array::from_fn(|i| std::array::from_fn(|j| p[(i, j)] * (scale[i] * scale[j])));
+    let whole = std::array::from_fn(|i| std::array::from_fn(|j| p[i][j] * (scale[i] * scale[j])));
     Inertia::from_pseudo_inertia(&whole)
 }
 
