@@ -11,9 +11,10 @@
 //! | one time block or group of a log, and its rows again | [`groups`], [`rows`] |
 //! | every linear estimator through one call | [`linear::estimate`] |
 //! | covariance that survives filtering | [`covariance`] |
-//! | held-out error over folds of blocks | [`folds`] |
+//! | held-out error over folds of blocks; several estimators on the same folds | [`folds`], [`held_out`] |
 //! | which parameters a model can do without | [`elimination`] |
 //! | whether residuals are white | [`whiteness`] |
+//! | standard parameters of bodies that can exist, with a proven gap | [`consistent`] |
 //! | which parameters the data determine, and which the prior | [`identifiability`] |
 //! | how well a prediction matches a measurement | [`metrics`] |
 //!
