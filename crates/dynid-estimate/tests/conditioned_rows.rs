@@ -46,6 +46,7 @@ fn case(logs: usize, share: f64) -> Case {
                 ddq: &ddq,
                 gravity: None,
                 channels: &[],
+                sign_width: 0.0,
             };
             model.regressor(&moving, &[], &mut block);
             let joints = (0..JOINTS)

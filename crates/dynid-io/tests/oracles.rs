@@ -170,6 +170,7 @@ fn check_blocks(oracle: &Oracle, name: &str) {
         ddq: &ddq,
         gravity: Some(&gravity),
         channels: &[],
+        sign_width: 0.0,
     };
     let model = RobotModel::new(oracle.mechanism.clone(), vec![]);
     let mut block = RegressorBlock::new(model.layout().clone(), samples);

@@ -63,6 +63,7 @@ impl RandomMotion {
             ddq: &self.ddq,
             gravity: None,
             channels: &channels,
+            sign_width: 0.0,
         })
     }
 }

@@ -225,6 +225,7 @@ impl CoupledRegressor {
             ddq: &joint[2],
             gravity: None,
             channels: &[],
+            sign_width: 0.0,
         };
         let gravity: Option<Vec<f64>> = motion
             .gravity

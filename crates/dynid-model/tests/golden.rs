@@ -289,7 +289,8 @@ fn linear_elements_follow_their_laws() {
         let mut linear = vec![0.0; 10];
         linear.extend_from_slice(values);
         let n = dq.len();
-        let motion = MotionBlock { samples: n, stride: n, q, dq, ddq, gravity: None, channels: &[] };
+        let motion =
+            MotionBlock { samples: n, stride: n, q, dq, ddq, gravity: None, channels: &[], sign_width: 0.0 };
         let mut block = RegressorBlock::new(model.layout().clone(), n);
         model.regressor(&motion, &[], &mut block);
         block.effort(0, &linear)
@@ -350,7 +351,16 @@ fn six_joint_effort(
     let model = RobotModel::new(modified_dh(&INDY7).build().unwrap(), elements);
     let mut linear = vec![0.0; 60];
     linear.extend_from_slice(values);
-    let motion = MotionBlock { samples: 1, stride: 1, q: &[0.0; 6], dq, ddq, gravity: None, channels: &[] };
+    let motion = MotionBlock {
+        samples: 1,
+        stride: 1,
+        q: &[0.0; 6],
+        dq,
+        ddq,
+        gravity: None,
+        channels: &[],
+        sign_width: 0.0,
+    };
     let mut block = RegressorBlock::new(model.layout().clone(), 1);
     model.regressor(&motion, &[], &mut block);
     (0..6).map(|j| block.effort(j, &linear)[0]).collect()

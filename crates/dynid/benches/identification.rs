@@ -96,6 +96,7 @@ fn blocks(model: &RobotModel, samples: usize, mut work: impl FnMut(&RegressorBlo
             ddq: &signals[2],
             gravity: None,
             channels: &[],
+            sign_width: 0.0,
         };
         model.regressor(&motion, &[], &mut block);
         let efforts = efforts.get_or_insert_with(|| {

@@ -33,6 +33,7 @@ impl Flat {
             ddq: &self.ddq,
             gravity: self.gravity.as_deref(),
             channels: &[],
+            sign_width: 0.0,
         };
         model.regressor(&motion, &[], &mut block);
         block

@@ -256,6 +256,7 @@ fn efforts(model: &RobotModel, values: &[f64], signals: &[Vec<f64>; 3], samples:
         ddq: &signals[2],
         gravity: None,
         channels: &[],
+        sign_width: 0.0,
     };
     model.regressor(&motion, &[], &mut block);
     (0..model.outputs().len()).map(|output| block.effort(output, values)).collect()

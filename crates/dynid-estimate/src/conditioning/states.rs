@@ -92,6 +92,7 @@ impl States {
             ddq: &self.ddq[range.start..],
             gravity: None,
             channels: &channels,
+            sign_width: 0.0,
         })
     }
 

@@ -1,6 +1,7 @@
 //! Blocks of samples, several at a time.
 
 use super::{Dynamics, State, inverse_dynamics, regressor};
+use crate::element::sign;
 use crate::scalar::{LANES, LaneTask, Scalar, run_on_lanes};
 use crate::spatial::Vec3;
 
@@ -24,6 +25,10 @@ pub struct MotionBlock<'a> {
     pub gravity: Option<&'a [f64]>,
     /// Extra channels by name, each at least `samples` long: motor current, temperature.
     pub channels: &'a [(&'a str, &'a [f64])],
+    /// Speed over which elements smooth the sign of a velocity: `s(v) = tanh(v / sign_width)`; 0: the sign itself.
+    ///
+    /// A smooth sign is for design and simulation, where derivatives are wanted; measured motion is taken as it is.
+    pub sign_width: f64,
 }
 
 impl<'a> MotionBlock<'a> {
@@ -40,6 +45,11 @@ impl<'a> MotionBlock<'a> {
     /// Samples of one position entry.
     pub fn position(&self, position: usize) -> &'a [f64] {
         &self.q[position * self.stride..][..self.samples]
+    }
+
+    /// The sign that elements take of a velocity, `s(v)`.
+    pub fn sign(&self, v: f64) -> f64 {
+        if self.sign_width > 0.0 { (v / self.sign_width).tanh() } else { sign(v) }
     }
 
     /// Samples of an extra channel.

@@ -1,6 +1,6 @@
 //! Friction that is linear in its parameters, and the constant offset.
 
-use super::{ElementColumns, JointElement, JointInfo, sign};
+use super::{ElementColumns, JointElement, JointInfo};
 use crate::dynamics::MotionBlock;
 use crate::parameter::Parameter;
 
@@ -47,7 +47,7 @@ impl JointElement for Coulomb {
         vec![(self.rate, 0)]
     }
     fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
-        out.map(0, motion.rate(self.rate), sign);
+        out.map(0, motion.rate(self.rate), |v| motion.sign(v));
     }
 }
 
@@ -99,8 +99,13 @@ impl JointElement for AsymmetricFriction {
     }
     fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         let v = motion.rate(self.rate);
-        out.map(0, v, |v| if v > 0.0 { 1.0 } else { 0.0 });
-        out.map(1, v, |v| if v < 0.0 { -1.0 } else { 0.0 });
+        // With an exact sign both shares vanish at rest.
+        let share = |v: f64| {
+            let s = motion.sign(v);
+            [0.5 * (s.abs() + s), 0.5 * (s.abs() - s)]
+        };
+        out.map(0, v, |v| share(v)[0]);
+        out.map(1, v, |v| -share(v)[1]);
         out.map(2, v, |v| v.max(0.0));
         out.map(3, v, |v| v.min(0.0));
     }

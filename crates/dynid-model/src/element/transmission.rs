@@ -1,7 +1,7 @@
 //! Joints that share motors: `q̇_motor = A q̇`, so efforts add up as `τ = Aᵀ τ_motor`.
 
 use super::friction::{EFFORT, VISCOUS};
-use super::{ElementColumns, JointElement, JointInfo, sign};
+use super::{ElementColumns, JointElement, JointInfo};
 use crate::dynamics::MotionBlock;
 use crate::parameter::Parameter;
 
@@ -64,7 +64,7 @@ impl JointElement for Transmission {
                 let (v, a) = (sum(motion.dq), sum(motion.ddq));
                 for (k, j) in acting.iter().enumerate() {
                     out.column(entry + 3 * k)[sample] = row[*j] * a;
-                    out.column(entry + 3 * k + 1)[sample] = row[*j] * sign(v);
+                    out.column(entry + 3 * k + 1)[sample] = row[*j] * motion.sign(v);
                     out.column(entry + 3 * k + 2)[sample] = row[*j] * v;
                 }
             }
@@ -114,7 +114,7 @@ impl JointElement for CoupledWrist {
         out.map(2, vb, |x| k * x);
         out.map(3, va, |x| k * x);
         for sample in 0..motion.samples {
-            let s = sign(k * va[sample] + vb[sample]);
+            let s = motion.sign(k * va[sample] + vb[sample]);
             out.column(4)[sample] = k * s;
             out.column(5)[sample] = s;
         }
