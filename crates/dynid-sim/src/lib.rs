@@ -1,0 +1,1 @@
+//! Virtual experiments: controlled robots in motion, with sensors and all their faults.
