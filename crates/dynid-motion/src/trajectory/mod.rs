@@ -1,9 +1,11 @@
 //! Excitation trajectories with exact derivatives.
 
 pub mod fourier;
+pub mod fourier_basis;
 pub mod quintic;
 
 pub use fourier::Fourier;
+pub use fourier_basis::FourierBasis;
 pub use quintic::Quintic;
 
 /// Why a trajectory was refused.
