@@ -1,4 +1,4 @@
-//! Time per sample of inverse dynamics and regressor, alone and over blocks of lanes.
+//! Time per sample of inverse dynamics, regressor and their adjoints, alone and over blocks of lanes.
 
 use divan::{Bencher, black_box, counter::ItemsCount};
 use dynid_model::*;
@@ -88,6 +88,38 @@ fn regressor_lanes(bencher: Bencher<'_, '_>, joints: usize) {
         bencher.counter(ItemsCount::new(BLOCK)).bench_local(|| {
             model.regressor(black_box(block), &[], &mut out);
             black_box(out.column(0, 0)[0])
+        });
+    });
+}
+
+/// Blocks too short for lanes: sample after sample.
+const SHORT: usize = 3;
+
+#[divan::bench(args = ROBOTS, consts = [SHORT, BLOCK])]
+fn effort_adjoint<const SAMPLES: usize>(bencher: Bencher<'_, '_>, joints: usize) {
+    let model = RobotModel::new(robot(joints), vec![]);
+    let phi = model.mechanism().inertia_vector();
+    let weights = vec![0.5; joints * SAMPLES];
+    let mut out = MotionAdjoint::new(joints, joints, SAMPLES);
+    RandomMotion::new(model.mechanism(), &[], SAMPLES, 1).with_block(|block| {
+        bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| {
+            model.effort_adjoint(black_box(block), &[], &phi, SAMPLES, &weights, &mut out);
+            black_box(out.q[0])
+        });
+    });
+}
+
+#[divan::bench(args = ROBOTS, consts = [SHORT, BLOCK])]
+fn regressor_adjoint<const SAMPLES: usize>(bencher: Bencher<'_, '_>, joints: usize) {
+    let model = RobotModel::new(robot(joints), vec![]);
+    let mut weights = RegressorBlock::new(model.layout().clone(), SAMPLES);
+    weights.set_samples(SAMPLES);
+    let mut out = MotionAdjoint::new(joints, joints, SAMPLES);
+    RandomMotion::new(model.mechanism(), &[], SAMPLES, 1).with_block(|block| {
+        model.regressor(block, &[], &mut weights);
+        bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| {
+            model.regressor_adjoint(black_box(block), &[], &weights, &mut out);
+            black_box(out.q[0])
         });
     });
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::dynamics::MotionBlock;
+use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::ParameterTable;
 
 /// Which columns of the regressor can differ from zero, row by row.
@@ -127,6 +127,25 @@ impl RegressorBlock {
         effort
     }
 
+    /// The same entries, to be written: weights for [`EffortModel::regressor_adjoint`].
+    pub fn column_mut(&mut self, output: usize, k: usize) -> &mut [f64] {
+        let slot = self.layout.first_slot[output] + k;
+        &mut self.data[slot * self.capacity..][..self.samples]
+    }
+
+    /// Makes this a block of `samples` samples; entries are to be written by the caller and are arbitrary until then.
+    ///
+    /// # Panics
+    /// If the block has no room for them.
+    pub fn set_samples(&mut self, samples: usize) {
+        assert!(samples <= self.capacity, "{samples} samples in a block of {}", self.capacity);
+        self.samples = samples;
+    }
+
+    pub(crate) fn data(&self) -> &[f64] {
+        &self.data
+    }
+
     pub(crate) fn start(&mut self, layout: &Arc<RegressorLayout>, samples: usize) {
         assert_eq!(*self.layout, **layout, "block of another model");
         assert!(samples <= self.capacity, "{samples} samples in a block of {}", self.capacity);
@@ -177,4 +196,48 @@ pub trait EffortModel: Send + Sync {
     /// # Panics
     /// If the block is larger than `out`, a channel is missing or `shape` has the wrong length.
     fn regressor(&self, motion: &MotionBlock<'_>, shape: &[f64], out: &mut RegressorBlock);
+
+    /// Efforts of a block, `W linear + offset`, without forming the regressor: output `o`, sample `s` at
+    /// `effort[o * stride + s]`.
+    ///
+    /// # Panics
+    /// If a slice has the wrong length or is too short, or a channel is missing.
+    fn efforts(
+        &self,
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        linear: &[f64],
+        stride: usize,
+        effort: &mut [f64],
+    );
+    /// Adds to `out` the derivatives of `Σ_o Σ_s weights[o * stride + s] · effort_o(s; linear)` with respect to the
+    /// motion: the sensitivity to a regressor in the direction of a matrix of rank one, or the gradient of efforts.
+    ///
+    /// `linear` need not be physical. Gravity and extra channels are held, as is the sign of a velocity without
+    /// [`MotionBlock::sign_width`].
+    ///
+    /// # Panics
+    /// As [`EffortModel::efforts`]; if `out` has other dimensions than motion and model; if a joint floats.
+    fn effort_adjoint(
+        &self,
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        linear: &[f64],
+        stride: usize,
+        weights: &[f64],
+        out: &mut MotionAdjoint,
+    );
+    /// Adds to `out` the derivatives of `Σ weights ∘ W` over all entries of the regressor and all samples with respect to
+    /// the motion. `weights` has this model's layout; its offsets are not used.
+    ///
+    /// # Panics
+    /// If `weights` is of another model or has another number of samples than `motion`; otherwise as
+    /// [`EffortModel::effort_adjoint`].
+    fn regressor_adjoint(
+        &self,
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        weights: &RegressorBlock,
+        out: &mut MotionAdjoint,
+    );
 }

@@ -22,7 +22,7 @@ pub mod symmetric;
 
 pub use base_parameters::{BaseParameters, BaseSettings};
 pub use description::{Description, JointDescription, JointKind, Limits, LinkDescription, Mimic};
-pub use dynamics::{Dynamics, DynamicsWorkspace, Energy, MotionBlock, State};
+pub use dynamics::{Dynamics, DynamicsWorkspace, Energy, MotionAdjoint, MotionBlock, State};
 pub use effort_model::{EffortModel, Output, RegressorBlock, RegressorLayout};
 pub use inertia::Inertia;
 pub use mechanism::{Body, Joint, Mechanism, MechanismError, MechanismWarning};

@@ -1,9 +1,11 @@
 //! The effort model of a robot: rigid bodies and joint elements.
 
+mod adjoint;
+
 use std::sync::Arc;
 
 use crate::description::JointKind;
-use crate::dynamics::{Dynamics, MotionBlock, Slots};
+use crate::dynamics::{Dynamics, MotionAdjoint, MotionBlock, Slots};
 use crate::effort_model::{EffortModel, Output, RegressorBlock, RegressorLayout};
 use crate::element::{ElementColumns, JointElement, JointInfo};
 use crate::inertia::{PARAMETER_NAMES, PARAMETER_UNITS};
@@ -15,6 +17,8 @@ struct PlacedElement {
     element: Box<dyn JointElement>,
     /// Slot of every entry.
     slots: Vec<usize>,
+    /// Rate and parameter column of every entry.
+    entries: Vec<(usize, usize)>,
     /// First of its shape parameters.
     first_shape: usize,
     shapes: usize,
@@ -102,13 +106,14 @@ impl RobotModel {
             .into_iter()
             .enumerate()
             .map(|(k, element)| {
-                let slots = element
+                let entries: Vec<(usize, usize)> = element
                     .entries()
                     .iter()
-                    .filter_map(|(rate, parameter)| layout.slot(*rate, first_column[k] + parameter))
+                    .map(|(rate, parameter)| (*rate, first_column[k] + parameter))
                     .collect();
+                let slots = entries.iter().filter_map(|(rate, column)| layout.slot(*rate, *column)).collect();
                 let shapes = element.shape(&joints).len();
-                PlacedElement { element, slots, first_shape: first_shape[k], shapes }
+                PlacedElement { element, slots, entries, first_shape: first_shape[k], shapes }
             })
             .collect();
         RobotModel {
@@ -188,6 +193,39 @@ impl EffortModel for RobotModel {
             placed.element.fill(&self.joints, motion, own, &mut columns);
         }
     }
+
+    fn efforts(
+        &self,
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        linear: &[f64],
+        stride: usize,
+        effort: &mut [f64],
+    ) {
+        self.block_efforts(motion, shape, linear, stride, effort);
+    }
+
+    fn effort_adjoint(
+        &self,
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        linear: &[f64],
+        stride: usize,
+        weights: &[f64],
+        out: &mut MotionAdjoint,
+    ) {
+        self.block_effort_adjoint(motion, shape, linear, (stride, weights), out);
+    }
+
+    fn regressor_adjoint(
+        &self,
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        weights: &RegressorBlock,
+        out: &mut MotionAdjoint,
+    ) {
+        self.block_regressor_adjoint(motion, shape, weights, out);
+    }
 }
 
 impl CoupledRegressor {
@@ -208,6 +246,30 @@ impl CoupledRegressor {
         CoupledRegressor { dynamics, slots, slot_count: 10 * folds.len(), folds }
     }
 
+    /// Hands on the motion of all joints, packed without gaps.
+    fn with_joint_motion<T>(
+        &self,
+        mechanism: &Mechanism,
+        motion: &MotionBlock<'_>,
+        work: impl FnOnce(&MotionBlock<'_>) -> T,
+    ) -> T {
+        let n = motion.samples;
+        let joint = mechanism.expand_block(motion);
+        let gravity: Option<Vec<f64>> = motion
+            .gravity
+            .map(|g| (0..3).flat_map(|c| g[c * motion.stride..][..n].iter().copied()).collect());
+        work(&MotionBlock {
+            samples: n,
+            stride: n,
+            q: &joint[0],
+            dq: &joint[1],
+            ddq: &joint[2],
+            gravity: gravity.as_deref(),
+            channels: &[],
+            sign_width: 0.0,
+        })
+    }
+
     fn fill(
         &self,
         mechanism: &Mechanism,
@@ -216,23 +278,10 @@ impl CoupledRegressor {
         out: &mut RegressorBlock,
     ) {
         let n = motion.samples;
-        let joint = mechanism.expand_block(motion);
-        let block = MotionBlock {
-            samples: n,
-            stride: n,
-            q: &joint[0],
-            dq: &joint[1],
-            ddq: &joint[2],
-            gravity: None,
-            channels: &[],
-            sign_width: 0.0,
-        };
-        let gravity: Option<Vec<f64>> = motion
-            .gravity
-            .map(|g| (0..3).flat_map(|c| g[c * motion.stride..][..n].iter().copied()).collect());
-        let block = MotionBlock { gravity: gravity.as_deref(), ..block };
         let mut rows = vec![0.0; self.slot_count * n];
-        self.dynamics.regressor_block(&block, &self.slots, n, &mut rows);
+        self.with_joint_motion(mechanism, motion, |block| {
+            self.dynamics.regressor_block(block, &self.slots, n, &mut rows);
+        });
         for output in 0..layout.outputs() {
             let first = layout.first_slot(output);
             for slot in first..first + layout.columns(output).len() {

@@ -52,6 +52,12 @@ impl<'a> MotionBlock<'a> {
         if self.sign_width > 0.0 { (v / self.sign_width).tanh() } else { sign(v) }
     }
 
+    /// Derivative of [`MotionBlock::sign`]: `(1 - s²) / sign_width`; 0 for the exact sign.
+    pub fn sign_slope(&self, v: f64) -> f64 {
+        let s = self.sign(v);
+        if self.sign_width > 0.0 { (1.0 - s * s) / self.sign_width } else { 0.0 }
+    }
+
     /// Samples of an extra channel.
     pub fn channel(&self, name: &str) -> Option<&'a [f64]> {
         self.channels.iter().find(|(n, _)| *n == name).map(|(_, v)| &v[..self.samples])
@@ -77,6 +83,12 @@ impl Slots {
         }
         Slots { by_axis }
     }
+
+    /// First of the ten slots of a carried axis.
+    #[inline(always)]
+    pub(super) fn of_axis(&self, axis: usize) -> usize {
+        self.by_axis[axis]
+    }
 }
 
 struct RegressorTask<'a> {
@@ -94,7 +106,7 @@ fn groups(samples: usize) -> impl Iterator<Item = usize> {
 }
 
 #[inline(always)]
-fn load_all<S: Scalar>(
+pub(super) fn load_all<S: Scalar>(
     from: &[f64],
     stride: usize,
     sample: usize,
@@ -107,7 +119,7 @@ fn load_all<S: Scalar>(
 }
 
 #[inline(always)]
-fn load_gravity<S: Scalar>(
+pub(super) fn load_gravity<S: Scalar>(
     dynamics: &Dynamics,
     motion: &MotionBlock<'_>,
     sample: usize,

@@ -3,6 +3,8 @@
 //! Notation and equations: *Own derivation* in the guide (`docs/guide.md`), after Featherstone 2008 and
 //! Atkeson, An & Hollerbach 1986. Frames: body quantities in axes of the body's joint frame, gravity in base axes.
 
+mod adjoint;
+mod adjoint_block;
 mod block;
 mod energy;
 mod inverse_dynamics;
@@ -11,6 +13,7 @@ mod motion;
 mod regressor;
 mod tree;
 
+pub use adjoint_block::MotionAdjoint;
 pub use block::MotionBlock;
 pub(crate) use block::Slots;
 pub use energy::Energy;

@@ -104,12 +104,22 @@ fn own_rows<S: Scalar>(
             }
             return;
         }
-        Motion::Revolute => (axis, Vec3::zero()),
-        Motion::Prismatic => (Vec3::zero(), axis),
-        Motion::Helical { pitch } => (axis, axis.scale(S::from_f64(pitch))),
+        Motion::Revolute | Motion::Prismatic | Motion::Helical { .. } => own_axis(node),
     };
     axes[0] = own;
     put(slots[0], columns, general_row(motion, tensor, own));
+}
+
+/// Angular and linear part of the unit motion of a joint with one rate, in axes of its body.
+#[inline(always)]
+pub(super) fn own_axis<S: Scalar>(node: &Node) -> (Vec3<S>, Vec3<S>) {
+    let axis = Vec3::constant(node.axis.0);
+    match node.motion {
+        Motion::RevoluteZ { .. } | Motion::Revolute => (axis, Vec3::zero()),
+        Motion::Prismatic => (Vec3::zero(), axis),
+        Motion::Helical { pitch } => (axis, axis.scale(S::from_f64(pitch))),
+        Motion::Floating => unreachable!("a floating joint has six"),
+    }
 }
 
 /// `[v·a | Bᵀv + a × z | Cᵀz]`.
@@ -126,13 +136,13 @@ fn general_row<S: Scalar>(
 }
 
 /// Columns of `C`: the moment per entry of the inertia tensor, `I α + ω × I ω = C (Ixx Ixy Ixz Iyy Iyz Izz)`.
-struct TensorRows<S> {
-    columns: [Vec3<S>; 6],
+pub(super) struct TensorRows<S> {
+    pub(super) columns: [Vec3<S>; 6],
 }
 
 impl<S: Scalar> TensorRows<S> {
     #[inline(always)]
-    fn new(omega: Vec3<S>, alpha: Vec3<S>) -> Self {
+    pub(super) fn new(omega: Vec3<S>, alpha: Vec3<S>) -> Self {
         let [x, y, z] = omega.0;
         let [a1, a2, a3] = alpha.0;
         let (xy, xz, yz) = (x * y, x * z, y * z);

@@ -1,8 +1,8 @@
 //! Efforts that depend on position.
 
 use super::friction::EFFORT;
-use super::{ElementColumns, JointElement, JointInfo};
-use crate::dynamics::MotionBlock;
+use super::{ElementColumns, ElementWeights, JointElement, JointInfo};
+use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::Parameter;
 
 /// Linear spring `k (q - q₀) = k q - (k q₀)`, two columns `[q, -1]` for `k` and `k q₀`.
@@ -36,6 +36,17 @@ impl JointElement for Spring {
         out.map(0, motion.position(joints[self.rate].position), |q| q);
         out.column(1).fill(-1.0);
     }
+    fn adjoint(
+        &self,
+        joints: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        _: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        let position = joints[self.rate].position;
+        weights.add(0, position, motion.position(position), |_| 1.0, &mut out.q);
+    }
 }
 
 impl JointElement for CyclicTorque {
@@ -53,5 +64,18 @@ impl JointElement for CyclicTorque {
         let q = motion.position(joints[self.rate].position);
         out.map(0, q, |q| (self.cycles * q).cos());
         out.map(1, q, |q| (self.cycles * q).sin());
+    }
+    fn adjoint(
+        &self,
+        joints: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        _: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        let position = joints[self.rate].position;
+        let (n, q) = (self.cycles, motion.position(position));
+        weights.add(0, position, q, |q| -n * (n * q).sin(), &mut out.q);
+        weights.add(1, position, q, |q| n * (n * q).cos(), &mut out.q);
     }
 }

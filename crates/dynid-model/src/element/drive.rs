@@ -1,7 +1,7 @@
 //! Drive gains.
 
-use super::{ElementColumns, JointElement, JointInfo};
-use crate::dynamics::MotionBlock;
+use super::{ElementColumns, ElementWeights, JointElement, JointInfo};
+use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::Parameter;
 
 /// Drive gain `K` (effort per ampere) as a parameter: column `-i` on the right-hand side of
@@ -37,5 +37,14 @@ impl JointElement for DriveGain {
         let name = current_channel(&joints[self.rate].name);
         let Some(current) = motion.channel(&name) else { panic!("motion block without channel `{name}`") };
         out.map(0, current, |i| -i);
+    }
+    fn adjoint(
+        &self,
+        _: &[JointInfo],
+        _: &MotionBlock<'_>,
+        _: &[f64],
+        _: &ElementWeights<'_>,
+        _: &mut MotionAdjoint,
+    ) {
     }
 }

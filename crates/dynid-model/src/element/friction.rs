@@ -1,7 +1,7 @@
 //! Friction that is linear in its parameters, and the constant offset.
 
-use super::{ElementColumns, JointElement, JointInfo};
-use crate::dynamics::MotionBlock;
+use super::{ElementColumns, ElementWeights, JointElement, JointInfo, sign};
+use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::Parameter;
 
 pub(super) const EFFORT: [&str; 2] = ["N m", "N"];
@@ -49,6 +49,16 @@ impl JointElement for Coulomb {
     fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         out.map(0, motion.rate(self.rate), |v| motion.sign(v));
     }
+    fn adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        _: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        weights.add(0, self.rate, motion.rate(self.rate), |v| motion.sign_slope(v), &mut out.dq);
+    }
 }
 
 impl JointElement for Viscous {
@@ -64,6 +74,16 @@ impl JointElement for Viscous {
     fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         out.map(0, motion.rate(self.rate), |v| v);
     }
+    fn adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        _: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        weights.add(0, self.rate, motion.rate(self.rate), |_| 1.0, &mut out.dq);
+    }
 }
 
 impl JointElement for Offset {
@@ -78,6 +98,15 @@ impl JointElement for Offset {
     }
     fn fill(&self, _: &[JointInfo], _: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         out.column(0).fill(1.0);
+    }
+    fn adjoint(
+        &self,
+        _: &[JointInfo],
+        _: &MotionBlock<'_>,
+        _: &[f64],
+        _: &ElementWeights<'_>,
+        _: &mut MotionAdjoint,
+    ) {
     }
 }
 
@@ -108,5 +137,21 @@ impl JointElement for AsymmetricFriction {
         out.map(1, v, |v| -share(v)[1]);
         out.map(2, v, |v| v.max(0.0));
         out.map(3, v, |v| v.min(0.0));
+    }
+    fn adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        _: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        let v = motion.rate(self.rate);
+        // Share of a velocity among the forward ones: the derivative of max(v, 0).
+        let forward = |v: f64| 0.5 * (1.0 + sign(v));
+        weights.add(0, self.rate, v, |v| forward(v) * motion.sign_slope(v), &mut out.dq);
+        weights.add(1, self.rate, v, |v| forward(-v) * motion.sign_slope(v), &mut out.dq);
+        weights.add(2, self.rate, v, forward, &mut out.dq);
+        weights.add(3, self.rate, v, |v| forward(-v), &mut out.dq);
     }
 }

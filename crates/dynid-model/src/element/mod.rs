@@ -15,7 +15,7 @@ pub use friction::{AsymmetricFriction, Coulomb, Offset, Viscous};
 pub use rotor::RotorInertia;
 pub use transmission::{CoupledWrist, Transmission};
 
-use crate::dynamics::MotionBlock;
+use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::{Owner, Parameter, ShapeParameter};
 
 /// An output as elements see it.
@@ -70,6 +70,37 @@ impl ElementColumns<'_> {
     }
 }
 
+/// Weights of the columns that an element fills, one column per entry of [`JointElement::entries`].
+#[derive(Debug)]
+pub struct ElementWeights<'a> {
+    pub(crate) data: &'a [f64],
+    pub(crate) slots: &'a [usize],
+    pub(crate) stride: usize,
+    pub(crate) samples: usize,
+}
+
+impl ElementWeights<'_> {
+    /// Weights of an entry, one number per sample.
+    pub fn column(&self, entry: usize) -> &[f64] {
+        &self.data[self.slots[entry] * self.stride..][..self.samples]
+    }
+
+    /// Adds `weight · f'(x)` of one entry to the derivatives by its signal: `to[coordinate * samples + s]`.
+    fn add(
+        &self,
+        entry: usize,
+        coordinate: usize,
+        signal: &[f64],
+        derivative: impl Fn(f64) -> f64,
+        to: &mut [f64],
+    ) {
+        let to = &mut to[coordinate * self.samples..][..self.samples];
+        for ((t, w), x) in to.iter_mut().zip(self.column(entry)).zip(signal) {
+            *t += w * derivative(*x);
+        }
+    }
+}
+
 /// An element that acts on one or more joints, linear in most of its parameters.
 pub trait JointElement: std::fmt::Debug + Send + Sync {
     /// Rates that it acts on.
@@ -97,6 +128,16 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
         motion: &MotionBlock<'_>,
         shape: &[f64],
         out: &mut ElementColumns<'_>,
+    );
+    /// Adds to `out` the derivatives of `Σ weights ∘ columns` with respect to the motion. Extra channels are held; where a
+    /// column has a kink, the mean of both sides counts.
+    fn adjoint(
+        &self,
+        joints: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
     );
 }
 

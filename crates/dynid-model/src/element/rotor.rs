@@ -1,7 +1,7 @@
 //! Rotor inertia reflected to the joint.
 
-use super::{ElementColumns, JointElement, JointInfo};
-use crate::dynamics::MotionBlock;
+use super::{ElementColumns, ElementWeights, JointElement, JointInfo};
+use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::Parameter;
 
 /// Reflected rotor inertia `I_a q̈` on its own joint, `I_a = n² J` (gyroscopic coupling neglected), one column.
@@ -25,5 +25,15 @@ impl JointElement for RotorInertia {
     }
     fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         out.map(0, motion.acceleration(self.rate), |a| a);
+    }
+    fn adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        _: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        weights.add(0, self.rate, motion.acceleration(self.rate), |_| 1.0, &mut out.ddq);
     }
 }

@@ -1,8 +1,8 @@
 //! Joints that share motors: `q̇_motor = A q̇`, so efforts add up as `τ = Aᵀ τ_motor`.
 
 use super::friction::{EFFORT, VISCOUS};
-use super::{ElementColumns, JointElement, JointInfo};
-use crate::dynamics::MotionBlock;
+use super::{ElementColumns, ElementWeights, JointElement, JointInfo};
+use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::Parameter;
 
 /// Motor-side inertia and friction behind a transmission matrix, the strict form: one `J`, `f_c`, `f_v` per motor,
@@ -71,6 +71,38 @@ impl JointElement for Transmission {
             entry += 3 * acting.len();
         }
     }
+    fn adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        _: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        let mut entry = 0;
+        for (m, row) in self.matrix.iter().enumerate() {
+            let acting = self.acting(m);
+            for sample in 0..motion.samples {
+                let v: f64 = acting
+                    .iter()
+                    .map(|j| row[*j] * motion.dq[self.joints[*j] * motion.stride + sample])
+                    .sum();
+                let weight = |parameter: usize| -> f64 {
+                    let of =
+                        |(k, j): (usize, &usize)| row[*j] * weights.column(entry + 3 * k + parameter)[sample];
+                    acting.iter().enumerate().map(of).sum()
+                };
+                let by_acceleration = weight(0);
+                let by_velocity = weight(1) * motion.sign_slope(v) + weight(2);
+                for j in &acting {
+                    let at = self.joints[*j] * motion.samples + sample;
+                    out.dq[at] += row[*j] * by_velocity;
+                    out.ddq[at] += row[*j] * by_acceleration;
+                }
+            }
+            entry += 3 * acting.len();
+        }
+    }
 }
 
 /// Coupling terms of a wrist whose second motor also turns with the first joint, as used for the Staubli TX40
@@ -117,6 +149,27 @@ impl JointElement for CoupledWrist {
             let s = motion.sign(k * va[sample] + vb[sample]);
             out.column(4)[sample] = k * s;
             out.column(5)[sample] = s;
+        }
+    }
+    fn adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        _: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        let k = self.ratio;
+        let (va, vb) = (motion.rate(self.a), motion.rate(self.b));
+        weights.add(0, self.b, motion.acceleration(self.b), |_| k, &mut out.ddq);
+        weights.add(1, self.a, motion.acceleration(self.a), |_| k, &mut out.ddq);
+        weights.add(2, self.b, vb, |_| k, &mut out.dq);
+        weights.add(3, self.a, va, |_| k, &mut out.dq);
+        for sample in 0..motion.samples {
+            let slope = motion.sign_slope(k * va[sample] + vb[sample])
+                * (k * weights.column(4)[sample] + weights.column(5)[sample]);
+            out.dq[self.a * motion.samples + sample] += k * slope;
+            out.dq[self.b * motion.samples + sample] += slope;
         }
     }
 }
