@@ -1,1 +1,24 @@
 //! Optimal excitation trajectories within all limits.
+
+pub mod constraint;
+pub mod criterion;
+mod design;
+mod feasibility;
+mod grid;
+mod limits;
+mod model;
+mod optimiser;
+mod parametrisation;
+mod problem;
+mod restoration;
+mod robot;
+mod search;
+mod start;
+
+pub use design::{Design, Outcome, Settings, StartOutcome, design};
+pub use feasibility::{Infeasible, LimitKind, LimitPoint};
+pub use limits::CoordinateLimits;
+pub use model::{ColumnInfo, ExcitationModel, Sensitivity};
+pub use parametrisation::{Parametrisation, StartConditions};
+pub use problem::{DEFAULT_SAMPLES_PER_HARMONIC, DEFAULT_SIGN_WIDTH, Problem, ProblemError};
+pub use robot::RobotExcitation;

@@ -1,0 +1,256 @@
+//! From a problem to the best of several optimised trajectories.
+
+use std::time::Instant;
+
+use faer::Mat;
+use rayon::prelude::*;
+
+use crate::criterion::{Criterion, Measure, Smoothing};
+use crate::feasibility::{Infeasible, diagnose, violated_at_start};
+use crate::grid::Grid;
+use crate::optimiser::{Settings as Steps, minimise};
+use crate::parametrisation::Parametrisation;
+use crate::problem::{Problem, ProblemError};
+use crate::restoration::Restoration;
+use crate::search::{Observation, Search};
+use crate::start::{feasible_start, generator};
+
+/// Settings of a design.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Most starts. Default 16.
+    pub starts: usize,
+    /// Seed of the first start; start `k` has seed `seed + k`. Default 1.
+    pub seed: u64,
+    /// No start begins after this time, s; starts that began are finished. `None` (default): all starts run, so that the
+    /// result does not depend on the speed of the machine.
+    pub time_budget_s: Option<f64>,
+    /// Samples of a period on which the reported criterion is taken, with exact signs. Default 1000.
+    pub report_samples: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings { starts: 16, seed: 1, time_budget_s: None, report_samples: 1000 }
+    }
+}
+
+/// One start's end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StartOutcome {
+    /// Its seed.
+    pub seed: u64,
+    /// Unknowns at the end; see [`Parametrisation`].
+    pub unknowns: Vec<f64>,
+    /// Criterion on the report's samples with exact signs; `None` if the matrix is singular.
+    pub criterion: Option<f64>,
+    /// Largest excess over a limit at any instant, normalised; limits hold if it is at most 0.
+    pub excess: f64,
+    /// Evaluations of criterion and limits.
+    pub evaluations: usize,
+    /// Share of the amplitudes left after the last resort of scaling them down; 1 as a rule.
+    pub share: f64,
+}
+
+impl StartOutcome {
+    /// Whether all limits hold and the criterion is defined.
+    pub fn is_feasible(&self) -> bool {
+        self.excess <= 0.0 && self.criterion.is_some()
+    }
+}
+
+/// Outcome of a design.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// At least one start ended within all limits.
+    Found(Design),
+    /// No start did, and the search for any motion within the limits failed too.
+    Infeasible(Infeasible),
+}
+
+/// The best trajectory and how it came about.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Design {
+    /// All starts that ran, by seed.
+    pub starts: Vec<StartOutcome>,
+    /// Index of the best.
+    pub best: usize,
+    /// Fourier coefficients `[q0, a.., b..]` of every coordinate, plain amplitudes.
+    pub coefficients: Vec<Vec<f64>>,
+}
+
+impl Design {
+    /// The best start.
+    pub fn best(&self) -> &StartOutcome {
+        &self.starts[self.best]
+    }
+}
+
+/// One stage of the schedule of a start.
+struct Stage {
+    criterion: Criterion,
+    smoothing: Smoothing,
+    iterations: usize,
+    radius: f64,
+    /// On the grid with twice the samples.
+    fine: bool,
+}
+
+/// Warm start with the determinant, which is smooth and pulls up all small values; then smooth stand-ins for measures of
+/// extremes, ever closer (spec/excitation.md sections 4.4 and 6.2).
+fn schedule(criterion: &Criterion) -> Vec<Stage> {
+    let stage = |smoothing, iterations, radius, fine| Stage {
+        criterion: criterion.clone(),
+        smoothing,
+        iterations,
+        radius,
+        fine,
+    };
+    let warm = Stage {
+        criterion: Criterion { measure: Measure::Determinant, scaling: criterion.scaling.clone() },
+        smoothing: None,
+        iterations: 15,
+        radius: 0.5,
+        fine: false,
+    };
+    let mut stages = vec![warm];
+    if criterion.is_extremal() {
+        stages.push(stage(Some(20.0), 60, 0.5, false));
+        stages.push(stage(Some(80.0), 60, 0.5, false));
+        stages.push(stage(Some(80.0), 20, 0.1, true));
+    } else {
+        stages.push(stage(None, 120, 0.5, false));
+        stages.push(stage(None, 20, 0.1, true));
+    }
+    stages
+}
+
+/// Optimises from several starts and keeps the best.
+///
+/// `done`: starts of an earlier run with the same problem and settings, which are not repeated. `observe` hears of every
+/// start as its batch ends, in the order of seeds. Results do not depend on the number of threads; with a time budget the
+/// number of starts depends on the machine, each start does not.
+///
+/// # Errors
+/// [`ProblemError`] if the problem is not well posed.
+pub fn design(
+    problem: &Problem,
+    settings: &Settings,
+    done: Vec<StartOutcome>,
+    observe: &mut dyn FnMut(&StartOutcome),
+) -> Result<Outcome, ProblemError> {
+    let begun = Instant::now();
+    problem.check()?;
+    let map = Parametrisation::new(&problem.limits, problem.base, problem.harmonics, &problem.start);
+    let optimiser = StartOptimiser::new(problem, &map, settings);
+    refuse_rank_deficient(problem, &optimiser.search)?;
+    let at_start = violated_at_start(problem, &map);
+    if !at_start.is_empty() {
+        return Ok(Outcome::Infeasible(Infeasible { violations: at_start, blamed: None, at_start: true }));
+    }
+    let mut starts = done;
+    starts.retain(|s| (settings.seed..settings.seed + settings.starts as u64).contains(&s.seed));
+    let missing: Vec<u64> = (settings.seed..settings.seed + settings.starts as u64)
+        .filter(|seed| starts.iter().all(|s| s.seed != *seed))
+        .collect();
+    let batch = rayon::current_num_threads().max(1);
+    for (k, seeds) in missing.chunks(batch).enumerate() {
+        let over = settings.time_budget_s.is_some_and(|budget| begun.elapsed().as_secs_f64() > budget);
+        if over && (k > 0 || !starts.is_empty()) {
+            break;
+        }
+        let ended: Vec<StartOutcome> = seeds.par_iter().filter_map(|seed| optimiser.run(*seed)).collect();
+        for outcome in ended {
+            observe(&outcome);
+            starts.push(outcome);
+        }
+    }
+    starts.sort_by_key(|s| s.seed);
+    let best = (0..starts.len()).filter(|k| starts[*k].is_feasible()).min_by(|a, b| {
+        let value = |k: &usize| starts[*k].criterion.unwrap_or(f64::INFINITY);
+        value(a).total_cmp(&value(b))
+    });
+    Ok(match best {
+        Some(best) => {
+            let coefficients = map.coefficients(&starts[best].unknowns);
+            Outcome::Found(Design { starts, best, coefficients })
+        }
+        None => Outcome::Infeasible(diagnose(problem, &map, settings.seed)),
+    })
+}
+
+/// Everything that starts share.
+struct StartOptimiser<'a> {
+    problem: &'a Problem,
+    search: Grid<'a>,
+    finer: Grid<'a>,
+    restoration: Restoration<'a>,
+    report: Grid<'a>,
+}
+
+impl<'a> StartOptimiser<'a> {
+    fn new(problem: &'a Problem, map: &'a Parametrisation, settings: &Settings) -> Self {
+        StartOptimiser {
+            problem,
+            search: Grid::search(problem, map, problem.samples),
+            finer: Grid::search(problem, map, 2 * problem.samples),
+            restoration: Restoration::new(problem, map),
+            report: Grid::exact(problem, map, settings.report_samples.max(4 * problem.harmonics)),
+        }
+    }
+
+    /// `None` if no start point within the limits was found or the criterion is not defined there.
+    fn run(&self, seed: u64) -> Option<StartOutcome> {
+        let mut z = feasible_start(&self.search, &mut generator(seed))?;
+        let mut evaluations = 0;
+        for stage in schedule(&self.problem.criterion) {
+            let grid = if stage.fine { &self.finer } else { &self.search };
+            let mut search = Search::new(grid, stage.criterion, stage.smoothing);
+            let steps = Steps { iterations: stage.iterations, radius: stage.radius, stall: 2e-4 };
+            z = minimise(&mut search, z, steps)?.z;
+            evaluations += search.evaluations;
+        }
+        let restored = self.restoration.restore(z);
+        Some(StartOutcome {
+            seed,
+            criterion: exact_criterion(self.problem, &self.report, &restored.z),
+            excess: restored.excess,
+            share: restored.share,
+            unknowns: restored.z,
+            evaluations,
+        })
+    }
+}
+
+/// Criterion with exact signs.
+fn exact_criterion(problem: &Problem, grid: &Grid<'_>, z: &[f64]) -> Option<f64> {
+    problem.criterion.value(&exact_triangle(problem, grid, z))
+}
+
+/// Triangle of the weighted observation matrix with exact signs.
+pub(crate) fn exact_triangle(problem: &Problem, grid: &Grid<'_>, z: &[f64]) -> Mat<f64> {
+    Observation::new(problem, &grid.motion(z), 0.0).triangle
+}
+
+/// Columns that no motion tells apart would make every criterion infinite: find out on one random motion.
+fn refuse_rank_deficient(problem: &Problem, grid: &Grid<'_>) -> Result<(), ProblemError> {
+    let z = crate::start::draw(grid, &mut generator(1));
+    let triangle = exact_triangle(problem, grid, &z);
+    let columns = problem.model.columns();
+    let n = triangle.ncols();
+    let lengths: Vec<f64> = (0..n).map(|j| triangle.col(j).norm_l2()).collect();
+    let silent: Vec<String> =
+        (0..n).filter(|j| lengths[*j] == 0.0).map(|j| columns[j].name.clone()).collect();
+    if !silent.is_empty() {
+        return Err(ProblemError::RankDeficient { columns: silent });
+    }
+    let scaled = Mat::from_fn(n, n, |i, j| triangle[(i, j)] / lengths[j]);
+    let Some((sigma, v)) = crate::criterion::singular_values(&scaled, true) else { return Ok(()) };
+    if sigma.last().is_some_and(|last| *last > 1e-9 * sigma[0]) {
+        return Ok(());
+    }
+    let direction = v.col_as_slice(n - 1);
+    let largest = direction.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let columns = (0..n).filter(|j| direction[*j].abs() > 0.1 * largest).map(|j| columns[j].name.clone());
+    Err(ProblemError::RankDeficient { columns: columns.collect() })
+}

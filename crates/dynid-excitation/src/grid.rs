@@ -1,0 +1,285 @@
+//! A design on a grid of times: motion, values of all limits, their linearisations.
+
+use dynid_model::{MotionAdjoint, MotionBlock};
+use dynid_motion::trajectory::FourierBasis;
+
+use crate::optimiser::{NearRow, Row};
+use crate::parametrisation::Parametrisation;
+use crate::problem::Problem;
+
+/// Motion of all coordinates at the times of a grid, `channel[coordinate * samples + sample]`.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct GridMotion {
+    pub(crate) samples: usize,
+    /// Positions and their first three derivatives.
+    pub(crate) channels: [Vec<f64>; 4],
+}
+
+impl GridMotion {
+    pub(crate) fn new(coefficients: &[Vec<f64>], basis: &FourierBasis) -> Self {
+        let samples = basis.times().len();
+        let mut channels = [const { Vec::new() }; 4];
+        for (derivative, channel) in channels.iter_mut().enumerate() {
+            channel.resize(samples * coefficients.len(), 0.0);
+            for (x, out) in coefficients.iter().zip(channel.chunks_exact_mut(samples)) {
+                basis.evaluate(derivative, x, out);
+            }
+        }
+        GridMotion { samples, channels }
+    }
+
+    pub(crate) fn block(&self, sign_width: f64) -> MotionBlock<'_> {
+        MotionBlock {
+            samples: self.samples,
+            stride: self.samples,
+            q: &self.channels[0],
+            dq: &self.channels[1],
+            ddq: &self.channels[2],
+            gravity: None,
+            channels: &[],
+            sign_width,
+        }
+    }
+}
+
+/// Which limit, at which sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct RowId {
+    pub(crate) limit: LimitId,
+    pub(crate) sample: usize,
+}
+
+/// Which limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LimitId {
+    /// A derivative (0 to 3) of a coordinate.
+    Coordinate { coordinate: usize, derivative: usize },
+    /// A row of a path constraint.
+    Path { constraint: usize, row: usize },
+}
+
+/// Values of all limits on a grid, normalised; the value of [`LimitId`] `k` at sample `s` is `values[k][s]`.
+pub(crate) struct LimitValues {
+    pub(crate) limits: Vec<LimitValue>,
+    pub(crate) motion: GridMotion,
+}
+
+/// Values of one limit at all samples and its bounds.
+pub(crate) struct LimitValue {
+    pub(crate) id: LimitId,
+    pub(crate) lower: f64,
+    pub(crate) upper: f64,
+    pub(crate) values: Vec<f64>,
+}
+
+impl LimitValue {
+    /// By how much a sample is outside; negative: inside.
+    pub(crate) fn excess(&self, sample: usize) -> f64 {
+        (self.values[sample] - self.upper).max(self.lower - self.values[sample])
+    }
+}
+
+impl LimitValues {
+    /// Largest excess over all limits and samples.
+    pub(crate) fn worst(&self) -> (f64, Option<RowId>) {
+        let mut worst = (f64::NEG_INFINITY, None);
+        for limit in &self.limits {
+            for sample in 0..self.motion.samples {
+                let excess = limit.excess(sample);
+                // A value that is not a number counts as outside.
+                if excess > worst.0 || excess.is_nan() {
+                    let excess = if excess.is_nan() { f64::INFINITY } else { excess };
+                    worst = (excess, Some(RowId { limit: limit.id, sample }));
+                }
+            }
+        }
+        worst
+    }
+}
+
+/// A problem on a grid of times.
+pub(crate) struct Grid<'a> {
+    pub(crate) problem: &'a Problem,
+    pub(crate) map: &'a Parametrisation,
+    pub(crate) basis: FourierBasis,
+    /// Bound of normalised coordinate limits: below 1 where peaks between samples are to be covered.
+    pub(crate) bound: f64,
+    /// Width of the smoothed sign.
+    pub(crate) sign_width: f64,
+}
+
+impl<'a> Grid<'a> {
+    /// Grid of the search: `samples` in one period, coordinate limits tightened so that peaks between samples stay
+    /// within them (spec/excitation.md section 5.2).
+    pub(crate) fn search(problem: &'a Problem, map: &'a Parametrisation, samples: usize) -> Self {
+        let basis = FourierBasis::on_period(problem.base, problem.harmonics, samples);
+        let bound = FourierBasis::grid_factor(problem.harmonics, samples).map_or(1.0, |f| 1.0 / f);
+        Grid { problem, map, basis, bound, sign_width: problem.sign_width }
+    }
+
+    /// Fine grid, limits as they are.
+    pub(crate) fn exact(problem: &'a Problem, map: &'a Parametrisation, samples: usize) -> Self {
+        let basis = FourierBasis::on_period(problem.base, problem.harmonics, samples);
+        Grid { problem, map, basis, bound: 1.0, sign_width: problem.sign_width }
+    }
+
+    /// Grid of given times, limits as they are.
+    pub(crate) fn at_times(problem: &'a Problem, map: &'a Parametrisation, times: Vec<f64>) -> Self {
+        let basis = FourierBasis::new(problem.base, problem.harmonics, times);
+        Grid { problem, map, basis, bound: 1.0, sign_width: problem.sign_width }
+    }
+
+    pub(crate) fn motion(&self, z: &[f64]) -> GridMotion {
+        GridMotion::new(&self.map.coefficients(z), &self.basis)
+    }
+
+    /// Values of all limits.
+    pub(crate) fn values(&self, z: &[f64]) -> LimitValues {
+        self.values_of(self.motion(z), true)
+    }
+
+    /// Values of the limits of a motion; without the coordinate limits if those are known to hold.
+    pub(crate) fn values_of(&self, motion: GridMotion, coordinates: bool) -> LimitValues {
+        let samples = motion.samples;
+        let mut limits = Vec::new();
+        if coordinates {
+            for (coordinate, limit) in self.problem.limits.iter().enumerate() {
+                for derivative in 0..4 {
+                    let Some(scale) = limit.of_derivative(derivative) else { continue };
+                    let middle = if derivative == 0 { limit.middle() } else { 0.0 };
+                    let channel = &motion.channels[derivative][coordinate * samples..][..samples];
+                    limits.push(LimitValue {
+                        id: LimitId::Coordinate { coordinate, derivative },
+                        lower: -self.bound,
+                        upper: self.bound,
+                        values: channel.iter().map(|x| (x - middle) / scale).collect(),
+                    });
+                }
+            }
+        }
+        let block = motion.block(self.sign_width);
+        for (c, constraint) in self.problem.constraints.iter().enumerate() {
+            let rows = constraint.rows();
+            let mut values = vec![0.0; rows.len() * samples];
+            constraint.values(&block, samples, &mut values);
+            for (row, (info, values)) in rows.iter().zip(values.chunks_exact(samples)).enumerate() {
+                limits.push(LimitValue {
+                    id: LimitId::Path { constraint: c, row },
+                    lower: info.lower,
+                    upper: info.upper,
+                    values: values.to_vec(),
+                });
+            }
+        }
+        LimitValues { limits, motion }
+    }
+
+    /// Linearised rows of all samples that `wanted(limit, sample)` names, with a distance to keep from the bound.
+    ///
+    /// Rows that the unknowns do not move (the start pose) are left out.
+    pub(crate) fn linearised(
+        &self,
+        values: &LimitValues,
+        margin: f64,
+        mut wanted: impl FnMut(&LimitValue, usize) -> bool,
+    ) -> Vec<NearRow<SidedRow>> {
+        let mut rows = Vec::new();
+        let mut path = Vec::new();
+        for limit in &values.limits {
+            for sample in 0..values.motion.samples {
+                if !wanted(limit, sample) {
+                    continue;
+                }
+                let id = RowId { limit: limit.id, sample };
+                let value = limit.values[sample];
+                let sides = [(1.0, limit.upper - margin - value), (-1.0, value - limit.lower - margin)];
+                // Only the nearer side can matter.
+                let (sign, bound) = if sides[0].1 <= sides[1].1 { sides[0] } else { sides[1] };
+                match limit.id {
+                    LimitId::Coordinate { .. } => {
+                        let mut row = self.coordinate_row(id);
+                        row.values.iter_mut().for_each(|x| *x *= sign);
+                        row.bound = bound;
+                        rows.push(NearRow { row, curved: None });
+                    }
+                    LimitId::Path { .. } => path.push((SidedRow { id, sign }, bound)),
+                }
+            }
+        }
+        let ids: Vec<SidedRow> = path.iter().map(|p| p.0).collect();
+        let gradients = self.path_rows(&values.motion, &ids);
+        for ((id, bound), mut row) in path.into_iter().zip(gradients) {
+            row.bound = bound;
+            rows.push(NearRow { row, curved: Some(id) });
+        }
+        rows.retain(|r| r.row.values.iter().any(|x| x.abs() > 1e-9));
+        rows
+    }
+
+    fn coordinate_row(&self, id: RowId) -> Row {
+        let LimitId::Coordinate { coordinate, derivative } = id.limit else {
+            unreachable!("asked of coordinate limits only")
+        };
+        let scale = self.problem.limits[coordinate].of_derivative(derivative).unwrap_or(f64::INFINITY);
+        let mut values = self.map.row(coordinate, &self.basis, derivative, id.sample);
+        values.iter_mut().for_each(|x| *x /= scale);
+        Row { first: self.map.range(coordinate).start, values, bound: 0.0 }
+    }
+
+    /// Gradients of path rows with respect to the unknowns, in the order of `ids`.
+    pub(crate) fn path_rows(&self, motion: &GridMotion, ids: &[SidedRow]) -> Vec<Row> {
+        let n = self.map.coordinates();
+        let block = motion.block(self.sign_width);
+        let mut rows = vec![Row { first: 0, values: Vec::new(), bound: 0.0 }; ids.len()];
+        for (c, constraint) in self.problem.constraints.iter().enumerate() {
+            let mut wanted = Vec::new();
+            let mut places = Vec::new();
+            for (place, id) in ids.iter().enumerate() {
+                if let LimitId::Path { constraint, row } = id.id.limit
+                    && constraint == c
+                {
+                    wanted.push((row, id.id.sample));
+                    places.push(place);
+                }
+            }
+            if wanted.is_empty() {
+                continue;
+            }
+            let mut gradients = vec![0.0; 3 * n * wanted.len()];
+            constraint.gradients(&block, &wanted, &mut gradients);
+            for ((gradient, (_, sample)), place) in gradients.chunks_exact(3 * n).zip(&wanted).zip(places) {
+                rows[place].values = self.state_gradient(gradient, *sample, ids[place].sign);
+            }
+        }
+        rows
+    }
+
+    /// Derivatives with respect to the unknowns from those with respect to the state of one sample.
+    fn state_gradient(&self, gradient: &[f64], sample: usize, sign: f64) -> Vec<f64> {
+        let n = self.map.coordinates();
+        let mut z = vec![0.0; self.map.unknowns()];
+        for coordinate in 0..n {
+            let to = &mut z[self.map.range(coordinate)];
+            for derivative in 0..3 {
+                let slope = sign * gradient[derivative * n + coordinate];
+                if slope != 0.0 {
+                    let row = self.map.row(coordinate, &self.basis, derivative, sample);
+                    to.iter_mut().zip(row).for_each(|(t, x)| *t += slope * x);
+                }
+            }
+        }
+        z
+    }
+
+    /// `∂/∂z` of `Σ G ∘ W` and the like from derivatives with respect to the motion.
+    pub(crate) fn gradient(&self, adjoint: &MotionAdjoint) -> Vec<f64> {
+        self.map.gradient(&self.basis, adjoint)
+    }
+}
+
+/// A row of a path constraint towards its upper (+1) or lower (-1) bound.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SidedRow {
+    pub(crate) id: RowId,
+    pub(crate) sign: f64,
+}

@@ -1,0 +1,7 @@
+//! Constrained minimisation: sequential quadratic programming over an elastic quadratic program.
+
+mod quadratic;
+mod sequential;
+
+pub(crate) use quadratic::{Elastic, QuadraticProgram, Row};
+pub(crate) use sequential::{NearRow, Point, Program, Settings, minimise};

@@ -1,0 +1,284 @@
+//! Sequential quadratic programming with damped BFGS and an elastic quadratic program on near-active rows.
+//!
+//! Source: spec/excitation.md section 6.1; Powell 1978 (damping).
+
+use super::quadratic::{Elastic, QuadraticProgram, Row};
+
+/// A problem `min c(z)` subject to rows, evaluated where asked.
+pub(crate) trait Program {
+    /// Names a row that is not linear, so that its gradient can be asked for at another point.
+    type Id: Copy;
+    /// Number of unknowns.
+    fn unknowns(&self) -> usize;
+    /// Objective and largest violation; `None` where the objective is not defined.
+    fn evaluate(&mut self, z: &[f64]) -> Option<Point>;
+    /// Gradient of the objective.
+    fn gradient(&mut self, z: &[f64]) -> Option<Vec<f64>>;
+    /// Linearised rows whose value is within `distance` of their bound.
+    fn near_rows(&mut self, z: &[f64], distance: f64) -> Vec<NearRow<Self::Id>>;
+    /// Gradients of rows that are not linear.
+    fn row_gradients(&mut self, z: &[f64], ids: &[Self::Id]) -> Vec<Row>;
+}
+
+/// Objective and largest violation of the rows at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Point {
+    pub(crate) objective: f64,
+    pub(crate) violation: f64,
+}
+
+/// A linearised row: `values · p ≤ bound`.
+#[derive(Debug, Clone)]
+pub(crate) struct NearRow<Id> {
+    pub(crate) row: Row,
+    /// `None`: the row is linear.
+    pub(crate) curved: Option<Id>,
+}
+
+/// Settings of a run.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Settings {
+    pub(crate) iterations: usize,
+    /// Trust box at the start.
+    pub(crate) radius: f64,
+    /// Progress below this counts as none; four such iterations in a row end the run.
+    pub(crate) stall: f64,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Outcome {
+    pub(crate) z: Vec<f64>,
+    /// At `z`.
+    pub(crate) point: Point,
+}
+
+/// Distance of rows that enter the quadratic program, at a trust box of zero size.
+const NEAR: f64 = 0.25;
+const LEAST_RADIUS: f64 = 0.02;
+const LARGEST_RADIUS: f64 = 2.0;
+const ARMIJO: f64 = 1e-4;
+const STALLED_ITERATIONS: usize = 4;
+const FEASIBLE: f64 = 1e-4;
+const ELASTIC: Elastic = Elastic { linear: 10.0, quadratic: 1e-4 };
+
+/// Minimises from `z`. `None` if the objective is not defined at the start.
+pub(crate) fn minimise<P: Program>(program: &mut P, z: Vec<f64>, settings: Settings) -> Option<Outcome> {
+    let n = program.unknowns();
+    let mut z = z;
+    let mut point = program.evaluate(&z)?;
+    let mut gradient = program.gradient(&z)?;
+    let mut hessian = Curvature::new(n);
+    let mut radius = settings.radius;
+    let mut weight: f64 = 0.0;
+    let mut stalled = 0;
+    let mut failures = 0;
+    let mut iterations = 0;
+    while iterations < settings.iterations && stalled < STALLED_ITERATIONS && failures < 4 {
+        iterations += 1;
+        let near = program.near_rows(&z, NEAR * (1.0 + radius));
+        let rows: Vec<Row> = near.iter().map(|r| r.row.clone()).collect();
+        let regular = hessian.regular();
+        let minimum = QuadraticProgram {
+            hessian: &regular,
+            gradient: &gradient,
+            rows: &rows,
+            radius,
+            elastic: Some(ELASTIC),
+        }
+        .solve();
+        let Ok(minimum) = minimum else {
+            radius *= 0.5;
+            failures += 1;
+            hessian.reset();
+            continue;
+        };
+        let active = minimum.multipliers.iter().filter(|u| **u > 0.0).count();
+        let largest = minimum.multipliers.iter().fold(0.0_f64, |m, u| m.max(*u));
+        weight = weight.max(1.5 * largest * active as f64);
+        let slope = dot(&gradient, &minimum.step) - weight * point.violation;
+        let merit = point.objective + weight * point.violation;
+
+        let mut length = 1.0;
+        let mut cuts = 0;
+        let accepted = loop {
+            let trial: Vec<f64> = z.iter().zip(&minimum.step).map(|(x, p)| x + length * p).collect();
+            if let Some(at) = program.evaluate(&trial) {
+                let decrease = ARMIJO * length * slope.min(0.0);
+                let better = at.objective + weight * at.violation <= merit + decrease;
+                if better && at.violation <= (0.9 * point.violation).max(0.05) {
+                    break Some((trial, at));
+                }
+            }
+            cuts += 1;
+            length *= 0.4;
+            if cuts > 7 {
+                break None;
+            }
+        };
+        let Some((next, at)) = accepted else {
+            failures += 1;
+            radius = (0.3 * radius).max(0.1 * LEAST_RADIUS);
+            hessian.reset();
+            // What the last trial left behind belongs to another point.
+            program.evaluate(&z)?;
+            continue;
+        };
+        failures = 0;
+        radius = match cuts {
+            0 => (1.5 * radius).min(LARGEST_RADIUS),
+            1 => radius,
+            _ => (0.6 * radius).max(LEAST_RADIUS),
+        };
+        let Some(next_gradient) = program.gradient(&next) else { break };
+        let step: Vec<f64> = next.iter().zip(&z).map(|(a, b)| a - b).collect();
+        let mut change: Vec<f64> = next_gradient.iter().zip(&gradient).map(|(a, b)| a - b).collect();
+        add_curvature_of_rows(program, &near, &minimum.multipliers, &next, &mut change);
+        hessian.update(&step, change);
+        let progress = (at.objective - point.objective).abs();
+        stalled = if progress < settings.stall && at.violation < FEASIBLE { stalled + 1 } else { 0 };
+        (z, point, gradient) = (next, at, next_gradient);
+    }
+    Some(Outcome { z, point })
+}
+
+/// Adds `Σ λ (∇y(z⁺) - ∇y(z))` of rows that are not linear: the rest of the change of the Lagrangian's gradient.
+fn add_curvature_of_rows<P: Program>(
+    program: &mut P,
+    near: &[NearRow<P::Id>],
+    multipliers: &[f64],
+    next: &[f64],
+    change: &mut [f64],
+) {
+    let curved: Vec<(P::Id, &Row, f64)> = near
+        .iter()
+        .zip(multipliers)
+        .filter(|(_, u)| **u > 0.0)
+        .filter_map(|(r, u)| r.curved.map(|id| (id, &r.row, *u)))
+        .collect();
+    if curved.is_empty() {
+        return;
+    }
+    let ids: Vec<P::Id> = curved.iter().map(|c| c.0).collect();
+    for ((_, before, multiplier), after) in curved.iter().zip(program.row_gradients(next, &ids)) {
+        for (k, x) in after.values.iter().enumerate() {
+            change[after.first + k] += multiplier * x;
+        }
+        for (k, x) in before.values.iter().enumerate() {
+            change[before.first + k] -= multiplier * x;
+        }
+    }
+}
+
+/// Approximate second derivatives of the Lagrangian, kept positive definite.
+struct Curvature {
+    n: usize,
+    matrix: Vec<f64>,
+}
+
+impl Curvature {
+    fn new(n: usize) -> Self {
+        let mut curvature = Curvature { n, matrix: vec![0.0; n * n] };
+        curvature.reset();
+        curvature
+    }
+
+    fn reset(&mut self) {
+        self.matrix.fill(0.0);
+        for i in 0..self.n {
+            self.matrix[i * self.n + i] = 0.1;
+        }
+    }
+
+    fn regular(&self) -> Vec<f64> {
+        let mut matrix = self.matrix.clone();
+        for i in 0..self.n {
+            matrix[i * self.n + i] += 1e-6;
+        }
+        matrix
+    }
+
+    /// BFGS update with Powell's damping.
+    fn update(&mut self, step: &[f64], mut change: Vec<f64>) {
+        let n = self.n;
+        let image: Vec<f64> = self.matrix.chunks_exact(n).map(|row| dot(row, step)).collect();
+        let bend = dot(step, &image);
+        if bend <= 0.0 {
+            return;
+        }
+        let along = dot(step, &change);
+        if along < 0.2 * bend {
+            let theta = 0.8 * bend / (bend - along);
+            for (c, b) in change.iter_mut().zip(&image) {
+                *c = theta * *c + (1.0 - theta) * b;
+            }
+        }
+        let along = dot(step, &change);
+        if !(along > 0.0 && along.is_finite()) {
+            return;
+        }
+        for i in 0..n {
+            let (c, b) = (change[i] / along, image[i] / bend);
+            for ((m, cj), bj) in self.matrix[i * n..(i + 1) * n].iter_mut().zip(&change).zip(&image) {
+                *m += c * cj - b * bj;
+            }
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rosenbrock's valley inside the disc of radius² 1.5 (the second derivative of the disc matters).
+    struct Valley;
+
+    impl Program for Valley {
+        type Id = ();
+        fn unknowns(&self) -> usize {
+            2
+        }
+        fn evaluate(&mut self, z: &[f64]) -> Option<Point> {
+            let objective = (1.0 - z[0]).powi(2) + 10.0 * (z[1] - z[0] * z[0]).powi(2);
+            let disc = z[0] * z[0] + z[1] * z[1] - 1.5;
+            Some(Point { objective, violation: disc.max(0.0) })
+        }
+        fn gradient(&mut self, z: &[f64]) -> Option<Vec<f64>> {
+            let bend = z[1] - z[0] * z[0];
+            Some(vec![-2.0 * (1.0 - z[0]) - 40.0 * z[0] * bend, 20.0 * bend])
+        }
+        fn near_rows(&mut self, z: &[f64], _: f64) -> Vec<NearRow<()>> {
+            self.row_gradients(z, &[()])
+                .into_iter()
+                .map(|mut row| {
+                    row.bound = 1.5 - z[0] * z[0] - z[1] * z[1];
+                    NearRow { row, curved: Some(()) }
+                })
+                .collect()
+        }
+        fn row_gradients(&mut self, z: &[f64], _: &[()]) -> Vec<Row> {
+            vec![Row { first: 0, values: vec![2.0 * z[0], 2.0 * z[1]], bound: 0.0 }]
+        }
+    }
+
+    #[test]
+    fn a_curved_constraint_is_met_at_the_optimum() {
+        let settings = Settings { iterations: 100, radius: 0.5, stall: 2e-4 };
+        let outcome = minimise(&mut Valley, vec![-1.0, 0.5], settings).unwrap();
+        // From the stationarity conditions of the same problem, solved by bisection on the circle.
+        let on_circle = |angle: f64| {
+            let (s, c) = angle.sin_cos();
+            let r = 1.5f64.sqrt();
+            (1.0 - r * c).powi(2) + 10.0 * (r * s - r * r * c * c).powi(2)
+        };
+        let best = (0..200_000)
+            .map(|k| on_circle(std::f64::consts::TAU * f64::from(k) / 200_000.0))
+            .fold(f64::INFINITY, f64::min);
+        assert!((outcome.point.objective - best).abs() < 2e-3, "{outcome:?} {best}");
+        assert!(outcome.point.violation < 1e-4, "{outcome:?}");
+    }
+}

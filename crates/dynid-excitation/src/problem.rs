@@ -1,0 +1,146 @@
+//! What is to be designed: model, limits, criterion, period.
+
+use faer::Mat;
+
+use crate::constraint::PathConstraint;
+use crate::criterion::Criterion;
+use crate::limits::CoordinateLimits;
+use crate::model::ExcitationModel;
+use crate::parametrisation::StartConditions;
+
+/// A design problem.
+pub struct Problem {
+    /// Model whose parameters are to become visible.
+    pub model: Box<dyn ExcitationModel>,
+    /// Names of the coordinates.
+    pub coordinates: Vec<String>,
+    /// Limits that are linear in the coefficients, one entry per coordinate.
+    pub limits: Vec<CoordinateLimits>,
+    /// Limits that are not: efforts, distances.
+    pub constraints: Vec<Box<dyn PathConstraint>>,
+    /// Fundamental `ω`, rad/s.
+    pub base: f64,
+    /// Harmonics `L`.
+    pub harmonics: usize,
+    /// Conditions at the start and end of every period.
+    pub start: StartConditions,
+    /// What is minimised.
+    pub criterion: Criterion,
+    /// Factor of every output's rows, `1/σ` of its noise; ones where noise is not known.
+    pub output_weights: Vec<f64>,
+    /// Information that is there already: a triangle of earlier rows, weighted alike, in the model's columns.
+    pub prior: Option<Mat<f64>>,
+    /// Width of the smoothed sign of velocities during the search, rad/s or m/s.
+    pub sign_width: f64,
+    /// Samples of a period during the search.
+    pub samples: usize,
+}
+
+/// Width of the smoothed sign of velocities, unless chosen otherwise (spec/excitation.md section 3.5).
+pub const DEFAULT_SIGN_WIDTH: f64 = 0.02;
+
+/// Samples per harmonic of a period during the search, unless chosen otherwise.
+pub const DEFAULT_SAMPLES_PER_HARMONIC: usize = 20;
+
+/// A problem that cannot be posed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProblemError {
+    /// A list has the wrong length.
+    #[error("{what}: expected {expected} entries, found {found}")]
+    Count {
+        /// Which list.
+        what: &'static str,
+        /// Entries needed.
+        expected: usize,
+        /// Entries given.
+        found: usize,
+    },
+    /// A number is out of range.
+    #[error("{what}: expected {expected}, found {found}")]
+    Value {
+        /// Which number.
+        what: String,
+        /// The range it must lie in.
+        expected: &'static str,
+        /// The number given.
+        found: f64,
+    },
+    /// Columns of the model cannot be told apart by any motion.
+    #[error("the observation matrix is rank deficient on random motion: {} cannot be told apart", columns.join(", "))]
+    RankDeficient {
+        /// Columns that carry the direction without effect.
+        columns: Vec<String>,
+    },
+}
+
+impl Problem {
+    /// Period, s.
+    pub fn period(&self) -> f64 {
+        std::f64::consts::TAU / self.base
+    }
+
+    /// Checks sizes and numbers.
+    ///
+    /// # Errors
+    /// [`ProblemError::Count`], [`ProblemError::Value`].
+    pub fn check(&self) -> Result<(), ProblemError> {
+        let n = self.model.coordinates();
+        let p = self.model.columns().len();
+        let count = |what, expected, found| {
+            if expected == found { Ok(()) } else { Err(ProblemError::Count { what, expected, found }) }
+        };
+        count("coordinates", n, self.coordinates.len())?;
+        count("limits", n, self.limits.len())?;
+        count("output weights", self.model.outputs(), self.output_weights.len())?;
+        if let Some(pose) = &self.start.pose {
+            count("start pose", n, pose.len())?;
+        }
+        if let Some(prior) = &self.prior {
+            count("prior information", p, prior.ncols())?;
+        }
+        if let crate::criterion::ColumnScaling::Given(scale) = &self.criterion.scaling {
+            count("column scales", p, scale.len())?;
+        }
+        if let crate::criterion::Measure::Trace(weights) = &self.criterion.measure {
+            count("weights of the trace", p, weights.len())?;
+        }
+        positive("base frequency", self.base)?;
+        positive("width of the smoothed sign", self.sign_width)?;
+        for weight in &self.output_weights {
+            positive("output weight", *weight)?;
+        }
+        if self.harmonics == 0 || self.harmonics > 100 {
+            return Err(value("harmonics", "1 to 100", self.harmonics as f64));
+        }
+        if self.samples < 4 * self.harmonics {
+            return Err(value("samples of a period", "at least 4 per harmonic", self.samples as f64));
+        }
+        for (name, limits) in self.coordinates.iter().zip(&self.limits) {
+            let (low, high) = limits.position;
+            if !(low.is_finite() && high.is_finite() && low < high) {
+                return Err(value(
+                    &format!("position range of {name}"),
+                    "finite, least below largest",
+                    high - low,
+                ));
+            }
+            for (what, limit) in
+                [("velocity", limits.velocity), ("acceleration", limits.acceleration), ("jerk", limits.jerk)]
+            {
+                if let Some(limit) = limit {
+                    positive(&format!("{what} limit of {name}"), limit)?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn positive(what: &str, x: f64) -> Result<(), ProblemError> {
+    if x > 0.0 && x.is_finite() { Ok(()) } else { Err(value(what, "a positive finite number", x)) }
+}
+
+fn value(what: &str, expected: &'static str, found: f64) -> ProblemError {
+    ProblemError::Value { what: what.to_owned(), expected, found }
+}

@@ -1,0 +1,117 @@
+//! Robots as models to design for: base columns of their regressor.
+
+use dynid_model::{BaseParameters, EffortModel, MotionAdjoint, MotionBlock, RegressorBlock, RobotModel};
+use faer::Mat;
+
+use crate::model::{ColumnInfo, ExcitationModel, Sensitivity};
+
+/// Base parameters of a robot: inertial, drive and friction columns that motion can reveal.
+#[derive(Debug)]
+pub struct RobotExcitation {
+    model: std::sync::Arc<RobotModel>,
+    shape: Vec<f64>,
+    /// Parameter columns, one per column of `W`.
+    kept: Vec<usize>,
+    columns: Vec<ColumnInfo>,
+    /// Per output and acting column: its place among the kept.
+    places: Vec<Vec<Option<usize>>>,
+}
+
+impl RobotExcitation {
+    /// The base parameters of `model`. `nominal`: values of all its parameters, if known; nominal base values follow.
+    ///
+    /// # Panics
+    /// If `nominal` or `shape` have the wrong length, or the model has a floating base.
+    pub fn new(
+        model: std::sync::Arc<RobotModel>,
+        shape: Vec<f64>,
+        base: &BaseParameters,
+        nominal: Option<&[f64]>,
+    ) -> Self {
+        let (positions, rates) = model.dimensions();
+        assert_eq!(positions, rates, "excitation of a floating base");
+        let table = model.parameters();
+        let values = nominal.map(|n| base.values(n));
+        let columns = base
+            .kept
+            .iter()
+            .enumerate()
+            .map(|(k, column)| ColumnInfo {
+                name: table.linear[*column].name.clone(),
+                unit: table.linear[*column].unit.to_owned(),
+                nominal: values.as_ref().map(|v| v[k]),
+            })
+            .collect();
+        let layout = model.layout();
+        let places = (0..layout.outputs())
+            .map(|o| layout.columns(o).iter().map(|c| base.kept.binary_search(c).ok()).collect())
+            .collect();
+        RobotExcitation { shape, kept: base.kept.clone(), columns, places, model }
+    }
+
+    /// The effort model.
+    pub fn model(&self) -> &RobotModel {
+        &self.model
+    }
+}
+
+impl ExcitationModel for RobotExcitation {
+    fn coordinates(&self) -> usize {
+        self.model.dimensions().1
+    }
+
+    fn outputs(&self) -> usize {
+        self.model.outputs().len()
+    }
+
+    fn columns(&self) -> &[ColumnInfo] {
+        &self.columns
+    }
+
+    fn observe(&self, motion: &MotionBlock<'_>, w: &mut Mat<f64>) {
+        let samples = motion.samples;
+        assert_eq!((w.nrows(), w.ncols()), (self.outputs() * samples, self.columns.len()), "size of W");
+        let mut block = RegressorBlock::new(self.model.layout().clone(), samples);
+        self.model.regressor(motion, &self.shape, &mut block);
+        w.fill(0.0);
+        for (output, places) in self.places.iter().enumerate() {
+            for (k, place) in places.iter().enumerate() {
+                if let Some(place) = place {
+                    w.col_as_slice_mut(*place)[output * samples..][..samples]
+                        .copy_from_slice(block.column(output, k));
+                }
+            }
+        }
+    }
+
+    fn adjoint(&self, motion: &MotionBlock<'_>, sensitivity: Sensitivity<'_>, out: &mut MotionAdjoint) {
+        let samples = motion.samples;
+        match sensitivity {
+            Sensitivity::Full(g) => {
+                let mut weights = RegressorBlock::new(self.model.layout().clone(), samples);
+                weights.set_samples(samples);
+                for (output, places) in self.places.iter().enumerate() {
+                    for (k, place) in places.iter().enumerate() {
+                        let to = weights.column_mut(output, k);
+                        match place {
+                            Some(place) => {
+                                to.copy_from_slice(&g.col_as_slice(*place)[output * samples..][..samples]);
+                            }
+                            None => to.fill(0.0),
+                        }
+                    }
+                }
+                self.model.regressor_adjoint(motion, &self.shape, &weights, out);
+            }
+            Sensitivity::Outer(terms) => {
+                for (u, v) in terms {
+                    let mut linear = vec![0.0; self.model.layout().parameters()];
+                    for (column, x) in self.kept.iter().zip(v) {
+                        linear[*column] = *x;
+                    }
+                    self.model.effort_adjoint(motion, &self.shape, &linear, samples, u, out);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! The design problem as the optimiser sees it.
+
+use dynid_model::MotionAdjoint;
+use faer::Mat;
+
+use crate::criterion::{Criterion, GramSensitivity, Smoothing, triangle};
+use crate::grid::{Grid, GridMotion, LimitValues, SidedRow};
+use crate::model::Sensitivity;
+use crate::optimiser::{NearRow, Point, Program, Row};
+use crate::problem::Problem;
+
+/// Weighted observation matrix of a motion and its triangle, prior information included.
+pub(crate) struct Observation {
+    /// `W`, rows weighted.
+    weighted: Mat<f64>,
+    pub(crate) triangle: Mat<f64>,
+}
+
+impl Observation {
+    pub(crate) fn new(problem: &Problem, motion: &GridMotion, sign_width: f64) -> Self {
+        let (outputs, samples) = (problem.model.outputs(), motion.samples);
+        let columns = problem.model.columns().len();
+        let mut weighted = Mat::zeros(outputs * samples, columns);
+        problem.model.observe(&motion.block(sign_width), &mut weighted);
+        for column in 0..columns {
+            let column = weighted.col_as_slice_mut(column);
+            for (part, weight) in column.chunks_exact_mut(samples).zip(&problem.output_weights) {
+                if *weight != 1.0 {
+                    part.iter_mut().for_each(|x| *x *= weight);
+                }
+            }
+        }
+        let prior = problem.prior.as_ref();
+        let extra = prior.map_or(0, Mat::nrows);
+        let rows = outputs * samples;
+        let mut stacked = Mat::zeros(rows + extra, columns);
+        stacked.subrows_mut(0, rows).copy_from(&weighted);
+        if let Some(prior) = prior {
+            stacked.subrows_mut(rows, extra).copy_from(prior);
+        }
+        let triangle = triangle(&mut stacked);
+        Observation { weighted, triangle }
+    }
+
+    /// Derivatives of the criterion with respect to the motion.
+    pub(crate) fn adjoint(
+        &self,
+        problem: &Problem,
+        motion: &GridMotion,
+        sign_width: f64,
+        sensitivity: &GramSensitivity,
+    ) -> MotionAdjoint {
+        let n = problem.model.coordinates();
+        let mut out = MotionAdjoint::new(n, n, motion.samples);
+        let block = motion.block(sign_width);
+        let weights = |row: usize| problem.output_weights[row / motion.samples];
+        match sensitivity {
+            GramSensitivity::Full(h) => {
+                let mut g = &self.weighted * h;
+                for column in 0..g.ncols() {
+                    let column = g.col_as_slice_mut(column);
+                    column.iter_mut().enumerate().for_each(|(row, x)| *x *= weights(row));
+                }
+                problem.model.adjoint(&block, Sensitivity::Full(&g), &mut out);
+            }
+            GramSensitivity::Outer(terms) => {
+                let outer: Vec<(Vec<f64>, Vec<f64>)> = terms
+                    .iter()
+                    .map(|(factor, v)| {
+                        let image = &self.weighted * faer::Col::from_fn(v.len(), |i| v[i]);
+                        let u = (0..image.nrows()).map(|row| factor * weights(row) * image[row]).collect();
+                        (u, v.clone())
+                    })
+                    .collect();
+                problem.model.adjoint(&block, Sensitivity::Outer(&outer), &mut out);
+            }
+        }
+        out
+    }
+}
+
+/// Criterion and limits on a grid, with what was computed last.
+pub(crate) struct Search<'a> {
+    grid: &'a Grid<'a>,
+    criterion: Criterion,
+    smoothing: Smoothing,
+    last: Option<Evaluation>,
+    pub(crate) evaluations: usize,
+}
+
+struct Evaluation {
+    z: Vec<f64>,
+    values: LimitValues,
+    observation: Observation,
+    sensitivity: GramSensitivity,
+    point: Point,
+}
+
+impl<'a> Search<'a> {
+    pub(crate) fn new(grid: &'a Grid<'a>, criterion: Criterion, smoothing: Smoothing) -> Self {
+        Search { grid, criterion, smoothing, last: None, evaluations: 0 }
+    }
+
+    fn at(&mut self, z: &[f64]) -> Option<&Evaluation> {
+        if self.last.as_ref().is_none_or(|e| e.z != z) {
+            self.evaluations += 1;
+            self.last = None;
+            let values = self.grid.values(z);
+            let observation = Observation::new(self.grid.problem, &values.motion, self.grid.sign_width);
+            let (objective, sensitivity) =
+                self.criterion.sensitivity(&observation.triangle, self.smoothing)?;
+            let violation = values.worst().0.max(0.0);
+            let point = Point { objective, violation };
+            self.last = Some(Evaluation { z: z.to_vec(), values, observation, sensitivity, point });
+        }
+        self.last.as_ref()
+    }
+}
+
+impl Program for Search<'_> {
+    type Id = SidedRow;
+
+    fn unknowns(&self) -> usize {
+        self.grid.map.unknowns()
+    }
+
+    fn evaluate(&mut self, z: &[f64]) -> Option<Point> {
+        self.at(z).map(|e| e.point)
+    }
+
+    fn gradient(&mut self, z: &[f64]) -> Option<Vec<f64>> {
+        let grid = self.grid;
+        let e = self.at(z)?;
+        let adjoint = e.observation.adjoint(grid.problem, &e.values.motion, grid.sign_width, &e.sensitivity);
+        Some(grid.gradient(&adjoint))
+    }
+
+    fn near_rows(&mut self, z: &[f64], distance: f64) -> Vec<NearRow<SidedRow>> {
+        let grid = self.grid;
+        match self.at(z) {
+            Some(e) => grid.linearised(&e.values, 0.0, |limit, sample| limit.excess(sample) > -distance),
+            None => Vec::new(),
+        }
+    }
+
+    fn row_gradients(&mut self, z: &[f64], ids: &[SidedRow]) -> Vec<Row> {
+        self.grid.path_rows(&self.grid.motion(z), ids)
+    }
+}
