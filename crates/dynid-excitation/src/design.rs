@@ -193,7 +193,7 @@ impl<'a> StartOptimiser<'a> {
         StartOptimiser {
             problem,
             search: Grid::search(problem, map, problem.samples),
-            finer: Grid::search(problem, map, 2 * problem.samples),
+            finer: Grid::exact(problem, map, 2 * problem.samples),
             restoration: Restoration::new(problem, map),
             report: Grid::exact(problem, map, settings.report_samples.max(4 * problem.harmonics)),
         }

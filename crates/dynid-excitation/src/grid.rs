@@ -135,26 +135,24 @@ impl<'a> Grid<'a> {
 
     /// Values of all limits.
     pub(crate) fn values(&self, z: &[f64]) -> LimitValues {
-        self.values_of(self.motion(z), true)
+        self.values_of(self.motion(z))
     }
 
-    /// Values of the limits of a motion; without the coordinate limits if those are known to hold.
-    pub(crate) fn values_of(&self, motion: GridMotion, coordinates: bool) -> LimitValues {
+    /// Values of all limits of a motion.
+    pub(crate) fn values_of(&self, motion: GridMotion) -> LimitValues {
         let samples = motion.samples;
         let mut limits = Vec::new();
-        if coordinates {
-            for (coordinate, limit) in self.problem.limits.iter().enumerate() {
-                for derivative in 0..4 {
-                    let Some(scale) = limit.of_derivative(derivative) else { continue };
-                    let middle = if derivative == 0 { limit.middle() } else { 0.0 };
-                    let channel = &motion.channels[derivative][coordinate * samples..][..samples];
-                    limits.push(LimitValue {
-                        id: LimitId::Coordinate { coordinate, derivative },
-                        lower: -self.bound,
-                        upper: self.bound,
-                        values: channel.iter().map(|x| (x - middle) / scale).collect(),
-                    });
-                }
+        for (coordinate, limit) in self.problem.limits.iter().enumerate() {
+            for derivative in 0..4 {
+                let Some(scale) = limit.of_derivative(derivative) else { continue };
+                let middle = if derivative == 0 { limit.middle() } else { 0.0 };
+                let channel = &motion.channels[derivative][coordinate * samples..][..samples];
+                limits.push(LimitValue {
+                    id: LimitId::Coordinate { coordinate, derivative },
+                    lower: -self.bound,
+                    upper: self.bound,
+                    values: channel.iter().map(|x| (x - middle) / scale).collect(),
+                });
             }
         }
         let block = motion.block(self.sign_width);

@@ -3,7 +3,10 @@
 pub mod constraint;
 pub mod criterion;
 mod design;
+mod duals;
+mod evaluation;
 mod feasibility;
+mod forecast;
 mod grid;
 mod limits;
 mod model;
@@ -16,7 +19,10 @@ mod search;
 mod start;
 
 pub use design::{Design, Outcome, Settings, StartOutcome, design};
+pub use duals::{DualConstraint, DualMap, DualModel, DualState};
+pub use evaluation::{criterion_gradient, information, limit_points};
 pub use feasibility::{Infeasible, LimitKind, LimitPoint};
+pub use forecast::{ColumnForecast, ConfoundedPair, Forecast, RandomComparison, forecast};
 pub use limits::CoordinateLimits;
 pub use model::{ColumnInfo, ExcitationModel, Sensitivity};
 pub use parametrisation::{Parametrisation, StartConditions};

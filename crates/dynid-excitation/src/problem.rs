@@ -28,6 +28,9 @@ pub struct Problem {
     pub criterion: Criterion,
     /// Factor of every output's rows, `1/σ` of its noise; ones where noise is not known.
     pub output_weights: Vec<f64>,
+    /// Independent samples that the log will hold: the information of a period counts as that of so many samples, on
+    /// whatever grid it is computed.
+    pub effective_samples: f64,
     /// Information that is there already: a triangle of earlier rows, weighted alike, in the model's columns.
     pub prior: Option<Mat<f64>>,
     /// Width of the smoothed sign of velocities during the search, rad/s or m/s.
@@ -107,6 +110,7 @@ impl Problem {
         }
         positive("base frequency", self.base)?;
         positive("width of the smoothed sign", self.sign_width)?;
+        positive("effective samples", self.effective_samples)?;
         for weight in &self.output_weights {
             positive("output weight", *weight)?;
         }

@@ -21,32 +21,41 @@ impl RobotExcitation {
     /// The base parameters of `model`. `nominal`: values of all its parameters, if known; nominal base values follow.
     ///
     /// # Panics
-    /// If `nominal` or `shape` have the wrong length, or the model has a floating base.
+    /// If `nominal` has the wrong length, or the model has a floating base.
     pub fn new(
         model: std::sync::Arc<RobotModel>,
         shape: Vec<f64>,
         base: &BaseParameters,
         nominal: Option<&[f64]>,
     ) -> Self {
+        let mut excitation = Self::of_columns(model, shape, base.kept.clone());
+        if let Some(nominal) = nominal {
+            for (column, value) in excitation.columns.iter_mut().zip(base.values(nominal)) {
+                column.nominal = Some(value);
+            }
+        }
+        excitation
+    }
+
+    /// Some parameter columns of `model`, ascending.
+    ///
+    /// # Panics
+    /// If a column does not exist, or the model has a floating base.
+    pub fn of_columns(model: std::sync::Arc<RobotModel>, shape: Vec<f64>, kept: Vec<usize>) -> Self {
         let (positions, rates) = model.dimensions();
         assert_eq!(positions, rates, "excitation of a floating base");
         let table = model.parameters();
-        let values = nominal.map(|n| base.values(n));
-        let columns = base
-            .kept
-            .iter()
-            .enumerate()
-            .map(|(k, column)| ColumnInfo {
-                name: table.linear[*column].name.clone(),
-                unit: table.linear[*column].unit.to_owned(),
-                nominal: values.as_ref().map(|v| v[k]),
-            })
-            .collect();
+        let column = |c: &usize| ColumnInfo {
+            name: table.linear[*c].name.clone(),
+            unit: table.linear[*c].unit.to_owned(),
+            nominal: None,
+        };
+        let columns = kept.iter().map(column).collect();
         let layout = model.layout();
         let places = (0..layout.outputs())
-            .map(|o| layout.columns(o).iter().map(|c| base.kept.binary_search(c).ok()).collect())
+            .map(|o| layout.columns(o).iter().map(|c| kept.binary_search(c).ok()).collect())
             .collect();
-        RobotExcitation { shape, kept: base.kept.clone(), columns, places, model }
+        RobotExcitation { shape, kept, columns, places, model }
     }
 
     /// The effort model.

@@ -24,10 +24,8 @@ impl Observation {
         problem.model.observe(&motion.block(sign_width), &mut weighted);
         for column in 0..columns {
             let column = weighted.col_as_slice_mut(column);
-            for (part, weight) in column.chunks_exact_mut(samples).zip(&problem.output_weights) {
-                if *weight != 1.0 {
-                    part.iter_mut().for_each(|x| *x *= weight);
-                }
+            for (part, weight) in column.chunks_exact_mut(samples).zip(row_weights(problem, samples)) {
+                part.iter_mut().for_each(|x| *x *= weight);
             }
         }
         let prior = problem.prior.as_ref();
@@ -53,7 +51,8 @@ impl Observation {
         let n = problem.model.coordinates();
         let mut out = MotionAdjoint::new(n, n, motion.samples);
         let block = motion.block(sign_width);
-        let weights = |row: usize| problem.output_weights[row / motion.samples];
+        let by_output: Vec<f64> = row_weights(problem, motion.samples).collect();
+        let weights = |row: usize| by_output[row / motion.samples];
         match sensitivity {
             GramSensitivity::Full(h) => {
                 let mut g = &self.weighted * h;
@@ -77,6 +76,12 @@ impl Observation {
         }
         out
     }
+}
+
+/// Factors of the rows of every output: `1/σ`, and the share of a sample of the log that a sample of the grid stands for.
+fn row_weights(problem: &Problem, samples: usize) -> impl Iterator<Item = f64> {
+    let share = (problem.effective_samples / samples as f64).sqrt();
+    problem.output_weights.iter().map(move |w| w * share)
 }
 
 /// Criterion and limits on a grid, with what was computed last.

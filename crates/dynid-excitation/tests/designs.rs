@@ -19,6 +19,7 @@ fn indy7(rest: bool) -> Option<Problem> {
         start: StartConditions { rest, ..Default::default() },
         criterion: Criterion::raw(Measure::Condition),
         output_weights: vec![1.0; 6],
+        effective_samples: 1000.0,
         prior: None,
         sign_width: DEFAULT_SIGN_WIDTH,
         samples: 100,

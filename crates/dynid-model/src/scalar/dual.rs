@@ -1,7 +1,7 @@
 //! Dual numbers: a value with its directional derivatives.
 
 use std::array::from_fn;
-use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 use super::Scalar;
 
@@ -18,6 +18,12 @@ impl<const N: usize> Dual<N> {
     /// A variable: derivative 1 along direction `direction`.
     pub fn variable(value: f64, direction: usize) -> Self {
         Dual { value, derivative: from_fn(|k| if k == direction { 1.0 } else { 0.0 }) }
+    }
+
+    /// Square root of a positive number.
+    pub fn sqrt(self) -> Self {
+        let root = self.value.sqrt();
+        Dual { value: root, derivative: self.derivative.map(|d| 0.5 * d / root) }
     }
 }
 
@@ -70,6 +76,14 @@ impl<const N: usize> Mul for Dual<N> {
             value: self.value * o.value,
             derivative: from_fn(|k| self.derivative[k] * o.value + self.value * o.derivative[k]),
         }
+    }
+}
+
+impl<const N: usize> Div for Dual<N> {
+    type Output = Self;
+    fn div(self, o: Self) -> Self {
+        let value = self.value / o.value;
+        Dual { value, derivative: from_fn(|k| (self.derivative[k] - value * o.derivative[k]) / o.value) }
     }
 }
 
