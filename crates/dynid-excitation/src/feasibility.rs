@@ -202,7 +202,7 @@ impl Program for Excess<'_> {
         Vec::new()
     }
 
-    fn row_gradients(&mut self, _: &[f64], _: &[SidedRow]) -> Vec<Row> {
+    fn curved_rows(&mut self, _: &[f64], _: &[SidedRow]) -> Vec<Row> {
         Vec::new()
     }
 }

@@ -1,6 +1,6 @@
 //! A design on a grid of times: motion, values of all limits, their linearisations.
 
-use dynid_model::{MotionAdjoint, MotionBlock};
+use dynid_model::MotionBlock;
 use dynid_motion::trajectory::FourierBasis;
 
 use crate::optimiser::{NearRow, Row};
@@ -200,14 +200,12 @@ impl<'a> Grid<'a> {
                         row.bound = bound;
                         rows.push(NearRow { row, curved: None });
                     }
-                    LimitId::Path { .. } => path.push((SidedRow { id, sign }, bound)),
+                    LimitId::Path { .. } => path.push(SidedRow { id, sign }),
                 }
             }
         }
-        let ids: Vec<SidedRow> = path.iter().map(|p| p.0).collect();
-        let gradients = self.path_rows(&values.motion, &ids);
-        for ((id, bound), mut row) in path.into_iter().zip(gradients) {
-            row.bound = bound;
+        for (mut row, id) in self.path_rows(values, &path).into_iter().zip(path) {
+            row.bound -= margin;
             rows.push(NearRow { row, curved: Some(id) });
         }
         rows.retain(|r| r.row.values.iter().any(|x| x.abs() > 1e-9));
@@ -224,11 +222,20 @@ impl<'a> Grid<'a> {
         Row { first: self.map.range(coordinate).start, values, bound: 0.0 }
     }
 
-    /// Gradients of path rows with respect to the unknowns, in the order of `ids`.
-    pub(crate) fn path_rows(&self, motion: &GridMotion, ids: &[SidedRow]) -> Vec<Row> {
+    /// Linearised rows of path constraints, in the order of `ids`.
+    pub(crate) fn path_rows(&self, values: &LimitValues, ids: &[SidedRow]) -> Vec<Row> {
         let n = self.map.coordinates();
-        let block = motion.block(self.sign_width);
-        let mut rows = vec![Row { first: 0, values: Vec::new(), bound: 0.0 }; ids.len()];
+        let block = values.motion.block(self.sign_width);
+        let mut rows: Vec<Row> = ids
+            .iter()
+            .map(|id| {
+                let slack = values.limits.iter().find(|l| l.id == id.id.limit).map_or(0.0, |l| {
+                    let value = l.values[id.id.sample];
+                    if id.sign > 0.0 { l.upper - value } else { value - l.lower }
+                });
+                Row { first: 0, values: Vec::new(), bound: slack }
+            })
+            .collect();
         for (c, constraint) in self.problem.constraints.iter().enumerate() {
             let mut wanted = Vec::new();
             let mut places = Vec::new();
@@ -267,11 +274,6 @@ impl<'a> Grid<'a> {
             }
         }
         z
-    }
-
-    /// `∂/∂z` of `Σ G ∘ W` and the like from derivatives with respect to the motion.
-    pub(crate) fn gradient(&self, adjoint: &MotionAdjoint) -> Vec<f64> {
-        self.map.gradient(&self.basis, adjoint)
     }
 }
 

@@ -3,7 +3,7 @@
 use dynid_model::MotionAdjoint;
 use faer::Mat;
 
-use crate::criterion::{Criterion, GramSensitivity, Smoothing, triangle};
+use crate::criterion::{Criterion, GramSensitivity, Measure, Smoothing, triangle};
 use crate::grid::{Grid, GridMotion, LimitValues, SidedRow};
 use crate::model::Sensitivity;
 use crate::optimiser::{NearRow, Point, Program, Row};
@@ -89,6 +89,8 @@ pub(crate) struct Search<'a> {
     grid: &'a Grid<'a>,
     criterion: Criterion,
     smoothing: Smoothing,
+    /// Factor of the criterion in the objective.
+    scale: f64,
     last: Option<Evaluation>,
     pub(crate) evaluations: usize,
 }
@@ -103,7 +105,12 @@ struct Evaluation {
 
 impl<'a> Search<'a> {
     pub(crate) fn new(grid: &'a Grid<'a>, criterion: Criterion, smoothing: Smoothing) -> Self {
-        Search { grid, criterion, smoothing, last: None, evaluations: 0 }
+        // A determinant is a sum over all columns; penalties and thresholds of progress are made for numbers around one.
+        let scale = match criterion.measure {
+            Measure::Determinant => 1.0 / grid.problem.model.columns().len() as f64,
+            _ => 1.0,
+        };
+        Search { grid, criterion, smoothing, scale, last: None, evaluations: 0 }
     }
 
     fn at(&mut self, z: &[f64]) -> Option<&Evaluation> {
@@ -112,10 +119,9 @@ impl<'a> Search<'a> {
             self.last = None;
             let values = self.grid.values(z);
             let observation = Observation::new(self.grid.problem, &values.motion, self.grid.sign_width);
-            let (objective, sensitivity) =
-                self.criterion.sensitivity(&observation.triangle, self.smoothing)?;
+            let (value, sensitivity) = self.criterion.sensitivity(&observation.triangle, self.smoothing)?;
             let violation = values.worst().0.max(0.0);
-            let point = Point { objective, violation };
+            let point = Point { objective: self.scale * value, violation };
             self.last = Some(Evaluation { z: z.to_vec(), values, observation, sensitivity, point });
         }
         self.last.as_ref()
@@ -134,10 +140,12 @@ impl Program for Search<'_> {
     }
 
     fn gradient(&mut self, z: &[f64]) -> Option<Vec<f64>> {
-        let grid = self.grid;
+        let (grid, scale) = (self.grid, self.scale);
         let e = self.at(z)?;
         let adjoint = e.observation.adjoint(grid.problem, &e.values.motion, grid.sign_width, &e.sensitivity);
-        Some(grid.gradient(&adjoint))
+        let mut gradient = grid.map.gradient(&grid.basis, &adjoint);
+        gradient.iter_mut().for_each(|x| *x *= scale);
+        Some(gradient)
     }
 
     fn near_rows(&mut self, z: &[f64], distance: f64) -> Vec<NearRow<SidedRow>> {
@@ -148,7 +156,11 @@ impl Program for Search<'_> {
         }
     }
 
-    fn row_gradients(&mut self, z: &[f64], ids: &[SidedRow]) -> Vec<Row> {
-        self.grid.path_rows(&self.grid.motion(z), ids)
+    fn curved_rows(&mut self, z: &[f64], ids: &[SidedRow]) -> Vec<Row> {
+        let grid = self.grid;
+        match self.at(z) {
+            Some(e) => grid.path_rows(&e.values, ids),
+            None => grid.path_rows(&grid.values(z), ids),
+        }
     }
 }

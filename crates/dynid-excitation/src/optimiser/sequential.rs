@@ -2,7 +2,7 @@
 //!
 //! Source: spec/excitation.md section 6.1; Powell 1978 (damping).
 
-use super::quadratic::{Elastic, QuadraticProgram, Row};
+use super::quadratic::{Elastic, Failure, Minimum, QuadraticProgram, Row};
 
 /// A problem `min c(z)` subject to rows, evaluated where asked.
 pub(crate) trait Program {
@@ -16,8 +16,8 @@ pub(crate) trait Program {
     fn gradient(&mut self, z: &[f64]) -> Option<Vec<f64>>;
     /// Linearised rows whose value is within `distance` of their bound.
     fn near_rows(&mut self, z: &[f64], distance: f64) -> Vec<NearRow<Self::Id>>;
-    /// Gradients of rows that are not linear.
-    fn row_gradients(&mut self, z: &[f64], ids: &[Self::Id]) -> Vec<Row>;
+    /// Linearised rows at `z` that are not linear, by name.
+    fn curved_rows(&mut self, z: &[f64], ids: &[Self::Id]) -> Vec<Row>;
 }
 
 /// Objective and largest violation of the rows at a point.
@@ -60,7 +60,11 @@ const LARGEST_RADIUS: f64 = 2.0;
 const ARMIJO: f64 = 1e-4;
 const STALLED_ITERATIONS: usize = 4;
 const FEASIBLE: f64 = 1e-4;
-const ELASTIC: Elastic = Elastic { linear: 10.0, quadratic: 1e-4 };
+/// Violation that steps may lead to, if there was less before.
+const LARGEST_VIOLATION: f64 = 0.05;
+/// Price of the elastic variable at the start, and where raising it ends.
+const LEAST_PRICE: f64 = 10.0;
+const LARGEST_PRICE: f64 = 1e5;
 
 /// Minimises from `z`. `None` if the objective is not defined at the start.
 pub(crate) fn minimise<P: Program>(program: &mut P, z: Vec<f64>, settings: Settings) -> Option<Outcome> {
@@ -71,43 +75,52 @@ pub(crate) fn minimise<P: Program>(program: &mut P, z: Vec<f64>, settings: Setti
     let mut hessian = Curvature::new(n);
     let mut radius = settings.radius;
     let mut weight: f64 = 0.0;
+    let mut price = LEAST_PRICE;
     let mut stalled = 0;
     let mut failures = 0;
     let mut iterations = 0;
     while iterations < settings.iterations && stalled < STALLED_ITERATIONS && failures < 4 {
         iterations += 1;
         let near = program.near_rows(&z, NEAR * (1.0 + radius));
-        let rows: Vec<Row> = near.iter().map(|r| r.row.clone()).collect();
+        let mut rows: Vec<Row> = near.iter().map(|r| r.row.clone()).collect();
         let regular = hessian.regular();
-        let minimum = QuadraticProgram {
-            hessian: &regular,
-            gradient: &gradient,
-            rows: &rows,
-            radius,
-            elastic: Some(ELASTIC),
-        }
-        .solve();
-        let Ok(minimum) = minimum else {
+        let step = Step { hessian: &regular, gradient: &gradient, radius };
+        let Ok(minimum) = step.solve(&rows, point.violation, &mut price) else {
             radius *= 0.5;
             failures += 1;
             hessian.reset();
             continue;
         };
-        let active = minimum.multipliers.iter().filter(|u| **u > 0.0).count();
-        let largest = minimum.multipliers.iter().fold(0.0_f64, |m, u| m.max(*u));
-        weight = weight.max(1.5 * largest * active as f64);
+        // The sum of multipliers is the least weight with which the merit function is exact.
+        weight = weight.max(1.2 * minimum.multipliers.iter().sum::<f64>());
         let slope = dot(&gradient, &minimum.step) - weight * point.violation;
         let merit = point.objective + weight * point.violation;
+        let acceptable = |at: Point, length: f64| {
+            let decrease = ARMIJO * length * slope.min(0.0);
+            let better = at.objective + weight * at.violation <= merit + decrease;
+            better && at.violation <= (0.9 * point.violation).max(LARGEST_VIOLATION)
+        };
 
         let mut length = 1.0;
         let mut cuts = 0;
         let accepted = loop {
-            let trial: Vec<f64> = z.iter().zip(&minimum.step).map(|(x, p)| x + length * p).collect();
-            if let Some(at) = program.evaluate(&trial) {
-                let decrease = ARMIJO * length * slope.min(0.0);
-                let better = at.objective + weight * at.violation <= merit + decrease;
-                if better && at.violation <= (0.9 * point.violation).max(0.05) {
-                    break Some((trial, at));
+            let trial = moved(&z, &minimum.step, length);
+            let at = program.evaluate(&trial);
+            if let Some(at) = at
+                && acceptable(at, length)
+            {
+                break Some((trial, at));
+            }
+            // A full step that curved constraints spoil: once more, with their curvature along the step.
+            if cuts == 0 && at.is_some_and(|at| at.violation > point.violation.max(1e-6)) {
+                bend(program, &near, &minimum.step, &trial, &mut rows);
+                if let Ok(corrected) = step.solve(&rows, point.violation, &mut price) {
+                    let trial = moved(&z, &corrected.step, 1.0);
+                    if let Some(at) = program.evaluate(&trial)
+                        && acceptable(at, 1.0)
+                    {
+                        break Some((trial, at));
+                    }
                 }
             }
             cuts += 1;
@@ -131,15 +144,57 @@ pub(crate) fn minimise<P: Program>(program: &mut P, z: Vec<f64>, settings: Setti
             _ => (0.6 * radius).max(LEAST_RADIUS),
         };
         let Some(next_gradient) = program.gradient(&next) else { break };
-        let step: Vec<f64> = next.iter().zip(&z).map(|(a, b)| a - b).collect();
+        let taken: Vec<f64> = next.iter().zip(&z).map(|(a, b)| a - b).collect();
         let mut change: Vec<f64> = next_gradient.iter().zip(&gradient).map(|(a, b)| a - b).collect();
         add_curvature_of_rows(program, &near, &minimum.multipliers, &next, &mut change);
-        hessian.update(&step, change);
+        hessian.update(&taken, change);
         let progress = (at.objective - point.objective).abs();
         stalled = if progress < settings.stall && at.violation < FEASIBLE { stalled + 1 } else { 0 };
         (z, point, gradient) = (next, at, next_gradient);
     }
     Some(Outcome { z, point })
+}
+
+fn moved(z: &[f64], step: &[f64], length: f64) -> Vec<f64> {
+    z.iter().zip(step).map(|(x, p)| x + length * p).collect()
+}
+
+/// The quadratic program of one iteration.
+struct Step<'a> {
+    hessian: &'a [f64],
+    gradient: &'a [f64],
+    radius: f64,
+}
+
+impl Step<'_> {
+    /// Solves with the elastic variable as cheap as it may be: rows must be met to half of the present violation, unless
+    /// no price achieves that within the trust box.
+    fn solve(&self, rows: &[Row], violation: f64, price: &mut f64) -> Result<Minimum, Failure> {
+        loop {
+            let minimum = QuadraticProgram {
+                hessian: self.hessian,
+                gradient: self.gradient,
+                rows,
+                radius: self.radius,
+                elastic: Some(Elastic { linear: *price, quadratic: 1e-4 }),
+            }
+            .solve()?;
+            if minimum.elastic <= 0.5 * violation + 1e-9 || *price >= LARGEST_PRICE {
+                return Ok(minimum);
+            }
+            *price *= 10.0;
+        }
+    }
+}
+
+/// Second-order correction: bounds of curved rows moved by what linearisation missed at the trial point.
+fn bend<P: Program>(program: &mut P, near: &[NearRow<P::Id>], step: &[f64], trial: &[f64], rows: &mut [Row]) {
+    let (places, ids): (Vec<usize>, Vec<P::Id>) =
+        near.iter().enumerate().filter_map(|(k, r)| r.curved.map(|id| (k, id))).unzip();
+    for (place, there) in places.into_iter().zip(program.curved_rows(trial, &ids)) {
+        let row = &mut rows[place];
+        row.bound = there.bound + dot(&row.values, &step[row.first..]);
+    }
 }
 
 /// Adds `Σ λ (∇y(z⁺) - ∇y(z))` of rows that are not linear: the rest of the change of the Lagrangian's gradient.
@@ -160,7 +215,7 @@ fn add_curvature_of_rows<P: Program>(
         return;
     }
     let ids: Vec<P::Id> = curved.iter().map(|c| c.0).collect();
-    for ((_, before, multiplier), after) in curved.iter().zip(program.row_gradients(next, &ids)) {
+    for ((_, before, multiplier), after) in curved.iter().zip(program.curved_rows(next, &ids)) {
         for (k, x) in after.values.iter().enumerate() {
             change[after.first + k] += multiplier * x;
         }
@@ -252,16 +307,11 @@ mod tests {
             Some(vec![-2.0 * (1.0 - z[0]) - 40.0 * z[0] * bend, 20.0 * bend])
         }
         fn near_rows(&mut self, z: &[f64], _: f64) -> Vec<NearRow<()>> {
-            self.row_gradients(z, &[()])
-                .into_iter()
-                .map(|mut row| {
-                    row.bound = 1.5 - z[0] * z[0] - z[1] * z[1];
-                    NearRow { row, curved: Some(()) }
-                })
-                .collect()
+            self.curved_rows(z, &[()]).into_iter().map(|row| NearRow { row, curved: Some(()) }).collect()
         }
-        fn row_gradients(&mut self, z: &[f64], _: &[()]) -> Vec<Row> {
-            vec![Row { first: 0, values: vec![2.0 * z[0], 2.0 * z[1]], bound: 0.0 }]
+        fn curved_rows(&mut self, z: &[f64], _: &[()]) -> Vec<Row> {
+            let bound = 1.5 - z[0] * z[0] - z[1] * z[1];
+            vec![Row { first: 0, values: vec![2.0 * z[0], 2.0 * z[1]], bound }]
         }
     }
 
