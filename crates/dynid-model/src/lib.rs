@@ -22,10 +22,10 @@ pub mod symmetric;
 
 pub use base_parameters::{BaseParameters, BaseSettings};
 pub use description::{Description, JointDescription, JointKind, Limits, LinkDescription, Mimic};
-pub use dynamics::{Dynamics, DynamicsWorkspace, Energy, MotionAdjoint, MotionBlock, State};
+pub use dynamics::{BodyPoint, Dynamics, DynamicsWorkspace, Energy, MotionAdjoint, MotionBlock, State};
 pub use effort_model::{EffortModel, Output, RegressorBlock, RegressorLayout};
 pub use inertia::Inertia;
-pub use mechanism::{Body, Joint, Mechanism, MechanismError, MechanismWarning};
+pub use mechanism::{Body, Frame, Joint, Mechanism, MechanismError, MechanismWarning};
 pub use parameter::{Owner, Parameter, ParameterTable, ShapeParameter};
 pub use random_motion::RandomMotion;
 pub use robot_model::RobotModel;

@@ -28,6 +28,15 @@ pub struct FixedLink {
     pub inertia: Option<Inertia>,
 }
 
+/// A frame of the robot: of a link, moving or fixed to another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// The body that carries it; `None`: the base.
+    pub body: Option<usize>,
+    /// Where it is in the frame of the body, or in base axes.
+    pub placement: Placement,
+}
+
 /// A moving joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
@@ -103,6 +112,8 @@ pub struct Mechanism {
     name: String,
     gravity: Vec3<f64>,
     base_link: String,
+    /// Links fixed to the ground, the root link first.
+    ground_links: Vec<FixedLink>,
     bodies: Vec<Body>,
     sweep: Vec<usize>,
     /// One entry per joint rate if mimic joints are coupled.
@@ -247,6 +258,23 @@ impl Mechanism {
             name: name.to_owned(),
             known: self.bodies.iter().map(|b| b.joint.name.clone()).collect(),
         })
+    }
+
+    /// Frame of the link with this name: a moving link, one that is fixed to it, or one that is fixed to the ground.
+    pub fn frame(&self, link: &str) -> Result<Frame, MechanismError> {
+        let named = |body, l: &FixedLink| (l.name.clone(), Frame { body, placement: l.placement });
+        let mut all: Vec<(String, Frame)> = self.ground_links.iter().map(|l| named(None, l)).collect();
+        for (b, body) in self.bodies.iter().enumerate() {
+            all.push((body.name.clone(), Frame { body: Some(b), placement: Placement::identity() }));
+            all.extend(body.fixed_links.iter().map(|l| named(Some(b), l)));
+        }
+        match all.iter().find(|(name, _)| name == link) {
+            Some((_, frame)) => Ok(*frame),
+            None => Err(MechanismError::UnknownLink {
+                name: link.to_owned(),
+                known: all.into_iter().map(|(name, _)| name).collect(),
+            }),
+        }
     }
 
     /// Standard inertial parameters of the file, ten per body in body order.

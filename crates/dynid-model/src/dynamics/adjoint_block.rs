@@ -2,9 +2,10 @@
 
 use super::adjoint::{AdjointWorkspace, Moments, effort_sweep, regressor_sweep};
 use super::block::{load_all, load_gravity};
+use super::groups::{GroupTask, groups, run};
 use super::tree::Node;
 use super::{Dynamics, MotionBlock, Slots};
-use crate::scalar::{FusedTask, LANES, LaneTask, Lanes, Scalar, run_fused, run_on_lanes};
+use crate::scalar::{LANES, Scalar};
 
 /// Derivatives of a scalar with respect to the motion of a block.
 ///
@@ -46,45 +47,6 @@ impl MotionAdjoint {
         assert_eq!(self.dq.len(), rates * samples, "rates of the adjoint");
         assert_eq!(self.ddq.len(), rates * samples, "accelerations of the adjoint");
     }
-}
-
-/// Work on groups of `width` consecutive samples, each group read as one number.
-trait GroupTask {
-    fn run<S: Scalar>(self, width: usize, load: impl Fn(&[f64]) -> S, store: impl Fn(S, &mut [f64]));
-}
-
-struct OnLanes<T>(T);
-
-impl<T: GroupTask> LaneTask for OnLanes<T> {
-    #[inline(always)]
-    fn run<S: Scalar>(self, load: impl Fn(&[f64]) -> S, store: impl Fn(S, &mut [f64])) {
-        self.0.run(LANES, load, store);
-    }
-}
-
-struct OneByOne<T>(T);
-
-impl<T: GroupTask> FusedTask for OneByOne<T> {
-    #[inline(always)]
-    fn fused(self) {
-        self.0.run(1, Lanes::<1, true>::load, |value, to| value.store(to));
-    }
-    fn plain(self) {
-        self.0.run(1, |from| from[0], |value: f64, to| to[0] = value);
-    }
-}
-
-fn run(samples: usize, task: impl GroupTask) {
-    if samples >= LANES { run_on_lanes(OnLanes(task)) } else { run_fused(OneByOne(task)) }
-}
-
-/// First sample of every group of `width`, and how many of its samples the group before has done.
-#[inline(always)]
-fn groups(samples: usize, width: usize) -> impl Iterator<Item = (usize, usize)> {
-    (0..samples.div_ceil(width)).map(move |g| {
-        let first = (g * width).min(samples - width);
-        (first, g * width - first)
-    })
 }
 
 #[inline(always)]

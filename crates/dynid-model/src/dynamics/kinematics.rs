@@ -1,37 +1,59 @@
 //! Forward kinematics.
 
 use super::motion::{Turns, placement};
-use super::{Dynamics, DynamicsWorkspace, State};
+use super::tree::Tree;
+use super::{Dynamics, DynamicsWorkspace};
+use crate::scalar::Scalar;
 use crate::spatial::{Mat3, Placement, Vec3};
 
+/// Reusable memory of forward kinematics.
+#[derive(Clone, Debug)]
+pub(super) struct KinematicsWorkspace<S> {
+    turns: Turns<S>,
+    joint_q: Vec<S>,
+    /// Rotation and origin of every node in base axes, in internal axes of the node.
+    pub(super) frames: Vec<(Mat3<S>, Vec3<S>)>,
+}
+
+impl<S: Scalar> KinematicsWorkspace<S> {
+    pub(super) fn new(tree: &Tree) -> Self {
+        KinematicsWorkspace {
+            turns: Turns::new(tree),
+            joint_q: vec![S::zero(); tree.positions],
+            frames: vec![(Mat3::zero(), Vec3::zero()); tree.nodes.len()],
+        }
+    }
+}
+
 impl Dynamics {
+    /// Fills `work.frames`.
+    #[inline(always)]
+    pub(super) fn place<S: Scalar>(&self, q: &[S], work: &mut KinematicsWorkspace<S>) {
+        self.expand_positions(q, &mut work.joint_q);
+        work.turns.fill(&self.tree, &work.joint_q);
+        for (index, node) in self.tree.nodes.iter().enumerate() {
+            let (rotation, origin) = placement(node, &work.turns, &work.joint_q);
+            work.frames[index] = match node.parent {
+                None => (rotation, origin),
+                Some(p) => {
+                    let (outer, at) = &work.frames[p];
+                    (outer.mul_mat(&rotation), outer.mul_vec(origin) + *at)
+                }
+            };
+        }
+    }
+
     /// Frames of all bodies in base axes, in file order; the axes are those of the file.
     pub fn forward_kinematics(&self, q: &[f64], work: &mut DynamicsWorkspace<f64>) -> Vec<Placement> {
         assert_eq!(q.len(), self.positions(), "length of q");
-        let joint_q;
-        let q = if self.follows.is_some() {
-            let zero = vec![0.0; self.rates()];
-            let state = State { q, dq: &zero, ddq: &zero, gravity: None };
-            self.expand(&state, &mut work.joint_state);
-            joint_q = work.joint_state[0].clone();
-            &joint_q
-        } else {
-            q
-        };
-        let mut turns = Turns::new(&self.tree);
-        turns.fill(&self.tree, q);
-        let mut internal: Vec<Placement> = Vec::with_capacity(self.tree.nodes.len());
+        self.place(q, &mut work.kinematics);
         let mut frames = vec![Placement::identity(); self.tree.nodes.len()];
-        for node in &self.tree.nodes {
-            let (rotation, translation) = placement(node, &turns, q);
-            let local = Placement { rotation, translation };
-            let global = node.parent.map_or(local, |p| internal[p].then(&local));
+        for (node, (rotation, translation)) in self.tree.nodes.iter().zip(&work.kinematics.frames) {
             let mut columns = [Vec3::zero(); 3];
             for k in 0..3 {
-                columns[node.axes[k]] = global.rotation.0[k];
+                columns[node.axes[k]] = rotation.0[k];
             }
-            frames[node.body] = Placement { rotation: Mat3(columns), translation: global.translation };
-            internal.push(global);
+            frames[node.body] = Placement { rotation: Mat3(columns), translation: *translation };
         }
         frames
     }

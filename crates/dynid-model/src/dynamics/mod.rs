@@ -7,9 +7,11 @@ mod adjoint;
 mod adjoint_block;
 mod block;
 mod energy;
+mod groups;
 mod inverse_dynamics;
 mod kinematics;
 mod motion;
+mod points;
 mod regressor;
 mod tree;
 
@@ -17,11 +19,13 @@ pub use adjoint_block::MotionAdjoint;
 pub use block::MotionBlock;
 pub(crate) use block::Slots;
 pub use energy::Energy;
+pub use points::BodyPoint;
 
 use crate::mechanism::{Follow, Mechanism};
 use crate::scalar::{FusedTask, Scalar, run_fused};
 use crate::spatial::Vec3;
 use inverse_dynamics::InverseDynamicsWorkspace;
+use kinematics::KinematicsWorkspace;
 use regressor::RegressorWorkspace;
 use tree::Tree;
 
@@ -48,6 +52,7 @@ pub struct DynamicsWorkspace<S: Scalar> {
     inverse: InverseDynamicsWorkspace<S>,
     regressor: RegressorWorkspace<S>,
     fused: FusedWorkspace<S::Fused>,
+    kinematics: KinematicsWorkspace<S>,
     joint_state: [Vec<S>; 3],
     joint_effort: Vec<S>,
     joint_regressor: Vec<S>,
@@ -140,6 +145,7 @@ impl Dynamics {
                     .map(|n| vec![S::zero().fuse(); n]),
                 effort: vec![S::zero().fuse(); self.tree.rates],
             },
+            kinematics: KinematicsWorkspace::new(&self.tree),
             joint_state: [vec![S::zero(); joint_positions], vec![S::zero(); joints], vec![S::zero(); joints]],
             joint_effort: vec![S::zero(); joints],
             joint_regressor: vec![S::zero(); joints * 10 * self.bodies],
@@ -174,23 +180,29 @@ impl Dynamics {
     /// Joint values of coupled coordinates.
     fn expand<S: Scalar>(&self, state: &State<'_, S>, joint_state: &mut [Vec<S>; 3]) {
         let Some(follows) = &self.follows else { return };
-        let scaled = |f: &Follow, values: &[S]| values[f.coordinate] * S::from_f64(f.ratio);
         let [q, dq, ddq] = joint_state;
+        for ((dq, ddq), f) in dq.iter_mut().zip(ddq).zip(follows) {
+            *dq = state.dq[f.coordinate] * S::from_f64(f.ratio);
+            *ddq = state.ddq[f.coordinate] * S::from_f64(f.ratio);
+        }
+        self.expand_positions(state.q, q);
+    }
+
+    /// Joint positions of coupled coordinates.
+    #[inline(always)]
+    fn expand_positions<S: Scalar>(&self, q: &[S], joint_q: &mut [S]) {
+        let Some(follows) = &self.follows else {
+            joint_q.copy_from_slice(q);
+            return;
+        };
         for node in &self.tree.nodes {
-            for k in 0..node.rates {
-                let f = &follows[node.rate + k];
-                dq[node.rate + k] = scaled(f, state.dq);
-                ddq[node.rate + k] = scaled(f, state.ddq);
-            }
             let f = &follows[node.rate];
+            // Positions and rates of coupled mechanisms are numbered alike up to the extra entry of quaternions.
+            let from = f.coordinate + self.quaternions_before(f.coordinate);
             if node.rates == 1 {
-                // Positions and rates of coupled mechanisms are numbered alike up to the extra entry of quaternions.
-                let shift = self.quaternions_before(f.coordinate);
-                q[node.position] =
-                    state.q[f.coordinate + shift] * S::from_f64(f.ratio) + S::from_f64(f.offset);
+                joint_q[node.position] = q[from] * S::from_f64(f.ratio) + S::from_f64(f.offset);
             } else {
-                let from = f.coordinate + self.quaternions_before(f.coordinate);
-                q[node.position..node.position + 7].copy_from_slice(&state.q[from..from + 7]);
+                joint_q[node.position..node.position + 7].copy_from_slice(&q[from..from + 7]);
             }
         }
     }

@@ -200,6 +200,7 @@ fn build(d: &Description) -> Result<Mechanism, MechanismError> {
     // Walk from the root without recursion: (link, body it belongs to, its frame in that body).
     let mut sweep = Vec::with_capacity(bodies.len());
     let mut reached = vec![false; d.links.len()];
+    let mut ground_links = Vec::new();
     let mut stack = vec![(root, d.floating_base.then_some(0), Placement::identity())];
     if d.floating_base {
         sweep.push(0);
@@ -207,6 +208,7 @@ fn build(d: &Description) -> Result<Mechanism, MechanismError> {
     while let Some((link, body, placement)) = stack.pop() {
         reached[link] = true;
         let stated = &d.links[link];
+        let welded = || FixedLink { name: stated.name.clone(), placement, inertia: stated.inertia };
         if let Some(b) = body {
             let owner = &mut bodies[b];
             if let Some(inertia) = &stated.inertia {
@@ -214,12 +216,10 @@ fn build(d: &Description) -> Result<Mechanism, MechanismError> {
                 owner.stated = true;
             }
             if stated.name != owner.name {
-                owner.fixed_links.push(FixedLink {
-                    name: stated.name.clone(),
-                    placement,
-                    inertia: stated.inertia,
-                });
+                owner.fixed_links.push(welded());
             }
+        } else {
+            ground_links.push(welded());
         }
         for &k in children[link].iter().rev() {
             let joint = &d.joints[k];
@@ -253,6 +253,7 @@ fn build(d: &Description) -> Result<Mechanism, MechanismError> {
         name: d.name.clone(),
         gravity: Vec3(d.gravity),
         base_link: d.links[root].name.clone(),
+        ground_links,
         bodies,
         sweep,
         follows,

@@ -94,6 +94,14 @@ pub enum MechanismError {
         /// Number found.
         found: usize,
     },
+    /// A link that was asked for does not exist.
+    #[error("no link is named `{name}` (links: {})", known.join(", "))]
+    UnknownLink {
+        /// The name asked for.
+        name: String,
+        /// Names that exist.
+        known: Vec<String>,
+    },
     /// A joint that was asked for does not exist or does not move.
     #[error("no moving joint is named `{name}` (joints: {})", known.join(", "))]
     UnknownJoint {
