@@ -4,7 +4,102 @@
 //! and distances are, each normalised to the order of one (spec/excitation.md section 5.1). None of them is band-limited:
 //! bounds that hold on a grid may break between its samples.
 
-use dynid_model::MotionBlock;
+mod capsule;
+mod cartesian;
+mod clearance;
+mod effort;
+mod segment;
+
+pub use capsule::{Capsule, CapsulePairs, Capsules};
+pub use cartesian::{CartesianLimits, FramePoint, Region};
+pub use effort::EffortLimits;
+
+use dynid_model::{MechanismError, MotionBlock};
+use thiserror::Error;
+
+/// Distance that counts as one in normalised rows, m.
+pub const DISTANCE_SCALE: f64 = 0.5;
+
+/// Why a constraint cannot be stated.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ConstraintError {
+    /// A frame does not exist.
+    #[error(transparent)]
+    Frame(#[from] MechanismError),
+    /// A number that must be finite, or positive, is not.
+    #[error("{what} of `{subject}` is {found}, expected {expected}")]
+    Number {
+        /// Which number.
+        what: &'static str,
+        /// Output, frame or region.
+        subject: String,
+        /// What was found.
+        found: f64,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// A list has the wrong length.
+    #[error("{found} {what}, expected {expected}")]
+    Length {
+        /// Of what.
+        what: &'static str,
+        /// Length found.
+        found: usize,
+        /// Length expected.
+        expected: usize,
+    },
+    /// A pair names a capsule that does not exist, or one capsule twice.
+    #[error("pair ({}, {}) of {capsules} capsules", pair.0, pair.1)]
+    Pair {
+        /// The pair.
+        pair: (usize, usize),
+        /// Number of capsules.
+        capsules: usize,
+    },
+    /// The derivative with respect to the orientation of a floating joint is not offered.
+    #[error("a joint floats: path constraints are for robots on a fixed base")]
+    Floating,
+}
+
+fn finite(what: &'static str, subject: &str, numbers: &[f64]) -> Result<(), ConstraintError> {
+    match numbers.iter().find(|x| !x.is_finite()) {
+        None => Ok(()),
+        Some(x) => Err(ConstraintError::Number {
+            what,
+            subject: subject.into(),
+            found: *x,
+            expected: "a finite number",
+        }),
+    }
+}
+
+fn positive(what: &'static str, subject: &str, number: f64) -> Result<(), ConstraintError> {
+    if number > 0.0 && number.is_finite() {
+        return Ok(());
+    }
+    let expected = "a positive number";
+    Err(ConstraintError::Number { what, subject: subject.into(), found: number, expected })
+}
+
+/// Floating joints have more position entries than rates.
+fn fixed_base(positions: usize, rates: usize) -> Result<(), ConstraintError> {
+    if positions == rates { Ok(()) } else { Err(ConstraintError::Floating) }
+}
+
+/// Positions of one sample.
+fn pose(motion: &MotionBlock<'_>, sample: usize, q: &mut [f64]) {
+    for (c, q) in q.iter_mut().enumerate() {
+        *q = motion.q[c * motion.stride + sample];
+    }
+}
+
+/// Indices of wanted rows, those of one sample next to each other.
+fn by_sample(wanted: &[(usize, usize)]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..wanted.len()).collect();
+    order.sort_by_key(|k| wanted[*k].1);
+    order
+}
 
 /// What a path constraint limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
