@@ -1,5 +1,7 @@
 //! Path constraints against brute force and central differences.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
 mod plain_urdf;
 mod support;
 
@@ -270,7 +272,9 @@ fn capsule_distances_are_those_of_brute_force_and_have_their_gradients() {
                 // Further rows of the pair are no smaller.
                 let next = (row + 1..constraint.rows().len()).take(4);
                 for end in next.take_while(|r| !of_pairs.contains(r)) {
-                    assert!(found[end * SAMPLES + s] >= found[row * SAMPLES + s]);
+                    let [end, least] = [end, *row].map(|r| found[r * SAMPLES + s]);
+                    // Where the closest point is an end, both are one distance, of some metres, from two formulas.
+                    assert!(end >= least - 4.0 * f64::EPSILON, "{end} below {least} by {:e}", least - end);
                 }
             }
         }

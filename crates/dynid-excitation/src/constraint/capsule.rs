@@ -177,10 +177,13 @@ impl PathConstraint for Capsules {
         let n = motion.samples;
         let mut positions = vec![0.0; 3 * self.points.len() * n];
         self.dynamics.points(motion, &self.points, n, &mut positions);
+        let mut ends = vec![Vec3::zero(); self.points.len()];
         for s in 0..n {
-            let end = |p: usize| Vec3([0, 1, 2].map(|c| positions[(3 * p + c) * n + s]));
+            for (p, end) in ends.iter_mut().enumerate() {
+                *end = Vec3([0, 1, 2].map(|c| positions[(3 * p + c) * n + s]));
+            }
             for row in 0..self.rows.len() {
-                let (pair, closest) = self.measure(row, |k| [end(2 * k), end(2 * k + 1)]);
+                let (pair, closest) = self.measure(row, |k| [ends[2 * k], ends[2 * k + 1]]);
                 values[row * stride + s] = (closest.distance - self.radii[pair]) / DISTANCE_SCALE;
             }
         }

@@ -5,7 +5,7 @@
 
 use dynid_model::Vec3;
 
-/// Below this share of the squared lengths two directions count as parallel: all that is lost is then found on an edge.
+/// Squared sine below which two directions count as parallel; what an edge may then miss is 1e-7 of a length.
 const PARALLEL: f64 = 1e-14;
 /// Distance below which its direction is not defined, m.
 const TOUCHING: f64 = 1e-12;
@@ -42,38 +42,41 @@ fn nearest_share(segment: &Segment, point: Vec3<f64>) -> f64 {
 
 /// An end point of one segment against the other segment: ends 0 and 1 of the first, then those of the second.
 pub(super) fn end_distance(first: &Segment, second: &Segment, end: usize) -> Closest {
+    between(first, second, end_shares(first, second, end))
+}
+
+fn end_shares(first: &Segment, second: &Segment, end: usize) -> [f64; 2] {
     let share = (end % 2) as f64;
-    let shares = match end / 2 {
+    match end / 2 {
         0 => [share, nearest_share(second, first[end % 2])],
         _ => [nearest_share(first, second[end % 2]), share],
-    };
-    between(first, second, shares)
+    }
 }
 
 /// Distance of two segments.
 pub(super) fn segment_distance(first: &Segment, second: &Segment) -> Closest {
-    let mut best = end_distance(first, second, 0);
-    for end in 1..4 {
-        let edge = end_distance(first, second, end);
-        if edge.distance < best.distance {
-            best = edge;
-        }
-    }
     let (d1, d2, gap) = (first[1] - first[0], second[1] - second[0], first[0] - second[0]);
     let (a, b, e) = (d1.dot(d1), d1.dot(d2), d2.dot(d2));
     let (c, f) = (d1.dot(gap), d2.dot(gap));
     let determinant = a * e - b * b;
-    if determinant <= PARALLEL * a * e {
-        return best;
-    }
-    let shares = [(b * f - c * e) / determinant, (a * f - b * c) / determinant];
-    if shares.iter().all(|s| (0.0..=1.0).contains(s)) {
-        let inside = between(first, second, shares);
-        if inside.distance < best.distance {
-            return inside;
+    if determinant > PARALLEL * a * e {
+        // The second share from the first: both from the determinant would miss the minimum between nearly parallel lines.
+        let share = (b * f - c * e) / determinant;
+        let shares = [share, (f + b * share) / e];
+        if shares.iter().all(|s| (0.0..=1.0).contains(s)) {
+            return between(first, second, shares);
         }
     }
-    best
+    let mut best = ([0.0; 2], f64::INFINITY);
+    for end in 0..4 {
+        let shares = end_shares(first, second, end);
+        let gap = point_at(first, shares[0]) - point_at(second, shares[1]);
+        let squared = gap.dot(gap);
+        if squared < best.1 {
+            best = (shares, squared);
+        }
+    }
+    between(first, second, best.0)
 }
 
 #[cfg(test)]
