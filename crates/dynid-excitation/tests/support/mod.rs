@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
 #![allow(dead_code, reason = "every test binary uses some of these")]
+#![allow(unreachable_pub, reason = "shared between test binaries")]
 
 use std::path::PathBuf;
 use std::sync::Arc;
