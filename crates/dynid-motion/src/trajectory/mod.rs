@@ -1,39 +1,44 @@
 //! Excitation trajectories with exact derivatives.
+//!
+//! Profiles move one coordinate ([`Quintic`], [`PaulBlend`], [`Trapezoid`]); a [`Trajectory`] moves all of them at once:
+//! [`FourierTrajectory`], [`QuinticSegment`], [`BSpline`], [`PerCoordinate`] profiles, and [`Sequence`], which joins
+//! approach, record and return. [`Sampled`] holds a trajectory on a grid of times.
 
+pub mod bspline;
+pub mod error;
 pub mod fourier;
 pub mod fourier_basis;
+pub mod fourier_trajectory;
+pub mod limits;
+pub mod paul;
+mod polynomial;
+pub mod profile;
 pub mod quintic;
+pub mod quintic_segment;
+pub mod row_order;
+pub mod sampled;
+pub mod sequence;
+pub mod trapezoid;
 
-pub use fourier::Fourier;
+pub use bspline::BSpline;
+pub use error::{Quantity, TrajectoryError};
+pub use fourier::{Extreme, Extremes, Form, Fourier};
 pub use fourier_basis::FourierBasis;
+pub use fourier_trajectory::FourierTrajectory;
+pub use limits::MotionLimits;
+pub use paul::PaulBlend;
+pub use profile::{PerCoordinate, Profile};
 pub use quintic::Quintic;
+pub use quintic_segment::QuinticSegment;
+pub use row_order::RowOrder;
+pub use sampled::Sampled;
+pub use sequence::{Phase, Sequence};
+pub use trapezoid::Trapezoid;
 
-/// Why a trajectory was refused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum TrajectoryError {
-    /// Sine and cosine amplitudes must come in pairs.
-    #[error("expected as many cosine as sine amplitudes ({expected}), found {found}")]
-    Harmonics {
-        /// Sine amplitudes given.
-        expected: usize,
-        /// Cosine amplitudes given.
-        found: usize,
-    },
-    /// A number is not finite or not positive where it must be.
-    #[error("{name}: expected {expected}, found {found}")]
-    Value {
-        /// Which number.
-        name: &'static str,
-        /// The range it must lie in.
-        expected: &'static str,
-        /// The value given.
-        found: f64,
-    },
-}
+use error::check;
 
-/// Motion of one joint at one time.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Motion of one coordinate at one time.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Point {
     /// Position, rad or m.
     pub position: f64,
@@ -41,12 +46,51 @@ pub struct Point {
     pub velocity: f64,
     /// Acceleration, per s^2.
     pub acceleration: f64,
+    /// Jerk, per s^3.
+    pub jerk: f64,
 }
 
-fn check(name: &'static str, found: f64, positive: bool) -> Result<(), TrajectoryError> {
-    if found.is_finite() && (found > 0.0 || !positive) {
-        return Ok(());
+impl Point {
+    /// At rest at a position.
+    pub fn rest(position: f64) -> Self {
+        Point { position, ..Point::default() }
     }
-    let expected = if positive { "a positive finite number" } else { "a finite number" };
-    Err(TrajectoryError::Value { name, expected, found })
+}
+
+/// Motion of all coordinates of a robot, from time 0 to [`Self::duration`].
+pub trait Trajectory: Send + Sync {
+    /// Number of coordinates.
+    fn coordinates(&self) -> usize;
+
+    /// Duration, s.
+    fn duration(&self) -> f64;
+
+    /// Exact motion at `time`, s, one point per coordinate.
+    ///
+    /// Before 0 and after the duration, position, velocity and acceleration of the nearer end are held and the jerk is 0:
+    /// a trajectory that ends at rest rests.
+    ///
+    /// # Panics
+    /// If `out` does not hold [`Self::coordinates`] points.
+    fn at(&self, time: f64, out: &mut [Point]);
+}
+
+impl<T: Trajectory + ?Sized> Trajectory for Box<T> {
+    fn coordinates(&self) -> usize {
+        (**self).coordinates()
+    }
+
+    fn duration(&self) -> f64 {
+        (**self).duration()
+    }
+
+    fn at(&self, time: f64, out: &mut [Point]) {
+        (**self).at(time, out);
+    }
+}
+
+/// The time within `[0, duration]`, and whether it was outside: what every trajectory holds there.
+fn held(time: f64, duration: f64) -> (f64, bool) {
+    let inside = time.clamp(0.0, duration);
+    (inside, inside != time)
 }

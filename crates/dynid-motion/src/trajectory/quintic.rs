@@ -1,6 +1,6 @@
 //! Quintic blend between two positions at rest.
 
-use super::{Point, TrajectoryError, check};
+use super::{Point, Profile, TrajectoryError, check};
 
 /// `q = from + (to - from) (10 s^3 - 15 s^4 + 6 s^5)`, `s = t / duration`: velocity and acceleration vanish at both
 /// ends, and the joint rests before and after.
@@ -49,7 +49,22 @@ impl Quintic {
             position,
             velocity: 30.0 * distance / self.duration * (s * rest).powi(2),
             acceleration: 60.0 * distance / self.duration.powi(2) * s * rest * (1.0 - 2.0 * s),
+            jerk: if (0.0..=self.duration).contains(&time) {
+                60.0 * distance / self.duration.powi(3) * (1.0 - 6.0 * s * rest)
+            } else {
+                0.0
+            },
         }
+    }
+}
+
+impl Profile for Quintic {
+    fn duration(&self) -> f64 {
+        self.duration
+    }
+
+    fn at(&self, time: f64) -> Point {
+        self.at(time)
     }
 }
 
@@ -79,6 +94,7 @@ mod tests {
             let (before, here, after) = (blend.at(t - h), blend.at(t), blend.at(t + h));
             assert!(((after.position - before.position) / (2.0 * h) - here.velocity).abs() < 1e-8);
             assert!(((after.velocity - before.velocity) / (2.0 * h) - here.acceleration).abs() < 1e-8);
+            assert!(((after.acceleration - before.acceleration) / (2.0 * h) - here.jerk).abs() < 1e-8);
         }
         assert!(Quintic::new(0.0, 1.0, 0.0).is_err());
         assert!(Quintic::new(f64::NAN, 1.0, 1.0).is_err());

@@ -193,18 +193,19 @@ impl Course {
 
     pub(super) fn at(&self, time: f64) -> Point {
         match self {
-            Course::Rest(position) => Point { position: *position, velocity: 0.0, acceleration: 0.0 },
+            Course::Rest(position) => Point::rest(*position),
             Course::Poses(moves) => {
                 let k = ((time / POSE_S) as usize).min(moves.len() - 1);
                 moves[k].at(time - k as f64 * POSE_S)
             }
             Course::Tones(middle, tones) => {
-                let mut point = Point { position: *middle, velocity: 0.0, acceleration: 0.0 };
+                let mut point = Point::rest(*middle);
                 for (amplitude, omega, phase) in tones {
                     let (sin, cos) = (omega * time + phase).sin_cos();
                     point.position += amplitude * sin;
                     point.velocity += amplitude * omega * cos;
                     point.acceleration -= amplitude * omega * omega * sin;
+                    point.jerk -= amplitude * omega.powi(3) * cos;
                 }
                 point
             }
