@@ -1,4 +1,5 @@
-//! Robot files and logs: URDF, robots in TOML (DH tables or body trees), MJCF (written), CSV logs and states.
+//! Robot files and logs: URDF, robots in TOML (DH tables or body trees), MJCF (written), CSV logs and states,
+//! trajectories (JSON; CSV and ROS 2 messages, written).
 //!
 //! Every door checks what it lets in: numbers are finite, names are unique, sizes are bounded. A fault becomes one
 //! typed error whose `Display` is one line (file, line, column or row, expected, found) and whose `hint()` says what
@@ -13,6 +14,7 @@ pub mod robot;
 mod source;
 pub mod states;
 pub mod toml_robot;
+pub mod trajectory;
 pub mod urdf;
 
 pub use columns::{ColumnMapping, GuessOptions, MappingError, MappingSpec, Signals};
@@ -22,3 +24,4 @@ pub use output::OutputError;
 pub use robot::{Place, RobotFileError};
 pub use states::{StateJoint, States, StatesError};
 pub use toml_robot::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, RobotFile, SettingValue};
+pub use trajectory::{TrajectoryFile, TrajectoryFileError};

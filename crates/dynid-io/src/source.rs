@@ -9,26 +9,54 @@ use crate::robot::RobotFileError;
 /// Largest robot file that is read, bytes (64 MiB).
 pub(crate) const MAX_ROBOT_FILE_BYTES: u64 = 64 << 20;
 
-/// The file's text without a byte order mark.
+/// Why a text cannot be had.
+pub(crate) enum TextFault {
+    /// The operating system would not give the file.
+    Unreadable(std::io::Error),
+    /// More bytes than the cap.
+    TooLarge {
+        /// Cap, bytes.
+        limit: u64,
+    },
+    /// Not UTF-8.
+    NotText {
+        /// Bytes before the fault.
+        offset: usize,
+        /// The byte there.
+        byte: u8,
+    },
+}
+
+/// The text of a robot file without a byte order mark.
 pub(crate) fn read_text(path: &Path, limit: u64) -> Result<String, RobotFileError> {
-    let file = path.display().to_string();
-    let unreadable = |error| RobotFileError::Unreadable { file: path.display().to_string(), error };
-    let handle = File::open(path).map_err(unreadable)?;
-    let metadata = handle.metadata().map_err(unreadable)?;
+    text(path, limit).map_err(|fault| {
+        let file = path.display().to_string();
+        match fault {
+            TextFault::Unreadable(error) => RobotFileError::Unreadable { file, error },
+            TextFault::TooLarge { limit } => RobotFileError::TooLarge { file, limit },
+            TextFault::NotText { offset, byte } => RobotFileError::NotText { file, offset, byte },
+        }
+    })
+}
+
+/// The file's text without a byte order mark.
+pub(crate) fn text(path: &Path, limit: u64) -> Result<String, TextFault> {
+    let handle = File::open(path).map_err(TextFault::Unreadable)?;
+    let metadata = handle.metadata().map_err(TextFault::Unreadable)?;
     if metadata.is_dir() {
-        return Err(unreadable(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
+        return Err(TextFault::Unreadable(std::io::ErrorKind::IsADirectory.into()));
     }
     if metadata.len() > limit {
-        return Err(RobotFileError::TooLarge { file, limit });
+        return Err(TextFault::TooLarge { limit });
     }
     let mut bytes = Vec::new();
-    handle.take(limit + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    handle.take(limit + 1).read_to_end(&mut bytes).map_err(TextFault::Unreadable)?;
     if bytes.len() as u64 > limit {
-        return Err(RobotFileError::TooLarge { file, limit });
+        return Err(TextFault::TooLarge { limit });
     }
     let text = String::from_utf8(bytes).map_err(|e| {
         let offset = e.utf8_error().valid_up_to();
-        RobotFileError::NotText { file, offset, byte: e.as_bytes().get(offset).copied().unwrap_or_default() }
+        TextFault::NotText { offset, byte: e.as_bytes().get(offset).copied().unwrap_or_default() }
     })?;
     Ok(match text.strip_prefix('\u{feff}') {
         Some(rest) => rest.to_owned(),

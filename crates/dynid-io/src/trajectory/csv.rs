@@ -1,0 +1,54 @@
+//! Sampled trajectories as tables.
+
+use std::path::Path;
+
+use dynid_motion::trajectory::{Phase, Sampled};
+
+use crate::csv::RowWriter;
+use crate::output::OutputError;
+
+/// Writes `t, q_<joint>.., dq_<joint>.., ddq_<joint>..` (s; rad or m and their derivatives) and, if phases are given, `phase`:
+/// 0 approach, 1 record, 2 return. The table reads back as states ([`crate::states`]) and, with efforts added, as a log.
+///
+/// `joints`: one name per coordinate; `phases`: one per sample.
+///
+/// # Errors
+/// [`OutputError`]: names or phases of another number, a failed write.
+pub fn write_csv(
+    path: impl AsRef<Path>,
+    joints: &[String],
+    sampled: &Sampled,
+    phases: Option<&[Phase]>,
+) -> Result<(), OutputError> {
+    let path = path.as_ref();
+    let n = sampled.samples();
+    check_shape(path, "joint names", sampled.coordinates(), joints.len())?;
+    if let Some(phases) = phases {
+        check_shape(path, "phases", n, phases.len())?;
+    }
+    let mut header = vec!["t".to_owned()];
+    for prefix in ["q", "dq", "ddq"] {
+        header.extend(joints.iter().map(|j| format!("{prefix}_{j}")));
+    }
+    header.extend(phases.map(|_| "phase".to_owned()));
+    let mut writer = RowWriter::create(path, &header)?;
+    let mut row = Vec::with_capacity(header.len());
+    for s in 0..n {
+        row.clear();
+        row.push(sampled.time[s]);
+        for signal in [&sampled.q, &sampled.dq, &sampled.ddq] {
+            row.extend((0..joints.len()).map(|c| signal[c * n + s]));
+        }
+        row.extend(phases.map(|p| f64::from(p[s].number())));
+        writer.row(&row)?;
+    }
+    writer.finish()
+}
+
+/// Fails unless the counts agree.
+pub(super) fn check_shape(path: &Path, what: &str, expected: usize, found: usize) -> Result<(), OutputError> {
+    if expected == found {
+        return Ok(());
+    }
+    Err(OutputError::Shape { file: path.display().to_string(), what: what.to_owned(), expected, found })
+}
