@@ -135,6 +135,13 @@ fn check_states(oracle: &Oracle, name: &str) {
             let mut effort = vec![0.0; n];
             dynamics.inverse_dynamics(&state, phi, &mut work, &mut effort);
             check(&effort, &s.effort, "effort");
+            let loaded = LoadedState { q: &s.q, dq: &s.dq, effort: &s.effort, gravity };
+            let mut ddq = vec![0.0; n];
+            let mut forward = dynamics.forward_workspace();
+            dynamics.forward_dynamics(&loaded, phi, AddedInertia::None, &mut forward, &mut ddq).unwrap();
+            // Rounding of the efforts, divided by the smallest inertia of the robot.
+            let error = relative(&ddq, &s.ddq);
+            assert!(error <= 1e-10, "{name} state {k}, acceleration: {error:e}");
             let mut y = vec![f64::NAN; n * phi.len()];
             dynamics.regressor(&state, &mut work, &mut y);
             check(&y, &s.regressor, "regressor");

@@ -1,6 +1,7 @@
-//! Time per sample of inverse dynamics, regressor and their adjoints, alone and over blocks of lanes.
+//! Time per sample of inverse and forward dynamics, regressor and adjoints, alone and over blocks of lanes.
 
 use divan::{Bencher, black_box, counter::ItemsCount};
+use dynid_model::scalar::Dual;
 use dynid_model::*;
 
 fn main() {
@@ -47,6 +48,33 @@ fn inverse_dynamics(bencher: Bencher<'_, '_>, joints: usize) {
         let state = State { q: black_box(&q), dq: &dq, ddq: &ddq, gravity: None };
         dynamics.inverse_dynamics(&state, &phi, &mut work, &mut effort);
         black_box(effort[0])
+    });
+}
+
+#[divan::bench(args = ROBOTS)]
+fn forward_dynamics(bencher: Bencher<'_, '_>, joints: usize) {
+    bench_forward(bencher, joints, |x, _| x);
+}
+
+/// With exact derivatives in all directions of position and rate of a six-joint arm.
+#[divan::bench(args = [6])]
+fn forward_dynamics_dual12(bencher: Bencher<'_, '_>, joints: usize) {
+    bench_forward(bencher, joints, Dual::<12>::variable);
+}
+
+fn bench_forward<S: Scalar>(bencher: Bencher<'_, '_>, joints: usize, number: impl Fn(f64, usize) -> S) {
+    let mechanism = robot(joints);
+    let dynamics = Dynamics::new(&mechanism);
+    let phi: Vec<S> = mechanism.inertia_vector().into_iter().map(S::from_f64).collect();
+    let mut work = dynamics.forward_workspace();
+    let q: Vec<S> = (0..joints).map(|k| number(0.3, k)).collect();
+    let dq: Vec<S> = (0..joints).map(|k| number(0.7, joints + k)).collect();
+    let effort = vec![S::from_f64(-0.4); joints];
+    let mut ddq = effort.clone();
+    bencher.bench_local(|| {
+        let state = LoadedState { q: black_box(&q), dq: &dq, effort: &effort, gravity: None };
+        let done = dynamics.forward_dynamics(&state, &phi, AddedInertia::None, &mut work, &mut ddq);
+        black_box((done, ddq[0]))
     });
 }
 

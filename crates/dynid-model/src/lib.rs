@@ -22,7 +22,10 @@ pub mod symmetric;
 
 pub use base_parameters::{BaseParameters, BaseSettings};
 pub use description::{Description, JointDescription, JointKind, Limits, LinkDescription, Mimic};
-pub use dynamics::{BodyPoint, Dynamics, DynamicsWorkspace, Energy, MotionAdjoint, MotionBlock, State};
+pub use dynamics::{
+    AddedInertia, BodyPoint, Dynamics, DynamicsWorkspace, Energy, ForwardDynamicsWorkspace, LoadedState,
+    MotionAdjoint, MotionBlock, NotPositive, State,
+};
 pub use effort_model::{EffortModel, Output, RegressorBlock, RegressorLayout};
 pub use inertia::Inertia;
 pub use mechanism::{Body, Frame, Joint, Mechanism, MechanismError, MechanismWarning};

@@ -1,12 +1,14 @@
-//! Dynamics of a mechanism: inverse dynamics, regressor, kinematics, mass matrix, energies.
+//! Dynamics of a mechanism: inverse and forward dynamics, regressor, kinematics, mass matrix, energies.
 //!
 //! Notation and equations: *Own derivation* in the guide (`docs/guide.md`), after Featherstone 2008 and
 //! Atkeson, An & Hollerbach 1986. Frames: body quantities in axes of the body's joint frame, gravity in base axes.
 
 mod adjoint;
 mod adjoint_block;
+mod articulated_body;
 mod block;
 mod energy;
+mod forward_dynamics;
 mod groups;
 mod inverse_dynamics;
 mod kinematics;
@@ -19,6 +21,7 @@ pub use adjoint_block::MotionAdjoint;
 pub use block::MotionBlock;
 pub(crate) use block::Slots;
 pub use energy::Energy;
+pub use forward_dynamics::{AddedInertia, ForwardDynamicsWorkspace, LoadedState, NotPositive};
 pub use points::BodyPoint;
 
 use crate::mechanism::{Follow, Mechanism};

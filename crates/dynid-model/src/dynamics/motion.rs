@@ -31,7 +31,7 @@ impl<S: Scalar> BodyMotion<S> {
 }
 
 #[inline(always)]
-fn gradient<S: Scalar>(omega: Vec3<S>, alpha: Vec3<S>) -> Mat3<S> {
+pub(crate) fn gradient<S: Scalar>(omega: Vec3<S>, alpha: Vec3<S>) -> Mat3<S> {
     let [x, y, z] = omega.0;
     let [a1, a2, a3] = alpha.0;
     let (xx, yy, zz) = (x * x, y * y, z * z);

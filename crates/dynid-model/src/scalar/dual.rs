@@ -42,6 +42,15 @@ impl<const N: usize> Scalar for Dual<N> {
         Dual { value, derivative: [0.0; N] }
     }
     #[inline(always)]
+    fn recip(self) -> Self {
+        let value = 1.0 / self.value;
+        Dual { value, derivative: self.derivative.map(|d| -value * value * d) }
+    }
+    #[inline(always)]
+    fn is_positive_finite(self) -> bool {
+        self.value.is_positive_finite()
+    }
+    #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         let (s, c) = Scalar::sin_cos(self.value);
         (

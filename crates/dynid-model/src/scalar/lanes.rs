@@ -43,6 +43,14 @@ impl<const N: usize, const FUSED: bool> Scalar for Lanes<N, FUSED> {
         Lanes([value; N])
     }
     #[inline(always)]
+    fn recip(self) -> Self {
+        Lanes(self.0.map(|x| 1.0 / x))
+    }
+    #[inline(always)]
+    fn is_positive_finite(self) -> bool {
+        self.0.iter().all(|x| x.is_positive_finite())
+    }
+    #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         let (s, c) = sin_cos_lanes::<N, FUSED>(self.0);
         (Lanes(s), Lanes(c))

@@ -25,6 +25,10 @@ pub trait Scalar:
     fn unfuse(fused: Self::Fused) -> Self;
     /// A constant.
     fn from_f64(value: f64) -> Self;
+    /// `1 / self`.
+    fn recip(self) -> Self;
+    /// True if the value (of every lane) is positive and finite.
+    fn is_positive_finite(self) -> bool;
     /// Sine and cosine of an angle in rad.
     fn sin_cos(self) -> (Self, Self);
     /// Sines and cosines of several angles, the same numbers as one by one.
@@ -70,6 +74,14 @@ impl Scalar for f64 {
     #[inline(always)]
     fn from_f64(value: f64) -> Self {
         value
+    }
+    #[inline(always)]
+    fn recip(self) -> Self {
+        1.0 / self
+    }
+    #[inline(always)]
+    fn is_positive_finite(self) -> bool {
+        self > 0.0 && self.is_finite()
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
