@@ -139,6 +139,50 @@ impl RobotModel {
     pub fn joints(&self) -> &[JointInfo] {
         &self.joints
     }
+
+    /// Efforts of the elements without those of the rigid bodies, `effort[output * samples + sample]`.
+    ///
+    /// `linear`: all linear parameters of the model. `out`: memory with room for the samples.
+    ///
+    /// # Panics
+    /// As [`EffortModel::regressor`], and if `linear` or `effort` has the wrong length.
+    pub fn element_efforts(
+        &self,
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        linear: &[f64],
+        out: &mut RegressorBlock,
+        effort: &mut [f64],
+    ) {
+        assert_eq!(linear.len(), self.parameters.linear.len(), "length of linear");
+        assert_eq!(effort.len(), self.outputs.len() * motion.samples, "length of effort");
+        out.start(&self.layout, motion.samples);
+        self.fill_elements(motion, shape, out);
+        effort.fill(0.0);
+        for placed in &self.elements {
+            for (slot, (rate, column)) in placed.slots.iter().zip(&placed.entries) {
+                let to = &mut effort[rate * motion.samples..][..motion.samples];
+                for (e, w) in to.iter_mut().zip(&*out.slot_mut(*slot)) {
+                    *e += w * linear[*column];
+                }
+            }
+        }
+    }
+
+    fn fill_elements(&self, motion: &MotionBlock<'_>, shape: &[f64], out: &mut RegressorBlock) {
+        assert_eq!(shape.len(), self.parameters.shape.len(), "length of shape");
+        let stride = out.stride();
+        for placed in &self.elements {
+            let mut columns = ElementColumns {
+                data: out.data_mut(),
+                slots: &placed.slots,
+                stride,
+                samples: motion.samples,
+            };
+            let own = &shape[placed.first_shape..placed.first_shape + placed.shapes];
+            placed.element.fill(&self.joints, motion, own, &mut columns);
+        }
+    }
 }
 
 impl EffortModel for RobotModel {
@@ -182,16 +226,7 @@ impl EffortModel for RobotModel {
             None => self.dynamics.regressor_block(motion, &self.slots, stride, out.data_mut()),
             Some(coupled) => coupled.fill(&self.mechanism, motion, &self.layout, out),
         }
-        for placed in &self.elements {
-            let mut columns = ElementColumns {
-                data: out.data_mut(),
-                slots: &placed.slots,
-                stride,
-                samples: motion.samples,
-            };
-            let own = &shape[placed.first_shape..placed.first_shape + placed.shapes];
-            placed.element.fill(&self.joints, motion, own, &mut columns);
-        }
+        self.fill_elements(motion, shape, out);
     }
 
     fn efforts(

@@ -1,0 +1,78 @@
+//! What can keep an experiment from running.
+
+use dynid_model::NotPositive;
+
+/// Why an experiment was refused or had to stop.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimError {
+    /// A setting is out of range.
+    #[error("{name}: expected {expected}, found {found}")]
+    Setting {
+        /// Which setting.
+        name: &'static str,
+        /// What it must be.
+        expected: &'static str,
+        /// The value given.
+        found: String,
+    },
+    /// A list has not one entry per joint, parameter or channel.
+    #[error("{name}: expected {expected} entries, found {found}")]
+    Length {
+        /// Which list.
+        name: &'static str,
+        /// Entries needed.
+        expected: usize,
+        /// Entries given.
+        found: usize,
+    },
+    /// A floating base has a quaternion among its positions and no drive.
+    #[error("a floating base cannot be controlled: simulate the arm alone")]
+    FloatingBase,
+    /// An element reads a channel that nothing feeds.
+    #[error("no profile for the channel `{name}`")]
+    Channel {
+        /// Name of the channel.
+        name: String,
+    },
+    /// The effort per acceleration of an element depends on the state.
+    #[error("an element's effort per acceleration depends on the state (joint {rate}, counted from 0)")]
+    VaryingInertia {
+        /// Rate whose row changes.
+        rate: usize,
+    },
+    /// The plant has a joint without inertia.
+    #[error("at {time} s {source}")]
+    Inertia {
+        /// Time, s.
+        time: f64,
+        /// Which joint.
+        source: NotPositive,
+    },
+    /// The motion changes faster than the integrator may follow: an unstable control loop, or nearly no inertia.
+    #[error(
+        "at {time} s the motion changes too fast to be followed ({steps} steps within a control interval): is the \
+         control loop stable?"
+    )]
+    TooFast {
+        /// Time, s.
+        time: f64,
+        /// Steps made in the interval.
+        steps: usize,
+    },
+}
+
+/// Fails unless `found` satisfies `ok`.
+pub(crate) fn demand(
+    ok: bool,
+    name: &'static str,
+    expected: &'static str,
+    found: impl ToString,
+) -> Result<(), SimError> {
+    if ok { Ok(()) } else { Err(SimError::Setting { name, expected, found: found.to_string() }) }
+}
+
+/// Fails unless a list has as many entries as it must.
+pub(crate) fn demand_length(name: &'static str, expected: usize, found: usize) -> Result<(), SimError> {
+    if expected == found { Ok(()) } else { Err(SimError::Length { name, expected, found }) }
+}

@@ -1,0 +1,330 @@
+//! The controlled robot: rigid bodies, joint elements, torque ripple of the drives.
+
+use dynid_model::{
+    AddedInertia, Dynamics, DynamicsWorkspace, EffortModel, ForwardDynamicsWorkspace, LoadedState,
+    MotionBlock, NotPositive, RegressorBlock, RobotModel,
+};
+
+use crate::error::{SimError, demand, demand_length};
+
+/// Torque ripple of one drive: it delivers `effort + amplitude · sin(cycles · q + phase)`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Ripple {
+    /// Amplitude, N m or N.
+    pub amplitude: f64,
+    /// Repetitions per turn (per `2π` metres for a joint that slides).
+    pub cycles: f64,
+    /// Phase, rad.
+    pub phase: f64,
+}
+
+/// Energy of a plant, J.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlantEnergy {
+    /// Kinetic energy of bodies and added inertias.
+    pub kinetic: f64,
+    /// Potential energy under gravity; zero at the base origin. Springs are elements and count as their work.
+    pub potential: f64,
+}
+
+/// A robot as the equation of motion sees it:
+/// `drive effort + ripple(q) = M(q) q̈ + h(q, q̇) + elements(q, q̇, q̈, channels)`.
+///
+/// Elements take a smooth sign of velocities, `tanh(v / sign_width)`: at rest a joint creeps by at most a few widths
+/// instead of sticking. Their effort per acceleration must not depend on the state.
+#[derive(Debug)]
+pub struct Plant {
+    model: RobotModel,
+    dynamics: Dynamics,
+    linear: Vec<f64>,
+    shape: Vec<f64>,
+    sign_width: f64,
+    ripple: Vec<Ripple>,
+    /// Effort of the elements per acceleration, row-major.
+    added: Vec<f64>,
+    /// Its diagonal, if there is nothing else.
+    diagonal: Option<Vec<f64>>,
+}
+
+/// Memory of [`Plant::acceleration`] and its kin.
+#[derive(Debug, Clone)]
+pub struct PlantWorkspace {
+    forward: ForwardDynamicsWorkspace<f64>,
+    dynamics: DynamicsWorkspace<f64>,
+    block: RegressorBlock,
+    effort: Vec<f64>,
+    /// Effort of elements at zero acceleration, of the last call.
+    pub(crate) element: Vec<f64>,
+    /// Effort of drives with ripple, of the last call.
+    pub(crate) delivered: Vec<f64>,
+    still: Vec<f64>,
+    /// Positions, rates, accelerations of the difference quotients, and their efforts.
+    moved: [Vec<f64>; 4],
+}
+
+impl Plant {
+    /// Joins a model with its parameters.
+    ///
+    /// `linear`, `shape`: the model's parameters. `sign_width`: rad/s or m/s, above 0.
+    ///
+    /// # Errors
+    /// [`SimError::FloatingBase`], [`SimError::Length`], [`SimError::Setting`], [`SimError::VaryingInertia`].
+    pub fn new(
+        model: RobotModel,
+        linear: Vec<f64>,
+        shape: Vec<f64>,
+        sign_width: f64,
+    ) -> Result<Plant, SimError> {
+        let (positions, n) = model.dimensions();
+        if positions != n {
+            return Err(SimError::FloatingBase);
+        }
+        demand_length("linear parameters", model.parameters().linear.len(), linear.len())?;
+        demand_length("shape parameters", model.parameters().shape.len(), shape.len())?;
+        demand(sign_width > 0.0 && sign_width.is_finite(), "sign_width", "a positive number", sign_width)?;
+        if let Some(x) = linear.iter().chain(&shape).find(|x| !x.is_finite()) {
+            return Err(SimError::Setting {
+                name: "parameters",
+                expected: "finite numbers",
+                found: x.to_string(),
+            });
+        }
+        let dynamics = Dynamics::new(model.mechanism());
+        let mut plant = Plant {
+            model,
+            dynamics,
+            linear,
+            shape,
+            sign_width,
+            ripple: Vec::new(),
+            added: vec![0.0; n * n],
+            diagonal: None,
+        };
+        plant.added = plant.added_inertia()?;
+        let off_diagonal = |k: usize| k % n.max(1) != k / n.max(1);
+        if (0..n * n).all(|k| !off_diagonal(k) || plant.added[k] == 0.0) {
+            plant.diagonal = Some((0..n).map(|k| plant.added[k * (n + 1)]).collect());
+        }
+        Ok(plant)
+    }
+
+    /// The same plant with ripple, one entry per joint.
+    ///
+    /// # Errors
+    /// [`SimError::Length`].
+    pub fn with_ripple(mut self, ripple: Vec<Ripple>) -> Result<Plant, SimError> {
+        demand_length("ripple", self.joints(), ripple.len())?;
+        self.ripple = ripple;
+        Ok(self)
+    }
+
+    /// The model.
+    pub fn model(&self) -> &RobotModel {
+        &self.model
+    }
+
+    /// Its linear parameters.
+    pub fn linear(&self) -> &[f64] {
+        &self.linear
+    }
+
+    /// Its shape parameters.
+    pub fn shape(&self) -> &[f64] {
+        &self.shape
+    }
+
+    /// Speed over which signs of velocities are smoothed.
+    pub fn sign_width(&self) -> f64 {
+        self.sign_width
+    }
+
+    /// Number of joints (rates).
+    pub fn joints(&self) -> usize {
+        self.dynamics.rates()
+    }
+
+    /// Memory.
+    pub fn workspace(&self) -> PlantWorkspace {
+        let n = self.joints();
+        let moved = 2 * n + 1;
+        PlantWorkspace {
+            forward: self.dynamics.forward_workspace(),
+            dynamics: self.dynamics.workspace(),
+            block: RegressorBlock::new(self.model.layout().clone(), moved),
+            effort: vec![0.0; n],
+            element: vec![0.0; n],
+            delivered: vec![0.0; n],
+            still: vec![0.0; n],
+            moved: [(); 4].map(|()| vec![0.0; n * moved]),
+        }
+    }
+
+    fn inertias(&self) -> &[f64] {
+        &self.linear[..self.dynamics.inertial_parameters()]
+    }
+
+    /// Effort of elements at one state.
+    fn element_effort(
+        &self,
+        [q, dq, ddq]: [&[f64]; 3],
+        channels: &[f64],
+        block: &mut RegressorBlock,
+        to: &mut [f64],
+    ) {
+        let channels: Vec<(&str, &[f64])> = self
+            .model
+            .channels()
+            .iter()
+            .zip(channels)
+            .map(|(name, value)| (name.as_str(), std::slice::from_ref(value)))
+            .collect();
+        let motion = MotionBlock {
+            samples: 1,
+            stride: 1,
+            q,
+            dq,
+            ddq,
+            gravity: None,
+            channels: &channels,
+            sign_width: self.sign_width,
+        };
+        self.model.element_efforts(&motion, &self.shape, &self.linear, block, to);
+    }
+
+    /// Effort of elements per acceleration, the same at some states of no special kind.
+    fn added_inertia(&self) -> Result<Vec<f64>, SimError> {
+        let n = self.joints();
+        let mut block = RegressorBlock::new(self.model.layout().clone(), 1);
+        let channels = vec![1.0; self.model.channels().len()];
+        let mut found: Option<Vec<f64>> = None;
+        for state in 0..3 {
+            let at = |k: usize, scale: f64| scale * (1.0 + k as f64 + 2.7 * f64::from(state)).sin();
+            let q: Vec<f64> = (0..n).map(|k| at(k, 1.0)).collect();
+            let dq: Vec<f64> = (0..n).map(|k| at(k + 17, f64::from(state))).collect();
+            let (mut without, mut with) = (vec![0.0; n], vec![0.0; n]);
+            let mut ddq = vec![0.0; n];
+            self.element_effort([&q, &dq, &ddq], &channels, &mut block, &mut without);
+            let mut added = vec![0.0; n * n];
+            for k in 0..n {
+                ddq[k] = 1.0;
+                self.element_effort([&q, &dq, &ddq], &channels, &mut block, &mut with);
+                ddq[k] = 0.0;
+                for row in 0..n {
+                    // Efforts of hundreds of newton metres leave this much of a difference that ought to be zero.
+                    let rounding = 8.0 * f64::EPSILON * (with[row].abs() + without[row].abs());
+                    let change = with[row] - without[row];
+                    added[row * n + k] = if change.abs() <= rounding { 0.0 } else { change };
+                }
+            }
+            match &found {
+                None => found = Some(added),
+                Some(first) => {
+                    let scale = first.iter().fold(1e-3_f64, |m, x| m.max(x.abs()));
+                    let differs = (0..n * n).find(|k| (first[*k] - added[*k]).abs() > 1e-9 * scale);
+                    if let Some(k) = differs {
+                        return Err(SimError::VaryingInertia { rate: k / n });
+                    }
+                }
+            }
+        }
+        Ok(found.unwrap_or_default())
+    }
+
+    fn deliver(&self, q: &[f64], effort: &[f64], to: &mut [f64]) {
+        to.copy_from_slice(effort);
+        for ((e, r), q) in to.iter_mut().zip(&self.ripple).zip(q) {
+            *e += r.amplitude * (r.cycles * q + r.phase).sin();
+        }
+    }
+
+    /// Accelerations under given drive efforts (before ripple), with `channels` in the order of the model's.
+    ///
+    /// # Errors
+    /// [`NotPositive`] for a joint without inertia.
+    pub fn acceleration(
+        &self,
+        (q, dq): (&[f64], &[f64]),
+        drive: &[f64],
+        channels: &[f64],
+        work: &mut PlantWorkspace,
+        ddq: &mut [f64],
+    ) -> Result<(), NotPositive> {
+        self.deliver(q, drive, &mut work.delivered);
+        self.element_effort([q, dq, &work.still], channels, &mut work.block, &mut work.element);
+        for (e, (d, x)) in work.effort.iter_mut().zip(work.delivered.iter().zip(&work.element)) {
+            *e = d - x;
+        }
+        let state = LoadedState { q, dq, effort: &work.effort, gravity: None };
+        let added = match &self.diagonal {
+            Some(d) => AddedInertia::Diagonal(d),
+            None => AddedInertia::Full(&self.added),
+        };
+        self.dynamics.forward_dynamics(&state, self.inertias(), added, &mut work.forward, ddq)
+    }
+
+    /// Efforts that joints feel, drive effort with ripple.
+    pub fn delivered(&self, q: &[f64], drive: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; q.len()];
+        self.deliver(q, drive, &mut out);
+        out
+    }
+
+    /// Mass matrix with the inertia of the elements, row-major.
+    pub fn mass_matrix(&self, q: &[f64], work: &mut PlantWorkspace) -> Vec<f64> {
+        let mut mass = self.dynamics.mass_matrix(q, self.inertias(), &mut work.dynamics);
+        mass.iter_mut().zip(&self.added).for_each(|(m, a)| *m += a);
+        mass
+    }
+
+    /// Energies of a state.
+    pub fn energy(&self, q: &[f64], dq: &[f64], work: &mut PlantWorkspace) -> PlantEnergy {
+        let bodies = self.dynamics.energy(q, dq, self.inertias(), &mut work.dynamics);
+        let n = self.joints();
+        let turning: f64 =
+            (0..n).map(|i| 0.5 * dq[i] * (0..n).map(|j| self.added[i * n + j] * dq[j]).sum::<f64>()).sum();
+        PlantEnergy { kinetic: bodies.kinetic + turning, potential: bodies.potential }
+    }
+
+    /// Stiffness `∂elements/∂q` and damping `∂elements/∂q̇`, row-major, by forward differences in one block.
+    ///
+    /// They only steer the integrator's matrix: its order of accuracy holds for any.
+    pub(crate) fn stiffness_and_damping(
+        &self,
+        (q, dq): (&[f64], &[f64]),
+        channels: &[f64],
+        work: &mut PlantWorkspace,
+        stiffness: &mut [f64],
+        damping: &mut [f64],
+    ) {
+        let n = self.joints();
+        let samples = 2 * n + 1;
+        let (turn, speed) = (1e-6, 1e-3 * self.sign_width);
+        let [mq, mdq, mddq, efforts] = &mut work.moved;
+        for k in 0..n {
+            mq[k * samples..][..samples].fill(q[k]);
+            mdq[k * samples..][..samples].fill(dq[k]);
+            mq[k * samples + 1 + k] += turn;
+            mdq[k * samples + 1 + n + k] += speed;
+        }
+        let repeated: Vec<Vec<f64>> = channels.iter().map(|c| vec![*c; samples]).collect();
+        let channels: Vec<(&str, &[f64])> =
+            self.model.channels().iter().zip(&repeated).map(|(n, v)| (n.as_str(), v.as_slice())).collect();
+        let motion = MotionBlock {
+            samples,
+            stride: samples,
+            q: mq,
+            dq: mdq,
+            ddq: mddq,
+            gravity: None,
+            channels: &channels,
+            sign_width: self.sign_width,
+        };
+        self.model.element_efforts(&motion, &self.shape, &self.linear, &mut work.block, efforts);
+        for (row, efforts) in efforts.chunks_exact(samples).enumerate() {
+            for k in 0..n {
+                stiffness[row * n + k] = (efforts[1 + k] - efforts[0]) / turn;
+                damping[row * n + k] = (efforts[1 + n + k] - efforts[0]) / speed;
+            }
+        }
+    }
+}
