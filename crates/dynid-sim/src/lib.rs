@@ -1,10 +1,28 @@
 //! Virtual experiments: controlled robots in motion, with sensors and all their faults.
+//!
+//! A [`Plant`] is a robot model with its true parameters. [`run`] lets a sampled controller move it along a reference and
+//! gives a log as a real robot would, with the truth beside it. Every fault of sensors, drives and logger is a setting of
+//! its own ([`Imperfections`]).
+//!
+//! Units are SI, angles rad.
 
+mod controller;
+mod encoder;
 mod error;
+mod experiment;
+mod imperfections;
 mod integrator;
 mod lu;
 mod plant;
+mod profile;
+mod recorder;
+pub mod streams;
 
+pub use controller::{ControlSettings, Wanted};
 pub use error::SimError;
+pub use experiment::{EnergyBalance, ExperimentResult, ExperimentSettings, run, wrong_model};
+pub use imperfections::Imperfections;
 pub use integrator::{IntegrationCount, Integrator, PlantState};
 pub use plant::{Plant, PlantEnergy, PlantWorkspace, Ripple};
+pub use profile::Profile;
+pub use recorder::{Truth, VirtualLog};

@@ -1,8 +1,10 @@
 //! The controlled robot: rigid bodies, joint elements, torque ripple of the drives.
 
+use std::sync::Arc;
+
 use dynid_model::{
     AddedInertia, Dynamics, DynamicsWorkspace, EffortModel, ForwardDynamicsWorkspace, LoadedState,
-    MotionBlock, NotPositive, RegressorBlock, RobotModel,
+    MotionBlock, NotPositive, RegressorBlock, RobotModel, State,
 };
 
 use crate::error::{SimError, demand, demand_length};
@@ -34,7 +36,7 @@ pub struct PlantEnergy {
 /// instead of sticking. Their effort per acceleration must not depend on the state.
 #[derive(Debug)]
 pub struct Plant {
-    model: RobotModel,
+    model: Arc<RobotModel>,
     dynamics: Dynamics,
     linear: Vec<f64>,
     shape: Vec<f64>,
@@ -70,11 +72,12 @@ impl Plant {
     /// # Errors
     /// [`SimError::FloatingBase`], [`SimError::Length`], [`SimError::Setting`], [`SimError::VaryingInertia`].
     pub fn new(
-        model: RobotModel,
+        model: impl Into<Arc<RobotModel>>,
         linear: Vec<f64>,
         shape: Vec<f64>,
         sign_width: f64,
     ) -> Result<Plant, SimError> {
+        let model = model.into();
         let (positions, n) = model.dimensions();
         if positions != n {
             return Err(SimError::FloatingBase);
@@ -108,14 +111,10 @@ impl Plant {
         Ok(plant)
     }
 
-    /// The same plant with ripple, one entry per joint.
-    ///
-    /// # Errors
-    /// [`SimError::Length`].
-    pub fn with_ripple(mut self, ripple: Vec<Ripple>) -> Result<Plant, SimError> {
-        demand_length("ripple", self.joints(), ripple.len())?;
+    /// Gives the drives their ripple, one entry per joint.
+    pub(crate) fn set_ripple(&mut self, ripple: Vec<Ripple>) {
+        debug_assert_eq!(ripple.len(), self.joints(), "one ripple per joint");
         self.ripple = ripple;
-        Ok(self)
     }
 
     /// The model.
@@ -260,6 +259,21 @@ impl Plant {
             None => AddedInertia::Full(&self.added),
         };
         self.dynamics.forward_dynamics(&state, self.inertias(), added, &mut work.forward, ddq)
+    }
+
+    /// Effort of the drives of a motion, without ripple: rigid bodies and elements.
+    pub fn drive_effort(
+        &self,
+        [q, dq, ddq]: [&[f64]; 3],
+        channels: &[f64],
+        work: &mut PlantWorkspace,
+    ) -> Vec<f64> {
+        let mut effort = vec![0.0; q.len()];
+        let state = State { q, dq, ddq, gravity: None };
+        self.dynamics.inverse_dynamics(&state, self.inertias(), &mut work.dynamics, &mut effort);
+        self.element_effort([q, dq, ddq], channels, &mut work.block, &mut work.effort);
+        effort.iter_mut().zip(&work.effort).for_each(|(e, x)| *e += x);
+        effort
     }
 
     /// Efforts that joints feel, drive effort with ripple.
