@@ -23,7 +23,7 @@ pub(crate) enum Command {
     Identify(Box<IdentifyArgs>),
     /// Effort of an identified model at given states.
     Predict(PredictArgs),
-    /// Make a virtual log by inverse dynamics.
+    /// Make a virtual log: by inverse dynamics, or of a controlled robot.
     Simulate(SimulateArgs),
     /// Compare an identified model with other logs.
     Validate(ValidateArgs),
@@ -224,6 +224,9 @@ pub(crate) struct SimulateArgs {
     /// Settings of the virtual log, TOML.
     #[arg(long, value_name = "FILE.toml")]
     pub(crate) config: Option<PathBuf>,
+    /// Let a controller move the robot, with all imperfections (default: inverse dynamics of the trajectory).
+    #[arg(long)]
+    pub(crate) closed_loop: bool,
     /// Length, s.
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) duration: Option<f64>,

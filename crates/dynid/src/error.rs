@@ -154,6 +154,9 @@ pub enum Error {
         /// What is wrong.
         source: Box<Error>,
     },
+    /// A virtual experiment cannot be run.
+    #[error(transparent)]
+    Experiment(#[from] dynid_sim::SimError),
     /// A setting has a value that makes no sense.
     #[error("setting `{name}`: expected {expected}, found {found}")]
     Setting {

@@ -37,6 +37,7 @@ pub use dynid_io as io;
 pub use dynid_model as model;
 pub use dynid_motion as motion;
 pub use dynid_report as report;
+pub use dynid_sim as sim;
 
 /// Version of the program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use dynid::io::csv;
-use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
+use dynid::simulate::{ExperimentSummary, SimulateMode, SimulateSettings, SimulatedLog, simulate};
 
 use super::load_robot;
 use crate::args::SimulateArgs;
@@ -24,26 +24,42 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
         None => SimulateSettings::default(),
         Some(path) => read_settings(path)?,
     };
+    if args.closed_loop {
+        settings.mode = SimulateMode::ClosedLoop;
+    }
     settings.duration_s = args.duration.unwrap_or(settings.duration_s);
     settings.rate_hz = args.rate_hz.unwrap_or(settings.rate_hz);
     settings.effort_noise = args.effort_noise.unwrap_or(settings.effort_noise);
     settings.encoder_bits = args.encoder_bits.unwrap_or(settings.encoder_bits);
     settings.seed = args.seed.unwrap_or(settings.seed);
     let log = simulate(&robot, &settings)?;
-    write(&args.out, &log, &[("q", &log.position), ("tau", &log.effort)])?;
+    let mut signals = vec![("q", &log.position), ("tau", &log.effort)];
+    if let Some(velocity) = &log.velocity {
+        signals.insert(1, ("dq", velocity));
+    }
+    write(&args.out, &log, &signals, &log.channels)?;
     note(&format!(
         "{} samples of {} joints written to {}",
         log.time.len(),
         log.joints.len(),
         args.out.display()
     ));
+    if let Some(e) = log.experiment.as_ref().filter(|e| e.saturated_ticks > 0) {
+        note(&format!(
+            "efforts were cut off at their limits at {} of {} control ticks",
+            e.saturated_ticks, e.ticks
+        ));
+    }
     if let Some(path) = &args.clean {
         let [q, dq, ddq, tau] = &log.clean;
-        write(path, &log, &[("q", q), ("dq", dq), ("ddq", ddq), ("tau", tau)])?;
+        write(path, &log, &[("q", q), ("dq", dq), ("ddq", ddq), ("tau", tau)], &log.channels)?;
     }
     if let Some(path) = &args.truth {
-        let truth: serde_json::Map<String, serde_json::Value> =
+        let mut truth: serde_json::Map<String, serde_json::Value> =
             log.truth.iter().map(|(n, v)| (n.clone(), (*v).into())).collect();
+        if let Some(experiment) = &log.experiment {
+            truth.insert("experiment".to_owned(), in_json(experiment));
+        }
         let text = serde_json::to_string_pretty(&truth).map_err(|e| Failure::Output(e.into()))?;
         dynid::io::output::write_atomically(path, (text + "\n").as_bytes())?;
     }
@@ -56,7 +72,31 @@ fn read_settings(path: &Path) -> Result<SimulateSettings, Failure> {
     Ok(SimulateSettings::parse(&text, &path.display().to_string())?)
 }
 
-fn write(path: &Path, log: &SimulatedLog, signals: &[(&str, &Vec<Vec<f64>>)]) -> Result<(), Failure> {
+fn in_json(experiment: &ExperimentSummary) -> serde_json::Value {
+    let ExperimentSummary { energy, integration, ripple, .. } = experiment;
+    serde_json::json!({
+        "imperfections": experiment.imperfections,
+        "sign_width": experiment.sign_width,
+        "ripple": ripple.iter().map(|r| [r.amplitude, r.cycles, r.phase]).collect::<Vec<_>>(),
+        "ticks": experiment.ticks,
+        "saturated_ticks": experiment.saturated_ticks,
+        "dropped_rows": experiment.dropped_rows,
+        "integration_steps": integration.accepted,
+        "rejected_steps": integration.rejected,
+        "energy_before_J": [energy.before.kinetic, energy.before.potential],
+        "energy_after_J": [energy.after.kinetic, energy.after.potential],
+        "drive_work_J": energy.drive_work,
+        "element_work_J": energy.element_work,
+        "energy_residual_J": energy.residual(),
+    })
+}
+
+fn write(
+    path: &Path,
+    log: &SimulatedLog,
+    signals: &[(&str, &Vec<Vec<f64>>)],
+    channels: &[(String, Vec<f64>)],
+) -> Result<(), Failure> {
     let mut header = vec!["t".to_owned()];
     let mut columns: Vec<&[f64]> = vec![&log.time];
     for (name, signal) in signals {
@@ -64,6 +104,10 @@ fn write(path: &Path, log: &SimulatedLog, signals: &[(&str, &Vec<Vec<f64>>)]) ->
             header.push(format!("{name}_{joint}"));
             columns.push(values);
         }
+    }
+    for (name, values) in channels {
+        header.push(name.clone());
+        columns.push(values);
     }
     csv::write(path, &header, &columns)?;
     Ok(())

@@ -1,0 +1,128 @@
+//! Virtual logs of a controlled robot.
+
+use std::sync::Arc;
+
+use dynid_model::{EffortModel, RobotModel};
+use dynid_motion::trajectory::Fourier;
+use dynid_sim::{
+    ControlSettings, ExperimentSettings, Imperfections, Plant, Profile, Wanted, run, wrong_model,
+};
+
+use super::settings::{SimulateSettings, setting};
+use super::{ExperimentSummary, SimulatedLog, named};
+use crate::Error;
+
+/// Least control rate that is chosen where none is stated, Hz.
+const LEAST_CONTROL_RATE: f64 = 1000.0;
+
+pub(super) fn experiment(
+    model: RobotModel,
+    trajectories: &[Fourier],
+    values: Vec<f64>,
+    settings: &SimulateSettings,
+) -> Result<SimulatedLog, Error> {
+    let model = Arc::new(model);
+    let table = settings.control.clone().unwrap_or_default();
+    let plant_table = settings.plant.clone().unwrap_or_default();
+    if !(0.0..=1.0).contains(&table.model_error) {
+        return Err(setting("control.model_error", "0 to 1", table.model_error));
+    }
+    let shape = vec![0.0; model.parameters().shape.len()];
+    let plant = |values: Vec<f64>| Plant::new(model.clone(), values, shape.clone(), plant_table.sign_width);
+    let nominal = plant(wrong_model(&values, table.model_error, settings.seed))?;
+    let mut truth = plant(values.clone())?;
+    let reference = |time: f64| -> Vec<Wanted> {
+        let point = |t: &Fourier| {
+            let p = t.at(time);
+            [p.position, p.velocity, p.acceleration]
+        };
+        trajectories.iter().map(point).collect()
+    };
+    let channels = model.channels().iter().map(|name| {
+        let points = settings.channels.get(name).map_or(&[][..], Vec::as_slice);
+        Profile::new(points.iter().map(|[t, x]| (*t, *x)).collect())
+    });
+    if let Some(name) = settings.channels.keys().find(|name| !model.channels().contains(name)) {
+        return Err(setting(&format!("channels.{name}"), "a channel that an element reads", name));
+    }
+    let experiment = ExperimentSettings {
+        duration_s: settings.duration_s,
+        log_rate_hz: settings.rate_hz,
+        tolerance: plant_table.tolerance,
+        control: control(&model, &table, settings.rate_hz)?,
+        imperfections: imperfections(settings),
+        channels: channels.collect::<Result<_, _>>()?,
+        seed: settings.seed,
+    };
+    let result = run(&mut truth, &nominal, &reference, &experiment)?;
+    let log = result.log;
+    Ok(SimulatedLog {
+        joints: model.mechanism().rate_names(),
+        time: log.time,
+        position: log.position,
+        velocity: settings.log_velocity.then_some(log.velocity),
+        effort: log.effort,
+        channels: model.channels().iter().cloned().zip(log.channels).collect(),
+        clean: [log.truth.q, log.truth.dq, log.truth.ddq, log.truth.effort],
+        truth: named(&model, values),
+        experiment: Some(ExperimentSummary {
+            imperfections: result.imperfections,
+            ripple: result.ripple,
+            energy: result.energy,
+            integration: result.integration,
+            ticks: result.ticks,
+            saturated_ticks: result.saturated_ticks,
+            dropped_rows: log.dropped_rows,
+            sign_width: plant_table.sign_width,
+        }),
+    })
+}
+
+fn control(
+    model: &RobotModel,
+    table: &super::ControlTable,
+    log_rate_hz: f64,
+) -> Result<ControlSettings, Error> {
+    let joints = model.mechanism().rate_names();
+    let passive = table
+        .passive
+        .iter()
+        .map(|name| {
+            let known = || Error::UnknownJoint { name: name.clone(), known: joints.clone() };
+            joints.iter().position(|j| j == name).ok_or_else(known)
+        })
+        .collect::<Result<_, _>>()?;
+    Ok(ControlSettings {
+        rate_hz: table.rate_hz.unwrap_or(log_rate_hz * (LEAST_CONTROL_RATE / log_rate_hz).ceil().max(1.0)),
+        bandwidth_hz: table.bandwidth_hz,
+        damping: table.damping,
+        position_gain: table.position_gain.clone(),
+        velocity_gain: table.velocity_gain.clone(),
+        feed_forward: table.feed_forward,
+        velocity_cutoff_hz: table.velocity_cutoff_hz,
+        delay_ticks: table.delay_ticks,
+        effort_limit: (!table.effort_limits).then(|| vec![f64::INFINITY; joints.len()]),
+        passive,
+    })
+}
+
+fn imperfections(settings: &SimulateSettings) -> Imperfections {
+    if settings.perfect {
+        return Imperfections::none();
+    }
+    let table = settings.imperfections.clone().unwrap_or_default();
+    Imperfections {
+        encoder_bits: settings.encoder_bits,
+        encoder_noise: table.encoder_noise,
+        velocity_noise: table.velocity_noise,
+        effort_noise_share: settings.effort_noise,
+        effort_noise: table.effort_noise_absolute,
+        ripple_share: table.ripple_share,
+        ripple_cycles: table.ripple_cycles,
+        effort_delay_samples: settings.delay_samples.unwrap_or(Imperfections::default().effort_delay_samples),
+        outlier_share: table.outlier_share,
+        outlier_size: table.outlier_size,
+        dropped_share: table.dropped_share,
+        clock_jitter_s: table.clock_jitter_s,
+    }
+}

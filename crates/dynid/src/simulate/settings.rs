@@ -1,0 +1,277 @@
+//! Settings of virtual logs.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use crate::Error;
+
+/// What a virtual log is made of.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SimulateSettings {
+    /// Length, s. Default 20.
+    pub duration_s: f64,
+    /// Sample rate, Hz. Default 500.
+    pub rate_hz: f64,
+    /// Harmonics of the trajectory. Default 5.
+    pub harmonics: usize,
+    /// Period of the trajectory, s. Default: the duration.
+    pub period_s: Option<f64>,
+    /// Share of the position and velocity limits that the motion uses. Default 0.8.
+    pub share: f64,
+    /// How the log is made. Default: inverse dynamics.
+    pub mode: SimulateMode,
+    /// Noise of the effort as a share of its rms. Default 0.02.
+    pub effort_noise: f64,
+    /// Encoder resolution, bits per turn (per metre for sliding joints); 0: exact. Default 18.
+    pub encoder_bits: u32,
+    /// Lead of the logged effort before the motion, samples. Default 0.5 with inverse dynamics (a command held over a
+    /// sample), 0.3 in closed loop, where the held command adds half a control tick by itself.
+    pub delay_samples: Option<f64>,
+    /// Largest acceleration, rad/s² or m/s². Default 6.
+    pub acceleration: f64,
+    /// Values of parameters that the robot file does not state, by name (`j1.fc`).
+    pub values: BTreeMap<String, f64>,
+    /// Seed of trajectory and noise. Default 1.
+    pub seed: u64,
+    /// Trajectories of joints by name, in place of random ones; the period is `period_s`.
+    pub trajectory: BTreeMap<String, SeriesSettings>,
+    /// Only in closed loop: switches every imperfection off, noise, encoder steps and delay included. Default false.
+    pub perfect: bool,
+    /// Only in closed loop: whether velocity is logged, as `dq_<joint>`. Default false.
+    pub log_velocity: bool,
+    /// Only in closed loop: the controller.
+    pub control: Option<ControlTable>,
+    /// Only in closed loop: what sensors, drives and logger do wrong.
+    pub imperfections: Option<ImperfectionTable>,
+    /// Only in closed loop: the equation of motion.
+    pub plant: Option<PlantTable>,
+    /// Only in closed loop: extra channels such as a temperature, by name: `[time in s, value]`, linear in between.
+    pub channels: BTreeMap<String, Vec<[f64; 2]>>,
+}
+
+/// How a virtual log is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SimulateMode {
+    /// The robot is on the trajectory exactly; efforts by inverse dynamics.
+    #[default]
+    InverseDynamics,
+    /// A controller makes the robot follow the trajectory; motion by integration.
+    ClosedLoop,
+}
+
+/// Fourier series of one joint: `offset + Σ_l sine_l sin(l ω t) + cosine_l cos(l ω t)`, rad or m.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SeriesSettings {
+    /// Middle. Default 0.
+    pub offset: f64,
+    /// Amplitudes of sines. Default: none.
+    pub sine: Vec<f64>,
+    /// Amplitudes of cosines, as many.
+    pub cosine: Vec<f64>,
+}
+
+/// Keys of `[control]`; see [`dynid_sim::ControlSettings`] for what is not said here.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ControlTable {
+    /// Ticks per second, a whole multiple of `rate_hz`. Default: the first such that is at least 1000.
+    pub rate_hz: Option<f64>,
+    /// Natural frequency of the position loop, Hz. Default 5.
+    pub bandwidth_hz: f64,
+    /// Damping ratio of the position loop. Default 1.
+    pub damping: f64,
+    /// Position gains in joint order, in place of those.
+    pub position_gain: Option<Vec<f64>>,
+    /// Velocity gains in joint order, in place of those.
+    pub velocity_gain: Option<Vec<f64>>,
+    /// Whether the nominal model is fed forward. Default true.
+    pub feed_forward: bool,
+    /// Standard deviation of the nominal model's parameters from the true ones, share of each. Default 0.1.
+    pub model_error: f64,
+    /// Low pass on differences of encoder readings, Hz. Default 100.
+    pub velocity_cutoff_hz: f64,
+    /// Time from a tick to the change of effort, ticks. Default 0.
+    pub delay_ticks: f64,
+    /// Whether efforts stay within the robot file's limits. Default true.
+    pub effort_limits: bool,
+    /// Joints without a drive. Default: none.
+    pub passive: Vec<String>,
+}
+
+impl Default for ControlTable {
+    fn default() -> Self {
+        let common = dynid_sim::ControlSettings::default();
+        ControlTable {
+            rate_hz: None,
+            bandwidth_hz: common.bandwidth_hz,
+            damping: common.damping,
+            position_gain: None,
+            velocity_gain: None,
+            feed_forward: common.feed_forward,
+            model_error: 0.1,
+            velocity_cutoff_hz: common.velocity_cutoff_hz,
+            delay_ticks: common.delay_ticks,
+            effort_limits: true,
+            passive: Vec::new(),
+        }
+    }
+}
+
+/// Keys of `[imperfections]`, as in [`dynid_sim::Imperfections`], whose defaults they have. Encoder steps, effort noise as
+/// a share and delay are `encoder_bits`, `effort_noise` and `delay_samples`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ImperfectionTable {
+    /// Encoder noise, rad or m.
+    pub encoder_noise: f64,
+    /// Noise of the logged velocity, rad/s or m/s.
+    pub velocity_noise: f64,
+    /// Further effort noise, the same for all joints, N m or N.
+    pub effort_noise_absolute: f64,
+    /// Torque ripple, share of the rms effort.
+    pub ripple_share: f64,
+    /// Repetitions of the ripple per turn.
+    pub ripple_cycles: f64,
+    /// Share of effort samples that are outliers.
+    pub outlier_share: f64,
+    /// Size of outliers in multiples of the rms effort.
+    pub outlier_size: f64,
+    /// Share of rows that are missing.
+    pub dropped_share: f64,
+    /// Error of the time stamps, s.
+    pub clock_jitter_s: f64,
+}
+
+impl Default for ImperfectionTable {
+    fn default() -> Self {
+        let common = dynid_sim::Imperfections::default();
+        ImperfectionTable {
+            encoder_noise: common.encoder_noise,
+            velocity_noise: common.velocity_noise,
+            effort_noise_absolute: common.effort_noise,
+            ripple_share: common.ripple_share,
+            ripple_cycles: common.ripple_cycles,
+            outlier_share: common.outlier_share,
+            outlier_size: common.outlier_size,
+            dropped_share: common.dropped_share,
+            clock_jitter_s: common.clock_jitter_s,
+        }
+    }
+}
+
+/// Keys of `[plant]`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PlantTable {
+    /// Speed over which the sign of a velocity is smoothed, rad/s or m/s. Default 1e-3.
+    pub sign_width: f64,
+    /// Largest local error of an integration step. Default 1e-9.
+    pub tolerance: f64,
+}
+
+impl Default for PlantTable {
+    fn default() -> Self {
+        PlantTable { sign_width: 1e-3, tolerance: 1e-9 }
+    }
+}
+
+impl Default for SimulateSettings {
+    fn default() -> Self {
+        SimulateSettings {
+            duration_s: 20.0,
+            rate_hz: 500.0,
+            harmonics: 5,
+            period_s: None,
+            share: 0.8,
+            mode: SimulateMode::InverseDynamics,
+            effort_noise: 0.02,
+            encoder_bits: 18,
+            delay_samples: None,
+            acceleration: 6.0,
+            values: BTreeMap::new(),
+            seed: 1,
+            trajectory: BTreeMap::new(),
+            perfect: false,
+            log_velocity: false,
+            control: None,
+            imperfections: None,
+            plant: None,
+            channels: BTreeMap::new(),
+        }
+    }
+}
+
+impl SimulateSettings {
+    /// Parses settings from TOML.
+    ///
+    /// # Errors
+    /// [`Error::Config`] with the line.
+    pub fn parse(text: &str, file: &str) -> Result<Self, Error> {
+        toml::from_str(text).map_err(|e| Error::Config {
+            file: file.to_owned(),
+            line: e.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count()),
+            message: e.message().lines().next().unwrap_or_default().to_owned(),
+        })
+    }
+
+    /// Fails unless all values make sense on their own.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        let s = self;
+        let positive = [
+            ("duration_s", s.duration_s),
+            ("rate_hz", s.rate_hz),
+            ("share", s.share),
+            ("acceleration", s.acceleration),
+            ("period_s", s.period_s.unwrap_or(1.0)),
+        ];
+        for (name, x) in positive {
+            if !(x.is_finite() && x > 0.0) {
+                return Err(setting(name, "a positive number", x));
+            }
+        }
+        for (name, x) in
+            [("effort_noise", s.effort_noise), ("delay_samples", s.delay_samples.unwrap_or(0.0).abs())]
+        {
+            if !(x.is_finite() && x >= 0.0) {
+                return Err(setting(name, "a finite number", x));
+            }
+        }
+        if s.duration_s * s.rate_hz > 1e8 {
+            return Err(setting("duration_s", "at most 1e8 samples", s.duration_s));
+        }
+        if !(1..=100).contains(&s.harmonics) {
+            return Err(setting("harmonics", "1 to 100", s.harmonics));
+        }
+        if s.encoder_bits > 40 {
+            return Err(setting("encoder_bits", "at most 40", s.encoder_bits));
+        }
+        s.check_mode()
+    }
+
+    /// Keys that would do nothing are slips.
+    fn check_mode(&self) -> Result<(), Error> {
+        if self.mode == SimulateMode::ClosedLoop {
+            return Ok(());
+        }
+        let given = [
+            ("control", self.control.is_some()),
+            ("imperfections", self.imperfections.is_some()),
+            ("plant", self.plant.is_some()),
+            ("channels", !self.channels.is_empty()),
+            ("perfect", self.perfect),
+            ("log_velocity", self.log_velocity),
+        ];
+        match given.iter().find(|(_, given)| *given) {
+            None => Ok(()),
+            Some((name, _)) => Err(setting(name, "mode = \"closed_loop\" beside it", "inverse dynamics")),
+        }
+    }
+}
+
+pub(super) fn setting(name: &str, expected: &str, found: impl ToString) -> Error {
+    Error::Setting { name: name.to_owned(), expected: expected.to_owned(), found: found.to_string() }
+}

@@ -1,0 +1,68 @@
+//! Wanted motion of a virtual robot.
+
+use dynid_model::RobotModel;
+use dynid_motion::trajectory::Fourier;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::settings::{SimulateSettings, setting};
+use crate::Error;
+
+/// One Fourier series per joint: as the settings state it, else a random one.
+pub(super) fn trajectories(
+    model: &RobotModel,
+    settings: &SimulateSettings,
+    rng: &mut ChaCha8Rng,
+) -> Result<Vec<Fourier>, Error> {
+    let mut out = random(model, settings, rng)?;
+    let names: Vec<String> = model.joints().iter().map(|j| j.name.clone()).collect();
+    for (joint, series) in &settings.trajectory {
+        let Some(j) = names.iter().position(|n| n == joint) else {
+            return Err(Error::UnknownJoint { name: joint.clone(), known: names });
+        };
+        out[j] = Fourier::plain(out[j].base(), series.offset, series.sine.clone(), series.cosine.clone())
+            .map_err(|e| setting(&format!("trajectory.{joint}"), "a Fourier series", e))?;
+    }
+    Ok(out)
+}
+
+/// One random Fourier series per joint, scaled so that position, speed and acceleration stay within their share.
+fn random(
+    model: &RobotModel,
+    settings: &SimulateSettings,
+    rng: &mut ChaCha8Rng,
+) -> Result<Vec<Fourier>, Error> {
+    let base = std::f64::consts::TAU / settings.period_s.unwrap_or(settings.duration_s);
+    let owners = model.mechanism().rate_bodies();
+    owners
+        .iter()
+        .map(|body| {
+            let joint = &model.mechanism().bodies()[*body].joint;
+            let reach = if joint.effort_unit() == "N" { 0.5 } else { 2.0 };
+            let (low, high) = joint.limits.position.unwrap_or((-reach, reach));
+            let (low, high) = (low.max(-2.0 * reach), high.min(2.0 * reach));
+            let middle = 0.5 * (low + high);
+            let mut draw = || -> Vec<f64> {
+                (0..settings.harmonics).map(|k| rng.random_range(-1.0..=1.0) / (1.0 + k as f64)).collect()
+            };
+            let (a, b) = (draw(), draw());
+            let fourier = |scale: f64| {
+                let scaled = |v: &[f64]| v.iter().map(|x| x * scale).collect::<Vec<f64>>();
+                Fourier::plain(base, middle, scaled(&a), scaled(&b))
+                    .map_err(|e| setting("harmonics", "a trajectory", e))
+            };
+            let unit = fourier(1.0)?;
+            let period = std::f64::consts::TAU / base;
+            let peak = |pick: &dyn Fn(&dynid_motion::trajectory::Point) -> f64| {
+                (0..2000)
+                    .map(|k| pick(&unit.at(period * f64::from(k) / 2000.0)).abs())
+                    .fold(f64::MIN_POSITIVE, f64::max)
+            };
+            let speed = joint.limits.velocity.unwrap_or(2.0);
+            let scale = (settings.share * 0.5 * (high - low) / peak(&|p| p.position - middle))
+                .min(settings.share * speed / peak(&|p| p.velocity))
+                .min(settings.share * settings.acceleration / peak(&|p| p.acceleration));
+            fourier(scale)
+        })
+        .collect()
+}
