@@ -30,6 +30,7 @@ fn main() -> ExitCode {
         Command::Regressor(args) => commands::regressor::run(&args),
         Command::Identify(args) => commands::identify::run(&args),
         Command::Predict(args) => commands::predict::run(&args),
+        Command::Design(args) => commands::design::run(&args),
         Command::Simulate(args) => commands::simulate::run(&args),
         Command::Validate(args) => commands::validate::run(&args),
         Command::Export(args) => commands::export::run(&args),

@@ -4,6 +4,7 @@ use std::io::IsTerminal;
 use std::time::Duration;
 
 use dynid::Step;
+use dynid::design::DesignStep;
 use dynid::estimators::conditioning::Stage;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -36,6 +37,43 @@ impl Progress {
             Step::Trust => "judging parameters".to_owned(),
             Step::Validate(log) => format!("predicting {log}"),
         });
+    }
+}
+
+/// Shows how far a design is; silent unless stderr is a terminal.
+pub(crate) struct DesignProgress(ProgressBar);
+
+impl DesignProgress {
+    pub(crate) fn new(quiet: bool) -> Self {
+        if quiet || !std::io::stderr().is_terminal() {
+            return DesignProgress(ProgressBar::hidden());
+        }
+        let bar = ProgressBar::new(0);
+        if let Ok(style) = ProgressStyle::with_template("{spinner} [{elapsed}] {bar:30} {pos}/{len} {msg}") {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(Duration::from_millis(120));
+        DesignProgress(bar)
+    }
+
+    pub(crate) fn step(&self, step: DesignStep) {
+        match step {
+            DesignStep::Starts { ended, of, best } => {
+                self.0.set_length(of as u64);
+                self.0.set_position(ended as u64);
+                let best =
+                    best.map_or_else(|| "none within all limits yet".to_owned(), |b| format!("best {b:.4}"));
+                self.0.set_message(format!("starts, {best}"));
+            }
+            DesignStep::Forecast => self.0.set_message("predicting what the log will tell"),
+            _ => self.0.set_message("finding base parameters"),
+        }
+    }
+}
+
+impl Drop for DesignProgress {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
     }
 }
 

@@ -1,12 +1,13 @@
 //! Given trajectories judged by a problem's criterion and limits.
 
-use faer::Mat;
-
 use crate::feasibility::{LimitPoint, worst_points};
 use crate::grid::{Grid, GridMotion};
 use crate::parametrisation::Parametrisation;
 use crate::problem::Problem;
 use crate::search::Observation;
+
+/// Fisher information `M_f = RᵀR` as its triangle `R`.
+pub type Information = faer::Mat<f64>;
 
 /// Triangle `R` of the weighted observation matrix of a trajectory on `samples` equidistant samples of its period, prior
 /// information included, with exact signs of velocities: `M_f = RᵀR`.
@@ -15,7 +16,7 @@ use crate::search::Observation;
 ///
 /// # Panics
 /// If the coefficients do not fit the problem.
-pub fn information(problem: &Problem, coefficients: &[Vec<f64>], samples: usize) -> Mat<f64> {
+pub fn information(problem: &Problem, coefficients: &[Vec<f64>], samples: usize) -> Information {
     with_grid(problem, samples, |grid| {
         let motion = GridMotion::new(coefficients, &grid.basis);
         Observation::new(problem, &motion, 0.0).triangle

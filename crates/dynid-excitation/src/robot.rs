@@ -6,7 +6,7 @@ use faer::Mat;
 use crate::model::{ColumnInfo, ExcitationModel, Sensitivity};
 
 /// Base parameters of a robot: inertial, drive and friction columns that motion can reveal.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct RobotExcitation {
     model: std::sync::Arc<RobotModel>,
     shape: Vec<f64>,

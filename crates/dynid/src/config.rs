@@ -54,7 +54,7 @@ pub struct Config {
 }
 
 /// Elements at joints.
-#[derive(Debug, Clone, Default, Deserialize, PartialEq)]
+#[derive(Debug, Clone, Default, Deserialize, Serialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct ElementsConfig {
     /// For every joint about which nothing else is said.
@@ -202,28 +202,28 @@ impl Config {
             if let Some(x) = value
                 && !(x.is_finite() && x > 0.0)
             {
-                return Err(setting(name, "a positive number", x));
+                return Err(Error::setting(name, "a positive number", x));
             }
         }
         for (name, value) in [("delay_samples", c.delay_samples), ("reversal_mask", c.reversal_mask)] {
             if let Some(x) = value
                 && !(x.is_finite() && x.abs() <= 1e4)
             {
-                return Err(setting(name, "a number of moderate size", x));
+                return Err(Error::setting(name, "a number of moderate size", x));
             }
         }
         if let Some(x) = c.trim_s
             && !(x.is_finite() && x >= 0.0)
         {
-            return Err(setting("trim_s", "a number that is not negative", x));
+            return Err(Error::setting("trim_s", "a number that is not negative", x));
         }
         if c.decimation == Some(0) {
-            return Err(setting("decimation", "at least 1", 0));
+            return Err(Error::setting("decimation", "at least 1", 0));
         }
         if let Some(g) = self.gravity
             && !g.iter().all(|x| x.is_finite())
         {
-            return Err(setting("gravity", "three finite numbers", format!("{g:?}")));
+            return Err(Error::setting("gravity", "three finite numbers", format!("{g:?}")));
         }
         for coupling in &self.coupling {
             if !coupling.matrix.iter().flatten().all(|x| x.is_finite()) {
@@ -236,14 +236,18 @@ impl Config {
         self.check_estimator()?;
         for (joint, position) in &self.locked {
             if !position.is_finite() {
-                return Err(setting(&format!("locked.{joint}"), "a finite number", position));
+                return Err(Error::setting(&format!("locked.{joint}"), "a finite number", position));
             }
         }
         for log in self.log.iter().chain(&self.validation) {
             if let Some((a, b)) = log.part
                 && !(0.0..1.0).contains(&a) | !(b > a && b <= 1.0)
             {
-                return Err(setting("part", "two increasing shares between 0 and 1", format!("[{a}, {b}]")));
+                return Err(Error::setting(
+                    "part",
+                    "two increasing shares between 0 and 1",
+                    format!("[{a}, {b}]"),
+                ));
             }
         }
         Ok(())
@@ -293,10 +297,6 @@ impl Config {
             ..defaults
         }
     }
-}
-
-fn setting(name: &str, expected: &str, found: impl ToString) -> Error {
-    Error::Setting { name: name.to_owned(), expected: expected.to_owned(), found: found.to_string() }
 }
 
 /// A list of just so many entries; serde's own arrays and tuples pass over surplus ones.

@@ -154,6 +154,26 @@ pub enum Error {
         /// What is wrong.
         source: Box<Error>,
     },
+    /// A design problem is not well posed.
+    #[error("design: {0}")]
+    Design(#[from] dynid_excitation::ProblemError),
+    /// A limit on the path cannot be stated.
+    #[error("design: {0}")]
+    Constraint(#[from] dynid_excitation::constraint::ConstraintError),
+    /// A trajectory cannot be made.
+    #[error("trajectory: {0}")]
+    Trajectory(#[from] dynid_motion::trajectory::TrajectoryError),
+    /// A trajectory file cannot be read.
+    #[error(transparent)]
+    TrajectoryFile(#[from] dynid_io::trajectory::TrajectoryFileError),
+    /// A checkpoint belongs to another problem, or is none.
+    #[error("{file}: not a checkpoint of this design: {message}")]
+    Checkpoint {
+        /// File.
+        file: String,
+        /// What is wrong.
+        message: String,
+    },
     /// A virtual experiment cannot be run.
     #[error(transparent)]
     Experiment(#[from] dynid_sim::SimError),
@@ -218,6 +238,11 @@ pub enum Error {
 }
 
 impl Error {
+    /// A setting whose value makes no sense.
+    pub(crate) fn setting(name: &str, expected: &str, found: impl ToString) -> Self {
+        Error::Setting { name: name.to_owned(), expected: expected.to_owned(), found: found.to_string() }
+    }
+
     /// What a user can do about it.
     pub fn hint(&self) -> Option<String> {
         use dynid_estimate::conditioning::ConditioningError as C;
@@ -228,6 +253,8 @@ impl Error {
             Error::RobotFile(e) => e.hint(),
             Error::LogFile(e) => e.hint(),
             Error::Export(e) => e.hint(),
+            Error::TrajectoryFile(e) => e.hint(),
+            Error::Checkpoint { .. } => Some("delete the file, or name another one".to_owned()),
             Error::Columns { source, .. } => source.hint(),
             Error::States(e) => e.hint(),
             Error::Output(e) => e.hint(),

@@ -3,7 +3,6 @@
 mod closed_loop;
 mod settings;
 mod trajectory;
-mod truth;
 
 use dynid_model::{EffortModel, MotionBlock, RegressorBlock, RobotModel};
 use dynid_motion::trajectory::Fourier;
@@ -13,6 +12,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::Error;
 use crate::elements::ElementPlan;
+use crate::nominal::nominal_parameters;
 use crate::robot::Robot;
 pub use settings::{
     ControlTable, ImperfectionTable, PlantTable, SeriesSettings, SimulateMode, SimulateSettings,
@@ -97,7 +97,7 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
     }
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
     let trajectories = trajectory::trajectories(&model, settings, &mut rng)?;
-    let values = truth::truth(&model, &plan, settings)?;
+    let values = nominal_parameters(&model, &plan, &settings.values)?;
     match settings.mode {
         SimulateMode::InverseDynamics => {
             Ok(by_inverse_dynamics(&model, &trajectories, values, settings, &mut rng))

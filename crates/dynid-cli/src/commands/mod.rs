@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub(crate) mod design;
 pub(crate) mod export;
 pub(crate) mod identify;
 pub(crate) mod inspect;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Config, pair, setting};
+use super::{Config, pair};
 use crate::Error;
 
 /// Limits beyond this are a slip or were meant to be infinite, whatever the unit.
@@ -128,26 +128,30 @@ impl Config {
             if let Some(x) = value
                 && !(x.is_finite() && x > 0.0)
             {
-                return Err(setting(name, "a positive number", x));
+                return Err(Error::setting(name, "a positive number", x));
             }
         }
         for (name, x) in &e.column_noise {
             if !(x.is_finite() && *x >= 0.0) {
-                return Err(setting(&format!("column_noise.{name}"), "a number that is not negative", x));
+                return Err(Error::setting(
+                    &format!("column_noise.{name}"),
+                    "a number that is not negative",
+                    x,
+                ));
             }
         }
         if e.method == Method::Tls && e.effort_noise.is_none() {
-            return Err(setting(
+            return Err(Error::setting(
                 "effort_noise",
                 "the standard deviation of the effort, which `tls` needs",
                 "nothing",
             ));
         }
         if e.prior == PriorDistance::Entropic && e.consistency == Consistency::SpatialInertia {
-            return Err(setting("prior", "`quadratic` with the 6 x 6 form", "`entropic`"));
+            return Err(Error::setting("prior", "`quadratic` with the 6 x 6 form", "`entropic`"));
         }
         if e.consistency == Consistency::None && !self.bound.is_empty() {
-            return Err(setting(
+            return Err(Error::setting(
                 "consistency",
                 "`pseudo-inertia` or `spatial-inertia`, as there are bounds",
                 "`none`",
@@ -179,11 +183,11 @@ impl BoundConfig {
         };
         if !complete {
             let expected = "`links` with `mass` (or, for one link, `com_x`, `com_y`, `com_z`), or `parameter` with `range`";
-            return Err(setting("bound", expected, self.keys()));
+            return Err(Error::setting("bound", expected, self.keys()));
         }
         let twice = self.links.iter().enumerate().find(|(k, link)| self.links[..*k].contains(link));
         if let Some((_, link)) = twice {
-            return Err(setting("bound.links", "every link once", format!("`{link}` twice")));
+            return Err(Error::setting("bound.links", "every link once", format!("`{link}` twice")));
         }
         for (key, (lower, upper)) in self.ranges() {
             // Infinity as lower limit, or minus infinity as upper one, admits no number.
@@ -192,11 +196,11 @@ impl BoundConfig {
                 let of = self.parameter.as_ref().map_or_else(|| self.links.join("`, `"), Clone::clone);
                 let expected = "[lower, upper] with lower not above upper and one of them finite";
                 let found = format!("[{lower}, {upper}] for `{of}`");
-                return Err(setting(&format!("bound.{key}"), expected, found));
+                return Err(Error::setting(&format!("bound.{key}"), expected, found));
             }
             if let Some(x) = [lower, upper].into_iter().find(|x| x.is_finite() && x.abs() > LARGEST_LIMIT) {
                 let expected = format!("limits up to {LARGEST_LIMIT:e}, or `-inf` and `inf`");
-                return Err(setting(&format!("bound.{key}"), &expected, format!("{x:e}")));
+                return Err(Error::setting(&format!("bound.{key}"), &expected, format!("{x:e}")));
             }
         }
         Ok(())

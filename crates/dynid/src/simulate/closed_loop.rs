@@ -8,7 +8,7 @@ use dynid_sim::{
     ControlSettings, ExperimentSettings, Imperfections, Plant, Profile, Wanted, run, wrong_model,
 };
 
-use super::settings::{SimulateSettings, setting};
+use super::settings::SimulateSettings;
 use super::{ExperimentSummary, SimulatedLog, named};
 use crate::Error;
 
@@ -25,7 +25,7 @@ pub(super) fn experiment(
     let table = settings.control.clone().unwrap_or_default();
     let plant_table = settings.plant.clone().unwrap_or_default();
     if !(0.0..=1.0).contains(&table.model_error) {
-        return Err(setting("control.model_error", "0 to 1", table.model_error));
+        return Err(Error::setting("control.model_error", "0 to 1", table.model_error));
     }
     let shape = vec![0.0; model.parameters().shape.len()];
     let plant = |values: Vec<f64>| Plant::new(model.clone(), values, shape.clone(), plant_table.sign_width);
@@ -43,7 +43,7 @@ pub(super) fn experiment(
         Profile::new(points.iter().map(|[t, x]| (*t, *x)).collect())
     });
     if let Some(name) = settings.channels.keys().find(|name| !model.channels().contains(name)) {
-        return Err(setting(&format!("channels.{name}"), "a channel that an element reads", name));
+        return Err(Error::setting(&format!("channels.{name}"), "a channel that an element reads", name));
     }
     let experiment = ExperimentSettings {
         duration_s: settings.duration_s,

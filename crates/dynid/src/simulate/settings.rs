@@ -230,24 +230,24 @@ impl SimulateSettings {
         ];
         for (name, x) in positive {
             if !(x.is_finite() && x > 0.0) {
-                return Err(setting(name, "a positive number", x));
+                return Err(Error::setting(name, "a positive number", x));
             }
         }
         for (name, x) in
             [("effort_noise", s.effort_noise), ("delay_samples", s.delay_samples.unwrap_or(0.0).abs())]
         {
             if !(x.is_finite() && x >= 0.0) {
-                return Err(setting(name, "a finite number", x));
+                return Err(Error::setting(name, "a finite number", x));
             }
         }
         if s.duration_s * s.rate_hz > 1e8 {
-            return Err(setting("duration_s", "at most 1e8 samples", s.duration_s));
+            return Err(Error::setting("duration_s", "at most 1e8 samples", s.duration_s));
         }
         if !(1..=100).contains(&s.harmonics) {
-            return Err(setting("harmonics", "1 to 100", s.harmonics));
+            return Err(Error::setting("harmonics", "1 to 100", s.harmonics));
         }
         if s.encoder_bits > 40 {
-            return Err(setting("encoder_bits", "at most 40", s.encoder_bits));
+            return Err(Error::setting("encoder_bits", "at most 40", s.encoder_bits));
         }
         s.check_mode()
     }
@@ -267,11 +267,9 @@ impl SimulateSettings {
         ];
         match given.iter().find(|(_, given)| *given) {
             None => Ok(()),
-            Some((name, _)) => Err(setting(name, "mode = \"closed_loop\" beside it", "inverse dynamics")),
+            Some((name, _)) => {
+                Err(Error::setting(name, "mode = \"closed_loop\" beside it", "inverse dynamics"))
+            }
         }
     }
-}
-
-pub(super) fn setting(name: &str, expected: &str, found: impl ToString) -> Error {
-    Error::Setting { name: name.to_owned(), expected: expected.to_owned(), found: found.to_string() }
 }

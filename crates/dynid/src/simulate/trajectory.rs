@@ -5,7 +5,7 @@ use dynid_motion::trajectory::Fourier;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::settings::{SimulateSettings, setting};
+use super::settings::SimulateSettings;
 use crate::Error;
 
 /// One Fourier series per joint: as the settings state it, else a random one.
@@ -21,7 +21,7 @@ pub(super) fn trajectories(
             return Err(Error::UnknownJoint { name: joint.clone(), known: names });
         };
         out[j] = Fourier::plain(out[j].base(), series.offset, series.sine.clone(), series.cosine.clone())
-            .map_err(|e| setting(&format!("trajectory.{joint}"), "a Fourier series", e))?;
+            .map_err(|e| Error::setting(&format!("trajectory.{joint}"), "a Fourier series", e))?;
     }
     Ok(out)
 }
@@ -49,7 +49,7 @@ fn random(
             let fourier = |scale: f64| {
                 let scaled = |v: &[f64]| v.iter().map(|x| x * scale).collect::<Vec<f64>>();
                 Fourier::plain(base, middle, scaled(&a), scaled(&b))
-                    .map_err(|e| setting("harmonics", "a trajectory", e))
+                    .map_err(|e| Error::setting("harmonics", "a trajectory", e))
             };
             let unit = fourier(1.0)?;
             let period = std::f64::consts::TAU / base;

@@ -1,42 +1,49 @@
-//! True parameters of a virtual robot.
+//! Nominal parameters of a robot: what its file states, and typical friction where it states none.
 
 use dynid_model::{EffortModel, RandomMotion, RegressorBlock, RobotModel};
 
-use super::settings::{SimulateSettings, setting};
+use std::collections::BTreeMap;
+
 use crate::Error;
 use crate::elements::ElementPlan;
 
 /// Seed of the states that typical friction is scaled by: the same robot always gets the same truth.
 const TYPICAL_SEED: u64 = 1;
 
-pub(super) fn truth(
+/// Values of all linear parameters of `model`: link inertias and element values of the robot file, `given` values by name
+/// over them. Friction about which neither says anything is typical for the joint: Coulomb 10 % and viscous 10 % (at the
+/// speed limit) of the largest rigid effort over random states. Offsets and rotors are zero then.
+///
+/// # Errors
+/// [`Error::Setting`] if a given name is no parameter or its value not finite.
+pub fn nominal_parameters(
     model: &RobotModel,
     plan: &ElementPlan,
-    settings: &SimulateSettings,
+    given: &BTreeMap<String, f64>,
 ) -> Result<Vec<f64>, Error> {
     let table = model.parameters();
     let mut values = table.prior();
     let peaks = typical_efforts(model, &values);
     let owners = model.mechanism().rate_bodies();
-    let mut given: Vec<(String, f64)> = Vec::new();
+    let mut stated: Vec<(String, f64)> = Vec::new();
     for (j, joint) in model.joints().iter().enumerate() {
         let speed = model.mechanism().bodies()[owners[j]].joint.limits.velocity.unwrap_or(2.0);
         for (symbol, value) in [("fc", 0.1 * peaks[j]), ("fv", 0.1 * peaks[j] / speed)] {
-            given.push((format!("{}.{symbol}", joint.name), value));
+            stated.push((format!("{}.{symbol}", joint.name), value));
         }
     }
-    given.extend(plan.stated_values());
-    for (name, value) in given {
+    stated.extend(plan.stated_values());
+    for (name, value) in stated {
         if let Some(column) = table.column(&name) {
             values[column] = value;
         }
     }
-    for (name, value) in &settings.values {
+    for (name, value) in given {
         let Some(column) = table.column(name) else {
-            return Err(setting("values", "names of parameters such as `j1.fc`", name));
+            return Err(Error::setting("values", "names of parameters such as `j1.fc`", name));
         };
         if !value.is_finite() {
-            return Err(setting(&format!("values.{name}"), "a finite number", value));
+            return Err(Error::setting(&format!("values.{name}"), "a finite number", value));
         }
         values[column] = *value;
     }
@@ -44,7 +51,7 @@ pub(super) fn truth(
 }
 
 /// Largest rigid effort of every joint over random states.
-fn typical_efforts(model: &RobotModel, values: &[f64]) -> Vec<f64> {
+pub(crate) fn typical_efforts(model: &RobotModel, values: &[f64]) -> Vec<f64> {
     const STATES: usize = 100;
     let motion = RandomMotion::new(model.mechanism(), model.channels(), STATES, TYPICAL_SEED);
     let mut block = RegressorBlock::new(model.layout().clone(), STATES);

@@ -1,0 +1,193 @@
+//! `dynid design`.
+
+use std::path::{Path, PathBuf};
+
+use dynid::design::{ColumnsName, CriterionName, DesignConfig, DesignRecord, MotionPaths, PerJoint, design};
+use dynid::io::OutputError;
+use dynid::io::output::write_atomically;
+
+use super::{element_names, table};
+use crate::args::{ColumnsArg, CriterionArg, DesignArgs};
+use crate::message::{Failure, data, note};
+use crate::outputs;
+use crate::progress::DesignProgress;
+
+const DEFAULT_OUT: &str = "dynid-design";
+
+pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
+    let config = configuration(args)?;
+    config.check()?;
+    let out = config.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
+    let paths = MotionPaths {
+        coefficients: out.join("trajectory.json"),
+        samples: out.join("trajectory.csv"),
+        ros_yaml: out.join("trajectory.ros2.yaml"),
+        ros_json: out.join("trajectory.ros2.json"),
+    };
+    let record_path = out.join("design.json");
+    let files = [&paths.coefficients, &paths.samples, &paths.ros_yaml, &paths.ros_json, &record_path]
+        .map(Clone::clone);
+    let earlier = config.earlier.iter().map(PathBuf::as_path);
+    let inputs: Vec<&Path> = earlier.chain([args.input.as_path(), &config.robot]).collect();
+    outputs::check_folder(&out, &files, &inputs)?;
+    if let Some(checkpoint) = &config.search.checkpoint {
+        outputs::check_files(&[("--checkpoint", checkpoint.as_path())], &inputs)?;
+    }
+    let progress = DesignProgress::new(args.quiet);
+    let run = design(&config, |step| progress.step(step))?;
+    let record = run.record(&config)?;
+    drop(progress);
+
+    std::fs::create_dir_all(&out)
+        .map_err(|error| OutputError::Unwritable { file: out.display().to_string(), error })?;
+    let mut written = Vec::new();
+    if let Ok(designed) = &run.outcome {
+        designed.motion.write(&paths)?;
+        written.extend([&paths.coefficients, &paths.samples, &paths.ros_yaml, &paths.ros_json]);
+    }
+    let text = serde_json::to_string_pretty(&record).map_err(|e| Failure::Output(e.into()))? + "\n";
+    write_atomically(&record_path, text.as_bytes())?;
+    written.push(&record_path);
+    if args.quiet {
+        if record.verdict.status == "fail" {
+            note(&verdict(&record));
+        }
+    } else {
+        summary(&record, &written);
+    }
+    if args.json {
+        data(&text)?;
+    }
+    Ok(u8::from(record.verdict.status == "fail"))
+}
+
+/// The configuration file, or one made of a robot file, with flags over it.
+fn configuration(args: &DesignArgs) -> Result<DesignConfig, Failure> {
+    let is_xml = args.input.extension().is_some_and(|e| e == "urdf" || e == "xml");
+    let robot = || DesignConfig { robot: args.input.clone(), ..DesignConfig::default() };
+    let mut config = if is_xml {
+        robot()
+    } else {
+        match DesignConfig::read(&args.input) {
+            Ok(config) => config,
+            Err(error) => match dynid::io::robot::read(&args.input) {
+                Ok(_) => robot(),
+                Err(_) => return Err(error.into()),
+            },
+        }
+    };
+    if args.out.is_some() {
+        config.out.clone_from(&args.out);
+    }
+    let t = &mut config.trajectory;
+    t.period_s = args.period.unwrap_or(t.period_s);
+    t.harmonics = args.harmonics.unwrap_or(t.harmonics);
+    t.periods = args.periods.unwrap_or(t.periods);
+    t.sample_rate_hz = args.rate_hz.unwrap_or(t.sample_rate_hz);
+    t.rest &= !args.no_rest;
+    if args.park && t.parking.is_none() {
+        t.parking = Some(std::collections::BTreeMap::new());
+    }
+    if let Some(acceleration) = args.acceleration {
+        config.limits.acceleration = PerJoint::All(acceleration);
+    }
+    config.limits.share = args.share.unwrap_or(config.limits.share);
+    match args.criterion {
+        Some(CriterionArg::RelativeStd) => config.criterion.name = Some(CriterionName::RelativeStd),
+        Some(CriterionArg::UnitCondition) => config.criterion.name = Some(CriterionName::UnitCondition),
+        Some(CriterionArg::Condition) => config.criterion.name = Some(CriterionName::Condition),
+        Some(CriterionArg::Mix) => config.criterion.name = Some(CriterionName::Mix),
+        Some(CriterionArg::A) => config.criterion.name = Some(CriterionName::A),
+        Some(CriterionArg::D) => config.criterion.name = Some(CriterionName::D),
+        Some(CriterionArg::E) => config.criterion.name = Some(CriterionName::E),
+        None => {}
+    }
+    match args.columns {
+        Some(ColumnsArg::All) => config.criterion.columns = ColumnsName::All,
+        Some(ColumnsArg::Inertial) => config.criterion.columns = ColumnsName::Inertial,
+        None => {}
+    }
+    if let Some(noise) = args.noise {
+        config.criterion.noise = PerJoint::All(noise);
+    }
+    config.earlier.extend(args.earlier.iter().cloned());
+    if args.elements.is_some() {
+        config.elements.default = element_names(args.elements.as_deref());
+    }
+    config.locked.extend(args.lock.iter().cloned());
+    let s = &mut config.search;
+    s.starts = args.starts.unwrap_or(s.starts);
+    s.seed = args.seed.unwrap_or(s.seed);
+    s.time_budget_s = args.time_budget.or(s.time_budget_s);
+    if args.checkpoint.is_some() {
+        s.checkpoint.clone_from(&args.checkpoint);
+    }
+    Ok(config)
+}
+
+/// Parameters that the summary shows, worst first.
+const SHOWN: usize = 8;
+
+fn summary(record: &DesignRecord, written: &[&PathBuf]) {
+    for warning in &record.verdict.warnings {
+        note(&format!("warning: {warning}"));
+    }
+    if let Some(value) = record.criterion.value {
+        note(&format!("{}: {}", record.criterion.meaning, table::number(Some(value))));
+        note(&format!(
+            "condition number: {} raw, {} with columns of unit length",
+            table::number(record.condition_number),
+            table::number(record.condition_number_scaled)
+        ));
+    }
+    if let Some(random) = &record.random {
+        note(&format!(
+            "standard deviations are {} times smaller than on random motion within the same limits (mean; geometric {})",
+            table::number(Some(random.mean_ratio)),
+            table::number(Some(random.geometric_ratio))
+        ));
+    }
+    let mut worst: Vec<_> = record.parameters.iter().filter(|p| p.rel_std.is_some()).collect();
+    worst.sort_by(|a, b| b.rel_std.unwrap_or(0.0).total_cmp(&a.rel_std.unwrap_or(0.0)));
+    if !worst.is_empty() {
+        note("\nparameters that the log will tell least about:");
+        let rows: Vec<Vec<String>> = worst
+            .iter()
+            .take(SHOWN)
+            .map(|p| {
+                vec![
+                    p.name.clone(),
+                    table::number(p.nominal),
+                    table::number(Some(p.std)),
+                    p.unit.clone(),
+                    table::number(p.rel_std.map(|r| 100.0 * r)),
+                ]
+            })
+            .collect();
+        note(table::aligned(&["parameter", "nominal", "std", "unit", "std, %"], &rows).trim_end());
+    }
+    for pair in &record.confounded {
+        note(&format!(
+            "hardly told apart: {} and {} (correlation {:.3})",
+            pair.names[0], pair.names[1], pair.correlation
+        ));
+    }
+    let acting = record.limits.iter().filter(|l| l.excess > -1e-3).count();
+    if record.infeasible.is_none() {
+        note(&format!("\n{acting} of {} limits act (used to 99.9 % or more)", record.limits.len()));
+    }
+    if let Some(infeasible) = &record.infeasible {
+        note("\nlimits that stay broken:");
+        for v in &infeasible.violations {
+            note(&format!("  {} of {} at {:.2} s", v.kind, v.subject, v.time_s));
+        }
+    }
+    note(&format!("\n{}", verdict(record)));
+    for file in written {
+        note(&format!("written: {}", file.display()));
+    }
+}
+
+fn verdict(record: &DesignRecord) -> String {
+    format!("{}: {}", record.verdict.status, record.verdict.headline)
+}

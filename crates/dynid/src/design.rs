@@ -1,0 +1,172 @@
+//! Excitation design: from a robot file and limits to a trajectory, what it promises, and files that robots understand.
+
+mod checkpoint;
+mod config;
+mod motion;
+mod problem;
+mod record;
+
+use std::path::Path;
+
+use dynid_excitation::{
+    Forecast, Infeasible, LimitPoint, Outcome, Settings, StartOutcome, forecast, limit_points,
+};
+
+use crate::Error;
+use crate::robot::{Robot, RobotOptions};
+pub use config::{
+    BoxConfig, CapsuleConfig, ColumnConfig, ColumnsName, CriterionConfig, CriterionName, CylinderConfig,
+    DesignConfig, HalfSpaceConfig, KeepConfig, LimitsConfig, PerJoint, SearchConfig, TrajectoryConfig,
+};
+pub use motion::{DesignedMotion, LegFault, MotionPaths};
+use problem::RobotProblem;
+pub use record::{DesignRecord, DesignVerdict};
+
+/// Samples of a period on which criterion and forecast are reported, unless the real rate asks for more.
+const REPORT_SAMPLES: usize = 1000;
+/// Samples of a period on which the limits are checked once more.
+const CHECK_SAMPLES: usize = 100_000;
+
+/// What is being worked on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum DesignStep {
+    /// Reading the robot, finding base parameters.
+    Structure,
+    /// Starts have ended.
+    Starts {
+        /// How many.
+        ended: usize,
+        /// Of how many.
+        of: usize,
+        /// Best criterion so far, if any start met all limits.
+        best: Option<f64>,
+    },
+    /// Predicting what the log will tell.
+    Forecast,
+}
+
+/// A design that has been run.
+pub struct DesignRun {
+    robot: Robot,
+    set: RobotProblem,
+    /// All starts that ran, by seed.
+    pub starts: Vec<StartOutcome>,
+    /// The trajectory, or why there is none.
+    pub outcome: Result<DesignedTrajectory, Infeasible>,
+}
+
+/// The best trajectory.
+#[derive(Debug)]
+pub struct DesignedTrajectory {
+    /// Fourier coefficients `[q0, a.., b..]` per joint, plain amplitudes.
+    pub coefficients: Vec<Vec<f64>>,
+    /// Index of the best start.
+    pub best: usize,
+    /// What the log will tell.
+    pub forecast: Forecast,
+    /// Limits broken by more than 1e-6 of themselves on a fine check of the period: none, or a fault of the program.
+    pub broken: Vec<LimitPoint>,
+    /// For every limit its instant of largest use.
+    pub uses: Vec<LimitPoint>,
+    /// Approach, periods and return.
+    pub motion: DesignedMotion,
+}
+
+/// Designs an excitation trajectory.
+///
+/// `progress` hears of every step. Results do not depend on the number of threads; with a time budget the number of starts
+/// depends on the machine.
+///
+/// # Errors
+/// [`Error`] for bad input. A problem without a solution is an [`Infeasible`] outcome.
+pub fn design(config: &DesignConfig, mut progress: impl FnMut(DesignStep)) -> Result<DesignRun, Error> {
+    config.check()?;
+    progress(DesignStep::Structure);
+    let options = RobotOptions {
+        gravity: config.gravity,
+        couple_mimics: config.couple_mimics,
+        floating_base: false,
+        locked: config.locked.iter().map(|(j, q)| (j.clone(), *q)).collect(),
+    };
+    let robot = Robot::load(&config.robot, &options)?;
+    let set = problem::problem(&robot, config)?;
+    let parking = problem::pose(&set, config)?;
+    let mut file = Checkpointing::open(config)?;
+    let settings = Settings {
+        starts: config.search.starts,
+        seed: config.search.seed,
+        time_budget_s: config.search.time_budget_s,
+        report_samples: REPORT_SAMPLES
+            .max((config.trajectory.period_s * config.trajectory.sample_rate_hz).min(1e4) as usize),
+    };
+    let mut ended = 0;
+    let mut best: Option<f64> = None;
+    let done = std::mem::take(&mut file.starts);
+    for start in &done {
+        file.push(start)?;
+    }
+    let mut fault = None;
+    let outcome = dynid_excitation::design(&set.problem, &settings, done, &mut |start| {
+        ended += 1;
+        if start.is_feasible() {
+            best = [best, start.criterion].into_iter().flatten().reduce(f64::min);
+        }
+        progress(DesignStep::Starts { ended, of: settings.starts, best });
+        if fault.is_none() {
+            fault = file.push(start).err();
+        }
+    })?;
+    if let Some(fault) = fault {
+        return Err(fault);
+    }
+    let (starts, outcome) = match outcome {
+        Outcome::Infeasible(infeasible) => (Vec::new(), Err(infeasible)),
+        Outcome::Found(found) => {
+            progress(DesignStep::Forecast);
+            let coefficients = found.coefficients;
+            let forecast =
+                forecast(&set.problem, &coefficients, settings.report_samples).ok_or_else(|| {
+                    Error::Unsupported("the designed trajectory leaves parameters unseen".to_owned())
+                })?;
+            let motion = DesignedMotion::new(&set, config, &coefficients, parking.as_deref())?;
+            let designed = DesignedTrajectory {
+                best: found.best,
+                forecast,
+                broken: limit_points(&set.problem, &coefficients, CHECK_SAMPLES, 1e-6),
+                uses: limit_points(&set.problem, &coefficients, settings.report_samples, f64::NEG_INFINITY),
+                motion,
+                coefficients,
+            };
+            (found.starts, Ok(designed))
+        }
+    };
+    Ok(DesignRun { robot, set, starts, outcome })
+}
+
+/// The checkpoint file of a run, if one is wanted.
+struct Checkpointing<'a> {
+    path: Option<&'a Path>,
+    fingerprint: String,
+    starts: Vec<StartOutcome>,
+}
+
+impl<'a> Checkpointing<'a> {
+    fn open(config: &'a DesignConfig) -> Result<Self, Error> {
+        let path = config.search.checkpoint.as_deref();
+        let fingerprint = checkpoint::fingerprint(config)?;
+        let starts = match path {
+            Some(path) => checkpoint::read(path, &fingerprint)?,
+            None => Vec::new(),
+        };
+        Ok(Checkpointing { path, fingerprint, starts })
+    }
+
+    fn push(&mut self, start: &StartOutcome) -> Result<(), Error> {
+        self.starts.push(start.clone());
+        match self.path {
+            Some(path) => checkpoint::write(path, &self.fingerprint, &self.starts),
+            None => Ok(()),
+        }
+    }
+}

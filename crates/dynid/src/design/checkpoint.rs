@@ -1,0 +1,97 @@
+//! Finished starts of a design on disk, so that a run can be taken up again.
+
+use std::path::Path;
+
+use dynid_excitation::StartOutcome;
+use dynid_io::output::write_atomically;
+use serde::{Deserialize, Serialize};
+
+use super::DesignConfig;
+use crate::Error;
+
+const SCHEMA: &str = "dynid-design-checkpoint/1";
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Checkpoint {
+    schema: String,
+    /// What the starts depend on.
+    problem: String,
+    starts: Vec<StartRecord>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct StartRecord {
+    seed: u64,
+    unknowns: Vec<f64>,
+    criterion: Option<f64>,
+    excess: f64,
+    evaluations: usize,
+    share: f64,
+}
+
+/// Text that differs between problems whose starts differ: robot, settings, version. The number of starts and the time
+/// budget do not matter.
+pub(super) fn fingerprint(config: &DesignConfig) -> Result<String, Error> {
+    let mut config = config.clone();
+    config.search.starts = 1;
+    config.search.time_budget_s = None;
+    config.search.checkpoint = None;
+    config.out = None;
+    config.trajectory.parking = None;
+    config.trajectory.frames.clear();
+    let robot = crate::logs::sha256(&config.robot)?;
+    let mut text = format!("{} {robot}", crate::VERSION);
+    for earlier in std::mem::take(&mut config.earlier) {
+        text += &crate::logs::sha256(&earlier)?;
+    }
+    config.robot = std::path::PathBuf::new();
+    let settings = serde_json::to_string(&config).unwrap_or_else(|_| format!("{config:?}"));
+    Ok(format!("{text} {settings}"))
+}
+
+/// Starts of an earlier run of the same problem; none if the file does not exist yet.
+pub(super) fn read(path: &Path, fingerprint: &str) -> Result<Vec<StartOutcome>, Error> {
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(source) => return Err(Error::Read { file: path.to_owned(), source }),
+    };
+    let fault = |message: String| Error::Checkpoint { file: path.display().to_string(), message };
+    let checkpoint: Checkpoint = serde_json::from_str(&text).map_err(|e| fault(e.to_string()))?;
+    if checkpoint.schema != SCHEMA {
+        return Err(fault(format!("expected schema {SCHEMA}, found {}", checkpoint.schema)));
+    }
+    if checkpoint.problem != fingerprint {
+        return Err(fault("robot, settings or version differ from those it was made with".to_owned()));
+    }
+    let outcome = |s: StartRecord| StartOutcome {
+        seed: s.seed,
+        unknowns: s.unknowns,
+        criterion: s.criterion,
+        excess: s.excess,
+        evaluations: s.evaluations,
+        share: s.share,
+    };
+    Ok(checkpoint.starts.into_iter().map(outcome).collect())
+}
+
+/// Writes all finished starts.
+pub(super) fn write(path: &Path, fingerprint: &str, starts: &[StartOutcome]) -> Result<(), Error> {
+    let record = |s: &StartOutcome| StartRecord {
+        seed: s.seed,
+        unknowns: s.unknowns.clone(),
+        criterion: s.criterion,
+        excess: s.excess,
+        evaluations: s.evaluations,
+        share: s.share,
+    };
+    let checkpoint = Checkpoint {
+        schema: SCHEMA.to_owned(),
+        problem: fingerprint.to_owned(),
+        starts: starts.iter().map(record).collect(),
+    };
+    let text = serde_json::to_string_pretty(&checkpoint)
+        .map_err(|e| Error::Checkpoint { file: path.display().to_string(), message: e.to_string() })?;
+    write_atomically(path, (text + "\n").as_bytes())?;
+    Ok(())
+}

@@ -1,0 +1,433 @@
+//! The configuration of a design, a TOML file.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+use crate::config::ElementsConfig;
+
+/// What is to be designed, and how. Every key but `robot` has a default.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DesignConfig {
+    /// Robot file (URDF or TOML), relative to the configuration.
+    pub robot: PathBuf,
+    /// Output folder, relative to the configuration. Without it the program writes to `dynid-design` in the current
+    /// folder.
+    pub out: Option<PathBuf>,
+    /// Gravity in base axes, m/s². Default: the robot file's, else 0 0 -9.81.
+    pub gravity: Option<[f64; 3]>,
+    /// Couple mimic joints to their leaders. Default false.
+    pub couple_mimics: bool,
+    /// Joints held at a position, rad or m.
+    pub locked: BTreeMap<String, f64>,
+    /// Elements per joint. Default: the robot file's, else coulomb, viscous, offset, rotor.
+    pub elements: ElementsConfig,
+    /// Nominal values of parameters that the robot file does not state, by name (`j1.fc`).
+    pub values: BTreeMap<String, f64>,
+    /// The trajectory's form.
+    pub trajectory: TrajectoryConfig,
+    /// Limits of joints, beside those of the robot file.
+    pub limits: LimitsConfig,
+    /// Where points of the robot must stay.
+    pub keep: Vec<KeepConfig>,
+    /// Capsules around links, which must not touch.
+    pub capsule: Vec<CapsuleConfig>,
+    /// What is minimised.
+    pub criterion: CriterionConfig,
+    /// Trajectories that will be or were recorded as well: their information counts. Files of earlier designs.
+    pub earlier: Vec<PathBuf>,
+    /// The search.
+    pub search: SearchConfig,
+}
+
+/// Form of the trajectory.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TrajectoryConfig {
+    /// Period, s. Default 20.
+    pub period_s: f64,
+    /// Harmonics. Default 5.
+    pub harmonics: usize,
+    /// Periods that are recorded. Default 1.
+    pub periods: usize,
+    /// Velocity and acceleration are zero at start and end. Default true.
+    pub rest: bool,
+    /// Jerk too. Default false.
+    pub zero_jerk: bool,
+    /// Pose at start and end of every period, rad or m, by joint; all joints or none. Default: free.
+    pub start_pose: BTreeMap<String, f64>,
+    /// Pose that the robot comes from and goes back to, by joint; joints left out are at zero, or the nearest position
+    /// within their limits. Default: no approach and no return.
+    pub parking: Option<BTreeMap<String, f64>>,
+    /// Rate of the commanded and recorded samples, Hz. Default 500.
+    pub sample_rate_hz: f64,
+    /// Frames whose paths are drawn. Default: the last link of every branch.
+    pub frames: Vec<String>,
+}
+
+impl Default for TrajectoryConfig {
+    fn default() -> Self {
+        TrajectoryConfig {
+            period_s: 20.0,
+            harmonics: 5,
+            periods: 1,
+            rest: true,
+            zero_jerk: false,
+            start_pose: BTreeMap::new(),
+            parking: None,
+            sample_rate_hz: 500.0,
+            frames: Vec::new(),
+        }
+    }
+}
+
+/// One number for all joints, or numbers for some.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(untagged)]
+pub enum PerJoint {
+    /// The same for all.
+    All(f64),
+    /// By joint.
+    Each(BTreeMap<String, f64>),
+}
+
+impl Default for PerJoint {
+    fn default() -> Self {
+        PerJoint::Each(BTreeMap::new())
+    }
+}
+
+impl PerJoint {
+    /// Per joint, `None` where nothing is said.
+    ///
+    /// # Errors
+    /// [`Error::UnknownJoint`], [`Error::Setting`] if a number is not positive.
+    pub(super) fn resolve(&self, what: &str, joints: &[String]) -> Result<Vec<Option<f64>>, Error> {
+        let positive = |name: &str, x: f64| {
+            if x > 0.0 && x.is_finite() { Ok(x) } else { Err(Error::setting(name, "a positive number", x)) }
+        };
+        match self {
+            PerJoint::All(x) => Ok(vec![Some(positive(what, *x)?); joints.len()]),
+            PerJoint::Each(map) => {
+                for (joint, x) in map {
+                    known(joint, joints)?;
+                    positive(&format!("{what}.{joint}"), *x)?;
+                }
+                Ok(joints.iter().map(|j| map.get(j).copied()).collect())
+            }
+        }
+    }
+}
+
+/// Refuses a joint that the robot does not have.
+pub(super) fn known(joint: &String, joints: &[String]) -> Result<(), Error> {
+    if joints.contains(joint) {
+        return Ok(());
+    }
+    Err(Error::UnknownJoint { name: joint.clone(), known: joints.to_vec() })
+}
+
+/// Limits of joints. What is not given comes from the robot file.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LimitsConfig {
+    /// Least and largest position, rad or m, by joint.
+    pub position: BTreeMap<String, [f64; 2]>,
+    /// Largest speed, rad/s or m/s.
+    pub velocity: PerJoint,
+    /// Largest acceleration, rad/s² or m/s². Default: full speed in half a second.
+    pub acceleration: PerJoint,
+    /// Largest jerk, rad/s³ or m/s³. Default: none.
+    pub jerk: PerJoint,
+    /// Largest effort, N m or N.
+    pub effort: PerJoint,
+    /// Share of the robot file's limits that may be used (positions: of the range about its middle). Default 1.
+    pub share: f64,
+    /// Keep the nominal model's efforts within their limits. Default true.
+    pub efforts: bool,
+}
+
+impl Default for LimitsConfig {
+    fn default() -> Self {
+        LimitsConfig {
+            position: BTreeMap::new(),
+            velocity: PerJoint::default(),
+            acceleration: PerJoint::default(),
+            jerk: PerJoint::default(),
+            effort: PerJoint::default(),
+            share: 1.0,
+            efforts: true,
+        }
+    }
+}
+
+/// Where points of the robot must stay; every region that is given counts. Base axes, m.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct KeepConfig {
+    /// Links.
+    pub frames: Vec<String>,
+    /// Point in the axes of each link, m. Default: its origin.
+    pub point: [f64; 3],
+    /// Least height `z`.
+    pub above: Option<f64>,
+    /// `normal · x ≥ offset`.
+    pub half_space: Option<HalfSpaceConfig>,
+    /// Inside a box.
+    pub inside: Option<BoxConfig>,
+    /// Outside an upright cylinder.
+    pub outside_cylinder: Option<CylinderConfig>,
+    /// Outside an upright column or above it.
+    pub outside_column: Option<ColumnConfig>,
+}
+
+/// A half-space.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct HalfSpaceConfig {
+    /// Direction into the allowed side; any length.
+    pub normal: [f64; 3],
+    /// Distance of the plane from the origin along the normal, m.
+    pub offset: f64,
+}
+
+/// An upright box.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoxConfig {
+    /// Smallest coordinates, m.
+    pub lower: [f64; 3],
+    /// Largest coordinates, m.
+    pub upper: [f64; 3],
+}
+
+/// An upright cylinder without ends.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct CylinderConfig {
+    /// `x`, `y` of its axis, m. Default: the origin.
+    #[serde(default)]
+    pub center: [f64; 2],
+    /// Radius, m.
+    pub radius: f64,
+}
+
+/// An upright column that stands on the ground.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct ColumnConfig {
+    /// `x`, `y` of its axis, m. Default: the origin.
+    #[serde(default)]
+    pub center: [f64; 2],
+    /// Radius, m.
+    pub radius: f64,
+    /// `z` of its top, m.
+    pub height: f64,
+}
+
+/// All points within a radius of a segment of a link.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct CapsuleConfig {
+    /// Link.
+    pub frame: String,
+    /// One end of the segment in the link's axes, m.
+    pub from: [f64; 3],
+    /// The other end; the same for a sphere.
+    pub to: [f64; 3],
+    /// Radius, m.
+    pub radius: f64,
+}
+
+/// What makes one trajectory better than another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CriterionName {
+    /// Mean square of the relative standard deviations of the base parameters.
+    RelativeStd,
+    /// Condition number of the columns at unit length.
+    UnitCondition,
+    /// Condition number of the columns in SI units.
+    Condition,
+    /// `w1 condition + w2 / smallest singular value`.
+    Mix,
+    /// A-optimal: mean variance of the base parameters.
+    A,
+    /// D-optimal: determinant of the information.
+    D,
+    /// E-optimal: smallest singular value.
+    E,
+}
+
+/// Parameters that are to become visible.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ColumnsName {
+    /// All base parameters: bodies, rotors, friction, offsets.
+    #[default]
+    All,
+    /// Base parameters of the rigid bodies alone.
+    Inertial,
+}
+
+/// The criterion.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CriterionConfig {
+    /// Which. Default: `relative-std` if the robot file states inertias, else `unit-condition`.
+    pub name: Option<CriterionName>,
+    /// Parameters that count. Default `all`.
+    pub columns: ColumnsName,
+    /// Standard deviation of the effort's noise, N m or N. Default: 1 % of the effort limit, else of the largest nominal
+    /// effort.
+    pub noise: PerJoint,
+    /// Time after which noise is independent of what it was, s. Default 0: every sample counts.
+    pub correlation_time_s: f64,
+    /// `w1`, `w2` of `mix`. Default 1, 1.
+    pub mix: [f64; 2],
+}
+
+impl Default for CriterionConfig {
+    fn default() -> Self {
+        CriterionConfig {
+            name: None,
+            columns: ColumnsName::All,
+            noise: PerJoint::default(),
+            correlation_time_s: 0.0,
+            mix: [1.0, 1.0],
+        }
+    }
+}
+
+/// The search.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SearchConfig {
+    /// Random starts. Default 16.
+    pub starts: usize,
+    /// Seed of the first. Default 1.
+    pub seed: u64,
+    /// No start begins after this time, s. Default: none.
+    pub time_budget_s: Option<f64>,
+    /// File that keeps finished starts, so that a run can be taken up again.
+    pub checkpoint: Option<PathBuf>,
+}
+
+impl Default for SearchConfig {
+    fn default() -> Self {
+        SearchConfig { starts: 16, seed: 1, time_budget_s: None, checkpoint: None }
+    }
+}
+
+impl DesignConfig {
+    /// Reads a configuration; paths in it become relative to its folder.
+    ///
+    /// # Errors
+    /// [`Error::Read`], and as [`DesignConfig::parse`].
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text =
+            std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
+        let mut config = Self::parse(&text, &path.display().to_string())?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        config.robot = folder.join(&config.robot);
+        config.out = config.out.map(|o| folder.join(o));
+        config.search.checkpoint = config.search.checkpoint.map(|c| folder.join(c));
+        for earlier in &mut config.earlier {
+            *earlier = folder.join(&earlier);
+        }
+        Ok(config)
+    }
+
+    /// Parses a configuration.
+    ///
+    /// # Errors
+    /// [`Error::Config`] with the line; [`Error::InFile`] with what [`DesignConfig::check`] finds.
+    pub fn parse(text: &str, file: &str) -> Result<Self, Error> {
+        let config: DesignConfig = toml::from_str(text).map_err(|e| Error::Config {
+            file: file.to_owned(),
+            line: e.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count()),
+            message: e.message().lines().next().unwrap_or_default().to_owned(),
+        })?;
+        if config.robot.as_os_str().is_empty() {
+            return Err(Error::Config {
+                file: file.to_owned(),
+                line: None,
+                message: "expected `robot = \"file\"`".to_owned(),
+            });
+        }
+        config.check().map_err(|e| Error::InFile { file: file.to_owned(), source: Box::new(e) })?;
+        Ok(config)
+    }
+
+    /// Checks numbers that need no robot.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub fn check(&self) -> Result<(), Error> {
+        let t = &self.trajectory;
+        let positive = [
+            ("trajectory.period_s", t.period_s),
+            ("trajectory.sample_rate_hz", t.sample_rate_hz),
+            ("limits.share", self.limits.share),
+            ("criterion.mix", self.criterion.mix[0]),
+        ];
+        for (name, x) in positive {
+            if !(x > 0.0 && x.is_finite()) {
+                return Err(Error::setting(name, "a positive number", x));
+            }
+        }
+        if self.limits.share > 1.0 {
+            return Err(Error::setting("limits.share", "at most 1", self.limits.share));
+        }
+        let other = [
+            ("criterion.mix", self.criterion.mix[1]),
+            ("criterion.correlation_time_s", self.criterion.correlation_time_s),
+            ("search.time_budget_s", self.search.time_budget_s.unwrap_or(0.0)),
+        ];
+        for (name, x) in other {
+            if !(x >= 0.0 && x.is_finite()) {
+                return Err(Error::setting(name, "a number that is not negative", x));
+            }
+        }
+        let counts = [
+            ("trajectory.harmonics", t.harmonics, 2, 50),
+            ("trajectory.periods", t.periods, 1, 10_000),
+            ("search.starts", self.search.starts, 1, 100_000),
+        ];
+        for (name, x, least, most) in counts {
+            if !(least..=most).contains(&x) {
+                return Err(Error::setting(name, &format!("{least} to {most}"), x));
+            }
+        }
+        let samples = t.period_s * t.sample_rate_hz;
+        if samples < 4.0 * t.harmonics as f64 {
+            let expected =
+                format!("at least {} Hz: four samples per harmonic", 4.0 * t.harmonics as f64 / t.period_s);
+            return Err(Error::setting("trajectory.sample_rate_hz", &expected, t.sample_rate_hz));
+        }
+        if samples * t.periods as f64 > 1e7 {
+            let expected = "at most 1e7 samples in all periods";
+            return Err(Error::setting("trajectory.sample_rate_hz", expected, t.sample_rate_hz));
+        }
+        for keep in &self.keep {
+            if keep.frames.is_empty() {
+                return Err(Error::setting("keep.frames", "at least one link", "none"));
+            }
+            let regions = [
+                keep.above.is_some(),
+                keep.half_space.is_some(),
+                keep.inside.is_some(),
+                keep.outside_cylinder.is_some(),
+                keep.outside_column.is_some(),
+            ];
+            if !regions.contains(&true) {
+                let expected = "`above`, `half_space`, `inside`, `outside_cylinder` or `outside_column`";
+                return Err(Error::setting("keep", expected, "no region"));
+            }
+        }
+        Ok(())
+    }
+}

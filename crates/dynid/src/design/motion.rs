@@ -1,0 +1,208 @@
+//! The whole motion of a design: approach, recorded periods, return.
+
+use dynid_excitation::LimitKind;
+use dynid_excitation::constraint::PathConstraint;
+use dynid_io::trajectory::{Leg, TrajectoryJoint};
+use dynid_io::{OutputError, TrajectoryFile};
+use dynid_model::MotionBlock;
+use dynid_motion::trajectory::{Form, FourierTrajectory, MotionLimits, Phase, RowOrder, Sampled, Sequence};
+
+use super::config::DesignConfig;
+use super::problem::RobotProblem;
+use crate::Error;
+
+/// Samples of approach and return at which efforts and distances are checked.
+const CHECKS: usize = 500;
+/// Approach and return are made longer by this factor until efforts are within their limits ..
+const SLOWER: f64 = 1.25;
+/// .. at most so often.
+const ATTEMPTS: usize = 12;
+
+/// A limit that approach or return breaks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LegFault {
+    /// What is limited.
+    pub kind: LimitKind,
+    /// Whose.
+    pub subject: String,
+    /// `approach` or `return`.
+    pub phase: &'static str,
+    /// Largest excess, in units of the limit.
+    pub excess: f64,
+}
+
+/// Approach, periods and return of a design.
+#[derive(Debug)]
+pub struct DesignedMotion {
+    /// Joints.
+    pub joints: Vec<String>,
+    /// As written to files.
+    pub file: TrajectoryFile,
+    /// All of it.
+    pub sequence: Sequence,
+    /// Rate of samples, Hz.
+    pub rate_hz: f64,
+    /// Limits that approach or return break: their path is straight in joint space, and no slowness mends that.
+    pub leg_faults: Vec<LegFault>,
+}
+
+impl DesignedMotion {
+    pub(super) fn new(
+        set: &RobotProblem,
+        config: &DesignConfig,
+        coefficients: &[Vec<f64>],
+        parking: Option<&[f64]>,
+    ) -> Result<Self, Error> {
+        let t = &config.trajectory;
+        let problem = &set.problem;
+        let order = RowOrder::default();
+        let record =
+            || FourierTrajectory::from_rows(problem.base, Form::Plain, &order, coefficients, t.periods);
+        let mut file = TrajectoryFile {
+            robot: Some(config.robot.display().to_string()),
+            form: Form::Plain,
+            joints: problem
+                .coordinates
+                .iter()
+                .zip(set.model.joints())
+                .map(|(name, info)| TrajectoryJoint { name: Some(name.clone()), slides: info.slides })
+                .collect(),
+            motion: record()?,
+            approach: None,
+            back: None,
+            sample_rate_hz: Some(t.sample_rate_hz),
+        };
+        let Some(parking) = parking else {
+            let sequence = file.sequence()?;
+            return Ok(Self::of(set, file, sequence, t.sample_rate_hz, Vec::new()));
+        };
+        let limits: Vec<MotionLimits> = problem
+            .limits
+            .iter()
+            .map(|l| MotionLimits {
+                position: l.position,
+                velocity: l.velocity.unwrap_or(f64::INFINITY),
+                acceleration: l.acceleration.unwrap_or(f64::INFINITY),
+                jerk: l.jerk.unwrap_or(f64::INFINITY),
+            })
+            .collect();
+        let shortest = Sequence::parked(parking, Box::new(record()?), &limits)?;
+        let length = |phase: Phase| shortest.span(phase).map_or(0.0, |s| s.end - s.start);
+        let (mut approach, mut back) = (length(Phase::Approach), length(Phase::Return));
+        let mut faults = Vec::new();
+        for _ in 0..ATTEMPTS {
+            file.approach = Some(Leg { pose: parking.to_vec(), duration_s: approach });
+            file.back = Some(Leg { pose: parking.to_vec(), duration_s: back });
+            let sequence = file.sequence()?;
+            let found = leg_faults(set, &sequence);
+            // Slowness helps efforts only, and only as long as it makes a difference.
+            let helps = |f: &LegFault| {
+                let before = faults.iter().find(|b: &&LegFault| b.subject == f.subject && b.phase == f.phase);
+                matches!(f.kind, LimitKind::Path(dynid_excitation::constraint::ConstraintKind::Effort))
+                    && before.is_none_or(|b| f.excess < 0.98 * b.excess)
+            };
+            let slower = |phase: &str| found.iter().any(|f| f.phase == phase && helps(f));
+            let (longer_approach, longer_back) =
+                (slower(Phase::Approach.name()), slower(Phase::Return.name()));
+            if !longer_approach && !longer_back {
+                return Ok(Self::of(set, file, sequence, t.sample_rate_hz, found));
+            }
+            approach *= if longer_approach { SLOWER } else { 1.0 };
+            back *= if longer_back { SLOWER } else { 1.0 };
+            faults = found;
+        }
+        let sequence = file.sequence()?;
+        Ok(Self::of(set, file, sequence, t.sample_rate_hz, faults))
+    }
+
+    fn of(
+        set: &RobotProblem,
+        file: TrajectoryFile,
+        sequence: Sequence,
+        rate_hz: f64,
+        leg_faults: Vec<LegFault>,
+    ) -> Self {
+        DesignedMotion { joints: set.problem.coordinates.clone(), file, sequence, rate_hz, leg_faults }
+    }
+
+    /// Samples at the rate.
+    ///
+    /// # Errors
+    /// [`Error::Trajectory`] if there are too many.
+    pub fn sampled(&self) -> Result<Sampled, Error> {
+        Ok(Sampled::at_rate(&self.sequence, self.rate_hz)?)
+    }
+
+    /// Writes the motion: coefficients (`.json`), samples (`.csv`), ROS 2 messages (`.ros2.yaml`, `.ros2.json`), each
+    /// beside its place and renamed. `stem`: path without these endings.
+    ///
+    /// # Errors
+    /// [`Error::Output`], [`Error::Trajectory`].
+    pub fn write(&self, paths: &MotionPaths) -> Result<(), Error> {
+        let sampled = self.sampled()?;
+        let phases: Vec<Phase> = sampled.time.iter().map(|t| self.sequence.phase(*t)).collect();
+        let output = |e: OutputError| Error::Output(e);
+        self.file.write(&paths.coefficients).map_err(output)?;
+        dynid_io::trajectory::write_csv(&paths.samples, &self.joints, &sampled, Some(&phases))
+            .map_err(output)?;
+        dynid_io::trajectory::write_ros_yaml(&paths.ros_yaml, &self.joints, &sampled).map_err(output)?;
+        dynid_io::trajectory::write_ros_json(&paths.ros_json, &self.joints, &sampled).map_err(output)
+    }
+}
+
+/// Where a motion is written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MotionPaths {
+    /// Coefficients, JSON.
+    pub coefficients: std::path::PathBuf,
+    /// Samples, CSV.
+    pub samples: std::path::PathBuf,
+    /// `trajectory_msgs/JointTrajectory` as YAML.
+    pub ros_yaml: std::path::PathBuf,
+    /// The same as JSON.
+    pub ros_json: std::path::PathBuf,
+}
+
+/// Path limits that approach and return break, one entry per limit and phase.
+fn leg_faults(set: &RobotProblem, sequence: &Sequence) -> Vec<LegFault> {
+    let mut faults = Vec::new();
+    for phase in [Phase::Approach, Phase::Return] {
+        let Some(span) = sequence.span(phase) else { continue };
+        let step = (span.end - span.start) / (CHECKS - 1) as f64;
+        let times = (0..CHECKS).map(|k| span.start + step * k as f64).collect();
+        let sampled = Sampled::at_times(sequence, times);
+        let block = MotionBlock {
+            samples: CHECKS,
+            stride: CHECKS,
+            q: &sampled.q,
+            dq: &sampled.dq,
+            ddq: &sampled.ddq,
+            gravity: None,
+            channels: &[],
+            sign_width: set.problem.sign_width,
+        };
+        for constraint in &set.problem.constraints {
+            faults.extend(broken(constraint.as_ref(), &block, phase));
+        }
+    }
+    faults
+}
+
+fn broken(constraint: &dyn PathConstraint, block: &MotionBlock<'_>, phase: Phase) -> Vec<LegFault> {
+    let rows = constraint.rows();
+    let mut values = vec![0.0; rows.len() * block.samples];
+    constraint.values(block, block.samples, &mut values);
+    rows.iter()
+        .zip(values.chunks_exact(block.samples))
+        .filter_map(|(row, values)| {
+            let excess =
+                values.iter().map(|x| (x - row.upper).max(row.lower - x)).fold(f64::NEG_INFINITY, f64::max);
+            (excess > 1e-6).then(|| LegFault {
+                kind: LimitKind::Path(row.kind),
+                subject: row.subject.clone(),
+                phase: phase.name(),
+                excess,
+            })
+        })
+        .collect()
+}

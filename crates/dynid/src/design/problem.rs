@@ -1,0 +1,422 @@
+//! From robot and configuration to a design problem.
+
+use std::sync::Arc;
+
+use dynid_excitation::constraint::{
+    Capsule, CapsulePairs, Capsules, CartesianLimits, EffortLimits, FramePoint, PathConstraint, Region,
+};
+use dynid_excitation::criterion::{Criterion, Measure};
+use dynid_excitation::{
+    CoordinateLimits, DEFAULT_SAMPLES_PER_HARMONIC, DEFAULT_SIGN_WIDTH, ExcitationModel, Information,
+    Problem, RobotExcitation, StartConditions, information,
+};
+use dynid_io::TrajectoryFile;
+use dynid_model::spatial::Vec3;
+use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
+use dynid_motion::trajectory::{Form, RowOrder};
+
+use super::config::{ColumnsName, CriterionName, DesignConfig, known};
+use crate::Error;
+use crate::elements::ElementPlan;
+use crate::nominal::{nominal_parameters, typical_efforts};
+use crate::robot::Robot;
+
+/// A nominal base parameter below this share of the largest of the same unit counts as so large: relative errors of what
+/// is next to nothing are not worth motion.
+const FLOOR_SHARE: f64 = 0.05;
+/// Noise of an effort that nothing is said about, as a share of its limit or of the largest nominal effort.
+const NOISE_SHARE: f64 = 0.01;
+/// Time to full speed where no acceleration limit is given, s.
+const TIME_TO_SPEED: f64 = 0.5;
+
+/// A design problem of a robot, and what was taken for granted in it.
+pub(super) struct RobotProblem {
+    pub(super) problem: Problem,
+    pub(super) model: Arc<RobotModel>,
+    /// Nominal values of all parameters; `None` if the robot file states no inertias.
+    pub(super) nominal: Option<Vec<f64>>,
+    pub(super) criterion: CriterionName,
+    /// Standard deviation of the noise, per joint.
+    pub(super) noise: Vec<f64>,
+    /// Effort limits, per joint.
+    pub(super) effort_limits: Vec<Option<f64>>,
+    /// What was taken for granted, in words.
+    pub(super) assumptions: Vec<String>,
+}
+
+pub(super) fn pose(problem: &RobotProblem, config: &DesignConfig) -> Result<Option<Vec<f64>>, Error> {
+    let Some(parking) = &config.trajectory.parking else { return Ok(None) };
+    let joints = &problem.problem.coordinates;
+    for joint in parking.keys() {
+        known(joint, joints)?;
+    }
+    let at = |(joint, limits): (&String, &CoordinateLimits)| match parking.get(joint) {
+        Some(x) if !(*x >= limits.position.0 && *x <= limits.position.1) => Err(Error::setting(
+            &format!("trajectory.parking.{joint}"),
+            &format!("{} to {}, the joint's limits", limits.position.0, limits.position.1),
+            x,
+        )),
+        Some(x) => Ok(*x),
+        None => Ok(0.0_f64.clamp(limits.position.0, limits.position.1)),
+    };
+    joints.iter().zip(&problem.problem.limits).map(at).collect::<Result<_, _>>().map(Some)
+}
+
+pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProblem, Error> {
+    let mechanism = &robot.mechanism;
+    if mechanism.positions() != mechanism.rates() {
+        return Err(Error::Unsupported(
+            "a floating base follows no joint trajectory: design for the arm alone".to_owned(),
+        ));
+    }
+    let joints = mechanism.rate_names();
+    let mut elements = robot.elements.clone();
+    for (joint, list) in &config.elements.joint {
+        known(joint, &joints)?;
+        elements.per_joint.retain(|(j, _)| j != joint);
+        elements.per_joint.push((joint.clone(), list.clone()));
+    }
+    let plan = ElementPlan::new(mechanism, &elements, config.elements.default.as_deref(), |_| true)?;
+    let model = Arc::new(RobotModel::new(mechanism.clone(), plan.build(mechanism)?));
+    if !model.channels().is_empty() {
+        return Err(Error::Unsupported(
+            "elements that read channels such as currents say nothing about motion: leave them out of a design"
+                .to_owned(),
+        ));
+    }
+    let mut assumptions = Vec::new();
+    let stated = mechanism.bodies().iter().any(|b| b.stated);
+    let nominal = match stated {
+        true => Some(nominal_parameters(&model, &plan, &config.values)?),
+        false => {
+            assumptions.push(
+                "the robot file states no inertias: efforts and relative standard deviations are unknown"
+                    .to_owned(),
+            );
+            None
+        }
+    };
+    let limits = joint_limits(robot, config, &joints, &mut assumptions)?;
+    let effort_limits = effort_limits(robot, config, &joints)?;
+    let constraints =
+        constraints(config, &model, nominal.as_deref(), &limits, &effort_limits, &mut assumptions)?;
+    let typical = nominal.as_ref().map(|n| typical_efforts(&model, n));
+    let noise = noise(config, &joints, &effort_limits, typical.as_deref(), &mut assumptions)?;
+
+    let excitation = columns(config, &model, nominal.as_deref());
+    let name = match config.criterion.name {
+        Some(CriterionName::RelativeStd) if nominal.is_none() => {
+            return Err(Error::setting(
+                "criterion.name",
+                "a criterion without nominal parameters: the robot file states no inertias",
+                "relative-std",
+            ));
+        }
+        Some(name) => name,
+        None if nominal.is_some() => CriterionName::RelativeStd,
+        None => CriterionName::UnitCondition,
+    };
+    let t = &config.trajectory;
+    let spacing = config.criterion.correlation_time_s.max(1.0 / t.sample_rate_hz);
+    let mut problem = Problem {
+        criterion: criterion(name, config, &excitation),
+        coordinates: joints.clone(),
+        limits,
+        constraints,
+        base: std::f64::consts::TAU / t.period_s,
+        harmonics: t.harmonics,
+        start: start_conditions(config, &joints)?,
+        output_weights: noise.iter().map(|s| 1.0 / s).collect(),
+        effective_samples: t.periods as f64 * t.period_s / spacing,
+        prior: None,
+        sign_width: DEFAULT_SIGN_WIDTH,
+        samples: DEFAULT_SAMPLES_PER_HARMONIC * t.harmonics,
+        model: Box::new(excitation.clone()),
+    };
+    problem.prior = earlier(config, &problem, &excitation, spacing)?;
+    Ok(RobotProblem { problem, model, nominal, criterion: name, noise, effort_limits, assumptions })
+}
+
+fn start_conditions(config: &DesignConfig, joints: &[String]) -> Result<StartConditions, Error> {
+    let t = &config.trajectory;
+    for joint in t.start_pose.keys() {
+        known(joint, joints)?;
+    }
+    let pose = if t.start_pose.is_empty() {
+        None
+    } else {
+        let at = |joint: &String| {
+            let x = t.start_pose.get(joint).copied().filter(|x| x.is_finite());
+            x.ok_or_else(|| {
+                Error::setting("trajectory.start_pose", &format!("a position of joint `{joint}`"), "none")
+            })
+        };
+        Some(joints.iter().map(at).collect::<Result<_, _>>()?)
+    };
+    Ok(StartConditions { rest: t.rest, zero_jerk: t.zero_jerk, pose })
+}
+
+fn joint_limits(
+    robot: &Robot,
+    config: &DesignConfig,
+    joints: &[String],
+    assumptions: &mut Vec<String>,
+) -> Result<Vec<CoordinateLimits>, Error> {
+    let l = &config.limits;
+    for joint in l.position.keys() {
+        known(joint, joints)?;
+    }
+    let velocity = l.velocity.resolve("limits.velocity", joints)?;
+    let acceleration = l.acceleration.resolve("limits.acceleration", joints)?;
+    let jerk = l.jerk.resolve("limits.jerk", joints)?;
+    let owners = robot.mechanism.rate_bodies();
+    let mut unlimited = Vec::new();
+    let mut assumed = Vec::new();
+    let mut out = Vec::with_capacity(joints.len());
+    for (k, joint) in joints.iter().enumerate() {
+        let described = &robot.mechanism.bodies()[owners[k]].joint;
+        let slides = described.effort_unit() == "N";
+        let stated = described.limits.position.filter(|(a, b)| a < b && a.is_finite() && b.is_finite());
+        let position = match (l.position.get(joint), stated) {
+            (Some([low, high]), _) => (*low, *high),
+            (None, Some((low, high))) => {
+                let cut = 0.5 * (1.0 - l.share) * (high - low);
+                (low + cut, high - cut)
+            }
+            (None, None) if !slides => {
+                unlimited.push(joint.as_str());
+                (-std::f64::consts::PI, std::f64::consts::PI)
+            }
+            (None, None) => {
+                let expected = "a range, m: the robot file states none";
+                return Err(Error::setting(&format!("limits.position.{joint}"), expected, "none"));
+            }
+        };
+        if !(position.0 < position.1 && position.0.is_finite() && position.1.is_finite()) {
+            let found = format!("{} to {}", position.0, position.1);
+            return Err(Error::setting(
+                &format!("limits.position.{joint}"),
+                "least below largest, finite",
+                found,
+            ));
+        }
+        let stated = described.limits.velocity.filter(|v| *v > 0.0 && v.is_finite()).map(|v| l.share * v);
+        let Some(speed) = velocity[k].or(stated) else {
+            let expected = "a speed: the robot file states none";
+            return Err(Error::setting(&format!("limits.velocity.{joint}"), expected, "none"));
+        };
+        if acceleration[k].is_none() {
+            assumed.push(joint.as_str());
+        }
+        out.push(CoordinateLimits {
+            position,
+            velocity: Some(speed),
+            acceleration: Some(acceleration[k].unwrap_or(speed / TIME_TO_SPEED)),
+            jerk: jerk[k],
+        });
+    }
+    if !unlimited.is_empty() {
+        assumptions.push(format!(
+            "no position limits are stated for {}: half a turn to both sides is used",
+            unlimited.join(", ")
+        ));
+    }
+    if !assumed.is_empty() {
+        assumptions.push(format!(
+            "no acceleration limits are stated for {}: full speed in {TIME_TO_SPEED} s is used",
+            assumed.join(", ")
+        ));
+    }
+    Ok(out)
+}
+
+fn effort_limits(robot: &Robot, config: &DesignConfig, joints: &[String]) -> Result<Vec<Option<f64>>, Error> {
+    let given = config.limits.effort.resolve("limits.effort", joints)?;
+    let owners = robot.mechanism.rate_bodies();
+    let stated = |k: usize| {
+        let limit = robot.mechanism.bodies()[owners[k]].joint.limits.effort;
+        limit.filter(|e| *e > 0.0 && e.is_finite()).map(|e| config.limits.share * e)
+    };
+    Ok(given.into_iter().enumerate().map(|(k, g)| g.or_else(|| stated(k))).collect())
+}
+
+fn constraints(
+    config: &DesignConfig,
+    model: &Arc<RobotModel>,
+    nominal: Option<&[f64]>,
+    limits: &[CoordinateLimits],
+    effort_limits: &[Option<f64>],
+    assumptions: &mut Vec<String>,
+) -> Result<Vec<Box<dyn PathConstraint>>, Error> {
+    let mechanism = model.mechanism();
+    let mut out: Vec<Box<dyn PathConstraint>> = Vec::new();
+    if config.limits.efforts && effort_limits.iter().any(Option::is_some) {
+        match nominal {
+            Some(nominal) => out.push(Box::new(EffortLimits::new(
+                model.clone(),
+                Vec::new(),
+                nominal.to_vec(),
+                effort_limits,
+            )?)),
+            None => assumptions.push("effort limits cannot be kept without inertias".to_owned()),
+        }
+    }
+    let regions = regions(config);
+    if !regions.is_empty() {
+        out.push(Box::new(CartesianLimits::new(mechanism, &regions)?));
+    }
+    if !config.capsule.is_empty() {
+        let capsules: Vec<Capsule> = config
+            .capsule
+            .iter()
+            .map(|c| Capsule { frame: c.frame.clone(), ends: [Vec3(c.from), Vec3(c.to)], radius: c.radius })
+            .collect();
+        let ranges: Vec<(f64, f64)> = limits.iter().map(|l| l.position).collect();
+        out.push(Box::new(Capsules::new(mechanism, &capsules, &CapsulePairs::All, &ranges)?));
+    }
+    Ok(out)
+}
+
+/// Regions that points must stay in.
+pub(super) fn regions(config: &DesignConfig) -> Vec<(FramePoint, Region)> {
+    let mut out = Vec::new();
+    for keep in &config.keep {
+        let mut regions = Vec::new();
+        if let Some(height) = keep.above {
+            regions.push(Region::HalfSpace { normal: Vec3([0.0, 0.0, 1.0]), offset: height });
+        }
+        if let Some(h) = keep.half_space {
+            regions.push(Region::HalfSpace { normal: Vec3(h.normal), offset: h.offset });
+        }
+        if let Some(b) = keep.inside {
+            regions.push(Region::InsideBox { lower: Vec3(b.lower), upper: Vec3(b.upper) });
+        }
+        if let Some(c) = keep.outside_cylinder {
+            regions.push(Region::OutsideCylinder { center: c.center, radius: c.radius });
+        }
+        if let Some(c) = keep.outside_column {
+            let (center, radius, height) = (c.center, c.radius, c.height);
+            regions.push(Region::OutsideOrAboveColumn { center, radius, height });
+        }
+        for frame in &keep.frames {
+            for region in &regions {
+                out.push((FramePoint { frame: frame.clone(), position: Vec3(keep.point) }, *region));
+            }
+        }
+    }
+    out
+}
+
+fn noise(
+    config: &DesignConfig,
+    joints: &[String],
+    effort_limits: &[Option<f64>],
+    typical: Option<&[f64]>,
+    assumptions: &mut Vec<String>,
+) -> Result<Vec<f64>, Error> {
+    let given = config.criterion.noise.resolve("criterion.noise", joints)?;
+    if given.iter().any(Option::is_none) {
+        assumptions.push(format!(
+            "noise of the effort is not stated for {}: {} % of the effort limit (of the largest nominal effort where \
+             there is no limit) is used",
+            joints.iter().zip(&given).filter(|(_, g)| g.is_none()).map(|(j, _)| j.as_str()).collect::<Vec<_>>().join(", "),
+            100.0 * NOISE_SHARE
+        ));
+    }
+    let guess = |k: usize| {
+        let size = effort_limits[k].or_else(|| typical.map(|t| t[k])).filter(|x| *x > 0.0);
+        size.map_or(1.0, |x| NOISE_SHARE * x)
+    };
+    Ok(given.into_iter().enumerate().map(|(k, g)| g.unwrap_or_else(|| guess(k))).collect())
+}
+
+fn columns(config: &DesignConfig, model: &Arc<RobotModel>, nominal: Option<&[f64]>) -> RobotExcitation {
+    let base = BaseParameters::of(model.as_ref(), model.mechanism(), &[], &BaseSettings::default());
+    match config.criterion.columns {
+        ColumnsName::All => RobotExcitation::new(model.clone(), Vec::new(), &base, nominal),
+        ColumnsName::Inertial => {
+            let rigid = Arc::new(RobotModel::new(model.mechanism().clone(), Vec::new()));
+            let base = BaseParameters::of(rigid.as_ref(), rigid.mechanism(), &[], &BaseSettings::default());
+            let links = rigid.parameters().linear.len();
+            RobotExcitation::new(rigid, Vec::new(), &base, nominal.map(|n| &n[..links]))
+        }
+    }
+}
+
+fn criterion(name: CriterionName, config: &DesignConfig, model: &RobotExcitation) -> Criterion {
+    let columns = model.columns();
+    match name {
+        CriterionName::RelativeStd => {
+            let size = |k: usize| columns[k].nominal.map_or(0.0, f64::abs);
+            let weights = (0..columns.len())
+                .map(|k| {
+                    let alike = (0..columns.len()).filter(|j| columns[*j].unit == columns[k].unit).map(size);
+                    let floor = FLOOR_SHARE * alike.fold(0.0, f64::max);
+                    match size(k).max(floor) {
+                        0.0 => 1.0,
+                        x => 1.0 / (x * x),
+                    }
+                })
+                .collect();
+            Criterion::raw(Measure::Trace(weights))
+        }
+        CriterionName::UnitCondition => Criterion::unit_norm(Measure::Condition),
+        CriterionName::Condition => Criterion::raw(Measure::Condition),
+        CriterionName::Mix => {
+            let [condition, smallest] = config.criterion.mix;
+            Criterion::raw(Measure::ConditionAndSmallest { condition, smallest })
+        }
+        CriterionName::A => Criterion::raw(Measure::Trace(vec![1.0; columns.len()])),
+        CriterionName::D => Criterion::raw(Measure::Determinant),
+        CriterionName::E => Criterion::raw(Measure::Smallest),
+    }
+}
+
+/// Information of earlier trajectories, stacked.
+fn earlier(
+    config: &DesignConfig,
+    problem: &Problem,
+    model: &RobotExcitation,
+    spacing: f64,
+) -> Result<Option<Information>, Error> {
+    let mut stacked: Option<Information> = None;
+    for path in &config.earlier {
+        let file = TrajectoryFile::read(path)?;
+        let order: Vec<usize> = problem
+            .coordinates
+            .iter()
+            .enumerate()
+            .map(|(k, joint)| {
+                let named = file.joints.iter().position(|j| j.name.as_deref() == Some(joint));
+                let by_number = file.joints.iter().all(|j| j.name.is_none()) && k < file.joints.len();
+                named.or(by_number.then_some(k)).ok_or_else(|| {
+                    let expected = format!("a trajectory of joint `{joint}`");
+                    Error::InFile {
+                        file: path.display().to_string(),
+                        source: Box::new(Error::setting("joints", &expected, "none")),
+                    }
+                })
+            })
+            .collect::<Result<_, _>>()?;
+        let rows = file.motion.to_rows(Form::Plain, &RowOrder::default())?;
+        let harmonics = rows.first().map_or(0, |r| (r.len() - 1) / 2);
+        let earlier = Problem {
+            model: Box::new(model.clone()),
+            coordinates: problem.coordinates.clone(),
+            limits: problem.limits.clone(),
+            constraints: Vec::new(),
+            base: file.motion.base(),
+            harmonics,
+            start: StartConditions::default(),
+            criterion: problem.criterion.clone(),
+            output_weights: problem.output_weights.clone(),
+            effective_samples: file.motion.periods() as f64 * file.motion.period() / spacing,
+            prior: stacked.take(),
+            sign_width: problem.sign_width,
+            samples: problem.samples,
+        };
+        let coefficients: Vec<Vec<f64>> = order.iter().map(|k| rows[*k].clone()).collect();
+        stacked = Some(information(&earlier, &coefficients, 1000.max(20 * harmonics)));
+    }
+    Ok(stacked)
+}

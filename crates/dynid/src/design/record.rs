@@ -1,0 +1,430 @@
+//! What a design leaves behind as JSON.
+
+use dynid_excitation::{Infeasible, LimitKind, LimitPoint, StartOutcome};
+use serde::Serialize;
+
+use super::config::{CriterionName, DesignConfig};
+use super::{DesignRun, DesignedTrajectory};
+use crate::Error;
+use crate::estimate::{InputRecord, Provenance};
+use crate::logs::sha256;
+
+/// Schema of `design.json`.
+pub(super) const SCHEMA: &str = "dynid-design/1";
+/// Starts within this share of the best count as equally good.
+const NEAR_BEST: f64 = 0.05;
+/// Relative standard deviation above which a parameter is called poorly seen.
+const POORLY_SEEN: f64 = 0.3;
+
+/// `design.json`: keys are added, never renamed.
+#[derive(Debug, Clone, Serialize)]
+pub struct DesignRecord {
+    /// Schema and version.
+    pub schema: &'static str,
+    /// Robot file.
+    pub robot: String,
+    /// Joints in the order of every "per joint" list.
+    pub joints: Vec<String>,
+    /// The result in words.
+    pub verdict: DesignVerdict,
+    /// What was minimised.
+    pub criterion: CriterionRecord,
+    /// Form of the trajectory.
+    pub trajectory: TrajectoryRecord,
+    /// Condition number of the noise-weighted columns in SI units; `None` without a trajectory, like all below.
+    pub condition_number: Option<f64>,
+    /// Condition number of the columns at unit length.
+    pub condition_number_scaled: Option<f64>,
+    /// Largest and smallest singular value of the noise-weighted matrix.
+    pub singular_values: Option<[f64; 2]>,
+    /// Predicted standard deviations.
+    pub parameters: Vec<ParameterForecast>,
+    /// Pairs that the log will hardly tell apart.
+    pub confounded: Vec<PairRecord>,
+    /// Parameters that make up the direction seen least, with their shares.
+    pub weakest: Vec<ShareRecord>,
+    /// Every limit at its instant of largest use, most used first.
+    pub limits: Vec<LimitRecord>,
+    /// Predicted gain over random motion within the same limits.
+    pub random: Option<RandomRecord>,
+    /// All starts.
+    pub starts: Vec<StartRecord>,
+    /// Why there is no trajectory.
+    pub infeasible: Option<InfeasibleRecord>,
+    /// Noise that the forecast assumes, per joint.
+    pub noise: Vec<f64>,
+    /// Where all this comes from.
+    pub provenance: Provenance,
+}
+
+/// The result in words.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DesignVerdict {
+    /// `pass`, `warn` or `fail`.
+    pub status: &'static str,
+    /// One sentence.
+    pub headline: String,
+    /// What to know before the motion is run.
+    pub warnings: Vec<String>,
+}
+
+/// The criterion and its value.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CriterionRecord {
+    /// Name, as in the configuration.
+    pub name: CriterionName,
+    /// What the value means.
+    pub meaning: &'static str,
+    /// Value on the report's samples with exact signs.
+    pub value: Option<f64>,
+    /// Logarithm that was minimised.
+    pub logarithm: Option<f64>,
+}
+
+/// Form of the trajectory.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TrajectoryRecord {
+    /// Period, s.
+    pub period_s: f64,
+    /// Harmonics.
+    pub harmonics: usize,
+    /// Recorded periods.
+    pub periods: usize,
+    /// Approach, s.
+    pub approach_s: Option<f64>,
+    /// Return, s.
+    pub return_s: Option<f64>,
+    /// Rate, Hz.
+    pub sample_rate_hz: f64,
+    /// Coefficients `[q0, a.., b..]` per joint, plain amplitudes.
+    pub coefficients: Vec<Vec<f64>>,
+}
+
+/// Forecast of one base parameter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ParameterForecast {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Nominal value.
+    pub nominal: Option<f64>,
+    /// Predicted standard deviation.
+    pub std: f64,
+    /// In shares of the nominal value.
+    pub rel_std: Option<f64>,
+}
+
+/// A confounded pair.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PairRecord {
+    /// Names.
+    pub names: [String; 2],
+    /// Correlation.
+    pub correlation: f64,
+}
+
+/// A name and a share.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShareRecord {
+    /// Name.
+    pub name: String,
+    /// Share, 0 to 1.
+    pub share: f64,
+}
+
+/// A limit at its instant of largest use.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LimitRecord {
+    /// What is limited.
+    pub kind: String,
+    /// Whose.
+    pub subject: String,
+    /// When, s after the start of a period.
+    pub time_s: f64,
+    /// Excess in units of the limit; 0 at the limit, negative within.
+    pub excess: f64,
+}
+
+/// Against random motion.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RandomRecord {
+    /// Random trajectories.
+    pub trajectories: usize,
+    /// Arithmetic mean of the ratios of standard deviations, random over designed.
+    pub mean_ratio: f64,
+    /// Geometric mean.
+    pub geometric_ratio: f64,
+    /// Median condition number of the random ones.
+    pub condition_number: f64,
+}
+
+/// One start.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StartRecord {
+    /// Seed.
+    pub seed: u64,
+    /// Logarithm of the criterion.
+    pub logarithm: Option<f64>,
+    /// All limits hold.
+    pub feasible: bool,
+    /// Evaluations.
+    pub evaluations: usize,
+}
+
+/// Why there is no trajectory.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct InfeasibleRecord {
+    /// The start pose itself is outside.
+    pub at_start: bool,
+    /// Limits that stay broken, worst first.
+    pub violations: Vec<LimitRecord>,
+    /// The limit without which the rest can be met.
+    pub blamed: Option<String>,
+}
+
+impl CriterionName {
+    /// What its value means.
+    pub fn meaning(self) -> &'static str {
+        match self {
+            CriterionName::RelativeStd => {
+                "root of the mean squared relative standard deviation of the base parameters"
+            }
+            CriterionName::UnitCondition => "condition number of the noise-weighted columns at unit length",
+            CriterionName::Condition => "condition number of the noise-weighted columns in SI units",
+            CriterionName::Mix => "w1 condition + w2 / smallest singular value",
+            CriterionName::A => "root of the mean variance of the base parameters, SI units",
+            CriterionName::D => "geometric mean of the axes of the confidence ellipsoid, SI units",
+            CriterionName::E => "longest axis of the confidence ellipsoid, SI units",
+        }
+    }
+
+    /// The figure that people know from the logarithm that is minimised; `columns`: number of parameters.
+    fn figure(self, logarithm: f64, columns: usize) -> f64 {
+        match self {
+            CriterionName::RelativeStd | CriterionName::A => (logarithm.exp() / columns as f64).sqrt(),
+            CriterionName::UnitCondition | CriterionName::Condition | CriterionName::Mix => logarithm.exp(),
+            CriterionName::D => (logarithm / (2.0 * columns as f64)).exp(),
+            CriterionName::E => (0.5 * logarithm).exp(),
+        }
+    }
+}
+
+impl From<&LimitPoint> for LimitRecord {
+    fn from(point: &LimitPoint) -> Self {
+        LimitRecord {
+            kind: point.kind.to_string(),
+            subject: point.subject.clone(),
+            time_s: point.time,
+            excess: point.excess,
+        }
+    }
+}
+
+impl DesignRun {
+    /// Everything as JSON keys.
+    ///
+    /// # Errors
+    /// [`Error::Read`] if an input has gone.
+    pub fn record(&self, config: &DesignConfig) -> Result<DesignRecord, Error> {
+        let set = &self.set;
+        let designed = self.outcome.as_ref().ok();
+        let forecast = designed.map(|d| &d.forecast);
+        let logarithm = designed.and_then(|d| self.starts[d.best].criterion);
+        let columns = set.problem.model.columns().len();
+        let leg = |leg: &Option<dynid_io::trajectory::Leg>| leg.as_ref().map(|l| l.duration_s);
+        let mut limits: Vec<LimitRecord> =
+            designed.map_or_else(Vec::new, |d| d.uses.iter().map(LimitRecord::from).collect());
+        limits.sort_by(|a, b| b.excess.total_cmp(&a.excess));
+        Ok(DesignRecord {
+            schema: SCHEMA,
+            robot: config.robot.display().to_string(),
+            joints: set.problem.coordinates.clone(),
+            verdict: self.verdict(),
+            criterion: CriterionRecord {
+                name: set.criterion,
+                meaning: set.criterion.meaning(),
+                value: logarithm.map(|l| set.criterion.figure(l, columns)),
+                logarithm,
+            },
+            trajectory: TrajectoryRecord {
+                period_s: config.trajectory.period_s,
+                harmonics: config.trajectory.harmonics,
+                periods: config.trajectory.periods,
+                approach_s: designed.and_then(|d| leg(&d.motion.file.approach)),
+                return_s: designed.and_then(|d| leg(&d.motion.file.back)),
+                sample_rate_hz: config.trajectory.sample_rate_hz,
+                coefficients: designed.map_or_else(Vec::new, |d| d.coefficients.clone()),
+            },
+            condition_number: forecast.map(|f| f.condition),
+            condition_number_scaled: forecast.map(|f| f.condition_unit_norm),
+            singular_values: forecast.map(|f| [f.singular_values.0, f.singular_values.1]),
+            parameters: forecast.map_or_else(Vec::new, |f| {
+                f.columns
+                    .iter()
+                    .map(|c| ParameterForecast {
+                        name: c.name.clone(),
+                        unit: c.unit.clone(),
+                        nominal: c.nominal,
+                        std: c.std,
+                        rel_std: c.relative_std,
+                    })
+                    .collect()
+            }),
+            confounded: forecast.map_or_else(Vec::new, |f| {
+                f.confounded
+                    .iter()
+                    .map(|p| PairRecord { names: p.names.clone(), correlation: p.correlation })
+                    .collect()
+            }),
+            weakest: forecast.map_or_else(Vec::new, |f| {
+                f.weakest
+                    .iter()
+                    .map(|(name, share)| ShareRecord { name: name.clone(), share: *share })
+                    .collect()
+            }),
+            limits,
+            random: forecast.and_then(|f| f.random.as_ref()).map(|r| RandomRecord {
+                trajectories: r.trajectories,
+                mean_ratio: r.mean_ratio,
+                geometric_ratio: r.geometric_ratio,
+                condition_number: r.condition,
+            }),
+            starts: self.starts.iter().map(start_record).collect(),
+            infeasible: self.outcome.as_ref().err().map(infeasible_record),
+            noise: set.noise.clone(),
+            provenance: provenance(config)?,
+        })
+    }
+
+    fn verdict(&self) -> DesignVerdict {
+        let mut warnings: Vec<String> = self.robot.warnings.clone();
+        warnings.extend(self.set.assumptions.iter().cloned());
+        match &self.outcome {
+            Err(infeasible) => {
+                DesignVerdict { status: "fail", headline: infeasible_headline(infeasible), warnings }
+            }
+            Ok(designed) => self.found_verdict(designed, warnings),
+        }
+    }
+
+    fn found_verdict(&self, designed: &DesignedTrajectory, mut warnings: Vec<String>) -> DesignVerdict {
+        for fault in &designed.motion.leg_faults {
+            warnings.push(format!(
+                "the {} breaks a limit ({} of {} by {:.1} %): its path is straight in joint space; choose another parking \
+                 or start pose",
+                fault.phase,
+                fault.kind,
+                fault.subject,
+                100.0 * fault.excess
+            ));
+        }
+        let poorly: Vec<&str> = designed
+            .forecast
+            .columns
+            .iter()
+            .filter(|c| c.relative_std.is_some_and(|r| r > POORLY_SEEN))
+            .map(|c| c.name.as_str())
+            .collect();
+        if !poorly.is_empty() {
+            warnings.push(format!(
+                "{} of {} parameters will be known to no better than {:.0} % of their nominal values: {}",
+                poorly.len(),
+                designed.forecast.columns.len(),
+                100.0 * POORLY_SEEN,
+                poorly.join(", ")
+            ));
+        }
+        if let Some(worst) = designed.broken.first() {
+            return DesignVerdict {
+                status: "fail",
+                headline: format!(
+                    "{} of {} is broken by {:.1e} of its limit: do not run this motion",
+                    worst.kind, worst.subject, worst.excess
+                ),
+                warnings,
+            };
+        }
+        let near = self.near_best(designed);
+        let status = if designed.motion.leg_faults.is_empty() { "pass" } else { "warn" };
+        let headline = format!(
+            "all limits hold at every instant of the period; {near} of {} starts ended within {:.0} % of the best",
+            self.starts.len(),
+            100.0 * NEAR_BEST
+        );
+        DesignVerdict { status, headline, warnings }
+    }
+
+    /// Starts whose figure is within a few per cent of the best.
+    pub fn near_best(&self, designed: &DesignedTrajectory) -> usize {
+        let columns = self.set.problem.model.columns().len();
+        let figure = |s: &StartOutcome| s.criterion.map(|c| self.set.criterion.figure(c, columns));
+        let Some(best) = figure(&self.starts[designed.best]) else { return 0 };
+        let near =
+            |s: &&StartOutcome| s.is_feasible() && figure(s).is_some_and(|x| x <= (1.0 + NEAR_BEST) * best);
+        self.starts.iter().filter(near).count()
+    }
+}
+
+fn start_record(start: &StartOutcome) -> StartRecord {
+    StartRecord {
+        seed: start.seed,
+        logarithm: start.criterion,
+        feasible: start.is_feasible(),
+        evaluations: start.evaluations,
+    }
+}
+
+fn infeasible_record(infeasible: &Infeasible) -> InfeasibleRecord {
+    InfeasibleRecord {
+        at_start: infeasible.at_start,
+        violations: infeasible.violations.iter().map(LimitRecord::from).collect(),
+        blamed: infeasible.blamed.map(|b| b.to_string()),
+    }
+}
+
+fn infeasible_headline(infeasible: &Infeasible) -> String {
+    let worst = infeasible.violations.first().map_or_else(
+        || "no start ended within all limits".to_owned(),
+        |v| {
+            let size = match v.kind {
+                LimitKind::Path(dynid_excitation::constraint::ConstraintKind::Effort)
+                | LimitKind::Position
+                | LimitKind::Velocity
+                | LimitKind::Acceleration
+                | LimitKind::Jerk => format!("{:.0} % over its limit", 100.0 * v.excess),
+                LimitKind::Path(_) => {
+                    format!(
+                        "{:.3} m on the wrong side",
+                        v.excess * dynid_excitation::constraint::DISTANCE_SCALE
+                    )
+                }
+            };
+            format!("{} of {} stays {size}, at {:.2} s", v.kind, v.subject, v.time)
+        },
+    );
+    match (infeasible.at_start, infeasible.blamed) {
+        (true, _) => format!("the start pose itself is not allowed: {worst}"),
+        (false, Some(blamed)) => {
+            format!("no motion keeps all limits: {worst}; without the limit of {blamed} there is one")
+        }
+        (false, None) => format!("no motion keeps all limits: {worst}"),
+    }
+}
+
+fn provenance(config: &DesignConfig) -> Result<Provenance, Error> {
+    let mut inputs = vec![InputRecord {
+        path: config.robot.display().to_string(),
+        kind: "robot".to_owned(),
+        sha256: sha256(&config.robot)?,
+    }];
+    for path in &config.earlier {
+        inputs.push(InputRecord {
+            path: path.display().to_string(),
+            kind: "trajectory".to_owned(),
+            sha256: sha256(path)?,
+        });
+    }
+    let settings = serde_json::to_value(config).unwrap_or_default();
+    Ok(Provenance { version: crate::VERSION.to_owned(), inputs, settings, seed: config.search.seed })
+}
