@@ -596,3 +596,22 @@ fn elements_that_need_a_channel_are_refused_by_simulate() {
     assert!(message.starts_with("error: ") && message.contains("current_j1"), "{message}");
     assert!(!out.exists());
 }
+
+#[test]
+fn simulate_in_closed_loop_writes_log_states_and_truth_the_same_every_time() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("arm.urdf"), TWO_LINKS).unwrap();
+    let make = |log: &str, truth: &str| {
+        let args = ["simulate", "arm.urdf", "--closed-loop", "--duration", "2", "--rate-hz", "250"];
+        let files = ["--out", log, "--clean", "clean.csv", "--truth", truth];
+        run(folder.path(), &[&args[..], &files].concat(), 0);
+    };
+    make("a.csv", "a.json");
+    make("b.csv", "b.json");
+    assert_eq!(read(folder.path(), "a.csv"), read(folder.path(), "b.csv"));
+    assert_eq!(read(folder.path(), "a.json"), read(folder.path(), "b.json"));
+    let truth = json(read(folder.path(), "a.json"));
+    assert!(truth["experiment"]["imperfections"].as_array().unwrap().len() > 5);
+    assert_eq!(truth["experiment"]["ticks"], 502);
+    assert!(truth["shoulder.fc"].is_number(), "{truth}");
+}

@@ -14,3 +14,4 @@ mod robots_in_urdf;
 #[path = "../support/mod.rs"]
 mod support;
 mod validation_logs;
+mod virtual_experiments;
