@@ -612,6 +612,7 @@ fn simulate_in_closed_loop_writes_log_states_and_truth_the_same_every_time() {
     assert_eq!(read(folder.path(), "a.json"), read(folder.path(), "b.json"));
     let truth = json(read(folder.path(), "a.json"));
     assert!(truth["experiment"]["imperfections"].as_array().unwrap().len() > 5);
-    assert_eq!(truth["experiment"]["ticks"], 502);
+    // A thousand a second from both ends on, and one for the delay.
+    assert_eq!(truth["experiment"]["ticks"], 2002);
     assert!(truth["shoulder.fc"].is_number(), "{truth}");
 }

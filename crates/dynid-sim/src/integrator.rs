@@ -4,6 +4,11 @@
 //! matrix `M + hγ D + h²γ² K`, where `K` and `D` are stiffness and damping of the elements. Its order holds for any such
 //! matrix, so that gravity and Coriolis forces, never stiff, need no derivative. With the exact matrix the method damps
 //! infinitely stiff modes in one step.
+//!
+//! Friction has a smooth sign instead of located events of sticking and slipping: joints that share motors would turn
+//! those into a complementarity problem, and smoothness costs next to nothing. A mass on a rough floor stops within
+//! 6e-9 m of the closed form at a width of 1e-4 m/s, with 8 % more steps than control intervals (`tests/integration.rs`);
+//! 20 s of a six-axis arm at 1 kHz take the same time for widths from 1e-2 to 1e-5 rad/s.
 
 use crate::error::{SimError, demand};
 use crate::lu::{Lu, add_product};

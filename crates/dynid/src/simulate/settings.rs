@@ -167,7 +167,7 @@ impl Default for ImperfectionTable {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PlantTable {
-    /// Speed over which the sign of a velocity is smoothed, rad/s or m/s. Default 1e-3.
+    /// Speed over which the sign of a velocity is smoothed, rad/s or m/s. Default 1e-4.
     pub sign_width: f64,
     /// Largest local error of an integration step. Default 1e-9.
     pub tolerance: f64,
@@ -175,7 +175,7 @@ pub struct PlantTable {
 
 impl Default for PlantTable {
     fn default() -> Self {
-        PlantTable { sign_width: 1e-3, tolerance: 1e-9 }
+        PlantTable { sign_width: 1e-4, tolerance: 1e-9 }
     }
 }
 
