@@ -4,7 +4,7 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use dynid::elements::ElementPlan;
 use dynid::estimators::factor::{Factor, FactorBuilder};
@@ -30,7 +30,7 @@ fn robots() -> Vec<(&'static str, PathBuf)> {
     robots
 }
 
-fn load(path: &PathBuf) -> Robot {
+fn load(path: &Path) -> Robot {
     Robot::load(path, &RobotOptions::default()).unwrap()
 }
 
@@ -93,6 +93,28 @@ fn without_imperfections_efforts_are_inverse_dynamics_and_energy_balances() {
         );
         assert!(worst < 1e-8 && missing.abs() < 1e-8 && e.saturated_ticks == 0 && e.imperfections.is_empty());
     }
+}
+
+#[test]
+fn stated_trajectories_are_followed_in_both_modes() {
+    let robot = load(&robots()[0].1);
+    let stated =
+        "duration_s = 5\nperiod_s = 5\n[trajectory.j2]\noffset = 0.2\nsine = [0.3]\ncosine = [-0.1]\n";
+    let wanted = |t: f64| {
+        let (s, c) = (std::f64::consts::TAU / 5.0 * t).sin_cos();
+        0.2 + 0.3 * s - 0.1 * c
+    };
+    let off = |log: &SimulatedLog| {
+        let distances = log.time.iter().zip(&log.clean[0][1]).map(|(t, q)| (q - wanted(*t)).abs());
+        distances.fold(0.0_f64, f64::max)
+    };
+    let exact = simulate(&robot, &SimulateSettings::parse(stated, "test").unwrap()).unwrap();
+    assert!(off(&exact) < 1e-15);
+    // With a right model and no imperfections what remains is what a held command does.
+    let controlled =
+        simulate(&robot, &settings(&format!("perfect = true\n{stated}[control]\nmodel_error = 0\n")))
+            .unwrap();
+    assert!(off(&controlled) < 2e-3, "{}", off(&controlled));
 }
 
 #[test]
@@ -185,7 +207,7 @@ fn noisy_factor(
 }
 
 /// Base parameters from a log by the whole pipeline: error and predicted standard deviation of each.
-fn identified(path: &PathBuf, text: &str) -> Vec<(f64, f64)> {
+fn identified(path: &Path, text: &str) -> Vec<(f64, f64)> {
     let robot = load(path);
     let log = simulate(&robot, &settings(text)).unwrap();
     let folder = tempfile::tempdir().unwrap();
