@@ -324,8 +324,11 @@ pub(crate) struct SimulateArgs {
     /// Let a controller move the robot, with all imperfections (default: inverse dynamics of the trajectory).
     #[arg(long)]
     pub(crate) closed_loop: bool,
+    /// Follow a trajectory file, approach and return included (`dynid design` writes them).
+    #[arg(long, value_name = "TRAJECTORY.json")]
+    pub(crate) follow: Option<PathBuf>,
     /// Length, s.
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, conflicts_with = "follow")]
     pub(crate) duration: Option<f64>,
     /// Sample rate, Hz.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]

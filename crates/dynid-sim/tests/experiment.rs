@@ -5,8 +5,10 @@
 mod arm;
 
 use arm::{arm, plant, slider};
-use dynid_model::element::{Coulomb, ElementColumns, JointElement, JointInfo, RotorInertia, Spring, Viscous};
-use dynid_model::{EffortModel, MotionBlock, Parameter, RegressorBlock};
+use dynid_model::element::{
+    Coulomb, ElementColumns, ElementWeights, JointElement, JointInfo, RotorInertia, Spring, Viscous,
+};
+use dynid_model::{EffortModel, MotionAdjoint, MotionBlock, Parameter, RegressorBlock};
 use dynid_sim::*;
 
 /// Viscous friction that falls with temperature: column `v (1 - 0.02 (T - 20))`.
@@ -33,6 +35,20 @@ impl JointElement for Lubricant {
         let v = motion.rate(self.rate);
         for ((to, v), t) in out.column(0).iter_mut().zip(v).zip(warm) {
             *to = v * (1.0 - 0.02 * (t - 20.0));
+        }
+    }
+    fn adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        _: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        let warm = motion.channel("temperature").unwrap();
+        let to = &mut out.dq[self.rate * motion.samples..][..motion.samples];
+        for ((to, w), t) in to.iter_mut().zip(weights.column(0)).zip(warm) {
+            *to += w * (1.0 - 0.02 * (t - 20.0));
         }
     }
 }

@@ -5,7 +5,6 @@ mod settings;
 mod trajectory;
 
 use dynid_model::{EffortModel, MotionBlock, RegressorBlock, RobotModel};
-use dynid_motion::trajectory::Fourier;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -17,6 +16,7 @@ use crate::robot::Robot;
 pub use settings::{
     ControlTable, ImperfectionTable, PlantTable, SeriesSettings, SimulateMode, SimulateSettings,
 };
+use trajectory::Reference;
 
 /// A virtual log with the truth beside it.
 #[derive(Debug, Clone)]
@@ -96,33 +96,39 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
         )));
     }
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
-    let trajectories = trajectory::trajectories(&model, settings, &mut rng)?;
+    let reference = Reference::new(&model, settings, &mut rng)?;
+    let settings = &match reference.duration() {
+        Some(duration_s) => SimulateSettings { duration_s, ..settings.clone() },
+        None => settings.clone(),
+    };
+    settings.check()?;
     let values = nominal_parameters(&model, &plan, &settings.values)?;
     match settings.mode {
         SimulateMode::InverseDynamics => {
-            Ok(by_inverse_dynamics(&model, &trajectories, values, settings, &mut rng))
+            Ok(by_inverse_dynamics(&model, &reference, values, settings, &mut rng))
         }
-        SimulateMode::ClosedLoop => closed_loop::experiment(model, &trajectories, values, settings),
+        SimulateMode::ClosedLoop => closed_loop::experiment(model, &reference, values, settings),
     }
 }
 
 fn by_inverse_dynamics(
     model: &RobotModel,
-    trajectories: &[Fourier],
+    reference: &Reference,
     values: Vec<f64>,
     settings: &SimulateSettings,
     rng: &mut ChaCha8Rng,
 ) -> SimulatedLog {
-    let n = trajectories.len();
+    let n = model.joints().len();
     let samples = (settings.duration_s * settings.rate_hz).round() as usize + 1;
     let sample = |shift: f64| {
         let mut signals = [vec![0.0; n * samples], vec![0.0; n * samples], vec![0.0; n * samples]];
-        for (j, trajectory) in trajectories.iter().enumerate() {
-            for s in 0..samples {
-                let point = trajectory.at((s as f64 + shift) / settings.rate_hz);
-                signals[0][j * samples + s] = point.position;
-                signals[1][j * samples + s] = point.velocity;
-                signals[2][j * samples + s] = point.acceleration;
+        for s in 0..samples {
+            for (j, [q, dq, ddq]) in
+                reference.at((s as f64 + shift) / settings.rate_hz).into_iter().enumerate()
+            {
+                signals[0][j * samples + s] = q;
+                signals[1][j * samples + s] = dq;
+                signals[2][j * samples + s] = ddq;
             }
         }
         signals

@@ -16,8 +16,11 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
             .into_iter()
             .filter_map(|(argument, path)| Some((argument, path?.as_path())))
             .collect();
-    let inputs: Vec<&Path> =
-        std::iter::once(&args.robot.robot).chain(&args.config).map(PathBuf::as_path).collect();
+    let inputs: Vec<&Path> = std::iter::once(&args.robot.robot)
+        .chain(&args.config)
+        .chain(&args.follow)
+        .map(PathBuf::as_path)
+        .collect();
     outputs::check_files(&files, &inputs)?;
     let robot = load_robot(&args.robot)?;
     let mut settings = match &args.config {
@@ -26,6 +29,9 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
     };
     if args.closed_loop {
         settings.mode = SimulateMode::ClosedLoop;
+    }
+    if args.follow.is_some() {
+        settings.follow.clone_from(&args.follow);
     }
     settings.duration_s = args.duration.unwrap_or(settings.duration_s);
     settings.rate_hz = args.rate_hz.unwrap_or(settings.rate_hz);
@@ -69,7 +75,10 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
 fn read_settings(path: &Path) -> Result<SimulateSettings, Failure> {
     let text = std::fs::read_to_string(path)
         .map_err(|source| dynid::Error::Read { file: path.to_owned(), source })?;
-    Ok(SimulateSettings::parse(&text, &path.display().to_string())?)
+    let mut settings = SimulateSettings::parse(&text, &path.display().to_string())?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    settings.follow = settings.follow.map(|f| folder.join(f));
+    Ok(settings)
 }
 
 fn in_json(experiment: &ExperimentSummary) -> serde_json::Value {

@@ -171,6 +171,26 @@ impl TrajectoryFile {
         Sequence::timed(leg(self.approach.as_ref()), Box::new(self.motion.clone()), leg(self.back.as_ref()))
     }
 
+    /// Coordinate of each of `joints`: by name, or by number where the file names none.
+    ///
+    /// # Errors
+    /// The first joint that the file does not move.
+    pub fn order_of(&self, joints: &[String]) -> Result<Vec<usize>, String> {
+        let unnamed = self.joints.iter().all(|j| j.name.is_none());
+        joints
+            .iter()
+            .enumerate()
+            .map(|(k, joint)| match unnamed {
+                true if k < self.joints.len() => Ok(k),
+                true => Err(joint.clone()),
+                false => {
+                    let named = self.joints.iter().position(|j| j.name.as_ref() == Some(joint));
+                    named.ok_or_else(|| joint.clone())
+                }
+            })
+            .collect()
+    }
+
     /// Names of the joints; those without one are called `q1`, `q2`, .. by their number.
     pub fn joint_names(&self) -> Vec<String> {
         let number = |k: usize| format!("q{}", k + 1);

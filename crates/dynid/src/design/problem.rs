@@ -382,22 +382,10 @@ fn earlier(
     let mut stacked: Option<Information> = None;
     for path in &config.earlier {
         let file = TrajectoryFile::read(path)?;
-        let order: Vec<usize> = problem
-            .coordinates
-            .iter()
-            .enumerate()
-            .map(|(k, joint)| {
-                let named = file.joints.iter().position(|j| j.name.as_deref() == Some(joint));
-                let by_number = file.joints.iter().all(|j| j.name.is_none()) && k < file.joints.len();
-                named.or(by_number.then_some(k)).ok_or_else(|| {
-                    let expected = format!("a trajectory of joint `{joint}`");
-                    Error::InFile {
-                        file: path.display().to_string(),
-                        source: Box::new(Error::setting("joints", &expected, "none")),
-                    }
-                })
-            })
-            .collect::<Result<_, _>>()?;
+        let order = file.order_of(&problem.coordinates).map_err(|joint| Error::InFile {
+            file: path.display().to_string(),
+            source: Box::new(Error::setting("joints", &format!("a trajectory of joint `{joint}`"), "none")),
+        })?;
         let rows = file.motion.to_rows(Form::Plain, &RowOrder::default())?;
         let harmonics = rows.first().map_or(0, |r| (r.len() - 1) / 2);
         let earlier = Problem {

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use dynid_model::{EffortModel, RobotModel};
-use dynid_motion::trajectory::Fourier;
 use dynid_sim::{
     ControlSettings, ExperimentSettings, Imperfections, Plant, Profile, Wanted, run, wrong_model,
 };
 
 use super::settings::SimulateSettings;
+use super::trajectory::Reference;
 use super::{ExperimentSummary, SimulatedLog, named};
 use crate::Error;
 
@@ -17,7 +17,7 @@ const LEAST_CONTROL_RATE: f64 = 1000.0;
 
 pub(super) fn experiment(
     model: RobotModel,
-    trajectories: &[Fourier],
+    reference: &Reference,
     values: Vec<f64>,
     settings: &SimulateSettings,
 ) -> Result<SimulatedLog, Error> {
@@ -31,13 +31,7 @@ pub(super) fn experiment(
     let plant = |values: Vec<f64>| Plant::new(model.clone(), values, shape.clone(), plant_table.sign_width);
     let nominal = plant(wrong_model(&values, table.model_error, settings.seed))?;
     let mut truth = plant(values.clone())?;
-    let reference = |time: f64| -> Vec<Wanted> {
-        let point = |t: &Fourier| {
-            let p = t.at(time);
-            [p.position, p.velocity, p.acceleration]
-        };
-        trajectories.iter().map(point).collect()
-    };
+    let wanted = |time: f64| -> Vec<Wanted> { reference.at(time) };
     let channels = model.channels().iter().map(|name| {
         let points = settings.channels.get(name).map_or(&[][..], Vec::as_slice);
         Profile::new(points.iter().map(|[t, x]| (*t, *x)).collect())
@@ -54,7 +48,7 @@ pub(super) fn experiment(
         channels: channels.collect::<Result<_, _>>()?,
         seed: settings.seed,
     };
-    let result = run(&mut truth, &nominal, &reference, &experiment)?;
+    let result = run(&mut truth, &nominal, &wanted, &experiment)?;
     let log = result.log;
     Ok(SimulatedLog {
         joints: model.mechanism().rate_names(),

@@ -1,6 +1,7 @@
 //! Settings of virtual logs.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use serde::Deserialize;
 
@@ -37,6 +38,9 @@ pub struct SimulateSettings {
     pub seed: u64,
     /// Trajectories of joints by name, in place of random ones; the period is `period_s`.
     pub trajectory: BTreeMap<String, SeriesSettings>,
+    /// Trajectory file (`dynid design` writes them) to follow, approach and return included, in place of all settings of a
+    /// trajectory and of the duration; relative to the settings' file.
+    pub follow: Option<PathBuf>,
     /// Only in closed loop: switches every imperfection off, noise, encoder steps and delay included. Default false.
     pub perfect: bool,
     /// Only in closed loop: whether velocity is logged, as `dq_<joint>`. Default false.
@@ -195,6 +199,7 @@ impl Default for SimulateSettings {
             values: BTreeMap::new(),
             seed: 1,
             trajectory: BTreeMap::new(),
+            follow: None,
             perfect: false,
             log_velocity: false,
             control: None,

@@ -1,15 +1,65 @@
 //! Wanted motion of a virtual robot.
 
+use dynid_io::TrajectoryFile;
 use dynid_model::RobotModel;
-use dynid_motion::trajectory::Fourier;
+use dynid_motion::trajectory::{Fourier, Point, Sequence, Trajectory};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::settings::SimulateSettings;
 use crate::Error;
 
+/// Motion that the robot is to make.
+pub(super) enum Reference {
+    /// One periodic series per joint.
+    Series(Vec<Fourier>),
+    /// A trajectory file; coordinate of every joint.
+    File(Sequence, Vec<usize>),
+}
+
+impl Reference {
+    /// From the trajectory file that the settings name, else series.
+    pub(super) fn new(
+        model: &RobotModel,
+        settings: &SimulateSettings,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Self, Error> {
+        let Some(path) = &settings.follow else {
+            return Ok(Reference::Series(series(model, settings, rng)?));
+        };
+        let file = TrajectoryFile::read(path)?;
+        let joints: Vec<String> = model.joints().iter().map(|j| j.name.clone()).collect();
+        let order = file.order_of(&joints).map_err(|joint| Error::InFile {
+            file: path.display().to_string(),
+            source: Box::new(Error::setting("joints", &format!("a trajectory of joint `{joint}`"), "none")),
+        })?;
+        Ok(Reference::File(file.sequence()?, order))
+    }
+
+    /// Duration of a trajectory file, s.
+    pub(super) fn duration(&self) -> Option<f64> {
+        match self {
+            Reference::Series(_) => None,
+            Reference::File(sequence, _) => Some(sequence.duration()),
+        }
+    }
+
+    /// Position, velocity and acceleration of all joints at a time.
+    pub(super) fn at(&self, time: f64) -> Vec<[f64; 3]> {
+        let wanted = |p: Point| [p.position, p.velocity, p.acceleration];
+        match self {
+            Reference::Series(series) => series.iter().map(|s| wanted(s.at(time))).collect(),
+            Reference::File(sequence, order) => {
+                let mut points = vec![Point::default(); sequence.coordinates()];
+                sequence.at(time, &mut points);
+                order.iter().map(|c| wanted(points[*c])).collect()
+            }
+        }
+    }
+}
+
 /// One Fourier series per joint: as the settings state it, else a random one.
-pub(super) fn trajectories(
+fn series(
     model: &RobotModel,
     settings: &SimulateSettings,
     rng: &mut ChaCha8Rng,
