@@ -47,6 +47,10 @@ pub struct Config {
     pub bound: Vec<BoundConfig>,
     /// Columns to keep as base parameters where there is a choice, by name (`link2.Izz`) or symbol (`Izz2`).
     pub preferred: Vec<String>,
+    /// Trajectory file of every `[[log]]` that states neither `trajectory` nor `period_s` of its own.
+    pub trajectory: Option<PathBuf>,
+    /// Period of every `[[log]]` that states neither, s.
+    pub period_s: Option<f64>,
     /// Logs to identify from.
     pub log: Vec<LogConfig>,
     /// Logs to validate on.
@@ -103,6 +107,11 @@ pub struct LogConfig {
     pub part: Option<(f64, f64)>,
     /// Columns of this log in place of the run's.
     pub columns: Option<MappingSpec>,
+    /// Trajectory file of a periodic motion, relative to the configuration: states come from a Fourier series of its period.
+    /// Default: the run's for `[[log]]`, none for `[[validation]]`.
+    pub trajectory: Option<PathBuf>,
+    /// The period alone, s, where the whole record is periodic.
+    pub period_s: Option<f64>,
 }
 
 /// Which way from samples to rows.
@@ -158,7 +167,9 @@ impl Config {
         config.out = config.out.map(|o| folder.join(o));
         for log in config.log.iter_mut().chain(&mut config.validation) {
             log.path = folder.join(&log.path);
+            log.trajectory = log.trajectory.as_ref().map(|t| folder.join(t));
         }
+        config.trajectory = config.trajectory.map(|t| folder.join(t));
         Ok(config)
     }
 
@@ -239,7 +250,9 @@ impl Config {
                 return Err(Error::setting(&format!("locked.{joint}"), "a finite number", position));
             }
         }
+        check_motion(self.trajectory.as_deref(), self.period_s)?;
         for log in self.log.iter().chain(&self.validation) {
+            check_motion(log.trajectory.as_deref(), log.period_s)?;
             if let Some((a, b)) = log.part
                 && !(0.0..1.0).contains(&a) | !(b > a && b <= 1.0)
             {
@@ -251,6 +264,17 @@ impl Config {
             }
         }
         Ok(())
+    }
+
+    /// Logs to identify from, each with the trajectory or period that applies to it.
+    pub fn training_logs(&self) -> Vec<LogConfig> {
+        let own = |log: &LogConfig| log.trajectory.is_some() || log.period_s.is_some();
+        let with_run = |log: &LogConfig| LogConfig {
+            trajectory: self.trajectory.clone(),
+            period_s: self.period_s,
+            ..log.clone()
+        };
+        self.log.iter().map(|log| if own(log) { log.clone() } else { with_run(log) }).collect()
     }
 
     /// Checks the given cut-offs against the sample rate of a log.
@@ -296,6 +320,18 @@ impl Config {
             trim_s: c.trim_s.unwrap_or(defaults.trim_s),
             ..defaults
         }
+    }
+}
+
+fn check_motion(trajectory: Option<&Path>, period_s: Option<f64>) -> Result<(), Error> {
+    match (trajectory, period_s) {
+        (Some(_), Some(period_s)) => {
+            Err(Error::setting("period_s", "either `trajectory` or `period_s`", period_s))
+        }
+        (None, Some(x)) if !(x.is_finite() && x > 0.0) => {
+            Err(Error::setting("period_s", "a positive number", x))
+        }
+        _ => Ok(()),
     }
 }
 

@@ -63,6 +63,19 @@ pub enum Error {
         /// Largest position found.
         largest: f64,
     },
+    /// A trajectory file cannot be used.
+    #[error(transparent)]
+    TrajectoryFile(#[from] dynid_io::TrajectoryFileError),
+    /// A trajectory file belongs to another robot.
+    #[error("{file}: joints: expected {expected}, found {found}")]
+    TrajectoryJoints {
+        /// File.
+        file: String,
+        /// What fits the robot.
+        expected: String,
+        /// What the file has.
+        found: String,
+    },
     /// Numbered columns for more joints than the robot moves.
     #[error(
         "{file}: position: expected {expected} numbered columns, one per moving joint, found one more: `{column}`"
@@ -261,6 +274,17 @@ impl Error {
             Error::Prior(_) => Some(
                 "correct the mass; a link without an inertia gets a default body as its prior".to_owned(),
             ),
+            Error::TrajectoryFile(e) => e.hint(),
+            Error::TrajectoryJoints { .. } => {
+                Some("use the trajectory that this robot ran, with the joint names of its robot file".to_owned())
+            }
+            Error::Conditioning(C::ShorterThanPeriod { .. }) => Some(
+                "record at least one whole period, or leave out `trajectory` and `period_s`: any motion will do then"
+                    .to_owned(),
+            ),
+            Error::Conditioning(C::OtherPeriod { .. }) => {
+                Some("check that the log belongs to the trajectory; `part` can leave out what does not repeat".to_owned())
+            }
             Error::Degrees { .. } => Some(
                 "state the unit: `q1[deg]` in the header, or `[columns] position = { columns = \"q{}\", unit = \"deg\" }`"
                     .to_owned(),

@@ -312,7 +312,7 @@ pub struct Provenance {
 pub struct InputRecord {
     /// Path as given.
     pub path: String,
-    /// `robot`, `log` or `validation`.
+    /// `robot`, `log`, `validation` or `trajectory`.
     pub kind: String,
     /// SHA-256 of its bytes.
     pub sha256: String,

@@ -5,7 +5,7 @@ mod figures;
 use std::path::Path;
 
 use dynid_estimate::conditioning::{
-    Conditioning, ConditioningSettings, PreparedLog, ReducedGroup, Stage, condition, predict, prepare,
+    Conditioning, ConditioningSettings, PreparedLog, ReducedGroup, Stage, condition, predict,
 };
 use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::identifiability::VisibleSpace;
@@ -128,11 +128,10 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
             "a floating base cannot be identified from joint logs: lock the base or leave it out".to_owned(),
         ));
     }
-    let (robot, loaded) = read_logs(config, &config.log, robot, &mut progress)?;
+    let (robot, loaded) = read_logs(config, &config.training_logs(), robot, &mut progress)?;
     let plan = plan_elements(config, &robot, &loaded)?;
     let model = RobotModel::new(robot.mechanism.clone(), plan.build(&robot.mechanism)?);
-    let prepared =
-        loaded.iter().map(|l| Ok(prepare(&l.log, &model, &settings)?)).collect::<Result<Vec<_>, Error>>()?;
+    let prepared = loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
 
     for log in &prepared {
         config.check_cutoffs(&log.name, log.rate_hz)?;
@@ -230,7 +229,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     for log in &config.validation {
         progress(Step::Validate(log.path.display().to_string()));
         let loaded = logs::load(log, &out.robot.mechanism, &config.columns, config.motor_side.as_ref())?;
-        let prepared = prepare(&loaded.log, &out.model, &out.settings)?;
+        let prepared = loaded.prepare(&out.model, &out.settings)?;
         out.validation.push(out.agreement(out.values(), &prepared)?);
         if out.consistent.constrained() {
             let free = out.agreement(out.unconstrained_values(), &prepared)?;
@@ -407,6 +406,9 @@ fn effort_sizes(logs: &[PreparedLog]) -> Vec<f64> {
 /// Sample rate below which a log of a robot is suspected of another unit of time, Hz.
 const SLOWEST_HZ: f64 = 10.0;
 
+/// Deviation from a Fourier series, in parts of the position noise, above which a motion does not repeat.
+const REPEATS: f64 = 2.0;
+
 fn log_warnings(model: &RobotModel, logs: &[PreparedLog]) -> Vec<String> {
     let mut out = Vec::new();
     for log in logs {
@@ -431,6 +433,14 @@ fn log_warnings(model: &RobotModel, logs: &[PreparedLog]) -> Vec<String> {
                 log.clock.gaps.len(),
                 log.clock.unusable
             ));
+        }
+        for (output, ratio) in log.periodic.iter().flat_map(|m| m.residual_ratio.iter().enumerate()) {
+            if let Some(ratio) = ratio.filter(|r| *r > REPEATS) {
+                out.push(format!(
+                    "{name}: joint `{}` does not repeat after the stated period: positions lie {ratio:.1} times their noise off the mean period; leave out `trajectory` and `period_s` for this log",
+                    model.outputs()[output].name
+                ));
+            }
         }
         for (output, moves) in log.moves.iter().enumerate() {
             if !moves {

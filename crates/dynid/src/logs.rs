@@ -2,10 +2,13 @@
 
 use std::path::Path;
 
+use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, prepare};
 use dynid_io::{ColumnMapping, MappingSpec, ReadOptions, Signals};
-use dynid_model::{JointKind, Mechanism};
+use dynid_model::{EffortModel, JointKind, Mechanism};
 use dynid_motion::{Channel, JointSignals, Log};
 use sha2::{Digest, Sha256};
+
+mod known_motion;
 
 use crate::Error;
 use crate::config::{LogConfig, MotorSide};
@@ -19,13 +22,33 @@ pub struct LoadedLog {
     pub not_logged: Vec<String>,
     /// How columns were understood: signal, column names.
     pub columns: Vec<(String, String)>,
+    /// Period of the motion, if one was stated, s.
+    pub period_s: Option<f64>,
+}
+
+impl LoadedLog {
+    /// Conditions the log's signals; states of a motion with a stated period come from its Fourier series.
+    ///
+    /// # Errors
+    /// [`Error::Conditioning`].
+    pub fn prepare(
+        &self,
+        model: &dyn EffortModel,
+        settings: &ConditioningSettings,
+    ) -> Result<PreparedLog, Error> {
+        let prepared = prepare(&self.log, model, settings)?;
+        match self.period_s {
+            Some(period_s) => Ok(prepared.with_period(period_s)?),
+            None => Ok(prepared),
+        }
+    }
 }
 
 /// Reads a log for a mechanism.
 ///
 /// # Errors
 /// [`Error::LogFile`], [`Error::Columns`], [`Error::SurplusColumn`], [`Error::Setting`], [`Error::Log`],
-/// [`Error::Degrees`], [`Error::FarPosition`].
+/// [`Error::Degrees`], [`Error::FarPosition`], [`Error::TrajectoryFile`], [`Error::TrajectoryJoints`].
 pub fn load(
     config: &LogConfig,
     mechanism: &Mechanism,
@@ -58,7 +81,15 @@ pub fn load(
             log.slice((from * rows).round() as usize..(to * rows).round() as usize)?
         }
     };
-    Ok(LoadedLog { log, not_logged: signals.not_logged.clone(), columns: describe(&mapping) })
+    let (log, period_s) = match &config.trajectory {
+        Some(path) => {
+            let cut = config.part.is_none() && config.rows.is_none();
+            let (log, period_s) = known_motion::record(log, path, &joints, cut)?;
+            (log, Some(period_s))
+        }
+        None => (log, config.period_s),
+    };
+    Ok(LoadedLog { period_s, log, not_logged: signals.not_logged.clone(), columns: describe(&mapping) })
 }
 
 /// Turns motor positions and efforts into those of the joints.

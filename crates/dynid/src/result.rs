@@ -237,6 +237,20 @@ impl Identification {
                 );
             }
         }
+        for log in &self.logs {
+            if let Some(motion) = &log.periodic {
+                add(
+                    &format!("period of {}", short_name(&log.name)),
+                    json!(motion.period_s),
+                    "s",
+                    "found",
+                    format!(
+                        "states from Fourier series over {} periods, harmonics per joint {:?}; the stated period is corrected by the positions",
+                        motion.periods, motion.harmonics
+                    ),
+                );
+            }
+        }
         let Some(c) = &self.conditioning else {
             let route = config.textbook_route();
             add(
@@ -368,16 +382,27 @@ fn provenance(config: &Config) -> Result<Provenance, Error> {
         kind: "robot".to_owned(),
         sha256: sha256(&config.robot)?,
     }];
-    for (kind, logs) in [("log", &config.log), ("validation", &config.validation)] {
+    let training = config.training_logs();
+    for (kind, logs) in [("log", &training), ("validation", &config.validation)] {
         for log in logs {
-            inputs.push(InputRecord {
-                path: log.path.display().to_string(),
-                kind: kind.to_owned(),
-                sha256: sha256(&log.path)?,
-            });
+            let trajectory = log.trajectory.as_ref().map(|path| ("trajectory", path));
+            for (kind, path) in std::iter::once((kind, &log.path)).chain(trajectory) {
+                inputs.push(InputRecord {
+                    path: path.display().to_string(),
+                    kind: kind.to_owned(),
+                    sha256: sha256(path)?,
+                });
+            }
         }
     }
-    let rows = |l: &crate::config::LogConfig| json!({ "path": l.path, "rows": l.rows, "part": l.part });
+    let rows = |l: &crate::config::LogConfig| {
+        let mut value = json!({ "path": l.path, "rows": l.rows, "part": l.part });
+        if l.trajectory.is_some() || l.period_s.is_some() {
+            value["trajectory"] = json!(l.trajectory);
+            value["period_s"] = json!(l.period_s);
+        }
+        value
+    };
     let settings = json!({
         "gravity": config.gravity,
         "couple_mimics": config.couple_mimics.unwrap_or(false),
@@ -387,7 +412,7 @@ fn provenance(config: &Config) -> Result<Provenance, Error> {
         "estimator": config.estimator,
         "bound": config.bound,
         "preferred": config.preferred,
-        "log": config.log.iter().map(rows).collect::<Vec<_>>(),
+        "log": training.iter().map(rows).collect::<Vec<_>>(),
         "validation": config.validation.iter().map(rows).collect::<Vec<_>>(),
     });
     Ok(Provenance { version: crate::VERSION.to_owned(), inputs, settings, seed: config.seed.unwrap_or(1) })

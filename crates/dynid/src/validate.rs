@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynid_estimate::conditioning::{ConditioningSettings, prepare};
+use dynid_estimate::conditioning::ConditioningSettings;
 use dynid_io::MappingSpec;
 use dynid_model::EffortModel;
 
@@ -41,7 +41,7 @@ pub fn validate(
     logs.iter()
         .map(|log| {
             let loaded = logs::load(log, model.mechanism(), columns, motor_side)?;
-            let prepared = prepare(&loaded.log, &model, &settings)?;
+            let prepared = loaded.prepare(&model, &settings)?;
             compare(&model, &values, &prepared, &alignment, &settings)
         })
         .inspect(|_| debug_assert_eq!(model.outputs().len(), estimate.joints.len()))

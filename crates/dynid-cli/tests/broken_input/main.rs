@@ -13,5 +13,6 @@ mod robots_in_toml;
 mod robots_in_urdf;
 #[path = "../support/mod.rs"]
 mod support;
+mod trajectories;
 mod validation_logs;
 mod virtual_experiments;

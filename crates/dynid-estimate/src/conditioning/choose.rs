@@ -54,9 +54,14 @@ pub(crate) fn limit(
 ) -> Result<KernelLimit, ConditioningError> {
     let mut lowest: Option<KernelLimit> = None;
     for log in logs {
-        if let Some(limit) = kernel_limit(&log.position_noise, log.rate_hz, &settings.cutoff)
-            && lowest.as_ref().is_none_or(|l| limit.limit_hz < l.limit_hz)
-        {
+        let Some(mut limit) = kernel_limit(&log.position_noise, log.rate_hz, &settings.cutoff) else {
+            continue;
+        };
+        if log.periodic.is_some() {
+            let most = settings.cutoff.kernel_rate * log.rate_hz;
+            limit.limit_hz = limit.limit_hz.max(settings.periodic_kernel_hz.min(most));
+        }
+        if lowest.as_ref().is_none_or(|l| limit.limit_hz < l.limit_hz) {
             lowest = Some(limit);
         }
     }

@@ -6,7 +6,9 @@
 
 mod choose;
 mod gram;
+mod harmonics;
 mod log_rows;
+mod periodic;
 mod predict;
 mod prepare;
 mod reduce;
@@ -19,6 +21,7 @@ mod trial;
 pub use crate::groups::ReducedGroup;
 pub use choose::{DelayEstimate, KernelTrial, MaskTrial};
 pub use log_rows::LogRows;
+pub use periodic::PeriodicMotion;
 pub use predict::predict;
 pub use prepare::{PreparedLog, prepare};
 pub use reduce::reduce;
@@ -71,6 +74,30 @@ pub enum ConditioningError {
     NothingMoves {
         /// Log.
         log: String,
+    },
+    /// A log without a whole period of its motion.
+    #[error(
+        "{log}: expected at least one whole period of {expected} s, of 8 samples or more, found {found:.3} s"
+    )]
+    ShorterThanPeriod {
+        /// Log.
+        log: String,
+        /// Period, s.
+        expected: f64,
+        /// Duration of the log, s.
+        found: f64,
+    },
+    /// The positions repeat after another time than stated.
+    #[error(
+        "{log}: expected a motion that repeats every {expected} s, found {found:.6} s and no end of the search"
+    )]
+    OtherPeriod {
+        /// Log.
+        log: String,
+        /// Period stated, s.
+        expected: f64,
+        /// Where the search left the stated period by more than 1 %, s.
+        found: f64,
     },
     /// No row is left.
     #[error(

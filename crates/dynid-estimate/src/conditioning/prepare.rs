@@ -6,7 +6,7 @@ use dynid_motion::spectrum::{EffortNoise, PositionNoise, effort_noise, position_
 use dynid_motion::{Channel, Log, spikes};
 use rayon::prelude::*;
 
-use super::{ConditioningError, ConditioningSettings};
+use super::{ConditioningError, ConditioningSettings, PeriodicMotion};
 
 /// A log on a uniform grid without spikes, joints in the order of the model's outputs.
 #[derive(Debug, Clone)]
@@ -35,6 +35,8 @@ pub struct PreparedLog {
     pub moves: Vec<bool>,
     /// What was found about the clock.
     pub clock: ClockReport,
+    /// Motion of a known period, if one was stated; states then come from it.
+    pub periodic: Option<PeriodicMotion>,
 }
 
 impl PreparedLog {
@@ -108,6 +110,7 @@ pub fn prepare(
         spikes: Vec::new(),
         moves: Vec::new(),
         clock: uniform.report,
+        periodic: None,
     };
     for (joint, moves, counts, position, effort) in done {
         out.position.push(joint.position);

@@ -10,6 +10,10 @@ use dynid_motion::spikes::SpikeSettings;
 pub struct ConditioningSettings {
     /// Cut-off of the widest kernel, Hz. Default: found.
     pub kernel_hz: Option<f64>,
+    /// Highest kernel cut-off tried on periodic logs where noise or band allow no higher one, Hz; at most the part of the sample
+    /// rate that `cutoff` allows. Default 20: their states hold next to no noise, but rigid bodies end where the first
+    /// resonances of an arm begin.
+    pub periodic_kernel_hz: f64,
     /// Cut-off of the state filter, Hz. Default: found.
     pub state_hz: Option<f64>,
     /// Delay of the motion behind the logged effort, in samples. Default: found.
@@ -55,6 +59,7 @@ impl Default for ConditioningSettings {
     fn default() -> Self {
         ConditioningSettings {
             kernel_hz: None,
+            periodic_kernel_hz: 20.0,
             state_hz: None,
             delay_samples: None,
             reversal_mask: None,

@@ -31,7 +31,8 @@ pub struct States {
 }
 
 impl States {
-    /// States of a prepared log: zero-phase Butterworth at `cutoff_hz`, central differences.
+    /// States of a prepared log: zero-phase Butterworth at `cutoff_hz`, central differences. Those of a periodic log are the
+    /// exact ones of its series; efforts pass the filter either way.
     pub fn new(
         log: &PreparedLog,
         cutoff_hz: f64,
@@ -41,10 +42,14 @@ impl States {
         let per_joint = (0..log.position.len())
             .into_par_iter()
             .map(|j| {
+                let effort = forward_backward(&filter, &log.effort[j])?;
+                if let Some(motion) = &log.periodic {
+                    let (q, dq, ddq) = (motion.q[j].clone(), motion.dq[j].clone(), motion.ddq[j].clone());
+                    return Ok((q, dq, ddq, effort, motion.velocity_sigma[j]));
+                }
                 let q = forward_backward(&filter, &log.position[j])?;
                 let dq = central(&q, log.rate_hz)?;
                 let ddq = central(&dq, log.rate_hz)?;
-                let effort = forward_backward(&filter, &log.effort[j])?;
                 let floor = log.position_noise[j].floor_psd;
                 let sigma = velocity_noise(floor, settings.state_order, cutoff_hz, log.rate_hz)?;
                 Ok((q, dq, ddq, effort, sigma))

@@ -1,6 +1,6 @@
 //! Whether a written robot gives the identified effort.
 
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, States, prepare};
+use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, States};
 use dynid_io::MappingSpec;
 use dynid_io::mjcf::JointParameters;
 use dynid_model::element::{Coulomb, JointElement, RotorInertia, Viscous};
@@ -63,7 +63,7 @@ impl CheckStates {
         let settings = ConditioningSettings::default();
         let prepared = logs.iter().map(|log| {
             let loaded = crate::logs::load(log, model.mechanism(), columns, motor_side)?;
-            Ok(prepare(&loaded.log, model, &settings)?)
+            loaded.prepare(model, &settings)
         });
         Self::logs(&prepared.collect::<Result<Vec<_>, Error>>()?, state_hz, &settings)
     }
