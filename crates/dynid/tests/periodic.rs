@@ -24,8 +24,15 @@ fn write(log: &SimulatedLog, path: &Path) {
     csv::write(path, &header, &columns).unwrap();
 }
 
-/// Error of the predicted effort on another motion, mean over joints, relative to the true effort.
-fn error(log: &SimulatedLog, held_out: &SimulatedLog, path: &Path, more: &str) -> f64 {
+/// Errors of an identification.
+struct Errors {
+    /// Of the predicted effort on another motion, mean over joints, relative to the true effort.
+    effort: f64,
+    /// Median relative error of the base parameters.
+    parameters: f64,
+}
+
+fn errors_of(log: &SimulatedLog, held_out: &SimulatedLog, path: &Path, more: &str) -> Errors {
     write(log, path);
     let text = format!(
         "robot = {:?}\n{more}\n[estimator]\nconsistency = \"none\"\n[[log]]\npath = {path:?}\n",
@@ -47,7 +54,13 @@ fn error(log: &SimulatedLog, held_out: &SimulatedLog, path: &Path, more: &str) -
         let off: Vec<f64> = e.iter().zip(f).map(|(e, f)| e - f).collect();
         square(&off) / square(e)
     });
-    (relative.sum::<f64>() / expected.len() as f64).sqrt()
+    let base = id.base.values(&truth);
+    let pairs = base.iter().zip(&id.fit().x).filter(|(b, _)| b.abs() > 1e-3);
+    let off: Vec<f64> = pairs.map(|(b, f)| (f / b - 1.0).abs()).collect();
+    Errors {
+        effort: (relative.sum::<f64>() / expected.len() as f64).sqrt(),
+        parameters: dynid::motion::median::median(&off).unwrap(),
+    }
 }
 
 /// A virtual experiment.
@@ -59,56 +72,65 @@ struct Case {
     seeds: u64,
 }
 
-/// Geometric means over seeds of the error without and with the period.
-fn errors(case: &Case) -> (f64, f64) {
+/// Geometric means over seeds of the errors without and with the period.
+fn errors(case: &Case) -> [Errors; 2] {
     let robot = Robot::load(&robot_file(), &RobotOptions::default()).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
     let held_out = SimulateSettings { seed: 99, rate_hz: 100.0, ..SimulateSettings::default() };
     let held_out = simulate(&robot, &held_out).unwrap();
     let (count, period) = case.periods;
-    let mut logs = (0.0, 0.0);
-    for seed in 1..=case.seeds {
-        let settings = SimulateSettings {
-            seed,
-            encoder_bits: case.encoder_bits,
-            effort_noise: case.effort_noise,
-            duration_s: count as f64 * period,
-            period_s: Some(period),
-            ..SimulateSettings::default()
-        };
-        let log = simulate(&robot, &settings).unwrap();
-        logs.0 += error(&log, &held_out, &path, "").ln();
-        logs.1 += error(&log, &held_out, &path, &format!("period_s = {period}")).ln();
-    }
-    let means = ((logs.0 / case.seeds as f64).exp(), (logs.1 / case.seeds as f64).exp());
+    let runs: Vec<[Errors; 2]> = (1..=case.seeds)
+        .map(|seed| {
+            let settings = SimulateSettings {
+                seed,
+                encoder_bits: case.encoder_bits,
+                effort_noise: case.effort_noise,
+                duration_s: count as f64 * period,
+                period_s: Some(period),
+                ..SimulateSettings::default()
+            };
+            let log = simulate(&robot, &settings).unwrap();
+            let known = format!("period_s = {period}");
+            ["", known.as_str()].map(|more| errors_of(&log, &held_out, &path, more))
+        })
+        .collect();
+    let mean = |pick: &dyn Fn(&[Errors; 2]) -> f64| {
+        (runs.iter().map(|r| pick(r).ln()).sum::<f64>() / runs.len() as f64).exp()
+    };
+    let found =
+        [0, 1].map(|k| Errors { effort: mean(&|r| r[k].effort), parameters: mean(&|r| r[k].parameters) });
+    let ratio = |pick: fn(&Errors) -> f64| pick(&found[1]) / pick(&found[0]);
     println!(
-        "{} bits, noise {}, {count} x {period} s: {:.2e} without, {:.2e} with, ratio {:.2}",
+        "{} bits, noise {}, {count} x {period} s: effort {:.2e} {:.2e} ({:.2}), parameters {:.2e} {:.2e} ({:.2})",
         case.encoder_bits,
         case.effort_noise,
-        means.0,
-        means.1,
-        means.1 / means.0
+        found[0].effort,
+        found[1].effort,
+        ratio(|e| e.effort),
+        found[0].parameters,
+        found[1].parameters,
+        ratio(|e| e.parameters)
     );
-    means
+    found
 }
 
 #[test]
 fn a_known_period_helps_where_effort_noise_is_small() {
     let case = Case { encoder_bits: 18, effort_noise: 0.005, periods: (4, 10.0), seeds: 2 };
-    let (without, with) = errors(&case);
-    assert!(with < 0.8 * without);
+    let [without, with] = errors(&case);
+    assert!(with.effort < 0.8 * without.effort);
 }
 
 #[test]
 fn a_known_period_does_no_harm_where_effort_noise_is_large() {
     let case = Case { encoder_bits: 16, effort_noise: 0.05, periods: (4, 10.0), seeds: 2 };
-    let (without, with) = errors(&case);
-    assert!(with < 1.1 * without);
+    let [without, with] = errors(&case);
+    assert!(with.effort < 1.1 * without.effort);
 }
 
 #[test]
-#[ignore = "measures what docs/guide.md says; half a minute"]
+#[ignore = "measures what docs/guide.md says; two minutes"]
 fn table_of_gains() {
     for (encoder_bits, effort_noise) in
         [(18, 0.0), (18, 0.005), (16, 0.005), (18, 0.02), (16, 0.02), (16, 0.05)]
@@ -140,7 +162,7 @@ fn a_trajectory_file_does_what_its_period_does() {
     );
     let file = folder.path().join("trajectory.json");
     std::fs::write(&file, text).unwrap();
-    let by_file = error(&log, &log, &path, &format!("trajectory = {file:?}"));
-    let by_period = error(&log, &log, &path, "period_s = 10");
+    let by_file = errors_of(&log, &log, &path, &format!("trajectory = {file:?}")).effort;
+    let by_period = errors_of(&log, &log, &path, "period_s = 10").effort;
     assert!((by_file / by_period - 1.0).abs() < 1e-6, "{by_file} {by_period}");
 }

@@ -39,7 +39,7 @@ impl PreparedLog {
     /// States from a motion that repeats every `period_s` seconds.
     ///
     /// By least squares over all whole periods, positions become `q0 + sum_k [a_k sin(k w t) + b_k cos(k w t)]`; velocity and
-    /// acceleration are its exact derivatives (Swevers et al. 1997; Olsen et al. 2002), and no filter stands between. Up to
+    /// acceleration are its exact derivatives (Swevers et al. 1997), and no filter stands between. Up to
     /// which harmonic is found for each joint: at most to the frequency at which the spectrum of its positions meets the
     /// noise, and no further than to the last harmonic that stands above the power of its neighbours by more than chance
     /// (1 % for a joint). Harmonics that a controller adds to the designed ones are thus found too.

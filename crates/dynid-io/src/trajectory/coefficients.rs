@@ -44,7 +44,7 @@ pub struct TrajectoryFile {
     pub robot: Option<String>,
     /// Form in which coefficients are written.
     pub form: Form,
-    /// Joints, in the order of the trajectory's coordinates.
+    /// Joints, in the order of the trajectory's coordinates and as many.
     pub joints: Vec<TrajectoryJoint>,
     /// The record, rad or m.
     pub motion: FourierTrajectory,
