@@ -176,9 +176,6 @@ pub enum Error {
     /// A trajectory cannot be made.
     #[error("trajectory: {0}")]
     Trajectory(#[from] dynid_motion::trajectory::TrajectoryError),
-    /// A trajectory file cannot be read.
-    #[error(transparent)]
-    TrajectoryFile(#[from] dynid_io::trajectory::TrajectoryFileError),
     /// A checkpoint belongs to another problem, or is none.
     #[error("{file}: not a checkpoint of this design: {message}")]
     Checkpoint {
@@ -266,7 +263,6 @@ impl Error {
             Error::RobotFile(e) => e.hint(),
             Error::LogFile(e) => e.hint(),
             Error::Export(e) => e.hint(),
-            Error::TrajectoryFile(e) => e.hint(),
             Error::Checkpoint { .. } => Some("delete the file, or name another one".to_owned()),
             Error::Columns { source, .. } => source.hint(),
             Error::States(e) => e.hint(),
