@@ -5,10 +5,8 @@ use faer::Mat;
 use crate::criterion::{inverse, singular_values};
 use crate::evaluation::{information, limit_points};
 use crate::feasibility::LimitPoint;
-use crate::grid::Grid;
-use crate::parametrisation::Parametrisation;
 use crate::problem::Problem;
-use crate::start::{feasible_start, generator};
+use crate::random::random_trajectory;
 
 /// Forecast of one parameter.
 #[derive(Debug, Clone, PartialEq)]
@@ -157,12 +155,10 @@ fn weakest(direction: &[f64], columns: &[ColumnForecast]) -> Vec<(String, f64)> 
 }
 
 fn random_comparison(problem: &Problem, designed: &[f64], samples: usize) -> Option<RandomComparison> {
-    let map = Parametrisation::new(&problem.limits, problem.base, problem.harmonics, &problem.start);
-    let grid = Grid::search(problem, &map, problem.samples);
     let (mut mean, mut geometric, mut condition) = (Vec::new(), Vec::new(), Vec::new());
     for k in 0..RANDOM_TRAJECTORIES {
-        let Some(z) = feasible_start(&grid, &mut generator(RANDOM_SEED + k)) else { continue };
-        let triangle = information(problem, &map.coefficients(&z), samples);
+        let Some(coefficients) = random_trajectory(problem, RANDOM_SEED + k) else { continue };
+        let triangle = information(problem, &coefficients, samples);
         let Some(inverse) = inverse(&triangle) else { continue };
         let ratios: Vec<f64> = deviations(&inverse).iter().zip(designed).map(|(r, d)| r / d).collect();
         let n = ratios.len() as f64;

@@ -144,6 +144,20 @@ pub fn design(config: &DesignConfig, mut progress: impl FnMut(DesignStep)) -> Re
     Ok(DesignRun { robot, set, starts, outcome })
 }
 
+impl DesignRun {
+    /// A random motion within the same limits, as long as the designed one, without approach and return; `None` if none is
+    /// found.
+    ///
+    /// # Errors
+    /// [`Error::Trajectory`].
+    pub fn random_motion(&self, config: &DesignConfig, seed: u64) -> Result<Option<DesignedMotion>, Error> {
+        match dynid_excitation::random_trajectory(&self.set.problem, seed) {
+            Some(coefficients) => DesignedMotion::new(&self.set, config, &coefficients, None).map(Some),
+            None => Ok(None),
+        }
+    }
+}
+
 /// The checkpoint file of a run, if one is wanted.
 struct Checkpointing<'a> {
     path: Option<&'a Path>,
