@@ -17,12 +17,10 @@ pub enum ReportError {
         found: usize,
     },
     /// The time of a log is not finite or runs backwards.
-    #[error(
-        "log {log:?}: time of sample {sample} is {found} s, expected a finite number not below {least} s"
-    )]
+    #[error("{place}: time of sample {sample} is {found} s, expected a finite number not below {least} s")]
     Time {
-        /// Name of the log.
-        log: String,
+        /// Where, e.g. `log "train"`.
+        place: String,
         /// Index of the sample, from 0.
         sample: usize,
         /// Time before it, s; minus infinity for the first sample.

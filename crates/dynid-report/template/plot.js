@@ -1,8 +1,7 @@
 "use strict";
-// Effort plots: one SVG per joint, one time window per log. Data of a log is decoded when it first comes into view.
+// Plots over time: one SVG per panel, one time window per log. Data of a log is decoded when it first comes into view.
 (function () {
   const HEIGHT = 150, LEFT = 52, RIGHT = 10, TOP = 6, BOTTOM = 20, PAPER_WIDTH = 690;
-  const SERIES = ["measured", "residual", "predicted"];
   const logs = new Map();
 
   function bytes(text) {
@@ -16,7 +15,6 @@
     return out;
   }
   function decodeValues(coded) {
-    if (!coded) return null;
     const view = bytes(coded.data), out = new Float64Array(view.byteLength / 2);
     for (let i = 0; i < out.length; i++) {
       const q = view.getInt16(2 * i, true), share = (q + 32767) / 65534;
@@ -29,9 +27,10 @@
     const data = JSON.parse(document.getElementById("log-" + id).textContent);
     const t = decodeTimes(data.time), end = t.length - 1;
     const log = { t: t, gap: data.gap, first: t[0], last: t[end] > t[0] ? t[end] : t[0] + 1, hidden: new Set(),
-      joints: data.joints.map(function (joint) {
-        return { unit: joint.unit, unused: joint.unused, measured: decodeValues(joint.measured),
-          predicted: decodeValues(joint.predicted), residual: decodeValues(joint.residual) };
+      panels: data.panels.map(function (panel) {
+        return { shaded: panel.shaded, limits: panel.limits, series: panel.series.map(function (series) {
+          return { name: series.name, kind: series.kind, values: decodeValues(series.values) };
+        }) };
       }) };
     log.a = log.first;
     log.b = log.last;
@@ -80,13 +79,13 @@
     return d;
   }
   function draw(figure, width) {
-    const box = figure.querySelector(".canvas"), log = load(figure.dataset.log), joint = log.joints[figure.dataset.joint];
+    const box = figure.querySelector(".canvas"), log = load(figure.dataset.log), panel = log.panels[figure.dataset.panel];
     const w = width || box.clientWidth;
     if (w < 80) return;
     const i = Math.max(0, firstNotBelow(log.t, log.a) - 1), j = Math.min(log.t.length, firstNotBelow(log.t, log.b) + 1);
-    const shown = SERIES.filter(function (name) { return joint[name] && !log.hidden.has(name); });
-    let low = Infinity, high = -Infinity;
-    for (const name of shown) for (let k = i; k < j; k++) { const v = joint[name][k]; if (v < low) low = v; if (v > high) high = v; }
+    const shown = panel.series.filter(function (series) { return !log.hidden.has(series.kind); });
+    let low = Math.min(...panel.limits), high = Math.max(...panel.limits);
+    for (const series of shown) for (let k = i; k < j; k++) { const v = series.values[k]; if (v < low) low = v; if (v > high) high = v; }
     if (!(low <= high)) { low = -1; high = 1; }
     if (!(high - low > 1e-12 * Math.max(Math.abs(low), Math.abs(high)))) { const pad = Math.abs(high) * 0.1 || 1; low -= pad; high += pad; }
     const margin = 0.05 * (high - low);
@@ -95,11 +94,11 @@
     const right = w - RIGHT, floor = HEIGHT - BOTTOM;
     const x = function (t) { return LEFT + (t - log.a) / (log.b - log.a) * (right - LEFT); };
     const y = function (v) { return floor - (v - low) / (high - low) * (floor - TOP); };
-    const clip = "clip-" + figure.dataset.log + "-" + figure.dataset.joint;
+    const clip = "clip-" + figure.dataset.log + "-" + figure.dataset.panel;
     let svg = '<svg viewBox="0 0 ' + w + " " + HEIGHT + '" preserveAspectRatio="none"><clipPath id="' + clip + '"><rect x="' + LEFT + '" y="0" width="' + (right - LEFT) + '" height="' + floor + '"/></clipPath><g clip-path="url(#' + clip + ')">';
-    for (const stretch of joint.unused) {
+    for (const stretch of panel.shaded) {
       if (stretch[1] < log.a || stretch[0] > log.b) continue;
-      svg += '<rect class="unused" x="' + x(stretch[0]).toFixed(1) + '" y="' + TOP + '" width="' + Math.max(0.7, x(stretch[1]) - x(stretch[0])).toFixed(1) + '" height="' + (floor - TOP) + '"/>';
+      svg += '<rect class="shaded" x="' + x(stretch[0]).toFixed(1) + '" y="' + TOP + '" width="' + Math.max(0.7, x(stretch[1]) - x(stretch[0])).toFixed(1) + '" height="' + (floor - TOP) + '"/>';
     }
     svg += "</g>";
     const ty = ticks(low, high, 4), tx = ticks(log.a, log.b, Math.max(2, Math.min(10, w / 90)));
@@ -111,7 +110,8 @@
       svg += '<path class="grid" d="M' + x(t).toFixed(1) + " " + TOP + "V" + floor + '"/><text x="' + Math.min(x(t), w - 4).toFixed(1) + '" y="' + (HEIGHT - 5) + '" text-anchor="' + (x(t) > w - 30 ? "end" : "middle") + '">' + label(t, tx) + (last ? " s" : "") + "</text>";
     });
     svg += '<g clip-path="url(#' + clip + ')">';
-    for (const name of shown) svg += '<path class="' + name + '" d="' + path(log, joint[name], i, j, x, y, right - LEFT) + '"/>';
+    for (const v of panel.limits) svg += '<path class="limit" d="M' + LEFT + " " + y(v).toFixed(1) + "H" + right + '"/>';
+    for (const series of shown) svg += '<path class="' + series.kind + '" d="' + path(log, series.values, i, j, x, y, right - LEFT) + '"/>';
     svg += '<rect class="select" y="' + TOP + '" width="0" height="' + (floor - TOP) + '"/><path class="cursor"/></g></svg>';
     box.innerHTML = svg;
     figure.drawn = true;
@@ -141,11 +141,11 @@
     if (action === "all") zoom(id, log.first, log.last);
   }
   function readOut(figure, px) {
-    const log = load(figure.dataset.log), joint = log.joints[figure.dataset.joint], time = figure.scale.time(px);
+    const log = load(figure.dataset.log), panel = log.panels[figure.dataset.panel], time = figure.scale.time(px);
     let k = Math.min(log.t.length - 1, firstNotBelow(log.t, time));
     if (k > 0 && time - log.t[k - 1] < log.t[k] - time) k--;
     const parts = [log.t[k].toFixed(3) + " s"];
-    for (const name of ["measured", "predicted", "residual"]) if (joint[name]) parts.push(name + " " + (isNaN(joint[name][k]) ? "-" : joint[name][k].toPrecision(4)));
+    for (const series of panel.series) parts.push(series.name + " " + (isNaN(series.values[k]) ? "-" : series.values[k].toPrecision(4)));
     figure.querySelector("output").textContent = parts.join("   ");
     const cx = figure.scale.x(log.t[k]);
     figure.querySelector(".cursor").setAttribute("d", "M" + cx.toFixed(1) + " " + TOP + "V" + figure.scale.floor);
@@ -220,7 +220,7 @@
   let pending = 0;
   window.addEventListener("resize", function () { clearTimeout(pending); pending = setTimeout(redraw, 100); });
   window.addEventListener("beforeprint", function () {
-    for (const figure of figures) if (figure.closest("details").open) draw(figure, PAPER_WIDTH);
+    for (const figure of figures) if (!figure.closest("details:not([open])")) draw(figure, Number(figure.dataset.paper) || PAPER_WIDTH);
   });
   window.addEventListener("afterprint", function () { redraw(); });
 })();

@@ -247,7 +247,7 @@ fn names_cannot_become_markup() {
     // The joint's name also stands in the plots' data, where it must come back unchanged.
     let json = between(&page, "<script type=\"application/json\" id=\"log-0\">", "</script>")[0];
     let payload: serde_json::Value = serde_json::from_str(json).unwrap();
-    assert_eq!(payload["joints"][0]["name"], HOSTILE);
+    assert_eq!(payload["panels"][0]["name"], HOSTILE);
 }
 
 #[test]
@@ -261,7 +261,7 @@ fn a_long_log_of_a_seven_axis_robot_stays_below_four_megabytes() {
     assert!(page.len() < 4_000_000, "{} bytes", page.len());
     let json = between(&page, "<script type=\"application/json\" id=\"log-0\">", "</script>")[0];
     let payload: serde_json::Value = serde_json::from_str(json).unwrap();
-    let characters = payload["joints"][0]["measured"]["data"].as_str().unwrap().len();
+    let characters = payload["panels"][0]["series"][0]["values"]["data"].as_str().unwrap().len();
     assert!(characters * 3 / 8 >= 2000, "{} points", characters * 3 / 8);
 }
 

@@ -1,6 +1,7 @@
 //! Small still pictures, as inline SVG without any text from outside.
 
 mod autocorrelation;
+mod axis;
 mod bars;
 mod histogram;
 mod interval;

@@ -24,13 +24,7 @@ pub(super) fn check(data: &ReportData) -> Result<(), ReportError> {
 }
 
 fn check_series(data: &ReportData, log: &LogReport, series: &LogSeries) -> Result<(), ReportError> {
-    let mut least = f64::NEG_INFINITY;
-    for (sample, &found) in series.time_s.iter().enumerate() {
-        if !found.is_finite() || found < least {
-            return Err(ReportError::Time { log: log.name.clone(), sample, least, found });
-        }
-        least = found;
-    }
+    time(&format!("log {:?}", log.name), &series.time_s)?;
     let samples = series.time_s.len();
     for (joint, efforts) in data.joints.iter().zip(&series.joints) {
         let place = |what: &str| format!("log {:?}, joint {:?}, {what}", log.name, joint.name);
@@ -41,6 +35,18 @@ fn check_series(data: &ReportData, log: &LogReport, series: &LogSeries) -> Resul
         if let Some(used) = &efforts.used {
             length(&place("used"), used.len(), samples)?;
         }
+    }
+    Ok(())
+}
+
+/// Fails unless every time is finite and none is below the one before.
+fn time(place: &str, time_s: &[f64]) -> Result<(), ReportError> {
+    let mut least = f64::NEG_INFINITY;
+    for (sample, &found) in time_s.iter().enumerate() {
+        if !found.is_finite() || found < least {
+            return Err(ReportError::Time { place: place.to_owned(), sample, least, found });
+        }
+        least = found;
     }
     Ok(())
 }

@@ -11,10 +11,12 @@ use crate::number::{self, UNDEFINED};
 pub(super) const PAGE: &str = "page.html";
 
 /// Every name ends in `.html`, which switches automatic escaping on.
-const TEMPLATES: [(&str, &str); 13] = [
+const TEMPLATES: [(&str, &str); 15] = [
+    ("shell.html", include_str!("../../template/shell.html")),
     (PAGE, include_str!("../../template/page.html")),
     ("macros.html", include_str!("../../template/macros.html")),
     ("verdict.html", include_str!("../../template/verdict.html")),
+    ("warnings.html", include_str!("../../template/warnings.html")),
     ("trust.html", include_str!("../../template/trust.html")),
     ("consistency.html", include_str!("../../template/consistency.html")),
     ("precision.html", include_str!("../../template/precision.html")),

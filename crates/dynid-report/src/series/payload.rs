@@ -1,4 +1,4 @@
-//! What the page's script gets for one log.
+//! What the page's script gets for one log, or for one trajectory.
 
 use serde::Serialize;
 
@@ -29,26 +29,36 @@ impl PointBudget {
     }
 }
 
-/// One log for the script.
+/// What is drawn over one common time, for the script.
 #[derive(Debug, Serialize)]
-pub(crate) struct LogPayload<'a> {
+pub(crate) struct PlotPayload<'a> {
     time: EncodedTimes,
     /// A step longer than this, s, is a gap in the log and breaks the curves.
     gap: f64,
     /// Samples behind one pair of points; absent if every sample is drawn.
     pub(crate) bucket: Option<usize>,
-    joints: Vec<JointPayload<'a>>,
+    panels: Vec<Panel<'a>>,
+}
+
+/// One plot.
+#[derive(Debug, Serialize)]
+struct Panel<'a> {
+    name: &'a str,
+    /// In the order drawn: the last one lies on top.
+    series: Vec<Curve>,
+    /// Shaded stretches of time, s.
+    shaded: Vec<[f64; 2]>,
+    /// Values marked by a line across; always inside the picture.
+    limits: Vec<f64>,
 }
 
 #[derive(Debug, Serialize)]
-struct JointPayload<'a> {
-    name: &'a str,
-    unit: &'a str,
-    measured: EncodedValues,
-    predicted: Option<EncodedValues>,
-    residual: Option<EncodedValues>,
-    /// Stretches that took no part in the estimate, s.
-    unused: Vec<[f64; 2]>,
+struct Curve {
+    /// What it is called when values are read out.
+    name: &'static str,
+    /// Class of its line, by which it is shown and hidden.
+    kind: &'static str,
+    values: EncodedValues,
 }
 
 /// `joints` and `series.joints` have equal length and each series has the length of `series.time_s`.
@@ -56,39 +66,47 @@ pub(crate) fn log_payload<'a>(
     joints: &'a [Joint],
     series: &LogSeries,
     budget: PointBudget,
-) -> LogPayload<'a> {
+) -> PlotPayload<'a> {
     let decimation = Decimation::new(series.time_s.len(), budget.per_series);
-    let times = decimation.times(&series.time_s);
-    let joints = joints
+    let panels = joints
         .iter()
         .zip(&series.joints)
-        .map(|(joint, efforts)| joint_payload(joint, efforts, &series.time_s, decimation))
+        .map(|(joint, efforts)| joint_panel(joint, efforts, &series.time_s, decimation))
         .collect();
-    LogPayload {
+    payload(&series.time_s, decimation, panels)
+}
+
+fn payload<'a>(time_s: &[f64], decimation: Decimation, panels: Vec<Panel<'a>>) -> PlotPayload<'a> {
+    let times = decimation.times(time_s);
+    PlotPayload {
         gap: 5.0 * median_step(&times),
         time: encode_times(&times),
         bucket: decimation.samples_per_bucket(),
-        joints,
+        panels,
     }
 }
 
-fn joint_payload<'a>(
+fn joint_panel<'a>(
     joint: &'a Joint,
     efforts: &JointSeries,
     time_s: &[f64],
     decimation: Decimation,
-) -> JointPayload<'a> {
-    let encode = |samples: &[f64]| encode_values(&decimation.values(samples));
-    JointPayload {
+) -> Panel<'a> {
+    let curve = |name, samples: &[f64]| Curve {
+        name,
+        kind: name,
+        values: encode_values(&decimation.values(samples)),
+    };
+    let mut series = vec![curve("measured", &efforts.measured)];
+    if let Some(predicted) = efforts.predicted.as_deref() {
+        series.push(curve("residual", &residual(&efforts.measured, predicted)));
+        series.push(curve("predicted", predicted));
+    }
+    Panel {
         name: &joint.name,
-        unit: &joint.effort_unit,
-        measured: encode(&efforts.measured),
-        predicted: efforts.predicted.as_deref().map(encode),
-        residual: efforts
-            .predicted
-            .as_deref()
-            .map(|predicted| encode(&residual(&efforts.measured, predicted))),
-        unused: efforts.used.as_deref().map(|used| unused_stretches(time_s, used)).unwrap_or_default(),
+        series,
+        shaded: efforts.used.as_deref().map(|used| unused_stretches(time_s, used)).unwrap_or_default(),
+        limits: Vec::new(),
     }
 }
 
