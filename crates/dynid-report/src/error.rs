@@ -28,6 +28,12 @@ pub enum ReportError {
         /// Time found, s.
         found: f64,
     },
+    /// The recorded part of a trajectory is not a stretch of time.
+    #[error("recorded part: {found:?} s, expected a finite start not behind its end")]
+    Recorded {
+        /// Start and end, s.
+        found: [f64; 2],
+    },
     /// The page could not be laid out.
     #[error("the report's page could not be laid out")]
     Template(#[from] minijinja::Error),

@@ -1,7 +1,8 @@
-//! The report: one HTML file that tells a customer what was identified and how far it can be trusted.
+//! Reports: one HTML file that tells a customer what was identified and how far it can be trusted, another that shows a
+//! designed trajectory and what its log will tell.
 //!
-//! Fill a [`ReportData`], call [`render`], write the text to a file. The crate knows nothing of models or
-//! estimators, and the page needs nothing but a browser: no network, no second file.
+//! Fill a [`ReportData`] or a [`DesignReport`], call [`render`] or [`render_design`], write the text to a file. The crate
+//! knows nothing of models or estimators, and a page needs nothing but a browser: no network, no second file.
 //!
 //! # Why the plots are our own
 //!
@@ -13,8 +14,9 @@
 //! | `charming` 0.6.0 | 1.03 MB | its HTML renderer loads the script from a network address; the copy of the script it ships is reachable only through its server-side feature, which embeds a JavaScript engine |
 //! | `template/plot.js` | 12 kB | drawn as SVG: zoom, pan, read-out, prints as vectors |
 //!
-//! The curves are drawn by the script from decimated series (least and greatest sample of each bucket), the small
-//! still pictures (histogram, autocorrelation, 95 % interval) by Rust, so that they are there without a script too.
+//! The curves are drawn by the script from decimated series (least and greatest sample of each bucket), the still
+//! pictures (histogram, autocorrelation, 95 % interval, paths of frames) by Rust, so that they are there without a script
+//! too.
 
 mod data;
 mod drawing;
@@ -24,11 +26,13 @@ mod page;
 mod series;
 
 pub use data::{
-    BaseParameter, Check, Chosen, Consistency, ConsistencyStatus, Fact, HeldOut, HeldOutJoint, InputFile,
-    Joint, JointDelay, JointQuality, JointSeries, Ladder, Limit, LogReport, LogRole, LogSeries, LogWhiteness,
-    Observation, Origin, OwnerKind, ParameterVerdict, Precision, Provenance, Pruning, PruningStep, Quality,
-    ReportData, Robot, Rung, StandardParameter, Status, UnidentifiableColumn, ValidationPrice, Value,
+    BaseParameter, Check, Chosen, ConfoundedPair, Consistency, ConsistencyStatus, DesignJoint,
+    DesignParameter, DesignQuality, DesignReport, DesignStart, Fact, FramePath, HeldOut, HeldOutJoint,
+    InputFile, Joint, JointDelay, JointMotion, JointQuality, JointSeries, Ladder, Limit, LimitUse, LogReport,
+    LogRole, LogSeries, LogWhiteness, Observation, Obstacle, Origin, OwnerKind, ParameterShare,
+    ParameterVerdict, Precision, Provenance, Pruning, PruningStep, Quality, RandomMotion, ReportData, Robot,
+    Rung, Shape, StandardParameter, Starts, Status, Trajectory, UnidentifiableColumn, ValidationPrice, Value,
     Verdict, Warning, Whiteness,
 };
 pub use error::ReportError;
-pub use page::render;
+pub use page::{render, render_design};

@@ -53,13 +53,14 @@
     if (big >= 1e6 || scale.step < 1e-6) return Number(value.toPrecision(4)).toExponential();
     return Math.abs(value) < scale.step / 2 ? "0" : value.toFixed(scale.decimals);
   }
-  // Path of values i..j; where points are denser than pixels, least and greatest of each pixel column.
+  // Path of values i..j; where points are denser than pixels, least and greatest of each half pixel, in the curve's direction.
   function path(log, v, i, j, x, y, width) {
-    const dense = j - i > 2 * width;
-    let d = "", pen = false, column = -1, low = 0, high = 0, before = NaN;
+    const dense = j - i > 4 * width;
+    let d = "", pen = false, column = -1, first = 0, last = 0, low = 0, high = 0, before = NaN;
     function flush() {
       if (column < 0) return;
-      d += (pen ? "L" : "M") + column + " " + y(low).toFixed(1) + (high > low ? "L" + column + " " + y(high).toFixed(1) : "");
+      const a = last < first ? high : low, b = last < first ? low : high;
+      d += (pen ? "L" : "M") + column + " " + y(a).toFixed(1) + (high > low ? "L" + column + " " + y(b).toFixed(1) : "");
       pen = true;
       column = -1;
     }
@@ -70,10 +71,11 @@
       before = time;
       const px = x(time);
       if (!dense) { d += (pen ? "L" : "M") + px.toFixed(1) + " " + y(value).toFixed(1); pen = true; continue; }
-      const c = Math.round(px);
-      if (c !== column) { flush(); column = c; low = high = value; }
+      const c = Math.round(2 * px) / 2;
+      if (c !== column) { flush(); column = c; first = low = high = value; }
       else if (value < low) low = value;
       else if (value > high) high = value;
+      last = value;
     }
     flush();
     return d;
@@ -101,7 +103,9 @@
       svg += '<rect class="shaded" x="' + x(stretch[0]).toFixed(1) + '" y="' + TOP + '" width="' + Math.max(0.7, x(stretch[1]) - x(stretch[0])).toFixed(1) + '" height="' + (floor - TOP) + '"/>';
     }
     svg += "</g>";
-    const ty = ticks(low, high, 4), tx = ticks(log.a, log.b, Math.max(2, Math.min(10, w / 90)));
+    let ty = ticks(low, high, 4);
+    if (ty.at.length < 3) ty = ticks(low, high, 8);
+    const tx = ticks(log.a, log.b, Math.max(2, Math.min(10, w / 90)));
     for (const v of ty.at) {
       svg += '<path class="' + (Math.abs(v) < ty.step / 2 ? "zero" : "grid") + '" d="M' + LEFT + " " + y(v).toFixed(1) + "H" + right + '"/><text x="' + (LEFT - 6) + '" y="' + (y(v) + 3.5).toFixed(1) + '" text-anchor="end">' + label(v, ty) + "</text>";
     }

@@ -12,6 +12,7 @@
 
 mod conditioning;
 mod consistency;
+mod design;
 mod log;
 mod parameters;
 mod precision;
@@ -21,6 +22,10 @@ mod verdict;
 
 pub use conditioning::{Chosen, JointDelay, Ladder, Observation, Origin, Rung, UnidentifiableColumn};
 pub use consistency::{Consistency, ConsistencyStatus, HeldOut, HeldOutJoint, Limit, ValidationPrice};
+pub use design::{
+    ConfoundedPair, DesignJoint, DesignParameter, DesignQuality, DesignReport, DesignStart, FramePath,
+    JointMotion, LimitUse, Obstacle, ParameterShare, RandomMotion, Shape, Starts, Trajectory,
+};
 pub use log::{JointQuality, JointSeries, LogReport, LogRole, LogSeries, Quality};
 pub use parameters::{BaseParameter, OwnerKind, ParameterVerdict, StandardParameter};
 pub use precision::{LogWhiteness, Precision, Whiteness};
@@ -153,6 +158,12 @@ impl From<Option<f64>> for Value {
 impl From<u64> for Value {
     fn from(count: u64) -> Self {
         Self::Count(count)
+    }
+}
+
+impl From<Option<u64>> for Value {
+    fn from(count: Option<u64>) -> Self {
+        count.map_or(Self::Undefined, Self::Count)
     }
 }
 

@@ -6,12 +6,16 @@ mod bars;
 mod histogram;
 mod interval;
 mod path;
+mod strip;
+mod views;
 
 pub(crate) use autocorrelation::autocorrelation_svg;
 pub(crate) use bars::{counts_svg, meter_svg, pair_svg};
 pub(crate) use histogram::histogram_svg;
 pub(crate) use interval::interval_svg;
 pub(crate) use path::{PathMarks, PathPoint, ceiling, fewest, path_svg};
+pub(crate) use strip::{StripDot, strip_svg};
+pub(crate) use views::{PathParts, View, view_pictures};
 
 /// Size and margins of the two residual pictures, in pixels at full size.
 mod frame {

@@ -40,7 +40,7 @@ fn check_series(data: &ReportData, log: &LogReport, series: &LogSeries) -> Resul
 }
 
 /// Fails unless every time is finite and none is below the one before.
-fn time(place: &str, time_s: &[f64]) -> Result<(), ReportError> {
+pub(super) fn time(place: &str, time_s: &[f64]) -> Result<(), ReportError> {
     let mut least = f64::NEG_INFINITY;
     for (sample, &found) in time_s.iter().enumerate() {
         if !found.is_finite() || found < least {
@@ -51,11 +51,11 @@ fn time(place: &str, time_s: &[f64]) -> Result<(), ReportError> {
     Ok(())
 }
 
-fn per_joint(place: &str, found: usize, joints: usize) -> Result<(), ReportError> {
+pub(super) fn per_joint(place: &str, found: usize, joints: usize) -> Result<(), ReportError> {
     if found == 0 { Ok(()) } else { length(place, found, joints) }
 }
 
-fn length(place: &str, found: usize, expected: usize) -> Result<(), ReportError> {
+pub(super) fn length(place: &str, found: usize, expected: usize) -> Result<(), ReportError> {
     if found == expected {
         return Ok(());
     }

@@ -9,9 +9,10 @@ use crate::drawing::{interval_svg, meter_svg, pair_svg};
 use crate::number::{self, UNDEFINED};
 
 pub(super) const PAGE: &str = "page.html";
+pub(super) const DESIGN_PAGE: &str = "design/page.html";
 
 /// Every name ends in `.html`, which switches automatic escaping on.
-const TEMPLATES: [(&str, &str); 15] = [
+const TEMPLATES: [(&str, &str); 23] = [
     ("shell.html", include_str!("../../template/shell.html")),
     (PAGE, include_str!("../../template/page.html")),
     ("macros.html", include_str!("../../template/macros.html")),
@@ -26,6 +27,14 @@ const TEMPLATES: [(&str, &str); 15] = [
     ("effort.html", include_str!("../../template/effort.html")),
     ("parameters.html", include_str!("../../template/parameters.html")),
     ("conditioning.html", include_str!("../../template/conditioning.html")),
+    (DESIGN_PAGE, include_str!("../../template/design/page.html")),
+    ("design/trajectory.html", include_str!("../../template/design/trajectory.html")),
+    ("design/forecast.html", include_str!("../../template/design/forecast.html")),
+    ("design/parameters.html", include_str!("../../template/design/parameters.html")),
+    ("design/limits.html", include_str!("../../template/design/limits.html")),
+    ("design/motion.html", include_str!("../../template/design/motion.html")),
+    ("design/paths.html", include_str!("../../template/design/paths.html")),
+    ("design/starts.html", include_str!("../../template/design/starts.html")),
     ("provenance.html", include_str!("../../template/provenance.html")),
 ];
 

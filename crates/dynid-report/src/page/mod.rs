@@ -2,13 +2,14 @@
 
 mod checks;
 mod context;
+mod design;
 mod environment;
 mod prose;
 mod pruning;
 mod script_data;
 mod trust;
 
-use crate::data::ReportData;
+use crate::data::{DesignReport, ReportData};
 use crate::error::ReportError;
 
 /// Lays the report out as one HTML file that needs nothing else.
@@ -26,4 +27,19 @@ pub fn render(data: &ReportData) -> Result<String, ReportError> {
     let environment = environment::environment()?;
     let context = context::context(data)?;
     Ok(environment.get_template(environment::PAGE)?.render(context)?)
+}
+
+/// Lays the report of a designed trajectory out as one HTML file, with the properties of [`render`]'s.
+///
+/// # Errors
+///
+/// [`ReportError::Length`] if the motion has not one entry per entry of [`DesignReport::joints`], or an array of it or the
+/// path of a frame is not as long as the time; [`ReportError::Time`] if the time is not finite or runs backwards;
+/// [`ReportError::Recorded`] if the recorded part does not run from a finite start to an end behind it. The other variants
+/// would be faults of this crate.
+pub fn render_design(data: &DesignReport) -> Result<String, ReportError> {
+    design::check(data)?;
+    let environment = environment::environment()?;
+    let context = design::context(data)?;
+    Ok(environment.get_template(environment::DESIGN_PAGE)?.render(context)?)
 }

@@ -2,8 +2,10 @@
 
 mod decimation;
 mod encoding;
+mod motion;
 mod payload;
 mod residual;
 
+pub(crate) use motion::{Quantity, drawn_limits, motion_payload};
 pub(crate) use payload::{PointBudget, log_payload, median_step};
 pub(crate) use residual::{Autocorrelation, ResidualSummary, residual, summarise};

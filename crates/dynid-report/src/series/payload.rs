@@ -10,7 +10,7 @@ use crate::data::{Joint, JointSeries, LogReport, LogSeries};
 /// Points drawn per series. Each costs 2.7 bytes of page.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PointBudget {
-    per_series: usize,
+    pub(super) per_series: usize,
 }
 
 impl PointBudget {
@@ -20,12 +20,19 @@ impl PointBudget {
     const LEAST: usize = 400;
     /// 40 s at 500 Hz in full.
     const MOST: usize = 20_000;
+    /// Enough for smooth curves at a zoom of five.
+    const MOST_SMOOTH: usize = 4000;
 
     /// Shares the page's points among the series of all logs.
     pub(crate) fn share(logs: &[LogReport]) -> Self {
         let series: usize =
             logs.iter().filter_map(|log| log.series.as_ref()).map(|series| 3 * series.joints.len()).sum();
         Self { per_series: (Self::TOTAL / series.max(1)).clamp(Self::LEAST, Self::MOST) }
+    }
+
+    /// For curves without noise.
+    pub(super) fn share_smooth(series: usize) -> Self {
+        Self { per_series: (Self::TOTAL / series.max(1)).clamp(Self::LEAST, Self::MOST_SMOOTH) }
     }
 }
 
@@ -40,25 +47,32 @@ pub(crate) struct PlotPayload<'a> {
     panels: Vec<Panel<'a>>,
 }
 
+impl PlotPayload<'_> {
+    /// Whether any stretch is shaded.
+    pub(crate) fn shaded(&self) -> bool {
+        self.panels.iter().any(|panel| !panel.shaded.is_empty())
+    }
+}
+
 /// One plot.
 #[derive(Debug, Serialize)]
-struct Panel<'a> {
-    name: &'a str,
+pub(super) struct Panel<'a> {
+    pub(super) name: &'a str,
     /// In the order drawn: the last one lies on top.
-    series: Vec<Curve>,
+    pub(super) series: Vec<Curve>,
     /// Shaded stretches of time, s.
-    shaded: Vec<[f64; 2]>,
+    pub(super) shaded: Vec<[f64; 2]>,
     /// Values marked by a line across; always inside the picture.
-    limits: Vec<f64>,
+    pub(super) limits: Vec<f64>,
 }
 
 #[derive(Debug, Serialize)]
-struct Curve {
+pub(super) struct Curve {
     /// What it is called when values are read out.
-    name: &'static str,
+    pub(super) name: &'static str,
     /// Class of its line, by which it is shown and hidden.
-    kind: &'static str,
-    values: EncodedValues,
+    pub(super) kind: &'static str,
+    pub(super) values: EncodedValues,
 }
 
 /// `joints` and `series.joints` have equal length and each series has the length of `series.time_s`.
@@ -76,7 +90,7 @@ pub(crate) fn log_payload<'a>(
     payload(&series.time_s, decimation, panels)
 }
 
-fn payload<'a>(time_s: &[f64], decimation: Decimation, panels: Vec<Panel<'a>>) -> PlotPayload<'a> {
+pub(super) fn payload<'a>(time_s: &[f64], decimation: Decimation, panels: Vec<Panel<'a>>) -> PlotPayload<'a> {
     let times = decimation.times(time_s);
     PlotPayload {
         gap: 5.0 * median_step(&times),
