@@ -15,8 +15,9 @@ pub struct Imperfections {
     pub velocity_noise: f64,
     /// Noise of the logged effort as a share of each joint's rms effort. Default 0.02.
     pub effort_noise_share: f64,
-    /// Standard deviation of further noise of the logged effort, the same for all joints, N m or N. Default 0.
-    pub effort_noise: f64,
+    /// Standard deviation of further noise of the logged effort per joint, N m or N; joints past its end have none. Default:
+    /// none.
+    pub effort_noise: Vec<f64>,
     /// Amplitude of the torque ripple as a share of each joint's rms feed-forward effort. The drive delivers it, the
     /// logged effort does not show it. Default 0.01.
     pub ripple_share: f64,
@@ -42,7 +43,7 @@ impl Default for Imperfections {
             encoder_noise: 5e-6,
             velocity_noise: 1e-3,
             effort_noise_share: 0.02,
-            effort_noise: 0.0,
+            effort_noise: Vec::new(),
             ripple_share: 0.01,
             ripple_cycles: 50.0,
             effort_delay_samples: 0.3,
@@ -62,7 +63,7 @@ impl Imperfections {
             encoder_noise: 0.0,
             velocity_noise: 0.0,
             effort_noise_share: 0.0,
-            effort_noise: 0.0,
+            effort_noise: Vec::new(),
             ripple_share: 0.0,
             ripple_cycles: 50.0,
             effort_delay_samples: 0.0,
@@ -80,7 +81,7 @@ impl Imperfections {
             ("encoder_noise", self.encoder_noise > 0.0),
             ("velocity_noise", self.velocity_noise > 0.0),
             ("effort_noise_share", self.effort_noise_share > 0.0),
-            ("effort_noise", self.effort_noise > 0.0),
+            ("effort_noise", self.effort_noise.iter().any(|s| *s > 0.0)),
             ("ripple", self.ripple_share > 0.0),
             ("effort_delay", self.effort_delay_samples != 0.0),
             ("outliers", self.outlier_share > 0.0 && self.outlier_size > 0.0),
@@ -98,13 +99,15 @@ impl Imperfections {
             ("encoder_noise", self.encoder_noise),
             ("velocity_noise", self.velocity_noise),
             ("effort_noise_share", self.effort_noise_share),
-            ("effort_noise", self.effort_noise),
             ("ripple_share", self.ripple_share),
             ("ripple_cycles", self.ripple_cycles),
             ("outlier_size", self.outlier_size),
             ("clock_jitter_s", self.clock_jitter_s),
         ] {
             demand(x.is_finite() && x >= 0.0, name, "a finite number, not negative", x)?;
+        }
+        for x in &self.effort_noise {
+            demand(x.is_finite() && *x >= 0.0, "effort_noise", "a finite number, not negative", x)?;
         }
         for (name, x) in [("outlier_share", self.outlier_share), ("dropped_share", self.dropped_share)] {
             demand((0.0..=0.5).contains(&x), name, "0 to 0.5", x)?;

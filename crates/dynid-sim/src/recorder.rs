@@ -85,9 +85,10 @@ impl Recording {
         let mut noise = generator(seed, Cause::Effort);
         let mut outliers = generator(seed, Cause::Outliers);
         let mut effort = self.effort;
-        for signal in &mut effort {
+        for (joint, signal) in effort.iter_mut().enumerate() {
             let rms = dynid_motion::signal::rms(signal);
-            let sigma = (faults.effort_noise_share * rms).hypot(faults.effort_noise);
+            let absolute = faults.effort_noise.get(joint).copied().unwrap_or(0.0);
+            let sigma = (faults.effort_noise_share * rms).hypot(absolute);
             for e in signal {
                 *e += sigma * normal(&mut noise);
                 let (draw, size): (f64, f64) = (outliers.random(), normal(&mut outliers));

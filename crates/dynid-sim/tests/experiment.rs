@@ -196,7 +196,7 @@ fn faults_keep_to_themselves() {
 fn noise_has_the_size_that_was_asked_for() {
     let mut with = settings(Imperfections {
         effort_noise_share: 0.03,
-        effort_noise: 0.4,
+        effort_noise: vec![0.4; 3],
         encoder_noise: 1e-4,
         velocity_noise: 2e-3,
         clock_jitter_s: 1e-4,

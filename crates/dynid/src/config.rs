@@ -1,8 +1,11 @@
 //! The configuration of a run, a TOML file.
 
 mod estimator;
+mod per_joint;
 
 pub use estimator::{BoundConfig, Consistency, EstimatorConfig, Method, PriorDistance, Variances};
+pub use per_joint::PerJoint;
+pub(crate) use per_joint::known;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

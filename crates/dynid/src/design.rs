@@ -16,7 +16,7 @@ use crate::Error;
 use crate::robot::{Robot, RobotOptions};
 pub use config::{
     BoxConfig, CapsuleConfig, ColumnConfig, ColumnsName, CriterionConfig, CriterionName, CylinderConfig,
-    DesignConfig, HalfSpaceConfig, KeepConfig, LimitsConfig, PerJoint, SearchConfig, TrajectoryConfig,
+    DesignConfig, HalfSpaceConfig, KeepConfig, LimitsConfig, SearchConfig, TrajectoryConfig,
 };
 pub use motion::{DesignedMotion, LegFault, MotionPaths};
 use problem::RobotProblem;

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use dynid::design::{CriterionName, DesignConfig, PerJoint, design};
+use dynid::config::PerJoint;
+use dynid::design::{CriterionName, DesignConfig, design};
 use dynid::robot::{Robot, RobotOptions};
 use dynid::simulate::{SimulateSettings, simulate};
 use dynid::{Config, Estimate, identify};
@@ -26,9 +27,11 @@ fn config() -> DesignConfig {
 
 /// Runs a trajectory file on the virtual robot, effort noise alone, and identifies the robot from the log.
 fn identified(folder: &Path, trajectory: &Path, seed: u64) -> Estimate {
+    let noise: Vec<String> = NOISE.iter().enumerate().map(|(k, s)| format!("j{} = {s}", k + 1)).collect();
+    let noise = noise.join(", ");
     let text = format!(
         "mode = 'closed_loop'\nfollow = '{}'\nseed = {seed}\nencoder_bits = 0\neffort_noise = 0.0\ndelay_samples = 0.0\n\
-         [imperfections]\neffort_noise_absolute = {NOISE:?}\nencoder_noise = 0.0\nripple_share = 0.0\n\
+         [imperfections]\neffort_noise_absolute = {{ {noise} }}\nencoder_noise = 0.0\nripple_share = 0.0\n\
          outlier_share = 0.0\ndropped_share = 0.0\nclock_jitter_s = 0.0\n",
         trajectory.display()
     );

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use dynid::design::{ColumnsName, CriterionName, DesignConfig, DesignRecord, MotionPaths, PerJoint, design};
+use dynid::config::PerJoint;
+use dynid::design::{ColumnsName, CriterionName, DesignConfig, DesignRecord, MotionPaths, design};
 use dynid::io::OutputError;
 use dynid::io::output::write_atomically;
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::config::ElementsConfig;
+use crate::config::{ElementsConfig, PerJoint};
 
 /// What is to be designed, and how. Every key but `robot` has a default.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
@@ -82,52 +82,6 @@ impl Default for TrajectoryConfig {
             frames: Vec::new(),
         }
     }
-}
-
-/// One number for all joints, or numbers for some.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
-#[serde(untagged)]
-pub enum PerJoint {
-    /// The same for all.
-    All(f64),
-    /// By joint.
-    Each(BTreeMap<String, f64>),
-}
-
-impl Default for PerJoint {
-    fn default() -> Self {
-        PerJoint::Each(BTreeMap::new())
-    }
-}
-
-impl PerJoint {
-    /// Per joint, `None` where nothing is said.
-    ///
-    /// # Errors
-    /// [`Error::UnknownJoint`], [`Error::Setting`] if a number is not positive.
-    pub(super) fn resolve(&self, what: &str, joints: &[String]) -> Result<Vec<Option<f64>>, Error> {
-        let positive = |name: &str, x: f64| {
-            if x > 0.0 && x.is_finite() { Ok(x) } else { Err(Error::setting(name, "a positive number", x)) }
-        };
-        match self {
-            PerJoint::All(x) => Ok(vec![Some(positive(what, *x)?); joints.len()]),
-            PerJoint::Each(map) => {
-                for (joint, x) in map {
-                    known(joint, joints)?;
-                    positive(&format!("{what}.{joint}"), *x)?;
-                }
-                Ok(joints.iter().map(|j| map.get(j).copied()).collect())
-            }
-        }
-    }
-}
-
-/// Refuses a joint that the robot does not have.
-pub(super) fn known(joint: &String, joints: &[String]) -> Result<(), Error> {
-    if joints.contains(joint) {
-        return Ok(());
-    }
-    Err(Error::UnknownJoint { name: joint.clone(), known: joints.to_vec() })
 }
 
 /// Limits of joints. What is not given comes from the robot file.

@@ -15,8 +15,9 @@ use dynid_model::spatial::Vec3;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
 use dynid_motion::trajectory::{Form, RowOrder};
 
-use super::config::{ColumnsName, CriterionName, DesignConfig, known};
+use super::config::{ColumnsName, CriterionName, DesignConfig};
 use crate::Error;
+use crate::config::known;
 use crate::elements::ElementPlan;
 use crate::nominal::{nominal_parameters, typical_efforts};
 use crate::robot::Robot;
@@ -166,9 +167,9 @@ fn joint_limits(
     for joint in l.position.keys() {
         known(joint, joints)?;
     }
-    let velocity = l.velocity.resolve("limits.velocity", joints)?;
-    let acceleration = l.acceleration.resolve("limits.acceleration", joints)?;
-    let jerk = l.jerk.resolve("limits.jerk", joints)?;
+    let velocity = l.velocity.positive("limits.velocity", joints)?;
+    let acceleration = l.acceleration.positive("limits.acceleration", joints)?;
+    let jerk = l.jerk.positive("limits.jerk", joints)?;
     let owners = robot.mechanism.rate_bodies();
     let mut unlimited = Vec::new();
     let mut assumed = Vec::new();
@@ -231,7 +232,7 @@ fn joint_limits(
 }
 
 fn effort_limits(robot: &Robot, config: &DesignConfig, joints: &[String]) -> Result<Vec<Option<f64>>, Error> {
-    let given = config.limits.effort.resolve("limits.effort", joints)?;
+    let given = config.limits.effort.positive("limits.effort", joints)?;
     let owners = robot.mechanism.rate_bodies();
     let stated = |k: usize| {
         let limit = robot.mechanism.bodies()[owners[k]].joint.limits.effort;
@@ -314,7 +315,7 @@ fn noise(
     typical: Option<&[f64]>,
     assumptions: &mut Vec<String>,
 ) -> Result<Vec<f64>, Error> {
-    let given = config.criterion.noise.resolve("criterion.noise", joints)?;
+    let given = config.criterion.noise.positive("criterion.noise", joints)?;
     if given.iter().any(Option::is_none) {
         assumptions.push(format!(
             "noise of the effort is not stated for {}: {} % of the effort limit (of the largest nominal effort where \

@@ -44,7 +44,7 @@ pub(super) fn experiment(
         log_rate_hz: settings.rate_hz,
         tolerance: plant_table.tolerance,
         control: control(&model, &table, settings.rate_hz)?,
-        imperfections: imperfections(settings),
+        imperfections: imperfections(settings, &model.mechanism().rate_names())?,
         channels: channels.collect::<Result<_, _>>()?,
         seed: settings.seed,
     };
@@ -100,17 +100,18 @@ fn control(
     })
 }
 
-fn imperfections(settings: &SimulateSettings) -> Imperfections {
+fn imperfections(settings: &SimulateSettings, joints: &[String]) -> Result<Imperfections, Error> {
     if settings.perfect {
-        return Imperfections::none();
+        return Ok(Imperfections::none());
     }
     let table = settings.imperfections.clone().unwrap_or_default();
-    Imperfections {
+    let noise = table.effort_noise_absolute.not_negative("imperfections.effort_noise_absolute", joints)?;
+    Ok(Imperfections {
         encoder_bits: settings.encoder_bits,
         encoder_noise: table.encoder_noise,
         velocity_noise: table.velocity_noise,
         effort_noise_share: settings.effort_noise,
-        effort_noise: table.effort_noise_absolute,
+        effort_noise: noise.into_iter().map(|x| x.unwrap_or(0.0)).collect(),
         ripple_share: table.ripple_share,
         ripple_cycles: table.ripple_cycles,
         effort_delay_samples: settings.delay_samples.unwrap_or(Imperfections::default().effort_delay_samples),
@@ -118,5 +119,5 @@ fn imperfections(settings: &SimulateSettings) -> Imperfections {
         outlier_size: table.outlier_size,
         dropped_share: table.dropped_share,
         clock_jitter_s: table.clock_jitter_s,
-    }
+    })
 }

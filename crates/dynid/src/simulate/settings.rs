@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::Deserialize;
 
 use crate::Error;
+use crate::config::PerJoint;
 
 /// What a virtual log is made of.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -134,8 +135,8 @@ pub struct ImperfectionTable {
     pub encoder_noise: f64,
     /// Noise of the logged velocity, rad/s or m/s.
     pub velocity_noise: f64,
-    /// Further effort noise, the same for all joints, N m or N.
-    pub effort_noise_absolute: f64,
+    /// Further effort noise, one number for all joints or numbers by joint, N m or N. Default: none.
+    pub effort_noise_absolute: PerJoint,
     /// Torque ripple, share of the rms effort.
     pub ripple_share: f64,
     /// Repetitions of the ripple per turn.
@@ -156,7 +157,7 @@ impl Default for ImperfectionTable {
         ImperfectionTable {
             encoder_noise: common.encoder_noise,
             velocity_noise: common.velocity_noise,
-            effort_noise_absolute: common.effort_noise,
+            effort_noise_absolute: PerJoint::default(),
             ripple_share: common.ripple_share,
             ripple_cycles: common.ripple_cycles,
             outlier_share: common.outlier_share,
