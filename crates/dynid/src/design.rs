@@ -5,6 +5,7 @@ mod config;
 mod motion;
 mod problem;
 mod record;
+mod report;
 
 use std::path::Path;
 

@@ -365,7 +365,7 @@ fn json_value(value: &serde_json::Value) -> Value {
 }
 
 /// Settings that differ from "not given", as lines.
-fn settings_facts(settings: &serde_json::Value) -> Vec<Fact> {
+pub(crate) fn settings_facts(settings: &serde_json::Value) -> Vec<Fact> {
     let Some(map) = settings.as_object() else { return Vec::new() };
     map.iter()
         .filter(|(_, v)| !v.is_null())

@@ -26,8 +26,10 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
         ros_json: out.join("trajectory.ros2.json"),
     };
     let record_path = out.join("design.json");
-    let files = [&paths.coefficients, &paths.samples, &paths.ros_yaml, &paths.ros_json, &record_path]
-        .map(Clone::clone);
+    let report_path = out.join("report.html");
+    let files =
+        [&paths.coefficients, &paths.samples, &paths.ros_yaml, &paths.ros_json, &record_path, &report_path]
+            .map(Clone::clone);
     let earlier = config.earlier.iter().map(PathBuf::as_path);
     let inputs: Vec<&Path> = earlier.chain([args.input.as_path(), &config.robot]).collect();
     outputs::check_folder(&out, &files, &inputs)?;
@@ -37,6 +39,7 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
     let progress = DesignProgress::new(args.quiet);
     let run = design(&config, |step| progress.step(step))?;
     let record = run.record(&config)?;
+    let report = run.report(&config, &record)?;
     drop(progress);
 
     std::fs::create_dir_all(&out)
@@ -48,7 +51,8 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
     }
     let text = serde_json::to_string_pretty(&record).map_err(|e| Failure::Output(e.into()))? + "\n";
     write_atomically(&record_path, text.as_bytes())?;
-    written.push(&record_path);
+    write_atomically(&report_path, report.as_bytes())?;
+    written.extend([&record_path, &report_path]);
     if args.quiet {
         if record.verdict.status == "fail" {
             note(&verdict(&record));

@@ -12,7 +12,7 @@ use crate::logs::sha256;
 /// Schema of `design.json`.
 pub(super) const SCHEMA: &str = "dynid-design/1";
 /// Starts within this share of the best count as equally good.
-const NEAR_BEST: f64 = 0.05;
+pub(super) const NEAR_BEST: f64 = 0.05;
 /// Relative standard deviation above which a parameter is called poorly seen.
 const POORLY_SEEN: f64 = 0.3;
 
@@ -164,8 +164,8 @@ pub struct RandomRecord {
 pub struct StartRecord {
     /// Seed.
     pub seed: u64,
-    /// Logarithm of the criterion.
-    pub logarithm: Option<f64>,
+    /// Criterion, as [`CriterionRecord::value`].
+    pub value: Option<f64>,
     /// All limits hold.
     pub feasible: bool,
     /// Evaluations.
@@ -188,7 +188,8 @@ impl CriterionName {
     pub fn meaning(self) -> &'static str {
         match self {
             CriterionName::RelativeStd => {
-                "root of the mean squared relative standard deviation of the base parameters"
+                "root of the mean squared relative standard deviation of the base parameters; values below 5 % of the \
+                 largest of the same unit count as so large"
             }
             CriterionName::UnitCondition => "condition number of the noise-weighted columns at unit length",
             CriterionName::Condition => "condition number of the noise-weighted columns in SI units",
@@ -290,7 +291,7 @@ impl DesignRun {
                 geometric_ratio: r.geometric_ratio,
                 condition_number: r.condition,
             }),
-            starts: self.starts.iter().map(start_record).collect(),
+            starts: self.starts.iter().map(|s| start_record(s, set.criterion, columns)).collect(),
             infeasible: self.outcome.as_ref().err().map(infeasible_record),
             noise: set.noise.clone(),
             provenance: provenance(config)?,
@@ -366,10 +367,10 @@ impl DesignRun {
     }
 }
 
-fn start_record(start: &StartOutcome) -> StartRecord {
+fn start_record(start: &StartOutcome, name: CriterionName, columns: usize) -> StartRecord {
     StartRecord {
         seed: start.seed,
-        logarithm: start.criterion,
+        value: start.criterion.map(|c| name.figure(c, columns)),
         feasible: start.is_feasible(),
         evaluations: start.evaluations,
     }
