@@ -1,6 +1,7 @@
 //! The effort model of a robot: rigid bodies and joint elements.
 
 mod adjoint;
+mod elements;
 
 use std::sync::Arc;
 
@@ -19,6 +20,8 @@ struct PlacedElement {
     slots: Vec<usize>,
     /// Rate and parameter column of every entry.
     entries: Vec<(usize, usize)>,
+    /// `0..entries.len()`: slots where only the element's own entries are stored.
+    entry_numbers: Vec<usize>,
     /// First of its shape parameters.
     first_shape: usize,
     shapes: usize,
@@ -113,7 +116,14 @@ impl RobotModel {
                     .collect();
                 let slots = entries.iter().filter_map(|(rate, column)| layout.slot(*rate, *column)).collect();
                 let shapes = element.shape(&joints).len();
-                PlacedElement { element, slots, entries, first_shape: first_shape[k], shapes }
+                PlacedElement {
+                    element,
+                    slots,
+                    entry_numbers: (0..entries.len()).collect(),
+                    entries,
+                    first_shape: first_shape[k],
+                    shapes,
+                }
             })
             .collect();
         RobotModel {
@@ -140,35 +150,6 @@ impl RobotModel {
         &self.joints
     }
 
-    /// Efforts of the elements without those of the rigid bodies, `effort[output * samples + sample]`.
-    ///
-    /// `linear`: all linear parameters of the model. `out`: memory with room for the samples.
-    ///
-    /// # Panics
-    /// As [`EffortModel::regressor`], and if `linear` or `effort` has the wrong length.
-    pub fn element_efforts(
-        &self,
-        motion: &MotionBlock<'_>,
-        shape: &[f64],
-        linear: &[f64],
-        out: &mut RegressorBlock,
-        effort: &mut [f64],
-    ) {
-        assert_eq!(linear.len(), self.parameters.linear.len(), "length of linear");
-        assert_eq!(effort.len(), self.outputs.len() * motion.samples, "length of effort");
-        out.start(&self.layout, motion.samples);
-        self.fill_elements(motion, shape, out);
-        effort.fill(0.0);
-        for placed in &self.elements {
-            for (slot, (rate, column)) in placed.slots.iter().zip(&placed.entries) {
-                let to = &mut effort[rate * motion.samples..][..motion.samples];
-                for (e, w) in to.iter_mut().zip(&*out.slot_mut(*slot)) {
-                    *e += w * linear[*column];
-                }
-            }
-        }
-    }
-
     fn fill_elements(&self, motion: &MotionBlock<'_>, shape: &[f64], out: &mut RegressorBlock) {
         assert_eq!(shape.len(), self.parameters.shape.len(), "length of shape");
         let stride = out.stride();
@@ -179,8 +160,7 @@ impl RobotModel {
                 stride,
                 samples: motion.samples,
             };
-            let own = &shape[placed.first_shape..placed.first_shape + placed.shapes];
-            placed.element.fill(&self.joints, motion, own, &mut columns);
+            placed.element.fill(&self.joints, motion, placed.shape(shape), &mut columns);
         }
     }
 }

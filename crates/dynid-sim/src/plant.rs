@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use dynid_model::{
     AddedInertia, Dynamics, DynamicsWorkspace, EffortModel, ForwardDynamicsWorkspace, LoadedState,
-    MotionBlock, NotPositive, RegressorBlock, RobotModel, State,
+    MotionAdjoint, MotionBlock, NotPositive, RobotModel, State,
 };
 
 use crate::error::{SimError, demand, demand_length};
@@ -53,15 +53,18 @@ pub struct Plant {
 pub struct PlantWorkspace {
     forward: ForwardDynamicsWorkspace<f64>,
     dynamics: DynamicsWorkspace<f64>,
-    block: RegressorBlock,
+    memory: Vec<f64>,
     effort: Vec<f64>,
     /// Effort of elements at zero acceleration, of the last call.
     pub(crate) element: Vec<f64>,
     /// Effort of drives with ripple, of the last call.
     pub(crate) delivered: Vec<f64>,
     still: Vec<f64>,
-    /// Positions, rates, accelerations of the difference quotients, and their efforts.
-    moved: [Vec<f64>; 4],
+    /// One copy of the state per joint: positions, rates, accelerations.
+    copies: [Vec<f64>; 3],
+    /// Copy `k` asks for the effort of joint `k`.
+    asked: Vec<f64>,
+    slopes: MotionAdjoint,
 }
 
 impl Plant {
@@ -145,16 +148,19 @@ impl Plant {
     /// Memory.
     pub fn workspace(&self) -> PlantWorkspace {
         let n = self.joints();
-        let moved = 2 * n + 1;
+        let mut asked = vec![0.0; n * n];
+        (0..n).for_each(|k| asked[k * n + k] = 1.0);
         PlantWorkspace {
             forward: self.dynamics.forward_workspace(),
             dynamics: self.dynamics.workspace(),
-            block: RegressorBlock::new(self.model.layout().clone(), moved),
+            memory: Vec::new(),
             effort: vec![0.0; n],
             element: vec![0.0; n],
             delivered: vec![0.0; n],
             still: vec![0.0; n],
-            moved: [(); 4].map(|()| vec![0.0; n * moved]),
+            copies: [(); 3].map(|()| vec![0.0; n * n]),
+            asked,
+            slopes: MotionAdjoint::new(n, n, n),
         }
     }
 
@@ -167,7 +173,7 @@ impl Plant {
         &self,
         [q, dq, ddq]: [&[f64]; 3],
         channels: &[f64],
-        block: &mut RegressorBlock,
+        memory: &mut Vec<f64>,
         to: &mut [f64],
     ) {
         let channels: Vec<(&str, &[f64])> = self
@@ -187,13 +193,14 @@ impl Plant {
             channels: &channels,
             sign_width: self.sign_width,
         };
-        self.model.element_efforts(&motion, &self.shape, &self.linear, block, to);
+        to.fill(0.0);
+        self.model.element_efforts(&motion, &self.shape, &self.linear, 1, to, memory);
     }
 
     /// Effort of elements per acceleration, the same at some states of no special kind.
     fn added_inertia(&self) -> Result<Vec<f64>, SimError> {
         let n = self.joints();
-        let mut block = RegressorBlock::new(self.model.layout().clone(), 1);
+        let mut memory = Vec::new();
         let channels = vec![1.0; self.model.channels().len()];
         let mut found: Option<Vec<f64>> = None;
         for state in 0..3 {
@@ -202,11 +209,11 @@ impl Plant {
             let dq: Vec<f64> = (0..n).map(|k| at(k + 17, f64::from(state))).collect();
             let (mut without, mut with) = (vec![0.0; n], vec![0.0; n]);
             let mut ddq = vec![0.0; n];
-            self.element_effort([&q, &dq, &ddq], &channels, &mut block, &mut without);
+            self.element_effort([&q, &dq, &ddq], &channels, &mut memory, &mut without);
             let mut added = vec![0.0; n * n];
             for k in 0..n {
                 ddq[k] = 1.0;
-                self.element_effort([&q, &dq, &ddq], &channels, &mut block, &mut with);
+                self.element_effort([&q, &dq, &ddq], &channels, &mut memory, &mut with);
                 ddq[k] = 0.0;
                 for row in 0..n {
                     // Efforts of hundreds of newton metres leave this much of a difference that ought to be zero.
@@ -249,7 +256,7 @@ impl Plant {
         ddq: &mut [f64],
     ) -> Result<(), NotPositive> {
         self.deliver(q, drive, &mut work.delivered);
-        self.element_effort([q, dq, &work.still], channels, &mut work.block, &mut work.element);
+        self.element_effort([q, dq, &work.still], channels, &mut work.memory, &mut work.element);
         for (e, (d, x)) in work.effort.iter_mut().zip(work.delivered.iter().zip(&work.element)) {
             *e = d - x;
         }
@@ -271,7 +278,7 @@ impl Plant {
         let mut effort = vec![0.0; q.len()];
         let state = State { q, dq, ddq, gravity: None };
         self.dynamics.inverse_dynamics(&state, self.inertias(), &mut work.dynamics, &mut effort);
-        self.element_effort([q, dq, ddq], channels, &mut work.block, &mut work.effort);
+        self.element_effort([q, dq, ddq], channels, &mut work.memory, &mut work.effort);
         effort.iter_mut().zip(&work.effort).for_each(|(e, x)| *e += x);
         effort
     }
@@ -299,9 +306,7 @@ impl Plant {
         PlantEnergy { kinetic: bodies.kinetic + turning, potential: bodies.potential }
     }
 
-    /// Stiffness `∂elements/∂q` and damping `∂elements/∂q̇`, row-major, by forward differences in one block.
-    ///
-    /// They only steer the integrator's matrix: its order of accuracy holds for any.
+    /// Stiffness `∂elements/∂q` and damping `∂elements/∂q̇`, row-major.
     pub(crate) fn stiffness_and_damping(
         &self,
         (q, dq): (&[f64], &[f64]),
@@ -311,33 +316,37 @@ impl Plant {
         damping: &mut [f64],
     ) {
         let n = self.joints();
-        let samples = 2 * n + 1;
-        let (turn, speed) = (1e-6, 1e-3 * self.sign_width);
-        let [mq, mdq, mddq, efforts] = &mut work.moved;
+        let [copied_q, copied_dq, copied_ddq] = &mut work.copies;
         for k in 0..n {
-            mq[k * samples..][..samples].fill(q[k]);
-            mdq[k * samples..][..samples].fill(dq[k]);
-            mq[k * samples + 1 + k] += turn;
-            mdq[k * samples + 1 + n + k] += speed;
+            copied_q[k * n..(k + 1) * n].fill(q[k]);
+            copied_dq[k * n..(k + 1) * n].fill(dq[k]);
         }
-        let repeated: Vec<Vec<f64>> = channels.iter().map(|c| vec![*c; samples]).collect();
+        let repeated: Vec<Vec<f64>> = channels.iter().map(|c| vec![*c; n]).collect();
         let channels: Vec<(&str, &[f64])> =
             self.model.channels().iter().zip(&repeated).map(|(n, v)| (n.as_str(), v.as_slice())).collect();
         let motion = MotionBlock {
-            samples,
-            stride: samples,
-            q: mq,
-            dq: mdq,
-            ddq: mddq,
+            samples: n,
+            stride: n,
+            q: copied_q,
+            dq: copied_dq,
+            ddq: copied_ddq,
             gravity: None,
             channels: &channels,
             sign_width: self.sign_width,
         };
-        self.model.element_efforts(&motion, &self.shape, &self.linear, &mut work.block, efforts);
-        for (row, efforts) in efforts.chunks_exact(samples).enumerate() {
+        work.slopes.clear();
+        self.model.element_adjoint(
+            &motion,
+            &self.shape,
+            &self.linear,
+            (n, &work.asked),
+            &mut work.slopes,
+            &mut work.memory,
+        );
+        for row in 0..n {
             for k in 0..n {
-                stiffness[row * n + k] = (efforts[1 + k] - efforts[0]) / turn;
-                damping[row * n + k] = (efforts[1 + n + k] - efforts[0]) / speed;
+                stiffness[row * n + k] = work.slopes.q[k * n + row];
+                damping[row * n + k] = work.slopes.dq[k * n + row];
             }
         }
     }

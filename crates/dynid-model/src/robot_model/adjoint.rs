@@ -1,18 +1,12 @@
 //! Efforts without a regressor, and the adjoints of efforts and regressor.
 
-use super::{CoupledRegressor, PlacedElement, RobotModel};
+use super::{CoupledRegressor, RobotModel};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::effort_model::{EffortModel, RegressorBlock};
-use crate::element::{ElementColumns, ElementWeights};
-
-impl PlacedElement {
-    fn shape<'a>(&self, shape: &'a [f64]) -> &'a [f64] {
-        &shape[self.first_shape..self.first_shape + self.shapes]
-    }
-}
+use crate::element::ElementWeights;
 
 impl RobotModel {
-    fn check_shapes(&self, shape: &[f64], linear: Option<&[f64]>) {
+    pub(super) fn check_shapes(&self, shape: &[f64], linear: Option<&[f64]>) {
         assert_eq!(shape.len(), self.parameters.shape.len(), "length of shape");
         if let Some(linear) = linear {
             assert_eq!(linear.len(), self.parameters.linear.len(), "length of linear");
@@ -28,23 +22,9 @@ impl RobotModel {
         effort: &mut [f64],
     ) {
         self.check_shapes(shape, Some(linear));
-        let n = motion.samples;
         let inertial = self.dynamics.inertial_parameters();
         self.dynamics.inverse_dynamics_block(motion, &linear[..inertial], stride, effort);
-        let mut data = Vec::new();
-        for placed in &self.elements {
-            let entries: Vec<usize> = (0..placed.entries.len()).collect();
-            data.clear();
-            data.resize(entries.len() * n, 0.0);
-            let mut columns = ElementColumns { data: &mut data, slots: &entries, stride: n, samples: n };
-            placed.element.fill(&self.joints, motion, placed.shape(shape), &mut columns);
-            for ((rate, column), values) in placed.entries.iter().zip(data.chunks_exact(n.max(1))) {
-                let factor = linear[*column];
-                for (e, w) in effort[rate * stride..][..n].iter_mut().zip(values) {
-                    *e += w * factor;
-                }
-            }
-        }
+        self.element_efforts(motion, shape, linear, stride, effort, &mut Vec::new());
     }
 
     pub(super) fn block_effort_adjoint(
@@ -72,16 +52,7 @@ impl RobotModel {
                 });
             }
         }
-        let mut data = Vec::new();
-        for placed in &self.elements {
-            let entries: Vec<usize> = (0..placed.entries.len()).collect();
-            data.clear();
-            for (rate, column) in &placed.entries {
-                data.extend(weights[rate * stride..][..n].iter().map(|u| u * linear[*column]));
-            }
-            let weights = ElementWeights { data: &data, slots: &entries, stride: n, samples: n };
-            placed.element.adjoint(&self.joints, motion, placed.shape(shape), &weights, out);
-        }
+        self.element_adjoint(motion, shape, linear, (stride, weights), out, &mut Vec::new());
     }
 
     pub(super) fn block_regressor_adjoint(

@@ -1,0 +1,72 @@
+//! Efforts of the elements alone, and their adjoint.
+
+use super::{PlacedElement, RobotModel};
+use crate::dynamics::{MotionAdjoint, MotionBlock};
+use crate::element::{ElementColumns, ElementWeights};
+
+impl PlacedElement {
+    pub(super) fn shape<'a>(&self, shape: &'a [f64]) -> &'a [f64] {
+        &shape[self.first_shape..self.first_shape + self.shapes]
+    }
+}
+
+impl RobotModel {
+    /// Adds the efforts of the elements, without those of the rigid bodies, to `effort[output * stride + s]`.
+    ///
+    /// `linear`: all linear parameters of the model. `memory`: scratch, of any length.
+    ///
+    /// # Panics
+    /// As [`EffortModel::efforts`](crate::EffortModel::efforts).
+    pub fn element_efforts(
+        &self,
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        linear: &[f64],
+        stride: usize,
+        effort: &mut [f64],
+        memory: &mut Vec<f64>,
+    ) {
+        self.check_shapes(shape, Some(linear));
+        let n = motion.samples;
+        for placed in &self.elements {
+            memory.clear();
+            memory.resize(placed.entries.len() * n, 0.0);
+            let mut columns =
+                ElementColumns { data: memory, slots: &placed.entry_numbers, stride: n, samples: n };
+            placed.element.fill(&self.joints, motion, placed.shape(shape), &mut columns);
+            for ((rate, column), values) in placed.entries.iter().zip(memory.chunks_exact(n.max(1))) {
+                let factor = linear[*column];
+                for (e, w) in effort[rate * stride..][..n].iter_mut().zip(values) {
+                    *e += w * factor;
+                }
+            }
+        }
+    }
+
+    /// Adds to `out` the derivatives of `Σ weights[output * stride + s] · effort` of the elements alone with respect to
+    /// the motion; compare [`EffortModel::effort_adjoint`](crate::EffortModel::effort_adjoint).
+    ///
+    /// # Panics
+    /// As [`EffortModel::effort_adjoint`](crate::EffortModel::effort_adjoint).
+    pub fn element_adjoint(
+        &self,
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        linear: &[f64],
+        (stride, weights): (usize, &[f64]),
+        out: &mut MotionAdjoint,
+        memory: &mut Vec<f64>,
+    ) {
+        self.check_shapes(shape, Some(linear));
+        let n = motion.samples;
+        for placed in &self.elements {
+            memory.clear();
+            for (rate, column) in &placed.entries {
+                memory.extend(weights[rate * stride..][..n].iter().map(|u| u * linear[*column]));
+            }
+            let weights =
+                ElementWeights { data: memory, slots: &placed.entry_numbers, stride: n, samples: n };
+            placed.element.adjoint(&self.joints, motion, placed.shape(shape), &weights, out);
+        }
+    }
+}
