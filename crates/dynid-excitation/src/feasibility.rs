@@ -144,7 +144,7 @@ fn closest(grid: &Grid<'_>, seed: u64, without: Option<LimitKind>) -> (Vec<f64>,
         let z = draw(grid, &mut generator(seed + k));
         let mut excess = Excess { grid, without };
         let settings = Settings { iterations: 200, radius: 0.5, stall: 1e-3 * RESIDUAL };
-        let Some(outcome) = minimise(&mut excess, z, settings) else { continue };
+        let Some(outcome) = minimise(&mut excess, z, None, settings) else { continue };
         if best.as_ref().is_none_or(|b| outcome.point.objective < b.1) {
             best = Some((outcome.z, outcome.point.objective));
         }
@@ -199,6 +199,10 @@ impl Program for Excess<'_> {
     }
 
     fn near_rows(&mut self, _: &[f64], _: f64) -> Vec<NearRow<SidedRow>> {
+        Vec::new()
+    }
+
+    fn curved_bounds(&mut self, _: &[f64], _: &[SidedRow]) -> Vec<f64> {
         Vec::new()
     }
 

@@ -80,6 +80,13 @@ impl LimitValue {
 }
 
 impl LimitValues {
+    /// Distance of a row from its bound, negative: outside.
+    pub(crate) fn slack(&self, row: SidedRow) -> f64 {
+        let limit = &self.limits[row.place];
+        let value = limit.values[row.id.sample];
+        if row.sign > 0.0 { limit.upper - value } else { value - limit.lower }
+    }
+
     /// Largest excess over all limits and samples.
     pub(crate) fn worst(&self) -> (f64, Option<RowId>) {
         let mut worst = (f64::NEG_INFINITY, None);
@@ -183,7 +190,7 @@ impl<'a> Grid<'a> {
     ) -> Vec<NearRow<SidedRow>> {
         let mut rows = Vec::new();
         let mut path = Vec::new();
-        for limit in &values.limits {
+        for (place, limit) in values.limits.iter().enumerate() {
             for sample in 0..values.motion.samples {
                 if !wanted(limit, sample) {
                     continue;
@@ -200,7 +207,7 @@ impl<'a> Grid<'a> {
                         row.bound = bound;
                         rows.push(NearRow { row, curved: None });
                     }
-                    LimitId::Path { .. } => path.push(SidedRow { id, sign }),
+                    LimitId::Path { .. } => path.push(SidedRow { id, place, sign }),
                 }
             }
         }
@@ -226,16 +233,8 @@ impl<'a> Grid<'a> {
     pub(crate) fn path_rows(&self, values: &LimitValues, ids: &[SidedRow]) -> Vec<Row> {
         let n = self.map.coordinates();
         let block = values.motion.block(self.sign_width);
-        let mut rows: Vec<Row> = ids
-            .iter()
-            .map(|id| {
-                let slack = values.limits.iter().find(|l| l.id == id.id.limit).map_or(0.0, |l| {
-                    let value = l.values[id.id.sample];
-                    if id.sign > 0.0 { l.upper - value } else { value - l.lower }
-                });
-                Row { first: 0, values: Vec::new(), bound: slack }
-            })
-            .collect();
+        let mut rows: Vec<Row> =
+            ids.iter().map(|id| Row { first: 0, values: Vec::new(), bound: values.slack(*id) }).collect();
         for (c, constraint) in self.problem.constraints.iter().enumerate() {
             let mut wanted = Vec::new();
             let mut places = Vec::new();
@@ -263,15 +262,16 @@ impl<'a> Grid<'a> {
     fn state_gradient(&self, gradient: &[f64], sample: usize, sign: f64) -> Vec<f64> {
         let n = self.map.coordinates();
         let mut z = vec![0.0; self.map.unknowns()];
+        let mut coefficients = vec![0.0; 1 + 2 * self.basis.harmonics()];
         for coordinate in 0..n {
-            let to = &mut z[self.map.range(coordinate)];
+            coefficients.fill(0.0);
             for derivative in 0..3 {
                 let slope = sign * gradient[derivative * n + coordinate];
-                if slope != 0.0 {
-                    let row = self.map.row(coordinate, &self.basis, derivative, sample);
-                    to.iter_mut().zip(row).for_each(|(t, x)| *t += slope * x);
+                for (c, b) in coefficients.iter_mut().zip(self.basis.row(derivative, sample)) {
+                    *c += slope * b;
                 }
             }
+            self.map.pull_back(coordinate, &coefficients, &mut z[self.map.range(coordinate)]);
         }
         z
     }
@@ -281,5 +281,7 @@ impl<'a> Grid<'a> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SidedRow {
     pub(crate) id: RowId,
+    /// Index of its limit among [`LimitValues::limits`], the same for all motions of a problem.
+    place: usize,
     pub(crate) sign: f64,
 }

@@ -136,8 +136,8 @@ impl Parametrisation {
             .collect()
     }
 
-    /// Derivatives of coefficients turned into derivatives of unknowns: `∂c/∂z` of one coordinate from `∂c/∂x`.
-    fn pull_back(&self, coordinate: usize, x: &[f64], z: &mut [f64]) {
+    /// Derivatives of coefficients turned into derivatives of unknowns: adds `∂c/∂z` of one coordinate from `∂c/∂x`.
+    pub(crate) fn pull_back(&self, coordinate: usize, x: &[f64], z: &mut [f64]) {
         let joint = &self.joints[coordinate];
         let sines = joint.sine_unknowns();
         let free = match joint.offset {

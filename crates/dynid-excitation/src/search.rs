@@ -156,6 +156,15 @@ impl Program for Search<'_> {
         }
     }
 
+    fn curved_bounds(&mut self, z: &[f64], ids: &[SidedRow]) -> Vec<f64> {
+        let grid = self.grid;
+        let bounds = |values: &LimitValues| ids.iter().map(|id| values.slack(*id)).collect();
+        match self.at(z) {
+            Some(e) => bounds(&e.values),
+            None => bounds(&grid.values(z)),
+        }
+    }
+
     fn curved_rows(&mut self, z: &[f64], ids: &[SidedRow]) -> Vec<Row> {
         let grid = self.grid;
         match self.at(z) {

@@ -4,4 +4,4 @@ mod quadratic;
 mod sequential;
 
 pub(crate) use quadratic::{Elastic, QuadraticProgram, Row};
-pub(crate) use sequential::{NearRow, Point, Program, Settings, minimise};
+pub(crate) use sequential::{Curvature, NearRow, Point, Program, Settings, minimise};

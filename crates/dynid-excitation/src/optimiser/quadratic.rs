@@ -159,26 +159,41 @@ impl<'a> DualMethod<'a> {
         }
     }
 
-    /// The constraint that is violated most, rows in units of their length.
-    fn most_violated(&self) -> Option<usize> {
-        let m = self.program.rows.len();
-        let mut worst = (-1e-10, None);
-        for constraint in 0..self.is_active.len() {
-            if self.is_active[constraint] {
-                continue;
-            }
-            let length = if constraint < m { self.norms[constraint].max(1e-9) } else { 1.0 };
-            let slack = self.slack(constraint) / length;
-            if slack < worst.0 {
-                worst = (slack, Some(constraint));
-            }
+    /// Slack in units of the row's length if the constraint is violated.
+    fn violation(&self, constraint: usize) -> Option<f64> {
+        if self.is_active[constraint] {
+            return None;
         }
+        let length = self.norms.get(constraint).map_or(1.0, |norm| norm.max(1e-9));
+        let slack = self.slack(constraint) / length;
+        (slack < -1e-10).then_some(slack)
+    }
+
+    /// Takes the constraint that is violated most among `candidates` and leaves those that are violated now.
+    fn most_violated(&self, candidates: &mut Vec<usize>) -> Option<usize> {
+        let mut worst = (0.0, None);
+        candidates.retain(|constraint| {
+            let slack = self.violation(*constraint);
+            if let Some(slack) = slack
+                && slack < worst.0
+            {
+                worst = (slack, Some(*constraint));
+            }
+            slack.is_some()
+        });
         worst.1
     }
 
     fn run(&mut self) -> Result<(), Failure> {
+        // Few constraints are ever violated: all are looked at only when those that were have been met.
+        let mut candidates = Vec::new();
         for _ in 0..20 * (self.n + 10) {
-            match self.most_violated() {
+            let mut worst = self.most_violated(&mut candidates);
+            if worst.is_none() {
+                candidates.extend(0..self.is_active.len());
+                worst = self.most_violated(&mut candidates);
+            }
+            match worst {
                 None => return Ok(()),
                 Some(constraint) => self.enforce(constraint)?,
             }
@@ -194,7 +209,7 @@ impl<'a> DualMethod<'a> {
             let q = self.active.len();
             let d = self.transformed(constraint);
             let curvature = dot(&d[q..], &d[q..]);
-            let scale = dot(&d, &d);
+            let scale = curvature + dot(&d[..q], &d[..q]);
             let mut z = vec![0.0; n];
             for (k, column) in self.j.chunks_exact(n).enumerate().skip(q) {
                 axpy(d[k], column, &mut z);
@@ -220,7 +235,7 @@ impl<'a> DualMethod<'a> {
                 axpy(step, &z, &mut self.x);
             }
             if primal_step <= dual_step {
-                self.add(constraint, multiplier, d);
+                self.add(constraint, multiplier, d, z);
                 return Ok(());
             }
             match blocking {
@@ -243,13 +258,20 @@ impl<'a> DualMethod<'a> {
         r
     }
 
-    fn add(&mut self, constraint: usize, multiplier: f64, mut d: Vec<f64>) {
+    /// Adds a constraint with `d = Jᵀ a` and `image = J₂ d₂`, the part of columns that are not in use: a reflection of these
+    /// columns brings `d₂` onto the first of them.
+    fn add(&mut self, constraint: usize, multiplier: f64, mut d: Vec<f64>, mut image: Vec<f64>) {
         let (n, q) = (self.n, self.active.len());
-        for k in (q + 1..n).rev() {
-            let (c, s, length) = rotation(d[k - 1], d[k]);
-            d[k - 1] = length;
-            self.rotate_columns(k - 1, c, s);
+        let length = dot(&d[q..], &d[q..]).sqrt();
+        let turned = -length.copysign(d[q]);
+        // Reflector v = d₂ - turned e₁; its half square is length (length + |d_q|).
+        axpy(-turned, &self.j[q * n..(q + 1) * n], &mut image);
+        let half_square = length * (length + d[q].abs());
+        d[q] -= turned;
+        for (column, v) in self.j[q * n..].chunks_exact_mut(n).zip(&d[q..]) {
+            axpy(-v / half_square, &image, column);
         }
+        d[q] = turned;
         self.r[q * n..q * n + q + 1].copy_from_slice(&d[..=q]);
         self.active.push(constraint);
         self.is_active[constraint] = true;
@@ -289,12 +311,22 @@ impl<'a> DualMethod<'a> {
 
 /// `c`, `s`, length with `c a + s b = length`, `c b - s a = 0`.
 fn rotation(a: f64, b: f64) -> (f64, f64, f64) {
-    let length = a.hypot(b);
+    let length = (a * a + b * b).sqrt();
     if length == 0.0 { (1.0, 0.0, 0.0) } else { (a / length, b / length, length) }
 }
 
+/// Partial sums side by side: one sum in order would wait for itself.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
+    let mut sums = [0.0; 8];
+    let length = a.len().min(b.len());
+    let (a, b) = (a[..length].chunks_exact(8), b[..length].chunks_exact(8));
+    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(x, y)| x * y).sum();
+    for (a, b) in a.zip(b) {
+        for k in 0..8 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
 }
 
 fn axpy(factor: f64, x: &[f64], y: &mut [f64]) {

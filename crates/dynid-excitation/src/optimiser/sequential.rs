@@ -1,6 +1,7 @@
 //! Sequential quadratic programming with damped BFGS and an elastic quadratic program on near-active rows.
 //!
-//! Source: spec/excitation.md section 6.1; Powell 1978 (damping).
+//! Source: spec/excitation.md section 6.1; Powell 1978 (damping), Shanno & Phua 1978 (first scale of the curvature),
+//! Nocedal & Wright 2006 section 3.5 (step lengths by interpolation).
 
 use super::quadratic::{Elastic, Failure, Minimum, QuadraticProgram, Row};
 
@@ -16,12 +17,14 @@ pub(crate) trait Program {
     fn gradient(&mut self, z: &[f64]) -> Option<Vec<f64>>;
     /// Linearised rows whose value is within `distance` of their bound.
     fn near_rows(&mut self, z: &[f64], distance: f64) -> Vec<NearRow<Self::Id>>;
+    /// Bounds of rows that are not linear at `z`, by name.
+    fn curved_bounds(&mut self, z: &[f64], ids: &[Self::Id]) -> Vec<f64>;
     /// Linearised rows at `z` that are not linear, by name.
     fn curved_rows(&mut self, z: &[f64], ids: &[Self::Id]) -> Vec<Row>;
 }
 
 /// Objective and largest violation of the rows at a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Point {
     pub(crate) objective: f64,
     pub(crate) violation: f64,
@@ -51,10 +54,12 @@ pub(crate) struct Outcome {
     pub(crate) z: Vec<f64>,
     /// At `z`.
     pub(crate) point: Point,
+    /// What was learned about second derivatives, for a run of a similar program.
+    pub(crate) curvature: Curvature,
 }
 
 /// Distance of rows that enter the quadratic program, at a trust box of zero size.
-const NEAR: f64 = 0.25;
+const NEAR: f64 = 0.5;
 const LEAST_RADIUS: f64 = 0.02;
 const LARGEST_RADIUS: f64 = 2.0;
 const ARMIJO: f64 = 1e-4;
@@ -65,14 +70,23 @@ const LARGEST_VIOLATION: f64 = 0.05;
 /// Price of the elastic variable at the start, and where raising it ends.
 const LEAST_PRICE: f64 = 10.0;
 const LARGEST_PRICE: f64 = 1e5;
+/// Bounds of the first estimate of second derivatives.
+const LEAST_CURVATURE: f64 = 0.01;
+const LARGEST_CURVATURE: f64 = 1e3;
 
-/// Minimises from `z`. `None` if the objective is not defined at the start.
-pub(crate) fn minimise<P: Program>(program: &mut P, z: Vec<f64>, settings: Settings) -> Option<Outcome> {
+/// Minimises from `z`, `curvature`: of an earlier run of a similar program. `None` if the objective is not defined at the
+/// start.
+pub(crate) fn minimise<P: Program>(
+    program: &mut P,
+    z: Vec<f64>,
+    curvature: Option<Curvature>,
+    settings: Settings,
+) -> Option<Outcome> {
     let n = program.unknowns();
     let mut z = z;
     let mut point = program.evaluate(&z)?;
     let mut gradient = program.gradient(&z)?;
-    let mut hessian = Curvature::new(n);
+    let mut hessian = curvature.unwrap_or_else(|| Curvature::new(n));
     let mut radius = settings.radius;
     let mut weight: f64 = 0.0;
     let mut price = LEAST_PRICE;
@@ -82,7 +96,8 @@ pub(crate) fn minimise<P: Program>(program: &mut P, z: Vec<f64>, settings: Setti
     while iterations < settings.iterations && stalled < STALLED_ITERATIONS && failures < 4 {
         iterations += 1;
         let near = program.near_rows(&z, NEAR * (1.0 + radius));
-        let mut rows: Vec<Row> = near.iter().map(|r| r.row.clone()).collect();
+        let (mut rows, curved): (Vec<Row>, Vec<Option<P::Id>>) =
+            near.into_iter().map(|r| (r.row, r.curved)).unzip();
         let regular = hessian.regular();
         let step = Step { hessian: &regular, gradient: &gradient, radius };
         let Ok(minimum) = step.solve(&rows, point.violation, &mut price) else {
@@ -113,7 +128,7 @@ pub(crate) fn minimise<P: Program>(program: &mut P, z: Vec<f64>, settings: Setti
             }
             // A full step that curved constraints spoil: once more, with their curvature along the step.
             if cuts == 0 && at.is_some_and(|at| at.violation > point.violation.max(1e-6)) {
-                bend(program, &near, &minimum.step, &trial, &mut rows);
+                bend(program, &curved, &minimum.step, &trial, &mut rows);
                 if let Ok(corrected) = step.solve(&rows, point.violation, &mut price) {
                     let trial = moved(&z, &corrected.step, 1.0);
                     if let Some(at) = program.evaluate(&trial)
@@ -124,7 +139,7 @@ pub(crate) fn minimise<P: Program>(program: &mut P, z: Vec<f64>, settings: Setti
                 }
             }
             cuts += 1;
-            length *= 0.4;
+            length *= shortened(at.map(|at| at.objective + weight * at.violation - merit), slope * length);
             if cuts > 7 {
                 break None;
             }
@@ -146,13 +161,20 @@ pub(crate) fn minimise<P: Program>(program: &mut P, z: Vec<f64>, settings: Setti
         let Some(next_gradient) = program.gradient(&next) else { break };
         let taken: Vec<f64> = next.iter().zip(&z).map(|(a, b)| a - b).collect();
         let mut change: Vec<f64> = next_gradient.iter().zip(&gradient).map(|(a, b)| a - b).collect();
-        add_curvature_of_rows(program, &near, &minimum.multipliers, &next, &mut change);
+        add_curvature_of_rows(program, &rows, &curved, &minimum.multipliers, &next, &mut change);
         hessian.update(&taken, change);
         let progress = (at.objective - point.objective).abs();
         stalled = if progress < settings.stall && at.violation < FEASIBLE { stalled + 1 } else { 0 };
         (z, point, gradient) = (next, at, next_gradient);
     }
-    Some(Outcome { z, point })
+    Some(Outcome { z, point, curvature: hessian })
+}
+
+/// Share of a step that is tried next: where the parabola through the rise of the merit at its end and its slope at its
+/// start is least.
+fn shortened(rise: Option<f64>, slope: f64) -> f64 {
+    let least = rise.map_or(f64::NAN, |rise| -0.5 * slope / (rise - slope));
+    if slope < 0.0 && least.is_finite() { least.clamp(0.1, 0.5) } else { 0.4 }
 }
 
 fn moved(z: &[f64], step: &[f64], length: f64) -> Vec<f64> {
@@ -188,34 +210,42 @@ impl Step<'_> {
 }
 
 /// Second-order correction: bounds of curved rows moved by what linearisation missed at the trial point.
-fn bend<P: Program>(program: &mut P, near: &[NearRow<P::Id>], step: &[f64], trial: &[f64], rows: &mut [Row]) {
+fn bend<P: Program>(
+    program: &mut P,
+    curved: &[Option<P::Id>],
+    step: &[f64],
+    trial: &[f64],
+    rows: &mut [Row],
+) {
     let (places, ids): (Vec<usize>, Vec<P::Id>) =
-        near.iter().enumerate().filter_map(|(k, r)| r.curved.map(|id| (k, id))).unzip();
-    for (place, there) in places.into_iter().zip(program.curved_rows(trial, &ids)) {
+        curved.iter().enumerate().filter_map(|(k, id)| id.map(|id| (k, id))).unzip();
+    for (place, bound) in places.into_iter().zip(program.curved_bounds(trial, &ids)) {
         let row = &mut rows[place];
-        row.bound = there.bound + dot(&row.values, &step[row.first..]);
+        row.bound = bound + dot(&row.values, &step[row.first..]);
     }
 }
 
 /// Adds `Σ λ (∇y(z⁺) - ∇y(z))` of rows that are not linear: the rest of the change of the Lagrangian's gradient.
 fn add_curvature_of_rows<P: Program>(
     program: &mut P,
-    near: &[NearRow<P::Id>],
+    rows: &[Row],
+    curved: &[Option<P::Id>],
     multipliers: &[f64],
     next: &[f64],
     change: &mut [f64],
 ) {
-    let curved: Vec<(P::Id, &Row, f64)> = near
+    let acting: Vec<(P::Id, &Row, f64)> = rows
         .iter()
+        .zip(curved)
         .zip(multipliers)
         .filter(|(_, u)| **u > 0.0)
-        .filter_map(|(r, u)| r.curved.map(|id| (id, &r.row, *u)))
+        .filter_map(|((row, id), u)| id.map(|id| (id, row, *u)))
         .collect();
-    if curved.is_empty() {
+    if acting.is_empty() {
         return;
     }
-    let ids: Vec<P::Id> = curved.iter().map(|c| c.0).collect();
-    for ((_, before, multiplier), after) in curved.iter().zip(program.curved_rows(next, &ids)) {
+    let ids: Vec<P::Id> = acting.iter().map(|c| c.0).collect();
+    for ((_, before, multiplier), after) in acting.iter().zip(program.curved_rows(next, &ids)) {
         for (k, x) in after.values.iter().enumerate() {
             change[after.first + k] += multiplier * x;
         }
@@ -226,22 +256,30 @@ fn add_curvature_of_rows<P: Program>(
 }
 
 /// Approximate second derivatives of the Lagrangian, kept positive definite.
-struct Curvature {
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Curvature {
     n: usize,
     matrix: Vec<f64>,
+    /// Nothing was learned yet.
+    fresh: bool,
 }
 
 impl Curvature {
     fn new(n: usize) -> Self {
-        let mut curvature = Curvature { n, matrix: vec![0.0; n * n] };
+        let mut curvature = Curvature { n, matrix: vec![0.0; n * n], fresh: true };
         curvature.reset();
         curvature
     }
 
     fn reset(&mut self) {
+        self.set_scale(0.1);
+        self.fresh = true;
+    }
+
+    fn set_scale(&mut self, scale: f64) {
         self.matrix.fill(0.0);
         for i in 0..self.n {
-            self.matrix[i * self.n + i] = 0.1;
+            self.matrix[i * self.n + i] = scale;
         }
     }
 
@@ -256,6 +294,14 @@ impl Curvature {
     /// BFGS update with Powell's damping.
     fn update(&mut self, step: &[f64], mut change: Vec<f64>) {
         let n = self.n;
+        if self.fresh {
+            // Directions of which nothing is known yet bend like the first step: steps along them would be too long.
+            let scale = dot(&change, &change) / dot(step, &change);
+            if scale > 0.0 && scale.is_finite() {
+                self.set_scale(scale.clamp(LEAST_CURVATURE, LARGEST_CURVATURE));
+            }
+            self.fresh = false;
+        }
         let image: Vec<f64> = self.matrix.chunks_exact(n).map(|row| dot(row, step)).collect();
         let bend = dot(step, &image);
         if bend <= 0.0 {
@@ -309,8 +355,11 @@ mod tests {
         fn near_rows(&mut self, z: &[f64], _: f64) -> Vec<NearRow<()>> {
             self.curved_rows(z, &[()]).into_iter().map(|row| NearRow { row, curved: Some(()) }).collect()
         }
-        fn curved_rows(&mut self, z: &[f64], _: &[()]) -> Vec<Row> {
-            let bound = 1.5 - z[0] * z[0] - z[1] * z[1];
+        fn curved_bounds(&mut self, z: &[f64], _: &[()]) -> Vec<f64> {
+            vec![1.5 - z[0] * z[0] - z[1] * z[1]]
+        }
+        fn curved_rows(&mut self, z: &[f64], ids: &[()]) -> Vec<Row> {
+            let bound = self.curved_bounds(z, ids)[0];
             vec![Row { first: 0, values: vec![2.0 * z[0], 2.0 * z[1]], bound }]
         }
     }
@@ -318,7 +367,7 @@ mod tests {
     #[test]
     fn a_curved_constraint_is_met_at_the_optimum() {
         let settings = Settings { iterations: 100, radius: 0.5, stall: 2e-4 };
-        let outcome = minimise(&mut Valley, vec![-1.0, 0.5], settings).unwrap();
+        let outcome = minimise(&mut Valley, vec![-1.0, 0.5], None, settings).unwrap();
         // From the stationarity conditions of the same problem, solved by bisection on the circle.
         let on_circle = |angle: f64| {
             let (s, c) = angle.sin_cos();
