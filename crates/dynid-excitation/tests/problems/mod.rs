@@ -48,8 +48,7 @@ impl Robot {
                 nominal[first + rotors.len() + k * friction.len() + j] = *value;
             }
         }
-        let base =
-            BaseParameters::of(&model, &model.mechanism().clone(), &[], &BaseSettings::default());
+        let base = BaseParameters::of(&model, &model.mechanism().clone(), &[], &BaseSettings::default());
         Robot { model: Arc::new(model), nominal, base }
     }
 
