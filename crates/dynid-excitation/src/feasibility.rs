@@ -5,7 +5,7 @@ use crate::grid::{Grid, LimitId, LimitValues, SidedRow};
 use crate::optimiser::{NearRow, Point, Program, Row, Settings, minimise};
 use crate::parametrisation::Parametrisation;
 use crate::problem::Problem;
-use crate::start::{draw, generator};
+use crate::start::{draw, generator, shrunk};
 
 /// What a limit limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,13 +52,32 @@ pub struct LimitPoint {
     pub excess: f64,
 }
 
+/// A limit without which all others can be met.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Blame {
+    /// What is limited.
+    pub kind: LimitKind,
+    /// Whose limit it is: coordinate, joint, frame or pair; `None`: no single one, but all of the kind together.
+    pub subject: Option<String>,
+}
+
+impl std::fmt::Display for Blame {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match &self.subject {
+            Some(subject) => write!(f, "{} of {subject}", self.kind),
+            None => write!(f, "{}", self.kind),
+        }
+    }
+}
+
 /// Limits that contradict each other, or the start pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Infeasible {
     /// What stays violated by the motion that comes closest, worst first; one entry per limit.
     pub violations: Vec<LimitPoint>,
-    /// The single kind of limit without which the others can be met, if there is one.
-    pub blamed: Option<LimitKind>,
+    /// The least that can be dropped for the others to be met: one limit of one subject, or one kind of limit, if either
+    /// is enough. Empty with a start pose that is outside already.
+    pub blamed: Option<Blame>,
     /// The start pose itself, at rest, is outside.
     pub at_start: bool,
 }
@@ -113,6 +132,9 @@ pub(crate) fn violated_at_start(problem: &Problem, map: &Parametrisation) -> Vec
 }
 
 const STARTS: u64 = 4;
+/// Most single limits that are tried as the one to blame.
+const SINGLE_SUSPECTS: usize = 4;
+const ROUNDS: usize = 20;
 /// Residuals below this count as none.
 const RESIDUAL: f64 = 1e-8;
 
@@ -124,29 +146,35 @@ pub(crate) fn diagnose(problem: &Problem, map: &Parametrisation, seed: u64) -> I
     let mut violations = worst_points(problem, &grid, &values, 0.0);
     let largest = violations.first().map_or(0.0, |v| v.excess);
     violations.retain(|v| v.excess >= 0.5 * largest);
-    let mut kinds: Vec<LimitKind> = Vec::new();
-    for limit in &values.limits {
-        let (kind, _) = describe(problem, limit.id);
-        if !kinds.contains(&kind) {
-            kinds.push(kind);
-        }
-    }
-    // Suspects first: kinds that stay violated.
-    kinds.sort_by_key(|k| violations.iter().position(|v| v.kind == *k).unwrap_or(usize::MAX));
-    let blamed = kinds.into_iter().find(|kind| closest(&grid, seed, Some(*kind)).1 < RESIDUAL);
+    let blamed = suspects(problem, &values, &violations)
+        .into_iter()
+        .find(|suspect| closest(&grid, seed, Some(suspect)).1 < RESIDUAL);
     Infeasible { violations, blamed, at_start: false }
 }
 
+/// What may be to blame: single limits that stay violated most, then their kinds, then all other kinds.
+fn suspects(problem: &Problem, values: &LimitValues, violations: &[LimitPoint]) -> Vec<Blame> {
+    let single = |v: &LimitPoint| Blame { kind: v.kind, subject: Some(v.subject.clone()) };
+    let mut suspects: Vec<Blame> = violations.iter().take(SINGLE_SUSPECTS).map(single).collect();
+    let of_limits = values.limits.iter().map(|l| describe(problem, l.id).0);
+    for kind in violations.iter().map(|v| v.kind).chain(of_limits) {
+        let blame = Blame { kind, subject: None };
+        if !suspects.contains(&blame) {
+            suspects.push(blame);
+        }
+    }
+    suspects
+}
+
 /// The motion with the least sum of squared excesses over several starts, and half that sum.
-fn closest(grid: &Grid<'_>, seed: u64, without: Option<LimitKind>) -> (Vec<f64>, f64) {
+fn closest(grid: &Grid<'_>, seed: u64, without: Option<&Blame>) -> (Vec<f64>, f64) {
     let mut best: Option<(Vec<f64>, f64)> = None;
     for k in 0..STARTS {
-        let z = draw(grid, &mut generator(seed + k));
-        let mut excess = Excess { grid, without };
-        let settings = Settings { iterations: 200, radius: 0.5, stall: 1e-3 * RESIDUAL };
-        let Some(outcome) = minimise(&mut excess, z, None, settings) else { continue };
-        if best.as_ref().is_none_or(|b| outcome.point.objective < b.1) {
-            best = Some((outcome.z, outcome.point.objective));
+        // Ever slower motions: what binds most tightly is often met best near standstill, far from a random motion.
+        let z = shrunk(grid, &draw(grid, &mut generator(seed + k)), 0.2_f64.powi(k as i32));
+        let Some((z, sum)) = approach(grid, z, without) else { continue };
+        if best.as_ref().is_none_or(|b| sum < b.1) {
+            best = Some((z, sum));
         }
         if best.as_ref().is_some_and(|b| b.1 < RESIDUAL) {
             break;
@@ -155,15 +183,40 @@ fn closest(grid: &Grid<'_>, seed: u64, without: Option<LimitKind>) -> (Vec<f64>,
     best.unwrap_or_else(|| (vec![0.0; grid.map.unknowns()], f64::INFINITY))
 }
 
-/// Half the sum of squared excesses, with no limits of its own.
+/// Minimises half the sum of squared excesses, which spans many orders of magnitude on its way: in rounds, each in units of
+/// what the last one left.
+fn approach(grid: &Grid<'_>, mut z: Vec<f64>, without: Option<&Blame>) -> Option<(Vec<f64>, f64)> {
+    let settings = Settings { iterations: 60, radius: 0.5, stall: 1e-3 };
+    let mut excess = Excess { grid, without, unit: 1.0 };
+    let mut sum = excess.evaluate(&z)?.objective;
+    for _ in 0..ROUNDS {
+        if sum < RESIDUAL {
+            break;
+        }
+        excess.unit = sum;
+        let outcome = minimise(&mut excess, z, None, settings)?;
+        z = outcome.z;
+        sum *= outcome.point.objective;
+        if outcome.point.objective > 0.9 {
+            break;
+        }
+    }
+    Some((z, sum))
+}
+
+/// Half the sum of squared excesses in some unit, with no limits of its own.
 struct Excess<'a> {
     grid: &'a Grid<'a>,
-    without: Option<LimitKind>,
+    unit: f64,
+    without: Option<&'a Blame>,
 }
 
 impl Excess<'_> {
     fn counts(&self, id: LimitId) -> bool {
-        self.without.is_none_or(|kind| describe(self.grid.problem, id).0 != kind)
+        self.without.is_none_or(|blame| {
+            let (kind, subject) = describe(self.grid.problem, id);
+            kind != blame.kind || blame.subject.as_ref().is_some_and(|s| *s != subject)
+        })
     }
 }
 
@@ -182,6 +235,7 @@ impl Program for Excess<'_> {
                 objective += 0.5 * limit.excess(sample).max(0.0).powi(2);
             }
         }
+        objective /= self.unit;
         objective.is_finite().then_some(Point { objective, violation: 0.0 })
     }
 
@@ -192,7 +246,7 @@ impl Program for Excess<'_> {
         for NearRow { row, .. } in rows {
             // A violated row has a negative bound, its excess with the sign turned.
             for (g, x) in gradient[row.first..].iter_mut().zip(&row.values) {
-                *g -= row.bound * x;
+                *g -= row.bound * x / self.unit;
             }
         }
         Some(gradient)

@@ -22,7 +22,7 @@ mod start;
 pub use design::{Design, Outcome, Settings, StartOutcome, design};
 pub use duals::{DualConstraint, DualMap, DualModel, DualState};
 pub use evaluation::{Information, criterion_gradient, information, limit_points};
-pub use feasibility::{Infeasible, LimitKind, LimitPoint};
+pub use feasibility::{Blame, Infeasible, LimitKind, LimitPoint};
 pub use forecast::{ColumnForecast, ConfoundedPair, Forecast, RandomComparison, forecast};
 pub use limits::CoordinateLimits;
 pub use model::{ColumnInfo, ExcitationModel, Sensitivity};

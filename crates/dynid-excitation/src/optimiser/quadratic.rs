@@ -216,9 +216,9 @@ impl<'a> DualMethod<'a> {
             }
             let r = self.solve_triangle(&d[..q]);
             let (mut dual_step, mut blocking) = (f64::INFINITY, None);
-            for k in 0..q {
-                if r[k] > 0.0 && self.multipliers[k] / r[k] < dual_step {
-                    (dual_step, blocking) = (self.multipliers[k] / r[k], Some(k));
+            for (k, (u, r)) in self.multipliers.iter().zip(&r).enumerate() {
+                if *r > 0.0 && u / r < dual_step {
+                    (dual_step, blocking) = (u / r, Some(k));
                 }
             }
             let independent = curvature > 1e-14 * scale;
@@ -251,9 +251,7 @@ impl<'a> DualMethod<'a> {
         for k in (0..r.len()).rev() {
             r[k] /= self.r[k * self.n + k];
             let x = r[k];
-            for i in 0..k {
-                r[i] -= self.r[k * self.n + i] * x;
-            }
+            axpy(-x, &self.r[k * self.n..][..k], &mut r);
         }
         r
     }
@@ -385,8 +383,8 @@ mod tests {
         let n = program.gradient.len();
         let p = &minimum.step;
         let mut slope = program.gradient.to_vec();
-        for i in 0..n {
-            slope[i] += dot(&program.hessian[i * n..(i + 1) * n], p);
+        for (s, row) in slope.iter_mut().zip(program.hessian.chunks_exact(n)) {
+            *s += dot(row, p);
         }
         let mut worst: f64 = 0.0;
         let mut price = 0.0;
