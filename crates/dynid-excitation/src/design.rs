@@ -10,7 +10,7 @@ use crate::feasibility::{Infeasible, diagnose, violated_at_start};
 use crate::grid::Grid;
 use crate::optimiser::{Curvature, Point, Settings as Steps, minimise};
 use crate::parametrisation::Parametrisation;
-use crate::problem::{Problem, ProblemError};
+use crate::problem::{Problem, ProblemError, value};
 use crate::restoration::Restoration;
 use crate::search::{Observation, Search};
 use crate::start::{feasible_start, generator};
@@ -32,6 +32,18 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Settings { starts: 16, seed: 1, time_budget_s: None, report_samples: 1000 }
+    }
+}
+
+impl Settings {
+    fn check(&self) -> Result<(), ProblemError> {
+        if self.starts == 0 || self.seed.checked_add(self.starts as u64).is_none() {
+            return Err(value("starts", "at least one, seeds within 64 bits", self.starts as f64));
+        }
+        if self.report_samples > 1_000_000 {
+            return Err(value("samples of the report", "at most 1000000", self.report_samples as f64));
+        }
+        Ok(())
     }
 }
 
@@ -145,6 +157,7 @@ pub fn design(
 ) -> Result<Outcome, ProblemError> {
     let begun = Instant::now();
     problem.check()?;
+    settings.check()?;
     let map = Parametrisation::new(&problem.limits, problem.base, problem.harmonics, &problem.start);
     let optimiser = StartOptimiser::new(problem, &map, settings);
     refuse_rank_deficient(problem, &optimiser.search)?;

@@ -73,7 +73,8 @@ impl std::fmt::Display for Blame {
 /// Limits that contradict each other, or the start pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Infeasible {
-    /// What stays violated by the motion that comes closest, worst first; one entry per limit.
+    /// What stays violated by the motion that comes closest, worst first; one entry per limit. Empty if limits can be met,
+    /// but only by motion so small that no start was found.
     pub violations: Vec<LimitPoint>,
     /// The least that can be dropped for the others to be met: one limit of one subject, or one kind of limit, if either
     /// is enough. Empty with a start pose that is outside already.
@@ -141,7 +142,10 @@ const RESIDUAL: f64 = 1e-8;
 /// Finds out which limits cannot be met.
 pub(crate) fn diagnose(problem: &Problem, map: &Parametrisation, seed: u64) -> Infeasible {
     let grid = Grid::search(problem, map, problem.samples);
-    let (z, _) = closest(&grid, seed, None);
+    let (z, sum) = closest(&grid, seed, None);
+    if sum < RESIDUAL {
+        return Infeasible { violations: Vec::new(), blamed: None, at_start: false };
+    }
     let values = grid.values(&z);
     let mut violations = worst_points(problem, &grid, &values, 0.0);
     let largest = violations.first().map_or(0.0, |v| v.excess);

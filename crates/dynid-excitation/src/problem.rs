@@ -3,7 +3,7 @@
 use faer::Mat;
 
 use crate::constraint::PathConstraint;
-use crate::criterion::Criterion;
+use crate::criterion::{ColumnScaling, Criterion, Measure};
 use crate::limits::CoordinateLimits;
 use crate::model::ExcitationModel;
 use crate::parametrisation::StartConditions;
@@ -44,6 +44,9 @@ pub const DEFAULT_SIGN_WIDTH: f64 = 0.02;
 
 /// Samples per harmonic of a period during the search, unless chosen otherwise.
 pub const DEFAULT_SAMPLES_PER_HARMONIC: usize = 20;
+
+/// More samples of a period than any search can use.
+const LARGEST_SAMPLES: usize = 100_000;
 
 /// A problem that cannot be posed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -90,24 +93,25 @@ impl Problem {
     pub fn check(&self) -> Result<(), ProblemError> {
         let n = self.model.coordinates();
         let p = self.model.columns().len();
-        let count = |what, expected, found| {
-            if expected == found { Ok(()) } else { Err(ProblemError::Count { what, expected, found }) }
-        };
         count("coordinates", n, self.coordinates.len())?;
         count("limits", n, self.limits.len())?;
         count("output weights", self.model.outputs(), self.output_weights.len())?;
+        if p == 0 {
+            return Err(value("columns", "at least one", 0.0));
+        }
         if let Some(pose) = &self.start.pose {
             count("start pose", n, pose.len())?;
+            for (name, q) in self.coordinates.iter().zip(pose) {
+                finite(&format!("start pose of {name}"), *q)?;
+            }
         }
         if let Some(prior) = &self.prior {
             count("prior information", p, prior.ncols())?;
+            for column in 0..p {
+                prior.col_as_slice(column).iter().try_for_each(|x| finite("prior information", *x))?;
+            }
         }
-        if let crate::criterion::ColumnScaling::Given(scale) = &self.criterion.scaling {
-            count("column scales", p, scale.len())?;
-        }
-        if let crate::criterion::Measure::Trace(weights) = &self.criterion.measure {
-            count("weights of the trace", p, weights.len())?;
-        }
+        self.check_criterion(p)?;
         positive("base frequency", self.base)?;
         positive("width of the smoothed sign", self.sign_width)?;
         positive("effective samples", self.effective_samples)?;
@@ -117,8 +121,21 @@ impl Problem {
         if self.harmonics == 0 || self.harmonics > 100 {
             return Err(value("harmonics", "1 to 100", self.harmonics as f64));
         }
-        if self.samples < 4 * self.harmonics {
-            return Err(value("samples of a period", "at least 4 per harmonic", self.samples as f64));
+        let conditions = usize::from(self.start.rest) + usize::from(self.start.zero_jerk);
+        if self.harmonics <= conditions {
+            return Err(value(
+                "harmonics",
+                "more than conditions on rates at the start",
+                self.harmonics as f64,
+            ));
+        }
+        if self.samples < 4 * self.harmonics || self.samples > LARGEST_SAMPLES {
+            let expected = "at least 4 per harmonic, at most 100000";
+            return Err(value("samples of a period", expected, self.samples as f64));
+        }
+        let rows = self.samples * self.model.outputs() + self.prior.as_ref().map_or(0, Mat::nrows);
+        if rows < p {
+            return Err(value("rows of the search's grid", "no fewer than columns", rows as f64));
         }
         for (name, limits) in self.coordinates.iter().zip(&self.limits) {
             let (low, high) = limits.position;
@@ -139,12 +156,44 @@ impl Problem {
         }
         Ok(())
     }
+
+    fn check_criterion(&self, columns: usize) -> Result<(), ProblemError> {
+        if let ColumnScaling::Given(scale) = &self.criterion.scaling {
+            count("column scales", columns, scale.len())?;
+            scale.iter().try_for_each(|s| positive("column scale", *s))?;
+        }
+        match &self.criterion.measure {
+            Measure::Trace(weights) => {
+                count("weights of the trace", columns, weights.len())?;
+                weights.iter().try_for_each(|w| not_negative("weight of the trace", *w))?;
+                positive("weight of the trace, sum", weights.iter().sum())
+            }
+            Measure::ConditionAndSmallest { condition, smallest } => {
+                not_negative("weight of the condition number", *condition)?;
+                not_negative("weight of the smallest singular value", *smallest)?;
+                positive("weights of the criterion, sum", condition + smallest)
+            }
+            Measure::Condition | Measure::Smallest | Measure::Determinant => Ok(()),
+        }
+    }
+}
+
+fn count(what: &'static str, expected: usize, found: usize) -> Result<(), ProblemError> {
+    if expected == found { Ok(()) } else { Err(ProblemError::Count { what, expected, found }) }
+}
+
+fn finite(what: &str, x: f64) -> Result<(), ProblemError> {
+    if x.is_finite() { Ok(()) } else { Err(value(what, "a finite number", x)) }
+}
+
+fn not_negative(what: &str, x: f64) -> Result<(), ProblemError> {
+    if x >= 0.0 && x.is_finite() { Ok(()) } else { Err(value(what, "a finite number, not negative", x)) }
 }
 
 fn positive(what: &str, x: f64) -> Result<(), ProblemError> {
     if x > 0.0 && x.is_finite() { Ok(()) } else { Err(value(what, "a positive finite number", x)) }
 }
 
-fn value(what: &str, expected: &'static str, found: f64) -> ProblemError {
+pub(crate) fn value(what: &str, expected: &'static str, found: f64) -> ProblemError {
     ProblemError::Value { what: what.to_owned(), expected, found }
 }

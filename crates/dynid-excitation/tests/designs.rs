@@ -1,5 +1,9 @@
 //! Designs of the acceptance table: reached, within all limits.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
+mod plain_urdf;
+mod problems;
 mod support;
 
 use dynid_excitation::criterion::{Criterion, Measure};
@@ -8,47 +12,115 @@ use support::*;
 
 const PI: f64 = std::f64::consts::PI;
 
-fn indy7(rest: bool) -> Option<Problem> {
-    let data = reference("robots/indy7.json")?;
-    let mechanism = mechanism(&data);
-    let excitation = excitation(model(&mechanism, 2..6, true));
-    Some(Problem {
-        coordinates: mechanism.rate_names(),
-        limits: limits(&data),
-        constraints: Vec::new(),
-        base: 0.1 * PI,
-        harmonics: 5,
-        start: StartConditions { rest, ..Default::default() },
-        criterion: Criterion::raw(Measure::Condition),
-        output_weights: vec![1.0; 6],
-        effective_samples: 1000.0,
-        prior: None,
-        sign_width: DEFAULT_SIGN_WIDTH,
-        samples: 100,
-        model: Box::new(excitation),
-    })
+/// Condition numbers of the first starts; every start ends within all limits, looked at in 10 000 instants, the best in
+/// 100 000.
+fn conditions(problem: &Problem, starts: usize) -> Vec<f64> {
+    let settings = Settings { starts, ..Settings::default() };
+    let outcome = design(problem, &settings, Vec::new(), &mut |_| {}).unwrap();
+    let Outcome::Found(found) = outcome else { panic!("{outcome:?}") };
+    assert_eq!(found.starts.len(), starts);
+    let map = Parametrisation::new(&problem.limits, problem.base, problem.harmonics, &problem.start);
+    for start in &found.starts {
+        assert!(start.is_feasible(), "{start:?}");
+        let broken = limit_points(problem, &map.coefficients(&start.unknowns), 10_000, 1e-6);
+        assert!(broken.is_empty(), "seed {}: {broken:?}", start.seed);
+    }
+    let broken = limit_points(problem, &found.coefficients, 100_000, 1e-6);
+    assert!(broken.is_empty(), "{broken:?}");
+    found.starts.iter().map(|s| s.criterion.unwrap().exp()).collect()
+}
+
+// Bounds are those of the acceptance table for all starts; a run over more starts is in statistics.rs.
+
+#[test]
+fn indy7_keeps_clear_of_floor_and_column() {
+    let Some(problem) = problems::indy7(false) else { return };
+    assert_eq!(problem.model.columns().len(), 58);
+    let found = conditions(&problem, 4);
+    assert!(found.iter().all(|c| *c <= 31.5), "{found:?}");
 }
 
 #[test]
-fn indy7_from_every_seed() {
-    let Some(problem) = indy7(false) else { return };
-    println!("{} columns", problem.model.columns().len());
-    let settings = Settings { starts: 16, ..Settings::default() };
-    let begun = std::time::Instant::now();
-    let outcome = design(&problem, &settings, Vec::new(), &mut |s| {
-        println!(
-            "seed {} cond {:.2} excess {:.1e} ev {} share {} at {:.2} s",
-            s.seed,
-            s.criterion.unwrap_or(f64::NAN).exp(),
-            s.excess,
-            s.evaluations,
-            s.share,
-            begun.elapsed().as_secs_f64()
-        );
-    })
-    .unwrap();
+fn indy7_from_rest_to_rest() {
+    let Some(problem) = problems::indy7(true) else { return };
+    let found = conditions(&problem, 2);
+    assert!(found.iter().all(|c| *c <= 33.0), "{found:?}");
+}
+
+#[test]
+fn er16_with_its_torques_and_wrist() {
+    let Some(problem) = problems::er16(false) else { return };
+    assert_eq!(problem.model.columns().len(), 15);
+    let found = conditions(&problem, 10);
+    assert!(found.iter().all(|c| *c <= 34.0), "{found:?}");
+    assert!(found.iter().any(|c| *c <= 30.5), "{found:?}");
+    let Some(problem) = problems::er16(true) else { return };
+    assert_eq!(problem.model.columns().len(), 24);
+    let found = conditions(&problem, 8);
+    assert!(found.iter().any(|c| *c <= 65.0), "{found:?}");
+}
+
+#[test]
+fn ur10_from_its_file() {
+    for (apart, starts) in [(false, 6), (true, 2)] {
+        let Some(problem) = problems::ur10(apart) else { return };
+        assert_eq!(problem.model.columns().len(), 36);
+        let found = conditions(&problem, starts);
+        assert!(found.iter().all(|c| *c <= 16.0), "{found:?}");
+    }
+}
+
+#[test]
+fn slides_jerk_limits_and_start_poses() {
+    let mut problem = problems::gantry();
+    conditions(&problem, 2);
+    let pose = vec![0.1, 0.1, 0.2, -0.3];
+    problem.start = StartConditions { rest: true, zero_jerk: true, pose: Some(pose.clone()) };
+    let settings = Settings { starts: 2, ..Settings::default() };
+    let outcome = design(&problem, &settings, Vec::new(), &mut |_| {}).unwrap();
     let Outcome::Found(found) = outcome else { panic!("{outcome:?}") };
-    assert_eq!(found.starts.len(), 16);
+    assert!(limit_points(&problem, &found.coefficients, 100_000, 1e-6).is_empty());
+    // Jerk acts; without its limit the design is better.
+    assert!(found.starts.iter().all(StartOutcome::is_feasible));
+    let acting = limit_points(&problem, &found.coefficients, 10_000, -1e-3);
+    assert!(acting.iter().any(|p| p.kind == LimitKind::Jerk), "{acting:?}");
+    let basis = dynid_motion::trajectory::FourierBasis::new(problem.base, 5, vec![0.0]);
+    for (x, pose) in found.coefficients.iter().zip(pose) {
+        for (derivative, wanted) in [(0, pose), (1, 0.0), (2, 0.0), (3, 0.0)] {
+            let mut value = [0.0];
+            basis.evaluate(derivative, x, &mut value);
+            assert!((value[0] - wanted).abs() < 1e-12, "{derivative}: {value:?}");
+        }
+    }
+}
+
+#[test]
+fn results_depend_neither_on_threads_nor_on_interruptions() {
+    let Some(problem) = problems::er16(false) else { return };
+    let settings = Settings { starts: 5, ..Settings::default() };
+    let run = |threads: usize, done: Vec<StartOutcome>| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let mut heard = Vec::new();
+        let outcome =
+            pool.install(|| design(&problem, &settings, done, &mut |s| heard.push(s.seed)).unwrap());
+        let Outcome::Found(found) = outcome else { panic!("{outcome:?}") };
+        (found, heard)
+    };
+    let (one, heard) = run(1, Vec::new());
+    assert_eq!(heard, [1, 2, 3, 4, 5]);
+    for threads in [2, 7] {
+        assert_eq!(run(threads, Vec::new()), (one.clone(), heard.clone()), "{threads} threads");
+    }
+    // Two starts are there already, one of another run is not taken.
+    let mut done = vec![one.starts[3].clone(), one.starts[1].clone(), one.starts[0].clone()];
+    done[2].seed = 77;
+    assert_eq!(run(2, done), (one.clone(), vec![1, 3, 5]));
+    // Time that is up lets what began end, and one batch begin.
+    let hurried = Settings { time_budget_s: Some(0.0), ..settings.clone() };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let outcome = pool.install(|| design(&problem, &hurried, Vec::new(), &mut |_| {}).unwrap());
+    let Outcome::Found(found) = outcome else { panic!("{outcome:?}") };
+    assert_eq!(found.starts, one.starts[..2]);
 }
 
 /// The two-axis pointing mechanism as a tree, with the eight columns of its ideal model.

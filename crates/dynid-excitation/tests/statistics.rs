@@ -1,6 +1,8 @@
 //! All starts of the acceptance table, with what they cost. Run by hand: `cargo test --release -p dynid-excitation --test
 //! statistics -- --ignored --nocapture --test-threads 1`.
 
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+
 mod plain_urdf;
 mod problems;
 mod support;

@@ -187,8 +187,8 @@ fn ur10_capsules(mechanism: &Mechanism) -> Vec<Capsule> {
     capsules
 }
 
-/// A gantry of two slides that carries an elbow arm of two turning joints, with jerk limits.
-pub fn gantry() -> Problem {
+/// A gantry of two slides that carries an elbow arm of two turning joints.
+pub fn gantry_robot() -> Robot {
     let mut d = Description::new("gantry");
     d.links.push(LinkDescription { name: "base".into(), inertia: None });
     let slide = JointKind::Prismatic;
@@ -218,7 +218,12 @@ pub fn gantry() -> Problem {
     }
     let mechanism = d.build().unwrap();
     let friction = [[60.0, 80.0, 1.0], [40.0, 50.0, -2.0], [3.0, 2.0, 0.1], [1.0, 1.0, 0.2]];
-    let robot = Robot::new(&mechanism, &[], &friction);
+    Robot::new(&mechanism, &[], &friction)
+}
+
+/// The gantry with jerk limits.
+pub fn gantry() -> Problem {
+    let robot = gantry_robot();
     let limit = |range: f64, velocity: f64, acceleration: f64, jerk: f64| CoordinateLimits {
         position: (-0.4 * range, 0.6 * range),
         velocity: Some(velocity),
