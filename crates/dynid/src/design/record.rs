@@ -380,7 +380,7 @@ fn infeasible_record(infeasible: &Infeasible) -> InfeasibleRecord {
     InfeasibleRecord {
         at_start: infeasible.at_start,
         violations: infeasible.violations.iter().map(LimitRecord::from).collect(),
-        blamed: infeasible.blamed.map(|b| b.to_string()),
+        blamed: infeasible.blamed.as_ref().map(|b| b.to_string()),
     }
 }
 
@@ -404,7 +404,7 @@ fn infeasible_headline(infeasible: &Infeasible) -> String {
             format!("{} of {} stays {size}, at {:.2} s", v.kind, v.subject, v.time)
         },
     );
-    match (infeasible.at_start, infeasible.blamed) {
+    match (infeasible.at_start, &infeasible.blamed) {
         (true, _) => format!("the start pose itself is not allowed: {worst}"),
         (false, Some(blamed)) => {
             format!("no motion keeps all limits: {worst}; without the limit of {blamed} there is one")
