@@ -296,7 +296,7 @@ impl Error {
                 _ => return None,
             }),
             Error::Conditioning(C::NothingMoves { .. }) => {
-                Some("a model of motion needs motion: check the columns, or record an excitation trajectory".to_owned())
+                Some("a model of motion needs motion: check the columns, or record an excitation trajectory (`dynid design` makes one)".to_owned())
             }
             Error::Conditioning(C::ConstantEffort { .. }) => {
                 Some("check that the effort column is the measured torque or current of this joint".to_owned())

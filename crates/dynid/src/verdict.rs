@@ -157,7 +157,7 @@ fn condition(id: &Identification) -> (Status, CheckResult) {
         condition.is_finite().then_some(condition),
         "",
         "below 100",
-        "how strongly errors of the effort are amplified; a better excitation trajectory lowers it",
+        "how strongly errors of the effort are amplified; a better excitation trajectory (`dynid design`) lowers it",
     )
 }
 
