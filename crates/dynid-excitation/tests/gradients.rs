@@ -1,5 +1,7 @@
 //! Exact gradients of criteria: golden numbers and central differences.
 
+mod plain_urdf;
+mod problems;
 mod support;
 
 use dynid_excitation::criterion::{ColumnScaling, Criterion, Measure};
@@ -139,6 +141,29 @@ fn every_criterion_agrees_with_differences() {
                         );
                     }
                 }
+            }
+        }
+    }
+}
+
+#[test]
+fn criteria_of_files_and_slides_agree_with_differences() {
+    let mut problems = vec![problems::gantry()];
+    problems.extend(problems::ur10(false));
+    for mut problem in problems {
+        let columns = problem.model.columns().len();
+        problem.sign_width = 0.3;
+        let coefficients: Vec<Vec<f64>> = (0..problem.limits.len())
+            .map(|j| (0..11).map(|k| 0.4 * ((3 * j + 2 * k) as f64).sin()).collect())
+            .collect();
+        for measure in [Measure::Condition, Measure::Determinant, Measure::Trace(vec![1.0; columns])] {
+            problem.criterion = Criterion::unit_norm(measure.clone());
+            let (_, gradient) = criterion_gradient(&problem, &coefficients, 60).unwrap();
+            let largest = gradient.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
+            for (joint, k) in [(0, 1), (1, 0), (1, 7), (2, 3), (3, 10)] {
+                let wanted = difference(&problem, &coefficients, joint, k, 60);
+                let found = gradient[joint][k];
+                assert!((found - wanted).abs() <= 1e-6 * largest, "{measure:?}: {found} {wanted} {largest}");
             }
         }
     }

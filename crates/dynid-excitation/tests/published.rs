@@ -1,5 +1,7 @@
 //! Published trajectories under the limits of their robots.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
 mod plain_urdf;
 mod problems;
 mod support;

@@ -8,6 +8,9 @@ use dynid_excitation::criterion::{ColumnScaling, Criterion, Measure};
 use dynid_excitation::*;
 use faer::Mat;
 
+/// What is wrong with a problem.
+type Change = Box<dyn FnOnce(&mut Problem)>;
+
 fn refusal(change: impl FnOnce(&mut Problem)) -> String {
     let mut problem = problems::gantry();
     change(&mut problem);
@@ -21,7 +24,7 @@ fn refusal(change: impl FnOnce(&mut Problem)) -> String {
 #[test]
 fn sizes_and_numbers() {
     let nan = f64::NAN;
-    let cases: Vec<(&str, Box<dyn FnOnce(&mut Problem)>)> = vec![
+    let cases: Vec<(&str, Change)> = vec![
         ("coordinates: expected 4 entries, found 3", Box::new(|p| p.coordinates.truncate(3))),
         ("limits: expected 4 entries, found 3", Box::new(|p| p.limits.truncate(3))),
         ("output weights: expected 4 entries, found 3", Box::new(|p| p.output_weights.truncate(3))),

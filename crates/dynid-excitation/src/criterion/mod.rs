@@ -275,3 +275,99 @@ impl<'a> Spectral<'a> {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const ORDERS: [f64; 4] = [5.0, 15.0, 50.0, 150.0];
+
+    fn measures() -> [Measure; 3] {
+        let both = Measure::ConditionAndSmallest { condition: 0.7, smallest: 3.0 };
+        [Measure::Condition, both, Measure::Smallest]
+    }
+
+    /// Tall matrices with spectra from flat to spread over six decades.
+    fn matrices() -> Vec<Mat<f64>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        [0.0, 1.0, 3.0, 6.0]
+            .map(|decades| {
+                let scale: Vec<f64> = (0..7).map(|j| 10_f64.powf(-decades * f64::from(j) / 6.0)).collect();
+                Mat::from_fn(30, 7, |_, j| scale[j] * rng.random_range(-1.0..=1.0))
+            })
+            .to_vec()
+    }
+
+    fn triangle_of(w: &Mat<f64>) -> Mat<f64> {
+        triangle(&mut w.clone())
+    }
+
+    #[test]
+    fn smooth_sensitivities_agree_with_differences() {
+        for w in matrices() {
+            for measure in measures() {
+                for scaling in [ColumnScaling::Raw, ColumnScaling::UnitNorm] {
+                    let criterion = Criterion { measure: measure.clone(), scaling };
+                    for order in ORDERS {
+                        let (value, h) = criterion.sensitivity(&triangle_of(&w), Some(order)).unwrap();
+                        assert_eq!(Some(value), criterion.smooth_value(&triangle_of(&w), Some(order)));
+                        let g = &w * h.dense(7);
+                        for (row, column) in [(0, 0), (3, 2), (11, 6), (29, 4)] {
+                            // In units of the column, whose length may be 1e-6.
+                            let unit = w.col(column).norm_l2();
+                            let moved = |steps: f64| {
+                                let mut w = w.clone();
+                                w[(row, column)] += steps * 1e-4 * unit;
+                                criterion.smooth_value(&triangle_of(&w), Some(order)).unwrap()
+                            };
+                            let difference = (8.0 * (moved(1.0) - moved(-1.0)) - (moved(2.0) - moved(-2.0)))
+                                / (12.0 * 1e-4);
+                            let found = g[(row, column)] * unit;
+                            assert!(
+                                (found - difference).abs() <= 1e-7 * (1.0 + difference.abs()),
+                                "{criterion:?} {order}: {found} {difference}"
+                            );
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// `ln cond ≤ P_s ≤ ln cond + 2 ln p / s`, also where powers of the singular values themselves would overflow.
+    #[test]
+    fn smooth_values_close_in_on_the_extremes() {
+        for w in matrices() {
+            for unit in [1e-30, 1.0, 1e30] {
+                let triangle = triangle_of(&(&w * faer::Scale(unit)));
+                let criterion = Criterion::raw(Measure::Condition);
+                let exact = criterion.value(&triangle).unwrap();
+                let mut before = f64::INFINITY;
+                for order in ORDERS {
+                    let smooth = criterion.smooth_value(&triangle, Some(order)).unwrap();
+                    assert!(smooth >= exact - 1e-12 && smooth <= exact + 2.0 * 7_f64.ln() / order + 1e-12);
+                    assert!(smooth <= before);
+                    before = smooth;
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn singular_and_broken_triangles_have_no_value() {
+        let mut triangle = triangle_of(&matrices()[0]);
+        triangle[(6, 6)] = 0.0;
+        let trace = Measure::Trace(vec![1.0; 7]);
+        for measure in measures().into_iter().chain([Measure::Determinant, trace]) {
+            for broken in [0.0, f64::NAN] {
+                triangle[(6, 6)] = broken;
+                let criterion = Criterion::raw(measure.clone());
+                let value = criterion.value(&triangle);
+                // A singular value of rounding size is a number, if a huge one.
+                assert!(value.is_none_or(|v| broken == 0.0 && v > 30.0), "{measure:?} {broken}: {value:?}");
+            }
+        }
+    }
+}
