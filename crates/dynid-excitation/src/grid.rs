@@ -264,9 +264,13 @@ impl<'a> Grid<'a> {
         let mut z = vec![0.0; self.map.unknowns()];
         let mut coefficients = vec![0.0; 1 + 2 * self.basis.harmonics()];
         for coordinate in 0..n {
+            let slopes = [0, 1, 2].map(|derivative| sign * gradient[derivative * n + coordinate]);
+            // Distances know nothing of rates, nor of joints beyond their point.
+            if slopes == [0.0; 3] {
+                continue;
+            }
             coefficients.fill(0.0);
-            for derivative in 0..3 {
-                let slope = sign * gradient[derivative * n + coordinate];
+            for (derivative, slope) in slopes.into_iter().enumerate().filter(|(_, slope)| *slope != 0.0) {
                 for (c, b) in coefficients.iter_mut().zip(self.basis.row(derivative, sample)) {
                     *c += slope * b;
                 }

@@ -1,5 +1,7 @@
 //! Exact gradients of criteria: golden numbers and central differences.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
 mod plain_urdf;
 mod problems;
 mod support;
