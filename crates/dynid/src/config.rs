@@ -339,12 +339,18 @@ fn check_motion(trajectory: Option<&Path>, period_s: Option<f64>) -> Result<(), 
 }
 
 /// A list of just so many entries; serde's own arrays and tuples pass over surplus ones.
-fn exactly<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
+pub(crate) fn exactly<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
     deserializer: D,
 ) -> Result<Option<[T; N]>, D::Error> {
+    just(deserializer).map(Some)
+}
+
+/// The same where it must be given.
+pub(crate) fn just<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
+    deserializer: D,
+) -> Result<[T; N], D::Error> {
     let list = Vec::<T>::deserialize(deserializer)?;
     <[T; N]>::try_from(list)
-        .map(Some)
         .map_err(|list| D::Error::custom(format!("expected a list of {N} numbers, found {}", list.len())))
 }
 

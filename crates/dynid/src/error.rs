@@ -263,6 +263,9 @@ impl Error {
             Error::RobotFile(e) => e.hint(),
             Error::LogFile(e) => e.hint(),
             Error::Export(e) => e.hint(),
+            Error::Design(dynid_excitation::ProblemError::RankDeficient { .. }) => Some(
+                "widen the limits that leave so little motion, or leave out elements that it cannot show".to_owned(),
+            ),
             Error::Checkpoint { .. } => Some("delete the file, or name another one".to_owned()),
             Error::Columns { source, .. } => source.hint(),
             Error::States(e) => e.hint(),
@@ -374,8 +377,24 @@ fn setting_hint(name: &str) -> Option<&'static str> {
         "prior" => "use `consistency = \"pseudo-inertia\"`, or leave `prior` out",
         "prior_weight" => "leave it out: held-out folds then say how much the robot file may count",
         "ridge_weight" => "leave it out: 1 is a Gaussian prior; less trusts the robot file less",
+        "capsule" => "give the base, or an obstacle that stands on it, a capsule of its own",
+        "criterion.name" => {
+            "leave `name` out, or state inertias: `dynid inspect ROBOT` shows what the file holds"
+        }
         "effort_noise" => "state it under [estimator], in N m or N",
         _ if name.starts_with("bound.") => "`-inf` and `inf` leave one side open: `mass = [0.5, inf]`",
+        _ if name.starts_with("limits.velocity.") => {
+            "for example `velocity = 1.5` or `velocity = { j1 = 1.5 }` under [limits], or a limit in the robot file"
+        }
+        _ if name.starts_with("limits.position.") => {
+            "for example `position = { j1 = [-1.0, 1.0] }` under [limits], or a limit in the robot file"
+        }
+        "trajectory.start_pose" => {
+            "a start pose names every joint that moves; leave it out to let the search choose"
+        }
+        _ if name.starts_with("trajectory.parking.") => {
+            "a pose within the limits; joints left out are at zero or the nearest position within theirs"
+        }
         _ if name.starts_with("column_noise.") => {
             "a name of `dynid inspect ROBOT` among the base parameters with a standard deviation; 0: exact"
         }

@@ -8,7 +8,7 @@ use crate::Error;
 
 /// One number for all joints, or numbers for some.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a number, or numbers by joint such as `{ j1 = 2.0 }`")]
 pub enum PerJoint {
     /// The same for all.
     All(f64),

@@ -3,10 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::Error;
-use crate::config::{ElementsConfig, PerJoint};
+use crate::config::{ElementsConfig, PerJoint, exactly, just};
+
+/// Seeds count up from start to start.
+const LARGEST_SEED: u64 = u64::MAX - 1_000_000;
 
 /// What is to be designed, and how. Every key but `robot` has a default.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
@@ -18,6 +21,7 @@ pub struct DesignConfig {
     /// folder.
     pub out: Option<PathBuf>,
     /// Gravity in base axes, m/s². Default: the robot file's, else 0 0 -9.81.
+    #[serde(deserialize_with = "exactly")]
     pub gravity: Option<[f64; 3]>,
     /// Couple mimic joints to their leaders. Default false.
     pub couple_mimics: bool,
@@ -89,6 +93,7 @@ impl Default for TrajectoryConfig {
 #[serde(deny_unknown_fields, default)]
 pub struct LimitsConfig {
     /// Least and largest position, rad or m, by joint.
+    #[serde(deserialize_with = "ranges")]
     pub position: BTreeMap<String, [f64; 2]>,
     /// Largest speed, rad/s or m/s.
     pub velocity: PerJoint,
@@ -125,6 +130,7 @@ pub struct KeepConfig {
     /// Links.
     pub frames: Vec<String>,
     /// Point in the axes of each link, m. Default: its origin.
+    #[serde(deserialize_with = "just")]
     pub point: [f64; 3],
     /// Least height `z`.
     pub above: Option<f64>,
@@ -143,6 +149,7 @@ pub struct KeepConfig {
 #[serde(deny_unknown_fields)]
 pub struct HalfSpaceConfig {
     /// Direction into the allowed side; any length.
+    #[serde(deserialize_with = "just")]
     pub normal: [f64; 3],
     /// Distance of the plane from the origin along the normal, m.
     pub offset: f64,
@@ -153,8 +160,10 @@ pub struct HalfSpaceConfig {
 #[serde(deny_unknown_fields)]
 pub struct BoxConfig {
     /// Smallest coordinates, m.
+    #[serde(deserialize_with = "just")]
     pub lower: [f64; 3],
     /// Largest coordinates, m.
+    #[serde(deserialize_with = "just")]
     pub upper: [f64; 3],
 }
 
@@ -163,7 +172,7 @@ pub struct BoxConfig {
 #[serde(deny_unknown_fields)]
 pub struct CylinderConfig {
     /// `x`, `y` of its axis, m. Default: the origin.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "just")]
     pub center: [f64; 2],
     /// Radius, m.
     pub radius: f64,
@@ -174,7 +183,7 @@ pub struct CylinderConfig {
 #[serde(deny_unknown_fields)]
 pub struct ColumnConfig {
     /// `x`, `y` of its axis, m. Default: the origin.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "just")]
     pub center: [f64; 2],
     /// Radius, m.
     pub radius: f64,
@@ -189,8 +198,10 @@ pub struct CapsuleConfig {
     /// Link.
     pub frame: String,
     /// One end of the segment in the link's axes, m.
+    #[serde(deserialize_with = "just")]
     pub from: [f64; 3],
     /// The other end; the same for a sphere.
+    #[serde(deserialize_with = "just")]
     pub to: [f64; 3],
     /// Radius, m.
     pub radius: f64,
@@ -241,6 +252,7 @@ pub struct CriterionConfig {
     /// Time after which noise is independent of what it was, s. Default 0: every sample counts.
     pub correlation_time_s: f64,
     /// `w1`, `w2` of `mix`. Default 1, 1.
+    #[serde(deserialize_with = "just")]
     pub mix: [f64; 2],
 }
 
@@ -274,6 +286,15 @@ impl Default for SearchConfig {
     fn default() -> Self {
         SearchConfig { starts: 16, seed: 1, time_budget_s: None, checkpoint: None }
     }
+}
+
+/// Ranges by joint, two numbers each.
+fn ranges<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<String, [f64; 2]>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(transparent)]
+    struct Range(#[serde(deserialize_with = "just")] [f64; 2]);
+    let ranges = BTreeMap::<String, Range>::deserialize(deserializer)?;
+    Ok(ranges.into_iter().map(|(joint, range)| (joint, range.0)).collect())
 }
 
 impl DesignConfig {
@@ -356,6 +377,16 @@ impl DesignConfig {
                 return Err(Error::setting(name, &format!("{least} to {most}"), x));
             }
         }
+        if self.search.seed > LARGEST_SEED {
+            return Err(Error::setting("search.seed", &format!("at most {LARGEST_SEED}"), self.search.seed));
+        }
+        let held = self.locked.iter().map(|(joint, x)| (format!("locked.{joint}"), *x));
+        let pull = self.gravity.into_iter().flatten().map(|x| ("gravity".to_owned(), x));
+        for (name, x) in held.chain(pull) {
+            if !x.is_finite() {
+                return Err(Error::setting(&name, "a finite number", x));
+            }
+        }
         let samples = t.period_s * t.sample_rate_hz;
         if samples < 4.0 * t.harmonics as f64 {
             let expected =
@@ -365,6 +396,10 @@ impl DesignConfig {
         if samples * t.periods as f64 > 1e7 {
             let expected = "at most 1e7 samples in all periods";
             return Err(Error::setting("trajectory.sample_rate_hz", expected, t.sample_rate_hz));
+        }
+        if self.capsule.len() == 1 {
+            let expected = "two or more: pairs of capsules must not touch";
+            return Err(Error::setting("capsule", expected, "one"));
         }
         for keep in &self.keep {
             if keep.frames.is_empty() {

@@ -85,6 +85,9 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
                 .to_owned(),
         ));
     }
+    for frame in &config.trajectory.frames {
+        mechanism.frame(frame).map_err(dynid_excitation::constraint::ConstraintError::from)?;
+    }
     let mut assumptions = Vec::new();
     let stated = mechanism.bodies().iter().any(|b| b.stated);
     let nominal = match stated {

@@ -1,5 +1,6 @@
 //! What a design leaves behind as JSON.
 
+use dynid_excitation::constraint::{ConstraintKind, DISTANCE_SCALE};
 use dynid_excitation::{Infeasible, LimitKind, LimitPoint, StartOutcome};
 use serde::Serialize;
 
@@ -385,25 +386,20 @@ fn infeasible_record(infeasible: &Infeasible) -> InfeasibleRecord {
 }
 
 fn infeasible_headline(infeasible: &Infeasible) -> String {
-    let worst = infeasible.violations.first().map_or_else(
-        || "no start ended within all limits".to_owned(),
-        |v| {
-            let size = match v.kind {
-                LimitKind::Path(dynid_excitation::constraint::ConstraintKind::Effort)
-                | LimitKind::Position
-                | LimitKind::Velocity
-                | LimitKind::Acceleration
-                | LimitKind::Jerk => format!("{:.0} % over its limit", 100.0 * v.excess),
-                LimitKind::Path(_) => {
-                    format!(
-                        "{:.3} m on the wrong side",
-                        v.excess * dynid_excitation::constraint::DISTANCE_SCALE
-                    )
-                }
-            };
-            format!("{} of {} stays {size}, at {:.2} s", v.kind, v.subject, v.time)
-        },
-    );
+    let Some(v) = infeasible.violations.first() else {
+        return "no start ended within all limits with every parameter visible, although the limits can be met, if only by \
+                little motion: widen them, or try more starts"
+            .to_owned();
+    };
+    let size = match v.kind {
+        LimitKind::Path(ConstraintKind::Effort)
+        | LimitKind::Position
+        | LimitKind::Velocity
+        | LimitKind::Acceleration
+        | LimitKind::Jerk => format!("{:.0} % over its limit", 100.0 * v.excess),
+        LimitKind::Path(_) => format!("{:.3} m on the wrong side", v.excess * DISTANCE_SCALE),
+    };
+    let worst = format!("{} of {} stays {size}, at {:.2} s", v.kind, v.subject, v.time);
     match (infeasible.at_start, &infeasible.blamed) {
         (true, _) => format!("the start pose itself is not allowed: {worst}"),
         (false, Some(blamed)) => {
