@@ -34,7 +34,13 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
     let inputs: Vec<&Path> = earlier.chain([args.input.as_path(), &config.robot]).collect();
     outputs::check_folder(&out, &files, &inputs)?;
     if let Some(checkpoint) = &config.search.checkpoint {
-        outputs::check_files(&[("--checkpoint", checkpoint.as_path())], &inputs)?;
+        let results = files.iter().map(|file| ("--out", file.as_path())).filter(|_| out.is_dir());
+        let all: Vec<(&str, &Path)> = results.chain([("--checkpoint", checkpoint.as_path())]).collect();
+        outputs::check_files(&all, &inputs)?;
+        if std::path::absolute(checkpoint).ok() == std::path::absolute(&out).ok() {
+            let text = format!("--checkpoint: {} is the output folder", checkpoint.display());
+            return Err(Failure::Usage(text, "give the checkpoint a file of its own"));
+        }
     }
     let progress = DesignProgress::new(args.quiet);
     let run = design(&config, |step| progress.step(step))?;
@@ -77,6 +83,7 @@ fn configuration(args: &DesignArgs) -> Result<DesignConfig, Failure> {
             Ok(config) => config,
             Err(error) => match dynid::io::robot::read(&args.input) {
                 Ok(_) => robot(),
+                Err(fault) if is_robot(&args.input) => return Err(fault.into()),
                 Err(_) => return Err(error.into()),
             },
         }
@@ -128,6 +135,12 @@ fn configuration(args: &DesignArgs) -> Result<DesignConfig, Failure> {
         s.checkpoint.clone_from(&args.checkpoint);
     }
     Ok(config)
+}
+
+/// Whether a TOML file, sound or not, means to be a robot: no configuration of a design has such a table.
+fn is_robot(path: &Path) -> bool {
+    let table = |line: &str| matches!(line.trim(), "[[joint]]" | "[[body]]");
+    std::fs::read_to_string(path).is_ok_and(|text| text.lines().any(table))
 }
 
 /// Parameters that the summary shows, worst first.
