@@ -3,6 +3,7 @@
 mod bounds;
 mod configurations;
 mod csv;
+mod designs;
 mod estimates_and_states;
 mod estimators;
 mod harness;

@@ -3,7 +3,7 @@
 use crate::harness::{CONFIG, RUN, case, check, config};
 
 /// A trajectory of the two-joint robot with a text replaced.
-fn trajectory(from: &str, to: &str) -> String {
+pub(crate) fn trajectory(from: &str, to: &str) -> String {
     let sound = r#"{
   "schema": "dynid-trajectory/1",
   "form": "plain",
