@@ -3,7 +3,7 @@
 use dynid_model::MotionAdjoint;
 use dynid_motion::trajectory::FourierBasis;
 
-use crate::limits::CoordinateLimits;
+use dynid_motion::trajectory::MotionLimits;
 
 /// Conditions at the start of every period (by periodicity also at its end).
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -49,7 +49,7 @@ enum Offset {
 
 impl Parametrisation {
     /// For coordinates with the given limits, a fundamental `base` (rad/s) and start conditions.
-    pub fn new(limits: &[CoordinateLimits], base: f64, harmonics: usize, start: &StartConditions) -> Self {
+    pub fn new(limits: &[MotionLimits], base: f64, harmonics: usize, start: &StartConditions) -> Self {
         let mut first = 0;
         let joints = limits
             .iter()

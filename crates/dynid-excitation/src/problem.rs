@@ -4,9 +4,9 @@ use faer::Mat;
 
 use crate::constraint::PathConstraint;
 use crate::criterion::{ColumnScaling, Criterion, Measure};
-use crate::limits::CoordinateLimits;
 use crate::model::ExcitationModel;
 use crate::parametrisation::StartConditions;
+use dynid_motion::trajectory::MotionLimits;
 
 /// A design problem.
 pub struct Problem {
@@ -14,8 +14,9 @@ pub struct Problem {
     pub model: Box<dyn ExcitationModel>,
     /// Names of the coordinates.
     pub coordinates: Vec<String>,
-    /// Limits that are linear in the coefficients, one entry per coordinate.
-    pub limits: Vec<CoordinateLimits>,
+    /// Limits that are linear in the coefficients, one entry per coordinate; positions need a finite range, which sets the
+    /// scale of the search.
+    pub limits: Vec<MotionLimits>,
     /// Limits that are not: efforts, distances.
     pub constraints: Vec<Box<dyn PathConstraint>>,
     /// Fundamental `ω`, rad/s.
@@ -149,8 +150,8 @@ impl Problem {
             for (what, limit) in
                 [("velocity", limits.velocity), ("acceleration", limits.acceleration), ("jerk", limits.jerk)]
             {
-                if let Some(limit) = limit {
-                    positive(&format!("{what} limit of {name}"), limit)?;
+                if limit.is_nan() || limit <= 0.0 {
+                    return Err(value(&format!("{what} limit of {name}"), "a positive number", limit));
                 }
             }
         }

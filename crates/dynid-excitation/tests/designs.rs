@@ -152,11 +152,11 @@ fn pointing(criterion: Criterion) -> Problem {
     // mx1, Izz1; mx2, Ixx2, Ixy2, Ixz2, Iyz2, Izz2.
     let kept = vec![1, 9, 11, 14, 15, 16, 18, 19];
     let robot = RobotExcitation::of_columns(model(&mechanism, 0..0, false).into(), Vec::new(), kept);
-    let limit = |q: f64, v: f64| CoordinateLimits {
+    let limit = |q: f64, v: f64| MotionLimits {
         position: (-q, q),
-        velocity: Some(v),
-        acceleration: Some(1.0),
-        jerk: None,
+        velocity: v,
+        acceleration: 1.0,
+        jerk: f64::INFINITY,
     };
     Problem {
         coordinates: mechanism.rate_names(),

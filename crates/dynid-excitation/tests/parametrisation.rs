@@ -1,17 +1,19 @@
 //! Start conditions hold for any unknowns; bounds on a grid hold between its samples.
 
-use dynid_excitation::{CoordinateLimits, Parametrisation, StartConditions};
+use dynid_excitation::{MotionLimits, Parametrisation, StartConditions};
 use dynid_motion::trajectory::FourierBasis;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-fn limits() -> Vec<CoordinateLimits> {
+const NONE: f64 = f64::INFINITY;
+
+fn limits() -> Vec<MotionLimits> {
     let limit =
-        |position, velocity, acceleration, jerk| CoordinateLimits { position, velocity, acceleration, jerk };
+        |position, velocity, acceleration, jerk| MotionLimits { position, velocity, acceleration, jerk };
     vec![
-        limit((-3.0, 3.0), Some(2.0), Some(3.0), None),
-        limit((-0.2, 1.7), Some(0.1), None, Some(4.0)),
-        limit((0.5, 0.9), None, None, None),
+        limit((-3.0, 3.0), 2.0, 3.0, NONE),
+        limit((-0.2, 1.7), 0.1, NONE, 4.0),
+        limit((0.5, 0.9), NONE, NONE, NONE),
     ]
 }
 

@@ -71,7 +71,7 @@ fn er16_reference_and_the_published_table() {
             for (joint, extreme) in numbers(&case[key]).into_iter().enumerate() {
                 let limits = &problem.limits[joint];
                 let limit = if kind == LimitKind::Velocity { limits.velocity } else { limits.acceleration };
-                let excess = extreme.to_radians() / limit.unwrap() - 1.0;
+                let excess = extreme.to_radians() / limit - 1.0;
                 let name = format!("j{}", joint + 1);
                 let found = broken.iter().find(|p| p.kind == kind && p.subject == name).map(|p| p.excess);
                 match found {

@@ -62,9 +62,9 @@ fn sizes_and_numbers() {
         ),
         ("position range of j3", Box::new(|p| p.limits[2].position = (1.0, 1.0))),
         ("position range of j3", Box::new(move |p| p.limits[2].position.0 = nan)),
-        ("velocity limit of j1", Box::new(|p| p.limits[0].velocity = Some(0.0))),
-        ("acceleration limit of j1", Box::new(move |p| p.limits[0].acceleration = Some(nan))),
-        ("jerk limit of j4", Box::new(|p| p.limits[3].jerk = Some(-2.0))),
+        ("velocity limit of j1", Box::new(|p| p.limits[0].velocity = 0.0)),
+        ("acceleration limit of j1", Box::new(move |p| p.limits[0].acceleration = nan)),
+        ("jerk limit of j4", Box::new(|p| p.limits[3].jerk = -2.0)),
         ("weights of the trace", Box::new(|p| p.criterion = Criterion::raw(Measure::Trace(vec![1.0])))),
         (
             "weight of the trace",

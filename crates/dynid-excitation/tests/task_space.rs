@@ -152,11 +152,11 @@ fn problem() -> Problem {
     let columns =
         names.iter().map(|n| ColumnInfo { name: (*n).into(), unit: String::new(), nominal: None }).collect();
     // Loose bounds of the pose; what binds are the sliders. They set the scale of the search.
-    let pose = |low: f64, high: f64, velocity: f64, acceleration: f64| CoordinateLimits {
+    let pose = |low: f64, high: f64, velocity: f64, acceleration: f64| MotionLimits {
         position: (low, high),
-        velocity: Some(velocity),
-        acceleration: Some(acceleration),
-        jerk: None,
+        velocity: velocity,
+        acceleration: acceleration,
+        jerk: f64::INFINITY,
     };
     Problem {
         model: Box::new(DualModel::<9>::new(3, columns, Arc::new(regressor))),

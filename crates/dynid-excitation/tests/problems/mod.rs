@@ -62,7 +62,7 @@ impl Robot {
     }
 
     /// All base columns, raw condition number, 5 harmonics of 0.05 Hz, 100 samples.
-    pub fn problem(&self, limits: Vec<CoordinateLimits>) -> Problem {
+    pub fn problem(&self, limits: Vec<MotionLimits>) -> Problem {
         Problem {
             coordinates: self.model.mechanism().rate_names(),
             limits,
@@ -148,13 +148,13 @@ pub fn ur10(apart: bool) -> Option<Problem> {
     let mechanism = ur10_mechanism()?;
     let robot = Robot::new(&mechanism, &[], &[]);
     let joints: Vec<Limits> = mechanism.bodies().iter().map(|b| b.joint.limits).collect();
-    let limits: Vec<CoordinateLimits> = joints
+    let limits: Vec<MotionLimits> = joints
         .iter()
-        .map(|l| CoordinateLimits {
+        .map(|l| MotionLimits {
             position: l.position.unwrap(),
-            velocity: Some(2.0),
-            acceleration: Some(20.0),
-            jerk: None,
+            velocity: 2.0,
+            acceleration: 20.0,
+            jerk: f64::INFINITY,
         })
         .collect();
     let ranges: Vec<(f64, f64)> = limits.iter().map(|l| l.position).collect();
@@ -224,11 +224,11 @@ pub fn gantry_robot() -> Robot {
 /// The gantry with jerk limits.
 pub fn gantry() -> Problem {
     let robot = gantry_robot();
-    let limit = |range: f64, velocity: f64, acceleration: f64, jerk: f64| CoordinateLimits {
+    let limit = |range: f64, velocity: f64, acceleration: f64, jerk: f64| MotionLimits {
         position: (-0.4 * range, 0.6 * range),
-        velocity: Some(velocity),
-        acceleration: Some(acceleration),
-        jerk: Some(jerk),
+        velocity: velocity,
+        acceleration: acceleration,
+        jerk: jerk,
     };
     let mut problem = robot.problem(vec![
         limit(2.0, 0.6, 1.5, 4.0),

@@ -7,7 +7,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use dynid_excitation::{CoordinateLimits, RobotExcitation};
+use dynid_excitation::{MotionLimits, RobotExcitation};
 use dynid_model::element::{Coulomb, JointElement, Offset, RotorInertia, Viscous};
 use dynid_model::*;
 use serde_json::Value;
@@ -86,7 +86,7 @@ pub fn excitation(model: RobotModel) -> RobotExcitation {
 }
 
 /// Limits of a robot file; angles in degrees where the keys say so.
-pub fn limits(data: &Value) -> Vec<CoordinateLimits> {
+pub fn limits(data: &Value) -> Vec<MotionLimits> {
     let limits = &data["limits"];
     let read = |key: &str| -> Vec<f64> {
         match limits.get(key) {
@@ -96,11 +96,11 @@ pub fn limits(data: &Value) -> Vec<CoordinateLimits> {
     };
     let (low, high, speed, acceleration) = (read("q_min"), read("q_max"), read("qd_max"), read("qdd_max"));
     (0..low.len())
-        .map(|k| CoordinateLimits {
+        .map(|k| MotionLimits {
             position: (low[k], high[k]),
-            velocity: Some(speed[k]),
-            acceleration: Some(acceleration[k]),
-            jerk: None,
+            velocity: speed[k],
+            acceleration: acceleration[k],
+            jerk: f64::INFINITY,
         })
         .collect()
 }

@@ -39,6 +39,28 @@ impl MotionLimits {
         }
     }
 
+    /// Middle of the position range.
+    pub fn middle(&self) -> f64 {
+        0.5 * (self.position.0 + self.position.1)
+    }
+
+    /// Half of the position range.
+    pub fn half_range(&self) -> f64 {
+        0.5 * (self.position.1 - self.position.0)
+    }
+
+    /// Largest deviation of a derivative from its middle (0: half the position range; 1 to 3: velocity, acceleration,
+    /// jerk), if it is limited.
+    pub fn of_derivative(&self, derivative: usize) -> Option<f64> {
+        let limit = match derivative {
+            0 => self.half_range(),
+            1 => self.velocity,
+            2 => self.acceleration,
+            _ => self.jerk,
+        };
+        limit.is_finite().then_some(limit)
+    }
+
     /// Fails if a limit is NaN, negative, zero for velocity, acceleration or jerk, or if the position range is empty.
     pub fn check(&self) -> Result<(), TrajectoryError> {
         let positive = [

@@ -5,7 +5,7 @@ use dynid_excitation::constraint::PathConstraint;
 use dynid_io::trajectory::{Leg, TrajectoryJoint};
 use dynid_io::{OutputError, TrajectoryFile};
 use dynid_model::MotionBlock;
-use dynid_motion::trajectory::{Form, FourierTrajectory, MotionLimits, Phase, RowOrder, Sampled, Sequence};
+use dynid_motion::trajectory::{Form, FourierTrajectory, Phase, RowOrder, Sampled, Sequence};
 
 use super::config::DesignConfig;
 use super::problem::RobotProblem;
@@ -76,17 +76,7 @@ impl DesignedMotion {
             let sequence = file.sequence()?;
             return Ok(Self::of(set, file, sequence, t.sample_rate_hz, Vec::new()));
         };
-        let limits: Vec<MotionLimits> = problem
-            .limits
-            .iter()
-            .map(|l| MotionLimits {
-                position: l.position,
-                velocity: l.velocity.unwrap_or(f64::INFINITY),
-                acceleration: l.acceleration.unwrap_or(f64::INFINITY),
-                jerk: l.jerk.unwrap_or(f64::INFINITY),
-            })
-            .collect();
-        let shortest = Sequence::parked(parking, Box::new(record()?), &limits)?;
+        let shortest = Sequence::parked(parking, Box::new(record()?), &problem.limits)?;
         let length = |phase: Phase| shortest.span(phase).map_or(0.0, |s| s.end - s.start);
         let (mut approach, mut back) = (length(Phase::Approach), length(Phase::Return));
         let mut faults = Vec::new();

@@ -7,8 +7,8 @@ use dynid_excitation::constraint::{
 };
 use dynid_excitation::criterion::{Criterion, Measure};
 use dynid_excitation::{
-    CoordinateLimits, DEFAULT_SAMPLES_PER_HARMONIC, DEFAULT_SIGN_WIDTH, ExcitationModel, Information,
-    Problem, RobotExcitation, StartConditions, information,
+    DEFAULT_SAMPLES_PER_HARMONIC, DEFAULT_SIGN_WIDTH, ExcitationModel, Information, MotionLimits, Problem,
+    RobotExcitation, StartConditions, information,
 };
 use dynid_io::TrajectoryFile;
 use dynid_model::spatial::Vec3;
@@ -51,7 +51,7 @@ pub(super) fn pose(problem: &RobotProblem, config: &DesignConfig) -> Result<Opti
     for joint in parking.keys() {
         known(joint, joints)?;
     }
-    let at = |(joint, limits): (&String, &CoordinateLimits)| match parking.get(joint) {
+    let at = |(joint, limits): (&String, &MotionLimits)| match parking.get(joint) {
         Some(x) if !(*x >= limits.position.0 && *x <= limits.position.1) => Err(Error::setting(
             &format!("trajectory.parking.{joint}"),
             &format!("{} to {}, the joint's limits", limits.position.0, limits.position.1),
@@ -165,7 +165,7 @@ fn joint_limits(
     config: &DesignConfig,
     joints: &[String],
     assumptions: &mut Vec<String>,
-) -> Result<Vec<CoordinateLimits>, Error> {
+) -> Result<Vec<MotionLimits>, Error> {
     let l = &config.limits;
     for joint in l.position.keys() {
         known(joint, joints)?;
@@ -212,11 +212,11 @@ fn joint_limits(
         if acceleration[k].is_none() {
             assumed.push(joint.as_str());
         }
-        out.push(CoordinateLimits {
+        out.push(MotionLimits {
             position,
-            velocity: Some(speed),
-            acceleration: Some(acceleration[k].unwrap_or(speed / TIME_TO_SPEED)),
-            jerk: jerk[k],
+            velocity: speed,
+            acceleration: acceleration[k].unwrap_or(speed / TIME_TO_SPEED),
+            jerk: jerk[k].unwrap_or(f64::INFINITY),
         });
     }
     if !unlimited.is_empty() {
@@ -248,7 +248,7 @@ fn constraints(
     config: &DesignConfig,
     model: &Arc<RobotModel>,
     nominal: Option<&[f64]>,
-    limits: &[CoordinateLimits],
+    limits: &[MotionLimits],
     effort_limits: &[Option<f64>],
     assumptions: &mut Vec<String>,
 ) -> Result<Vec<Box<dyn PathConstraint>>, Error> {

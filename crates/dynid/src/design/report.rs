@@ -142,9 +142,9 @@ impl DesignRun {
                 effort_unit: if joint.slides { "N" } else { "N m" }.to_owned(),
                 position_low: Some(limits.position.0),
                 position_high: Some(limits.position.1),
-                velocity: limits.velocity,
-                acceleration: limits.acceleration,
-                jerk: limits.jerk,
+                velocity: limits.of_derivative(1),
+                acceleration: limits.of_derivative(2),
+                jerk: limits.of_derivative(3),
                 effort: *effort,
             })
             .collect()
