@@ -154,8 +154,8 @@ fn problem() -> Problem {
     // Loose bounds of the pose; what binds are the sliders. They set the scale of the search.
     let pose = |low: f64, high: f64, velocity: f64, acceleration: f64| MotionLimits {
         position: (low, high),
-        velocity: velocity,
-        acceleration: acceleration,
+        velocity,
+        acceleration,
         jerk: f64::INFINITY,
     };
     Problem {

@@ -226,9 +226,9 @@ pub fn gantry() -> Problem {
     let robot = gantry_robot();
     let limit = |range: f64, velocity: f64, acceleration: f64, jerk: f64| MotionLimits {
         position: (-0.4 * range, 0.6 * range),
-        velocity: velocity,
-        acceleration: acceleration,
-        jerk: jerk,
+        velocity,
+        acceleration,
+        jerk,
     };
     let mut problem = robot.problem(vec![
         limit(2.0, 0.6, 1.5, 4.0),
