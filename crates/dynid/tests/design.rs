@@ -1,5 +1,7 @@
 //! Designs from end to end: designed, run on a virtual robot, identified.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
 use std::path::{Path, PathBuf};
 
 use dynid::config::PerJoint;
