@@ -13,8 +13,14 @@ use serde_json::{Value, json};
 use support::{TWO_LINKS, dynid, indy7, run};
 use tempfile::TempDir;
 
-const FILES: [&str; 5] =
-    ["design.json", "trajectory.csv", "trajectory.json", "trajectory.ros2.json", "trajectory.ros2.yaml"];
+const FILES: [&str; 6] = [
+    "design.json",
+    "report.html",
+    "trajectory.csv",
+    "trajectory.json",
+    "trajectory.ros2.json",
+    "trajectory.ros2.yaml",
+];
 const JOINTS: [&str; 6] = ["j1", "j2", "j3", "j4", "j5", "j6"];
 /// Limits of robots/indy7.toml: degrees, degrees a second.
 const POSITION: [f64; 6] = [175.0, 100.0, 150.0, 175.0, 175.0, 215.0];
@@ -83,7 +89,7 @@ fn largest(values: &[f64]) -> f64 {
 }
 
 #[test]
-fn a_design_leaves_five_files_and_says_what_they_are_worth() {
+fn a_design_leaves_six_files_and_says_what_they_are_worth() {
     let (folder, output) = designed();
     assert_eq!(listing(&folder.path().join("out")), FILES);
     assert!(output.stdout.is_empty());
@@ -98,6 +104,7 @@ fn a_design_leaves_five_files_and_says_what_they_are_worth() {
         "pass: all limits hold at every instant",
         "written: out/trajectory.json",
         "written: out/design.json",
+        "written: out/report.html",
     ];
     for part in parts {
         assert!(said.contains(part), "{part}: {said}");
@@ -146,7 +153,10 @@ fn design_json_has_the_keys_types_and_lengths_of_the_contract() {
     assert!(excess.windows(2).all(|w| w[0] >= w[1]) && excess[0] <= 0.0, "{excess:?}");
     let shares: f64 = d["weakest"].as_array().unwrap().iter().map(|w| w["share"].as_f64().unwrap()).sum();
     assert!((0.9..=1.0 + 1e-12).contains(&shares), "{shares}");
-    let seeds: Vec<&Value> = d["starts"].as_array().unwrap().iter().map(|s| &s["seed"]).collect();
+    let starts = d["starts"].as_array().unwrap();
+    assert!(starts.iter().all(|s| s["feasible"] == true && s["evaluations"].is_u64()));
+    assert!(starts.iter().any(|s| s["value"] == d["criterion"]["value"]));
+    let seeds: Vec<&Value> = starts.iter().map(|s| &s["seed"]).collect();
     assert_eq!(seeds, [1, 2]);
     assert!(d["random"]["mean_ratio"].as_f64().unwrap() > 1.0);
     assert!(d["infeasible"].is_null());
@@ -456,11 +466,40 @@ fn a_checkpoint_takes_up_finished_starts_and_is_refused_for_another_problem() {
     assert!(!folder.path().join("other").exists());
 }
 
+/// The list of keys in docs/guide.md, those in comments included, as far as it suits the Indy7.
+fn keys_of_the_guide() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/guide.md");
+    let guide = std::fs::read_to_string(path).unwrap();
+    let list = guide.split("### All keys\n\n```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    let key =
+        |line: &str| line.starts_with("[[") || line.split_once(" = ").is_some_and(|(k, _)| !k.contains(' '));
+    let stated = list.lines().map(|line| line.strip_prefix("# ").filter(|rest| key(rest)).unwrap_or(line));
+    // A start pose names all joints, files have to be there, and one capsule alone is none.
+    let unfit = ["start_pose", "earlier", "j6 = 0.0"];
+    let lines: Vec<&str> = stated.filter(|line| !unfit.iter().any(|key| line.starts_with(key))).collect();
+    let text = lines.join("\n").replace("\"tool\"", "\"link6\"").replace("robot.urdf", "indy7.toml");
+    text + "\n[[capsule]]\nframe = \"base\"\nfrom = [0, 0, 0]\nto = [0, 0, 0.2]\nradius = 0.1\n"
+}
+
+#[test]
+fn every_key_of_the_guide_is_known_to_the_program() {
+    let text = keys_of_the_guide();
+    for key in ["parking", "half_space", "outside_column", "radius", "mix", "checkpoint", "jerk", "gravity"] {
+        assert!(text.lines().any(|line| line.starts_with(&format!("{key} = "))), "{key}: {text}");
+    }
+    let folder = folder(&[("design.toml", &text)]);
+    let args = ["design", "design.toml", "--starts", "1", "--rate-hz", "50"];
+    let output = dynid().current_dir(folder.path()).args(args).output().unwrap();
+    // Limits picked as examples may contradict each other.
+    assert!(matches!(output.status.code(), Some(0 | 1)), "{}", stderr(&output));
+    assert!(folder.path().join("dynid-design/design.json").is_file());
+}
+
 /// A design that ends with exit code 1, and its `design.json`.
 fn infeasible(config: &str) -> (String, Value) {
     let folder = folder(&[("design.toml", &format!("robot = \"indy7.toml\"\nout = \"out\"\n{config}"))]);
     let output = run(folder.path(), &["design", "design.toml", "--starts", "2", "--rate-hz", "50", "-q"], 1);
-    assert_eq!(listing(&folder.path().join("out")), ["design.json"]);
+    assert_eq!(listing(&folder.path().join("out")), ["design.json", "report.html"]);
     let said = stderr(&output);
     assert!(said.starts_with("fail: ") && said.lines().count() == 1, "{said}");
     let d = json(read(folder.path(), "out/design.json"));
@@ -503,7 +542,7 @@ fn limits_that_no_motion_keeps_are_named_with_the_one_in_the_way() {
     let (said, d) = infeasible("[[keep]]\nframes = [\"link6\"]\nabove = 2.0\n");
     assert!(said.contains("no motion keeps all limits") && said.contains("plane of link6"), "{said}");
     assert_eq!(d["infeasible"]["at_start"], false);
-    assert_eq!(d["infeasible"]["blamed"], "distance from a plane");
+    assert_eq!(d["infeasible"]["blamed"], "distance from a plane of link6");
 }
 
 #[test]
