@@ -1,9 +1,10 @@
 //! From a problem to the best of several optimised trajectories.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
 use std::time::Instant;
 
 use faer::Mat;
-use rayon::prelude::*;
 
 use crate::criterion::{Criterion, Measure, Smoothing};
 use crate::feasibility::{Infeasible, diagnose, violated_at_start};
@@ -144,7 +145,7 @@ const TRIAL_ITERATIONS: usize = 10;
 /// Optimises from several starts and keeps the best.
 ///
 /// `done`: starts of an earlier run with the same problem and settings, which are not repeated. `observe` hears of every
-/// start as its batch ends, in the order of seeds. Results do not depend on the number of threads; with a time budget the
+/// start as it ends. Results do not depend on the number of threads; with a time budget the
 /// number of starts depends on the machine, each start does not.
 ///
 /// # Errors
@@ -170,18 +171,33 @@ pub fn design(
     let missing: Vec<u64> = (settings.seed..settings.seed + settings.starts as u64)
         .filter(|seed| starts.iter().all(|s| s.seed != *seed))
         .collect();
-    let batch = rayon::current_num_threads().max(1);
-    for (k, seeds) in missing.chunks(batch).enumerate() {
+    // Starts differ in length: threads take the next one as they get free, in the order of seeds.
+    let next = AtomicUsize::new(0);
+    let had_some = !starts.is_empty();
+    let take = || {
+        let k = next.fetch_add(1, Ordering::Relaxed);
         let over = settings.time_budget_s.is_some_and(|budget| begun.elapsed().as_secs_f64() > budget);
-        if over && (k > 0 || !starts.is_empty()) {
-            break;
+        missing.get(k).filter(|_| !over || (k == 0 && !had_some))
+    };
+    let threads = rayon::current_num_threads().clamp(1, missing.len().max(1));
+    let (send, ended) = mpsc::channel();
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            let send = send.clone();
+            scope.spawn(|| {
+                let send = send;
+                while let Some(seed) = take() {
+                    // The receiver lives as long as this scope.
+                    let _ = send.send(optimiser.run(*seed));
+                }
+            });
         }
-        let ended: Vec<StartOutcome> = seeds.par_iter().filter_map(|seed| optimiser.run(*seed)).collect();
-        for outcome in ended {
+        drop(send);
+        for outcome in ended.iter().flatten() {
             observe(&outcome);
             starts.push(outcome);
         }
-    }
+    });
     starts.sort_by_key(|s| s.seed);
     let best = (0..starts.len()).filter(|k| starts[*k].is_feasible()).min_by(|a, b| {
         let value = |k: &usize| starts[*k].criterion.unwrap_or(f64::INFINITY);

@@ -23,7 +23,7 @@ pub use motion::{DesignedMotion, LegFault, MotionPaths};
 use problem::RobotProblem;
 pub use record::{DesignRecord, DesignVerdict};
 
-/// Samples of a period on which criterion and forecast are reported, unless the real rate asks for more.
+/// Samples of a period on which criterion and forecast are taken, with exact signs; at least 20 per harmonic.
 const REPORT_SAMPLES: usize = 1000;
 /// Samples of a period on which the limits are checked once more.
 const CHECK_SAMPLES: usize = 100_000;
@@ -98,8 +98,7 @@ pub fn design(config: &DesignConfig, mut progress: impl FnMut(DesignStep)) -> Re
         starts: config.search.starts,
         seed: config.search.seed,
         time_budget_s: config.search.time_budget_s,
-        report_samples: REPORT_SAMPLES
-            .max((config.trajectory.period_s * config.trajectory.sample_rate_hz).min(1e4) as usize),
+        report_samples: REPORT_SAMPLES.max(20 * config.trajectory.harmonics),
     };
     let mut ended = 0;
     let mut best: Option<f64> = None;
