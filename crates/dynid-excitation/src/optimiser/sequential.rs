@@ -60,6 +60,8 @@ pub(crate) struct Outcome {
 
 /// Distance of rows that enter the quadratic program, at a trust box of zero size.
 const NEAR: f64 = 0.5;
+/// Largest such distance: steps are much shorter than a large trust box, and rows cost time.
+const FARTHEST: f64 = 0.75;
 const LEAST_RADIUS: f64 = 0.02;
 const LARGEST_RADIUS: f64 = 2.0;
 const ARMIJO: f64 = 1e-4;
@@ -95,7 +97,7 @@ pub(crate) fn minimise<P: Program>(
     let mut iterations = 0;
     while iterations < settings.iterations && stalled < STALLED_ITERATIONS && failures < 4 {
         iterations += 1;
-        let near = program.near_rows(&z, NEAR * (1.0 + radius));
+        let near = program.near_rows(&z, (NEAR * (1.0 + radius)).min(FARTHEST));
         let (mut rows, curved): (Vec<Row>, Vec<Option<P::Id>>) =
             near.into_iter().map(|r| (r.row, r.curved)).unzip();
         let regular = hessian.regular();
