@@ -199,6 +199,19 @@ fn names_cannot_become_markup() {
 }
 
 #[test]
+fn a_design_that_failed_keeps_silent_about_its_log() {
+    let report = DesignReport {
+        verdict: Verdict { headline: "No motion keeps all limits".into(), ..Verdict::default() },
+        ..DesignReport::default()
+    };
+    let page = render_design(&report).unwrap();
+    assert!(page.contains("No motion keeps all limits"));
+    for heading in ["What the log will tell", "Hard to tell apart", "Motion of the joints"] {
+        assert!(!page.contains(heading), "{heading}");
+    }
+}
+
+#[test]
 fn nothing_known_still_makes_a_page_that_says_so() {
     let page = render_design(&DesignReport::default()).unwrap();
     assert!(page.contains(">FAIL</span>") && !page.contains(">OK</span>"));

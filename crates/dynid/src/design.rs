@@ -2,6 +2,7 @@
 
 mod checkpoint;
 mod config;
+mod limits;
 mod motion;
 mod problem;
 mod record;

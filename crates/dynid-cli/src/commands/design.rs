@@ -194,7 +194,7 @@ fn summary(record: &DesignRecord, written: &[&PathBuf]) {
     if record.infeasible.is_none() {
         note(&format!("\n{acting} of {} limits act (used to 99.9 % or more)", record.limits.len()));
     }
-    if let Some(infeasible) = &record.infeasible {
+    if let Some(infeasible) = record.infeasible.as_ref().filter(|i| !i.violations.is_empty()) {
         note("\nlimits that stay broken:");
         for v in &infeasible.violations {
             note(&format!("  {} of {} at {:.2} s", v.kind, v.subject, v.time_s));

@@ -2,20 +2,17 @@
 
 use std::sync::Arc;
 
-use dynid_excitation::constraint::{
-    Capsule, CapsulePairs, Capsules, CartesianLimits, EffortLimits, FramePoint, PathConstraint, Region,
-};
 use dynid_excitation::criterion::{Criterion, Measure};
 use dynid_excitation::{
     DEFAULT_SAMPLES_PER_HARMONIC, DEFAULT_SIGN_WIDTH, ExcitationModel, Information, MotionLimits, Problem,
     RobotExcitation, StartConditions, information,
 };
 use dynid_io::TrajectoryFile;
-use dynid_model::spatial::Vec3;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
 use dynid_motion::trajectory::{Form, RowOrder};
 
 use super::config::{ColumnsName, CriterionName, DesignConfig};
+use super::limits::{constraints, effort_limits, joint_limits};
 use crate::Error;
 use crate::config::known;
 use crate::elements::ElementPlan;
@@ -27,8 +24,6 @@ use crate::robot::Robot;
 const FLOOR_SHARE: f64 = 0.05;
 /// Noise of an effort that nothing is said about, as a share of its limit or of the largest nominal effort.
 const NOISE_SHARE: f64 = 0.01;
-/// Time to full speed where no acceleration limit is given, s.
-const TIME_TO_SPEED: f64 = 0.5;
 
 /// A design problem of a robot, and what was taken for granted in it.
 pub(super) struct RobotProblem {
@@ -158,157 +153,6 @@ fn start_conditions(config: &DesignConfig, joints: &[String]) -> Result<StartCon
         Some(joints.iter().map(at).collect::<Result<_, _>>()?)
     };
     Ok(StartConditions { rest: t.rest, zero_jerk: t.zero_jerk, pose })
-}
-
-fn joint_limits(
-    robot: &Robot,
-    config: &DesignConfig,
-    joints: &[String],
-    assumptions: &mut Vec<String>,
-) -> Result<Vec<MotionLimits>, Error> {
-    let l = &config.limits;
-    for joint in l.position.keys() {
-        known(joint, joints)?;
-    }
-    let velocity = l.velocity.positive("limits.velocity", joints)?;
-    let acceleration = l.acceleration.positive("limits.acceleration", joints)?;
-    let jerk = l.jerk.positive("limits.jerk", joints)?;
-    let owners = robot.mechanism.rate_bodies();
-    let mut unlimited = Vec::new();
-    let mut assumed = Vec::new();
-    let mut out = Vec::with_capacity(joints.len());
-    for (k, joint) in joints.iter().enumerate() {
-        let described = &robot.mechanism.bodies()[owners[k]].joint;
-        let slides = described.effort_unit() == "N";
-        let stated = described.limits.position.filter(|(a, b)| a < b && a.is_finite() && b.is_finite());
-        let position = match (l.position.get(joint), stated) {
-            (Some([low, high]), _) => (*low, *high),
-            (None, Some((low, high))) => {
-                let cut = 0.5 * (1.0 - l.share) * (high - low);
-                (low + cut, high - cut)
-            }
-            (None, None) if !slides => {
-                unlimited.push(joint.as_str());
-                (-std::f64::consts::PI, std::f64::consts::PI)
-            }
-            (None, None) => {
-                let expected = "a range, m: the robot file states none";
-                return Err(Error::setting(&format!("limits.position.{joint}"), expected, "none"));
-            }
-        };
-        if !(position.0 < position.1 && position.0.is_finite() && position.1.is_finite()) {
-            let found = format!("{} to {}", position.0, position.1);
-            return Err(Error::setting(
-                &format!("limits.position.{joint}"),
-                "least below largest, finite",
-                found,
-            ));
-        }
-        let stated = described.limits.velocity.filter(|v| *v > 0.0 && v.is_finite()).map(|v| l.share * v);
-        let Some(speed) = velocity[k].or(stated) else {
-            let expected = "a speed: the robot file states none";
-            return Err(Error::setting(&format!("limits.velocity.{joint}"), expected, "none"));
-        };
-        if acceleration[k].is_none() {
-            assumed.push(joint.as_str());
-        }
-        out.push(MotionLimits {
-            position,
-            velocity: speed,
-            acceleration: acceleration[k].unwrap_or(speed / TIME_TO_SPEED),
-            jerk: jerk[k].unwrap_or(f64::INFINITY),
-        });
-    }
-    if !unlimited.is_empty() {
-        assumptions.push(format!(
-            "no position limits are stated for {}: half a turn to both sides is used",
-            unlimited.join(", ")
-        ));
-    }
-    if !assumed.is_empty() {
-        assumptions.push(format!(
-            "no acceleration limits are stated for {}: full speed in {TIME_TO_SPEED} s is used",
-            assumed.join(", ")
-        ));
-    }
-    Ok(out)
-}
-
-fn effort_limits(robot: &Robot, config: &DesignConfig, joints: &[String]) -> Result<Vec<Option<f64>>, Error> {
-    let given = config.limits.effort.positive("limits.effort", joints)?;
-    let owners = robot.mechanism.rate_bodies();
-    let stated = |k: usize| {
-        let limit = robot.mechanism.bodies()[owners[k]].joint.limits.effort;
-        limit.filter(|e| *e > 0.0 && e.is_finite()).map(|e| config.limits.share * e)
-    };
-    Ok(given.into_iter().enumerate().map(|(k, g)| g.or_else(|| stated(k))).collect())
-}
-
-fn constraints(
-    config: &DesignConfig,
-    model: &Arc<RobotModel>,
-    nominal: Option<&[f64]>,
-    limits: &[MotionLimits],
-    effort_limits: &[Option<f64>],
-    assumptions: &mut Vec<String>,
-) -> Result<Vec<Box<dyn PathConstraint>>, Error> {
-    let mechanism = model.mechanism();
-    let mut out: Vec<Box<dyn PathConstraint>> = Vec::new();
-    if config.limits.efforts && effort_limits.iter().any(Option::is_some) {
-        match nominal {
-            Some(nominal) => out.push(Box::new(EffortLimits::new(
-                model.clone(),
-                Vec::new(),
-                nominal.to_vec(),
-                effort_limits,
-            )?)),
-            None => assumptions.push("effort limits cannot be kept without inertias".to_owned()),
-        }
-    }
-    let regions = regions(config);
-    if !regions.is_empty() {
-        out.push(Box::new(CartesianLimits::new(mechanism, &regions)?));
-    }
-    if !config.capsule.is_empty() {
-        let capsules: Vec<Capsule> = config
-            .capsule
-            .iter()
-            .map(|c| Capsule { frame: c.frame.clone(), ends: [Vec3(c.from), Vec3(c.to)], radius: c.radius })
-            .collect();
-        let ranges: Vec<(f64, f64)> = limits.iter().map(|l| l.position).collect();
-        out.push(Box::new(Capsules::new(mechanism, &capsules, &CapsulePairs::All, &ranges)?));
-    }
-    Ok(out)
-}
-
-/// Regions that points must stay in.
-pub(super) fn regions(config: &DesignConfig) -> Vec<(FramePoint, Region)> {
-    let mut out = Vec::new();
-    for keep in &config.keep {
-        let mut regions = Vec::new();
-        if let Some(height) = keep.above {
-            regions.push(Region::HalfSpace { normal: Vec3([0.0, 0.0, 1.0]), offset: height });
-        }
-        if let Some(h) = keep.half_space {
-            regions.push(Region::HalfSpace { normal: Vec3(h.normal), offset: h.offset });
-        }
-        if let Some(b) = keep.inside {
-            regions.push(Region::InsideBox { lower: Vec3(b.lower), upper: Vec3(b.upper) });
-        }
-        if let Some(c) = keep.outside_cylinder {
-            regions.push(Region::OutsideCylinder { center: c.center, radius: c.radius });
-        }
-        if let Some(c) = keep.outside_column {
-            let (center, radius, height) = (c.center, c.radius, c.height);
-            regions.push(Region::OutsideOrAboveColumn { center, radius, height });
-        }
-        for frame in &keep.frames {
-            for region in &regions {
-                out.push((FramePoint { frame: frame.clone(), position: Vec3(keep.point) }, *region));
-            }
-        }
-    }
-    out
 }
 
 fn noise(

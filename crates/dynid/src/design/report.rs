@@ -8,7 +8,7 @@ use dynid_report as report;
 use dynid_report::Fact;
 
 use super::config::{ColumnsName, CriterionName, DesignConfig};
-use super::problem::regions;
+use super::limits::regions;
 use super::record::NEAR_BEST;
 use super::{DesignRecord, DesignRun, DesignedTrajectory};
 use crate::Error;

@@ -17,7 +17,8 @@ use super::{Fact, Provenance, Robot, Verdict, Warning};
 /// Everything the report of one designed trajectory shows.
 ///
 /// Every list may be empty and every `Option` `None`: its section then says so or is left out, its number is printed
-/// as `-`. [`Default`] gives an empty report. A list documented "per joint" has one entry per entry of
+/// as `-`; a verdict that fails with a headline, without parameters, leaves out what a trajectory would have told. [`Default`] gives an empty
+/// report. A list documented "per joint" has one entry per entry of
 /// [`DesignReport::joints`], in that order, or is empty.
 ///
 /// # Example
