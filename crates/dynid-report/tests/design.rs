@@ -5,8 +5,8 @@ mod synthetic;
 
 use dynid_report::{
     ConfoundedPair, DesignJoint, DesignParameter, DesignReport, DesignStart, Fact, FramePath, JointMotion,
-    LimitUse, Obstacle, ParameterShare, RandomMotion, ReportError, Shape, Starts, Trajectory, Warning,
-    render_design,
+    LimitUse, Obstacle, ParameterShare, RandomMotion, ReportError, Shape, Starts, Trajectory, Verdict,
+    Warning, render_design,
 };
 
 const HOSTILE: &str = "</script><script>alert('x')</script><img src=\"https://example.org/x.png\">&";
