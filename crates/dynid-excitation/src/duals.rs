@@ -21,7 +21,8 @@ pub struct DualState<'a, const N: usize> {
     pub ddq: &'a [Dual<N>],
 }
 
-/// Writes the outputs of a [`DualFunction`] at a state.
+/// Writes the outputs of a function of the motion at a state: the entries of a [`DualModel`], the values of a
+/// [`DualConstraint`].
 pub type DualMap<const N: usize> = Arc<dyn Fn(DualState<'_, N>, &mut [Dual<N>]) + Send + Sync>;
 
 /// A function of the motion at one instant with exact derivatives.

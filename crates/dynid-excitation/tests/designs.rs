@@ -104,6 +104,8 @@ fn results_depend_neither_on_threads_nor_on_interruptions() {
         let outcome =
             pool.install(|| design(&problem, &settings, done, &mut |s| heard.push(s.seed)).unwrap());
         let Outcome::Found(found) = outcome else { panic!("{outcome:?}") };
+        // Starts are heard of as they end.
+        heard.sort_unstable();
         (found, heard)
     };
     let (one, heard) = run(1, Vec::new());
@@ -115,12 +117,12 @@ fn results_depend_neither_on_threads_nor_on_interruptions() {
     let mut done = vec![one.starts[3].clone(), one.starts[1].clone(), one.starts[0].clone()];
     done[2].seed = 77;
     assert_eq!(run(2, done), (one.clone(), vec![1, 3, 5]));
-    // Time that is up lets what began end, and one batch begin.
+    // Time that is up lets what began end, and one start begin.
     let hurried = Settings { time_budget_s: Some(0.0), ..settings.clone() };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     let outcome = pool.install(|| design(&problem, &hurried, Vec::new(), &mut |_| {}).unwrap());
     let Outcome::Found(found) = outcome else { panic!("{outcome:?}") };
-    assert_eq!(found.starts, one.starts[..2]);
+    assert_eq!(found.starts, one.starts[..1]);
 }
 
 /// The two-axis pointing mechanism as a tree, with the eight columns of its ideal model.

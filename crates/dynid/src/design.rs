@@ -179,6 +179,7 @@ impl<'a> Checkpointing<'a> {
 
     fn push(&mut self, start: &StartOutcome) -> Result<(), Error> {
         self.starts.push(start.clone());
+        self.starts.sort_by_key(|s| s.seed);
         match self.path {
             Some(path) => checkpoint::write(path, &self.fingerprint, &self.starts),
             None => Ok(()),
