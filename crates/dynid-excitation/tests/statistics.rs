@@ -50,23 +50,31 @@ fn run(name: &str, problem: &Problem, starts: usize) -> Vec<f64> {
     values
 }
 
+/// The bounds of spec/excitation.md section 9: best of all starts, every start.
+fn require(values: &[f64], best: f64, worst: f64) {
+    let found = values.iter().fold((f64::INFINITY, 0.0_f64), |(b, w), x| (b.min(*x), w.max(*x)));
+    assert!(found.0 <= best && found.1 <= worst, "{found:?}, required {best} and {worst}");
+}
+
 #[test]
-#[ignore = "minutes: all starts of the acceptance table"]
+#[ignore = "half a minute of two cores: every start of every problem; the ordinary run takes a few of each"]
 fn acceptance_table() {
     if let Some(problem) = problems::indy7(false) {
-        run("indy7, 58", &problem, 16);
+        require(&run("indy7, 58", &problem, 16), 28.0, 31.5);
     }
     if let Some(problem) = problems::indy7(true) {
         run("indy7, 58, at rest", &problem, 16);
     }
     if let Some(problem) = problems::er16(false) {
-        run("er16, 15", &problem, 16);
+        require(&run("er16, 15", &problem, 16), 30.5, 34.0);
     }
     if let Some(problem) = problems::er16(true) {
-        run("er16, 24", &problem, 16);
+        require(&run("er16, 24", &problem, 16), 65.0, f64::INFINITY);
     }
     if let Some(problem) = problems::ur10(false) {
-        run("ur10, 36", &problem, 20);
+        let values = run("ur10, 36", &problem, 20);
+        assert_eq!(values.len(), 20);
+        require(&values, 16.0, 20.0);
     }
     if let Some(problem) = problems::ur10(true) {
         run("ur10, 36, capsules", &problem, 20);

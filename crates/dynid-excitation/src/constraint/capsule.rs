@@ -12,8 +12,8 @@ use super::cartesian::{add_along, distance_row, resolve};
 use super::clearance::Clearance;
 use super::segment::{Closest, Segment, end_distance, segment_distance};
 use super::{
-    ConstraintError, ConstraintKind, ConstraintRow, DISTANCE_SCALE, PathConstraint, by_sample, fixed_base,
-    pose, positive,
+    ConstraintError, ConstraintKind, ConstraintRow, DISTANCE_SCALE, PathConstraint, at_poses, fixed_base,
+    positive,
 };
 
 /// All points within `radius` of the segment between two points of a link.
@@ -193,18 +193,7 @@ impl PathConstraint for Capsules {
         let n = self.dynamics.rates();
         assert_eq!(out.len(), 3 * n * wanted.len(), "length of the gradients");
         out.fill(0.0);
-        let mut work = self.dynamics.workspace();
-        let mut q = vec![0.0; n];
-        let mut ends = vec![Vec3::zero(); self.points.len()];
-        let mut jacobians = vec![0.0; 3 * n * self.points.len()];
-        let mut placed = None;
-        for k in by_sample(wanted) {
-            let (row, sample) = wanted[k];
-            if placed != Some(sample) {
-                pose(motion, sample, &mut q);
-                self.dynamics.point_jacobians(&q, &self.points, &mut work, &mut ends, &mut jacobians);
-                placed = Some(sample);
-            }
+        at_poses(&self.dynamics, &self.points, motion, wanted, |k, row, ends, jacobians| {
             let (pair, closest) = self.measure(row, |k| [ends[2 * k], ends[2 * k + 1]]);
             let (a, b) = self.pairs[pair];
             let gradient = &mut out[3 * n * k..][..n];
@@ -214,6 +203,6 @@ impl PathConstraint for Capsules {
                     add_along(jacobian, closest.direction.scale(sign * part / DISTANCE_SCALE), gradient);
                 }
             }
-        }
+        });
     }
 }

@@ -3,8 +3,8 @@
 use dynid_model::{BodyPoint, Dynamics, Mechanism, MotionBlock, Vec3};
 
 use super::{
-    ConstraintError, ConstraintKind, ConstraintRow, DISTANCE_SCALE, PathConstraint, by_sample, finite,
-    fixed_base, pose, positive,
+    ConstraintError, ConstraintKind, ConstraintRow, DISTANCE_SCALE, PathConstraint, at_poses, finite,
+    fixed_base, positive,
 };
 
 /// Sharpness of the smooth maximum, 1/m: it lies at most `ln 2 / b` = 7 mm below the maximum.
@@ -203,23 +203,12 @@ impl PathConstraint for CartesianLimits {
         let n = self.dynamics.rates();
         assert_eq!(out.len(), 3 * n * wanted.len(), "length of the gradients");
         out.fill(0.0);
-        let mut work = self.dynamics.workspace();
-        let mut q = vec![0.0; n];
-        let mut positions = vec![Vec3::zero(); self.points.len()];
-        let mut jacobians = vec![0.0; 3 * n * self.points.len()];
-        let mut placed = None;
-        for k in by_sample(wanted) {
-            let (row, sample) = wanted[k];
-            if placed != Some(sample) {
-                pose(motion, sample, &mut q);
-                self.dynamics.point_jacobians(&q, &self.points, &mut work, &mut positions, &mut jacobians);
-                placed = Some(sample);
-            }
+        at_poses(&self.dynamics, &self.points, motion, wanted, |k, row, positions, jacobians| {
             let (point, distance) = &self.distances[row];
             let (_, slope) = distance.at(positions[*point]);
             let jacobian = &jacobians[3 * n * point..][..3 * n];
             add_along(jacobian, slope.scale(1.0 / DISTANCE_SCALE), &mut out[3 * n * k..][..n]);
-        }
+        });
     }
 }
 

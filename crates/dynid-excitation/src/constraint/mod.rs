@@ -14,7 +14,7 @@ pub use capsule::{Capsule, CapsulePairs, Capsules};
 pub use cartesian::{CartesianLimits, FramePoint, Region};
 pub use effort::EffortLimits;
 
-use dynid_model::{MechanismError, MotionBlock};
+use dynid_model::{BodyPoint, Dynamics, MechanismError, MotionBlock, Vec3};
 use thiserror::Error;
 
 /// Distance that counts as one in normalised rows, m.
@@ -91,6 +91,32 @@ fn fixed_base(positions: usize, rates: usize) -> Result<(), ConstraintError> {
 fn pose(motion: &MotionBlock<'_>, sample: usize, q: &mut [f64]) {
     for (c, q) in q.iter_mut().enumerate() {
         *q = motion.q[c * motion.stride + sample];
+    }
+}
+
+/// Calls `work(place, row, positions, jacobians)` for every wanted row, with points and their Jacobians (row-major, three
+/// rows a point) at the pose of its sample; each pose is computed once.
+fn at_poses(
+    dynamics: &Dynamics,
+    points: &[BodyPoint],
+    motion: &MotionBlock<'_>,
+    wanted: &[(usize, usize)],
+    mut work: impl FnMut(usize, usize, &[Vec3<f64>], &[f64]),
+) {
+    let n = dynamics.rates();
+    let mut memory = dynamics.workspace();
+    let mut q = vec![0.0; n];
+    let mut positions = vec![Vec3::zero(); points.len()];
+    let mut jacobians = vec![0.0; 3 * n * points.len()];
+    let mut placed = None;
+    for place in by_sample(wanted) {
+        let (row, sample) = wanted[place];
+        if placed != Some(sample) {
+            pose(motion, sample, &mut q);
+            dynamics.point_jacobians(&q, points, &mut memory, &mut positions, &mut jacobians);
+            placed = Some(sample);
+        }
+        work(place, row, &positions, &jacobians);
     }
 }
 
