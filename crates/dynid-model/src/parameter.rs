@@ -37,7 +37,7 @@ pub struct ShapeParameter {
     pub name: String,
     /// Unit.
     pub unit: &'static str,
-    /// Start value.
+    /// Value where nothing else is said: the start of searches; in an identified model the value found.
     pub start: f64,
     /// Lower bound.
     pub lower: f64,

@@ -145,6 +145,19 @@ impl RobotModel {
         &self.mechanism
     }
 
+    /// The same model with other values of its shape parameters: those that hold wherever nothing else is said
+    /// ([`ParameterTable::shape_start`]).
+    ///
+    /// # Panics
+    /// If there is not one value per shape parameter.
+    pub fn with_shape(mut self, values: &[f64]) -> Self {
+        assert_eq!(values.len(), self.parameters.shape.len(), "length of shape");
+        for (parameter, value) in self.parameters.shape.iter_mut().zip(values) {
+            parameter.start = *value;
+        }
+        self
+    }
+
     /// Joints as elements see them, one per rate.
     pub fn joints(&self) -> &[JointInfo] {
         &self.joints

@@ -67,7 +67,8 @@ pub fn compare(
 ) -> Result<Agreement, Error> {
     let state_hz = alignment.state_hz;
     let filter_hz = alignment.filter_hz.min(0.4 * log.rate_hz);
-    let run = |delay: f64| predict(model, &[], values, log, state_hz, delay, settings);
+    let shape = model.parameters().shape_start();
+    let run = |delay: f64| predict(model, &shape, values, log, state_hz, delay, settings);
     let same_rate = (log.rate_hz / alignment.delay_rate_hz - 1.0).abs() <= 0.05;
     let predicted = run(if same_rate { alignment.delay_samples } else { 0.0 })?;
     let unaligned = run(0.0)?;

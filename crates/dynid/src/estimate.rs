@@ -3,14 +3,14 @@
 mod model;
 mod trust;
 
-pub use model::{CouplingRecord, JointRecord, LinkRecord, ModelRecord};
+pub use model::{CouplingRecord, JointRecord, LinkRecord, ModelRecord, SettingRecord};
 pub use trust::{
     ConsistencyRecord, HeldOutRecord, PrecisionRecord, PruningRecord, PruningStep, WhitenessRecord,
 };
 
 use std::path::Path;
 
-use dynid_model::RobotModel;
+use dynid_model::{EffortModel, RobotModel};
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
@@ -42,6 +42,9 @@ pub struct Estimate {
     pub parameters: Vec<ParameterValue>,
     /// Base parameters.
     pub base_parameters: Vec<BaseValue>,
+    /// Parameters that enter the effort nonlinearly.
+    #[serde(default)]
+    pub shape_parameters: Vec<ShapeValue>,
     /// Whether every link could be a physical body.
     pub feasible: bool,
     /// Physical consistency of the standard parameters and what it costs; absent if none was asked for.
@@ -179,6 +182,27 @@ pub struct BaseValue {
     pub std_white: Option<f64>,
     /// Relative standard deviation, percent; absent where the value is below two standard deviations.
     pub rel_std: Option<f64>,
+}
+
+/// One shape parameter: a Stribeck velocity, the slope of an arctangent.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct ShapeValue {
+    /// Name, `<joint>.vs`.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Value.
+    pub value: f64,
+    /// Range that was searched.
+    pub range: (f64, f64),
+    /// Standard deviation; absent if it was not estimated.
+    #[serde(default)]
+    pub std: Option<f64>,
+    /// `seen in the data`, `bounded on one side`, `not seen` or `given`.
+    pub verdict: String,
+    /// Why, in words.
+    #[serde(default)]
+    pub reason: Option<String>,
 }
 
 /// Per-joint agreement, in the effort's unit.
@@ -359,11 +383,21 @@ impl Estimate {
         }
         let elements = plan.build(&mechanism)?;
         let model = RobotModel::new(mechanism, elements);
-        let expected = dynid_model::EffortModel::parameters(&model).linear.len();
+        let table = model.parameters();
+        let expected = table.linear.len();
         if expected != self.parameters.len() {
             return Err(fault(format!("{} parameters, the model has {expected}", self.parameters.len())));
         }
-        Ok(model)
+        let shape: Vec<f64> = self.shape_parameters.iter().map(|s| s.value).collect();
+        let names = self.shape_parameters.iter().map(|s| &s.name);
+        if !names.eq(table.shape.iter().map(|s| &s.name)) || !shape.iter().all(|x| x.is_finite()) {
+            return Err(fault(format!(
+                "{} finite shape parameters, the model has {}",
+                shape.len(),
+                table.shape.len()
+            )));
+        }
+        Ok(model.with_shape(&shape))
     }
 
     /// Values of all linear parameters.

@@ -95,14 +95,15 @@ impl Fitted {
 pub(crate) fn rows<'a>(
     config: &Config,
     model: &'a RobotModel,
+    shape: &'a [f64],
     kept: &[usize],
     logs: &'a [PreparedLog],
     conditioning: Option<&Conditioning>,
     settings: &ConditioningSettings,
 ) -> Result<Box<dyn RowSource + 'a>, Error> {
     Ok(match conditioning {
-        Some(found) => Box::new(LogRows::new(model, &[], kept, logs, found, settings)?),
-        None => Box::new(textbook_rows(model, &[], kept, logs, &config.textbook_route(), settings)?),
+        Some(found) => Box::new(LogRows::new(model, shape, kept, logs, found, settings)?),
+        None => Box::new(textbook_rows(model, shape, kept, logs, &config.textbook_route(), settings)?),
     })
 }
 

@@ -138,12 +138,13 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     }
 
     progress(Step::Structure);
+    let shape = model.parameters().shape_start();
     let base_settings = BaseSettings {
         seed: config.seed.unwrap_or(1),
         preferred: preferred_columns(config, &model)?,
         ..BaseSettings::default()
     };
-    let base = BaseParameters::of(&model, model.mechanism(), &[], &base_settings);
+    let base = BaseParameters::of(&model, model.mechanism(), &shape, &base_settings);
     if base.is_empty() {
         return Err(Error::Unsupported("no parameter of this robot acts on any effort".to_owned()));
     }
@@ -158,13 +159,14 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     let method = fitting::method(&config.estimator, &model, &base, &prior, &space)?;
 
     let conditioning = match config.conditioning.route {
-        Route::Compact => Some(condition(&model, &[], &base.kept, &prepared, &settings, |stage| {
+        Route::Compact => Some(condition(&model, &shape, &base.kept, &prepared, &settings, |stage| {
             progress(Step::Conditioning(stage));
         })?),
         Route::Textbook => None,
     };
     progress(Step::Fit);
-    let source = fitting::rows(config, &model, &base.kept, &prepared, conditioning.as_ref(), &settings)?;
+    let source =
+        fitting::rows(config, &model, &shape, &base.kept, &prepared, conditioning.as_ref(), &settings)?;
     let (fit, groups) = fitting::fit(config, base.len(), &method, &*source)?;
     let residuals = fitting::residuals(&*source, &fit)?;
     drop(source);
@@ -300,7 +302,16 @@ impl Identification {
     /// # Errors
     /// [`Error::Conditioning`].
     pub fn predict(&self, log: &PreparedLog) -> Result<Vec<Vec<f64>>, Error> {
-        Ok(predict(&self.model, &[], self.values(), log, self.state_hz, self.delay_samples, &self.settings)?)
+        let shape = self.model.parameters().shape_start();
+        Ok(predict(
+            &self.model,
+            &shape,
+            self.values(),
+            log,
+            self.state_hz,
+            self.delay_samples,
+            &self.settings,
+        )?)
     }
 
     /// Standard deviations of all base parameters: reported and white; `None` where a column was dropped.

@@ -76,7 +76,8 @@ pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection,
     let default = elements.or(if robot.elements.defaults.is_empty() { Some(none) } else { None });
     let plan = ElementPlan::new(mechanism, &robot.elements, default, |_| true)?;
     let model = RobotModel::new(mechanism.clone(), plan.build(mechanism)?);
-    let base = BaseParameters::of(&model, mechanism, &[], &BaseSettings::default());
+    let base =
+        BaseParameters::of(&model, mechanism, &model.parameters().shape_start(), &BaseSettings::default());
     let table = model.parameters();
     let expressions = base.expressions(table);
     let names = mechanism.rate_names();

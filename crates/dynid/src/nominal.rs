@@ -55,7 +55,7 @@ pub(crate) fn typical_efforts(model: &RobotModel, values: &[f64]) -> Vec<f64> {
     const STATES: usize = 100;
     let motion = RandomMotion::new(model.mechanism(), model.channels(), STATES, TYPICAL_SEED);
     let mut block = RegressorBlock::new(model.layout().clone(), STATES);
-    motion.with_block(|m| model.regressor(m, &[], &mut block));
+    motion.with_block(|m| model.regressor(m, &model.parameters().shape_start(), &mut block));
     (0..model.outputs().len())
         .map(|j| block.effort(j, values).iter().fold(0.0_f64, |m, x| m.max(x.abs())))
         .collect()

@@ -35,7 +35,7 @@ impl Flat {
             channels: &[],
             sign_width: 0.0,
         };
-        model.regressor(&motion, &[], &mut block);
+        model.regressor(&motion, &model.parameters().shape_start(), &mut block);
         block
     }
 }

@@ -10,7 +10,7 @@ use crate::agreement::Agreement;
 use crate::config::{Config, Route};
 use crate::estimate::{
     BaseValue, Choice, ConditioningRecord, Estimate, FitSummary, FitValues, InputRecord, LogFit, ModelRecord,
-    ParameterValue, Provenance, RankStatus, SCHEMA,
+    ParameterValue, Provenance, RankStatus, SCHEMA, ShapeValue,
 };
 use crate::identify::Identification;
 use crate::logs::sha256;
@@ -49,6 +49,7 @@ impl Identification {
             },
             parameters: self.parameter_values(),
             base_parameters: self.base_values(),
+            shape_parameters: self.shape_values(),
             feasible: self.unphysical_bodies().is_empty(),
             consistency: self.consistency_record(config),
             held_out: self.held_out_record(),
@@ -148,6 +149,23 @@ impl Identification {
                     std_white: white,
                     rel_std: relative(value, std),
                 }
+            })
+            .collect()
+    }
+
+    fn shape_values(&self) -> Vec<ShapeValue> {
+        let table = self.model.parameters();
+        table
+            .shape
+            .iter()
+            .map(|p| ShapeValue {
+                name: p.name.clone(),
+                unit: p.unit.to_owned(),
+                value: p.start,
+                range: (p.lower, p.upper),
+                std: None,
+                verdict: "given".to_owned(),
+                reason: None,
             })
             .collect()
     }

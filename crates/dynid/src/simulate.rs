@@ -196,6 +196,6 @@ fn efforts(model: &RobotModel, values: &[f64], signals: &[Vec<f64>; 3], samples:
         channels: &[],
         sign_width: 0.0,
     };
-    model.regressor(&motion, &[], &mut block);
+    model.regressor(&motion, &model.parameters().shape_start(), &mut block);
     (0..model.outputs().len()).map(|output| block.effort(output, values)).collect()
 }

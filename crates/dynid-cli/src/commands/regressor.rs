@@ -28,8 +28,14 @@ pub(crate) fn run(args: &RegressorArgs) -> Result<u8, Failure> {
         data(&csv_text(&joints, &effort))?;
         return Ok(0);
     }
-    let base =
-        args.base.then(|| BaseParameters::of(&model, model.mechanism(), &[], &BaseSettings::default()));
+    let base = args.base.then(|| {
+        BaseParameters::of(
+            &model,
+            model.mechanism(),
+            &model.parameters().shape_start(),
+            &BaseSettings::default(),
+        )
+    });
     let table = &model.parameters().linear;
     let columns = match &base {
         None => table.iter().map(|p| p.name.clone()).collect(),

@@ -6,7 +6,7 @@ use dynid_excitation::MotionLimits;
 use dynid_excitation::constraint::{
     Capsule, CapsulePairs, Capsules, CartesianLimits, EffortLimits, FramePoint, PathConstraint, Region,
 };
-use dynid_model::{RobotModel, Vec3};
+use dynid_model::{EffortModel, RobotModel, Vec3};
 
 use super::config::DesignConfig;
 use crate::Error;
@@ -118,7 +118,7 @@ pub(super) fn constraints(
         match nominal {
             Some(nominal) => out.push(Box::new(EffortLimits::new(
                 model.clone(),
-                Vec::new(),
+                model.parameters().shape_start(),
                 nominal.to_vec(),
                 effort_limits,
             )?)),

@@ -179,9 +179,10 @@ fn noise(
 }
 
 fn columns(config: &DesignConfig, model: &Arc<RobotModel>, nominal: Option<&[f64]>) -> RobotExcitation {
-    let base = BaseParameters::of(model.as_ref(), model.mechanism(), &[], &BaseSettings::default());
+    let shape = model.parameters().shape_start();
+    let base = BaseParameters::of(model.as_ref(), model.mechanism(), &shape, &BaseSettings::default());
     match config.criterion.columns {
-        ColumnsName::All => RobotExcitation::new(model.clone(), Vec::new(), &base, nominal),
+        ColumnsName::All => RobotExcitation::new(model.clone(), shape, &base, nominal),
         ColumnsName::Inertial => {
             let rigid = Arc::new(RobotModel::new(model.mechanism().clone(), Vec::new()));
             let base = BaseParameters::of(rigid.as_ref(), rigid.mechanism(), &[], &BaseSettings::default());

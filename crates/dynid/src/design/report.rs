@@ -182,7 +182,8 @@ impl DesignRun {
         let block = block(&sampled);
         let effort = self.set.nominal.as_ref().map(|nominal| {
             let mut effort = vec![0.0; self.set.model.outputs().len() * n];
-            self.set.model.efforts(&block, &[], nominal, n, &mut effort);
+            let shape = self.set.model.parameters().shape_start();
+            self.set.model.efforts(&block, &shape, nominal, n, &mut effort);
             effort
         });
         let row = |signal: &[f64], k: usize| signal[k * n..(k + 1) * n].to_vec();

@@ -26,12 +26,22 @@ pub struct ModelRecord {
     pub elements: Vec<Vec<String>>,
     /// Couplings.
     pub couplings: Vec<CouplingRecord>,
-    /// Numeric settings of elements: joint, element, key, value.
-    pub element_settings: Vec<(String, String, String, f64)>,
+    /// Settings of elements that are numbers or flags: joint, element, key, value.
+    pub element_settings: Vec<(String, String, String, SettingRecord)>,
     /// Cut-off of the state filter, Hz.
     pub state_hz: f64,
     /// Cut-off of the widest kernel, Hz.
     pub kernel_hz: f64,
+}
+
+/// Value of an element's setting.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum SettingRecord {
+    /// A number.
+    Number(f64),
+    /// True or false.
+    Flag(bool),
 }
 
 /// A link.
@@ -108,9 +118,13 @@ impl ModelRecord {
         let element_settings = plan
             .settings()
             .iter()
-            .filter_map(|s| match s.value {
-                SettingValue::Number(x) => Some((s.joint.clone(), s.element.clone(), s.key.clone(), x)),
-                _ => None,
+            .filter_map(|s| {
+                let value = match s.value {
+                    SettingValue::Number(x) => SettingRecord::Number(x),
+                    SettingValue::Flag(x) => SettingRecord::Flag(x),
+                    _ => return None,
+                };
+                Some((s.joint.clone(), s.element.clone(), s.key.clone(), value))
             })
             .collect();
         ModelRecord {
@@ -159,7 +173,10 @@ impl ModelRecord {
                 joint: joint.clone(),
                 element: element.clone(),
                 key: key.clone(),
-                value: SettingValue::Number(*value),
+                value: match *value {
+                    SettingRecord::Number(x) => SettingValue::Number(x),
+                    SettingRecord::Flag(x) => SettingValue::Flag(x),
+                },
             })
             .collect();
         let spec = ElementSpec { settings, ..ElementSpec::default() };

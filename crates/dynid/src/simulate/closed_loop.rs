@@ -27,7 +27,7 @@ pub(super) fn experiment(
     if !(0.0..=1.0).contains(&table.model_error) {
         return Err(Error::setting("control.model_error", "0 to 1", table.model_error));
     }
-    let shape = vec![0.0; model.parameters().shape.len()];
+    let shape = model.parameters().shape_start();
     let plant = |values: Vec<f64>| Plant::new(model.clone(), values, shape.clone(), plant_table.sign_width);
     let nominal = plant(wrong_model(&values, table.model_error, settings.seed))?;
     let mut truth = plant(values.clone())?;
