@@ -1,7 +1,7 @@
 //! Reports: one HTML file that tells a customer what was identified and how far it can be trusted, another that shows a
-//! designed trajectory and what its log will tell.
+//! designed trajectory and what its log will tell, a third that holds the claims of a study against what was measured.
 //!
-//! Fill a [`ReportData`] or a [`DesignReport`], call [`render`] or [`render_design`], write the text to a file. The crate
+//! Fill a [`ReportData`], a [`DesignReport`] or a [`StudyReport`], call [`render`], [`render_design`] or [`render_study`], write the text to a file. The crate
 //! knows nothing of models or estimators, and a page needs nothing but a browser: no network, no second file.
 //!
 //! # Why the plots are our own
@@ -26,13 +26,14 @@ mod page;
 mod series;
 
 pub use data::{
-    BaseParameter, Check, Chosen, ConfoundedPair, Consistency, ConsistencyStatus, DesignJoint,
-    DesignParameter, DesignQuality, DesignReport, DesignStart, Fact, FramePath, HeldOut, HeldOutJoint,
-    InputFile, Joint, JointDelay, JointMotion, JointQuality, JointSeries, Ladder, Limit, LimitUse, LogReport,
-    LogRole, LogSeries, LogWhiteness, Observation, Obstacle, Origin, OwnerKind, ParameterShare,
-    ParameterVerdict, Precision, Provenance, Pruning, PruningStep, Quality, RandomMotion, ReportData, Robot,
-    Rung, Shape, StandardParameter, Starts, Status, Trajectory, UnidentifiableColumn, ValidationPrice, Value,
-    Verdict, Warning, Whiteness,
+    BaseParameter, Chart, ChartAxis, ChartCurve, Check, Chosen, ConfoundedPair, Consistency,
+    ConsistencyStatus, CurveStyle, DesignJoint, DesignParameter, DesignQuality, DesignReport, DesignStart,
+    Fact, FramePath, HeldOut, HeldOutJoint, InputFile, Joint, JointDelay, JointMotion, JointQuality,
+    JointSeries, Ladder, Limit, LimitUse, LogReport, LogRole, LogSeries, LogWhiteness, Observation, Obstacle,
+    Origin, OwnerKind, ParameterShare, ParameterVerdict, Precision, Provenance, Pruning, PruningStep,
+    Quality, RandomMotion, ReportData, Robot, Rung, Shape, StandardParameter, Starts, Status, StudyReport,
+    StudyRow, StudySection, StudyTable, Trajectory, UnidentifiableColumn, ValidationPrice, Value, Verdict,
+    Warning, Whiteness,
 };
 pub use error::ReportError;
-pub use page::{render, render_design};
+pub use page::{render, render_design, render_study};

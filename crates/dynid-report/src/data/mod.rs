@@ -18,6 +18,7 @@ mod parameters;
 mod precision;
 mod provenance;
 mod pruning;
+mod study;
 mod verdict;
 
 pub use conditioning::{Chosen, JointDelay, Ladder, Observation, Origin, Rung, UnidentifiableColumn};
@@ -31,6 +32,7 @@ pub use parameters::{BaseParameter, OwnerKind, ParameterVerdict, StandardParamet
 pub use precision::{LogWhiteness, Precision, Whiteness};
 pub use provenance::{InputFile, Provenance};
 pub use pruning::{Pruning, PruningStep};
+pub use study::{Chart, ChartAxis, ChartCurve, CurveStyle, StudyReport, StudyRow, StudySection, StudyTable};
 pub use verdict::{Check, Status, Verdict, Warning};
 
 use serde::Serialize;

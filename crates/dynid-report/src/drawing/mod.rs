@@ -3,6 +3,7 @@
 mod autocorrelation;
 mod axis;
 mod bars;
+mod chart;
 mod histogram;
 mod interval;
 mod path;
@@ -11,6 +12,7 @@ mod views;
 
 pub(crate) use autocorrelation::autocorrelation_svg;
 pub(crate) use bars::{counts_svg, meter_svg, pair_svg};
+pub(crate) use chart::chart_svg;
 pub(crate) use histogram::histogram_svg;
 pub(crate) use interval::interval_svg;
 pub(crate) use path::{PathMarks, PathPoint, ceiling, fewest, path_svg};

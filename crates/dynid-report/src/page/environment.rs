@@ -10,9 +10,10 @@ use crate::number::{self, UNDEFINED};
 
 pub(super) const PAGE: &str = "page.html";
 pub(super) const DESIGN_PAGE: &str = "design/page.html";
+pub(super) const STUDY_PAGE: &str = "study/page.html";
 
 /// Every name ends in `.html`, which switches automatic escaping on.
-const TEMPLATES: [(&str, &str); 23] = [
+const TEMPLATES: [(&str, &str); 24] = [
     ("shell.html", include_str!("../../template/shell.html")),
     (PAGE, include_str!("../../template/page.html")),
     ("macros.html", include_str!("../../template/macros.html")),
@@ -35,6 +36,7 @@ const TEMPLATES: [(&str, &str); 23] = [
     ("design/motion.html", include_str!("../../template/design/motion.html")),
     ("design/paths.html", include_str!("../../template/design/paths.html")),
     ("design/starts.html", include_str!("../../template/design/starts.html")),
+    (STUDY_PAGE, include_str!("../../template/study/page.html")),
     ("provenance.html", include_str!("../../template/provenance.html")),
 ];
 

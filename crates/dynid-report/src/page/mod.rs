@@ -7,9 +7,10 @@ mod environment;
 mod prose;
 mod pruning;
 mod script_data;
+mod study;
 mod trust;
 
-use crate::data::{DesignReport, ReportData};
+use crate::data::{DesignReport, ReportData, StudyReport};
 use crate::error::ReportError;
 
 /// Lays the report out as one HTML file that needs nothing else.
@@ -42,4 +43,21 @@ pub fn render_design(data: &DesignReport) -> Result<String, ReportError> {
     let environment = environment::environment()?;
     let context = design::context(data)?;
     Ok(environment.get_template(environment::DESIGN_PAGE)?.render(context)?)
+}
+
+/// Lays the report of a study out as one HTML file, with the properties of [`render`]'s; it is complete without a script.
+///
+/// # Errors
+///
+/// [`ReportError::Length`] if a row of a table has more cells than the table has headings. The other variants would be
+/// faults of this crate.
+pub fn render_study(data: &StudyReport) -> Result<String, ReportError> {
+    for table in data.sections.iter().flat_map(|s| &s.tables) {
+        if let Some(row) = table.rows.iter().find(|row| row.len() > table.head.len()) {
+            let place = format!("table {:?}", table.caption);
+            return Err(ReportError::Length { place, expected: table.head.len(), found: row.len() });
+        }
+    }
+    let environment = environment::environment()?;
+    Ok(environment.get_template(environment::STUDY_PAGE)?.render(study::context(data))?)
 }
