@@ -197,6 +197,26 @@ pub trait EffortModel: Send + Sync {
     /// If the block is larger than `out`, a channel is missing or `shape` has the wrong length.
     fn regressor(&self, motion: &MotionBlock<'_>, shape: &[f64], out: &mut RegressorBlock);
 
+    /// Columns of the regressor that change with the shape parameters: `(output, linear column)`, each once, ascending by
+    /// output.
+    fn shaped_columns(&self) -> &[(usize, usize)];
+    /// Which shape parameter changes which of them: `(index into shaped_columns, shape parameter)`, each once.
+    fn shape_dependence(&self) -> &[(usize, usize)];
+    /// The columns of [`EffortModel::shaped_columns`], `values[k * stride + s]`, and their derivatives by shape parameters,
+    /// `derivatives[d * stride + s]` for the `d`-th pair of [`EffortModel::shape_dependence`]. An empty slice is not wanted.
+    /// No rigid-body work is done.
+    ///
+    /// # Panics
+    /// If `shape` has the wrong length, a channel is missing, or a slice that is not empty is too short.
+    fn shaped(
+        &self,
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        stride: usize,
+        values: &mut [f64],
+        derivatives: &mut [f64],
+    );
+
     /// Efforts of a block, `W linear + offset`, without forming the regressor: output `o`, sample `s` at
     /// `effort[o * stride + s]`.
     ///

@@ -2,6 +2,7 @@
 
 mod adjoint;
 mod elements;
+mod shaped;
 
 use std::sync::Arc;
 
@@ -12,6 +13,7 @@ use crate::element::{ElementColumns, JointElement, JointInfo};
 use crate::inertia::{PARAMETER_NAMES, PARAMETER_UNITS};
 use crate::mechanism::{Body, Mechanism};
 use crate::parameter::{Owner, Parameter, ParameterTable};
+use shaped::Shaped;
 
 #[derive(Debug)]
 struct PlacedElement {
@@ -51,6 +53,7 @@ pub struct RobotModel {
     slots: Slots,
     coupled: Option<CoupledRegressor>,
     elements: Vec<PlacedElement>,
+    shaped: Shaped,
     channels: Vec<String>,
 }
 
@@ -105,7 +108,7 @@ impl RobotModel {
                 (Slots::new(&dynamics, |_, _| 0), Some(coupled))
             }
         };
-        let elements = elements
+        let elements: Vec<PlacedElement> = elements
             .into_iter()
             .enumerate()
             .map(|(k, element)| {
@@ -127,6 +130,7 @@ impl RobotModel {
             })
             .collect();
         RobotModel {
+            shaped: Shaped::new(&elements),
             dynamics,
             joints,
             outputs,
@@ -220,6 +224,25 @@ impl EffortModel for RobotModel {
             Some(coupled) => coupled.fill(&self.mechanism, motion, &self.layout, out),
         }
         self.fill_elements(motion, shape, out);
+    }
+
+    fn shaped_columns(&self) -> &[(usize, usize)] {
+        &self.shaped.columns
+    }
+
+    fn shape_dependence(&self) -> &[(usize, usize)] {
+        &self.shaped.dependence
+    }
+
+    fn shaped(
+        &self,
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        stride: usize,
+        values: &mut [f64],
+        derivatives: &mut [f64],
+    ) {
+        self.fill_shaped(motion, shape, stride, values, derivatives);
     }
 
     fn efforts(

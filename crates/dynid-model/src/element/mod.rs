@@ -7,12 +7,14 @@ mod compliance;
 mod drive;
 mod friction;
 mod rotor;
+mod shape;
 mod transmission;
 
 pub use compliance::{CyclicTorque, Spring};
 pub use drive::{DriveGain, current_channel};
-pub use friction::{AsymmetricFriction, Coulomb, Offset, Viscous};
+pub use friction::{Arctangent, AsymmetricFriction, Coulomb, Offset, Stribeck, Viscous};
 pub use rotor::RotorInertia;
+pub use shape::{ShapeFault, ShapeSetting};
 pub use transmission::{CoupledWrist, Transmission};
 
 use crate::dynamics::{MotionAdjoint, MotionBlock};
@@ -62,6 +64,21 @@ impl ElementColumns<'_> {
         &mut self.data[self.slots[entry] * self.stride..][..self.samples]
     }
 
+    /// The columns of two entries.
+    ///
+    /// # Panics
+    /// If they are the same column.
+    pub fn two_columns(&mut self, a: usize, b: usize) -> [&mut [f64]; 2] {
+        let range = |entry: usize| {
+            let first = self.slots[entry] * self.stride;
+            first..first + self.samples
+        };
+        match self.data.get_disjoint_mut([range(a), range(b)]) {
+            Ok(columns) => columns,
+            Err(fault) => panic!("columns {a} and {b}: {fault}"),
+        }
+    }
+
     /// Fills the column of an entry from one signal.
     pub fn map(&mut self, entry: usize, signal: &[f64], f: impl Fn(f64) -> f64) {
         for (to, x) in self.column(entry).iter_mut().zip(signal) {
@@ -107,7 +124,7 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     fn rates(&self) -> Vec<usize>;
     /// Linear parameters. `joints`: one per rate of the mechanism.
     fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter>;
-    /// Shape parameters; none by default.
+    /// Shape parameters that are free, in the order of the element's shape vector; none by default.
     fn shape(&self, _joints: &[JointInfo]) -> Vec<ShapeParameter> {
         Vec::new()
     }
@@ -129,6 +146,20 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
         shape: &[f64],
         out: &mut ElementColumns<'_>,
     );
+    /// Which columns change with which shape parameter: `(entry, shape parameter)`, each pair once; none by default.
+    fn shape_entries(&self) -> Vec<(usize, usize)> {
+        Vec::new()
+    }
+    /// Fills the derivative of an entry's column by a shape parameter, one column per pair of
+    /// [`JointElement::shape_entries`].
+    fn shape_derivatives(
+        &self,
+        _joints: &[JointInfo],
+        _motion: &MotionBlock<'_>,
+        _shape: &[f64],
+        _out: &mut ElementColumns<'_>,
+    ) {
+    }
     /// Adds to `out` the derivatives of `Σ weights ∘ columns` with respect to the motion. Extra channels are held; where a
     /// column has a kink, the mean of both sides counts.
     fn adjoint(

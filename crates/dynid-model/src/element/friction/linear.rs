@@ -1,11 +1,9 @@
 //! Friction that is linear in its parameters, and the constant offset.
 
-use super::{ElementColumns, ElementWeights, JointElement, JointInfo, sign};
+use super::{EFFORT, VISCOUS};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
+use crate::element::{ElementColumns, ElementWeights, JointElement, JointInfo, sign};
 use crate::parameter::Parameter;
-
-pub(super) const EFFORT: [&str; 2] = ["N m", "N"];
-pub(super) const VISCOUS: [&str; 2] = ["N m s/rad", "N s/m"];
 
 /// Coulomb friction `F_c s(v)`, one column.
 #[derive(Debug, Clone, PartialEq)]

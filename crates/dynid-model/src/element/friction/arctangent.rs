@@ -1,0 +1,84 @@
+//! Arctangent friction.
+
+use super::{EFFORT, PER_SPEED};
+use crate::dynamics::{MotionAdjoint, MotionBlock};
+use crate::element::shape::values;
+use crate::element::{ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting};
+use crate::parameter::{Parameter, ShapeParameter};
+
+/// Friction `F_a atan(f_b v)`: one column `atan(f_b v)` for `fa`, one shape parameter `fb` (s/rad, s/m).
+///
+/// `∂/∂v = f_b / (1 + f_b² v²)`, `∂/∂f_b = v / (1 + f_b² v²)`. Beside Coulomb and viscous friction it forms the law of
+/// spec/er16.md section 3; `fa` may then be negative (friction that falls from rest). With `f_b v_max < 1` the column
+/// equals viscous friction, with `f_b |v| > 100` Coulomb friction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arctangent {
+    /// Rate it acts on.
+    pub rate: usize,
+    /// Slope parameter `f_b`, positive. Default: 10 in 1 .. 100, all divided by the scale of speed.
+    pub fb: ShapeSetting,
+}
+
+impl Arctangent {
+    /// For speeds up to about 1 rad/s or m/s.
+    pub fn new(rate: usize) -> Self {
+        Self::scaled(rate, 1.0)
+    }
+
+    /// For speeds up to `v_max`, rad/s or m/s, above 0.
+    pub fn scaled(rate: usize, v_max: f64) -> Self {
+        Arctangent { rate, fb: ShapeSetting::between(1.0 / v_max, 100.0 / v_max) }
+    }
+
+    fn slope(&self, shape: &[f64]) -> f64 {
+        let [fb] = values([&self.fb], shape);
+        fb
+    }
+}
+
+impl JointElement for Arctangent {
+    fn rates(&self) -> Vec<usize> {
+        vec![self.rate]
+    }
+    fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
+        vec![joints[self.rate].parameter("fa", EFFORT, None)]
+    }
+    fn shape(&self, joints: &[JointInfo]) -> Vec<ShapeParameter> {
+        let fb = || self.fb.parameter(&joints[self.rate], "fb", PER_SPEED, true);
+        if self.fb.held { Vec::new() } else { vec![fb()] }
+    }
+    fn entries(&self) -> Vec<(usize, usize)> {
+        vec![(self.rate, 0)]
+    }
+    fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, shape: &[f64], out: &mut ElementColumns<'_>) {
+        let fb = self.slope(shape);
+        out.map(0, motion.rate(self.rate), |v| (fb * v).atan());
+    }
+    fn shape_entries(&self) -> Vec<(usize, usize)> {
+        if self.fb.held { Vec::new() } else { vec![(0, 0)] }
+    }
+    fn shape_derivatives(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        out: &mut ElementColumns<'_>,
+    ) {
+        if !self.fb.held {
+            let fb = self.slope(shape);
+            out.map(0, motion.rate(self.rate), |v| v / (1.0 + (fb * v) * (fb * v)));
+        }
+    }
+    fn adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        let fb = self.slope(shape);
+        let slope = |v: f64| fb / (1.0 + (fb * v) * (fb * v));
+        weights.add(0, self.rate, motion.rate(self.rate), slope, &mut out.dq);
+    }
+}
