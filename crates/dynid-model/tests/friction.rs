@@ -4,7 +4,10 @@
 
 use std::path::PathBuf;
 
-use dynid_model::element::{Arctangent, Coulomb, JointElement, ShapeSetting, Stribeck, Viscous};
+use dynid_model::element::{
+    Arctangent, Coulomb, JointElement, PowerLaw, ShapeSetting, Sigmoid, SigmoidOffset, Stribeck,
+    TanhFriction, Viscous, ViscousMagnitude,
+};
 use dynid_model::*;
 use serde_json::Value;
 
@@ -97,6 +100,18 @@ fn curves_are_those_of_the_catalogue() {
                 elements.push(Box::new(Arctangent::new(0)));
                 (vec![p("fa")], vec![p("fb")])
             }
+            "tanh" => {
+                elements.push(Box::new(TanhFriction::new(0)));
+                (vec![p("fc")], vec![p("w")])
+            }
+            "sigmoid" => {
+                elements.push(Box::new(Sigmoid::new(0)));
+                (vec![p("p1")], vec![p("p2"), p("p3")])
+            }
+            "power" => {
+                elements.push(Box::new(PowerLaw::new(0)));
+                (vec![p("c")], vec![p("p")])
+            }
             "stribeck" => {
                 elements.push(Box::new(Stribeck { delta: free(1.5), ..Stribeck::new(0) }));
                 elements.push(Box::new(Viscous { rate: 0 }));
@@ -119,7 +134,7 @@ fn curves_are_those_of_the_catalogue() {
             assert!((effort[k] - direct[k]).abs() <= 1e-13 * scale, "{name}: columns times linear");
         }
     }
-    assert_eq!(seen, ["arctan", "stribeck", "stribeck"]);
+    assert_eq!(seen, ["arctan", "tanh", "sigmoid", "stribeck", "stribeck", "power"]);
 }
 
 /// Elements of every kind with free shape, some parameters held, linear elements between them.
@@ -132,6 +147,12 @@ fn all_elements() -> Vec<Box<dyn JointElement>> {
         Box::new(Stribeck { vs: free(0.2), ..Stribeck::new(0) }),
         Box::new(Stribeck { rate: 3, vs: ShapeSetting::held(0.1), delta: free(0.8) }),
         Box::new(Arctangent { rate: 3, fb: ShapeSetting::held(4.0) }),
+        Box::new(TanhFriction { rate: 1, w: free(0.15) }),
+        Box::new(Sigmoid { rate: 2, phi2: free(9.0), phi3: free(0.026) }),
+        Box::new(Sigmoid { rate: 3, phi2: ShapeSetting::held(12.0), phi3: free(-0.02) }),
+        Box::new(SigmoidOffset { rate: 0, alpha: free(8.0), nu: free(0.03) }),
+        Box::new(PowerLaw { rate: 2, p: free(0.7) }),
+        Box::new(ViscousMagnitude { rate: 1 }),
     ]
 }
 
@@ -223,6 +244,24 @@ fn derivatives_by_speed_are_those_of_central_differences() {
             let difference = (above[k] - below[k]) / (2.0 * h * motion.dq[k]);
             let error = (found.dq[k] - difference).abs();
             assert!(error <= 1e-6 * (1.0 + difference.abs()), "{k}: {} {difference}", found.dq[k]);
+        }
+    }
+}
+
+#[test]
+fn ur10_form_is_the_panda_form_but_for_an_offset() {
+    let motion = Speeds::new(1, &SPEEDS);
+    // 459 s/rad: the steepest value identified for a UR10.
+    for shape in [[9.0, 0.02], [459.0, -0.004], [1e6, 0.05]] {
+        let forms: [Box<dyn JointElement>; 2] = [Box::new(Sigmoid::new(0)), Box::new(SigmoidOffset::new(0))];
+        let efforts = forms
+            .map(|form| columns(&model(1, vec![form]), &motion.block(0.0), &shape).column(0, 10).to_vec());
+        let rest = 1.0 / (1.0 + (-shape[0] * shape[1]).exp());
+        for (s, v) in SPEEDS.into_iter().enumerate() {
+            let expected = 1.0 / (1.0 + (-shape[0] * (v + shape[1])).exp());
+            assert!((efforts[1][s] - expected).abs() <= 1e-14, "{v}: {} {expected}", efforts[1][s]);
+            assert!((efforts[1][s] - efforts[0][s] - rest).abs() <= 1e-14, "{v}");
+            assert!(v != 0.0 || efforts[0][s] == 0.0, "zero at rest");
         }
     }
 }

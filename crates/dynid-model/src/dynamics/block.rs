@@ -52,6 +52,16 @@ impl<'a> MotionBlock<'a> {
         if self.sign_width > 0.0 { (v / self.sign_width).tanh() } else { sign(v) }
     }
 
+    /// [`MotionBlock::sign`] of every speed.
+    pub(crate) fn fill_signs(&self, speeds: &[f64], out: &mut [f64]) {
+        // The choice outside of the loop leaves one without branches.
+        if self.sign_width > 0.0 {
+            out.iter_mut().zip(speeds).for_each(|(s, v)| *s = self.sign(*v));
+        } else {
+            out.iter_mut().zip(speeds).for_each(|(s, v)| *s = sign(*v));
+        }
+    }
+
     /// Derivative of [`MotionBlock::sign`]: `(1 - s²) / sign_width`; 0 for the exact sign.
     pub fn sign_slope(&self, v: f64) -> f64 {
         let s = self.sign(v);

@@ -12,13 +12,17 @@ mod transmission;
 
 pub use compliance::{CyclicTorque, Spring};
 pub use drive::{DriveGain, current_channel};
-pub use friction::{Arctangent, AsymmetricFriction, Coulomb, Offset, Stribeck, Viscous};
+pub use friction::{
+    Arctangent, AsymmetricFriction, Coulomb, Offset, PowerLaw, Sigmoid, SigmoidOffset, Stribeck,
+    TanhFriction, Viscous, ViscousMagnitude,
+};
 pub use rotor::RotorInertia;
 pub use shape::{ShapeFault, ShapeSetting};
 pub use transmission::{CoupledWrist, Transmission};
 
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::{Owner, Parameter, ShapeParameter};
+use crate::scalar::elementary::{Curve, map_curve};
 
 /// An output as elements see it.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,6 +81,13 @@ impl ElementColumns<'_> {
             Ok(columns) => columns,
             Err(fault) => panic!("columns {a} and {b}: {fault}"),
         }
+    }
+
+    /// Fills the column of an entry with a curve of one signal.
+    fn curve(&mut self, entry: usize, signal: &[f64], curve: &impl Curve) {
+        let column = self.column(entry);
+        column.copy_from_slice(signal);
+        map_curve(curve, column);
     }
 
     /// Fills the column of an entry from one signal.

@@ -104,3 +104,8 @@ pub(super) fn places<const N: usize>(settings: [&ShapeSetting; N]) -> [Option<us
     let mut next = 0..;
     settings.map(|s| if s.held { None } else { next.next() })
 }
+
+/// The parameters whose setting does not hold them.
+pub(super) fn free<const N: usize>(parameters: [(&ShapeSetting, ShapeParameter); N]) -> Vec<ShapeParameter> {
+    parameters.into_iter().filter(|(setting, _)| !setting.held).map(|(_, parameter)| parameter).collect()
+}

@@ -2,6 +2,7 @@
 
 mod dispatch;
 mod dual;
+pub(crate) mod elementary;
 mod lanes;
 mod sine;
 

@@ -2,9 +2,10 @@
 
 use super::{EFFORT, PER_SPEED};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
-use crate::element::shape::values;
+use crate::element::shape::{self, places, values};
 use crate::element::{ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting};
 use crate::parameter::{Parameter, ShapeParameter};
+use crate::scalar::elementary::{Curve, atan};
 
 /// Friction `F_a atan(f_b v)`: one column `atan(f_b v)` for `fa`, one shape parameter `fb` (s/rad, s/m).
 ///
@@ -36,6 +37,17 @@ impl Arctangent {
     }
 }
 
+struct Law {
+    fb: f64,
+}
+
+impl Curve for Law {
+    #[inline(always)]
+    fn at(&self, v: f64) -> f64 {
+        atan(self.fb * v)
+    }
+}
+
 impl JointElement for Arctangent {
     fn rates(&self) -> Vec<usize> {
         vec![self.rate]
@@ -44,18 +56,16 @@ impl JointElement for Arctangent {
         vec![joints[self.rate].parameter("fa", EFFORT, None)]
     }
     fn shape(&self, joints: &[JointInfo]) -> Vec<ShapeParameter> {
-        let fb = || self.fb.parameter(&joints[self.rate], "fb", PER_SPEED, true);
-        if self.fb.held { Vec::new() } else { vec![fb()] }
+        shape::free([(&self.fb, self.fb.parameter(&joints[self.rate], "fb", PER_SPEED, true))])
     }
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0)]
     }
     fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, shape: &[f64], out: &mut ElementColumns<'_>) {
-        let fb = self.slope(shape);
-        out.map(0, motion.rate(self.rate), |v| (fb * v).atan());
+        out.curve(0, motion.rate(self.rate), &Law { fb: self.slope(shape) });
     }
     fn shape_entries(&self) -> Vec<(usize, usize)> {
-        if self.fb.held { Vec::new() } else { vec![(0, 0)] }
+        places([&self.fb]).into_iter().flatten().map(|p| (0, p)).collect()
     }
     fn shape_derivatives(
         &self,

@@ -19,6 +19,14 @@ pub struct Viscous {
     pub rate: usize,
 }
 
+/// Part of viscous friction that keeps its sign in both directions, `F_va |v|`, one column: beside [`Viscous`], coefficients
+/// `F_v + F_va` forwards and `F_v - F_va` backwards. Passive together with it for `|F_va| <= F_v`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViscousMagnitude {
+    /// Rate it acts on.
+    pub rate: usize,
+}
+
 /// Constant effort `F_o`, one column: zero of the current or torque sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Offset {
@@ -81,6 +89,31 @@ impl JointElement for Viscous {
         out: &mut MotionAdjoint,
     ) {
         weights.add(0, self.rate, motion.rate(self.rate), |_| 1.0, &mut out.dq);
+    }
+}
+
+impl JointElement for ViscousMagnitude {
+    fn rates(&self) -> Vec<usize> {
+        vec![self.rate]
+    }
+    fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
+        vec![joints[self.rate].parameter("fva", VISCOUS, None)]
+    }
+    fn entries(&self) -> Vec<(usize, usize)> {
+        vec![(self.rate, 0)]
+    }
+    fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
+        out.map(0, motion.rate(self.rate), f64::abs);
+    }
+    fn adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        _: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        weights.add(0, self.rate, motion.rate(self.rate), sign, &mut out.dq);
     }
 }
 

@@ -1,11 +1,17 @@
 //! Friction of velocity, and the constant offset (spec/elements.md section 2).
 
 mod arctangent;
+mod hyperbolic;
 mod linear;
+mod power_law;
+mod sigmoid;
 mod stribeck;
 
 pub use arctangent::Arctangent;
-pub use linear::{AsymmetricFriction, Coulomb, Offset, Viscous};
+pub use hyperbolic::TanhFriction;
+pub use linear::{AsymmetricFriction, Coulomb, Offset, Viscous, ViscousMagnitude};
+pub use power_law::PowerLaw;
+pub use sigmoid::{Sigmoid, SigmoidOffset};
 pub use stribeck::Stribeck;
 
 pub(super) const EFFORT: [&str; 2] = ["N m", "N"];

@@ -2,17 +2,18 @@
 
 use super::{EFFORT, NUMBER, SPEED};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
-use crate::element::shape::{places, values};
+use crate::element::shape::{self, places, values};
 use crate::element::{ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting};
 use crate::parameter::{Parameter, ShapeParameter};
+use crate::scalar::elementary::{Curve, decay, map_curve};
 
 /// Friction that falls from static `F_s` to Coulomb `F_c` with speed, `s(v) (F_c + (F_s - F_c) E)` with
 /// `E = exp(-|v/v_s|^δ)`: two columns `[s (1 - E), s E]` for `fc`, `fs`, shape parameters `vs` and `delta`.
 ///
 /// It takes the place of [`Coulomb`](super::Coulomb) (the columns of both are collinear: they add up to `s`); viscous
 /// friction stands beside it. `∂E/∂v = -E δ x^δ / v`, `∂E/∂v_s = E δ x^δ / v_s`, `∂E/∂δ = -E x^δ ln x` with
-/// `x = |v/v_s|`. Without samples below some `3 v_s`, `fs` and `vs` cannot be estimated. `F_s < F_c` is
-/// passive but no Stribeck effect.
+/// `x = |v/v_s|`. Without samples below some `3 v_s`, `fs` and `vs` cannot be estimated. `F_s < F_c` is passive but no
+/// Stribeck effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stribeck {
     /// Rate it acts on.
@@ -44,7 +45,7 @@ impl Stribeck {
 }
 
 /// `x^δ`, without a power where there is a cheaper way.
-fn power(x: f64, delta: f64) -> f64 {
+fn raised(x: f64, delta: f64) -> f64 {
     if delta == 2.0 {
         x * x
     } else if delta == 1.0 {
@@ -52,6 +53,42 @@ fn power(x: f64, delta: f64) -> f64 {
     } else {
         x.powf(delta)
     }
+}
+
+/// `v` to `exp(-(v/v_s)²)`.
+struct Gauss {
+    per_vs: f64,
+}
+
+impl Curve for Gauss {
+    #[inline(always)]
+    fn at(&self, v: f64) -> f64 {
+        let x = v * self.per_vs;
+        decay(x * x)
+    }
+}
+
+/// `x` to `exp(-x)`.
+struct Exponential;
+
+impl Curve for Exponential {
+    #[inline(always)]
+    fn at(&self, x: f64) -> f64 {
+        decay(x)
+    }
+}
+
+/// Fills `E`.
+fn fill_falling(speeds: &[f64], [vs, delta]: [f64; 2], out: &mut [f64]) {
+    if delta == 2.0 {
+        out.copy_from_slice(speeds);
+        map_curve(&Gauss { per_vs: 1.0 / vs }, out);
+        return;
+    }
+    for (to, v) in out.iter_mut().zip(speeds) {
+        *to = raised((v / vs).abs(), delta);
+    }
+    map_curve(&Exponential, out);
 }
 
 impl JointElement for Stribeck {
@@ -64,26 +101,22 @@ impl JointElement for Stribeck {
     }
     fn shape(&self, joints: &[JointInfo]) -> Vec<ShapeParameter> {
         let joint = &joints[self.rate];
-        let mut out = Vec::new();
-        if !self.vs.held {
-            out.push(self.vs.parameter(joint, "vs", SPEED, true));
-        }
-        if !self.delta.held {
-            out.push(self.delta.parameter(joint, "delta", NUMBER, true));
-        }
-        out
+        shape::free([
+            (&self.vs, self.vs.parameter(joint, "vs", SPEED, true)),
+            (&self.delta, self.delta.parameter(joint, "delta", NUMBER, true)),
+        ])
     }
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0), (self.rate, 1)]
     }
     fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, shape: &[f64], out: &mut ElementColumns<'_>) {
-        let [vs, delta] = values(self.settings(), shape);
         let speeds = motion.rate(self.rate);
         let [coulomb, fixed] = out.two_columns(0, 1);
-        for ((c, f), v) in coulomb.iter_mut().zip(fixed).zip(speeds) {
-            let (s, e) = (motion.sign(*v), (-power((v / vs).abs(), delta)).exp());
-            *f = s * e;
-            *c = s - *f;
+        motion.fill_signs(speeds, coulomb);
+        fill_falling(speeds, values(self.settings(), shape), fixed);
+        for (c, f) in coulomb.iter_mut().zip(fixed) {
+            *f *= *c;
+            *c -= *f;
         }
     }
     fn shape_entries(&self) -> Vec<(usize, usize)> {
@@ -98,16 +131,17 @@ impl JointElement for Stribeck {
     ) {
         let [vs, delta] = values(self.settings(), shape);
         let speeds = motion.rate(self.rate);
-        let [by_vs, by_delta] = places(self.settings());
-        let mut fill = |place: usize, derivative: &dyn Fn(f64) -> f64| {
+        let mut fill = |place: usize, factor: &dyn Fn(f64) -> f64| {
             let [coulomb, fixed] = out.two_columns(2 * place, 2 * place + 1);
+            motion.fill_signs(speeds, coulomb);
+            fill_falling(speeds, [vs, delta], fixed);
             for ((c, f), v) in coulomb.iter_mut().zip(fixed).zip(speeds) {
                 let x = (v / vs).abs();
-                let raised = power(x, delta);
-                *f = motion.sign(*v) * (-raised).exp() * raised * derivative(x);
+                *f *= *c * raised(x, delta) * factor(x);
                 *c = -*f;
             }
         };
+        let [by_vs, by_delta] = places(self.settings());
         if let Some(place) = by_vs {
             fill(place, &|_| delta / vs);
         }
@@ -126,10 +160,10 @@ impl JointElement for Stribeck {
     ) {
         let [vs, delta] = values(self.settings(), shape);
         let speeds = motion.rate(self.rate);
-        // s E and its derivative by v; the part of E counts nothing at rest, where s = 0.
         let fixed = |v: f64| {
-            let raised = power((v / vs).abs(), delta);
-            let e = (-raised).exp();
+            let raised = raised((v / vs).abs(), delta);
+            let e = decay(raised);
+            // At rest the sign is 0 and the slope of E counts nothing.
             let falling = if v == 0.0 { 0.0 } else { motion.sign(v) * e * delta * raised / v };
             motion.sign_slope(v) * e - falling
         };
