@@ -16,6 +16,7 @@
 //! | whether residuals are white | [`whiteness`] |
 //! | standard parameters of bodies that can exist, with a proven gap | [`consistent`] |
 //! | which parameters the data determine, and which the prior | [`identifiability`] |
+//! | searches that need values only: populations, patterns | [`search`] |
 //! | how well a prediction matches a measurement | [`metrics`] |
 //!
 //! Notation: `W` is the regressor (rows × `p` columns), `y` the effort, `x` the parameters,
@@ -35,6 +36,7 @@ pub mod linear;
 pub mod metrics;
 pub mod rank;
 pub mod rows;
+pub mod search;
 mod triangular;
 mod whitened;
 pub mod whiteness;
