@@ -6,6 +6,7 @@
 mod compliance;
 mod drive;
 mod friction;
+mod linearised;
 mod rotor;
 mod shape;
 mod transmission;
@@ -16,6 +17,7 @@ pub use friction::{
     Arctangent, AsymmetricFriction, Coulomb, Offset, PowerLaw, Sigmoid, SigmoidOffset, Stribeck,
     TanhFriction, Viscous, ViscousMagnitude,
 };
+pub use linearised::{Linearised, change_name};
 pub use rotor::RotorInertia;
 pub use shape::{ShapeFault, ShapeSetting};
 pub use transmission::{CoupledWrist, Transmission};
@@ -169,6 +171,17 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
         _motion: &MotionBlock<'_>,
         _shape: &[f64],
         _out: &mut ElementColumns<'_>,
+    ) {
+    }
+    /// Adds to `out` the derivatives of `Σ weights ∘ shape derivatives` with respect to the motion, one column of weights
+    /// per pair of [`JointElement::shape_entries`]; kinks as in [`JointElement::adjoint`].
+    fn shape_adjoint(
+        &self,
+        _joints: &[JointInfo],
+        _motion: &MotionBlock<'_>,
+        _shape: &[f64],
+        _weights: &ElementWeights<'_>,
+        _out: &mut MotionAdjoint,
     ) {
     }
     /// Adds to `out` the derivatives of `Σ weights ∘ columns` with respect to the motion. Extra channels are held; where a

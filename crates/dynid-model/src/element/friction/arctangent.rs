@@ -79,6 +79,23 @@ impl JointElement for Arctangent {
             out.map(0, motion.rate(self.rate), |v| v / (1.0 + (fb * v) * (fb * v)));
         }
     }
+    fn shape_adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        if !self.fb.held {
+            let fb = self.slope(shape);
+            let bend = |v: f64| {
+                let square = (fb * v) * (fb * v);
+                (1.0 - square) / ((1.0 + square) * (1.0 + square))
+            };
+            weights.add(0, self.rate, motion.rate(self.rate), bend, &mut out.dq);
+        }
+    }
     fn adjoint(
         &self,
         _: &[JointInfo],

@@ -96,6 +96,23 @@ impl JointElement for TanhFriction {
             out.curve(0, motion.rate(self.rate), &ByWidth(self.law(shape)));
         }
     }
+    fn shape_adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        if !self.w.held {
+            let law = self.law(shape);
+            let bend = |v: f64| {
+                let x = v / law.w;
+                (2.0 * x * law.at(v) - 1.0) * law.squared_secant(v) / (law.w * law.w)
+            };
+            weights.add(0, self.rate, motion.rate(self.rate), bend, &mut out.dq);
+        }
+    }
     fn adjoint(
         &self,
         _: &[JointInfo],

@@ -69,6 +69,26 @@ impl JointElement for PowerLaw {
             out.map(0, motion.rate(self.rate), derivative);
         }
     }
+    fn shape_adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        if !self.p.held {
+            let p = self.exponent(shape);
+            let bend = |v: f64| {
+                if v == 0.0 {
+                    return 0.0;
+                }
+                let (power, log) = (v.abs().powf(p), v.abs().ln());
+                motion.sign_slope(v) * power * log + motion.sign(v) * power / v * (p * log + 1.0)
+            };
+            weights.add(0, self.rate, motion.rate(self.rate), bend, &mut out.dq);
+        }
+    }
     fn adjoint(
         &self,
         _: &[JointInfo],

@@ -116,6 +116,31 @@ impl Curve for Derivative {
     }
 }
 
+/// Adds the derivatives by the velocity of those by slope and shift, which both forms share: a base does not move.
+fn bend(
+    places: [Option<usize>; 2],
+    [slope, shift]: [f64; 2],
+    rate: usize,
+    motion: &MotionBlock<'_>,
+    weights: &ElementWeights<'_>,
+    out: &mut MotionAdjoint,
+) {
+    // S'' = S' (1 - 2 S)
+    let second = |x: f64| logistic_slope(x) * (1.0 - 2.0 * logistic(x));
+    let [by_slope, by_shift] = places;
+    if let Some(place) = by_slope {
+        let of_speed = |v: f64| {
+            let x = slope * (v + shift);
+            logistic_slope(x) + x * second(x)
+        };
+        weights.add(place, rate, motion.rate(rate), of_speed, &mut out.dq);
+    }
+    if let Some(place) = by_shift {
+        let of_speed = |v: f64| slope * slope * second(slope * (v + shift));
+        weights.add(place, rate, motion.rate(rate), of_speed, &mut out.dq);
+    }
+}
+
 impl JointElement for Sigmoid {
     fn rates(&self) -> Vec<usize> {
         vec![self.rate]
@@ -156,6 +181,17 @@ impl JointElement for Sigmoid {
         if let Some(place) = by_shift {
             out.curve(place, speeds, &Derivative::by_shift(at).zero_at_rest());
         }
+    }
+    fn shape_adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        let at = values(self.settings(), shape);
+        bend(places(self.settings()), at, self.rate, motion, weights, out);
     }
     fn adjoint(
         &self,
@@ -209,6 +245,17 @@ impl JointElement for SigmoidOffset {
         if let Some(place) = by_shift {
             out.curve(place, speeds, &Derivative::by_shift(at));
         }
+    }
+    fn shape_adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        let at = values(self.settings(), shape);
+        bend(places(self.settings()), at, self.rate, motion, weights, out);
     }
     fn adjoint(
         &self,

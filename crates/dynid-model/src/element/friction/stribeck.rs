@@ -150,6 +150,35 @@ impl JointElement for Stribeck {
             fill(place, &|x| if x > 0.0 { -x.ln() } else { 0.0 });
         }
     }
+    fn shape_adjoint(
+        &self,
+        _: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        let [vs, delta] = values(self.settings(), shape);
+        let speeds = motion.rate(self.rate);
+        // Derivatives by v of s E x^δ and of -s E x^δ ln x.
+        let bend = |v: f64, logarithm: bool| {
+            let x = (v / vs).abs();
+            if x == 0.0 {
+                return 0.0;
+            }
+            let power = raised(x, delta);
+            let e = decay(power);
+            let (factor, slope) = if logarithm { (-x.ln(), -1.0 / v) } else { (1.0, 0.0) };
+            let falling = e * power * (delta * (1.0 - power) / v * factor + slope);
+            motion.sign_slope(v) * e * power * factor + motion.sign(v) * falling
+        };
+        let [by_vs, by_delta] = places(self.settings());
+        for (place, scale, logarithm) in [(by_vs, delta / vs, false), (by_delta, 1.0, true)] {
+            let Some(place) = place else { continue };
+            weights.add(2 * place, self.rate, speeds, |v| -scale * bend(v, logarithm), &mut out.dq);
+            weights.add(2 * place + 1, self.rate, speeds, |v| scale * bend(v, logarithm), &mut out.dq);
+        }
+    }
     fn adjoint(
         &self,
         _: &[JointInfo],

@@ -1,0 +1,137 @@
+//! Elements linearised about values of their shape parameters.
+
+use super::{ElementColumns, ElementWeights, JointElement, JointInfo};
+use crate::dynamics::{MotionAdjoint, MotionBlock};
+use crate::parameter::{Owner, Parameter};
+
+/// An element about a point `(c₀, α₀)` of its linear and shape parameters: its columns at `α₀`, and one column per shape
+/// parameter, `Σ ∂column/∂α · c₀`, whose coefficient is the change of that parameter from `α₀`.
+///
+/// A linear fit of such a model is one Gauss-Newton step on linear and shape parameters together, and its covariance is
+/// that of both. The change is named `<joint>.<symbol> (change)` and bounded by the bounds of the shape parameter.
+#[derive(Debug)]
+pub struct Linearised {
+    element: Box<dyn JointElement>,
+    shape: Vec<f64>,
+    /// Rate and shape parameter of every further column.
+    changes: Vec<(usize, usize)>,
+    /// Per pair of the element's shape entries: its further column, and the factor `c₀`.
+    pairs: Vec<(usize, f64)>,
+    entries: Vec<(usize, usize)>,
+}
+
+impl Linearised {
+    /// `shape`, `linear`: the point, the element's own parameters alone.
+    ///
+    /// # Panics
+    /// If a vector has another length than the element has parameters.
+    pub fn new(
+        element: Box<dyn JointElement>,
+        joints: &[JointInfo],
+        shape: Vec<f64>,
+        linear: Vec<f64>,
+    ) -> Self {
+        assert_eq!(element.shape(joints).len(), shape.len(), "length of shape");
+        assert_eq!(element.parameters(joints).len(), linear.len(), "length of linear");
+        let mut entries = element.entries();
+        let mut changes: Vec<(usize, usize)> = Vec::new();
+        let mut pairs = Vec::new();
+        for (entry, parameter) in element.shape_entries() {
+            let (rate, factor) = (entries[entry].0, linear[entries[entry].1]);
+            let place = changes.iter().position(|c| *c == (rate, parameter)).unwrap_or_else(|| {
+                changes.push((rate, parameter));
+                changes.len() - 1
+            });
+            pairs.push((place, factor));
+        }
+        entries.extend(changes.iter().map(|(rate, parameter)| (*rate, linear.len() + parameter)));
+        Linearised { element, shape, changes, pairs, entries }
+    }
+
+    fn own_entries(&self) -> usize {
+        self.entries.len() - self.changes.len()
+    }
+}
+
+/// Name of the linear parameter that stands for the change of a shape parameter.
+pub fn change_name(shape_parameter: &str) -> String {
+    format!("{shape_parameter} (change)")
+}
+
+impl JointElement for Linearised {
+    fn rates(&self) -> Vec<usize> {
+        self.element.rates()
+    }
+    fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
+        let mut out = self.element.parameters(joints);
+        let joint = &joints[self.element.rates().first().copied().unwrap_or(0)];
+        out.extend(self.element.shape(joints).into_iter().zip(&self.shape).map(|(shape, at)| {
+            let symbol = shape.name.rsplit('.').next().unwrap_or_default();
+            Parameter {
+                name: change_name(&shape.name),
+                symbol: format!("d{symbol}{}", joint.number),
+                unit: shape.unit,
+                owner: Owner::Joint(joint.name.clone()),
+                prior: None,
+                lower: Some(shape.lower - at),
+                upper: Some(shape.upper - at),
+                fold_first: true,
+            }
+        }));
+        out
+    }
+    fn entries(&self) -> Vec<(usize, usize)> {
+        self.entries.clone()
+    }
+    fn channels(&self, joints: &[JointInfo]) -> Vec<String> {
+        self.element.channels(joints)
+    }
+    fn reversal_speeds(&self) -> Vec<Vec<(usize, f64)>> {
+        self.element.reversal_speeds()
+    }
+    fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
+        let own = self.own_entries();
+        let mut columns = ElementColumns {
+            data: &mut *out.data,
+            slots: &out.slots[..own],
+            stride: out.stride,
+            samples: out.samples,
+        };
+        self.element.fill(joints, motion, &self.shape, &mut columns);
+        if self.changes.is_empty() {
+            return;
+        }
+        let n = motion.samples;
+        let slots: Vec<usize> = (0..self.pairs.len()).collect();
+        let mut memory = vec![0.0; self.pairs.len() * n];
+        let mut derivatives = ElementColumns { data: &mut memory, slots: &slots, stride: n, samples: n };
+        self.element.shape_derivatives(joints, motion, &self.shape, &mut derivatives);
+        for change in 0..self.changes.len() {
+            out.column(own + change).fill(0.0);
+        }
+        for ((change, factor), derivative) in self.pairs.iter().zip(memory.chunks_exact(n.max(1))) {
+            for (to, d) in out.column(own + change).iter_mut().zip(derivative) {
+                *to += factor * d;
+            }
+        }
+    }
+    fn adjoint(
+        &self,
+        joints: &[JointInfo],
+        motion: &MotionBlock<'_>,
+        _: &[f64],
+        weights: &ElementWeights<'_>,
+        out: &mut MotionAdjoint,
+    ) {
+        let (own, n) = (self.own_entries(), motion.samples);
+        let columns = ElementWeights { slots: &weights.slots[..own], ..*weights };
+        self.element.adjoint(joints, motion, &self.shape, &columns, out);
+        let mut memory = Vec::with_capacity(self.pairs.len() * n);
+        for (change, factor) in &self.pairs {
+            memory.extend(weights.column(own + change).iter().map(|w| factor * w));
+        }
+        let slots: Vec<usize> = (0..self.pairs.len()).collect();
+        let pairs = ElementWeights { data: &memory, slots: &slots, stride: n, samples: n };
+        self.element.shape_adjoint(joints, motion, &self.shape, &pairs, out);
+    }
+}
