@@ -1,9 +1,11 @@
 //! The configuration of a run, a TOML file.
 
 mod estimator;
+mod friction;
 mod per_joint;
 
 pub use estimator::{BoundConfig, Consistency, EstimatorConfig, Method, PriorDistance, Variances};
+pub use friction::Friction;
 pub use per_joint::PerJoint;
 pub(crate) use per_joint::known;
 
@@ -68,6 +70,8 @@ pub struct ElementsConfig {
     pub default: Option<Vec<String>>,
     /// For single joints.
     pub joint: BTreeMap<String, Vec<String>>,
+    /// Friction in place of that of the lists, or shapes found beside it. Default `auto`.
+    pub friction: Friction,
 }
 
 /// Motor-side inertia and friction of joints that share motors; see the robot file's `[[coupling]]`.

@@ -367,9 +367,13 @@ fn plan_elements(config: &Config, robot: &Robot, logs: &[LoadedLog]) -> Result<E
         matrix: c.matrix.clone(),
         form: c.form,
     }));
-    ElementPlan::new(&robot.mechanism, &spec, config.elements.default.as_deref(), |rate| {
-        logs.iter().any(|l| l.log.joints().iter().any(|j| j.name == names[rate] && j.moves()))
-    })
+    let moves =
+        |rate: usize| logs.iter().any(|l| l.log.joints().iter().any(|j| j.name == names[rate] && j.moves()));
+    let mut plan = ElementPlan::new(&robot.mechanism, &spec, config.elements.default.as_deref(), moves)?;
+    for list in &mut plan.per_rate {
+        *list = config.elements.friction.of_joint(list);
+    }
+    Ok(plan)
 }
 
 fn preferred_columns(config: &Config, model: &RobotModel) -> Result<Vec<usize>, Error> {

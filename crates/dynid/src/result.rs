@@ -425,7 +425,7 @@ fn provenance(config: &Config) -> Result<Provenance, Error> {
         "gravity": config.gravity,
         "couple_mimics": config.couple_mimics.unwrap_or(false),
         "locked": config.locked,
-        "elements": { "default": config.elements.default, "joint": config.elements.joint },
+        "elements": { "default": config.elements.default, "joint": config.elements.joint, "friction": config.elements.friction },
         "conditioning": config.conditioning,
         "estimator": config.estimator,
         "bound": config.bound,

@@ -1,0 +1,87 @@
+//! Friction laws by name.
+
+use serde::{Deserialize, Serialize};
+
+/// Friction of the joints that move.
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Friction {
+    /// The elements of the robot file or the configuration, and shapes that held-out blocks ask for.
+    #[default]
+    Auto,
+    /// The elements of the robot file or the configuration, nothing else.
+    Given,
+    /// Coulomb, viscous, offset.
+    Linear,
+    /// Coulomb and viscous friction with a law of its own for each direction.
+    Asymmetric,
+    /// Coulomb, viscous, offset and an arctangent.
+    Arctangent,
+    /// Stribeck in place of Coulomb; viscous, offset.
+    Stribeck,
+    /// A hyperbolic tangent in place of Coulomb; viscous, offset.
+    Tanh,
+    /// A sigmoid that vanishes at rest in place of Coulomb; viscous, offset.
+    Sigmoid,
+    /// A sigmoid beside viscous friction and the offset that centres it.
+    SigmoidOffset,
+    /// Coulomb, a power of the speed in place of viscous friction, offset.
+    Power,
+}
+
+/// Elements of all these laws.
+const FRICTION_ELEMENTS: [&str; 11] = [
+    "coulomb",
+    "viscous",
+    "offset",
+    "asymmetric",
+    "viscous_magnitude",
+    "arctangent",
+    "stribeck",
+    "tanh",
+    "sigmoid",
+    "sigmoid_offset",
+    "power",
+];
+
+impl Friction {
+    fn elements(self) -> Option<&'static [&'static str]> {
+        Some(match self {
+            Friction::Auto | Friction::Given => return None,
+            Friction::Linear => &["coulomb", "viscous", "offset"],
+            Friction::Asymmetric => &["asymmetric"],
+            Friction::Arctangent => &["coulomb", "viscous", "offset", "arctangent"],
+            Friction::Stribeck => &["stribeck", "viscous", "offset"],
+            Friction::Tanh => &["tanh", "viscous", "offset"],
+            Friction::Sigmoid => &["sigmoid", "viscous", "offset"],
+            Friction::SigmoidOffset => &["sigmoid_offset", "viscous", "offset"],
+            Friction::Power => &["coulomb", "power", "offset"],
+        })
+    }
+
+    /// Element names of a joint with this friction in place of the one listed; a joint without any keeps none.
+    pub(crate) fn of_joint(self, listed: &[String]) -> Vec<String> {
+        let is_friction = |name: &&String| FRICTION_ELEMENTS.contains(&name.as_str());
+        let Some(law) = self.elements().filter(|_| listed.iter().any(|n| is_friction(&n))) else {
+            return listed.to_vec();
+        };
+        let others = listed.iter().filter(|n| !is_friction(n)).cloned();
+        law.iter().map(|n| (*n).to_owned()).chain(others).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_law_replaces_friction_and_leaves_the_rest() {
+        let listed = ["coulomb", "viscous", "offset", "rotor"].map(str::to_owned);
+        let names = |law: Friction, listed: &[String]| law.of_joint(listed).join(" ");
+        assert_eq!(names(Friction::Stribeck, &listed), "stribeck viscous offset rotor");
+        assert_eq!(names(Friction::Asymmetric, &listed), "asymmetric rotor");
+        assert_eq!(names(Friction::Auto, &listed), "coulomb viscous offset rotor");
+        assert_eq!(names(Friction::Stribeck, &["rotor".to_owned()]), "rotor");
+        assert_eq!(names(Friction::Stribeck, &[]), "");
+    }
+}
