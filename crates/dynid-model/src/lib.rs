@@ -31,6 +31,6 @@ pub use inertia::Inertia;
 pub use mechanism::{Body, Frame, Joint, Mechanism, MechanismError, MechanismWarning};
 pub use parameter::{Owner, Parameter, ParameterTable, ShapeParameter};
 pub use random_motion::RandomMotion;
-pub use robot_model::RobotModel;
+pub use robot_model::{FrictionPassivity, Passivity, RobotModel};
 pub use scalar::Scalar;
 pub use spatial::{Mat3, Placement, Vec3};

@@ -2,6 +2,7 @@
 
 mod adjoint;
 mod elements;
+mod passivity;
 mod shaped;
 
 use std::sync::Arc;
@@ -13,6 +14,7 @@ use crate::element::{ElementColumns, JointElement, JointInfo};
 use crate::inertia::{PARAMETER_NAMES, PARAMETER_UNITS};
 use crate::mechanism::{Body, Mechanism};
 use crate::parameter::{Owner, Parameter, ParameterTable};
+pub use passivity::{FrictionPassivity, Passivity};
 use shaped::Shaped;
 
 #[derive(Debug)]

@@ -143,6 +143,10 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     }
     /// Which of its linear parameters act on which rate: `(rate, parameter)`.
     fn entries(&self) -> Vec<(usize, usize)>;
+    /// Its effort is friction: of a single rate, whose velocity alone it depends on. False by default.
+    fn is_friction(&self) -> bool {
+        false
+    }
     /// Extra channels that it reads.
     fn channels(&self, _joints: &[JointInfo]) -> Vec<String> {
         Vec::new()

@@ -58,6 +58,9 @@ impl JointElement for Arctangent {
     fn shape(&self, joints: &[JointInfo]) -> Vec<ShapeParameter> {
         shape::free([(&self.fb, self.fb.parameter(&joints[self.rate], "fb", PER_SPEED, true))])
     }
+    fn is_friction(&self) -> bool {
+        true
+    }
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0)]
     }

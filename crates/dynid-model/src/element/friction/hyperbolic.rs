@@ -76,6 +76,9 @@ impl JointElement for TanhFriction {
     fn shape(&self, joints: &[JointInfo]) -> Vec<ShapeParameter> {
         shape::free([(&self.w, self.w.parameter(&joints[self.rate], "w", SPEED, true))])
     }
+    fn is_friction(&self) -> bool {
+        true
+    }
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0)]
     }

@@ -49,6 +49,9 @@ impl JointElement for Coulomb {
     fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
         vec![joints[self.rate].parameter("fc", EFFORT, Some(0.0))]
     }
+    fn is_friction(&self) -> bool {
+        true
+    }
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0)]
     }
@@ -74,6 +77,9 @@ impl JointElement for Viscous {
     fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
         vec![joints[self.rate].parameter("fv", VISCOUS, Some(0.0))]
     }
+    fn is_friction(&self) -> bool {
+        true
+    }
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0)]
     }
@@ -98,6 +104,9 @@ impl JointElement for ViscousMagnitude {
     }
     fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
         vec![joints[self.rate].parameter("fva", VISCOUS, None)]
+    }
+    fn is_friction(&self) -> bool {
+        true
     }
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0)]
@@ -153,6 +162,9 @@ impl JointElement for AsymmetricFriction {
             joint.parameter("fvp", VISCOUS, Some(0.0)),
             joint.parameter("fvn", VISCOUS, Some(0.0)),
         ]
+    }
+    fn is_friction(&self) -> bool {
+        true
     }
     fn entries(&self) -> Vec<(usize, usize)> {
         (0..4).map(|k| (self.rate, k)).collect()

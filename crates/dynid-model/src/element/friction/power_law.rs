@@ -43,6 +43,9 @@ impl JointElement for PowerLaw {
     fn shape(&self, joints: &[JointInfo]) -> Vec<ShapeParameter> {
         shape::free([(&self.p, self.p.parameter(&joints[self.rate], "p", NUMBER, true))])
     }
+    fn is_friction(&self) -> bool {
+        true
+    }
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0)]
     }

@@ -155,6 +155,9 @@ impl JointElement for Sigmoid {
             (&self.phi3, self.phi3.parameter(joint, "phi3", SPEED, false)),
         ])
     }
+    fn is_friction(&self) -> bool {
+        true
+    }
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0)]
     }
@@ -219,6 +222,9 @@ impl JointElement for SigmoidOffset {
             (&self.alpha, self.alpha.parameter(joint, "alpha", PER_SPEED, true)),
             (&self.nu, self.nu.parameter(joint, "nu", SPEED, false)),
         ])
+    }
+    fn is_friction(&self) -> bool {
+        true
     }
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0)]

@@ -13,7 +13,7 @@ use crate::scalar::elementary::{Curve, decay, map_curve};
 /// It takes the place of [`Coulomb`](super::Coulomb) (the columns of both are collinear: they add up to `s`); viscous
 /// friction stands beside it. `∂E/∂v = -E δ x^δ / v`, `∂E/∂v_s = E δ x^δ / v_s`, `∂E/∂δ = -E x^δ ln x` with
 /// `x = |v/v_s|`. Without samples below some `3 v_s`, `fs` and `vs` cannot be estimated. `F_s < F_c` is passive but no
-/// Stribeck effect.
+/// Stribeck effect: [`friction_passivity`](crate::RobotModel::friction_passivity) tells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stribeck {
     /// Rate it acts on.
@@ -105,6 +105,9 @@ impl JointElement for Stribeck {
             (&self.vs, self.vs.parameter(joint, "vs", SPEED, true)),
             (&self.delta, self.delta.parameter(joint, "delta", NUMBER, true)),
         ])
+    }
+    fn is_friction(&self) -> bool {
+        true
     }
     fn entries(&self) -> Vec<(usize, usize)> {
         vec![(self.rate, 0), (self.rate, 1)]
