@@ -11,11 +11,12 @@ use crate::elements::ElementPlan;
 const TYPICAL_SEED: u64 = 1;
 
 /// Values of all linear parameters of `model`: link inertias and element values of the robot file, `given` values by name
-/// over them. Friction about which neither says anything is typical for the joint: Coulomb 10 % and viscous 10 % (at the
-/// speed limit) of the largest rigid effort over random states. Offsets and rotors are zero then.
+/// over them. Friction about which neither says anything is typical for the joint: Coulomb 10 % (static 13 %, sigmoids
+/// from -10 to 10 %) and viscous 10 % (at the speed limit) of the largest rigid effort over random states. Offsets, rotors
+/// and what else elements may have are zero then.
 ///
 /// # Errors
-/// [`Error::Setting`] if a given name is no parameter or its value not finite.
+/// [`Error::Setting`] if a given name is no parameter, linear or shape, or its value not finite.
 pub fn nominal_parameters(
     model: &RobotModel,
     plan: &ElementPlan,
@@ -28,9 +29,15 @@ pub fn nominal_parameters(
     let mut stated: Vec<(String, f64)> = Vec::new();
     for (j, joint) in model.joints().iter().enumerate() {
         let speed = model.mechanism().bodies()[owners[j]].joint.limits.velocity.unwrap_or(2.0);
-        for (symbol, value) in [("fc", 0.1 * peaks[j]), ("fv", 0.1 * peaks[j] / speed)] {
-            stated.push((format!("{}.{symbol}", joint.name), value));
-        }
+        let typical = [
+            ("fc", 0.1 * peaks[j]),
+            ("fv", 0.1 * peaks[j] / speed),
+            ("fs", 0.13 * peaks[j]),
+            ("ft", 0.1 * peaks[j]),
+            ("fg", 0.2 * peaks[j]),
+            ("fl", 0.2 * peaks[j]),
+        ];
+        stated.extend(typical.map(|(symbol, value)| (format!("{}.{symbol}", joint.name), value)));
     }
     stated.extend(plan.stated_values());
     for (name, value) in stated {
@@ -39,15 +46,33 @@ pub fn nominal_parameters(
         }
     }
     for (name, value) in given {
-        let Some(column) = table.column(name) else {
-            return Err(Error::setting("values", "names of parameters such as `j1.fc`", name));
-        };
         if !value.is_finite() {
             return Err(Error::setting(&format!("values.{name}"), "a finite number", value));
         }
-        values[column] = *value;
+        match table.column(name) {
+            Some(column) => values[column] = *value,
+            None if table.shape.iter().any(|s| s.name == *name) => {}
+            None => return Err(Error::setting("values", "names of parameters such as `j1.fc`", name)),
+        }
     }
     Ok(values)
+}
+
+/// The model with `given` values by name of its shape parameters.
+///
+/// # Errors
+/// [`Error::Setting`] if a value does not lie within the bounds of its parameter.
+pub fn with_nominal_shape(model: RobotModel, given: &BTreeMap<String, f64>) -> Result<RobotModel, Error> {
+    let mut shape = model.parameters().shape_start();
+    for (parameter, value) in model.parameters().shape.iter().zip(&mut shape) {
+        let Some(stated) = given.get(&parameter.name) else { continue };
+        if !(*stated >= parameter.lower && *stated <= parameter.upper) {
+            let expected = format!("{} to {} {}", parameter.lower, parameter.upper, parameter.unit);
+            return Err(Error::setting(&format!("values.{}", parameter.name), &expected, stated));
+        }
+        *value = *stated;
+    }
+    Ok(model.with_shape(&shape))
 }
 
 /// Largest rigid effort of every joint over random states.

@@ -41,7 +41,19 @@ impl Robot {
     /// # Errors
     /// [`Error::RobotFile`], [`Error::Mechanism`], [`Error::UnknownJoint`].
     pub fn load(path: &Path, options: &RobotOptions) -> Result<Robot, Error> {
-        let mut file = dynid_io::robot::read(path)?;
+        Self::of_file(path, dynid_io::robot::read(path)?, options)
+    }
+
+    /// The same from the text of a TOML robot file; `path` stands in messages and provenance.
+    ///
+    /// # Errors
+    /// As [`Robot::load`].
+    pub fn parse(text: &str, path: &Path, options: &RobotOptions) -> Result<Robot, Error> {
+        let file = dynid_io::toml_robot::parse(text, &path.display().to_string())?;
+        Self::of_file(path, file, options)
+    }
+
+    fn of_file(path: &Path, mut file: RobotFile, options: &RobotOptions) -> Result<Robot, Error> {
         let d = &mut file.description;
         if let Some(g) = options.gravity {
             d.gravity = g;

@@ -11,7 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::Error;
 use crate::elements::ElementPlan;
-use crate::nominal::nominal_parameters;
+use crate::nominal::{nominal_parameters, with_nominal_shape};
 use crate::robot::Robot;
 pub use settings::{
     ControlTable, ImperfectionTable, PlantTable, SeriesSettings, SimulateMode, SimulateSettings,
@@ -83,6 +83,7 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
     }
     let plan = ElementPlan::new(mechanism, &robot.elements, None, |_| true)?;
     let model = RobotModel::new(mechanism.clone(), plan.build(mechanism)?);
+    let model = with_nominal_shape(model, &settings.values)?;
     let missing: Vec<&str> = model
         .channels()
         .iter()
@@ -181,7 +182,9 @@ fn by_inverse_dynamics(
 const HELD_COMMAND: f64 = 0.5;
 
 fn named(model: &RobotModel, values: Vec<f64>) -> Vec<(String, f64)> {
-    model.parameters().linear.iter().map(|p| p.name.clone()).zip(values).collect()
+    let table = model.parameters();
+    let linear = table.linear.iter().map(|p| p.name.clone()).zip(values);
+    linear.chain(table.shape.iter().map(|s| (s.name.clone(), s.start))).collect()
 }
 
 fn efforts(model: &RobotModel, values: &[f64], signals: &[Vec<f64>; 3], samples: usize) -> Vec<Vec<f64>> {

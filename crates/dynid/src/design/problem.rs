@@ -16,7 +16,7 @@ use super::limits::{constraints, effort_limits, joint_limits};
 use crate::Error;
 use crate::config::known;
 use crate::elements::ElementPlan;
-use crate::nominal::{nominal_parameters, typical_efforts};
+use crate::nominal::{nominal_parameters, typical_efforts, with_nominal_shape};
 use crate::robot::Robot;
 
 /// A nominal base parameter below this share of the largest of the same unit counts as so large: relative errors of what
@@ -73,7 +73,8 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
         elements.per_joint.push((joint.clone(), list.clone()));
     }
     let plan = ElementPlan::new(mechanism, &elements, config.elements.default.as_deref(), |_| true)?;
-    let model = Arc::new(RobotModel::new(mechanism.clone(), plan.build(mechanism)?));
+    let model = RobotModel::new(mechanism.clone(), plan.build(mechanism)?);
+    let model = Arc::new(with_nominal_shape(model, &config.values)?);
     if !model.channels().is_empty() {
         return Err(Error::Unsupported(
             "elements that read channels such as currents say nothing about motion: leave them out of a design"
