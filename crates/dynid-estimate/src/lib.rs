@@ -10,6 +10,7 @@
 //! | which columns are excited, which depend on others | [`rank`] |
 //! | one time block or group of a log, and its rows again | [`groups`], [`rows`] |
 //! | every linear estimator through one call | [`linear::estimate`] |
+//! | shape parameters beside linear ones | [`separable`] |
 //! | covariance that survives filtering | [`covariance`] |
 //! | held-out error over folds of blocks; several estimators on the same folds | [`folds`], [`held_out`] |
 //! | which parameters a model can do without | [`elimination`] |
@@ -37,6 +38,7 @@ pub mod metrics;
 pub mod rank;
 pub mod rows;
 pub mod search;
+pub mod separable;
 mod triangular;
 mod whitened;
 pub mod whiteness;

@@ -241,7 +241,7 @@ fn weighted(
 }
 
 /// `1.4826 median|r - median r|` over the groups of a class.
-fn robust_scales(
+pub(crate) fn robust_scales(
     residuals: &[Vec<f64>],
     classes: &[usize],
     floors: &[f64],

@@ -50,7 +50,7 @@ pub enum VarianceSharing {
 
 impl VarianceSharing {
     /// Per group, the index of the first group it shares its variance with.
-    pub(super) fn classes(self, groups: &[ReducedGroup]) -> Vec<usize> {
+    pub(crate) fn classes(self, groups: &[ReducedGroup]) -> Vec<usize> {
         let same = |a: &ReducedGroup, b: &ReducedGroup| match self {
             VarianceSharing::Group => (a.log, a.output, a.scale) == (b.log, b.output, b.scale),
             VarianceSharing::JointAndLog => (a.log, a.output) == (b.log, b.output),

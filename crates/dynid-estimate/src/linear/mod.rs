@@ -12,6 +12,7 @@ mod wls;
 
 pub use estimate::estimate;
 pub use extended::ols_extended;
+pub(crate) use irls::robust_scales;
 pub use linear_estimate::{GroupFit, LinearEstimate};
 pub use method::{IrlsSettings, LinearError, LinearMethod, LinearSettings, VarianceSharing};
 pub use ols::{LinearSolution, ols};

@@ -1,0 +1,307 @@
+//! The separable fit from problem to estimate.
+
+use super::estimate::{SeparableEstimate, kappa};
+use super::levenberg::{SearchStatus, Stops, search};
+use super::linearised::Linearisation;
+use super::polish::polish;
+use super::problem::{SeparableProblem, check};
+use super::profile::{Minimum, ShapeFinding, ShapeVerdict};
+use super::projection::Projection;
+use super::reduction::{GroupReduction, Target};
+use super::robust::{Robust, refine_robust};
+use super::scale::SearchBox;
+use super::settings::{SeparableError, SeparableLoss, SeparableSettings, Weighting};
+use super::starts::{StartReport, multi_start, starts};
+use crate::groups::ReducedGroup;
+use crate::linear::{LinearEstimate, LinearMethod, LinearSettings, estimate};
+use rayon::prelude::*;
+
+/// Fits linear and shape parameters of a separable problem.
+///
+/// 1. Multi-start of Levenberg-Marquardt searches on the projected residual, with variances of a linear fit at the given
+///    start; then variances and parameters in turn until both settle.
+/// 2. Profiles: shape parameters that the data do not see are held at their start, the flattest first, and the others
+///    fitted again.
+/// 3. Robust losses: iteratively re-weighted from there.
+/// 4. Gauss-Newton on all parameters together for the last digits, and the covariance of all of them.
+///
+/// Starts are clipped into the bounds. The result does not depend on the number of threads.
+///
+/// # Errors
+/// [`SeparableError`] for problems that are not well formed or whose model is finite nowhere. Rank deficiency, iteration
+/// limits and unseen parameters are statuses of the estimate.
+///
+/// Source: Golub & Pereyra 1973; Kaufman 1975.
+pub fn fit(
+    problem: &dyn SeparableProblem,
+    settings: &SeparableSettings,
+) -> Result<SeparableEstimate, SeparableError> {
+    check(problem)?;
+    let mut work = Work::new(problem, settings)?;
+    let (report, mut status) = work.global()?;
+    let mut findings = work.findings();
+    let mut judged: Vec<Option<ShapeFinding>> = vec![None; findings.len()];
+    while let Some(flattest) = flattest(&findings) {
+        judged[flattest] = Some(findings[flattest].clone());
+        work.held[flattest] = true;
+        work.u[flattest] = work.bounds.start[flattest];
+        status = work.settle()?;
+        findings = work.findings();
+    }
+    for (finding, earlier) in findings.iter_mut().zip(judged) {
+        if let Some(earlier) = earlier {
+            *finding = earlier;
+        }
+    }
+    work.finish(report, status, findings)
+}
+
+/// The least seen of the shape parameters that are not seen.
+fn flattest(findings: &[ShapeFinding]) -> Option<usize> {
+    let range = |k: &usize| findings[*k].profile.iter().map(|p| p.1).fold(0.0, f64::max);
+    (0..findings.len())
+        .filter(|k| findings[*k].verdict == ShapeVerdict::NotSeen)
+        .min_by(|a, b| range(a).total_cmp(&range(b)))
+}
+
+/// State of a fit.
+pub(super) struct Work<'a> {
+    pub(super) problem: &'a dyn SeparableProblem,
+    pub(super) settings: &'a SeparableSettings,
+    pub(super) bounds: SearchBox,
+    pub(super) reductions: Vec<GroupReduction>,
+    pub(super) linearisation: Linearisation<'a>,
+    /// `σ_j²` per group.
+    pub(super) variances: Vec<f64>,
+    pub(super) u: Vec<f64>,
+    pub(super) linear: Vec<f64>,
+    pub(super) held: Vec<bool>,
+}
+
+impl<'a> Work<'a> {
+    fn new(
+        problem: &'a dyn SeparableProblem,
+        settings: &'a SeparableSettings,
+    ) -> Result<Self, SeparableError> {
+        let bounds = SearchBox::new(problem.shape());
+        let groups = problem.groups();
+        Ok(Work {
+            problem,
+            settings,
+            reductions: groups.par_iter().map(|g| GroupReduction::new(g, None)).collect(),
+            linearisation: Linearisation::new(problem)?,
+            variances: vec![1.0; groups.len()],
+            u: bounds.start.clone(),
+            linear: vec![0.0; problem.linear()],
+            held: (0..bounds.len()).map(|k| bounds.lower[k] == bounds.upper[k]).collect(),
+            bounds,
+        })
+    }
+
+    fn projection(&self) -> Projection<'_> {
+        Projection::new(self.problem, &self.reductions, self.weights())
+    }
+
+    pub(super) fn weights(&self) -> Vec<f64> {
+        self.variances.iter().map(|v| 1.0 / v.sqrt()).collect()
+    }
+
+    pub(super) fn shape(&self) -> Vec<f64> {
+        self.bounds.natural(&self.u)
+    }
+
+    /// Shape parameters that are neither held nor at a bound.
+    pub(super) fn active(&self) -> Vec<usize> {
+        let inside = |k: usize| !self.bounds.at_lower(k, self.u[k]) && !self.bounds.at_upper(k, self.u[k]);
+        (0..self.u.len()).filter(|k| !self.held[*k] && inside(*k)).collect()
+    }
+
+    fn stops(&self) -> Stops {
+        Stops {
+            iterations: self.settings.max_iterations,
+            step: self.settings.step_tolerance,
+            gradient: self.settings.gradient_tolerance,
+            fall: 0.0,
+        }
+    }
+
+    /// Weighted rss below which nothing but rounding is left.
+    fn rounding(&self) -> f64 {
+        let groups = self.problem.groups().iter().zip(&self.variances);
+        let energy: f64 = groups.map(|(g, v)| g.effort.iter().map(|y| y * y).sum::<f64>() / v).sum();
+        (100.0 * f64::EPSILON).powi(2) * energy
+    }
+
+    fn global(&mut self) -> Result<(StartReport, SearchStatus), SeparableError> {
+        if self.bounds.len() > 0 {
+            self.renew_variances(&[])?;
+        }
+        let starts = starts(&self.bounds, self.settings.starts, self.settings.seed);
+        let (found, report) =
+            multi_start(&self.projection(), &self.bounds, &starts, &self.held, self.stops(), self.rounding())
+                .ok_or(SeparableError::NotFiniteAnywhere { starts: starts.len() })?;
+        (self.u, self.linear) = (found.u, found.point.linear);
+        let status = self.settle()?;
+        Ok((report, status))
+    }
+
+    /// Parameters and variances in turn, from where they are, until both settle.
+    fn settle(&mut self) -> Result<SearchStatus, SeparableError> {
+        let (tolerance, passes) = match &self.settings.weighting {
+            Weighting::Equal => (f64::INFINITY, 1),
+            Weighting::Groups { wls, .. } => (wls.tolerance, wls.max_passes.max(1)),
+        };
+        let mut pass = 0;
+        loop {
+            let found = search(&self.projection(), &self.bounds, &self.u, &self.held, self.stops())
+                .ok_or(SeparableError::NotFiniteAnywhere { starts: 1 })?;
+            (self.u, self.linear) = (found.u, found.point.linear);
+            pass += 1;
+            let active = self.active();
+            let change = self.renew_variances(&active)?;
+            if change <= tolerance || pass >= passes {
+                return Ok(found.status);
+            }
+        }
+    }
+
+    /// Settings of the linear estimators that follow the linearised problem.
+    pub(super) fn linear_settings(&self) -> LinearSettings {
+        match &self.settings.weighting {
+            Weighting::Equal => {
+                LinearSettings { irls: self.settings.irls.clone(), ..LinearSettings::default() }
+            }
+            Weighting::Groups { sharing, wls } => {
+                LinearSettings { wls: wls.clone(), sharing: *sharing, irls: self.settings.irls.clone() }
+            }
+        }
+    }
+
+    fn linear_estimate(
+        &self,
+        groups: &[ReducedGroup],
+        active: usize,
+    ) -> Result<LinearEstimate, SeparableError> {
+        let method = match self.settings.weighting {
+            Weighting::Equal => LinearMethod::Ols,
+            Weighting::Groups { .. } => LinearMethod::Wls,
+        };
+        Ok(estimate(groups, None, self.problem.linear() + active, &method, &self.linear_settings())?)
+    }
+
+    /// Variances of the linearised problem; returns the largest relative change.
+    fn renew_variances(&mut self, active: &[usize]) -> Result<f64, SeparableError> {
+        let shape = self.shape();
+        if matches!(self.settings.weighting, Weighting::Equal)
+            || self.projection().at(&shape, Target::Effort).is_none()
+        {
+            return Ok(0.0);
+        }
+        let groups: Vec<ReducedGroup> = self
+            .linearisation
+            .reduced(&self.linear, &shape, active)?
+            .iter()
+            .map(|g| g.coarsened(g.blocks.len().max(1)))
+            .collect();
+        let found = self.linear_estimate(&groups, active.len())?;
+        let mut change = 0.0_f64;
+        for (old, new) in self.variances.iter_mut().zip(&found.groups) {
+            change = change.max((new.variance - *old).abs() / new.variance);
+            *old = new.variance;
+        }
+        Ok(change)
+    }
+
+    /// Least-squares estimate of the linearised problem with all time blocks.
+    pub(super) fn linearised(&self) -> Result<LinearEstimate, SeparableError> {
+        let active = self.active();
+        let groups = self.linearisation.reduced(&self.linear, &self.shape(), &active)?;
+        self.linear_estimate(&groups, active.len())
+    }
+
+    fn findings(&self) -> Vec<ShapeFinding> {
+        let linearised = self.linearised().ok();
+        let inflation = linearised.as_ref().map_or(1.0, kappa);
+        let projection = self.projection();
+        let rss = projection.at(&self.shape(), Target::Residual(&self.linear)).map_or(0.0, |p| p.rss);
+        let variance = match self.settings.weighting {
+            Weighting::Groups { .. } => 1.0,
+            Weighting::Equal => {
+                let freedom = projection.rows() as f64 - (self.linear.len() + self.active().len()) as f64;
+                rss / freedom.max(1.0)
+            }
+        };
+        let minimum = Minimum {
+            projection: &projection,
+            bounds: &self.bounds,
+            u: &self.u,
+            rss,
+            held: &self.held,
+            variance: variance.max(self.rounding()).max(f64::MIN_POSITIVE),
+            rise: self.settings.profile_rise * inflation,
+            points: self.settings.profile_points,
+        };
+        minimum.findings(self.problem)
+    }
+
+    fn finish(
+        mut self,
+        starts: StartReport,
+        status: SearchStatus,
+        findings: Vec<ShapeFinding>,
+    ) -> Result<SeparableEstimate, SeparableError> {
+        let robust = match self.settings.loss {
+            SeparableLoss::Squares => None,
+            _ => Some(refine_robust(&mut self)?),
+        };
+        let row_weights = robust.as_ref().map(|r| r.root_weights.clone());
+        if let Some(Robust { root_weights, .. }) = &robust {
+            self.reductions = (self.problem.groups().par_iter())
+                .zip(root_weights)
+                .map(|(group, weights)| GroupReduction::new(group, Some(weights)))
+                .collect();
+        }
+        let projection = self.projection();
+        let polished = polish(&projection, &self.bounds, self.linear.clone(), self.shape(), &self.held)
+            .ok_or(SeparableError::NotFiniteAnywhere { starts: 1 })?;
+        let dependent = projection
+            .at(&polished.shape, Target::Residual(&polished.linear))
+            .map_or_else(Vec::new, |p| p.dependent);
+        drop(projection);
+        let active = self.active();
+        self.linear.clone_from(&polished.linear);
+        let linearised = match self.settings.loss {
+            SeparableLoss::Absolute => None,
+            SeparableLoss::Squares => {
+                let groups = self.linearisation.reduced(&polished.linear, &polished.shape, &active)?;
+                Some(self.linear_estimate(&groups, active.len())?)
+            }
+            SeparableLoss::Huber => {
+                let total = polished.linear.len() + active.len();
+                let rows = self.linearisation.rows(&polished.linear, &polished.shape, &active);
+                let groups = self.linearisation.reduced(&polished.linear, &polished.shape, &active)?;
+                let settings = self.linear_settings();
+                Some(estimate(&groups, Some(&rows), total, &LinearMethod::Huber, &settings)?)
+            }
+        };
+        let residuals = self.linearisation.residuals(&polished.linear, &polished.shape);
+        let inflation = linearised.as_ref().map_or(1.0, kappa);
+        Ok(SeparableEstimate {
+            linear: polished.linear,
+            shape: polished.shape,
+            rss: polished.rss,
+            variances: self.variances,
+            residuals,
+            row_weights,
+            dependent,
+            status,
+            passes: robust.as_ref().map_or(0, |r| r.passes),
+            settled: robust.as_ref().is_none_or(|r| r.settled),
+            starts,
+            findings,
+            active,
+            inflation,
+            linearised,
+        })
+    }
+}

@@ -1,0 +1,46 @@
+//! Separable least squares: models linear in most of their parameters, `y ≈ Φ(α) c` (spec/estimation.md section 7).
+//!
+//! For given shape parameters `α` the linear ones follow from `Φ = QR`, so that only `α` is searched, on the residual
+//! `r(α) = (1 - QQᵀ) y` with Kaufman's Jacobian `J_k = -(1 - QQᵀ) ∂Φ/∂α_k c`: bounded Levenberg-Marquardt from several
+//! starts. Only columns that change are projected again; fixed columns are reduced once per group of rows, whatever the
+//! weights.
+//!
+//! | question | item |
+//! |---|---|
+//! | rows, columns, derivatives of one's own problem | [`SeparableProblem`] |
+//! | an effort model over motion and measured efforts | [`EffortProblem`] |
+//! | rows of logs through kernels | [`crate::conditioning::refine`] |
+//! | the fit | [`fit`], [`SeparableSettings`] |
+//! | values, covariance of `(c, α)` together | [`SeparableEstimate`] |
+//! | whether the data see a shape parameter | [`ShapeFinding`] |
+//! | whether another minimum was reached from other starts | [`StartReport`] |
+//!
+//! `(ΦᵀΦ)⁻¹` alone is never a covariance: it takes the shape for known.
+//!
+//! Source: Golub & Pereyra 1973; Kaufman 1975; Moré 1978 for scaling and damping.
+
+mod dense;
+mod estimate;
+mod fit;
+mod levenberg;
+mod limit;
+mod linearised;
+mod polish;
+mod problem;
+mod profile;
+mod projection;
+mod reduction;
+mod robust;
+mod scale;
+mod settings;
+mod sobol;
+mod starts;
+
+pub use estimate::SeparableEstimate;
+pub use fit::fit;
+pub use levenberg::SearchStatus;
+pub use limit::limit_model;
+pub use problem::{Bound, RowGroup, SeparableProblem, ShapedColumns};
+pub use profile::{ShapeFinding, ShapeVerdict};
+pub use settings::{SeparableError, SeparableLoss, SeparableSettings, Weighting};
+pub use starts::{StartOutcome, StartReport};
