@@ -1,6 +1,7 @@
 //! The main job: from a robot file and logs to an identified model.
 
 mod figures;
+mod structure;
 
 use std::path::Path;
 
@@ -8,24 +9,22 @@ use dynid_estimate::conditioning::{
     Conditioning, ConditioningSettings, PreparedLog, ReducedGroup, Stage, condition, predict,
 };
 use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
-use dynid_estimate::identifiability::VisibleSpace;
 use dynid_estimate::linear::LinearEstimate;
 use dynid_estimate::whiteness::InBandWhiteness;
-use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
+use dynid_model::{BaseParameters, EffortModel, RobotModel};
 
 use crate::Error;
-use crate::advice;
 use crate::agreement::{self, Agreement};
-use crate::bounds;
 use crate::config::{Config, LogConfig, Route};
 use crate::consistency::{self, Consistent};
 use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
 use crate::fitting::{self, Fitted};
 use crate::logs::{self, LoadedLog};
-use crate::prior::{self, Prior};
+use crate::prior::Prior;
 use crate::robot::{Robot, RobotOptions};
 use crate::trust::{Evidence, Trust};
+use structure::Structure;
 
 /// What is being worked on, for progress displays.
 #[derive(Debug, Clone, PartialEq)]
@@ -138,33 +137,20 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     }
 
     progress(Step::Structure);
-    let shape = model.parameters().shape_start();
-    let base_settings = BaseSettings {
-        seed: config.seed.unwrap_or(1),
-        preferred: preferred_columns(config, &model)?,
-        ..BaseSettings::default()
-    };
-    let base = BaseParameters::of(&model, model.mechanism(), &shape, &base_settings);
-    if base.is_empty() {
-        return Err(Error::Unsupported("no parameter of this robot acts on any effort".to_owned()));
-    }
-
-    let stated = stated_values(&model, &plan);
-    let prior = prior::of(&model, &stated, &effort_sizes(&prepared), &config.robot.display().to_string())?;
-    let regrouping = advice::regrouping(&base);
-    let space = VisibleSpace::new(&regrouping, &prior.std);
-
     // Names that do not exist are told before the long work.
-    let bounds = bounds::rows(&config.bound, &model)?;
-    let method = fitting::method(&config.estimator, &model, &base, &prior, &space)?;
+    let shape = model.parameters().shape_start();
+    let structure = Structure::of(config, &model, &plan, &prepared)?;
 
     let conditioning = match config.conditioning.route {
-        Route::Compact => Some(condition(&model, &shape, &base.kept, &prepared, &settings, |stage| {
-            progress(Step::Conditioning(stage));
-        })?),
+        Route::Compact => {
+            Some(condition(&model, &shape, &structure.base.kept, &prepared, &settings, |stage| {
+                progress(Step::Conditioning(stage));
+            })?)
+        }
         Route::Textbook => None,
     };
     progress(Step::Fit);
+    let Structure { base, stated, prior, regrouping, space, bounds, method } = structure;
     let source =
         fitting::rows(config, &model, &shape, &base.kept, &prepared, conditioning.as_ref(), &settings)?;
     let (fit, groups) = fitting::fit(config, base.len(), &method, &*source)?;
@@ -374,48 +360,6 @@ fn plan_elements(config: &Config, robot: &Robot, logs: &[LoadedLog]) -> Result<E
         *list = config.elements.friction.of_joint(list);
     }
     Ok(plan)
-}
-
-fn preferred_columns(config: &Config, model: &RobotModel) -> Result<Vec<usize>, Error> {
-    config
-        .preferred
-        .iter()
-        .map(|name| {
-            let by_symbol = || model.parameters().linear.iter().position(|p| p.symbol == *name);
-            model.parameters().column(name).or_else(by_symbol).ok_or_else(|| Error::Setting {
-                name: "preferred".to_owned(),
-                expected: "names of parameters such as `link2.Izz` or `Izz2`".to_owned(),
-                found: name.clone(),
-            })
-        })
-        .collect()
-}
-
-/// What the robot file states: link inertias, element values.
-fn stated_values(model: &RobotModel, plan: &ElementPlan) -> Vec<Option<f64>> {
-    let table = model.parameters();
-    let mut stated: Vec<Option<f64>> = table.linear.iter().map(|p| p.prior).collect();
-    for (name, value) in plan.stated_values() {
-        if let Some(column) = table.column(&name) {
-            stated[column] = Some(value);
-        }
-    }
-    stated
-}
-
-/// Per output, the effort that 99 % of the samples of all logs stay below.
-fn effort_sizes(logs: &[PreparedLog]) -> Vec<f64> {
-    let outputs = logs.first().map_or(0, |l| l.effort.len());
-    (0..outputs)
-        .map(|j| {
-            let mut sizes: Vec<f64> = logs.iter().flat_map(|l| l.effort[j].iter().map(|e| e.abs())).collect();
-            let last = sizes.len().saturating_sub(1);
-            if sizes.is_empty() {
-                return 0.0;
-            }
-            *sizes.select_nth_unstable_by(last * 99 / 100, f64::total_cmp).1
-        })
-        .collect()
 }
 
 /// Sample rate below which a log of a robot is suspected of another unit of time, Hz.
