@@ -4,7 +4,8 @@
 //! [`spectrum`] finds the sensor noise and the excited band, and [`cutoff`] the cut-off frequencies they allow;
 //! [`filter`], [`difference`], [`kernel`] and [`shift`] form states, regression rows and delays; [`mask`] says which
 //! samples may be used. [`textbook`] is the plain route (zero-phase Butterworth, central differences, decimation),
-//! [`velocity`] judges a measured velocity, [`trajectory`] holds the excitation trajectories.
+//! [`velocity`] judges a measured velocity, [`trajectory`] holds the excitation trajectories. For motions that repeat:
+//! [`periods`] averages records, [`frequency`] differentiates them by their [`harmonics`], [`smoothing`] fits cubics.
 //!
 //! Units: s, Hz, rad (or m), rad/s, N m (or N). Signals are slices of `f64` on a uniform grid of `rate_hz`.
 //! Every function that takes data from outside checks that it is finite and returns a typed error if not, so that
@@ -14,12 +15,16 @@ pub mod clock;
 pub mod cutoff;
 pub mod difference;
 pub mod filter;
+pub mod frequency;
+pub mod harmonics;
 pub mod kernel;
 pub mod log;
 pub mod mask;
 pub mod median;
+pub mod periods;
 pub mod shift;
 pub mod signal;
+pub mod smoothing;
 pub mod spectrum;
 pub mod spikes;
 pub mod textbook;

@@ -6,7 +6,6 @@
 
 mod choose;
 mod gram;
-mod harmonics;
 mod log_rows;
 mod periodic;
 mod predict;

@@ -1,9 +1,9 @@
 //! States of periodic motions: a Fourier series through the positions, differentiated exactly.
 
+use dynid_motion::harmonics::Harmonics;
 use dynid_motion::median::median;
 use rayon::prelude::*;
 
-use super::harmonics::Harmonics;
 use super::{ConditioningError, PreparedLog};
 
 /// Periodic motion found in a log; see [`PreparedLog::with_period`].

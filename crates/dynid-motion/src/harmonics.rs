@@ -1,15 +1,18 @@
-//! Least squares with the sines and cosines of one period.
+//! Fourier series through samples, by least squares.
 
-use dynid_motion::signal::rms;
+use crate::signal::rms;
 
 /// Offset, sine and cosine amplitudes: `q_n = c0 + sum_k [s_k sin(k step n) + c_k cos(k step n)]`, `n = 0, 1, ..`.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Harmonics {
+pub struct Harmonics {
     /// Phase of the first harmonic per sample, rad.
-    pub(crate) step: f64,
-    pub(crate) offset: f64,
-    pub(crate) sine: Vec<f64>,
-    pub(crate) cosine: Vec<f64>,
+    pub step: f64,
+    /// Offset `c0`.
+    pub offset: f64,
+    /// Sine amplitudes `s_k` from the first harmonic on.
+    pub sine: Vec<f64>,
+    /// Cosine amplitudes `c_k` from the first harmonic on.
+    pub cosine: Vec<f64>,
 }
 
 /// Samples over which a rotation is carried on before it is computed afresh.
@@ -35,8 +38,12 @@ impl Harmonics {
     /// Least squares fit of `count` harmonics through the usable samples.
     ///
     /// Over whole periods the columns are nearly orthogonal, so that conjugate gradients on the normal equations end
-    /// after a few steps; their condition number is near 1.
-    pub(crate) fn fit(signal: &[f64], usable: &[bool], step: f64, count: usize) -> Self {
+    /// after a few steps; their condition number is near 1. Samples must be finite, and more than `2 count + 1` usable
+    /// over a good part of a period: nothing else is checked, and fewer leave some amplitudes arbitrary.
+    ///
+    /// # Panics
+    /// If `usable` is longer than `signal`.
+    pub fn fit(signal: &[f64], usable: &[bool], step: f64, count: usize) -> Self {
         let samples = usable.iter().filter(|u| **u).count() as f64;
         // Without its middle, so that the offset costs the amplitudes no digits.
         let middle = masked(signal, usable).sum::<f64>() / samples.max(1.0);
@@ -77,7 +84,7 @@ impl Harmonics {
     }
 
     /// Values at the samples `0..samples`.
-    pub(crate) fn values(&self, samples: usize) -> Vec<f64> {
+    pub fn values(&self, samples: usize) -> Vec<f64> {
         let mut out = vec![self.offset; samples];
         for (k, (s, c)) in self.sine.iter().zip(&self.cosine).enumerate() {
             let rate = self.step * (k + 1) as f64;
@@ -87,7 +94,7 @@ impl Harmonics {
     }
 
     /// The derivative with respect to time at a sample rate.
-    pub(crate) fn derivative(&self, rate_hz: f64) -> Self {
+    pub fn derivative(&self, rate_hz: f64) -> Self {
         let omega = |k: usize| self.step * rate_hz * (k + 1) as f64;
         Harmonics {
             step: self.step,
@@ -98,12 +105,12 @@ impl Harmonics {
     }
 
     /// Squared amplitude of each harmonic.
-    pub(crate) fn powers(&self) -> Vec<f64> {
+    pub fn powers(&self) -> Vec<f64> {
         self.sine.iter().zip(&self.cosine).map(|(s, c)| s * s + c * c).collect()
     }
 
-    /// RMS of what the usable samples are off.
-    pub(crate) fn residual_rms(&self, signal: &[f64], usable: &[bool]) -> f64 {
+    /// RMS of what the usable samples are off the series.
+    pub fn residual_rms(&self, signal: &[f64], usable: &[bool]) -> f64 {
         let values = self.values(signal.len());
         let off: Vec<f64> =
             signal.iter().zip(values).zip(usable).filter(|(_, u)| **u).map(|((x, v), _)| x - v).collect();
