@@ -5,8 +5,8 @@
 use std::path::PathBuf;
 
 use dynid_model::element::{
-    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, JointElement, Offset, RotorInertia, Spring,
-    Transmission, Viscous,
+    Arctangent, AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, JointElement, Offset, RotorInertia,
+    Spring, Transmission, Viscous,
 };
 use dynid_model::*;
 use serde_json::Value;
@@ -237,45 +237,111 @@ fn indy7_has_forty_base_parameters_with_the_textbook_regroupings() {
     assert_eq!(silent, ["m1", "mx1", "my1", "mz1", "Ixx1", "Ixy1", "Ixz1", "Iyy1", "Iyz1", "m2", "mz2"]);
 }
 
+/// Standard parameters of three links in the paper's order → ours.
+fn er16_parameters(given: &[f64]) -> Vec<f64> {
+    let mut phi = vec![0.0; 30];
+    for link in 0..3 {
+        for (k, c) in PAPER_ORDER.iter().enumerate() {
+            phi[10 * link + c] = given[10 * link + k];
+        }
+    }
+    phi
+}
+
+/// For every base parameter of the paper's list, its place among ours.
+fn er16_places(g: &Value, model: &RobotModel, base: &BaseParameters) -> Vec<usize> {
+    let listed = g["independent"].as_array().unwrap();
+    assert_eq!(base.len(), listed.len());
+    let symbol = |column: &usize| model.parameters().linear[*column].symbol.as_str();
+    listed
+        .iter()
+        .map(|name| base.kept.iter().position(|c| symbol(c) == name.as_str().unwrap()).unwrap())
+        .collect()
+}
+
 #[test]
-fn er16_has_fifteen_base_parameters() {
+fn er16_has_the_fifteen_base_parameters_of_the_paper() {
     let Some(g) = golden("er16_dynamics.json") else { return };
     let model = RobotModel::new(modified_dh(&ER16).build().unwrap(), vec![]);
     let base = BaseParameters::of(&model, model.mechanism(), &[], &BaseSettings::default());
-    let names: Vec<&str> = base.kept.iter().map(|c| model.parameters().linear[*c].symbol.as_str()).collect();
-    let mut expected: Vec<&str> =
-        g["independent"].as_array().unwrap().iter().map(|s| s.as_str().unwrap()).collect();
-    let mut found = names.clone();
-    found.sort_unstable();
-    let listed = expected.clone();
-    expected.sort_unstable();
-    assert_eq!(found, expected);
-    let to_ours = |given: &[f64]| {
-        let mut phi = vec![0.0; 30];
+    assert!(base.gap.ratio() > 1e10, "{:?}", base.gap);
+    let places = er16_places(&g, &model, &base);
+    let k = base.matrix();
+    let expected = flat(&g["grouping_matrix_15x30"]);
+    for (row, own) in places.iter().enumerate() {
         for link in 0..3 {
-            for (k, c) in PAPER_ORDER.iter().enumerate() {
-                phi[10 * link + c] = given[10 * link + k];
+            for (column, c) in PAPER_ORDER.iter().enumerate() {
+                let (f, e) = (k[own * 30 + 10 * link + c], expected[row * 30 + 10 * link + column]);
+                assert!((f - e).abs() <= 1e-9, "base {row}, link {link}, {column}: {f} against {e}");
             }
         }
-        phi
-    };
-    for (phi, beta) in [("phi_random", "phi_b_random"), ("phi_standard_truth", "phi_b_truth")] {
-        let values = base.values(&to_ours(&numbers(&g[phi])));
-        let expected = numbers(&g[beta]);
-        for (symbol, e) in listed.iter().zip(expected) {
-            let own = names.iter().position(|n| n == symbol).unwrap();
-            assert!((values[own] - e).abs() <= 1e-6 * e.abs().max(1.0), "{symbol}: {} {e}", values[own]);
-        }
     }
+    for (phi, beta) in [("phi_random", "phi_b_random"), ("phi_standard_truth", "phi_b_truth")] {
+        let values = base.values(&er16_parameters(&numbers(&g[phi])));
+        let found: Vec<f64> = places.iter().map(|own| values[*own]).collect();
+        check_close(&found, &numbers(&g[beta]), 1e-9, 1e-9, beta);
+    }
+}
+
+#[test]
+fn er16_efforts_friction_regressor_and_poses() {
+    let Some(g) = golden("er16_dynamics.json") else { return };
+    // f0, fc, fv, fa and fb of every joint: spec/er16.md section 4.
+    let friction = [
+        [0.7044, 3.9877, 8.0, 32.3929, 6.9975],
+        [53.2922, -2.8909, -70.0174, 70.0243, 19.7363],
+        [-3.4499, 30.6465, 4.3297, -2.7533, 5.0],
+    ];
+    let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
+    let mut linear = er16_parameters(&numbers(&g["phi_standard_truth"]));
+    for (rate, [f0, fc, fv, fa, _]) in friction.into_iter().enumerate() {
+        elements.push(Box::new(Offset { rate }));
+        elements.push(Box::new(Coulomb { rate }));
+        elements.push(Box::new(Viscous { rate }));
+        elements.push(Box::new(Arctangent::new(rate)));
+        linear.extend([f0, fc, fv, fa]);
+    }
+    let shape = friction.map(|[.., fb]| fb);
+    let mechanism = modified_dh(&ER16).build().unwrap();
+    let rigid = RobotModel::new(mechanism.clone(), vec![]);
+    let base = BaseParameters::of(&rigid, &mechanism, &[], &BaseSettings::default());
+    let places = er16_places(&g, &rigid, &base);
+    let model = RobotModel::new(mechanism, elements);
     let dynamics = Dynamics::new(model.mechanism());
     let mut work = dynamics.workspace();
-    let phi = to_ours(&numbers(&g["phi_standard_truth"]));
     for state in g["states"].as_array().unwrap() {
         let (q, dq, ddq) = (numbers(&state["q"]), numbers(&state["qd"]), numbers(&state["qdd"]));
+        let motion = MotionBlock {
+            samples: 1,
+            stride: 1,
+            q: &q,
+            dq: &dq,
+            ddq: &ddq,
+            gravity: None,
+            channels: &[],
+            sign_width: 0.0,
+        };
         let mut effort = vec![0.0; 3];
-        let s = State { q: &q, dq: &dq, ddq: &ddq, gravity: None };
-        dynamics.inverse_dynamics(&s, &phi, &mut work, &mut effort);
-        check_close(&effort, &numbers(&state["tau_rigid_from_standard"]), 1e-9, 0.0, "tau");
+        rigid.efforts(&motion, &[], &linear[..30], 1, &mut effort);
+        check_close(&effort, &numbers(&state["tau_rigid_from_standard"]), 1e-9, 0.0, "rigid");
+        let mut effort = vec![0.0; 3];
+        model.element_efforts(&motion, &shape, &linear, 1, &mut effort, &mut Vec::new());
+        check_close(&effort, &numbers(&state["friction"]), 1e-9, 0.0, "friction");
+        model.efforts(&motion, &shape, &linear, 1, &mut effort);
+        check_close(&effort, &numbers(&state["tau_total"]), 1e-9, 0.0, "total");
+        let mut w = RegressorBlock::new(rigid.layout().clone(), 1);
+        rigid.regressor(&motion, &[], &mut w);
+        let expected = flat(&state["regressor_base_3x15"]);
+        for joint in 0..3 {
+            for (k, own) in places.iter().enumerate() {
+                let acting = rigid.layout().columns(joint).iter().position(|c| *c == base.kept[*own]);
+                let (f, e) = (acting.map_or(0.0, |a| w.column(joint, a)[0]), expected[joint * 15 + k]);
+                assert!((f - e).abs() <= 1e-9, "joint {joint}, base {k}: {f} against {e}");
+            }
+        }
+        let frame = dynamics.forward_kinematics(&q, &mut work)[2];
+        check_close(frame.rotation.rows().as_flattened(), &flat(&state["fk_frame3_R"]), 1e-9, 0.0, "R");
+        check_close(&frame.translation.0, &numbers(&state["fk_frame3_p"]), 1e-9, 0.0, "p");
     }
 }
 
