@@ -1,17 +1,37 @@
 //! Joint elements by name.
 
+mod friction;
+mod pairs;
+
+pub use pairs::AlikeElements;
+
 use dynid_io::{CouplingForm, CouplingSpec, ElementSpec, SettingValue};
 use dynid_model::element::{
     AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, JointElement, Offset, RotorInertia,
-    Spring, Transmission, Viscous,
+    Spring, Transmission, Viscous, ViscousMagnitude,
 };
 use dynid_model::{JointKind, Mechanism};
 
 use crate::Error;
 
 /// Element names that a robot file or a configuration may use.
-pub const NAMES: [&str; 8] =
-    ["coulomb", "viscous", "offset", "asymmetric", "rotor", "spring", "cyclic", "drive_gain"];
+pub const NAMES: [&str; 15] = [
+    "coulomb",
+    "viscous",
+    "offset",
+    "asymmetric",
+    "rotor",
+    "spring",
+    "cyclic",
+    "drive_gain",
+    "stribeck",
+    "arctangent",
+    "tanh",
+    "sigmoid",
+    "sigmoid_offset",
+    "power",
+    "viscous_magnitude",
+];
 
 /// Elements of a joint about which nothing is said.
 pub const DEFAULTS: [&str; 4] = ["coulomb", "viscous", "offset", "rotor"];
@@ -77,13 +97,29 @@ impl ElementPlan {
         &self.spec.settings
     }
 
+    /// Pairs of elements at a joint that only a suitable motion tells apart.
+    pub fn alike(&self, mechanism: &Mechanism) -> Vec<AlikeElements> {
+        let names = mechanism.rate_names();
+        names.iter().zip(&self.per_rate).flat_map(|(joint, list)| pairs::alike(joint, list)).collect()
+    }
+
     /// Builds the elements in joint order, couplings last.
+    ///
+    /// Shape parameters about which nothing is said get bounds for the speed limit of the joint, or for 1 rad/s (m/s)
+    /// where there is none.
+    ///
+    /// # Errors
+    /// [`Error::UnknownElement`], [`Error::ElementSetting`], [`Error::EqualElements`], [`Error::Coupling`],
+    /// [`Error::UnknownJoint`].
     pub fn build(&self, mechanism: &Mechanism) -> Result<Vec<Box<dyn JointElement>>, Error> {
         let names = mechanism.rate_names();
+        let owners = mechanism.rate_bodies();
         let mut out: Vec<Box<dyn JointElement>> = Vec::new();
         for (rate, list) in self.per_rate.iter().enumerate() {
+            pairs::check(&names[rate], list)?;
+            let speed = mechanism.bodies()[owners[rate]].joint.limits.velocity;
             for name in list {
-                out.push(self.element(name, rate, &names[rate])?);
+                out.push(self.element(name, rate, &names[rate], speed)?);
             }
         }
         for coupling in &self.couplings {
@@ -92,8 +128,18 @@ impl ElementPlan {
         Ok(out)
     }
 
-    fn element(&self, name: &str, rate: usize, joint: &str) -> Result<Box<dyn JointElement>, Error> {
+    fn element(
+        &self,
+        name: &str,
+        rate: usize,
+        joint: &str,
+        speed: Option<f64>,
+    ) -> Result<Box<dyn JointElement>, Error> {
+        if let Some(built) = friction::build(name, rate, joint, speed, &self.spec.settings) {
+            return built;
+        }
         Ok(match name {
+            "viscous_magnitude" => Box::new(ViscousMagnitude { rate }),
             "coulomb" => Box::new(Coulomb { rate }),
             "viscous" => Box::new(Viscous { rate }),
             "offset" => Box::new(Offset { rate }),
@@ -126,7 +172,8 @@ impl ElementPlan {
     /// Values that the robot file states for element parameters: `(parameter name, value)`.
     ///
     /// `[element.j1] rotor = { inertia = 0.4 }` states `j1.Ia`; `coulomb = { effort = .. }`, `viscous = { coefficient = .. }`
-    /// and `offset = { effort = .. }` state `fc`, `fv`, `fo`.
+    /// and `offset = { effort = .. }` state `fc`, `fv`, `fo`; `arctangent`, `tanh`, `sigmoid`, `sigmoid_offset` have an
+    /// `effort`, `power` and `viscous_magnitude` a `coefficient`, `stribeck` has `coulomb` and `static`.
     pub fn stated_values(&self) -> Vec<(String, f64)> {
         self.spec
             .settings
@@ -137,7 +184,7 @@ impl ElementPlan {
                     ("coulomb", "effort") => "fc",
                     ("viscous", "coefficient") => "fv",
                     ("offset", "effort") => "fo",
-                    _ => return None,
+                    (element, key) => friction::STATED.iter().find(|(e, k, _)| *e == element && *k == key)?.2,
                 };
                 match s.value {
                     SettingValue::Number(x) => Some((format!("{}.{symbol}", s.joint), x)),

@@ -109,6 +109,18 @@ pub enum Error {
         /// What is wrong.
         fault: String,
     },
+    /// Two elements of a joint that no motion can tell apart.
+    #[error("elements `{first}` and `{second}` of joint `{joint}` depend on each other: {reason}")]
+    EqualElements {
+        /// Joint.
+        joint: String,
+        /// The element to leave out.
+        first: String,
+        /// The other.
+        second: String,
+        /// Why.
+        reason: String,
+    },
     /// A coupling is wrong.
     #[error("coupling of joints {joints}: {fault}")]
     Coupling {
@@ -266,6 +278,7 @@ impl Error {
             Error::Design(dynid_excitation::ProblemError::RankDeficient { .. }) => Some(
                 "widen the limits that leave so little motion, or leave out elements that it cannot show".to_owned(),
             ),
+            Error::EqualElements { first, .. } => Some(format!("leave out one `{first}`")),
             Error::Checkpoint { .. } => Some("delete the file, or name another one".to_owned()),
             Error::Columns { source, .. } => source.hint(),
             Error::States(e) => e.hint(),

@@ -170,6 +170,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     let row_rms = figures::row_rms(&groups, &fitted.estimate.x, base.len());
     let residual_ratio = figures::residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
     let mut warnings = robot.warnings.clone();
+    warnings.extend(plan.alike(&robot.mechanism).iter().map(ToString::to_string));
     warnings.extend(prior.warnings.iter().cloned());
     warnings.extend(log_warnings(&model, &prepared));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();

@@ -121,6 +121,11 @@ pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection,
             .collect(),
         never_seen: base.zero.iter().map(|c| table.linear[*c].name.clone()).collect(),
         rank_gap: (base.gap.kept, base.gap.dropped),
-        warnings: robot.warnings.clone(),
+        warnings: robot
+            .warnings
+            .iter()
+            .cloned()
+            .chain(plan.alike(mechanism).iter().map(ToString::to_string))
+            .collect(),
     })
 }

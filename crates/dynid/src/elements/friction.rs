@@ -1,0 +1,195 @@
+//! Friction elements with shape parameters, from the settings of a robot file.
+
+use dynid_io::{ElementSetting, SettingValue};
+use dynid_model::element::{
+    Arctangent, JointElement, PowerLaw, ShapeSetting, Sigmoid, SigmoidOffset, Stribeck, TanhFriction,
+};
+
+use crate::Error;
+
+/// Settings that state a linear parameter: element, key, symbol of the parameter.
+pub(super) const STATED: [(&str, &str, &str); 8] = [
+    ("arctangent", "effort", "fa"),
+    ("stribeck", "coulomb", "fc"),
+    ("stribeck", "static", "fs"),
+    ("tanh", "effort", "ft"),
+    ("sigmoid", "effort", "fg"),
+    ("sigmoid_offset", "effort", "fl"),
+    ("power", "coefficient", "fp"),
+    ("viscous_magnitude", "coefficient", "fva"),
+];
+
+/// Shape parameters of every element, and whether its bounds scale with the speeds in use.
+const SHAPES: [(&str, &[&str], bool); 6] = [
+    ("arctangent", &["fb"], true),
+    ("stribeck", &["vs", "delta"], true),
+    ("tanh", &["w"], true),
+    ("sigmoid", &["phi2", "phi3"], false),
+    ("sigmoid_offset", &["alpha", "nu"], false),
+    ("power", &["p"], false),
+];
+
+const SHAPE_KEYS: [&str; 4] = ["start", "lower", "upper", "held"];
+/// Key of the scale of speed.
+const SPEED: &str = "speed";
+
+/// The element of this name at a joint; `None` if it is none of these. `speed`: largest speed of the joint, if known.
+pub(super) fn build(
+    name: &str,
+    rate: usize,
+    joint: &str,
+    speed: Option<f64>,
+    settings: &[ElementSetting],
+) -> Option<Result<Box<dyn JointElement>, Error>> {
+    let (element, shapes, scaled) = *SHAPES.iter().find(|(element, _, _)| *element == name)?;
+    let own = settings.iter().filter(|s| s.joint == joint && s.element == name).collect();
+    Some(Settings { element, joint, own }.build(rate, shapes, scaled, speed))
+}
+
+/// Settings of one element at one joint.
+struct Settings<'a> {
+    element: &'static str,
+    joint: &'a str,
+    own: Vec<&'a ElementSetting>,
+}
+
+impl Settings<'_> {
+    fn build(
+        &self,
+        rate: usize,
+        shapes: &[&str],
+        scaled: bool,
+        speed: Option<f64>,
+    ) -> Result<Box<dyn JointElement>, Error> {
+        self.check_keys(shapes, scaled)?;
+        let v_max = self.speed()?.or(speed.filter(|v| v.is_finite() && *v > 0.0)).unwrap_or(1.0);
+        Ok(match self.element {
+            "arctangent" => {
+                let Arctangent { fb, .. } = Arctangent::scaled(rate, v_max);
+                Box::new(Arctangent { rate, fb: self.shape("fb", fb, true)? })
+            }
+            "stribeck" => {
+                let Stribeck { vs, delta, .. } = Stribeck::scaled(rate, v_max);
+                let (vs, delta) = (self.shape("vs", vs, true)?, self.shape("delta", delta, true)?);
+                Box::new(Stribeck { rate, vs, delta })
+            }
+            "tanh" => {
+                let TanhFriction { w, .. } = TanhFriction::scaled(rate, v_max);
+                Box::new(TanhFriction { rate, w: self.shape("w", w, true)? })
+            }
+            "sigmoid" => {
+                let Sigmoid { phi2, phi3, .. } = Sigmoid::new(rate);
+                let (phi2, phi3) = (self.shape("phi2", phi2, true)?, self.shape("phi3", phi3, false)?);
+                Box::new(Sigmoid { rate, phi2, phi3 })
+            }
+            "sigmoid_offset" => {
+                let SigmoidOffset { alpha, nu, .. } = SigmoidOffset::new(rate);
+                let (alpha, nu) = (self.shape("alpha", alpha, true)?, self.shape("nu", nu, false)?);
+                Box::new(SigmoidOffset { rate, alpha, nu })
+            }
+            _ => {
+                let PowerLaw { p, .. } = PowerLaw::new(rate);
+                Box::new(PowerLaw { rate, p: self.shape("p", p, true)? })
+            }
+        })
+    }
+
+    fn fault(&self, fault: String) -> Error {
+        Error::ElementSetting { element: self.element.to_owned(), joint: self.joint.to_owned(), fault }
+    }
+
+    fn check_keys(&self, shapes: &[&str], scaled: bool) -> Result<(), Error> {
+        let values: Vec<&str> = STATED
+            .iter()
+            .filter(|(element, _, _)| *element == self.element)
+            .map(|(_, key, _)| *key)
+            .collect();
+        for setting in &self.own {
+            let (head, tail) = setting.key.split_once('.').unwrap_or((&setting.key, ""));
+            let shape = shapes.contains(&head) && (tail.is_empty() || SHAPE_KEYS.contains(&tail));
+            let value = tail.is_empty() && (values.contains(&head) || (scaled && head == SPEED));
+            if !shape && !value {
+                let values =
+                    values.iter().map(|v| format!("`{v}`")).chain(scaled.then(|| format!("`{SPEED}`")));
+                let shapes = shapes
+                    .iter()
+                    .map(|s| format!("`{s}` (or `{s}.{}`)", SHAPE_KEYS.join(&format!("`, `{s}."))));
+                let expected: Vec<String> = values.chain(shapes).collect();
+                return Err(self.fault(format!(
+                    "expected one of {}, found `{}`",
+                    expected.join(", "),
+                    setting.key
+                )));
+            }
+            if value {
+                self.number(&setting.key)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn setting(&self, key: &str) -> Option<&SettingValue> {
+        self.own.iter().find(|s| s.key == key).map(|s| &s.value)
+    }
+
+    fn number(&self, key: &str) -> Result<Option<f64>, Error> {
+        match self.setting(key) {
+            None => Ok(None),
+            Some(SettingValue::Number(x)) => Ok(Some(*x)),
+            Some(other) => Err(self.fault(format!("`{key}`: expected a number, found {}", in_words(other)))),
+        }
+    }
+
+    fn flag(&self, key: &str) -> Result<Option<bool>, Error> {
+        match self.setting(key) {
+            None => Ok(None),
+            Some(SettingValue::Flag(flag)) => Ok(Some(*flag)),
+            // Result files record settings as numbers.
+            Some(SettingValue::Number(x)) if *x == 0.0 || *x == 1.0 => Ok(Some(*x == 1.0)),
+            Some(other) => {
+                Err(self.fault(format!("`{key}`: expected true or false, found {}", in_words(other))))
+            }
+        }
+    }
+
+    fn speed(&self) -> Result<Option<f64>, Error> {
+        match self.number(SPEED)? {
+            Some(v) if v <= 0.0 => {
+                Err(self.fault(format!("`{SPEED}`: expected a number above 0, found {v}")))
+            }
+            v => Ok(v),
+        }
+    }
+
+    /// A shape parameter: `<key> = start`, or a table with `start`, `lower`, `upper`, `held`. Bounds about which nothing is
+    /// said are the default's, widened to hold the start.
+    fn shape(&self, key: &str, default: ShapeSetting, positive: bool) -> Result<ShapeSetting, Error> {
+        let of = |field: &str| format!("{key}.{field}");
+        let start = self.number(key)?.or(self.number(&of("start"))?);
+        let (lower, upper) = (self.number(&of("lower"))?, self.number(&of("upper"))?);
+        let held = self.flag(&of("held"))?.unwrap_or(default.held);
+        // A default start outside of stated bounds moves to the nearest of them.
+        let start = start.unwrap_or_else(|| {
+            let start = lower.map_or(default.start, |l| default.start.max(l));
+            upper.map_or(start, |u| start.min(u))
+        });
+        let setting = ShapeSetting {
+            start,
+            lower: lower.unwrap_or(default.lower.min(start)),
+            upper: upper.unwrap_or(default.upper.max(start)),
+            held,
+        };
+        setting.check(positive).map_err(|e| self.fault(format!("`{key}`: {e}")))?;
+        Ok(setting)
+    }
+}
+
+fn in_words(value: &SettingValue) -> String {
+    match value {
+        SettingValue::Number(x) => x.to_string(),
+        SettingValue::Text(text) => format!("{text:?}"),
+        SettingValue::Flag(flag) => flag.to_string(),
+        SettingValue::Numbers(list) => format!("{list:?}"),
+        SettingValue::Texts(list) => format!("{list:?}"),
+    }
+}

@@ -1,0 +1,132 @@
+//! Elements with shape parameters as a robot file states them.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
+use dynid::Error;
+use dynid::elements::ElementPlan;
+use dynid::io::toml_robot;
+use dynid::model::{EffortModel, Mechanism, ParameterTable, RobotModel};
+
+/// A joint with a speed limit of 4 rad/s, and what is said about its elements.
+fn plan(elements: &str) -> (Mechanism, ElementPlan) {
+    let text = format!(
+        "schema = 1\nname = \"one\"\ndh = \"modified\"\n[[joint]]\nname = \"j1\"\nd = 0.3\n\
+         limits = {{ velocity = 4.0 }}\nmass = 1.0\n[element.j1]\n{elements}\n"
+    );
+    let robot = toml_robot::parse(&text, "one.toml").unwrap();
+    let mechanism = robot.description.build().unwrap();
+    let plan = ElementPlan::new(&mechanism, &robot.elements, None, |_| true).unwrap();
+    (mechanism, plan)
+}
+
+fn table(elements: &str) -> ParameterTable {
+    let (mechanism, plan) = plan(elements);
+    RobotModel::new(mechanism.clone(), plan.build(&mechanism).unwrap()).parameters().clone()
+}
+
+fn fault(elements: &str) -> String {
+    let (mechanism, plan) = plan(elements);
+    plan.build(&mechanism).unwrap_err().to_string()
+}
+
+#[test]
+fn every_name_builds_an_element_with_parameters_of_its_own() {
+    let names = dynid::elements::NAMES;
+    for name in names {
+        let table = table(&format!("elements = [\"{name}\"]"));
+        assert!(table.linear.len() > 10, "{name}");
+    }
+    let apart = ["arctangent", "tanh", "sigmoid", "sigmoid_offset", "power", "viscous_magnitude", "stribeck"];
+    let all = table(&format!("elements = {apart:?}"));
+    let mut names: Vec<&str> = all.linear.iter().map(|p| p.name.as_str()).collect();
+    names.extend(all.shape.iter().map(|p| p.name.as_str()));
+    let count = names.len();
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), count, "{names:?}");
+}
+
+#[test]
+fn settings_reach_the_shape_parameters() {
+    let t =
+        table("elements = [\"stribeck\"]\nstribeck = { vs = { start = 0.04, lower = 0.01, upper = 0.1 } }");
+    let vs = &t.shape[0];
+    assert_eq!(t.shape.len(), 1, "delta is held unless stated otherwise");
+    assert_eq!((vs.name.as_str(), vs.start, vs.lower, vs.upper), ("j1.vs", 0.04, 0.01, 0.1));
+    let t = table(
+        "elements = [\"stribeck\"]\nstribeck = { vs = { start = 0.04, held = true }, delta = { held = false } }",
+    );
+    let delta = &t.shape[0];
+    assert_eq!((t.shape.len(), delta.name.as_str(), delta.start), (1, "j1.delta", 2.0));
+    // A number alone is the start; bounds follow the speed limit, and hold the start.
+    let t = table("elements = [\"arctangent\"]\narctangent = { fb = 7.0 }");
+    assert_eq!((t.shape[0].start, t.shape[0].lower, t.shape[0].upper), (7.0, 0.25, 25.0));
+    let t = table("elements = [\"arctangent\"]\narctangent = { fb = 30, speed = 1 }");
+    assert_eq!((t.shape[0].start, t.shape[0].lower, t.shape[0].upper), (30.0, 1.0, 100.0));
+    let t = table("elements = [\"arctangent\"]\narctangent = { fb = 0.1 }");
+    assert_eq!((t.shape[0].start, t.shape[0].lower), (0.1, 0.1));
+    let t = table("elements = [\"tanh\"]\ntanh = { w = { upper = 0.01 } }");
+    assert_eq!((t.shape[0].start, t.shape[0].lower, t.shape[0].upper), (0.01, 0.004, 0.01));
+}
+
+#[test]
+fn values_of_linear_parameters_are_stated() {
+    let (_, plan) = plan(
+        "elements = [\"stribeck\", \"arctangent\"]\nstribeck = { coulomb = 9.1, static = 11.8 }\n\
+         arctangent = { effort = -2.5, fb = 5.0 }",
+    );
+    let mut stated = plan.stated_values();
+    stated.sort_by(|a, b| a.0.cmp(&b.0));
+    let expected = [("j1.fa", -2.5), ("j1.fc", 9.1), ("j1.fs", 11.8)];
+    assert_eq!(stated, expected.map(|(name, value)| (name.to_owned(), value)));
+}
+
+#[test]
+fn wrong_settings_are_told() {
+    for (elements, parts) in [
+        ("stribeck = { vz = 0.1 }", &["`stribeck` of joint `j1`", "`vs`", "`delta.held`", "found `vz`"][..]),
+        ("stribeck = { vs = { begin = 0.1 } }", &["found `vs.begin`"]),
+        ("stribeck = { vs = \"slow\" }", &["`vs`", "expected a number", "\"slow\""]),
+        ("stribeck = { coulomb = true }", &["`coulomb`", "expected a number", "true"]),
+        ("stribeck = { vs = { held = 2 } }", &["`vs.held`", "true or false", "2"]),
+        ("stribeck = { vs = { lower = 0.2, start = 0.1 } }", &["`vs`", "between 0.2", "found 0.1"]),
+        ("stribeck = { vs = -1 }", &["`vs`", "above 0", "-1"]),
+        ("stribeck = { speed = 0 }", &["`speed`", "above 0", "found 0"]),
+    ] {
+        let found = fault(&format!("elements = [\"stribeck\"]\n{elements}"));
+        for part in parts {
+            assert!(found.contains(part), "{elements}: {found}");
+        }
+    }
+}
+
+#[test]
+fn elements_that_depend_on_each_other_are_refused() {
+    for (first, second) in [
+        ("offset", "asymmetric"),
+        ("coulomb", "asymmetric"),
+        ("viscous", "asymmetric"),
+        ("coulomb", "stribeck"),
+        ("viscous", "viscous"),
+    ] {
+        let (mechanism, plan) = plan(&format!("elements = [\"{second}\", \"{first}\"]"));
+        let found = plan.build(&mechanism).unwrap_err();
+        assert!(
+            matches!(&found, Error::EqualElements { first: f, second: s, .. } if f == first && s == second)
+        );
+        assert!(found.hint().unwrap().contains(first), "{found}");
+    }
+}
+
+#[test]
+fn elements_that_only_some_motions_tell_apart_are_named() {
+    let of = |list: &str| {
+        let (mechanism, plan) = plan(&format!("elements = {list}"));
+        plan.alike(&mechanism).iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    assert_eq!(of("[\"coulomb\", \"viscous\", \"offset\", \"rotor\"]"), Vec::<String>::new());
+    let found = of("[\"tanh\", \"coulomb\"]");
+    assert!(found.len() == 1 && found[0].contains("`coulomb` and `tanh` of joint `j1`"), "{found:?}");
+    let found = of("[\"viscous\", \"arctangent\"]");
+    assert!(found.len() == 1 && found[0].contains("1/fb"), "{found:?}");
+}
