@@ -16,12 +16,12 @@ const MAX_BLOCKS: usize = 64;
 /// States of all logs are held; regressors and kernels are computed again on every pass. Where the rows fit in memory,
 /// [`crate::rows::MemoryRows::collect`] makes further passes cheap.
 pub struct LogRows<'a> {
-    model: &'a dyn EffortModel,
+    pub(super) model: &'a dyn EffortModel,
     shape: &'a [f64],
     columns: KeptColumns,
     /// Per output: the rung of its mask, as a bit.
     wanted: Vec<u8>,
-    logs: Vec<ConditionedLog<'a>>,
+    pub(super) logs: Vec<ConditionedLog<'a>>,
     groups: Vec<GroupShape>,
 }
 
@@ -31,11 +31,11 @@ impl std::fmt::Debug for LogRows<'_> {
     }
 }
 
-struct ConditionedLog<'a> {
-    log: &'a PreparedLog,
-    states: States,
+pub(super) struct ConditionedLog<'a> {
+    pub(super) log: &'a PreparedLog,
+    pub(super) states: States,
     masks: Vec<Masks>,
-    kernels: Kernels,
+    pub(super) kernels: Kernels,
     /// Per output: effort led by the delay.
     efforts: Vec<Vec<f64>>,
     block_length: usize,

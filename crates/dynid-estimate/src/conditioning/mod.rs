@@ -13,6 +13,7 @@ mod prepare;
 mod reduce;
 mod rows;
 mod settings;
+mod shaped_rows;
 mod states;
 mod textbook;
 mod trial;
@@ -25,6 +26,7 @@ pub use predict::predict;
 pub use prepare::{PreparedLog, prepare};
 pub use reduce::reduce;
 pub use settings::ConditioningSettings;
+pub use shaped_rows::{RefineError, ShapedRows, refine};
 pub use states::States;
 pub use textbook::{TextbookRoute, reduce_textbook, textbook_rows};
 

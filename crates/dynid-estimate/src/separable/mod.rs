@@ -20,11 +20,13 @@
 //! Source: Golub & Pereyra 1973; Kaufman 1975; Moré 1978 for scaling and damping.
 
 mod dense;
+mod effort_problem;
 mod estimate;
 mod fit;
 mod levenberg;
 mod limit;
 mod linearised;
+mod places;
 mod polish;
 mod problem;
 mod profile;
@@ -36,10 +38,12 @@ mod settings;
 mod sobol;
 mod starts;
 
+pub use effort_problem::{EffortBlock, EffortProblem};
 pub use estimate::SeparableEstimate;
 pub use fit::fit;
 pub use levenberg::SearchStatus;
 pub use limit::limit_model;
+pub(crate) use places::{OutputPlaces, places};
 pub use problem::{Bound, RowGroup, SeparableProblem, ShapedColumns};
 pub use profile::{ShapeFinding, ShapeVerdict};
 pub use settings::{SeparableError, SeparableLoss, SeparableSettings, Weighting};
