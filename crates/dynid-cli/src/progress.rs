@@ -32,6 +32,7 @@ impl Progress {
             Step::Conditioning(Stage::Veto) => "choosing the kernel".to_owned(),
             Step::Conditioning(Stage::Mask) => "choosing the reversal mask".to_owned(),
             Step::Conditioning(Stage::Delay) => "estimating the delay".to_owned(),
+            Step::Shapes => "searching shape parameters".to_owned(),
             Step::Fit => "fitting".to_owned(),
             Step::Consistency => "making bodies physical".to_owned(),
             Step::Trust => "judging parameters".to_owned(),
@@ -68,6 +69,21 @@ impl DesignProgress {
             DesignStep::Forecast => self.0.set_message("predicting what the log will tell"),
             _ => self.0.set_message("finding base parameters"),
         }
+    }
+}
+
+/// Shows how far a study is; silent unless stderr is a terminal.
+pub(crate) struct StudyProgress(DesignProgress);
+
+impl StudyProgress {
+    pub(crate) fn new(quiet: bool) -> Self {
+        StudyProgress(DesignProgress::new(quiet))
+    }
+
+    pub(crate) fn step(&self, step: &dynid_studies::Progress) {
+        self.0.0.set_length(step.steps as u64);
+        self.0.0.set_position(step.done as u64);
+        self.0.0.set_message(step.step.clone());
     }
 }
 

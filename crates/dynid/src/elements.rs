@@ -5,7 +5,7 @@ mod pairs;
 
 pub use pairs::AlikeElements;
 
-use dynid_io::{CouplingForm, CouplingSpec, ElementSpec, SettingValue};
+use dynid_io::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, SettingValue};
 use dynid_model::element::{
     AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, JointElement, Offset, RotorInertia,
     Spring, Transmission, Viscous, ViscousMagnitude,
@@ -95,6 +95,29 @@ impl ElementPlan {
     /// Settings of the elements.
     pub fn settings(&self) -> &[dynid_io::ElementSetting] {
         &self.spec.settings
+    }
+
+    /// The same with bounds of shape parameters for the speeds that a log reaches, per rate; `None`: not known. Settings that
+    /// state a speed stand.
+    pub fn with_speeds(mut self, mechanism: &Mechanism, speeds: &[Option<f64>]) -> Self {
+        let names = mechanism.rate_names();
+        for ((joint, list), speed) in names.iter().zip(&self.per_rate).zip(speeds) {
+            let Some(speed) = speed.filter(|v| v.is_finite() && *v > 0.0) else { continue };
+            for element in list.iter().filter(|name| friction::scales(name)) {
+                let is_speed = |s: &ElementSetting| {
+                    s.joint == *joint && s.element == *element && s.key == friction::SPEED
+                };
+                if !self.spec.settings.iter().any(is_speed) {
+                    self.spec.settings.push(ElementSetting {
+                        joint: joint.clone(),
+                        element: element.clone(),
+                        key: friction::SPEED.to_owned(),
+                        value: SettingValue::Number(speed),
+                    });
+                }
+            }
+        }
+        self
     }
 
     /// Pairs of elements at a joint that only a suitable motion tells apart.

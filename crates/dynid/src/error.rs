@@ -158,6 +158,9 @@ pub enum Error {
     /// The linear estimator has no estimate.
     #[error("estimator: {0}")]
     Linear(#[from] dynid_estimate::linear::LinearError),
+    /// Shape parameters cannot be found.
+    #[error("shape parameters: {0}")]
+    Shapes(#[from] dynid_estimate::conditioning::RefineError),
     /// No physically consistent parameters meet the bounds.
     #[error("consistent estimate: {0}")]
     Consistency(#[from] dynid_estimate::consistent::ProblemError),

@@ -198,6 +198,9 @@ pub struct ShapeValue {
     /// Standard deviation; absent if it was not estimated.
     #[serde(default)]
     pub std: Option<f64>,
+    /// 95 % interval; one-sided ones end at a bound.
+    #[serde(default)]
+    pub interval: Option<(f64, f64)>,
     /// `seen in the data`, `bounded on one side`, `not seen` or `given`.
     pub verdict: String,
     /// Why, in words.

@@ -12,6 +12,7 @@ use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::linear::LinearEstimate;
 use dynid_estimate::whiteness::InBandWhiteness;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
+use dynid_motion::Log;
 
 use crate::Error;
 use crate::agreement::{self, Agreement};
@@ -23,6 +24,7 @@ use crate::fitting::{self, Fitted};
 use crate::logs::{self, LoadedLog};
 use crate::prior::Prior;
 use crate::robot::{Robot, RobotOptions};
+use crate::shape::{self, ShapeFit};
 use crate::trust::{Evidence, Trust};
 use structure::Structure;
 
@@ -35,6 +37,8 @@ pub enum Step {
     Structure,
     /// A step of the conditioning.
     Conditioning(Stage),
+    /// Searching shape parameters.
+    Shapes,
     /// Final fit with its covariance.
     Fit,
     /// Physically consistent standard parameters.
@@ -52,8 +56,12 @@ pub struct Identification {
     pub robot: Robot,
     /// Elements per joint.
     pub plan: ElementPlan,
-    /// The effort model.
+    /// The effort model of the fit: with shape parameters, linearised about the values found.
     pub model: RobotModel,
+    /// Shape parameters as found; `None` if the model has none or the route does not search them.
+    pub shapes: Option<ShapeFit>,
+    /// The nonlinear model with its linear parameters that the fit's parameters stand for, where it was linearised.
+    pub nonlinear: Option<(RobotModel, Vec<f64>)>,
     /// Base parameters of the model.
     pub base: BaseParameters,
     /// Training logs.
@@ -138,17 +146,29 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
 
     progress(Step::Structure);
     // Names that do not exist are told before the long work.
-    let shape = model.parameters().shape_start();
     let structure = Structure::of(config, &model, &plan, &prepared)?;
+    let start = model.parameters().shape_start();
 
     let conditioning = match config.conditioning.route {
         Route::Compact => {
-            Some(condition(&model, &shape, &structure.base.kept, &prepared, &settings, |stage| {
+            Some(condition(&model, &start, &structure.base.kept, &prepared, &settings, |stage| {
                 progress(Step::Conditioning(stage));
             })?)
         }
         Route::Textbook => None,
     };
+    let (model, structure, shapes) = match &conditioning {
+        Some(choices) if !model.parameters().shape.is_empty() => {
+            progress(Step::Shapes);
+            let (found, linear) =
+                shape::find(config, model, &structure.base, &prepared, (choices, &settings))?;
+            let linearised = shape::linearised(&plan, &found.model, &linear)?;
+            let structure = Structure::of(config, &linearised, &plan, &prepared)?;
+            (linearised, structure, Some(found))
+        }
+        _ => (model, structure, None),
+    };
+    let shape = model.parameters().shape_start();
     progress(Step::Fit);
     let Structure { base, stated, prior, regrouping, space, bounds, method } = structure;
     let source =
@@ -203,7 +223,10 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         logs: Vec::new(),
         robot,
         model,
+        shapes,
+        nonlinear: None,
     };
+    out.nonlinear = out.unfolded(out.values())?;
     for (l, log) in prepared.iter().enumerate() {
         progress(Step::Validate(log.name.clone()));
         let agreement = out.agreement(out.values(), log)?;
@@ -270,8 +293,10 @@ impl Identification {
     /// # Errors
     /// [`Error::Conditioning`].
     pub fn agreement(&self, values: &[f64], log: &PreparedLog) -> Result<Agreement, Error> {
+        let unfolded = self.unfolded(values)?;
+        let (model, values) = unfolded.as_ref().map_or((&self.model, values), |(m, v)| (m, v));
         agreement::compare(
-            &self.model,
+            model,
             values,
             log,
             &agreement::Alignment {
@@ -284,21 +309,30 @@ impl Identification {
         )
     }
 
+    /// The nonlinear model and its linear parameters that parameters of the fit stand for; `None` if the fit's model is not
+    /// linearised.
+    fn unfolded(&self, values: &[f64]) -> Result<Option<(RobotModel, Vec<f64>)>, Error> {
+        let Some(found) = &self.shapes else { return Ok(None) };
+        let unfolded = shape::unfold(&found.model, &self.model, values);
+        let mechanism = self.model.mechanism();
+        let model = RobotModel::new(mechanism.clone(), self.plan.build(mechanism)?);
+        Ok(Some((model.with_shape(&unfolded.shape), unfolded.linear)))
+    }
+
+    /// The identified model and its linear parameters: [`Identification::values`], or what they stand for where the fit's
+    /// model is linearised.
+    pub fn identified_model(&self) -> (&RobotModel, &[f64]) {
+        self.nonlinear.as_ref().map_or((&self.model, self.values()), |(model, values)| (model, values))
+    }
+
     /// Predicted effort on a prepared log, per output.
     ///
     /// # Errors
     /// [`Error::Conditioning`].
     pub fn predict(&self, log: &PreparedLog) -> Result<Vec<Vec<f64>>, Error> {
-        let shape = self.model.parameters().shape_start();
-        Ok(predict(
-            &self.model,
-            &shape,
-            self.values(),
-            log,
-            self.state_hz,
-            self.delay_samples,
-            &self.settings,
-        )?)
+        let (model, values) = self.identified_model();
+        let shape = model.parameters().shape_start();
+        Ok(predict(model, &shape, values, log, self.state_hz, self.delay_samples, &self.settings)?)
     }
 
     /// Standard deviations of all base parameters: reported and white; `None` where a column was dropped.
@@ -360,7 +394,23 @@ fn plan_elements(config: &Config, robot: &Robot, logs: &[LoadedLog]) -> Result<E
     for list in &mut plan.per_rate {
         *list = config.elements.friction.of_joint(list);
     }
-    Ok(plan)
+    let speeds: Vec<Option<f64>> =
+        names.iter().map(|name| logs.iter().filter_map(|l| fastest(&l.log, name)).reduce(f64::max)).collect();
+    Ok(plan.with_speeds(&robot.mechanism, &speeds))
+}
+
+/// Largest mean speed of a joint over 50 ms of a log; spikes and noise of the position count little.
+fn fastest(log: &Log, joint: &str) -> Option<f64> {
+    const SPAN_S: f64 = 0.05;
+    let position = &log.joints().iter().find(|j| j.name == joint)?.position;
+    let time = log.time();
+    let rows = time.len().checked_sub(1)?;
+    let step = (time[rows] - time[0]) / rows as f64;
+    let span = ((SPAN_S / step).ceil() as usize).clamp(1, rows.max(1));
+    (0..=rows.checked_sub(span)?)
+        .map(|k| ((position[k + span] - position[k]) / (time[k + span] - time[k])).abs())
+        .filter(|v| v.is_finite())
+        .reduce(f64::max)
 }
 
 /// Sample rate below which a log of a robot is suspected of another unit of time, Hz.

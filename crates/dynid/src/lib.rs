@@ -23,6 +23,7 @@ pub mod prior;
 mod report_data;
 mod result;
 pub mod robot;
+pub mod shape;
 pub mod simulate;
 pub mod trust;
 pub mod validate;

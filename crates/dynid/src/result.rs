@@ -2,6 +2,7 @@
 
 mod trust;
 
+use dynid_model::element::change_name;
 use dynid_model::{EffortModel, Inertia, Owner};
 use serde_json::json;
 
@@ -14,6 +15,7 @@ use crate::estimate::{
 };
 use crate::identify::Identification;
 use crate::logs::sha256;
+use crate::shape;
 use crate::verdict;
 
 impl Identification {
@@ -29,7 +31,9 @@ impl Identification {
         model.state_hz = self.state_hz;
         model.kernel_hz = self.kernel_hz;
         let names = |columns: &[usize]| -> Vec<String> {
-            columns.iter().map(|c| self.model.parameters().linear[*c].name.clone()).collect()
+            let name = |c: &usize| self.model.parameters().linear[*c].name.clone();
+            // The change of a shape parameter stands for the parameter itself.
+            columns.iter().map(name).map(|n| shape::of_change(&n).unwrap_or(&n).to_owned()).collect()
         };
         let not_excited: Vec<usize> = solution.dropped.iter().map(|c| self.base.kept[*c]).collect();
         Ok(Estimate {
@@ -96,6 +100,7 @@ impl Identification {
             .iter()
             .zip(&self.trust.parameters)
             .enumerate()
+            .filter(|(_, (p, _))| shape::of_change(&p.name).is_none())
             .map(|(c, (p, trust))| {
                 let (link, joint) = match &p.owner {
                     Owner::Link(name) => (Some(name.clone()), None),
@@ -133,6 +138,7 @@ impl Identification {
         self.standard_deviations()
             .into_iter()
             .enumerate()
+            .filter(|(k, _)| shape::of_change(&table.linear[self.base.kept[*k]].name).is_none())
             .map(|(k, (std, white))| {
                 let p = &table.linear[self.base.kept[k]];
                 let value = std.map(|_| self.fit().x[k]);
@@ -154,18 +160,34 @@ impl Identification {
     }
 
     fn shape_values(&self) -> Vec<ShapeValue> {
-        let table = self.model.parameters();
-        table
+        let (model, _) = self.identified_model();
+        let columns = self.model.parameters();
+        model
+            .parameters()
             .shape
             .iter()
-            .map(|p| ShapeValue {
-                name: p.name.clone(),
-                unit: p.unit.to_owned(),
-                value: p.start,
-                range: (p.lower, p.upper),
-                std: None,
-                verdict: "given".to_owned(),
-                reason: None,
+            .enumerate()
+            .map(|(k, p)| {
+                let finding = self.shapes.as_ref().map(|found| &found.findings[k]);
+                let trust = columns.column(&change_name(&p.name)).map(|c| &self.trust.parameters[c]);
+                let (verdict, one_sided) = shape::verdict(finding.map(|f| f.verdict));
+                let seen = verdict == shape::SEEN;
+                let std = trust.and_then(|t| t.std).filter(|_| seen);
+                let at =
+                    self.shapes.as_ref().map_or(p.start, |found| found.model.parameters().shape[k].start);
+                let around = trust.and_then(|t| t.interval).filter(|_| seen).map(|(low, high)| {
+                    ((at + low).clamp(p.lower, p.upper), (at + high).clamp(p.lower, p.upper))
+                });
+                ShapeValue {
+                    name: p.name.clone(),
+                    unit: p.unit.to_owned(),
+                    value: p.start,
+                    range: (p.lower, p.upper),
+                    std,
+                    interval: around.or(one_sided),
+                    verdict: verdict.to_owned(),
+                    reason: shape::reason(finding, self.conditioning.is_some()),
+                }
             })
             .collect()
     }

@@ -1,10 +1,46 @@
-//! Shape parameters of an identified model.
+//! Shape parameters of a run: found by separable least squares, then linearised, so that the final fit, its covariance and
+//! all that follows know of them.
 
+use dynid_estimate::conditioning::{Conditioning, ConditioningSettings, PreparedLog, refine};
+use dynid_estimate::separable::{
+    Bound, SeparableEstimate, SeparableSettings, ShapeFinding, ShapeVerdict, StartReport,
+};
 use dynid_model::element::{JointElement, Linearised, change_name};
-use dynid_model::{EffortModel, RobotModel};
+use dynid_model::{BaseParameters, EffortModel, RobotModel};
 
 use crate::Error;
+use crate::config::Config;
 use crate::elements::ElementPlan;
+
+/// Shape parameters found from logs.
+#[derive(Debug)]
+pub struct ShapeFit {
+    /// The nonlinear model with the values found.
+    pub model: RobotModel,
+    /// What the data say about each.
+    pub findings: Vec<ShapeFinding>,
+    /// What other starts of the search reached.
+    pub starts: StartReport,
+}
+
+/// Finds the shape parameters of a model on conditioned logs; also returns the linear parameters that go with them.
+pub(crate) fn find(
+    config: &Config,
+    model: RobotModel,
+    base: &BaseParameters,
+    logs: &[PreparedLog],
+    (choices, settings): (&Conditioning, &ConditioningSettings),
+) -> Result<(ShapeFit, Vec<f64>), Error> {
+    let shape = model.parameters().shape_start();
+    let separable = SeparableSettings { seed: config.seed.unwrap_or(1), ..SeparableSettings::default() };
+    let found: SeparableEstimate = refine(&model, &shape, &base.kept, logs, choices, settings, &separable)?;
+    let mut linear = vec![0.0; model.parameters().linear.len()];
+    for (column, value) in base.kept.iter().zip(&found.linear) {
+        linear[*column] = *value;
+    }
+    let model = model.with_shape(&found.shape);
+    Ok((ShapeFit { model, findings: found.findings, starts: found.starts }, linear))
+}
 
 /// The model of a plan, linearised about its shape parameters and the given linear parameters: every shape parameter
 /// becomes a linear one, the change from its value.
@@ -69,4 +105,45 @@ pub(crate) fn kept_columns<'a>(
     let names: Vec<String> = model.parameters().shape.iter().map(|s| change_name(&s.name)).collect();
     let table = &linearised.parameters().linear;
     (0..table.len()).filter(move |c| !names.contains(&table[*c].name))
+}
+
+/// Name of the shape parameter whose change a linear parameter is.
+pub(crate) fn of_change(name: &str) -> Option<&str> {
+    name.strip_suffix(change_name("").as_str())
+}
+
+/// Verdict of a shape parameter that the logs show.
+pub(crate) const SEEN: &str = "seen in the data";
+
+/// Verdict in words, and the interval of one that is bounded on one side.
+pub(crate) fn verdict(found: Option<ShapeVerdict>) -> (&'static str, Option<(f64, f64)>) {
+    match found {
+        Some(ShapeVerdict::Seen) => (SEEN, None),
+        Some(ShapeVerdict::OneSided { lower, upper }) => ("bounded on one side", Some((lower, upper))),
+        Some(ShapeVerdict::NotSeen) => ("not seen", None),
+        Some(ShapeVerdict::Held | ShapeVerdict::NotJudged) | None => ("given", None),
+    }
+}
+
+/// Why, in words. `searched`: the route searches shape parameters.
+pub(crate) fn reason(finding: Option<&ShapeFinding>, searched: bool) -> Option<String> {
+    let Some(finding) = finding else {
+        return (!searched)
+            .then(|| "the textbook route does not search it: it is held at its start".to_owned());
+    };
+    match (finding.verdict, finding.at_bound) {
+        (ShapeVerdict::NotSeen, _) => {
+            Some("any value within its range fits these logs alike: it is held at its start".to_owned())
+        }
+        (_, Some(bound)) => {
+            let side = match bound {
+                Bound::Lower => "lower",
+                Bound::Upper => "upper",
+            };
+            let limit = finding.limit.map_or_else(String::new, |l| format!(": the law is then {l}"));
+            Some(format!("at its {side} bound{limit}"))
+        }
+        (ShapeVerdict::OneSided { .. }, None) => Some("the logs bound it on one side only".to_owned()),
+        _ => None,
+    }
 }

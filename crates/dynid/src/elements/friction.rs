@@ -31,7 +31,12 @@ const SHAPES: [(&str, &[&str], bool); 6] = [
 
 const SHAPE_KEYS: [&str; 4] = ["start", "lower", "upper", "held"];
 /// Key of the scale of speed.
-const SPEED: &str = "speed";
+pub(super) const SPEED: &str = "speed";
+
+/// Whether the bounds of an element's shape parameters scale with the speeds in use.
+pub(super) fn scales(name: &str) -> bool {
+    SHAPES.iter().any(|(element, _, scaled)| *element == name && *scaled)
+}
 
 /// The element of this name at a joint; `None` if it is none of these. `speed`: largest speed of the joint, if known.
 pub(super) fn build(

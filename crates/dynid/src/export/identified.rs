@@ -82,7 +82,8 @@ impl Source {
 impl Identification {
     /// The identified robot, for [`RobotExport`](super::RobotExport) and [`json`](super::json()).
     pub fn identified(&self) -> Identified<'_> {
-        Identified { description: &self.robot.file.description, model: &self.model, values: self.values() }
+        let (model, values) = self.identified_model();
+        Identified { description: &self.robot.file.description, model, values }
     }
 }
 
