@@ -3,7 +3,7 @@
 
 mod nist_nonlinear;
 
-use dynid_estimate::separable::{SeparableSettings, Weighting, fit};
+use dynid_estimate::separable::{Deviations, SeparableSettings, Weighting, fit};
 use nist_nonlinear::{NistProblem, Published, SETS};
 
 fn settings() -> SeparableSettings {
@@ -27,7 +27,7 @@ fn digits(set: &'static Published, start: usize, separate: bool) -> [f64; 3] {
     let problem = NistProblem::new(set, start, separate);
     let estimate = fit(&problem, &settings()).unwrap();
     let mut parameters = problem.assemble(&estimate.linear, &estimate.shape);
-    let (linear, shape) = estimate.standard_deviations().unwrap();
+    let Deviations { linear, shape } = estimate.standard_deviations().unwrap();
     let mut deviations: Vec<f64> =
         problem.assemble(&linear, &shape).into_iter().map(|d| d.unwrap_or(f64::NAN)).collect();
     if set.name == "MGH17" && parameters[3] > parameters[4] {

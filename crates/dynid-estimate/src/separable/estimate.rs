@@ -43,17 +43,26 @@ pub struct SeparableEstimate {
     pub linearised: Option<LinearEstimate>,
 }
 
+/// Standard deviations; `None` for parameters that are dependent, held or at a bound.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Deviations {
+    /// Of the linear parameters.
+    pub linear: Vec<Option<f64>>,
+    /// Of the shape parameters.
+    pub shape: Vec<Option<f64>>,
+}
+
 impl SeparableEstimate {
     /// Standard deviations of linear and shape parameters if all residuals were independent, from
-    /// `σ̂² (J_fᵀ J_f)⁻¹`; `None` for those that are dependent, held or at a bound.
-    pub fn standard_deviations(&self) -> Option<(Vec<Option<f64>>, Vec<Option<f64>>)> {
+    /// `σ̂² (J_fᵀ J_f)⁻¹`.
+    pub fn standard_deviations(&self) -> Option<Deviations> {
         let fit = self.linearised.as_ref()?;
         let covariance = fit.model_covariance();
         Some(self.spread(fit, &covariance, self.residual_variance(fit)))
     }
 
     /// The same from the delete-a-block jackknife, which survives filtered residuals; `None` below two time blocks.
-    pub fn jackknife_deviations(&self) -> Option<(Vec<Option<f64>>, Vec<Option<f64>>)> {
+    pub fn jackknife_deviations(&self) -> Option<Deviations> {
         let fit = self.linearised.as_ref()?;
         let covariance = fit.jackknife()?.covariance;
         Some(self.spread(fit, &covariance, 1.0))
@@ -67,12 +76,7 @@ impl SeparableEstimate {
         variance.unwrap_or(1.0)
     }
 
-    fn spread(
-        &self,
-        fit: &LinearEstimate,
-        covariance: &Mat<f64>,
-        factor: f64,
-    ) -> (Vec<Option<f64>>, Vec<Option<f64>>) {
+    fn spread(&self, fit: &LinearEstimate, covariance: &Mat<f64>, factor: f64) -> Deviations {
         let mut all = vec![None; fit.x.len()];
         for (i, &column) in fit.solution.kept.iter().enumerate() {
             all[column] = Some((factor * covariance[(i, i)]).sqrt());
@@ -82,7 +86,7 @@ impl SeparableEstimate {
             shape[k] = all[self.linear.len() + i];
         }
         all.truncate(self.linear.len());
-        (all, shape)
+        Deviations { linear: all, shape }
     }
 }
 

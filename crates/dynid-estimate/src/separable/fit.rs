@@ -11,17 +11,20 @@ use super::reduction::{GroupReduction, Target};
 use super::robust::{Robust, refine_robust};
 use super::scale::SearchBox;
 use super::settings::{SeparableError, SeparableLoss, SeparableSettings, Weighting};
-use super::starts::{StartReport, multi_start, starts};
+use super::starts::{START_FALL, StartReport, multi_start, starts};
 use crate::groups::ReducedGroup;
 use crate::linear::{LinearEstimate, LinearMethod, LinearSettings, estimate};
 use rayon::prelude::*;
+
+/// Residuals below this share of the efforts are rounding, as for the weights of linear fits.
+const ROUNDING: f64 = 1e-9;
 
 /// Fits linear and shape parameters of a separable problem.
 ///
 /// 1. Multi-start of Levenberg-Marquardt searches on the projected residual, with variances of a linear fit at the given
 ///    start; then variances and parameters in turn until both settle.
 /// 2. Profiles: shape parameters that the data do not see are held at their start, the flattest first, and the others
-///    fitted again.
+///    fitted again (unless [`SeparableSettings::hold_unseen`] is off).
 /// 3. Robust losses: iteratively re-weighted from there.
 /// 4. Gauss-Newton on all parameters together for the last digits, and the covariance of all of them.
 ///
@@ -41,7 +44,7 @@ pub fn fit(
     let (report, mut status) = work.global()?;
     let mut findings = work.findings();
     let mut judged: Vec<Option<ShapeFinding>> = vec![None; findings.len()];
-    while let Some(flattest) = flattest(&findings) {
+    while let Some(flattest) = flattest(&findings).filter(|_| settings.hold_unseen) {
         judged[flattest] = Some(findings[flattest].clone());
         work.held[flattest] = true;
         work.u[flattest] = work.bounds.start[flattest];
@@ -122,14 +125,15 @@ impl<'a> Work<'a> {
             step: self.settings.step_tolerance,
             gradient: self.settings.gradient_tolerance,
             fall: 0.0,
+            relative_fall: 0.0,
         }
     }
 
-    /// Weighted rss below which nothing but rounding is left.
+    /// Weighted rss below which nothing but rounding and the tolerance of steps is left.
     fn rounding(&self) -> f64 {
         let groups = self.problem.groups().iter().zip(&self.variances);
         let energy: f64 = groups.map(|(g, v)| g.effort.iter().map(|y| y * y).sum::<f64>() / v).sum();
-        (100.0 * f64::EPSILON).powi(2) * energy
+        ROUNDING.powi(2) * energy
     }
 
     fn global(&mut self) -> Result<(StartReport, SearchStatus), SeparableError> {
@@ -137,9 +141,15 @@ impl<'a> Work<'a> {
             self.renew_variances(&[])?;
         }
         let starts = starts(&self.bounds, self.settings.starts, self.settings.seed);
-        let (found, report) =
-            multi_start(&self.projection(), &self.bounds, &starts, &self.held, self.stops(), self.rounding())
-                .ok_or(SeparableError::NotFiniteAnywhere { starts: starts.len() })?;
+        let (found, report) = multi_start(
+            &self.projection(),
+            &self.bounds,
+            &starts,
+            &self.held,
+            Stops { relative_fall: START_FALL, ..self.stops() },
+            self.rounding(),
+        )
+        .ok_or(SeparableError::NotFiniteAnywhere { starts: starts.len() })?;
         (self.u, self.linear) = (found.u, found.point.linear);
         let status = self.settle()?;
         Ok((report, status))

@@ -31,6 +31,8 @@ pub(super) struct Stops {
     pub(super) gradient: f64,
     /// Predicted fall of the rss that is not worth a step.
     pub(super) fall: f64,
+    /// The same as a share of the rss.
+    pub(super) relative_fall: f64,
 }
 
 /// End of a search.
@@ -75,7 +77,7 @@ pub(super) fn search(
         if small {
             break SearchStatus::SmallStep;
         }
-        if damping <= 1.0 && predicted < stops.fall {
+        if damping <= 1.0 && predicted < stops.fall.max(stops.relative_fall * point.rss) {
             break SearchStatus::SmallGradient;
         }
         let found = projection.at(&next, Target::Effort).filter(|p| p.rss.is_finite());

@@ -39,7 +39,7 @@ mod sobol;
 mod starts;
 
 pub use effort_problem::{EffortBlock, EffortProblem};
-pub use estimate::SeparableEstimate;
+pub use estimate::{Deviations, SeparableEstimate};
 pub use fit::fit;
 pub use levenberg::SearchStatus;
 pub use limit::limit_model;

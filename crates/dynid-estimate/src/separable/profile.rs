@@ -23,7 +23,8 @@ pub enum ShapeVerdict {
         /// Upper end.
         upper: f64,
     },
-    /// The loss is flat between the bounds: the value is the start, held there while the others were fitted.
+    /// The loss is flat between the bounds: the value is the start, held there while the others were fitted, if
+    /// [`super::SeparableSettings::hold_unseen`].
     NotSeen,
     /// Held: the bounds coincide.
     Held,
@@ -111,6 +112,7 @@ impl Minimum<'_> {
             step: 1e-4,
             gradient: 1e-8,
             fall: DONE * self.rise * self.variance,
+            relative_fall: 0.0,
         };
         let walk = |points: Vec<f64>| {
             let mut u = self.u.to_vec();

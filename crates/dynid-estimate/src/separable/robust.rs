@@ -62,6 +62,7 @@ pub(super) fn refine_robust(work: &mut Work<'_>) -> Result<Robust, SeparableErro
             step: INNER_STEP,
             gradient: work.settings.gradient_tolerance,
             fall: 0.0,
+            relative_fall: 0.0,
         };
         let found = search(&projection, &work.bounds, &work.u, &work.held, stops)
             .ok_or(SeparableError::NotFiniteAnywhere { starts: 1 })?;

@@ -56,6 +56,9 @@ pub struct SeparableSettings {
     /// Rise of the loss in units of the residual variance that counts as seen; times the variance inflation.
     /// Default 3.84, the 95 % quantile of χ² with one degree of freedom.
     pub profile_rise: f64,
+    /// Hold shape parameters that are not seen at their start. Default true; false: they keep the value of the least loss,
+    /// which noise has chosen.
+    pub hold_unseen: bool,
     /// Robust losses.
     pub irls: IrlsSettings,
 }
@@ -72,6 +75,7 @@ impl Default for SeparableSettings {
             gradient_tolerance: 1e-8,
             profile_points: 15,
             profile_rise: 3.84,
+            hold_unseen: true,
             irls: IrlsSettings::default(),
         }
     }

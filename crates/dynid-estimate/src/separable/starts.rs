@@ -9,7 +9,9 @@ use rayon::prelude::*;
 /// Most dimensions whose corners are all tried (16 of them); beyond, the lowest and the highest corner only.
 const CORNER_DIMENSIONS: usize = 4;
 /// Losses that differ by less than this, relative, count as the same.
-pub(super) const SAME_LOSS: f64 = 1e-6;
+const SAME_LOSS: f64 = 1e-6;
+/// Predicted fall of the loss, relative, that ends a search of a multi-start: the best one goes on from there.
+pub(super) const START_FALL: f64 = 1e-9;
 
 /// One search of a multi-start.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,4 +1,5 @@
 //! Golden numbers shared by the tests.
+#![allow(dead_code, reason = "every test uses its own part")]
 
 use serde_json::Value;
 use std::path::Path;

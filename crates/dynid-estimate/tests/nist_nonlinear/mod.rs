@@ -1,4 +1,5 @@
 //! Nonlinear-regression sets of the NIST Statistical Reference Datasets as separable and as general problems.
+#![expect(clippy::suspicious_arithmetic_impl, reason = "the rules of derivatives mix sums and products")]
 
 mod data;
 
