@@ -7,10 +7,10 @@ use super::bee_colony::BeeColony;
 use super::cma_es::CmaEs;
 use super::cuckoo::{CuckooSearch, ImprovedCuckooSearch};
 use super::differential_evolution::DifferentialEvolution;
+use super::driver::Limits;
 use super::error::SearchError;
 use super::particle_swarm::ParticleSwarm;
 use super::pattern::PatternSearch;
-use super::run::Limits;
 use super::settings::Settings;
 
 /// A search algorithm with its parameters.
@@ -22,7 +22,7 @@ use super::settings::Settings;
 /// | `cs` | [`CuckooSearch`] | 25 | 200 iterations |
 /// | `ics` | [`ImprovedCuckooSearch`] | 25 | 200 iterations |
 /// | `pso` | [`ParticleSwarm::published`] | 25 | 200 iterations |
-/// | `pso-general` | [`ParticleSwarm::general`] | 40 | 10 000 d evaluations |
+/// | `pso-general` | [`ParticleSwarm::general`] | 20 | 10 000 d evaluations |
 /// | `gps` | [`PatternSearch`] | none | 100 d iterations, 2000 d evaluations |
 /// | `cma-es` | [`CmaEs`] | 4 + ⌊3 ln d⌋ | 10 000 d evaluations |
 /// | `de` | [`DifferentialEvolution`] | 60 | 10 000 d evaluations |

@@ -14,7 +14,8 @@
 //! - [`BeeColony::published`] (the default): all coordinates change, `a = 0.5`, `L = 600`, `f = exp(-J/mean J)`
 //!   (spec/xy-pointing.md section 11). Sources without a finite value have `f = 0` and do not enter the mean. If there are
 //!   negative values, all are counted from the least.
-//! - [`BeeColony::general`]: see there.
+//! - [`BeeColony::general`]: about one coordinate in ten changes (one for certain), `a = 1`, `L = n d/2`, and every step
+//!   has a pull `ψ_d (best_d - x_id)`, `ψ_d` uniform on `[0, 1.5]`, towards the best point (Zhu & Kwong 2010).
 //!
 //! Evaluations: `n + 2n` per iteration and one per scout; 40 100 with 100 sources and 200 iterations, plus scouts.
 //!
@@ -126,7 +127,7 @@ impl Colony {
             self.sources.take(source, &self.candidates, candidate);
             self.trials[source] = 0;
         } else {
-            self.trials[source] += 1;
+            self.trials[source] = self.trials[source].saturating_add(1);
         }
     }
 

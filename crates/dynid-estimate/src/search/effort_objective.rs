@@ -1,11 +1,13 @@
 //! Misfit of an effort model as a function of all its parameters.
 
-use dynid_model::{EffortModel, MotionBlock, RegressorBlock};
-use faer::linalg::matmul::matmul;
-use faer::{Accum, MatMut, MatRef, Par};
-use thiserror::Error;
+mod error;
 
 use super::objective::Objective;
+use dynid_model::{EffortModel, MotionBlock, RegressorBlock};
+pub use error::EffortObjectiveError;
+use error::{check_efforts, check_loss};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
 
 /// How residuals `r` of an output count.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -18,55 +20,6 @@ pub enum EffortLoss {
     /// Huber 1964: `r²/2` up to the threshold `k` of the output, `k |r| - k²/2` beyond. One threshold per output, in units
     /// of its effort, positive.
     Huber(Vec<f64>),
-}
-
-/// Why an objective cannot be formed.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[non_exhaustive]
-pub enum EffortObjectiveError {
-    /// No samples.
-    #[error("no samples")]
-    NoSamples,
-    /// A slice has the wrong length.
-    #[error("{what}: {found}, expected {expected}")]
-    Length {
-        /// What was counted.
-        what: &'static str,
-        /// As it should be.
-        expected: usize,
-        /// As it is.
-        found: usize,
-    },
-    /// A linear column that the model does not have, or that is listed twice.
-    #[error("linear column {column} of {columns} is none of the model's or is listed twice")]
-    Column {
-        /// The column.
-        column: usize,
-        /// Number of columns of the model.
-        columns: usize,
-    },
-    /// A weight or threshold out of its range.
-    #[error("{what} of output {output} is {found}, expected {expected}")]
-    Value {
-        /// What it is.
-        what: &'static str,
-        /// Output, from 0.
-        output: usize,
-        /// Its range.
-        expected: &'static str,
-        /// Its value.
-        found: f64,
-    },
-    /// A measured effort or an entry of the regressor that is not finite.
-    #[error("{what} of output {output} is not finite at sample {sample}")]
-    NotFinite {
-        /// What it is.
-        what: &'static str,
-        /// Output, from 0.
-        output: usize,
-        /// Sample, from 0.
-        sample: usize,
-    },
 }
 
 /// Misfit of efforts over all samples and outputs, as a function of linear and shape parameters together:
@@ -335,38 +288,6 @@ fn output_columns(
         Ok(OutputColumns { weight, fixed: fixed.filter_map(|c| unknown(*c)).collect(), shaped })
     };
     (0..outputs).map(of).collect()
-}
-
-fn check_loss(loss: &EffortLoss, outputs: usize) -> Result<(), EffortObjectiveError> {
-    let EffortLoss::Huber(thresholds) = loss else { return Ok(()) };
-    if thresholds.len() != outputs {
-        let (what, found) = ("thresholds", thresholds.len());
-        return Err(EffortObjectiveError::Length { what, expected: outputs, found });
-    }
-    match thresholds.iter().position(|k| !(*k > 0.0 && k.is_finite())) {
-        None => Ok(()),
-        Some(output) => {
-            let (what, expected) = ("threshold", "positive and finite");
-            Err(EffortObjectiveError::Value { what, output, expected, found: thresholds[output] })
-        }
-    }
-}
-
-fn check_efforts(effort: &[&[f64]], outputs: usize, samples: usize) -> Result<(), EffortObjectiveError> {
-    if samples == 0 {
-        return Err(EffortObjectiveError::NoSamples);
-    }
-    if effort.len() != outputs {
-        let (what, found) = ("outputs with efforts", effort.len());
-        return Err(EffortObjectiveError::Length { what, expected: outputs, found });
-    }
-    match effort.iter().find(|e| e.len() != samples) {
-        None => Ok(()),
-        Some(wrong) => {
-            let what = "samples of effort";
-            Err(EffortObjectiveError::Length { what, expected: samples, found: wrong.len() })
-        }
-    }
 }
 
 /// `Σ f(r)` in eight partial sums, which the compiler can keep in vector registers.

@@ -33,13 +33,13 @@ impl History {
                     index += 1;
                     index % 2 == 1
                 });
-                self.stride *= 2;
+                self.stride = self.stride.saturating_mul(2);
             }
             if self.offered.is_multiple_of(self.stride) {
                 self.points.push(HistoryPoint { evaluations, value });
             }
         }
-        self.offered += 1;
+        self.offered = self.offered.saturating_add(1);
     }
 
     /// All points and, where it is not among them, the last.

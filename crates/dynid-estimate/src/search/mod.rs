@@ -33,6 +33,7 @@ mod checkpoint;
 mod cma_es;
 mod cuckoo;
 mod differential_evolution;
+mod driver;
 mod effort_objective;
 mod error;
 mod history;
@@ -68,7 +69,8 @@ pub use run::{Progress, SearchResult, Status};
 pub use settings::Settings;
 pub use tent::TentMap;
 
-use run::{Driver, Method, Run};
+use driver::Driver;
+use run::{Method, Run};
 
 /// What watches a run: called after every whole iteration, and able to stop it.
 pub type Observer<'a> = dyn FnMut(&Progress<'_>) -> ControlFlow<()> + 'a;

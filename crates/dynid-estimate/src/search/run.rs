@@ -1,11 +1,8 @@
-//! One run: counting, keeping the best, deciding when to end.
-
-use std::ops::ControlFlow;
+//! One run: what algorithms draw from and evaluate with, counting and keeping the best.
 
 use super::bounds::Bounds;
-use super::checkpoint::{Checkpoint, CheckpointError, Transfer};
-use super::error::SearchError;
-use super::history::{History, HistoryPoint};
+use super::checkpoint::{Checkpoint, Transfer};
+use super::history::HistoryPoint;
 use super::objective::Objective;
 use super::random::Random;
 use super::settings::Settings;
@@ -71,7 +68,7 @@ pub struct Progress<'a> {
     pub point: Option<&'a [f64]>,
     /// Its value, `+∞` without one.
     pub value: f64,
-    save: &'a dyn Fn() -> Checkpoint,
+    pub(super) save: &'a dyn Fn() -> Checkpoint,
 }
 
 impl Progress<'_> {
@@ -89,12 +86,12 @@ pub(super) struct Run<'a> {
     objective: &'a dyn Objective,
     start: Option<Vec<f64>>,
     limit: u64,
-    evaluations: u64,
-    not_finite: u64,
+    pub(super) evaluations: u64,
+    pub(super) not_finite: u64,
     /// Some candidates were not evaluated for want of budget: the state is of no whole iteration.
-    truncated: bool,
-    best: Vec<f64>,
-    best_value: f64,
+    pub(super) truncated: bool,
+    pub(super) best: Vec<f64>,
+    pub(super) best_value: f64,
     points: Vec<f64>,
 }
 
@@ -136,7 +133,7 @@ impl<'a> Run<'a> {
     /// Values of candidates in search coordinates; `+∞` where there is none, or no budget left.
     pub(super) fn evaluate(&mut self, candidates: &[f64], values: &mut [f64]) {
         let d = self.bounds.dimensions();
-        let left = usize::try_from(self.limit - self.evaluations).unwrap_or(usize::MAX);
+        let left = usize::try_from(self.limit.saturating_sub(self.evaluations)).unwrap_or(usize::MAX);
         let count = values.len().min(left);
         self.truncated |= count < values.len();
         let (values, beyond) = values.split_at_mut(count);
@@ -168,154 +165,11 @@ impl<'a> Run<'a> {
         value[0]
     }
 
-    fn fields(&mut self, transfer: &mut Transfer<'_>) {
+    pub(super) fn fields(&mut self, transfer: &mut Transfer<'_>) {
         self.random.fields(transfer);
         transfer.integer(&mut self.evaluations);
         transfer.integer(&mut self.not_finite);
         transfer.reals(&mut self.best);
         transfer.real(&mut self.best_value);
-    }
-}
-
-/// Limits of a run, defaults filled in.
-pub(super) struct Limits {
-    pub(super) iterations: u64,
-    pub(super) evaluations: u64,
-}
-
-/// A run together with its algorithm.
-#[derive(Clone)]
-pub(super) struct Driver<'a, M> {
-    method: M,
-    run: Run<'a>,
-    history: History,
-    iteration: u64,
-    improved: u64,
-    started: bool,
-    label: String,
-    seed: u64,
-}
-
-impl<'a, M: Method> Driver<'a, M> {
-    pub(super) fn new(method: M, run: Run<'a>, settings: &Settings, label: String) -> Self {
-        let history = History::new(settings.history);
-        Driver { method, run, history, iteration: 0, improved: 0, started: false, label, seed: settings.seed }
-    }
-
-    /// Continues from a checkpoint.
-    pub(super) fn load(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        if checkpoint.algorithm != self.label {
-            let (expected, found) = (self.label.clone(), checkpoint.algorithm.clone());
-            return Err(CheckpointError::Algorithm { expected, found });
-        }
-        if checkpoint.seed != self.seed {
-            return Err(CheckpointError::Seed { expected: self.seed, found: checkpoint.seed });
-        }
-        let bounds = self.bounds();
-        let words = checkpoint.words.strip_prefix(bounds.as_slice()).ok_or(CheckpointError::Bounds)?;
-        let mut transfer = Transfer::Load { words, damaged: false };
-        self.fields(&mut transfer);
-        if !transfer.complete() {
-            return Err(CheckpointError::Damaged);
-        }
-        self.started = true;
-        Ok(())
-    }
-
-    fn bounds(&self) -> Vec<u64> {
-        let bounds = self.run.bounds;
-        let (lower, upper) = (bounds.lower().iter(), bounds.upper().iter());
-        let kinds = (0..bounds.dimensions()).map(|i| u64::from(bounds.is_logarithmic(i)));
-        let count = std::iter::once(bounds.dimensions() as u64);
-        count.chain(lower.chain(upper).map(|b| b.to_bits())).chain(kinds).collect()
-    }
-
-    fn fields(&mut self, transfer: &mut Transfer<'_>) {
-        transfer.integer(&mut self.iteration);
-        transfer.integer(&mut self.improved);
-        self.run.fields(transfer);
-        self.history.fields(transfer);
-        self.method.fields(transfer);
-    }
-
-    fn into_checkpoint(mut self) -> Checkpoint {
-        let mut words = self.bounds();
-        self.fields(&mut Transfer::Save(&mut words));
-        Checkpoint { algorithm: self.label, seed: self.seed, words }
-    }
-
-    /// Runs to the end.
-    pub(super) fn finish(
-        mut self,
-        limits: &Limits,
-        settings: &Settings,
-        observer: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
-    ) -> Result<SearchResult, SearchError> {
-        if !self.started {
-            self.method.start(&mut self.run);
-            self.record();
-        }
-        let status = loop {
-            if settings.target.is_some_and(|target| self.run.best_value <= target) {
-                break Status::TargetReached;
-            }
-            if self.run.evaluations >= limits.evaluations || self.iteration >= limits.iterations {
-                break Status::BudgetUsed;
-            }
-            if settings.stall.is_some_and(|stall| self.iteration - self.improved >= stall) {
-                break Status::Stalled;
-            }
-            let before = self.run.best_value;
-            let step = self.method.iterate(&mut self.run);
-            self.iteration += 1;
-            if self.run.best_value < before {
-                self.improved = self.iteration;
-            }
-            self.record();
-            if self.run.truncated {
-                continue;
-            }
-            if step == Step::Converged {
-                break Status::Converged;
-            }
-            if self.observe(observer).is_break() {
-                break Status::Stopped;
-            }
-        };
-        self.result(status)
-    }
-
-    fn record(&mut self) {
-        if self.run.best_value.is_finite() {
-            self.history.offer(self.run.evaluations, self.run.best_value);
-        }
-    }
-
-    fn observe(&self, observer: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>) -> ControlFlow<()> {
-        let progress = Progress {
-            iteration: self.iteration,
-            evaluations: self.run.evaluations,
-            not_finite: self.run.not_finite,
-            point: self.run.best_value.is_finite().then_some(&self.run.best),
-            value: self.run.best_value,
-            save: &|| self.clone().into_checkpoint(),
-        };
-        observer(&progress)
-    }
-
-    fn result(self, status: Status) -> Result<SearchResult, SearchError> {
-        let Run { best, best_value, evaluations, not_finite, .. } = self.run;
-        if best_value.is_infinite() {
-            return Err(SearchError::NowhereFinite { evaluations });
-        }
-        Ok(SearchResult {
-            point: best,
-            value: best_value,
-            iterations: self.iteration,
-            evaluations,
-            not_finite,
-            history: self.history.closed(evaluations, best_value),
-            status,
-        })
     }
 }
