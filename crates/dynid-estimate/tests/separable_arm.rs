@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "in tests a panic is the report")]
 
 mod arm;
-mod arm;
+mod er16_arm;
 mod golden;
 
 use dynid_estimate::conditioning::{ConditioningSettings, condition, prepare, refine};
@@ -16,7 +16,7 @@ use dynid_model::{
     LinkDescription, MotionBlock, Placement, RegressorBlock, RobotModel,
 };
 use dynid_motion::{JointSignals, Log};
-use arm::Er16;
+use er16_arm::Er16;
 use std::io::Read;
 use std::path::Path;
 
@@ -85,7 +85,7 @@ fn er16_with_noise_beats_the_truth_and_does_not_depend_on_the_start() {
 fn er16_golden_set_is_fitted_no_worse_than_by_the_reference() {
     let Some(golden) = golden::load("er16_identification.json") else { return };
     let Some(arm) = Er16::golden(&golden) else { return };
-    let effort = arm::joint_after_joint(&golden["tau"]);
+    let effort = er16_arm::joint_after_joint(&golden["tau"]);
     let estimate = fitted(&arm, &effort, &least());
     let reference = golden::number(&golden["reference_ls"]["rss"]);
     let own: f64 = estimate.residuals.iter().flatten().map(|r| r * r).sum();
@@ -95,7 +95,7 @@ fn er16_golden_set_is_fitted_no_worse_than_by_the_reference() {
         let found = arm.loss_of(&golden::vector(&case["x"]), &effort);
         assert!((found - golden::number(&case["F"])).abs() < 1e-8, "{found}");
     }
-    let clean = arm::joint_after_joint(&golden["tau_noise_free"]);
+    let clean = er16_arm::joint_after_joint(&golden["tau_noise_free"]);
     let error = arm.error(&fitted(&arm, &clean, &least()));
     println!("ER-16 golden without noise: largest error {error:.1e}");
     assert!(error < 1e-6);

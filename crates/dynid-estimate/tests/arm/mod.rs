@@ -1,214 +1,189 @@
-//! Joints 1 to 3 of the ER-16 with offset, Coulomb, viscous and arctangent friction (spec/er16.md).
+//! A six-joint arm with friction on an exciting motion, its rows filtered and thinned as a log's are.
+#![allow(dead_code, reason = "every test uses its own part")]
 
-use dynid_estimate::separable::{EffortBlock, SeparableEstimate};
-use dynid_model::element::{Arctangent, Coulomb, JointElement, Offset, Viscous};
+use dynid_estimate::rows::{GroupShape, MemoryRows, Rows};
+use dynid_model::element::{Coulomb, JointElement, Offset, Viscous};
 use dynid_model::{
-    Description, EffortModel, Inertia, JointDescription, JointKind, Limits, LinkDescription, MotionBlock,
-    Placement, RegressorBlock, RobotModel, ShapeParameter,
+    BaseParameters, BaseSettings, Description, EffortModel, Inertia, JointDescription, JointKind, Limits,
+    LinkDescription, MotionBlock, Placement, RegressorBlock, RobotModel,
 };
+use dynid_motion::filter::{Sections, butterworth, forward_backward, pick};
+use dynid_motion::trajectory::Fourier;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use serde_json::Value;
-use std::f64::consts::{FRAC_PI_2, TAU};
 
-pub(crate) const JOINTS: usize = 3;
-/// Time blocks of the motion.
-const BLOCKS: usize = 10;
+pub(crate) const JOINTS: usize = 6;
+pub(crate) const RATE_HZ: f64 = 250.0;
+pub(crate) const CUT_OFF_HZ: f64 = 10.0;
+const DECIMATION: usize = 10;
+/// Standard deviation of the raw effort noise of each joint, N m.
+pub(crate) const NOISE: [f64; JOINTS] = [2.0, 3.0, 1.5, 0.4, 0.3, 0.2];
 
-/// The arm, its motion and the truth of Table 3.
-pub(crate) struct Er16 {
-    pub(crate) model: RobotModel,
-    pub(crate) kept: Vec<usize>,
-    /// 15 base parameters, then `fo, fc, fv, fa, fb` per joint.
-    pub(crate) truth: Vec<f64>,
-    /// Per kept column: its place in the truth.
-    places: Vec<usize>,
-    samples: usize,
-    q: Vec<f64>,
-    dq: Vec<f64>,
-    ddq: Vec<f64>,
-}
-
-fn model() -> RobotModel {
-    let mut d = Description::new("er16");
-    d.links.push(LinkDescription { name: "base".into(), inertia: None });
-    let rows = [(0.0, 0.0, 0.45, 0.0), (0.17, -FRAC_PI_2, 0.0, -FRAC_PI_2), (0.7, 0.0, 0.0, 0.0)];
-    for (k, (a, alpha, length, theta)) in rows.into_iter().enumerate() {
-        let inertia = Some(Inertia([1.0, 0.1, 0.1, 0.1, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0]));
-        d.links.push(LinkDescription { name: format!("link{}", k + 1), inertia });
+pub(crate) fn model() -> RobotModel {
+    let mut d = Description::new("arm");
+    d.links.push(LinkDescription { name: "l0".into(), inertia: None });
+    let tilt = [0.0, -1.571, 0.0, -1.571, 1.571, -1.571];
+    for k in 1..=JOINTS {
+        d.links.push(LinkDescription {
+            name: format!("l{k}"),
+            inertia: Some(Inertia([3.0, 0.1, 0.2, 0.3, 0.5, 0.01, 0.02, 0.6, 0.03, 0.7])),
+        });
         d.joints.push(JointDescription {
-            name: format!("j{}", k + 1),
-            parent: if k == 0 { "base".into() } else { format!("link{k}") },
-            child: format!("link{}", k + 1),
+            name: format!("j{k}"),
+            parent: format!("l{}", k - 1),
+            child: format!("l{k}"),
             kind: JointKind::Revolute,
-            placement: Placement::rotate([1.0, 0.0, 0.0], alpha)
-                .then(&Placement::translate(a, 0.0, 0.0))
-                .then(&Placement::rotate([0.0, 0.0, 1.0], theta))
-                .then(&Placement::translate(0.0, 0.0, length)),
+            placement: Placement::from_xyz_rpy([0.03 * k as f64, 0.0, 0.25], [tilt[k - 1], 0.0, 0.0]),
             axis: [0.0, 0.0, 1.0],
             limits: Limits::default(),
             mimic: None,
         });
     }
     let elements = (0..JOINTS)
-        .flat_map(|rate| -> [Box<dyn JointElement>; 4] {
-            [
-                Box::new(Offset { rate }),
-                Box::new(Coulomb { rate }),
-                Box::new(Viscous { rate }),
-                Box::new(Arctangent::new(rate)),
-            ]
+        .flat_map(|rate| -> [Box<dyn JointElement>; 3] {
+            [Box::new(Viscous { rate }), Box::new(Coulomb { rate }), Box::new(Offset { rate })]
         })
         .collect();
     RobotModel::new(d.build().unwrap(), elements)
 }
 
-/// Numbers of a table of samples × joints, joint after joint.
-pub(crate) fn joint_after_joint(table: &Value) -> Vec<f64> {
-    let rows: Vec<Vec<f64>> = table.as_array().unwrap().iter().map(crate::golden::vector).collect();
-    (0..JOINTS).flat_map(|j| rows.iter().map(move |r| r[j]).collect::<Vec<f64>>()).collect()
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
 }
 
-impl Er16 {
-    fn new(q: Vec<f64>, dq: Vec<f64>, ddq: Vec<f64>) -> Option<Self> {
-        let robot = crate::golden::load("../robots/er16.json")?;
-        let model = model();
-        let base = robot["truth"]["base_names"].as_array().unwrap();
-        let friction = ["fo", "fc", "fv", "fa"];
-        let listed = base.iter().enumerate().map(|(place, name)| (place, name.as_str().unwrap().to_owned()));
-        let listed = listed.chain((0..JOINTS).flat_map(|j| {
-            friction.iter().enumerate().map(move |(k, name)| (15 + 5 * j + k, format!("{name}{}", j + 1)))
-        }));
-        let column = |symbol: &str| {
-            let found = model.parameters().linear.iter().position(|p| p.symbol == symbol);
-            found.unwrap_or_else(|| panic!("no parameter {symbol}"))
-        };
-        let mut columns: Vec<(usize, usize)> = listed.map(|(place, name)| (column(&name), place)).collect();
-        columns.sort_unstable();
-        let numbers = |name: &str| crate::golden::vector(&robot["truth"][name]);
-        Some(Er16 {
-            kept: columns.iter().map(|c| c.0).collect(),
-            places: columns.iter().map(|c| c.1).collect(),
-            truth: numbers("phi_base").into_iter().chain(numbers("friction")).collect(),
-            model,
-            samples: q.len() / JOINTS,
-            q,
-            dq,
-            ddq,
-        })
-    }
-
-    /// One period of the reference trajectory `inertial`.
-    pub(crate) fn reference(samples: usize) -> Option<Self> {
-        let robot = crate::golden::load("../robots/er16.json")?;
-        let (mut q, mut dq, mut ddq) = (Vec::new(), Vec::new(), Vec::new());
-        for row in robot["trajectories"]["inertial"]["coefficients"].as_array().unwrap() {
-            let c = crate::golden::vector(row);
-            for s in 0..samples {
-                let t = TAU * s as f64 / samples as f64;
-                let (mut position, mut velocity, mut acceleration) = (c[0], 0.0, 0.0);
-                for k in 1..=5 {
-                    let (a, b, w) = (c[k], c[5 + k], k as f64 * TAU * 0.05);
-                    let (sin, cos) = (k as f64 * t).sin_cos();
-                    position += a * sin + b * cos;
-                    velocity += w * (a * cos - b * sin);
-                    acceleration -= w * w * (a * sin + b * cos);
-                }
-                q.push(position);
-                dq.push(velocity);
-                ddq.push(acceleration);
-            }
+/// Positions, velocities and accelerations, joint after joint.
+pub(crate) fn motion(samples: usize, stream: u64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    let mut rng = ChaCha8Rng::seed_from_u64(40);
+    rng.set_stream(stream);
+    let (mut q, mut dq, mut ddq) = (Vec::new(), Vec::new(), Vec::new());
+    for joint in 0..JOINTS {
+        let mut speeds = || (0..6).map(|_| 0.45 * normal(&mut rng)).collect::<Vec<f64>>();
+        // Periods between 9 and 13 s that share no multiple within a log.
+        let base = std::f64::consts::TAU / (9.0 + 0.73 * joint as f64);
+        let motion = Fourier::velocity_amplitudes(base, 0.3, &speeds(), &speeds()).unwrap();
+        for k in 0..samples {
+            let point = motion.at(k as f64 / RATE_HZ);
+            q.push(point.position);
+            dq.push(point.velocity);
+            ddq.push(point.acceleration);
         }
-        Er16::new(q, dq, ddq)
     }
+    (q, dq, ddq)
+}
 
-    /// The motion of the golden set.
-    pub(crate) fn golden(golden: &Value) -> Option<Self> {
-        let of = |name: &str| joint_after_joint(&golden[name]);
-        Er16::new(of("q"), of("qd"), of("qdd"))
-    }
+/// Effort noise of a joint with correlation time `tau` in seconds (0: white).
+pub(crate) fn noise(joint: usize, samples: usize, seed: u64, tau: f64) -> Vec<f64> {
+    let mut rng = ChaCha8Rng::seed_from_u64(41 + joint as u64);
+    rng.set_stream(seed);
+    let pole = if tau > 0.0 { (-1.0 / (tau * RATE_HZ)).exp() } else { 0.0 };
+    let mut state = normal(&mut rng);
+    let draws = (0..samples).map(|_| {
+        state = pole * state + (1.0 - pole * pole).sqrt() * normal(&mut rng);
+        NOISE[joint] * state
+    });
+    draws.collect()
+}
 
-    /// Shape parameters with the bounds of the study.
-    pub(crate) fn shape(&self) -> Vec<ShapeParameter> {
-        let own = self.model.parameters().shape.iter();
-        own.map(|p| ShapeParameter { start: 5.5, lower: 1.0, upper: 30.0, logarithmic: true, ..p.clone() })
-            .collect()
-    }
+/// Filtered and thinned rows of one motion, effort without noise.
+pub(crate) struct Arm {
+    /// Parameters of the base columns behind the efforts.
+    pub(crate) truth: Vec<f64>,
+    samples: usize,
+    filter: Sections,
+    /// Raw regressor of all standard parameters, and the base columns among them.
+    raw: RegressorBlock,
+    kept: Vec<usize>,
+    /// Per joint: base columns that act.
+    acting: Vec<Vec<usize>>,
+    /// Per joint: column-major regressor and effort.
+    rows: Vec<(Vec<f64>, Vec<f64>)>,
+}
 
-    fn motion(&self, from: usize, samples: usize) -> MotionBlock<'_> {
-        MotionBlock {
+impl Arm {
+    pub(crate) fn new(seconds: f64) -> Arm {
+        let model = model();
+        let samples = (seconds * RATE_HZ) as usize;
+        let (q, dq, ddq) = motion(samples, 0);
+        let mut rng = ChaCha8Rng::seed_from_u64(39);
+        let base = BaseParameters::of(&model, model.mechanism(), &[], &BaseSettings::default());
+        let truth: Vec<f64> = base.kept.iter().map(|_| normal(&mut rng)).collect();
+        let moving = MotionBlock {
             samples,
-            stride: self.samples,
-            q: &self.q[from..],
-            dq: &self.dq[from..],
-            ddq: &self.ddq[from..],
+            stride: samples,
+            q: &q,
+            dq: &dq,
+            ddq: &ddq,
             gravity: None,
             channels: &[],
             sign_width: 0.0,
+        };
+        let mut block = RegressorBlock::new(model.layout().clone(), samples);
+        model.regressor(&moving, &[], &mut block);
+        let filter = butterworth(4, CUT_OFF_HZ, RATE_HZ).unwrap();
+        let (mut acting, mut rows) = (Vec::new(), Vec::new());
+        for joint in 0..JOINTS {
+            let (mut names, mut regressor) = (Vec::new(), Vec::new());
+            let mut effort = vec![0.0; samples.div_ceil(DECIMATION)];
+            for (k, column) in model.layout().columns(joint).iter().enumerate() {
+                let Ok(name) = base.kept.binary_search(column) else { continue };
+                let thin = thinned(&filter, block.column(joint, k));
+                effort.iter_mut().zip(&thin).for_each(|(e, w)| *e += w * truth[name]);
+                names.push(name);
+                regressor.extend(thin);
+            }
+            acting.push(names);
+            rows.push((regressor, effort));
         }
+        Arm { truth, samples, filter, raw: block, kept: base.kept, acting, rows }
     }
 
-    /// Ten time blocks of one log.
-    pub(crate) fn blocks<'a>(&'a self, effort: &'a [f64]) -> Vec<EffortBlock<'a>> {
-        let length = self.samples.div_ceil(BLOCKS);
-        (0..self.samples)
-            .step_by(length)
-            .map(|k| EffortBlock {
-                log: 0,
-                motion: self.motion(k, length.min(self.samples - k)),
-                effort: &effort[k..],
-            })
-            .collect()
+    /// Measured minus predicted raw effort of a joint of [`Self::log`] at an estimate of the base parameters.
+    pub(crate) fn raw_residual(&self, joint: usize, seed: u64, tau: f64, x: &[f64]) -> Vec<f64> {
+        let mut error = vec![0.0; self.raw.layout().parameters()];
+        for (column, (x, truth)) in self.kept.iter().zip(x.iter().zip(&self.truth)) {
+            error[*column] = x - truth;
+        }
+        let noise = noise(joint, self.samples, seed, tau);
+        noise.iter().zip(self.raw.effort(joint, &error)).map(|(n, e)| n - e).collect()
     }
 
-    /// Efforts of a parameter vector in the order of the truth, joint after joint.
-    pub(crate) fn efforts(&self, x: &[f64]) -> Vec<f64> {
-        let shape: Vec<f64> = (0..JOINTS).map(|j| x[19 + 5 * j]).collect();
-        let mut linear = vec![0.0; self.model.layout().parameters()];
-        self.kept.iter().zip(&self.places).for_each(|(column, place)| linear[*column] = x[*place]);
-        let mut block = RegressorBlock::new(self.model.layout().clone(), self.samples);
-        self.model.regressor(&self.motion(0, self.samples), &shape, &mut block);
-        (0..JOINTS).flat_map(|j| block.effort(j, &linear)).collect()
+    /// One log: noise of correlation time `tau` (0: white) on the raw efforts, filtered and thinned with them, in blocks
+    /// of a second.
+    pub(crate) fn log(&self, seed: u64, tau: f64) -> MemoryRows {
+        let per_block = (RATE_HZ as usize).div_ceil(DECIMATION);
+        let mut out = MemoryRows::new();
+        for joint in 0..JOINTS {
+            let noise = noise(joint, self.samples, seed, tau);
+            let (regressor, clean) = &self.rows[joint];
+            let noise = thinned(&self.filter, &noise);
+            let effort: Vec<f64> = clean.iter().zip(&noise).map(|(c, n)| c + n).collect();
+            let blocks = effort.len() / per_block;
+            let columns = self.acting[joint].clone();
+            let group = out.add_group(GroupShape { log: 0, output: joint, scale: 0, columns, blocks });
+            for block in 0..blocks {
+                let range = block * per_block..(block + 1) * per_block;
+                let samples: Vec<usize> = range.clone().map(|k| k * DECIMATION).collect();
+                out.push(
+                    group,
+                    &Rows {
+                        block,
+                        samples: &samples,
+                        regressor: &self.part(regressor, range.clone(), effort.len()),
+                        stride: per_block,
+                        effort: &effort[range],
+                    },
+                );
+            }
+        }
+        out
     }
 
-    pub(crate) fn clean(&self) -> Vec<f64> {
-        self.efforts(&self.truth)
+    fn part(&self, regressor: &[f64], range: std::ops::Range<usize>, stride: usize) -> Vec<f64> {
+        regressor.chunks_exact(stride).flat_map(|column| column[range.clone()].iter().copied()).collect()
     }
+}
 
-    /// Efforts with white noise of 4, 5 and 3 N m.
-    pub(crate) fn noisy(&self, seed: u64) -> Vec<f64> {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let deviation = |k: usize| [4.0, 5.0, 3.0][k / self.samples];
-        let clean = self.clean().into_iter().enumerate();
-        clean
-            .map(|(k, e)| {
-                let draw: f64 = StandardNormal.sample(&mut rng);
-                e + deviation(k) * draw
-            })
-            .collect()
-    }
-
-    /// The estimate in the order of the truth.
-    pub(crate) fn vector(&self, estimate: &SeparableEstimate) -> Vec<f64> {
-        let mut x = vec![0.0; self.truth.len()];
-        self.places.iter().zip(&estimate.linear).for_each(|(place, v)| x[*place] = *v);
-        estimate.shape.iter().enumerate().for_each(|(j, fb)| x[19 + 5 * j] = *fb);
-        x
-    }
-
-    /// Largest deviation from the truth.
-    pub(crate) fn error(&self, estimate: &SeparableEstimate) -> f64 {
-        self.vector(estimate).iter().zip(&self.truth).map(|(x, t)| (x - t).abs()).fold(0.0, f64::max)
-    }
-
-    /// `F`: mean over samples of the sum of absolute residuals of the joints.
-    pub(crate) fn loss_of(&self, x: &[f64], effort: &[f64]) -> f64 {
-        let residuals = self.efforts(x).into_iter().zip(effort).map(|(e, y)| (e - y).abs());
-        residuals.sum::<f64>() / self.samples as f64
-    }
-
-    pub(crate) fn loss(&self, estimate: &SeparableEstimate, effort: &[f64]) -> f64 {
-        self.loss_of(&self.vector(estimate), effort)
-    }
+fn thinned(filter: &Sections, signal: &[f64]) -> Vec<f64> {
+    pick(&forward_backward(filter, signal).unwrap(), DECIMATION, 0)
 }
