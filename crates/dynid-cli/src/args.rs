@@ -29,6 +29,8 @@ pub(crate) enum Command {
     Simulate(SimulateArgs),
     /// Compare an identified model with other logs.
     Validate(ValidateArgs),
+    /// Published systems, every claim of their papers beside what is measured here.
+    Study(StudyArgs),
     /// Put identified parameters into a robot file: URDF, MJCF or JSON, read back and checked before it is written.
     Export(ExportArgs),
 }
@@ -102,6 +104,31 @@ pub(crate) enum MethodArg {
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub(crate) enum FrictionArg {
+    /// The elements given, and shapes that held-out blocks ask for (default).
+    Auto,
+    /// The elements given, nothing else.
+    Given,
+    /// Coulomb, viscous, offset.
+    Linear,
+    /// A law of its own for each direction.
+    Asymmetric,
+    /// Coulomb, viscous, offset and an arctangent.
+    Arctangent,
+    /// Stribeck in place of Coulomb.
+    Stribeck,
+    /// A hyperbolic tangent in place of Coulomb.
+    Tanh,
+    /// A sigmoid in place of Coulomb.
+    Sigmoid,
+    /// A sigmoid beside an offset.
+    SigmoidOffset,
+    /// A power of the speed in place of viscous friction.
+    Power,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum ConsistencyArg {
     /// Bodies with a mass distribution (4 x 4 pseudo-inertia).
     PseudoInertia,
@@ -144,6 +171,9 @@ pub(crate) struct IdentifyArgs {
     /// coulomb,viscous,offset,rotor).
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub(crate) elements: Option<Vec<String>>,
+    /// Friction of joints that have any: shapes found on held-out data, or one law for all.
+    #[arg(long, value_enum)]
+    pub(crate) friction: Option<FrictionArg>,
     /// Hold a joint at a position, rad or m.
     #[arg(long, value_name = "JOINT=POSITION", value_parser = joint_value)]
     pub(crate) lock: Vec<(String, f64)>,
@@ -428,4 +458,25 @@ fn row_range(text: &str) -> Result<(usize, usize), String> {
     let fault = || format!("expected FIRST:LAST, found `{text}`");
     let (first, last) = text.split_once(':').ok_or_else(fault)?;
     Ok((first.parse().map_err(|_| fault())?, last.parse().map_err(|_| fault())?))
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct StudyArgs {
+    /// Name of the study; `list` shows all.
+    pub(crate) name: String,
+    /// Folder for study.json and report.html (default: `dynid-study-NAME`).
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the rows as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Keep every row, shrink statistics: under a minute.
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Print nothing but results and errors.
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
 }

@@ -33,6 +33,7 @@ fn main() -> ExitCode {
         Command::Design(args) => commands::design::run(&args),
         Command::Simulate(args) => commands::simulate::run(&args),
         Command::Validate(args) => commands::validate::run(&args),
+        Command::Study(args) => commands::study::run(&args),
         Command::Export(args) => commands::export::run(&args),
     };
     match outcome {

@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use dynid::config::{Config, Consistency, LogConfig, Method, Route};
+use dynid::config::{Config, Consistency, Friction, LogConfig, Method, Route};
 use dynid::estimate::Estimate;
 use dynid::io::OutputError;
 use dynid::io::output::write_atomically;
 use dynid::{Error, identify};
 
 use super::{apply_log_args, element_names, export, table};
-use crate::args::{ConsistencyArg, IdentifyArgs, MethodArg, RouteArg};
+use crate::args::{ConsistencyArg, FrictionArg, IdentifyArgs, MethodArg, RouteArg};
 use crate::message::{Failure, data, note};
 use crate::outputs;
 use crate::progress::Progress;
@@ -86,6 +86,20 @@ fn configuration(args: &IdentifyArgs) -> Result<Config, Failure> {
     }
     if args.elements.is_some() {
         config.elements.default = element_names(args.elements.as_deref());
+    }
+    if let Some(friction) = args.friction {
+        config.elements.friction = match friction {
+            FrictionArg::Auto => Friction::Auto,
+            FrictionArg::Given => Friction::Given,
+            FrictionArg::Linear => Friction::Linear,
+            FrictionArg::Asymmetric => Friction::Asymmetric,
+            FrictionArg::Arctangent => Friction::Arctangent,
+            FrictionArg::Stribeck => Friction::Stribeck,
+            FrictionArg::Tanh => Friction::Tanh,
+            FrictionArg::Sigmoid => Friction::Sigmoid,
+            FrictionArg::SigmoidOffset => Friction::SigmoidOffset,
+            FrictionArg::Power => Friction::Power,
+        };
     }
     apply_log_args(&mut config.columns, &args.columns);
     config.locked.extend(args.lock.iter().cloned());

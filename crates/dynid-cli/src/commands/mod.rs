@@ -7,6 +7,7 @@ pub(crate) mod inspect;
 pub(crate) mod predict;
 pub(crate) mod regressor;
 pub(crate) mod simulate;
+pub(crate) mod study;
 mod table;
 pub(crate) mod validate;
 
