@@ -3,7 +3,7 @@
 use dynid_motion::cutoff::{KernelLimit, kernel_candidates, kernel_limit};
 use dynid_motion::median::median;
 
-use super::trial::{Choice, Trial};
+use super::trial::{Choice, PROBES, Trial};
 use super::{ConditioningError, ConditioningSettings, PreparedLog};
 
 /// One kernel that was tried.
@@ -88,7 +88,7 @@ pub(crate) fn delay_limits(logs: &[PreparedLog], settings: &ConditioningSettings
 pub(crate) fn delay(
     trial: &Trial,
     rung: &[usize],
-    rich: bool,
+    shapes: &[Vec<usize>],
     limits: (f64, f64),
     settings: &ConditioningSettings,
     start: f64,
@@ -108,7 +108,7 @@ pub(crate) fn delay(
     let mut at = start;
     let mut out = None;
     for _ in 0..6 {
-        let choice = Choice { rung: rung.to_vec(), delay: at, rich, free_delay: true };
+        let choice = Choice { rung: rung.to_vec(), delay: at, shapes: shapes.to_vec(), free_delay: true };
         let rests = trial.delay_rests(&choice, None);
         let folds = trial.folds() as f64;
         let without: Vec<Vec<f64>> =
@@ -191,6 +191,22 @@ fn reference(trial: &Trial, choice: &Choice, rows_at: &[usize]) -> Vec<f64> {
     sums.iter().map(|(s, n)| if *n > 0 { s / *n as f64 } else { 1.0 }).collect()
 }
 
+pub(crate) fn mean(v: &[f64]) -> f64 {
+    v.iter().sum::<f64>() / v.len().max(1) as f64
+}
+
+/// Standard error of the mean.
+pub(crate) fn error(v: &[f64]) -> f64 {
+    let (m, n) = (mean(v), v.len() as f64);
+    (v.iter().map(|x| (x - m).powi(2)).sum::<f64>() / (n * (n - 1.0)).max(1.0)).sqrt()
+}
+
+/// Whether losses per time block fall by more than `sigmas` standard errors and more than `share` of themselves.
+pub(crate) fn wins(from: &[f64], to: &[f64], sigmas: f64, share: f64) -> bool {
+    let gains: Vec<f64> = from.iter().zip(to).map(|(a, b)| a - b).collect();
+    from.len() == to.len() && mean(&gains) > sigmas * error(&gains) && mean(&gains) > share * mean(from)
+}
+
 /// Index of the highest kernel that no held-out loss speaks against, and the losses of all.
 pub(crate) fn kernel(
     trials: &[Trial],
@@ -205,16 +221,22 @@ pub(crate) fn kernel(
     let rows_at: Vec<usize> =
         (0..scorer.outputs()).map(|j| scorer.allowed(j, strictest, settings.least_usable)).collect();
     let mut medians = [Vec::new(), Vec::new()];
-    for (rich, medians) in [false, true].into_iter().zip(&mut medians) {
-        let base = Choice { rung: rows_at.clone(), delay: 0.5, rich, free_delay: false };
+    for (shapes, medians) in [0, PROBES].into_iter().zip(&mut medians) {
+        let shapes: Vec<Vec<usize>> = vec![(0..shapes).collect(); scorer.outputs()];
+        let with = |rung: &[usize], delay: f64| Choice {
+            rung: rung.to_vec(),
+            delay,
+            shapes: shapes.clone(),
+            free_delay: false,
+        };
+        let base = with(&rows_at, 0.5);
         let reference = reference(scorer, &base, &rows_at);
         for trial in trials {
             let rung: Vec<usize> =
                 (0..trial.outputs()).map(|j| trial.allowed(j, strictest, settings.least_usable)).collect();
-            let own = delay(trial, &rung, rich, limits, settings, 0.5).samples;
-            let choice = Choice { rung, delay: own, rich, free_delay: false };
-            let scored = Choice { rung: rows_at.clone(), delay: own, rich, free_delay: false };
-            let values = losses(trial, &choice, (scorer, &scored), &rows_at, &reference);
+            let own = delay(trial, &rung, &shapes, limits, settings, 0.5).samples;
+            let values =
+                losses(trial, &with(&rung, own), (scorer, &with(&rows_at, own)), &rows_at, &reference);
             medians.push(median(&values).unwrap_or(f64::INFINITY));
         }
         let best = medians.iter().copied().fold(f64::INFINITY, f64::min);
@@ -246,16 +268,12 @@ pub(crate) fn masks(
     };
     // Losses are compared on rows that every rung has: those of the strictest one that keeps half of the samples.
     let rows_at: Vec<usize> = (0..outputs).map(|j| trial.allowed(j, rungs - 1, 0.5)).collect();
-    let choice = |rung: Vec<usize>| Choice { rung, delay, rich: false, free_delay: false };
+    let choice =
+        |rung: Vec<usize>| Choice { rung, delay, shapes: vec![Vec::new(); outputs], free_delay: false };
     let reference = reference(trial, &choice(rows_at.clone()), &rows_at);
     let score = |rung: Vec<usize>| {
         let c = choice(rung);
         losses(trial, &c, (trial, &c), &rows_at, &reference)
-    };
-    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len().max(1) as f64;
-    let error = |v: &[f64]| {
-        let (m, n) = (mean(v), v.len() as f64);
-        (v.iter().map(|x| (x - m).powi(2)).sum::<f64>() / (n * (n - 1.0)).max(1.0)).sqrt()
     };
 
     if let Some(level) = settings.reversal_mask {
@@ -265,12 +283,7 @@ pub(crate) fn masks(
     let ladder: Vec<Vec<f64>> = (0..rungs).map(|r| score(at(r))).collect();
     let smallest = ladder.iter().map(|l| mean(l)).fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE);
     // Rows are worth keeping: a stricter rung has to prove its gain, block by block.
-    let wins = |from: &[f64], to: &[f64], sigmas: f64| {
-        let gains: Vec<f64> = from.iter().zip(to).map(|(a, b)| a - b).collect();
-        from.len() == to.len()
-            && mean(&gains) > sigmas * error(&gains)
-            && mean(&gains) > settings.mask_gain * mean(from)
-    };
+    let wins = |from: &[f64], to: &[f64], sigmas: f64| wins(from, to, sigmas, settings.mask_gain);
     let best = (1..rungs)
         .fold(0, |best, r| if wins(&ladder[best], &ladder[r], settings.mask_sigma.0) { r } else { best });
     let table = (0..rungs)
@@ -300,4 +313,41 @@ pub(crate) fn masks(
         }
     }
     (current, table)
+}
+
+/// Rungs once more, with friction shapes in the fit: joint by joint from `rung`, losses on all rows off reversal.
+pub(crate) fn masks_again(
+    trial: &Trial,
+    rung: &[usize],
+    shapes: &[Vec<usize>],
+    delay: f64,
+    settings: &ConditioningSettings,
+) -> Vec<usize> {
+    let outputs = trial.outputs();
+    let rungs = settings.ladder.len() + 1;
+    let rows_at: Vec<usize> = (0..outputs).map(|j| trial.allowed(j, 1, settings.least_usable)).collect();
+    let choice = |rung: Vec<usize>| Choice { rung, delay, shapes: shapes.to_vec(), free_delay: false };
+    let reference = reference(trial, &choice(rung.to_vec()), &rows_at);
+    let score = |rung: Vec<usize>| {
+        let c = choice(rung);
+        losses(trial, &c, (trial, &c), &rows_at, &reference)
+    };
+    let mut current = rung.to_vec();
+    let mut current_losses = score(current.clone());
+    let (sigmas, share) = settings.friction.mask_again;
+    for output in 0..outputs {
+        for rung in 1..rungs {
+            if trial.allowed(output, rung, settings.least_usable) != rung || rung == current[output] {
+                continue;
+            }
+            let mut changed = current.clone();
+            changed[output] = rung;
+            let values = score(changed.clone());
+            if wins(&current_losses, &values, sigmas, share) {
+                current = changed;
+                current_losses = values;
+            }
+        }
+    }
+    current
 }

@@ -5,14 +5,15 @@
 
 use std::collections::BTreeMap;
 
-use faer::linalg::solvers::Solve;
+use faer::linalg::solvers::{Llt, Solve};
 use faer::{Mat, Side};
 
 use super::PreparedLog;
+use super::friction::BasePrior;
 use super::rows::{RowBatch, RowConsumer};
 use crate::rows::RowsError;
 
-/// `Xᵀ X` of rows `[W, probes, efforts at lags]`.
+/// `Xᵀ X` of rows `[W, friction shapes, efforts at lags]`.
 #[derive(Debug, Clone)]
 pub(crate) struct Gram {
     pub(crate) size: usize,
@@ -44,6 +45,18 @@ impl Gram {
 
     pub(crate) fn at(&self, i: usize, j: usize) -> f64 {
         self.values[i.min(j) * self.size + i.max(j)]
+    }
+
+    /// The normal matrix of some of its columns.
+    pub(crate) fn selected(&self, columns: &[usize]) -> Gram {
+        let mut out = Gram::zero(columns.len());
+        out.rows = self.rows;
+        for (i, a) in columns.iter().enumerate() {
+            for (j, b) in columns.iter().enumerate().skip(i) {
+                out.values[i * out.size + j] = self.at(*a, *b);
+            }
+        }
+        out
     }
 
     /// The normal matrix of new columns, each a combination `Σ factor · column` of old ones.
@@ -182,35 +195,8 @@ pub(crate) fn solve(groups: &[Group], unknowns: usize, passes: usize) -> (Vec<f6
     }
     let mut x = vec![0.0; unknowns];
     for pass in 0..passes {
-        let mut normal = Mat::<f64>::zeros(unknowns, unknowns);
-        let mut rhs = Mat::<f64>::zeros(unknowns, 1);
-        for (group, variance) in groups.iter().zip(&variances) {
-            let y = group.gram.size - 1;
-            for (i, gi) in group.unknowns.iter().enumerate() {
-                for (j, gj) in group.unknowns.iter().enumerate() {
-                    normal[(*gi, *gj)] += group.gram.at(i, j) / variance;
-                }
-                rhs[(*gi, 0)] += group.gram.at(i, y) / variance;
-            }
-        }
-        let scale: Vec<f64> = (0..unknowns)
-            .map(|k| if normal[(k, k)] > 0.0 { 1.0 / normal[(k, k)].sqrt() } else { 0.0 })
-            .collect();
-        // A trace of ridge in unit columns: choices must not fail where a log leaves a direction unexcited.
-        let scaled = Mat::from_fn(unknowns, unknowns, |i, j| {
-            scale[i] * scale[j] * normal[(i, j)]
-                + if i != j {
-                    0.0
-                } else if scale[i] > 0.0 {
-                    1e-10
-                } else {
-                    1.0
-                }
-        });
-        let scaled_rhs = Mat::from_fn(unknowns, 1, |i, _| scale[i] * rhs[(i, 0)]);
-        let Ok(factor) = scaled.llt(Side::Lower) else { return (x, variances) };
-        let solution = factor.solve(&scaled_rhs);
-        x = (0..unknowns).map(|k| solution[(k, 0)] * scale[k]).collect();
+        let Some(solution) = Normal::new(groups, unknowns, &variances).solve() else { return (x, variances) };
+        x = solution;
         if pass + 1 == passes {
             break;
         }
@@ -224,6 +210,71 @@ pub(crate) fn solve(groups: &[Group], unknowns: usize, passes: usize) -> (Vec<f6
         }
     }
     (x, variances)
+}
+
+/// Normal equations with one weight per group.
+pub(crate) struct Normal {
+    pub(crate) matrix: Mat<f64>,
+    pub(crate) rhs: Mat<f64>,
+}
+
+impl Normal {
+    pub(crate) fn new(groups: &[Group], unknowns: usize, variances: &[f64]) -> Self {
+        let mut matrix = Mat::<f64>::zeros(unknowns, unknowns);
+        let mut rhs = Mat::<f64>::zeros(unknowns, 1);
+        for (group, variance) in groups.iter().zip(variances) {
+            let y = group.gram.size - 1;
+            for (i, gi) in group.unknowns.iter().enumerate() {
+                for (j, gj) in group.unknowns.iter().enumerate() {
+                    matrix[(*gi, *gj)] += group.gram.at(i, j) / variance;
+                }
+                rhs[(*gi, 0)] += group.gram.at(i, y) / variance;
+            }
+        }
+        Normal { matrix, rhs }
+    }
+
+    /// Adds what is known of the first unknowns beforehand.
+    pub(crate) fn add_prior(&mut self, prior: &BasePrior) {
+        for (i, row) in prior.precision.row_iter().enumerate() {
+            for (j, p) in row.iter().enumerate() {
+                self.matrix[(i, j)] += p;
+                self.rhs[(i, 0)] += p * prior.values[j];
+            }
+        }
+    }
+
+    /// Unknowns; those that the rows do not excite are zero. `None` where the matrix is not definite to rounding.
+    pub(crate) fn solve(&self) -> Option<Vec<f64>> {
+        let unknowns = self.rhs.nrows();
+        let scale = self.scale();
+        let solution = self
+            .unit(unknowns, &scale)?
+            .solve(&Mat::from_fn(unknowns, 1, |i, _| scale[i] * self.rhs[(i, 0)]));
+        Some((0..unknowns).map(|k| solution[(k, 0)] * scale[k]).collect())
+    }
+
+    /// Factors that give every column the length 1; zero for columns without excitation.
+    pub(crate) fn scale(&self) -> Vec<f64> {
+        let length = |k: usize| self.matrix[(k, k)];
+        (0..self.rhs.nrows()).map(|k| if length(k) > 0.0 { 1.0 / length(k).sqrt() } else { 0.0 }).collect()
+    }
+
+    /// Factor of the first `unknowns` columns in the unit lengths of `scale`.
+    pub(crate) fn unit(&self, unknowns: usize, scale: &[f64]) -> Option<Llt<f64>> {
+        // A trace of ridge in unit columns: choices must not fail where a log leaves a direction unexcited.
+        let unit = Mat::from_fn(unknowns, unknowns, |i, j| {
+            scale[i] * scale[j] * self.matrix[(i, j)]
+                + if i != j {
+                    0.0
+                } else if scale[i] > 0.0 {
+                    1e-10
+                } else {
+                    1.0
+                }
+        });
+        unit.llt(Side::Lower).ok()
+    }
 }
 
 /// Residual sum of squares of the rows of a normal matrix `[columns, effort]`.

@@ -148,7 +148,7 @@ impl RowSource for LogRows<'_> {
                 masks: &log.masks,
                 kernels: &log.kernels,
                 wanted: &self.wanted,
-                probes: false,
+                shapes: &vec![Vec::new(); log.efforts.len()],
             }
             .run(&mut consumers)?;
             first_group += scales * log.efforts.len();

@@ -5,6 +5,7 @@
 //! time blocks.
 
 mod choose;
+mod friction;
 mod gram;
 mod log_rows;
 mod periodic;
@@ -20,6 +21,10 @@ mod trial;
 
 pub use crate::groups::ReducedGroup;
 pub use choose::{DelayEstimate, KernelTrial, MaskTrial};
+pub use friction::{
+    BasePrior, FrictionChoice, FrictionSettings, FrictionShape, JointFriction, ShapeKind, ShapeTrial,
+    choose_friction,
+};
 pub use log_rows::LogRows;
 pub use periodic::PeriodicMotion;
 pub use predict::predict;
@@ -34,7 +39,7 @@ use dynid_model::EffortModel;
 use dynid_motion::cutoff::KernelLimit;
 
 use crate::factor::FactorError;
-use trial::Trial;
+use trial::{Trial, TrialShapes};
 
 /// Why a log cannot be conditioned.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -158,6 +163,8 @@ pub enum Stage {
     Mask,
     /// Estimating the delay.
     Delay,
+    /// Choosing friction shapes.
+    Friction,
 }
 
 /// Finds kernel, delay and masks for prepared logs.
@@ -183,8 +190,17 @@ pub fn condition(
     let mut trials = Vec::with_capacity(candidates.len());
     for (k, kernel_hz) in candidates.iter().enumerate() {
         progress(Stage::Kernel(k, candidates.len()));
-        let trial =
-            Trial::new(model, shape, kept, logs, *kernel_hz, limit.crossing_hz, delay_limits, settings)?;
+        let trial = Trial::new(
+            model,
+            shape,
+            kept,
+            logs,
+            *kernel_hz,
+            limit.crossing_hz,
+            delay_limits,
+            TrialShapes::Probes,
+            settings,
+        )?;
         if trial.rows() > 0.0 {
             trials.push(trial);
         }
@@ -206,11 +222,12 @@ pub fn condition(
     let middle: Vec<usize> = (0..trial.outputs())
         .map(|j| trial.allowed(j, settings.ladder.len().div_ceil(2), settings.least_usable))
         .collect();
-    let first = choose::delay(&trial, &middle, false, delay_limits, settings, prior);
+    let plain = vec![Vec::new(); trial.outputs()];
+    let first = choose::delay(&trial, &middle, &plain, delay_limits, settings, prior);
     progress(Stage::Mask);
     let (rung, mask_trials) = choose::masks(&trial, first.samples, settings);
     progress(Stage::Delay);
-    let delay = choose::delay(&trial, &rung, false, delay_limits, settings, first.samples);
+    let delay = choose::delay(&trial, &rung, &plain, delay_limits, settings, first.samples);
     let usable = (0..trial.outputs()).map(|j| trial.coverage[j][rung[j]]).collect();
     let mask = rung.iter().map(|r| (*r > 0).then(|| settings.ladder[*r - 1])).collect();
     Ok(Conditioning {

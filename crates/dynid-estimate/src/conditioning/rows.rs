@@ -4,6 +4,7 @@ use dynid_model::{EffortModel, RegressorBlock};
 use dynid_motion::{Kernel, SignalError};
 use rayon::prelude::*;
 
+use super::friction::FrictionShape;
 use super::states::{Masks, States};
 use super::{ConditioningSettings, PreparedLog};
 use crate::rows::RowsError;
@@ -86,8 +87,8 @@ pub(crate) struct RowBatch<'a> {
     pub(crate) centres: &'a [usize],
     /// Rungs at which each row is used.
     pub(crate) rungs: &'a [u8],
-    /// Kept regressor columns, then probe columns, column-major with stride `centres.len()`; the model's known offset is
-    /// the last column.
+    /// Kept regressor columns, then columns of friction shapes, column-major with stride `centres.len()`; the model's known
+    /// offset is the last column.
     pub(crate) columns: &'a [f64],
     /// Half width of the kernel.
     pub(crate) half_width: usize,
@@ -109,12 +110,9 @@ pub(crate) struct Pass<'a> {
     pub(crate) kernels: &'a Kernels,
     /// Only rows used at one of these rungs are computed, per output.
     pub(crate) wanted: &'a [u8],
-    /// Also form the probe columns |v|, Stribeck and tanh of the output's speed.
-    pub(crate) probes: bool,
+    /// Per output: friction shapes of its speed that get columns of their own.
+    pub(crate) shapes: &'a [Vec<FrictionShape>],
 }
-
-/// Number of probe columns.
-pub(crate) const PROBES: usize = 3;
 
 /// Samples whose regressor is held at a time, beyond the kernels' reach.
 const BLOCK: usize = 2048;
@@ -153,8 +151,8 @@ impl Pass<'_> {
         regressor: &RegressorBlock,
         consumer: &mut C,
     ) -> Result<(), RowsError> {
-        let probes =
-            if self.probes { self.probe_columns(output, first, regressor.samples()) } else { vec![] };
+        let speed = &self.states.velocity(output)[first..first + regressor.samples()];
+        let shaped: Vec<Vec<f64>> = self.shapes[output].iter().map(|s| s.column(speed)).collect();
         let mut centres = Vec::new();
         let mut rungs = Vec::new();
         let mut columns = Vec::new();
@@ -175,11 +173,11 @@ impl Pass<'_> {
             }
             let local = &self.columns.local[output];
             columns.clear();
-            columns.resize((local.len() + probes.len() + 1) * centres.len(), 0.0);
+            columns.resize((local.len() + shaped.len() + 1) * centres.len(), 0.0);
             let sources = local
                 .iter()
                 .map(|k| regressor.column(output, *k))
-                .chain(probes.iter().map(Vec::as_slice))
+                .chain(shaped.iter().map(Vec::as_slice))
                 .chain([regressor.offset(output)]);
             for (source, out) in sources.zip(columns.chunks_exact_mut(centres.len())) {
                 kernel.apply_block(source, first, &centres, out);
@@ -196,20 +194,6 @@ impl Pass<'_> {
             )?;
         }
         Ok(())
-    }
-
-    /// `|v|`, `s(v) exp(-(v/v_s)²)` and `tanh(v/v_c)` with `v_s`, `v_c` a quarter and the whole of the rms speed: enough to
-    /// tell whether a kernel or a missing friction shape spoils a fit.
-    fn probe_columns(&self, output: usize, first: usize, samples: usize) -> Vec<Vec<f64>> {
-        let all = self.states.velocity(output);
-        let scale = dynid_motion::signal::rms(all).max(f64::MIN_POSITIVE);
-        let v = &all[first..first + samples];
-        let map = |f: &dyn Fn(f64) -> f64| v.iter().map(|v| f(v / scale)).collect::<Vec<f64>>();
-        vec![
-            map(&f64::abs),
-            map(&|u| dynid_model::element::sign(u) * (-(4.0 * u).powi(2)).exp()),
-            map(&f64::tanh),
-        ]
     }
 }
 

@@ -5,6 +5,8 @@ use dynid_motion::cutoff::CutoffSettings;
 use dynid_motion::spectrum::NoiseSettings;
 use dynid_motion::spikes::SpikeSettings;
 
+use super::FrictionSettings;
+
 /// How a log is brought from samples to regression rows. `None` means: found from the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConditioningSettings {
@@ -37,6 +39,8 @@ pub struct ConditioningSettings {
     pub mask_sigma: (f64, f64),
     /// Mean and standard deviation of the prior on the delay, samples. Default 0.5, 1.
     pub delay_prior: (f64, f64),
+    /// Choice of friction shapes.
+    pub friction: FrictionSettings,
     /// Remove spikes. Default true.
     pub remove_spikes: bool,
     /// Order of the state filter (Butterworth, run forward and backward). Default 4.
@@ -71,6 +75,7 @@ impl Default for ConditioningSettings {
             mask_gain: 0.002,
             mask_sigma: (1.0, 2.0),
             delay_prior: (0.5, 1.0),
+            friction: FrictionSettings::default(),
             remove_spikes: true,
             state_order: 4,
             block_s: 1.0,

@@ -1,11 +1,13 @@
 //! Fits for choices: one pass over the logs, then any number of fits with other masks, delays and columns.
 
+use super::friction::{FrictionShape, ShapeKind};
 use super::gram::{Classes, Gram, GramConsumer, Group, Lags, RowClass, rss, solve};
-use super::rows::{KeptColumns, Kernels, PROBES, Pass, masks};
+use super::rows::{KeptColumns, Kernels, Pass, masks};
 use super::states::States;
 use super::{ConditioningError, ConditioningSettings, PreparedLog};
 use dynid_model::EffortModel;
 use dynid_motion::cutoff::{kernel_scales, state_cutoff};
+use rayon::prelude::*;
 
 /// Sums of one kernel candidate.
 pub(crate) struct Trial {
@@ -13,7 +15,9 @@ pub(crate) struct Trial {
     pub(crate) state_hz: Vec<f64>,
     pub(crate) scales_hz: Vec<f64>,
     pub(crate) lags: Lags,
-    columns: KeptColumns,
+    pub(crate) columns: KeptColumns,
+    /// Per output: number of friction shapes with columns.
+    shapes: Vec<usize>,
     /// Per output.
     classes: Vec<Classes>,
     /// Per output and rung: share of samples that stay usable.
@@ -28,10 +32,43 @@ pub(crate) struct Choice {
     pub(crate) rung: Vec<usize>,
     /// Delay, samples.
     pub(crate) delay: f64,
-    /// With the probe columns.
-    pub(crate) rich: bool,
+    /// Per output: which friction shapes take part, by their place among the trial's.
+    pub(crate) shapes: Vec<Vec<usize>>,
     /// With one unknown per output for the rest of the delay.
     pub(crate) free_delay: bool,
+}
+
+/// Number of probe shapes.
+pub(crate) const PROBES: usize = 3;
+
+/// Friction shapes whose columns a trial sums beside the model's.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum TrialShapes<'a> {
+    /// `|v|`, Stribeck and tanh with a quarter and the whole of the log's rms speed: enough to tell whether a kernel or a
+    /// missing friction shape spoils a fit.
+    Probes,
+    /// Per output.
+    Library(&'a [Vec<FrictionShape>]),
+}
+
+impl TrialShapes<'_> {
+    fn of_log(self, states: &States) -> Vec<Vec<FrictionShape>> {
+        match self {
+            TrialShapes::Library(shapes) => shapes.to_vec(),
+            TrialShapes::Probes => (0..states.effort.len())
+                .map(|output| {
+                    let rms = dynid_motion::signal::rms(states.velocity(output)).max(f64::MIN_POSITIVE);
+                    [
+                        (ShapeKind::ViscousMagnitude, 1.0),
+                        (ShapeKind::Stribeck, 0.25 * rms),
+                        (ShapeKind::Tanh, rms),
+                    ]
+                    .map(|(kind, speed)| FrictionShape { kind, speed })
+                    .to_vec()
+                })
+                .collect(),
+        }
+    }
 }
 
 impl Trial {
@@ -45,6 +82,7 @@ impl Trial {
         kernel_hz: f64,
         crossing_hz: f64,
         delay_limits: (f64, f64),
+        shapes: TrialShapes<'_>,
         settings: &ConditioningSettings,
     ) -> Result<Trial, ConditioningError> {
         let columns = KeptColumns::new(model, kept);
@@ -56,6 +94,7 @@ impl Trial {
         let scales_hz = scales(kernel_hz, crossing_hz, slowest, settings);
         let lags = Lags::new(delay_limits.0, delay_limits.1, kernel_hz, slowest);
         let total: f64 = logs.iter().map(|l| l.samples() as f64).sum();
+        let mut shape_counts = vec![0; outputs];
         for log in logs {
             let cutoff = state_hz_of(kernel_hz, crossing_hz, log.rate_hz, settings);
             state_hz.push(cutoff);
@@ -74,6 +113,8 @@ impl Trial {
                 .map(|j| GramConsumer::new(log, &states.effort[j], &kernels.kernels, lags, settings.folds))
                 .collect();
             let wanted = vec![u8::MAX; outputs];
+            let shapes = shapes.of_log(&states);
+            shape_counts = shapes.iter().map(Vec::len).collect();
             Pass {
                 model,
                 shape,
@@ -83,7 +124,7 @@ impl Trial {
                 masks: &masks,
                 kernels: &kernels,
                 wanted: &wanted,
-                probes: true,
+                shapes: &shapes,
             }
             .run(&mut consumers)
             .map_err(|e| ConditioningError::Rows { output: e.group, source: e.source })?;
@@ -93,7 +134,17 @@ impl Trial {
                 }
             }
         }
-        Ok(Trial { kernel_hz, state_hz, scales_hz, lags, columns, classes, coverage, folds: settings.folds })
+        Ok(Trial {
+            kernel_hz,
+            state_hz,
+            scales_hz,
+            lags,
+            columns,
+            shapes: shape_counts,
+            classes,
+            coverage,
+            folds: settings.folds,
+        })
     }
 
     pub(crate) fn outputs(&self) -> usize {
@@ -114,17 +165,26 @@ impl Trial {
         (0..=rung).rev().find(|r| self.coverage[output][*r] >= least).unwrap_or(0)
     }
 
-    /// Number of unknowns: base columns, then per output the probes, then per output the rest of the delay.
+    /// Place of an output's first friction shape among the unknowns: base columns come first, then the shapes of all
+    /// outputs, then per output the rest of the delay.
+    fn first_shape(&self, choice: &Choice, output: usize) -> usize {
+        self.columns.total + choice.shapes[..output].iter().map(Vec::len).sum::<usize>()
+    }
+
     fn unknowns(&self, choice: &Choice) -> usize {
         let outputs = self.outputs();
-        self.columns.total
-            + if choice.rich { PROBES * outputs } else { 0 }
-            + if choice.free_delay { outputs } else { 0 }
+        self.first_shape(choice, outputs) + if choice.free_delay { outputs } else { 0 }
     }
 
     /// Index of the unknown that is the rest of an output's delay.
     fn delay_unknown(&self, choice: &Choice, output: usize) -> usize {
-        self.columns.total + if choice.rich { PROBES * self.outputs() } else { 0 } + output
+        self.first_shape(choice, self.outputs()) + output
+    }
+
+    /// The effort `delay` samples earlier and its derivative by the delay, as combinations of an output's columns.
+    fn efforts(&self, output: usize, delay: f64) -> [Vec<(usize, f64)>; 2] {
+        let first = self.columns.global[output].len() + self.shapes[output];
+        self.lags.weights(delay).map(|w| w.into_iter().map(|(k, f)| (first + k, f)).collect())
     }
 
     /// Columns and unknowns of an output under a choice.
@@ -132,22 +192,79 @@ impl Trial {
         let own = self.columns.global[output].len();
         let mut columns: Vec<Vec<(usize, f64)>> = (0..own).map(|k| vec![(k, 1.0)]).collect();
         let mut unknowns = self.columns.global[output].clone();
-        if choice.rich {
-            for k in 0..PROBES {
-                columns.push(vec![(own + k, 1.0)]);
-                unknowns.push(self.columns.total + PROBES * output + k);
-            }
+        let first = self.first_shape(choice, output);
+        for (place, k) in choice.shapes[output].iter().enumerate() {
+            columns.push(vec![(own + k, 1.0)]);
+            unknowns.push(first + place);
         }
-        let [value, slope] = self.lags.weights(choice.delay);
-        let place = |w: Vec<(usize, f64)>, sign: f64| -> Vec<(usize, f64)> {
-            w.into_iter().map(|(k, f)| (own + PROBES + k, sign * f)).collect()
-        };
+        let [value, slope] = self.efforts(output, choice.delay);
         if choice.free_delay {
-            columns.push(place(slope, -1.0));
+            columns.push(slope.into_iter().map(|(k, f)| (k, -f)).collect());
             unknowns.push(self.delay_unknown(choice, output));
         }
-        columns.push(place(value, 1.0));
+        columns.push(value);
         (columns, unknowns)
+    }
+
+    /// The same trial with the columns of some of its friction shapes, per output.
+    pub(crate) fn with_shapes(&self, shapes: &[Vec<usize>]) -> Trial {
+        let classes = self
+            .classes
+            .par_iter()
+            .zip(shapes)
+            .enumerate()
+            .map(|(output, (classes, kept))| {
+                let own = self.columns.global[output].len();
+                let first_lag = own + self.shapes[output];
+                let columns: Vec<usize> = (0..own)
+                    .chain(kept.iter().map(|k| own + k))
+                    .chain(first_lag..first_lag + self.lags.count)
+                    .collect();
+                classes.iter().map(|(class, gram)| (*class, gram.selected(&columns))).collect()
+            })
+            .collect();
+        Trial {
+            kernel_hz: self.kernel_hz,
+            state_hz: self.state_hz.clone(),
+            scales_hz: self.scales_hz.clone(),
+            lags: self.lags,
+            columns: self.columns.clone(),
+            shapes: shapes.iter().map(Vec::len).collect(),
+            classes,
+            coverage: self.coverage.clone(),
+            folds: self.folds,
+        }
+    }
+
+    /// Sums of an output at one rung and delay, per time block: `[base columns, friction shapes, effort]`.
+    pub(crate) fn block_sums(&self, output: usize, rung: usize, delay: f64) -> BlockSums {
+        let shaped = self.columns.global[output].len() + self.shapes[output];
+        let [effort, _] = self.efforts(output, delay);
+        let columns: Vec<Vec<(usize, f64)>> = (0..shaped).map(|k| vec![(k, 1.0)]).chain([effort]).collect();
+        let combined = |sums: Vec<Option<Gram>>| -> Vec<Gram> {
+            sums.iter()
+                .map(|s| s.as_ref().map_or_else(|| Gram::zero(shaped + 1), |s| s.combined(&columns)))
+                .collect()
+        };
+        let per_fold: Vec<Vec<Gram>> =
+            (0..self.folds).map(|fold| combined(self.sum(output, rung, |c| c.fold == fold))).collect();
+        let without = |left_out: Option<usize>| -> Vec<Gram> {
+            let mut sums = vec![Gram::zero(shaped + 1); self.scales_hz.len()];
+            for (_, grams) in per_fold.iter().enumerate().filter(|(fold, _)| Some(*fold) != left_out) {
+                sums.iter_mut().zip(grams).for_each(|(s, g)| s.add(g));
+            }
+            sums
+        };
+        let scored = (0..self.folds)
+            .map(|fold| {
+                let mut sum = Gram::zero(shaped + 1);
+                combined(self.sum(output, rung, |c| c.scored && c.fold == fold))
+                    .iter()
+                    .for_each(|g| sum.add(g));
+                sum
+            })
+            .collect();
+        BlockSums { without: (0..self.folds).map(|f| without(Some(f))).collect(), all: without(None), scored }
     }
 
     fn sum(&self, output: usize, rung: usize, keep: impl Fn(&RowClass) -> bool) -> Vec<Option<Gram>> {
@@ -202,6 +319,17 @@ impl Trial {
         let x = self.fit(choice, without);
         (0..self.outputs()).map(|output| x[self.delay_unknown(choice, output)]).collect()
     }
+}
+
+/// Sums of one output over time blocks, columns `[base columns, friction shapes, effort]`.
+#[derive(Debug)]
+pub(crate) struct BlockSums {
+    /// Per time block left out and kernel scale.
+    pub(crate) without: Vec<Vec<Gram>>,
+    /// Per kernel scale.
+    pub(crate) all: Vec<Gram>,
+    /// Per time block: rows whose kernel lies in it, all scales.
+    pub(crate) scored: Vec<Gram>,
 }
 
 /// State cut-off of a log for a kernel.

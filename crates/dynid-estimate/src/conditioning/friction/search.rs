@@ -1,0 +1,319 @@
+//! Greedy search over friction shapes, joint by joint.
+
+use std::collections::BTreeMap;
+
+use faer::Mat;
+use faer::linalg::solvers::Solve;
+use rayon::prelude::*;
+
+use super::losses::Losses;
+use super::{BasePrior, FrictionShape, JointFriction, ShapeKind, ShapeTrial};
+use crate::conditioning::gram::{Group, Normal, rss, solve};
+use crate::conditioning::trial::{BlockSums, Trial};
+use crate::conditioning::{Conditioning, ConditioningSettings};
+
+/// A candidate that keeps less than this part of its sum of squares beside the other columns is one of them.
+const COLLINEAR: f64 = 1e-6;
+/// Rounds in which every shape may be replaced by a better one.
+const REPLACEMENTS: usize = 2;
+
+/// Rungs and shapes of a fit.
+#[derive(Debug, Clone)]
+struct Fit {
+    rung: Vec<usize>,
+    /// Per output: places in its library.
+    shapes: Vec<Vec<usize>>,
+}
+
+/// A candidate on held-out blocks.
+struct Scored {
+    place: usize,
+    losses: Losses,
+}
+
+pub(super) struct Search<'a> {
+    trial: &'a Trial,
+    library: &'a [Vec<FrictionShape>],
+    prior: Option<&'a BasePrior>,
+    settings: &'a ConditioningSettings,
+    /// Per output: the rung without mask beyond reversal itself.
+    lowest: Vec<usize>,
+    /// Rungs chosen before.
+    before: Vec<usize>,
+    /// Per output and rung in use.
+    sums: BTreeMap<(usize, usize), BlockSums>,
+    fit: Fit,
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(
+        trial: &'a Trial,
+        library: &'a [Vec<FrictionShape>],
+        prior: Option<&'a BasePrior>,
+        choices: &Conditioning,
+        settings: &'a ConditioningSettings,
+    ) -> Self {
+        let outputs = trial.outputs();
+        let first_rung = usize::from(settings.reversal_mask.is_none_or(|level| level >= 0.0));
+        let lowest: Vec<usize> =
+            (0..outputs).map(|j| trial.allowed(j, first_rung, settings.least_usable)).collect();
+        let mut keys: Vec<(usize, usize)> =
+            (0..outputs).flat_map(|j| [(j, choices.rung[j]), (j, lowest[j]), (j, 0)]).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        let sums = keys
+            .into_par_iter()
+            .map(|(j, rung)| ((j, rung), trial.block_sums(j, rung, choices.delay.samples)))
+            .collect();
+        let fit = Fit { rung: choices.rung.clone(), shapes: vec![Vec::new(); outputs] };
+        Search { trial, library, prior, settings, lowest, before: choices.rung.clone(), sums, fit }
+    }
+
+    /// Rungs of all outputs and the chosen places in their libraries.
+    pub(super) fn into_parts(self) -> (Vec<usize>, Vec<Vec<usize>>) {
+        (self.fit.rung, self.fit.shapes)
+    }
+
+    pub(super) fn run(&mut self) -> Vec<JointFriction> {
+        let outputs = self.trial.outputs();
+        for shapes in 1..=2 {
+            for output in 0..outputs {
+                if self.fit.shapes[output].len() < shapes && self.worth_trying(output) {
+                    self.extend(output);
+                }
+            }
+            for _ in 0..REPLACEMENTS {
+                let before = self.fit.shapes.clone();
+                for output in 0..outputs {
+                    for shape in self.fit.shapes[output].clone() {
+                        self.replace(output, shape);
+                    }
+                }
+                if self.fit.shapes == before {
+                    break;
+                }
+            }
+        }
+        (0..outputs).map(|output| self.report(output)).collect()
+    }
+
+    fn blocks(&self, output: usize) -> usize {
+        self.sums[&(output, self.lowest[output])].scored.iter().filter(|g| g.rows > 0.0).count()
+    }
+
+    fn worth_trying(&self, output: usize) -> bool {
+        !self.library[output].is_empty() && self.blocks(output) >= self.settings.friction.least_blocks
+    }
+
+    /// Standard errors and share of the loss that one more shape beside `present` ones must gain.
+    fn bar(&self, present: usize) -> (f64, f64) {
+        if present == 0 { self.settings.friction.first } else { self.settings.friction.second }
+    }
+
+    /// The candidate of least loss among those that pass.
+    fn best(&self, base: &Fit, output: usize, from: &Losses, tried: Vec<Scored>) -> Option<Scored> {
+        let bar = self.bar(base.shapes[output].len());
+        tried
+            .into_iter()
+            .filter(|t| from.falls(&t.losses, bar))
+            .min_by(|a, b| a.losses.mean().total_cmp(&b.losses.mean()))
+    }
+
+    /// Adds the best candidate to an output if it passes.
+    fn extend(&mut self, output: usize) {
+        let base = self.with_low_speeds(output);
+        let (from, tried) = self.candidates(&base, output);
+        let best = self.best(&base, output, &from, tried);
+        if let Some(best) = best {
+            self.fit = base;
+            self.fit.shapes[output].push(best.place);
+        }
+    }
+
+    /// Puts the best candidate in the place of a shape, or drops it where none passes any more.
+    fn replace(&mut self, output: usize, current: usize) {
+        let mut base = self.fit.clone();
+        base.shapes[output].retain(|s| *s != current);
+        let (from, mut tried) = self.candidates(&base, output);
+        if !tried.iter().any(|t| t.place == current) {
+            let variances = self.variances(&base);
+            let losses = self.losses(&with(&base, output, current), output, &variances);
+            tried.push(Scored { place: current, losses });
+        }
+        let best = self.best(&base, output, &from, tried);
+        self.fit = base;
+        match best {
+            Some(best) => self.fit.shapes[output].push(best.place),
+            None if self.fit.shapes[output].is_empty() => self.fit.rung[output] = self.before[output],
+            None => {}
+        }
+    }
+
+    /// Gains of what was chosen, and of the best that was not.
+    fn report(&self, output: usize) -> JointFriction {
+        let blocks = self.blocks(output);
+        if !self.worth_trying(output) {
+            return JointFriction { blocks, ..JointFriction::default() };
+        }
+        let trial = |place: usize, from: &Losses, to: &Losses| {
+            let (gain, standard_error) = from.share_of_fall(to);
+            ShapeTrial { shape: self.library[output][place], gain, standard_error }
+        };
+        let chosen = self.with_low_speeds(output);
+        let (from, tried) = self.candidates(&chosen, output);
+        let accepted = chosen.shapes[output]
+            .iter()
+            .map(|place| {
+                let mut base = chosen.clone();
+                base.shapes[output].retain(|s| s != place);
+                let variances = self.variances(&base);
+                trial(*place, &self.losses(&base, output, &variances), &from)
+            })
+            .collect();
+        let mut rejected: Vec<ShapeTrial> = Vec::new();
+        for candidate in tried {
+            let candidate = trial(candidate.place, &from, &candidate.losses);
+            match rejected.iter_mut().find(|r| r.shape.kind == candidate.shape.kind) {
+                Some(of_kind) if of_kind.gain >= candidate.gain => {}
+                Some(of_kind) => *of_kind = candidate,
+                None => rejected.push(candidate),
+            }
+        }
+        JointFriction { accepted, rejected, blocks }
+    }
+
+    /// The present fit with low speeds of one output in its rows.
+    fn with_low_speeds(&self, output: usize) -> Fit {
+        let mut fit = self.fit.clone();
+        fit.rung[output] = self.lowest[output];
+        fit
+    }
+
+    /// Held-out losses of an output without and with the best candidates of every kind that is not present.
+    fn candidates(&self, base: &Fit, output: usize) -> (Losses, Vec<Scored>) {
+        let variances = self.variances(base);
+        let from = self.losses(base, output, &variances);
+        let mut ranked = self.gains(base, output, &variances);
+        ranked.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        // The best of every kind first: neighbours in a grid say the same thing.
+        let kind = |place: usize| self.library[output][place].kind;
+        let mut places: Vec<usize> = Vec::new();
+        for (place, _) in &ranked {
+            if !places.iter().any(|p| kind(*p) == kind(*place)) {
+                places.push(*place);
+            }
+        }
+        let others: Vec<usize> = ranked.iter().map(|r| r.0).filter(|p| !places.contains(p)).collect();
+        places.extend(others);
+        places.truncate(self.settings.friction.tried);
+        let tried = places
+            .into_iter()
+            .map(|place| Scored {
+                place,
+                losses: self.losses(&with(base, output, place), output, &variances),
+            })
+            .collect();
+        (from, tried)
+    }
+
+    /// Fall of the weighted loss on all rows with each candidate of an output alone, the variances held.
+    fn gains(&self, base: &Fit, output: usize, variances: &[f64]) -> Vec<(usize, f64)> {
+        let library = &self.library[output];
+        let present = &base.shapes[output];
+        let candidates: Vec<usize> = (0..library.len())
+            .filter(|c| !present.iter().any(|p| library[*p].kind == library[*c].kind))
+            .collect();
+        let (mut groups, unknowns) = self.groups(base, None);
+        let scales = self.trial.scales_hz.len();
+        let columns: Vec<usize> = present.iter().chain(&candidates).copied().collect();
+        let sums = &self.sums[&(output, base.rung[output])];
+        for (group, gram) in groups[output * scales..(output + 1) * scales].iter_mut().zip(&sums.all) {
+            group.gram = gram.selected(&self.columns(output, &columns));
+            group.unknowns.extend(unknowns..unknowns + candidates.len());
+        }
+        let normal = self.normal(&groups, unknowns + candidates.len(), variances);
+        let scale = normal.scale();
+        let Some(factor) = normal.unit(unknowns, &scale) else { return Vec::new() };
+        let unit = |i: usize, k: usize| scale[i] * scale[unknowns + k] * normal.matrix[(i, unknowns + k)];
+        let cross = Mat::from_fn(unknowns, candidates.len(), unit);
+        let solved = factor.solve(&cross);
+        let x = factor.solve(&Mat::from_fn(unknowns, 1, |i, _| scale[i] * normal.rhs[(i, 0)]));
+        let gain = |k: usize| -> Option<f64> {
+            let c = unknowns + k;
+            let rest = 1.0 - (0..unknowns).map(|i| cross[(i, k)] * solved[(i, k)]).sum::<f64>();
+            let slope =
+                scale[c] * normal.rhs[(c, 0)] - (0..unknowns).map(|i| cross[(i, k)] * x[(i, 0)]).sum::<f64>();
+            // A falling tanh would be friction that drives; what falls from rest is for Stribeck.
+            let allowed = library[candidates[k]].kind != ShapeKind::Tanh || slope > 0.0;
+            (allowed && scale[c] > 0.0 && rest > COLLINEAR).then(|| slope * slope / rest)
+        };
+        candidates.iter().enumerate().filter_map(|(k, c)| Some((*c, gain(k)?))).collect()
+    }
+
+    /// Losses of an output: logarithm of the mean square residual in every time block, fitted without that block.
+    fn losses(&self, fit: &Fit, output: usize, variances: &[f64]) -> Losses {
+        let columns = self.columns(output, &fit.shapes[output]);
+        let rungs = [self.lowest[output], 0].map(|rung| &self.sums[&(output, rung)].scored);
+        let per_block: Vec<[f64; 2]> = (0..rungs[0].len())
+            .into_par_iter()
+            .filter(|fold| rungs[0][*fold].rows > 0.0)
+            .map(|fold| {
+                let (groups, unknowns) = self.groups(fit, Some(fold));
+                let x = self.normal(&groups, unknowns, variances).solve();
+                let x = x.unwrap_or_else(|| vec![0.0; unknowns]);
+                let own = &groups[output * self.trial.scales_hz.len()].unknowns;
+                rungs.map(|scored| {
+                    let mean_square =
+                        rss(&scored[fold].selected(&columns), own, &x) / scored[fold].rows.max(1.0);
+                    mean_square.max(f64::MIN_POSITIVE).ln()
+                })
+            })
+            .collect();
+        Losses {
+            off_reversal: per_block.iter().map(|l| l[0]).collect(),
+            anywhere: per_block.iter().map(|l| l[1]).collect(),
+        }
+    }
+
+    fn normal(&self, groups: &[Group], unknowns: usize, variances: &[f64]) -> Normal {
+        let mut normal = Normal::new(groups, unknowns, variances);
+        if let Some(prior) = self.prior {
+            normal.add_prior(prior);
+        }
+        normal
+    }
+
+    fn variances(&self, fit: &Fit) -> Vec<f64> {
+        let (groups, unknowns) = self.groups(fit, None);
+        solve(&groups, unknowns, 3).1
+    }
+
+    /// Columns of an output with some shapes, the effort last.
+    fn columns(&self, output: usize, shapes: &[usize]) -> Vec<usize> {
+        let own = self.trial.columns.global[output].len();
+        let effort = own + self.library[output].len();
+        (0..own).chain(shapes.iter().map(|s| own + s)).chain([effort]).collect()
+    }
+
+    /// Rows of a fit, scale by scale for every output, and its number of unknowns.
+    fn groups(&self, fit: &Fit, without: Option<usize>) -> (Vec<Group>, usize) {
+        let mut groups = Vec::new();
+        let mut unknowns = self.trial.columns.total;
+        for (output, shapes) in fit.shapes.iter().enumerate() {
+            let mut own = self.trial.columns.global[output].clone();
+            own.extend(unknowns..unknowns + shapes.len());
+            unknowns += shapes.len();
+            let columns = self.columns(output, shapes);
+            let sums = &self.sums[&(output, fit.rung[output])];
+            let grams = without.map_or(&sums.all, |fold| &sums.without[fold]);
+            groups.extend(grams.iter().map(|g| Group { gram: g.selected(&columns), unknowns: own.clone() }));
+        }
+        (groups, unknowns)
+    }
+}
+
+fn with(base: &Fit, output: usize, place: usize) -> Fit {
+    let mut fit = base.clone();
+    fit.shapes[output].push(place);
+    fit
+}
