@@ -16,6 +16,9 @@ const STARTING_S: f64 = 0.03;
 /// Effort limits count up to this multiple of the logged effort.
 const LIMIT_OF_LOGGED: f64 = 10.0;
 
+/// Shares of the velocity limits at which columns are looked at: some friction acts at low speeds only.
+const SPEEDS: [f64; 5] = [1.0, 0.25, 0.0625, 0.015625, 0.00390625];
+
 /// Speed limit of a joint for priors and motions: as stated, at most 4π rad/s (2 m/s); 2 rad/s (0.5 m/s) by default.
 pub(crate) fn speed_limit(slides: bool, stated: Option<f64>) -> f64 {
     let (default, most) = if slides { (0.5, 2.0) } else { (2.0, 4.0 * std::f64::consts::PI) };
@@ -59,7 +62,7 @@ pub(super) fn standard_deviations(
 struct Probe {
     /// Per output and parameter: largest entry of the column at unit accelerations, at rest entries taken away.
     accelerated: Vec<Vec<f64>>,
-    /// Per output and parameter: largest entry of the column at the velocity limits.
+    /// Per output and parameter: largest entry of the column at the velocity limits and at shares of them.
     moving: Vec<Vec<f64>>,
     /// Per rate: mean diagonal entry of the mass matrix of the prior bodies.
     mass: Vec<f64>,
@@ -96,13 +99,18 @@ impl Probe {
                 block
             };
             let (rest, accelerated) = (columns(&zero, &zero), columns(&zero, &unit));
-            let moving = columns(&fast, &zero);
+            let moving: Vec<RegressorBlock> = SPEEDS
+                .iter()
+                .map(|share| columns(&fast.iter().map(|v| share * v).collect::<Vec<f64>>(), &zero))
+                .collect();
             let (mass, rigid) = rigid_bodies(model, motion, inertias);
             Probe {
                 accelerated: largest(model, |output, k, s| {
                     accelerated.column(output, k)[s] - rest.column(output, k)[s]
                 }),
-                moving: largest(model, |output, k, s| moving.column(output, k)[s]),
+                moving: largest(model, |output, k, s| {
+                    moving.iter().map(|b| b.column(output, k)[s].abs()).fold(0.0, f64::max)
+                }),
                 mass,
                 rigid,
                 limits: limits.clone(),
