@@ -5,6 +5,7 @@ mod pairs;
 
 pub use pairs::AlikeElements;
 
+use dynid_estimate::conditioning::{FrictionShape, ShapeKind};
 use dynid_io::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, SettingValue};
 use dynid_model::element::{
     AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, JointElement, Offset, RotorInertia,
@@ -126,6 +127,27 @@ impl ElementPlan {
         names.iter().zip(&self.per_rate).flat_map(|(joint, list)| pairs::alike(joint, list)).collect()
     }
 
+    /// Adds a friction shape to a joint, its speed the start of a search within a factor of 3. Stribeck friction takes
+    /// the place of Coulomb friction.
+    pub(crate) fn add_shape(&mut self, rate: usize, joint: &str, shape: &FrictionShape) {
+        let (name, key) = shape_element(shape.kind);
+        let list = &mut self.per_rate[rate];
+        match list.iter_mut().find(|n| name == "stribeck" && *n == "coulomb") {
+            Some(coulomb) => *coulomb = name.to_owned(),
+            None => list.push(name.to_owned()),
+        }
+        for (field, value) in
+            [("start", shape.speed), ("lower", shape.speed / 3.0), ("upper", 3.0 * shape.speed)]
+        {
+            self.spec.settings.extend(key.map(|key| ElementSetting {
+                joint: joint.to_owned(),
+                element: name.to_owned(),
+                key: format!("{key}.{field}"),
+                value: SettingValue::Number(value),
+            }));
+        }
+    }
+
     /// Builds the elements in joint order, couplings last.
     ///
     /// Shape parameters about which nothing is said get bounds for the speed limit of the joint, or for 1 rad/s (m/s)
@@ -215,6 +237,15 @@ impl ElementPlan {
                 }
             })
             .collect()
+    }
+}
+
+/// Element of a friction shape, and the shape parameter that its speed is.
+pub(crate) fn shape_element(kind: ShapeKind) -> (&'static str, Option<&'static str>) {
+    match kind {
+        ShapeKind::ViscousMagnitude => ("viscous_magnitude", None),
+        ShapeKind::Stribeck => ("stribeck", Some("vs")),
+        ShapeKind::Tanh => ("tanh", Some("w")),
     }
 }
 

@@ -315,10 +315,31 @@ pub struct ConditioningRecord {
     pub kernel_trials: Vec<(f64, f64, f64)>,
     /// Reversal ladder: share of rms speed (absent: no mask), relative loss, its standard error, share of samples kept.
     pub mask_trials: Vec<(Option<f64>, f64, f64, f64)>,
+    /// Friction shapes tried on held-out blocks.
+    #[serde(default)]
+    pub friction_trials: Vec<FrictionTrial>,
     /// RMS of the fit's own rows, per joint.
     pub row_rms: Vec<Option<f64>>,
     /// Residual against what sensor noise explains, per joint.
     pub residual_ratio: Vec<Option<f64>>,
+}
+
+/// A friction shape that was tried on held-out blocks.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct FrictionTrial {
+    /// Joint.
+    pub joint: String,
+    /// Element that stands for the shape.
+    pub element: String,
+    /// Its speed (`vs`, `w`) in the grid of the search, rad/s or m/s; absent where the shape has none.
+    pub speed: Option<f64>,
+    /// Share by which the joint's held-out mean square falls: of an accepted shape against the choice without it, of
+    /// another one beside the choice.
+    pub gain: f64,
+    /// Standard error of the gain over time blocks.
+    pub standard_error: f64,
+    /// Whether it was taken.
+    pub accepted: bool,
 }
 
 /// Where a result comes from.

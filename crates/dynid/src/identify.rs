@@ -1,12 +1,13 @@
 //! The main job: from a robot file and logs to an identified model.
 
 mod figures;
+mod friction;
 mod structure;
 
 use std::path::Path;
 
 use dynid_estimate::conditioning::{
-    Conditioning, ConditioningSettings, PreparedLog, ReducedGroup, Stage, condition, predict,
+    Conditioning, ConditioningSettings, JointFriction, PreparedLog, ReducedGroup, Stage, condition, predict,
 };
 use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::linear::LinearEstimate;
@@ -16,7 +17,7 @@ use dynid_motion::Log;
 
 use crate::Error;
 use crate::agreement::{self, Agreement};
-use crate::config::{Config, LogConfig, Route};
+use crate::config::{Config, Friction, LogConfig, Route};
 use crate::consistency::{self, Consistent};
 use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
@@ -70,6 +71,9 @@ pub struct Identification {
     pub columns: Vec<Vec<(String, String)>>,
     /// Choices of the compact route; `None` on the textbook route.
     pub conditioning: Option<Conditioning>,
+    /// Per output: friction shapes chosen beside the elements asked for, and candidates that were not; empty where none
+    /// were looked for.
+    pub friction: Vec<JointFriction>,
     /// What is known about the parameters without logs.
     pub prior: Prior,
     /// The fit in the base columns.
@@ -136,7 +140,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         ));
     }
     let (robot, loaded) = read_logs(config, &config.training_logs(), robot, &mut progress)?;
-    let plan = plan_elements(config, &robot, &loaded)?;
+    let mut plan = plan_elements(config, &robot, &loaded)?;
     let model = RobotModel::new(robot.mechanism.clone(), plan.build(&robot.mechanism)?);
     let prepared = loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
 
@@ -156,6 +160,22 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
             })?)
         }
         Route::Textbook => None,
+    };
+    let mut warnings = robot.warnings.clone();
+    warnings.extend(plan.alike(&robot.mechanism).iter().map(ToString::to_string));
+    let mut shapes_of_friction = Vec::new();
+    let (model, structure, conditioning) = match conditioning {
+        Some(choices) if config.elements.friction == Friction::Auto => {
+            let found =
+                friction::choose(&model, &structure, &mut plan, &prepared, &choices, &settings, |stage| {
+                    progress(Step::Conditioning(stage));
+                })?;
+            shapes_of_friction = found.per_output;
+            let model = RobotModel::new(robot.mechanism.clone(), plan.build(&robot.mechanism)?);
+            let structure = Structure::of(config, &model, &plan, &prepared)?;
+            (model, structure, Some(found.conditioning))
+        }
+        conditioning => (model, structure, conditioning),
     };
     let (model, structure, shapes) = match &conditioning {
         Some(choices) if !model.parameters().shape.is_empty() => {
@@ -189,8 +209,6 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     };
     let row_rms = figures::row_rms(&groups, &fitted.estimate.x, base.len());
     let residual_ratio = figures::residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
-    let mut warnings = robot.warnings.clone();
-    warnings.extend(plan.alike(&robot.mechanism).iter().map(ToString::to_string));
     warnings.extend(prior.warnings.iter().cloned());
     warnings.extend(log_warnings(&model, &prepared));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
@@ -199,6 +217,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         base,
         columns: loaded.into_iter().map(|l| l.columns).collect(),
         conditioning,
+        friction: shapes_of_friction,
         prior,
         fitted,
         consistent,

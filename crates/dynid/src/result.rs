@@ -1,5 +1,6 @@
 //! From an identification to its result file.
 
+mod friction;
 mod trust;
 
 use dynid_model::element::change_name;
@@ -224,6 +225,7 @@ impl Identification {
             mask_trials: self.conditioning.as_ref().map_or_else(Vec::new, |c| {
                 c.mask_trials.iter().map(|t| (t.level, t.loss, t.standard_error, t.kept)).collect()
             }),
+            friction_trials: friction::trials(self),
             row_rms: self.row_rms.clone(),
             residual_ratio: self.residual_ratio.clone(),
         }
@@ -363,6 +365,10 @@ impl Identification {
                     100.0 * mask.1
                 ),
             );
+        }
+        for (output, joint) in self.model.outputs().iter().zip(&self.friction) {
+            let (shapes, reason) = friction::in_words(joint);
+            add(&format!("friction shapes of {}", output.name), json!(shapes), "", "found", reason);
         }
         out
     }

@@ -1,0 +1,58 @@
+//! Friction shapes in words and records.
+
+use dynid_estimate::conditioning::{JointFriction, ShapeTrial};
+use dynid_model::EffortModel;
+
+use crate::elements::shape_element;
+use crate::estimate::FrictionTrial;
+use crate::identify::Identification;
+
+/// All shapes tried, joint after joint, accepted ones first.
+pub(super) fn trials(id: &Identification) -> Vec<FrictionTrial> {
+    let record = |joint: &str, trial: &ShapeTrial, accepted: bool| {
+        let (element, speed) = shape_element(trial.shape.kind);
+        FrictionTrial {
+            joint: joint.to_owned(),
+            element: element.to_owned(),
+            speed: speed.map(|_| trial.shape.speed),
+            gain: trial.gain,
+            standard_error: trial.standard_error,
+            accepted,
+        }
+    };
+    id.model
+        .outputs()
+        .iter()
+        .zip(&id.friction)
+        .flat_map(|(output, joint)| {
+            let accepted = joint.accepted.iter().map(|t| record(&output.name, t, true));
+            let others = joint.rejected.iter().map(|t| record(&output.name, t, false));
+            accepted.chain(others).collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+/// Shapes of a joint, and why these.
+pub(super) fn in_words(joint: &JointFriction) -> (Vec<String>, String) {
+    let name = |t: &ShapeTrial| match shape_element(t.shape.kind) {
+        (element, Some(key)) => format!("{element} ({key} {:.3})", t.shape.speed),
+        (element, None) => element.to_owned(),
+    };
+    let gain =
+        |t: &ShapeTrial| format!("{} {:.1} ± {:.1} %", name(t), 100.0 * t.gain, 100.0 * t.standard_error);
+    let list = |trials: &[ShapeTrial]| trials.iter().map(gain).collect::<Vec<_>>().join(", ");
+    let reason = match (joint.accepted.is_empty(), joint.rejected.is_empty()) {
+        (true, true) => format!(
+            "none tried: {} time blocks with rows, or a joint that moves one way or has no friction to refine",
+            joint.blocks
+        ),
+        (true, false) => format!("held-out error does not fall enough: {}", list(&joint.rejected)),
+        (false, true) => format!("held-out error falls: {}", list(&joint.accepted)),
+        (false, false) => format!(
+            "held-out error falls: {}; beside that it would: {}",
+            list(&joint.accepted),
+            list(&joint.rejected)
+        ),
+    };
+    (joint.accepted.iter().map(name).collect(), reason)
+}
