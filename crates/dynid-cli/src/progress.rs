@@ -32,7 +32,6 @@ impl Progress {
             Step::Conditioning(Stage::Veto) => "choosing the kernel".to_owned(),
             Step::Conditioning(Stage::Mask) => "choosing the reversal mask".to_owned(),
             Step::Conditioning(Stage::Friction) => "choosing friction shapes".to_owned(),
-            Step::Conditioning(Stage::Friction) => "choosing friction shapes".to_owned(),
             Step::Conditioning(Stage::Delay) => "estimating the delay".to_owned(),
             Step::Shapes => "searching shape parameters".to_owned(),
             Step::Fit => "fitting".to_owned(),
