@@ -91,7 +91,8 @@ pub(crate) fn on_validation(config: &Config, id: &Identification, filter_hz: f64
         delay_rate_hz: id.delay_rate_hz,
         filter_hz,
     };
-    compare(&id.model, id.values(), &prepared, &alignment, &id.settings).unwrap()
+    let (model, values) = id.identified_model();
+    compare(model, values, &prepared, &alignment, &id.settings).unwrap()
 }
 
 /// Geometric mean of ratios.
