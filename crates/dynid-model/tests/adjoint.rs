@@ -6,8 +6,8 @@
 mod random_tree;
 
 use dynid_model::element::{
-    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, JointElement, Offset, RotorInertia,
-    Spring, Transmission, Viscous, current_channel,
+    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, JointElement, LoadFriction, Offset,
+    RotorInertia, Spring, Transmission, Viscous, current_channel,
 };
 use dynid_model::scalar::Dual;
 use dynid_model::*;
@@ -188,6 +188,8 @@ fn model_with_elements() -> RobotModel {
     for (k, joint) in d.joints.iter_mut().enumerate() {
         joint.kind = if k == 2 { JointKind::Prismatic } else { JointKind::Revolute };
     }
+    let mechanism = d.build().unwrap();
+    let reference: Vec<f64> = mechanism.inertia_vector();
     let elements: Vec<Box<dyn JointElement>> = vec![
         Box::new(Coulomb { rate: 0 }),
         Box::new(Viscous { rate: 0 }),
@@ -203,8 +205,9 @@ fn model_with_elements() -> RobotModel {
         }),
         Box::new(CoupledWrist { a: 1, b: 3, ratio: 0.8 }),
         Box::new(DriveGain { rate: 3 }),
+        Box::new(LoadFriction::new(&mechanism, vec![0, 2], reference.into())),
     ];
-    RobotModel::new(d.build().unwrap(), elements)
+    RobotModel::new(mechanism, elements)
 }
 
 #[test]

@@ -8,15 +8,15 @@ pub use pairs::AlikeElements;
 use dynid_estimate::conditioning::{FrictionShape, ShapeKind};
 use dynid_io::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, SettingValue};
 use dynid_model::element::{
-    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, JointElement, Offset, RotorInertia,
-    Spring, Transmission, Viscous, ViscousMagnitude,
+    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, JointElement, LoadFriction, Offset,
+    RotorInertia, Spring, Transmission, Viscous, ViscousMagnitude,
 };
 use dynid_model::{JointKind, Mechanism};
 
 use crate::Error;
 
 /// Element names that a robot file or a configuration may use.
-pub const NAMES: [&str; 15] = [
+pub const NAMES: [&str; 16] = [
     "coulomb",
     "viscous",
     "offset",
@@ -32,7 +32,11 @@ pub const NAMES: [&str; 15] = [
     "sigmoid_offset",
     "power",
     "viscous_magnitude",
+    "load",
 ];
+
+/// Friction that grows with the load of the gear.
+const LOAD: &str = "load";
 
 /// Elements of a joint about which nothing is said.
 pub const DEFAULTS: [&str; 4] = ["coulomb", "viscous", "offset", "rotor"];
@@ -46,6 +50,9 @@ pub struct ElementPlan {
     pub couplings: Vec<CouplingSpec>,
     /// Settings of elements.
     spec: ElementSpec,
+    /// Ten standard parameters per body whose rigid effort loads the gears of `load` elements; `None`: those of the robot
+    /// file.
+    pub load_reference: Option<Vec<f64>>,
 }
 
 impl ElementPlan {
@@ -85,12 +92,17 @@ impl ElementPlan {
                 }
             })
             .collect();
-        Ok(ElementPlan { per_rate, couplings: spec.couplings.clone(), spec: spec.clone() })
+        Ok(ElementPlan {
+            per_rate,
+            couplings: spec.couplings.clone(),
+            spec: spec.clone(),
+            load_reference: None,
+        })
     }
 
     /// A plan with given names per rate, as an estimate file records it.
     pub fn recorded(per_rate: Vec<Vec<String>>, couplings: Vec<CouplingSpec>, spec: ElementSpec) -> Self {
-        ElementPlan { per_rate, couplings, spec }
+        ElementPlan { per_rate, couplings, spec, load_reference: None }
     }
 
     /// Settings of the elements.
@@ -148,7 +160,7 @@ impl ElementPlan {
         }
     }
 
-    /// Builds the elements in joint order, couplings last.
+    /// Builds the elements in joint order, but gear loads and couplings last.
     ///
     /// Shape parameters about which nothing is said get bounds for the speed limit of the joint, or for 1 rad/s (m/s)
     /// where there is none.
@@ -163,10 +175,11 @@ impl ElementPlan {
         for (rate, list) in self.per_rate.iter().enumerate() {
             pairs::check(&names[rate], list)?;
             let speed = mechanism.bodies()[owners[rate]].joint.limits.velocity;
-            for name in list {
+            for name in list.iter().filter(|name| *name != LOAD) {
                 out.push(self.element(name, rate, &names[rate], speed)?);
             }
         }
+        out.extend(self.load(mechanism, &names)?);
         for coupling in &self.couplings {
             out.push(build_coupling(coupling, &names)?);
         }
@@ -205,6 +218,26 @@ impl ElementPlan {
             }
             _ => return Err(Error::UnknownElement { name: name.to_owned(), joint: joint.to_owned() }),
         })
+    }
+
+    /// The loads of all gears, one element: they need the same rigid efforts.
+    fn load(&self, mechanism: &Mechanism, names: &[String]) -> Result<Option<Box<dyn JointElement>>, Error> {
+        let loaded = |rate: &usize| self.per_rate[*rate].iter().any(|name| name == LOAD);
+        let rates: Vec<usize> = (0..self.per_rate.len()).filter(loaded).collect();
+        let Some(first) = rates.first() else { return Ok(None) };
+        let fault = |fault: &str| Error::ElementSetting {
+            element: LOAD.to_owned(),
+            joint: names[*first].clone(),
+            fault: fault.to_owned(),
+        };
+        if mechanism.follows().is_some() {
+            return Err(fault("it has no form for joints that follow others: do not couple mimic joints"));
+        }
+        let reference = self.load_reference.clone().unwrap_or_else(|| mechanism.inertia_vector());
+        if reference.len() != mechanism.inertial_parameters() {
+            return Err(fault("the reference inertias are those of another robot"));
+        }
+        Ok(Some(Box::new(LoadFriction::new(mechanism, rates, reference.into()))))
     }
 
     fn number(&self, joint: &str, element: &str, key: &str) -> Option<f64> {
@@ -246,6 +279,7 @@ pub(crate) fn shape_element(kind: ShapeKind) -> (&'static str, Option<&'static s
         ShapeKind::ViscousMagnitude => ("viscous_magnitude", None),
         ShapeKind::Stribeck => ("stribeck", Some("vs")),
         ShapeKind::Tanh => ("tanh", Some("w")),
+        ShapeKind::Load => (LOAD, None),
     }
 }
 

@@ -149,6 +149,7 @@ impl RowSource for LogRows<'_> {
                 kernels: &log.kernels,
                 wanted: &self.wanted,
                 shapes: &vec![Vec::new(); log.efforts.len()],
+                load: &[],
             }
             .run(&mut consumers)?;
             first_group += scales * log.efforts.len();

@@ -4,7 +4,7 @@ use dynid_model::{EffortModel, RegressorBlock};
 use dynid_motion::{Kernel, SignalError};
 use rayon::prelude::*;
 
-use super::friction::FrictionShape;
+use super::friction::{FrictionShape, ShapeKind};
 use super::states::{Masks, States};
 use super::{ConditioningSettings, PreparedLog};
 use crate::rows::RowsError;
@@ -112,6 +112,8 @@ pub(crate) struct Pass<'a> {
     pub(crate) wanted: &'a [u8],
     /// Per output: friction shapes of its speed that get columns of their own.
     pub(crate) shapes: &'a [Vec<FrictionShape>],
+    /// Linear parameters whose effort is the load of [`ShapeKind::Load`]; empty if no shape asks for it.
+    pub(crate) load: &'a [f64],
 }
 
 /// Samples whose regressor is held at a time, beyond the kernels' reach.
@@ -152,7 +154,11 @@ impl Pass<'_> {
         consumer: &mut C,
     ) -> Result<(), RowsError> {
         let speed = &self.states.velocity(output)[first..first + regressor.samples()];
-        let shaped: Vec<Vec<f64>> = self.shapes[output].iter().map(|s| s.column(speed)).collect();
+        let loads = match self.shapes[output].iter().any(|s| s.kind == ShapeKind::Load) {
+            true => regressor.effort(output, self.load),
+            false => Vec::new(),
+        };
+        let shaped: Vec<Vec<f64>> = self.shapes[output].iter().map(|s| s.column(speed, &loads)).collect();
         let mut centres = Vec::new();
         let mut rungs = Vec::new();
         let mut columns = Vec::new();

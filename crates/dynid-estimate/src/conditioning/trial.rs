@@ -47,14 +47,14 @@ pub(crate) enum TrialShapes<'a> {
     /// `|v|`, Stribeck and tanh with a quarter and the whole of the log's rms speed: enough to tell whether a kernel or a
     /// missing friction shape spoils a fit.
     Probes,
-    /// Per output.
-    Library(&'a [Vec<FrictionShape>]),
+    /// Per output; `load`: linear parameters whose effort is the load of [`ShapeKind::Load`].
+    Library { shapes: &'a [Vec<FrictionShape>], load: &'a [f64] },
 }
 
 impl TrialShapes<'_> {
     fn of_log(self, states: &States) -> Vec<Vec<FrictionShape>> {
         match self {
-            TrialShapes::Library(shapes) => shapes.to_vec(),
+            TrialShapes::Library { shapes, .. } => shapes.to_vec(),
             TrialShapes::Probes => (0..states.effort.len())
                 .map(|output| {
                     let rms = dynid_motion::signal::rms(states.velocity(output)).max(f64::MIN_POSITIVE);
@@ -87,6 +87,10 @@ impl Trial {
     ) -> Result<Trial, ConditioningError> {
         let columns = KeptColumns::new(model, kept);
         let outputs = model.outputs().len();
+        let load = match shapes {
+            TrialShapes::Library { load, .. } => load,
+            TrialShapes::Probes => &[],
+        };
         let mut classes: Vec<Classes> = vec![Classes::new(); outputs];
         let mut coverage: Vec<Vec<f64>> = vec![Vec::new(); outputs];
         let mut state_hz = Vec::new();
@@ -116,6 +120,7 @@ impl Trial {
             let shapes = shapes.of_log(&states);
             shape_counts = shapes.iter().map(Vec::len).collect();
             Pass {
+                load,
                 model,
                 shape,
                 columns: &columns,

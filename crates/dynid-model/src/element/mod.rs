@@ -14,8 +14,8 @@ mod transmission;
 pub use compliance::{CyclicTorque, Spring};
 pub use drive::{DriveGain, current_channel};
 pub use friction::{
-    Arctangent, AsymmetricFriction, Coulomb, Offset, PowerLaw, Sigmoid, SigmoidOffset, Stribeck,
-    TanhFriction, Viscous, ViscousMagnitude,
+    Arctangent, AsymmetricFriction, Coulomb, LoadFriction, Offset, PowerLaw, Sigmoid, SigmoidOffset,
+    Stribeck, TanhFriction, Viscous, ViscousMagnitude,
 };
 pub use linearised::{Linearised, change_name};
 pub use rotor::RotorInertia;

@@ -30,7 +30,7 @@ pub enum Friction {
 }
 
 /// Elements of all these laws.
-const FRICTION_ELEMENTS: [&str; 11] = [
+const FRICTION_ELEMENTS: [&str; 12] = [
     "coulomb",
     "viscous",
     "offset",
@@ -42,6 +42,7 @@ const FRICTION_ELEMENTS: [&str; 11] = [
     "sigmoid",
     "sigmoid_offset",
     "power",
+    "load",
 ];
 
 impl Friction {

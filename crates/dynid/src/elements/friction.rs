@@ -8,7 +8,7 @@ use dynid_model::element::{
 use crate::Error;
 
 /// Settings that state a linear parameter: element, key, symbol of the parameter.
-pub(super) const STATED: [(&str, &str, &str); 8] = [
+pub(super) const STATED: [(&str, &str, &str); 9] = [
     ("arctangent", "effort", "fa"),
     ("stribeck", "coulomb", "fc"),
     ("stribeck", "static", "fs"),
@@ -17,6 +17,7 @@ pub(super) const STATED: [(&str, &str, &str); 8] = [
     ("sigmoid_offset", "effort", "fl"),
     ("power", "coefficient", "fp"),
     ("viscous_magnitude", "coefficient", "fva"),
+    ("load", "coefficient", "mu"),
 ];
 
 /// Shape parameters of every element, and whether its bounds scale with the speeds in use.

@@ -15,7 +15,7 @@ const EQUAL: [(&str, &str, &str); 6] = [
 ];
 
 /// Elements whose columns are alike unless the motion tells them apart, and what it takes.
-const ALIKE: [(&str, &str, &str); 13] = [
+const ALIKE: [(&str, &str, &str); 15] = [
     ("coulomb", "tanh", SLOW),
     ("coulomb", "sigmoid", SLOW),
     ("coulomb", "sigmoid_offset", SLOW),
@@ -28,6 +28,8 @@ const ALIKE: [(&str, &str, &str); 13] = [
     ("arctangent", "sigmoid", SLOW),
     ("arctangent", "sigmoid_offset", SLOW),
     ("viscous", "arctangent", "speeds far above 1/fb"),
+    ("coulomb", "load", "loads that vary"),
+    ("stribeck", "load", "loads that vary"),
     ("viscous", "power", "speeds that differ by an order of magnitude"),
 ];
 const SLOW: &str = "many samples close to rest";

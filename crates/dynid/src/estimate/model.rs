@@ -28,6 +28,9 @@ pub struct ModelRecord {
     pub couplings: Vec<CouplingRecord>,
     /// Settings of elements that are numbers or flags: joint, element, key, value.
     pub element_settings: Vec<(String, String, String, SettingRecord)>,
+    /// Standard parameters of all bodies whose rigid effort loads the gears of `load` elements; absent: those of the links.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub load_reference: Option<Vec<f64>>,
     /// Cut-off of the state filter, Hz.
     pub state_hz: f64,
     /// Cut-off of the widest kernel, Hz.
@@ -136,6 +139,7 @@ impl ModelRecord {
             elements: plan.per_rate.clone(),
             couplings,
             element_settings,
+            load_reference: plan.load_reference.clone(),
             state_hz: 0.0,
             kernel_hz: 0.0,
         }
@@ -180,7 +184,9 @@ impl ModelRecord {
             })
             .collect();
         let spec = ElementSpec { settings, ..ElementSpec::default() };
-        ElementPlan::recorded(self.elements.clone(), couplings, spec)
+        let mut plan = ElementPlan::recorded(self.elements.clone(), couplings, spec);
+        plan.load_reference.clone_from(&self.load_reference);
+        plan
     }
 }
 

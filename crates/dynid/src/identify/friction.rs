@@ -24,10 +24,13 @@ pub(super) fn choose(
     progress: impl FnMut(Stage),
 ) -> Result<FrictionChoice, Error> {
     let names = model.mechanism().rate_names();
+    let follows = model.mechanism().follows().is_some();
     let rates: Vec<Option<usize>> =
         model.outputs().iter().map(|o| names.iter().position(|n| *n == o.name)).collect();
-    let kinds: Vec<Vec<ShapeKind>> =
-        rates.iter().map(|rate| rate.map_or_else(Vec::new, |r| kinds_beside(&plan.per_rate[r]))).collect();
+    let kinds: Vec<Vec<ShapeKind>> = rates
+        .iter()
+        .map(|rate| rate.map_or_else(Vec::new, |r| kinds_beside(&plan.per_rate[r], follows)))
+        .collect();
     let Structure { base, prior, regrouping, .. } = structure;
     let prior = BasePrior::new(regrouping, &prior.values, &prior.std);
     let shape = model.parameters().shape_start();
@@ -49,11 +52,14 @@ pub(super) fn choose(
             }
         }
     }
+    if !found.load.is_empty() {
+        plan.load_reference = Some(found.load[..model.mechanism().inertial_parameters()].to_vec());
+    }
     Ok(found)
 }
 
-/// Kinds of shapes that say something new beside given elements.
-fn kinds_beside(elements: &[String]) -> Vec<ShapeKind> {
+/// Kinds of shapes that say something new beside given elements. `follows`: some joints follow others.
+fn kinds_beside(elements: &[String], follows: bool) -> Vec<ShapeKind> {
     const SHAPED: [&str; 6] = ["stribeck", "tanh", "sigmoid", "sigmoid_offset", "arctangent", "power"];
     let has = |name: &str| elements.iter().any(|e| e == name);
     let shaped = SHAPED.iter().any(|name| has(name));
@@ -67,6 +73,9 @@ fn kinds_beside(elements: &[String]) -> Vec<ShapeKind> {
     if (has("coulomb") || has("viscous") || has("asymmetric")) && !shaped {
         out.push(ShapeKind::Tanh);
     }
+    if (has("coulomb") || has("stribeck")) && !has("load") && !follows {
+        out.push(ShapeKind::Load);
+    }
     out
 }
 
@@ -76,12 +85,13 @@ mod tests {
 
     #[test]
     fn shapes_are_tried_beside_what_they_add_to() {
-        let kinds = |list: &[&str]| kinds_beside(&list.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>());
-        let all = [ShapeKind::ViscousMagnitude, ShapeKind::Stribeck, ShapeKind::Tanh];
+        let kinds =
+            |list: &[&str]| kinds_beside(&list.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>(), false);
+        let all = [ShapeKind::ViscousMagnitude, ShapeKind::Stribeck, ShapeKind::Tanh, ShapeKind::Load];
         assert_eq!(kinds(&["coulomb", "viscous", "offset", "rotor"]), all);
-        assert_eq!(kinds(&["stribeck", "viscous"]), [ShapeKind::ViscousMagnitude]);
+        assert_eq!(kinds(&["stribeck", "viscous"]), [ShapeKind::ViscousMagnitude, ShapeKind::Load]);
         assert_eq!(kinds(&["asymmetric"]), [ShapeKind::Tanh]);
-        assert_eq!(kinds(&["coulomb", "viscous", "viscous_magnitude", "arctangent"]), []);
+        assert_eq!(kinds(&["coulomb", "viscous", "viscous_magnitude", "arctangent"]), [ShapeKind::Load]);
         assert_eq!(kinds(&["rotor"]), []);
     }
 }

@@ -13,6 +13,8 @@ pub enum ShapeKind {
     Stribeck,
     /// `tanh(v/v_c)`: friction that saturates.
     Tanh,
+    /// `|τ| s(v)` with the rigid effort `τ` of an earlier fit: friction of loaded gears.
+    Load,
 }
 
 /// A column of friction over the speed `v` of a joint.
@@ -20,18 +22,19 @@ pub enum ShapeKind {
 pub struct FrictionShape {
     /// Which law.
     pub kind: ShapeKind,
-    /// `v_s` or `v_c`, rad/s or m/s; 1 and without meaning for `|v|`.
+    /// `v_s` or `v_c`, rad/s or m/s; 1 and without meaning for the other kinds.
     pub speed: f64,
 }
 
 impl FrictionShape {
-    /// The column, one entry per speed.
-    pub(crate) fn column(&self, speeds: &[f64]) -> Vec<f64> {
+    /// The column, one entry per speed. `loads`: rigid efforts at the same samples; read by [`ShapeKind::Load`] alone.
+    pub(crate) fn column(&self, speeds: &[f64], loads: &[f64]) -> Vec<f64> {
         let map = |f: &dyn Fn(f64) -> f64| speeds.iter().map(|v| f(*v)).collect();
         match self.kind {
             ShapeKind::ViscousMagnitude => map(&f64::abs),
             ShapeKind::Stribeck => map(&|v| sign(v) * (-(v / self.speed).powi(2)).exp()),
             ShapeKind::Tanh => map(&|v| (v / self.speed).tanh()),
+            ShapeKind::Load => speeds.iter().zip(loads).map(|(v, load)| sign(*v) * load.abs()).collect(),
         }
     }
 }
@@ -77,7 +80,7 @@ pub(super) fn of_output(output: usize, kinds: &[ShapeKind], states: &[States]) -
     kinds
         .iter()
         .flat_map(|kind| match kind {
-            ShapeKind::ViscousMagnitude => vec![FrictionShape { kind: *kind, speed: 1.0 }],
+            ShapeKind::ViscousMagnitude | ShapeKind::Load => vec![FrictionShape { kind: *kind, speed: 1.0 }],
             ShapeKind::Stribeck => speeds(*kind, rms, STRIBECK),
             ShapeKind::Tanh => speeds(*kind, WIDEST_TANH * rms, TANH),
         })

@@ -6,13 +6,14 @@ mod search;
 
 pub use library::{FrictionShape, ShapeKind};
 
-use dynid_model::EffortModel;
+use dynid_model::{EffortModel, Owner};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
 use super::states::States;
 use super::trial::{Trial, TrialShapes, state_hz_of};
 use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog, Stage, choose};
+use crate::linear::{LinearMethod, LinearSettings, estimate};
 use search::Search;
 
 /// When a friction shape is accepted.
@@ -74,6 +75,9 @@ pub struct FrictionChoice {
     pub per_output: Vec<JointFriction>,
     /// The choices made before, with masks and delay brought up to date.
     pub conditioning: Conditioning,
+    /// Linear parameters whose effort is the load of [`ShapeKind::Load`]: inertial ones of a fit without shapes, zeros
+    /// elsewhere. Empty if no joint took that shape.
+    pub load: Vec<f64>,
 }
 
 /// What is known of base parameters without logs: a normal distribution.
@@ -149,6 +153,11 @@ pub fn choose_friction(
     let library: Vec<Vec<FrictionShape>> =
         kinds.iter().enumerate().map(|(output, kinds)| library::of_output(output, kinds, &states)).collect();
     drop(states);
+    let has_load = library.iter().flatten().any(|s| s.kind == ShapeKind::Load);
+    let load = match has_load {
+        true => rigid_parameters(model, shape, kept, logs, choices, settings)?,
+        false => Vec::new(),
+    };
     let limits = choose::delay_limits(logs, settings);
     let trial = Trial::new(
         model,
@@ -158,7 +167,7 @@ pub fn choose_friction(
         choices.kernel_hz,
         crossing_hz,
         limits,
-        TrialShapes::Library(&library),
+        TrialShapes::Library { shapes: &library, load: &load },
         settings,
     )?;
     let mut search = Search::new(&trial, &library, prior, choices, settings);
@@ -180,5 +189,30 @@ pub fn choose_friction(
         conditioning.mask = rung.iter().map(|r| (*r > 0).then(|| settings.ladder[*r - 1])).collect();
         conditioning.rung = rung;
     }
-    Ok(FrictionChoice { per_output, conditioning })
+    let loaded = |joint: &JointFriction| joint.accepted.iter().any(|t| t.shape.kind == ShapeKind::Load);
+    let load = if per_output.iter().any(loaded) { load } else { Vec::new() };
+    Ok(FrictionChoice { per_output, conditioning, load })
+}
+
+/// Inertial parameters of a fit without shapes, zeros elsewhere.
+fn rigid_parameters(
+    model: &dyn EffortModel,
+    shape: &[f64],
+    kept: &[usize],
+    logs: &[PreparedLog],
+    choices: &Conditioning,
+    settings: &ConditioningSettings,
+) -> Result<Vec<f64>, ConditioningError> {
+    let groups = super::reduce(model, shape, kept, logs, choices, settings)?;
+    let table = &model.parameters().linear;
+    let mut out = vec![0.0; table.len()];
+    // Without a fit there is no load, and its column is passed over as empty.
+    if let Ok(fit) = estimate(&groups, None, kept.len(), &LinearMethod::Wls, &LinearSettings::default()) {
+        for (column, value) in kept.iter().zip(&fit.x) {
+            if matches!(table[*column].owner, Owner::Link(_)) {
+                out[*column] = *value;
+            }
+        }
+    }
+    Ok(out)
 }

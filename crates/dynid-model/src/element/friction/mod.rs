@@ -3,6 +3,7 @@
 mod arctangent;
 mod hyperbolic;
 mod linear;
+mod load;
 mod power_law;
 mod sigmoid;
 mod stribeck;
@@ -10,6 +11,7 @@ mod stribeck;
 pub use arctangent::Arctangent;
 pub use hyperbolic::TanhFriction;
 pub use linear::{AsymmetricFriction, Coulomb, Offset, Viscous, ViscousMagnitude};
+pub use load::LoadFriction;
 pub use power_law::PowerLaw;
 pub use sigmoid::{Sigmoid, SigmoidOffset};
 pub use stribeck::Stribeck;
