@@ -189,6 +189,10 @@ pub(crate) struct IdentifyArgs {
     /// Estimator.
     #[arg(long, value_enum)]
     pub(crate) estimator: Option<MethodArg>,
+    /// Search of the shape parameters of friction over all their range: abc, cs, ics, pso, gps, cma-es, de (default:
+    /// Gauss-Newton from several starts).
+    #[arg(long, value_name = "ALGORITHM")]
+    pub(crate) search: Option<String>,
     /// Which bodies the standard parameters may describe [default: pseudo-inertia].
     #[arg(long, value_enum)]
     pub(crate) consistency: Option<ConsistencyArg>,

@@ -6,9 +6,10 @@ mod er16_arm;
 mod golden;
 
 use dynid_estimate::conditioning::{ConditioningSettings, condition, prepare, refine};
+use dynid_estimate::search;
 use dynid_estimate::separable::{
-    EffortBlock, EffortProblem, SeparableEstimate, SeparableLoss, SeparableSettings, ShapeVerdict, Weighting,
-    fit,
+    EffortBlock, EffortProblem, SeparableError, SeparableEstimate, SeparableLoss, SeparableSettings,
+    ShapeSearch, ShapeVerdict, Weighting, fit,
 };
 use dynid_model::element::{JointElement, Offset, Stribeck, Viscous};
 use dynid_model::{
@@ -79,6 +80,34 @@ fn er16_with_noise_beats_the_truth_and_does_not_depend_on_the_start() {
         assert!(squares.starts.reached == 20 || (unseen && squares.starts.distinct > 1));
         assert_eq!(squares.starts.distinct == 1, squares.starts.reached == 20);
     }
+}
+
+/// A search over the slopes alone, linear parameters eliminated, ends where the multi-start does.
+#[test]
+fn er16_by_a_search_of_the_slopes() {
+    let Some(arm) = Er16::reference(200) else { return };
+    let effort = arm.noisy(0);
+    let multi_start = fitted(&arm, &effort, &least());
+    for name in ["ics", "abc", "pso-general", "gps", "cma-es", "de"] {
+        let search = ShapeSearch {
+            algorithm: name.parse().unwrap(),
+            settings: search::Settings { evaluations: Some(300), ..search::Settings::default() },
+        };
+        let found = fitted(&arm, &effort, &SeparableSettings { search: Some(search), ..least() });
+        assert_eq!(found.starts.outcomes.len(), 1, "{name}");
+        assert!(
+            (found.rss / multi_start.rss - 1.0).abs() < 1e-9,
+            "{name}: {} {}",
+            found.rss,
+            multi_start.rss
+        );
+    }
+    let settings = search::Settings { evaluations: Some(0), ..search::Settings::default() };
+    let none = ShapeSearch { algorithm: "de".parse().unwrap(), settings };
+    let blocks = arm.blocks(&effort);
+    let problem = EffortProblem::new(&arm.model, &arm.kept, &blocks).unwrap().with_shape(arm.shape());
+    let refused = fit(&problem, &SeparableSettings { search: Some(none), ..least() });
+    assert!(matches!(refused, Err(SeparableError::Search(_))), "{refused:?}");
 }
 
 #[test]

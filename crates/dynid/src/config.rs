@@ -4,7 +4,9 @@ mod estimator;
 mod friction;
 mod per_joint;
 
-pub use estimator::{BoundConfig, Consistency, EstimatorConfig, Method, PriorDistance, Variances};
+pub use estimator::{
+    BoundConfig, Consistency, EstimatorConfig, Method, PriorDistance, ShapeConfig, Variances,
+};
 pub use friction::Friction;
 pub use per_joint::PerJoint;
 pub(crate) use per_joint::known;

@@ -32,7 +32,14 @@ pub(crate) fn find(
     (choices, settings): (&Conditioning, &ConditioningSettings),
 ) -> Result<(ShapeFit, Vec<f64>), Error> {
     let shape = model.parameters().shape_start();
-    let separable = SeparableSettings { seed: config.seed.unwrap_or(1), ..SeparableSettings::default() };
+    let defaults = SeparableSettings::default();
+    let seed = config.seed.unwrap_or(1);
+    let separable = SeparableSettings {
+        seed,
+        search: config.estimator.shape.search(seed)?,
+        starts: config.estimator.shape.starts.unwrap_or(defaults.starts),
+        ..defaults
+    };
     let found: SeparableEstimate = refine(&model, &shape, &base.kept, logs, choices, settings, &separable)?;
     let mut linear = vec![0.0; model.parameters().linear.len()];
     for (column, value) in base.kept.iter().zip(&found.linear) {

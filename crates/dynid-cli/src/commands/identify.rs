@@ -123,6 +123,9 @@ fn configuration(args: &IdentifyArgs) -> Result<Config, Failure> {
         Some(MethodArg::Ridge) => config.estimator.method = Method::Ridge,
         None => {}
     }
+    if args.search.is_some() {
+        config.estimator.shape.search.clone_from(&args.search);
+    }
     match args.consistency {
         Some(ConsistencyArg::PseudoInertia) => config.estimator.consistency = Consistency::PseudoInertia,
         Some(ConsistencyArg::SpatialInertia) => config.estimator.consistency = Consistency::SpatialInertia,

@@ -10,11 +10,14 @@ use super::projection::Projection;
 use super::reduction::{GroupReduction, Target};
 use super::robust::{Robust, refine_robust};
 use super::scale::SearchBox;
-use super::settings::{SeparableError, SeparableLoss, SeparableSettings, Weighting};
+use super::settings::{SeparableError, SeparableLoss, SeparableSettings, ShapeSearch, Weighting};
 use super::starts::{START_FALL, StartReport, multi_start, starts};
 use crate::groups::ReducedGroup;
 use crate::linear::{LinearEstimate, LinearMethod, LinearSettings, estimate};
+use crate::search::{self, Bounds, PointObjective, SearchError};
+use dynid_model::ShapeParameter;
 use rayon::prelude::*;
+use std::ops::ControlFlow;
 
 /// Residuals below this share of the efforts are rounding, as for the weights of linear fits.
 const ROUNDING: f64 = 1e-9;
@@ -136,11 +139,41 @@ impl<'a> Work<'a> {
         ROUNDING.powi(2) * energy
     }
 
+    /// Best point of a search, in searched coordinates.
+    fn searched(&self, search: &ShapeSearch) -> Result<Vec<f64>, SeparableError> {
+        let parameters = self.problem.shape();
+        let free: Vec<usize> = (0..parameters.len()).filter(|k| !self.held[*k]).collect();
+        let side = |of: &dyn Fn(&ShapeParameter) -> f64| free.iter().map(|k| of(&parameters[*k])).collect();
+        let logarithmic: Vec<usize> = (0..free.len()).filter(|i| parameters[free[*i]].logarithmic).collect();
+        let bounds = Bounds::new(side(&|p| p.lower), side(&|p| p.upper))
+            .and_then(|b| b.with_logarithmic(&logarithmic))
+            .map_err(SearchError::from)?;
+        let at = self.shape();
+        let whole = |point: &[f64]| {
+            let mut shape = at.clone();
+            free.iter().zip(point).for_each(|(k, x)| shape[*k] = *x);
+            shape
+        };
+        let projection = self.projection();
+        let loss = |point: &[f64]| projection.at(&whole(point), Target::Effort).map_or(f64::NAN, |p| p.rss);
+        let objective = PointObjective::new(free.len(), loss).in_parallel();
+        let start = search.settings.start.clone().unwrap_or_else(|| free.iter().map(|k| at[*k]).collect());
+        let settings = search::Settings { start: Some(start), ..search.settings.clone() };
+        let found = search::run(&search.algorithm, &objective, &bounds, &settings, &mut |_| {
+            ControlFlow::Continue(())
+        })?;
+        let shape = whole(&found.point);
+        Ok((0..shape.len()).map(|k| self.bounds.searched(k, shape[k])).collect())
+    }
+
     fn global(&mut self) -> Result<(StartReport, SearchStatus), SeparableError> {
         if self.bounds.len() > 0 {
             self.renew_variances(&[])?;
         }
-        let starts = starts(&self.bounds, self.settings.starts, self.settings.seed);
+        let starts = match &self.settings.search {
+            Some(search) if self.held.contains(&false) => vec![self.searched(search)?],
+            _ => starts(&self.bounds, self.settings.starts, self.settings.seed),
+        };
         let (found, report) = multi_start(
             &self.projection(),
             &self.bounds,

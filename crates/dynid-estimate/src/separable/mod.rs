@@ -46,5 +46,5 @@ pub use limit::limit_model;
 pub(crate) use places::{OutputPlaces, places};
 pub use problem::{Bound, RowGroup, SeparableProblem, ShapedColumns};
 pub use profile::{ShapeFinding, ShapeVerdict};
-pub use settings::{SeparableError, SeparableLoss, SeparableSettings, Weighting};
+pub use settings::{SeparableError, SeparableLoss, SeparableSettings, ShapeSearch, Weighting};
 pub use starts::{StartOutcome, StartReport};

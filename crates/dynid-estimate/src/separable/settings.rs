@@ -1,6 +1,7 @@
 //! Settings and errors of separable fits.
 
 use crate::linear::{IrlsSettings, LinearError, VarianceSharing, WlsSettings};
+use crate::search::{self, Algorithm, SearchError};
 
 /// Loss of the residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -34,6 +35,16 @@ impl Default for Weighting {
     }
 }
 
+/// A search of shape parameters over the whole box, linear parameters eliminated; its best point is where the fit
+/// starts. The objective is the weighted residual sum of squares.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShapeSearch {
+    /// Algorithm.
+    pub algorithm: Algorithm,
+    /// Its budget and seed; a start is taken from the problem where none is given.
+    pub settings: search::Settings,
+}
+
 /// Settings of [`super::fit`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeparableSettings {
@@ -45,6 +56,8 @@ pub struct SeparableSettings {
     pub starts: usize,
     /// Seed of the starts that are neither corners nor centre. Default 0.
     pub seed: u64,
+    /// Finds the one start by this search in place of the multi-start; it needs finite bounds. Default none.
+    pub search: Option<ShapeSearch>,
     /// Most iterations from one start. Default 200.
     pub max_iterations: usize,
     /// Stop when no shape parameter moves by more than this share of its value. Default 1e-10.
@@ -70,6 +83,7 @@ impl Default for SeparableSettings {
             weighting: Weighting::default(),
             starts: 20,
             seed: 0,
+            search: None,
             max_iterations: 200,
             step_tolerance: 1e-10,
             gradient_tolerance: 1e-8,
@@ -148,6 +162,9 @@ pub enum SeparableError {
         /// Starts tried.
         starts: usize,
     },
+    /// The search cannot run.
+    #[error("search: {0}")]
+    Search(#[from] SearchError),
     /// The covariance cannot be formed.
     #[error(transparent)]
     Linear(#[from] LinearError),

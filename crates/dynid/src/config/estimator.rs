@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use dynid_estimate::search::{Algorithm, Settings};
+use dynid_estimate::separable::ShapeSearch;
 use serde::{Deserialize, Serialize};
 
 use super::{Config, pair};
@@ -66,6 +68,45 @@ pub enum PriorDistance {
     Entropic,
 }
 
+/// How the shape parameters of friction are searched; the best point found is refined by Gauss-Newton either way.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct ShapeConfig {
+    /// A search over the whole box of bounds: `abc`, `cs`, `ics`, `pso`, `gps`, `cma-es`, `de` (see
+    /// [`Algorithm`](dynid_estimate::search::Algorithm)). Default: Gauss-Newton from several starts.
+    pub search: Option<String>,
+    /// Evaluations of that search. Default 2000.
+    pub evaluations: Option<u64>,
+    /// Starts of Gauss-Newton without a search. Default 20.
+    pub starts: Option<usize>,
+}
+
+impl ShapeConfig {
+    /// The search asked for, if any.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for an unknown algorithm or a count of 0.
+    pub fn search(&self, seed: u64) -> Result<Option<ShapeSearch>, Error> {
+        for (name, count) in
+            [("shape.evaluations", self.evaluations), ("shape.starts", self.starts.map(|n| n as u64))]
+        {
+            if count == Some(0) {
+                return Err(Error::setting(name, "at least 1", 0));
+            }
+        }
+        let Some(name) = &self.search else { return Ok(None) };
+        let algorithm: Algorithm = name.parse().map_err(|_| {
+            Error::setting("shape.search", &format!("one of {}", Algorithm::NAMES.join(", ")), name)
+        })?;
+        let evaluations = Some(self.evaluations.unwrap_or(SEARCH_EVALUATIONS));
+        let settings = Settings { evaluations, seed, ..Settings::default() };
+        Ok(Some(ShapeSearch { algorithm, settings }))
+    }
+}
+
+/// Evaluations of a search unless stated otherwise: each is a linear fit of all rows.
+const SEARCH_EVALUATIONS: u64 = 2000;
+
 /// Settings of the estimator.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
@@ -85,6 +126,8 @@ pub struct EstimatorConfig {
     pub consistency: Consistency,
     /// Distance from the robot file. Default `quadratic`.
     pub prior: PriorDistance,
+    /// Search of shape parameters.
+    pub shape: ShapeConfig,
     /// Weight of that distance, residual variances per squared deviation or per nat. Default: as large as held-out folds
     /// allow, at most that of a Gaussian prior.
     pub prior_weight: Option<f64>,
@@ -140,6 +183,7 @@ impl Config {
                 ));
             }
         }
+        e.shape.search(1)?;
         if e.method == Method::Tls && e.effort_noise.is_none() {
             return Err(Error::setting(
                 "effort_noise",
