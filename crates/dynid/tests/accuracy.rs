@@ -8,6 +8,7 @@
 #[expect(dead_code, reason = "each test binary uses its part")]
 mod support;
 
+use dynid::estimators::conditioning::ShapeKind;
 use dynid::io::{ReadOptions, csv};
 use dynid::model::EffortModel;
 use dynid::predict::efforts;
@@ -17,6 +18,8 @@ struct Found {
     fourier: f64,
     p2p: f64,
     delay: f64,
+    /// Kinds of friction shapes, joint after joint.
+    shapes: Vec<ShapeKind>,
 }
 
 fn identify(log: &str) -> Option<Found> {
@@ -45,7 +48,8 @@ path = "{data}/oracles/logs/{log}/train.csv.gz"
         }
         (sum / id.model.outputs().len() as f64).sqrt()
     };
-    let found = Found { fourier: m2("valid_fourier"), p2p: m2("valid_p2p"), delay: id.delay_samples };
+    let shapes = id.friction.iter().flat_map(|j| j.accepted.iter().map(|t| t.shape.kind)).collect();
+    let found = Found { fourier: m2("valid_fourier"), p2p: m2("valid_p2p"), delay: id.delay_samples, shapes };
     println!("{log}: M2 {:.6} / {:.6}, delay {:.3}", found.fourier, found.p2p, found.delay);
     Some(found)
 }
@@ -55,6 +59,7 @@ fn ur5_500_hz() {
     let Some(found) = identify("ur5_dev") else { return };
     assert!(found.fourier <= 1.3 * 0.00095 && found.p2p <= 1.3 * 0.00102);
     assert!((found.delay - 0.5).abs() <= 0.1);
+    assert_eq!(found.shapes, []);
 }
 
 #[test]
@@ -62,6 +67,7 @@ fn ur5_1000_hz() {
     let Some(found) = identify("ur5_1k") else { return };
     assert!(found.fourier <= 1.3 * 0.00027 && found.p2p <= 1.3 * 0.00030);
     assert!((found.delay - 0.5).abs() <= 0.1);
+    assert_eq!(found.shapes, []);
 }
 
 /// Stribeck friction in the log, linear friction in the robot file.
@@ -70,4 +76,5 @@ fn iiwa_250_hz() {
     let Some(found) = identify("iiwa_250") else { return };
     assert!(found.fourier <= 1.5 * 0.0060 && found.p2p <= 1.5 * 0.0068);
     assert!((found.delay - 1.5).abs() <= 0.1);
+    assert_eq!(found.shapes, [ShapeKind::Stribeck; 7]);
 }

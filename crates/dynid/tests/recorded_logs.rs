@@ -25,6 +25,15 @@ fn check(name: &str, text: &str, parameters: usize, filter_hz: f64, baseline: &[
         id.kernel_hz,
         id.delay_samples
     );
+    for (output, joint) in id.model.outputs().iter().zip(&id.friction) {
+        for taken in &joint.accepted {
+            let (kind, percent) = (taken.shape.kind, 100.0 * taken.gain);
+            println!(
+                "  {}: {kind:?} {:.3}, held-out mean square falls by {percent:.0} %",
+                output.name, taken.shape.speed
+            );
+        }
+    }
     assert!(plain <= limit, "{name}: {plain} above {limit}");
 }
 
