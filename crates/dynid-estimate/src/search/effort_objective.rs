@@ -8,6 +8,7 @@ pub use error::EffortObjectiveError;
 use error::{check_efforts, check_loss};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
+use rayon::prelude::*;
 
 /// How residuals `r` of an output count.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -47,6 +48,8 @@ pub struct EffortObjective<'a> {
 
 /// Candidates per matrix product.
 const GROUP: usize = 8;
+/// Predicted efforts of all candidates above which groups are worth a thread each.
+const PARALLEL: usize = 10_000;
 /// Samples per matrix product: fixed columns of an output and predictions of a group stay in the cache.
 const ROWS: usize = 256;
 
@@ -76,6 +79,14 @@ impl<'a> Chunk<'a> {
 }
 
 impl<'a> EffortObjective<'a> {
+    fn room(&self) -> Room {
+        Room {
+            coefficients: Vec::new(),
+            products: vec![0.0; self.outputs.len() * GROUP * ROWS],
+            shaped: vec![0.0; self.model.shaped_columns().len() * ROWS],
+        }
+    }
+
     /// The objective of a motion and its measured efforts, `effort[j]` being the samples of output `j`.
     ///
     /// `linear`: columns of the regressor that are searched. `weights`: `δ_j` per output, not negative; empty for 1 each.
@@ -200,18 +211,23 @@ impl Objective for EffortObjective<'_> {
     }
 
     fn evaluate(&self, candidates: &[f64], values: &mut [f64]) {
-        let mut room = Room {
-            coefficients: Vec::new(),
-            products: vec![0.0; self.outputs.len() * GROUP * ROWS],
-            shaped: vec![0.0; self.model.shaped_columns().len() * ROWS],
-        };
-        let groups = candidates.chunks(GROUP * self.dimensions());
-        for (values, group) in values.chunks_mut(GROUP).zip(groups) {
+        let group_size = GROUP * self.dimensions();
+        let work = |room: &mut Room, values: &mut [f64], group: &[f64]| {
             values.fill(0.0);
             for chunk in &self.chunks {
-                self.add(chunk, group, values, &mut room);
+                self.add(chunk, group, values, room);
             }
             values.iter_mut().for_each(|value| *value /= self.samples as f64);
+        };
+        let entries = values.len() * self.samples * self.outputs.len();
+        if entries < PARALLEL {
+            let mut room = self.room();
+            let groups = candidates.chunks(group_size);
+            values.chunks_mut(GROUP).zip(groups).for_each(|(values, group)| work(&mut room, values, group));
+        } else {
+            let groups = candidates.par_chunks(group_size);
+            let values = values.par_chunks_mut(GROUP).zip(groups);
+            values.for_each_init(|| self.room(), |room, (values, group)| work(room, values, group));
         }
     }
 }
