@@ -11,7 +11,8 @@ use dynid_estimate::conditioning::{
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, MotionBlock, RegressorBlock, RobotModel};
 use dynid_motion::{JointSignals, Log};
 
-const ALL: [ShapeKind; 3] = [ShapeKind::ViscousMagnitude, ShapeKind::Stribeck, ShapeKind::Tanh];
+const ALL: [ShapeKind; 4] =
+    [ShapeKind::ViscousMagnitude, ShapeKind::Stribeck, ShapeKind::Tanh, ShapeKind::Load];
 
 struct Case {
     model: RobotModel,
@@ -22,12 +23,12 @@ struct Case {
 }
 
 impl Case {
-    /// A log with linear friction and `friction(joint, v)` on top; `way(joint)`: whether a joint turns to and fro.
+    /// A log with linear friction and `friction(joint, v, rigid effort)` on top; `way(joint)`: whether a joint turns to and fro.
     fn new(
         seconds: f64,
         seed: u64,
         kernel_hz: Option<f64>,
-        friction: impl Fn(usize, f64) -> f64,
+        friction: impl Fn(usize, f64, f64) -> f64,
         way: impl Fn(usize) -> bool,
     ) -> Case {
         let model = model();
@@ -51,6 +52,7 @@ impl Case {
                 _ => {}
             }
         }
+        let rigid = model.parameters().prior();
         let mut block = RegressorBlock::new(model.layout().clone(), samples);
         let moving = MotionBlock {
             samples,
@@ -68,7 +70,8 @@ impl Case {
                 let range = joint * samples..(joint + 1) * samples;
                 let noise = arm::noise(joint, samples, 100 + seed, 0.0);
                 let effort = block.effort(joint, &linear);
-                let more = dq[range.clone()].iter().map(|v| friction(joint, *v));
+                let loads = block.effort(joint, &rigid);
+                let more = dq[range.clone()].iter().zip(loads).map(|(v, load)| friction(joint, *v, load));
                 JointSignals {
                     name: format!("j{}", joint + 1),
                     position: q[range].to_vec(),
@@ -99,7 +102,8 @@ fn stribeck(joint: usize, v: f64, size: f64) -> f64 {
 #[test]
 fn stribeck_friction_is_found_where_it_is() {
     let with = [1, 4];
-    let friction = |joint: usize, v: f64| if with.contains(&joint) { stribeck(joint, v, 4.0) } else { 0.0 };
+    let friction =
+        |joint: usize, v: f64, _: f64| if with.contains(&joint) { stribeck(joint, v, 4.0) } else { 0.0 };
     let case = Case::new(40.0, 0, None, friction, |_| true);
     let found = case.choose(&ALL);
     for (joint, choice) in found.per_output.iter().enumerate() {
@@ -127,7 +131,7 @@ fn stribeck_friction_is_found_where_it_is() {
 fn linear_friction_asks_for_no_shape() {
     let (mut false_shapes, logs) = (0, 10);
     for seed in 0..logs {
-        let found = Case::new(20.0, seed, None, |_, _| 0.0, |_| true).choose(&ALL);
+        let found = Case::new(20.0, seed, None, |_, _, _| 0.0, |_| true).choose(&ALL);
         for choice in &found.per_output {
             false_shapes += choice.accepted.len();
             choice.accepted.iter().for_each(|a| println!("log {seed}: {a:?}"));
@@ -138,8 +142,32 @@ fn linear_friction_asks_for_no_shape() {
 }
 
 #[test]
+fn friction_of_a_loaded_gear_is_found_where_it_is() {
+    let with = 1;
+    let friction = |joint: usize, v: f64, load: f64| {
+        if joint == with { 0.1 * load.abs() * v.signum() } else { 0.0 }
+    };
+    let case = Case::new(40.0, 2, None, friction, |_| true);
+    let found = case.choose(&ALL);
+    for (joint, choice) in found.per_output.iter().enumerate() {
+        println!("joint {}: {choice:?}", joint + 1);
+        let kinds: Vec<ShapeKind> = choice.accepted.iter().map(|a| a.shape.kind).collect();
+        assert_eq!(
+            kinds,
+            if joint == with { vec![ShapeKind::Load] } else { Vec::new() },
+            "joint {}",
+            joint + 1
+        );
+    }
+    let inertial = case.model.mechanism().inertial_parameters();
+    assert!(
+        found.load[..inertial].iter().any(|x| *x != 0.0) && found.load[inertial..].iter().all(|x| *x == 0.0)
+    );
+}
+
+#[test]
 fn joints_that_turn_one_way_get_no_shape() {
-    let case = Case::new(20.0, 3, None, |joint, v| stribeck(joint, v, 4.0), |joint| joint != 2);
+    let case = Case::new(20.0, 3, None, |joint, v, _| stribeck(joint, v, 4.0), |joint| joint != 2);
     let found = case.choose(&ALL);
     assert!(found.per_output[2].accepted.is_empty() && found.per_output[2].rejected.is_empty());
     assert!(!found.per_output[1].rejected.is_empty() || !found.per_output[1].accepted.is_empty());
@@ -147,7 +175,7 @@ fn joints_that_turn_one_way_get_no_shape() {
 
 #[test]
 fn a_log_too_short_for_held_out_blocks_asks_for_nothing() {
-    let case = Case::new(3.0, 1, Some(1.0), |joint, v| stribeck(joint, v, 4.0), |_| true);
+    let case = Case::new(3.0, 1, Some(1.0), |joint, v, _| stribeck(joint, v, 4.0), |_| true);
     let found = case.choose(&ALL);
     // The narrowest kernel (4 Hz) reaches 0.23 s to either side, a block is 0.375 s long: no row lies in one.
     assert!(found.per_output.iter().all(|c| c.blocks == 0 && c.accepted.is_empty() && c.rejected.is_empty()));
