@@ -4,11 +4,11 @@ use super::axis::{tick_label, ticks};
 use crate::data::{Chart, ChartAxis, ChartCurve, CurveStyle};
 
 const WIDTH: f64 = 520.0;
-const HEIGHT: f64 = 280.0;
+const HEIGHT: f64 = 270.0;
 const LEFT: f64 = 58.0;
 const RIGHT: f64 = 14.0;
 const TOP: f64 = 8.0;
-const BOTTOM: f64 = 38.0;
+const BOTTOM: f64 = 24.0;
 /// Curves with more points are thinned to the least and greatest of each pixel, or evenly if they run back and forth.
 const MOST_POINTS: usize = 1600;
 /// Classes of lines, in order, then again from the first.

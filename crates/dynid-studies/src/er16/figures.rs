@@ -62,11 +62,13 @@ pub(super) fn errors(data: &Measurement, rate_hz: f64, predicted: &[(&str, &[f64
     (0..JOINTS)
         .map(|j| {
             let clean = data.joint(&data.clean, j);
-            let curves = predicted.iter().map(|(name, p)| {
+            let last = (data.samples - 1) as f64 / rate_hz;
+            let zero = curve("truth", vec![[0.0, 0.0], [last, 0.0]], CurveStyle::Dashed);
+            let curves = std::iter::once(zero).chain(predicted.iter().map(|(name, p)| {
                 let difference = data.joint(p, j).iter().zip(clean).enumerate();
                 let points = difference.map(|(k, (p, c))| [k as f64 / rate_hz, p - c]).collect();
                 curve(name, points, CurveStyle::Line)
-            });
+            }));
             Chart {
                 title: format!("Error of the torque of joint {} against the noise-free torque", j + 1),
                 x: axis("time", "s"),
