@@ -7,13 +7,8 @@ use dynid_model::element::{
 };
 use dynid_model::*;
 
-/// A joint with given elements: its friction for given values of their parameters.
-fn passivity(
-    elements: Vec<Box<dyn JointElement>>,
-    values: &[f64],
-    shape: &[f64],
-    range: (f64, f64),
-) -> FrictionPassivity {
+/// A joint with given elements, and the parameters of a massless link with given values of theirs.
+fn joint(elements: Vec<Box<dyn JointElement>>, values: &[f64]) -> (RobotModel, Vec<f64>) {
     let mut d = Description::new("joint");
     d.links.extend(["l0", "l1"].map(|l| LinkDescription { name: l.into(), inertia: None }));
     d.joints.push(JointDescription {
@@ -26,8 +21,17 @@ fn passivity(
         limits: Limits::default(),
         mimic: None,
     });
-    let model = RobotModel::new(d.build().unwrap(), elements);
-    let linear: Vec<f64> = [0.0; 10].into_iter().chain(values.iter().copied()).collect();
+    let linear = [0.0; 10].into_iter().chain(values.iter().copied()).collect();
+    (RobotModel::new(d.build().unwrap(), elements), linear)
+}
+
+fn passivity(
+    elements: Vec<Box<dyn JointElement>>,
+    values: &[f64],
+    shape: &[f64],
+    range: (f64, f64),
+) -> FrictionPassivity {
+    let (model, linear) = joint(elements, values);
     model.friction_passivity(0, shape, &linear, range)
 }
 
@@ -112,4 +116,20 @@ fn static_friction_below_coulomb_friction_is_told() {
     let (usual, odd) = (of(&[9.1, 11.83]), of(&[11.83, 9.1]));
     assert_eq!((usual.passivity, usual.static_below_coulomb), (Passivity::Passive, false));
     assert_eq!((odd.passivity, odd.static_below_coulomb), (Passivity::Passive, true));
+}
+
+#[test]
+fn effort_of_friction_leaves_out_what_acts_at_rest() {
+    let [f0, fc, fv, fa, fb] = ER16[1];
+    let (model, linear) = joint(four(), &[f0, fc, fv, fa]);
+    let velocities = [-0.4, 0.0, 0.003, 1.7];
+    let efforts = model.friction_effort(0, &[fb], &linear, &velocities);
+    for (v, e) in velocities.into_iter().zip(efforts) {
+        let sign = if v == 0.0 { 0.0 } else { f64::signum(v) };
+        let expected = fc * sign + fv * v + fa * (fb * v).atan();
+        assert!(
+            (e - expected).abs() <= 4.0 * f64::EPSILON * (f0.abs() + fc.abs() + fv.abs() + fa),
+            "{v}: {e}"
+        );
+    }
 }

@@ -1,6 +1,6 @@
 //! Joint elements by name.
 
-mod friction;
+pub(crate) mod friction;
 mod pairs;
 
 pub use pairs::AlikeElements;

@@ -1,8 +1,10 @@
 //! The result file `estimate.json`: stable keys, added to but never renamed.
 
+mod friction;
 mod model;
 mod trust;
 
+pub use friction::{FrictionTrial, PassivityRecord};
 pub use model::{CouplingRecord, JointRecord, LinkRecord, ModelRecord, SettingRecord};
 pub use trust::{
     ConsistencyRecord, HeldOutRecord, PrecisionRecord, PruningRecord, PruningStep, WhitenessRecord,
@@ -45,6 +47,9 @@ pub struct Estimate {
     /// Parameters that enter the effort nonlinearly.
     #[serde(default)]
     pub shape_parameters: Vec<ShapeValue>,
+    /// Whether the identified friction takes energy out of the motion; joints that move and have friction.
+    #[serde(default)]
+    pub friction_passivity: Vec<PassivityRecord>,
     /// Whether every link could be a physical body.
     pub feasible: bool,
     /// Physical consistency of the standard parameters and what it costs; absent if none was asked for.
@@ -322,24 +327,6 @@ pub struct ConditioningRecord {
     pub row_rms: Vec<Option<f64>>,
     /// Residual against what sensor noise explains, per joint.
     pub residual_ratio: Vec<Option<f64>>,
-}
-
-/// A friction shape that was tried on held-out blocks.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct FrictionTrial {
-    /// Joint.
-    pub joint: String,
-    /// Element that stands for the shape.
-    pub element: String,
-    /// Its speed (`vs`, `w`) in the grid of the search, rad/s or m/s; absent where the shape has none.
-    pub speed: Option<f64>,
-    /// Share by which the joint's held-out mean square falls: of an accepted shape against the choice without it, of
-    /// another one beside the choice.
-    pub gain: f64,
-    /// Standard error of the gain over time blocks.
-    pub standard_error: f64,
-    /// Whether it was taken.
-    pub accepted: bool,
 }
 
 /// Where a result comes from.

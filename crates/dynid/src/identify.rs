@@ -23,6 +23,7 @@ use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
 use crate::fitting::{self, Fitted};
 use crate::logs::{self, LoadedLog};
+use crate::passivity::SPEED_SPAN_S;
 use crate::prior::Prior;
 use crate::robot::{Robot, RobotOptions};
 use crate::shape::{self, ShapeFit};
@@ -418,14 +419,13 @@ fn plan_elements(config: &Config, robot: &Robot, logs: &[LoadedLog]) -> Result<E
     Ok(plan.with_speeds(&robot.mechanism, &speeds))
 }
 
-/// Largest mean speed of a joint over 50 ms of a log; spikes and noise of the position count little.
+/// Largest mean speed of a joint over [`SPEED_SPAN_S`] of a log.
 fn fastest(log: &Log, joint: &str) -> Option<f64> {
-    const SPAN_S: f64 = 0.05;
     let position = &log.joints().iter().find(|j| j.name == joint)?.position;
     let time = log.time();
     let rows = time.len().checked_sub(1)?;
     let step = (time[rows] - time[0]) / rows as f64;
-    let span = ((SPAN_S / step).ceil() as usize).clamp(1, rows.max(1));
+    let span = ((SPEED_SPAN_S / step).ceil() as usize).clamp(1, rows.max(1));
     (0..=rows.checked_sub(span)?)
         .map(|k| ((position[k + span] - position[k]) / (time[k + span] - time[k])).abs())
         .filter(|v| v.is_finite())

@@ -18,6 +18,7 @@ pub mod identify;
 pub mod inspect;
 pub mod logs;
 pub mod nominal;
+mod passivity;
 pub mod predict;
 pub mod prior;
 mod report_data;

@@ -55,6 +55,7 @@ impl Identification {
             parameters: self.parameter_values(),
             base_parameters: self.base_values(),
             shape_parameters: self.shape_values(),
+            friction_passivity: self.friction_passivity(),
             feasible: self.unphysical_bodies().is_empty(),
             consistency: self.consistency_record(config),
             held_out: self.held_out_record(),

@@ -102,7 +102,7 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
         status: status.word().to_owned(),
         headline,
         checks: checks.into_iter().map(|(_, c)| c).collect(),
-        warnings: id.warnings.iter().cloned().chain(unphysical(id)).collect(),
+        warnings: id.warnings.iter().cloned().chain(unphysical(id)).chain(id.friction_warnings()).collect(),
     };
     (status, verdict)
 }

@@ -84,6 +84,23 @@ impl RobotModel {
         FrictionPassivity { passivity, worst, static_below_coulomb: self.static_below_coulomb(rate, linear) }
     }
 
+    /// Effort of the friction elements of a joint over velocities (rad/s, m/s), less that at rest, `e(v) - e(0)`, in N m or N;
+    /// what [`RobotModel::friction_passivity`] looks at.
+    ///
+    /// # Panics
+    /// If there is no such rate, or `shape` or `linear` has the wrong length.
+    pub fn friction_effort(
+        &self,
+        rate: usize,
+        shape: &[f64],
+        linear: &[f64],
+        velocities: &[f64],
+    ) -> Vec<f64> {
+        self.check_shapes(shape, Some(linear));
+        let friction = Friction::new(self, rate, shape, linear);
+        friction.efforts(velocities).into_iter().map(|e| e - friction.at_rest).collect()
+    }
+
     fn static_below_coulomb(&self, rate: usize, linear: &[f64]) -> bool {
         let value = |symbol: &str| {
             let name = format!("{}.{symbol}", self.joints[rate].name);

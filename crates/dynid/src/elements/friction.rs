@@ -30,6 +30,19 @@ const SHAPES: [(&str, &[&str], bool); 6] = [
     ("power", &["p"], false),
 ];
 
+/// Friction laws of the speed alone that have no shape parameters.
+const UNSHAPED: [&str; 4] = ["coulomb", "viscous", "asymmetric", "viscous_magnitude"];
+
+/// Whether an element is friction of the joint's own speed alone.
+pub(crate) fn is_law(name: &str) -> bool {
+    UNSHAPED.contains(&name) || is_shaped(name)
+}
+
+/// Whether an element is friction with shape parameters, known or not.
+pub(crate) fn is_shaped(name: &str) -> bool {
+    SHAPES.iter().any(|(element, _, _)| *element == name)
+}
+
 const SHAPE_KEYS: [&str; 4] = ["start", "lower", "upper", "held"];
 /// Key of the scale of speed.
 pub(super) const SPEED: &str = "speed";

@@ -9,6 +9,7 @@ use dynid_model::{EffortModel, RobotModel};
 use super::structure::Structure;
 use crate::Error;
 use crate::elements::ElementPlan;
+use crate::elements::friction::is_shaped;
 
 /// Chooses shapes for all joints and adds them to the plan; shape parameters start at the values found.
 ///
@@ -60,9 +61,8 @@ pub(super) fn choose(
 
 /// Kinds of shapes that say something new beside given elements. `follows`: some joints follow others.
 fn kinds_beside(elements: &[String], follows: bool) -> Vec<ShapeKind> {
-    const SHAPED: [&str; 6] = ["stribeck", "tanh", "sigmoid", "sigmoid_offset", "arctangent", "power"];
     let has = |name: &str| elements.iter().any(|e| e == name);
-    let shaped = SHAPED.iter().any(|name| has(name));
+    let shaped = elements.iter().any(|name| is_shaped(name));
     let mut out = Vec::new();
     if has("viscous") && !has("viscous_magnitude") {
         out.push(ShapeKind::ViscousMagnitude);

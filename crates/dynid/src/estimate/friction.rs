@@ -1,0 +1,44 @@
+//! Friction in the result file: shapes that were tried, and whether the identified laws are passive.
+
+use serde::{Deserialize, Serialize};
+
+/// A friction shape that was tried on held-out blocks.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct FrictionTrial {
+    /// Joint.
+    pub joint: String,
+    /// Element that stands for the shape.
+    pub element: String,
+    /// Its speed (`vs`, `w`) in the grid of the search, rad/s or m/s; absent where the shape has none.
+    pub speed: Option<f64>,
+    /// Share by which the joint's held-out mean square falls: of an accepted shape against the choice without it, of
+    /// another one beside the choice.
+    pub gain: f64,
+    /// Standard error of the gain over time blocks.
+    pub standard_error: f64,
+    /// Whether it was taken.
+    pub accepted: bool,
+}
+
+/// Whether the identified friction of a joint is passive, `v (e(v) - e(0)) >= 0`, at the velocities of the training logs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PassivityRecord {
+    /// Joint.
+    pub joint: String,
+    /// Velocities that the training logs reach, rad/s or m/s; rest lies within.
+    pub velocity_range: (f64, f64),
+    /// `passive`, `passive on` (the intervals) or `not passive`.
+    pub passivity: String,
+    /// Intervals of velocity `(from, to)` on which alone it is passive, ascending; empty unless `passive on`.
+    #[serde(default)]
+    pub intervals: Vec<(f64, f64)>,
+    /// Velocity at which friction feeds most power into the motion; absent where it is passive.
+    #[serde(default)]
+    pub worst_velocity: Option<f64>,
+    /// That power, W.
+    #[serde(default)]
+    pub worst_power: Option<f64>,
+    /// Static friction is identified below Coulomb friction.
+    #[serde(default)]
+    pub static_below_coulomb: bool,
+}

@@ -1,0 +1,157 @@
+//! Whether the identified friction takes energy out of the motion.
+
+use dynid_estimate::conditioning::PreparedLog;
+use dynid_model::{EffortModel, Passivity};
+
+use crate::elements::friction;
+use crate::estimate::PassivityRecord;
+use crate::identify::Identification;
+
+/// [`PassivityRecord::passivity`] of a law that is passive on all of the range.
+pub(crate) const PASSIVE: &str = "passive";
+/// Of one that is passive on parts of it.
+pub(crate) const PASSIVE_ON: &str = "passive on";
+/// Of one that is passive nowhere.
+pub(crate) const NOT_PASSIVE: &str = "not passive";
+
+/// Positions are compared over this time, s: spikes and noise count little then.
+pub(crate) const SPEED_SPAN_S: f64 = 0.05;
+
+/// Friction coefficients that a passive law has positive; offsets and the difference between the directions have any sign.
+const COEFFICIENTS: [&str; 12] = ["fc", "fs", "fv", "fa", "ft", "fg", "fl", "fp", "fcp", "fcn", "fvp", "fvn"];
+
+/// Least and greatest mean velocity of an output over [`SPEED_SPAN_S`] in logs that move it, with rest; `None` if none does.
+fn velocities(logs: &[PreparedLog], output: usize) -> Option<(f64, f64)> {
+    let mut range: Option<(f64, f64)> = None;
+    for log in logs.iter().filter(|log| log.moves[output]) {
+        let position = &log.position[output];
+        let span = ((SPEED_SPAN_S * log.rate_hz).ceil() as usize).max(1);
+        let mut sound = 0;
+        for (k, usable) in log.usable.iter().enumerate() {
+            sound = if *usable { sound + 1 } else { 0 };
+            if sound > span {
+                let v = (position[k] - position[k - span]) * log.rate_hz / span as f64;
+                let (low, high) = range.unwrap_or((0.0, 0.0));
+                range = Some((low.min(v), high.max(v)));
+            }
+        }
+    }
+    range.filter(|(low, high)| low.is_finite() && high.is_finite() && low < high)
+}
+
+impl Identification {
+    /// Rate of each output of the model.
+    pub(crate) fn output_rates(&self) -> Vec<Option<usize>> {
+        let names = self.model.mechanism().rate_names();
+        self.model.outputs().iter().map(|o| names.iter().position(|n| *n == o.name)).collect()
+    }
+
+    /// Passivity of the identified friction on the velocities that the training logs reach, joint by joint; joints without
+    /// friction and those that no log moves are left out.
+    pub fn friction_passivity(&self) -> Vec<PassivityRecord> {
+        let (model, linear) = self.identified_model();
+        let shape = model.parameters().shape_start();
+        let outputs = self.model.outputs().iter().zip(self.output_rates()).enumerate();
+        outputs
+            .filter_map(|(k, (output, rate))| {
+                let rate = rate?;
+                if !self.plan.per_rate[rate].iter().any(|name| friction::is_law(name)) {
+                    return None;
+                }
+                let (low, high) = velocities(&self.logs, k)?;
+                let found = model.friction_passivity(rate, &shape, linear, (low, high));
+                let (passivity, intervals) = match found.passivity {
+                    Passivity::Passive => (PASSIVE, Vec::new()),
+                    Passivity::PassiveOn(intervals) => (PASSIVE_ON, intervals),
+                    Passivity::NotPassive => (NOT_PASSIVE, Vec::new()),
+                };
+                Some(PassivityRecord {
+                    joint: output.name.clone(),
+                    velocity_range: (low, high),
+                    passivity: passivity.to_owned(),
+                    intervals,
+                    worst_velocity: found.worst.map(|(v, _)| v),
+                    worst_power: found.worst.map(|(_, power)| power),
+                    static_below_coulomb: found.static_below_coulomb,
+                })
+            })
+            .collect()
+    }
+
+    /// Warnings about friction that drives the motion, and about static friction below Coulomb friction.
+    pub(crate) fn friction_warnings(&self) -> Vec<String> {
+        let mut out = Vec::new();
+        for record in self.friction_passivity() {
+            let joint = &record.joint;
+            if record.passivity != PASSIVE {
+                out.push(format!(
+                    "the identified friction of `{joint}` is {}: a simulator with it may not come to rest. {}, or ask for a \
+                     simpler law (`--friction linear`)",
+                    in_words(&record, self.speed_unit(joint)),
+                    self.bound_on_friction(joint)
+                ));
+            }
+            if record.static_below_coulomb {
+                out.push(format!(
+                    "static friction of `{joint}` is identified below Coulomb friction (`{joint}.fs` < `{joint}.fc`): the law \
+                     rises from rest, which is no Stribeck effect. Take a simpler law (`coulomb` in place of `stribeck`), or bound \
+                     `{joint}.fs` from below (`[[bound]]`)"
+                ));
+            }
+        }
+        out
+    }
+
+    /// The remedy that keeps the law: coefficients that must not be negative.
+    fn bound_on_friction(&self, joint: &str) -> String {
+        let (model, linear) = self.identified_model();
+        let table = &model.parameters().linear;
+        let coefficient = |name: &str| match name.rsplit_once('.') {
+            Some((owner, symbol)) => owner == joint && COEFFICIENTS.contains(&symbol),
+            None => false,
+        };
+        let negative = table.iter().zip(linear).filter(|(p, value)| **value < 0.0 && coefficient(&p.name));
+        let names: Vec<String> = negative.map(|(p, _)| format!("`{}`", p.name)).collect();
+        match names.is_empty() {
+            true => "Bound its coefficients (`[[bound]]`)".to_owned(),
+            false => format!("Bound {} to at least 0 (`[[bound]]`)", names.join(" and ")),
+        }
+    }
+
+    /// Unit of a joint's velocity.
+    pub(crate) fn speed_unit(&self, joint: &str) -> &'static str {
+        match self.model.outputs().iter().find(|o| o.name == joint) {
+            Some(output) if output.unit == "N" => "m/s",
+            _ => "rad/s",
+        }
+    }
+}
+
+/// Where the friction is passive, after "is".
+pub(crate) fn in_words(record: &PassivityRecord, unit: &str) -> String {
+    let range =
+        |(low, high): (f64, f64)| format!("from {} to {} {unit}", three_digits(low), three_digits(high));
+    let all = range(record.velocity_range);
+    let worst = match (record.worst_velocity, record.worst_power) {
+        (Some(v), Some(power)) => {
+            format!("it drives the motion, most at {} {unit} with {} W", three_digits(v), three_digits(power))
+        }
+        _ => "it drives the motion".to_owned(),
+    };
+    match record.passivity.as_str() {
+        PASSIVE => format!("passive {all}, all that the training logs reach"),
+        PASSIVE_ON => {
+            let parts: Vec<String> = record.intervals.iter().copied().map(range).collect();
+            format!(
+                "passive {} alone; elsewhere {all}, as the training logs reach, {worst}",
+                parts.join(" and ")
+            )
+        }
+        _ => format!("nowhere passive {all}, as the training logs reach: {worst}"),
+    }
+}
+
+/// `x` rounded to three significant digits.
+fn three_digits(x: f64) -> String {
+    format!("{x:.2e}").parse::<f64>().map_or_else(|_| x.to_string(), |rounded| rounded.to_string())
+}
