@@ -24,5 +24,11 @@ pub enum StudyError {
     },
     /// The pipeline refused.
     #[error(transparent)]
-    Dynid(#[from] dynid::Error),
+    Dynid(Box<dynid::Error>),
+}
+
+impl<E: Into<dynid::Error>> From<E> for StudyError {
+    fn from(error: E) -> Self {
+        StudyError::Dynid(Box::new(error.into()))
+    }
 }

@@ -37,6 +37,8 @@ pub struct StudyRun {
     pub report: StudyReport,
 }
 
+type Driver = fn(&RunSettings, &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError>;
+
 /// A study that can be run.
 #[derive(Debug, Clone, Copy)]
 pub struct Study {
@@ -46,7 +48,7 @@ pub struct Study {
     pub title: &'static str,
     /// Where it was published.
     pub source: &'static str,
-    driver: fn(&RunSettings, &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError>,
+    driver: Driver,
 }
 
 /// What is being worked on: a step of so many.

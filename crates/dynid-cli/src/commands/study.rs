@@ -62,7 +62,7 @@ fn list_studies(args: &StudyArgs) -> Result<u8, Failure> {
 
 fn failure(error: StudyError) -> Failure {
     match error {
-        StudyError::Dynid(error) => error.into(),
+        StudyError::Dynid(error) => Failure::Input(error),
         other => Failure::Usage(other.to_string(), "this is a fault of the program, please report it"),
     }
 }

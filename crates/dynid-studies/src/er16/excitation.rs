@@ -66,11 +66,8 @@ pub(super) fn problem(arm: &Arm, settings: &Settings, columns: Columns) -> Resul
         coordinates: mechanism.rate_names(),
         limits: limits.collect(),
         constraints: vec![
-            Box::new(
-                EffortLimits::new(arm.model.clone(), arm.shape.clone(), arm.linear.clone(), &torque)
-                    .map_err(dynid::Error::from)?,
-            ),
-            Box::new(CartesianLimits::new(mechanism, &regions).map_err(dynid::Error::from)?),
+            Box::new(EffortLimits::new(arm.model.clone(), arm.shape.clone(), arm.linear.clone(), &torque)?),
+            Box::new(CartesianLimits::new(mechanism, &regions)?),
         ],
         base: settings.base_frequency(),
         harmonics: HARMONICS,
@@ -96,13 +93,12 @@ pub(super) fn printed_trajectory(arm: &Arm, settings: &Settings) -> Result<Row, 
     let (mut angle, mut relative) = (0.0_f64, 0.0_f64);
     let mut violations = Vec::new();
     for case in &reference.appendix_evaluations {
-        let order: RowOrder = case.order.parse().map_err(dynid::Error::from)?;
+        let order: RowOrder = case.order.parse()?;
         let series = reference
             .appendix_a1
             .iter()
             .map(|row| Fourier::from_row(settings.base_frequency(), Form::Plain, &order, row))
-            .collect::<Result<Vec<Fourier>, _>>()
-            .map_err(dynid::Error::from)?;
+            .collect::<Result<Vec<Fourier>, _>>()?;
         for (j, series) in series.iter().enumerate() {
             // The reference takes extremes over its 2000 samples.
             let samples: Vec<[f64; 3]> = (0..FINE)
@@ -123,11 +119,8 @@ pub(super) fn printed_trajectory(arm: &Arm, settings: &Settings) -> Result<Row, 
                 angle = angle.max((own - wanted).abs());
             }
         }
-        let rows: Vec<Vec<f64>> = series
-            .iter()
-            .map(|s| s.to_row(Form::Plain, &RowOrder::default()))
-            .collect::<Result<_, _>>()
-            .map_err(dynid::Error::from)?;
+        let rows: Vec<Vec<f64>> =
+            series.iter().map(|s| s.to_row(Form::Plain, &RowOrder::default())).collect::<Result<_, _>>()?;
         let found = condition(&problem, &rows).unwrap_or(f64::INFINITY);
         relative = relative.max((found / case.cond_phi15 - 1.0).abs());
         let worst = limit_points(&problem, &rows, FINE, 0.0);
@@ -163,7 +156,7 @@ pub(super) fn designed(
     let problem = problem(arm, settings, columns)?;
     let search =
         SearchSettings { starts: if run.quick { 4 } else { 8 }, seed: run.seed, ..SearchSettings::default() };
-    let outcome = design(&problem, &search, Vec::new(), &mut |_| {}).map_err(dynid::Error::from)?;
+    let outcome = design(&problem, &search, Vec::new(), &mut |_| {})?;
     let Outcome::Found(design) = outcome else { return Ok(None) };
     let mut starts: Vec<f64> =
         design.starts.iter().filter(|s| s.is_feasible()).filter_map(|s| s.criterion.map(f64::exp)).collect();

@@ -80,8 +80,11 @@ pub(super) fn errors(data: &Measurement, rate_hz: f64, predicted: &[(&str, &[f64
         .collect()
 }
 
-/// Friction of every joint over its velocity. `laws`: name and the friction of `(joint, velocity)`.
-pub(super) fn friction(data: &Measurement, laws: &[(&str, &dyn Fn(usize, f64) -> f64)]) -> Vec<Chart> {
+/// Friction of `(joint, velocity)`.
+pub(super) type FrictionLaw<'a> = &'a dyn Fn(usize, f64) -> f64;
+
+/// Friction of every joint over its velocity, by laws with their names.
+pub(super) fn friction(data: &Measurement, laws: &[(&str, FrictionLaw<'_>)]) -> Vec<Chart> {
     const POINTS: i32 = 400;
     (0..JOINTS)
         .map(|j| {

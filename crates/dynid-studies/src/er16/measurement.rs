@@ -89,7 +89,7 @@ impl Measurement {
 
 pub(super) fn trajectory(settings: &Settings, rows: &[Vec<f64>]) -> Result<FourierTrajectory, StudyError> {
     FourierTrajectory::from_rows(settings.base_frequency(), Form::Plain, &RowOrder::default(), rows, 1)
-        .map_err(|e| StudyError::Dynid(e.into()))
+        .map_err(StudyError::from)
 }
 
 fn correlation(a: &[f64], b: &[f64]) -> f64 {

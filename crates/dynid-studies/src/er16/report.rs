@@ -181,7 +181,7 @@ impl Contents<'_> {
             compared.linear_model.efforts(&block, &[], &linear, 1, &mut effort);
             effort[j]
         };
-        let laws: [(&str, &dyn Fn(usize, f64) -> f64); 3] = [
+        let laws: [(&str, figures::FrictionLaw<'_>); 3] = [
             ("truth", &|j, v| figures::friction_law(self.arm, &truth, j, v)),
             ("linear with offset", &of_linear),
             ("with arctangent", &|j, v| figures::friction_law(self.arm, &compared.unknowns, j, v)),
