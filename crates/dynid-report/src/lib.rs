@@ -28,12 +28,12 @@ mod series;
 pub use data::{
     BaseParameter, Chart, ChartAxis, ChartCurve, Check, Chosen, ConfoundedPair, Consistency,
     ConsistencyStatus, CurveStyle, DesignJoint, DesignParameter, DesignQuality, DesignReport, DesignStart,
-    Fact, FramePath, HeldOut, HeldOutJoint, InputFile, Joint, JointDelay, JointMotion, JointQuality,
-    JointSeries, Ladder, Limit, LimitUse, LogReport, LogRole, LogSeries, LogWhiteness, Observation, Obstacle,
-    Origin, OwnerKind, ParameterShare, ParameterVerdict, Precision, Provenance, Pruning, PruningStep,
-    Quality, RandomMotion, ReportData, Robot, Rung, Shape, StandardParameter, Starts, Status, StudyReport,
-    StudyRow, StudySection, StudyTable, Trajectory, UnidentifiableColumn, ValidationPrice, Value, Verdict,
-    Warning, Whiteness,
+    Fact, FramePath, FrictionTrial, HeldOut, HeldOutJoint, InputFile, Joint, JointDelay, JointMotion,
+    JointQuality, JointSeries, Ladder, Limit, LimitUse, LogReport, LogRole, LogSeries, LogWhiteness,
+    Observation, Obstacle, Origin, OwnerKind, ParameterShare, ParameterVerdict, Precision, Provenance,
+    Pruning, PruningStep, Quality, RandomMotion, ReportData, Robot, Rung, Shape, ShapeParameter,
+    ShapeVerdict, StandardParameter, Starts, Status, StudyReport, StudyRow, StudySection, StudyTable,
+    Trajectory, UnidentifiableColumn, ValidationPrice, Value, Verdict, Warning, Whiteness,
 };
 pub use error::ReportError;
 pub use page::{render, render_design, render_study};

@@ -4,10 +4,10 @@
 mod synthetic;
 
 use dynid_report::{
-    BaseParameter, Check, Chosen, Consistency, Fact, HeldOut, HeldOutJoint, InputFile, Joint, JointDelay,
-    JointQuality, JointSeries, Ladder, Limit, LogReport, LogSeries, LogWhiteness, Precision, Pruning,
-    PruningStep, ReportData, ReportError, Rung, StandardParameter, UnidentifiableColumn, ValidationPrice,
-    Verdict, Warning, render,
+    BaseParameter, Chart, ChartAxis, ChartCurve, Check, Chosen, Consistency, Fact, FrictionTrial, HeldOut,
+    HeldOutJoint, InputFile, Joint, JointDelay, JointQuality, JointSeries, Ladder, Limit, LogReport,
+    LogSeries, LogWhiteness, Precision, Pruning, PruningStep, ReportData, ReportError, Rung, ShapeParameter,
+    ShapeVerdict, StandardParameter, UnidentifiableColumn, ValidationPrice, Verdict, Warning, render,
 };
 
 const HOSTILE: &str = "</script><script>alert('x')</script><img src=\"https://example.org/x.png\">&";
@@ -63,6 +63,26 @@ fn hollow(text: &str) -> ReportData {
             reason: text(),
             combination: text(),
             advice: text(),
+            ..Default::default()
+        }],
+        shape_parameters: vec![ShapeParameter {
+            name: text(),
+            unit: text(),
+            reason: text(),
+            ..Default::default()
+        }],
+        friction_laws: vec![Chart {
+            title: text(),
+            note: text(),
+            x: ChartAxis { label: text(), unit: text(), ..Default::default() },
+            y: ChartAxis { label: text(), unit: text(), ..Default::default() },
+            curves: vec![ChartCurve { name: text(), ..Default::default() }; 2],
+            ..Default::default()
+        }],
+        friction_trials: vec![FrictionTrial {
+            joint: text(),
+            element: text(),
+            speed_unit: text(),
             ..Default::default()
         }],
         motions: vec![text()],
@@ -222,6 +242,42 @@ fn the_path_of_smaller_models_is_drawn_with_its_choice() {
     assert!(page.contains("<title>36 parameters: 1.300 ± 0.10</title>"));
     assert!(between(&page, "Essential parameters</h3>", "</p>")[0].contains("<code>Izz1</code>"));
     assert_eq!(page.matches("<tr class=\"chosen\"><td class=\"n\">36</td>").count(), 1);
+}
+
+#[test]
+fn nonlinear_friction_is_shown_where_there_is_any() {
+    let mut data = synthetic::report(6, 500);
+    let page = render(&data).unwrap();
+    let rows = between(&page, "Parameters that enter nonlinearly</h3>", "</table>")[0];
+    assert!(
+        rows.contains("<td>joint_2.vs</td><td class=\"n\">0.0412</td><td class=\"n\">0.0031</td>"),
+        "{rows}"
+    );
+    assert!(
+        rows.contains("0.0350 to 0.0474")
+            && rows.contains("0.0200 to 0.0850")
+            && rows.contains("bounded on one side"),
+        "{rows}"
+    );
+    assert_eq!(page.matches("<svg class=\"chart\"").count(), 1);
+    let trials = between(&page, "Friction shapes tried</h3>", "</table>")[0];
+    assert!(
+        trials.contains("<td>stribeck</td><td class=\"n\">0.0400 rad&#x2f;s</td><td class=\"n\">12.3</td>"),
+        "{trials}"
+    );
+    assert!(page.contains("href=\"#friction\""));
+
+    data.shape_parameters.clear();
+    data.friction_laws.clear();
+    data.friction_trials.clear();
+    let page = render(&data).unwrap();
+    for absent in ["#friction", "id=\"friction\"", "Friction shapes tried", "<svg class=\"chart\""] {
+        assert!(!page.contains(absent), "{absent}");
+    }
+
+    data.shape_parameters = vec![ShapeParameter { verdict: ShapeVerdict::NotSeen, ..Default::default() }];
+    let page = render(&data).unwrap();
+    assert!(page.contains("Parameters that enter nonlinearly") && !page.contains("Friction over velocity"));
 }
 
 #[test]

@@ -80,24 +80,30 @@ impl Identification {
 
     /// Warnings about friction that drives the motion, and about static friction below Coulomb friction.
     pub(crate) fn friction_warnings(&self) -> Vec<String> {
-        let mut out = Vec::new();
-        for record in self.friction_passivity() {
-            let joint = &record.joint;
-            if record.passivity != PASSIVE {
-                out.push(format!(
-                    "the identified friction of `{joint}` is {}: a simulator with it may not come to rest. {}, or ask for a \
-                     simpler law (`--friction linear`)",
-                    in_words(&record, self.speed_unit(joint)),
-                    self.bound_on_friction(joint)
-                ));
-            }
-            if record.static_below_coulomb {
-                out.push(format!(
-                    "static friction of `{joint}` is identified below Coulomb friction (`{joint}.fs` < `{joint}.fc`): the law \
-                     rises from rest, which is no Stribeck effect. Take a simpler law (`coulomb` in place of `stribeck`), or bound \
-                     `{joint}.fs` from below (`[[bound]]`)"
-                ));
-            }
+        let records = self.friction_passivity();
+        let mut out: Vec<String> = records
+            .iter()
+            .filter(|r| r.passivity != PASSIVE)
+            .map(|r| {
+                format!(
+                    "the identified friction of `{}` is {}; a simulator with it may not come to rest. {}, or ask for a simpler \
+                     law (`--friction linear`)",
+                    r.joint,
+                    in_words(r, self.speed_unit(&r.joint)),
+                    self.bound_on_friction(&r.joint)
+                )
+            })
+            .collect();
+        let rising: Vec<&str> =
+            records.iter().filter(|r| r.static_below_coulomb).map(|r| r.joint.as_str()).collect();
+        if !rising.is_empty() {
+            out.push(format!(
+                "static friction of `{}` is identified below Coulomb friction (`fs` < `fc`): friction rises from rest, which is \
+                 no Stribeck effect, and `fs` and `vs` tell the shape of the law alone. Take a law that rises from rest \
+                 (`--friction tanh`) or a simpler one (`--friction linear`), or bound `{}.fs` from below (`[[bound]]`)",
+                rising.join("`, `"),
+                rising[0]
+            ));
         }
         out
     }
@@ -143,12 +149,22 @@ pub(crate) fn in_words(record: &PassivityRecord, unit: &str) -> String {
         PASSIVE_ON => {
             let parts: Vec<String> = record.intervals.iter().copied().map(range).collect();
             format!(
-                "passive {} alone; elsewhere {all}, as the training logs reach, {worst}",
+                "passive {} alone; elsewhere {all}, the range of the training logs, {worst}",
                 parts.join(" and ")
             )
         }
-        _ => format!("nowhere passive {all}, as the training logs reach: {worst}"),
+        _ => format!("nowhere passive {all}, the range of the training logs: {worst}"),
     }
+}
+
+/// What there is to say about a law in its chart.
+pub(crate) fn sentence(record: &PassivityRecord, unit: &str) -> String {
+    let words = in_words(record, unit);
+    let mut out = words[..1].to_uppercase() + &words[1..] + ".";
+    if record.static_below_coulomb {
+        out.push_str(" Static friction is identified below Coulomb friction.");
+    }
+    out
 }
 
 /// `x` rounded to three significant digits.

@@ -1,5 +1,6 @@
 //! The report's content from an identification and its result file.
 
+mod friction;
 mod trust;
 
 use dynid_report as report;
@@ -93,6 +94,8 @@ impl Identification {
             ],
             base_parameters: trust::base_parameters(estimate),
             standard_parameters: self.standard_parameters(estimate),
+            shape_parameters: friction::shape_parameters(estimate),
+            friction_laws: self.friction_laws(estimate),
             motions: estimate.motions_that_would_help.clone(),
             consistency: self.consistency_report(estimate),
             held_out: trust::held_out(estimate),
@@ -120,6 +123,7 @@ impl Identification {
                 .collect(),
             conditioning: estimate.conditioning.choices.iter().map(chosen).collect(),
             ladders: self.ladders(),
+            friction_trials: self.friction_trials(estimate),
             delays: self.delays(),
             provenance: report::Provenance {
                 version: estimate.provenance.version.clone(),

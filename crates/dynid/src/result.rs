@@ -17,6 +17,7 @@ use crate::estimate::{
 use crate::identify::Identification;
 use crate::logs::sha256;
 use crate::shape;
+use crate::trust::ParameterTrust;
 use crate::verdict;
 
 impl Identification {
@@ -188,7 +189,8 @@ impl Identification {
                     std,
                     interval: around.or(one_sided),
                     verdict: verdict.to_owned(),
-                    reason: shape::reason(finding, self.conditioning.is_some()),
+                    reason: shape::reason(finding, self.conditioning.is_some())
+                        .or_else(|| trust.filter(|t| seen && t.std.is_none()).map(without_interval)),
                 }
             })
             .collect()
@@ -416,6 +418,13 @@ fn pool(all: &[(FitValues, usize)]) -> FitValues {
         };
     };
     only.clone()
+}
+
+/// Why a shape parameter that the search finds in the data has no interval.
+fn without_interval(trust: &ParameterTrust) -> String {
+    let verdict = &trust.assessment.verdict;
+    let reason = verdict.reason().map_or_else(String::new, |r| format!(" ({r})"));
+    format!("no interval: beside all other parameters it is {}{reason}", verdict.words())
 }
 
 fn relative(value: Option<f64>, std: Option<f64>) -> Option<f64> {

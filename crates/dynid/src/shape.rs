@@ -122,12 +122,17 @@ pub(crate) fn of_change(name: &str) -> Option<&str> {
 /// Verdict of a shape parameter that the logs show.
 pub(crate) const SEEN: &str = "seen in the data";
 
+/// Verdict of one that they bound on one side.
+pub(crate) const ONE_SIDED: &str = "bounded on one side";
+/// Verdict of one of which any value fits.
+pub(crate) const NOT_SEEN: &str = "not seen";
+
 /// Verdict in words, and the interval of one that is bounded on one side.
 pub(crate) fn verdict(found: Option<ShapeVerdict>) -> (&'static str, Option<(f64, f64)>) {
     match found {
         Some(ShapeVerdict::Seen) => (SEEN, None),
-        Some(ShapeVerdict::OneSided { lower, upper }) => ("bounded on one side", Some((lower, upper))),
-        Some(ShapeVerdict::NotSeen) => ("not seen", None),
+        Some(ShapeVerdict::OneSided { lower, upper }) => (ONE_SIDED, Some((lower, upper))),
+        Some(ShapeVerdict::NotSeen) => (NOT_SEEN, None),
         Some(ShapeVerdict::Held | ShapeVerdict::NotJudged) | None => ("given", None),
     }
 }

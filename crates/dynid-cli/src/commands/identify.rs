@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use dynid::config::{Config, Consistency, Friction, LogConfig, Method, Route};
-use dynid::estimate::Estimate;
+use dynid::estimate::{Estimate, ShapeValue};
 use dynid::io::OutputError;
 use dynid::io::output::write_atomically;
 use dynid::{Error, identify};
@@ -189,6 +189,9 @@ fn summary<'a>(estimate: &Estimate, files: impl Iterator<Item = &'a Path>) {
         count("carried by the prior"),
         count("not identifiable"),
     ));
+    for shape in &estimate.shape_parameters {
+        note(&format!("  {}", shape_parameter(shape)));
+    }
     for motion in &estimate.motions_that_would_help {
         note(&format!("  {motion}"));
     }
@@ -196,6 +199,16 @@ fn summary<'a>(estimate: &Estimate, files: impl Iterator<Item = &'a Path>) {
     for file in files {
         note(&format!("written: {}", file.display()));
     }
+}
+
+/// A parameter that enters nonlinearly: value, interval, verdict with its reason.
+fn shape_parameter(shape: &ShapeValue) -> String {
+    let number = |x: f64| table::number(Some(x));
+    let interval = shape
+        .interval
+        .map_or_else(String::new, |(low, high)| format!(" (95 %: {} to {})", number(low), number(high)));
+    let reason = shape.reason.as_ref().map_or_else(String::new, |r| format!(", {r}"));
+    format!("{} = {} {}{interval}: {}{reason}", shape.name, number(shape.value), shape.unit, shape.verdict)
 }
 
 fn verdict(estimate: &Estimate) -> String {

@@ -8,6 +8,8 @@ use dynid_report::{
     Robot, Rung, Status, UnidentifiableColumn, Verdict, Warning,
 };
 
+#[path = "friction.rs"]
+mod friction;
 #[path = "trust.rs"]
 mod trust;
 
@@ -41,6 +43,8 @@ pub(crate) fn report(joints: usize, samples: usize) -> ReportData {
         ],
         base_parameters: base_parameters(joints),
         standard_parameters: trust::standard_parameters(joints),
+        shape_parameters: friction::shape_parameters(),
+        friction_laws: friction::laws(),
         motions: trust::motions(),
         consistency: Some(trust::consistency()),
         held_out: trust::held_out(joints),
@@ -60,6 +64,7 @@ pub(crate) fn report(joints: usize, samples: usize) -> ReportData {
             .into(),
         conditioning: conditioning(),
         ladders: ladders(),
+        friction_trials: friction::trials(),
         delays: (0..joints)
             .map(|j| JointDelay {
                 delay_s: Some(0.0005 + 0.0001 * j as f64),

@@ -13,6 +13,7 @@
 mod conditioning;
 mod consistency;
 mod design;
+mod friction;
 mod log;
 mod parameters;
 mod precision;
@@ -27,6 +28,7 @@ pub use design::{
     ConfoundedPair, DesignJoint, DesignParameter, DesignQuality, DesignReport, DesignStart, FramePath,
     JointMotion, LimitUse, Obstacle, ParameterShare, RandomMotion, Shape, Starts, Trajectory,
 };
+pub use friction::{FrictionTrial, ShapeParameter, ShapeVerdict};
 pub use log::{JointQuality, JointSeries, LogReport, LogRole, LogSeries, Quality};
 pub use parameters::{BaseParameter, OwnerKind, ParameterVerdict, StandardParameter};
 pub use precision::{LogWhiteness, Precision, Whiteness};
@@ -60,6 +62,10 @@ pub struct ReportData {
     pub base_parameters: Vec<BaseParameter>,
     /// Parameters per link and joint.
     pub standard_parameters: Vec<StandardParameter>,
+    /// Parameters that enter the effort nonlinearly.
+    pub shape_parameters: Vec<ShapeParameter>,
+    /// Effort of friction over velocity, a chart per joint whose law is not linear in its parameters.
+    pub friction_laws: Vec<Chart>,
     /// Motions that would reveal what the logs do not, most helpful first, a sentence each.
     pub motions: Vec<String>,
     /// Physical consistency and its price; `None` if none was asked for.
@@ -78,6 +84,8 @@ pub struct ReportData {
     pub conditioning: Vec<Chosen>,
     /// Candidate settings that were compared, with their losses: mask ladder, kernel ladder, ...
     pub ladders: Vec<Ladder>,
+    /// Friction shapes that were tried, joint by joint.
+    pub friction_trials: Vec<FrictionTrial>,
     /// Per joint: delay between measured position and measured effort.
     pub delays: Vec<JointDelay>,
     /// What is needed to repeat the run.

@@ -4,6 +4,7 @@ use minijinja::context;
 use minijinja::value::{Serde, Value};
 use serde::Serialize;
 
+use super::chart::chart;
 use super::pruning::pruning;
 use super::script_data::script_json;
 use super::trust::{limits_by_owner, trust};
@@ -27,6 +28,9 @@ pub(super) fn context(data: &ReportData) -> Result<Value, ReportError> {
         estimation => Serde(&data.estimation),
         base_parameters => Serde(&data.base_parameters),
         trust => Serde(trust(data)),
+        shape_parameters => Serde(&data.shape_parameters),
+        friction_laws => Serde(data.friction_laws.iter().map(chart).collect::<Vec<_>>()),
+        friction_trials => Serde(&data.friction_trials),
         motions => Serde(&data.motions),
         consistency => Serde(&data.consistency),
         limits_by_owner => Serde(limits_by_owner(data.consistency.as_ref())),

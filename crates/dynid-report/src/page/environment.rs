@@ -13,7 +13,7 @@ pub(super) const DESIGN_PAGE: &str = "design/page.html";
 pub(super) const STUDY_PAGE: &str = "study/page.html";
 
 /// Every name ends in `.html`, which switches automatic escaping on.
-const TEMPLATES: [(&str, &str); 24] = [
+const TEMPLATES: [(&str, &str); 25] = [
     ("shell.html", include_str!("../../template/shell.html")),
     (PAGE, include_str!("../../template/page.html")),
     ("macros.html", include_str!("../../template/macros.html")),
@@ -27,6 +27,7 @@ const TEMPLATES: [(&str, &str); 24] = [
     ("quality.html", include_str!("../../template/quality.html")),
     ("effort.html", include_str!("../../template/effort.html")),
     ("parameters.html", include_str!("../../template/parameters.html")),
+    ("friction.html", include_str!("../../template/friction.html")),
     ("conditioning.html", include_str!("../../template/conditioning.html")),
     (DESIGN_PAGE, include_str!("../../template/design/page.html")),
     ("design/trajectory.html", include_str!("../../template/design/trajectory.html")),

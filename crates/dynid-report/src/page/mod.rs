@@ -1,5 +1,6 @@
 //! The page: checked data in, HTML out.
 
+mod chart;
 mod checks;
 mod context;
 mod design;

@@ -4,8 +4,8 @@ use minijinja::context;
 use minijinja::value::{Serde, Value};
 use serde::Serialize;
 
-use crate::data::{Chart, ChartAxis, Fact, StudyReport, StudySection, StudyTable};
-use crate::drawing::chart_svg;
+use super::chart::{ChartView, chart};
+use crate::data::{Fact, StudyReport, StudySection, StudyTable};
 
 pub(super) fn context(data: &StudyReport) -> Value {
     let sections: Vec<SectionView<'_>> = data.sections.iter().map(section).collect();
@@ -30,22 +30,6 @@ struct SectionView<'a> {
     charts: Vec<ChartView<'a>>,
 }
 
-#[derive(Debug, Serialize)]
-struct ChartView<'a> {
-    title: &'a str,
-    note: &'a str,
-    x: &'a ChartAxis,
-    y: &'a ChartAxis,
-    curves: Vec<Legend<'a>>,
-    picture: String,
-}
-
-#[derive(Debug, Serialize)]
-struct Legend<'a> {
-    name: &'a str,
-    style: crate::data::CurveStyle,
-}
-
 fn section(section: &StudySection) -> SectionView<'_> {
     SectionView {
         title: &section.title,
@@ -53,16 +37,5 @@ fn section(section: &StudySection) -> SectionView<'_> {
         facts: &section.facts,
         tables: &section.tables,
         charts: section.charts.iter().map(chart).collect(),
-    }
-}
-
-fn chart(chart: &Chart) -> ChartView<'_> {
-    ChartView {
-        title: &chart.title,
-        note: &chart.note,
-        x: &chart.x,
-        y: &chart.y,
-        curves: chart.curves.iter().map(|c| Legend { name: &c.name, style: c.style }).collect(),
-        picture: chart_svg(chart),
     }
 }

@@ -1,0 +1,110 @@
+//! Nonlinear friction, as the report shows it.
+
+use dynid_model::EffortModel;
+use dynid_report as report;
+
+use crate::elements::friction::{is_law, is_shaped};
+use crate::estimate::{Estimate, PassivityRecord};
+use crate::identify::Identification;
+use crate::passivity;
+use crate::shape::{self, NOT_SEEN, ONE_SIDED};
+
+/// Velocities drawn on each side of rest.
+const POINTS: usize = 200;
+
+impl Identification {
+    /// Friction over velocity of joints that have a law with shape parameters.
+    pub(super) fn friction_laws(&self, estimate: &Estimate) -> Vec<report::Chart> {
+        let outputs = estimate.joints.iter().zip(self.output_rates());
+        outputs
+            .filter_map(|(joint, rate)| {
+                let rate = rate?;
+                let record = estimate.friction_passivity.iter().find(|r| r.joint == *joint)?;
+                self.plan.per_rate[rate].iter().any(|name| is_shaped(name)).then(|| self.law(record, rate))
+            })
+            .collect()
+    }
+
+    fn law(&self, record: &PassivityRecord, rate: usize) -> report::Chart {
+        let (model, linear) = self.identified_model();
+        let shape = model.parameters().shape_start();
+        let (low, high) = record.velocity_range;
+        // Denser towards rest, where laws bend.
+        let side = |k: usize| (k as f64 / POINTS as f64).powi(3);
+        let backward = (1..=POINTS).rev().map(|k| low * side(k));
+        let mut velocities: Vec<f64> =
+            backward.chain(std::iter::once(0.0)).chain((1..=POINTS).map(|k| high * side(k))).collect();
+        velocities.dedup();
+        let efforts = model.friction_effort(rate, &shape, linear, &velocities);
+        let points: Vec<[f64; 2]> = velocities.into_iter().zip(efforts).map(|(v, e)| [v, e]).collect();
+        let mut curves = vec![report::ChartCurve {
+            name: "identified law".to_owned(),
+            points: points.clone(),
+            style: report::CurveStyle::Line,
+        }];
+        if record.passivity != passivity::PASSIVE {
+            let drives = |[v, e]: [f64; 2]| [v, if v * e < 0.0 { e } else { f64::NAN }];
+            curves.push(report::ChartCurve {
+                name: "drives the motion".to_owned(),
+                points: points.into_iter().map(drives).collect(),
+                style: report::CurveStyle::Line,
+            });
+        }
+        let unit = self.speed_unit(&record.joint);
+        let axis = |label: &str, unit: &str| report::ChartAxis {
+            label: label.to_owned(),
+            unit: unit.to_owned(),
+            logarithmic: false,
+        };
+        let laws: Vec<&str> =
+            self.plan.per_rate[rate].iter().map(String::as_str).filter(|name| is_law(name)).collect();
+        report::Chart {
+            title: format!("{}: {}", record.joint, laws.join(" + ")),
+            note: passivity::sentence(record, unit),
+            x: axis("velocity", unit),
+            y: axis("friction", if unit == "m/s" { "N" } else { "N m" }),
+            equal_units: false,
+            curves,
+        }
+    }
+
+    pub(super) fn friction_trials(&self, estimate: &Estimate) -> Vec<report::FrictionTrial> {
+        estimate
+            .conditioning
+            .friction_trials
+            .iter()
+            .map(|t| report::FrictionTrial {
+                joint: t.joint.clone(),
+                element: t.element.clone(),
+                speed: t.speed,
+                speed_unit: self.speed_unit(&t.joint).to_owned(),
+                gain_percent: Some(100.0 * t.gain),
+                standard_error_percent: Some(100.0 * t.standard_error),
+                accepted: t.accepted,
+            })
+            .collect()
+    }
+}
+
+pub(super) fn shape_parameters(estimate: &Estimate) -> Vec<report::ShapeParameter> {
+    let verdict = |words: &str| match words {
+        shape::SEEN => report::ShapeVerdict::SeenInData,
+        ONE_SIDED => report::ShapeVerdict::OneSided,
+        NOT_SEEN => report::ShapeVerdict::NotSeen,
+        _ => report::ShapeVerdict::Given,
+    };
+    estimate
+        .shape_parameters
+        .iter()
+        .map(|p| report::ShapeParameter {
+            name: p.name.clone(),
+            unit: p.unit.clone(),
+            value: Some(p.value),
+            std: p.std,
+            interval: p.interval.map(|(low, high)| [low, high]),
+            range: Some([p.range.0, p.range.1]),
+            verdict: verdict(&p.verdict),
+            reason: p.reason.clone().unwrap_or_default(),
+        })
+        .collect()
+}
