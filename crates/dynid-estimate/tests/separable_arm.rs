@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "in tests a panic is the report")]
 
 mod arm;
+mod er16;
 mod er16_arm;
 mod golden;
 
@@ -32,13 +33,13 @@ fn least() -> SeparableSettings {
 
 fn fitted(arm: &Er16, effort: &[f64], settings: &SeparableSettings) -> SeparableEstimate {
     let blocks = arm.blocks(effort);
-    let problem = EffortProblem::new(&arm.model, &arm.kept, &blocks).unwrap();
+    let problem = EffortProblem::new(&arm.arm.model, &arm.arm.kept, &blocks).unwrap();
     fit(&problem.with_shape(arm.shape()), settings).unwrap()
 }
 
 #[test]
 fn er16_without_noise_gives_back_all_thirty_parameters() {
-    let Some(arm) = Er16::reference(200) else { return };
+    let Some(arm) = Er16::reference() else { return };
     let effort = arm.clean();
     let started = std::time::Instant::now();
     let estimate = fitted(&arm, &effort, &least());
@@ -56,7 +57,7 @@ fn er16_without_noise_gives_back_all_thirty_parameters() {
 
 #[test]
 fn er16_with_noise_beats_the_truth_and_does_not_depend_on_the_start() {
-    let Some(arm) = Er16::reference(200) else { return };
+    let Some(arm) = Er16::reference() else { return };
     for seed in 0..5 {
         let effort = arm.noisy(seed);
         let started = std::time::Instant::now();
@@ -85,7 +86,7 @@ fn er16_with_noise_beats_the_truth_and_does_not_depend_on_the_start() {
 /// A search over the slopes alone, linear parameters eliminated, ends where the multi-start does.
 #[test]
 fn er16_by_a_search_of_the_slopes() {
-    let Some(arm) = Er16::reference(200) else { return };
+    let Some(arm) = Er16::reference() else { return };
     let effort = arm.noisy(0);
     let multi_start = fitted(&arm, &effort, &least());
     for name in ["ics", "abc", "pso-general", "gps", "cma-es", "de"] {
@@ -105,7 +106,7 @@ fn er16_by_a_search_of_the_slopes() {
     let settings = search::Settings { evaluations: Some(0), ..search::Settings::default() };
     let none = ShapeSearch { algorithm: "de".parse().unwrap(), settings };
     let blocks = arm.blocks(&effort);
-    let problem = EffortProblem::new(&arm.model, &arm.kept, &blocks).unwrap().with_shape(arm.shape());
+    let problem = EffortProblem::new(&arm.arm.model, &arm.arm.kept, &blocks).unwrap().with_shape(arm.shape());
     let refused = fit(&problem, &SeparableSettings { search: Some(none), ..least() });
     assert!(matches!(refused, Err(SeparableError::Search(_))), "{refused:?}");
 }
@@ -114,7 +115,7 @@ fn er16_by_a_search_of_the_slopes() {
 fn er16_golden_set_is_fitted_no_worse_than_by_the_reference() {
     let Some(golden) = golden::load("er16_identification.json") else { return };
     let Some(arm) = Er16::golden(&golden) else { return };
-    let effort = er16_arm::joint_after_joint(&golden["tau"]);
+    let effort = er16::joint_after_joint(&golden["tau"]);
     let estimate = fitted(&arm, &effort, &least());
     let reference = golden::number(&golden["reference_ls"]["rss"]);
     let own: f64 = estimate.residuals.iter().flatten().map(|r| r * r).sum();
@@ -124,7 +125,7 @@ fn er16_golden_set_is_fitted_no_worse_than_by_the_reference() {
         let found = arm.loss_of(&golden::vector(&case["x"]), &effort);
         assert!((found - golden::number(&case["F"])).abs() < 1e-8, "{found}");
     }
-    let clean = er16_arm::joint_after_joint(&golden["tau_noise_free"]);
+    let clean = er16::joint_after_joint(&golden["tau_noise_free"]);
     let error = arm.error(&fitted(&arm, &clean, &least()));
     println!("ER-16 golden without noise: largest error {error:.1e}");
     assert!(error < 1e-6);

@@ -32,6 +32,12 @@ pub(crate) fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
 }
 
+/// Numbers of a table of samples × joints, joint after joint.
+pub(crate) fn joint_after_joint(table: &Value) -> Vec<f64> {
+    let rows: Vec<Vec<f64>> = table.as_array().unwrap().iter().map(numbers).collect();
+    (0..rows[0].len()).flat_map(|c| rows.iter().map(move |r| r[c])).collect()
+}
+
 /// Positions, velocities, accelerations, joint after joint.
 pub(crate) struct Motion {
     pub(crate) samples: usize,
@@ -43,10 +49,7 @@ pub(crate) struct Motion {
 impl Motion {
     /// From one row per sample.
     pub(crate) fn from_rows(q: &Value, dq: &Value, ddq: &Value) -> Motion {
-        let columns = |rows: &Value| -> Vec<f64> {
-            let rows: Vec<Vec<f64>> = rows.as_array().unwrap().iter().map(numbers).collect();
-            (0..rows[0].len()).flat_map(|c| rows.iter().map(move |r| r[c])).collect()
-        };
+        let columns = joint_after_joint;
         Motion { samples: q.as_array().unwrap().len(), q: columns(q), dq: columns(dq), ddq: columns(ddq) }
     }
 
@@ -70,7 +73,7 @@ pub(crate) struct Er16 {
     /// Base columns of the model.
     pub(crate) kept: Vec<usize>,
     /// For every unknown of our objective: its place in the published order.
-    order: Vec<usize>,
+    pub(crate) order: Vec<usize>,
 }
 
 impl Er16 {
@@ -123,10 +126,14 @@ impl Er16 {
         self.order.iter().map(|k| published[*k]).collect()
     }
 
-    pub(crate) fn truth(&self) -> Vec<f64> {
+    pub(crate) fn published_truth(&self) -> Vec<f64> {
         let mut all = numbers(&self.data["truth"]["phi_base"]);
         all.extend(numbers(&self.data["truth"]["friction"]));
-        self.ours(&all)
+        all
+    }
+
+    pub(crate) fn truth(&self) -> Vec<f64> {
+        self.ours(&self.published_truth())
     }
 
     pub(crate) fn bounds(&self) -> Bounds {
