@@ -84,7 +84,7 @@ fn a_law_that_drives_the_motion_is_told_with_a_remedy() {
 
     assert!(page.contains("Parameters that enter nonlinearly"));
     let row = page.split("<tr><td>j1.fb</td>").nth(1).unwrap().split("</tr>").next().unwrap();
-    assert!(row.contains("seen in the data") && row.contains("s/rad"), "{row}");
+    assert!(row.contains("seen in the data") && row.contains("s&#x2f;rad"), "{row}");
     assert!(page.contains("<figcaption>j1: coulomb + viscous + arctangent</figcaption>"));
     assert!(page.contains("<svg class=\"chart\"") && page.contains("drives the motion</span>"));
     assert!(page.contains("Passive from -1."), "the passive range in words");
