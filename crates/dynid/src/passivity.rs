@@ -118,10 +118,17 @@ impl Identification {
         };
         let negative = table.iter().zip(linear).filter(|(p, value)| **value < 0.0 && coefficient(&p.name));
         let names: Vec<String> = negative.map(|(p, _)| format!("`{}`", p.name)).collect();
-        match names.is_empty() {
-            true => "Bound its coefficients (`[[bound]]`)".to_owned(),
-            false => format!("Bound {} to at least 0 (`[[bound]]`)", names.join(" and ")),
-        }
+        let what = match names.is_empty() {
+            true => "its coefficients".to_owned(),
+            false => format!("{} to at least 0", names.join(" and ")),
+        };
+        // Bounds are kept by the consistent estimate alone.
+        let ask = if self.consistent.estimate.is_some() {
+            "Bound"
+        } else {
+            "Ask for physical consistency and bound"
+        };
+        format!("{ask} {what} (`[[bound]]`)")
     }
 
     /// Unit of a joint's velocity.

@@ -80,7 +80,7 @@ fn a_law_that_drives_the_motion_is_told_with_a_remedy() {
 
     let [warning] = about_friction(&estimate)[..] else { panic!("{:?}", estimate.verdict.warnings) };
     assert!(warning.contains("drives the motion, most at -2 rad/s") && warning.contains("--friction linear"));
-    assert!(warning.contains("`j1.fv`") && warning.contains("[[bound]]"), "{warning}");
+    assert!(warning.contains("`j1.fv`") && warning.contains("consistency and bound"), "{warning}");
 
     assert!(page.contains("Parameters that enter nonlinearly"));
     let row = page.split("<tr><td>j1.fb</td>").nth(1).unwrap().split("</tr>").next().unwrap();
