@@ -86,7 +86,8 @@ fn pairs() -> Vec<Pair> {
                 *x = 3.0 + k as f64;
             }
             let own = linear[10..].to_vec();
-            let linearised = Linearised::new(again, plain.joints(), shape.clone(), own);
+            let linearised =
+                Linearised::new(again, plain.joints(), shape.clone(), own, vec![true; shape.len()]);
             let linearised = RobotModel::new(mechanism(), vec![Box::new(linearised)]);
             let mut at = linear.clone();
             at.resize(linearised.parameters().linear.len(), 0.0);
@@ -159,5 +160,42 @@ fn adjoint_of_changes_is_the_derivative_by_the_velocity() {
                 out.dq[s]
             );
         }
+    }
+}
+
+#[test]
+fn held_shape_parameters_have_no_column() {
+    let (dq, zero) = (speeds(), vec![0.0; SAMPLES]);
+    let motion = block(&dq, &zero, 0.0);
+    let own = |pair: &Pair| pair.linear[10..].to_vec();
+    for (element, pair) in elements().into_iter().zip(pairs()) {
+        let shape = pair.shape.clone();
+        let held = vec![false; shape.len()];
+        let element = Linearised::new(element, pair.plain.joints(), shape, own(&pair), held);
+        let model = RobotModel::new(mechanism(), vec![Box::new(element)]);
+        assert_eq!(model.parameters().linear, pair.plain.parameters().linear);
+        let here = efforts(&pair.plain, &motion, &pair.shape, &pair.linear);
+        assert_eq!(here, efforts(&model, &motion, &[], &pair.linear));
+    }
+    // The last of several alone.
+    for (element, pair) in elements().into_iter().zip(pairs()).filter(|(_, pair)| pair.shape.len() > 1) {
+        let known = pair.linear.len();
+        let mut free = vec![false; pair.shape.len()];
+        free[pair.shape.len() - 1] = true;
+        let element = Linearised::new(element, pair.plain.joints(), pair.shape.clone(), own(&pair), free);
+        let model = RobotModel::new(mechanism(), vec![Box::new(element)]);
+        assert_eq!(
+            model.parameters().linear[known..],
+            pair.linearised.parameters().linear[pair.at.len() - 1..]
+        );
+        let mut all = pair.at.clone();
+        *all.last_mut().unwrap() = 0.3;
+        let last: Vec<f64> = all[..known].iter().copied().chain([0.3]).collect();
+        let [few, many] = [(&model, &last), (&pair.linearised, &all)].map(|(model, linear)| {
+            let mut out = MotionAdjoint::new(1, 1, SAMPLES);
+            model.effort_adjoint(&motion, &[], linear, SAMPLES, &vec![1.0; SAMPLES], &mut out);
+            (efforts(model, &motion, &[], linear), out.dq)
+        });
+        assert_eq!(few, many);
     }
 }

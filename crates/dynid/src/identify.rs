@@ -183,7 +183,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
             progress(Step::Shapes);
             let (found, linear) =
                 shape::find(config, model, &structure.base, &prepared, (choices, &settings))?;
-            let linearised = shape::linearised(&plan, &found.model, &linear)?;
+            let free: Vec<bool> = found.findings.iter().map(shape::is_free).collect();
+            let linearised = shape::linearised(&plan, &found.model, &linear, &free)?;
             let structure = Structure::of(config, &linearised, &plan, &prepared)?;
             (linearised, structure, Some(found))
         }

@@ -49,32 +49,53 @@ pub(crate) fn find(
     Ok((ShapeFit { model, findings: found.findings, starts: found.starts }, linear))
 }
 
+/// Whether a linearised model may change a shape parameter: not if the logs do not see it or it lies at a bound, since a
+/// step would then have no evidence or lead out of its range.
+pub(crate) fn is_free(finding: &ShapeFinding) -> bool {
+    !matches!(finding.verdict, ShapeVerdict::NotSeen | ShapeVerdict::Held) && finding.at_bound.is_none()
+}
+
 /// The model of a plan, linearised about its shape parameters and the given linear parameters: every shape parameter
-/// becomes a linear one, the change from its value.
+/// that is `free` becomes a linear one, the change from its value; the others stay.
 ///
 /// # Errors
 /// As [`ElementPlan::build`].
 ///
 /// # Panics
-/// If `linear` is not one value per linear parameter of `model`, or `model` is not of this plan.
-pub fn linearised(plan: &ElementPlan, model: &RobotModel, linear: &[f64]) -> Result<RobotModel, Error> {
+/// If `linear` is not one value per linear parameter of `model`, `free` not one per shape parameter, or `model` is not of
+/// this plan.
+pub fn linearised(
+    plan: &ElementPlan,
+    model: &RobotModel,
+    linear: &[f64],
+    free: &[bool],
+) -> Result<RobotModel, Error> {
+    assert_eq!(free.len(), model.parameters().shape.len(), "length of free");
     assert_eq!(linear.len(), model.parameters().linear.len(), "length of linear");
     let mechanism = model.mechanism();
     let shape = model.parameters().shape_start();
-    let (mut shape, mut linear) = (shape.as_slice(), &linear[mechanism.inertial_parameters()..]);
+    let (mut shape, mut free) = (shape.as_slice(), free);
+    let mut linear = &linear[mechanism.inertial_parameters()..];
     let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
     for element in plan.build(mechanism)? {
         let own_shape = take(&mut shape, element.shape(model.joints()).len());
         let own_linear = take(&mut linear, element.parameters(model.joints()).len());
+        let own_free = take(&mut free, own_shape.len());
         elements.push(match own_shape {
             [] => element,
-            _ => Box::new(Linearised::new(element, model.joints(), own_shape.to_vec(), own_linear.to_vec())),
+            _ => Box::new(Linearised::new(
+                element,
+                model.joints(),
+                own_shape.to_vec(),
+                own_linear.to_vec(),
+                own_free.to_vec(),
+            )),
         });
     }
     Ok(RobotModel::new(mechanism.clone(), elements))
 }
 
-fn take<'a>(rest: &mut &'a [f64], count: usize) -> &'a [f64] {
+fn take<'a, T>(rest: &mut &'a [T], count: usize) -> &'a [T] {
     let (own, others) = rest.split_at(count);
     *rest = others;
     own

@@ -8,20 +8,23 @@ use crate::parameter::{Owner, Parameter};
 /// parameter, `Σ ∂column/∂α · c₀`, whose coefficient is the change of that parameter from `α₀`.
 ///
 /// A linear fit of such a model is one Gauss-Newton step on linear and shape parameters together, and its covariance is
-/// that of both. The change is named `<joint>.<symbol> (change)` and bounded by the bounds of the shape parameter.
+/// that of both. The change is named `<joint>.<symbol> (change)` and bounded by the bounds of the shape parameter. Shape
+/// parameters that are not free stay at `α₀` and have no column.
 #[derive(Debug)]
 pub struct Linearised {
     element: Box<dyn JointElement>,
     shape: Vec<f64>,
+    /// Per shape parameter: whether it may change.
+    free: Vec<bool>,
     /// Rate and shape parameter of every further column.
     changes: Vec<(usize, usize)>,
-    /// Per pair of the element's shape entries: its further column, and the factor `c₀`.
-    pairs: Vec<(usize, f64)>,
+    /// Per pair of the element's shape entries: its further column, if the parameter may change, and the factor `c₀`.
+    pairs: Vec<(Option<usize>, f64)>,
     entries: Vec<(usize, usize)>,
 }
 
 impl Linearised {
-    /// `shape`, `linear`: the point, the element's own parameters alone.
+    /// `shape`, `linear`: the point, the element's own parameters alone. `free`: per shape parameter, whether it may change.
     ///
     /// # Panics
     /// If a vector has another length than the element has parameters.
@@ -30,22 +33,29 @@ impl Linearised {
         joints: &[JointInfo],
         shape: Vec<f64>,
         linear: Vec<f64>,
+        free: Vec<bool>,
     ) -> Self {
         assert_eq!(element.shape(joints).len(), shape.len(), "length of shape");
+        assert_eq!(free.len(), shape.len(), "length of free");
         assert_eq!(element.parameters(joints).len(), linear.len(), "length of linear");
         let mut entries = element.entries();
         let mut changes: Vec<(usize, usize)> = Vec::new();
         let mut pairs = Vec::new();
         for (entry, parameter) in element.shape_entries() {
             let (rate, factor) = (entries[entry].0, linear[entries[entry].1]);
+            if !free[parameter] {
+                pairs.push((None, factor));
+                continue;
+            }
             let place = changes.iter().position(|c| *c == (rate, parameter)).unwrap_or_else(|| {
                 changes.push((rate, parameter));
                 changes.len() - 1
             });
-            pairs.push((place, factor));
+            pairs.push((Some(place), factor));
         }
-        entries.extend(changes.iter().map(|(rate, parameter)| (*rate, linear.len() + parameter)));
-        Linearised { element, shape, changes, pairs, entries }
+        let place = |parameter: usize| linear.len() + free[..parameter].iter().filter(|f| **f).count();
+        entries.extend(changes.iter().map(|(rate, parameter)| (*rate, place(*parameter))));
+        Linearised { element, shape, free, changes, pairs, entries }
     }
 
     fn own_entries(&self) -> usize {
@@ -65,7 +75,8 @@ impl JointElement for Linearised {
     fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
         let mut out = self.element.parameters(joints);
         let joint = &joints[self.element.rates().first().copied().unwrap_or(0)];
-        out.extend(self.element.shape(joints).into_iter().zip(&self.shape).map(|(shape, at)| {
+        let free = self.element.shape(joints).into_iter().zip(&self.shape).zip(&self.free);
+        out.extend(free.filter(|(_, free)| **free).map(|((shape, at), _)| {
             let symbol = shape.name.rsplit('.').next().unwrap_or_default();
             Parameter {
                 name: change_name(&shape.name),
@@ -110,6 +121,7 @@ impl JointElement for Linearised {
             out.column(own + change).fill(0.0);
         }
         for ((change, factor), derivative) in self.pairs.iter().zip(memory.chunks_exact(n.max(1))) {
+            let Some(change) = change else { continue };
             for (to, d) in out.column(own + change).iter_mut().zip(derivative) {
                 *to += factor * d;
             }
@@ -128,7 +140,10 @@ impl JointElement for Linearised {
         self.element.adjoint(joints, motion, &self.shape, &columns, out);
         let mut memory = Vec::with_capacity(self.pairs.len() * n);
         for (change, factor) in &self.pairs {
-            memory.extend(weights.column(own + change).iter().map(|w| factor * w));
+            match change {
+                Some(change) => memory.extend(weights.column(own + change).iter().map(|w| factor * w)),
+                None => memory.resize(memory.len() + n, 0.0),
+            }
         }
         let slots: Vec<usize> = (0..self.pairs.len()).collect();
         let pairs = ElementWeights { data: &memory, slots: &slots, stride: n, samples: n };
