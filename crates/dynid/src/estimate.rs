@@ -12,7 +12,7 @@ pub use trust::{
 
 use std::path::Path;
 
-use dynid_model::{EffortModel, RobotModel};
+use dynid_model::{EffortModel, RobotModel, ShapeParameter};
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
@@ -196,14 +196,17 @@ pub struct ShapeValue {
     pub name: String,
     /// Unit.
     pub unit: String,
-    /// Value.
+    /// Value, beside physically consistent linear parameters.
     pub value: f64,
+    /// Value beside the linear parameters without constraints; absent: the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unconstrained: Option<f64>,
     /// Range that was searched.
     pub range: (f64, f64),
-    /// Standard deviation; absent if it was not estimated.
+    /// Standard deviation of the unconstrained value; absent if it was not estimated.
     #[serde(default)]
     pub std: Option<f64>,
-    /// 95 % interval; one-sided ones end at a bound.
+    /// 95 % interval around the unconstrained value; one-sided ones end at a bound.
     #[serde(default)]
     pub interval: Option<(f64, f64)>,
     /// `seen in the data`, `bounded on one side`, `not seen` or `given`.
@@ -376,11 +379,12 @@ impl Estimate {
         text
     }
 
-    /// Rebuilds the effort model.
+    /// Rebuilds the effort model with the shape parameters that go with the linear ones of `split`; `file` stands in
+    /// messages.
     ///
     /// # Errors
-    /// [`Error::EstimateFile`] if the record contradicts itself.
-    pub fn effort_model(&self, file: &Path) -> Result<RobotModel, Error> {
+    /// [`Error::EstimateFile`] if the record contradicts itself or a shape parameter is not within its range.
+    pub fn effort_model(&self, file: &Path, split: Split) -> Result<RobotModel, Error> {
         let fault = |message: String| Error::EstimateFile { file: file.display().to_string(), message };
         let description = self.model.description(&self.robot).map_err(&fault)?;
         let mechanism = description.build().map_err(|e| fault(e.to_string()))?;
@@ -399,16 +403,35 @@ impl Estimate {
         if expected != self.parameters.len() {
             return Err(fault(format!("{} parameters, the model has {expected}", self.parameters.len())));
         }
-        let shape: Vec<f64> = self.shape_parameters.iter().map(|s| s.value).collect();
-        let names = self.shape_parameters.iter().map(|s| &s.name);
-        if !names.eq(table.shape.iter().map(|s| &s.name)) || !shape.iter().all(|x| x.is_finite()) {
-            return Err(fault(format!(
-                "{} finite shape parameters, the model has {}",
-                shape.len(),
-                table.shape.len()
-            )));
-        }
+        let shape = self.shape(split, &table.shape).map_err(fault)?;
         Ok(model.with_shape(&shape))
+    }
+
+    /// Values of the shape parameters that go with a split; `Err` says what is wrong with them.
+    fn shape(&self, split: Split, expected: &[ShapeParameter]) -> Result<Vec<f64>, String> {
+        let names = |list: &mut dyn Iterator<Item = &String>| {
+            let list: Vec<String> = list.map(|name| format!("`{name}`")).collect();
+            if list.is_empty() { "none".to_owned() } else { list.join(", ") }
+        };
+        if !self.shape_parameters.iter().map(|s| &s.name).eq(expected.iter().map(|s| &s.name)) {
+            return Err(format!(
+                "expected the shape parameters {}, found {}",
+                names(&mut expected.iter().map(|s| &s.name)),
+                names(&mut self.shape_parameters.iter().map(|s| &s.name))
+            ));
+        }
+        let within = |(found, model): (&ShapeValue, &ShapeParameter)| {
+            let value = match split {
+                Split::Unconstrained => found.unconstrained.unwrap_or(found.value),
+                Split::Consistent => found.value,
+            };
+            if value >= model.lower && value <= model.upper {
+                return Ok(value);
+            }
+            let ShapeParameter { name, unit, lower, upper, .. } = model;
+            Err(format!("shape parameter `{name}`: expected {lower} to {upper} {unit}, found {value}"))
+        };
+        self.shape_parameters.iter().zip(expected).map(within).collect()
     }
 
     /// Values of all linear parameters.

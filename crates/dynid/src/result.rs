@@ -165,6 +165,10 @@ impl Identification {
     fn shape_values(&self) -> Vec<ShapeValue> {
         let (model, _) = self.identified_model();
         let columns = self.model.parameters();
+        let free = self
+            .shapes
+            .as_ref()
+            .map(|found| shape::unfold(&found.model, &self.model, self.unconstrained_values()));
         model
             .parameters()
             .shape
@@ -185,6 +189,7 @@ impl Identification {
                     name: p.name.clone(),
                     unit: p.unit.to_owned(),
                     value: p.start,
+                    unconstrained: free.as_ref().map(|free| free.shape[k]),
                     range: (p.lower, p.upper),
                     std,
                     interval: around.or(one_sided),

@@ -29,7 +29,7 @@ pub fn validate(
     motor_side: Option<&MotorSide>,
     filter_hz: Option<f64>,
 ) -> Result<Vec<Agreement>, Error> {
-    let model = estimate.effort_model(file)?;
+    let model = estimate.effort_model(file, split)?;
     let values = estimate.values(split);
     let settings = ConditioningSettings::default();
     let alignment = Alignment {

@@ -64,7 +64,12 @@ impl Case {
     }
 
     fn identified(&self) -> Identified<'_> {
-        Identified { description: &self.description, model: &self.model, values: &self.values }
+        Identified {
+            description: &self.description,
+            model: &self.model,
+            values: &self.values,
+            load_reference: None,
+        }
     }
 
     fn source(&self) -> Source {
@@ -353,7 +358,8 @@ fn a_helical_joint_is_refused_by_both_formats() {
     let description = dynid::io::robot::read(&path).unwrap().description;
     let model = RobotModel::new(description.build().unwrap(), Vec::new());
     let values = model.mechanism().inertia_vector();
-    let identified = Identified { description: &description, model: &model, values: &values };
+    let identified =
+        Identified { description: &description, model: &model, values: &values, load_reference: None };
     let export = RobotExport::new(identified, &source).unwrap();
     let states = CheckStates::random(&model);
     for (refused, format) in [(export.urdf(&states), "URDF"), (export.mjcf(&states), "MJCF")] {

@@ -17,7 +17,8 @@ pub(crate) fn run(args: &PredictArgs) -> Result<u8, Failure> {
         outputs::check_files(&[("--out", out)], &[&args.estimate, &args.states])?;
     }
     let estimate = Estimate::read(&args.estimate)?;
-    let model = estimate.effort_model(&args.estimate)?;
+    let split = args.split.of();
+    let model = estimate.effort_model(&args.estimate, split)?;
     if !model.channels().is_empty() {
         return Err(Failure::Usage(
             format!(
@@ -29,7 +30,7 @@ pub(crate) fn run(args: &PredictArgs) -> Result<u8, Failure> {
         ));
     }
     let states = states::read(&args.states, &state_joints(model.mechanism()), &ReadOptions::default())?;
-    let effort = efforts(&model, &estimate.values(args.split.of()), &states);
+    let effort = efforts(&model, &estimate.values(split), &states);
     match &args.out {
         None => data(&csv_text(&estimate.joints, &effort))?,
         Some(path) => {

@@ -18,6 +18,9 @@ pub struct Identified<'a> {
     pub model: &'a RobotModel,
     /// Linear parameters of the model.
     pub values: &'a [f64],
+    /// Ten standard parameters per body whose rigid effort loads the gears of `load` elements; `None`: those of the model's
+    /// mechanism.
+    pub load_reference: Option<&'a [f64]>,
 }
 
 /// The same, as an estimate file holds it.
@@ -26,12 +29,18 @@ pub struct IdentifiedRobot {
     description: Description,
     model: RobotModel,
     values: Vec<f64>,
+    load_reference: Option<Vec<f64>>,
 }
 
 impl IdentifiedRobot {
     /// What the functions of this module take.
     pub fn identified(&self) -> Identified<'_> {
-        Identified { description: &self.description, model: &self.model, values: &self.values }
+        Identified {
+            description: &self.description,
+            model: &self.model,
+            values: &self.values,
+            load_reference: self.load_reference.as_deref(),
+        }
     }
 }
 
@@ -41,12 +50,13 @@ impl Estimate {
     /// # Errors
     /// [`Error::EstimateFile`] if the record contradicts itself.
     pub fn identified_robot(&self, file: &Path) -> Result<IdentifiedRobot, Error> {
-        let model = self.effort_model(file)?;
+        let model = self.effort_model(file, Split::Consistent)?;
         let description = self
             .model
             .description(&self.robot)
             .map_err(|message| Error::EstimateFile { file: file.display().to_string(), message })?;
-        Ok(IdentifiedRobot { description, model, values: self.values(Split::Consistent) })
+        let load_reference = self.model.load_reference.clone();
+        Ok(IdentifiedRobot { description, model, values: self.values(Split::Consistent), load_reference })
     }
 
     /// The robot file that was identified, if the estimate names it.
@@ -83,7 +93,8 @@ impl Identification {
     /// The identified robot, for [`RobotExport`](super::RobotExport) and [`json`](super::json()).
     pub fn identified(&self) -> Identified<'_> {
         let (model, values) = self.identified_model();
-        Identified { description: &self.robot.file.description, model, values }
+        let load_reference = self.plan.load_reference.as_deref();
+        Identified { description: &self.robot.file.description, model, values, load_reference }
     }
 }
 
