@@ -32,7 +32,8 @@ pub(super) struct JointValues {
 /// Splits the values of a model into what a format states and what it leaves out.
 ///
 /// `fc`, `fv` become friction and damping, of asymmetric friction the means of both directions; `Ia` is armature in
-/// MJCF and has no place in URDF. Negative values, which simulators refuse, are stated as 0.
+/// MJCF and has no place in URDF. Negative values, which simulators refuse, are stated as 0. Stribeck friction becomes the
+/// Coulomb friction that it falls to.
 pub(super) fn split(model: &RobotModel, values: &[f64], format: Format) -> JointValues {
     let table = model.parameters();
     let bodies = 10 * model.mechanism().bodies().len();
@@ -71,6 +72,10 @@ pub(super) fn split(model: &RobotModel, values: &[f64], format: Format) -> Joint
             Format::Mjcf => friction("Ia", "rotor inertia"),
             Format::Urdf => None,
         };
+        // Stribeck friction whose static friction equals Coulomb friction is Coulomb friction.
+        if let (Some(fixed), Some(coulomb)) = (column("fs"), friction_loss) {
+            out.values[fixed] = coulomb;
+        }
         if friction_loss.or(damping).or(armature).is_some() {
             out.joints.push(JointParameters {
                 joint: joint.name.clone(),
@@ -98,6 +103,13 @@ fn left_out(model: &RobotModel, values: &[f64], format: Format) -> Vec<String> {
             Some("Ia") if format == Format::Mjcf => continue,
             Some("Ia") => "rotor inertia (armature in MJCF)",
             Some("fo") => "offset",
+            Some("fs") => "rise of Stribeck friction towards rest",
+            Some("fa") => "arctangent friction",
+            Some("ft") => "tanh friction",
+            Some("fg" | "fl") => "sigmoid friction",
+            Some("fp") => "power-law friction",
+            Some("fva") => "difference of friction between the directions",
+            Some("mu") => "friction that grows with the load",
             Some("k" | "kq0") => "spring",
             Some("ca" | "cb") => "cyclic effort",
             Some("K") => "drive gain",

@@ -26,8 +26,11 @@ pub struct RobotJson {
     pub links: Vec<LinkJson>,
     /// Joints in the order of the efforts.
     pub joints: Vec<JointJson>,
-    /// Parameters of further elements (springs, couplings, asymmetric friction).
+    /// Parameters of further elements (springs, couplings, asymmetric and nonlinear friction).
     pub other: Vec<OtherJson>,
+    /// Shape parameters: those that enter the effort nonlinearly.
+    #[serde(default)]
+    pub shape: Vec<OtherJson>,
 }
 
 /// A moving link together with all that is welded to it, in the axes of its joint frame (the URDF link frame).
@@ -47,6 +50,10 @@ pub struct LinkJson {
     pub inertia_com: Option<[f64; 6]>,
     /// Inertia tensor about the origin of the joint frame, same order, kg m².
     pub inertia_frame: [f64; 6],
+    /// Standard parameters m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the joint frame whose rigid effort friction of
+    /// the load (`mu`) refers to; absent without such friction.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub load_reference: Option<[f64; 10]>,
     /// Why no body could have these values; absent if one could.
     pub fault: Option<String>,
 }
@@ -85,24 +92,31 @@ pub struct OtherJson {
 /// [`Error::Export`] with [`ExportError::ReadBack`](super::ExportError::ReadBack).
 pub fn json(identified: &Identified<'_>, states: &CheckStates) -> Result<Exported, Error> {
     let Identified { model, values, .. } = *identified;
-    let robot = RobotJson::new(model, values);
+    let robot = RobotJson::new(identified);
     let mut text = serde_json::to_string_pretty(&robot)
         .unwrap_or_else(|e| unreachable!("a robot holds only plain data: {e}"));
     text.push('\n');
     let read: RobotJson = serde_json::from_str(&text)
         .unwrap_or_else(|e| unreachable!("what was just written has the layout it was written with: {e}"));
-    let difference = largest_difference((model, values), (model, &read.values(model)), states);
+    let difference = largest_difference(
+        (model, &model.parameters().shape_start(), values),
+        (model, &read.shape_values(model), &read.values(model)),
+        states,
+    );
     Ok(Exported { text, difference: judge("JSON", difference)?, notes: Vec::new() })
 }
 
 impl RobotJson {
-    fn new(model: &RobotModel, values: &[f64]) -> Self {
+    fn new(identified: &Identified<'_>) -> Self {
+        let Identified { model, values, .. } = *identified;
         let mechanism = model.mechanism();
+        let reference = load_reference(identified);
         let links = mechanism
             .bodies()
             .iter()
             .zip(inertias(values))
-            .map(|(body, inertia)| {
+            .enumerate()
+            .map(|(b, (body, inertia))| {
                 let split = inertia.about_com();
                 LinkJson {
                     name: body.name.clone(),
@@ -112,6 +126,7 @@ impl RobotJson {
                     com: split.map(|(com, _)| com.0),
                     inertia_com: split.map(|(_, tensor)| six(&tensor)),
                     inertia_frame: six(&inertia.tensor()),
+                    load_reference: reference.as_ref().map(|bodies| bodies[b].0),
                     fault: inertia.physical_fault().map(str::to_owned),
                 }
             })
@@ -151,7 +166,18 @@ impl RobotJson {
             links,
             joints,
             other: other.collect(),
+            shape: table
+                .shape
+                .iter()
+                .map(|s| OtherJson { name: s.name.clone(), value: s.start, unit: s.unit.to_owned() })
+                .collect(),
         }
+    }
+
+    /// Shape parameters of a model of the same robot; one that is not stated is not a number.
+    fn shape_values(&self, model: &RobotModel) -> Vec<f64> {
+        let stated = |name: &str| self.shape.iter().find(|s| s.name == name).map_or(f64::NAN, |s| s.value);
+        model.parameters().shape.iter().map(|s| stated(&s.name)).collect()
     }
 
     /// Linear parameters of a model of the same robot, from mass, centre of mass and the tensor about it.
@@ -184,6 +210,14 @@ impl RobotJson {
         }
         values
     }
+}
+
+/// Bodies that friction of the load refers to, if the model has such friction.
+fn load_reference(identified: &Identified<'_>) -> Option<Vec<Inertia>> {
+    let Identified { model, load_reference, .. } = *identified;
+    let loaded = model.joints().iter().any(|joint| element(model, &joint.name, "mu").is_some());
+    let own = || model.mechanism().inertia_vector();
+    loaded.then(|| inertias(&load_reference.map_or_else(own, <[f64]>::to_vec)).collect())
 }
 
 /// Column of an element's parameter.

@@ -6,8 +6,13 @@
 //! | viscous friction `fv` | `<dynamics damping>` | `damping` |
 //! | Coulomb friction `fc` | `<dynamics friction>` | `frictionloss` |
 //! | rotor inertia `Ia` | no place | `armature` |
+//! | Stribeck friction | as Coulomb friction `fc`, without its rise towards rest | the same |
+//! | arctangent, tanh, sigmoid, power law, friction of the load | no place | left out |
 //! | offset, spring, cyclic effort, couplings | no place | left out |
 //! | gravity | no place | `<option gravity>` |
+//!
+//! What is left out is named in [`Exported::notes`]. The JSON holds everything: all parameters, shape parameters, and what
+//! friction of the load refers to.
 //!
 //! **Welded links.** A log shows the body that moves as one: a moving link with everything on fixed joints behind it.
 //! Links on fixed joints keep the inertia of the robot file and the moving link gets the difference, as long as that is a
@@ -30,7 +35,7 @@ mod read_back;
 use dynid_io::mjcf::{self, JointParameters};
 use dynid_io::urdf::{self, JointDynamics};
 use dynid_model::mechanism::ROOT_JOINT;
-use dynid_model::{Description, Inertia, JointKind};
+use dynid_model::{Description, EffortModel, Inertia, JointKind};
 
 use crate::Error;
 use crate::identify::Identification;
@@ -203,7 +208,11 @@ impl<'a> RobotExport<'a> {
         let (back, stated) = read_back::compile(read, joints, &self.held, model).map_err(|fault| {
             ExportError::OtherRobot { file: format!("exported {}", format.name()), fault }
         })?;
-        let difference = read_back::largest_difference((model, values), (&back, &stated), states);
+        let difference = read_back::largest_difference(
+            (model, &model.parameters().shape_start(), values),
+            (&back, &back.parameters().shape_start(), &stated),
+            states,
+        );
         Ok(Exported { text, difference: read_back::judge(format.name(), difference)?, notes })
     }
 }

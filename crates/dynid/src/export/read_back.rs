@@ -134,20 +134,20 @@ pub(super) fn compile(
     Ok((RobotModel::new(mechanism, elements), values))
 }
 
-/// Largest difference of effort between two models of the same coordinates, joint by joint relative to the largest effort
+/// Largest difference of effort between two models of the same coordinates, each with shape and linear parameters, joint by joint relative to the largest effort
 /// of the joint (of all joints, times 1e-6, if that is more: a joint may need no effort at all).
 pub(super) fn largest_difference(
-    (a, a_values): (&RobotModel, &[f64]),
-    (b, b_values): (&RobotModel, &[f64]),
+    (a, a_shape, a_values): (&RobotModel, &[f64], &[f64]),
+    (b, b_shape, b_values): (&RobotModel, &[f64], &[f64]),
     states: &CheckStates,
 ) -> f64 {
     let outputs = a.outputs().len();
     let (mut largest, mut difference) = (vec![0.0_f64; outputs], vec![0.0_f64; outputs]);
     let room = if matches!(states.0, Kind::Random(_)) { STATES } else { BLOCK };
     let mut blocks = [a, b].map(|model| RegressorBlock::new(model.layout().clone(), room));
-    let shapes = [a, b].map(|model| model.parameters().shape_start());
     states.for_each_block(|motion| {
-        for (model, (block, shape)) in [a, b].into_iter().zip(blocks.iter_mut().zip(&shapes)) {
+        let models = [(a, a_shape), (b, b_shape)];
+        for ((model, shape), block) in models.into_iter().zip(&mut blocks) {
             model.regressor(motion, shape, block);
         }
         for output in 0..outputs {
