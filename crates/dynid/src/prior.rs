@@ -37,7 +37,7 @@ pub enum PriorError {
 ///   the velocity limit: a drive takes about 0.03 s to start its own rotor;
 /// - one with both bounds: a third of its range;
 /// - all others: `max(0.5 |stated|, 0.1 min_j e_j/c_j)`, `c_j` the largest at the velocity limits and at 1/4, 1/16, 1/64 and 1/256 of
-///   them, anywhere in the position range.
+///   them and next to rest, anywhere in the position range.
 ///   For Coulomb friction, offset, cyclic torques and the preload of a spring that is a tenth of the effort `e_j`; for viscous
 ///   friction the same divided by the velocity limit; for a spring, divided by the largest position; for motors behind a
 ///   transmission, carried through its matrix; for a drive gain, the effort per ampere.

@@ -16,8 +16,9 @@ const STARTING_S: f64 = 0.03;
 /// Effort limits count up to this multiple of the logged effort.
 const LIMIT_OF_LOGGED: f64 = 10.0;
 
-/// Shares of the velocity limits at which columns are looked at: some friction acts at low speeds only.
-const SPEEDS: [f64; 5] = [1.0, 0.25, 0.0625, 0.015625, 0.00390625];
+/// Shares of the velocity limits at which columns are looked at: some friction acts at low speeds only, Stribeck friction of
+/// a small speed next to rest alone.
+const SPEEDS: [f64; 6] = [1.0, 0.25, 0.0625, 0.015625, 0.00390625, 1e-9];
 
 /// Speed limit of a joint for priors and motions: as stated, at most 4π rad/s (2 m/s); 2 rad/s (0.5 m/s) by default.
 pub(crate) fn speed_limit(slides: bool, stated: Option<f64>) -> f64 {
