@@ -15,6 +15,7 @@ use crate::Error;
 use crate::config::{Config, Consistency, PriorDistance};
 use crate::fitting::Fitted;
 use crate::prior::Prior;
+use crate::shape;
 
 /// Index of the unconstrained estimate in [`Consistent::held_out`].
 pub const UNCONSTRAINED: usize = 0;
@@ -200,7 +201,12 @@ fn problem(
             nonnegative: p.lower == Some(0.0),
         });
         let limit = |side: &str, factor: f64, value: f64| Bound {
-            name: format!("`{}` {side} {value} {} (its element)", p.name, p.unit),
+            name: match shape::of_change(&p.name) {
+                Some(name) => {
+                    format!("range of `{name}`, its {} end", if factor > 0.0 { "upper" } else { "lower" })
+                }
+                None => format!("`{}` {side} {value} {} (its element)", p.name, p.unit),
+            },
             terms: vec![(column, factor)],
             upper: factor * value,
         };

@@ -36,7 +36,7 @@ pub const NAMES: [&str; 16] = [
 ];
 
 /// Friction that grows with the load of the gear.
-const LOAD: &str = "load";
+pub(crate) const LOAD: &str = "load";
 
 /// Elements of a joint about which nothing is said.
 pub const DEFAULTS: [&str; 4] = ["coulomb", "viscous", "offset", "rotor"];

@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::Error;
-use crate::elements::ElementPlan;
+use crate::elements::{ElementPlan, LOAD};
 use crate::nominal::{nominal_parameters, with_nominal_shape};
 use crate::robot::Robot;
 pub use settings::{
@@ -82,6 +82,12 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
         ));
     }
     let plan = ElementPlan::new(mechanism, &robot.elements, None, |_| true)?;
+    if settings.mode == SimulateMode::ClosedLoop && plan.per_rate.iter().flatten().any(|name| name == LOAD) {
+        return Err(Error::Unsupported(format!(
+            "`{LOAD}` friction depends on accelerations through its load, for which the equation of motion has no form: \
+             simulate by inverse dynamics"
+        )));
+    }
     let model = RobotModel::new(mechanism.clone(), plan.build(mechanism)?);
     let model = with_nominal_shape(model, &settings.values)?;
     let missing: Vec<&str> = model

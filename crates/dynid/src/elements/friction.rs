@@ -134,11 +134,11 @@ impl Settings<'_> {
                     .iter()
                     .map(|s| format!("`{s}` (or `{s}.{}`)", SHAPE_KEYS.join(&format!("`, `{s}."))));
                 let expected: Vec<String> = values.chain(shapes).collect();
-                return Err(self.fault(format!(
-                    "expected one of {}, found `{}`",
-                    expected.join(", "),
-                    setting.key
-                )));
+                let (kind, found) = match setting.key.as_str() {
+                    "" => ("a table with some", in_words(&setting.value)),
+                    key => ("one", format!("`{key}`")),
+                };
+                return Err(self.fault(format!("expected {kind} of {}, found {found}", expected.join(", "))));
             }
             if value {
                 self.number(&setting.key)?;
