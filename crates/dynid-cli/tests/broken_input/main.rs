@@ -6,6 +6,7 @@ mod csv;
 mod designs;
 mod estimates_and_states;
 mod estimators;
+mod friction;
 mod harness;
 mod log_files;
 mod log_signals;
