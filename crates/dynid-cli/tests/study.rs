@@ -1,5 +1,7 @@
 //! `dynid study`: every claim of a study with what is measured, in text, JSON and a report.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
 #[expect(dead_code, reason = "other tests need robots as well")]
 mod support;
 

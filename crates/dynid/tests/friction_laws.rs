@@ -105,7 +105,7 @@ impl Bench {
             header.extend(log.joints.iter().map(|j| format!("{prefix}_{j}")));
             columns.extend(signals.iter().map(Vec::as_slice));
         }
-        csv::write(&self.path(name), &header, &columns).unwrap();
+        csv::write(self.path(name), &header, &columns).unwrap();
         log
     }
 

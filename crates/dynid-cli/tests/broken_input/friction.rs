@@ -1,5 +1,7 @@
 //! Friction laws, their settings, their shape parameters in estimates, and studies.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
 use std::sync::OnceLock;
 
 use crate::harness::{Case, case, check, config, sound};
