@@ -13,7 +13,8 @@ use support::{PANDA, TX40, UR10, data, geometric_mean, on_validation, rms, run};
 fn check(name: &str, text: &str, parameters: usize, filter_hz: f64, baseline: &[f64], limit: f64) {
     let Some((config, id)) = run(text) else { return };
     let shaped: usize = id.friction.iter().map(|joint| joint.accepted.len()).sum();
-    let searched = id.shapes.as_ref().map_or(0, |s| s.model.parameters().shape.len());
+    let table = &id.model.parameters().linear;
+    let searched = id.base.kept.iter().filter(|c| table[**c].name.ends_with("(change)")).count();
     assert_eq!(id.base.len(), parameters + shaped + searched, "{name}: base parameters");
     let agreement = on_validation(&config, &id, filter_hz);
     let ratio = |fit| geometric_mean(rms(fit).iter().zip(baseline).map(|(r, b)| r / b));
