@@ -86,7 +86,7 @@ fn check(python: &Path, name: &str, robot: &Path, change: impl Fn(&str, f64, f64
     };
     simulate("12", &["--out", "log.csv", "--truth", "truth.json"]);
     simulate("3", &["--out", "other.csv", "--seed", "5", "--clean", "states.csv"]);
-    let args = ["identify", robot, "--log", "log.csv", "--out", "out", "--quiet"];
+    let args = ["identify", robot, "--log", "log.csv", "--friction", "given", "--out", "out", "--quiet"];
     let code = dynid().current_dir(at).args(args).output().unwrap().status.code();
     assert!(matches!(code, Some(0 | 1)), "{name}: {code:?}");
     let read =

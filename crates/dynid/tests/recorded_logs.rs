@@ -29,8 +29,9 @@ fn check(name: &str, text: &str, parameters: usize, filter_hz: f64, baseline: &[
     for (output, joint) in id.model.outputs().iter().zip(&id.friction) {
         for taken in &joint.accepted {
             let (kind, percent) = (taken.shape.kind, 100.0 * taken.gain);
+            let errors = taken.gain / taken.standard_error;
             println!(
-                "  {}: {kind:?} {:.3}, held-out mean square falls by {percent:.0} %",
+                "  {}: {kind:?} {:.3}, held-out mean square falls by {percent:.0} %, {errors:.1} standard errors",
                 output.name, taken.shape.speed
             );
         }
