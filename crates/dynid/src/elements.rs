@@ -160,6 +160,19 @@ impl ElementPlan {
         }
     }
 
+    /// Takes a shape away again that [`ElementPlan::add_shape`] added.
+    pub(crate) fn remove_shape(&mut self, rate: usize, joint: &str, shape: &FrictionShape) {
+        let (name, _) = shape_element(shape.kind);
+        let list = &mut self.per_rate[rate];
+        if let Some(place) = list.iter().position(|n| *n == name) {
+            match name {
+                "stribeck" => list[place] = "coulomb".to_owned(),
+                _ => drop(list.remove(place)),
+            }
+        }
+        self.spec.settings.retain(|s| !(s.joint == joint && s.element == name));
+    }
+
     /// Builds the elements in joint order, but gear loads and couplings last.
     ///
     /// Shape parameters about which nothing is said get bounds for the speed limit of the joint, or for 1 rad/s (m/s)

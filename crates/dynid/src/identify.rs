@@ -178,18 +178,24 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         }
         conditioning => (model, structure, conditioning),
     };
-    let (model, structure, shapes) = match &conditioning {
-        Some(choices) if !model.parameters().shape.is_empty() => {
+    let (mut model, mut structure) = (model, structure);
+    let mut shapes = None;
+    if let Some(choices) = &conditioning {
+        while !model.parameters().shape.is_empty() {
             progress(Step::Shapes);
             let (found, linear) =
                 shape::find(config, model, &structure.base, &prepared, (choices, &settings))?;
+            if friction::drop_unseen(&found.model, &found, &mut shapes_of_friction, &mut plan) {
+                model = RobotModel::new(robot.mechanism.clone(), plan.build(&robot.mechanism)?);
+                structure = Structure::of(config, &model, &plan, &prepared)?;
+                continue;
+            }
             let free: Vec<bool> = found.findings.iter().map(shape::is_free).collect();
-            let linearised = shape::linearised(&plan, &found.model, &linear, &free)?;
-            let structure = Structure::of(config, &linearised, &plan, &prepared)?;
-            (linearised, structure, Some(found))
+            model = shape::linearised(&plan, &found.model, &linear, &free)?;
+            structure = Structure::of(config, &model, &plan, &prepared)?;
+            shapes = Some(found);
         }
-        _ => (model, structure, None),
-    };
+    }
     let shape = model.parameters().shape_start();
     progress(Step::Fit);
     let Structure { base, stated, prior, regrouping, space, bounds, method } = structure;

@@ -1,15 +1,17 @@
 //! Friction shapes found beside the elements of a plan.
 
 use dynid_estimate::conditioning::{
-    BasePrior, Conditioning, ConditioningSettings, FrictionChoice, PreparedLog, ShapeKind, Stage,
-    choose_friction,
+    BasePrior, Conditioning, ConditioningSettings, FrictionChoice, JointFriction, PreparedLog, ShapeKind,
+    ShapeTrial, Stage, choose_friction,
 };
+use dynid_estimate::separable::ShapeVerdict;
 use dynid_model::{EffortModel, RobotModel};
 
 use super::structure::Structure;
 use crate::Error;
-use crate::elements::ElementPlan;
 use crate::elements::friction::is_shaped;
+use crate::elements::{ElementPlan, shape_element};
+use crate::shape::ShapeFit;
 
 /// Chooses shapes for all joints and adds them to the plan; shape parameters start at the values found.
 ///
@@ -57,6 +59,36 @@ pub(super) fn choose(
         plan.load_reference = Some(found.load[..model.mechanism().inertial_parameters()].to_vec());
     }
     Ok(found)
+}
+
+/// Drops chosen shapes whose shape parameter the logs do not see after all; tells whether there were any.
+pub(super) fn drop_unseen(
+    model: &RobotModel,
+    found: &ShapeFit,
+    chosen: &mut [JointFriction],
+    plan: &mut ElementPlan,
+) -> bool {
+    let table = found.model.parameters();
+    let unseen = |joint: &str, trial: &ShapeTrial| {
+        let (_, Some(symbol)) = shape_element(trial.shape.kind) else { return false };
+        let name = format!("{joint}.{symbol}");
+        let place = table.shape.iter().position(|s| s.name == name);
+        place.is_some_and(|k| found.findings[k].verdict == ShapeVerdict::NotSeen)
+    };
+    let names = model.mechanism().rate_names();
+    let mut dropped = false;
+    for (output, joint) in model.outputs().iter().zip(chosen) {
+        let Some(rate) = names.iter().position(|n| *n == output.name) else { continue };
+        let (gone, kept): (Vec<ShapeTrial>, Vec<ShapeTrial>) =
+            joint.accepted.drain(..).partition(|trial| unseen(&output.name, trial));
+        joint.accepted = kept;
+        for trial in gone {
+            plan.remove_shape(rate, &output.name, &trial.shape);
+            joint.rejected.push(trial);
+            dropped = true;
+        }
+    }
+    dropped
 }
 
 /// Kinds of shapes that say something new beside given elements. `follows`: some joints follow others.
