@@ -49,7 +49,7 @@ pub struct EffortObjective<'a> {
 /// Candidates per matrix product.
 const GROUP: usize = 8;
 /// Predicted efforts of all candidates above which groups are worth a thread each.
-const PARALLEL: usize = 10_000;
+const PARALLEL: usize = 100_000;
 /// Samples per matrix product: fixed columns of an output and predictions of a group stay in the cache.
 const ROWS: usize = 256;
 
@@ -211,23 +211,29 @@ impl Objective for EffortObjective<'_> {
     }
 
     fn evaluate(&self, candidates: &[f64], values: &mut [f64]) {
-        let group_size = GROUP * self.dimensions();
-        let work = |room: &mut Room, values: &mut [f64], group: &[f64]| {
-            values.fill(0.0);
-            for chunk in &self.chunks {
-                self.add(chunk, group, values, room);
+        let d = self.dimensions();
+        let work = |values: &mut [f64], candidates: &[f64]| {
+            let mut room = self.room();
+            for (values, group) in values.chunks_mut(GROUP).zip(candidates.chunks(GROUP * d)) {
+                values.fill(0.0);
+                for chunk in &self.chunks {
+                    self.add(chunk, group, values, &mut room);
+                }
+                values.iter_mut().for_each(|value| *value /= self.samples as f64);
             }
-            values.iter_mut().for_each(|value| *value /= self.samples as f64);
         };
         let entries = values.len() * self.samples * self.outputs.len();
-        if entries < PARALLEL {
-            let mut room = self.room();
-            let groups = candidates.chunks(group_size);
-            values.chunks_mut(GROUP).zip(groups).for_each(|(values, group)| work(&mut room, values, group));
+        let threads = if entries < PARALLEL { 1 } else { rayon::current_num_threads() };
+        // Whole groups for every thread: a value does not depend on how many there are.
+        let share = values.len().div_ceil(GROUP).div_ceil(threads) * GROUP;
+        if share >= values.len() {
+            work(values, candidates);
         } else {
-            let groups = candidates.par_chunks(group_size);
-            let values = values.par_chunks_mut(GROUP).zip(groups);
-            values.for_each_init(|| self.room(), |room, (values, group)| work(room, values, group));
+            let shares = candidates.par_chunks(share * d);
+            values
+                .par_chunks_mut(share)
+                .zip(shares)
+                .for_each(|(values, candidates)| work(values, candidates));
         }
     }
 }
