@@ -4,7 +4,7 @@ use dynid::model::{BaseParameters, BaseSettings, BodyPoint, Dynamics, EffortMode
 use dynid::model::{RegressorBlock, RobotModel, Vec3};
 use serde_json::json;
 
-use super::arm::{Arm, INERTIAL, JOINTS, Place, expanded};
+use super::arm::{Arm, INERTIAL, JOINTS, Place};
 use super::reference::{self, StateReference};
 use super::settings::Settings;
 use crate::{Row, StudyError};
@@ -87,7 +87,7 @@ fn regressor(arm: &Arm, block: &MotionBlock<'_>) -> Vec<Vec<f64>> {
                 if let Place::Base(k) = place {
                     unit[*k] = 1.0;
                 }
-                rows.effort(j, &expanded(&arm.base, &unit, arm.linear.len()))[0]
+                rows.effort(j, &arm.base.expanded(&unit))[0]
             };
             arm.places[..INERTIAL].iter().map(column).collect()
         })

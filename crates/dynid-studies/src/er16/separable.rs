@@ -7,7 +7,7 @@ use dynid::model::{BaseParameters, BaseSettings, EffortModel, MotionBlock, Robot
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::arm::{Arm, JOINTS, Place, expanded};
+use super::arm::{Arm, JOINTS, Place};
 use super::measurement::Measurement;
 use super::reference;
 use super::search::{Searches, unknowns};
@@ -97,7 +97,7 @@ fn linear_friction(
     let base = BaseParameters::of(&model, &arm.mechanism, &[], &BaseSettings::default());
     let settings = plain(SeparableLoss::Squares);
     let estimate = solve(&model, &base.kept, &data.block(), &data.torque, Vec::new(), &settings)?;
-    let linear = expanded(&base, &estimate.linear, model.parameters().linear.len());
+    let linear = base.expanded(&estimate.linear);
     let mut torque = vec![0.0; data.clean.len()];
     model.efforts(&data.block(), &[], &linear, data.samples, &mut torque);
     Ok((torque, model, linear))
