@@ -1,6 +1,6 @@
 //! The paper's figures, redone.
 
-use dynid::model::{BodyPoint, Dynamics, MotionBlock, Vec3};
+use dynid::model::{BodyPoint, Dynamics, EffortModel, MotionBlock, RobotModel, Vec3};
 use dynid::motion::trajectory::Sampled;
 use dynid::report::{Chart, ChartAxis, ChartCurve, CurveStyle};
 
@@ -117,19 +117,33 @@ pub(super) fn friction(data: &Measurement, laws: &[(&str, FrictionLaw<'_>)]) -> 
 pub(super) fn friction_law(arm: &Arm, unknowns: &[f64], joint: usize, velocity: f64) -> f64 {
     let friction: Vec<f64> =
         unknowns.iter().enumerate().map(|(k, x)| if k < INERTIAL { 0.0 } else { *x }).collect();
-    let (q, mut dq) = ([0.0; JOINTS], [0.0; JOINTS]);
+    let (base, shape) = arm.split(&friction);
+    effort_at_velocity(&arm.model, &shape, &arm.base.expanded(&base), joint, velocity)
+}
+
+/// Effort of a joint that alone moves, at a constant velocity, all joints at zero.
+pub(super) fn effort_at_velocity(
+    model: &RobotModel,
+    shape: &[f64],
+    linear: &[f64],
+    joint: usize,
+    velocity: f64,
+) -> f64 {
+    let (zero, mut dq) = ([0.0; JOINTS], [0.0; JOINTS]);
     dq[joint] = velocity;
     let block = MotionBlock {
         samples: 1,
         stride: 1,
-        q: &q,
+        q: &zero,
         dq: &dq,
-        ddq: &q,
+        ddq: &zero,
         gravity: None,
         channels: &[],
         sign_width: 0.0,
     };
-    arm.efforts(&block, &friction)[joint]
+    let mut effort = [0.0; JOINTS];
+    model.efforts(&block, shape, linear, 1, &mut effort);
+    effort[joint]
 }
 
 /// Paths of the wrist centre, from the side and from above.

@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::arm::{Arm, JOINTS};
+use super::reference::IdentificationReference;
 use super::settings::Settings;
 use crate::StudyError;
 
@@ -46,6 +47,22 @@ impl Measurement {
         let truth: Vec<f64> = settings.unknowns.iter().map(|u| u.value).collect();
         out.clean = arm.efforts(&out.block(), &truth);
         Ok(out.with_noise(settings, seed))
+    }
+
+    /// Motion and torque of the independent implementation, which gives no torque without noise: both are the same here.
+    pub(super) fn of_reference(reference: &IdentificationReference) -> Self {
+        let transposed = |rows: &[[f64; JOINTS]]| -> Vec<f64> {
+            (0..JOINTS).flat_map(|j| rows.iter().map(move |row| row[j])).collect()
+        };
+        let torque = transposed(&reference.tau);
+        Measurement {
+            samples: reference.q.len(),
+            q: transposed(&reference.q),
+            dq: transposed(&reference.qd),
+            ddq: transposed(&reference.qdd),
+            clean: torque.clone(),
+            torque,
+        }
     }
 
     /// The same motion with another realisation of the noise.
