@@ -144,16 +144,7 @@ impl<'a> Friction<'a> {
         let n = velocities.len();
         let mut dq = vec![0.0; self.model.joints.len() * n];
         dq[self.rate * n..][..n].copy_from_slice(velocities);
-        let motion = MotionBlock {
-            samples: n,
-            stride: n,
-            q: &[],
-            dq: &dq,
-            ddq: &[],
-            gravity: None,
-            channels: &[],
-            sign_width: 0.0,
-        };
+        let motion = MotionBlock::plain(n, &[], &dq, &[]);
         let mut effort = vec![0.0; n];
         for placed in &self.elements {
             let mut data = vec![0.0; placed.entries.len() * n];

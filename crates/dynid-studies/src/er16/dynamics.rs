@@ -64,16 +64,7 @@ pub(super) fn rows(arm: &Arm, settings: &Settings) -> Result<[Row; 2], StudyErro
 }
 
 fn block(state: &StateReference) -> MotionBlock<'_> {
-    MotionBlock {
-        samples: 1,
-        stride: 1,
-        q: &state.q,
-        dq: &state.qd,
-        ddq: &state.qdd,
-        gravity: None,
-        channels: &[],
-        sign_width: 0.0,
-    }
+    MotionBlock::plain(1, &state.q, &state.qd, &state.qdd)
 }
 
 /// Base columns of the inertial unknowns in the paper's order, one row per joint.

@@ -131,16 +131,7 @@ pub(super) fn effort_at_velocity(
 ) -> f64 {
     let (zero, mut dq) = ([0.0; JOINTS], [0.0; JOINTS]);
     dq[joint] = velocity;
-    let block = MotionBlock {
-        samples: 1,
-        stride: 1,
-        q: &zero,
-        dq: &dq,
-        ddq: &zero,
-        gravity: None,
-        channels: &[],
-        sign_width: 0.0,
-    };
+    let block = MotionBlock::plain(1, &zero, &dq, &zero);
     let mut effort = [0.0; JOINTS];
     model.efforts(&block, shape, linear, 1, &mut effort);
     effort[joint]
@@ -160,16 +151,7 @@ pub(super) fn paths(
         let time = (0..=SAMPLES).map(|k| k as f64 / (SAMPLES as f64 * settings.fundamental_hz)).collect();
         let motion = Sampled::at_times(&trajectory(settings, rows)?, time);
         let n = motion.samples();
-        let block = MotionBlock {
-            samples: n,
-            stride: n,
-            q: &motion.q,
-            dq: &motion.dq,
-            ddq: &motion.ddq,
-            gravity: None,
-            channels: &[],
-            sign_width: 0.0,
-        };
+        let block = MotionBlock::plain(n, &motion.q, &motion.dq, &motion.ddq);
         let mut at = vec![0.0; 3 * n];
         dynamics.points(&block, &point, n, &mut at);
         named.push((*name, at, n));

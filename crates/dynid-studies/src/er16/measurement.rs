@@ -76,16 +76,7 @@ impl Measurement {
     }
 
     pub(super) fn block(&self) -> MotionBlock<'_> {
-        MotionBlock {
-            samples: self.samples,
-            stride: self.samples,
-            q: &self.q,
-            dq: &self.dq,
-            ddq: &self.ddq,
-            gravity: None,
-            channels: &[],
-            sign_width: 0.0,
-        }
+        MotionBlock::plain(self.samples, &self.q, &self.dq, &self.ddq)
     }
 
     /// Mean over samples of the sum over joints of `|a - b|`, N m: the paper's objective with `δ = 1`.
