@@ -263,7 +263,7 @@ pub fn run(
 ) -> Result<ExperimentResult, SimError> {
     let n = plant.joints();
     settings.control.check(n)?;
-    settings.imperfections.check()?;
+    settings.imperfections.check(n)?;
     let schedule = Schedule::new(settings)?;
     demand_length("joints of the nominal model", n, nominal.joints())?;
     let start = reference(0.0);
@@ -273,7 +273,11 @@ pub fn run(
         return Err(SimError::Channel { name: name.clone() });
     }
     demand_length("channel profiles", channels.len(), settings.channels.len())?;
-    let ripple = ripple(nominal, reference, settings);
+    let ripple = settings
+        .imperfections
+        .ripple
+        .clone()
+        .unwrap_or_else(|| ripple(nominal, reference, settings));
     plant.set_ripple(ripple.clone());
 
     let poses: Vec<Vec<f64>> =

@@ -1,6 +1,7 @@
 //! What sensors, drives and loggers do wrong.
 
-use crate::error::{SimError, demand};
+use crate::error::{SimError, demand, demand_length};
+use crate::plant::Ripple;
 
 /// Imperfections of a virtual experiment. Each draws from a stream of its own (see [`crate::streams`]): switching one
 /// off leaves the others as they were.
@@ -23,6 +24,8 @@ pub struct Imperfections {
     pub ripple_share: f64,
     /// Repetitions of the ripple per turn of the joint. Default 50.
     pub ripple_cycles: f64,
+    /// Ripple of every drive in place of such a one. Default: none given.
+    pub ripple: Option<Vec<Ripple>>,
     /// Age of the logged effort relative to the logged motion, log samples, whole or not; negative: effort is newer.
     /// Default 0.3. The command that is held over a tick leads the motion by half a tick on top of that.
     pub effort_delay_samples: f64,
@@ -46,6 +49,7 @@ impl Default for Imperfections {
             effort_noise: Vec::new(),
             ripple_share: 0.01,
             ripple_cycles: 50.0,
+            ripple: None,
             effort_delay_samples: 0.3,
             outlier_share: 1e-3,
             outlier_size: 5.0,
@@ -66,6 +70,7 @@ impl Imperfections {
             effort_noise: Vec::new(),
             ripple_share: 0.0,
             ripple_cycles: 50.0,
+            ripple: None,
             effort_delay_samples: 0.0,
             outlier_share: 0.0,
             outlier_size: 5.0,
@@ -82,7 +87,7 @@ impl Imperfections {
             ("velocity_noise", self.velocity_noise > 0.0),
             ("effort_noise_share", self.effort_noise_share > 0.0),
             ("effort_noise", self.effort_noise.iter().any(|s| *s > 0.0)),
-            ("ripple", self.ripple_share > 0.0),
+            ("ripple", self.has_ripple()),
             ("effort_delay", self.effort_delay_samples != 0.0),
             ("outliers", self.outlier_share > 0.0 && self.outlier_size > 0.0),
             ("dropped", self.dropped_share > 0.0),
@@ -93,7 +98,19 @@ impl Imperfections {
         .collect()
     }
 
-    pub(crate) fn check(&self) -> Result<(), SimError> {
+    fn has_ripple(&self) -> bool {
+        match &self.ripple {
+            Some(given) => given.iter().any(|r| r.amplitude != 0.0),
+            None => self.ripple_share > 0.0,
+        }
+    }
+
+    pub(crate) fn check(&self, joints: usize) -> Result<(), SimError> {
+        if let Some(ripple) = &self.ripple {
+            demand_length("drives with ripple", joints, ripple.len())?;
+            let finite = |r: &Ripple| [r.amplitude, r.cycles, r.phase].iter().all(|x| x.is_finite());
+            demand(ripple.iter().all(finite), "ripple", "finite numbers", format!("{ripple:?}"))?;
+        }
         demand(self.encoder_bits <= 40, "encoder_bits", "at most 40", self.encoder_bits)?;
         for (name, x) in [
             ("encoder_noise", self.encoder_noise),

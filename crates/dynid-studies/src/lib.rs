@@ -5,6 +5,7 @@
 //! [`run`] runs one.
 
 pub mod er16;
+pub mod indy7;
 mod error;
 mod record;
 

@@ -10,6 +10,8 @@
 //! | rows, columns, derivatives of one's own problem | [`SeparableProblem`] |
 //! | an effort model over motion and measured efforts | [`EffortProblem`] |
 //! | rows of logs through kernels | [`crate::conditioning::refine`] |
+//! | friction measured in steady motion | [`SteadyRows`] |
+//! | several of these together | [`JoinedProblem`] |
 //! | the fit | [`fit`], [`SeparableSettings`] |
 //! | values, covariance of `(c, α)` together | [`SeparableEstimate`] |
 //! | whether the data see a shape parameter | [`ShapeFinding`] |
@@ -23,6 +25,7 @@ mod dense;
 mod effort_problem;
 mod estimate;
 mod fit;
+mod joined;
 mod levenberg;
 mod limit;
 mod linearised;
@@ -37,10 +40,12 @@ mod scale;
 mod settings;
 mod sobol;
 mod starts;
+mod steady_rows;
 
 pub use effort_problem::{EffortBlock, EffortProblem};
 pub use estimate::{Deviations, SeparableEstimate};
 pub use fit::fit;
+pub use joined::JoinedProblem;
 pub use levenberg::SearchStatus;
 pub use limit::limit_model;
 pub(crate) use places::{OutputPlaces, places};
@@ -48,3 +53,4 @@ pub use problem::{Bound, RowGroup, SeparableProblem, ShapedColumns};
 pub use profile::{ShapeFinding, ShapeVerdict};
 pub use settings::{SeparableError, SeparableLoss, SeparableSettings, ShapeSearch, Weighting};
 pub use starts::{StartOutcome, StartReport};
+pub use steady_rows::{SteadyFrictionRow, SteadyRows};

@@ -114,6 +114,7 @@ fn imperfections(settings: &SimulateSettings, joints: &[String]) -> Result<Imper
         effort_noise: noise.into_iter().map(|x| x.unwrap_or(0.0)).collect(),
         ripple_share: table.ripple_share,
         ripple_cycles: table.ripple_cycles,
+        ripple: None,
         effort_delay_samples: settings.delay_samples.unwrap_or(Imperfections::default().effort_delay_samples),
         outlier_share: table.outlier_share,
         outlier_size: table.outlier_size,

@@ -1,0 +1,157 @@
+//! The simulated arm: robot file, true friction, and models with the friction that an estimate assumes.
+
+use std::sync::Arc;
+
+use dynid::model::element::{
+    Coulomb, ExponentialViscous, JointElement, LuGre, Offset, RotorInertia, ShapeSetting, Viscous,
+};
+use dynid::model::{BaseParameters, BaseSettings, EffortModel, KnownElement, Mechanism, RobotModel};
+use dynid::sim::Plant;
+use dynid::{Robot, RobotOptions};
+
+use super::{JOINTS, fault};
+use super::settings::{Friction, Settings};
+use crate::StudyError;
+
+/// Speed over which the simulation smooths the sign of velocities in the viscous law, rad/s. Bristles need none.
+const SIGN_WIDTH: f64 = 1e-4;
+
+/// The arm and its truth.
+#[derive(Debug)]
+pub(super) struct Indy7 {
+    pub(super) mechanism: Mechanism,
+    /// Bristles, viscous friction of temperature and rotors.
+    pub(super) model: Arc<RobotModel>,
+    /// True linear parameters of [`Self::model`]; it has no free shape.
+    pub(super) linear: Vec<f64>,
+    /// True standard parameters: ten per link, then the rotor inertias.
+    pub(super) standard: Vec<f64>,
+    /// Base parameters of links and rotors.
+    inertial: BaseParameters,
+    /// Place of each row of Table A1 among them.
+    order: Vec<usize>,
+}
+
+/// Inertial rows of Table A1 by the parameter that stands for each.
+const TABLE_A1: [&str; 40] = [
+    "Izz1", "Ixx2", "Ixy2", "Ixz2", "Iyz2", "Izz2", "mx2", "my2", "Ixx3", "Ixy3", "Ixz3", "Iyz3", "Izz3", "mx3",
+    "my3", "Ia3", "Ixx4", "Ixy4", "Ixz4", "Iyz4", "Izz4", "mx4", "my4", "Ia4", "Ixx5", "Ixy5", "Ixz5", "Iyz5",
+    "Izz5", "mx5", "my5", "Ia5", "Ixx6", "Ixy6", "Ixz6", "Iyz6", "Izz6", "mx6", "my6", "Ia6",
+];
+
+impl Indy7 {
+    pub(super) fn new(settings: &Settings) -> Result<Self, StudyError> {
+        let robot = Robot::parse(
+            include_str!("../../../../robots/indy7.toml"),
+            "robots/indy7.toml".as_ref(),
+            &RobotOptions::default(),
+        )?;
+        let mechanism = robot.mechanism.clone();
+        let rotor = |name: &str| {
+            let stated = robot.elements.settings.iter().find(|s| {
+                s.joint == name && s.element == "rotor" && s.key == "inertia"
+            });
+            match stated.map(|s| &s.value) {
+                Some(dynid::io::SettingValue::Number(x)) => Ok(*x),
+                _ => Err(StudyError::Data {
+                    file: "robots/indy7.toml",
+                    message: format!("joint `{name}` states no rotor inertia"),
+                }),
+            }
+        };
+        let names = mechanism.rate_names();
+        let mut rotors = [0.0; JOINTS];
+        for (to, name) in rotors.iter_mut().zip(&names) {
+            *to = rotor(name)?;
+        }
+        let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
+        let mut linear = mechanism.inertia_vector();
+        for (rate, friction) in settings.friction.iter().enumerate() {
+            for known in friction.known(rate, settings.thermal.valid) {
+                elements.push(known.element);
+                linear.extend(known.linear);
+            }
+            elements.push(Box::new(RotorInertia { rate }));
+            linear.push(rotors[rate]);
+        }
+        let model = Arc::new(RobotModel::new(mechanism.clone(), elements));
+        let standard = mechanism.inertia_vector().into_iter().chain(rotors).collect();
+        let rigid = rigid(&mechanism);
+        let inertial = BaseParameters::of(&rigid, &mechanism, &[], &BaseSettings::default());
+        let table = &rigid.parameters().linear;
+        let place = |name: &&str| inertial.kept.iter().position(|c| table[*c].symbol == **name);
+        let order: Vec<usize> = TABLE_A1.iter().filter_map(|name| place(name)).collect();
+        if order.len() != TABLE_A1.len() || inertial.len() != order.len() {
+            return Err(fault("the base parameters are not those of Table A1"));
+        }
+        Ok(Indy7 { mechanism, model, linear, standard, inertial, order })
+    }
+
+    /// Base values of standard parameters (ten per link, then rotor inertias) in the order of Table A1.
+    pub(super) fn base_values(&self, standard: &[f64]) -> Vec<f64> {
+        let values = self.inertial.values(standard);
+        self.order.iter().map(|k| values[*k]).collect()
+    }
+
+    pub(super) fn plant(&self) -> Result<Plant, StudyError> {
+        Ok(Plant::new(self.model.clone(), self.linear.clone(), Vec::new(), SIGN_WIDTH)?)
+    }
+
+    /// Rigid bodies and rotors, with Coulomb, viscous and offset columns: the regression of the paper, in which they stand
+    /// for the friction or for its errors.
+    pub(super) fn regression(&self) -> RobotModel {
+        let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
+        for rate in 0..JOINTS {
+            elements.push(Box::new(RotorInertia { rate }));
+            elements.push(Box::new(Coulomb { rate }));
+            elements.push(Box::new(Viscous { rate }));
+            elements.push(Box::new(Offset { rate }));
+        }
+        RobotModel::new(self.mechanism.clone(), elements)
+    }
+}
+
+/// Links and rotors alone.
+pub(super) fn rigid(mechanism: &Mechanism) -> RobotModel {
+    let rotors = (0..JOINTS).map(|rate| -> Box<dyn JointElement> { Box::new(RotorInertia { rate }) });
+    RobotModel::new(mechanism.clone(), rotors.collect())
+}
+
+impl Friction {
+    /// Bristles and viscous friction with these values.
+    pub(super) fn known(&self, rate: usize, valid: [f64; 2]) -> [KnownElement; 2] {
+        let held = ShapeSetting::held;
+        let bristles = LuGre {
+            rate,
+            kappa: held(self.sigma0 / self.coulomb),
+            rho: held(self.fixed / self.coulomb),
+            vs: held(self.stribeck_speed),
+            delta: held(2.0),
+        };
+        let viscous = ExponentialViscous {
+            sigma3: held(self.sigma3[0]),
+            sigma3_slope: held(self.sigma3[1]),
+            sigma4: held(self.sigma4[0]),
+            sigma4_slope: held(self.sigma4[1]),
+            reference_temperature: 0.0,
+            temperature_range: (valid[0], valid[1]),
+            ..ExponentialViscous::new(rate)
+        };
+        [
+            KnownElement {
+                element: Box::new(bristles),
+                linear: vec![self.coulomb, self.sigma1],
+                shape: Vec::new(),
+            },
+            KnownElement { element: Box::new(viscous), linear: self.sigma2.to_vec(), shape: Vec::new() },
+        ]
+    }
+
+    /// Steady friction at a speed (rad/s) and a temperature, N m.
+    pub(super) fn steady(&self, v: f64, temperature: f64) -> f64 {
+        let line = |[value, slope]: [f64; 2]| value + slope * temperature;
+        let falling = (-(v / self.stribeck_speed).powi(2)).exp();
+        let viscous = line(self.sigma2) * -(-(line(self.sigma3) * v).powf(line(self.sigma4))).exp_m1();
+        self.coulomb + (self.fixed - self.coulomb) * falling + viscous
+    }
+}
