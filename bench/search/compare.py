@@ -3,8 +3,8 @@
     python compare.py SEARCH_FUNCTIONS [SEEDS]
 
 SEARCH_FUNCTIONS: the example program `search_functions` of dynid-estimate. Prints a table of medians of the best values
-over the seeds and of evaluations per second of the fastest run (others share the machine), one thread each. mealpy ends after the iteration in which the budget is
-used up, so it never makes fewer evaluations than ours.
+over the seeds and of evaluations per second of the fastest run (others share the machine), one thread each. mealpy ends
+after the iteration in which the budget is used up, so it never makes fewer evaluations than ours.
 """
 
 import json

@@ -38,16 +38,7 @@ fn case(logs: usize, share: f64) -> Case {
         .map(|log| {
             let (q, dq, ddq) = motion(samples, log as u64);
             let mut block = RegressorBlock::new(model.layout().clone(), samples);
-            let moving = dynid_model::MotionBlock {
-                samples,
-                stride: samples,
-                q: &q,
-                dq: &dq,
-                ddq: &ddq,
-                gravity: None,
-                channels: &[],
-                sign_width: 0.0,
-            };
+            let moving = dynid_model::MotionBlock::plain(samples, &q, &dq, &ddq);
             model.regressor(&moving, &[], &mut block);
             let joints = (0..JOINTS)
                 .map(|joint| {

@@ -54,16 +54,7 @@ impl Case {
         }
         let rigid = model.parameters().prior();
         let mut block = RegressorBlock::new(model.layout().clone(), samples);
-        let moving = MotionBlock {
-            samples,
-            stride: samples,
-            q: &q,
-            dq: &dq,
-            ddq: &ddq,
-            gravity: None,
-            channels: &[],
-            sign_width: 0.0,
-        };
+        let moving = MotionBlock::plain(samples, &q, &dq, &ddq);
         model.regressor(&moving, &[], &mut block);
         let joints = (0..JOINTS)
             .map(|joint| {

@@ -180,15 +180,8 @@ fn recorded_friction_of_single_joints_is_fitted_as_well_as_by_the_readme() {
             text.lines().skip(1).map(|l| l.split(',').map(|v| v.parse().unwrap()).collect()).collect();
         let column = |k: usize| rows.iter().map(|r| r[k]).collect::<Vec<f64>>();
         let (dq, effort, rest) = (column(2), column(4), vec![0.0; rows.len()]);
-        let motion = |from: usize, samples: usize| MotionBlock {
-            samples,
-            stride: samples,
-            q: &rest[from..],
-            dq: &dq[from..],
-            ddq: &rest[from..],
-            gravity: None,
-            channels: &[],
-            sign_width: 0.0,
+        let motion = |from: usize, samples: usize| {
+            MotionBlock::plain(samples, &rest[from..], &dq[from..], &rest[from..])
         };
         let length = 500;
         let blocks: Vec<EffortBlock<'_>> = (0..rows.len())
@@ -247,16 +240,7 @@ fn shapes_are_found_from_the_rows_of_a_log() {
     }
     let (q, dq, ddq) = arm::motion(samples, 3);
     let mut block = RegressorBlock::new(model.layout().clone(), samples);
-    let moving = MotionBlock {
-        samples,
-        stride: samples,
-        q: &q,
-        dq: &dq,
-        ddq: &ddq,
-        gravity: None,
-        channels: &[],
-        sign_width: 0.0,
-    };
+    let moving = MotionBlock::plain(samples, &q, &dq, &ddq);
     model.regressor(&moving, &truth, &mut block);
     let joints = (0..arm::JOINTS)
         .map(|joint| {

@@ -74,16 +74,7 @@ fn refill(bencher: Bencher<'_, '_>, samples: usize, element: Box<dyn JointElemen
     });
     let model = RobotModel::new(d.build().expect("the bench robot is sound"), vec![element]);
     let (v, rest) = (speeds(samples), vec![0.0; samples]);
-    let motion = MotionBlock {
-        samples,
-        stride: samples,
-        q: &rest,
-        dq: &v,
-        ddq: &rest,
-        gravity: None,
-        channels: &[],
-        sign_width: 0.0,
-    };
+    let motion = MotionBlock::plain(samples, &rest, &v, &rest);
     let shape = model.parameters().shape_start();
     let mut values = vec![0.0; model.shaped_columns().len() * samples];
     bencher.counter(ItemsCount::new(samples)).bench_local(|| {

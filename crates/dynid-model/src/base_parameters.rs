@@ -190,6 +190,19 @@ impl BaseParameters {
         values
     }
 
+    /// The parameter vector whose kept columns are `beta` and all others zero: its base values are `beta`.
+    ///
+    /// # Panics
+    /// If `beta` has the wrong length.
+    pub fn expanded(&self, beta: &[f64]) -> Vec<f64> {
+        assert_eq!(beta.len(), self.len(), "length of beta");
+        let mut x = vec![0.0; self.parameters];
+        for (column, value) in self.kept.iter().zip(beta) {
+            x[*column] = *value;
+        }
+        x
+    }
+
     /// Regrouping matrix `K`, row-major, `len() × parameters`.
     pub fn matrix(&self) -> Vec<f64> {
         let mut k = vec![0.0; self.len() * self.parameters];

@@ -155,6 +155,10 @@ impl RegressorBlock {
         }
     }
 
+    pub(crate) fn offset_mut(&mut self, output: usize) -> &mut [f64] {
+        &mut self.offset[output * self.capacity..][..self.samples]
+    }
+
     pub(crate) fn data_mut(&mut self) -> &mut [f64] {
         &mut self.data
     }
@@ -173,6 +177,13 @@ pub struct Output {
     pub unit: &'static str,
 }
 
+/// What elements remember of the motion before a block; the default is the start of a record.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct History {
+    /// Per element; empty at the start.
+    pub(crate) states: Vec<Vec<f64>>,
+}
+
 /// A model whose effort is linear in most of its parameters:
 /// `effort = W(motion; shape) · linear + offset(motion; shape)`.
 pub trait EffortModel: Send + Sync {
@@ -184,6 +195,28 @@ pub trait EffortModel: Send + Sync {
     fn layout(&self) -> &Arc<RegressorLayout>;
     /// Names of the extra channels that a motion block must hold.
     fn channels(&self) -> &[String];
+    /// Names of the signals that depend on the motion before; none by default. Where a motion block holds them as channels,
+    /// they are used, elsewhere the steady state.
+    fn signals(&self) -> &[String] {
+        &[]
+    }
+    /// Forms these signals over a block, signal `k`, sample `s` at `out[k * stride + s]`, and takes `history` to the end of
+    /// the block. However a record is cut into blocks, the same bits come out.
+    ///
+    /// `step_s`: time between samples, s.
+    ///
+    /// # Panics
+    /// If `shape` has the wrong length, a channel is missing or `out` is too short.
+    fn remember(
+        &self,
+        _motion: &MotionBlock<'_>,
+        _step_s: f64,
+        _shape: &[f64],
+        _history: &mut History,
+        _stride: usize,
+        _out: &mut [f64],
+    ) {
+    }
     /// Number of entries of the position vector, number of rates.
     fn dimensions(&self) -> (usize, usize);
     /// Speeds whose change of sign spoils rows of an output: combinations `Σ factor · rate` that a sign is taken of.

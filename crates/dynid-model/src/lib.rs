@@ -26,11 +26,11 @@ pub use dynamics::{
     AddedInertia, BodyPoint, Dynamics, DynamicsWorkspace, Energy, ForwardDynamicsWorkspace, LoadedState,
     MotionAdjoint, MotionBlock, NotPositive, State,
 };
-pub use effort_model::{EffortModel, Output, RegressorBlock, RegressorLayout};
+pub use effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
 pub use inertia::Inertia;
 pub use mechanism::{Body, Frame, Joint, Mechanism, MechanismError, MechanismWarning};
 pub use parameter::{Owner, Parameter, ParameterTable, ShapeParameter};
 pub use random_motion::RandomMotion;
-pub use robot_model::{FrictionPassivity, Passivity, RobotModel};
+pub use robot_model::{FrictionPassivity, KnownElement, Passivity, RobotModel};
 pub use scalar::Scalar;
 pub use spatial::{Mat3, Placement, Vec3};

@@ -2,6 +2,8 @@
 
 mod adjoint;
 mod elements;
+mod history;
+mod known;
 mod passivity;
 mod shaped;
 
@@ -9,11 +11,13 @@ use std::sync::Arc;
 
 use crate::description::JointKind;
 use crate::dynamics::{Dynamics, MotionAdjoint, MotionBlock, Slots};
-use crate::effort_model::{EffortModel, Output, RegressorBlock, RegressorLayout};
+use crate::effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
 use crate::element::{ElementColumns, JointElement, JointInfo};
 use crate::inertia::{PARAMETER_NAMES, PARAMETER_UNITS};
 use crate::mechanism::{Body, Mechanism};
 use crate::parameter::{Owner, Parameter, ParameterTable};
+pub use known::KnownElement;
+use known::PlacedKnown;
 pub use passivity::{FrictionPassivity, Passivity};
 use shaped::Shaped;
 
@@ -29,6 +33,8 @@ struct PlacedElement {
     /// First of its shape parameters.
     first_shape: usize,
     shapes: usize,
+    /// How many signals it remembers.
+    signals: usize,
 }
 
 /// Joint-level regressor of a mechanism with coupled joints, folded into coordinates afterwards.
@@ -57,6 +63,8 @@ pub struct RobotModel {
     elements: Vec<PlacedElement>,
     shaped: Shaped,
     channels: Vec<String>,
+    known: Vec<PlacedKnown>,
+    signals: Vec<String>,
 }
 
 impl RobotModel {
@@ -122,6 +130,7 @@ impl RobotModel {
                 let slots = entries.iter().filter_map(|(rate, column)| layout.slot(*rate, *column)).collect();
                 let shapes = element.shape(&joints).len();
                 PlacedElement {
+                    signals: element.signals(&joints).len(),
                     element,
                     slots,
                     entry_numbers: (0..entries.len()).collect(),
@@ -131,7 +140,7 @@ impl RobotModel {
                 }
             })
             .collect();
-        RobotModel {
+        let mut model = RobotModel {
             shaped: Shaped::new(&elements),
             dynamics,
             joints,
@@ -142,8 +151,12 @@ impl RobotModel {
             coupled,
             elements,
             channels,
+            known: Vec::new(),
+            signals: Vec::new(),
             mechanism,
-        }
+        };
+        model.signals = model.signal_names();
+        model
     }
 
     /// The mechanism.
@@ -201,6 +214,22 @@ impl EffortModel for RobotModel {
         &self.channels
     }
 
+    fn signals(&self) -> &[String] {
+        &self.signals
+    }
+
+    fn remember(
+        &self,
+        motion: &MotionBlock<'_>,
+        step_s: f64,
+        shape: &[f64],
+        history: &mut History,
+        stride: usize,
+        out: &mut [f64],
+    ) {
+        self.form_signals(motion, step_s, shape, history, stride, out);
+    }
+
     fn dimensions(&self) -> (usize, usize) {
         (self.mechanism.positions(), self.mechanism.rates())
     }
@@ -226,6 +255,7 @@ impl EffortModel for RobotModel {
             Some(coupled) => coupled.fill(&self.mechanism, motion, &self.layout, out),
         }
         self.fill_elements(motion, shape, out);
+        self.fill_known(motion, out);
     }
 
     fn shaped_columns(&self) -> &[(usize, usize)] {

@@ -290,16 +290,7 @@ fn an_exact_sign_has_no_slope() {
     let linear: Vec<f64> = (0..11).map(|k| if k == 10 { 1.0 } else { 0.0 }).collect();
     let (positions, rates) = model.dimensions();
     let mut out = MotionAdjoint::new(positions, rates, 1);
-    let block = MotionBlock {
-        samples: 1,
-        stride: 1,
-        q: &[0.1],
-        dq: &[0.001],
-        ddq: &[0.2],
-        gravity: None,
-        channels: &[],
-        sign_width: 0.0,
-    };
+    let block = MotionBlock::plain(1, &[0.1], &[0.001], &[0.2]);
     model.effort_adjoint(&block, &[], &linear, 1, &[1.0], &mut out);
     assert_eq!(out, MotionAdjoint::new(positions, rates, 1));
     let smooth = MotionBlock { sign_width: 0.02, ..block };

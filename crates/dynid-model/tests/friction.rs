@@ -5,7 +5,7 @@
 use std::path::PathBuf;
 
 use dynid_model::element::{
-    Arctangent, Coulomb, JointElement, PowerLaw, ShapeSetting, Sigmoid, SigmoidOffset, Stribeck,
+    Arctangent, Coulomb, ExponentialViscous, JointElement, LuGre, PowerLaw, ShapeSetting, Sigmoid, SigmoidOffset, Stribeck,
     TanhFriction, Viscous, ViscousMagnitude,
 };
 use dynid_model::*;
@@ -82,7 +82,8 @@ fn columns(model: &RobotModel, motion: &MotionBlock<'_>, shape: &[f64]) -> Regre
 }
 
 fn free(start: f64) -> ShapeSetting {
-    ShapeSetting { start, lower: 0.5 * start, upper: 2.0 * start, held: false }
+    let ends = [0.5 * start, 2.0 * start];
+    ShapeSetting { start, lower: ends[0].min(ends[1]), upper: ends[0].max(ends[1]), held: false }
 }
 
 #[test]
@@ -112,6 +113,18 @@ fn curves_are_those_of_the_catalogue() {
                 elements.push(Box::new(PowerLaw::new(0)));
                 (vec![p("c")], vec![p("p")])
             }
+            "exponential_viscous" => {
+                let pair = |key: &str| numbers(&curve["parameters"][key]);
+                let law = ExponentialViscous {
+                    sigma3_slope: free(0.01),
+                    sigma4_slope: free(0.01),
+                    reference_temperature: 0.0,
+                    temperature: Some(p("T")),
+                    ..ExponentialViscous::new(0)
+                };
+                elements.push(Box::new(law));
+                (pair("s2"), [pair("s3"), pair("s4")].concat())
+            }
             "stribeck" => {
                 elements.push(Box::new(Stribeck { delta: free(1.5), ..Stribeck::new(0) }));
                 elements.push(Box::new(Viscous { rate: 0 }));
@@ -134,7 +147,7 @@ fn curves_are_those_of_the_catalogue() {
             assert!((effort[k] - direct[k]).abs() <= 1e-13 * scale, "{name}: columns times linear");
         }
     }
-    assert_eq!(seen, ["arctan", "tanh", "sigmoid", "stribeck", "stribeck", "power"]);
+    assert_eq!(seen, ["arctan", "tanh", "sigmoid", "stribeck", "stribeck", "exponential_viscous", "power"]);
 }
 
 /// Elements of every kind with free shape, some parameters held, linear elements between them.
@@ -153,6 +166,17 @@ fn all_elements() -> Vec<Box<dyn JointElement>> {
         Box::new(SigmoidOffset { rate: 0, alpha: free(8.0), nu: free(0.03) }),
         Box::new(PowerLaw { rate: 2, p: free(0.7) }),
         Box::new(ViscousMagnitude { rate: 1 }),
+        Box::new(ExponentialViscous {
+            sigma3: free(1.3),
+            sigma3_slope: free(0.013),
+            sigma4: free(0.8),
+            sigma4_slope: free(-0.004),
+            temperature: Some(31.0),
+            ..ExponentialViscous::new(2)
+        }),
+        Box::new(ExponentialViscous { sigma4: free(1.7), temperature: Some(18.0), ..ExponentialViscous::new(1) }),
+        Box::new(LuGre { kappa: free(700.0), rho: free(1.4), vs: free(0.2), delta: free(1.4), rate: 1 }),
+        Box::new(LuGre::new(3)),
     ]
 }
 

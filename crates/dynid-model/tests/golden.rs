@@ -311,16 +311,7 @@ fn er16_efforts_friction_regressor_and_poses() {
     let mut work = dynamics.workspace();
     for state in g["states"].as_array().unwrap() {
         let (q, dq, ddq) = (numbers(&state["q"]), numbers(&state["qd"]), numbers(&state["qdd"]));
-        let motion = MotionBlock {
-            samples: 1,
-            stride: 1,
-            q: &q,
-            dq: &dq,
-            ddq: &ddq,
-            gravity: None,
-            channels: &[],
-            sign_width: 0.0,
-        };
+        let motion = MotionBlock::plain(1, &q, &dq, &ddq);
         let mut effort = vec![0.0; 3];
         rigid.efforts(&motion, &[], &linear[..30], 1, &mut effort);
         check_close(&effort, &numbers(&state["tau_rigid_from_standard"]), 1e-9, 0.0, "rigid");
@@ -355,8 +346,7 @@ fn linear_elements_follow_their_laws() {
         let mut linear = vec![0.0; 10];
         linear.extend_from_slice(values);
         let n = dq.len();
-        let motion =
-            MotionBlock { samples: n, stride: n, q, dq, ddq, gravity: None, channels: &[], sign_width: 0.0 };
+        let motion = MotionBlock::plain(n, q, dq, ddq);
         let mut block = RegressorBlock::new(model.layout().clone(), n);
         model.regressor(&motion, &[], &mut block);
         block.effort(0, &linear)
@@ -417,16 +407,7 @@ fn six_joint_effort(
     let model = RobotModel::new(modified_dh(&INDY7).build().unwrap(), elements);
     let mut linear = vec![0.0; 60];
     linear.extend_from_slice(values);
-    let motion = MotionBlock {
-        samples: 1,
-        stride: 1,
-        q: &[0.0; 6],
-        dq,
-        ddq,
-        gravity: None,
-        channels: &[],
-        sign_width: 0.0,
-    };
+    let motion = MotionBlock::plain(1, &[0.0; 6], dq, ddq);
     let mut block = RegressorBlock::new(model.layout().clone(), 1);
     model.regressor(&motion, &[], &mut block);
     (0..6).map(|j| block.effort(j, &linear)[0]).collect()

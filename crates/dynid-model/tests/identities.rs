@@ -390,6 +390,7 @@ fn nearest_parameters_have_the_base_values_and_stay_at_the_prior_if_they_can() {
         let own = base.values(&prior);
         check_close(&base.nearest(&own, &prior, &scale), &prior, 1e-12 * largest(&prior), "unchanged prior");
         let beta: Vec<f64> = own.iter().enumerate().map(|(k, b)| b + (k as f64).sin()).collect();
+        assert_eq!(base.values(&base.expanded(&beta)), beta, "tree {seed}: kept columns alone");
         let x = base.nearest(&beta, &prior, &scale);
         check_close(&base.values(&x), &beta, 1e-9 * largest(&beta).max(1.0), &format!("tree {seed}: K x"));
         for c in &base.zero {

@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use dynid_model::element::{
-    Arctangent, JointElement, Linearised, PowerLaw, Sigmoid, SigmoidOffset, Stribeck, TanhFriction,
+    Arctangent, ExponentialViscous, JointElement, Linearised, LuGre, PowerLaw, Sigmoid, SigmoidOffset, Stribeck, TanhFriction,
 };
 use dynid_model::*;
 
@@ -38,6 +38,8 @@ fn elements() -> Vec<Box<dyn JointElement>> {
         Box::new(Stribeck::new(0)),
         Box::new(free),
         Box::new(PowerLaw::new(0)),
+        Box::new(ExponentialViscous { temperature: Some(31.0), ..ExponentialViscous::new(0) }),
+        Box::new(LuGre::new(0)),
     ]
 }
 

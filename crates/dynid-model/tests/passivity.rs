@@ -32,7 +32,7 @@ fn passivity(
     range: (f64, f64),
 ) -> FrictionPassivity {
     let (model, linear) = joint(elements, values);
-    model.friction_passivity(0, shape, &linear, range)
+    model.friction_passivity(0, shape, &linear, range, &[])
 }
 
 fn four() -> Vec<Box<dyn JointElement>> {
@@ -123,7 +123,7 @@ fn effort_of_friction_leaves_out_what_acts_at_rest() {
     let [f0, fc, fv, fa, fb] = ER16[1];
     let (model, linear) = joint(four(), &[f0, fc, fv, fa]);
     let velocities = [-0.4, 0.0, 0.003, 1.7];
-    let efforts = model.friction_effort(0, &[fb], &linear, &velocities);
+    let efforts = model.friction_effort(0, &[fb], &linear, &velocities, &[]);
     for (v, e) in velocities.into_iter().zip(efforts) {
         let sign = if v == 0.0 { 0.0 } else { f64::signum(v) };
         let expected = fc * sign + fv * v + fa * (fb * v).atan();

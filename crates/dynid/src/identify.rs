@@ -2,6 +2,7 @@
 
 mod figures;
 mod friction;
+mod shapes;
 mod structure;
 
 use std::path::Path;
@@ -17,7 +18,7 @@ use dynid_motion::Log;
 
 use crate::Error;
 use crate::agreement::{self, Agreement};
-use crate::config::{Config, Friction, LogConfig, Route};
+use crate::config::{Config, LogConfig, Route};
 use crate::consistency::{self, Consistent};
 use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
@@ -28,6 +29,7 @@ use crate::prior::Prior;
 use crate::robot::{Robot, RobotOptions};
 use crate::shape::{self, ShapeFit};
 use crate::trust::{Evidence, Trust};
+use shapes::Shaped;
 use structure::Structure;
 
 /// What is being worked on, for progress displays.
@@ -164,38 +166,15 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     };
     let mut warnings = robot.warnings.clone();
     warnings.extend(plan.alike(&robot.mechanism).iter().map(ToString::to_string));
-    let mut shapes_of_friction = Vec::new();
-    let (model, structure, conditioning) = match conditioning {
-        Some(choices) if config.elements.friction == Friction::Auto => {
-            let found =
-                friction::choose(&model, &structure, &mut plan, &prepared, &choices, &settings, |stage| {
-                    progress(Step::Conditioning(stage));
-                })?;
-            shapes_of_friction = found.per_output;
-            let model = RobotModel::new(robot.mechanism.clone(), plan.build(&robot.mechanism)?);
-            let structure = Structure::of(config, &model, &plan, &prepared)?;
-            (model, structure, Some(found.conditioning))
-        }
-        conditioning => (model, structure, conditioning),
-    };
-    let (mut model, mut structure) = (model, structure);
-    let mut shapes = None;
-    if let Some(choices) = &conditioning {
-        while !model.parameters().shape.is_empty() {
-            progress(Step::Shapes);
-            let (found, linear) =
-                shape::find(config, model, &structure.base, &prepared, (choices, &settings))?;
-            if friction::drop_unseen(&found.model, &found, &mut shapes_of_friction, &mut plan) {
-                model = RobotModel::new(robot.mechanism.clone(), plan.build(&robot.mechanism)?);
-                structure = Structure::of(config, &model, &plan, &prepared)?;
-                continue;
-            }
-            let free: Vec<bool> = found.findings.iter().map(shape::is_free).collect();
-            model = shape::linearised(&plan, &found.model, &linear, &free)?;
-            structure = Structure::of(config, &model, &plan, &prepared)?;
-            shapes = Some(found);
-        }
-    }
+    let Shaped { model, structure, conditioning, friction, found: shapes } = shapes::search(
+        config,
+        (model, structure),
+        &mut plan,
+        &prepared,
+        conditioning,
+        &settings,
+        &mut progress,
+    )?;
     let shape = model.parameters().shape_start();
     progress(Step::Fit);
     let Structure { base, stated, prior, regrouping, space, bounds, method } = structure;
@@ -225,7 +204,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         base,
         columns: loaded.into_iter().map(|l| l.columns).collect(),
         conditioning,
-        friction: shapes_of_friction,
+        friction,
         prior,
         fitted,
         consistent,

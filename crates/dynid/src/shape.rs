@@ -41,10 +41,7 @@ pub(crate) fn find(
         ..defaults
     };
     let found: SeparableEstimate = refine(&model, &shape, &base.kept, logs, choices, settings, &separable)?;
-    let mut linear = vec![0.0; model.parameters().linear.len()];
-    for (column, value) in base.kept.iter().zip(&found.linear) {
-        linear[*column] = *value;
-    }
+    let linear = base.expanded(&found.linear);
     let model = model.with_shape(&found.shape);
     Ok((ShapeFit { model, findings: found.findings, starts: found.starts }, linear))
 }

@@ -195,16 +195,7 @@ fn named(model: &RobotModel, values: Vec<f64>) -> Vec<(String, f64)> {
 
 fn efforts(model: &RobotModel, values: &[f64], signals: &[Vec<f64>; 3], samples: usize) -> Vec<Vec<f64>> {
     let mut block = RegressorBlock::new(model.layout().clone(), samples);
-    let motion = MotionBlock {
-        samples,
-        stride: samples,
-        q: &signals[0],
-        dq: &signals[1],
-        ddq: &signals[2],
-        gravity: None,
-        channels: &[],
-        sign_width: 0.0,
-    };
+    let motion = MotionBlock::plain(samples, &signals[0], &signals[1], &signals[2]);
     model.regressor(&motion, &model.parameters().shape_start(), &mut block);
     (0..model.outputs().len()).map(|output| block.effort(output, values)).collect()
 }

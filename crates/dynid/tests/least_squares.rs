@@ -57,16 +57,7 @@ fn indy7_least_squares() {
     };
     let (q, dq, ddq, tau) = (flat("q"), flat("qd"), flat("qdd"), flat("tau"));
     let n = q.len() / 6;
-    let motion = MotionBlock {
-        samples: n,
-        stride: n,
-        q: &q,
-        dq: &dq,
-        ddq: &ddq,
-        gravity: None,
-        channels: &[],
-        sign_width: 0.0,
-    };
+    let motion = MotionBlock::plain(n, &q, &dq, &ddq);
     let mut block = RegressorBlock::new(model.layout().clone(), n);
     model.regressor(&motion, &[], &mut block);
     let factors: Vec<Factor> = (0..6)

@@ -108,16 +108,7 @@ impl Arm {
         let mut rng = ChaCha8Rng::seed_from_u64(39);
         let base = BaseParameters::of(&model, model.mechanism(), &[], &BaseSettings::default());
         let truth: Vec<f64> = base.kept.iter().map(|_| normal(&mut rng)).collect();
-        let moving = MotionBlock {
-            samples,
-            stride: samples,
-            q: &q,
-            dq: &dq,
-            ddq: &ddq,
-            gravity: None,
-            channels: &[],
-            sign_width: 0.0,
-        };
+        let moving = MotionBlock::plain(samples, &q, &dq, &ddq);
         let mut block = RegressorBlock::new(model.layout().clone(), samples);
         model.regressor(&moving, &[], &mut block);
         let filter = butterworth(4, CUT_OFF_HZ, RATE_HZ).unwrap();

@@ -54,16 +54,7 @@ impl Motion {
     }
 
     pub(crate) fn block(&self) -> MotionBlock<'_> {
-        MotionBlock {
-            samples: self.samples,
-            stride: self.samples,
-            q: &self.q,
-            dq: &self.dq,
-            ddq: &self.ddq,
-            gravity: None,
-            channels: &[],
-            sign_width: 0.0,
-        }
+        MotionBlock::plain(self.samples, &self.q, &self.dq, &self.ddq)
     }
 }
 

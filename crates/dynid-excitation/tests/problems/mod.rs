@@ -124,7 +124,8 @@ pub fn indy7_weighted(measure: Measure) -> Option<Problem> {
 }
 
 /// ER-16 joints 1 to 3 with torque and wrist limits. The torque limit knows friction linear in the velocity beyond
-/// Coulomb's, of the size of the published curves at 0.5 rad/s: these curves themselves are no element yet.
+/// Coulomb's, of the size of the published curves with an arctangent at 0.5 rad/s: the recorded figures were made with this
+/// stand-in.
 pub fn er16(friction_columns: bool) -> Option<Problem> {
     let data = reference("robots/er16.json")?;
     let mechanism = mechanism(&data);

@@ -32,6 +32,12 @@ pub struct MotionBlock<'a> {
 }
 
 impl<'a> MotionBlock<'a> {
+    /// Packed motion (`stride = samples`) with the mechanism's constant gravity, no extra channels, and the sign of a
+    /// velocity itself.
+    pub fn plain(samples: usize, q: &'a [f64], dq: &'a [f64], ddq: &'a [f64]) -> Self {
+        MotionBlock { samples, stride: samples, q, dq, ddq, gravity: None, channels: &[], sign_width: 0.0 }
+    }
+
     /// Samples of one rate.
     pub fn rate(&self, rate: usize) -> &'a [f64] {
         &self.dq[rate * self.stride..][..self.samples]

@@ -1,6 +1,6 @@
 //! Drive gains.
 
-use super::{ElementColumns, ElementWeights, JointElement, JointInfo};
+use super::{ElementColumns, ElementWeights, JointElement, JointInfo, current_channel};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::Parameter;
 
@@ -13,11 +13,6 @@ use crate::parameter::Parameter;
 pub struct DriveGain {
     /// Rate it acts on.
     pub rate: usize,
-}
-
-/// Name of the channel that holds the motor current of a joint, A.
-pub fn current_channel(joint: &str) -> String {
-    format!("current_{joint}")
 }
 
 impl JointElement for DriveGain {

@@ -97,6 +97,19 @@ impl JointElement for Linearised {
     fn channels(&self, joints: &[JointInfo]) -> Vec<String> {
         self.element.channels(joints)
     }
+    fn signals(&self, joints: &[JointInfo]) -> Vec<String> {
+        self.element.signals(joints)
+    }
+    fn remember(
+        &self,
+        motion: &MotionBlock<'_>,
+        step_s: f64,
+        _: &[f64],
+        state: &mut Vec<f64>,
+        out: &mut [&mut [f64]],
+    ) {
+        self.element.remember(motion, step_s, &self.shape, state, out);
+    }
     fn reversal_speeds(&self) -> Vec<Vec<(usize, f64)>> {
         self.element.reversal_speeds()
     }

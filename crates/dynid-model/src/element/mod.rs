@@ -3,6 +3,7 @@
 //! Efforts count on the drive's side of the balance: `effort of the drive = rigid bodies + Σ elements`, so friction is
 //! positive for positive speed. `s(v)` is the sign with `s(0) = 0`.
 
+mod channel;
 mod compliance;
 mod drive;
 mod friction;
@@ -11,10 +12,11 @@ mod rotor;
 mod shape;
 mod transmission;
 
+pub use channel::{current_channel, temperature_channel};
 pub use compliance::{CyclicTorque, Spring};
-pub use drive::{DriveGain, current_channel};
+pub use drive::DriveGain;
 pub use friction::{
-    Arctangent, AsymmetricFriction, Coulomb, LoadFriction, Offset, PowerLaw, Sigmoid, SigmoidOffset,
+    Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, LoadFriction, LuGre, Offset, PowerLaw, Sigmoid, SigmoidOffset,
     Stribeck, TanhFriction, Viscous, ViscousMagnitude,
 };
 pub use linearised::{Linearised, change_name};
@@ -150,6 +152,23 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     /// Extra channels that it reads.
     fn channels(&self, _joints: &[JointInfo]) -> Vec<String> {
         Vec::new()
+    }
+    /// Names of the signals that it forms from the motion before ([`JointElement::remember`]); its columns read them as
+    /// channels. None by default.
+    fn signals(&self, _joints: &[JointInfo]) -> Vec<String> {
+        Vec::new()
+    }
+    /// Forms the samples of its signals over a block, `out[signal][sample]`, and takes its state to the end of the block.
+    ///
+    /// `step_s`: time between samples. `state`: empty at the start of a record; afterwards what the block before left.
+    fn remember(
+        &self,
+        _motion: &MotionBlock<'_>,
+        _step_s: f64,
+        _shape: &[f64],
+        _state: &mut Vec<f64>,
+        _out: &mut [&mut [f64]],
+    ) {
     }
     /// Combinations `Σ factor · rate`, besides single rates, whose sign the element takes.
     fn reversal_speeds(&self) -> Vec<Vec<(usize, f64)>> {

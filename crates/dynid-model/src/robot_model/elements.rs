@@ -11,7 +11,7 @@ impl PlacedElement {
 }
 
 impl RobotModel {
-    /// Adds the efforts of the elements, without those of the rigid bodies, to `effort[output * stride + s]`.
+    /// Adds the efforts of the elements, known ones too, without those of the rigid bodies, to `effort[output * stride + s]`.
     ///
     /// `linear`: all linear parameters of the model. `memory`: scratch, of any length.
     ///
@@ -41,6 +41,11 @@ impl RobotModel {
                 }
             }
         }
+        self.known_efforts(motion, memory, |rate, values, factor| {
+            for (e, w) in effort[rate * stride..][..n].iter_mut().zip(values) {
+                *e += w * factor;
+            }
+        });
     }
 
     /// Adds to `out` the derivatives of `Σ weights[output * stride + s] · effort` of the elements alone with respect to
@@ -59,6 +64,7 @@ impl RobotModel {
     ) {
         self.check_shapes(shape, Some(linear));
         let n = motion.samples;
+        let known_weights = weights;
         for placed in &self.elements {
             memory.clear();
             for (rate, column) in &placed.entries {
@@ -68,5 +74,6 @@ impl RobotModel {
                 ElementWeights { data: memory, slots: &placed.entry_numbers, stride: n, samples: n };
             placed.element.adjoint(&self.joints, motion, placed.shape(shape), &weights, out);
         }
+        self.known_adjoint(motion, (stride, known_weights), out, memory);
     }
 }

@@ -37,22 +37,24 @@ impl RobotModel {
     /// `range.0` to `range.1` (rad/s, m/s). The effort at rest is the offset of the joint and left out.
     ///
     /// Signs are looked at on 4000 velocities on each side of rest, denser towards rest, and intervals are located
-    /// between them by bisection to the last digits. Rest itself needs no friction. Couplings of joints do not count.
+    /// between them by bisection to the last digits. Channels such as a temperature are `held` at a value each. Rest itself needs no friction. Couplings of joints do not count.
     /// Where a joint has no friction, it is passive.
     ///
     /// # Panics
-    /// If there is no such rate, `shape` or `linear` has the wrong length, or the range is not finite and ascending.
+    /// If there is no such rate, `shape` or `linear` has the wrong length, the range is not finite and ascending, or a channel
+    /// is missing.
     pub fn friction_passivity(
         &self,
         rate: usize,
         shape: &[f64],
         linear: &[f64],
         range: (f64, f64),
+        held: &[(&str, f64)],
     ) -> FrictionPassivity {
         self.check_shapes(shape, Some(linear));
         let (lower, upper) = range;
         assert!(lower.is_finite() && upper.is_finite() && lower <= upper, "velocities {lower} .. {upper}");
-        let friction = Friction::new(self, rate, shape, linear);
+        let friction = Friction::new(self, rate, shape, linear, held);
         // Speeds of each side, with the sign of the velocity.
         let sides = [(-1.0, (-upper).max(0.0), -lower), (1.0, lower.max(0.0), upper)];
         let mut intervals: Vec<(f64, f64)> = Vec::new();
@@ -88,16 +90,17 @@ impl RobotModel {
     /// what [`RobotModel::friction_passivity`] looks at.
     ///
     /// # Panics
-    /// If there is no such rate, or `shape` or `linear` has the wrong length.
+    /// If there is no such rate, `shape` or `linear` has the wrong length, or a channel is missing.
     pub fn friction_effort(
         &self,
         rate: usize,
         shape: &[f64],
         linear: &[f64],
         velocities: &[f64],
+        held: &[(&str, f64)],
     ) -> Vec<f64> {
         self.check_shapes(shape, Some(linear));
-        let friction = Friction::new(self, rate, shape, linear);
+        let friction = Friction::new(self, rate, shape, linear, held);
         friction.efforts(velocities).into_iter().map(|e| e - friction.at_rest).collect()
     }
 
@@ -117,6 +120,7 @@ struct Friction<'a> {
     rate: usize,
     shape: &'a [f64],
     linear: &'a [f64],
+    held: &'a [(&'a str, f64)],
     at_rest: f64,
 }
 
@@ -132,10 +136,16 @@ struct Side {
 }
 
 impl<'a> Friction<'a> {
-    fn new(model: &'a RobotModel, rate: usize, shape: &'a [f64], linear: &'a [f64]) -> Self {
+    fn new(
+        model: &'a RobotModel,
+        rate: usize,
+        shape: &'a [f64],
+        linear: &'a [f64],
+        held: &'a [(&'a str, f64)],
+    ) -> Self {
         let of_joint = |p: &&PlacedElement| p.element.is_friction() && p.element.rates() == [rate];
         let elements = model.elements.iter().filter(of_joint).collect();
-        let mut friction = Friction { model, elements, rate, shape, linear, at_rest: 0.0 };
+        let mut friction = Friction { model, elements, rate, shape, linear, held, at_rest: 0.0 };
         friction.at_rest = friction.efforts(&[0.0])[0];
         friction
     }
@@ -144,16 +154,10 @@ impl<'a> Friction<'a> {
         let n = velocities.len();
         let mut dq = vec![0.0; self.model.joints.len() * n];
         dq[self.rate * n..][..n].copy_from_slice(velocities);
-        let motion = MotionBlock {
-            samples: n,
-            stride: n,
-            q: &[],
-            dq: &dq,
-            ddq: &[],
-            gravity: None,
-            channels: &[],
-            sign_width: 0.0,
-        };
+        let held: Vec<Vec<f64>> = self.held.iter().map(|(_, x)| vec![*x; n]).collect();
+        let channels: Vec<(&str, &[f64])> =
+            self.held.iter().zip(&held).map(|((name, _), x)| (*name, x.as_slice())).collect();
+        let motion = MotionBlock { channels: &channels, ..MotionBlock::plain(n, &[], &dq, &[]) };
         let mut effort = vec![0.0; n];
         for placed in &self.elements {
             let mut data = vec![0.0; placed.entries.len() * n];

@@ -19,6 +19,18 @@ pub(crate) fn map_curve(curve: &impl Curve, values: &mut [f64]) {
     run_fused(MapTask { curve, values });
 }
 
+/// Replaces all values by `e^-x`; none may be negative.
+pub(crate) fn map_decay(values: &mut [f64]) {
+    struct Decay;
+    impl Curve for Decay {
+        #[inline(always)]
+        fn at(&self, x: f64) -> f64 {
+            decay(x)
+        }
+    }
+    map_curve(&Decay, values);
+}
+
 struct MapTask<'a, C> {
     curve: &'a C,
     values: &'a mut [f64],

@@ -114,18 +114,9 @@ impl Arm {
     /// Efforts of the paper's unknowns over a block: joint `j`, sample `s` at `[j * samples + s]`.
     pub(super) fn efforts(&self, motion: &MotionBlock<'_>, unknowns: &[f64]) -> Vec<f64> {
         let (base, shape) = self.split(unknowns);
-        let linear = expanded(&self.base, &base, self.linear.len());
+        let linear = self.base.expanded(&base);
         let mut effort = vec![0.0; JOINTS * motion.samples];
         self.model.efforts(motion, &shape, &linear, motion.samples, &mut effort);
         effort
     }
-}
-
-/// Linear parameters of a model that give base values: zeros but for the kept columns.
-pub(super) fn expanded(base: &BaseParameters, values: &[f64], parameters: usize) -> Vec<f64> {
-    let mut linear = vec![0.0; parameters];
-    for (column, value) in base.kept.iter().zip(values) {
-        linear[*column] = *value;
-    }
-    linear
 }

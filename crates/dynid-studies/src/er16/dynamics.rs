@@ -4,7 +4,7 @@ use dynid::model::{BaseParameters, BaseSettings, BodyPoint, Dynamics, EffortMode
 use dynid::model::{RegressorBlock, RobotModel, Vec3};
 use serde_json::json;
 
-use super::arm::{Arm, INERTIAL, JOINTS, Place, expanded};
+use super::arm::{Arm, INERTIAL, JOINTS, Place};
 use super::reference::{self, StateReference};
 use super::settings::Settings;
 use crate::{Row, StudyError};
@@ -64,16 +64,7 @@ pub(super) fn rows(arm: &Arm, settings: &Settings) -> Result<[Row; 2], StudyErro
 }
 
 fn block(state: &StateReference) -> MotionBlock<'_> {
-    MotionBlock {
-        samples: 1,
-        stride: 1,
-        q: &state.q,
-        dq: &state.qd,
-        ddq: &state.qdd,
-        gravity: None,
-        channels: &[],
-        sign_width: 0.0,
-    }
+    MotionBlock::plain(1, &state.q, &state.qd, &state.qdd)
 }
 
 /// Base columns of the inertial unknowns in the paper's order, one row per joint.
@@ -87,7 +78,7 @@ fn regressor(arm: &Arm, block: &MotionBlock<'_>) -> Vec<Vec<f64>> {
                 if let Place::Base(k) = place {
                     unit[*k] = 1.0;
                 }
-                rows.effort(j, &expanded(&arm.base, &unit, arm.linear.len()))[0]
+                rows.effort(j, &arm.base.expanded(&unit))[0]
             };
             arm.places[..INERTIAL].iter().map(column).collect()
         })

@@ -1,6 +1,6 @@
 //! The paper's figures, redone.
 
-use dynid::model::{BodyPoint, Dynamics, MotionBlock, Vec3};
+use dynid::model::{BodyPoint, Dynamics, EffortModel, MotionBlock, RobotModel, Vec3};
 use dynid::motion::trajectory::Sampled;
 use dynid::report::{Chart, ChartAxis, ChartCurve, CurveStyle};
 
@@ -117,19 +117,24 @@ pub(super) fn friction(data: &Measurement, laws: &[(&str, FrictionLaw<'_>)]) -> 
 pub(super) fn friction_law(arm: &Arm, unknowns: &[f64], joint: usize, velocity: f64) -> f64 {
     let friction: Vec<f64> =
         unknowns.iter().enumerate().map(|(k, x)| if k < INERTIAL { 0.0 } else { *x }).collect();
-    let (q, mut dq) = ([0.0; JOINTS], [0.0; JOINTS]);
+    let (base, shape) = arm.split(&friction);
+    effort_at_velocity(&arm.model, &shape, &arm.base.expanded(&base), joint, velocity)
+}
+
+/// Effort of a joint that alone moves, at a constant velocity, all joints at zero.
+pub(super) fn effort_at_velocity(
+    model: &RobotModel,
+    shape: &[f64],
+    linear: &[f64],
+    joint: usize,
+    velocity: f64,
+) -> f64 {
+    let (zero, mut dq) = ([0.0; JOINTS], [0.0; JOINTS]);
     dq[joint] = velocity;
-    let block = MotionBlock {
-        samples: 1,
-        stride: 1,
-        q: &q,
-        dq: &dq,
-        ddq: &q,
-        gravity: None,
-        channels: &[],
-        sign_width: 0.0,
-    };
-    arm.efforts(&block, &friction)[joint]
+    let block = MotionBlock::plain(1, &zero, &dq, &zero);
+    let mut effort = [0.0; JOINTS];
+    model.efforts(&block, shape, linear, 1, &mut effort);
+    effort[joint]
 }
 
 /// Paths of the wrist centre, from the side and from above.
@@ -146,16 +151,7 @@ pub(super) fn paths(
         let time = (0..=SAMPLES).map(|k| k as f64 / (SAMPLES as f64 * settings.fundamental_hz)).collect();
         let motion = Sampled::at_times(&trajectory(settings, rows)?, time);
         let n = motion.samples();
-        let block = MotionBlock {
-            samples: n,
-            stride: n,
-            q: &motion.q,
-            dq: &motion.dq,
-            ddq: &motion.ddq,
-            gravity: None,
-            channels: &[],
-            sign_width: 0.0,
-        };
+        let block = MotionBlock::plain(n, &motion.q, &motion.dq, &motion.ddq);
         let mut at = vec![0.0; 3 * n];
         dynamics.points(&block, &point, n, &mut at);
         named.push((*name, at, n));

@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::arm::{Arm, JOINTS};
+use super::reference::IdentificationReference;
 use super::settings::Settings;
 use crate::StudyError;
 
@@ -48,6 +49,22 @@ impl Measurement {
         Ok(out.with_noise(settings, seed))
     }
 
+    /// Motion and torque of the independent implementation, which gives no torque without noise: both are the same here.
+    pub(super) fn of_reference(reference: &IdentificationReference) -> Self {
+        let transposed = |rows: &[[f64; JOINTS]]| -> Vec<f64> {
+            (0..JOINTS).flat_map(|j| rows.iter().map(move |row| row[j])).collect()
+        };
+        let torque = transposed(&reference.tau);
+        Measurement {
+            samples: reference.q.len(),
+            q: transposed(&reference.q),
+            dq: transposed(&reference.qd),
+            ddq: transposed(&reference.qdd),
+            clean: torque.clone(),
+            torque,
+        }
+    }
+
     /// The same motion with another realisation of the noise.
     pub(super) fn with_noise(&self, settings: &Settings, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -59,16 +76,7 @@ impl Measurement {
     }
 
     pub(super) fn block(&self) -> MotionBlock<'_> {
-        MotionBlock {
-            samples: self.samples,
-            stride: self.samples,
-            q: &self.q,
-            dq: &self.dq,
-            ddq: &self.ddq,
-            gravity: None,
-            channels: &[],
-            sign_width: 0.0,
-        }
+        MotionBlock::plain(self.samples, &self.q, &self.dq, &self.ddq)
     }
 
     /// Mean over samples of the sum over joints of `|a - b|`, N m: the paper's objective with `δ = 1`.

@@ -59,15 +59,16 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     let searches = search::searches(&arm, &settings, &data, run, &mut step)?;
     step("separable least squares");
     let found = separable::identify_plain(&arm, &data)?;
+    let absolute = separable::identify_absolute(&arm, &data)?;
     let predicted = arm.efforts(&data.block(), &found.unknowns);
     rows.extend(search::rows(&searches, data.correlation(&data.torque, &predicted), &settings));
     let fast = measure(REVERSAL_RATE_HZ)?;
     let friction = separable::compare_friction(&arm, &fast)?;
     rows.push(separable::reversal_row(&fast, &friction));
-    rows.push(separable::separable_row(&arm, &settings, &data, &found)?);
+    rows.push(separable::separable_row(&arm, &settings, &data, &found, &absolute)?);
 
     step("intervals and polish");
-    rows.extend(separable::beyond(&arm, &settings, &data, &found, &searches, run)?);
+    rows.extend(separable::beyond(&arm, &settings, &data, &found, &absolute, &searches, run)?);
     rows.push(excitation::better_trajectory(own.as_ref(), with_friction.as_ref()));
     rows.push(separable::passivity_row(&arm));
     rows.push(feasible::row(&arm, &data)?);

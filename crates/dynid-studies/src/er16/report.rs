@@ -1,6 +1,5 @@
 //! The study's report.
 
-use dynid::model::{EffortModel, MotionBlock};
 use dynid::report::{Fact, Provenance, StudyReport, StudySection, StudyTable, Value};
 
 use super::arm::{Arm, JOINTS};
@@ -164,22 +163,7 @@ impl Contents<'_> {
             let bodies = 10 * self.arm.mechanism.bodies().len();
             let mut linear = compared.linear.clone();
             linear[..bodies].fill(0.0);
-            let mut dq = [0.0; JOINTS];
-            dq[j] = v;
-            let zero = [0.0; JOINTS];
-            let block = MotionBlock {
-                samples: 1,
-                stride: 1,
-                q: &zero,
-                dq: &dq,
-                ddq: &zero,
-                gravity: None,
-                channels: &[],
-                sign_width: 0.0,
-            };
-            let mut effort = [0.0; JOINTS];
-            compared.linear_model.efforts(&block, &[], &linear, 1, &mut effort);
-            effort[j]
+            figures::effort_at_velocity(&compared.linear_model, &[], &linear, j, v)
         };
         let laws: [(&str, figures::FrictionLaw<'_>); 3] = [
             ("truth", &|j, v| figures::friction_law(self.arm, &truth, j, v)),

@@ -4,7 +4,6 @@ use dynid::estimators::search::{
     Algorithm, Bounds, CuckooSearch, EffortLoss, EffortObjective, HistoryPoint, ImprovedCuckooSearch,
     Objective, ParticleSwarm, SearchResult, Settings as SearchSettings, many, rank_sum,
 };
-use dynid::model::MotionBlock;
 use serde_json::json;
 
 use super::arm::{Arm, JOINTS, Place};
@@ -80,13 +79,9 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// The paper's objective on a motion with measured torque; its unknowns are base values, then shape.
-pub(super) fn objective<'a>(
-    arm: &'a Arm,
-    motion: MotionBlock<'a>,
-    torque: &'a [f64],
-) -> Result<EffortObjective<'a>, StudyError> {
-    let effort: Vec<&[f64]> = torque.chunks_exact(motion.samples).collect();
-    EffortObjective::new(arm.model.as_ref(), motion, &effort, &arm.base.kept, &[], EffortLoss::Absolute)
+pub(super) fn objective<'a>(arm: &'a Arm, data: &'a Measurement) -> Result<EffortObjective<'a>, StudyError> {
+    let effort: Vec<&[f64]> = data.torque.chunks_exact(data.samples).collect();
+    EffortObjective::new(arm.model.as_ref(), data.block(), &effort, &arm.base.kept, &[], EffortLoss::Absolute)
         .map_err(|e| StudyError::Data { file: "er16", message: e.to_string() })
 }
 
@@ -115,23 +110,8 @@ fn bounds(arm: &Arm, settings: &Settings) -> Result<Bounds, StudyError> {
 /// Row 6.
 pub(super) fn objective_row(arm: &Arm) -> Result<Row, StudyError> {
     let reference = reference::identification()?;
-    let transposed = |rows: &[[f64; 3]]| -> Vec<f64> {
-        (0..JOINTS).flat_map(|j| rows.iter().map(move |row| row[j])).collect()
-    };
-    let (q, dq, ddq) = (transposed(&reference.q), transposed(&reference.qd), transposed(&reference.qdd));
-    let torque = transposed(&reference.tau);
-    let samples = reference.q.len();
-    let motion = MotionBlock {
-        samples,
-        stride: samples,
-        q: &q,
-        dq: &dq,
-        ddq: &ddq,
-        gravity: None,
-        channels: &[],
-        sign_width: 0.0,
-    };
-    let objective = objective(arm, motion, &torque)?;
+    let data = Measurement::of_reference(&reference);
+    let objective = objective(arm, &data)?;
     let mut worst = 0.0_f64;
     for case in &reference.objective_cases {
         let mut value = [0.0];
@@ -156,7 +136,7 @@ pub(super) fn searches(
     run: &RunSettings,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Searches, StudyError> {
-    let objective = objective(arm, data.block(), &data.torque)?;
+    let objective = objective(arm, data)?;
     let bounds = bounds(arm, settings)?;
     let seeds: Vec<u64> = (0..if run.quick { 30 } else { 60 }).map(|k| run.seed + k).collect();
     let mut search = |name: &'static str, algorithm: &Algorithm| -> Result<Searched, StudyError> {

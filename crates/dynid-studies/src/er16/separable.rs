@@ -3,11 +3,11 @@
 use dynid::estimators::separable::{
     EffortBlock, EffortProblem, SeparableEstimate, SeparableLoss, SeparableSettings, Weighting, fit,
 };
-use dynid::model::{BaseParameters, BaseSettings, EffortModel, MotionBlock, RobotModel, ShapeParameter};
+use dynid::model::{BaseParameters, BaseSettings, EffortModel, RobotModel, ShapeParameter};
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::arm::{Arm, JOINTS, Place, expanded};
+use super::arm::{Arm, JOINTS, Place};
 use super::measurement::Measurement;
 use super::reference;
 use super::search::{Searches, unknowns};
@@ -50,12 +50,11 @@ fn centred(model: &dyn EffortModel) -> Vec<ShapeParameter> {
 fn solve(
     model: &dyn EffortModel,
     kept: &[usize],
-    motion: &MotionBlock<'_>,
-    torque: &[f64],
+    data: &Measurement,
     shape: Vec<ShapeParameter>,
     settings: &SeparableSettings,
 ) -> Result<SeparableEstimate, StudyError> {
-    let blocks = [EffortBlock { log: 0, motion: *motion, effort: torque }];
+    let blocks = [EffortBlock { log: 0, motion: data.block(), effort: &data.torque }];
     let problem = EffortProblem::new(model, kept, &blocks).map_err(fault)?.with_shape(shape);
     fit(&problem, settings).map_err(fault)
 }
@@ -63,12 +62,11 @@ fn solve(
 /// Identifies the arm with its nonlinear friction.
 pub(super) fn identify(
     arm: &Arm,
-    motion: &MotionBlock<'_>,
-    torque: &[f64],
+    data: &Measurement,
     settings: &SeparableSettings,
 ) -> Result<Identified, StudyError> {
     let model = arm.model.as_ref();
-    let estimate = solve(model, &arm.base.kept, motion, torque, centred(model), settings)?;
+    let estimate = solve(model, &arm.base.kept, data, centred(model), settings)?;
     let found = estimate.standard_deviations();
     let place = |p: &Place| match (&found, *p) {
         (Some(found), Place::Base(k)) => found.linear[k],
@@ -84,7 +82,12 @@ pub(super) fn identify(
 
 /// The paper's data by squares, unweighted.
 pub(super) fn identify_plain(arm: &Arm, data: &Measurement) -> Result<Identified, StudyError> {
-    identify(arm, &data.block(), &data.torque, &plain(SeparableLoss::Squares))
+    identify(arm, data, &plain(SeparableLoss::Squares))
+}
+
+/// The same by the paper's objective, the sum of absolute errors.
+pub(super) fn identify_absolute(arm: &Arm, data: &Measurement) -> Result<Identified, StudyError> {
+    identify(arm, data, &plain(SeparableLoss::Absolute))
 }
 
 /// Torque of a linear friction model fitted to data, at the data's motion.
@@ -96,8 +99,8 @@ fn linear_friction(
     let model = arm.with_linear_friction(offset);
     let base = BaseParameters::of(&model, &arm.mechanism, &[], &BaseSettings::default());
     let settings = plain(SeparableLoss::Squares);
-    let estimate = solve(&model, &base.kept, &data.block(), &data.torque, Vec::new(), &settings)?;
-    let linear = expanded(&base, &estimate.linear, model.parameters().linear.len());
+    let estimate = solve(&model, &base.kept, data, Vec::new(), &settings)?;
+    let linear = base.expanded(&estimate.linear);
     let mut torque = vec![0.0; data.clean.len()];
     model.efforts(&data.block(), &[], &linear, data.samples, &mut torque);
     Ok((torque, model, linear))
@@ -163,12 +166,13 @@ pub(super) fn objective_of(arm: &Arm, data: &Measurement, unknowns: &[f64]) -> f
     data.mean_error(&data.torque, &arm.efforts(&data.block(), unknowns))
 }
 
-/// Row 10.
+/// Row 10. `found` by squares, `absolute` by absolute errors.
 pub(super) fn separable_row(
     arm: &Arm,
     settings: &Settings,
     data: &Measurement,
     found: &Identified,
+    absolute: &Identified,
 ) -> Result<Row, StudyError> {
     let truth: Vec<f64> = settings.unknowns.iter().map(|u| u.value).collect();
     let noise_free = Measurement { torque: data.clean.clone(), ..data.clone() };
@@ -176,27 +180,11 @@ pub(super) fn separable_row(
     let exact_objective = objective_of(arm, &noise_free, &exact.unknowns);
     let worst = exact.unknowns.iter().zip(&truth).map(|(x, t)| (x - t).abs()).fold(0.0, f64::max);
 
-    let absolute = identify(arm, &data.block(), &data.torque, &plain(SeparableLoss::Absolute))?;
     let objective = objective_of(arm, data, &absolute.unknowns);
     let of_truth = objective_of(arm, data, &truth);
 
     let reference = reference::identification()?;
-    let transposed = |rows: &[[f64; 3]]| -> Vec<f64> {
-        (0..JOINTS).flat_map(|j| rows.iter().map(move |row| row[j])).collect()
-    };
-    let (q, dq, ddq) = (transposed(&reference.q), transposed(&reference.qd), transposed(&reference.qdd));
-    let samples = reference.q.len();
-    let motion = MotionBlock {
-        samples,
-        stride: samples,
-        q: &q,
-        dq: &dq,
-        ddq: &ddq,
-        gravity: None,
-        channels: &[],
-        sign_width: 0.0,
-    };
-    let of_reference = identify(arm, &motion, &transposed(&reference.tau), &plain(SeparableLoss::Squares))?;
+    let of_reference = identify_plain(arm, &Measurement::of_reference(&reference))?;
     let ratio = of_reference.estimate.rss / reference.reference_ls.rss;
     let starts = &found.estimate.starts;
     Ok(Row::new(
@@ -222,16 +210,16 @@ pub(super) fn separable_row(
     ))
 }
 
-/// Rows beyond the paper that need the separable solver: a, b, d.
+/// Rows beyond the paper that need the separable solver: a, b, d. `found` by squares, `absolute` by absolute errors.
 pub(super) fn beyond(
     arm: &Arm,
     settings: &Settings,
     data: &Measurement,
     found: &Identified,
+    absolute: &Identified,
     searches: &Searches,
     run: &RunSettings,
 ) -> Result<Vec<Row>, StudyError> {
-    let absolute = identify(arm, &data.block(), &data.torque, &plain(SeparableLoss::Absolute))?;
     let (l1, l2) = (objective_of(arm, data, &absolute.unknowns), objective_of(arm, data, &found.unknowns));
     let refinement = Row::new(
         "a",
@@ -259,7 +247,7 @@ fn coverage(
         .into_par_iter()
         .map(|k| {
             let noisy = data.with_noise(settings, run.seed + 1000 + k);
-            let found = identify(arm, &noisy.block(), &noisy.torque, &solver)?;
+            let found = identify(arm, &noisy, &solver)?;
             let known = found.unknowns.iter().zip(&found.deviations).zip(&truth);
             let inside = known.filter_map(|((x, s), t)| s.map(|s| (x - t).abs() <= QUANTILE * s));
             Ok(inside.fold((0, 0), |(hit, all), inside| (hit + usize::from(inside), all + 1)))
@@ -295,7 +283,7 @@ fn polished(
         let (_, shape) = arm.split(&unknowns(arm, &result.point));
         let mut start = centred(model);
         start.iter_mut().zip(&shape).for_each(|(p, at)| p.start = *at);
-        let polished = solve(model, &arm.base.kept, &data.block(), &data.torque, start, &settings)?;
+        let polished = solve(model, &arm.base.kept, data, start, &settings)?;
         let above = polished.rss / found.estimate.rss - 1.0;
         worst = worst.max(above);
         reached += usize::from(above <= 1e-6);
@@ -317,7 +305,7 @@ fn polished(
 
 /// By squares with a variance per joint.
 pub(super) fn identify_weighted(arm: &Arm, data: &Measurement) -> Result<Identified, StudyError> {
-    identify(arm, &data.block(), &data.torque, &SeparableSettings::default())
+    identify(arm, data, &SeparableSettings::default())
 }
 
 /// Row e: where the true friction of joint 2 takes energy out of the motion.

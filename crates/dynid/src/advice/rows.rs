@@ -92,16 +92,7 @@ impl<'a> CandidateRows<'a> {
         let widest = self.kernels.first()?;
         let samples = (self.duration_s * self.rate_hz).round() as usize;
         let [q, dq, ddq] = self.signals(motion, samples, widest.cutoff_hz());
-        let block = MotionBlock {
-            samples,
-            stride: samples,
-            q: &q,
-            dq: &dq,
-            ddq: &ddq,
-            gravity: None,
-            channels: &[],
-            sign_width: 0.0,
-        };
+        let block = MotionBlock::plain(samples, &q, &dq, &ddq);
         let mut regressor = RegressorBlock::new(self.model.layout().clone(), samples);
         self.model.regressor(&block, &self.model.parameters().shape_start(), &mut regressor);
         let factors: Vec<Factor> =
@@ -189,16 +180,7 @@ fn dry_outputs(model: &RobotModel) -> Vec<bool> {
     // Two samples: creeping forward and backward.
     let dq: Vec<f64> = (0..n).flat_map(|_| [CREEP, -CREEP]).collect();
     let zero = vec![0.0; 2 * n];
-    let block = MotionBlock {
-        samples: 2,
-        stride: 2,
-        q: &zero,
-        dq: &dq,
-        ddq: &zero,
-        gravity: None,
-        channels: &[],
-        sign_width: 0.0,
-    };
+    let block = MotionBlock::plain(2, &zero, &dq, &zero);
     let mut regressor = RegressorBlock::new(model.layout().clone(), 2);
     model.regressor(&block, &model.parameters().shape_start(), &mut regressor);
     (0..n)

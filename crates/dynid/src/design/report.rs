@@ -257,16 +257,7 @@ impl DesignRun {
 }
 
 fn block(sampled: &Sampled) -> MotionBlock<'_> {
-    MotionBlock {
-        samples: sampled.samples(),
-        stride: sampled.samples(),
-        q: &sampled.q,
-        dq: &sampled.dq,
-        ddq: &sampled.ddq,
-        gravity: None,
-        channels: &[],
-        sign_width: 0.0,
-    }
+    MotionBlock::plain(sampled.samples(), &sampled.q, &sampled.dq, &sampled.ddq)
 }
 
 fn criterion_name(name: CriterionName) -> &'static str {

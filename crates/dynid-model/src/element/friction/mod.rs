@@ -1,17 +1,21 @@
 //! Friction of velocity, and the constant offset (spec/elements.md section 2).
 
 mod arctangent;
+mod exponential_viscous;
 mod hyperbolic;
 mod linear;
 mod load;
+mod lugre;
 mod power_law;
 mod sigmoid;
 mod stribeck;
 
 pub use arctangent::Arctangent;
+pub use exponential_viscous::ExponentialViscous;
 pub use hyperbolic::TanhFriction;
 pub use linear::{AsymmetricFriction, Coulomb, Offset, Viscous, ViscousMagnitude};
 pub use load::LoadFriction;
+pub use lugre::LuGre;
 pub use power_law::PowerLaw;
 pub use sigmoid::{Sigmoid, SigmoidOffset};
 pub use stribeck::Stribeck;
@@ -19,5 +23,6 @@ pub use stribeck::Stribeck;
 pub(super) const EFFORT: [&str; 2] = ["N m", "N"];
 pub(super) const VISCOUS: [&str; 2] = ["N m s/rad", "N s/m"];
 const SPEED: [&str; 2] = ["rad/s", "m/s"];
+const PER_ANGLE: [&str; 2] = ["1/rad", "1/m"];
 const PER_SPEED: [&str; 2] = ["s/rad", "s/m"];
 const NUMBER: [&str; 2] = ["1", "1"];

@@ -5,7 +5,7 @@ use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::element::shape::{self, places, values};
 use crate::element::{ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting};
 use crate::parameter::{Parameter, ShapeParameter};
-use crate::scalar::elementary::{Curve, decay, map_curve};
+use crate::scalar::elementary::{Curve, decay, map_curve, map_decay};
 
 /// Friction that falls from static `F_s` to Coulomb `F_c` with speed, `s(v) (F_c + (F_s - F_c) E)` with
 /// `E = exp(-|v/v_s|^δ)`: two columns `[s (1 - E), s E]` for `fc`, `fs`, shape parameters `vs` and `delta`.
@@ -45,7 +45,7 @@ impl Stribeck {
 }
 
 /// `x^δ`, without a power where there is a cheaper way.
-fn raised(x: f64, delta: f64) -> f64 {
+pub(super) fn raised(x: f64, delta: f64) -> f64 {
     if delta == 2.0 {
         x * x
     } else if delta == 1.0 {
@@ -68,18 +68,8 @@ impl Curve for Gauss {
     }
 }
 
-/// `x` to `exp(-x)`.
-struct Exponential;
-
-impl Curve for Exponential {
-    #[inline(always)]
-    fn at(&self, x: f64) -> f64 {
-        decay(x)
-    }
-}
-
 /// Fills `E`.
-fn fill_falling(speeds: &[f64], [vs, delta]: [f64; 2], out: &mut [f64]) {
+pub(super) fn fill_falling(speeds: &[f64], [vs, delta]: [f64; 2], out: &mut [f64]) {
     if delta == 2.0 {
         out.copy_from_slice(speeds);
         map_curve(&Gauss { per_vs: 1.0 / vs }, out);
@@ -88,7 +78,7 @@ fn fill_falling(speeds: &[f64], [vs, delta]: [f64; 2], out: &mut [f64]) {
     for (to, v) in out.iter_mut().zip(speeds) {
         *to = raised((v / vs).abs(), delta);
     }
-    map_curve(&Exponential, out);
+    map_decay(out);
 }
 
 impl JointElement for Stribeck {
