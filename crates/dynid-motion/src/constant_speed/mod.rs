@@ -11,6 +11,7 @@ mod speed;
 
 pub use pairs::{PairSettings, Pairing, Pass, PassSummary, SpeedPoint, Unpaired, UnpairedReason, pair};
 pub use segments::{Segment, SegmentSettings, at_rest, segments};
+pub use speed::speed;
 
 use crate::signal::SignalError;
 

@@ -1,14 +1,37 @@
 //! Speed of a joint from its positions.
 
 use super::ConstantSpeedError;
+use crate::log::JointSignals;
 use crate::median::median;
-use crate::signal::{SignalError, check_finite, quantum};
+use crate::signal::{SignalError, check_finite, check_positive, quantum};
 
 /// Speed around every sample, and how far noise moves it.
 pub(super) struct Smoothed {
     pub(super) speed: Vec<f64>,
     /// Standard deviation of noise in `speed`.
     pub(super) noise: f64,
+}
+
+/// Speed of a joint at every sample, rad/s or m/s: the slope of the least-squares line through its positions within
+/// `window` seconds, or the mean of its logged velocity there.
+///
+/// # Errors
+/// As [`super::segments`].
+pub fn speed(
+    time: &[f64],
+    joint: &JointSignals,
+    window: f64,
+    use_velocity: bool,
+) -> Result<Vec<f64>, ConstantSpeedError> {
+    check_positive("window", window)?;
+    check(time, &[("position", &joint.position)])?;
+    match &joint.velocity {
+        Some(velocity) if use_velocity => {
+            check(time, &[("velocity", velocity)])?;
+            Ok(of_velocity(time, velocity, window).speed)
+        }
+        _ => Ok(of_positions(time, &joint.position, window).speed),
+    }
 }
 
 pub(super) fn check(time: &[f64], signals: &[(&'static str, &[f64])]) -> Result<(), ConstantSpeedError> {
