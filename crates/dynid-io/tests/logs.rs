@@ -130,7 +130,7 @@ fn units_scales_and_offsets_end_in_si() {
     assert!((s.position[0][0] - std::f64::consts::PI).abs() < 1e-15);
     assert_eq!(s.position[1], [1.0, 0.25]);
     assert_eq!(s.effort.unwrap(), [[1.0, -0.5], [-40.0, -10.0]]);
-    assert_eq!(s.temperature.unwrap()[1], [30.0, 30.0]);
+    assert_eq!(s.temperature.unwrap()[1], Some(vec![30.0, 30.0]));
     assert_eq!(s.channels, [("grip".to_owned(), vec![11.0, 13.0])]);
 
     let s = signals(
@@ -149,7 +149,10 @@ fn units_scales_and_offsets_end_in_si() {
 #[test]
 fn one_joint_needs_no_numbers_and_capital_t_beside_t_is_a_temperature() {
     let s = signals("t,q,dq,ddq,tau,T\n0,1,2,3,4,30\n", "axis", "");
-    assert_eq!((s.time, s.position, s.temperature), (vec![0.0], vec![vec![1.0]], Some(vec![vec![30.0]])));
+    assert_eq!(
+        (s.time, s.position, s.temperature),
+        (vec![0.0], vec![vec![1.0]], Some(vec![Some(vec![30.0])]))
+    );
     let s = signals("T,q,tau\n0,1,2\n", "axis", "");
     assert_eq!((s.time, s.temperature), (vec![0.0], None));
 }

@@ -83,7 +83,9 @@ impl BaseParameters {
             0 => 100.max((3 * columns).div_ceil(model.outputs().len())),
             n => n,
         };
-        let motion = RandomMotion::new(mechanism, model.channels(), states, settings.seed);
+        // What elements remember takes values of its own: any of them may come before a state.
+        let channels = model.channels().iter().chain(model.signals());
+        let motion = RandomMotion::new(mechanism, channels, states, settings.seed);
         motion.with_block(|block| Self::on_motion(model, block, shape, settings))
     }
 

@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::description::JointKind;
 use crate::dynamics::MotionBlock;
+use crate::element::is_temperature;
 use crate::mechanism::Mechanism;
 
 /// Motion that owns its samples; see [`MotionBlock`] for the layout (`stride = samples`).
@@ -19,8 +20,14 @@ pub struct RandomMotion {
 
 impl RandomMotion {
     /// Uniform positions inside the limits (±π and ±1 m where the file states none), rates in ±2, accelerations in ±5,
-    /// extra channels in ±1; unit quaternions for floating joints. The same seed gives the same numbers.
-    pub fn new(mechanism: &Mechanism, channels: &[String], samples: usize, seed: u64) -> Self {
+    /// extra channels in ±1 (temperatures in 20 .. 40 °C); unit quaternions for floating joints. The same seed gives the
+    /// same numbers.
+    pub fn new<'a>(
+        mechanism: &Mechanism,
+        channels: impl IntoIterator<Item = &'a String>,
+        samples: usize,
+        seed: u64,
+    ) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut q = Vec::new();
         let mut uniform = |range: f64, count: usize| -> Vec<f64> {
@@ -29,7 +36,16 @@ impl RandomMotion {
         let rates = mechanism.rates();
         let dq = uniform(2.0, rates * samples);
         let ddq = uniform(5.0, rates * samples);
-        let channels = channels.iter().map(|c| (c.clone(), uniform(1.0, samples))).collect();
+        let channels = channels
+            .into_iter()
+            .map(|name| {
+                let mut values = uniform(1.0, samples);
+                if is_temperature(name) {
+                    values.iter_mut().for_each(|t| *t = 30.0 + 10.0 * *t);
+                }
+                (name.clone(), values)
+            })
+            .collect();
         for body in mechanism.bodies() {
             if mechanism.follows().is_some() && body.joint.mimic.is_some() {
                 continue;

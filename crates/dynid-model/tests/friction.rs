@@ -5,8 +5,8 @@
 use std::path::PathBuf;
 
 use dynid_model::element::{
-    Arctangent, Coulomb, ExponentialViscous, JointElement, LuGre, PowerLaw, ShapeSetting, Sigmoid, SigmoidOffset, Stribeck,
-    TanhFriction, Viscous, ViscousMagnitude,
+    Arctangent, Coulomb, ExponentialViscous, JointElement, LuGre, PowerLaw, ShapeSetting, Sigmoid,
+    SigmoidOffset, Stribeck, TanhFriction, Viscous, ViscousMagnitude,
 };
 use dynid_model::*;
 use serde_json::Value;
@@ -174,7 +174,11 @@ fn all_elements() -> Vec<Box<dyn JointElement>> {
             temperature: Some(31.0),
             ..ExponentialViscous::new(2)
         }),
-        Box::new(ExponentialViscous { sigma4: free(1.7), temperature: Some(18.0), ..ExponentialViscous::new(1) }),
+        Box::new(ExponentialViscous {
+            sigma4: free(1.7),
+            temperature: Some(18.0),
+            ..ExponentialViscous::new(1)
+        }),
         Box::new(LuGre { kappa: free(700.0), rho: free(1.4), vs: free(0.2), delta: free(1.4), rate: 1 }),
         Box::new(LuGre::new(3)),
     ]

@@ -88,7 +88,13 @@ impl Motion {
     }
 
     /// Signals of a model, formed in blocks that end at the cuts and at the end.
-    fn signals(&self, model: &RobotModel, step: f64, shape: &[f64], cuts: &[usize]) -> Vec<(String, Vec<f64>)> {
+    fn signals(
+        &self,
+        model: &RobotModel,
+        step: f64,
+        shape: &[f64],
+        cuts: &[usize],
+    ) -> Vec<(String, Vec<f64>)> {
         let mut all = vec![f64::NAN; model.signals().len() * self.samples];
         let mut history = History::default();
         let mut start = 0;
@@ -292,7 +298,8 @@ fn away_from_reversals_bristles_are_stribeck_friction() {
 #[test]
 fn known_elements_are_offset_and_part_of_every_effort() {
     let p = [9.1, 11.83, 0.04, 16804.0, 270.0];
-    let viscous = || ExponentialViscous { sigma3: held(1.3), sigma4: held(0.8), ..ExponentialViscous::new(0) };
+    let viscous =
+        || ExponentialViscous { sigma3: held(1.3), sigma4: held(0.8), ..ExponentialViscous::new(0) };
     let known = vec![
         KnownElement { element: Box::new(lugre(0, p)), linear: vec![p[0], p[4]], shape: vec![] },
         KnownElement { element: Box::new(viscous()), linear: vec![30.0, -1.0], shape: vec![] },

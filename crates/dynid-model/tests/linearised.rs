@@ -3,7 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use dynid_model::element::{
-    Arctangent, ExponentialViscous, JointElement, Linearised, LuGre, PowerLaw, Sigmoid, SigmoidOffset, Stribeck, TanhFriction,
+    Arctangent, ExponentialViscous, JointElement, Linearised, LuGre, PowerLaw, Sigmoid, SigmoidOffset,
+    Stribeck, TanhFriction,
 };
 use dynid_model::*;
 

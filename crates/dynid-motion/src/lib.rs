@@ -29,6 +29,7 @@ pub mod signal;
 pub mod smoothing;
 pub mod spectrum;
 pub mod spikes;
+pub mod temperature;
 pub mod textbook;
 pub mod trajectory;
 pub mod velocity;

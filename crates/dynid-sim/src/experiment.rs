@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use dynid_model::EffortModel;
+use dynid_model::{EffortModel, History};
 use rand::RngExt;
 
 use crate::controller::{ControlSettings, Controller, Wanted};
@@ -227,10 +227,14 @@ impl Run<'_> {
     }
 
     fn sample(&mut self, row: usize, time: f64, reading: &[f64], channels: &[f64]) -> Result<(), SimError> {
-        let PlantState { q, dq, .. } = &self.state;
+        let PlantState { q, dq, history, .. } = &self.state;
         let mut ddq = vec![0.0; q.len()];
+        let mut all = channels.to_vec();
+        if self.plant.remembers() {
+            all.extend(self.plant.signals(history, None, dq));
+        }
         self.plant
-            .acceleration((q, dq), &self.in_force, channels, self.integrator.workspace(), &mut ddq)
+            .acceleration((q, dq), &self.in_force, &all, self.integrator.workspace(), &mut ddq)
             .map_err(|source| SimError::Inertia { time, source })?;
         let between = (self.schedule.motion_part > 0.0).then(|| self.encoders.between_ticks(q));
         let felt = self.plant.delivered(q, &self.in_force);
@@ -284,6 +288,7 @@ pub fn run(
         state: PlantState {
             q: start.iter().map(|w| w[0]).collect(),
             dq: start.iter().map(|w| w[1]).collect(),
+            history: History::default(),
             drive_work: 0.0,
             element_work: 0.0,
         },
@@ -303,7 +308,7 @@ pub fn run(
         }
         run.tick(tick, &reading, command, &channels)?;
     }
-    let PlantState { q, dq, drive_work, element_work } = &run.state;
+    let PlantState { q, dq, drive_work, element_work, .. } = &run.state;
     let after = plant.energy(q, dq, run.integrator.workspace());
     Ok(ExperimentResult {
         energy: EnergyBalance { before, after, drive_work: *drive_work, element_work: *element_work },

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dynid_model::{
-    AddedInertia, Dynamics, DynamicsWorkspace, EffortModel, ForwardDynamicsWorkspace, LoadedState,
+    AddedInertia, Dynamics, DynamicsWorkspace, EffortModel, ForwardDynamicsWorkspace, History, LoadedState,
     MotionAdjoint, MotionBlock, NotPositive, RobotModel, State,
 };
 
@@ -33,7 +33,10 @@ pub struct PlantEnergy {
 /// `drive effort + ripple(q) = M(q) q̈ + h(q, q̇) + elements(q, q̇, q̈, channels)`.
 ///
 /// Elements take a smooth sign of velocities, `tanh(v / sign_width)`: at rest a joint creeps by at most a few widths
-/// instead of sticking. Their effort per acceleration must not depend on the state.
+/// instead of sticking (bristles do stick). Their effort per acceleration must not depend on the state.
+///
+/// Values of channels may be followed by those of the model's signals ([`Plant::signals`]); without them elements that
+/// remember are in their steady state.
 #[derive(Debug)]
 pub struct Plant {
     model: Arc<RobotModel>,
@@ -164,6 +167,45 @@ impl Plant {
         }
     }
 
+    fn channel_names(&self) -> impl Iterator<Item = &str> {
+        self.model.channels().iter().chain(self.model.signals()).map(String::as_str)
+    }
+
+    /// Whether elements remember the motion before.
+    pub fn remembers(&self) -> bool {
+        !self.model.signals().is_empty()
+    }
+
+    /// Values of the model's signals at velocities `dq`, a time `step` (s) after what `history` remembers, with velocities
+    /// `between` on the way; at that instant itself without a step.
+    pub fn signals(&self, history: &History, step: Option<(f64, &[f64])>, dq: &[f64]) -> Vec<f64> {
+        match step {
+            None => self.remember(&mut history.clone(), &[dq], 1.0),
+            Some((step, between)) => {
+                let both = self.remember(&mut history.clone(), &[between, dq], step);
+                both.into_iter().skip(1).step_by(2).collect()
+            }
+        }
+    }
+
+    /// Takes what elements remember on by `step` seconds at velocities `dq`.
+    pub(crate) fn pass(&self, history: &mut History, step: f64, dq: &[f64]) {
+        if self.remembers() {
+            self.remember(history, &[dq], step);
+        }
+    }
+
+    /// Signals of some instants, signal after signal.
+    fn remember(&self, history: &mut History, velocities: &[&[f64]], step: f64) -> Vec<f64> {
+        let (joints, samples) = (self.joints(), velocities.len());
+        let dq: Vec<f64> = (0..joints).flat_map(|j| velocities.iter().map(move |v| v[j])).collect();
+        let rest = vec![0.0; dq.len()];
+        let mut out = vec![0.0; self.model.signals().len() * samples];
+        let motion = MotionBlock::plain(samples, &rest, &dq, &rest);
+        self.model.remember(&motion, step, &self.shape, history, samples, &mut out);
+        out
+    }
+
     fn inertias(&self) -> &[f64] {
         &self.linear[..self.dynamics.inertial_parameters()]
     }
@@ -177,11 +219,9 @@ impl Plant {
         to: &mut [f64],
     ) {
         let channels: Vec<(&str, &[f64])> = self
-            .model
-            .channels()
-            .iter()
+            .channel_names()
             .zip(channels)
-            .map(|(name, value)| (name.as_str(), std::slice::from_ref(value)))
+            .map(|(name, value)| (name, std::slice::from_ref(value)))
             .collect();
         let motion = MotionBlock {
             samples: 1,
@@ -243,7 +283,7 @@ impl Plant {
         }
     }
 
-    /// Accelerations under given drive efforts (before ripple), with `channels` in the order of the model's.
+    /// Accelerations under given drive efforts (before ripple), with `channels` in the order of the model's, then its signals.
     ///
     /// # Errors
     /// [`NotPositive`] for a joint without inertia.
@@ -323,7 +363,7 @@ impl Plant {
         }
         let repeated: Vec<Vec<f64>> = channels.iter().map(|c| vec![*c; n]).collect();
         let channels: Vec<(&str, &[f64])> =
-            self.model.channels().iter().zip(&repeated).map(|(n, v)| (n.as_str(), v.as_slice())).collect();
+            self.channel_names().zip(&repeated).map(|(n, v)| (n, v.as_slice())).collect();
         let motion = MotionBlock {
             samples: n,
             stride: n,

@@ -5,11 +5,15 @@
 mod arm;
 
 use arm::{arm, plant, slider};
-use dynid_model::element::{Coulomb, JointElement, RotorInertia, Spring, Transmission, Viscous};
+use dynid_model::History;
+use dynid_model::element::{
+    Coulomb, JointElement, LuGre, RotorInertia, ShapeSetting, Spring, Transmission, Viscous,
+};
 use dynid_sim::{Integrator, Plant, PlantState, SimError};
 
 fn start(q: &[f64], dq: &[f64]) -> PlantState {
-    PlantState { q: q.to_vec(), dq: dq.to_vec(), drive_work: 0.0, element_work: 0.0 }
+    let history = History::default();
+    PlantState { q: q.to_vec(), dq: dq.to_vec(), history, drive_work: 0.0, element_work: 0.0 }
 }
 
 /// Runs in intervals of a millisecond, as a controller would.
@@ -139,4 +143,56 @@ fn motion_that_runs_away_is_an_error_with_its_time() {
         matches!(found, Err(SimError::TooFast { time, .. }) if (2.0..2.001).contains(&time)),
         "{found:?}"
     );
+}
+
+/// Bristles under a mass: `m v' = F - (σ0 z + σ1 z' + σ2 v)`, by a Runge-Kutta method with steps of a microsecond.
+fn bristles_by_runge_kutta(force: f64, seconds: f64) -> [f64; 2] {
+    let rate = |[_, v, z]: [f64; 3]| {
+        let g = FC + (FS - FC) * (-(v / VS).powi(2)).exp();
+        let bend = v - S0 * v.abs() * z / g;
+        [v, (force - S0 * z - S1 * bend - S2 * v) / MASS, bend]
+    };
+    let h = 1e-6;
+    let mut x = [0.0; 3];
+    for _ in 0..(seconds / h).round() as usize {
+        let at = |k: [f64; 3], h: f64| std::array::from_fn(|i| x[i] + h * k[i]);
+        let k1 = rate(x);
+        let k2 = rate(at(k1, 0.5 * h));
+        let k3 = rate(at(k2, 0.5 * h));
+        let k4 = rate(at(k3, h));
+        x = std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+    }
+    [x[0], x[1]]
+}
+
+const MASS: f64 = 2.0;
+const FC: f64 = 2.5;
+const FS: f64 = 3.25;
+const VS: f64 = 0.05;
+const S0: f64 = 1820.0;
+const S1: f64 = 105.0;
+const S2: f64 = 8.0;
+
+#[test]
+fn bristles_stick_creep_and_break_away() {
+    let held = ShapeSetting::held;
+    let law = LuGre { rate: 0, kappa: held(S0 / FC), rho: held(FS / FC), vs: held(VS), delta: held(2.0) };
+    let elements: Vec<Box<dyn JointElement>> = vec![Box::new(law), Box::new(Viscous { rate: 0 })];
+    let floor = slider(MASS, elements, &[FC, S1, S2], 1e-4);
+    // Held by the bristles, and pushed beyond what they can hold.
+    for force in [2.0, 6.0] {
+        let [x, v] = bristles_by_runge_kutta(force, 0.5);
+        let errors = [500.0, 1000.0, 4000.0].map(|rate| {
+            let mut state = start(&[0.0], &[0.0]);
+            let mut integrator = Integrator::new(&floor, 1e-6).unwrap();
+            for k in 0..(0.5 * rate) as usize {
+                integrator.advance(&mut state, &[force], &[], k as f64 / rate, 1.0 / rate).unwrap();
+            }
+            [(state.q[0] - x).abs(), (state.dq[0] - v).abs()]
+        });
+        println!("{force} N: {x:e} m, {v:e} m/s; errors {errors:?}");
+        assert!((x < 2e-3) == (force < FS), "{force} N: {x}");
+        assert!(errors[1][0] <= 1e-3 * x && errors[2][0] <= 1e-4 * x, "{force} N: {errors:?}");
+        assert!(errors[2][1] <= 1e-3 * v.abs().max(1e-3), "{force} N: {errors:?}");
+    }
 }

@@ -16,7 +16,7 @@ use dynid_model::{JointKind, Mechanism};
 use crate::Error;
 
 /// Element names that a robot file or a configuration may use.
-pub const NAMES: [&str; 16] = [
+pub const NAMES: [&str; 18] = [
     "coulomb",
     "viscous",
     "offset",
@@ -33,6 +33,8 @@ pub const NAMES: [&str; 16] = [
     "power",
     "viscous_magnitude",
     "load",
+    "exponential_viscous",
+    "lugre",
 ];
 
 /// Friction that grows with the load of the gear.

@@ -51,6 +51,20 @@ pub enum Error {
         /// Limit of the robot file, rad.
         limit: Option<f64>,
     },
+    /// A temperature that no joint has.
+    #[error(
+        "{file}: row {row}: joint `{joint}`: expected a temperature between -40 and 120 °C, found {found}"
+    )]
+    Temperature {
+        /// Log file.
+        file: String,
+        /// Joint.
+        joint: String,
+        /// Data row, from 1.
+        row: usize,
+        /// Value found.
+        found: f64,
+    },
     /// A position that no joint reaches.
     #[error("{file}: joint `{joint}`: expected positions up to {limit:e} rad or m, found {largest:e}")]
     FarPosition {
@@ -274,6 +288,7 @@ impl Error {
         use dynid_estimate::consistent::ProblemError as P;
         use dynid_estimate::linear::LinearError as L;
         use dynid_model::MechanismError as M;
+        use dynid_model::element::is_temperature;
         match self {
             Error::RobotFile(e) => e.hint(),
             Error::LogFile(e) => e.hint(),
@@ -323,6 +338,14 @@ impl Error {
             Error::Conditioning(C::NoRows { .. }) => {
                 Some("record a longer motion, or set a higher `kernel_hz`".to_owned())
             }
+            Error::Temperature { .. } => Some(
+                "state the unit: `[columns] temperature = { columns = \"temp{}\", unit = \"K\" }` (or \"F\")".to_owned(),
+            ),
+            Error::Conditioning(C::MissingChannel { channel, .. }) => is_temperature(channel).then(|| {
+                "name the column under [columns] (`temperature`), or state a constant one in the robot file: \
+                 `exponential_viscous = { temperature = 30 }`"
+                    .to_owned()
+            }),
             Error::FarPosition { .. } => Some(
                 "encoder counts need a scale: `[columns] position = { columns = \"q{}\", scale = .. }`".to_owned(),
             ),

@@ -197,6 +197,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     let row_rms = figures::row_rms(&groups, &fitted.estimate.x, base.len());
     let residual_ratio = figures::residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
     warnings.extend(prior.warnings.iter().cloned());
+    warnings.extend(loaded.iter().flat_map(|l| logs::temperature_warnings(&l.log)));
     warnings.extend(log_warnings(&model, &prepared));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
     let mut out = Identification {

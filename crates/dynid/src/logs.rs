@@ -4,7 +4,9 @@ use std::path::Path;
 
 use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, prepare};
 use dynid_io::{ColumnMapping, MappingSpec, ReadOptions, Signals};
+use dynid_model::element::{is_temperature, temperature_channel};
 use dynid_model::{EffortModel, JointKind, Mechanism};
+use dynid_motion::temperature::{self, TemperatureDoubt};
 use dynid_motion::{Channel, JointSignals, Log};
 use sha2::{Digest, Sha256};
 
@@ -48,7 +50,7 @@ impl LoadedLog {
 ///
 /// # Errors
 /// [`Error::LogFile`], [`Error::Columns`], [`Error::SurplusColumn`], [`Error::Setting`], [`Error::Log`],
-/// [`Error::Degrees`], [`Error::FarPosition`], [`Error::TrajectoryFile`], [`Error::TrajectoryJoints`].
+/// [`Error::Degrees`], [`Error::FarPosition`], [`Error::Temperature`], [`Error::TrajectoryFile`], [`Error::TrajectoryJoints`].
 pub fn load(
     config: &LogConfig,
     mechanism: &Mechanism,
@@ -73,6 +75,7 @@ pub fn load(
     }
     check_degrees(&signals, mechanism, &file)?;
     check_reach(&signals, &file)?;
+    check_temperatures(&signals, &file)?;
     let log = assemble(&file, &signals)?;
     let log = match config.part {
         None => log,
@@ -148,9 +151,39 @@ fn assemble(file: &str, signals: &Signals) -> Result<Log, Error> {
             effort: take(&signals.effort, k).unwrap_or_default(),
         })
         .collect();
-    let channels =
-        signals.channels.iter().map(|(name, values)| Channel { name: name.clone(), values: values.clone() });
+    let stated = signals.channels.iter().map(|(name, values)| (name.clone(), values));
+    let temperatures = signals.temperature.iter().flat_map(|list| signals.joints.iter().zip(list));
+    let measured =
+        temperatures.filter_map(|(joint, values)| Some((temperature_channel(joint), values.as_ref()?)));
+    let channels = stated.chain(measured).map(|(name, values)| Channel { name, values: values.clone() });
     Ok(Log::new(file, signals.time.clone(), joints, channels.collect())?)
+}
+
+/// Refuses temperatures that no joint has.
+fn check_temperatures(signals: &Signals, file: &str) -> Result<(), Error> {
+    for (joint, values) in signals.joints.iter().zip(signals.temperature.iter().flatten()) {
+        let doubt = values.as_ref().and_then(|values| temperature::doubt(values));
+        if let Some(TemperatureDoubt::Implausible { sample, found }) = doubt {
+            let (file, joint) = (file.to_owned(), joint.clone());
+            return Err(Error::Temperature { file, joint, row: sample + 1, found });
+        }
+    }
+    Ok(())
+}
+
+/// Doubts about the temperatures of a log, in words.
+pub(crate) fn temperature_warnings(log: &Log) -> Vec<String> {
+    let file = Path::new(log.name()).file_name().map_or_else(|| log.name().into(), |n| n.to_string_lossy());
+    let doubtful = log.channels().iter().filter(|c| is_temperature(&c.name));
+    doubtful
+        .filter_map(|c| match temperature::doubt(&c.values)? {
+            TemperatureDoubt::LooksLikeFahrenheit { least, greatest } => Some(format!(
+                "{file}: `{}` lies between {least:.0} and {greatest:.0}: if these are degrees Fahrenheit, say so (unit \"F\")",
+                c.name
+            )),
+            _ => None,
+        })
+        .collect()
 }
 
 fn check_degrees(signals: &Signals, mechanism: &Mechanism, file: &str) -> Result<(), Error> {
@@ -228,6 +261,9 @@ fn describe(mapping: &ColumnMapping) -> Vec<(String, String)> {
     out.push(("position".to_owned(), list(&mapping.position)));
     if let Some(effort) = &mapping.effort {
         out.push(("effort".to_owned(), list(effort)));
+    }
+    if let Some(temperature) = &mapping.temperature {
+        out.push(("temperature".to_owned(), list(temperature)));
     }
     for (name, column) in &mapping.channels {
         out.push((name.clone(), column.name.clone()));

@@ -1,7 +1,7 @@
 //! Whether the identified friction takes energy out of the motion.
 
 use dynid_estimate::conditioning::PreparedLog;
-use dynid_model::{EffortModel, Passivity};
+use dynid_model::{EffortModel, FrictionPassivity, Passivity};
 
 use crate::elements::friction;
 use crate::estimate::PassivityRecord;
@@ -18,7 +18,8 @@ pub(crate) const NOT_PASSIVE: &str = "not passive";
 pub(crate) const SPEED_SPAN_S: f64 = 0.05;
 
 /// Friction coefficients that a passive law has positive; offsets and the difference between the directions have any sign.
-const COEFFICIENTS: [&str; 12] = ["fc", "fs", "fv", "fa", "ft", "fg", "fl", "fp", "fcp", "fcn", "fvp", "fvn"];
+const COEFFICIENTS: [&str; 13] =
+    ["fc", "fs", "fv", "fa", "ft", "fg", "fl", "fp", "fcp", "fcn", "fvp", "fvn", "sigma2"];
 
 /// Least and greatest mean velocity of an output over [`SPEED_SPAN_S`] in logs that move it, with rest; `None` if none does.
 fn velocities(logs: &[PreparedLog], output: usize) -> Option<(f64, f64)> {
@@ -39,15 +40,36 @@ fn velocities(logs: &[PreparedLog], output: usize) -> Option<(f64, f64)> {
     range.filter(|(low, high)| low.is_finite() && high.is_finite() && low < high)
 }
 
+/// Largest power that friction feeds in, W.
+fn fed(found: &FrictionPassivity) -> f64 {
+    found.worst.map_or(0.0, |(_, power)| power)
+}
+
 impl Identification {
+    /// Channels of the identified model at their least and at their greatest values of the training logs.
+    pub(crate) fn held_channels(&self) -> Vec<Vec<(&str, f64)>> {
+        let (model, _) = self.identified_model();
+        let names = model.channels();
+        if names.is_empty() {
+            return vec![Vec::new()];
+        }
+        let extreme = |name: &String, pick: fn(f64, f64) -> f64| {
+            let channels = self.logs.iter().flat_map(|log| &log.channels).filter(|c| c.name == *name);
+            channels.flat_map(|c| c.values.iter().copied()).reduce(pick).unwrap_or(0.0)
+        };
+        [f64::min, f64::max]
+            .map(|pick| names.iter().map(|name| (name.as_str(), extreme(name, pick))).collect())
+            .to_vec()
+    }
+
     /// Rate of each output of the model.
     pub(crate) fn output_rates(&self) -> Vec<Option<usize>> {
         let names = self.model.mechanism().rate_names();
         self.model.outputs().iter().map(|o| names.iter().position(|n| *n == o.name)).collect()
     }
 
-    /// Passivity of the identified friction on the velocities that the training logs reach, joint by joint; joints without
-    /// friction and those that no log moves are left out.
+    /// Passivity of the identified friction on the velocities that the training logs reach, joint by joint, at the worse of
+    /// the coldest and the warmest state logged; joints without friction and those that no log moves are left out.
     pub fn friction_passivity(&self) -> Vec<PassivityRecord> {
         let (model, linear) = self.identified_model();
         let shape = model.parameters().shape_start();
@@ -59,7 +81,11 @@ impl Identification {
                     return None;
                 }
                 let (low, high) = velocities(&self.logs, k)?;
-                let found = model.friction_passivity(rate, &shape, linear, (low, high));
+                let found = self
+                    .held_channels()
+                    .iter()
+                    .map(|held| model.friction_passivity(rate, &shape, linear, (low, high), held))
+                    .max_by(|a, b| fed(a).total_cmp(&fed(b)))?;
                 let (passivity, intervals) = match found.passivity {
                     Passivity::Passive => (PASSIVE, Vec::new()),
                     Passivity::PassiveOn(intervals) => (PASSIVE_ON, intervals),

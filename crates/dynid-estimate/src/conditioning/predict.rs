@@ -25,9 +25,12 @@ pub fn predict(
     let outputs = model.outputs().len();
     let mut predicted = vec![Vec::with_capacity(log.samples()); outputs];
     let mut block = RegressorBlock::new(model.layout().clone(), BLOCK);
+    let remembered = states.remembered(model, shape, &log.channels);
     for start in (0..log.samples()).step_by(BLOCK) {
         let range = start..(start + BLOCK).min(log.samples());
-        states.with_block(range, &log.channels, |motion| model.regressor(motion, shape, &mut block));
+        states.with_block(range, &log.channels, &remembered, |motion| {
+            model.regressor(motion, shape, &mut block);
+        });
         for (output, out) in predicted.iter_mut().enumerate() {
             out.extend(block.effort(output, linear));
         }

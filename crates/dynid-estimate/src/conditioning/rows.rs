@@ -126,11 +126,12 @@ impl Pass<'_> {
         let reach = self.kernels.kernels[0].half_width();
         let block = BLOCK.max(6 * reach);
         let mut regressor = RegressorBlock::new(self.model.layout().clone(), block + 2 * reach);
+        let remembered = self.states.remembered(self.model, self.shape, &self.log.channels);
         let mut start = 0;
         while start < samples {
             let end = (start + block).min(samples);
             let range = start.saturating_sub(reach)..(end + reach).min(samples);
-            self.states.with_block(range.clone(), &self.log.channels, |motion| {
+            self.states.with_block(range.clone(), &self.log.channels, &remembered, |motion| {
                 self.model.regressor(motion, self.shape, &mut regressor);
             });
             consumers

@@ -130,6 +130,7 @@ impl SeparableProblem for ShapedRows<'_> {
         let mut first = 0;
         for log in &self.rows.logs {
             let samples = log.states.samples;
+            let remembered = log.states.remembered(model, shape, &log.log.channels);
             // Chunk after chunk: values, then derivatives, each column `CHUNK` long.
             let chunks: Vec<Vec<f64>> = (0..samples.div_ceil(CHUNK))
                 .into_par_iter()
@@ -137,7 +138,7 @@ impl SeparableProblem for ShapedRows<'_> {
                     let range = c * CHUNK..((c + 1) * CHUNK).min(samples);
                     let mut all = vec![0.0; (shaped + dependent) * CHUNK];
                     let (values, derivatives) = all.split_at_mut(shaped * CHUNK);
-                    log.states.with_block(range, &log.log.channels, |motion| {
+                    log.states.with_block(range, &log.log.channels, &remembered, |motion| {
                         model.shaped(motion, shape, CHUNK, values, derivatives);
                     });
                     all

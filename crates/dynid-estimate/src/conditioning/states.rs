@@ -1,6 +1,7 @@
 //! States of a log at the state cut-off, and which samples spoil a row.
 
-use dynid_model::{EffortModel, MotionBlock};
+use dynid_model::{EffortModel, History, MotionBlock};
+use dynid_motion::Channel;
 use dynid_motion::difference::central;
 use dynid_motion::filter::{butterworth, forward_backward};
 use dynid_motion::mask::{near_reversal, reversal_threshold};
@@ -80,15 +81,31 @@ impl States {
         &self.dq[output * self.samples..][..self.samples]
     }
 
-    /// A run of samples as a motion block. `channels`: whole channels of the log.
+    /// Signals of a model that depend on the motion before, over the whole record. `channels`: whole channels of the log.
+    pub fn remembered(&self, model: &dyn EffortModel, shape: &[f64], channels: &[Channel]) -> Vec<Channel> {
+        let (names, n) = (model.signals(), self.samples);
+        if names.is_empty() || n == 0 {
+            return Vec::new();
+        }
+        let mut values = vec![0.0; names.len() * n];
+        self.with_block(0..n, channels, &[], |motion| {
+            model.remember(motion, 1.0 / self.rate_hz, shape, &mut History::default(), n, &mut values);
+        });
+        let signals = names.iter().zip(values.chunks_exact(n));
+        signals.map(|(name, values)| Channel { name: name.clone(), values: values.to_vec() }).collect()
+    }
+
+    /// A run of samples as a motion block. `channels`: whole channels of the log; `remembered`: signals of the model over the
+    /// whole record ([`States::remembered`]).
     pub fn with_block<T>(
         &self,
         range: std::ops::Range<usize>,
-        channels: &[dynid_motion::Channel],
+        channels: &[Channel],
+        remembered: &[Channel],
         work: impl FnOnce(&MotionBlock<'_>) -> T,
     ) -> T {
         let channels: Vec<(&str, &[f64])> =
-            channels.iter().map(|c| (c.name.as_str(), &c.values[range.clone()])).collect();
+            channels.iter().chain(remembered).map(|c| (c.name.as_str(), &c.values[range.clone()])).collect();
         work(&MotionBlock {
             samples: range.len(),
             stride: self.samples,

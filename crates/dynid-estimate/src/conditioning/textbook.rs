@@ -94,7 +94,8 @@ fn rows_of<'a>(
         let filter = butterworth(route.order, cutoff, log.rate_hz)?;
         let samples = log.samples();
         let mut regressor = RegressorBlock::new(model.layout().clone(), samples);
-        states.with_block(0..samples, &log.channels, |motion| {
+        let remembered = states.remembered(model, shape, &log.channels);
+        states.with_block(0..samples, &log.channels, &remembered, |motion| {
             model.regressor(motion, shape, &mut regressor);
         });
         let trim = (route.trim_s * log.rate_hz).round() as usize;

@@ -28,8 +28,8 @@ pub struct Signals {
     pub acceleration: Option<Vec<Vec<f64>>>,
     /// Effort, N m or N.
     pub effort: Option<Vec<Vec<f64>>>,
-    /// Temperature, °C.
-    pub temperature: Option<Vec<Vec<f64>>>,
+    /// Temperature, °C, of logged joints that have a column for it; `None` without any such column.
+    pub temperature: Option<Vec<Option<Vec<f64>>>>,
     /// Other columns.
     pub channels: Vec<(String, Vec<f64>)>,
 }
@@ -51,6 +51,11 @@ impl ColumnMapping {
             .channels
             .iter()
             .map(|(name, column)| Ok((name.clone(), convert(table, &format!("channel `{name}`"), column)?)));
+        let temperature = self.temperature.as_ref().map(|columns| {
+            let of_joint =
+                |k: &usize| columns[*k].as_ref().map(|c| convert(table, "temperature", c)).transpose();
+            indices.iter().map(of_joint).collect()
+        });
         Ok(Signals {
             joints: indices.iter().map(|k| self.joints[*k].clone()).collect(),
             not_logged: self.not_logged().into_iter().map(str::to_owned).collect(),
@@ -58,7 +63,7 @@ impl ColumnMapping {
             velocity: optional(Signal::Velocity, &self.velocity)?,
             acceleration: optional(Signal::Acceleration, &self.acceleration)?,
             effort: optional(Signal::Effort, &self.effort)?,
-            temperature: optional(Signal::Temperature, &self.temperature)?,
+            temperature: temperature.transpose()?,
             channels: channels.collect::<Result<_, _>>()?,
             indices,
             time,

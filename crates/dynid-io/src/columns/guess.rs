@@ -38,7 +38,7 @@ impl ColumnMapping {
             joints: joints.to_vec(),
             velocity: optional(Signal::Velocity)?,
             acceleration: optional(Signal::Acceleration)?,
-            temperature: optional(Signal::Temperature)?,
+            temperature: finder.find(Signal::Temperature)?.map(|columns| of_logged(columns, &logged)),
             effort: finder.effort(options, &logged)?,
             channels: Vec::new(),
             time,
@@ -268,17 +268,12 @@ impl<'a> Finder<'a> {
         columns: Option<PerJointColumns>,
         logged: &[bool],
     ) -> Result<Option<PerJointColumns>, MappingError> {
-        let Some(mut columns) = columns else { return Ok(None) };
+        let Some(columns) = columns else { return Ok(None) };
         let without: Vec<bool> = columns.iter().zip(logged).map(|(c, l)| *l && c.is_none()).collect();
         if without.contains(&true) {
             return Err(self.missing(signal, &without));
         }
-        for (column, logged) in columns.iter_mut().zip(logged) {
-            if !logged {
-                *column = None;
-            }
-        }
-        Ok(Some(columns))
+        Ok(Some(of_logged(columns, logged)))
     }
 
     /// The error for the joints that are marked.
@@ -320,4 +315,14 @@ impl<'a> Finder<'a> {
         }
         Ok(ColumnUse { column, name, factor: conversion.factor, offset: conversion.offset })
     }
+}
+
+/// Columns of logged joints alone.
+pub(super) fn of_logged(mut columns: PerJointColumns, logged: &[bool]) -> PerJointColumns {
+    for (column, logged) in columns.iter_mut().zip(logged) {
+        if !logged {
+            *column = None;
+        }
+    }
+    columns
 }

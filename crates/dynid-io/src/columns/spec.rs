@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::error::MappingError;
-use super::guess::{Finder, GuessOptions, PerJointColumns};
+use super::guess::{Finder, GuessOptions, PerJointColumns, of_logged};
 use super::names::{ColumnName, Signal};
 use super::units::{Conversion, conversion};
 use super::{ColumnMapping, ColumnUse, TimeSource};
@@ -156,12 +156,17 @@ impl ColumnMapping {
             };
             finder.effort(&options, &logged)?
         };
+        // Some joints may be without a sensor.
+        let temperature = match &spec.temperature {
+            Some(stated) => Some(resolver.signal(Signal::Temperature, stated)?),
+            None => finder.find(Signal::Temperature)?,
+        };
         let channels = spec.channels.iter().map(|(name, channel)| resolver.channel(name, channel));
         let mapping = ColumnMapping {
             joints: joints.to_vec(),
             velocity: optional(Signal::Velocity, &spec.velocity)?,
             acceleration: optional(Signal::Acceleration, &spec.acceleration)?,
-            temperature: optional(Signal::Temperature, &spec.temperature)?,
+            temperature: temperature.map(|columns| of_logged(columns, &logged)),
             effort,
             channels: channels.collect::<Result<_, _>>()?,
             time,

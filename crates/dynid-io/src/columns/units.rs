@@ -49,6 +49,9 @@ pub(super) fn conversion(signal: Signal, unit: &str, column: &str) -> Result<Con
         },
         Signal::Temperature => match plain.as_str() {
             "c" | "degc" => Some(1.0),
+            "f" | "degf" => {
+                return Ok(Conversion { factor: 5.0 / 9.0, offset: -160.0 / 9.0, ..Conversion::IDENTITY });
+            }
             "k" => return Ok(Conversion { offset: -273.15, ..Conversion::IDENTITY }),
             _ => None,
         },
@@ -81,6 +84,6 @@ fn expected(signal: Signal) -> &'static str {
         Signal::Velocity => "rad/s, deg/s, rev/s, rpm, m/s, mm/s",
         Signal::Acceleration => "rad/s2, deg/s2, rev/s2, m/s2, mm/s2",
         Signal::Effort => "N m, mN m, kN m, N, kN, A, mA",
-        Signal::Temperature => "degC, K",
+        Signal::Temperature => "degC, degF, K",
     }
 }

@@ -9,3 +9,8 @@ pub fn current_channel(joint: &str) -> String {
 pub fn temperature_channel(joint: &str) -> String {
     format!("temperature_{joint}")
 }
+
+/// Whether a channel holds a temperature.
+pub fn is_temperature(channel: &str) -> bool {
+    channel.starts_with("temperature_")
+}

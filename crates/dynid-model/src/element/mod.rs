@@ -12,12 +12,12 @@ mod rotor;
 mod shape;
 mod transmission;
 
-pub use channel::{current_channel, temperature_channel};
+pub use channel::{current_channel, is_temperature, temperature_channel};
 pub use compliance::{CyclicTorque, Spring};
 pub use drive::DriveGain;
 pub use friction::{
-    Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, LoadFriction, LuGre, Offset, PowerLaw, Sigmoid, SigmoidOffset,
-    Stribeck, TanhFriction, Viscous, ViscousMagnitude,
+    Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, LoadFriction, LuGre, Offset, PowerLaw,
+    Sigmoid, SigmoidOffset, Stribeck, TanhFriction, Viscous, ViscousMagnitude,
 };
 pub use linearised::{Linearised, change_name};
 pub use rotor::RotorInertia;

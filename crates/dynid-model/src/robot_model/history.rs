@@ -7,7 +7,8 @@ use crate::effort_model::History;
 impl RobotModel {
     /// Names of the signals of all elements, those of known elements last.
     pub(super) fn signal_names(&self) -> Vec<String> {
-        let elements = self.elements.iter().map(|p| &p.element).chain(self.known.iter().map(|k| &k.placed.element));
+        let elements =
+            self.elements.iter().map(|p| &p.element).chain(self.known.iter().map(|k| &k.placed.element));
         let names: Vec<String> = elements.flat_map(|e| e.signals(&self.joints)).collect();
         let distinct = |k: &usize| !names[..*k].contains(&names[*k]);
         assert!((0..names.len()).all(|k| distinct(&k)), "two elements at a joint share signals: {names:?}");

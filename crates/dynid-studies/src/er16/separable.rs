@@ -313,7 +313,7 @@ pub(super) fn passivity_row(arm: &Arm) -> Row {
     use dynid::model::Passivity;
     /// Beyond the excited speeds of the reference, rad/s.
     const MOST: f64 = 1.8;
-    let found = arm.model.friction_passivity(1, &arm.shape, &arm.linear, (0.0, MOST));
+    let found = arm.model.friction_passivity(1, &arm.shape, &arm.linear, (0.0, MOST), &[]);
     let interval = match &found.passivity {
         Passivity::PassiveOn(intervals) => intervals.first().copied(),
         _ => None,

@@ -2,13 +2,14 @@
 
 use dynid_io::{ElementSetting, SettingValue};
 use dynid_model::element::{
-    Arctangent, JointElement, PowerLaw, ShapeSetting, Sigmoid, SigmoidOffset, Stribeck, TanhFriction,
+    Arctangent, ExponentialViscous, JointElement, LuGre, PowerLaw, ShapeSetting, Sigmoid, SigmoidOffset,
+    Stribeck, TanhFriction,
 };
 
 use crate::Error;
 
 /// Settings that state a linear parameter: element, key, symbol of the parameter.
-pub(super) const STATED: [(&str, &str, &str); 9] = [
+pub(super) const STATED: [(&str, &str, &str); 13] = [
     ("arctangent", "effort", "fa"),
     ("stribeck", "coulomb", "fc"),
     ("stribeck", "static", "fs"),
@@ -18,16 +19,30 @@ pub(super) const STATED: [(&str, &str, &str); 9] = [
     ("power", "coefficient", "fp"),
     ("viscous_magnitude", "coefficient", "fva"),
     ("load", "coefficient", "mu"),
+    ("exponential_viscous", "sigma2", "sigma2"),
+    ("exponential_viscous", "sigma2_slope", "sigma2_slope"),
+    ("lugre", "coulomb", "fc"),
+    ("lugre", "sigma1", "sigma1"),
 ];
 
 /// Shape parameters of every element, and whether its bounds scale with the speeds in use.
-const SHAPES: [(&str, &[&str], bool); 6] = [
+const SHAPES: [(&str, &[&str], bool); 8] = [
     ("arctangent", &["fb"], true),
     ("stribeck", &["vs", "delta"], true),
     ("tanh", &["w"], true),
     ("sigmoid", &["phi2", "phi3"], false),
     ("sigmoid_offset", &["alpha", "nu"], false),
     ("power", &["p"], false),
+    ("exponential_viscous", &["sigma3", "sigma3_slope", "sigma4", "sigma4_slope"], false),
+    ("lugre", &["kappa", "rho", "vs", "delta"], true),
+];
+
+/// Further settings, numbers: element and key.
+const OPTIONS: [(&str, &str); 4] = [
+    ("exponential_viscous", "reference_temperature"),
+    ("exponential_viscous", "temperature"),
+    ("exponential_viscous", "temperature_min"),
+    ("exponential_viscous", "temperature_max"),
 ];
 
 /// Friction laws of the speed alone that have no shape parameters.
@@ -96,6 +111,17 @@ impl Settings<'_> {
                 let TanhFriction { w, .. } = TanhFriction::scaled(rate, v_max);
                 Box::new(TanhFriction { rate, w: self.shape("w", w, true)? })
             }
+            "exponential_viscous" => Box::new(self.exponential_viscous(rate)?),
+            "lugre" => {
+                let LuGre { kappa, rho, vs, delta, .. } = LuGre::scaled(rate, v_max);
+                Box::new(LuGre {
+                    rate,
+                    kappa: self.shape("kappa", kappa, true)?,
+                    rho: self.shape("rho", rho, true)?,
+                    vs: self.shape("vs", vs, true)?,
+                    delta: self.shape("delta", delta, true)?,
+                })
+            }
             "sigmoid" => {
                 let Sigmoid { phi2, phi3, .. } = Sigmoid::new(rate);
                 let (phi2, phi3) = (self.shape("phi2", phi2, true)?, self.shape("phi3", phi3, false)?);
@@ -113,15 +139,56 @@ impl Settings<'_> {
         })
     }
 
+    fn exponential_viscous(&self, rate: usize) -> Result<ExponentialViscous, Error> {
+        let default = ExponentialViscous::new(rate);
+        let number = |key: &str, default: f64| -> Result<f64, Error> {
+            let x = self.number(key)?.unwrap_or(default);
+            match x.is_nan() {
+                true => Err(self.fault(format!("`{key}`: expected a number, found {x}"))),
+                false => Ok(x),
+            }
+        };
+        let (lowest, highest) = default.temperature_range;
+        let range = (number("temperature_min", lowest)?, number("temperature_max", highest)?);
+        if range.0 >= range.1 {
+            let fault = format!(
+                "expected `temperature_min` below `temperature_max`, found {} and {}",
+                range.0, range.1
+            );
+            return Err(self.fault(fault));
+        }
+        let degrees = |key: &str, t: f64| match dynid_motion::temperature::PLAUSIBLE.contains(&t) {
+            true => Ok(t),
+            false => Err(self.fault(format!("`{key}`: expected degrees Celsius, found {t}"))),
+        };
+        Ok(ExponentialViscous {
+            sigma3: self.shape("sigma3", default.sigma3, true)?,
+            sigma3_slope: self.shape("sigma3_slope", default.sigma3_slope, false)?,
+            sigma4: self.shape("sigma4", default.sigma4, true)?,
+            sigma4_slope: self.shape("sigma4_slope", default.sigma4_slope, false)?,
+            reference_temperature: degrees(
+                "reference_temperature",
+                number("reference_temperature", default.reference_temperature)?,
+            )?,
+            temperature_range: range,
+            temperature: match self.number("temperature")? {
+                Some(t) => Some(degrees("temperature", t)?),
+                None => None,
+            },
+            ..default
+        })
+    }
+
     fn fault(&self, fault: String) -> Error {
         Error::ElementSetting { element: self.element.to_owned(), joint: self.joint.to_owned(), fault }
     }
 
     fn check_keys(&self, shapes: &[&str], scaled: bool) -> Result<(), Error> {
-        let values: Vec<&str> = STATED
-            .iter()
-            .filter(|(element, _, _)| *element == self.element)
-            .map(|(_, key, _)| *key)
+        let stated = STATED.iter().map(|(element, key, _)| (element, key));
+        let values: Vec<&str> = stated
+            .chain(OPTIONS.iter().map(|(element, key)| (element, key)))
+            .filter(|(element, _)| **element == self.element)
+            .map(|(_, key)| *key)
             .collect();
         for setting in &self.own {
             let (head, tail) = setting.key.split_once('.').unwrap_or((&setting.key, ""));

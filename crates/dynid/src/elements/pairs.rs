@@ -5,17 +5,20 @@ use std::fmt;
 use crate::Error;
 
 /// Elements whose columns depend on each other whatever the motion, the one to be left out first, and why.
-const EQUAL: [(&str, &str, &str); 6] = [
+const EQUAL: [(&str, &str, &str); 9] = [
     ("offset", "asymmetric", "its Coulomb columns differ by a constant"),
     ("coulomb", "asymmetric", "its Coulomb columns add up to the sign"),
     ("viscous", "asymmetric", "its viscous columns add up to the velocity"),
     ("viscous_magnitude", "asymmetric", "its viscous columns differ by the speed"),
     ("stribeck", "asymmetric", "the columns of both add up to the sign"),
     ("coulomb", "stribeck", "its columns add up to the sign"),
+    ("coulomb", "lugre", "its bristles, once bent, are the sign"),
+    ("stribeck", "lugre", "its bristles, once bent, are Stribeck friction"),
+    ("asymmetric", "lugre", "its bristles, once bent, are the sign"),
 ];
 
 /// Elements whose columns are alike unless the motion tells them apart, and what it takes.
-const ALIKE: [(&str, &str, &str); 15] = [
+const ALIKE: [(&str, &str, &str); 18] = [
     ("coulomb", "tanh", SLOW),
     ("coulomb", "sigmoid", SLOW),
     ("coulomb", "sigmoid_offset", SLOW),
@@ -28,6 +31,9 @@ const ALIKE: [(&str, &str, &str); 15] = [
     ("arctangent", "sigmoid", SLOW),
     ("arctangent", "sigmoid_offset", SLOW),
     ("viscous", "arctangent", "speeds far above 1/fb"),
+    ("viscous", "exponential_viscous", "speeds far above 1/sigma3"),
+    ("power", "exponential_viscous", "speeds far above 1/sigma3"),
+    ("lugre", "tanh", SLOW),
     ("coulomb", "load", "loads that vary"),
     ("stribeck", "load", "loads that vary"),
     ("viscous", "power", "speeds that differ by an order of magnitude"),

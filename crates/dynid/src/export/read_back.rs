@@ -86,7 +86,7 @@ impl CheckStates {
             Kind::Logs(logs) => {
                 for (states, channels) in logs {
                     for range in starts(states.samples) {
-                        states.with_block(range, channels, &mut work);
+                        states.with_block(range, channels, &[], &mut work);
                     }
                 }
             }

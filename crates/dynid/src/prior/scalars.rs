@@ -1,5 +1,6 @@
 //! Prior standard deviations of element parameters, by what their columns do.
 
+use dynid_model::element::is_temperature;
 use dynid_model::{Dynamics, EffortModel, MotionBlock, RandomMotion, RegressorBlock, RobotModel, State};
 
 /// Random states behind the figures.
@@ -83,10 +84,13 @@ impl Probe {
             .zip(&owners)
             .map(|(joint, body)| speed_limit(joint.slides, mechanism.bodies()[*body].joint.limits.velocity))
             .collect();
-        // Channels are currents: one ampere.
-        let one = vec![1.0; STATES];
-        let channels: Vec<(&str, &[f64])> =
-            model.channels().iter().map(|c| (c.as_str(), one.as_slice())).collect();
+        // Channels are currents, one ampere, or temperatures, those of a warm joint.
+        let (one, warm) = (vec![1.0; STATES], vec![35.0; STATES]);
+        let channels: Vec<(&str, &[f64])> = model
+            .channels()
+            .iter()
+            .map(|c| (c.as_str(), if is_temperature(c) { warm.as_slice() } else { one.as_slice() }))
+            .collect();
         RandomMotion::new(mechanism, &[], STATES, SEED).with_block(|motion| {
             let zero = vec![0.0; motion.dq.len()];
             let sign = |x: &f64| if *x < 0.0 { -1.0 } else { 1.0 };

@@ -35,7 +35,9 @@ impl Identification {
         let mut velocities: Vec<f64> =
             backward.chain(std::iter::once(0.0)).chain((1..=POINTS).map(|k| high * side(k))).collect();
         velocities.dedup();
-        let efforts = model.friction_effort(rate, &shape, linear, &velocities);
+        // The coldest state logged, where channels make a difference.
+        let held = self.held_channels().swap_remove(0);
+        let efforts = model.friction_effort(rate, &shape, linear, &velocities, &held);
         let points: Vec<[f64; 2]> = velocities.into_iter().zip(efforts).map(|(v, e)| [v, e]).collect();
         let mut curves = vec![report::ChartCurve {
             name: "identified law".to_owned(),

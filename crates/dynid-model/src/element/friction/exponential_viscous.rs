@@ -78,11 +78,7 @@ impl ExponentialViscous {
                 let Some(temperature) = motion.channel(&name) else {
                     panic!("motion block without channel `{name}`")
                 };
-                speeds
-                    .iter()
-                    .zip(temperature)
-                    .enumerate()
-                    .for_each(|(k, (v, t))| work(k, *v, above(*t)));
+                speeds.iter().zip(temperature).enumerate().for_each(|(k, (v, t))| work(k, *v, above(*t)));
             }
         }
     }

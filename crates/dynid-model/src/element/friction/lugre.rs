@@ -1,10 +1,10 @@
 //! LuGre friction: bristles that bend before they slip.
 
-use super::{EFFORT, NUMBER, PER_ANGLE, SPEED, VISCOUS};
 use super::stribeck::{fill_falling, raised};
+use super::{EFFORT, NUMBER, PER_ANGLE, SPEED, VISCOUS};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::element::shape::{self, places, values};
-use crate::element::{ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting};
+use crate::element::{ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting, sign};
 use crate::parameter::{Parameter, ShapeParameter};
 use crate::scalar::elementary::{decay, map_decay};
 
@@ -19,7 +19,7 @@ use crate::scalar::elementary::{decay, map_decay};
 ///
 /// Its columns depend on the motion before: they are signals that [`JointElement::remember`] forms sample after sample, with
 /// the velocity held over each step, `w⁺ = s γ + (w - s γ) exp(-κ |v| Δt / γ)`, exact and stable for any step. A record
-/// starts at `w = s(v) γ(v)`, the steady state, which is 0 at rest. Where a motion block comes without these signals, the
+/// starts at `w = s(v) γ(v)`, the steady state, which is 0 at rest; signs are exact there, whatever a block smooths. Where a motion block comes without these signals, the
 /// steady state `[s γ, 0]` stands in for them: away from reversals, after a travel of some `5 γ / κ`, there is no difference.
 ///
 /// `κ` and `σ1` are seen in pre-sliding motion alone, measured at the motor; elsewhere hold them.
@@ -172,7 +172,7 @@ impl JointElement for LuGre {
             let by_shape = gamma_by_shape(*first, shape);
             let mut gamma = [0.0];
             fill_gamma(&[*first], shape, &mut gamma);
-            let s = motion.sign(*first);
+            let s = sign(*first);
             state.push(s * gamma[0]);
             state.extend(free.iter().map(|p| s * by_shape[*p]));
         }
@@ -191,7 +191,7 @@ impl JointElement for LuGre {
                 let (v, g) = (speeds[k], gamma[k]);
                 bent[k] = w;
                 rate[k] = v - v.abs() * w / g;
-                let steady = motion.sign(v) * g;
+                let steady = sign(v) * g;
                 w = if v == 0.0 { w } else { steady + (w - steady) * left[k] };
             }
             state[0] = w;
@@ -199,7 +199,7 @@ impl JointElement for LuGre {
         }
         for k in 0..n {
             let (v, g, e) = (speeds[k], gamma[k], left[k]);
-            let (w, s) = (state[0], motion.sign(v));
+            let (w, s) = (state[0], sign(v));
             let by_shape = gamma_by_shape(v, shape);
             bent[k] = w;
             rate[k] = v - v.abs() * w / g;
@@ -254,8 +254,7 @@ impl JointElement for LuGre {
         let speeds = motion.rate(self.rate);
         for (p, place) in places(self.settings()).into_iter().enumerate() {
             let Some(place) = place else { continue };
-            let signals =
-                [2 * p + 2, 2 * p + 3].map(|index| self.remembered(joints, motion, index));
+            let signals = [2 * p + 2, 2 * p + 3].map(|index| self.remembered(joints, motion, index));
             let [bent, rate] = out.two_columns(2 * place, 2 * place + 1);
             if let [Some(by_shape), Some(rate_by_shape)] = signals {
                 bent.copy_from_slice(by_shape);
