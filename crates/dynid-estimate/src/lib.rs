@@ -11,6 +11,7 @@
 //! | one time block or group of a log, and its rows again | [`groups`], [`rows`] |
 //! | every linear estimator through one call | [`linear::estimate`] |
 //! | shape parameters beside linear ones | [`separable`] |
+//! | friction laws from constant-speed tests | [`steady_friction`] |
 //! | covariance that survives filtering | [`covariance`] |
 //! | held-out error over folds of blocks; several estimators on the same folds | [`folds`], [`held_out`] |
 //! | which parameters a model can do without | [`elimination`] |
@@ -39,6 +40,7 @@ pub mod rank;
 pub mod rows;
 pub mod search;
 pub mod separable;
+pub mod steady_friction;
 mod triangular;
 mod whitened;
 pub mod whiteness;

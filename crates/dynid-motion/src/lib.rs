@@ -4,7 +4,8 @@
 //! [`spectrum`] finds the sensor noise and the excited band, and [`cutoff`] the cut-off frequencies they allow;
 //! [`filter`], [`difference`], [`kernel`] and [`shift`] form states, regression rows and delays; [`mask`] says which
 //! samples may be used. [`textbook`] is the plain route (zero-phase Butterworth, central differences, decimation),
-//! [`velocity`] judges a measured velocity, [`trajectory`] holds the excitation trajectories. For motions that repeat:
+//! [`velocity`] judges a measured velocity, [`constant_speed`] finds constant-speed passes and pairs both directions,
+//! [`trajectory`] holds the excitation trajectories. For motions that repeat:
 //! [`periods`] averages records, [`frequency`] differentiates them by their [`harmonics`], [`smoothing`] fits cubics.
 //!
 //! Units: s, Hz, rad (or m), rad/s, N m (or N). Signals are slices of `f64` on a uniform grid of `rate_hz`.
@@ -12,6 +13,7 @@
 //! no result holds a NaN (unless values are so large, beyond some 1e150, that their squares overflow).
 
 pub mod clock;
+pub mod constant_speed;
 pub mod cutoff;
 pub mod difference;
 pub mod filter;

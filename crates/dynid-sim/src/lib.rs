@@ -4,6 +4,8 @@
 //! gives a log as a real robot would, with the truth beside it. Every fault of sensors, drives and logger is a setting of
 //! its own ([`Imperfections`]).
 //!
+//! [`presliding`] moves a single joint within its friction, where bristles bend and hardly slip.
+//!
 //! Units are SI, angles rad.
 
 mod controller;
@@ -14,6 +16,7 @@ mod imperfections;
 mod integrator;
 mod lu;
 mod plant;
+pub mod presliding;
 mod profile;
 mod recorder;
 pub mod streams;
