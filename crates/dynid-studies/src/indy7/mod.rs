@@ -4,11 +4,13 @@ mod dynamics;
 mod estimators;
 mod excitation;
 mod experiment;
+mod friction;
 mod identification;
 mod one_shot;
 mod reference;
 mod robot;
 mod settings;
+mod sweep;
 
 use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
 
@@ -26,6 +28,23 @@ mod tests {
     use identification::*;
     use dynid::estimators::separable::SteadyFrictionRow;
     use dynid::model::element::*;
+    #[test]
+    fn steps() {
+        let settings = settings::Settings::read().unwrap();
+        let arm = robot::Indy7::new(&settings).unwrap();
+        let s = std::time::Instant::now();
+        let found = friction::experiment(&arm, &settings, &RunSettings { quick: true, seed: 1 }, 1).unwrap();
+        println!("STEP {:?}", s.elapsed());
+        for (j, f) in found.iter().enumerate() {
+            let mut worst = 0.0f64; let mut top = 0.0f64;
+            for t in [19.0, 31.0, 43.0, 51.0] { for v in [0.02, 0.05, 0.1, 0.3, 0.7, 1.2, 2.0, 2.4] {
+                let own = f.fit.law.friction(&[v], &[t])[0];
+                let truth = settings.friction[j].steady(v, t);
+                worst = worst.max((own - truth).abs()); top = top.max(truth);
+            }}
+            println!("STEP {j}: {} points worst {:.4} {:?} rms {:.3} {:?}", f.points.len(), worst / top, f.fit.law.form, f.fit.error.rms, f.fit.notes);
+        }
+    }
     #[test]
     fn golden() {
         let settings = settings::Settings::read().unwrap();

@@ -39,13 +39,54 @@ const TABLE_A1: [&str; 40] = [
     "Izz5", "mx5", "my5", "Ia5", "Ixx6", "Ixy6", "Ixz6", "Iyz6", "Izz6", "mx6", "my6", "Ia6",
 ];
 
+/// The arm with all joints but one at rest in the upright pose.
+#[derive(Debug)]
+pub(super) struct SingleJoint {
+    pub(super) name: String,
+    pub(super) model: Arc<RobotModel>,
+    pub(super) linear: Vec<f64>,
+}
+
+impl SingleJoint {
+    pub(super) fn new(settings: &Settings, arm: &Indy7, joint: usize) -> Result<Self, StudyError> {
+        let names = arm.mechanism.rate_names();
+        let others = names.iter().enumerate().filter(|(j, _)| *j != joint);
+        let options = RobotOptions {
+            locked: others.map(|(_, name)| (name.clone(), 0.0)).collect(),
+            ..RobotOptions::default()
+        };
+        let mechanism = load(&options)?.mechanism;
+        let mut linear = mechanism.inertia_vector();
+        let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
+        for known in settings.friction[joint].known(0, settings.thermal.valid) {
+            elements.push(known.element);
+            linear.extend(known.linear);
+        }
+        elements.push(Box::new(RotorInertia { rate: 0 }));
+        linear.push(arm.standard[10 * JOINTS + joint]);
+        let model = Arc::new(RobotModel::new(mechanism, elements));
+        Ok(SingleJoint { name: names[joint].clone(), model, linear })
+    }
+
+    pub(super) fn plant(&self) -> Result<Plant, StudyError> {
+        Ok(Plant::new(self.model.clone(), self.linear.clone(), Vec::new(), SIGN_WIDTH)?)
+    }
+
+    /// All that turns with the joint in the upright pose, rotor included, kg m².
+    pub(super) fn inertia(&self) -> Result<f64, StudyError> {
+        let plant = self.plant()?;
+        Ok(plant.mass_matrix(&[0.0], &mut plant.workspace())[0])
+    }
+}
+
+fn load(options: &RobotOptions) -> Result<Robot, StudyError> {
+    let text = include_str!("../../../../robots/indy7.toml");
+    Ok(Robot::parse(text, "robots/indy7.toml".as_ref(), options)?)
+}
+
 impl Indy7 {
     pub(super) fn new(settings: &Settings) -> Result<Self, StudyError> {
-        let robot = Robot::parse(
-            include_str!("../../../../robots/indy7.toml"),
-            "robots/indy7.toml".as_ref(),
-            &RobotOptions::default(),
-        )?;
+        let robot = load(&RobotOptions::default())?;
         let mechanism = robot.mechanism.clone();
         let rotor = |name: &str| {
             let stated = robot.elements.settings.iter().find(|s| {
