@@ -25,6 +25,8 @@ pub(crate) enum Command {
     Predict(PredictArgs),
     /// Design an excitation trajectory within all limits: writes trajectory files, design.json and report.html.
     Design(Box<DesignArgs>),
+    /// Friction from constant-speed tests and pre-sliding motion: writes friction.json and report.html.
+    Friction(FrictionTestArgs),
     /// Make a virtual log: by inverse dynamics, or of a controlled robot.
     Simulate(SimulateArgs),
     /// Compare an identified model with other logs.
@@ -341,6 +343,21 @@ pub(crate) struct DesignArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) checkpoint: Option<PathBuf>,
     /// Print design.json to stdout as well.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Say only what went wrong.
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct FrictionTestArgs {
+    /// Configuration (TOML).
+    pub(crate) input: PathBuf,
+    /// Output folder (default: dynid-friction).
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print friction.json to stdout as well.
     #[arg(long)]
     pub(crate) json: bool,
     /// Say only what went wrong.

@@ -31,6 +31,7 @@ fn main() -> ExitCode {
         Command::Identify(args) => commands::identify::run(&args),
         Command::Predict(args) => commands::predict::run(&args),
         Command::Design(args) => commands::design::run(&args),
+        Command::Friction(args) => commands::friction::run(&args),
         Command::Simulate(args) => commands::simulate::run(&args),
         Command::Validate(args) => commands::validate::run(&args),
         Command::Study(args) => commands::study::run(&args),

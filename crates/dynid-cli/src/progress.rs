@@ -6,6 +6,7 @@ use std::time::Duration;
 use dynid::Step;
 use dynid::design::DesignStep;
 use dynid::estimators::conditioning::Stage;
+use dynid::friction::FrictionStep;
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Shows what is being worked on; silent unless stderr is a terminal.
@@ -38,6 +39,16 @@ impl Progress {
             Step::Consistency => "making bodies physical".to_owned(),
             Step::Trust => "judging parameters".to_owned(),
             Step::Validate(log) => format!("predicting {log}"),
+        });
+    }
+}
+
+impl Progress {
+    pub(crate) fn friction(&self, step: FrictionStep) {
+        self.0.set_message(match step {
+            FrictionStep::Read(file) => format!("reading {file}"),
+            FrictionStep::Law(joint) => format!("fitting friction of {joint}"),
+            FrictionStep::Presliding(joint) => format!("searching bristles of {joint}"),
         });
     }
 }

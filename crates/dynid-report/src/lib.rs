@@ -35,5 +35,6 @@ pub use data::{
     ShapeVerdict, StandardParameter, Starts, Status, StudyReport, StudyRow, StudySection, StudyTable,
     Trajectory, UnidentifiableColumn, ValidationPrice, Value, Verdict, Warning, Whiteness,
 };
+pub use data::{CurvesByTemperature, FrictionReport, FrictionTest, Surface, TemperatureLevel};
 pub use error::ReportError;
-pub use page::{render, render_design, render_study};
+pub use page::{render, render_design, render_friction, render_study};

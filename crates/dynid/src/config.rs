@@ -360,6 +360,8 @@ pub(crate) fn just<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usiz
         .map_err(|list| D::Error::custom(format!("expected a list of {N} numbers, found {}", list.len())))
 }
 
-fn pair<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<Option<(T, T)>, D::Error> {
+pub(crate) fn pair<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+    deserializer: D,
+) -> Result<Option<(T, T)>, D::Error> {
     Ok(exactly(deserializer)?.map(|[lower, upper]| (lower, upper)))
 }

@@ -216,6 +216,9 @@ pub enum Error {
     /// A virtual experiment cannot be run.
     #[error(transparent)]
     Experiment(#[from] dynid_sim::SimError),
+    /// Friction experiments cannot be evaluated.
+    #[error("{0}")]
+    Friction(#[from] Box<crate::friction::FrictionError>),
     /// A setting has a value that makes no sense.
     #[error("setting `{name}`: expected {expected}, found {found}")]
     Setting {
@@ -276,6 +279,12 @@ pub enum Error {
     Report(#[from] dynid_report::ReportError),
 }
 
+impl From<crate::friction::FrictionError> for Error {
+    fn from(error: crate::friction::FrictionError) -> Self {
+        Error::Friction(Box::new(error))
+    }
+}
+
 impl Error {
     /// A setting whose value makes no sense.
     pub(crate) fn setting(name: &str, expected: &str, found: impl ToString) -> Self {
@@ -293,6 +302,7 @@ impl Error {
             Error::RobotFile(e) => e.hint(),
             Error::LogFile(e) => e.hint(),
             Error::Export(e) => e.hint(),
+            Error::Friction(e) => e.hint(),
             Error::Design(dynid_excitation::ProblemError::RankDeficient { .. }) => Some(
                 "widen the limits that leave so little motion, or leave out elements that it cannot show".to_owned(),
             ),

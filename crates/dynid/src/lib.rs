@@ -14,6 +14,7 @@ mod error;
 pub mod estimate;
 pub mod export;
 pub mod fitting;
+pub mod friction;
 pub mod identify;
 pub mod inspect;
 pub mod logs;
@@ -33,6 +34,7 @@ pub mod verdict;
 pub use config::Config;
 pub use error::Error;
 pub use estimate::Estimate;
+pub use friction::{FrictionConfig, FrictionModel, identify_friction};
 pub use identify::{Identification, Step, identify};
 pub use robot::{Robot, RobotOptions};
 

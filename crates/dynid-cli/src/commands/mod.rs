@@ -2,6 +2,7 @@
 
 pub(crate) mod design;
 pub(crate) mod export;
+pub(crate) mod friction;
 pub(crate) mod identify;
 pub(crate) mod inspect;
 pub(crate) mod predict;

@@ -92,7 +92,8 @@ pub fn analyse(points: &[SteadyPoint], settings: &SteadySettings) -> Result<Stea
             vec![(0..points.len()).collect()]
         }
     };
-    let thermal = thermal_levels(&rows, &levels, settings, &mut notes);
+    let known = notes.is_empty();
+    let thermal = known && thermal_levels(&rows, &levels, settings, &mut notes);
     let (solved, ladder) = climb(&rows, thermal, settings, &mut notes)?;
     let law = solved.laws[0].clone();
     let error = solved.error();
@@ -158,7 +159,7 @@ fn thermal_levels(
     }
     let (low, high) = rows.range();
     let enough = levels.len() >= 2 && high - low >= settings.least_span;
-    if !enough && (high > low || levels.len() > 1) {
+    if !enough {
         notes.push(format!(
             "temperatures from {low:.1} to {high:.1} degC: slopes over temperature are not estimable, they are held at zero \
              (a span of {} K is needed)",

@@ -168,7 +168,16 @@ fn solved(
     places: &[(Vec<usize>, Vec<usize>)],
     (linear_count, range): (usize, (f64, f64)),
 ) -> Solved {
-    let covariance = covariance(found);
+    let chi_squared: f64 = found.residuals.iter().flatten().map(|r| r * r).sum();
+    let rows: usize = parts.iter().map(Rows::len).sum();
+    let coefficients = linear_count + found.shape.len();
+    let mut covariance = covariance(found);
+    // Points that state their errors are not better than these because most of them fit better: where friction is large, the few
+    // that decide need not.
+    let freedom = rows.saturating_sub(coefficients) as f64;
+    if !settings.series && chi_squared > 0.0 && chi_squared < freedom {
+        covariance *= faer::Scale(freedom / chi_squared);
+    }
     let std = |at: usize| Some(covariance[(at, at)].sqrt()).filter(|s| s.is_finite());
     let symbols: Vec<&'static str> = form.linear().into_iter().chain(form.shape()).collect();
     let places: Vec<Vec<usize>> = places
@@ -198,9 +207,9 @@ fn solved(
     Solved {
         laws,
         residuals,
-        chi_squared: found.residuals.iter().flatten().map(|r| r * r).sum(),
-        rows: parts.iter().map(Rows::len).sum(),
-        coefficients: linear_count + found.shape.len(),
+        chi_squared,
+        rows,
+        coefficients,
         places,
         largest_friction: parts.iter().flat_map(|p| &p.friction).fold(0.0, |m, f| m.max(f.abs())),
         covariance,

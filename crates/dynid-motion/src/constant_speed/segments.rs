@@ -27,6 +27,9 @@ pub struct SegmentSettings {
     pub use_velocity: bool,
 }
 
+/// Windows in which speed is averaged, one after the other, in units of the setting.
+const WINDOWS: [f64; 3] = [1.0, 4.0, 16.0];
+
 impl Default for SegmentSettings {
     fn default() -> Self {
         SegmentSettings {
@@ -73,7 +76,8 @@ pub struct Segment {
 /// Speed is the slope of the least-squares line through the positions in a window (or the averaged velocity). Within every
 /// run of one direction, the longest stretch in which the speed stays within `± (speed_tolerance |mean| + noise_tolerance
 /// noise)` is taken, then the longest of what is left on either side, and so on: a staircase of speeds gives one
-/// segment per step. Both ends are trimmed.
+/// segment per step. Both ends are trimmed. What is left is looked at again with windows four and sixteen times as wide: near
+/// the resolution of the encoder, slow speeds show over longer times only.
 ///
 /// # Errors
 /// [`ConstantSpeedError`] for settings out of range, fewer than three samples, values that are not finite, and time that
@@ -85,30 +89,40 @@ pub fn segments(
 ) -> Result<Vec<Segment>, ConstantSpeedError> {
     settings.check()?;
     check(time, &[("position", &joint.position)])?;
-    let smoothed = match &joint.velocity {
-        Some(velocity) if settings.use_velocity => {
-            check(time, &[("velocity", velocity)])?;
-            of_velocity(time, velocity, settings.window_s)
+    let logged = joint.velocity.as_ref().filter(|_| settings.use_velocity);
+    if let Some(velocity) = logged {
+        check(time, &[("velocity", velocity)])?;
+    }
+    let mut found: Vec<Segment> = Vec::new();
+    for factor in WINDOWS {
+        let window = factor * settings.window_s;
+        let mut smoothed = match logged {
+            Some(velocity) => of_velocity(time, velocity, window),
+            None => of_positions(time, &joint.position, window),
+        };
+        for segment in &found {
+            smoothed.speed[segment.rows.clone()].fill(0.0);
         }
-        _ => of_positions(time, &joint.position, settings.window_s),
-    };
-    let least = settings.least_speed.unwrap_or(5.0 * smoothed.noise);
-    let slack = settings.noise_tolerance * smoothed.noise;
-    let mut found = Vec::new();
-    for run in runs(&smoothed.speed, least) {
-        let mut left = vec![run];
-        while let Some(rows) = left.pop() {
-            let longest = |rows: Range<usize>| time[rows.end - 1] - time[rows.start];
-            if rows.len() < 3 || longest(rows.clone()) < settings.least_duration_s + 2.0 * settings.trim_s {
-                continue;
+        let least = settings.least_speed.unwrap_or(5.0 * smoothed.noise);
+        let slack = settings.noise_tolerance * smoothed.noise;
+        // Within half a window of a change, speeds are mixed.
+        let trim = if factor > 1.0 { settings.trim_s.max(0.5 * window) } else { settings.trim_s };
+        let shortest = settings.least_duration_s + 2.0 * trim;
+        for run in runs(&smoothed.speed, least) {
+            let mut left = vec![run];
+            while let Some(rows) = left.pop() {
+                let longest = |rows: Range<usize>| time[rows.end - 1] - time[rows.start];
+                if rows.len() < 3 || longest(rows.clone()) < shortest {
+                    continue;
+                }
+                let stretch = steadiest(time, &smoothed.speed, rows.clone(), settings.speed_tolerance, slack);
+                if longest(stretch.clone()) < shortest {
+                    continue;
+                }
+                left.push(rows.start..stretch.start);
+                left.push(stretch.end..rows.end);
+                found.extend(trimmed(time, &joint.position, &smoothed.speed, stretch, trim));
             }
-            let stretch = steadiest(time, &smoothed.speed, rows.clone(), settings.speed_tolerance, slack);
-            if longest(stretch.clone()) < settings.least_duration_s + 2.0 * settings.trim_s {
-                continue;
-            }
-            left.push(rows.start..stretch.start);
-            left.push(stretch.end..rows.end);
-            found.extend(trimmed(time, &joint.position, &smoothed.speed, stretch, settings.trim_s));
         }
     }
     found.retain(|s| s.duration >= settings.least_duration_s * (1.0 - 1e-9));

@@ -14,6 +14,7 @@ mod conditioning;
 mod consistency;
 mod design;
 mod friction;
+mod friction_test;
 mod log;
 mod parameters;
 mod precision;
@@ -29,6 +30,7 @@ pub use design::{
     JointMotion, LimitUse, Obstacle, ParameterShare, RandomMotion, Shape, Starts, Trajectory,
 };
 pub use friction::{FrictionTrial, ShapeParameter, ShapeVerdict};
+pub use friction_test::{CurvesByTemperature, FrictionReport, FrictionTest, Surface, TemperatureLevel};
 pub use log::{JointQuality, JointSeries, LogReport, LogRole, LogSeries, Quality};
 pub use parameters::{BaseParameter, OwnerKind, ParameterVerdict, StandardParameter};
 pub use precision::{LogWhiteness, Precision, Whiteness};

@@ -84,19 +84,30 @@ fn scaled(chart: &Chart, curve: &ChartCurve) -> Vec<[f64; 2]> {
     curve.points.iter().map(|p| [scale(&chart.x, p[0]), scale(&chart.y, p[1])]).collect()
 }
 
-struct Scale {
-    low: f64,
-    high: f64,
+/// A drawn axis: its ends, as logarithms on a logarithmic one.
+pub(super) struct Scale {
+    pub(super) low: f64,
+    pub(super) high: f64,
     logarithmic: bool,
 }
 
 impl Scale {
-    fn new(axis: &ChartAxis, (low, high): (f64, f64), margin: f64) -> Self {
+    pub(super) fn new(axis: &ChartAxis, (low, high): (f64, f64), margin: f64) -> Self {
         let least = if axis.logarithmic { 0.1 } else { 1e-9 * low.abs().max(high.abs()).max(1e-9) };
         let spread = (high - low).max(least);
         let middle = 0.5 * (low + high);
         let half = (0.5 + margin) * spread;
         Scale { low: middle - half, high: middle + half, logarithmic: axis.logarithmic }
+    }
+
+    /// Place of a value on the drawn scale.
+    pub(super) fn of(&self, value: f64) -> f64 {
+        if self.logarithmic { value.log10() } else { value }
+    }
+
+    /// Value at a place on the drawn scale.
+    pub(super) fn back(&self, place: f64) -> f64 {
+        if self.logarithmic { 10f64.powf(place) } else { place }
     }
 
     fn widen(&mut self, length: f64) {
@@ -105,7 +116,7 @@ impl Scale {
     }
 
     /// Places on the drawn scale with their texts.
-    fn ticks(&self, wished: f64) -> Vec<(f64, String)> {
+    pub(super) fn ticks(&self, wished: f64) -> Vec<(f64, String)> {
         let (low, high) = (self.low, self.high);
         if !self.logarithmic {
             return ticks(low, high, wished).into_iter().map(|v| (v, tick_label(v))).collect();

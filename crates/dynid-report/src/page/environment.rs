@@ -10,10 +10,11 @@ use crate::number::{self, UNDEFINED};
 
 pub(super) const PAGE: &str = "page.html";
 pub(super) const DESIGN_PAGE: &str = "design/page.html";
+pub(super) const FRICTION_PAGE: &str = "friction_test/page.html";
 pub(super) const STUDY_PAGE: &str = "study/page.html";
 
 /// Every name ends in `.html`, which switches automatic escaping on.
-const TEMPLATES: [(&str, &str); 25] = [
+const TEMPLATES: [(&str, &str); 26] = [
     ("shell.html", include_str!("../../template/shell.html")),
     (PAGE, include_str!("../../template/page.html")),
     ("macros.html", include_str!("../../template/macros.html")),
@@ -37,6 +38,7 @@ const TEMPLATES: [(&str, &str); 25] = [
     ("design/motion.html", include_str!("../../template/design/motion.html")),
     ("design/paths.html", include_str!("../../template/design/paths.html")),
     ("design/starts.html", include_str!("../../template/design/starts.html")),
+    (FRICTION_PAGE, include_str!("../../template/friction_test/page.html")),
     (STUDY_PAGE, include_str!("../../template/study/page.html")),
     ("provenance.html", include_str!("../../template/provenance.html")),
 ];

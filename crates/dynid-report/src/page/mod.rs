@@ -5,13 +5,14 @@ mod checks;
 mod context;
 mod design;
 mod environment;
+mod friction_test;
 mod prose;
 mod pruning;
 mod script_data;
 mod study;
 mod trust;
 
-use crate::data::{DesignReport, ReportData, StudyReport};
+use crate::data::{DesignReport, FrictionReport, ReportData, StudyReport, StudyTable};
 use crate::error::ReportError;
 
 /// Lays the report out as one HTML file that needs nothing else.
@@ -46,6 +47,29 @@ pub fn render_design(data: &DesignReport) -> Result<String, ReportError> {
     Ok(environment.get_template(environment::DESIGN_PAGE)?.render(context)?)
 }
 
+/// Lays the report of friction experiments out as one HTML file, with the properties of [`render`]'s; it is complete without
+/// a script.
+///
+/// # Errors
+///
+/// [`ReportError::Length`] if a row of a table has more cells than the table has headings. The other variants would be
+/// faults of this crate.
+pub fn render_friction(data: &FrictionReport) -> Result<String, ReportError> {
+    check_tables(data.joints.iter().flat_map(|j| &j.tables))?;
+    let environment = environment::environment()?;
+    Ok(environment.get_template(environment::FRICTION_PAGE)?.render(friction_test::context(data))?)
+}
+
+fn check_tables<'a>(tables: impl Iterator<Item = &'a StudyTable>) -> Result<(), ReportError> {
+    for table in tables {
+        if let Some(row) = table.rows.iter().find(|row| row.len() > table.head.len()) {
+            let place = format!("table {:?}", table.caption);
+            return Err(ReportError::Length { place, expected: table.head.len(), found: row.len() });
+        }
+    }
+    Ok(())
+}
+
 /// Lays the report of a study out as one HTML file, with the properties of [`render`]'s; it is complete without a script.
 ///
 /// # Errors
@@ -53,12 +77,7 @@ pub fn render_design(data: &DesignReport) -> Result<String, ReportError> {
 /// [`ReportError::Length`] if a row of a table has more cells than the table has headings. The other variants would be
 /// faults of this crate.
 pub fn render_study(data: &StudyReport) -> Result<String, ReportError> {
-    for table in data.sections.iter().flat_map(|s| &s.tables) {
-        if let Some(row) = table.rows.iter().find(|row| row.len() > table.head.len()) {
-            let place = format!("table {:?}", table.caption);
-            return Err(ReportError::Length { place, expected: table.head.len(), found: row.len() });
-        }
-    }
+    check_tables(data.sections.iter().flat_map(|s| &s.tables))?;
     let environment = environment::environment()?;
     Ok(environment.get_template(environment::STUDY_PAGE)?.render(study::context(data))?)
 }

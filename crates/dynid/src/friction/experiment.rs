@@ -1,0 +1,223 @@
+//! From logs to points of steady friction.
+
+use dynid_estimate::steady_friction::SteadyPoint;
+use dynid_model::element::temperature_channel;
+use dynid_motion::clock::{ClockSettings, UniformLog, uniform};
+use dynid_motion::constant_speed::{Pairing, Pass, Segment, at_rest, pair, segments, speed};
+
+use super::config::{FrictionConfig, FrictionLog, LoggedSignal, ThermalLines};
+use super::error::FrictionError;
+use crate::Error;
+use crate::logs::{self, LoadedLog};
+use crate::robot::Robot;
+
+/// Samples of one pass at constant speed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PassSamples {
+    /// Log file.
+    pub log: String,
+    /// Signed speed, rad/s or m/s.
+    pub speed: f64,
+    /// Duration, s.
+    pub duration: f64,
+    position: Vec<f64>,
+    effort: Vec<f64>,
+    temperature: Option<Vec<f64>>,
+}
+
+/// What the logs say about one joint.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct JointExperiment {
+    /// Joint.
+    pub joint: String,
+    /// Passes at constant speed.
+    pub passes: Vec<PassSamples>,
+    /// Forward and backward together.
+    pub pairing: Pairing,
+    /// Samples of friction signals, in order of time, logs one after the other.
+    pub series: Vec<SteadyPoint>,
+    /// Whether some log has no temperature.
+    pub without_temperature: bool,
+    /// What to know about it.
+    pub notes: Vec<String>,
+}
+
+impl JointExperiment {
+    /// Points to be fitted: those of pairs, else those of friction signals.
+    pub fn points(&self) -> Vec<SteadyPoint> {
+        if self.pairing.points.is_empty() {
+            return self.series.clone();
+        }
+        self.pairing
+            .points
+            .iter()
+            .map(|p| SteadyPoint {
+                speed: p.speed,
+                temperature: p.temperature,
+                friction: p.friction,
+                std: p.std,
+            })
+            .collect()
+    }
+
+    /// Whether the points are samples of a signal.
+    pub fn is_series(&self) -> bool {
+        self.pairing.points.is_empty() && !self.series.is_empty()
+    }
+}
+
+/// Reads all logs of steady tests. Joints come in the robot's order, those without a pass or signal left out.
+pub(super) fn read(
+    config: &FrictionConfig,
+    robot: &Robot,
+    warnings: &mut Vec<String>,
+    mut progress: impl FnMut(String),
+) -> Result<Vec<JointExperiment>, Error> {
+    let names = robot.mechanism.rate_names();
+    let mut joints: Vec<JointExperiment> = names
+        .iter()
+        .map(|joint| JointExperiment { joint: joint.clone(), ..JointExperiment::default() })
+        .collect();
+    for log in &config.log {
+        progress(log.path.display().to_string());
+        if let Some(name) = log.joint.as_ref().filter(|j| !names.contains(j)) {
+            return Err(Error::UnknownJoint { name: name.clone(), known: names.clone() });
+        }
+        let loaded = logs::load(&log.plain(), &robot.mechanism, &config.columns, None)?;
+        warnings.extend(logs::temperature_warnings(&loaded.log));
+        match log.signal {
+            LoggedSignal::Effort => passes(config, log, &loaded, &mut joints, warnings)?,
+            LoggedSignal::Friction => series(config, log, &loaded, &mut joints)?,
+        }
+    }
+    for joint in &mut joints {
+        let passes: Vec<Pass<'_>> = joint
+            .passes
+            .iter()
+            .map(|p| Pass {
+                speed: p.speed,
+                position: &p.position,
+                effort: &p.effort,
+                temperature: p.temperature.as_deref(),
+            })
+            .collect();
+        joint.pairing = pair(&passes, &config.pairing()).map_err(FrictionError::from)?;
+    }
+    joints.retain(|j| !j.passes.is_empty() || !j.series.is_empty());
+    if joints.is_empty() {
+        let log = &config.log[0];
+        return Err(FrictionError::NoConstantSpeed {
+            file: log.path.display().to_string(),
+            logs: config.log.len(),
+            joint: log.joint.clone(),
+            least_duration_s: config.constant_speed.least_duration_s,
+        }
+        .into());
+    }
+    Ok(joints)
+}
+
+pub(super) fn on_grid(loaded: &LoadedLog) -> Result<UniformLog, Error> {
+    let settings = ClockSettings::default();
+    Ok(uniform(&loaded.log, &settings)
+        .map_err(|e| FrictionError::Clock { file: loaded.log.name().to_owned(), source: e })?)
+}
+
+/// Temperatures of a joint.
+pub(super) fn temperature<'a>(joint: &str, channels: &'a [dynid_motion::Channel]) -> Option<&'a [f64]> {
+    let name = temperature_channel(joint);
+    channels.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
+}
+
+fn missing_temperature(config: &FrictionConfig, file: &str, joint: &str) -> Result<(), Error> {
+    match config.thermal_lines {
+        ThermalLines::Required => {
+            Err(FrictionError::NoTemperature { file: file.to_owned(), joint: joint.to_owned() }.into())
+        }
+        _ => Ok(()),
+    }
+}
+
+fn passes(
+    config: &FrictionConfig,
+    log: &FrictionLog,
+    loaded: &LoadedLog,
+    joints: &mut [JointExperiment],
+    warnings: &mut Vec<String>,
+) -> Result<(), Error> {
+    let file = loaded.log.name().to_owned();
+    let grid = on_grid(loaded)?;
+    let time: Vec<f64> = (0..grid.samples()).map(|k| grid.time(k)).collect();
+    let mut found = 0;
+    for (k, signals) in grid.joints.iter().enumerate() {
+        let asked = log.joint.as_ref().map(|j| *j == signals.name);
+        if asked == Some(false) || (asked.is_none() && !signals.moves()) {
+            continue;
+        }
+        let all = segments(&time, signals, &config.segments()).map_err(FrictionError::from)?;
+        let others = grid.joints.iter().enumerate().filter(|(j, _)| *j != k);
+        let rests = |s: &Segment| {
+            others.clone().all(|(_, o)| at_rest(o, s.rows.clone(), config.constant_speed.rest_tolerance))
+        };
+        let (alone, together): (Vec<Segment>, Vec<Segment>) = all.into_iter().partition(rests);
+        if !together.is_empty() && (alone.is_empty() || asked == Some(true)) {
+            warnings.push(format!(
+                "{file}: joint `{}`: {} of {} stretches of constant speed left out, since other joints move meanwhile",
+                signals.name,
+                together.len(),
+                together.len() + alone.len()
+            ));
+        }
+        let Some(joint) = joints.iter_mut().find(|j| j.joint == signals.name) else { continue };
+        let warmth = temperature(&signals.name, &grid.channels);
+        if warmth.is_none() && !alone.is_empty() {
+            missing_temperature(config, &file, &signals.name)?;
+            joint.without_temperature = true;
+        }
+        found += alone.len();
+        for segment in alone {
+            let rows: Vec<usize> = segment.rows.clone().filter(|r| grid.usable[*r]).collect();
+            let take = |x: &[f64]| rows.iter().map(|r| x[*r]).collect::<Vec<f64>>();
+            joint.passes.push(PassSamples {
+                log: file.clone(),
+                speed: segment.speed,
+                duration: segment.duration,
+                position: take(&signals.position),
+                effort: take(&signals.effort),
+                temperature: warmth.map(take),
+            });
+        }
+    }
+    if found == 0 && config.log.len() > 1 {
+        warnings.push(format!("{file}: no stretch of constant speed"));
+    }
+    Ok(())
+}
+
+fn series(
+    config: &FrictionConfig,
+    log: &FrictionLog,
+    loaded: &LoadedLog,
+    joints: &mut [JointExperiment],
+) -> Result<(), Error> {
+    let file = loaded.log.name().to_owned();
+    for signals in loaded.log.joints() {
+        let asked = log.joint.as_ref().map(|j| *j == signals.name);
+        if asked == Some(false) || (asked.is_none() && !signals.moves()) {
+            continue;
+        }
+        let Some(joint) = joints.iter_mut().find(|j| j.joint == signals.name) else { continue };
+        let c = &config.constant_speed;
+        let speeds =
+            speed(loaded.log.time(), signals, c.window_s, c.use_velocity).map_err(FrictionError::from)?;
+        let warmth = temperature(&signals.name, loaded.log.channels());
+        if warmth.is_none() {
+            missing_temperature(config, &file, &signals.name)?;
+            joint.without_temperature = true;
+        }
+        joint.series.extend(speeds.iter().zip(&signals.effort).enumerate().map(|(k, (speed, friction))| {
+            SteadyPoint { speed: *speed, temperature: warmth.map(|t| t[k]), friction: *friction, std: 1.0 }
+        }));
+    }
+    Ok(())
+}

@@ -1,0 +1,135 @@
+//! Friction experiments: constant-speed tests and pre-sliding motion of single joints.
+//!
+//! From logs in which one joint at a time runs at constant speeds forth and back, [`identify_friction`] finds
+//!
+//! - friction by speed and temperature, half the difference of both directions at equal position (gravity and offset
+//!   cancel): [`dynid_motion::constant_speed`];
+//! - the friction law that these points can carry, with straight lines of its viscous coefficients over temperature:
+//!   [`dynid_estimate::steady_friction`];
+//! - stiffness and damping of LuGre's bristles from pre-sliding logs, by simulation error: [`dynid_sim::presliding`].
+//!
+//! [`FrictionModel`] is what it leaves behind, `friction.json`. What the logs cannot tell is said, not guessed: with one
+//! direction alone Coulomb friction and offset are the same column.
+
+pub mod config;
+mod error;
+mod experiment;
+pub mod model;
+mod presliding;
+mod record;
+mod report;
+
+pub use config::{
+    BristlePrior, ConstantSpeedConfig, FrictionConfig, FrictionLog, HoldName, LawName, LoggedSignal,
+    PairsConfig, PreslidingLog, ThermalLines,
+};
+pub use error::FrictionError;
+pub use experiment::{JointExperiment, PassSamples};
+pub use model::FrictionModel;
+pub use presliding::PreslidingFit;
+
+use dynid_estimate::steady_friction::{SteadyError, SteadyFriction, analyse};
+
+use crate::Error;
+use crate::robot::{Robot, RobotOptions};
+
+/// What is being worked on.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FrictionStep {
+    /// Reading a log.
+    Read(String),
+    /// Fitting the law of a joint.
+    Law(String),
+    /// Searching the bristles of a joint.
+    Presliding(String),
+}
+
+/// One joint with everything that was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IdentifiedJoint {
+    /// What the logs say.
+    pub experiment: JointExperiment,
+    /// The law, or why there is none.
+    pub law: Result<SteadyFriction, String>,
+    /// Pre-sliding logs.
+    pub presliding: Vec<PreslidingFit>,
+}
+
+/// Friction of a robot with everything that was found on the way.
+#[derive(Debug)]
+pub struct FrictionIdentification {
+    /// The robot.
+    pub robot: Robot,
+    /// Joints with tests, in the robot's order.
+    pub joints: Vec<IdentifiedJoint>,
+    /// Warnings, in words.
+    pub warnings: Vec<String>,
+}
+
+/// Reads robot and logs, finds points, laws and bristles.
+///
+/// # Errors
+/// [`Error`]: bad input, among it no stretch of constant speed in any log, and thermal lines that are required but
+/// impossible. One direction only, too few speeds and coarse encoders are results that say so.
+pub fn identify_friction(
+    config: &FrictionConfig,
+    mut progress: impl FnMut(FrictionStep),
+) -> Result<FrictionIdentification, Error> {
+    config.check()?;
+    let robot = Robot::load(&config.robot, &RobotOptions::default())?;
+    // What a robot file leaves open about bodies is no matter for friction.
+    let mut warnings = Vec::new();
+    let known = robot.mechanism.rate_names();
+    if let Some(name) = config.prior.keys().find(|j| !known.contains(j)) {
+        return Err(Error::UnknownJoint { name: name.clone(), known });
+    }
+    let experiments =
+        experiment::read(config, &robot, &mut warnings, |file| progress(FrictionStep::Read(file)))?;
+    let mut joints = Vec::with_capacity(experiments.len());
+    for experiment in experiments {
+        progress(FrictionStep::Law(experiment.joint.clone()));
+        let law = law(config, &experiment)?;
+        joints.push(IdentifiedJoint { experiment, law, presliding: Vec::new() });
+    }
+    for log in &config.presliding {
+        progress(FrictionStep::Presliding(log.joint.clone()));
+        let joint = joints.iter_mut().find(|j| j.experiment.joint == log.joint);
+        let law = joint.as_ref().and_then(|j| j.law.as_ref().ok()).map(|l| &l.law);
+        let fit = presliding::find(config, log, &robot, law, &mut warnings)?;
+        if let Some(joint) = joint {
+            joint.presliding.push(fit);
+        }
+    }
+    Ok(FrictionIdentification { robot, joints, warnings })
+}
+
+/// The law of one joint; `Err` inside: there is none, and why.
+fn law(
+    config: &FrictionConfig,
+    experiment: &JointExperiment,
+) -> Result<Result<SteadyFriction, String>, Error> {
+    let joint = || experiment.joint.clone();
+    if experiment.pairing.one_direction() {
+        let reason = "all passes run in one direction: Coulomb friction and offset or gravity cannot be told apart, \
+                      record the same speeds in the other direction";
+        return Ok(Err(reason.to_owned()));
+    }
+    let points = experiment.points();
+    if points.is_empty() {
+        return Ok(Err("no two passes of both directions share speed, temperature and positions".to_owned()));
+    }
+    let steady = config.steady(experiment.is_series());
+    let found = match analyse(&points, &steady) {
+        Ok(found) => found,
+        Err(source @ SteadyError::TooFew { .. }) => return Ok(Err(source.to_string())),
+        Err(source @ SteadyError::Unsupported(_)) if steady.form.is_none() => {
+            return Ok(Err(source.to_string()));
+        }
+        Err(source) => return Err(FrictionError::Law { joint: joint(), source }.into()),
+    };
+    if config.thermal_lines == ThermalLines::Required && !found.law.form.thermal {
+        let reason = found.notes.first().cloned().unwrap_or_else(|| format!("the law is {}", found.law.form));
+        return Err(FrictionError::NoLines { joint: joint(), reason }.into());
+    }
+    Ok(Ok(found))
+}

@@ -1,0 +1,248 @@
+//! Bristles from pre-sliding motion, by simulation error.
+
+use std::ops::ControlFlow;
+
+use dynid_estimate::search::{
+    Algorithm, Bounds, PointObjective, SearchError, Settings, covariance_of_values, run,
+};
+use dynid_estimate::steady_friction::FrictionLaw;
+use dynid_motion::signal::quantum;
+use dynid_sim::presliding::{EffortHold, PreslidingJoint, SteadyTable, presliding};
+
+use super::config::{FrictionConfig, HoldName, PreslidingLog};
+use super::error::FrictionError;
+use super::experiment::{on_grid, temperature};
+use crate::Error;
+use crate::logs;
+use crate::robot::Robot;
+
+/// Positions coarser than this share of the motion do not show its shape.
+const COARSE: f64 = 0.02;
+/// Relative standard deviation from which a value says nothing.
+const UNKNOWN: f64 = 0.25;
+/// Either side of a guess that the search covers, as a factor.
+const REACH: f64 = 40.0;
+/// End of the table of steady friction, rad/s or m/s: beyond what a search may come across.
+const LARGEST_SPEED: f64 = 100.0;
+/// Points per coordinate of the first look.
+const GRID: usize = 7;
+
+/// What a pre-sliding log says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PreslidingFit {
+    /// Log file.
+    pub log: String,
+    /// Joint.
+    pub joint: String,
+    /// `σ0, σ1` with standard deviations, or why they are not identifiable.
+    pub outcome: Result<[(f64, f64); 2], String>,
+    /// Peak to peak of the motion, rad or m.
+    pub motion: f64,
+    /// Resolution of the positions, rad or m.
+    pub resolution: f64,
+    /// Residual of the positions at the best point, rad or m.
+    pub residual_rms: Option<f64>,
+    /// How the effort runs between samples, as fits better or asked for.
+    pub hold: Option<EffortHold>,
+    /// Time, s, measured and simulated positions, for pictures.
+    pub curves: Vec<[f64; 3]>,
+    /// Simulations run.
+    pub simulations: u64,
+}
+
+/// Finds `σ0` and `σ1` of a joint, its steady law being known.
+///
+/// The joint is simulated under the logged effort from rest; `ln σ0, ln σ1` minimise the squared difference of the positions,
+/// a constant apart: a grid first, then pattern search. Standard deviations come from the parabola of the objective, its
+/// residuals counted as correlated as they are.
+pub(super) fn find(
+    config: &FrictionConfig,
+    log: &PreslidingLog,
+    robot: &Robot,
+    law: Option<&FrictionLaw>,
+    warnings: &mut Vec<String>,
+) -> Result<PreslidingFit, Error> {
+    let file = log.path.display().to_string();
+    let known = robot.mechanism.rate_names();
+    if !known.contains(&log.joint) {
+        return Err(Error::UnknownJoint { name: log.joint.clone(), known });
+    }
+    let plain = crate::config::LogConfig {
+        path: log.path.clone(),
+        rows: log.rows,
+        columns: log.columns.clone(),
+        ..crate::config::LogConfig::default()
+    };
+    let loaded = logs::load(&plain, &robot.mechanism, &config.columns, None)?;
+    warnings.extend(logs::temperature_warnings(&loaded.log));
+    let grid = on_grid(&loaded)?;
+    let unknown = || FrictionError::NoSteadyLaw { file: file.clone(), joint: log.joint.clone() };
+    let signals = grid.joints.iter().find(|j| j.name == log.joint).ok_or_else(unknown)?;
+    let law = law.ok_or_else(unknown)?;
+    let warm = temperature(&log.joint, &grid.channels)
+        .map_or(config.reference_temperature, |t| t.iter().sum::<f64>() / t.len() as f64);
+    let (low, high) =
+        signals.position.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let mut out = PreslidingFit {
+        log: file,
+        joint: log.joint.clone(),
+        outcome: Err(String::new()),
+        motion: high - low,
+        resolution: quantum(&signals.position),
+        residual_rms: None,
+        hold: None,
+        curves: Vec::new(),
+        simulations: 0,
+    };
+    if out.motion <= 0.0 || out.resolution > COARSE * out.motion {
+        out.outcome = Err(format!(
+            "not identifiable: positions have a resolution of {:.1e} and move by {:.1e}; the encoder is too coarse, one at \
+             the motor is needed",
+            out.resolution, out.motion
+        ));
+        return Ok(out);
+    }
+    let interval = 1.0 / grid.rate_hz;
+    let parts = law.parts();
+    let table =
+        SteadyTable::new(&parts.model, &parts.shape, [&parts.bristles, &parts.viscous], warm, LARGEST_SPEED)?;
+    let holds: &[EffortHold] = match log.effort_hold {
+        HoldName::Auto => &[EffortHold::Held, EffortHold::Linear],
+        HoldName::Held => &[EffortHold::Held],
+        HoldName::Linear => &[EffortHold::Linear],
+    };
+    let task = Task { log, table: &table, effort: &signals.effort, position: &signals.position, interval };
+    let mut best: Option<Found> = None;
+    for hold in holds {
+        let found = task.search(*hold, out.motion, &mut out.simulations)?;
+        if best.as_ref().is_none_or(|b| found.value < b.value) {
+            best = Some(found);
+        }
+    }
+    if let Some(found) = best {
+        task.judge(&found, &mut out);
+        out.curves.iter_mut().for_each(|c| c[0] += grid.start);
+    }
+    Ok(out)
+}
+
+/// A joint's log against its simulation.
+struct Task<'a> {
+    log: &'a PreslidingLog,
+    table: &'a SteadyTable,
+    effort: &'a [f64],
+    position: &'a [f64],
+    interval: f64,
+}
+
+struct Found {
+    hold: EffortHold,
+    sigma: [f64; 2],
+    value: f64,
+    at_bound: bool,
+}
+
+impl Task<'_> {
+    /// Measured less simulated positions, their mean taken out; `None` where the simulation has no numbers.
+    fn residual(&self, hold: EffortHold, sigma: &[f64]) -> Option<Vec<f64>> {
+        let joint = PreslidingJoint {
+            inertia: self.log.inertia,
+            offset: self.log.offset,
+            stiffness: sigma[0],
+            damping: sigma[1],
+        };
+        let simulated = presliding(&joint, self.table, self.effort, self.interval, hold).ok()?;
+        let mut residual: Vec<f64> = self.position.iter().zip(&simulated).map(|(m, s)| m - s).collect();
+        let mean = residual.iter().sum::<f64>() / residual.len() as f64;
+        residual.iter_mut().for_each(|r| *r -= mean);
+        residual.iter().all(|r| r.is_finite()).then_some(residual)
+    }
+
+    fn loss(&self, hold: EffortHold, sigma: &[f64]) -> f64 {
+        self.residual(hold, sigma).map_or(f64::INFINITY, |r| r.iter().map(|r| r * r).sum())
+    }
+
+    fn search(&self, hold: EffortHold, motion: f64, simulations: &mut u64) -> Result<Found, Error> {
+        let span = |x: &[f64]| {
+            let (low, high) =
+                x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+            high - low
+        };
+        // A spring that moves so far under such an effort, and its critical damping.
+        let stiffness = (span(self.effort) / motion).max(1e-9);
+        let guess = [stiffness, (stiffness * self.log.inertia).sqrt()];
+        let (lower, upper) = (guess.map(|x| x / REACH), guess.map(|x| x * REACH));
+        let objective = PointObjective::new(2, |x: &[f64]| self.loss(hold, x)).in_parallel();
+        let mut start = guess.to_vec();
+        let mut least = f64::INFINITY;
+        let places: Vec<f64> =
+            (0..GRID).map(|k| REACH.powf(1.6 * (k as f64 / (GRID - 1) as f64 - 0.5))).collect();
+        let candidates: Vec<f64> = places
+            .iter()
+            .flat_map(|a| places.iter().flat_map(move |b| [guess[0] * a, guess[1] * b]))
+            .collect();
+        let mut values = vec![0.0; GRID * GRID];
+        dynid_estimate::search::Objective::evaluate(&objective, &candidates, &mut values);
+        *simulations += values.len() as u64;
+        for (value, point) in values.iter().zip(candidates.chunks_exact(2)) {
+            if *value < least {
+                (least, start) = (*value, point.to_vec());
+            }
+        }
+        let bounds = Bounds::new(lower.to_vec(), upper.to_vec())
+            .and_then(|b| b.with_logarithmic(&[0, 1]))
+            .map_err(|e| FrictionError::from(SearchError::from(e)))?;
+        let settings = Settings { start: Some(start), ..Settings::default() };
+        let algorithm: Algorithm = "gps".parse().map_err(FrictionError::from)?;
+        let found = run(&algorithm, &objective, &bounds, &settings, &mut |_| ControlFlow::Continue(()))
+            .map_err(FrictionError::from)?;
+        *simulations += found.evaluations;
+        let at_bound = (0..2)
+            .any(|k| found.point[k] <= lower[k] * (1.0 + 1e-9) || found.point[k] >= upper[k] * (1.0 - 1e-9));
+        Ok(Found { hold, sigma: [found.point[0], found.point[1]], value: found.value, at_bound })
+    }
+
+    fn judge(&self, found: &Found, out: &mut PreslidingFit) {
+        let Some(residual) = self.residual(found.hold, &found.sigma) else {
+            out.outcome = Err("not identifiable: the simulation has no finite positions".to_owned());
+            return;
+        };
+        let n = residual.len() as f64;
+        let rms = (found.value / n).sqrt();
+        out.residual_rms = Some(rms);
+        out.hold = Some(found.hold);
+        let mean = self.position.iter().sum::<f64>() / n;
+        let thin = residual.len().div_ceil(3000);
+        out.curves = residual
+            .iter()
+            .zip(self.position)
+            .enumerate()
+            .step_by(thin)
+            .map(|(k, (r, q))| [k as f64 * self.interval, q - mean, q - mean - r])
+            .collect();
+        let energy: f64 = residual.iter().map(|r| r * r).sum();
+        let neighbours: f64 = residual.windows(2).map(|r| r[0] * r[1]).sum();
+        let correlation = if energy > 0.0 { (neighbours / energy).clamp(0.0, 0.999) } else { 0.0 };
+        let variance = rms * rms * (1.0 + correlation) / (1.0 - correlation);
+        let of_logs = |u: &[f64]| self.loss(found.hold, &[u[0].exp(), u[1].exp()]);
+        let at = found.sigma.map(f64::ln);
+        let covariance = covariance_of_values(&of_logs, &at, &[0.02, 0.02], variance);
+        out.simulations += 9;
+        out.outcome = match covariance {
+            _ if found.at_bound => {
+                Err("not identifiable: the search ends at its bounds, the log leaves them open".to_owned())
+            }
+            None => Err("not identifiable: the motion leaves stiffness or damping open".to_owned()),
+            Some(c) if c[(0, 0)].sqrt() > UNKNOWN || c[(1, 1)].sqrt() > UNKNOWN => Err(format!(
+                "not identifiable: relative standard deviations are {:.0} % and {:.0} %",
+                100.0 * c[(0, 0)].sqrt(),
+                100.0 * c[(1, 1)].sqrt()
+            )),
+            Some(_) if rms > 0.2 * out.motion => Err(format!(
+                "not identifiable: the simulation misses the motion by {:.0} % of it",
+                100.0 * rms / out.motion
+            )),
+            Some(c) => Ok([0, 1].map(|k| (found.sigma[k], found.sigma[k] * c[(k, k)].sqrt()))),
+        };
+    }
+}
