@@ -11,6 +11,7 @@ mod reference;
 mod robot;
 mod settings;
 mod sweep;
+mod validation;
 
 use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
 
@@ -29,6 +30,93 @@ mod tests {
     use dynid::estimators::separable::SteadyFrictionRow;
     use dynid::model::element::*;
     #[test]
+    fn seeds() {
+        let settings = settings::Settings::read().unwrap();
+        let arm = robot::Indy7::new(&settings).unwrap();
+        let run = RunSettings { quick: true, seed: 1 };
+        let v: Vec<_> = [20.5, 43.0].iter().map(|t| validation::Validation::new(&arm, &settings, *t, 1).unwrap()).collect();
+        for (name, rows) in [("ref", settings.trajectories.excitation.clone()), ("own", excitation::designed(&arm, &settings, &run).unwrap().unwrap().rows)] {
+            for seed in 1..4 {
+                let r = validation::realisation(&arm, &settings, &rows, &run, seed).unwrap();
+                for v in &v {
+                    for (n, e) in [("conv", &r.conventional), ("prop", &r.proposed), ("two", &r.two_step), ("one", &r.one_shot)] {
+                        let t = v.table(e, &settings).unwrap();
+                        let m: Vec<f64> = (0..6).map(|j| validation::median(t.iter().map(|r| r[j]).collect())).collect();
+                        println!("SEED {name} {seed} {n} {m:.3?}");
+                    }
+                }
+                let b: Vec<f64> = [&r.conventional, &r.proposed, &r.two_step, &r.one_shot].iter().map(|e| { let t = arm.base_values(&arm.standard); let b = e.base(&arm); (b.iter().zip(&t).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / 40.0).sqrt() }).collect();
+                println!("SEED base errors {b:.4?}");
+            }
+        }
+    }
+    #[test]
+    fn variants() {
+        let settings = settings::Settings::read().unwrap();
+        let arm = robot::Indy7::new(&settings).unwrap();
+        let run = RunSettings { quick: true, seed: 1 };
+        let friction = friction::experiment(&arm, &settings, &run, 1).unwrap();
+        let make = |rows: &[Vec<f64>], t: f64, ripple: bool, seed: u64| {
+            let tr = experiment::trajectory(rows).unwrap();
+            let e = experiment::Experiment { trajectory: &tr, temperature: experiment::constant(t).unwrap(), ripple, rate_hz: 4000.0, seed };
+            e.prepared("x", &arm, &settings).unwrap()
+        };
+        let points: Vec<_> = friction.iter().enumerate().flat_map(|(j, f)| f.rows(j)).collect();
+        for ripple in [false, true] {
+            let val: Vec<_> = settings.trajectories.validation.iter().enumerate().map(|(k, v)| make(v, 20.5, ripple, 40 + k as u64)).collect();
+            let id = make(&settings.trajectories.excitation, 31.0, ripple, 1);
+            let two = regression(&arm, validation::known(&friction, &settings, None).unwrap(), &id, &settings, OURS).unwrap();
+            let prop = regression(&arm, validation::known(&friction, &settings, None).unwrap(), &id, &settings, PAPER).unwrap();
+            let mut all = vec![("prop".to_owned(), prop), ("two".to_owned(), two)];
+            {
+                use dynid::model::*;
+                let mut el: Vec<Box<dyn JointElement>> = Vec::new();
+                for rate in 0..6 { el.push(Box::new(RotorInertia { rate })); el.push(Box::new(Offset { rate })); }
+                let model = RobotModel::new(arm.mechanism.clone(), el).with_known(validation::known(&friction, &settings, None).unwrap());
+                all.push(("nofree".to_owned(), regression_of(&arm, model, &id, &settings, OURS).unwrap()));
+                let model = RobotModel::new(arm.mechanism.clone(), (0..6).map(|rate| Box::new(RotorInertia { rate }) as Box<dyn JointElement>).collect()).with_known(validation::known(&friction, &settings, None).unwrap());
+                let mut values = arm.standard.clone(); values.truncate(66);
+                all.push(("truth".to_owned(), Identified { model, values, margins: [0.0; 2] }));
+            }
+            for k in [0.0, 10.0] {
+                let starts: Vec<_> = friction.iter().enumerate().map(|(j, f)| f.start(j, [15.0, 52.0]).unwrap()).collect();
+                std::fs::write("/tmp/kernel", format!("{k}")).unwrap();
+                all.push((format!("one {k}"), one_shot::one_shot(&arm, starts, &points, &id, OURS).unwrap()));
+            }
+            for (n, e) in &all {
+                let t: Vec<_> = val.iter().map(|l| e.fair_rmse(l, &settings).unwrap()).collect();
+                let m: Vec<f64> = (0..6).map(|j| validation::median(t.iter().map(|r| r[j]).collect())).collect();
+                let b = e.base(&arm); let tr = arm.base_values(&arm.standard);
+                println!("VAR {ripple} {n} {m:.3?} base {:.4}", (b.iter().zip(&tr).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / 40.0).sqrt());
+            }
+        }
+    }
+    #[test]
+    fn designs() {
+        let settings = settings::Settings::read().unwrap();
+        let arm = robot::Indy7::new(&settings).unwrap();
+        let run = RunSettings { quick: true, seed: 1 };
+        let friction = friction::experiment(&arm, &settings, &run, 1).unwrap();
+        let points: Vec<_> = friction.iter().enumerate().flat_map(|(j, f)| f.rows(j)).collect();
+        let val: Vec<_> = settings.trajectories.validation.iter().map(|v| validation::log(&arm, &settings, v, 20.5, 44).unwrap()).collect();
+        for seed in 1..9u64 {
+            let rows = excitation::designed(&arm, &settings, &RunSettings { quick: true, seed }).unwrap().unwrap();
+            let id = validation::log(&arm, &settings, &rows.rows, 31.0, seed).unwrap();
+            let two = regression(&arm, validation::known(&friction, &settings, None).unwrap(), &id, &settings, OURS).unwrap();
+            let mut all = vec![("two".to_owned(), two)];
+            for k in [0.0, 10.0] {
+                let starts: Vec<_> = friction.iter().enumerate().map(|(j, f)| f.start(j, [15.0, 52.0]).unwrap()).collect();
+                std::fs::write("/tmp/kernel", format!("{k}")).unwrap();
+                all.push((format!("one {k}"), one_shot::one_shot(&arm, starts, &points, &id, OURS).unwrap()));
+            }
+            for (n, e) in &all {
+                let t: Vec<_> = val.iter().map(|l| e.fair_rmse(l, &settings).unwrap()).collect();
+                let m: Vec<f64> = (0..6).map(|j| validation::median(t.iter().map(|r| r[j]).collect())).collect();
+                println!("DES {seed} {:.2} {n} {m:.3?}", rows.condition);
+            }
+        }
+    }
+    #[test]
     fn steps() {
         let settings = settings::Settings::read().unwrap();
         let arm = robot::Indy7::new(&settings).unwrap();
@@ -43,6 +131,7 @@ mod tests {
                 worst = worst.max((own - truth).abs()); top = top.max(truth);
             }}
             println!("STEP {j}: {} points worst {:.4} {:?} rms {:.3} {:?}", f.points.len(), worst / top, f.fit.law.form, f.fit.error.rms, f.fit.notes);
+            println!("STEP {:?} {:.4} {:.4}", f.bristles, f.bristles[0].0 / settings.friction[j].sigma0, f.bristles[1].0 / settings.friction[j].sigma1);
         }
     }
     #[test]

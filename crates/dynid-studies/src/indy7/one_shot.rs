@@ -47,7 +47,8 @@ pub(super) fn one_shot(
     let free = model(arm, &friction);
     let shape = free.parameters().shape_start();
     let base = BaseParameters::of(&free, &arm.mechanism, &shape, &BaseSettings::default());
-    let settings = ConditioningSettings { reversal_mask: Some(-1.0), ..ConditioningSettings::default() };
+    let k: f64 = std::fs::read_to_string("/tmp/kernel").ok().and_then(|s| s.parse().ok()).unwrap_or(0.0);
+    let settings = ConditioningSettings { reversal_mask: Some(-1.0), kernel_hz: (k > 0.0).then_some(k), ..ConditioningSettings::default() };
     let logs = std::slice::from_ref(log);
     let choices = condition(&free, &shape, &base.kept, logs, &settings, |_| {}).map_err(fault)?;
     let rows = ShapedRows::new(&free, &shape, &base.kept, logs, &choices, &settings).map_err(fault)?;

@@ -111,16 +111,17 @@ pub(super) fn sweep(
 /// Resolution of the motor's encoder seen at the joint, rad: standard deviation of the noise.
 const MOTOR_NOISE: f64 = 2e-6;
 /// Sample rate, Hz, base frequency, Hz, and duration, s, of motion within friction.
-const PRESLIDING: (f64, f64, f64) = (4000.0, 3.0, 4.0);
+const PRESLIDING: (f64, f64, f64) = (4000.0, 3.0, 2.0);
 
-/// Torque `A (sin ωt + 0.5 sin 2.3 ωt)` with `A = 0.7 F_s` on a joint at rest, and the motion of about 1 mrad it gives.
+/// Torque `A (sin ωt + 0.5 sin 2.3 ωt)` with `A = 0.7 F_s` on a joint at rest, the motion of about 1 mrad it gives, and the
+/// constant torque beneath it.
 pub(super) fn presliding(
     joint: usize,
     arm: &SingleJoint,
     settings: &Settings,
     temperature: f64,
     seed: u64,
-) -> Result<Log, StudyError> {
+) -> Result<(Log, f64), StudyError> {
     let (rate, frequency, duration) = PRESLIDING;
     let plant = arm.plant()?;
     let mut integrator = Integrator::new(&plant, 1e-6)?;
@@ -149,7 +150,8 @@ pub(super) fn presliding(
         effort.push(drive);
         integrator.advance(&mut state, &[drive], &[temperature], t, 1.0 / rate)?;
     }
-    log(arm, time, vec![position], vec![effort], vec![vec![temperature; samples]])
+    let log = log(arm, time, vec![position], vec![effort], vec![vec![temperature; samples]])?;
+    Ok((log, gravity))
 }
 
 fn log(

@@ -26,7 +26,7 @@ pub use config::{
 pub use error::FrictionError;
 pub use experiment::{JointExperiment, PassSamples};
 pub use model::FrictionModel;
-pub use presliding::PreslidingFit;
+pub use presliding::{PreslidingFit, PreslidingTest, fit_presliding};
 
 use dynid_estimate::steady_friction::{SteadyError, SteadyFriction, analyse};
 

@@ -50,11 +50,30 @@ pub struct PreslidingFit {
     pub simulations: u64,
 }
 
-/// Finds `σ0` and `σ1` of a joint, its steady law being known.
-///
-/// The joint is simulated under the logged effort from rest; `ln σ0, ln σ1` minimise the squared difference of the positions,
-/// a constant apart: a grid first, then pattern search. Standard deviations come from the parabola of the objective, its
-/// residuals counted as correlated as they are.
+/// A joint that an effort moves within its friction.
+#[derive(Debug, Clone, Copy)]
+pub struct PreslidingTest<'a> {
+    /// Name of the log.
+    pub log: &'a str,
+    /// Joint.
+    pub joint: &'a str,
+    /// Inertia at the joint in this pose, all that moves with it, kg m² or kg.
+    pub inertia: f64,
+    /// Constant effort in this pose (gravity, offset), N m or N.
+    pub offset: f64,
+    /// The effort between its samples.
+    pub effort_hold: HoldName,
+    /// Effort, N m or N.
+    pub effort: &'a [f64],
+    /// Position, rad or m.
+    pub position: &'a [f64],
+    /// Sample rate, Hz.
+    pub rate_hz: f64,
+    /// Temperature of the joint, °C.
+    pub temperature: f64,
+}
+
+/// Finds `σ0` and `σ1` from a log.
 pub(super) fn find(
     config: &FrictionConfig,
     log: &PreslidingLog,
@@ -81,14 +100,39 @@ pub(super) fn find(
     let law = law.ok_or_else(unknown)?;
     let warm = temperature(&log.joint, &grid.channels)
         .map_or(config.reference_temperature, |t| t.iter().sum::<f64>() / t.len() as f64);
+    let test = PreslidingTest {
+        log: &file,
+        joint: &log.joint,
+        inertia: log.inertia,
+        offset: log.offset,
+        effort_hold: log.effort_hold,
+        effort: &signals.effort,
+        position: &signals.position,
+        rate_hz: grid.rate_hz,
+        temperature: warm,
+    };
+    let mut out = fit_presliding(&test, law)?;
+    out.curves.iter_mut().for_each(|c| c[0] += grid.start);
+    Ok(out)
+}
+
+/// Finds `σ0` and `σ1` of a joint, its steady law being known.
+///
+/// The joint is simulated under the effort from rest; `ln σ0, ln σ1` minimise the squared difference of the positions, a
+/// constant apart: a grid first, then pattern search. Standard deviations come from the parabola of the objective, its
+/// residuals counted as correlated as they are.
+///
+/// # Errors
+/// [`Error::Friction`] for numbers that no search can start from. What the motion does not tell is said in the outcome.
+pub fn fit_presliding(test: &PreslidingTest<'_>, law: &FrictionLaw) -> Result<PreslidingFit, Error> {
     let (low, high) =
-        signals.position.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+        test.position.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
     let mut out = PreslidingFit {
-        log: file,
-        joint: log.joint.clone(),
+        log: test.log.to_owned(),
+        joint: test.joint.to_owned(),
         outcome: Err(String::new()),
         motion: high - low,
-        resolution: quantum(&signals.position),
+        resolution: quantum(test.position),
         residual_rms: None,
         hold: None,
         curves: Vec::new(),
@@ -102,16 +146,16 @@ pub(super) fn find(
         ));
         return Ok(out);
     }
-    let interval = 1.0 / grid.rate_hz;
     let parts = law.parts();
+    let parameters = [parts.bristles.as_slice(), parts.viscous.as_slice()];
     let table =
-        SteadyTable::new(&parts.model, &parts.shape, [&parts.bristles, &parts.viscous], warm, LARGEST_SPEED)?;
-    let holds: &[EffortHold] = match log.effort_hold {
+        SteadyTable::new(&parts.model, &parts.shape, parameters, test.temperature, LARGEST_SPEED)?;
+    let holds: &[EffortHold] = match test.effort_hold {
         HoldName::Auto => &[EffortHold::Held, EffortHold::Linear],
         HoldName::Held => &[EffortHold::Held],
         HoldName::Linear => &[EffortHold::Linear],
     };
-    let task = Task { log, table: &table, effort: &signals.effort, position: &signals.position, interval };
+    let task = Task { test, table: &table, interval: 1.0 / test.rate_hz };
     let mut best: Option<Found> = None;
     for hold in holds {
         let found = task.search(*hold, out.motion, &mut out.simulations)?;
@@ -121,17 +165,14 @@ pub(super) fn find(
     }
     if let Some(found) = best {
         task.judge(&found, &mut out);
-        out.curves.iter_mut().for_each(|c| c[0] += grid.start);
     }
     Ok(out)
 }
 
 /// A joint's log against its simulation.
 struct Task<'a> {
-    log: &'a PreslidingLog,
+    test: &'a PreslidingTest<'a>,
     table: &'a SteadyTable,
-    effort: &'a [f64],
-    position: &'a [f64],
     interval: f64,
 }
 
@@ -146,13 +187,13 @@ impl Task<'_> {
     /// Measured less simulated positions, their mean taken out; `None` where the simulation has no numbers.
     fn residual(&self, hold: EffortHold, sigma: &[f64]) -> Option<Vec<f64>> {
         let joint = PreslidingJoint {
-            inertia: self.log.inertia,
-            offset: self.log.offset,
+            inertia: self.test.inertia,
+            offset: self.test.offset,
             stiffness: sigma[0],
             damping: sigma[1],
         };
-        let simulated = presliding(&joint, self.table, self.effort, self.interval, hold).ok()?;
-        let mut residual: Vec<f64> = self.position.iter().zip(&simulated).map(|(m, s)| m - s).collect();
+        let simulated = presliding(&joint, self.table, self.test.effort, self.interval, hold).ok()?;
+        let mut residual: Vec<f64> = self.test.position.iter().zip(&simulated).map(|(m, s)| m - s).collect();
         let mean = residual.iter().sum::<f64>() / residual.len() as f64;
         residual.iter_mut().for_each(|r| *r -= mean);
         residual.iter().all(|r| r.is_finite()).then_some(residual)
@@ -169,8 +210,8 @@ impl Task<'_> {
             high - low
         };
         // A spring that moves so far under such an effort, and its critical damping.
-        let stiffness = (span(self.effort) / motion).max(1e-9);
-        let guess = [stiffness, (stiffness * self.log.inertia).sqrt()];
+        let stiffness = (span(self.test.effort) / motion).max(1e-9);
+        let guess = [stiffness, (stiffness * self.test.inertia).sqrt()];
         let (lower, upper) = (guess.map(|x| x / REACH), guess.map(|x| x * REACH));
         let objective = PointObjective::new(2, |x: &[f64]| self.loss(hold, x)).in_parallel();
         let mut start = guess.to_vec();
@@ -211,11 +252,11 @@ impl Task<'_> {
         let rms = (found.value / n).sqrt();
         out.residual_rms = Some(rms);
         out.hold = Some(found.hold);
-        let mean = self.position.iter().sum::<f64>() / n;
+        let mean = self.test.position.iter().sum::<f64>() / n;
         let thin = residual.len().div_ceil(3000);
         out.curves = residual
             .iter()
-            .zip(self.position)
+            .zip(self.test.position)
             .enumerate()
             .step_by(thin)
             .map(|(k, (r, q))| [k as f64 * self.interval, q - mean, q - mean - r])

@@ -1,0 +1,133 @@
+//! Rows 9 to 11 and what goes beyond: estimates at work on other trajectories, cold and hot.
+
+use dynid::estimators::conditioning::PreparedLog;
+use dynid::model::KnownElement;
+use rayon::prelude::*;
+
+use super::experiment::{Experiment, constant, trajectory};
+use super::friction::{JointFriction, experiment};
+use super::identification::{Identified, OURS, PAPER, regression};
+use super::one_shot::one_shot;
+use super::robot::Indy7;
+use super::settings::{PerJoint, Settings};
+use crate::{RunSettings, StudyError};
+
+/// Names of the validation trajectories.
+pub(super) const NAMES: [&str; 3] = ["A", "B", "C"];
+/// Seed of the validation logs, apart from those of identification.
+const VALIDATION_SEED: u64 = 900;
+
+/// Logs of the three trajectories at one temperature.
+#[derive(Debug)]
+pub(super) struct Validation {
+    pub(super) logs: [PreparedLog; 3],
+}
+
+/// RMSE per trajectory and joint, N m.
+pub(super) type Table = [PerJoint; 3];
+
+impl Validation {
+    pub(super) fn new(arm: &Indy7, settings: &Settings, temperature: f64, seed: u64) -> Result<Self, StudyError> {
+        let logs: Vec<PreparedLog> = (0..3)
+            .into_par_iter()
+            .map(|k| {
+                let rows = &settings.trajectories.validation[k];
+                log(arm, settings, rows, temperature, VALIDATION_SEED + 10 * seed + k as u64)
+            })
+            .collect::<Result<_, StudyError>>()?;
+        let [a, b, c] = logs.try_into().unwrap_or_else(|_| unreachable!("three trajectories give three logs"));
+        Ok(Validation { logs: [a, b, c] })
+    }
+
+    pub(super) fn table(&self, found: &Identified, settings: &Settings) -> Result<Table, StudyError> {
+        let [a, b, c] = &self.logs;
+        Ok([found.rmse(a, settings)?, found.rmse(b, settings)?, found.rmse(c, settings)?])
+    }
+}
+
+/// One period of a trajectory in the paper's form at the rate of the paper, torque ripple on.
+pub(super) fn log(
+    arm: &Indy7,
+    settings: &Settings,
+    rows: &[Vec<f64>],
+    temperature: f64,
+    seed: u64,
+) -> Result<PreparedLog, StudyError> {
+    let experiment = Experiment {
+        trajectory: &trajectory(rows)?,
+        temperature: constant(temperature)?,
+        ripple: true,
+        rate_hz: settings.simulation.rate_hz,
+        seed,
+    };
+    experiment.prepared("virtual log", arm, settings)
+}
+
+/// Friction of all joints as elements; `stated`: joint and temperature in place of the measured one.
+pub(super) fn known(
+    friction: &[JointFriction],
+    settings: &Settings,
+    stated: Option<(usize, f64)>,
+) -> Result<Vec<KnownElement>, StudyError> {
+    let mut out = Vec::new();
+    for (joint, found) in friction.iter().enumerate() {
+        let stated = stated.filter(|(j, _)| *j == joint).map(|(_, t)| t);
+        out.extend(found.known(joint, settings.thermal.valid, stated)?);
+    }
+    Ok(out)
+}
+
+/// Everything that one seed gives.
+#[derive(Debug)]
+pub(super) struct Realisation {
+    pub(super) friction: Vec<JointFriction>,
+    pub(super) log: PreparedLog,
+    pub(super) conventional: Identified,
+    /// By the paper's constraints.
+    pub(super) proposed: Identified,
+    /// Bodies that can exist, errors of friction of any sign.
+    pub(super) two_step: Identified,
+    pub(super) one_shot: Identified,
+}
+
+/// Friction experiment and identification at the moderate temperature.
+pub(super) fn realisation(
+    arm: &Indy7,
+    settings: &Settings,
+    excitation: &[Vec<f64>],
+    run: &RunSettings,
+    seed: u64,
+) -> Result<Realisation, StudyError> {
+    let (friction, log) = rayon::join(
+        || experiment(arm, settings, run, seed),
+        || log(arm, settings, excitation, settings.thermal.moderate, seed),
+    );
+    let (friction, log) = (friction?, log?);
+    let conventional = regression(arm, Vec::new(), &log, settings, PAPER)?;
+    let proposed = regression(arm, known(&friction, settings, None)?, &log, settings, PAPER)?;
+    let two_step = regression(arm, known(&friction, settings, None)?, &log, settings, OURS)?;
+    let starts = friction.iter().enumerate().map(|(j, f)| f.start(j, settings.thermal.valid));
+    let points: Vec<_> = friction.iter().enumerate().flat_map(|(j, f)| f.rows(j)).collect();
+    let one_shot = one_shot(arm, starts.collect::<Result<_, _>>()?, &points, &log, OURS)?;
+    Ok(Realisation { friction, log, conventional, proposed, two_step, one_shot })
+}
+
+/// Share of the error that is gone, per trajectory and joint.
+pub(super) fn improvement(before: &Table, after: &Table) -> [PerJoint; 3] {
+    std::array::from_fn(|k| std::array::from_fn(|j| 1.0 - after[k][j] / before[k][j]))
+}
+
+/// Median of numbers.
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    match n {
+        0 => f64::NAN,
+        _ => 0.5 * (values[(n - 1) / 2] + values[n / 2]),
+    }
+}
+
+/// Base values that change by more than a fifth from one estimate to another; those of 0.001 and less count as 0.001.
+pub(super) fn changed(cold: &[f64], hot: &[f64]) -> usize {
+    cold.iter().zip(hot).filter(|(a, b)| (*a - *b).abs() > 0.2 * a.abs().max(1e-3)).count()
+}
