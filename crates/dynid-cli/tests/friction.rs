@@ -13,7 +13,7 @@ use support::{TWO_LINKS, run};
 fn sweep(directions: &[f64]) -> String {
     let mut text =
         String::from("t,q_shoulder,q_elbow,effort_shoulder,effort_elbow,temp_shoulder,temp_elbow\n");
-    let (mut t, mut q) = (0.0, -0.5_f64);
+    let (mut t, mut q) = (0.0_f64, -0.5_f64);
     for speed in [0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.1, 1.3] {
         for direction in directions {
             let v = direction * speed;
