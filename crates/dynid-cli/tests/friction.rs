@@ -7,13 +7,13 @@ mod support;
 use std::fmt::Write;
 use std::path::Path;
 
-use support::{TWO_LINKS, run};
+use support::{TWO_LINKS, indy7, run};
 
 /// Passes of the shoulder at some speeds under Coulomb and viscous friction, gravity and a little ripple.
 fn sweep(directions: &[f64]) -> String {
     let mut text =
         String::from("t,q_shoulder,q_elbow,effort_shoulder,effort_elbow,temp_shoulder,temp_elbow\n");
-    let (mut t, mut q) = (0.0, -0.5_f64);
+    let (mut t, mut q) = (0.0_f64, -0.5_f64);
     for speed in [0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.1, 1.3] {
         for direction in directions {
             let v = direction * speed;
@@ -35,6 +35,7 @@ fn sweep(directions: &[f64]) -> String {
 
 fn put(folder: &Path, config: &str, directions: &[f64]) {
     std::fs::write(folder.join("robot.urdf"), TWO_LINKS).unwrap();
+    std::fs::write(folder.join("indy7.toml"), indy7()).unwrap();
     std::fs::write(folder.join("log.csv"), sweep(directions)).unwrap();
     std::fs::write(folder.join("friction.toml"), config).unwrap();
 }
@@ -71,6 +72,7 @@ fn one_direction_ends_with_exit_code_1() {
 fn bad_configurations_end_with_exit_code_2_and_one_message() {
     for (config, words) in [
         ("robot = \"robot.urdf\"\n", "at least one `[[log]]`"),
+        ("robot = \"indy7.toml\"\n[[log]]\npath = \"log.csv\"\n", "log.csv: "),
         ("robot = \"robot.urdf\"\nspeed = 1\n[[log]]\npath = \"log.csv\"\n", "unknown field `speed`"),
         ("robot = \"robot.urdf\"\nconfidence = 2\n[[log]]\npath = \"log.csv\"\n", "between 0 and 1"),
         (

@@ -1,5 +1,7 @@
 //! A joint within its friction against closed forms.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
 use dynid_model::element::{Coulomb, JointElement, Stribeck, Viscous};
 use dynid_model::{
     Description, EffortModel, JointDescription, JointKind, Limits, LinkDescription, Placement, RobotModel,

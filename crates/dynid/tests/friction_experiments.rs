@@ -1,5 +1,7 @@
 //! Friction experiments from log files: synthetic sweeps made from the closed form.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
 use std::fmt::Write;
 use std::path::Path;
 

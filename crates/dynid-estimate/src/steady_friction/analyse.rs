@@ -211,7 +211,7 @@ fn climb(
         });
         rung.error = Some(solved.error());
         rung.aicc = aicc(&solved, effective);
-        rung.refused = refusal(&solved.laws[0], rows);
+        rung.refused = refusal(&solved.laws[0], rows, settings.series);
         if let (Some(value), None) = (rung.aicc, &rung.refused)
             && best.as_ref().is_none_or(|(least, ..)| value < least - GAIN)
         {
@@ -232,6 +232,14 @@ fn climb(
         && let Some(reason) = ladder.iter().filter(|r| r.form.stribeck).find_map(|r| r.refused.as_ref())
     {
         notes.push(format!("static friction F_s and Stribeck speed v_s are not estimable: {reason}"));
+    }
+    if let (Some(fs), Some(fc)) = (solved.laws[0].value("fs"), solved.laws[0].value("fc"))
+        && fs <= fc
+    {
+        notes.push(format!(
+            "friction rises from {fs:.3} near rest to {fc:.3}: reversals are smeared (bending bristles, filters, noise of the \
+             speed), F_s is no static friction"
+        ));
     }
     if thermal && !taken.has_lines() {
         notes.push("the points do not show that friction changes with temperature".to_owned());
@@ -266,7 +274,7 @@ fn independent(residual: &[f64]) -> f64 {
 }
 
 /// Why a fitted law is no candidate.
-fn refusal(law: &FrictionLaw, rows: &Rows) -> Option<String> {
+fn refusal(law: &FrictionLaw, rows: &Rows, series: bool) -> Option<String> {
     if law.value("fc").is_some_and(|fc| fc < 0.0) {
         return Some("its Coulomb friction is negative".to_owned());
     }
@@ -279,7 +287,8 @@ fn refusal(law: &FrictionLaw, rows: &Rows) -> Option<String> {
                 if below == 0 { "no points".to_owned() } else { "points at one speed only".to_owned() }
             ));
         }
-        if fs <= fc {
+        // A signal passes through reversals, where friction has yet to build up: it may rise from rest.
+        if fs <= fc && !(series && fs >= 0.0) {
             return Some("friction does not fall with speed near rest".to_owned());
         }
     }

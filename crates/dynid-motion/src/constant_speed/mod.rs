@@ -1,6 +1,6 @@
 //! Constant-speed passes of a joint, and what a forward and a backward one say together.
 //!
-//! [`segments`] finds where a joint moves at constant speed. At constant speed the effort is gravity, offset and friction;
+//! [`segments()`] finds where a joint moves at constant speed. At constant speed the effort is gravity, offset and friction;
 //! at one position gravity and offset are the same both ways, so that [`pair`] tells them apart: half the difference of
 //! both directions is friction, half their sum gravity and offset. With one direction alone they cannot be told apart,
 //! and the passes are returned with that reason.

@@ -16,7 +16,7 @@ pub(super) struct Smoothed {
 /// `window` seconds, or the mean of its logged velocity there.
 ///
 /// # Errors
-/// As [`super::segments`].
+/// As [`segments()`](super::segments()).
 pub fn speed(
     time: &[f64],
     joint: &JointSignals,

@@ -11,7 +11,8 @@ const STOPS: [[f64; 3]; 5] = [
 
 /// `rgb(..)` of a share between 0 and 1.
 pub(super) fn colour(share: f64) -> String {
-    let place = share.clamp(0.0, 1.0) * (STOPS.len() - 1) as f64;
+    let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
+    let place = share * (STOPS.len() - 1) as f64;
     let k = (place as usize).min(STOPS.len() - 2);
     let mix = |i: usize| STOPS[k][i] + (place - k as f64) * (STOPS[k + 1][i] - STOPS[k][i]);
     format!("rgb({:.0},{:.0},{:.0})", mix(0), mix(1), mix(2))

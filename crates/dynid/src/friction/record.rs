@@ -216,6 +216,13 @@ fn law(
     out.notes.extend(found.notes.iter().cloned());
     let simple = law.value("fs").is_none() || law.value("sigma2").is_none() || !law.form.thermal;
     out.status = if simple { "simplified" } else { "identified" }.to_owned();
+    if law.value("fv").is_some_and(|fv| fv < 0.0) {
+        out.notes.push(
+            "the viscous coefficient is negative: friction falls with speed within the speeds of the test, the law is not to be \
+             used beyond them"
+                .to_owned(),
+        );
+    }
     check_range(out, found, experiment);
 }
 
