@@ -27,6 +27,7 @@
 pub mod conditioning;
 pub mod consistent;
 pub mod covariance;
+pub mod cyclic;
 pub mod distribution;
 pub mod elimination;
 pub mod factor;

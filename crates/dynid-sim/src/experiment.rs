@@ -273,11 +273,8 @@ pub fn run(
         return Err(SimError::Channel { name: name.clone() });
     }
     demand_length("channel profiles", channels.len(), settings.channels.len())?;
-    let ripple = settings
-        .imperfections
-        .ripple
-        .clone()
-        .unwrap_or_else(|| ripple(nominal, reference, settings));
+    let ripple =
+        settings.imperfections.ripple.clone().unwrap_or_else(|| ripple(nominal, reference, settings));
     plant.set_ripple(ripple.clone());
 
     let poses: Vec<Vec<f64>> =

@@ -232,10 +232,10 @@ impl<'a> Integrator<'a> {
         if !self.lu.factor(n, &matrix) {
             return Ok(f64::INFINITY);
         }
-        for i in 0..STAGES {
+        for (i, alpha) in ALPHA.iter().enumerate() {
             self.load_stage(from, i);
             let channels = self.with_signals(channels, |plant| {
-                let step = h * ALPHA[i].iter().sum::<f64>();
+                let step = h * alpha.iter().sum::<f64>();
                 let between = mean(&from.dq, &self.at.dq);
                 let step = (step > 0.0).then_some((step, between.as_slice()));
                 plant.signals(&from.history, step, &self.at.dq)

@@ -5,8 +5,8 @@
 //! [`run`] runs one.
 
 pub mod er16;
-pub mod indy7;
 mod error;
+pub mod indy7;
 mod record;
 
 pub use error::StudyError;
@@ -63,8 +63,10 @@ pub struct Progress {
     pub steps: usize,
 }
 
-const STUDIES: [Study; 1] =
-    [Study { name: er16::NAME, title: er16::TITLE, source: er16::SOURCE, driver: er16::run }];
+const STUDIES: [Study; 2] = [
+    Study { name: er16::NAME, title: er16::TITLE, source: er16::SOURCE, driver: er16::run },
+    Study { name: indy7::NAME, title: indy7::TITLE, source: indy7::SOURCE, driver: indy7::run },
+];
 
 /// All studies.
 pub fn list() -> &'static [Study] {

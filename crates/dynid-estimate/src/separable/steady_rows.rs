@@ -51,7 +51,12 @@ struct OutputSteady {
 }
 
 impl OutputSteady {
-    fn new(model: &dyn EffortModel, output: usize, places: OutputPlaces, points: &[&SteadyFrictionRow]) -> Self {
+    fn new(
+        model: &dyn EffortModel,
+        output: usize,
+        places: OutputPlaces,
+        points: &[&SteadyFrictionRow],
+    ) -> Self {
         let (positions, rates) = model.dimensions();
         let samples = 2 * points.len();
         let mut dq = vec![0.0; rates * samples];
@@ -119,7 +124,8 @@ impl<'a> SteadyRows<'a> {
             let mut regressor = RegressorBlock::new(model.layout().clone(), 2 * own.len());
             steady.with_block(model, |motion| model.regressor(motion, &shape, &mut regressor));
             let fixed = steady.places.fixed.iter();
-            group.fixed_values = fixed.flat_map(|(acting, _)| steady.odd(regressor.column(output, *acting))).collect();
+            group.fixed_values =
+                fixed.flat_map(|(acting, _)| steady.odd(regressor.column(output, *acting))).collect();
             let known = steady.odd(regressor.offset(output));
             let measured = own.iter().zip(&steady.weights).map(|(p, w)| w * p.friction);
             group.effort = measured.zip(known).map(|(y, known)| y - known).collect();

@@ -1,10 +1,10 @@
 //! Rows 1 to 3: dynamics, base parameters, friction and filter against an independent implementation.
 
+use dynid::model::element::{Coulomb, JointElement, Offset, RotorInertia, Viscous};
 use dynid::model::{
     BaseParameters, BaseSettings, BodyPoint, Dynamics, EffortModel, History, MotionBlock, RegressorBlock,
     RobotModel, Vec3,
 };
-use dynid::model::element::{Coulomb, JointElement, Offset, RotorInertia, Viscous};
 use dynid::motion::filter::{butterworth, forward_backward};
 use dynid::motion::trajectory::{Point, Trajectory};
 use serde_json::json;
@@ -170,7 +170,13 @@ fn friction_and_filter(arm: &Indy7, settings: &Settings) -> Result<Row, StudyErr
 }
 
 /// Friction torque for velocities, joint after joint; of the record before too where a step is given.
-fn friction_efforts(arm: &Indy7, linear: &[f64], dq: &[f64], temperature: f64, step: Option<f64>) -> Vec<f64> {
+fn friction_efforts(
+    arm: &Indy7,
+    linear: &[f64],
+    dq: &[f64],
+    temperature: f64,
+    step: Option<f64>,
+) -> Vec<f64> {
     let samples = dq.len() / JOINTS;
     let model = arm.model.as_ref();
     let zero = vec![0.0; dq.len()];

@@ -111,11 +111,8 @@ fn nearest(arm: &Indy7, target: &[f64], form: Form) -> Result<Vec<f64>, StudyErr
         }
     }
     let ball = Inertia([4.0, 0.0, 0.0, 0.0, 0.04, 0.0, 0.0, 0.04, 0.0, 0.04]);
-    let links = (0..JOINTS).map(|i| LinkPrior {
-        name: format!("link{}", i + 1),
-        first_column: 10 * i,
-        prior: ball,
-    });
+    let links =
+        (0..JOINTS).map(|i| LinkPrior { name: format!("link{}", i + 1), first_column: 10 * i, prior: ball });
     let scalars = (0..JOINTS).map(|i| ScalarPrior {
         name: format!("Ia{}", i + 1),
         column: 10 * JOINTS + i,
@@ -131,7 +128,8 @@ fn nearest(arm: &Indy7, target: &[f64], form: Form) -> Result<Vec<f64>, StudyErr
         bounds: Vec::new(),
         prior_std: vec![1.0; columns],
     };
-    let settings = ConsistentSettings { form, margin: Margin::Absolute(1e-6), ..ConsistentSettings::default() };
+    let settings =
+        ConsistentSettings { form, margin: Margin::Absolute(1e-6), ..ConsistentSettings::default() };
     Ok(estimate(&problem, &settings).map_err(fault)?.x)
 }
 
@@ -207,8 +205,8 @@ fn noise_free(arm: &Indy7, settings: &Settings) -> Result<Row, StudyError> {
         .collect();
     let model = arm.regression().with_known(known);
     let base = BaseParameters::of(&model, &arm.mechanism, &[], &BaseSettings::default());
-    let motion =
-        Sampled::at_rate(&trajectory(&settings.trajectories.excitation)?, simulation.rate_hz).map_err(fault)?;
+    let motion = Sampled::at_rate(&trajectory(&settings.trajectories.excitation)?, simulation.rate_hz)
+        .map_err(fault)?;
     let samples = motion.samples();
     let warm = vec![settings.thermal.moderate; samples];
     let plain = MotionBlock::plain(samples, &motion.q, &motion.dq, &motion.ddq);

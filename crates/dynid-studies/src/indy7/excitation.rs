@@ -8,7 +8,7 @@ use dynid::excitation::{
     DEFAULT_SAMPLES_PER_HARMONIC, DEFAULT_SIGN_WIDTH, Outcome, Problem, RobotExcitation,
     Settings as SearchSettings, StartConditions, design, information, limit_points,
 };
-use dynid::model::{BaseParameters, BaseSettings, EffortModel, RobotModel, Vec3};
+use dynid::model::{BaseParameters, BaseSettings, RobotModel, Vec3};
 use dynid::motion::trajectory::{Form, MotionLimits, RowOrder};
 use serde_json::json;
 

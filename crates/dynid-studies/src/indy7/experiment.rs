@@ -19,7 +19,12 @@ pub(super) const BASE: f64 = 0.1 * PI;
 
 /// A periodic trajectory from rows of the paper's form.
 pub(super) fn trajectory(rows: &[Vec<f64>]) -> Result<FourierTrajectory, StudyError> {
-    Ok(FourierTrajectory::from_rows(BASE, Form::VelocityAmplitudes, &RowOrder::default(), rows, 1)?)
+    repeated(rows, 1)
+}
+
+/// The same several times.
+pub(super) fn repeated(rows: &[Vec<f64>], periods: usize) -> Result<FourierTrajectory, StudyError> {
+    Ok(FourierTrajectory::from_rows(BASE, Form::VelocityAmplitudes, &RowOrder::default(), rows, periods)?)
 }
 
 /// What is to be run.

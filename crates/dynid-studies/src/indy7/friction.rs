@@ -1,9 +1,7 @@
 //! Step 1: the friction experiment of every joint.
 
 use dynid::estimators::separable::SteadyFrictionRow;
-use dynid::estimators::steady_friction::{
-    FrictionLaw, SteadyFriction, SteadyPoint, SteadySettings, analyse,
-};
+use dynid::estimators::steady_friction::{FrictionLaw, SteadyFriction, SteadyPoint, SteadySettings, analyse};
 use dynid::friction::{HoldName, PreslidingTest, fit_presliding};
 use dynid::model::KnownElement;
 use dynid::model::element::{ExponentialViscous, LuGre, ShapeSetting};

@@ -45,8 +45,6 @@ pub(super) struct Identified {
     pub(super) model: RobotModel,
     /// All its linear parameters.
     pub(super) values: Vec<f64>,
-    /// Least spectral margin of all links under the constraint: `B_L` and pseudo-inertia.
-    pub(super) margins: [f64; 2],
 }
 
 impl Identified {
@@ -82,23 +80,58 @@ impl Identified {
     }
 }
 
+/// Error of a joint's prediction over a log, where prediction and measurement have passed the same low-pass filter.
+#[derive(Debug)]
+pub(super) struct Filtered {
+    pub(super) position: Vec<f64>,
+    pub(super) measured: Vec<f64>,
+    pub(super) predicted: Vec<f64>,
+}
+
+impl Filtered {
+    pub(super) fn error(&self) -> Vec<f64> {
+        self.measured.iter().zip(&self.predicted).map(|(m, p)| m - p).collect()
+    }
+}
+
 impl Identified {
-    /// RMSE per joint where prediction and measurement pass the same low-pass filter, N m: what friction does at a
-    /// reversal counts alike on both sides. States up to four times its cut-off.
-    pub(super) fn fair_rmse(&self, log: &PreparedLog, settings: &Settings) -> Result<PerJoint, StudyError> {
+    /// Per joint, prediction and measurement through the same low-pass filter, 50 a second: what friction does at a reversal
+    /// then counts alike on both sides. States up to four times its cut-off; a second is cut from either end.
+    pub(super) fn filtered(
+        &self,
+        log: &PreparedLog,
+        settings: &Settings,
+    ) -> Result<Vec<Filtered>, StudyError> {
         let cutoff = settings.simulation.cutoff_hz;
         let conditioning = ConditioningSettings::default();
         let predicted =
             predict(&self.model, &[], &self.values, log, 4.0 * cutoff, 0.0, &conditioning).map_err(fault)?;
         let filter = butterworth(4, cutoff, log.rate_hz).map_err(fault)?;
+        let step = route(settings, log.rate_hz).factor(log.rate_hz);
         let cut = log.rate_hz as usize;
-        let mut out = [0.0; JOINTS];
-        for (joint, (to, predicted)) in out.iter_mut().zip(&predicted).enumerate() {
-            let error: Vec<f64> = log.effort[joint].iter().zip(predicted).map(|(m, p)| m - p).collect();
-            let error = forward_backward(&filter, &error).map_err(fault)?;
-            *to = rms(&error[cut..error.len() - cut]);
-        }
-        Ok(out)
+        let thin = |signal: &[f64]| -> Result<Vec<f64>, StudyError> {
+            let smooth = forward_backward(&filter, signal).map_err(fault)?;
+            Ok(smooth[cut..smooth.len() - cut].iter().step_by(step).copied().collect())
+        };
+        (0..JOINTS)
+            .map(|joint| {
+                Ok(Filtered {
+                    position: thin(&log.position[joint])?,
+                    measured: thin(&log.effort[joint])?,
+                    predicted: thin(&predicted[joint])?,
+                })
+            })
+            .collect()
+    }
+
+    /// RMSE per joint of [`Self::filtered`], N m.
+    pub(super) fn filtered_rmse(
+        &self,
+        log: &PreparedLog,
+        settings: &Settings,
+    ) -> Result<PerJoint, StudyError> {
+        let filtered = self.filtered(log, settings)?;
+        Ok(std::array::from_fn(|j| rms(&filtered[j].error())))
     }
 }
 
@@ -138,7 +171,7 @@ pub(super) fn regression(
     regression_of(arm, arm.regression().with_known(known), log, settings, constraints)
 }
 
-/// The same for a model of ones own choice.
+/// The same for any model with friction columns.
 pub(super) fn regression_of(
     arm: &Indy7,
     model: RobotModel,
@@ -159,8 +192,7 @@ pub(super) fn regression_of(
     let factors: Vec<Factor> = groups.iter().map(|g| g.merged(base.len())).collect();
     let weighted = wls(&factors, &WlsSettings::default()).factor;
     let values = feasible(arm, &model, &base, &weighted, constraints)?;
-    let margins = margins(&values);
-    Ok(Identified { model, values, margins })
+    Ok(Identified { model, values })
 }
 
 /// Standard parameters of least weighted residual among those that the constraints allow, and after them the changes of
@@ -187,7 +219,8 @@ pub(super) fn feasible(
         regrouping[(base.len() + change, linear + change)] = 1.0;
     }
     let scalars = (10 * JOINTS..columns).map(|column| {
-        let name = table.get(column).map_or_else(|| format!("change {}", column - linear), |p| p.name.clone());
+        let name =
+            table.get(column).map_or_else(|| format!("change {}", column - linear), |p| p.name.clone());
         let symbol = name.rsplit('.').next().unwrap_or_default();
         let friction = constraints.friction_not_negative && ["fc", "fv"].contains(&symbol);
         ScalarPrior {
@@ -231,12 +264,8 @@ pub(super) fn margins(values: &[f64]) -> [f64; 2] {
     for ten in values[..10 * JOINTS].chunks_exact(10) {
         let [m, x, y, z, xx, xy, xz, yy, yz, zz] = std::array::from_fn(|k| ten[k]);
         let half = 0.5 * (xx + yy + zz);
-        let pseudo = [
-            [half - xx, -xy, -xz, x],
-            [-xy, half - yy, -yz, y],
-            [-xz, -yz, half - zz, z],
-            [x, y, z, m],
-        ];
+        let pseudo =
+            [[half - xx, -xy, -xz, x], [-xy, half - yy, -yz, y], [-xz, -yz, half - zz, z], [x, y, z, m]];
         let spatial = [
             [xx, xy, xz, 0.0, -z, y],
             [xy, yy, yz, z, 0.0, -x],

@@ -5,9 +5,9 @@ use dynid::estimators::separable::{JoinedProblem, SeparableSettings, SteadyFrict
 use dynid::model::element::{ExponentialViscous, JointElement, LuGre, Offset, RotorInertia, ShapeSetting};
 use dynid::model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
 
-use super::identification::{Constraints, Identified, feasible, margins};
-use super::robot::Indy7;
-use super::fault;
+use super::identification::{Constraints, Identified, feasible};
+use super::robot::{Indy7, ripple};
+use super::{JOINTS, fault};
 use crate::StudyError;
 
 /// Friction of one joint: start values and bounds of what is free in it.
@@ -25,30 +25,35 @@ impl FrictionStart {
     }
 }
 
-fn model(arm: &Indy7, friction: &[FrictionStart]) -> RobotModel {
+/// `cycles`: of the torque ripple of every joint, where there is one to estimate.
+fn model(arm: &Indy7, friction: &[FrictionStart], cycles: &Cycles) -> RobotModel {
     let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
     for (rate, f) in friction.iter().enumerate() {
         elements.push(Box::new(f.bristles.clone()));
         elements.push(Box::new(f.viscous.clone()));
         elements.push(Box::new(Offset { rate }));
         elements.push(Box::new(RotorInertia { rate }));
+        elements.extend(ripple(rate, &cycles[rate]));
     }
     RobotModel::new(arm.mechanism.clone(), elements)
 }
 
-/// All friction and all inertias. `points`: of the friction experiment.
+/// Per joint, repetitions per turn of the torque ripple that is modelled.
+pub(super) type Cycles = [Vec<u32>; JOINTS];
+
+/// All friction and all inertias, and ripple of known order. `points`: of the friction experiment.
 pub(super) fn one_shot(
     arm: &Indy7,
     mut friction: Vec<FrictionStart>,
     points: &[SteadyFrictionRow],
+    cycles: &Cycles,
     log: &PreparedLog,
     constraints: Constraints,
 ) -> Result<Identified, StudyError> {
-    let free = model(arm, &friction);
+    let free = model(arm, &friction, cycles);
     let shape = free.parameters().shape_start();
     let base = BaseParameters::of(&free, &arm.mechanism, &shape, &BaseSettings::default());
-    let k: f64 = std::fs::read_to_string("/tmp/kernel").ok().and_then(|s| s.parse().ok()).unwrap_or(0.0);
-    let settings = ConditioningSettings { reversal_mask: Some(-1.0), kernel_hz: (k > 0.0).then_some(k), ..ConditioningSettings::default() };
+    let settings = ConditioningSettings { reversal_mask: Some(-1.0), ..ConditioningSettings::default() };
     let logs = std::slice::from_ref(log);
     let choices = condition(&free, &shape, &base.kept, logs, &settings, |_| {}).map_err(fault)?;
     let rows = ShapedRows::new(&free, &shape, &base.kept, logs, &choices, &settings).map_err(fault)?;
@@ -67,6 +72,5 @@ pub(super) fn one_shot(
     for (setting, value) in settings.zip(at) {
         *setting = ShapeSetting::held(value);
     }
-    let margins = margins(&values);
-    Ok(Identified { model: model(arm, &friction), values, margins })
+    Ok(Identified { model: model(arm, &friction, cycles), values })
 }

@@ -3,14 +3,16 @@
 use std::sync::Arc;
 
 use dynid::model::element::{
-    Coulomb, ExponentialViscous, JointElement, LuGre, Offset, RotorInertia, ShapeSetting, Viscous,
+    Coulomb, CyclicTorque, ExponentialViscous, JointElement, LuGre, Offset, RotorInertia, ShapeSetting,
+    Viscous,
 };
 use dynid::model::{BaseParameters, BaseSettings, EffortModel, KnownElement, Mechanism, RobotModel};
 use dynid::sim::Plant;
 use dynid::{Robot, RobotOptions};
 
-use super::{JOINTS, fault};
+use super::one_shot::Cycles;
 use super::settings::{Friction, Settings};
+use super::{JOINTS, fault};
 use crate::StudyError;
 
 /// Speed over which the simulation smooths the sign of velocities in the viscous law, rad/s. Bristles need none.
@@ -33,10 +35,10 @@ pub(super) struct Indy7 {
 }
 
 /// Inertial rows of Table A1 by the parameter that stands for each.
-const TABLE_A1: [&str; 40] = [
-    "Izz1", "Ixx2", "Ixy2", "Ixz2", "Iyz2", "Izz2", "mx2", "my2", "Ixx3", "Ixy3", "Ixz3", "Iyz3", "Izz3", "mx3",
-    "my3", "Ia3", "Ixx4", "Ixy4", "Ixz4", "Iyz4", "Izz4", "mx4", "my4", "Ia4", "Ixx5", "Ixy5", "Ixz5", "Iyz5",
-    "Izz5", "mx5", "my5", "Ia5", "Ixx6", "Ixy6", "Ixz6", "Iyz6", "Izz6", "mx6", "my6", "Ia6",
+pub(super) const TABLE_A1: [&str; 40] = [
+    "Izz1", "Ixx2", "Ixy2", "Ixz2", "Iyz2", "Izz2", "mx2", "my2", "Ixx3", "Ixy3", "Ixz3", "Iyz3", "Izz3",
+    "mx3", "my3", "Ia3", "Ixx4", "Ixy4", "Ixz4", "Iyz4", "Izz4", "mx4", "my4", "Ia4", "Ixx5", "Ixy5", "Ixz5",
+    "Iyz5", "Izz5", "mx5", "my5", "Ia5", "Ixx6", "Ixy6", "Ixz6", "Iyz6", "Izz6", "mx6", "my6", "Ia6",
 ];
 
 /// The arm with all joints but one at rest in the upright pose.
@@ -89,9 +91,11 @@ impl Indy7 {
         let robot = load(&RobotOptions::default())?;
         let mechanism = robot.mechanism.clone();
         let rotor = |name: &str| {
-            let stated = robot.elements.settings.iter().find(|s| {
-                s.joint == name && s.element == "rotor" && s.key == "inertia"
-            });
+            let stated = robot
+                .elements
+                .settings
+                .iter()
+                .find(|s| s.joint == name && s.element == "rotor" && s.key == "inertia");
             match stated.map(|s| &s.value) {
                 Some(dynid::io::SettingValue::Number(x)) => Ok(*x),
                 _ => Err(StudyError::Data {
@@ -121,7 +125,7 @@ impl Indy7 {
         let inertial = BaseParameters::of(&rigid, &mechanism, &[], &BaseSettings::default());
         let table = &rigid.parameters().linear;
         let place = |name: &&str| inertial.kept.iter().position(|c| table[*c].symbol == **name);
-        let order: Vec<usize> = TABLE_A1.iter().filter_map(|name| place(name)).collect();
+        let order: Vec<usize> = TABLE_A1.iter().filter_map(place).collect();
         if order.len() != TABLE_A1.len() || inertial.len() != order.len() {
             return Err(fault("the base parameters are not those of Table A1"));
         }
@@ -141,15 +145,27 @@ impl Indy7 {
     /// Rigid bodies and rotors, with Coulomb, viscous and offset columns: the regression of the paper, in which they stand
     /// for the friction or for its errors.
     pub(super) fn regression(&self) -> RobotModel {
+        self.regression_with(&Cycles::default())
+    }
+
+    /// The same with torque ripple of given orders.
+    pub(super) fn regression_with(&self, cycles: &Cycles) -> RobotModel {
         let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
-        for rate in 0..JOINTS {
+        for (rate, orders) in cycles.iter().enumerate() {
             elements.push(Box::new(RotorInertia { rate }));
             elements.push(Box::new(Coulomb { rate }));
             elements.push(Box::new(Viscous { rate }));
             elements.push(Box::new(Offset { rate }));
+            elements.extend(ripple(rate, orders));
         }
         RobotModel::new(self.mechanism.clone(), elements)
     }
+}
+
+/// Torque ripple of given orders at a joint.
+pub(super) fn ripple(rate: usize, orders: &[u32]) -> Vec<Box<dyn JointElement>> {
+    let order = |n: &u32| -> Box<dyn JointElement> { Box::new(CyclicTorque { rate, cycles: f64::from(*n) }) };
+    orders.iter().map(order).collect()
 }
 
 /// Links and rotors alone.

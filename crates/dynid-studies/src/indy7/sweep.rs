@@ -46,7 +46,11 @@ impl Staircase {
             let ramp = v / ACCELERATION;
             let steady = (LONGEST.0 / v).min(LONGEST.1);
             for direction in [1.0, -1.0] {
-                moves.extend([(ramp, direction * ACCELERATION), (steady, 0.0), (ramp, -direction * ACCELERATION)]);
+                moves.extend([
+                    (ramp, direction * ACCELERATION),
+                    (steady, 0.0),
+                    (ramp, -direction * ACCELERATION),
+                ]);
                 moves.push((0.1, 0.0));
             }
         }
@@ -83,8 +87,8 @@ pub(super) fn sweep(
 ) -> Result<Log, StudyError> {
     let motion = Staircase::new(levels);
     let simulation = &settings.simulation;
-    let channel =
-        Profile::new(vec![(0.0, temperature - DRIFT), (motion.duration, temperature + DRIFT)]).map_err(fault)?;
+    let channel = Profile::new(vec![(0.0, temperature - DRIFT), (motion.duration, temperature + DRIFT)])
+        .map_err(fault)?;
     let experiment = ExperimentSettings {
         duration_s: motion.duration,
         log_rate_hz: RATE_HZ,

@@ -1,13 +1,14 @@
 //! Rows 9 to 11 and what goes beyond: estimates at work on other trajectories, cold and hot.
 
 use dynid::estimators::conditioning::PreparedLog;
+use dynid::estimators::cyclic::find_cyclic;
 use dynid::model::KnownElement;
 use rayon::prelude::*;
 
 use super::experiment::{Experiment, constant, trajectory};
 use super::friction::{JointFriction, experiment};
-use super::identification::{Identified, OURS, PAPER, regression};
-use super::one_shot::one_shot;
+use super::identification::{Identified, OURS, PAPER, regression, regression_of};
+use super::one_shot::{Cycles, one_shot};
 use super::robot::Indy7;
 use super::settings::{PerJoint, Settings};
 use crate::{RunSettings, StudyError};
@@ -27,7 +28,12 @@ pub(super) struct Validation {
 pub(super) type Table = [PerJoint; 3];
 
 impl Validation {
-    pub(super) fn new(arm: &Indy7, settings: &Settings, temperature: f64, seed: u64) -> Result<Self, StudyError> {
+    pub(super) fn new(
+        arm: &Indy7,
+        settings: &Settings,
+        temperature: f64,
+        seed: u64,
+    ) -> Result<Self, StudyError> {
         let logs: Vec<PreparedLog> = (0..3)
             .into_par_iter()
             .map(|k| {
@@ -35,13 +41,26 @@ impl Validation {
                 log(arm, settings, rows, temperature, VALIDATION_SEED + 10 * seed + k as u64)
             })
             .collect::<Result<_, StudyError>>()?;
-        let [a, b, c] = logs.try_into().unwrap_or_else(|_| unreachable!("three trajectories give three logs"));
+        let [a, b, c] =
+            logs.try_into().unwrap_or_else(|_| unreachable!("three trajectories give three logs"));
         Ok(Validation { logs: [a, b, c] })
     }
 
+    /// By the paper's processing.
     pub(super) fn table(&self, found: &Identified, settings: &Settings) -> Result<Table, StudyError> {
         let [a, b, c] = &self.logs;
         Ok([found.rmse(a, settings)?, found.rmse(b, settings)?, found.rmse(c, settings)?])
+    }
+
+    /// Prediction and measurement through the same filter.
+    pub(super) fn filtered_table(
+        &self,
+        found: &Identified,
+        settings: &Settings,
+    ) -> Result<Table, StudyError> {
+        let [a, b, c] = &self.logs;
+        let of = |log| found.filtered_rmse(log, settings);
+        Ok([of(a)?, of(b)?, of(c)?])
     }
 }
 
@@ -81,13 +100,53 @@ pub(super) fn known(
 #[derive(Debug)]
 pub(super) struct Realisation {
     pub(super) friction: Vec<JointFriction>,
-    pub(super) log: PreparedLog,
     pub(super) conventional: Identified,
     /// By the paper's constraints.
     pub(super) proposed: Identified,
     /// Bodies that can exist, errors of friction of any sign.
     pub(super) two_step: Identified,
+    /// With the ripple that residuals show.
     pub(super) one_shot: Identified,
+    /// Without ripple; not in quick runs.
+    pub(super) plain_one_shot: Option<Identified>,
+    /// Orders of that ripple.
+    pub(super) cycles: Cycles,
+}
+
+/// Most repetitions per turn of a ripple that is looked for, and the least share of held-out squares that it must explain.
+const RIPPLE: (u32, f64) = (6, 0.1);
+
+/// Rounds in which further orders are looked for.
+const ROUNDS: usize = 4;
+
+/// Orders of the ripple that residuals show: the two-step regression again and again with the orders found so far among its
+/// columns, until nothing more shows.
+fn ripple(
+    arm: &Indy7,
+    friction: &[JointFriction],
+    log: &PreparedLog,
+    settings: &Settings,
+) -> Result<Cycles, StudyError> {
+    let (most, least) = RIPPLE;
+    let mut cycles: Cycles = std::array::from_fn(|_| Vec::new());
+    for _ in 0..ROUNDS {
+        let model = arm.regression_with(&cycles).with_known(known(friction, settings, None)?);
+        let found = regression_of(arm, model, log, settings, OURS)?;
+        let filtered = found.filtered(log, settings)?;
+        let mut more = false;
+        for (joint, orders) in cycles.iter_mut().enumerate() {
+            let seen = &filtered[joint];
+            let order = find_cyclic(&seen.position, &seen.error(), most, least).map(|f| f.cycles);
+            if let Some(order) = order.filter(|o| !orders.contains(o)) {
+                orders.push(order);
+                more = true;
+            }
+        }
+        if !more {
+            break;
+        }
+    }
+    Ok(cycles)
 }
 
 /// Friction experiment and identification at the moderate temperature.
@@ -103,13 +162,20 @@ pub(super) fn realisation(
         || log(arm, settings, excitation, settings.thermal.moderate, seed),
     );
     let (friction, log) = (friction?, log?);
+    let known = || known(&friction, settings, None);
     let conventional = regression(arm, Vec::new(), &log, settings, PAPER)?;
-    let proposed = regression(arm, known(&friction, settings, None)?, &log, settings, PAPER)?;
-    let two_step = regression(arm, known(&friction, settings, None)?, &log, settings, OURS)?;
+    let proposed = regression(arm, known()?, &log, settings, PAPER)?;
+    let two_step = regression(arm, known()?, &log, settings, OURS)?;
+    let cycles = ripple(arm, &friction, &log, settings)?;
     let starts = friction.iter().enumerate().map(|(j, f)| f.start(j, settings.thermal.valid));
+    let starts = starts.collect::<Result<Vec<_>, _>>()?;
     let points: Vec<_> = friction.iter().enumerate().flat_map(|(j, f)| f.rows(j)).collect();
-    let one_shot = one_shot(arm, starts.collect::<Result<_, _>>()?, &points, &log, OURS)?;
-    Ok(Realisation { friction, log, conventional, proposed, two_step, one_shot })
+    let plain = || one_shot(arm, starts.clone(), &points, &Cycles::default(), &log, OURS);
+    let plain = || (!run.quick).then(plain).transpose();
+    let (one_shot, plain) =
+        rayon::join(|| one_shot(arm, starts.clone(), &points, &cycles, &log, OURS), plain);
+    let (one_shot, plain_one_shot) = (one_shot?, plain?);
+    Ok(Realisation { friction, conventional, proposed, two_step, one_shot, plain_one_shot, cycles })
 }
 
 /// Share of the error that is gone, per trajectory and joint.
