@@ -1,7 +1,9 @@
 //! Time to refill the column of a friction element over a block, beside the standard library's functions.
 
 use divan::{Bencher, black_box, counter::ItemsCount};
-use dynid_model::element::{Arctangent, JointElement, Sigmoid, Stribeck, TanhFriction};
+use dynid_model::element::{
+    Arctangent, ExponentialViscous, JointElement, LuGre, ShapeSetting, Sigmoid, Stribeck, TanhFriction,
+};
 use dynid_model::*;
 
 fn main() {
@@ -81,4 +83,86 @@ fn refill(bencher: Bencher<'_, '_>, samples: usize, element: Box<dyn JointElemen
         model.shaped(black_box(&motion), &shape, samples, &mut values, &mut []);
         black_box(&values);
     });
+}
+
+/// 20 s at 4 kHz.
+const RECORD: usize = 80_000;
+const JOINTS: usize = 6;
+
+/// Friction of six joints over a record, bristles and viscous friction of temperature: signals of the motion before, then
+/// efforts.
+#[divan::bench]
+fn bristles_of_six_joints_over_20_s_at_4_khz(bencher: Bencher<'_, '_>) {
+    let mut d = Description::new("row");
+    d.links.push(LinkDescription { name: "base".into(), inertia: None });
+    let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
+    let mut friction = Vec::new();
+    for rate in 0..JOINTS {
+        d.links.push(LinkDescription { name: format!("l{rate}"), inertia: None });
+        d.joints.push(JointDescription {
+            name: format!("j{rate}"),
+            parent: if rate == 0 { "base".into() } else { format!("l{}", rate - 1) },
+            child: format!("l{rate}"),
+            kind: JointKind::Revolute,
+            placement: Placement::identity(),
+            axis: [0.0, 0.0, 1.0],
+            limits: Limits::default(),
+            mimic: None,
+        });
+        let held = ShapeSetting::held;
+        elements.push(Box::new(LuGre {
+            kappa: held(1850.0),
+            rho: held(1.3),
+            vs: held(0.04),
+            ..LuGre::new(rate)
+        }));
+        elements.push(Box::new(ExponentialViscous {
+            sigma3: held(1.3),
+            sigma4: held(0.8),
+            ..ExponentialViscous::new(rate)
+        }));
+        friction.extend([9.1, 270.0, 30.0, -1.0]);
+    }
+    let model = RobotModel::new(d.build().unwrap_or_else(|e| panic!("{e}")), elements);
+    let linear: Vec<f64> = [0.0; 10 * JOINTS].into_iter().chain(friction).collect();
+    let dq: Vec<f64> = (0..JOINTS).flat_map(|_| speeds_of_record()).collect();
+    let (rest, warm) = (vec![0.0; dq.len()], vec![31.0; RECORD]);
+    let mut signals = vec![0.0; model.signals().len() * RECORD];
+    let (mut effort, mut memory) = (vec![0.0; dq.len()], Vec::new());
+    bencher.counter(ItemsCount::new(JOINTS * RECORD)).bench_local(|| {
+        let plain = MotionBlock::plain(RECORD, &rest, black_box(&dq), &rest);
+        model.remember(&plain, 2.5e-4, &[], &mut History::default(), RECORD, &mut signals);
+        let warmth = model.channels().iter().map(|name| (name.as_str(), warm.as_slice()));
+        let bristles = model.signals().iter().map(String::as_str).zip(signals.chunks_exact(RECORD));
+        let channels: Vec<(&str, &[f64])> = warmth.chain(bristles).collect();
+        let motion = MotionBlock { channels: &channels, ..plain };
+        effort.fill(0.0);
+        model.element_efforts(&motion, &[], &linear, RECORD, &mut effort, &mut memory);
+        black_box(&effort);
+    });
+}
+
+/// The same sample by sample with the standard library's functions.
+#[divan::bench]
+fn bristles_sample_by_sample_with_the_standard_library(bencher: Bencher<'_, '_>) {
+    let dq: Vec<f64> = (0..JOINTS).flat_map(|_| speeds_of_record()).collect();
+    let mut effort = vec![0.0; dq.len()];
+    bencher.counter(ItemsCount::new(JOINTS * RECORD)).bench_local(|| {
+        for (speeds, effort) in black_box(&dq).chunks_exact(RECORD).zip(effort.chunks_exact_mut(RECORD)) {
+            let mut z = 0.0;
+            for (v, e) in speeds.iter().zip(effort) {
+                let g = 9.1 + 2.73 * (-(v / 0.04) * (v / 0.04)).exp();
+                let bend = v - 16_835.0 * v.abs() * z / g;
+                let viscous = 24.0 * (1.0 - (-(1.3 * v.abs()).powf(0.8)).exp());
+                *e = 16_835.0 * z + 270.0 * bend + viscous.copysign(*v);
+                let steady = g.copysign(*v) / 16_835.0;
+                z = steady + (z - steady) * (-16_835.0 * v.abs() * 2.5e-4 / g).exp();
+            }
+        }
+        black_box(&effort);
+    });
+}
+
+fn speeds_of_record() -> Vec<f64> {
+    (0..RECORD).map(|k| 1.2 * (0.001 * k as f64).sin() + 0.3 * (0.0037 * k as f64).cos()).collect()
 }

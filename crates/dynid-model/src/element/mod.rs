@@ -12,6 +12,7 @@ mod rotor;
 mod shape;
 mod transmission;
 
+use channel::temperature_of;
 pub use channel::{current_channel, is_temperature, temperature_channel};
 pub use compliance::{CyclicTorque, Spring};
 pub use drive::DriveGain;

@@ -22,9 +22,9 @@ use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
 use experiment::Experiment;
 use identification::{Identified, OURS, PAPER, regression};
 use robot::Indy7;
-use rows::{Ends, Four};
+use rows::Four;
 use settings::Settings;
-use validation::{Realisation, Validation, known, log, realisation};
+use validation::{Ends, Realisation, Validation, known, log, realisation};
 
 /// Name on the command line.
 pub const NAME: &str = "indy7";
@@ -70,20 +70,19 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
         || Validation::new(&arm, &settings, thermal.cold, run.seed),
         || Validation::new(&arm, &settings, thermal.hot, run.seed),
     );
-    let (cold, hot) = (cold?, hot?);
-    let ends = Ends { cold: &cold, hot: &hot };
+    let ends = Ends { cold: cold?, hot: hot? };
 
     let mut realisations: Vec<Realisation> = Vec::new();
     for k in 0..seeds {
         step(&format!("friction experiment and identification {} of {seeds}", k + 1));
-        realisations.push(realisation(&arm, &settings, excitation, run, run.seed + k)?);
+        realisations.push(realisation(&arm, &settings, excitation, &ends, run, run.seed + k)?);
     }
     let first = &realisations[0];
     rows.push(rows::friction_row(&settings, &first.friction));
     rows.push(rows::validation_row(&settings, &ends, first)?);
-    rows.push(rows::one_shot_row(&settings, &ends, &realisations)?);
+    rows.push(rows::one_shot_row(&realisations));
     rows.push(rows::missing_temperature_row(&arm, &settings, &ends, first)?);
-    rows.push(rows::price_row(&settings, &ends, first)?);
+    rows.push(rows::price_row(first));
 
     step("identification cold and hot");
     let conditions = Conditions::new(&arm, &settings, excitation, run.seed)?;

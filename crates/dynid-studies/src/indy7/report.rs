@@ -9,9 +9,9 @@ use super::experiment::trajectory;
 use super::friction::JointFriction;
 use super::identification::Identified;
 use super::robot::{Indy7, TABLE_A1};
-use super::rows::{Ends, Four};
+use super::rows::Four;
 use super::settings::Settings;
-use super::validation::{NAMES, Realisation};
+use super::validation::{Ends, NAMES, Realisation};
 use super::{Conditions, JOINTS, TITLE};
 use crate::{StudyError, StudyRecord};
 
@@ -20,7 +20,7 @@ pub(super) struct Contents<'a> {
     pub(super) arm: &'a Indy7,
     pub(super) settings: &'a Settings,
     pub(super) excitation: &'a [Vec<f64>],
-    pub(super) ends: &'a Ends<'a>,
+    pub(super) ends: &'a Ends,
     pub(super) found: &'a Realisation,
     pub(super) four: &'a Four,
     /// Logs of the excitation trajectory, cold and hot.
@@ -94,8 +94,8 @@ impl Contents<'_> {
                 y: axis(line.symbol, ""),
                 equal_units: false,
                 curves: vec![
-                    curve("band", CurveStyle::Dashed, band(-1.0)),
-                    curve("band", CurveStyle::Dashed, band(1.0)),
+                    curve("95 % from", CurveStyle::Dashed, band(-1.0)),
+                    curve("95 % to", CurveStyle::Dashed, band(1.0)),
                     curve("line", CurveStyle::Line, grid.iter().map(|t| [*t, line.at(*t)]).collect()),
                     curve("per temperature", CurveStyle::Dots, markers.collect()),
                 ],
@@ -154,7 +154,7 @@ impl Contents<'_> {
         curves.push(curve("measured", CurveStyle::Dots, points));
         Chart {
             title: "Joint 1: friction by speed and temperature (Figure 5)".into(),
-            note: "Friction falls by almost a third per 12 K at high speed; Coulomb and static friction are free of temperature."
+            note: "At 1 rad/s friction falls by more than a third from 20.5 to 43 °C; Coulomb and static friction are free of temperature."
                 .into(),
             x: ChartAxis { logarithmic: true, ..axis("speed", "rad/s") },
             y: axis("friction", "N m"),
@@ -198,8 +198,8 @@ impl Contents<'_> {
         for (k, (name, log)) in
             [("cold", &self.conditions.cold), ("hot", &self.conditions.hot)].iter().enumerate()
         {
-            let conventional = self.found.conventional.filtered(log, self.settings)?;
-            let proposed = self.found.proposed.filtered(log, self.settings)?;
+            let conventional = self.found.conventional.found.filtered(log, self.settings)?;
+            let proposed = self.found.proposed.found.filtered(log, self.settings)?;
             for joint in [0, 1, 5] {
                 let line = |values: &[f64]| -> Vec<[f64; 2]> {
                     values.iter().enumerate().map(|(s, x)| [1.0 + s as f64 / 50.0, *x]).collect()
@@ -245,11 +245,11 @@ impl Contents<'_> {
     fn validation_section(&self) -> Result<StudySection, StudyError> {
         let mut tables = Vec::new();
         for (name, validation, paper) in [
-            ("Table 3, cold (20.5 °C)", self.ends.cold, &self.settings.paper.cold),
-            ("Table 4, hot (43 °C)", self.ends.hot, &self.settings.paper.hot),
+            ("Table 3, cold (20.5 °C)", &self.ends.cold, &self.settings.paper.cold),
+            ("Table 4, hot (43 °C)", &self.ends.hot, &self.settings.paper.hot),
         ] {
-            let conventional = validation.table(&self.found.conventional, self.settings)?;
-            let proposed = validation.table(&self.found.proposed, self.settings)?;
+            let conventional = validation.table(&self.found.conventional.found, self.settings)?;
+            let proposed = validation.table(&self.found.proposed.found, self.settings)?;
             let mut rows = Vec::new();
             for k in 0..3 {
                 for (what, theirs, ours) in [
@@ -327,7 +327,7 @@ impl Contents<'_> {
 
     fn one_shot_section(&self) -> Result<StudySection, StudyError> {
         let mut rows = Vec::new();
-        for (name, validation) in [("cold", self.ends.cold), ("hot", self.ends.hot)] {
+        for (end, name) in ["cold", "hot"].into_iter().enumerate() {
             let estimates = [
                 ("conventional", Some(&self.found.conventional)),
                 ("two-step, the paper's constraints", Some(&self.found.proposed)),
@@ -337,8 +337,7 @@ impl Contents<'_> {
             ];
             for (what, estimate) in estimates {
                 let Some(estimate) = estimate else { continue };
-                for (k, values) in validation.filtered_table(estimate, self.settings)?.into_iter().enumerate()
-                {
+                for (k, values) in estimate.scores[end].into_iter().enumerate() {
                     let mut row = vec![text(name), text(NAMES[k]), text(what)];
                     row.extend(values.map(Value::from));
                     rows.push(row);
@@ -346,8 +345,8 @@ impl Contents<'_> {
             }
         }
         let log = &self.ends.cold.logs[0];
-        let two = self.found.two_step.filtered(log, self.settings)?;
-        let one = self.found.one_shot.filtered(log, self.settings)?;
+        let two = self.found.two_step.found.filtered(log, self.settings)?;
+        let one = self.found.one_shot.found.filtered(log, self.settings)?;
         let line = |values: Vec<f64>| -> Vec<[f64; 2]> {
             values.into_iter().enumerate().map(|(s, x)| [1.0 + s as f64 / 50.0, x]).collect()
         };

@@ -7,21 +7,9 @@ use super::friction::JointFriction;
 use super::identification::{Identified, margins};
 use super::robot::Indy7;
 use super::settings::Settings;
-use super::validation::{NAMES, Realisation, Table, Validation, changed, improvement, known, median};
+use super::validation::{Ends, NAMES, Realisation, Scored, Table, changed, improvement, known, median};
 use crate::{Row, StudyError};
 use dynid::model::EffortModel;
-
-/// Validation at both ends of the temperatures.
-pub(super) struct Ends<'a> {
-    pub(super) cold: &'a Validation,
-    pub(super) hot: &'a Validation,
-}
-
-impl Ends<'_> {
-    fn named(&self) -> [(&'static str, &Validation); 2] {
-        [("cold", self.cold), ("hot", self.hot)]
-    }
-}
 
 /// Row 8.
 pub(super) fn friction_row(settings: &Settings, found: &[JointFriction]) -> Row {
@@ -63,7 +51,7 @@ fn flat(table: &Table) -> Vec<f64> {
 /// Row 9.
 pub(super) fn validation_row(
     settings: &Settings,
-    ends: &Ends<'_>,
+    ends: &Ends,
     found: &Realisation,
 ) -> Result<Row, StudyError> {
     let mut pass = true;
@@ -71,8 +59,8 @@ pub(super) fn validation_row(
     let mut measured = serde_json::Map::new();
     let paper = [&settings.paper.cold, &settings.paper.hot];
     for (((name, validation), paper), required) in ends.named().into_iter().zip(paper).zip([0.6, 0.5]) {
-        let conventional = validation.table(&found.conventional, settings)?;
-        let proposed = validation.table(&found.proposed, settings)?;
+        let conventional = validation.table(&found.conventional.found, settings)?;
+        let proposed = validation.table(&found.proposed.found, settings)?;
         let gain = improvement(&conventional, &proposed);
         let theirs = improvement(&paper.conventional, &paper.proposed);
         let all = flat(&gain);
@@ -156,44 +144,37 @@ pub(super) fn robustness_rows(arm: &Indy7, four: &Four, realistic: &[Identified;
 }
 
 /// Ratio of RMSE to those of the two-step estimate, per joint: median over realisations and trajectories.
-fn ratios(
-    settings: &Settings,
-    validation: &Validation,
-    realisations: &[Realisation],
-    of: impl Fn(&Realisation) -> Option<&Identified>,
-) -> Result<Option<Vec<f64>>, StudyError> {
+fn ratios<'a>(
+    end: usize,
+    realisations: &'a [Realisation],
+    of: impl Fn(&'a Realisation) -> Option<&'a Scored>,
+) -> Option<Vec<f64>> {
     let mut all = vec![Vec::new(); JOINTS];
     for found in realisations {
-        let Some(own) = of(found) else { return Ok(None) };
-        let own = validation.filtered_table(own, settings)?;
-        let theirs = validation.filtered_table(&found.two_step, settings)?;
-        for (own, theirs) in own.iter().zip(&theirs) {
+        let (own, theirs) = (&of(found)?.scores[end], &found.two_step.scores[end]);
+        for (own, theirs) in own.iter().zip(theirs) {
             for (j, list) in all.iter_mut().enumerate() {
                 list.push(own[j] / theirs[j]);
             }
         }
     }
-    Ok(Some(all.into_iter().map(median).collect()))
+    Some(all.into_iter().map(median).collect())
 }
 
 /// Row b.
-pub(super) fn one_shot_row(
-    settings: &Settings,
-    ends: &Ends<'_>,
-    realisations: &[Realisation],
-) -> Result<Row, StudyError> {
+pub(super) fn one_shot_row(realisations: &[Realisation]) -> Row {
     let mut measured = serde_json::Map::new();
     let mut worst = [0.0_f64; 2];
-    for (name, validation) in ends.named() {
-        let whole = ratios(settings, validation, realisations, |r| Some(&r.one_shot))?;
-        let plain = ratios(settings, validation, realisations, |r| r.plain_one_shot.as_ref())?;
+    for (end, name) in ["cold", "hot"].into_iter().enumerate() {
+        let whole = ratios(end, realisations, |r| Some(&r.one_shot));
+        let plain = ratios(end, realisations, |r| r.plain_one_shot.as_ref());
         worst[0] = whole.iter().flatten().copied().fold(worst[0], f64::max);
         worst[1] = plain.iter().flatten().copied().fold(worst[1], f64::max);
         measured.insert(name.to_owned(), json!({ "one_shot": whole, "without_ripple": plain }));
     }
     measured.insert("realisations".to_owned(), realisations.len().into());
     measured.insert("cycles".to_owned(), json!(realisations.iter().map(|r| &r.cycles).collect::<Vec<_>>()));
-    Ok(Row::new(
+    Row::new(
         "b",
         "Friction, inertias and the torque ripple that residuals show, all from one fit to the excitation log and the friction \
          points, predict at least as well as the two-step estimate, on every joint, cold and hot",
@@ -208,28 +189,28 @@ pub(super) fn one_shot_row(
             ),
         },
         worst[0] <= 1.0,
-    ))
+    )
 }
 
 /// Row c.
 pub(super) fn missing_temperature_row(
     arm: &Indy7,
     settings: &Settings,
-    ends: &Ends<'_>,
+    ends: &Ends,
     found: &Realisation,
 ) -> Result<Row, StudyError> {
     let mut confined = true;
     let mut measured = serde_json::Map::new();
     let mut words = Vec::new();
-    for (name, validation) in ends.named() {
+    for (end, (name, validation)) in ends.named().into_iter().enumerate() {
         let log = &validation.logs[0];
-        let with = found.two_step.filtered_rmse(log, settings)?;
+        let with = found.two_step.scores[end][0];
         let mut without = [0.0; JOINTS];
         for (joint, own) in without.iter_mut().enumerate() {
             let stated = Some((joint, settings.thermal.moderate));
             let blind = Identified {
                 model: arm.regression().with_known(known(&found.friction, settings, stated)?),
-                values: found.two_step.values.clone(),
+                values: found.two_step.found.values.clone(),
             };
             let table = blind.filtered_rmse(log, settings)?;
             *own = table[joint];
@@ -254,22 +235,17 @@ pub(super) fn missing_temperature_row(
 }
 
 /// Row d.
-pub(super) fn price_row(
-    settings: &Settings,
-    ends: &Ends<'_>,
-    found: &Realisation,
-) -> Result<Row, StudyError> {
+pub(super) fn price_row(found: &Realisation) -> Row {
     let mut worst = 0.0_f64;
     let mut measured = serde_json::Map::new();
-    for (name, validation) in ends.named() {
-        let ours = validation.filtered_table(&found.two_step, settings)?;
-        let paper = validation.filtered_table(&found.proposed, settings)?;
+    for (end, name) in ["cold", "hot"].into_iter().enumerate() {
+        let (ours, paper) = (&found.two_step.scores[end], &found.proposed.scores[end]);
         let ratio: Vec<f64> =
             (0..JOINTS).map(|j| median((0..3).map(|k| ours[k][j] / paper[k][j]).collect())).collect();
         worst = ratio.iter().copied().fold(worst, f64::max);
         measured.insert(name.to_owned(), json!({ "ratio": ratio }));
     }
-    Ok(Row::new(
+    Row::new(
         "d",
         "Bodies that can exist and errors of friction of any sign, our defaults, in place of the paper's constraints: what they \
          cost in prediction",
@@ -277,7 +253,7 @@ pub(super) fn price_row(
         measured.into(),
         format!("at most {:.1} % higher", 100.0 * (worst - 1.0)),
         worst <= 1.1,
-    ))
+    )
 }
 
 /// Row e: the same record of a warming arm, with its temperatures and with that of its start.

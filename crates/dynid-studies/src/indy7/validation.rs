@@ -96,19 +96,50 @@ pub(super) fn known(
     Ok(out)
 }
 
+/// Errors on the validation logs where prediction and measurement pass the same filter, cold and hot.
+pub(super) type Scores = [Table; 2];
+
+/// Validation at both ends of the temperatures.
+#[derive(Debug)]
+pub(super) struct Ends {
+    pub(super) cold: Validation,
+    pub(super) hot: Validation,
+}
+
+impl Ends {
+    pub(super) fn named(&self) -> [(&'static str, &Validation); 2] {
+        [("cold", &self.cold), ("hot", &self.hot)]
+    }
+
+    fn scores(&self, found: &Identified, settings: &Settings) -> Result<Scores, StudyError> {
+        let (cold, hot) = rayon::join(
+            || self.cold.filtered_table(found, settings),
+            || self.hot.filtered_table(found, settings),
+        );
+        Ok([cold?, hot?])
+    }
+}
+
+/// An estimate with its errors.
+#[derive(Debug)]
+pub(super) struct Scored {
+    pub(super) found: Identified,
+    pub(super) scores: Scores,
+}
+
 /// Everything that one seed gives.
 #[derive(Debug)]
 pub(super) struct Realisation {
     pub(super) friction: Vec<JointFriction>,
-    pub(super) conventional: Identified,
+    pub(super) conventional: Scored,
     /// By the paper's constraints.
-    pub(super) proposed: Identified,
+    pub(super) proposed: Scored,
     /// Bodies that can exist, errors of friction of any sign.
-    pub(super) two_step: Identified,
+    pub(super) two_step: Scored,
     /// With the ripple that residuals show.
-    pub(super) one_shot: Identified,
+    pub(super) one_shot: Scored,
     /// Without ripple; not in quick runs.
-    pub(super) plain_one_shot: Option<Identified>,
+    pub(super) plain_one_shot: Option<Scored>,
     /// Orders of that ripple.
     pub(super) cycles: Cycles,
 }
@@ -154,6 +185,7 @@ pub(super) fn realisation(
     arm: &Indy7,
     settings: &Settings,
     excitation: &[Vec<f64>],
+    ends: &Ends,
     run: &RunSettings,
     seed: u64,
 ) -> Result<Realisation, StudyError> {
@@ -174,8 +206,18 @@ pub(super) fn realisation(
     let plain = || (!run.quick).then(plain).transpose();
     let (one_shot, plain) =
         rayon::join(|| one_shot(arm, starts.clone(), &points, &cycles, &log, OURS), plain);
-    let (one_shot, plain_one_shot) = (one_shot?, plain?);
-    Ok(Realisation { friction, conventional, proposed, two_step, one_shot, plain_one_shot, cycles })
+    let scored = |found: Identified| -> Result<Scored, StudyError> {
+        Ok(Scored { scores: ends.scores(&found, settings)?, found })
+    };
+    Ok(Realisation {
+        conventional: scored(conventional)?,
+        proposed: scored(proposed)?,
+        two_step: scored(two_step)?,
+        one_shot: scored(one_shot?)?,
+        plain_one_shot: plain?.map(scored).transpose()?,
+        friction,
+        cycles,
+    })
 }
 
 /// Share of the error that is gone, per trajectory and joint.

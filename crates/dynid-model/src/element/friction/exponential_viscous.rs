@@ -5,6 +5,7 @@ use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::element::shape::{self, places, values};
 use crate::element::{
     ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting, temperature_channel,
+    temperature_of,
 };
 use crate::parameter::{Parameter, ShapeParameter};
 
@@ -74,9 +75,9 @@ impl ExponentialViscous {
                 speeds.iter().enumerate().for_each(|(k, v)| work(k, *v, above));
             }
             None => {
-                let name = temperature_channel(&joints[self.rate].name);
-                let Some(temperature) = motion.channel(&name) else {
-                    panic!("motion block without channel `{name}`")
+                let joint = &joints[self.rate].name;
+                let Some(temperature) = temperature_of(motion.channels, joint) else {
+                    panic!("motion block without channel `{}`", temperature_channel(joint))
                 };
                 speeds.iter().zip(temperature).enumerate().for_each(|(k, (v, t))| work(k, *v, above(*t)));
             }
@@ -89,7 +90,8 @@ struct Sample {
     sign: f64,
     /// `a = |σ3 v|^σ4`.
     power: f64,
-    e: f64,
+    /// `1 - e`, exact for small arguments too.
+    risen: f64,
     sigma3: f64,
     sigma4: f64,
     /// `ln |σ3 v|`.
@@ -105,21 +107,22 @@ impl Sample {
         let sigma4 = (s4 + s4_slope * above).max(LEAST);
         let logarithm = (sigma3 * v.abs()).ln();
         let power = (sigma4 * logarithm).exp();
-        Sample { sign: motion.sign(v), power, e: (-power).exp(), sigma3, sigma4, logarithm }
+        let risen = -(-power).exp_m1();
+        Sample { sign: motion.sign(v), power, risen, sigma3, sigma4, logarithm }
     }
 
-    /// `1 - e`, exact for small arguments too.
-    fn risen(&self) -> f64 {
-        -(-self.power).exp_m1()
+    /// `e`; where it is lost in rounding it multiplies nothing that matters.
+    fn e(&self) -> f64 {
+        1.0 - self.risen
     }
 
     /// `∂(1 - e)/∂σ3` or `∂(1 - e)/∂σ4`.
     fn by_shape(&self, exponent: bool) -> f64 {
         match exponent {
-            false => self.e * self.power * self.sigma4 / self.sigma3,
+            false => self.e() * self.power * self.sigma4 / self.sigma3,
             // x^σ ln x goes to 0 with x.
             true if self.power == 0.0 => 0.0,
-            true => self.e * self.power * self.logarithm,
+            true => self.e() * self.power * self.logarithm,
         }
     }
 
@@ -128,7 +131,7 @@ impl Sample {
         if v == 0.0 {
             return 0.0;
         }
-        motion.sign_slope(v) * self.risen() + self.sign * self.e * self.power * self.sigma4 / v
+        motion.sign_slope(v) * self.risen + self.sign * self.e() * self.power * self.sigma4 / v
     }
 
     /// Derivative of `s ∂(1 - e)/∂σ` by the velocity.
@@ -141,7 +144,7 @@ impl Sample {
             false => self.sigma4 / self.sigma3 * rising,
             true => rising * self.logarithm + 1.0,
         };
-        motion.sign_slope(v) * self.by_shape(exponent) + self.sign * self.e * self.power * along / v
+        motion.sign_slope(v) * self.by_shape(exponent) + self.sign * self.e() * self.power * along / v
     }
 }
 
@@ -191,7 +194,7 @@ impl JointElement for ExponentialViscous {
         let [value, slope] = out.two_columns(0, 1);
         self.each(joints, motion, |k, v, above| {
             let sample = Sample::new(motion, v, above, values);
-            value[k] = sample.sign * sample.risen();
+            value[k] = sample.sign * sample.risen;
             slope[k] = value[k] * above;
         });
     }

@@ -99,7 +99,13 @@ impl LuGre {
         motion: &MotionBlock<'a>,
         index: usize,
     ) -> Option<&'a [f64]> {
-        motion.channel(&Self::signal(&joints[self.rate], index))
+        let joint = joints[self.rate].name.as_str();
+        let is_it = |name: &str| {
+            let rest = name.strip_prefix(joint).and_then(|rest| rest.strip_prefix('.'));
+            rest == Some(SIGNALS[index])
+        };
+        let (_, values) = motion.channels.iter().find(|(name, _)| is_it(name))?;
+        Some(&values[..motion.samples])
     }
 }
 
