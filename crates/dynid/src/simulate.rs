@@ -4,7 +4,7 @@ mod closed_loop;
 mod settings;
 mod trajectory;
 
-use dynid_model::{EffortModel, MotionBlock, RegressorBlock, RobotModel};
+use dynid_model::{EffortModel, History, MotionBlock, RegressorBlock, RobotModel};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -141,9 +141,10 @@ fn by_inverse_dynamics(
         signals
     };
     let at = sample(0.0);
-    let clean_effort = efforts(model, &values, &at, samples);
+    let span = (samples, settings.rate_hz);
+    let clean_effort = efforts(model, &values, &at, span);
     // The logged effort belongs to the motion that follows it.
-    let led = efforts(model, &values, &sample(settings.delay_samples.unwrap_or(HELD_COMMAND)), samples);
+    let led = efforts(model, &values, &sample(settings.delay_samples.unwrap_or(HELD_COMMAND)), span);
     let step = |j: usize| {
         let turn = if model.joints()[j].slides { 1.0 } else { std::f64::consts::TAU };
         turn / 2f64.powi(settings.encoder_bits as i32)
@@ -193,9 +194,20 @@ fn named(model: &RobotModel, values: Vec<f64>) -> Vec<(String, f64)> {
     linear.chain(table.shape.iter().map(|s| (s.name.clone(), s.start))).collect()
 }
 
-fn efforts(model: &RobotModel, values: &[f64], signals: &[Vec<f64>; 3], samples: usize) -> Vec<Vec<f64>> {
+/// Efforts along a motion that starts in the steady state of elements that remember.
+fn efforts(
+    model: &RobotModel,
+    values: &[f64],
+    signals: &[Vec<f64>; 3],
+    (samples, rate_hz): (usize, f64),
+) -> Vec<Vec<f64>> {
     let mut block = RegressorBlock::new(model.layout().clone(), samples);
-    let motion = MotionBlock::plain(samples, &signals[0], &signals[1], &signals[2]);
-    model.regressor(&motion, &model.parameters().shape_start(), &mut block);
+    let shape = model.parameters().shape_start();
+    let plain = MotionBlock::plain(samples, &signals[0], &signals[1], &signals[2]);
+    let mut remembered = vec![0.0; model.signals().len() * samples];
+    model.remember(&plain, 1.0 / rate_hz, &shape, &mut History::default(), samples, &mut remembered);
+    let named = model.signals().iter().zip(remembered.chunks_exact(samples));
+    let channels: Vec<(&str, &[f64])> = named.map(|(name, values)| (name.as_str(), values)).collect();
+    model.regressor(&MotionBlock { channels: &channels, ..plain }, &shape, &mut block);
     (0..model.outputs().len()).map(|output| block.effort(output, values)).collect()
 }
