@@ -11,9 +11,10 @@ use dynid_model::element::{
     AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, JointElement, LoadFriction, Offset,
     RotorInertia, Spring, Transmission, Viscous, ViscousMagnitude,
 };
-use dynid_model::{JointKind, Mechanism};
+use dynid_model::{JointKind, Mechanism, RobotModel};
 
 use crate::Error;
+use crate::friction::KnownFriction;
 
 /// Element names that a robot file or a configuration may use.
 pub const NAMES: [&str; 18] = [
@@ -55,6 +56,11 @@ pub struct ElementPlan {
     /// Ten standard parameters per body whose rigid effort loads the gears of `load` elements; `None`: those of the robot
     /// file.
     pub load_reference: Option<Vec<f64>>,
+    /// Friction whose effort is known, at most one law per joint. Coefficients of friction among the elements of these
+    /// joints are errors of the laws.
+    pub known: Vec<KnownFriction>,
+    /// Whether these errors may have any sign.
+    pub free_errors: bool,
 }
 
 impl ElementPlan {
@@ -99,12 +105,15 @@ impl ElementPlan {
             couplings: spec.couplings.clone(),
             spec: spec.clone(),
             load_reference: None,
+            known: Vec::new(),
+            free_errors: true,
         })
     }
 
     /// A plan with given names per rate, as an estimate file records it.
     pub fn recorded(per_rate: Vec<Vec<String>>, couplings: Vec<CouplingSpec>, spec: ElementSpec) -> Self {
-        ElementPlan { per_rate, couplings, spec, load_reference: None }
+        let (load_reference, known) = (None, Vec::new());
+        ElementPlan { per_rate, couplings, spec, load_reference, known, free_errors: true }
     }
 
     /// Settings of the elements.
@@ -201,6 +210,58 @@ impl ElementPlan {
         Ok(out)
     }
 
+    /// The effort model of the plan, known friction included.
+    ///
+    /// # Errors
+    /// As [`ElementPlan::build`].
+    pub fn model(&self, mechanism: &Mechanism) -> Result<RobotModel, Error> {
+        self.complete(mechanism, self.build(mechanism)?)
+    }
+
+    /// A model of elements that stand for those of the plan, completed by known friction.
+    ///
+    /// # Errors
+    /// [`Error::ElementSetting`] for bristles beside known bristles, [`Error::UnknownJoint`].
+    pub(crate) fn complete(
+        &self,
+        mechanism: &Mechanism,
+        elements: Vec<Box<dyn JointElement>>,
+    ) -> Result<RobotModel, Error> {
+        let names = mechanism.rate_names();
+        let mut known = Vec::new();
+        for law in &self.known {
+            let Some(rate) = names.iter().position(|n| *n == law.joint) else {
+                return Err(Error::UnknownJoint { name: law.joint.clone(), known: names });
+            };
+            if law.slipping_bristle().is_some() && self.per_rate[rate].iter().any(|name| name == "lugre") {
+                return Err(Error::ElementSetting {
+                    element: "lugre".to_owned(),
+                    joint: law.joint.clone(),
+                    fault: "its known friction has bristles already: take `coulomb` for their error"
+                        .to_owned(),
+                });
+            }
+            known.extend(law.elements(rate));
+        }
+        let model = RobotModel::new(mechanism.clone(), elements).with_known(known);
+        Ok(match self.free_errors {
+            true => model.with_free_sign(|p| self.is_friction_error(&p.name)),
+            false => model,
+        })
+    }
+
+    /// Known friction of a joint.
+    pub fn known_friction(&self, joint: &str) -> Option<&KnownFriction> {
+        self.known.iter().find(|law| law.joint == joint)
+    }
+
+    /// Whether a parameter is the error of a coefficient of known friction.
+    pub fn is_friction_error(&self, name: &str) -> bool {
+        name.rsplit_once('.').is_some_and(|(joint, symbol)| {
+            friction::COEFFICIENTS.contains(&symbol) && self.known_friction(joint).is_some()
+        })
+    }
+
     fn element(
         &self,
         name: &str,
@@ -262,7 +323,8 @@ impl ElementPlan {
         })
     }
 
-    /// Values that the robot file states for element parameters: `(parameter name, value)`.
+    /// Values that the robot file states for element parameters: `(parameter name, value)`. It states friction, not errors of
+    /// known friction.
     ///
     /// `[element.j1] rotor = { inertia = 0.4 }` states `j1.Ia`; `coulomb = { effort = .. }`, `viscous = { coefficient = .. }`
     /// and `offset = { effort = .. }` state `fc`, `fv`, `fo`; `arctangent`, `tanh`, `sigmoid`, `sigmoid_offset` have an
@@ -284,6 +346,7 @@ impl ElementPlan {
                     _ => None,
                 }
             })
+            .filter(|(name, _)| !self.is_friction_error(name))
             .collect()
     }
 }

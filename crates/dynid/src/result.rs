@@ -287,6 +287,30 @@ impl Identification {
                 );
             }
         }
+        for law in &self.plan.known {
+            let errors: Vec<&str> = self.model.parameters().linear.iter().map(|p| p.name.as_str()).collect();
+            let own = |name: &&str| {
+                let offset = name.strip_suffix(".fo") == Some(law.joint.as_str());
+                let of_joint = name.rsplit_once('.').is_some_and(|(joint, _)| joint == law.joint);
+                offset || (of_joint && self.plan.is_friction_error(name))
+            };
+            let errors: Vec<&str> = errors.into_iter().filter(own).collect();
+            add(
+                &format!("known friction of {}", law.joint),
+                json!(law.in_words()),
+                "",
+                "given",
+                match errors.is_empty() {
+                    true => "its effort is taken off; the model has no parameters for its errors".to_owned(),
+                    false => format!(
+                        "its effort is taken off; {} {} errors of it{}",
+                        errors.join(", "),
+                        if errors.len() == 1 { "is the" } else { "are" },
+                        if self.plan.free_errors { ", of any sign" } else { "" }
+                    ),
+                },
+            );
+        }
         for log in &self.logs {
             if let Some(motion) = &log.periodic {
                 add(
@@ -464,11 +488,19 @@ fn provenance(config: &Config) -> Result<Provenance, Error> {
         }
         value
     };
+    let elements = &config.elements;
+    if let Some(path) = &elements.known_friction {
+        inputs.push(InputRecord {
+            path: path.display().to_string(),
+            kind: "friction".to_owned(),
+            sha256: sha256(path)?,
+        });
+    }
     let settings = json!({
         "gravity": config.gravity,
         "couple_mimics": config.couple_mimics.unwrap_or(false),
         "locked": config.locked,
-        "elements": { "default": config.elements.default, "joint": config.elements.joint, "friction": config.elements.friction },
+        "elements": elements,
         "conditioning": config.conditioning,
         "estimator": config.estimator,
         "bound": config.bound,

@@ -148,8 +148,7 @@ pub fn fit_presliding(test: &PreslidingTest<'_>, law: &FrictionLaw) -> Result<Pr
     }
     let parts = law.parts();
     let parameters = [parts.bristles.as_slice(), parts.viscous.as_slice()];
-    let table =
-        SteadyTable::new(&parts.model, &parts.shape, parameters, test.temperature, LARGEST_SPEED)?;
+    let table = SteadyTable::new(&parts.model, &parts.shape, parameters, test.temperature, LARGEST_SPEED)?;
     let holds: &[EffortHold] = match test.effort_hold {
         HoldName::Auto => &[EffortHold::Held, EffortHold::Linear],
         HoldName::Held => &[EffortHold::Held],
