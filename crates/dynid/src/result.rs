@@ -288,28 +288,8 @@ impl Identification {
             }
         }
         for law in &self.plan.known {
-            let errors: Vec<&str> = self.model.parameters().linear.iter().map(|p| p.name.as_str()).collect();
-            let own = |name: &&str| {
-                let offset = name.strip_suffix(".fo") == Some(law.joint.as_str());
-                let of_joint = name.rsplit_once('.').is_some_and(|(joint, _)| joint == law.joint);
-                offset || (of_joint && self.plan.is_friction_error(name))
-            };
-            let errors: Vec<&str> = errors.into_iter().filter(own).collect();
-            add(
-                &format!("known friction of {}", law.joint),
-                json!(law.in_words()),
-                "",
-                "given",
-                match errors.is_empty() {
-                    true => "its effort is taken off; the model has no parameters for its errors".to_owned(),
-                    false => format!(
-                        "its effort is taken off; {} {} errors of it{}",
-                        errors.join(", "),
-                        if errors.len() == 1 { "is the" } else { "are" },
-                        if self.plan.free_errors { ", of any sign" } else { "" }
-                    ),
-                },
-            );
+            let name = format!("known friction of {}", law.joint);
+            add(&name, json!(law.in_words()), "", "given", friction::of_known(self, law));
         }
         for log in &self.logs {
             if let Some(motion) = &log.periodic {
