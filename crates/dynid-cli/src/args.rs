@@ -176,6 +176,9 @@ pub(crate) struct IdentifyArgs {
     /// Friction of joints that have any: shapes found on held-out data, or one law for all.
     #[arg(long, value_enum)]
     pub(crate) friction: Option<FrictionArg>,
+    /// Friction file of `dynid friction`: its laws count as known, and what is identified of friction are their errors.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) known_friction: Option<PathBuf>,
     /// Hold a joint at a position, rad or m.
     #[arg(long, value_name = "JOINT=POSITION", value_parser = joint_value)]
     pub(crate) lock: Vec<(String, f64)>,

@@ -1,4 +1,4 @@
-//! `dynid friction`: files, exit codes, messages.
+//! `dynid friction`, and `dynid identify --known-friction` with its file: files, exit codes, messages.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
@@ -102,5 +102,102 @@ fn bad_configurations_end_with_exit_code_2_and_one_message() {
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(said.starts_with("error: ") && said.contains(words), "{words}: {said}");
         assert!(!folder.path().join("dynid-friction").exists());
+    }
+}
+
+/// A law of `dynid friction` for both joints, viscous friction falling with the temperature.
+const KNOWN_FRICTION: &str = r#"{
+  "schema": 1, "robot": "arm", "verdict": { "status": "pass", "headline": "" }, "warnings": [],
+  "provenance": { "version": "0", "inputs": [], "settings": {}, "seed": 1 },
+  "joints": [LAWS]
+}"#;
+
+const LAW: &str = r#"{
+  "joint": "NAME", "status": "identified", "coulomb": 1.0, "temperature_range": [20.0, 40.0], "offset": 0.0,
+  "viscous": { "reference_temperature": 30.0, "sigma2": 2.0, "sigma2_slope": -0.02, "sigma3": 0.8, "sigma3_slope": 0.0,
+    "sigma4": 0.8, "sigma4_slope": 0.0 },
+  "std": {}, "points": [], "samples": 0, "levels": [], "lines": {}, "laws": [], "unpaired": [], "presliding": [],
+  "notes": []
+}"#;
+
+/// A simulated log of the arm, with a column of temperatures or without.
+fn put_simulated(folder: &Path) {
+    std::fs::write(folder.join("robot.urdf"), TWO_LINKS).unwrap();
+    let joints = ["shoulder", "elbow"].map(|name| LAW.replace("NAME", name)).join(",");
+    std::fs::write(folder.join("friction.json"), KNOWN_FRICTION.replace("LAWS", &joints)).unwrap();
+    run(folder, &["simulate", "robot.urdf", "--out", "bare.csv"], 0);
+    let bare = std::fs::read_to_string(folder.join("bare.csv")).unwrap();
+    let warm: Vec<String> = bare
+        .lines()
+        .enumerate()
+        .map(|(k, line)| line.to_owned() + if k == 0 { ",temp_shoulder,temp_elbow" } else { ",31.0,29.0" })
+        .collect();
+    std::fs::write(folder.join("log.csv"), warm.join("\n") + "\n").unwrap();
+}
+
+#[test]
+fn a_flag_names_the_friction_file_and_predictions_ask_for_temperatures() {
+    let folder = tempfile::tempdir().unwrap();
+    put_simulated(folder.path());
+    let args =
+        ["identify", "robot.urdf", "--log", "log.csv", "--known-friction", "friction.json", "--out", "out"];
+    let output = run(folder.path(), &args, 0);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        said.contains("known friction of shoulder = \"Coulomb and exponential viscous friction"),
+        "{said}"
+    );
+    assert!(said.contains("left out of the known friction of `shoulder` in URDF"), "{said}");
+    let text = std::fs::read_to_string(folder.path().join("out/estimate.json")).unwrap();
+    let estimate: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(estimate["model"]["known_friction"][1]["joint"], "elbow");
+
+    let states = "q1,q2,dq1,dq2,ddq1,ddq2\n0.1,0.2,0.5,-0.5,0,0\n";
+    std::fs::write(folder.path().join("states.csv"), states).unwrap();
+    let predict = ["predict", "out/estimate.json", "--states", "states.csv"];
+    let refused = run(folder.path(), &predict, 2);
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(said.contains("states.csv: expected the column `temperature_shoulder`"), "{said}");
+    let effort = |temperature: f64| -> f64 {
+        let header = "q1,q2,dq1,dq2,ddq1,ddq2,temperature_shoulder,temperature_elbow";
+        let states = format!("{header}\n0.1,0.2,0.5,-0.5,0,0,{temperature},30\n");
+        std::fs::write(folder.path().join("states.csv"), states).unwrap();
+        let output = run(folder.path(), &predict, 0);
+        let text = String::from_utf8(output.stdout).unwrap();
+        text.lines().nth(1).unwrap().split(',').next().unwrap().parse().unwrap()
+    };
+    // σ2 falls by 0.02 N m per kelvin, 1 - exp(-(0.8 · 0.5)^0.8) of it at 0.5 rad/s; clamped at 40 degrees.
+    let risen = 1.0 - (-(0.4_f64).powf(0.8)).exp();
+    assert!((effort(25.0) - effort(35.0) - 0.2 * risen).abs() < 1e-9);
+    assert!((effort(40.0) - effort(60.0)).abs() < 1e-12);
+    run(folder.path(), &["validate", "out/estimate.json", "--log", "log.csv"], 0);
+    run(folder.path(), &["validate", "out/estimate.json", "--log", "bare.csv"], 2);
+}
+
+#[test]
+fn a_log_without_temperatures_is_refused_with_a_hint() {
+    let folder = tempfile::tempdir().unwrap();
+    put_simulated(folder.path());
+    let args =
+        ["identify", "robot.urdf", "--log", "bare.csv", "--known-friction", "friction.json", "--out", "out"];
+    let output = run(folder.path(), &args, 2);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("temperature_shoulder") && said.contains("temperature = 30"), "{said}");
+    assert!(!folder.path().join("out/estimate.json").exists());
+    let config = "robot = \"robot.urdf\"\n[elements]\nknown_friction = \"friction.json\"\ntemperature = 30.0\n\
+                  [[log]]\npath = \"bare.csv\"\n";
+    std::fs::write(folder.path().join("run.toml"), config).unwrap();
+    run(folder.path(), &["identify", "run.toml", "--out", "out", "--quiet"], 0);
+    for (text, words) in [
+        (config.replace("friction.json", "robot.urdf"), "not a friction model"),
+        (config.replace("friction.json", "none.json"), "none.json"),
+        (config.replace("30.0", "{ wrist = 30.0 }"), "no joint is named `wrist`"),
+        (config.replace("30.0", "303.0"), "elements.temperature"),
+        (config.replace("known_friction = \"friction.json\"\n", ""), "`known_friction` beside it"),
+    ] {
+        std::fs::write(folder.path().join("run.toml"), text).unwrap();
+        let output = run(folder.path(), &["identify", "run.toml", "--out", "other"], 2);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(said.starts_with("error: ") && said.contains(words), "{words}: {said}");
     }
 }

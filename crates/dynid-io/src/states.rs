@@ -34,6 +34,8 @@ pub struct States {
     pub acceleration: Vec<Vec<f64>>,
     /// Gravity in base axes, m/s², if the table states it.
     pub gravity: Option<[Vec<f64>; 3]>,
+    /// Channels that were asked for, by name: `temperature_<joint>` in °C.
+    pub channels: Vec<(String, Vec<f64>)>,
 }
 
 /// Why a table of states was refused.
@@ -59,6 +61,19 @@ pub enum StatesError {
         named: Vec<String>,
         /// Numbered names.
         numbered: Vec<String>,
+        /// Names there are.
+        header: Vec<String>,
+    },
+    /// A channel is missing that the model reads.
+    #[error(
+        "{file}: expected the column `{channel}`, which the model reads, found {}",
+        listed(header, LISTED)
+    )]
+    MissingChannel {
+        /// File.
+        file: String,
+        /// Name of channel and column.
+        channel: String,
         /// Names there are.
         header: Vec<String>,
     },
@@ -97,6 +112,9 @@ impl StatesError {
                 "name all columns by joint or number them all from 1; `qd`, `qdd` may stand for `dq`, `ddq`"
                     .to_owned(),
             ),
+            StatesError::MissingChannel { .. } => {
+                Some("add the column: temperatures in degrees Celsius, currents in A".to_owned())
+            }
             StatesError::Surplus { .. } => {
                 Some("the states belong to another robot, or to this one with a floating base (--floating-base); use names by joint to pick columns".to_owned())
             }
@@ -122,6 +140,29 @@ pub fn read(
     from_table(&csv::read(path, options)?, joints)
 }
 
+/// Reads a table of states with columns of channels that a model reads, each by its name (`temperature_<joint>`, °C); see
+/// [`read`].
+///
+/// # Errors
+/// [`StatesError`].
+pub fn read_with_channels(
+    path: impl AsRef<Path>,
+    joints: &[StateJoint],
+    channels: &[String],
+    options: &ReadOptions,
+) -> Result<States, StatesError> {
+    let table = csv::read(path, options)?;
+    let mut states = from_table(&table, joints)?;
+    for channel in channels {
+        let Some(values) = table.column(channel) else {
+            let (file, channel) = (table.source.clone(), channel.clone());
+            return Err(StatesError::MissingChannel { file, channel, header: table.header });
+        };
+        states.channels.push((channel.clone(), values.to_vec()));
+    }
+    Ok(states)
+}
+
 /// Picks the states out of a table; see [`read`].
 ///
 /// # Errors
@@ -142,7 +183,14 @@ pub fn from_table(table: &Table, joints: &[StateJoint]) -> Result<States, States
             }
         }
     }
-    Ok(States { rows: table.rows, position, velocity, acceleration, gravity: gravity(table)? })
+    Ok(States {
+        rows: table.rows,
+        position,
+        velocity,
+        acceleration,
+        gravity: gravity(table)?,
+        channels: Vec::new(),
+    })
 }
 
 /// Names of coordinates without the prefix: `_<joint>` or `_<joint>.x`.

@@ -325,6 +325,13 @@ fn known_elements_are_offset_and_part_of_every_effort() {
     for ((a, b), c) in found.iter().zip(&wanted).zip(&by_rows) {
         assert!((a - b).abs() <= 1e-12 && (c - b).abs() <= 1e-12, "{a} {b} {c}");
     }
+    // Friction of the joint is known and own together.
+    let law = |model: &RobotModel, linear: &[f64]| {
+        model.friction_effort(0, &[], linear, &[-1.0, 0.02, 0.5], &[("temperature_j1", 33.0)])
+    };
+    for (a, b) in law(&model, &linear(&own)).iter().zip(law(&whole, &linear(&theirs))) {
+        assert!((a - b).abs() <= 1e-12 * b.abs(), "{a} {b}");
+    }
     // Without the motion before, the adjoint of the steady state.
     let moving = Motion::new(vec![velocities(30)], Some(33.0));
     let slope = |model: &RobotModel, linear: &[f64]| {
@@ -335,6 +342,12 @@ fn known_elements_are_offset_and_part_of_every_effort() {
     for (a, b) in slope(&model, &linear(&own)).iter().zip(slope(&whole, &linear(&theirs))) {
         assert!((a - b).abs() <= 1e-12 * b.abs().max(1.0), "{a} {b}");
     }
+    // Errors of what is known have any sign where that is asked for.
+    let lowest = |model: &RobotModel| model.parameters().linear.iter().map(|p| p.lower).collect::<Vec<_>>();
+    let before = lowest(&model);
+    let after = lowest(&model.with_free_sign(|p| p.name == "j1.fc"));
+    let changed: Vec<usize> = (0..before.len()).filter(|k| before[*k] != after[*k]).collect();
+    assert_eq!((changed, before[10], after[10]), (vec![10], Some(0.0), None));
 }
 
 #[test]

@@ -7,7 +7,7 @@ mod per_joint;
 pub use estimator::{
     BoundConfig, Consistency, EstimatorConfig, Method, PriorDistance, ShapeConfig, Variances,
 };
-pub use friction::Friction;
+pub use friction::{Friction, FrictionErrors};
 pub use per_joint::PerJoint;
 pub(crate) use per_joint::known;
 
@@ -74,6 +74,17 @@ pub struct ElementsConfig {
     pub joint: BTreeMap<String, Vec<String>>,
     /// Friction in place of that of the lists, or shapes found beside it. Default `auto`.
     pub friction: Friction,
+    /// Friction file whose laws are known: their efforts are taken off, and what remains of Coulomb and viscous friction and
+    /// offset of these joints are errors of the laws. Relative to the configuration. Shapes are then found at other joints
+    /// alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub known_friction: Option<PathBuf>,
+    /// Sign of the errors of known friction. Default `free`.
+    #[serde(skip_serializing_if = "is_default")]
+    pub friction_errors: FrictionErrors,
+    /// Constant temperature of joints with known friction in place of the logged one, °C. Default: none.
+    #[serde(skip_serializing_if = "is_default")]
+    pub temperature: PerJoint,
 }
 
 /// Motor-side inertia and friction of joints that share motors; see the robot file's `[[coupling]]`.
@@ -174,6 +185,7 @@ impl Config {
         let folder = path.parent().unwrap_or(Path::new(""));
         config.robot = folder.join(&config.robot);
         config.out = config.out.map(|o| folder.join(o));
+        config.elements.known_friction = config.elements.known_friction.map(|f| folder.join(f));
         for log in config.log.iter_mut().chain(&mut config.validation) {
             log.path = folder.join(&log.path);
             log.trajectory = log.trajectory.as_ref().map(|t| folder.join(t));
@@ -253,6 +265,7 @@ impl Config {
                 });
             }
         }
+        self.elements.check()?;
         self.check_estimator()?;
         for (joint, position) in &self.locked {
             if !position.is_finite() {
@@ -330,6 +343,27 @@ impl Config {
             ..defaults
         }
     }
+}
+
+impl ElementsConfig {
+    /// Checks that what goes with known friction does not stand alone.
+    fn check(&self) -> Result<(), Error> {
+        if self.known_friction.is_some() {
+            return Ok(());
+        }
+        let expected = "`known_friction` beside it";
+        if self.friction_errors != FrictionErrors::default() {
+            return Err(Error::setting("elements.friction_errors", expected, "none"));
+        }
+        if self.temperature != PerJoint::default() {
+            return Err(Error::setting("elements.temperature", expected, "none"));
+        }
+        Ok(())
+    }
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 fn check_motion(trajectory: Option<&Path>, period_s: Option<f64>) -> Result<(), Error> {

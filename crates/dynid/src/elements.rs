@@ -1,6 +1,7 @@
 //! Joint elements by name.
 
 pub(crate) mod friction;
+mod model;
 mod pairs;
 
 pub use pairs::AlikeElements;
@@ -14,6 +15,7 @@ use dynid_model::element::{
 use dynid_model::{JointKind, Mechanism};
 
 use crate::Error;
+use crate::friction::KnownFriction;
 
 /// Element names that a robot file or a configuration may use.
 pub const NAMES: [&str; 18] = [
@@ -55,6 +57,11 @@ pub struct ElementPlan {
     /// Ten standard parameters per body whose rigid effort loads the gears of `load` elements; `None`: those of the robot
     /// file.
     pub load_reference: Option<Vec<f64>>,
+    /// Friction whose effort is known, at most one law per joint. Coefficients of friction among the elements of these
+    /// joints are errors of the laws.
+    pub known: Vec<KnownFriction>,
+    /// Whether these errors may have any sign.
+    pub free_errors: bool,
 }
 
 impl ElementPlan {
@@ -99,12 +106,15 @@ impl ElementPlan {
             couplings: spec.couplings.clone(),
             spec: spec.clone(),
             load_reference: None,
+            known: Vec::new(),
+            free_errors: true,
         })
     }
 
     /// A plan with given names per rate, as an estimate file records it.
     pub fn recorded(per_rate: Vec<Vec<String>>, couplings: Vec<CouplingSpec>, spec: ElementSpec) -> Self {
-        ElementPlan { per_rate, couplings, spec, load_reference: None }
+        let (load_reference, known) = (None, Vec::new());
+        ElementPlan { per_rate, couplings, spec, load_reference, known, free_errors: true }
     }
 
     /// Settings of the elements.
@@ -262,7 +272,8 @@ impl ElementPlan {
         })
     }
 
-    /// Values that the robot file states for element parameters: `(parameter name, value)`.
+    /// Values that the robot file states for element parameters: `(parameter name, value)`. It states friction, not errors of
+    /// known friction.
     ///
     /// `[element.j1] rotor = { inertia = 0.4 }` states `j1.Ia`; `coulomb = { effort = .. }`, `viscous = { coefficient = .. }`
     /// and `offset = { effort = .. }` state `fc`, `fv`, `fo`; `arctangent`, `tanh`, `sigmoid`, `sigmoid_offset` have an
@@ -284,6 +295,7 @@ impl ElementPlan {
                     _ => None,
                 }
             })
+            .filter(|(name, _)| !self.is_friction_error(name))
             .collect()
     }
 }

@@ -39,6 +39,12 @@ pub enum Error {
     /// A states table cannot be read.
     #[error(transparent)]
     States(#[from] dynid_io::StatesError),
+    /// States lack a channel that the model reads.
+    #[error("states: expected the channel `{channel}`, which the model reads, found none")]
+    StatesChannel {
+        /// Name of the channel.
+        channel: String,
+    },
     /// Positions look like degrees although radians are said.
     #[error("{file}: joint `{joint}`: position {largest:.1} rad {}: these look like degrees", limit.map_or_else(|| "is more than two turns".to_owned(), |l| format!("is far beyond the limit of {l:.2} rad")))]
     Degrees {
@@ -310,6 +316,9 @@ impl Error {
             Error::Checkpoint { .. } => Some("delete the file, or name another one".to_owned()),
             Error::Columns { source, .. } => source.hint(),
             Error::States(e) => e.hint(),
+            Error::StatesChannel { .. } => {
+                Some("read the states with it: a column of this name, temperatures in degrees Celsius".to_owned())
+            }
             Error::Output(e) => e.hint(),
             Error::Prior(_) => Some(
                 "correct the mass; a link without an inertia gets a default body as its prior".to_owned(),
@@ -352,8 +361,8 @@ impl Error {
                 "state the unit: `[columns] temperature = { columns = \"temp{}\", unit = \"K\" }` (or \"F\")".to_owned(),
             ),
             Error::Conditioning(C::MissingChannel { channel, .. }) => is_temperature(channel).then(|| {
-                "name the column under [columns] (`temperature`), or state a constant one in the robot file: \
-                 `exponential_viscous = { temperature = 30 }`"
+                "name the column under [columns] (`temperature`), or state a constant one: of known friction under [elements], \
+                 `temperature = 30`, of an element in the robot file, `exponential_viscous = { temperature = 30 }`"
                     .to_owned()
             }),
             Error::FarPosition { .. } => Some(

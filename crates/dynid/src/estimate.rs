@@ -350,7 +350,7 @@ pub struct Provenance {
 pub struct InputRecord {
     /// Path as given.
     pub path: String,
-    /// `robot`, `log`, `validation` or `trajectory`.
+    /// `robot`, `log`, `validation`, `trajectory` or `friction`.
     pub kind: String,
     /// SHA-256 of its bytes.
     pub sha256: String,
@@ -396,8 +396,10 @@ impl Estimate {
                 mechanism.rates()
             )));
         }
-        let elements = plan.build(&mechanism)?;
-        let model = RobotModel::new(mechanism, elements);
+        for law in &plan.known {
+            law.check().map_err(|e| fault(format!("known friction of joint `{}`: {e}", law.joint)))?;
+        }
+        let model = plan.model(&mechanism)?;
         let table = model.parameters();
         let expected = table.linear.len();
         if expected != self.parameters.len() {

@@ -2,6 +2,7 @@
 
 mod figures;
 mod friction;
+mod known;
 mod shapes;
 mod structure;
 
@@ -18,11 +19,12 @@ use dynid_motion::Log;
 
 use crate::Error;
 use crate::agreement::{self, Agreement};
-use crate::config::{Config, LogConfig, Route};
+use crate::config::{Config, FrictionErrors, LogConfig, Route};
 use crate::consistency::{self, Consistent};
 use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
 use crate::fitting::{self, Fitted};
+use crate::friction::KnownFriction;
 use crate::logs::{self, LoadedLog};
 use crate::passivity::SPEED_SPAN_S;
 use crate::prior::Prior;
@@ -144,7 +146,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     }
     let (robot, loaded) = read_logs(config, &config.training_logs(), robot, &mut progress)?;
     let mut plan = plan_elements(config, &robot, &loaded)?;
-    let model = RobotModel::new(robot.mechanism.clone(), plan.build(&robot.mechanism)?);
+    let model = plan.model(&robot.mechanism)?;
     let prepared = loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
 
     for log in &prepared {
@@ -199,6 +201,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     warnings.extend(prior.warnings.iter().cloned());
     warnings.extend(loaded.iter().flat_map(|l| logs::temperature_warnings(&l.log)));
     warnings.extend(log_warnings(&model, &prepared));
+    warnings.extend(known::warnings(&plan, &robot.mechanism, &prepared));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
     let mut out = Identification {
         plan,
@@ -249,6 +252,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         progress(Step::Validate(log.path.display().to_string()));
         let loaded = logs::load(log, &out.robot.mechanism, &config.columns, config.motor_side.as_ref())?;
         let prepared = loaded.prepare(&out.model, &out.settings)?;
+        out.warnings.extend(known::logged_beyond(&out.plan, &prepared));
         out.validation.push(out.agreement(out.values(), &prepared)?);
         if out.consistent.constrained() {
             let free = out.agreement(out.unconstrained_values(), &prepared)?;
@@ -322,7 +326,7 @@ impl Identification {
         let Some(found) = &self.shapes else { return Ok(None) };
         let unfolded = shape::unfold(&found.model, &self.model, values);
         let mechanism = self.model.mechanism();
-        let model = RobotModel::new(mechanism.clone(), self.plan.build(mechanism)?);
+        let model = self.plan.model(mechanism)?;
         Ok(Some((model.with_shape(&unfolded.shape), unfolded.linear)))
     }
 
@@ -400,6 +404,11 @@ fn plan_elements(config: &Config, robot: &Robot, logs: &[LoadedLog]) -> Result<E
     let mut plan = ElementPlan::new(&robot.mechanism, &spec, config.elements.default.as_deref(), moves)?;
     for list in &mut plan.per_rate {
         *list = config.elements.friction.of_joint(list);
+    }
+    if let Some(file) = &config.elements.known_friction {
+        let temperatures = config.elements.temperature.finite("elements.temperature", &names)?;
+        plan.known = KnownFriction::load(file, &names, &temperatures)?;
+        plan.free_errors = config.elements.friction_errors == FrictionErrors::Free;
     }
     let speeds: Vec<Option<f64>> =
         names.iter().map(|name| logs.iter().filter_map(|l| fastest(&l.log, name)).reduce(f64::max)).collect();

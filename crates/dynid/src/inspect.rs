@@ -1,6 +1,6 @@
 //! What a robot file holds and what of it can be identified.
 
-use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
+use dynid_model::{BaseParameters, BaseSettings, EffortModel};
 use serde::Serialize;
 
 use crate::Error;
@@ -75,7 +75,7 @@ pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection,
     let none: &[String] = &[];
     let default = elements.or(if robot.elements.defaults.is_empty() { Some(none) } else { None });
     let plan = ElementPlan::new(mechanism, &robot.elements, default, |_| true)?;
-    let model = RobotModel::new(mechanism.clone(), plan.build(mechanism)?);
+    let model = plan.model(mechanism)?;
     let base =
         BaseParameters::of(&model, mechanism, &model.parameters().shape_start(), &BaseSettings::default());
     let table = model.parameters();

@@ -17,10 +17,6 @@ pub(crate) const NOT_PASSIVE: &str = "not passive";
 /// Positions are compared over this time, s: spikes and noise count little then.
 pub(crate) const SPEED_SPAN_S: f64 = 0.05;
 
-/// Friction coefficients that a passive law has positive; offsets and the difference between the directions have any sign.
-const COEFFICIENTS: [&str; 13] =
-    ["fc", "fs", "fv", "fa", "ft", "fg", "fl", "fp", "fcp", "fcn", "fvp", "fvn", "sigma2"];
-
 /// Least and greatest mean velocity of an output over [`SPEED_SPAN_S`] in logs that move it, with rest; `None` if none does.
 fn velocities(logs: &[PreparedLog], output: usize) -> Option<(f64, f64)> {
     let mut range: Option<(f64, f64)> = None;
@@ -77,7 +73,8 @@ impl Identification {
         outputs
             .filter_map(|(k, (output, rate))| {
                 let rate = rate?;
-                if !self.plan.per_rate[rate].iter().any(|name| friction::is_law(name)) {
+                let known = self.plan.known_friction(&output.name).is_some();
+                if !known && !self.plan.per_rate[rate].iter().any(|name| friction::is_law(name)) {
                     return None;
                 }
                 let (low, high) = velocities(&self.logs, k)?;
@@ -98,7 +95,8 @@ impl Identification {
                     intervals,
                     worst_velocity: found.worst.map(|(v, _)| v),
                     worst_power: found.worst.map(|(_, power)| power),
-                    static_below_coulomb: found.static_below_coulomb,
+                    // Errors of known friction may have any order.
+                    static_below_coulomb: found.static_below_coulomb && !known,
                 })
             })
             .collect()
@@ -111,12 +109,19 @@ impl Identification {
             .iter()
             .filter(|r| r.passivity != PASSIVE)
             .map(|r| {
+                let remedy = match self.plan.known_friction(&r.joint) {
+                    Some(_) => "The errors of its known friction outweigh it: look at both with doubt, or keep them positive \
+                         (`friction_errors = \"nonnegative\"`)"
+                        .to_owned(),
+                    None => format!(
+                        "{}, or ask for a simpler law (`--friction linear`)",
+                        self.bound_on_friction(&r.joint)
+                    ),
+                };
                 format!(
-                    "the identified friction of `{}` is {}; a simulator with it may not come to rest. {}, or ask for a simpler \
-                     law (`--friction linear`)",
+                    "the identified friction of `{}` is {}; a simulator with it may not come to rest. {remedy}",
                     r.joint,
                     in_words(r, self.speed_unit(&r.joint)),
-                    self.bound_on_friction(&r.joint)
                 )
             })
             .collect();
@@ -139,7 +144,7 @@ impl Identification {
         let (model, linear) = self.identified_model();
         let table = &model.parameters().linear;
         let coefficient = |name: &str| match name.rsplit_once('.') {
-            Some((owner, symbol)) => owner == joint && COEFFICIENTS.contains(&symbol),
+            Some((owner, symbol)) => owner == joint && friction::COEFFICIENTS.contains(&symbol),
             None => false,
         };
         let negative = table.iter().zip(linear).filter(|(p, value)| **value < 0.0 && coefficient(&p.name));

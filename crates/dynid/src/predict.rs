@@ -3,6 +3,8 @@
 use dynid_io::States;
 use dynid_model::{BaseParameters, EffortModel, MotionBlock, RegressorBlock, RobotModel};
 
+use crate::Error;
+
 /// Channel-after-channel copy of a states table.
 struct Flat {
     rows: usize,
@@ -10,6 +12,7 @@ struct Flat {
     dq: Vec<f64>,
     ddq: Vec<f64>,
     gravity: Option<Vec<f64>>,
+    channels: Vec<(String, Vec<f64>)>,
 }
 
 impl Flat {
@@ -20,10 +23,18 @@ impl Flat {
             dq: states.velocity.concat(),
             ddq: states.acceleration.concat(),
             gravity: states.gravity.as_ref().map(|g| g.concat()),
+            channels: states.channels.clone(),
         }
     }
 
-    fn regressor(&self, model: &RobotModel) -> RegressorBlock {
+    fn regressor(&self, model: &RobotModel) -> Result<RegressorBlock, Error> {
+        for channel in model.channels() {
+            if !self.channels.iter().any(|(name, _)| name == channel) {
+                return Err(Error::StatesChannel { channel: channel.clone() });
+            }
+        }
+        let channels: Vec<(&str, &[f64])> =
+            self.channels.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect();
         let mut block = RegressorBlock::new(model.layout().clone(), self.rows);
         let motion = MotionBlock {
             samples: self.rows,
@@ -32,23 +43,34 @@ impl Flat {
             dq: &self.dq,
             ddq: &self.ddq,
             gravity: self.gravity.as_deref(),
-            channels: &[],
+            channels: &channels,
             sign_width: 0.0,
         };
         model.regressor(&motion, &model.parameters().shape_start(), &mut block);
-        block
+        Ok(block)
     }
 }
 
-/// Effort of every output at every state, for given linear parameters.
-pub fn efforts(model: &RobotModel, values: &[f64], states: &States) -> Vec<Vec<f64>> {
-    let block = Flat::new(states).regressor(model);
-    (0..model.outputs().len()).map(|output| block.effort(output, values)).collect()
+/// Effort of every output at every state, for given linear parameters; that of known elements included. Friction that remembers
+/// the motion (LuGre) is in its steady state.
+///
+/// # Errors
+/// [`Error::StatesChannel`]: the states lack a channel that the model reads, a temperature.
+pub fn efforts(model: &RobotModel, values: &[f64], states: &States) -> Result<Vec<Vec<f64>>, Error> {
+    let block = Flat::new(states).regressor(model)?;
+    Ok((0..model.outputs().len()).map(|output| block.effort(output, values)).collect())
 }
 
 /// Regressor at every state: `rows[state][output][column]`, in standard columns or, with `base`, in base columns.
-pub fn regressors(model: &RobotModel, base: Option<&BaseParameters>, states: &States) -> Vec<Vec<Vec<f64>>> {
-    let block = Flat::new(states).regressor(model);
+///
+/// # Errors
+/// As [`efforts`].
+pub fn regressors(
+    model: &RobotModel,
+    base: Option<&BaseParameters>,
+    states: &States,
+) -> Result<Vec<Vec<Vec<f64>>>, Error> {
+    let block = Flat::new(states).regressor(model)?;
     let layout = model.layout();
     let columns: Vec<usize> = base.map_or_else(|| (0..layout.parameters()).collect(), |b| b.kept.clone());
     let mut out = vec![vec![vec![0.0; columns.len()]; layout.outputs()]; states.rows];
@@ -60,5 +82,5 @@ pub fn regressors(model: &RobotModel, base: Option<&BaseParameters>, states: &St
             }
         }
     }
-    out
+    Ok(out)
 }

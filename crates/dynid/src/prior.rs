@@ -5,7 +5,7 @@ mod bodies;
 mod scalars;
 
 pub use bodies::{BodyPrior, Origin};
-pub(crate) use scalars::speed_limit;
+pub(crate) use scalars::{speed_limit, typical_channels};
 
 use dynid_model::{EffortModel, Mechanism, RobotModel};
 use thiserror::Error;

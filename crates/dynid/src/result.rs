@@ -287,6 +287,10 @@ impl Identification {
                 );
             }
         }
+        for law in &self.plan.known {
+            let name = format!("known friction of {}", law.joint);
+            add(&name, json!(law.in_words()), "", "given", friction::of_known(self, law));
+        }
         for log in &self.logs {
             if let Some(motion) = &log.periodic {
                 add(
@@ -464,11 +468,19 @@ fn provenance(config: &Config) -> Result<Provenance, Error> {
         }
         value
     };
+    let elements = &config.elements;
+    if let Some(path) = &elements.known_friction {
+        inputs.push(InputRecord {
+            path: path.display().to_string(),
+            kind: "friction".to_owned(),
+            sha256: sha256(path)?,
+        });
+    }
     let settings = json!({
         "gravity": config.gravity,
         "couple_mimics": config.couple_mimics.unwrap_or(false),
         "locked": config.locked,
-        "elements": { "default": config.elements.default, "joint": config.elements.joint, "friction": config.elements.friction },
+        "elements": elements,
         "conditioning": config.conditioning,
         "estimator": config.estimator,
         "bound": config.bound,

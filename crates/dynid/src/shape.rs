@@ -89,7 +89,7 @@ pub fn linearised(
             )),
         });
     }
-    Ok(RobotModel::new(mechanism.clone(), elements))
+    plan.complete(mechanism, elements)
 }
 
 fn take<'a, T>(rest: &mut &'a [T], count: usize) -> &'a [T] {

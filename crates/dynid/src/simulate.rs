@@ -88,7 +88,7 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
              simulate by inverse dynamics"
         )));
     }
-    let model = RobotModel::new(mechanism.clone(), plan.build(mechanism)?);
+    let model = plan.model(mechanism)?;
     let model = with_nominal_shape(model, &settings.values)?;
     let missing: Vec<&str> = model
         .channels()

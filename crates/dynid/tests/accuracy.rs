@@ -35,7 +35,7 @@ path = "{data}/oracles/logs/{log}/train.csv.gz"
         let joints = id.robot.state_joints();
         let states = dynid::io::states::from_table(&table, &joints).unwrap();
         let (model, values) = id.identified_model();
-        let predicted = efforts(model, values, &states);
+        let predicted = efforts(model, values, &states).unwrap();
         let mut sum = 0.0;
         for (j, predicted) in predicted.iter().enumerate() {
             let truth = table.column(&format!("tau{}", j + 1)).unwrap();

@@ -69,6 +69,7 @@ impl Case {
             model: &self.model,
             values: &self.values,
             load_reference: None,
+            known_friction: &[],
         }
     }
 
@@ -358,8 +359,13 @@ fn a_helical_joint_is_refused_by_both_formats() {
     let description = dynid::io::robot::read(&path).unwrap().description;
     let model = RobotModel::new(description.build().unwrap(), Vec::new());
     let values = model.mechanism().inertia_vector();
-    let identified =
-        Identified { description: &description, model: &model, values: &values, load_reference: None };
+    let identified = Identified {
+        description: &description,
+        model: &model,
+        values: &values,
+        load_reference: None,
+        known_friction: &[],
+    };
     let export = RobotExport::new(identified, &source).unwrap();
     let states = CheckStates::random(&model);
     for (refused, format) in [(export.urdf(&states), "URDF"), (export.mjcf(&states), "MJCF")] {

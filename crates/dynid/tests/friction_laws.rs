@@ -199,9 +199,10 @@ fn every_law_is_found_recorded_and_exported() {
             velocity: log.clean[1].clone(),
             acceleration: log.clean[2].clone(),
             gravity: None,
+            channels: Vec::new(),
         };
         let model = read.effort_model(&bench.path("estimate.json"), Split::Consistent).unwrap();
-        let predicted = efforts(&model, &read.values(Split::Consistent), &states);
+        let predicted = efforts(&model, &read.values(Split::Consistent), &states).unwrap();
         for (p, clean) in predicted.iter().zip(&log.clean[3]) {
             let square = |list: &mut dyn Iterator<Item = f64>| list.map(|x| x * x).sum::<f64>();
             let error = square(&mut p.iter().zip(clean).map(|(p, c)| p - c));

@@ -46,9 +46,16 @@ fn errors_of(log: &SimulatedLog, held_out: &SimulatedLog, path: &Path, more: &st
         truth[table.column(name).unwrap()] = *value;
     }
     let [position, velocity, acceleration, _] = held_out.clean.clone();
-    let states = States { rows: held_out.time.len(), position, velocity, acceleration, gravity: None };
-    let expected = efforts(&id.model, &truth, &states);
-    let found = efforts(&id.model, id.unconstrained_values(), &states);
+    let states = States {
+        rows: held_out.time.len(),
+        position,
+        velocity,
+        acceleration,
+        gravity: None,
+        channels: Vec::new(),
+    };
+    let expected = efforts(&id.model, &truth, &states).unwrap();
+    let found = efforts(&id.model, id.unconstrained_values(), &states).unwrap();
     let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
     let relative = expected.iter().zip(&found).map(|(e, f)| {
         let off: Vec<f64> = e.iter().zip(f).map(|(e, f)| e - f).collect();

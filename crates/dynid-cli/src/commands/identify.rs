@@ -22,7 +22,8 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     let robot = config.robot.file_stem().map_or_else(|| "robot".into(), |s| s.to_string_lossy().into_owned());
     let files = ["estimate.json", "report.html", &format!("{robot}.urdf")].map(|name| out.join(name));
     let logs = config.log.iter().chain(&config.validation).map(|log| log.path.as_path());
-    let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).collect();
+    let friction = config.elements.known_friction.as_deref();
+    let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).chain(friction).collect();
     outputs::check_folder(&out, &files, &inputs)?;
     let progress = Progress::new(args.quiet);
     let identification = identify(&config, |step| progress.step(step))?;
@@ -100,6 +101,9 @@ fn configuration(args: &IdentifyArgs) -> Result<Config, Failure> {
             FrictionArg::SigmoidOffset => Friction::SigmoidOffset,
             FrictionArg::Power => Friction::Power,
         };
+    }
+    if args.known_friction.is_some() {
+        config.elements.known_friction.clone_from(&args.known_friction);
     }
     apply_log_args(&mut config.columns, &args.columns);
     config.locked.extend(args.lock.iter().cloned());

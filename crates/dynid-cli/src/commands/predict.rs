@@ -19,18 +19,10 @@ pub(crate) fn run(args: &PredictArgs) -> Result<u8, Failure> {
     let estimate = Estimate::read(&args.estimate)?;
     let split = args.split.of();
     let model = estimate.effort_model(&args.estimate, split)?;
-    if !model.channels().is_empty() {
-        return Err(Failure::Usage(
-            format!(
-                "{}: the model reads the channels {}, which a states table does not hold",
-                args.estimate.display(),
-                model.channels().join(", ")
-            ),
-            "use `dynid validate` with a log that holds them",
-        ));
-    }
-    let states = states::read(&args.states, &state_joints(model.mechanism()), &ReadOptions::default())?;
-    let effort = efforts(&model, &estimate.values(split), &states);
+    let joints = state_joints(model.mechanism());
+    let states =
+        states::read_with_channels(&args.states, &joints, model.channels(), &ReadOptions::default())?;
+    let effort = efforts(&model, &estimate.values(split), &states)?;
     match &args.out {
         None => data(&csv_text(&estimate.joints, &effort))?,
         Some(path) => {

@@ -22,7 +22,7 @@ pub(crate) fn run(args: &RegressorArgs) -> Result<u8, Failure> {
     let robot = load_robot(&args.robot)?;
     let states = states::read(&args.states, &robot.state_joints(), &ReadOptions::default())?;
     let model = RobotModel::new(robot.mechanism.clone(), Vec::new());
-    let effort = efforts(&model, &model.parameters().prior(), &states);
+    let effort = efforts(&model, &model.parameters().prior(), &states)?;
     let joints: Vec<String> = model.outputs().iter().map(|o| o.name.clone()).collect();
     if !args.json {
         data(&csv_text(&joints, &effort))?;
@@ -44,7 +44,7 @@ pub(crate) fn run(args: &RegressorArgs) -> Result<u8, Failure> {
     json(&Output {
         columns,
         effort: (0..states.rows).map(|s| effort.iter().map(|e| e[s]).collect()).collect(),
-        regressor: regressors(&model, base.as_ref(), &states),
+        regressor: regressors(&model, base.as_ref(), &states)?,
         joints,
     })?;
     Ok(0)

@@ -4,6 +4,7 @@ use super::{PlacedElement, RobotModel};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::effort_model::RegressorBlock;
 use crate::element::{ElementColumns, ElementWeights, JointElement};
+use crate::parameter::Parameter;
 
 /// An element with values of all of its parameters.
 #[derive(Debug)]
@@ -54,6 +55,17 @@ impl RobotModel {
             self.known.push(PlacedKnown { placed, linear, shape });
         }
         self.signals = self.signal_names();
+        self
+    }
+
+    /// The same model with linear parameters of any sign where `is_free` says so: errors of known elements, say, have no
+    /// reason to be positive.
+    pub fn with_free_sign(mut self, is_free: impl Fn(&Parameter) -> bool) -> Self {
+        for parameter in self.parameters.linear.iter_mut().filter(|p| is_free(p)) {
+            if parameter.lower == Some(0.0) {
+                parameter.lower = None;
+            }
+        }
         self
     }
 

@@ -33,7 +33,7 @@ const GRID: usize = 4000;
 const ROUNDING: f64 = 1e-12;
 
 impl RobotModel {
-    /// Whether the friction elements of a joint together are passive, `v (e(v) - e(0)) >= 0`, for velocities from
+    /// Whether the friction elements of a joint together, known ones too, are passive, `v (e(v) - e(0)) >= 0`, for velocities from
     /// `range.0` to `range.1` (rad/s, m/s). The effort at rest is the offset of the joint and left out.
     ///
     /// Signs are looked at on 4000 velocities on each side of rest, denser towards rest, and intervals are located
@@ -86,7 +86,7 @@ impl RobotModel {
         FrictionPassivity { passivity, worst, static_below_coulomb: self.static_below_coulomb(rate, linear) }
     }
 
-    /// Effort of the friction elements of a joint over velocities (rad/s, m/s), less that at rest, `e(v) - e(0)`, in N m or N;
+    /// Effort of the friction elements of a joint, known ones too, over velocities (rad/s, m/s), less that at rest, `e(v) - e(0)`, in N m or N;
     /// what [`RobotModel::friction_passivity`] looks at.
     ///
     /// # Panics
@@ -116,12 +116,17 @@ impl RobotModel {
 /// The law of a joint's friction elements.
 struct Friction<'a> {
     model: &'a RobotModel,
-    elements: Vec<&'a PlacedElement>,
+    elements: Vec<Law<'a>>,
     rate: usize,
-    shape: &'a [f64],
-    linear: &'a [f64],
     held: &'a [(&'a str, f64)],
     at_rest: f64,
+}
+
+/// One friction element with its shape parameters and the values that its entries point at.
+struct Law<'a> {
+    placed: &'a PlacedElement,
+    shape: &'a [f64],
+    linear: &'a [f64],
 }
 
 /// Friction of one direction of motion.
@@ -143,9 +148,12 @@ impl<'a> Friction<'a> {
         linear: &'a [f64],
         held: &'a [(&'a str, f64)],
     ) -> Self {
-        let of_joint = |p: &&PlacedElement| p.element.is_friction() && p.element.rates() == [rate];
-        let elements = model.elements.iter().filter(of_joint).collect();
-        let mut friction = Friction { model, elements, rate, shape, linear, held, at_rest: 0.0 };
+        let own = model.elements.iter().map(|placed| Law { placed, shape: placed.shape(shape), linear });
+        let known = model.known.iter().map(|k| Law { placed: &k.placed, shape: &k.shape, linear: &k.linear });
+        let of_joint =
+            |law: &Law<'_>| law.placed.element.is_friction() && law.placed.element.rates() == [rate];
+        let elements = own.chain(known).filter(of_joint).collect();
+        let mut friction = Friction { model, elements, rate, held, at_rest: 0.0 };
         friction.at_rest = friction.efforts(&[0.0])[0];
         friction
     }
@@ -159,14 +167,14 @@ impl<'a> Friction<'a> {
             self.held.iter().zip(&held).map(|((name, _), x)| (*name, x.as_slice())).collect();
         let motion = MotionBlock { channels: &channels, ..MotionBlock::plain(n, &[], &dq, &[]) };
         let mut effort = vec![0.0; n];
-        for placed in &self.elements {
+        for Law { placed, shape, linear } in &self.elements {
             let mut data = vec![0.0; placed.entries.len() * n];
             let slots = &placed.entry_numbers;
             let mut columns = ElementColumns { data: &mut data, slots, stride: n, samples: n };
-            placed.element.fill(&self.model.joints, &motion, placed.shape(self.shape), &mut columns);
+            placed.element.fill(&self.model.joints, &motion, shape, &mut columns);
             for ((_, column), values) in placed.entries.iter().zip(data.chunks_exact(n)) {
                 for (e, w) in effort.iter_mut().zip(values) {
-                    *e += w * self.linear[*column];
+                    *e += w * linear[*column];
                 }
             }
         }

@@ -6,6 +6,8 @@ use dynid_motion::Kernel;
 use dynid_motion::mask::{dilate, near_reversal};
 use dynid_motion::signal::rms;
 
+use crate::prior::typical_channels;
+
 use super::motions::{Course, Motion, MotionSettings, Reach};
 
 /// Rows are formed at cut-offs up to this, Hz; the motions hold nothing above.
@@ -92,7 +94,9 @@ impl<'a> CandidateRows<'a> {
         let widest = self.kernels.first()?;
         let samples = (self.duration_s * self.rate_hz).round() as usize;
         let [q, dq, ddq] = self.signals(motion, samples, widest.cutoff_hz());
-        let block = MotionBlock::plain(samples, &q, &dq, &ddq);
+        let values = typical_channels(self.model, samples);
+        let channels = named(&values);
+        let block = MotionBlock { channels: &channels, ..MotionBlock::plain(samples, &q, &dq, &ddq) };
         let mut regressor = RegressorBlock::new(self.model.layout().clone(), samples);
         self.model.regressor(&block, &self.model.parameters().shape_start(), &mut regressor);
         let factors: Vec<Factor> =
@@ -173,6 +177,10 @@ impl<'a> CandidateRows<'a> {
     }
 }
 
+fn named(channels: &[(String, Vec<f64>)]) -> Vec<(&str, &[f64])> {
+    channels.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect()
+}
+
 /// Outputs whose effort jumps when all speeds change their sign.
 fn dry_outputs(model: &RobotModel) -> Vec<bool> {
     const CREEP: f64 = 1e-9;
@@ -180,7 +188,9 @@ fn dry_outputs(model: &RobotModel) -> Vec<bool> {
     // Two samples: creeping forward and backward.
     let dq: Vec<f64> = (0..n).flat_map(|_| [CREEP, -CREEP]).collect();
     let zero = vec![0.0; 2 * n];
-    let block = MotionBlock::plain(2, &zero, &dq, &zero);
+    let values = typical_channels(model, 2);
+    let channels = named(&values);
+    let block = MotionBlock { channels: &channels, ..MotionBlock::plain(2, &zero, &dq, &zero) };
     let mut regressor = RegressorBlock::new(model.layout().clone(), 2);
     model.regressor(&block, &model.parameters().shape_start(), &mut regressor);
     (0..n)

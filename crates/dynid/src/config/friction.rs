@@ -29,6 +29,17 @@ pub enum Friction {
     Power,
 }
 
+/// Sign of the errors of known friction.
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum FrictionErrors {
+    /// Any: known friction may be too large or too small.
+    #[default]
+    Free,
+    /// Not negative, as coefficients of friction.
+    Nonnegative,
+}
+
 /// Elements of all these laws.
 const FRICTION_ELEMENTS: [&str; 12] = [
     "coulomb",

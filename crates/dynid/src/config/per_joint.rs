@@ -39,6 +39,14 @@ impl PerJoint {
         self.resolve(what, joints, "a number that is not negative", |x| x >= 0.0)
     }
 
+    /// Finite numbers per joint, `None` where nothing is said.
+    ///
+    /// # Errors
+    /// [`Error::UnknownJoint`], [`Error::Setting`] if a number is not finite.
+    pub(crate) fn finite(&self, what: &str, joints: &[String]) -> Result<Vec<Option<f64>>, Error> {
+        self.resolve(what, joints, "a finite number", |_| true)
+    }
+
     fn resolve(
         &self,
         what: &str,

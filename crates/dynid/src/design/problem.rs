@@ -72,8 +72,15 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
         elements.per_joint.retain(|(j, _)| j != joint);
         elements.per_joint.push((joint.clone(), list.clone()));
     }
+    if let Some(file) = &config.elements.known_friction {
+        return Err(Error::setting(
+            "elements.known_friction",
+            "a design without known friction, which changes no column of the regressor",
+            file.display(),
+        ));
+    }
     let plan = ElementPlan::new(mechanism, &elements, config.elements.default.as_deref(), |_| true)?;
-    let model = RobotModel::new(mechanism.clone(), plan.build(mechanism)?);
+    let model = plan.model(mechanism)?;
     let model = Arc::new(with_nominal_shape(model, &config.values)?);
     if !model.channels().is_empty() {
         return Err(Error::Unsupported(

@@ -45,6 +45,10 @@ const OPTIONS: [(&str, &str); 4] = [
     ("exponential_viscous", "temperature_max"),
 ];
 
+/// Friction coefficients that a passive law has positive; offsets and the difference between the directions have any sign.
+pub(crate) const COEFFICIENTS: [&str; 13] =
+    ["fc", "fs", "fv", "fa", "ft", "fg", "fl", "fp", "fcp", "fcn", "fvp", "fvn", "sigma2"];
+
 /// Friction laws of the speed alone that have no shape parameters.
 const UNSHAPED: [&str; 4] = ["coulomb", "viscous", "asymmetric", "viscous_magnitude"];
 

@@ -8,6 +8,7 @@ use dynid_model::{
 use serde::{Deserialize, Serialize};
 
 use crate::elements::ElementPlan;
+use crate::friction::KnownFriction;
 
 /// Robot, elements and settings that predictions need.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -31,6 +32,9 @@ pub struct ModelRecord {
     /// Standard parameters of all bodies whose rigid effort loads the gears of `load` elements; absent: those of the links.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub load_reference: Option<Vec<f64>>,
+    /// Friction whose effort is known; coefficients of friction among the parameters of these joints are its errors.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub known_friction: Vec<KnownFriction>,
     /// Cut-off of the state filter, Hz.
     pub state_hz: f64,
     /// Cut-off of the widest kernel, Hz.
@@ -140,6 +144,7 @@ impl ModelRecord {
             couplings,
             element_settings,
             load_reference: plan.load_reference.clone(),
+            known_friction: plan.known.clone(),
             state_hz: 0.0,
             kernel_hz: 0.0,
         }
@@ -186,6 +191,7 @@ impl ModelRecord {
         let spec = ElementSpec { settings, ..ElementSpec::default() };
         let mut plan = ElementPlan::recorded(self.elements.clone(), couplings, spec);
         plan.load_reference.clone_from(&self.load_reference);
+        plan.known.clone_from(&self.known_friction);
         plan
     }
 }

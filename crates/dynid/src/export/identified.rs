@@ -7,6 +7,7 @@ use dynid_model::{Description, Inertia, RobotModel};
 
 use crate::Error;
 use crate::estimate::{Estimate, InputRecord, Split};
+use crate::friction::KnownFriction;
 use crate::identify::Identification;
 
 /// A robot with identified parameters, whatever they come from.
@@ -21,6 +22,8 @@ pub struct Identified<'a> {
     /// Ten standard parameters per body whose rigid effort loads the gears of `load` elements; `None`: those of the model's
     /// mechanism.
     pub load_reference: Option<&'a [f64]>,
+    /// Friction that the model knows beside its parameters, which are errors of it.
+    pub known_friction: &'a [KnownFriction],
 }
 
 /// The same, as an estimate file holds it.
@@ -30,6 +33,7 @@ pub struct IdentifiedRobot {
     model: RobotModel,
     values: Vec<f64>,
     load_reference: Option<Vec<f64>>,
+    known_friction: Vec<KnownFriction>,
 }
 
 impl IdentifiedRobot {
@@ -40,6 +44,7 @@ impl IdentifiedRobot {
             model: &self.model,
             values: &self.values,
             load_reference: self.load_reference.as_deref(),
+            known_friction: &self.known_friction,
         }
     }
 }
@@ -55,8 +60,13 @@ impl Estimate {
             .model
             .description(&self.robot)
             .map_err(|message| Error::EstimateFile { file: file.display().to_string(), message })?;
-        let load_reference = self.model.load_reference.clone();
-        Ok(IdentifiedRobot { description, model, values: self.values(Split::Consistent), load_reference })
+        Ok(IdentifiedRobot {
+            description,
+            model,
+            values: self.values(Split::Consistent),
+            load_reference: self.model.load_reference.clone(),
+            known_friction: self.model.known_friction.clone(),
+        })
     }
 
     /// The robot file that was identified, if the estimate names it.
@@ -93,8 +103,13 @@ impl Identification {
     /// The identified robot, for [`RobotExport`](super::RobotExport) and [`json`](super::json()).
     pub fn identified(&self) -> Identified<'_> {
         let (model, values) = self.identified_model();
-        let load_reference = self.plan.load_reference.as_deref();
-        Identified { description: &self.robot.file.description, model, values, load_reference }
+        Identified {
+            description: &self.robot.file.description,
+            model,
+            values,
+            load_reference: self.plan.load_reference.as_deref(),
+            known_friction: &self.plan.known,
+        }
     }
 }
 

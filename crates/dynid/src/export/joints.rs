@@ -3,6 +3,10 @@
 use dynid_io::mjcf::JointParameters;
 use dynid_model::{EffortModel, Owner, RobotModel};
 
+use super::Identified;
+use crate::friction::KnownFriction;
+use crate::friction::model::ViscousModel;
+
 /// A file format.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Format {
@@ -34,7 +38,11 @@ pub(super) struct JointValues {
 /// `fc`, `fv` become friction and damping, of asymmetric friction the means of both directions; `Ia` is armature in
 /// MJCF and has no place in URDF. Negative values, which simulators refuse, are stated as 0. Stribeck friction becomes the
 /// Coulomb friction that it falls to.
-pub(super) fn split(model: &RobotModel, values: &[f64], format: Format) -> JointValues {
+///
+/// Of known friction the file states Coulomb friction and a linear viscous coefficient, each with its error; viscous friction
+/// that saturates has no place in it, and neither has the error beside it.
+pub(super) fn split(identified: &Identified<'_>, format: Format) -> JointValues {
+    let Identified { model, values, known_friction, .. } = *identified;
     let table = model.parameters();
     let bodies = 10 * model.mechanism().bodies().len();
     let mut kept = values[..bodies].to_vec();
@@ -42,6 +50,7 @@ pub(super) fn split(model: &RobotModel, values: &[f64], format: Format) -> Joint
     let mut out = JointValues { joints: Vec::new(), values: kept, notes: Vec::new() };
     for joint in model.joints() {
         let column = |symbol: &str| table.column(&format!("{}.{symbol}", joint.name));
+        let law = known_friction.iter().find(|law| law.joint == joint.name);
         let mut state = |symbol: &str, what: &str, unit_of: usize, value: f64| {
             if value < 0.0 {
                 out.notes.push(format!(
@@ -57,21 +66,27 @@ pub(super) fn split(model: &RobotModel, values: &[f64], format: Format) -> Joint
             }
             value
         };
-        let mut friction = |symbol: &str, what: &str| {
+        let mut friction = |symbol: &str, what: &str, known: Known| {
             let single = column(symbol);
             let both = column(&format!("{symbol}p")).zip(column(&format!("{symbol}n")));
+            let total = |own: f64| match known {
+                Known::Part(part) => part + own,
+                Known::NoPlace => 0.0,
+            };
             match (single, both) {
-                (Some(c), _) => Some(state(symbol, what, c, values[c])),
-                (None, Some((p, n))) => Some(state(symbol, what, p, 0.5 * (values[p] + values[n]))),
+                (Some(c), _) => Some(state(symbol, what, c, total(values[c]))),
+                (None, Some((p, n))) => Some(state(symbol, what, p, total(0.5 * (values[p] + values[n])))),
                 (None, None) => None,
             }
         };
-        let friction_loss = friction("fc", "Coulomb friction");
-        let damping = friction("fv", "viscous friction");
+        let friction_loss =
+            friction("fc", "Coulomb friction", Known::Part(law.map_or(0.0, |law| law.coulomb)));
+        let damping = friction("fv", "viscous friction", viscous(law));
         let armature = match format {
-            Format::Mjcf => friction("Ia", "rotor inertia"),
+            Format::Mjcf => friction("Ia", "rotor inertia", Known::Part(0.0)),
             Format::Urdf => None,
         };
+        out.notes.extend(law.and_then(|law| known_left_out(law, format, friction_loss, damping)));
         // Stribeck friction whose static friction equals Coulomb friction is Coulomb friction.
         if let (Some(fixed), Some(coulomb)) = (column("fs"), friction_loss) {
             out.values[fixed] = coulomb;
@@ -87,6 +102,58 @@ pub(super) fn split(model: &RobotModel, values: &[f64], format: Format) -> Joint
     }
     out.notes.extend(left_out(model, values, format));
     out
+}
+
+/// What known friction adds to a coefficient of a file.
+#[derive(Clone, Copy)]
+enum Known {
+    Part(f64),
+    /// Friction of a form that the file has no place for.
+    NoPlace,
+}
+
+fn viscous(law: Option<&KnownFriction>) -> Known {
+    match law.and_then(|law| law.viscous) {
+        None => Known::Part(0.0),
+        Some(ViscousModel::Linear { coefficient }) => Known::Part(coefficient),
+        Some(ViscousModel::Exponential(_)) => Known::NoPlace,
+    }
+}
+
+/// Parts of known friction that a file lacks, in words. `friction_loss`, `damping`: what it states.
+fn known_left_out(
+    law: &KnownFriction,
+    format: Format,
+    friction_loss: Option<f64>,
+    damping: Option<f64>,
+) -> Option<String> {
+    let mut parts = Vec::new();
+    if friction_loss.is_none() {
+        parts.push("Coulomb friction (the model has no `coulomb` for its error)");
+    }
+    match (law.viscous, damping) {
+        (Some(ViscousModel::Exponential(_)), _) => {
+            parts.push("viscous friction, which saturates, with its error")
+        }
+        (Some(ViscousModel::Linear { .. }), None) => {
+            parts.push("viscous friction (the model has no `viscous` for its error)");
+        }
+        _ => {}
+    }
+    if law.slipping_bristle().is_some() {
+        parts.push("bristles");
+    }
+    if law.static_.is_some_and(|fixed| fixed != law.coulomb) {
+        parts.push("rise towards rest");
+    }
+    (!parts.is_empty()).then(|| {
+        format!(
+            "left out of the known friction of `{}` in {}: {}",
+            law.joint,
+            format.name(),
+            parts.join(", ")
+        )
+    })
 }
 
 /// What a format has no place for, one line per kind of element.

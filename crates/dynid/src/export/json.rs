@@ -7,6 +7,7 @@ use super::identified::inertias;
 use super::read_back::{CheckStates, judge, largest_difference};
 use super::{Exported, Identified};
 use crate::Error;
+use crate::friction::KnownFriction;
 
 /// Version of the layout of [`RobotJson`]: keys are added but never renamed.
 pub const ROBOT_JSON_SCHEMA: u32 = 1;
@@ -31,6 +32,9 @@ pub struct RobotJson {
     /// Shape parameters: those that enter the effort nonlinearly.
     #[serde(default)]
     pub shape: Vec<OtherJson>,
+    /// Friction that is known beside `joints`, whose `coulomb`, `viscous` and `offset` are errors of it where it is stated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub known_friction: Vec<KnownFriction>,
 }
 
 /// A moving link together with all that is welded to it, in the axes of its joint frame (the URDF link frame).
@@ -171,6 +175,7 @@ impl RobotJson {
                 .iter()
                 .map(|s| OtherJson { name: s.name.clone(), value: s.start, unit: s.unit.to_owned() })
                 .collect(),
+            known_friction: identified.known_friction.to_vec(),
         }
     }
 

@@ -137,8 +137,7 @@ impl<'a> RobotExport<'a> {
     /// # Errors
     /// [`Error::RobotFile`]: URDF cannot state the robot; [`Error::Export`]: see [`ExportError::ReadBack`].
     pub fn urdf(&self, states: &CheckStates) -> Result<Exported, Error> {
-        let JointValues { joints, values, notes } =
-            joints::split(self.identified.model, self.identified.values, Format::Urdf);
+        let JointValues { joints, values, notes } = joints::split(&self.identified, Format::Urdf);
         let source = match &self.source.urdf {
             Some(text) => text.clone(),
             None => urdf::from_description(&self.description)?,
@@ -186,8 +185,7 @@ impl<'a> RobotExport<'a> {
     /// # Errors
     /// [`Error::RobotFile`]: MJCF cannot state the robot; [`Error::Export`]: see [`ExportError::ReadBack`].
     pub fn mjcf(&self, states: &CheckStates) -> Result<Exported, Error> {
-        let JointValues { joints, values, notes } =
-            joints::split(self.identified.model, self.identified.values, Format::Mjcf);
+        let JointValues { joints, values, notes } = joints::split(&self.identified, Format::Mjcf);
         let text = mjcf::from_description(&self.description, &joints)?;
         let read = mjcf::parse(&text, "exported MJCF")?;
         let notes = [self.notes.clone(), notes].concat();

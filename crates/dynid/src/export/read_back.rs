@@ -134,7 +134,7 @@ pub(super) fn compile(
     Ok((RobotModel::new(mechanism, elements), values))
 }
 
-/// Largest difference of effort between two models of the same coordinates, each with shape and linear parameters, joint by joint relative to the largest effort
+/// Largest difference of effort, without that of known elements, between two models of the same coordinates, each with shape and linear parameters, joint by joint relative to the largest effort
 /// of the joint (of all joints, times 1e-6, if that is more: a joint may need no effort at all).
 pub(super) fn largest_difference(
     (a, a_shape, a_values): (&RobotModel, &[f64], &[f64]),
@@ -151,7 +151,11 @@ pub(super) fn largest_difference(
             model.regressor(motion, shape, block);
         }
         for output in 0..outputs {
-            let (x, y) = (blocks[0].effort(output, a_values), blocks[1].effort(output, b_values));
+            let effort = |block: &RegressorBlock, values: &[f64]| -> Vec<f64> {
+                let whole = block.effort(output, values);
+                whole.iter().zip(block.offset(output)).map(|(e, known)| e - known).collect()
+            };
+            let (x, y) = (effort(&blocks[0], a_values), effort(&blocks[1], b_values));
             for (x, y) in x.iter().zip(&y) {
                 largest[output] = largest[output].max(x.abs());
                 let d = (x - y).abs();

@@ -14,6 +14,7 @@
 pub mod config;
 mod error;
 mod experiment;
+mod known;
 pub mod model;
 mod presliding;
 mod record;
@@ -25,6 +26,7 @@ pub use config::{
 };
 pub use error::FrictionError;
 pub use experiment::{JointExperiment, PassSamples};
+pub use known::KnownFriction;
 pub use model::FrictionModel;
 pub use presliding::{PreslidingFit, PreslidingTest, fit_presliding};
 

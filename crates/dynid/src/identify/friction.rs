@@ -32,7 +32,12 @@ pub(super) fn choose(
         model.outputs().iter().map(|o| names.iter().position(|n| *n == o.name)).collect();
     let kinds: Vec<Vec<ShapeKind>> = rates
         .iter()
-        .map(|rate| rate.map_or_else(Vec::new, |r| kinds_beside(&plan.per_rate[r], follows)))
+        .map(|rate| match *rate {
+            // Its shape is known already.
+            Some(r) if plan.known_friction(&names[r]).is_some() => Vec::new(),
+            Some(r) => kinds_beside(&plan.per_rate[r], follows),
+            None => Vec::new(),
+        })
         .collect();
     let Structure { base, prior, regrouping, .. } = structure;
     let prior = BasePrior::new(regrouping, &prior.values, &prior.std);

@@ -41,11 +41,12 @@ pub(super) fn search(
     let Some(choices) = &mut out.conditioning else { return Ok(out) };
     let mechanism = out.model.mechanism().clone();
     let rebuilt = |plan: &ElementPlan| -> Result<(RobotModel, Structure), Error> {
-        let model = RobotModel::new(mechanism.clone(), plan.build(&mechanism)?);
+        let model = plan.model(&mechanism)?;
         let structure = Structure::of(config, &model, plan, logs)?;
         Ok((model, structure))
     };
-    if config.elements.friction == Friction::Auto {
+    let all_known = plan.known.len() == plan.per_rate.len();
+    if config.elements.friction == Friction::Auto && !all_known {
         let chosen = friction::choose(&out.model, &out.structure, plan, logs, choices, settings, |stage| {
             progress(Step::Conditioning(stage));
         })?;

@@ -21,6 +21,12 @@ const LIMIT_OF_LOGGED: f64 = 10.0;
 /// a small speed next to rest alone.
 const SPEEDS: [f64; 6] = [1.0, 0.25, 0.0625, 0.015625, 0.00390625, 1e-9];
 
+/// Channels that a model reads for motions without a log: currents of one ampere, the temperature of a warm joint, 35 °C.
+pub(crate) fn typical_channels(model: &RobotModel, samples: usize) -> Vec<(String, Vec<f64>)> {
+    let value = |name: &str| if is_temperature(name) { 35.0 } else { 1.0 };
+    model.channels().iter().map(|name| (name.clone(), vec![value(name); samples])).collect()
+}
+
 /// Speed limit of a joint for priors and motions: as stated, at most 4π rad/s (2 m/s); 2 rad/s (0.5 m/s) by default.
 pub(crate) fn speed_limit(slides: bool, stated: Option<f64>) -> f64 {
     let (default, most) = if slides { (0.5, 2.0) } else { (2.0, 4.0 * std::f64::consts::PI) };
@@ -84,13 +90,9 @@ impl Probe {
             .zip(&owners)
             .map(|(joint, body)| speed_limit(joint.slides, mechanism.bodies()[*body].joint.limits.velocity))
             .collect();
-        // Channels are currents, one ampere, or temperatures, those of a warm joint.
-        let (one, warm) = (vec![1.0; STATES], vec![35.0; STATES]);
-        let channels: Vec<(&str, &[f64])> = model
-            .channels()
-            .iter()
-            .map(|c| (c.as_str(), if is_temperature(c) { warm.as_slice() } else { one.as_slice() }))
-            .collect();
+        let channels = typical_channels(model, STATES);
+        let channels: Vec<(&str, &[f64])> =
+            channels.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect();
         RandomMotion::new(mechanism, &[], STATES, SEED).with_block(|motion| {
             let zero = vec![0.0; motion.dq.len()];
             let sign = |x: &f64| if *x < 0.0 { -1.0 } else { 1.0 };

@@ -13,14 +13,16 @@ use crate::shape::{self, NOT_SEEN, ONE_SIDED};
 const POINTS: usize = 200;
 
 impl Identification {
-    /// Friction over velocity of joints that have a law with shape parameters.
+    /// Friction over velocity of joints that have a law with shape parameters, or whose friction is known.
     pub(super) fn friction_laws(&self, estimate: &Estimate) -> Vec<report::Chart> {
         let outputs = estimate.joints.iter().zip(self.output_rates());
         outputs
             .filter_map(|(joint, rate)| {
                 let rate = rate?;
                 let record = estimate.friction_passivity.iter().find(|r| r.joint == *joint)?;
-                self.plan.per_rate[rate].iter().any(|name| is_shaped(name)).then(|| self.law(record, rate))
+                let known = self.plan.known_friction(joint).is_some();
+                let shaped = self.plan.per_rate[rate].iter().any(|name| is_shaped(name));
+                (known || shaped).then(|| self.law(record, rate))
             })
             .collect()
     }
@@ -58,8 +60,16 @@ impl Identification {
             unit: unit.to_owned(),
             logarithmic: false,
         };
-        let laws: Vec<&str> =
-            self.plan.per_rate[rate].iter().map(String::as_str).filter(|name| is_law(name)).collect();
+        let known = self.plan.known_friction(&record.joint).map(|law| law.in_words());
+        let own = self.plan.per_rate[rate].iter().map(String::as_str).filter(|name| is_law(name));
+        let laws: Vec<String> = match known {
+            Some(law) => {
+                let errors: Vec<&str> = own.collect();
+                let errors = (!errors.is_empty()).then(|| format!("errors ({})", errors.join(", ")));
+                std::iter::once(format!("known {law}")).chain(errors).collect()
+            }
+            None => own.map(str::to_owned).collect(),
+        };
         report::Chart {
             title: format!("{}: {}", record.joint, laws.join(" + ")),
             note: passivity::sentence(record, unit),

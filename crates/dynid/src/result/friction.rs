@@ -5,6 +5,7 @@ use dynid_model::EffortModel;
 
 use crate::elements::shape_element;
 use crate::estimate::FrictionTrial;
+use crate::friction::KnownFriction;
 use crate::identify::Identification;
 
 /// All shapes tried, joint after joint, accepted ones first.
@@ -55,4 +56,21 @@ pub(super) fn in_words(joint: &JointFriction) -> (Vec<String>, String) {
         ),
     };
     (joint.accepted.iter().map(name).collect(), reason)
+}
+
+/// What known friction does to the parameters of its joint.
+pub(super) fn of_known(id: &Identification, law: &KnownFriction) -> String {
+    let of_joint = |name: &str| name.rsplit_once('.').is_some_and(|(joint, _)| joint == law.joint);
+    let is_error = |name: &str| name.ends_with(".fo") || id.plan.is_friction_error(name);
+    let names = id.model.parameters().linear.iter().map(|p| p.name.as_str());
+    let errors: Vec<&str> = names.filter(|name| of_joint(name) && is_error(name)).collect();
+    match errors[..] {
+        [] => "its effort is taken off; the model has no parameters for its errors".to_owned(),
+        _ => format!(
+            "its effort is taken off; {} {} of it{}",
+            errors.join(", "),
+            if errors.len() == 1 { "is the error" } else { "are errors" },
+            if id.plan.free_errors { ", of any sign" } else { "" }
+        ),
+    }
 }

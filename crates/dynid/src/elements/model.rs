@@ -1,0 +1,62 @@
+//! From a plan to an effort model, known friction included.
+
+use dynid_model::element::JointElement;
+use dynid_model::{Mechanism, RobotModel};
+
+use super::{ElementPlan, friction};
+use crate::Error;
+use crate::friction::KnownFriction;
+
+impl ElementPlan {
+    /// The effort model of the plan, known friction included.
+    ///
+    /// # Errors
+    /// As [`ElementPlan::build`].
+    pub fn model(&self, mechanism: &Mechanism) -> Result<RobotModel, Error> {
+        self.complete(mechanism, self.build(mechanism)?)
+    }
+
+    /// A model of elements that stand for those of the plan, completed by known friction.
+    ///
+    /// # Errors
+    /// [`Error::ElementSetting`] for bristles beside known bristles, [`Error::UnknownJoint`].
+    pub(crate) fn complete(
+        &self,
+        mechanism: &Mechanism,
+        elements: Vec<Box<dyn JointElement>>,
+    ) -> Result<RobotModel, Error> {
+        let names = mechanism.rate_names();
+        let mut known = Vec::new();
+        for law in &self.known {
+            let Some(rate) = names.iter().position(|n| *n == law.joint) else {
+                return Err(Error::UnknownJoint { name: law.joint.clone(), known: names });
+            };
+            if law.slipping_bristle().is_some() && self.per_rate[rate].iter().any(|name| name == "lugre") {
+                return Err(Error::ElementSetting {
+                    element: "lugre".to_owned(),
+                    joint: law.joint.clone(),
+                    fault: "its known friction has bristles already: take `coulomb` for their error"
+                        .to_owned(),
+                });
+            }
+            known.extend(law.elements(rate));
+        }
+        let model = RobotModel::new(mechanism.clone(), elements).with_known(known);
+        Ok(match self.free_errors {
+            true => model.with_free_sign(|p| self.is_friction_error(&p.name)),
+            false => model,
+        })
+    }
+
+    /// Known friction of a joint.
+    pub fn known_friction(&self, joint: &str) -> Option<&KnownFriction> {
+        self.known.iter().find(|law| law.joint == joint)
+    }
+
+    /// Whether a parameter is the error of a coefficient of known friction.
+    pub fn is_friction_error(&self, name: &str) -> bool {
+        name.rsplit_once('.').is_some_and(|(joint, symbol)| {
+            friction::COEFFICIENTS.contains(&symbol) && self.known_friction(joint).is_some()
+        })
+    }
+}

@@ -1,0 +1,327 @@
+//! Two-step identification: friction known from its own experiment, inertias and errors of friction from a log.
+
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+
+use std::path::PathBuf;
+
+use dynid::config::LogConfig;
+use dynid::estimate::{Estimate, Split};
+use dynid::estimators::conditioning::ConditioningError;
+use dynid::export::{CheckStates, RobotExport, RobotJson, Source, json};
+use dynid::identify::Identification;
+use dynid::io::{States, csv};
+use dynid::model::EffortModel;
+use dynid::predict::efforts;
+use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
+use dynid::validate::{log_fit, validate};
+use dynid::{Config, Error, Robot, RobotOptions, identify};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+const ARM: &str = r#"schema = 1
+name = "arm"
+dh = "modified"
+[[joint]]
+name = "j1"
+alpha = "-90deg"
+d = 0.3
+limits = { position = [-2.0, 2.0], velocity = 3.0, effort = 200.0 }
+phi = [3.0, 0.6, 0.03, 0.0, 0.06, -0.006, 0.0, 0.17, 0.0, 0.18]
+[[joint]]
+name = "j2"
+a = 0.35
+limits = { position = [-2.0, 2.0], velocity = 3.0, effort = 200.0 }
+phi = [1.5, 0.225, 0.01, 0.0, 0.03, -0.0015, 0.0, 0.06, 0.0, 0.06]
+"#;
+
+/// Friction of both joints: it falls from rest, saturates with speed and falls by 1.2 % of its amplitude per kelvin.
+const FRICTION: &str = r#"stribeck = { coulomb = 2.0, static = 2.8, vs = 0.1 }
+exponential_viscous = { sigma2 = 9.0, sigma2_slope = -0.108, sigma3 = 0.9, sigma4 = 0.8, reference_temperature = 30.0 }
+offset = { effort = 0.4 }
+"#;
+
+/// Friction of one joint as its experiment left it.
+fn law(joint: &str, coulomb: f64) -> Value {
+    json!({
+        "joint": joint, "status": "identified", "coulomb": coulomb, "static": coulomb + 0.8,
+        "stribeck_speed": 0.1, "stribeck_exponent": 2.0,
+        "viscous": {
+            "reference_temperature": 30.0, "sigma2": 9.0, "sigma2_slope": -0.108, "sigma3": 0.9,
+            "sigma3_slope": 0.0, "sigma4": 0.8, "sigma4_slope": 0.0,
+        },
+        "offset": 7.0, "temperature_range": [20.0, 50.0], "std": {}, "points": [], "samples": 0, "levels": [],
+        "lines": {}, "laws": [], "unpaired": [], "presliding": [], "notes": [],
+    })
+}
+
+fn friction_file(joints: &[Value]) -> String {
+    json!({
+        "schema": 1, "robot": "arm", "verdict": { "status": "pass", "headline": "" }, "joints": joints,
+        "provenance": { "version": "0", "inputs": [], "settings": {}, "seed": 1 }, "warnings": [],
+    })
+    .to_string()
+}
+
+/// A folder with the robot as the user knows it, its friction file and its logs.
+struct Bench(TempDir);
+
+impl Bench {
+    fn new(coulomb: f64) -> Self {
+        let bench = Bench(tempfile::tempdir().unwrap());
+        std::fs::write(bench.path("arm.toml"), ARM).unwrap();
+        std::fs::write(bench.path("friction.json"), friction_file(&[law("j1", coulomb), law("j2", coulomb)]))
+            .unwrap();
+        bench
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// A log in which both joints warm up from one temperature to another.
+    fn log(&self, name: &str, [from, to]: [f64; 2], seed: u64) -> SimulatedLog {
+        let both = ["j1", "j2"].map(|joint| format!("[element.{joint}]\n{FRICTION}")).concat();
+        let elements = r#"[defaults]
+elements = ["stribeck", "exponential_viscous", "offset"]
+"#;
+        std::fs::write(self.path("truth.toml"), format!("{ARM}{elements}{both}")).unwrap();
+        let robot = Robot::load(&self.path("truth.toml"), &RobotOptions::default()).unwrap();
+        let channel = format!("[[0.0, {from}], [16.0, {to}]]");
+        let settings = format!(
+            "mode = \"closed_loop\"\nduration_s = 16.0\nrate_hz = 250\nseed = {seed}\neffort_noise = 0.01\n\
+             [channels]\ntemperature_j1 = {channel}\ntemperature_j2 = {channel}\n"
+        );
+        let log = simulate(&robot, &SimulateSettings::parse(&settings, "simulation").unwrap()).unwrap();
+        let mut header = vec!["t".to_owned()];
+        let mut columns: Vec<&[f64]> = vec![&log.time];
+        for (prefix, signals) in [("q", &log.position), ("tau", &log.effort)] {
+            header.extend(log.joints.iter().map(|j| format!("{prefix}_{j}")));
+            columns.extend(signals.iter().map(Vec::as_slice));
+        }
+        csv::write(self.path(&format!("bare_{name}")), &header, &columns).unwrap();
+        header.extend(log.joints.iter().map(|j| format!("temp_{j}")));
+        columns.extend(log.channels.iter().map(|(_, values)| values.as_slice()));
+        csv::write(self.path(name), &header, &columns).unwrap();
+        log
+    }
+
+    fn config(&self, elements: &str, logs: &str) -> Config {
+        let path = self.path("run.toml");
+        std::fs::write(&path, format!("robot = \"arm.toml\"\n[elements]\n{elements}\n{logs}")).unwrap();
+        Config::read(&path).unwrap()
+    }
+
+    fn identify(&self, elements: &str, logs: &str) -> (Identification, Estimate) {
+        let config = self.config(elements, logs);
+        let found = identify(&config, |_| {}).unwrap();
+        let estimate = found.estimate(&config).unwrap();
+        std::fs::write(self.path("estimate.json"), estimate.to_json()).unwrap();
+        let read = Estimate::read(&self.path("estimate.json")).unwrap();
+        assert_eq!(read.to_json(), estimate.to_json(), "an estimate survives its file");
+        (found, read)
+    }
+}
+
+const KNOWN: &str = "known_friction = \"friction.json\"";
+const LOG: &str = "[[log]]\npath = \"log.csv\"\n";
+
+fn value(estimate: &Estimate, name: &str) -> f64 {
+    estimate.parameters.iter().find(|p| p.name == name).unwrap().value
+}
+
+/// Distance of the inertial base parameters from the truth, in deviations of the prior.
+fn inertial_error(found: &Identification, log: &SimulatedLog) -> f64 {
+    let table = &found.model.parameters().linear;
+    let truth: Vec<f64> = table
+        .iter()
+        .map(|p| log.truth.iter().find(|(name, _)| *name == p.name).map_or(0.0, |(_, value)| *value))
+        .collect();
+    let (truth, values) = (found.base.values(&truth), found.base.values(found.unconstrained_values()));
+    let inertial = found.base.kept.iter().zip(truth.iter().zip(&values)).filter(|(c, _)| **c < 20);
+    inertial.map(|(c, (t, x))| ((x - t) / found.prior.std[*c]).powi(2)).sum::<f64>().sqrt()
+}
+
+#[test]
+fn known_friction_carries_over_to_another_temperature() {
+    let bench = Bench::new(2.0);
+    let log = bench.log("log.csv", [22.0, 34.0], 1);
+    bench.log("hot.csv", [46.0, 48.0], 2);
+    let logs = format!("{LOG}[[validation]]\npath = \"hot.csv\"\n");
+    let (two_step, estimate) = bench.identify(KNOWN, &logs);
+    let (conventional, plain) = bench.identify("friction = \"given\"", &logs);
+    let hot = |e: &Estimate| e.validation[0].filtered.relative_error.unwrap();
+    let errors = [inertial_error(&two_step, &log), inertial_error(&conventional, &log)];
+    println!(
+        "hot log: {} % against {} %; inertias off by {errors:?} prior deviations",
+        hot(&estimate),
+        hot(&plain)
+    );
+    assert!(hot(&estimate) < 0.4 * hot(&plain), "{} against {}", hot(&estimate), hot(&plain));
+    assert!(errors[0] < errors[1], "{errors:?}");
+    // What is left of friction is small beside it.
+    for name in ["j1.fc", "j2.fc", "j1.fv", "j2.fv"] {
+        assert!(value(&estimate, name).abs() < 0.3, "{name} = {}", value(&estimate, name));
+    }
+    // The offset of the experiment is not taken over.
+    assert!((value(&estimate, "j1.fo") - 0.4).abs() < 0.2, "{}", value(&estimate, "j1.fo"));
+    assert!(estimate.shape_parameters.is_empty() && two_step.friction.is_empty());
+    let told = estimate.conditioning.choices.iter().find(|c| c.name == "known friction of j1").unwrap();
+    assert!(told.reason.contains("j1.fc, j1.fv, j1.fo are errors of it, of any sign"), "{}", told.reason);
+    let input = estimate.provenance.inputs.iter().find(|i| i.kind == "friction").unwrap();
+    assert_eq!(input.sha256, dynid::logs::sha256(&bench.path("friction.json")).unwrap());
+    assert!(two_step.report(&bench.config(KNOWN, &logs), &estimate).unwrap().contains("known Stribeck"));
+}
+
+#[test]
+fn errors_of_friction_have_any_sign_unless_told_otherwise() {
+    // 0.5 N m too much.
+    let bench = Bench::new(2.5);
+    bench.log("log.csv", [22.0, 34.0], 1);
+    let (_, free) = bench.identify(KNOWN, LOG);
+    for name in ["j1.fc", "j2.fc"] {
+        assert!((value(&free, name) + 0.5).abs() < 0.2, "{name} = {}", value(&free, name));
+    }
+    // The law with its errors takes energy out of the motion: both are looked at together.
+    assert!(
+        free.friction_passivity.iter().all(|p| p.passivity == "passive"),
+        "{:?}",
+        free.friction_passivity
+    );
+    let (_, nonnegative) = bench.identify(&format!("{KNOWN}\nfriction_errors = \"nonnegative\""), LOG);
+    for name in ["j1.fc", "j2.fc"] {
+        assert!((0.0..0.05).contains(&value(&nonnegative, name)), "{name} = {}", value(&nonnegative, name));
+    }
+}
+
+#[test]
+fn a_log_without_temperature_is_named_and_a_constant_one_helps() {
+    let bench = Bench::new(2.0);
+    bench.log("log.csv", [31.0, 31.0], 1);
+    let bare = "[[log]]\npath = \"bare_log.csv\"\n";
+    let error = identify(&bench.config(KNOWN, bare), |_| {}).unwrap_err();
+    let hint = error.hint().unwrap();
+    match error {
+        Error::Conditioning(ConditioningError::MissingChannel { log, channel }) => {
+            assert!(log.contains("bare_log.csv") && channel == "temperature_j1", "{log}: {channel}");
+        }
+        other => panic!("{other}"),
+    }
+    assert!(hint.contains("under [elements]"), "{hint}");
+    let (_, held) = bench.identify(&format!("{KNOWN}\ntemperature = 31.0"), bare);
+    let (_, logged) = bench.identify(KNOWN, LOG);
+    for (a, b) in held.parameters.iter().zip(&logged.parameters) {
+        assert!(
+            (a.value - b.value).abs() <= 1e-9 * (1.0 + b.value.abs()),
+            "{}: {} {}",
+            a.name,
+            a.value,
+            b.value
+        );
+    }
+    assert_eq!(held.model.known_friction[1].temperature, Some(31.0));
+    // It predicts without temperatures.
+    let model = held.effort_model(&bench.path("estimate.json"), Split::Consistent).unwrap();
+    assert!(model.channels().is_empty());
+    let senseless = bench.config(&format!("{KNOWN}\ntemperature = {{ j2 = 304.0 }}"), bare);
+    assert!(identify(&senseless, |_| {}).unwrap_err().to_string().contains("elements.temperature"));
+}
+
+#[test]
+fn an_estimate_predicts_with_the_known_friction() {
+    let bench = Bench::new(2.0);
+    let log = bench.log("log.csv", [22.0, 34.0], 1);
+    let (found, read) = bench.identify(KNOWN, LOG);
+    let file = bench.path("estimate.json");
+    let config = LogConfig { path: bench.path("log.csv"), ..LogConfig::default() };
+    let again =
+        validate(&read, Split::Consistent, &file, &[config], &Default::default(), None, None).unwrap();
+    let own = log_fit(&found.agreement(found.values(), &found.logs[0]).unwrap());
+    assert_eq!(own.raw.rms, log_fit(&again[0]).raw.rms);
+
+    let model = read.effort_model(&file, Split::Consistent).unwrap();
+    let mut states = States {
+        rows: log.time.len(),
+        position: log.clean[0].clone(),
+        velocity: log.clean[1].clone(),
+        acceleration: log.clean[2].clone(),
+        gravity: None,
+        channels: Vec::new(),
+    };
+    let values = read.values(Split::Consistent);
+    let missing = efforts(&model, &values, &states).unwrap_err();
+    assert!(matches!(&missing, Error::StatesChannel { channel } if channel == "temperature_j1"), "{missing}");
+    states.channels.clone_from(&log.channels);
+    for (predicted, clean) in efforts(&model, &values, &states).unwrap().iter().zip(&log.clean[3]) {
+        let square = |list: &mut dyn Iterator<Item = f64>| list.map(|x| x * x).sum::<f64>();
+        let error = square(&mut predicted.iter().zip(clean).map(|(p, c)| p - c));
+        let share = (error / square(&mut clean.iter().copied())).sqrt();
+        assert!(share < 0.03, "{:.2} % off the true effort", 100.0 * share);
+    }
+
+    let robot = read.identified_robot(&file).unwrap();
+    let states = CheckStates::random(robot.identified().model);
+    let stated: RobotJson = serde_json::from_str(&json(&robot.identified(), &states).unwrap().text).unwrap();
+    assert_eq!(stated.known_friction, read.model.known_friction);
+    let source = Source::read(&bench.path("arm.toml")).unwrap();
+    let export = RobotExport::new(robot.identified(), &source).unwrap();
+    for exported in [export.urdf(&states).unwrap(), export.mjcf(&states).unwrap()] {
+        let notes = exported.notes.join("\n");
+        assert!(notes.contains("left out of the known friction of `j1`"), "{notes}");
+    }
+    let urdf = export.urdf(&states).unwrap().text;
+    let dynamics = dynid::io::urdf::dynamics(&urdf, "urdf").unwrap();
+    let j1 = dynamics.iter().find(|d| d.joint == "j1").unwrap();
+    let expected = 2.0 + value(&read, "j1.fc");
+    assert!((j1.friction - expected).abs() < 1e-9 && j1.damping == 0.0, "{j1:?} {expected}");
+}
+
+#[test]
+fn what_the_law_does_not_know_is_said() {
+    let bench = Bench::new(2.0);
+    bench.log("log.csv", [40.0, 60.0], 1);
+    std::fs::write(bench.path("friction.json"), friction_file(&[law("j1", 2.0)])).unwrap();
+    let (_, estimate) = bench.identify(KNOWN, LOG);
+    let warnings = estimate.verdict.warnings.join("\n");
+    // Half of the record is warmer than 50 degrees.
+    assert!(warnings.contains("log.csv: 50 % of the temperatures of `j1`"), "{warnings}");
+    assert!(warnings.contains("20.0 to 50.0 °C"), "{warnings}");
+    assert!(warnings.contains("no friction is known of `j2`"), "{warnings}");
+
+    std::fs::write(bench.path("friction.json"), friction_file(&[law("wrist", 2.0)])).unwrap();
+    let error = identify(&bench.config(KNOWN, LOG), |_| {}).unwrap_err();
+    assert!(error.to_string().contains("wrist") && error.hint().is_some(), "{error}");
+    std::fs::write(bench.path("friction.json"), friction_file(&[law("j1", -2.0)])).unwrap();
+    let error = identify(&bench.config(KNOWN, LOG), |_| {}).unwrap_err();
+    assert!(error.to_string().contains("joint `j1`: `coulomb`: expected at least 0"), "{error}");
+    let lugre = format!("{KNOWN}\njoint = {{ j1 = [\"lugre\"] }}");
+    let mut bristled = law("j1", 2.0);
+    bristled["bristle"] = json!({ "sigma0": 2000.0, "sigma1": 1.0 });
+    std::fs::write(bench.path("friction.json"), friction_file(&[bristled])).unwrap();
+    let error = identify(&bench.config(&lugre, LOG), |_| {}).unwrap_err();
+    assert!(error.to_string().contains("has bristles already"), "{error}");
+    let alone = Config::parse("robot = \"a\"\n[elements]\ntemperature = 30\n[[log]]\npath = \"b\"\n", "c");
+    assert!(alone.unwrap_err().to_string().contains("known_friction"));
+}
+
+#[test]
+fn bristles_are_remembered_through_a_record() {
+    let bench = Bench::new(2.0);
+    bench.log("log.csv", [22.0, 34.0], 1);
+    let with = |bristle: Value| {
+        let joints = ["j1", "j2"].map(|name| {
+            let mut joint = law(name, 2.0);
+            joint["bristle"] = bristle.clone();
+            joint
+        });
+        std::fs::write(bench.path("friction.json"), friction_file(&joints)).unwrap();
+        bench.identify(KNOWN, LOG).1
+    };
+    let stiff = with(json!({ "sigma0": 1e6, "sigma1": 1.0 }));
+    let (steady, soft) = (with(Value::Null), with(json!({ "sigma0": 20.0, "sigma1": 1.0 })));
+    let error = |e: &Estimate| e.fit.filtered.relative_error.unwrap();
+    println!("{} % stiff, {} % steady, {} % soft", error(&stiff), error(&steady), error(&soft));
+    // The true friction has no bristles. Stiff ones differ by the sample that they turn late (the velocity is held over a
+    // step); soft ones, which bend by a tenth of a radian, spoil the fit.
+    assert!(error(&stiff) < 1.5 * error(&steady));
+    assert!(error(&soft) > 3.0 * error(&steady));
+}
