@@ -37,7 +37,7 @@ pub(super) struct JointValues {
 ///
 /// `fc`, `fv` become friction and damping, of asymmetric friction the means of both directions; `Ia` is armature in
 /// MJCF and has no place in URDF. Negative values, which simulators refuse, are stated as 0. Stribeck friction becomes the
-/// Coulomb friction that it falls to.
+/// Coulomb friction that it falls to, and so do bristles.
 ///
 /// Of known friction the file states Coulomb friction and a linear viscous coefficient, each with its error; viscous friction
 /// that saturates has no place in it, and neither has the error beside it.
@@ -171,6 +171,8 @@ fn left_out(model: &RobotModel, values: &[f64], format: Format) -> Vec<String> {
             Some("Ia") => "rotor inertia (armature in MJCF)",
             Some("fo") => "offset",
             Some("fs") => "rise of Stribeck friction towards rest",
+            Some("sigma1") => "bristles and the rise of their friction towards rest",
+            Some("sigma2" | "sigma2_slope") => "viscous friction that saturates and depends on temperature",
             Some("fa") => "arctangent friction",
             Some("ft") => "tanh friction",
             Some("fg" | "fl") => "sigmoid friction",

@@ -3,7 +3,7 @@
 use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, States};
 use dynid_io::MappingSpec;
 use dynid_io::mjcf::JointParameters;
-use dynid_model::element::{Coulomb, JointElement, RotorInertia, Viscous};
+use dynid_model::element::{Coulomb, JointElement, LuGre, RotorInertia, Viscous, sign};
 use dynid_model::{Description, EffortModel, MotionBlock, RandomMotion, RegressorBlock, RobotModel};
 use dynid_motion::Channel;
 
@@ -148,7 +148,7 @@ pub(super) fn largest_difference(
     states.for_each_block(|motion| {
         let models = [(a, a_shape), (b, b_shape)];
         for ((model, shape), block) in models.into_iter().zip(&mut blocks) {
-            model.regressor(motion, shape, block);
+            with_slipping_bristles(model, motion, |motion| model.regressor(motion, shape, block));
         }
         for output in 0..outputs {
             let effort = |block: &RegressorBlock, values: &[f64]| -> Vec<f64> {
@@ -166,6 +166,30 @@ pub(super) fn largest_difference(
     });
     let floor = 1e-6 * largest.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     difference.iter().zip(&largest).map(|(d, l)| d / l.max(floor)).fold(0.0, f64::max)
+}
+
+/// The same motion for elements that remember, bristles slipping as Coulomb friction does: what files have a place for.
+fn with_slipping_bristles(model: &RobotModel, motion: &MotionBlock<'_>, work: impl FnOnce(&MotionBlock<'_>)) {
+    let still = vec![0.0; motion.samples];
+    let slipping: Vec<(&str, Vec<f64>)> = model
+        .joints()
+        .iter()
+        .enumerate()
+        .flat_map(|(rate, joint)| {
+            let bent = format!("{}.{}", joint.name, LuGre::BRISTLE);
+            let signal = model.signals().iter().find(|name| **name == bent)?;
+            Some((signal.as_str(), motion.rate(rate).iter().map(|v| sign(*v)).collect()))
+        })
+        .collect();
+    let others = model.signals().iter().filter(|name| slipping.iter().all(|(n, _)| n != name));
+    let channels: Vec<(&str, &[f64])> = motion
+        .channels
+        .iter()
+        .copied()
+        .chain(slipping.iter().map(|(name, values)| (*name, values.as_slice())))
+        .chain(others.map(|name| (name.as_str(), still.as_slice())))
+        .collect();
+    work(&MotionBlock { channels: &channels, ..*motion });
 }
 
 /// Largest difference that passes: text, centres of mass and frames cost a few digits of sixteen, an error far more.

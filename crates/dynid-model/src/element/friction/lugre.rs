@@ -43,7 +43,7 @@ pub struct LuGre {
 const SHAPES: usize = 4;
 /// Endings of the signals' names: `w`, `ẇ/κ`, then both by `κ`, `ρ`, `v_s`, `δ`.
 const SIGNALS: [&str; 2 * (1 + SHAPES)] = [
-    "bristle",
+    LuGre::BRISTLE,
     "bristle_rate",
     "bristle_by_kappa",
     "bristle_rate_by_kappa",
@@ -56,6 +56,9 @@ const SIGNALS: [&str; 2 * (1 + SHAPES)] = [
 ];
 
 impl LuGre {
+    /// Name of the signal `w`, after that of the joint and a dot.
+    pub const BRISTLE: &str = "bristle";
+
     /// For speeds up to about 1 rad/s or m/s.
     pub fn new(rate: usize) -> Self {
         Self::scaled(rate, 1.0)
