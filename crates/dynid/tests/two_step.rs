@@ -1,6 +1,6 @@
 //! Two-step identification: friction known from its own experiment, inertias and errors of friction from a log.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use std::path::PathBuf;
 
