@@ -184,6 +184,18 @@ pub struct History {
     pub(crate) states: Vec<Vec<f64>>,
 }
 
+impl History {
+    /// What every element remembers; empty at the start.
+    pub fn states(&self) -> &[Vec<f64>] {
+        &self.states
+    }
+
+    /// The history of elements that remember this, as [`History::states`] gave it for the same model.
+    pub fn of_states(states: Vec<Vec<f64>>) -> Self {
+        History { states }
+    }
+}
+
 /// A model whose effort is linear in most of its parameters:
 /// `effort = W(motion; shape) · linear + offset(motion; shape)`.
 pub trait EffortModel: Send + Sync {

@@ -7,6 +7,7 @@
 mod choose;
 mod friction;
 mod gram;
+mod live_rows;
 mod log_rows;
 mod periodic;
 mod predict;
@@ -25,6 +26,7 @@ pub use friction::{
     BasePrior, FrictionChoice, FrictionSettings, FrictionShape, JointFriction, ShapeKind, ShapeTrial,
     choose_friction,
 };
+pub use live_rows::{LiveRow, LiveRowSettings, LiveRows};
 pub use log_rows::LogRows;
 pub use periodic::PeriodicMotion;
 pub use predict::predict;

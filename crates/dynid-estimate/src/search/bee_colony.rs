@@ -22,10 +22,10 @@
 //! Sources: Karaboga & Basturk 2007; Akay & Karaboga 2012 for the share of coordinates.
 
 use super::algorithm::{inside, positive};
-use super::checkpoint::Transfer;
 use super::error::SearchError;
 use super::population::Population;
 use super::run::{Method, Run, Step};
+use dynid_motion::words::Transfer;
 
 /// Parameters of a bee colony.
 #[derive(Debug, Clone, PartialEq)]

@@ -26,11 +26,11 @@ mod descent;
 mod fold;
 
 use super::algorithm::inside;
-use super::checkpoint::Transfer;
 use super::error::SearchError;
 use super::population::Population;
 use super::run::{Method, Run, Step};
 use descent::Descent;
+use dynid_motion::words::Transfer;
 
 /// Parameters of the evolution strategy.
 #[derive(Debug, Clone, PartialEq)]

@@ -18,11 +18,11 @@
 //! Sources: Yang & Deb 2009 (plain); Ding, Li, Li & Chao 2018, as read by spec/er16.md (improved).
 
 use super::algorithm::{inside, positive};
-use super::checkpoint::Transfer;
 use super::error::SearchError;
 use super::population::Population;
 use super::run::{Method, Run, Step};
 use super::tent::TentMap;
+use dynid_motion::words::Transfer;
 use statrs::function::gamma::gamma;
 
 /// Parameters of plain cuckoo search; population 25 and 200 iterations by default.

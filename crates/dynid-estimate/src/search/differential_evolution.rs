@@ -19,11 +19,11 @@
 //! Sanderson 2009 for mutation, archive and bounds.
 
 use super::algorithm::not_negative;
-use super::checkpoint::Transfer;
 use super::error::SearchError;
 use super::population::Population;
 use super::random::Random;
 use super::run::{Method, Run, Step};
+use dynid_motion::words::Transfer;
 
 /// Parameters of differential evolution; population 60 by default.
 #[derive(Debug, Clone, PartialEq)]

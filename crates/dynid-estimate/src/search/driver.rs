@@ -2,11 +2,12 @@
 
 use std::ops::ControlFlow;
 
-use super::checkpoint::{Checkpoint, CheckpointError, Transfer};
+use super::checkpoint::{Checkpoint, CheckpointError};
 use super::error::SearchError;
 use super::history::History;
 use super::run::{Method, Progress, Run, SearchResult, Status, Step};
 use super::settings::Settings;
+use dynid_motion::words::Transfer;
 
 /// Limits of a run, defaults filled in.
 pub(super) struct Limits {

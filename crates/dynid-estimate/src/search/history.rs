@@ -1,6 +1,6 @@
 //! How the best value fell.
 
-use super::checkpoint::Transfer;
+use dynid_motion::words::Transfer;
 
 /// Best value known after a number of evaluations.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -25,10 +25,10 @@
 //! Source: Kennedy & Eberhart 1995; Shi & Eberhart 1998 for `w`.
 
 use super::algorithm::{inside, not_negative};
-use super::checkpoint::Transfer;
 use super::error::SearchError;
 use super::population::Population;
 use super::run::{Method, Run, Step};
+use dynid_motion::words::Transfer;
 
 /// Which memories a particle hears of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -15,9 +15,9 @@
 //! Deterministic: the seed has no effect. Sources: Torczon 1997; spec/prr3.md section 10 for scales, factors and limits.
 
 use super::algorithm::positive;
-use super::checkpoint::Transfer;
 use super::error::SearchError;
 use super::run::{Method, Run, Step};
+use dynid_motion::words::Transfer;
 
 /// Parameters of pattern search.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,11 +1,12 @@
 //! One run: what algorithms draw from and evaluate with, counting and keeping the best.
 
 use super::bounds::Bounds;
-use super::checkpoint::{Checkpoint, Transfer};
+use super::checkpoint::Checkpoint;
 use super::history::HistoryPoint;
 use super::objective::Objective;
 use super::random::Random;
 use super::settings::Settings;
+use dynid_motion::words::Transfer;
 
 /// Whether an algorithm has more to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

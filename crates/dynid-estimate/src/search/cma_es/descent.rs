@@ -2,8 +2,8 @@
 
 use faer::{Mat, Side};
 
-use crate::search::checkpoint::Transfer;
 use crate::search::random::Random;
+use dynid_motion::words::Transfer;
 
 /// Differences of values, and steps over the width of the box, that count as none.
 const TOLERANCE: f64 = 1e-12;
