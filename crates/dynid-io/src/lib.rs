@@ -13,6 +13,7 @@ pub mod output;
 pub mod robot;
 mod source;
 pub mod states;
+pub mod stream;
 pub mod toml_robot;
 pub mod trajectory;
 pub mod urdf;

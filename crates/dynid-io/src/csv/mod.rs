@@ -9,4 +9,5 @@ mod write;
 
 pub use error::LogFileError;
 pub use read::{Delimiter, ReadOptions, Table, read};
+pub(crate) use read::{RowFault, RowParser};
 pub use write::{RowWriter, write};

@@ -108,7 +108,7 @@ pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Table, LogF
     let delimiter = options.delimiter.unwrap_or_else(|| detect(header));
     let fields = split(header, delimiter);
     let header_line = lines.number();
-    let mut rows = Rows::new(&file, header_line, delimiter, &fields, options)?;
+    let mut rows = Rows::new(RowParser::new(&file, header_line, delimiter, &fields, options)?, &file);
     let mut row = 0;
     while row < last
         && let Some(line) = lines.next()?
@@ -127,17 +127,16 @@ pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Table, LogF
     Ok(rows.into_table(first, row + 1 - first))
 }
 
-/// What is wrong with a row; names are filled in by [`Rows::error`].
-enum RowFault {
+/// What is wrong with a row.
+pub(crate) enum RowFault {
     FieldCount(usize),
     NotANumber(usize, String),
     NotFinite(usize, String),
     TooBig(usize, String),
 }
 
-/// The rows read so far.
-struct Rows<'a> {
-    file: &'a str,
+/// From lines to numbers.
+pub(crate) struct RowParser {
     delimiter: Delimiter,
     separator: Option<u8>,
     names: Vec<String>,
@@ -147,12 +146,17 @@ struct Rows<'a> {
     largest: Vec<f64>,
     max_magnitude: f64,
     values: Vec<f64>,
-    columns: Vec<Vec<f64>>,
 }
 
-impl<'a> Rows<'a> {
+impl RowParser {
+    /// A parser of the rows under a header line.
+    pub(crate) fn of_header(file: &str, line: usize, header: &[u8]) -> Result<Self, LogFileError> {
+        let delimiter = detect(header);
+        Self::new(file, line, delimiter, &split(header, delimiter), &ReadOptions::default())
+    }
+
     fn new(
-        file: &'a str,
+        file: &str,
         line: usize,
         delimiter: Delimiter,
         fields: &[Vec<u8>],
@@ -192,8 +196,7 @@ impl<'a> Rows<'a> {
         let ignored: Vec<bool> = names.iter().map(|n| options.ignore.contains(n)).collect();
         let largest =
             names.iter().map(|n| if is_time_name(n) { f64::MAX } else { options.max_magnitude }).collect();
-        Ok(Rows {
-            file,
+        Ok(RowParser {
             delimiter,
             separator: match delimiter {
                 Delimiter::Comma => Some(b','),
@@ -206,25 +209,24 @@ impl<'a> Rows<'a> {
             largest,
             max_magnitude: options.max_magnitude,
             values: vec![0.0; names.len()],
-            columns: vec![Vec::new(); names.len()],
             names,
         })
     }
 
-    fn parse(&mut self, line: &[u8]) -> Result<(), RowFault> {
+    /// Column names.
+    pub(crate) fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The numbers of the line that was parsed last.
+    pub(crate) fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Takes the numbers of a line; ignored columns keep what they held.
+    pub(crate) fn parse(&mut self, line: &[u8]) -> Result<(), RowFault> {
         if !self.parse_plain(line) {
             self.parse_fields(line)?;
-        }
-        if self.any_ignored {
-            for ((column, x), ignored) in self.columns.iter_mut().zip(&self.values).zip(&self.ignored) {
-                if !ignored {
-                    column.push(*x);
-                }
-            }
-        } else {
-            for (column, x) in self.columns.iter_mut().zip(&self.values) {
-                column.push(*x);
-            }
         }
         Ok(())
     }
@@ -278,13 +280,37 @@ impl<'a> Rows<'a> {
         }
         Ok(())
     }
+}
+
+/// The rows read so far.
+struct Rows<'a> {
+    file: &'a str,
+    parser: RowParser,
+    columns: Vec<Vec<f64>>,
+}
+
+impl<'a> Rows<'a> {
+    fn new(parser: RowParser, file: &'a str) -> Self {
+        Rows { file, columns: vec![Vec::new(); parser.names.len()], parser }
+    }
+
+    fn parse(&mut self, line: &[u8]) -> Result<(), RowFault> {
+        self.parser.parse(line)?;
+        let RowParser { values, ignored, any_ignored, .. } = &self.parser;
+        for (k, (column, x)) in self.columns.iter_mut().zip(values).enumerate() {
+            if !any_ignored || !ignored[k] {
+                column.push(*x);
+            }
+        }
+        Ok(())
+    }
 
     fn error(&self, fault: RowFault, row: usize, line: usize) -> LogFileError {
         let file = self.file.to_owned();
-        let name = |k: usize| self.names[k].clone();
+        let name = |k: usize| self.parser.names[k].clone();
         match fault {
             RowFault::FieldCount(found) => {
-                LogFileError::FieldCount { file, row, line, expected: self.names.len(), found }
+                LogFileError::FieldCount { file, row, line, expected: self.parser.names.len(), found }
             }
             RowFault::NotANumber(k, found) => {
                 LogFileError::NotANumber { file, row, line, column: name(k), found }
@@ -293,24 +319,19 @@ impl<'a> Rows<'a> {
                 LogFileError::NotFinite { file, row, line, column: name(k), found }
             }
             RowFault::TooBig(k, found) => {
-                let (column, limit) = (name(k), self.max_magnitude);
+                let (column, limit) = (name(k), self.parser.max_magnitude);
                 LogFileError::TooBig { file, row, line, column, limit, found }
             }
         }
     }
 
     fn into_table(self, first_row: usize, rows: usize) -> Table {
-        let kept = |(k, _): &(usize, _)| !self.ignored[*k];
+        let RowParser { names, ignored, .. } = self.parser;
+        let kept = |k: usize| !ignored[k];
         Table {
             source: self.file.to_owned(),
-            header: self
-                .names
-                .into_iter()
-                .enumerate()
-                .filter(|(k, _)| !self.ignored[*k])
-                .map(|(_, n)| n)
-                .collect(),
-            columns: self.columns.into_iter().enumerate().filter(kept).map(|(_, c)| c).collect(),
+            header: names.into_iter().enumerate().filter(|(k, _)| kept(*k)).map(|(_, n)| n).collect(),
+            columns: self.columns.into_iter().enumerate().filter(|(k, _)| kept(*k)).map(|(_, c)| c).collect(),
             rows,
             first_row,
         }
