@@ -4,7 +4,7 @@
 //! them into conic form. Iterations are printed first.
 #![expect(clippy::unwrap_used, reason = "a benchmark that fails should stop")]
 
-#[path = "../../../crates/dynid-estimate/tests/random_problem/mod.rs"]
+#[path = "../../../crates/dynid-estimate/tests/all/random_problem/mod.rs"]
 mod random_problem;
 
 use divan::Bencher;

@@ -1,7 +1,7 @@
 //! Two solvers that share the definition of a body and nothing else, on one set of problems.
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
-#[path = "../../../crates/dynid-estimate/tests/random_problem/mod.rs"]
+#[path = "../../../crates/dynid-estimate/tests/all/random_problem/mod.rs"]
 mod random_problem;
 
 use std::collections::BTreeMap;

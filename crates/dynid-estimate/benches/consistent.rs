@@ -1,7 +1,7 @@
 //! Consistent estimates of reduced problems: `cargo bench -p dynid-estimate --bench consistent`.
 #![expect(clippy::unwrap_used, reason = "a benchmark that fails should stop")]
 
-#[path = "../tests/random_problem/mod.rs"]
+#[path = "../tests/all/random_problem/mod.rs"]
 mod random_problem;
 
 use divan::Bencher;

@@ -9,7 +9,7 @@
 
 #![expect(clippy::print_stdout, reason = "a benchmark prints its figures")]
 
-#[path = "../tests/er16/mod.rs"]
+#[path = "../tests/all/er16/mod.rs"]
 mod er16;
 
 use std::error::Error;

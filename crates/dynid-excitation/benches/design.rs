@@ -2,11 +2,11 @@
 
 #![expect(clippy::unwrap_used, reason = "the bench's robots are sound")]
 
-#[path = "../tests/plain_urdf/mod.rs"]
+#[path = "../tests/all/plain_urdf/mod.rs"]
 mod plain_urdf;
-#[path = "../tests/problems/mod.rs"]
+#[path = "../tests/all/problems/mod.rs"]
 mod problems;
-#[path = "../tests/support/mod.rs"]
+#[path = "../tests/all/support/mod.rs"]
 mod support;
 
 use divan::{Bencher, black_box};

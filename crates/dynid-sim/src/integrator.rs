@@ -10,8 +10,8 @@
 //!
 //! Friction has a smooth sign instead of located events of sticking and slipping: joints that share motors would turn
 //! those into a complementarity problem, and smoothness costs next to nothing. A mass on a rough floor stops within
-//! 6e-9 m of the closed form at a width of 1e-4 m/s, with 8 % more steps than control intervals (`tests/integration.rs`);
-//! 20 s of a six-axis arm at 1 kHz take the same time for widths from 1e-2 to 1e-5 rad/s.
+//! 6e-9 m of the closed form at a width of 1e-4 m/s, with 8 % more steps than control intervals
+//! (`tests/all/integration.rs`); 20 s of a six-axis arm at 1 kHz take the same time for widths from 1e-2 to 1e-5 rad/s.
 
 use dynid_model::History;
 

@@ -1,0 +1,11 @@
+//! All tests of the crate from outside, in one program: each program would be linked against everything again.
+
+mod broken_input;
+mod contract;
+mod design;
+mod estimator_settings;
+mod export;
+mod friction;
+mod other_libraries;
+mod study;
+mod support;

@@ -1,0 +1,96 @@
+//! `dynid study`: every claim of a study with what is measured, in text, JSON and a report.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
+use std::path::Path;
+
+use serde_json::Value as Json;
+
+use crate::support::{dynid, run};
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// A quick run of a study with a number of threads: stdout, and the folder's two files.
+fn quick(study: &str, folder: &Path, out: &str, threads: &str) -> [String; 3] {
+    let args = ["study", study, "--quick", "--json", "--out", out];
+    let output = dynid().current_dir(folder).env("RAYON_NUM_THREADS", threads).args(args).output().unwrap();
+    let stderr = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    let read = |name: &str| std::fs::read_to_string(folder.join(out).join(name)).unwrap();
+    [text(&output.stdout), read("study.json"), read("report.html")]
+}
+
+#[test]
+fn list_names_every_study() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = text(&run(folder.path(), &["study", "list"], 0).stdout);
+    let listed: Json =
+        serde_json::from_slice(&run(folder.path(), &["study", "list", "--json"], 0).stdout).unwrap();
+    let listed = listed.as_array().unwrap();
+    assert!(["er16", "indy7"].iter().all(|name| listed.iter().any(|s| s["study"] == **name)));
+    for study in listed {
+        for key in ["study", "title", "source"] {
+            let value = study[key].as_str().unwrap();
+            assert!(!value.is_empty() && plain.contains(value), "{key}: {value}");
+        }
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "a list leaves nothing behind");
+}
+
+/// Every claim holds, has its numbers, and stands in the report; ids of the rows.
+fn holds_every_claim(name: &str, [stdout, json, report]: &[String; 3]) -> Vec<String> {
+    assert_eq!(stdout, json);
+    let study: Json = serde_json::from_str(json).unwrap();
+    let rows = study["rows"].as_array().unwrap();
+    assert!(!rows.is_empty());
+    let escapes =
+        [("\u{a0}", " "), ("&#39;", "'"), ("&lt;", "<"), ("&gt;", ">"), ("&quot;", "\""), ("&amp;", "&")];
+    let page = escapes.iter().fold(report.clone(), |page, (from, to)| page.replace(from, to));
+    let mut ids = Vec::new();
+    for row in rows {
+        let words =
+            |key: &str| row[key].as_str().filter(|w| !w.is_empty()).unwrap_or_else(|| panic!("{key}: {row}"));
+        ids.push(words("id").to_owned());
+        words("required");
+        let measured = row["measured"].as_object().unwrap();
+        assert!(!measured.is_empty(), "{row}");
+        assert_eq!(row["pass"], true, "{row}");
+        let claim = words("claim");
+        assert!(page.contains(claim), "the report lacks: {claim}");
+    }
+    assert_eq!(
+        (&study["study"], &study["quick"], &study["pass"]),
+        (&name.into(), &true.into(), &true.into())
+    );
+    assert!(report.to_lowercase().starts_with("<!doctype html>"));
+    let count = ids.len();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), count, "{ids:?}");
+    ids
+}
+
+#[test]
+fn er16_holds_every_claim_and_repeats_bit_by_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = quick("er16", folder.path(), "one", "1");
+    holds_every_claim("er16", &first);
+    assert!(quick("er16", folder.path(), "two", "2") == first, "two threads give other bits than one");
+}
+
+#[test]
+fn indy7_holds_every_claim() {
+    let folder = tempfile::tempdir().unwrap();
+    let ids = holds_every_claim("indy7", &quick("indy7", folder.path(), "one", "2"));
+    assert!((1..=12).all(|row| ids.contains(&row.to_string())), "{ids:?}");
+}
+
+#[test]
+#[ignore = "two minutes"]
+fn indy7_repeats_bit_by_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = quick("indy7", folder.path(), "one", "1");
+    assert!(quick("indy7", folder.path(), "two", "2") == first, "two threads give other bits than one");
+}

@@ -1,0 +1,15 @@
+//! All tests of the crate from outside, in one program: each program would be linked against everything again.
+
+mod constraints;
+mod designs;
+mod forecasts;
+mod gradients;
+mod infeasible;
+mod parametrisation;
+mod plain_urdf;
+mod problems;
+mod published;
+mod refusals;
+mod statistics;
+mod support;
+mod task_space;

@@ -1,0 +1,8 @@
+//! All tests of the crate from outside, in one program: each program would be linked against everything again.
+
+mod broken_files;
+mod logs;
+mod mjcf;
+mod oracles;
+mod robot_files;
+mod trajectory_files;

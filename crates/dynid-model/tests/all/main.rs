@@ -1,0 +1,13 @@
+//! All tests of the crate from outside, in one program: each program would be linked against everything again.
+
+mod adjoint;
+mod forward_dynamics;
+mod friction;
+mod golden;
+mod history;
+mod identities;
+mod linearised;
+mod passivity;
+mod points;
+mod random_tree;
+mod structure;

@@ -1,0 +1,10 @@
+//! All tests of the crate from outside, in one program: each program would be linked against everything again.
+
+mod golden;
+mod noise;
+mod periodic_signals;
+mod recorded;
+mod scipy;
+mod textbook;
+mod trajectories;
+mod trajectory_golden;

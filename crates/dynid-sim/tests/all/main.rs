@@ -1,0 +1,6 @@
+//! All tests of the crate from outside, in one program: each program would be linked against everything again.
+
+mod arm;
+mod experiment;
+mod integration;
+mod presliding;

@@ -1,0 +1,19 @@
+//! All tests of the crate from outside, in one program: each program would be linked against everything again.
+
+mod accuracy;
+mod bristles;
+mod design;
+mod elements;
+mod export;
+mod friction_experiments;
+mod friction_laws;
+mod friction_recorded;
+mod friction_report;
+mod identifiability;
+mod least_squares;
+mod periodic;
+mod recorded_logs;
+mod support;
+mod trust;
+mod two_step;
+mod virtual_experiment;

@@ -1,0 +1,109 @@
+//! What the tests on recorded and simulated logs share.
+
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+
+use std::path::PathBuf;
+
+use dynid::Config;
+use dynid::agreement::{Agreement, Alignment, compare};
+use dynid::estimators::conditioning::prepare;
+use dynid::identify::{Identification, identify};
+
+/// Panda with torque sensors, later 30 % kept back.
+pub(crate) const PANDA: &str = r#"
+robot = "{data}/panda-gaz2019/panda_kinematics.urdf"
+[elements]
+default = ["coulomb", "viscous", "offset"]
+[[log]]
+path = "{data}/panda-gaz2019/exciting_trajectory.csv.gz"
+part = [0.0, 0.7]
+[[validation]]
+path = "{data}/panda-gaz2019/exciting_trajectory.csv.gz"
+part = [0.7, 1.0]
+"#;
+
+/// Staubli TX40 with its coupled wrist: motor-side log, later 40 % kept back.
+pub(crate) const TX40: &str = r#"
+robot = "{data}/staubli-tx40/tx40.urdf"
+[columns]
+rate_hz = 5000
+position = "qm{}"
+effort = { columns = "im{}" }
+[motor_side]
+matrix = [
+  [32.0, 0, 0, 0, 0, 0], [0, 32.0, 0, 0, 0, 0], [0, 0, 45.0, 0, 0, 0],
+  [0, 0, 0, -48.0, 0, 0], [0, 0, 0, 0, 45.0, 0], [0, 0, 0, 0, 32.0, 32.0],
+]
+offset = [0, -1.5707963267948966, 1.5707963267948966, 0, 0, 0]
+[[coupling]]
+motors = ["m5", "m6"]
+joints = ["joint_5", "joint_6"]
+matrix = [[45.0, 0.0], [32.0, 32.0]]
+form = "columns"
+[[log]]
+path = "{data}/staubli-tx40/motor_log.csv.gz"
+part = [0.0, 0.6]
+[[validation]]
+path = "{data}/staubli-tx40/motor_log.csv.gz"
+part = [0.6, 1.0]
+"#;
+
+/// UR10 of the University of Salerno, later 30 % kept back.
+pub(crate) const UR10: &str = r#"
+robot = "{data}/ur10-unisa/ur10_kinematics.urdf"
+[[log]]
+path = "{data}/ur10-unisa/exciting_trajectory.csv.gz"
+part = [0.0, 0.7]
+[[validation]]
+path = "{data}/ur10-unisa/exciting_trajectory.csv.gz"
+part = [0.7, 1.0]
+"#;
+
+/// Folder of shared data, or `None` with a note.
+pub(crate) fn data() -> Option<PathBuf> {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    if path.is_dir() {
+        return Some(path);
+    }
+    println!("skipped: ../shared not present");
+    None
+}
+
+/// Identifies by a configuration in which `{data}` stands for the data folder.
+pub(crate) fn run(text: &str) -> Option<(Config, Identification)> {
+    let data = data()?;
+    let config = Config::parse(&text.replace("{data}", &data.display().to_string()), "test").unwrap();
+    let identification = identify(&config, |_| {}).unwrap();
+    Some((config, identification))
+}
+
+/// Agreement on the first validation log through a filter of the given cut-off.
+pub(crate) fn on_validation(config: &Config, id: &Identification, filter_hz: f64) -> Agreement {
+    let log = dynid::logs::load(
+        &config.validation[0],
+        &id.robot.mechanism,
+        &config.columns,
+        config.motor_side.as_ref(),
+    )
+    .unwrap();
+    let prepared = prepare(&log.log, &id.model, &id.settings).unwrap();
+    let alignment = Alignment {
+        state_hz: id.state_hz,
+        delay_samples: id.delay_samples,
+        delay_rate_hz: id.delay_rate_hz,
+        filter_hz,
+    };
+    let (model, values) = id.identified_model();
+    compare(model, values, &prepared, &alignment, &id.settings).unwrap()
+}
+
+/// Geometric mean of ratios.
+pub(crate) fn geometric_mean(ratios: impl Iterator<Item = f64>) -> f64 {
+    let logs: Vec<f64> = ratios.map(f64::ln).collect();
+    (logs.iter().sum::<f64>() / logs.len() as f64).exp()
+}
+
+/// RMS per joint.
+pub(crate) fn rms(fit: &dynid::estimators::metrics::Fit) -> Vec<f64> {
+    fit.channels.iter().map(|c| c.rms.unwrap()).collect()
+}
