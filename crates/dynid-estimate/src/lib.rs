@@ -18,6 +18,7 @@
 //! | whether residuals are white | [`whiteness`] |
 //! | standard parameters of bodies that can exist, with a proven gap | [`consistent`] |
 //! | which parameters the data determine, and which the prior | [`identifiability`] |
+//! | estimates while the machine runs, alarms on changes | [`online`] |
 //! | searches that need values only: populations, patterns | [`search`] |
 //! | how well a prediction matches a measurement | [`metrics`] |
 //!
@@ -37,6 +38,7 @@ pub mod held_out;
 pub mod identifiability;
 pub mod linear;
 pub mod metrics;
+pub mod online;
 pub mod rank;
 pub mod rows;
 pub mod search;

@@ -123,6 +123,20 @@ impl Factor {
         builder.finish()
     }
 
+    /// Factor of `rows` samples from the `p × (p + 1)` entries of `[R z]` and `ρ`, with the signs of rows set right.
+    pub(crate) fn from_triangle(
+        columns: usize,
+        entry: impl Fn(usize, usize) -> f64,
+        rho: f64,
+        rows: usize,
+    ) -> Factor {
+        let mut builder = FactorBuilder::with_chunk_rows(columns, columns);
+        builder.stack(columns, entry);
+        let mut factor = builder.finish();
+        factor.rho = factor.rho.hypot(rho);
+        Factor { rows, ..factor }
+    }
+
     fn with_remainder(&self, builder: FactorBuilder) -> Factor {
         let mut factor = builder.finish();
         factor.rho = factor.rho.hypot(self.rho);

@@ -1,0 +1,5 @@
+//! Time per sample: `cargo bench -p dynid-online --bench update`.
+
+fn main() {
+    divan::main();
+}

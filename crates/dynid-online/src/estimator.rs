@@ -1,0 +1,512 @@
+//! One sample after the other.
+
+use alloc::vec;
+use alloc::vec::Vec;
+use core::fmt::Write;
+
+use crate::change_detection::ChangeDetection;
+use crate::downdating::RowWindow;
+use crate::drift::Drift;
+use crate::error::{SampleError, SettingsError, StateError};
+use crate::excitation_monitor::ExcitationMonitor;
+use crate::forgetting::{
+    BoundedCovariance, DirectionalForgetting, Forgetting, error_driven_factor, excess_error, relative_error,
+};
+use crate::innovation::{Innovation, cholesky, solve_lower};
+use crate::reaction::{Reaction, TargetedReaction};
+use crate::settings::Settings;
+use crate::square_root::{SquareRoot, dot};
+use crate::state::{Fingerprint, Transfer};
+use crate::window::BlockWindow;
+
+/// Entries of weighted rows beyond this are refused, since squares of gains could overflow.
+const LARGEST: f64 = 1e75;
+/// Nothing is discounted once a diagonal entry of `R` is below this (parameters in scales): it would become zero.
+const LEAST_PIVOT: f64 = 1e-50;
+/// First word of a saved state.
+const STATE_VERSION: u64 = 1;
+
+/// Noise of the rows of a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RowNoise<'a> {
+    /// Standard deviation of each row, in the unit of its effort; independent of each other.
+    Std(&'a [f64]),
+    /// Covariance of the rows, `m × m`, row by row; the lower triangle is read. Where regressors are measured, this is
+    /// the place for `xᵀ Σ_φ x`, which rows may have in common.
+    Covariance(&'a [f64]),
+}
+
+/// What a sample did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Number of the sample, from 0.
+    pub sample: u64,
+    /// Factor by which old information was discounted (along the sample's directions, for directional forgetting); 1 if nothing
+    /// was.
+    pub lambda: f64,
+    /// Mean square of the whitened innovations: 1 on average while model and noise are right.
+    pub normalised_square: f64,
+    /// Cumulative sum of change detection after the sample; 0 on an alarm and without detection.
+    pub statistic: f64,
+    /// Whether the sample raised an alarm.
+    pub alarm: bool,
+    /// Whether the sample is held back until the reaction to an alarm is decided.
+    pub held_back: bool,
+    /// The reaction that the sample completed. The jump is in the parameter's unit.
+    pub reaction: Option<Reaction>,
+    /// Number of parameters that do not forget because nothing excites them.
+    pub frozen: usize,
+}
+
+/// Where information is kept.
+#[derive(Debug, Clone)]
+enum Memory {
+    Recursive(SquareRoot),
+    Blocks(BlockWindow),
+    Rows(RowWindow),
+}
+
+impl Memory {
+    fn root(&self) -> &SquareRoot {
+        match self {
+            Memory::Recursive(root) => root,
+            Memory::Blocks(window) => window.total(),
+            Memory::Rows(window) => window.total(),
+        }
+    }
+
+    /// Adds rows; a recursive memory uses them up.
+    fn push(&mut self, rows: &mut [f64]) {
+        match self {
+            Memory::Recursive(root) => root.push(rows),
+            Memory::Blocks(window) => window.push(rows),
+            Memory::Rows(window) => window.push(rows),
+        }
+    }
+
+    fn transfer(&mut self, transfer: &mut Transfer<'_>) {
+        match self {
+            Memory::Recursive(root) => root.transfer(transfer),
+            Memory::Blocks(window) => window.transfer(transfer),
+            Memory::Rows(window) => window.transfer(transfer),
+        }
+    }
+}
+
+/// Recursive estimator of `y = Φ x + noise`, sample by sample.
+///
+/// Per sample: drift; innovations with the estimate so far; forgetting; the new rows; the new estimate; change detection. After
+/// an alarm, samples are held back until the reaction is decided ([`TargetedReaction`]).
+///
+/// Everything is allocated by [`Estimator::new`]. No state becomes non-finite whatever finite samples come.
+///
+/// ```
+/// use dynid_online::{Estimator, Forgetting, RowNoise, Settings};
+///
+/// let mut settings = Settings::new(vec![0.0, 0.0], vec![10.0, 10.0], 1);
+/// settings.forgetting = Forgetting::Constant { lambda: 0.99 };
+/// let mut estimator = Estimator::new(settings)?;
+/// for k in 0..100 {
+///     let speed = (0.1 * k as f64).sin();
+///     let effort = 2.0 * speed + 0.5 * speed.signum();
+///     estimator.step(&[speed, speed.signum()], &[effort], RowNoise::Std(&[0.01]))?;
+/// }
+/// assert!((estimator.x()[0] - 2.0).abs() < 1e-4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Estimator {
+    settings: Settings,
+    fingerprint: u64,
+    memory: Memory,
+    drift: Option<Drift>,
+    directional: Option<DirectionalForgetting>,
+    bounded: Option<BoundedCovariance>,
+    monitor: Option<ExcitationMonitor>,
+    detection: Option<ChangeDetection>,
+    reaction: Option<TargetedReaction>,
+    innovation: Innovation,
+    samples: u64,
+    /// Estimate in scales, and in the parameters' units.
+    scaled: Vec<f64>,
+    x: Vec<f64>,
+    error: Vec<f64>,
+    rows: Vec<f64>,
+    noise: Vec<f64>,
+    never_frozen: Vec<bool>,
+    prior_std: Vec<f64>,
+    scratch: Vec<f64>,
+}
+
+impl Estimator {
+    /// Estimator before its first sample. Allocates all it needs; with change detection it takes some milliseconds.
+    ///
+    /// # Errors
+    /// [`SettingsError`] of [`Settings::validate`].
+    pub fn new(settings: Settings) -> Result<Self, SettingsError> {
+        settings.validate()?;
+        let (p, m) = (settings.columns(), settings.rows);
+        let in_scales =
+            |list: &[f64]| -> Vec<f64> { list.iter().zip(&settings.scale).map(|(v, s)| v / s).collect() };
+        let (start, prior_std) = (in_scales(&settings.start), in_scales(&settings.prior_std));
+        let information: Vec<f64> = prior_std.iter().map(|s| 1.0 / (s * s)).collect();
+        let shares = |share: f64| -> Vec<f64> { information.iter().map(|i| share * i).collect() };
+        let root = SquareRoot::from_prior(&start, &prior_std);
+        let memory = match settings.forgetting {
+            Forgetting::BlockWindow { samples, blocks } => {
+                Memory::Blocks(BlockWindow::new(root, samples / blocks, blocks, m))
+            }
+            Forgetting::RowWindow { samples, blocks } => {
+                Memory::Rows(RowWindow::new(root, samples / blocks, blocks, m))
+            }
+            _ => Memory::Recursive(root),
+        };
+        let drift = match &settings.forgetting {
+            Forgetting::Drift { rate, interval } => {
+                let variance: Vec<f64> = in_scales(rate).iter().map(|r| r * r * interval).collect();
+                Some(Drift::new(&variance))
+            }
+            _ => None,
+        };
+        let directional = matches!(settings.forgetting, Forgetting::Directional { .. })
+            .then(|| DirectionalForgetting::new(p, m));
+        let mut fingerprint = Fingerprint::new();
+        // Writing into a hash cannot fail.
+        let _ = write!(fingerprint, "{settings:?}");
+        Ok(Self {
+            fingerprint: fingerprint.0,
+            memory,
+            drift,
+            directional,
+            bounded: settings.bounded_covariance.map(|share| BoundedCovariance::new(&shares(share))),
+            monitor: settings.monitor.map(|s| ExcitationMonitor::new(&shares(s.share), s.samples, m)),
+            detection: settings.detection.map(|s| ChangeDetection::new(&s, m)),
+            reaction: settings.reaction.map(|s| TargetedReaction::new(&s, p, m)),
+            innovation: Innovation::new(p, m),
+            samples: 0,
+            x: settings.start.clone(),
+            scaled: start,
+            error: vec![0.0; m],
+            rows: vec![0.0; m * (p + 1)],
+            noise: vec![0.0; m * m],
+            never_frozen: vec![false; p],
+            prior_std,
+            scratch: vec![0.0; 2 * p + 1],
+            settings,
+        })
+    }
+
+    /// Takes a sample of `m` rows, `1 ≤ m ≤ rows`.
+    ///
+    /// `regressor`: `m × p`, row by row, effort per parameter unit; `effort`: `m` entries.
+    ///
+    /// # Errors
+    /// [`SampleError`]: lengths that do not fit, numbers that are not finite, noise that is none. The estimator is then as it was before.
+    pub fn step(
+        &mut self,
+        regressor: &[f64],
+        effort: &[f64],
+        noise: RowNoise<'_>,
+    ) -> Result<Step, SampleError> {
+        let m = effort.len();
+        self.weigh(regressor, effort, noise)?;
+        let rows = &mut self.rows[..m * (self.x.len() + 1)];
+        let frozen = self.monitor.as_ref().map_or(self.never_frozen.as_slice(), |m| m.frozen());
+        if let (Some(drift), Memory::Recursive(root)) = (&mut self.drift, &mut self.memory) {
+            drift.advance(root, frozen);
+        }
+        for (error, (y, phi)) in
+            self.error.iter_mut().zip(effort.iter().zip(regressor.chunks_exact(self.x.len())))
+        {
+            *error = y - dot(phi, &self.x);
+        }
+        self.innovation.evaluate(self.memory.root(), &self.scaled, rows);
+        if let Some(monitor) = &mut self.monitor {
+            monitor.push(rows);
+        }
+        let held_back = self.reaction.as_ref().is_some_and(TargetedReaction::is_active);
+        let (mut lambda, mut alarm, mut reaction) = (1.0, false, None);
+        if held_back {
+            reaction = self.hold_back(m);
+        } else {
+            lambda = self.forget(effort);
+            self.memory.push(&mut self.rows[..m * (self.x.len() + 1)]);
+            self.solve();
+            if let Some(detection) = &mut self.detection {
+                alarm = detection.push(self.innovation.whitened());
+            }
+            if let (true, Some(reaction)) = (alarm, &mut self.reaction) {
+                reaction.start();
+            }
+        }
+        self.samples += 1;
+        let u = self.innovation.whitened();
+        Ok(Step {
+            sample: self.samples - 1,
+            lambda,
+            normalised_square: u.iter().map(|u| u * u).sum::<f64>() / m as f64,
+            statistic: self.detection.as_ref().map_or(0.0, ChangeDetection::statistic),
+            alarm,
+            held_back,
+            reaction,
+            frozen: self.monitor.as_ref().map_or(0, ExcitationMonitor::frozen_count),
+        })
+    }
+
+    /// Writes whitened rows `[φ y]` with parameters in scales; on errors only this workspace has changed.
+    fn weigh(&mut self, regressor: &[f64], effort: &[f64], noise: RowNoise<'_>) -> Result<(), SampleError> {
+        let (p, m) = (self.x.len(), effort.len());
+        if m == 0 || m > self.settings.rows {
+            return Err(SampleError::Rows { most: self.settings.rows, found: m });
+        }
+        let (what, list, expected) = match noise {
+            RowNoise::Std(list) => ("row deviations", list, m),
+            RowNoise::Covariance(list) => ("row covariance", list, m * m),
+        };
+        for (what, list, expected) in [("regressor", regressor, m * p), (what, list, expected)] {
+            if list.len() != expected {
+                return Err(SampleError::Length { what, expected, found: list.len() });
+            }
+        }
+        for (what, list) in [("regressor", regressor), ("effort", effort), (what, list)] {
+            if let Some(index) = list.iter().position(|v| !v.is_finite()) {
+                return Err(SampleError::NotFinite { what, index });
+            }
+        }
+        let rows = &mut self.rows[..m * (p + 1)];
+        let given = regressor.chunks_exact(p).zip(effort);
+        for (row, (phi, y)) in rows.chunks_exact_mut(p + 1).zip(given) {
+            for (entry, (f, s)) in row.iter_mut().zip(phi.iter().zip(&self.settings.scale)) {
+                *entry = f * s;
+            }
+            row[p] = *y;
+        }
+        match noise {
+            RowNoise::Std(list) => {
+                for (i, (row, std)) in rows.chunks_exact_mut(p + 1).zip(list).enumerate() {
+                    if *std <= 0.0 {
+                        return Err(SampleError::Noise { row: i });
+                    }
+                    row.iter_mut().for_each(|v| *v /= std);
+                }
+            }
+            RowNoise::Covariance(list) => {
+                let factor = &mut self.noise[..m * m];
+                factor.copy_from_slice(list);
+                cholesky(factor, m).map_err(|row| SampleError::Noise { row })?;
+                solve_lower(factor, m, rows, p + 1);
+            }
+        }
+        match rows.iter().position(|v| v.is_nan() || v.abs() > LARGEST) {
+            Some(place) if place % (p + 1) == p => {
+                Err(SampleError::NotFinite { what: "effort", index: place / (p + 1) })
+            }
+            Some(place) => {
+                let index = place / (p + 1) * p + place % (p + 1);
+                Err(SampleError::NotFinite { what: "regressor", index })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Forgets and returns the factor.
+    fn forget(&mut self, effort: &[f64]) -> f64 {
+        let m = effort.len();
+        let lambda = match &self.settings.forgetting {
+            Forgetting::Constant { lambda } | Forgetting::Directional { lambda, .. } => *lambda,
+            Forgetting::ErrorDriven { alpha, beta, floor } => {
+                error_driven_factor(relative_error(&self.error[..m], effort, *floor), *alpha, *beta)
+            }
+            Forgetting::NoiseNormalised { alpha, beta, dead_zone } => {
+                error_driven_factor(excess_error(self.innovation.whitened(), *dead_zone), *alpha, *beta)
+            }
+            _ => 1.0,
+        };
+        let Memory::Recursive(root) = &mut self.memory else { return 1.0 };
+        if lambda >= 1.0 || (0..self.x.len()).any(|j| root.row(j)[0] < LEAST_PIVOT) {
+            return 1.0;
+        }
+        match (&self.settings.forgetting, &mut self.directional, &mut self.monitor) {
+            (Forgetting::Directional { tolerance, .. }, Some(directional), _) => {
+                directional.forget(root, &self.rows[..m * (self.x.len() + 1)], lambda, *tolerance);
+            }
+            (_, _, Some(monitor)) => monitor.discount(root, lambda),
+            _ => root.discount(lambda),
+        }
+        if let Some(bounded) = &mut self.bounded {
+            bounded.hold(root, &self.scaled, lambda);
+        }
+        lambda
+    }
+
+    /// Gives the sample to the reaction, which it may complete.
+    fn hold_back(&mut self, m: usize) -> Option<Reaction> {
+        let (Some(reaction), Memory::Recursive(root)) = (&mut self.reaction, &mut self.memory) else {
+            return None;
+        };
+        if !reaction.push(&self.rows[..m * (self.x.len() + 1)]) {
+            return None;
+        }
+        let inflation = self.detection.as_ref().map_or(1.0, ChangeDetection::inflation);
+        let mut outcome = reaction.finish(root, inflation);
+        outcome.jump *= self.settings.scale[outcome.best];
+        self.solve();
+        Some(outcome)
+    }
+
+    fn solve(&mut self) {
+        if self.memory.root().solve(&mut self.scaled) {
+            self.publish();
+        }
+    }
+
+    fn publish(&mut self) {
+        for (x, (scaled, scale)) in self.x.iter_mut().zip(self.scaled.iter().zip(&self.settings.scale)) {
+            *x = scaled * scale;
+        }
+    }
+
+    /// The estimate, in the parameters' units.
+    pub fn x(&self) -> &[f64] {
+        &self.x
+    }
+
+    /// Writes the standard deviation of each parameter, in its unit (`p` entries).
+    ///
+    /// They hold for row noise as stated and white; [`ChangeDetection::inflation`] says by how much variances fall short where
+    /// it was learned.
+    pub fn std(&mut self, out: &mut [f64]) {
+        assert_eq!(out.len(), self.x.len(), "one deviation per parameter");
+        let root = self.memory.root();
+        let scratch = &mut self.scratch[..root.columns()];
+        for (j, (std, scale)) in out.iter_mut().zip(&self.settings.scale).enumerate() {
+            *std = libm::sqrt(root.variance(j, scratch)) * scale;
+        }
+    }
+
+    /// Writes the covariance of the parameters, `p × p` row by row, in products of their units.
+    pub fn covariance(&self, out: &mut [f64]) {
+        let p = self.x.len();
+        self.memory.root().covariance(out);
+        for (place, value) in out.iter_mut().enumerate() {
+            *value *= self.settings.scale[place / p] * self.settings.scale[place % p];
+        }
+    }
+
+    /// Information, with the prior and with parameters in scales.
+    pub fn information(&self) -> &SquareRoot {
+        self.memory.root()
+    }
+
+    /// Settings.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Samples taken.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Errors `y - Φ x` of the last sample's prediction, in the unit of effort.
+    pub fn prediction_error(&self) -> &[f64] {
+        &self.error[..self.innovation.whitened().len()]
+    }
+
+    /// Innovations of the last sample.
+    pub fn innovation(&self) -> &Innovation {
+        &self.innovation
+    }
+
+    /// Change detection, if there is any.
+    pub fn detection(&self) -> Option<&ChangeDetection> {
+        self.detection.as_ref()
+    }
+
+    /// Excitation monitor, if there is one.
+    pub fn monitor(&self) -> Option<&ExcitationMonitor> {
+        self.monitor.as_ref()
+    }
+
+    /// Sets the covariance back to the prior's; the estimate stays. Samples held back are dropped.
+    ///
+    /// # Errors
+    /// [`SettingsError::Combination`] with windows.
+    pub fn reset(&mut self) -> Result<(), SettingsError> {
+        let Memory::Recursive(root) = &mut self.memory else { return Err(WINDOW) };
+        root.restart(&self.scaled, &self.prior_std);
+        if let Some(reaction) = &mut self.reaction {
+            reaction.stop();
+        }
+        if let Some(detection) = &mut self.detection {
+            detection.restart();
+        }
+        Ok(())
+    }
+
+    /// Adds the standard deviation `std`, in the parameter's unit, to parameter `j` alone; the estimate stays.
+    ///
+    /// # Errors
+    /// [`SettingsError`] with windows, for `j` beyond the last parameter, and unless `std` is finite and not negative.
+    pub fn open(&mut self, j: usize, std: f64) -> Result<(), SettingsError> {
+        let p = self.x.len();
+        let Memory::Recursive(root) = &mut self.memory else { return Err(WINDOW) };
+        if j >= p {
+            let (what, expected, found) = ("parameter to open", "one that exists", j as f64);
+            return Err(SettingsError::Number { what, index: j, expected, found });
+        }
+        let scaled = std / self.settings.scale[j];
+        if !(0.0..1e30).contains(&scaled) {
+            let (what, expected) = ("deviation to add", "up to 1e30 scales, not negative");
+            return Err(SettingsError::Number { what, index: j, expected, found: std });
+        }
+        root.open(j, scaled * scaled, &mut self.scratch);
+        Ok(())
+    }
+
+    /// The whole state as words of 64 bits, for any file format. Real numbers are their bits.
+    ///
+    /// An estimator that loads them continues with the same bits as one that was never interrupted. Allocates.
+    pub fn save(&self) -> Vec<u64> {
+        let mut words = Vec::new();
+        self.clone().transfer(&mut Transfer::Save(&mut words));
+        words
+    }
+
+    /// Takes over a state saved with the same settings. Allocates.
+    ///
+    /// # Errors
+    /// [`StateError`]; the estimator is then as it was before.
+    pub fn load(&mut self, words: &[u64]) -> Result<(), StateError> {
+        let mut loaded = self.clone();
+        let mut transfer = Transfer::load(words);
+        loaded.transfer(&mut transfer);
+        transfer.finish()?;
+        loaded.publish();
+        *self = loaded;
+        Ok(())
+    }
+
+    fn transfer(&mut self, transfer: &mut Transfer<'_>) {
+        transfer.fingerprint(STATE_VERSION);
+        transfer.fingerprint(self.fingerprint);
+        transfer.integer(&mut self.samples);
+        transfer.reals(&mut self.scaled);
+        self.memory.transfer(transfer);
+        if let Some(bounded) = &mut self.bounded {
+            bounded.transfer(transfer);
+        }
+        if let Some(monitor) = &mut self.monitor {
+            monitor.transfer(transfer);
+        }
+        if let Some(detection) = &mut self.detection {
+            detection.transfer(transfer);
+        }
+        if let Some(reaction) = &mut self.reaction {
+            reaction.transfer(transfer);
+        }
+    }
+}
+
+const WINDOW: SettingsError =
+    SettingsError::Combination { what: "a window holds samples and the prior: its covariance cannot be set" };
