@@ -113,6 +113,9 @@ impl JointElement for Linearised {
     fn reversal_speeds(&self) -> Vec<Vec<(usize, f64)>> {
         self.element.reversal_speeds()
     }
+    fn travels(&self) -> Vec<(usize, f64)> {
+        self.element.travels()
+    }
     fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         let own = self.own_entries();
         let mut columns = ElementColumns {

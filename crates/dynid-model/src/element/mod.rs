@@ -6,6 +6,7 @@
 mod channel;
 mod compliance;
 mod drive;
+mod elastic;
 mod friction;
 mod linearised;
 mod rotor;
@@ -16,9 +17,10 @@ use channel::temperature_of;
 pub use channel::{current_channel, is_temperature, temperature_channel};
 pub use compliance::{CyclicTorque, Spring};
 pub use drive::DriveGain;
+pub use elastic::{CubicFit, CubicSpring, ElasticDoubt, ElasticTransmission, PiecewiseFit, PiecewiseSpring};
 pub use friction::{
     Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, LoadFriction, LuGre, Offset, PowerLaw,
-    Sigmoid, SigmoidOffset, Stribeck, TanhFriction, Viscous, ViscousMagnitude,
+    Sigmoid, SigmoidOffset, Stribeck, StribeckViscous, TanhFriction, Viscous, ViscousMagnitude,
 };
 pub use linearised::{Linearised, change_name};
 pub use rotor::RotorInertia;
@@ -173,6 +175,11 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     }
     /// Combinations `Σ factor · rate`, besides single rates, whose sign the element takes.
     fn reversal_speeds(&self) -> Vec<Vec<(usize, f64)>> {
+        Vec::new()
+    }
+    /// How far rates travel per travel of a joint, `(rate, factor)`: a motor behind a gear. None by default: 1. Random motion
+    /// of [coordinates](crate::Coordinate) takes its size from it.
+    fn travels(&self) -> Vec<(usize, f64)> {
         Vec::new()
     }
     /// Fills the columns of all entries.
