@@ -1,6 +1,7 @@
 //! The effort model of a robot: rigid bodies and joint elements.
 
 mod adjoint;
+mod elastic;
 mod elements;
 mod history;
 mod known;
@@ -441,9 +442,9 @@ fn joint_infos(mechanism: &Mechanism, coordinates: &[Coordinate]) -> Vec<JointIn
 /// How far each coordinate without bodies travels per travel of a joint.
 fn travels(elements: &[Box<dyn JointElement>], first_rate: usize, count: usize) -> Vec<f64> {
     let mut travels = vec![1.0; count];
-    for (rate, factor) in elements.iter().flat_map(|e| e.travels()) {
-        if let Some(travel) = rate.checked_sub(first_rate).and_then(|k| travels.get_mut(k)) {
-            *travel = factor;
+    for e in elements.iter().filter_map(|e| e.elastic()) {
+        if let Some(travel) = e.motor.checked_sub(first_rate).and_then(|k| travels.get_mut(k)) {
+            *travel = e.ratio;
         }
     }
     travels

@@ -8,9 +8,11 @@ mod random_tree;
 use std::path::PathBuf;
 
 use dynid_model::element::{
-    Coulomb, CubicSpring, CyclicTorque, ElasticDoubt, ElasticTransmission, JointElement, PiecewiseSpring,
-    RotorInertia, ShapeSetting, Spring, StribeckViscous, TanhFriction, Viscous,
+    Arctangent, Coulomb, CubicSpring, CyclicTorque, ElasticDoubt, ElasticTransmission, ExternalLoad,
+    JetMotion, JointElement, Offset, PiecewiseSpring, PowerLaw, RotorInertia, ShapeSetting, Spring, Stribeck,
+    StribeckViscous, TanhFriction, Viscous, ViscousMagnitude,
 };
+use dynid_model::scalar::{Jet, Scalar as _};
 use dynid_model::*;
 use random_tree::tree;
 use serde_json::Value;
@@ -441,4 +443,98 @@ fn without_a_motor_position_only_the_sum_of_both_rows_is_seen() {
 fn names_are_taken_once() {
     let mechanism = tree(1, 4).build().unwrap();
     RobotModel::with_coordinates(mechanism, vec![Coordinate::turning("j1")], vec![]);
+}
+
+/// Positions, rates and so on to the fourth derivative at a time, of coordinate `c`.
+fn smooth(c: usize, t: f64) -> [f64; 5] {
+    let (w, phase, size) = (1.3 + 0.4 * c as f64, 0.7 * c as f64, 0.8 - 0.1 * c as f64);
+    std::array::from_fn(|k| {
+        size * w.powi(k as i32) * (w * t + phase + 0.5 * std::f64::consts::PI * k as f64).sin()
+    })
+}
+
+#[test]
+fn jets_of_bodies_and_elements_are_their_derivatives_by_time() {
+    let mut d = tree(3, 8);
+    d.joints.iter_mut().for_each(|j| j.kind = JointKind::Revolute);
+    let held = ShapeSetting::held;
+    let elements: Vec<Box<dyn JointElement>> = vec![
+        Box::new(Coulomb { rate: 0 }),
+        Box::new(Viscous { rate: 0 }),
+        Box::new(ViscousMagnitude { rate: 1 }),
+        Box::new(Offset { rate: 0 }),
+        Box::new(RotorInertia { rate: 1 }),
+        Box::new(Spring { rate: 2 }),
+        Box::new(CyclicTorque { rate: 1, cycles: 3.0 }),
+        Box::new(TanhFriction { rate: 2, w: held(0.7) }),
+        Box::new(Arctangent { rate: 0, fb: held(1.7) }),
+        Box::new(Stribeck { rate: 1, vs: held(0.9), delta: held(1.4) }),
+        Box::new(Stribeck { rate: 2, vs: held(0.6), delta: held(2.0) }),
+        Box::new(StribeckViscous { rate: 0, vs: held(0.8), delta: held(1.0) }),
+        Box::new(ExternalLoad { rate: 0, brake: true }),
+        Box::new(ExternalLoad { rate: 1, brake: false }),
+    ];
+    let model = RobotModel::new(d.build().unwrap(), elements);
+    let linear: Vec<f64> = (0..model.parameters().linear.len()).map(|k| 0.4 + 0.2 * (k % 5) as f64).collect();
+    let dynamics = Dynamics::new(model.mechanism());
+    let inertias: Vec<Jet> = linear[..30].iter().map(|x| Jet::from_f64(*x)).collect();
+    let names: Vec<&str> = model.channels().iter().map(String::as_str).collect();
+    assert_eq!(names, ["load_j1", "load_j2"]);
+    for sign_width in [0.0, 0.5] {
+        let effort = |t: f64| {
+            let of = |k: usize| (0..3).map(|c| smooth(c, t)[k]).collect::<Vec<f64>>();
+            let load = [0, 1].map(|c| [smooth(c + 5, t)[0]]);
+            let channels = [(names[0], load[0].as_slice()), (names[1], load[1].as_slice())];
+            let (q, dq, ddq) = (of(0), of(1), of(2));
+            let motion =
+                MotionBlock { channels: &channels, sign_width, ..MotionBlock::plain(1, &q, &dq, &ddq) };
+            let mut effort = vec![0.0; 3];
+            model.efforts(&motion, &[], &linear, 1, &mut effort);
+            effort
+        };
+        for t in [0.1, 0.9, 2.2] {
+            let of = |k: usize| {
+                (0..3).map(|c| Jet::new([0, 1, 2].map(|d| smooth(c, t)[k + d]))).collect::<Vec<_>>()
+            };
+            let (q, dq, ddq) = (of(0), of(1), of(2));
+            let load = [0, 1].map(|c| Jet::new([0, 1, 2].map(|d| smooth(c + 5, t)[d])));
+            let channels = [(names[0], load[0]), (names[1], load[1])];
+            let mut found = vec![Jet::default(); 3];
+            let state = State { q: &q, dq: &dq, ddq: &ddq, gravity: None };
+            dynamics.inverse_dynamics(&state, &inertias, &mut dynamics.workspace(), &mut found);
+            let motion = JetMotion { q: &q, dq: &dq, ddq: &ddq, channels: &channels, sign_width };
+            model.element_jets(&motion, &[], &linear, |_| true, &mut found).unwrap();
+            // Errors of third and fourth derivatives, some 1e3, times h², and of rounding over h².
+            let h = 1e-4;
+            let (below, here, above) = (effort(t - h), effort(t), effort(t + h));
+            for (o, jet) in found.iter().enumerate() {
+                let first = (above[o] - below[o]) / (2.0 * h);
+                let second = (above[o] - 2.0 * here[o] + below[o]) / (h * h);
+                assert!(
+                    (jet.value - here[o]).abs() <= 1e-13 * here[o].abs().max(10.0),
+                    "{o}: {jet:?} {}",
+                    here[o]
+                );
+                assert!((jet.first - first).abs() <= 1e-5, "{o}, first: {jet:?} {first}");
+                assert!((jet.second - second).abs() <= 1e-4, "{o}, second: {jet:?} {second}");
+            }
+        }
+    }
+    let silent = RobotModel::new(model.mechanism().clone(), vec![Box::new(PowerLaw::new(1))]);
+    let rest = [Jet::default(); 3];
+    let motion = JetMotion { q: &rest, dq: &rest, ddq: &rest, channels: &[], sign_width: 0.0 };
+    let shape = silent.parameters().shape_start();
+    let ask =
+        |rate: usize| silent.element_jets(&motion, &shape, &[0.0; 31], |r| r == rate, &mut rest.clone());
+    assert_eq!((ask(0), ask(1)), (Ok(()), Err("j2.fp".into())));
+}
+
+#[test]
+fn motors_and_links_know_each_other() {
+    let model = elastic_arm();
+    assert_eq!((model.elastic_motor(1), model.elastic_motor(2)), (Some((5, -2.0)), None));
+    assert_eq!((model.elastic_link(6), model.elastic_link(3)), (Some((3, 1.5)), None));
+    let linear: Vec<f64> = (0..model.parameters().linear.len()).map(|k| k as f64).collect();
+    let found: Vec<_> = model.elastic_transmissions(&linear).into_iter().map(|(e, v)| (e.link, v)).collect();
+    assert_eq!(found, [(0, vec![40.0, 41.0, 42.0]), (1, vec![43.0, 44.0]), (3, vec![45.0, 46.0])]);
 }

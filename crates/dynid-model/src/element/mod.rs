@@ -7,7 +7,9 @@ mod channel;
 mod compliance;
 mod drive;
 mod elastic;
+mod external_load;
 mod friction;
+mod jets;
 mod linearised;
 mod rotor;
 mod shape;
@@ -18,10 +20,12 @@ pub use channel::{current_channel, is_temperature, temperature_channel};
 pub use compliance::{CyclicTorque, Spring};
 pub use drive::DriveGain;
 pub use elastic::{CubicFit, CubicSpring, ElasticDoubt, ElasticTransmission, PiecewiseFit, PiecewiseSpring};
+pub use external_load::{ExternalLoad, load_channel};
 pub use friction::{
     Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, LoadFriction, LuGre, Offset, PowerLaw,
     Sigmoid, SigmoidOffset, Stribeck, StribeckViscous, TanhFriction, Viscous, ViscousMagnitude,
 };
+pub use jets::JetMotion;
 pub use linearised::{Linearised, change_name};
 pub use rotor::RotorInertia;
 pub use shape::{ShapeFault, ShapeSetting};
@@ -29,6 +33,7 @@ pub use transmission::{CoupledWrist, Transmission};
 
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::{Owner, Parameter, ShapeParameter};
+use crate::scalar::Jet;
 use crate::scalar::elementary::{Curve, map_curve};
 
 /// An output as elements see it.
@@ -177,10 +182,9 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     fn reversal_speeds(&self) -> Vec<Vec<(usize, f64)>> {
         Vec::new()
     }
-    /// How far rates travel per travel of a joint, `(rate, factor)`: a motor behind a gear. None by default: 1. Random motion
-    /// of [coordinates](crate::Coordinate) takes its size from it.
-    fn travels(&self) -> Vec<(usize, f64)> {
-        Vec::new()
+    /// The elastic transmission that it is, if it is one; none by default.
+    fn elastic(&self) -> Option<&ElasticTransmission> {
+        None
     }
     /// Fills the columns of all entries.
     fn fill(
@@ -190,6 +194,11 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
         shape: &[f64],
         out: &mut ElementColumns<'_>,
     );
+    /// Fills the columns of all entries at one instant with their time derivatives; false, having filled nothing that
+    /// counts, if the element does not offer them or a channel is missing. Not offered by default.
+    fn jets(&self, _joints: &[JointInfo], _motion: &JetMotion<'_>, _shape: &[f64], _out: &mut [Jet]) -> bool {
+        false
+    }
     /// Which columns change with which shape parameter: `(entry, shape parameter)`, each pair once; none by default.
     fn shape_entries(&self) -> Vec<(usize, usize)> {
         Vec::new()

@@ -149,8 +149,8 @@ impl JointElement for ElasticTransmission {
         let parameters = 1 + usize::from(self.cubic) + usize::from(self.damping);
         (0..parameters).flat_map(|k| [(self.motor, k), (self.link, k)]).collect()
     }
-    fn travels(&self) -> Vec<(usize, f64)> {
-        vec![(self.motor, self.ratio)]
+    fn elastic(&self) -> Option<&ElasticTransmission> {
+        Some(self)
     }
     fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         let deformation = self.deformation(joints, motion);

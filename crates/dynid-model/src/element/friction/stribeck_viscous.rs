@@ -1,11 +1,12 @@
 //! Viscous friction that fades with speed.
 
-use super::stribeck::{fill_falling, raised};
+use super::stribeck::{falling_jet, fill_falling, raised};
 use super::{NUMBER, SPEED, VISCOUS};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::element::shape::{self, places, values};
-use crate::element::{ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting};
+use crate::element::{ElementColumns, ElementWeights, JetMotion, JointElement, JointInfo, ShapeSetting};
 use crate::parameter::{Parameter, ShapeParameter};
+use crate::scalar::Jet;
 use crate::scalar::elementary::decay;
 
 /// Viscous friction of the Stribeck range, `F_vs v E` with `E = exp(-|v/v_s|^δ)`: one column for `fvs`, shape parameters `vs`
@@ -128,6 +129,11 @@ impl JointElement for StribeckViscous {
             let speeds = motion.rate(self.rate);
             weights.add(place, self.rate, speeds, |v| scale * bend(v, logarithm), &mut out.dq);
         }
+    }
+    fn jets(&self, _: &[JointInfo], motion: &JetMotion<'_>, shape: &[f64], out: &mut [Jet]) -> bool {
+        let v = motion.dq[self.rate];
+        out[0] = v * falling_jet(v, values(self.settings(), shape));
+        true
     }
     fn adjoint(
         &self,
