@@ -84,8 +84,7 @@ impl BaseParameters {
             n => n,
         };
         // What elements remember takes values of its own: any of them may come before a state.
-        let channels = model.channels().iter().chain(model.signals());
-        let motion = RandomMotion::new(mechanism, channels, states, settings.seed);
+        let motion = RandomMotion::of(model, mechanism, states, settings.seed);
         motion.with_block(|block| Self::on_motion(model, block, shape, settings))
     }
 

@@ -231,6 +231,11 @@ pub trait EffortModel: Send + Sync {
     }
     /// Number of entries of the position vector, number of rates.
     fn dimensions(&self) -> (usize, usize);
+    /// For every coordinate without bodies, the last of the rates and of the positions: how far it travels per travel of a
+    /// joint, a gear ratio. None by default.
+    fn travels(&self) -> &[f64] {
+        &[]
+    }
     /// Speeds whose change of sign spoils rows of an output: combinations `Σ factor · rate` that a sign is taken of.
     /// By default the output's own rate.
     fn reversal_speeds(&self, output: usize) -> Vec<Vec<(usize, f64)>> {

@@ -7,6 +7,7 @@
 //! Units are SI, angles rad. Standard parameters are about the joint frame in the axes of the file.
 
 pub mod base_parameters;
+mod coordinate;
 pub mod description;
 pub mod dynamics;
 pub mod effort_model;
@@ -21,6 +22,7 @@ pub mod spatial;
 pub mod symmetric;
 
 pub use base_parameters::{BaseParameters, BaseSettings};
+pub use coordinate::Coordinate;
 pub use description::{Description, JointDescription, JointKind, Limits, LinkDescription, Mimic};
 pub use dynamics::{
     AddedInertia, BodyPoint, Dynamics, DynamicsWorkspace, Energy, ForwardDynamicsWorkspace, LoadedState,

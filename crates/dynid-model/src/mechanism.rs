@@ -122,6 +122,20 @@ pub struct Mechanism {
 }
 
 impl Mechanism {
+    /// A mechanism in which nothing moves, for a model of [coordinates](crate::Coordinate) without bodies alone.
+    pub fn without_bodies(name: impl Into<String>) -> Self {
+        Mechanism {
+            name: name.into(),
+            gravity: Vec3(crate::description::STANDARD_GRAVITY),
+            base_link: "base".into(),
+            ground_links: Vec::new(),
+            bodies: Vec::new(),
+            sweep: Vec::new(),
+            follows: None,
+            warnings: Vec::new(),
+        }
+    }
+
     /// Name of the robot.
     pub fn name(&self) -> &str {
         &self.name

@@ -1,6 +1,7 @@
 //! The effort model of a robot: rigid bodies and joint elements.
 
 mod adjoint;
+mod elastic;
 mod elements;
 mod history;
 mod known;
@@ -9,6 +10,7 @@ mod shaped;
 
 use std::sync::Arc;
 
+use crate::coordinate::Coordinate;
 use crate::description::JointKind;
 use crate::dynamics::{Dynamics, MotionAdjoint, MotionBlock, Slots};
 use crate::effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
@@ -50,9 +52,13 @@ struct CoupledRegressor {
 /// Rigid bodies of a [`Mechanism`] plus elements at its joints.
 ///
 /// Columns: ten standard parameters per body in file order, then the elements' parameters in the order given.
+///
+/// Positions, rates and outputs: those of the mechanism, then one of each per [`Coordinate`] without bodies.
 #[derive(Debug)]
 pub struct RobotModel {
     mechanism: Mechanism,
+    coordinates: Vec<Coordinate>,
+    travels: Vec<f64>,
     dynamics: Dynamics,
     joints: Vec<JointInfo>,
     outputs: Vec<Output>,
@@ -73,19 +79,35 @@ impl RobotModel {
     /// # Panics
     /// If an element names a rate that the mechanism does not have.
     pub fn new(mechanism: Mechanism, elements: Vec<Box<dyn JointElement>>) -> Self {
+        Self::with_coordinates(mechanism, Vec::new(), elements)
+    }
+
+    /// Combines a mechanism with coordinates that no body moves with, and with elements at both: motors behind elastic
+    /// transmissions. Coordinate `k` has the position `mechanism.positions() + k` and the rate `mechanism.rates() + k`.
+    ///
+    /// The mechanism may be one [without bodies](Mechanism::without_bodies).
+    ///
+    /// # Panics
+    /// If an element names a rate that there is not, or two coordinates or joints share a name.
+    pub fn with_coordinates(
+        mechanism: Mechanism,
+        coordinates: Vec<Coordinate>,
+        elements: Vec<Box<dyn JointElement>>,
+    ) -> Self {
         let dynamics = Dynamics::new(&mechanism);
-        let joints = joint_infos(&mechanism);
-        let outputs = mechanism
-            .rate_names()
-            .into_iter()
-            .zip(mechanism.effort_units())
-            .map(|(name, unit)| Output { name, unit })
+        let joints = joint_infos(&mechanism, &coordinates);
+        let own_units = coordinates.iter().map(Coordinate::effort_unit);
+        let outputs: Vec<Output> = joints
+            .iter()
+            .zip(mechanism.effort_units().into_iter().chain(own_units))
+            .map(|(joint, unit)| Output { name: joint.name.clone(), unit })
             .collect();
 
         let acting = acting_bodies(&mechanism);
         let mut linear = inertial_parameters(&mechanism);
         let mut columns: Vec<Vec<usize>> =
             acting.iter().map(|bodies| bodies.iter().flat_map(|b| 10 * b..10 * b + 10).collect()).collect();
+        columns.resize(joints.len(), Vec::new());
         let mut shape = Vec::new();
         let mut channels: Vec<String> = Vec::new();
         let mut first_column = Vec::with_capacity(elements.len());
@@ -118,6 +140,7 @@ impl RobotModel {
                 (Slots::new(&dynamics, |_, _| 0), Some(coupled))
             }
         };
+        let travels = travels(&elements, mechanism.rates(), coordinates.len());
         let elements: Vec<PlacedElement> = elements
             .into_iter()
             .enumerate()
@@ -153,6 +176,8 @@ impl RobotModel {
             channels,
             known: Vec::new(),
             signals: Vec::new(),
+            coordinates,
+            travels,
             mechanism,
         };
         model.signals = model.signal_names();
@@ -162,6 +187,11 @@ impl RobotModel {
     /// The mechanism.
     pub fn mechanism(&self) -> &Mechanism {
         &self.mechanism
+    }
+
+    /// Coordinates without bodies, the last of the rates.
+    pub fn coordinates(&self) -> &[Coordinate] {
+        &self.coordinates
     }
 
     /// The same model with other values of its shape parameters: those that hold wherever nothing else is said
@@ -177,7 +207,7 @@ impl RobotModel {
         self
     }
 
-    /// Joints as elements see them, one per rate.
+    /// Joints and coordinates as elements see them, one per rate.
     pub fn joints(&self) -> &[JointInfo] {
         &self.joints
     }
@@ -231,7 +261,12 @@ impl EffortModel for RobotModel {
     }
 
     fn dimensions(&self) -> (usize, usize) {
-        (self.mechanism.positions(), self.mechanism.rates())
+        let own = self.coordinates.len();
+        (self.mechanism.positions() + own, self.mechanism.rates() + own)
+    }
+
+    fn travels(&self) -> &[f64] {
+        &self.travels
     }
 
     fn reversal_speeds(&self, output: usize) -> Vec<Vec<(usize, f64)>> {
@@ -381,7 +416,7 @@ impl CoupledRegressor {
     }
 }
 
-fn joint_infos(mechanism: &Mechanism) -> Vec<JointInfo> {
+fn joint_infos(mechanism: &Mechanism, coordinates: &[Coordinate]) -> Vec<JointInfo> {
     let owners = mechanism.rate_bodies();
     let names = mechanism.rate_names();
     let mut position = 0;
@@ -396,7 +431,23 @@ fn joint_infos(mechanism: &Mechanism) -> Vec<JointInfo> {
         }
         out.push(JointInfo { name, number: k + 1, position, slides: joint.kind == JointKind::Prismatic });
     }
+    for (k, coordinate) in coordinates.iter().enumerate() {
+        let Coordinate { name, slides } = coordinate.clone();
+        assert!(out.iter().all(|j| j.name != name), "two coordinates named `{name}`");
+        out.push(JointInfo { number: out.len() + 1, position: mechanism.positions() + k, name, slides });
+    }
     out
+}
+
+/// How far each coordinate without bodies travels per travel of a joint.
+fn travels(elements: &[Box<dyn JointElement>], first_rate: usize, count: usize) -> Vec<f64> {
+    let mut travels = vec![1.0; count];
+    for e in elements.iter().filter_map(|e| e.elastic()) {
+        if let Some(travel) = e.motor.checked_sub(first_rate).and_then(|k| travels.get_mut(k)) {
+            *travel = e.ratio;
+        }
+    }
+    travels
 }
 
 fn ancestor_rates(mechanism: &Mechanism, body: usize) -> Vec<usize> {

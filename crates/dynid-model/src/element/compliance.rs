@@ -1,9 +1,10 @@
 //! Efforts that depend on position.
 
 use super::friction::EFFORT;
-use super::{ElementColumns, ElementWeights, JointElement, JointInfo};
+use super::{ElementColumns, ElementWeights, JetMotion, JointElement, JointInfo};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::Parameter;
+use crate::scalar::{Jet, Scalar};
 
 /// Linear spring `k (q - q₀) = k q - (k q₀)`, two columns `[q, -1]` for `k` and `k q₀`.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,6 +37,11 @@ impl JointElement for Spring {
         out.map(0, motion.position(joints[self.rate].position), |q| q);
         out.column(1).fill(-1.0);
     }
+    fn jets(&self, joints: &[JointInfo], motion: &JetMotion<'_>, _: &[f64], out: &mut [Jet]) -> bool {
+        out[0] = motion.q[joints[self.rate].position];
+        out[1] = -Jet::one();
+        true
+    }
     fn adjoint(
         &self,
         joints: &[JointInfo],
@@ -64,6 +70,11 @@ impl JointElement for CyclicTorque {
         let q = motion.position(joints[self.rate].position);
         out.map(0, q, |q| (self.cycles * q).cos());
         out.map(1, q, |q| (self.cycles * q).sin());
+    }
+    fn jets(&self, joints: &[JointInfo], motion: &JetMotion<'_>, _: &[f64], out: &mut [Jet]) -> bool {
+        let (sine, cosine) = motion.q[joints[self.rate].position].scaled(self.cycles).sin_cos();
+        [out[0], out[1]] = [cosine, sine];
+        true
     }
     fn adjoint(
         &self,

@@ -1,6 +1,6 @@
 //! Elements linearised about values of their shape parameters.
 
-use super::{ElementColumns, ElementWeights, JointElement, JointInfo};
+use super::{ElasticTransmission, ElementColumns, ElementWeights, JointElement, JointInfo};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::{Owner, Parameter};
 
@@ -112,6 +112,9 @@ impl JointElement for Linearised {
     }
     fn reversal_speeds(&self) -> Vec<Vec<(usize, f64)>> {
         self.element.reversal_speeds()
+    }
+    fn elastic(&self) -> Option<&ElasticTransmission> {
+        self.element.elastic()
     }
     fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         let own = self.own_entries();

@@ -6,7 +6,10 @@
 mod channel;
 mod compliance;
 mod drive;
+mod elastic;
+mod external_load;
 mod friction;
+mod jets;
 mod linearised;
 mod rotor;
 mod shape;
@@ -16,10 +19,13 @@ use channel::temperature_of;
 pub use channel::{current_channel, is_temperature, temperature_channel};
 pub use compliance::{CyclicTorque, Spring};
 pub use drive::DriveGain;
+pub use elastic::{CubicFit, CubicSpring, ElasticDoubt, ElasticTransmission, PiecewiseFit, PiecewiseSpring};
+pub use external_load::{ExternalLoad, load_channel};
 pub use friction::{
     Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, LoadFriction, LuGre, Offset, PowerLaw,
-    Sigmoid, SigmoidOffset, Stribeck, TanhFriction, Viscous, ViscousMagnitude,
+    Sigmoid, SigmoidOffset, Stribeck, StribeckViscous, TanhFriction, Viscous, ViscousMagnitude,
 };
+pub use jets::JetMotion;
 pub use linearised::{Linearised, change_name};
 pub use rotor::RotorInertia;
 pub use shape::{ShapeFault, ShapeSetting};
@@ -27,6 +33,7 @@ pub use transmission::{CoupledWrist, Transmission};
 
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::{Owner, Parameter, ShapeParameter};
+use crate::scalar::Jet;
 use crate::scalar::elementary::{Curve, map_curve};
 
 /// An output as elements see it.
@@ -175,6 +182,10 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     fn reversal_speeds(&self) -> Vec<Vec<(usize, f64)>> {
         Vec::new()
     }
+    /// The elastic transmission that it is, if it is one; none by default.
+    fn elastic(&self) -> Option<&ElasticTransmission> {
+        None
+    }
     /// Fills the columns of all entries.
     fn fill(
         &self,
@@ -183,6 +194,11 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
         shape: &[f64],
         out: &mut ElementColumns<'_>,
     );
+    /// Fills the columns of all entries at one instant with their time derivatives; false, having filled nothing that
+    /// counts, if the element does not offer them or a channel is missing. Not offered by default.
+    fn jets(&self, _joints: &[JointInfo], _motion: &JetMotion<'_>, _shape: &[f64], _out: &mut [Jet]) -> bool {
+        false
+    }
     /// Which columns change with which shape parameter: `(entry, shape parameter)`, each pair once; none by default.
     fn shape_entries(&self) -> Vec<(usize, usize)> {
         Vec::new()

@@ -1,8 +1,9 @@
 //! Rotor inertia reflected to the joint.
 
-use super::{ElementColumns, ElementWeights, JointElement, JointInfo};
+use super::{ElementColumns, ElementWeights, JetMotion, JointElement, JointInfo};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::Parameter;
+use crate::scalar::Jet;
 
 /// Reflected rotor inertia `I_a q̈` on its own joint, `I_a = n² J` (gyroscopic coupling neglected), one column.
 ///
@@ -25,6 +26,10 @@ impl JointElement for RotorInertia {
     }
     fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         out.map(0, motion.acceleration(self.rate), |a| a);
+    }
+    fn jets(&self, _: &[JointInfo], motion: &JetMotion<'_>, _: &[f64], out: &mut [Jet]) -> bool {
+        out[0] = motion.ddq[self.rate];
+        true
     }
     fn adjoint(
         &self,

@@ -23,6 +23,9 @@ impl RobotModel {
     ) {
         self.check_shapes(shape, Some(linear));
         let inertial = self.dynamics.inertial_parameters();
+        for output in self.mechanism.rates()..self.outputs.len() {
+            effort[output * stride..][..motion.samples].fill(0.0);
+        }
         self.dynamics.inverse_dynamics_block(motion, &linear[..inertial], stride, effort);
         self.element_efforts(motion, shape, linear, stride, effort, &mut Vec::new());
     }

@@ -3,18 +3,20 @@
 mod dispatch;
 mod dual;
 pub(crate) mod elementary;
+mod jet;
 mod lanes;
 mod sine;
 
 pub(crate) use dispatch::{FusedTask, run_fused};
 pub use dispatch::{LANES, LaneTask, run_on_lanes};
 pub use dual::Dual;
+pub use jet::Jet;
 pub use lanes::Lanes;
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-/// A number for the dynamics recursion: `f64`, SIMD lanes, dual numbers.
+/// A number for the dynamics recursion: `f64`, SIMD lanes, dual numbers, jets.
 pub trait Scalar:
     Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self> + AddAssign
 {

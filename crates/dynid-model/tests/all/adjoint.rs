@@ -4,8 +4,8 @@
 
 use crate::random_tree::{self, check_close, generator, numbers, sample, tree};
 use dynid_model::element::{
-    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, JointElement, LoadFriction, Offset,
-    RotorInertia, Spring, Transmission, Viscous, current_channel,
+    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, ExternalLoad, JointElement,
+    LoadFriction, Offset, RotorInertia, Spring, Transmission, Viscous, current_channel, load_channel,
 };
 use dynid_model::scalar::Dual;
 use dynid_model::*;
@@ -202,6 +202,8 @@ fn model_with_elements() -> RobotModel {
         }),
         Box::new(CoupledWrist { a: 1, b: 3, ratio: 0.8 }),
         Box::new(DriveGain { rate: 3 }),
+        Box::new(ExternalLoad { rate: 0, brake: true }),
+        Box::new(ExternalLoad { rate: 2, brake: false }),
         Box::new(LoadFriction::new(&mechanism, vec![0, 2], reference.into())),
     ];
     RobotModel::new(mechanism, elements)
@@ -216,7 +218,8 @@ fn elements_have_the_derivatives_of_central_differences() {
     let v = random(model.parameters().linear.len(), 1);
     let current = (current_channel("j4"), random(samples, 2));
     let u = random(rates * samples, 3);
-    let channels = [(current.0.as_str(), current.1.as_slice())];
+    let loads = [1, 3].map(|j| (load_channel(&format!("j{j}")), random(samples, 5 + j)));
+    let channels = [&current, &loads[0], &loads[1]].map(|c| (c.0.as_str(), c.1.as_slice()));
     RandomMotion::new(model.mechanism(), &[], samples, seed).with_block(|block| {
         let packed = |values: &[f64]| -> Vec<f64> {
             values.chunks_exact(block.stride).flat_map(|c| c[..samples].to_vec()).collect()
@@ -300,9 +303,9 @@ fn efforts_are_those_of_the_regressor() {
     let model = model_with_elements();
     for samples in [2, 9] {
         let v = random(model.parameters().linear.len(), 1);
-        let current = random(samples, 2);
-        let name = current_channel("j4");
-        let channels = [(name.as_str(), current.as_slice())];
+        let names = [current_channel("j4"), load_channel("j1"), load_channel("j3")];
+        let values = [2, 6, 8].map(|seed| random(samples, seed));
+        let channels = [0, 1, 2].map(|c| (names[c].as_str(), values[c].as_slice()));
         RandomMotion::new(model.mechanism(), &[], samples, 5).with_block(|block| {
             let block = MotionBlock { channels: &channels, sign_width: 0.1, ..*block };
             let mut w = RegressorBlock::new(model.layout().clone(), samples);

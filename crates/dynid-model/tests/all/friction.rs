@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use dynid_model::element::{
     Arctangent, Coulomb, ExponentialViscous, JointElement, LuGre, PowerLaw, ShapeSetting, Sigmoid,
-    SigmoidOffset, Stribeck, TanhFriction, Viscous, ViscousMagnitude,
+    SigmoidOffset, Stribeck, StribeckViscous, TanhFriction, Viscous, ViscousMagnitude,
 };
 use dynid_model::*;
 use serde_json::Value;
@@ -165,6 +165,7 @@ fn all_elements() -> Vec<Box<dyn JointElement>> {
         Box::new(Sigmoid { rate: 3, phi2: ShapeSetting::held(12.0), phi3: free(-0.02) }),
         Box::new(SigmoidOffset { rate: 0, alpha: free(8.0), nu: free(0.03) }),
         Box::new(PowerLaw { rate: 2, p: free(0.7) }),
+        Box::new(StribeckViscous { rate: 2, vs: free(0.3), delta: free(1.3) }),
         Box::new(ViscousMagnitude { rate: 1 }),
         Box::new(ExponentialViscous {
             sigma3: free(1.3),

@@ -3,8 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use dynid_model::element::{
-    Arctangent, ExponentialViscous, JointElement, Linearised, LuGre, PowerLaw, Sigmoid, SigmoidOffset,
-    Stribeck, TanhFriction,
+    Arctangent, ExponentialViscous, JointElement, Linearised, LuGre, PowerLaw, ShapeSetting, Sigmoid,
+    SigmoidOffset, Stribeck, StribeckViscous, TanhFriction,
 };
 use dynid_model::*;
 
@@ -27,6 +27,10 @@ fn mechanism() -> Mechanism {
     d.build().unwrap()
 }
 
+fn free_shape(start: f64) -> ShapeSetting {
+    ShapeSetting { start, lower: 0.5 * start, upper: 2.0 * start, held: false }
+}
+
 fn elements() -> Vec<Box<dyn JointElement>> {
     let mut free = Stribeck::new(0);
     free.delta.held = false;
@@ -38,6 +42,7 @@ fn elements() -> Vec<Box<dyn JointElement>> {
         Box::new(SigmoidOffset::new(0)),
         Box::new(Stribeck::new(0)),
         Box::new(free),
+        Box::new(StribeckViscous { rate: 0, vs: free_shape(0.2), delta: free_shape(1.3) }),
         Box::new(PowerLaw::new(0)),
         Box::new(ExponentialViscous { temperature: Some(31.0), ..ExponentialViscous::new(0) }),
         Box::new(LuGre::new(0)),

@@ -3,8 +3,9 @@
 use super::{EFFORT, PER_SPEED};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::element::shape::{self, places, values};
-use crate::element::{ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting};
+use crate::element::{ElementColumns, ElementWeights, JetMotion, JointElement, JointInfo, ShapeSetting};
 use crate::parameter::{Parameter, ShapeParameter};
+use crate::scalar::Jet;
 use crate::scalar::elementary::{Curve, atan};
 
 /// Friction `F_a atan(f_b v)`: one column `atan(f_b v)` for `fa`, one shape parameter `fb` (s/rad, s/m).
@@ -98,6 +99,13 @@ impl JointElement for Arctangent {
             };
             weights.add(0, self.rate, motion.rate(self.rate), bend, &mut out.dq);
         }
+    }
+    fn jets(&self, _: &[JointInfo], motion: &JetMotion<'_>, shape: &[f64], out: &mut [Jet]) -> bool {
+        let (fb, v) = (self.slope(shape), motion.dq[self.rate]);
+        let x = fb * v.value;
+        let slope = fb / (1.0 + x * x);
+        out[0] = v.through([x.atan(), slope, -2.0 * x * slope * slope]);
+        true
     }
     fn adjoint(
         &self,

@@ -2,9 +2,11 @@
 
 use super::{EFFORT, SPEED};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
+use crate::element::jets::hyperbolic;
 use crate::element::shape::{self, places, values};
-use crate::element::{ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting};
+use crate::element::{ElementColumns, ElementWeights, JetMotion, JointElement, JointInfo, ShapeSetting};
 use crate::parameter::{Parameter, ShapeParameter};
+use crate::scalar::Jet;
 use crate::scalar::elementary::{Curve, tanh};
 
 /// Friction `F_t tanh(v/w)`: one column for `ft`, one shape parameter `w` (rad/s, m/s).
@@ -115,6 +117,11 @@ impl JointElement for TanhFriction {
             };
             weights.add(0, self.rate, motion.rate(self.rate), bend, &mut out.dq);
         }
+    }
+    fn jets(&self, _: &[JointInfo], motion: &JetMotion<'_>, shape: &[f64], out: &mut [Jet]) -> bool {
+        let [w] = values([&self.w], shape);
+        out[0] = hyperbolic(motion.dq[self.rate], w);
+        true
     }
     fn adjoint(
         &self,

@@ -2,8 +2,9 @@
 
 use super::{EFFORT, VISCOUS};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
-use crate::element::{ElementColumns, ElementWeights, JointElement, JointInfo, sign};
+use crate::element::{ElementColumns, ElementWeights, JetMotion, JointElement, JointInfo, sign};
 use crate::parameter::Parameter;
+use crate::scalar::{Jet, Scalar};
 
 /// Coulomb friction `F_c s(v)`, one column.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,6 +59,10 @@ impl JointElement for Coulomb {
     fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         out.map(0, motion.rate(self.rate), |v| motion.sign(v));
     }
+    fn jets(&self, _: &[JointInfo], motion: &JetMotion<'_>, _: &[f64], out: &mut [Jet]) -> bool {
+        out[0] = motion.sign(motion.dq[self.rate]);
+        true
+    }
     fn adjoint(
         &self,
         _: &[JointInfo],
@@ -85,6 +90,10 @@ impl JointElement for Viscous {
     }
     fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         out.map(0, motion.rate(self.rate), |v| v);
+    }
+    fn jets(&self, _: &[JointInfo], motion: &JetMotion<'_>, _: &[f64], out: &mut [Jet]) -> bool {
+        out[0] = motion.dq[self.rate];
+        true
     }
     fn adjoint(
         &self,
@@ -114,6 +123,11 @@ impl JointElement for ViscousMagnitude {
     fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         out.map(0, motion.rate(self.rate), f64::abs);
     }
+    fn jets(&self, _: &[JointInfo], motion: &JetMotion<'_>, _: &[f64], out: &mut [Jet]) -> bool {
+        let v = motion.dq[self.rate];
+        out[0] = v.scaled(sign(v.value));
+        true
+    }
     fn adjoint(
         &self,
         _: &[JointInfo],
@@ -138,6 +152,10 @@ impl JointElement for Offset {
     }
     fn fill(&self, _: &[JointInfo], _: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         out.column(0).fill(1.0);
+    }
+    fn jets(&self, _: &[JointInfo], _: &JetMotion<'_>, _: &[f64], out: &mut [Jet]) -> bool {
+        out[0] = Jet::one();
+        true
     }
     fn adjoint(
         &self,

@@ -9,6 +9,7 @@ mod lugre;
 mod power_law;
 mod sigmoid;
 mod stribeck;
+mod stribeck_viscous;
 
 pub use arctangent::Arctangent;
 pub use exponential_viscous::ExponentialViscous;
@@ -19,6 +20,7 @@ pub use lugre::LuGre;
 pub use power_law::PowerLaw;
 pub use sigmoid::{Sigmoid, SigmoidOffset};
 pub use stribeck::Stribeck;
+pub use stribeck_viscous::StribeckViscous;
 
 pub(super) const EFFORT: [&str; 2] = ["N m", "N"];
 pub(super) const VISCOUS: [&str; 2] = ["N m s/rad", "N s/m"];

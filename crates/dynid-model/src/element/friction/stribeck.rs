@@ -3,8 +3,9 @@
 use super::{EFFORT, NUMBER, SPEED};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::element::shape::{self, places, values};
-use crate::element::{ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting};
+use crate::element::{ElementColumns, ElementWeights, JetMotion, JointElement, JointInfo, ShapeSetting};
 use crate::parameter::{Parameter, ShapeParameter};
+use crate::scalar::Jet;
 use crate::scalar::elementary::{Curve, decay, map_curve, map_decay};
 
 /// Friction that falls from static `F_s` to Coulomb `F_c` with speed, `s(v) (F_c + (F_s - F_c) E)` with
@@ -79,6 +80,19 @@ pub(super) fn fill_falling(speeds: &[f64], [vs, delta]: [f64; 2], out: &mut [f64
         *to = raised((v / vs).abs(), delta);
     }
     map_decay(out);
+}
+
+/// `E` with its time derivatives; at rest with `δ < 2`, where it has a kink, the mean of both sides.
+pub(super) fn falling_jet(v: Jet, [vs, delta]: [f64; 2]) -> Jet {
+    let power = raised((v.value / vs).abs(), delta);
+    let e = decay(power);
+    let (slope, bend) = if v.value != 0.0 {
+        let slope = -e * delta * power / v.value;
+        (slope, -slope * (delta * power - delta + 1.0) / v.value)
+    } else {
+        (0.0, if delta == 2.0 { -2.0 / (vs * vs) } else { 0.0 })
+    };
+    v.through([e, slope, bend])
 }
 
 impl JointElement for Stribeck {
@@ -171,6 +185,13 @@ impl JointElement for Stribeck {
             weights.add(2 * place, self.rate, speeds, |v| -scale * bend(v, logarithm), &mut out.dq);
             weights.add(2 * place + 1, self.rate, speeds, |v| scale * bend(v, logarithm), &mut out.dq);
         }
+    }
+    fn jets(&self, _: &[JointInfo], motion: &JetMotion<'_>, shape: &[f64], out: &mut [Jet]) -> bool {
+        let v = motion.dq[self.rate];
+        let (sign, falling) = (motion.sign(v), falling_jet(v, values(self.settings(), shape)));
+        out[1] = sign * falling;
+        out[0] = sign - out[1];
+        true
     }
     fn adjoint(
         &self,

@@ -1,0 +1,9 @@
+//! Joints with an elastic transmission: harmonic drives (spec/elements.md section 7).
+
+mod cubic_spring;
+mod piecewise;
+mod transmission;
+
+pub use cubic_spring::CubicSpring;
+pub use piecewise::{CubicFit, PiecewiseFit, PiecewiseSpring};
+pub use transmission::{ElasticDoubt, ElasticTransmission};
