@@ -444,6 +444,31 @@ impl Estimator {
         Ok(())
     }
 
+    /// Takes over what is known from elsewhere, with parameters in scales; samples held back are dropped and change detection
+    /// starts again.
+    ///
+    /// # Errors
+    /// [`SettingsError`] with windows, and unless `root` has as many parameters and determines them all.
+    pub fn set_information(&mut self, root: &SquareRoot) -> Result<(), SettingsError> {
+        let Memory::Recursive(own) = &mut self.memory else { return Err(WINDOW) };
+        if root.columns() != own.columns() {
+            let (what, expected, found) = ("parameters of the information", own.columns(), root.columns());
+            return Err(SettingsError::Length { what, expected, found });
+        }
+        if !root.is_regular() {
+            return Err(SettingsError::Combination { what: "information must determine every parameter" });
+        }
+        own.copy_from(root);
+        if let Some(reaction) = &mut self.reaction {
+            reaction.stop();
+        }
+        if let Some(detection) = &mut self.detection {
+            detection.restart();
+        }
+        self.solve();
+        Ok(())
+    }
+
     /// Adds the standard deviation `std`, in the parameter's unit, to parameter `j` alone; the estimate stays.
     ///
     /// # Errors

@@ -2,12 +2,14 @@
 
 mod estimator;
 mod friction;
+mod online;
 mod per_joint;
 
 pub use estimator::{
     BoundConfig, Consistency, EstimatorConfig, Method, PriorDistance, ShapeConfig, Variances,
 };
 pub use friction::{Friction, FrictionErrors};
+pub use online::{ForgettingRule, OnlineConfig};
 pub use per_joint::PerJoint;
 pub(crate) use per_joint::known;
 
@@ -62,6 +64,8 @@ pub struct Config {
     pub log: Vec<LogConfig>,
     /// Logs to validate on.
     pub validation: Vec<LogConfig>,
+    /// On-line identification ([`crate::online`]); nothing else looks at it.
+    pub online: OnlineConfig,
 }
 
 /// Elements at joints.
@@ -179,9 +183,19 @@ impl Config {
     /// # Errors
     /// [`Error::Read`], and as [`Config::parse`].
     pub fn read(path: &Path) -> Result<Self, Error> {
+        let config = Self::read_for_stream(path)?;
+        config.demand_logs(&path.display().to_string())?;
+        Ok(config)
+    }
+
+    /// The same, for a run that need not have a log.
+    ///
+    /// # Errors
+    /// As [`Config::read`].
+    pub fn read_for_stream(path: &Path) -> Result<Self, Error> {
         let text =
             std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
-        let mut config = Self::parse(&text, &path.display().to_string())?;
+        let mut config = Self::parse_any(&text, &path.display().to_string())?;
         let folder = path.parent().unwrap_or(Path::new(""));
         config.robot = folder.join(&config.robot);
         config.out = config.out.map(|o| folder.join(o));
@@ -191,6 +205,7 @@ impl Config {
             log.trajectory = log.trajectory.as_ref().map(|t| folder.join(t));
         }
         config.trajectory = config.trajectory.map(|t| folder.join(t));
+        config.online.checkpoint = config.online.checkpoint.map(|c| folder.join(c));
         Ok(config)
     }
 
@@ -199,6 +214,20 @@ impl Config {
     /// # Errors
     /// [`Error::Config`] with the line; [`Error::InFile`] with what [`Config::check`] finds.
     pub fn parse(text: &str, file: &str) -> Result<Self, Error> {
+        let config = Self::parse_any(text, file)?;
+        config.demand_logs(file)?;
+        Ok(config)
+    }
+
+    fn demand_logs(&self, file: &str) -> Result<(), Error> {
+        if !self.log.is_empty() {
+            return Ok(());
+        }
+        let message = "expected at least one `[[log]]` with a `path`".to_owned();
+        Err(Error::Config { file: file.to_owned(), line: None, message })
+    }
+
+    fn parse_any(text: &str, file: &str) -> Result<Self, Error> {
         let config: Config = toml::from_str(text).map_err(|e| Error::Config {
             file: file.to_owned(),
             line: e.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count()),
@@ -211,9 +240,6 @@ impl Config {
         };
         if config.robot.as_os_str().is_empty() {
             return Err(missing("`robot = \"file\"`"));
-        }
-        if config.log.is_empty() {
-            return Err(missing("at least one `[[log]]` with a `path`"));
         }
         for log in config.log.iter().chain(&config.validation) {
             if log.path.as_os_str().is_empty() {
@@ -266,6 +292,7 @@ impl Config {
             }
         }
         self.elements.check()?;
+        self.online.check()?;
         self.check_estimator()?;
         for (joint, position) in &self.locked {
             if !position.is_finite() {

@@ -163,7 +163,7 @@ fn unconstrained(regrouping: &Mat<f64>, prior: &Prior, fitted: &Fitted) -> Optio
     split.map(|p| p.mean)
 }
 
-fn form(config: &Config) -> Option<Form> {
+pub(crate) fn form(config: &Config) -> Option<Form> {
     match config.estimator.consistency {
         Consistency::PseudoInertia => Some(Form::PseudoInertia),
         Consistency::SpatialInertia => Some(Form::SpatialInertia),
@@ -172,7 +172,7 @@ fn form(config: &Config) -> Option<Form> {
 }
 
 /// `R = R_β K` in standard columns with the priors of links and elements.
-fn problem(
+pub(crate) fn problem(
     model: &RobotModel,
     regrouping: &Mat<f64>,
     factor: &Factor,

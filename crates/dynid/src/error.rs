@@ -184,6 +184,12 @@ pub enum Error {
     /// No physically consistent parameters meet the bounds.
     #[error("consistent estimate: {0}")]
     Consistency(#[from] dynid_estimate::consistent::ProblemError),
+    /// An on-line estimator cannot be set up.
+    #[error("on-line estimator: {0}")]
+    OnlineSettings(#[from] dynid_estimate::online::SettingsError),
+    /// Rows that an on-line estimator cannot take.
+    #[error("on-line estimator: {0}")]
+    OnlineSample(#[from] dynid_estimate::online::SampleError),
     /// A configuration file cannot be parsed.
     #[error("{file}{}: {message}", line.map_or_else(String::new, |l| format!(":{l}")))]
     Config {

@@ -19,12 +19,11 @@ use dynid_motion::Log;
 
 use crate::Error;
 use crate::agreement::{self, Agreement};
-use crate::config::{Config, FrictionErrors, LogConfig, Route};
+use crate::config::{Config, LogConfig, Route};
 use crate::consistency::{self, Consistent};
 use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
 use crate::fitting::{self, Fitted};
-use crate::friction::KnownFriction;
 use crate::logs::{self, LoadedLog};
 use crate::passivity::SPEED_SPAN_S;
 use crate::prior::Prior;
@@ -33,6 +32,7 @@ use crate::shape::{self, ShapeFit};
 use crate::trust::{Evidence, Trust};
 use shapes::Shaped;
 use structure::Structure;
+pub(crate) use structure::{effort_sizes, stated_values};
 
 /// What is being worked on, for progress displays.
 #[derive(Debug, Clone, PartialEq)]
@@ -388,28 +388,9 @@ fn read_logs(
 
 fn plan_elements(config: &Config, robot: &Robot, logs: &[LoadedLog]) -> Result<ElementPlan, Error> {
     let names = robot.mechanism.rate_names();
-    let mut spec = robot.elements.clone();
-    for (joint, list) in &config.elements.joint {
-        spec.per_joint.retain(|(j, _)| j != joint);
-        spec.per_joint.push((joint.clone(), list.clone()));
-    }
-    spec.couplings.extend(config.coupling.iter().map(|c| dynid_io::CouplingSpec {
-        motors: c.motors.clone(),
-        joints: c.joints.clone(),
-        matrix: c.matrix.clone(),
-        form: c.form,
-    }));
     let moves =
         |rate: usize| logs.iter().any(|l| l.log.joints().iter().any(|j| j.name == names[rate] && j.moves()));
-    let mut plan = ElementPlan::new(&robot.mechanism, &spec, config.elements.default.as_deref(), moves)?;
-    for list in &mut plan.per_rate {
-        *list = config.elements.friction.of_joint(list);
-    }
-    if let Some(file) = &config.elements.known_friction {
-        let temperatures = config.elements.temperature.finite("elements.temperature", &names)?;
-        plan.known = KnownFriction::load(file, &names, &temperatures)?;
-        plan.free_errors = config.elements.friction_errors == FrictionErrors::Free;
-    }
+    let plan = ElementPlan::of_run(config, robot, moves)?;
     let speeds: Vec<Option<f64>> =
         names.iter().map(|name| logs.iter().filter_map(|l| fastest(&l.log, name)).reduce(f64::max)).collect();
     Ok(plan.with_speeds(&robot.mechanism, &speeds))

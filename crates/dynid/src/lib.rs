@@ -19,6 +19,7 @@ pub mod identify;
 pub mod inspect;
 pub mod logs;
 pub mod nominal;
+pub mod online;
 mod passivity;
 pub mod predict;
 pub mod prior;

@@ -96,7 +96,7 @@ pub fn load(
 }
 
 /// Turns motor positions and efforts into those of the joints.
-fn to_joint_side(signals: &mut Signals, transmission: &MotorSide) -> Result<(), Error> {
+pub(crate) fn to_joint_side(signals: &mut Signals, transmission: &MotorSide) -> Result<(), Error> {
     let n = signals.joints.len();
     let matrix = &transmission.matrix;
     let setting =
@@ -220,7 +220,7 @@ fn check_reach(signals: &Signals, file: &str) -> Result<(), Error> {
 }
 
 /// Refuses `q1..q7` for six joints: which of the seven is not the robot's, numbers do not tell.
-fn check_surplus(
+pub(crate) fn check_surplus(
     mapping: &ColumnMapping,
     joints: &[String],
     header: &[String],
@@ -236,7 +236,7 @@ fn check_surplus(
     Err(Error::SurplusColumn { file: file.to_owned(), expected: joints.len(), column })
 }
 
-fn check_gains(spec: &MappingSpec, joints: usize) -> Result<(), Error> {
+pub(crate) fn check_gains(spec: &MappingSpec, joints: usize) -> Result<(), Error> {
     match &spec.current_gains {
         Some(gains) if gains.len() != joints => Err(Error::Setting {
             name: "current_gains".to_owned(),

@@ -118,6 +118,23 @@ impl States {
         })
     }
 
+    /// Least speed of every reversal speed of an output at a level of the mask, `max(stick_sigma σ_v, level rms(v))`
+    /// ([`reversal_threshold`]).
+    pub fn reversal_thresholds(
+        &self,
+        model: &dyn EffortModel,
+        output: usize,
+        level: f64,
+        stick_sigma: f64,
+    ) -> Vec<f64> {
+        let speeds = model.reversal_speeds(output);
+        let threshold = |speed: &Vec<(usize, f64)>| {
+            let (v, sigma) = self.combined(speed);
+            reversal_threshold(&v, sigma, stick_sigma, level)
+        };
+        speeds.iter().map(threshold).collect()
+    }
+
     /// A combination of rates and the standard deviation of its noise.
     fn combined(&self, speed: &[(usize, f64)]) -> (Vec<f64>, f64) {
         let mut v = vec![0.0; self.samples];

@@ -79,6 +79,12 @@ impl LiveGrid {
         self.last_time
     }
 
+    /// The next sample begins a run, whatever its time.
+    pub fn interrupt(&mut self) {
+        self.last_time = None;
+        self.in_a_row = 0;
+    }
+
     /// Takes a sample and hands on the grid points up to it.
     ///
     /// # Panics

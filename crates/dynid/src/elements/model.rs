@@ -5,9 +5,46 @@ use dynid_model::{Mechanism, RobotModel};
 
 use super::{ElementPlan, friction};
 use crate::Error;
+use crate::config::{Config, FrictionErrors};
 use crate::friction::KnownFriction;
+use crate::robot::Robot;
 
 impl ElementPlan {
+    /// The plan of a run: elements of the robot file, then of the configuration, known friction with them.
+    ///
+    /// `moves`: whether the joint of a rate moves.
+    ///
+    /// # Errors
+    /// As [`ElementPlan::new`] and [`KnownFriction::load`].
+    pub(crate) fn of_run(
+        config: &Config,
+        robot: &Robot,
+        moves: impl Fn(usize) -> bool,
+    ) -> Result<ElementPlan, Error> {
+        let names = robot.mechanism.rate_names();
+        let mut spec = robot.elements.clone();
+        for (joint, list) in &config.elements.joint {
+            spec.per_joint.retain(|(j, _)| j != joint);
+            spec.per_joint.push((joint.clone(), list.clone()));
+        }
+        spec.couplings.extend(config.coupling.iter().map(|c| dynid_io::CouplingSpec {
+            motors: c.motors.clone(),
+            joints: c.joints.clone(),
+            matrix: c.matrix.clone(),
+            form: c.form,
+        }));
+        let mut plan = ElementPlan::new(&robot.mechanism, &spec, config.elements.default.as_deref(), moves)?;
+        for list in &mut plan.per_rate {
+            *list = config.elements.friction.of_joint(list);
+        }
+        if let Some(file) = &config.elements.known_friction {
+            let temperatures = config.elements.temperature.finite("elements.temperature", &names)?;
+            plan.known = KnownFriction::load(file, &names, &temperatures)?;
+            plan.free_errors = config.elements.friction_errors == FrictionErrors::Free;
+        }
+        Ok(plan)
+    }
+
     /// The effort model of the plan, known friction included.
     ///
     /// # Errors

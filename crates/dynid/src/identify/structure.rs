@@ -66,7 +66,7 @@ fn preferred_columns(config: &Config, model: &RobotModel) -> Result<Vec<usize>, 
 }
 
 /// What the robot file states: link inertias, element values.
-fn stated_values(model: &RobotModel, plan: &ElementPlan) -> Vec<Option<f64>> {
+pub(crate) fn stated_values(model: &RobotModel, plan: &ElementPlan) -> Vec<Option<f64>> {
     let table = model.parameters();
     let mut stated: Vec<Option<f64>> = table.linear.iter().map(|p| p.prior).collect();
     for (name, value) in plan.stated_values() {
@@ -78,7 +78,7 @@ fn stated_values(model: &RobotModel, plan: &ElementPlan) -> Vec<Option<f64>> {
 }
 
 /// Per output, the effort that 99 % of the samples of all logs stay below.
-fn effort_sizes(logs: &[PreparedLog]) -> Vec<f64> {
+pub(crate) fn effort_sizes(logs: &[PreparedLog]) -> Vec<f64> {
     let outputs = logs.first().map_or(0, |l| l.effort.len());
     (0..outputs)
         .map(|j| {

@@ -1,0 +1,217 @@
+//! What moved: hypotheses on a change, judged by the samples after an alarm.
+
+use dynid_online::SquareRoot;
+
+use crate::distribution::chi_squared_quantile;
+
+/// Something that may have changed: a body that was picked up, the friction of a joint, a single parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChangeHypothesis {
+    /// What it is.
+    pub name: String,
+    /// `E`, direction after direction, `p` entries each: unit jump `k` moves the parameters by direction `k`. In the units of the
+    /// factors.
+    pub directions: Vec<f64>,
+    /// Prior standard deviation of each jump, positive.
+    pub std: Vec<f64>,
+}
+
+/// A hypothesis against the samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JudgedHypothesis {
+    /// Index among the hypotheses.
+    pub hypothesis: usize,
+    /// Share of the total gain that its jumps explain, 0 to 1.
+    pub share: f64,
+    /// Logarithm of the Bayes factor against "nothing changed".
+    pub evidence: f64,
+    /// Estimated jumps and their standard deviations.
+    pub jumps: Vec<(f64, f64)>,
+}
+
+/// What the samples after an alarm say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChangeJudgement {
+    /// Fall of the residual sum of squares when the samples before and after get parameters of their own (Chow 1960), in
+    /// units of the noise variance.
+    pub total_gain: f64,
+    /// Whether that is more than chance would give.
+    pub confirmed: bool,
+    /// All hypotheses, the largest evidence first.
+    pub judged: Vec<JudgedHypothesis>,
+}
+
+/// Judges hypotheses on what moved between the samples behind `before` and those behind `after`.
+///
+/// For a hypothesis with directions `E` and jumps `δ ~ N(0, diag(std²))` the rows are
+/// `[[-R E, R, z], [0, R_a, z_a]]` in `(δ, x)`, with `x` the parameters after the change. The Bayes factor weighs what the jumps explain
+/// against how many there are and how far they might have gone, so a body that explains as much as all parameters together wins over
+/// them, and a single parameter over the body.
+///
+/// `inflation`: by how much squares of rows are overstated because rows are coloured, at least 1; `level`: probability with
+/// which chance alone is called a change.
+///
+/// # Panics
+/// If factors or hypotheses have different numbers of parameters.
+pub fn judge_change(
+    before: &SquareRoot,
+    after: &SquareRoot,
+    hypotheses: &[ChangeHypothesis],
+    inflation: f64,
+    level: f64,
+) -> ChangeJudgement {
+    let p = before.columns();
+    let (before, after) = (deflated(before, inflation), deflated(after, inflation));
+    let mut together = before.clone();
+    together.merge(&after, &mut vec![0.0; p * (p + 1)]);
+    // What remains of both fits is in all of them.
+    let total_gain = (together.rss() - before.rss() - after.rss()).max(0.0);
+    let still = log_diagonal(&together);
+    let judged = |(hypothesis, candidate): (usize, &ChangeHypothesis)| {
+        let joint = joined(&before, &after, candidate);
+        let gain = (together.rss() - joint.rss()).max(0.0);
+        let jumps = candidate.std.len();
+        let prior: f64 = candidate.std.iter().map(|s| -s.ln()).sum();
+        let occam = log_diagonal(&joint) - still - prior;
+        let (mut x, mut scratch) = (vec![0.0; p + jumps], vec![0.0; p + jumps]);
+        let solved = joint.solve(&mut x);
+        JudgedHypothesis {
+            hypothesis,
+            share: if total_gain > 0.0 { (gain / total_gain).min(1.0) } else { 0.0 },
+            evidence: 0.5 * gain - occam,
+            jumps: match solved {
+                true => (0..jumps).map(|k| (x[k], joint.variance(k, &mut scratch).sqrt())).collect(),
+                false => Vec::new(),
+            },
+        }
+    };
+    let mut judged: Vec<JudgedHypothesis> = hypotheses.iter().enumerate().map(judged).collect();
+    judged.sort_by(|a, b| b.evidence.total_cmp(&a.evidence).then(a.hypothesis.cmp(&b.hypothesis)));
+    let significant = chi_squared_quantile(1.0 - level, p as f64).unwrap_or(f64::INFINITY);
+    ChangeJudgement { total_gain, confirmed: total_gain > significant, judged }
+}
+
+/// What is known of the parameters after the change if the hypothesis holds: the samples before count as far as its jumps leave them.
+///
+/// # Panics
+/// If the hypothesis has another number of parameters.
+pub fn after_change(before: &SquareRoot, after: &SquareRoot, hypothesis: &ChangeHypothesis) -> SquareRoot {
+    let joint = joined(before, after, hypothesis);
+    let (p, jumps) = (before.columns(), hypothesis.std.len());
+    let mut out = SquareRoot::new(p);
+    for i in 0..p {
+        out.set_row(i, joint.row(jumps + i));
+    }
+    out.set_remainder(joint.rss(), joint.weight());
+    out
+}
+
+/// Factor of `(δ, x)`.
+fn joined(before: &SquareRoot, after: &SquareRoot, hypothesis: &ChangeHypothesis) -> SquareRoot {
+    let (p, jumps) = (before.columns(), hypothesis.std.len());
+    assert_eq!(hypothesis.directions.len(), p * jumps, "directions of a hypothesis");
+    let width = jumps + p + 1;
+    let mut joint = SquareRoot::new(jumps + p);
+    let mut rows = vec![0.0; jumps * width];
+    for (k, (row, std)) in rows.chunks_exact_mut(width).zip(&hypothesis.std).enumerate() {
+        row[k] = 1.0 / std;
+    }
+    joint.push(&mut rows);
+    let mut rows = vec![0.0; 2 * p * width];
+    let (first, second) = rows.split_at_mut(p * width);
+    for (i, row) in first.chunks_exact_mut(width).enumerate() {
+        let known = before.row(i);
+        for (k, direction) in hypothesis.directions.chunks_exact(p).enumerate() {
+            row[k] = -known[..p - i].iter().zip(&direction[i..]).map(|(r, e)| r * e).sum::<f64>();
+        }
+        row[jumps + i..].copy_from_slice(known);
+    }
+    for (i, row) in second.chunks_exact_mut(width).enumerate() {
+        row[jumps + i..].copy_from_slice(after.row(i));
+    }
+    joint.push(&mut rows);
+    joint.set_remainder(
+        joint.rss() + before.rss() + after.rss(),
+        before.weight() + after.weight(),
+    );
+    joint
+}
+
+fn deflated(root: &SquareRoot, inflation: f64) -> SquareRoot {
+    let mut out = root.clone();
+    out.discount(1.0 / inflation.max(1.0));
+    out
+}
+
+fn log_diagonal(root: &SquareRoot) -> f64 {
+    (0..root.columns()).map(|j| root.r(j, j).ln()).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows of four parameters with unit noise that depends on nothing but the row.
+    fn factor(x: &[f64; 4], rows: std::ops::Range<u32>) -> SquareRoot {
+        let mut root = SquareRoot::new(4);
+        for n in rows {
+            let t = f64::from(n);
+            let phi = [(0.7 * t).sin(), (1.3 * t).cos(), (0.31 * t).sin() * (1.9 * t).cos(), 1.0];
+            let noise = (12.9898 * t).sin() * 43758.5453;
+            let noise = ((noise - noise.floor()) - 0.5) * 12f64.sqrt();
+            let y = phi.iter().zip(x).map(|(a, b)| a * b).sum::<f64>() + noise;
+            root.push(&mut [phi[0], phi[1], phi[2], phi[3], y]);
+        }
+        root
+    }
+
+    fn hypotheses() -> Vec<ChangeHypothesis> {
+        let mut out: Vec<ChangeHypothesis> = (0..4)
+            .map(|j| {
+                let mut directions = vec![0.0; 4];
+                directions[j] = 1.0;
+                ChangeHypothesis { name: format!("x{j}"), directions, std: vec![3.0] }
+            })
+            .collect();
+        out.push(ChangeHypothesis {
+            name: "body".into(),
+            directions: vec![1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.5, 0.0],
+            std: vec![3.0; 2],
+        });
+        out
+    }
+
+    #[test]
+    fn the_smallest_hypothesis_that_explains_all_wins() {
+        let before = factor(&[1.0, 2.0, -1.0, 0.5], 0..4000);
+        let single = judge_change(&before, &factor(&[1.0, 3.0, -1.0, 0.5], 5000..5400), &hypotheses(), 1.0, 0.01);
+        assert!(single.confirmed);
+        assert_eq!(single.judged[0].hypothesis, 1);
+        assert!(single.judged[0].share > 0.9);
+        let (jump, std) = single.judged[0].jumps[0];
+        assert!((jump - 1.0).abs() < 3.0 * std && std < 0.15, "{jump} {std}");
+        // Two parameters, in the proportion of a body.
+        let body = judge_change(&before, &factor(&[0.2, 3.0, -0.5, 0.5], 5000..5400), &hypotheses(), 1.0, 0.01);
+        assert_eq!(body.judged[0].hypothesis, 4);
+        assert!(body.judged[0].share > 0.9);
+        let jumps: Vec<f64> = body.judged[0].jumps.iter().map(|(j, _)| *j).collect();
+        assert!((jumps[0] + 0.8).abs() < 0.3 && (jumps[1] - 1.0).abs() < 0.3, "{jumps:?}");
+    }
+
+    #[test]
+    fn nothing_is_called_nothing_and_what_is_known_after_is_the_fit_with_jumps() {
+        let truth = [1.0, 2.0, -1.0, 0.5];
+        let before = factor(&truth, 0..4000);
+        let quiet = judge_change(&before, &factor(&truth, 5000..5400), &hypotheses(), 1.0, 0.01);
+        assert!(!quiet.confirmed && quiet.judged[0].evidence < 3.0);
+        let after = factor(&[1.0, 3.0, -1.0, 0.5], 5000..5400);
+        let known = after_change(&before, &after, &hypotheses()[1]);
+        let mut x = [0.0; 4];
+        assert!(known.solve(&mut x));
+        let mut scratch = [0.0; 4];
+        let std: Vec<f64> = (0..4).map(|j| known.variance(j, &mut scratch).sqrt()).collect();
+        // What did not move is known from both stretches, what did from the second.
+        assert!(std[0] < 0.03 && std[1] > 0.05, "{std:?}");
+        assert!((x[1] - 3.0).abs() < 3.0 * std[1] && (x[0] - 1.0).abs() < 4.0 * std[0]);
+    }
+}

@@ -1,0 +1,109 @@
+//! What may move, in words and as directions of the base parameters.
+
+use std::collections::BTreeMap;
+
+use dynid_estimate::Mat;
+use dynid_estimate::online::{ChangeHypothesis, JudgedHypothesis};
+use dynid_model::{EffortModel, Owner};
+
+use super::event::{Moved, MovedParameter};
+use super::learning::Structure;
+use crate::prior::Prior;
+
+/// Directions shorter than this share of the longest one do not act.
+const SILENT: f64 = 1e-9;
+/// A jump is told if it is known to this share of what was possible.
+const KNOWN: f64 = 0.3;
+/// Hypotheses reported beside the best.
+const ALTERNATIVES: usize = 3;
+
+/// Hypotheses with the standard parameters behind their jumps.
+#[derive(Debug)]
+pub(super) struct Hypotheses {
+    pub(super) list: Vec<ChangeHypothesis>,
+    /// Per hypothesis: columns of the standard parameters that jump; empty: the base parameters themselves.
+    columns: Vec<Vec<usize>>,
+}
+
+impl Hypotheses {
+    /// Every link, the elements of every joint, every single parameter, and everything at once. Jumps may go as far as the prior
+    /// deviations say. `scale`: units of the base parameters.
+    pub(super) fn new(structure: &Structure, prior: &Prior, scale: &[f64]) -> Hypotheses {
+        let parameters = &structure.model.parameters().linear;
+        let acting: Vec<usize> =
+            (0..parameters.len()).filter(|c| acts(&structure.regrouping, *c, scale)).collect();
+        let mut groups: BTreeMap<(u8, String), Vec<usize>> = BTreeMap::new();
+        let mut order = Vec::new();
+        for c in &acting {
+            let key = match &parameters[*c].owner {
+                Owner::Link(link) => (0, format!("link `{link}`")),
+                Owner::Joint(joint) => (1, format!("joint `{joint}`")),
+            };
+            if !groups.contains_key(&key) {
+                order.push(key.clone());
+            }
+            groups.entry(key).or_default().push(*c);
+        }
+        let mut out = Hypotheses { list: Vec::new(), columns: Vec::new() };
+        let mut add = |name: String, columns: Vec<usize>| {
+            let entry = |row: usize, c: usize| structure.regrouping[(row, c)] / scale[row];
+            out.list.push(ChangeHypothesis {
+                name,
+                directions: columns.iter().flat_map(|c| (0..scale.len()).map(|row| entry(row, *c))).collect(),
+                std: columns.iter().map(|c| prior.std[*c]).collect(),
+            });
+            out.columns.push(columns);
+        };
+        for key in order {
+            if groups[&key].len() > 1 {
+                add(key.1.clone(), groups[&key].clone());
+            }
+        }
+        for c in acting {
+            add(parameters[c].name.clone(), vec![c]);
+        }
+        let p = scale.len();
+        out.list.push(ChangeHypothesis {
+            name: "several things".to_owned(),
+            directions: (0..p * p).map(|k| f64::from(u8::from(k % (p + 1) == 0))).collect(),
+            std: vec![1.0; p],
+        });
+        out.columns.push(Vec::new());
+        out
+    }
+
+    /// The best hypothesis in words, then others.
+    pub(super) fn tell(
+        &self,
+        structure: &Structure,
+        judged: &[JudgedHypothesis],
+    ) -> (Option<Moved>, Vec<Moved>) {
+        let mut told = judged.iter().map(|j| self.moved(structure, j));
+        let best = told.next();
+        (best, told.take(ALTERNATIVES).collect())
+    }
+
+    fn moved(&self, structure: &Structure, judged: &JudgedHypothesis) -> Moved {
+        let hypothesis = &self.list[judged.hypothesis];
+        let columns = &self.columns[judged.hypothesis];
+        let table = structure.model.parameters();
+        let known = columns.iter().zip(&judged.jumps).zip(&hypothesis.std);
+        let parameters = known
+            .filter(|((_, (_, std)), prior)| *std < KNOWN * **prior)
+            .map(|((column, (jump, std)), _)| MovedParameter {
+                name: table.linear[*column].name.clone(),
+                jump: *jump,
+                std: *std,
+            })
+            .collect();
+        Moved { what: hypothesis.name.clone(), share: judged.share, parameters }
+    }
+}
+
+fn acts(regrouping: &Mat<f64>, column: usize, scale: &[f64]) -> bool {
+    let length = |c: usize| -> f64 {
+        (0..scale.len()).map(|row| (regrouping[(row, c)] / scale[row]).powi(2)).sum::<f64>().sqrt()
+    };
+    let longest = (0..regrouping.ncols()).map(length).fold(0.0, f64::max);
+    length(column) > SILENT * longest
+}

@@ -1,0 +1,457 @@
+//! The estimate that follows the stream.
+
+use dynid_estimate::conditioning::{LiveRow, LiveRows};
+use dynid_estimate::consistent::{Settings as ConsistentSettings, estimate};
+use dynid_estimate::online::{
+    DetectionSettings, Estimator, FalseAlarms, Forgetting, RowNoise, Settings, SquareRoot, Whiteness,
+    after_change, factor_from_root, judge_change,
+};
+use dynid_model::EffortModel;
+use dynid_motion::live::LiveGrid;
+use dynid_motion::words::Transfer;
+
+use super::event::{Counts, Event, ParameterValue, PlainValue};
+use super::learning::{Learned, Structure};
+use super::moved::Hypotheses;
+use super::samples::Sample;
+use crate::Error;
+use crate::config::{Config, ForgettingRule};
+use crate::consistency;
+use crate::prior::Prior;
+
+/// Published forgetting (Sun et al., Eq. 44 and below).
+const ALPHA: f64 = 0.05;
+const BETA: f64 = -4.68;
+/// Efforts below this share of the largest count as this large in relative errors.
+const EFFORT_FLOOR: f64 = 0.05;
+/// Prediction errors beyond this many deviations forget, with `noise-normalised`.
+const DEAD_ZONE: f64 = 3.0;
+/// Directions that are excited by less than this share are not forgotten.
+const DIRECTION_TOLERANCE: f64 = 1e-6;
+/// Blocks of a window.
+const BLOCKS: usize = 20;
+/// What parameters wander in the memory, as a share of their prior deviation.
+const WANDERING: f64 = 0.1;
+/// Share of the learned stretch that change detection learns from.
+const LEARNED_SHARE: f64 = 0.8;
+/// Prior of a stretch on its own, in prior deviations of the run.
+const NO_PRIOR: f64 = 1e9;
+/// Probability with which chance alone passes for a change once an alarm has been raised.
+const CHANCE: f64 = 0.01;
+/// A parameter is determined if its deviation is below this share of that before any sample.
+const DETERMINED: f64 = 0.1;
+
+/// Samples after an alarm on their own.
+#[derive(Debug)]
+struct Hold {
+    alarm: f64,
+    left: u64,
+}
+
+/// The running phase of a session.
+#[derive(Debug)]
+pub(super) struct Running {
+    pub(super) learned: Learned,
+    prior: Prior,
+    grid: LiveGrid,
+    rows: LiveRows,
+    estimator: Estimator,
+    hypotheses: Hypotheses,
+    /// Information when the sum of change detection was last zero: a change, if any, came later.
+    unchanged: SquareRoot,
+    /// The samples since, on their own.
+    since: Estimator,
+    empty: SquareRoot,
+    hold: Option<Hold>,
+    /// Time of the newest row.
+    newest: f64,
+    next_report: Option<f64>,
+    /// Per output: sum of squared prediction errors since the last report, and their number.
+    errors: Vec<(f64, u64)>,
+    regressor: Vec<f64>,
+    std: Vec<f64>,
+    pub(super) counts: Counts,
+    /// Rows that have come but were not taken yet; emptied within every call.
+    waiting: Vec<LiveRow>,
+}
+
+impl Running {
+    pub(super) fn new(config: &Config, structure: &Structure, learned: Learned) -> Result<Running, Error> {
+        let outputs = structure.model.outputs().len();
+        let rows = learned.live_rows(structure)?;
+        let settings = settings(config, &learned, outputs, rows.spacing_s());
+        let window = Settings {
+            prior_std: learned.prior_std.iter().map(|s| NO_PRIOR * s).collect(),
+            start: vec![0.0; learned.start.len()],
+            forgetting: Forgetting::None,
+            bounded_covariance: None,
+            detection: None,
+            ..settings.clone()
+        };
+        let prior = structure.prior(&learned.efforts, &config.robot)?;
+        let estimator = Estimator::new(settings)?;
+        let since = Estimator::new(window)?;
+        Ok(Running {
+            grid: learned.grid(structure)?,
+            hypotheses: Hypotheses::new(structure, &prior, &learned.prior_std),
+            unchanged: estimator.information().clone(),
+            empty: since.information().clone(),
+            std: vec![0.0; learned.start.len()],
+            errors: vec![(0.0, 0); outputs],
+            regressor: Vec::new(),
+            newest: f64::NEG_INFINITY,
+            next_report: None,
+            hold: None,
+            counts: Counts::default(),
+            waiting: Vec::new(),
+            estimator,
+            since,
+            prior,
+            rows,
+            learned,
+        })
+    }
+
+    /// The event that tells what was learned.
+    pub(super) fn introduction(&self, structure: &Structure, time: f64) -> Event {
+        let outputs = self.errors.len();
+        let table = structure.model.parameters();
+        let expressions = structure.base.expressions(table);
+        let parameters = structure.base.kept.iter().zip(expressions);
+        Event::Learned {
+            time,
+            rate_hz: self.learned.rows.states.rate_hz,
+            kernel_hz: self.learned.rows.kernel_hz,
+            state_hz: self.learned.rows.states.state_hz,
+            delay_samples: self.learned.rows.states.delay_samples,
+            lag_s: self.rows.lag_s(),
+            rows_per_s: 1.0 / self.rows.spacing_s(),
+            noise: (0..outputs).map(|o| self.learned.noise[o * outputs + o].sqrt()).collect(),
+            parameters: parameters
+                .map(|(column, expression)| super::LearnedParameter {
+                    name: table.linear[*column].name.clone(),
+                    unit: table.linear[*column].unit.to_owned(),
+                    expression,
+                })
+                .collect(),
+            warnings: structure.warnings.clone(),
+        }
+    }
+
+    /// The next sample comes from another record.
+    pub(super) fn interrupt(&mut self) {
+        self.grid.interrupt();
+    }
+
+    /// Takes a sample; rows appear some samples later.
+    pub(super) fn sample(&mut self, sample: &Sample) {
+        let Running { grid, rows, waiting, .. } = self;
+        grid.push(sample.time, &sample.values, |s| {
+            rows.push(s.time, s.values, s.first, |row| waiting.push(row.clone()));
+        });
+        self.counts.samples += 1;
+    }
+
+    /// Takes the rows that have come.
+    pub(super) fn drain(
+        &mut self,
+        config: &Config,
+        structure: &Structure,
+        emit: &mut dyn FnMut(Event),
+    ) -> Result<(), Error> {
+        let Running { rows, waiting, .. } = self;
+        rows.drain(|row| waiting.push(row.clone()));
+        let clock = self.grid.counts();
+        (self.counts.backward, self.counts.gaps, self.counts.set_back) =
+            (clock.backward, clock.gaps, clock.set_back);
+        for row in std::mem::take(&mut self.waiting) {
+            self.row(config, structure, &row, emit)?;
+        }
+        Ok(())
+    }
+
+    fn row(
+        &mut self,
+        config: &Config,
+        structure: &Structure,
+        row: &LiveRow,
+        emit: &mut dyn FnMut(Event),
+    ) -> Result<(), Error> {
+        self.newest = row.time;
+        let used: Vec<usize> = (0..row.usable.len()).filter(|o| row.usable[*o]).collect();
+        if !used.is_empty() {
+            let outputs = row.usable.len();
+            self.regressor.clear();
+            used.iter().for_each(|o| self.regressor.extend_from_slice(&row.columns[*o]));
+            let effort: Vec<f64> = used.iter().map(|o| row.effort[*o]).collect();
+            let noise: Vec<f64> = used
+                .iter()
+                .flat_map(|i| used.iter().map(move |j| i * outputs + j))
+                .map(|k| self.learned.noise[k])
+                .collect();
+            self.counts.rows += 1;
+            self.update(config, structure, &used, &effort, &noise, emit)?;
+        }
+        let due = *self.next_report.get_or_insert(row.time + config.online.report_s);
+        if row.time >= due {
+            let missed = ((row.time - due) / config.online.report_s).floor();
+            self.next_report = Some(due + (1.0 + missed) * config.online.report_s);
+            emit(self.report(config, structure)?);
+        }
+        Ok(())
+    }
+
+    fn update(
+        &mut self,
+        config: &Config,
+        structure: &Structure,
+        used: &[usize],
+        effort: &[f64],
+        noise: &[f64],
+        emit: &mut dyn FnMut(Event),
+    ) -> Result<(), Error> {
+        if self.hold.is_none() && self.statistic() == 0.0 {
+            self.unchanged.copy_from(self.estimator.information());
+            self.since.set_information(&self.empty)?;
+        }
+        self.since.step(&self.regressor, effort, RowNoise::Covariance(noise))?;
+        if let Some(hold) = &mut self.hold {
+            let p = self.learned.start.len();
+            for ((o, y), phi) in used.iter().zip(effort).zip(self.regressor.chunks_exact(p)) {
+                let e = y - phi.iter().zip(self.estimator.x()).map(|(f, x)| f * x).sum::<f64>();
+                self.errors[*o] = (self.errors[*o].0 + e * e, self.errors[*o].1 + 1);
+            }
+            hold.left -= 1;
+            if hold.left == 0 {
+                let alarm = hold.alarm;
+                self.hold = None;
+                emit(self.judge(structure, alarm)?);
+            }
+            return Ok(());
+        }
+        let step = self.estimator.step(&self.regressor, effort, RowNoise::Covariance(noise))?;
+        for (o, e) in used.iter().zip(self.estimator.prediction_error()) {
+            self.errors[*o] = (self.errors[*o].0 + e * e, self.errors[*o].1 + 1);
+        }
+        if step.alarm {
+            self.counts.alarms += 1;
+            let threshold = self.estimator.detection().map_or(0.0, |d| d.threshold());
+            emit(Event::Alarm { time: self.newest, threshold });
+            if config.online.forgetting != ForgettingRule::Window {
+                let samples = (config.online.reaction_s / self.rows.spacing_s()).ceil().max(1.0) as u64;
+                self.hold = Some(Hold { alarm: self.newest, left: samples });
+            }
+        }
+        Ok(())
+    }
+
+    /// Judges the samples since the change and takes over what is known after it.
+    fn judge(&mut self, structure: &Structure, alarm: f64) -> Result<Event, Error> {
+        let after = self.since.information();
+        let inflation = self.inflation();
+        let judgement =
+            judge_change(&self.unchanged, after, &self.hypotheses.list, inflation, CHANCE);
+        let known = match judgement.judged.first().filter(|_| judgement.confirmed) {
+            Some(best) => after_change(&self.unchanged, after, &self.hypotheses.list[best.hypothesis]),
+            None => {
+                let mut merged = self.unchanged.clone();
+                let p = merged.columns();
+                merged.merge(after, &mut vec![0.0; p * (p + 1)]);
+                merged
+            }
+        };
+        self.estimator.set_information(&known)?;
+        let (moved, alternatives) = match judgement.confirmed {
+            true => self.hypotheses.tell(structure, &judgement.judged),
+            false => (None, Vec::new()),
+        };
+        Ok(Event::Change {
+            time: self.newest,
+            alarm,
+            confirmed: judgement.confirmed,
+            moved,
+            alternatives,
+        })
+    }
+
+    fn statistic(&self) -> f64 {
+        self.estimator.detection().map_or(0.0, |d| d.statistic())
+    }
+
+    fn inflation(&self) -> f64 {
+        self.estimator.detection().map_or(1.0, |d| d.inflation())
+    }
+
+    /// The estimate as it is.
+    pub(super) fn report(&mut self, config: &Config, structure: &Structure) -> Result<Event, Error> {
+        let coloured = self.inflation().sqrt();
+        self.estimator.std(&mut self.std);
+        let names = &structure.model.parameters().linear;
+        let value = |(k, column): (usize, &usize)| ParameterValue {
+            name: names[*column].name.clone(),
+            value: self.estimator.x()[k],
+            std: coloured * self.std[k],
+        };
+        let parameters: Vec<ParameterValue> =
+            structure.base.kept.iter().enumerate().map(value).collect();
+        let determined = parameters
+            .iter()
+            .zip(&self.learned.prior_std)
+            .filter(|(p, prior)| p.std < DETERMINED * **prior)
+            .count();
+        let residual_rms = self
+            .errors
+            .iter()
+            .map(|(sum, count)| (*count > 0).then(|| (sum / *count as f64).sqrt()))
+            .collect();
+        self.errors.fill((0.0, 0));
+        Ok(Event::Estimate {
+            time: self.newest,
+            standard: self.standard(config, structure)?,
+            determined: determined as f64 / parameters.len() as f64,
+            parameters,
+            residual_rms,
+            statistic: self.statistic(),
+            threshold: self.estimator.detection().map(|d| d.threshold()),
+            rows: self.counts.rows,
+            alarms: self.counts.alarms,
+        })
+    }
+
+    /// Standard parameters of bodies that can exist.
+    fn standard(&self, config: &Config, structure: &Structure) -> Result<Vec<PlainValue>, Error> {
+        let bodies = structure.model.mechanism().bodies().len();
+        let Some(form) = consistency::form(config).filter(|_| config.online.consistent && bodies > 0) else {
+            return Ok(Vec::new());
+        };
+        let factor = factor_from_root(self.estimator.information(), &self.learned.prior_std);
+        let problem = consistency::problem(
+            &structure.model,
+            &structure.regrouping,
+            &factor,
+            &self.prior,
+            &structure.bounds,
+        );
+        let settings =
+            ConsistentSettings { form, gaussian_weight: self.inflation(), ..ConsistentSettings::default() };
+        let found = estimate(&problem, &settings)?;
+        let names = structure.model.parameters().linear.iter();
+        Ok(names.zip(found.x).map(|(p, value)| PlainValue { name: p.name.clone(), value }).collect())
+    }
+
+    /// Whether something is waiting for more samples that the end of the stream would lose.
+    pub(super) fn finish(
+        &mut self,
+        config: &Config,
+        structure: &Structure,
+        emit: &mut dyn FnMut(Event),
+    ) -> Result<(), Error> {
+        self.drain(config, structure, emit)?;
+        if let Some(hold) = self.hold.take() {
+            emit(self.judge(structure, hold.alarm)?);
+        }
+        emit(self.report(config, structure)?);
+        Ok(())
+    }
+
+    /// Carries the state to or from a checkpoint.
+    pub(super) fn transfer(&mut self, transfer: &mut Transfer<'_>) {
+        self.grid.transfer(transfer);
+        self.rows.transfer(transfer);
+        transfer_estimator(&mut self.estimator, transfer);
+        transfer_estimator(&mut self.since, transfer);
+        transfer_root(&mut self.unchanged, transfer);
+        let mut held = self.hold.is_some();
+        transfer.flag(&mut held);
+        let hold = self.hold.get_or_insert(Hold { alarm: 0.0, left: 1 });
+        transfer.real(&mut hold.alarm);
+        transfer.integer(&mut hold.left);
+        if !held {
+            self.hold = None;
+        }
+        transfer.real(&mut self.newest);
+        let mut due = self.next_report.unwrap_or(f64::NAN);
+        transfer.real(&mut due);
+        self.next_report = (!due.is_nan()).then_some(due);
+        for (sum, count) in &mut self.errors {
+            transfer.real(sum);
+            transfer.integer(count);
+        }
+        let Counts { samples, rows, backward, gaps, set_back, already_seen, alarms } = &mut self.counts;
+        for count in [samples, rows, backward, gaps, set_back, already_seen, alarms] {
+            transfer.integer(count);
+        }
+    }
+}
+
+fn transfer_estimator(estimator: &mut Estimator, transfer: &mut Transfer<'_>) {
+    let mut words = estimator.save();
+    let mut length = words.len();
+    transfer.count(&mut length, MOST_WORDS);
+    words.resize(length, 0);
+    words.iter_mut().for_each(|w| transfer.integer(w));
+    if matches!(transfer, Transfer::Load { .. }) && estimator.load(&words).is_err() {
+        transfer.fail();
+    }
+}
+
+/// Most words of an estimator that a checkpoint is believed.
+const MOST_WORDS: usize = 1 << 28;
+
+fn transfer_root(root: &mut SquareRoot, transfer: &mut Transfer<'_>) {
+    for i in 0..root.columns() {
+        let mut row = root.row(i).to_vec();
+        transfer.reals(&mut row);
+        if row[0].is_nan() || row[0] < 0.0 {
+            transfer.fail();
+            return;
+        }
+        root.set_row(i, &row);
+    }
+    let (mut rss, mut weight) = (root.rss(), root.weight());
+    transfer.real(&mut rss);
+    transfer.real(&mut weight);
+    root.set_remainder(rss, weight);
+}
+
+fn settings(config: &Config, learned: &Learned, rows: usize, spacing_s: f64) -> Settings {
+    let online = &config.online;
+    let lambda = (-spacing_s / online.memory_s).exp();
+    let largest = learned.efforts.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let samples = ((online.memory_s / spacing_s / BLOCKS as f64).ceil().max(1.0)) as usize * BLOCKS;
+    let forgetting = match online.forgetting {
+        ForgettingRule::None => Forgetting::None,
+        ForgettingRule::Constant => Forgetting::Constant { lambda },
+        ForgettingRule::Directional => Forgetting::Directional { lambda, tolerance: DIRECTION_TOLERANCE },
+        ForgettingRule::ErrorDriven => {
+            Forgetting::ErrorDriven { alpha: ALPHA, beta: BETA, floor: EFFORT_FLOOR * largest }
+        }
+        ForgettingRule::NoiseNormalised => {
+            Forgetting::NoiseNormalised { alpha: ALPHA, beta: BETA, dead_zone: DEAD_ZONE }
+        }
+        ForgettingRule::Window => Forgetting::BlockWindow { samples, blocks: BLOCKS },
+        ForgettingRule::Drift => Forgetting::Drift {
+            rate: learned.prior_std.iter().map(|s| WANDERING * s / online.memory_s.sqrt()).collect(),
+            interval: spacing_s,
+        },
+    };
+    let discounts = matches!(
+        online.forgetting,
+        ForgettingRule::Constant | ForgettingRule::ErrorDriven | ForgettingRule::NoiseNormalised
+    );
+    let whiteness =
+        Whiteness::Learned { samples: ((LEARNED_SHARE * learned.row_samples as f64) as usize).max(50) };
+    let hours = online.false_alarm_hours * 3600.0 / spacing_s;
+    let detection = DetectionSettings {
+        false_alarms: FalseAlarms::Rate { rate: online.false_alarm_rate, samples: hours.max(1.0) },
+        whiteness,
+        ..DetectionSettings::default()
+    };
+    Settings {
+        forgetting,
+        bounded_covariance: discounts.then_some(1.0),
+        detection: online.alarms.then_some(detection),
+        reaction: None,
+        ..Settings::new(learned.start.clone(), learned.prior_std.clone(), rows)
+    }
+}
