@@ -31,6 +31,8 @@ pub(crate) enum Command {
     Simulate(SimulateArgs),
     /// Compare an identified model with other logs.
     Validate(ValidateArgs),
+    /// Follow a stream or logs: estimates as JSON lines, alarms when something changes (exit code 1).
+    Online(OnlineArgs),
     /// Published systems, every claim of their papers beside what is measured here.
     Study(StudyArgs),
     /// Put identified parameters into a robot file: URDF, MJCF or JSON, read back and checked before it is written.
@@ -66,6 +68,38 @@ pub(crate) struct InspectArgs {
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum StreamArg {
+    /// A header line, then numbers between commas.
+    Csv,
+    /// One JSON object per line.
+    Json,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct OnlineArgs {
+    /// Configuration as for `identify`; keys of its own are under [online].
+    pub(crate) config: PathBuf,
+    /// Read samples from stdin, one per line, instead of the configuration's logs.
+    #[arg(long, value_name = "FORMAT")]
+    pub(crate) stream: Option<StreamArg>,
+    /// Log to follow instead of those of the configuration; may be given more than once.
+    #[arg(long, value_name = "FILE", conflicts_with = "stream")]
+    pub(crate) log: Vec<PathBuf>,
+    /// Write the state to this file, and go on from it if it exists (default: the configuration's).
+    #[arg(long, value_name = "FILE")]
+    pub(crate) checkpoint: Option<PathBuf>,
+    /// The stream begins again from its start: pass over what the checkpoint has seen (logs always do).
+    #[arg(long, requires = "stream")]
+    pub(crate) replay: bool,
+    /// Print JSON lines on a terminal too, in place of the live view.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Say nothing but data and errors.
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
 }
 
 #[derive(Debug, Args)]

@@ -5,6 +5,7 @@ pub(crate) mod export;
 pub(crate) mod friction;
 pub(crate) mod identify;
 pub(crate) mod inspect;
+pub(crate) mod online;
 pub(crate) mod predict;
 pub(crate) mod regressor;
 pub(crate) mod simulate;

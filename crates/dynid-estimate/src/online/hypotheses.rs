@@ -130,10 +130,7 @@ fn joined(before: &SquareRoot, after: &SquareRoot, hypothesis: &ChangeHypothesis
         row[jumps + i..].copy_from_slice(after.row(i));
     }
     joint.push(&mut rows);
-    joint.set_remainder(
-        joint.rss() + before.rss() + after.rss(),
-        before.weight() + after.weight(),
-    );
+    joint.set_remainder(joint.rss() + before.rss() + after.rss(), before.weight() + after.weight());
     joint
 }
 
@@ -184,14 +181,16 @@ mod tests {
     #[test]
     fn the_smallest_hypothesis_that_explains_all_wins() {
         let before = factor(&[1.0, 2.0, -1.0, 0.5], 0..4000);
-        let single = judge_change(&before, &factor(&[1.0, 3.0, -1.0, 0.5], 5000..5400), &hypotheses(), 1.0, 0.01);
+        let single =
+            judge_change(&before, &factor(&[1.0, 3.0, -1.0, 0.5], 5000..5400), &hypotheses(), 1.0, 0.01);
         assert!(single.confirmed);
         assert_eq!(single.judged[0].hypothesis, 1);
         assert!(single.judged[0].share > 0.9);
         let (jump, std) = single.judged[0].jumps[0];
         assert!((jump - 1.0).abs() < 3.0 * std && std < 0.15, "{jump} {std}");
         // Two parameters, in the proportion of a body.
-        let body = judge_change(&before, &factor(&[0.2, 3.0, -0.5, 0.5], 5000..5400), &hypotheses(), 1.0, 0.01);
+        let body =
+            judge_change(&before, &factor(&[0.2, 3.0, -0.5, 0.5], 5000..5400), &hypotheses(), 1.0, 0.01);
         assert_eq!(body.judged[0].hypothesis, 4);
         assert!(body.judged[0].share > 0.9);
         let jumps: Vec<f64> = body.judged[0].jumps.iter().map(|(j, _)| *j).collect();

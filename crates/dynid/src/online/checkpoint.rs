@@ -88,10 +88,12 @@ impl Checkpoint {
         let damaged = || fault("it is damaged; delete it to begin anew");
         let digits = self.state.as_bytes();
         let word = |w: &[u8]| {
-            std::str::from_utf8(w).ok().filter(|w| w.len() == 16).and_then(|w| u64::from_str_radix(w, 16).ok())
+            std::str::from_utf8(w)
+                .ok()
+                .filter(|w| w.len() == 16)
+                .and_then(|w| u64::from_str_radix(w, 16).ok())
         };
-        let words =
-            digits.chunks(16).map(word).collect::<Option<Vec<u64>>>().ok_or_else(damaged)?;
+        let words = digits.chunks(16).map(word).collect::<Option<Vec<u64>>>().ok_or_else(damaged)?;
         let mut load = Transfer::load(&words);
         let mut place = Place { offset: 0.0, latest: 0.0, rows: 0 };
         place.transfer(&mut load);

@@ -72,6 +72,8 @@ pub struct Counts {
     pub already_seen: u64,
     /// Alarms.
     pub alarms: u64,
+    /// Alarms that the samples after them bore out, or that nothing judged.
+    pub changes: u64,
 }
 
 /// An event, in JSON an object whose `event` names it.

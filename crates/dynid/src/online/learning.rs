@@ -5,8 +5,7 @@ use std::sync::Arc;
 
 use dynid_estimate::Mat;
 use dynid_estimate::conditioning::{
-    ConditioningError, LiveRow, LiveRowSettings, LiveRows, PreparedLog, States,
-    condition, prepare,
+    ConditioningError, LiveRow, LiveRowSettings, LiveRows, PreparedLog, States, condition, prepare,
 };
 use dynid_estimate::consistent::Bound;
 use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate};
@@ -31,7 +30,6 @@ const SAMPLES_PER_OUTPUT: usize = 20;
 /// The robot of a session and what is known of it without samples.
 #[derive(Debug)]
 pub(super) struct Structure {
-    pub(super) robot: Robot,
     pub(super) model: Arc<RobotModel>,
     pub(super) shape: Vec<f64>,
     pub(super) base: BaseParameters,
@@ -76,7 +74,6 @@ impl Structure {
             bounds: bounds::rows(&config.bound, &model)?,
             stated: stated_values(&model, &plan),
             model: Arc::new(model),
-            robot,
             shape,
             base,
             warnings,
@@ -197,7 +194,8 @@ impl Structure {
         let start = self.base.values(&prior.values);
         let std = (0..self.base.len())
             .map(|row| {
-                let parts = prior.std.iter().enumerate().map(|(c, s)| (self.regrouping[(row, c)] * s).powi(2));
+                let parts =
+                    prior.std.iter().enumerate().map(|(c, s)| (self.regrouping[(row, c)] * s).powi(2));
                 parts.sum::<f64>().sqrt()
             })
             .collect();
@@ -266,13 +264,8 @@ fn noise(structure: &Structure, live: &[LiveRow]) -> Result<Option<Vec<f64>>, Er
     let columns: Vec<usize> = (0..structure.base.len()).collect();
     let mut rows = MemoryRows::new();
     for output in 0..outputs {
-        let group = rows.add_group(GroupShape {
-            log: 0,
-            output,
-            scale: 0,
-            columns: columns.clone(),
-            blocks: 1,
-        });
+        let group =
+            rows.add_group(GroupShape { log: 0, output, scale: 0, columns: columns.clone(), blocks: 1 });
         let used: Vec<(usize, &LiveRow)> =
             live.iter().enumerate().filter(|(_, row)| row.usable[output]).collect();
         if used.is_empty() {
@@ -292,7 +285,8 @@ fn noise(structure: &Structure, live: &[LiveRow]) -> Result<Option<Vec<f64>>, Er
             },
         );
     }
-    let groups = reduce_rows(&rows).map_err(|e| ConditioningError::Rows { output: e.group, source: e.source })?;
+    let groups =
+        reduce_rows(&rows).map_err(|e| ConditioningError::Rows { output: e.group, source: e.source })?;
     let fit = estimate(&groups, Some(&rows), columns.len(), &LinearMethod::Wls, &LinearSettings::default())?;
     let residual = |row: &LiveRow, output: usize| -> f64 {
         row.effort[output] - row.columns[output].iter().zip(&fit.x).map(|(w, x)| w * x).sum::<f64>()

@@ -240,6 +240,8 @@ impl Running {
             if config.online.forgetting != ForgettingRule::Window {
                 let samples = (config.online.reaction_s / self.rows.spacing_s()).ceil().max(1.0) as u64;
                 self.hold = Some(Hold { alarm: self.newest, left: samples });
+            } else {
+                self.counts.changes += 1;
             }
         }
         Ok(())
@@ -249,8 +251,7 @@ impl Running {
     fn judge(&mut self, structure: &Structure, alarm: f64) -> Result<Event, Error> {
         let after = self.since.information();
         let inflation = self.inflation();
-        let judgement =
-            judge_change(&self.unchanged, after, &self.hypotheses.list, inflation, CHANCE);
+        let judgement = judge_change(&self.unchanged, after, &self.hypotheses.list, inflation, CHANCE);
         let known = match judgement.judged.first().filter(|_| judgement.confirmed) {
             Some(best) => after_change(&self.unchanged, after, &self.hypotheses.list[best.hypothesis]),
             None => {
@@ -260,18 +261,13 @@ impl Running {
                 merged
             }
         };
+        self.counts.changes += u64::from(judgement.confirmed);
         self.estimator.set_information(&known)?;
         let (moved, alternatives) = match judgement.confirmed {
             true => self.hypotheses.tell(structure, &judgement.judged),
             false => (None, Vec::new()),
         };
-        Ok(Event::Change {
-            time: self.newest,
-            alarm,
-            confirmed: judgement.confirmed,
-            moved,
-            alternatives,
-        })
+        Ok(Event::Change { time: self.newest, alarm, confirmed: judgement.confirmed, moved, alternatives })
     }
 
     fn statistic(&self) -> f64 {
@@ -292,8 +288,7 @@ impl Running {
             value: self.estimator.x()[k],
             std: coloured * self.std[k],
         };
-        let parameters: Vec<ParameterValue> =
-            structure.base.kept.iter().enumerate().map(value).collect();
+        let parameters: Vec<ParameterValue> = structure.base.kept.iter().enumerate().map(value).collect();
         let determined = parameters
             .iter()
             .zip(&self.learned.prior_std)
@@ -377,8 +372,9 @@ impl Running {
             transfer.real(sum);
             transfer.integer(count);
         }
-        let Counts { samples, rows, backward, gaps, set_back, already_seen, alarms } = &mut self.counts;
-        for count in [samples, rows, backward, gaps, set_back, already_seen, alarms] {
+        let Counts { samples, rows, backward, gaps, set_back, already_seen, alarms, changes } =
+            &mut self.counts;
+        for count in [samples, rows, backward, gaps, set_back, already_seen, alarms, changes] {
             transfer.integer(count);
         }
     }

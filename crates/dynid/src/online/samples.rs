@@ -1,7 +1,7 @@
 //! From rows of a stream to samples of a model's outputs.
 
 use dynid_io::columns::TimeSource;
-use dynid_io::{ColumnMapping, Table};
+use dynid_io::{ColumnMapping, MappingSpec, Table};
 use dynid_model::element::temperature_channel;
 
 use crate::config::Config;
@@ -34,14 +34,14 @@ impl Samples {
         name: &str,
         header: &[String],
         joints: &[String],
-        config: &Config,
+        columns: &MappingSpec,
     ) -> Result<Samples, Error> {
         let named = |source| Error::Columns { file: name.to_owned(), source };
-        let mapping = ColumnMapping::from_spec(header, joints, &config.columns).map_err(named)?;
-        if config.columns.position.is_none() {
+        let mapping = ColumnMapping::from_spec(header, joints, columns).map_err(named)?;
+        if columns.position.is_none() {
             logs::check_surplus(&mapping, joints, header, name)?;
         }
-        logs::check_gains(&config.columns, joints.len())?;
+        logs::check_gains(columns, joints.len())?;
         if mapping.effort.is_none() {
             return Err(Error::Unsupported(format!("{name}: a stream without efforts identifies nothing")));
         }
@@ -118,9 +118,10 @@ impl Samples {
                 };
                 stated.or_else(measured).ok_or_else(|| {
                     let (log, channel) = (self.name.clone(), wanted.clone());
-                    Error::Conditioning(
-                        dynid_estimate::conditioning::ConditioningError::MissingChannel { log, channel },
-                    )
+                    Error::Conditioning(dynid_estimate::conditioning::ConditioningError::MissingChannel {
+                        log,
+                        channel,
+                    })
                 })
             })
             .collect::<Result<Vec<&Vec<f64>>, Error>>()?;

@@ -1,5 +1,6 @@
 //! A stream from its first row to its end.
 
+use dynid_io::MappingSpec;
 use dynid_model::EffortModel;
 
 use super::checkpoint::{Checkpoint, Place};
@@ -49,14 +50,20 @@ pub struct Session {
 }
 
 impl Session {
-    /// A session on a stream with these columns. `name` stands in messages.
+    /// A session on a stream with these columns. `name` stands in messages; `columns` say which is which, by default the
+    /// configuration's.
     ///
     /// # Errors
     /// [`Error`]: bad configuration, robot or columns.
-    pub fn new(config: &Config, name: &str, header: &[String]) -> Result<Session, Error> {
+    pub fn new(
+        config: &Config,
+        name: &str,
+        header: &[String],
+        columns: Option<&MappingSpec>,
+    ) -> Result<Session, Error> {
         config.check()?;
         let joints = Structure::new(config, &[])?.joints();
-        let samples = Samples::new(name, header, &joints, config)?;
+        let samples = Samples::new(name, header, &joints, columns.unwrap_or(&config.columns))?;
         let structure = Structure::new(config, &samples.not_logged())?;
         Ok(Session {
             phase: Phase::Learning { samples: Vec::new(), wanted_s: config.online.learn_s },
@@ -80,14 +87,13 @@ impl Session {
         &mut self,
         name: &str,
         header: &[String],
+        columns: Option<&MappingSpec>,
         emit: &mut dyn FnMut(Event),
     ) -> Result<(), Error> {
         self.flush(emit)?;
-        let mut joints = self.structure.joints();
         let still = self.samples.not_logged();
-        joints.extend(still.iter().cloned());
-        let all = Structure::new(&self.config, &[])?.joints();
-        let samples = Samples::new(name, header, &all, &self.config)?;
+        let joints = Structure::new(&self.config, &[])?.joints();
+        let samples = Samples::new(name, header, &joints, columns.unwrap_or(&self.config.columns))?;
         if samples.not_logged() != still {
             return Err(Error::Unsupported(format!(
                 "{name}: expected columns of the same joints as before, not logged: {still:?}, found {:?}",
@@ -104,15 +110,16 @@ impl Session {
         self.structure.joints()
     }
 
-    /// Takes a row of the stream.
+    /// Takes a row of the stream; whether the rows taken so far were worked off.
     ///
     /// # Errors
     /// [`Error`]: what cannot be learned from or estimated.
-    pub fn row(&mut self, row: &[f64], emit: &mut dyn FnMut(Event)) -> Result<(), Error> {
-        if self.samples.push(row) {
+    pub fn row(&mut self, row: &[f64], emit: &mut dyn FnMut(Event)) -> Result<bool, Error> {
+        let due = self.samples.push(row);
+        if due {
             self.flush(emit)?;
         }
-        Ok(())
+        Ok(due)
     }
 
     /// Works off the rows taken so far.
@@ -212,6 +219,11 @@ impl Session {
         }
         emit(Event::End { counts: self.counts() });
         Ok(())
+    }
+
+    /// Time of the latest sample, s.
+    pub fn latest(&self) -> Option<f64> {
+        self.latest
     }
 
     /// Rows and samples so far.
