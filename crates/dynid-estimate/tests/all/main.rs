@@ -38,4 +38,5 @@ mod separable;
 mod separable_arm;
 mod simulated;
 mod steady_friction;
+mod steady_rows;
 mod whiteness_power;
