@@ -236,7 +236,7 @@ fn an_estimate_predicts_with_the_known_friction() {
     let again =
         validate(&read, Split::Consistent, &file, &[config], &Default::default(), None, None).unwrap();
     let own = log_fit(&found.agreement(found.values(), &found.logs[0]).unwrap());
-    assert_eq!(own.raw.rms, log_fit(&again[0]).raw.rms);
+    assert_eq!(own.raw.rms, log_fit(&again.agreements[0]).raw.rms);
 
     let model = read.effort_model(&file, Split::Consistent).unwrap();
     let mut states = States {
@@ -286,6 +286,18 @@ fn what_the_law_does_not_know_is_said() {
     assert!(warnings.contains("log.csv: 50 % of the temperatures of `j1`"), "{warnings}");
     assert!(warnings.contains("20.0 to 50.0 °C"), "{warnings}");
     assert!(warnings.contains("no friction is known of `j2`"), "{warnings}");
+    bench.log("warm.csv", [30.0, 40.0], 2);
+    let logs = ["log.csv", "warm.csv"].map(|name| LogConfig { path: bench.path(name), ..Default::default() });
+    let file = bench.path("estimate.json");
+    let again =
+        validate(&estimate, Split::Consistent, &file, &logs, &Default::default(), None, None).unwrap();
+    let told: Vec<&String> =
+        estimate.verdict.warnings.iter().filter(|w| w.contains("temperatures")).collect();
+    assert_eq!(
+        again.warnings.iter().collect::<Vec<_>>(),
+        told,
+        "as when it was identified; the warm log is within the range"
+    );
 
     std::fs::write(bench.path("friction.json"), friction_file(&[law("wrist", 2.0)])).unwrap();
     let error = identify(&bench.config(KNOWN, LOG), |_| {}).unwrap_err();
