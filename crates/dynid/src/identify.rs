@@ -19,7 +19,7 @@ use dynid_motion::Log;
 
 use crate::Error;
 use crate::agreement::{self, Agreement};
-use crate::config::{Config, FrictionErrors, LogConfig, Route};
+use crate::config::{Config, FrictionErrors, LogConfig, PerJoint, Route};
 use crate::consistency::{self, Consistent};
 use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
@@ -408,11 +408,26 @@ fn plan_elements(config: &Config, robot: &Robot, logs: &[LoadedLog]) -> Result<E
     if let Some(file) = &config.elements.known_friction {
         let temperatures = config.elements.temperature.finite("elements.temperature", &names)?;
         plan.known = KnownFriction::load(file, &names, &temperatures)?;
+        check_temperature(&config.elements.temperature, &plan.known)?;
         plan.free_errors = config.elements.friction_errors == FrictionErrors::Free;
     }
     let speeds: Vec<Option<f64>> =
         names.iter().map(|name| logs.iter().filter_map(|l| fastest(&l.log, name)).reduce(f64::max)).collect();
     Ok(plan.with_speeds(&robot.mechanism, &speeds))
+}
+
+/// Refuses a temperature that no law reads: of a joint whose known friction does not change with it, or of all joints where
+/// none's does.
+fn check_temperature(stated: &PerJoint, known: &[KnownFriction]) -> Result<(), Error> {
+    let reads = |joint: &str| known.iter().any(|law| law.joint == joint && law.is_thermal());
+    let unread = match stated {
+        PerJoint::All(t) => (!known.iter().any(KnownFriction::is_thermal)).then(|| t.to_string()),
+        PerJoint::Each(map) => {
+            map.iter().find(|(joint, _)| !reads(joint)).map(|(joint, t)| format!("{joint} = {t}"))
+        }
+    };
+    let expected = "temperatures of joints whose known friction changes with them";
+    unread.map_or(Ok(()), |found| Err(Error::setting("elements.temperature", expected, found)))
 }
 
 /// Largest mean speed of a joint over [`SPEED_SPAN_S`] of a log.

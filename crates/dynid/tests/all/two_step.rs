@@ -227,6 +227,33 @@ fn a_log_without_temperature_is_named_and_a_constant_one_helps() {
 }
 
 #[test]
+fn a_temperature_that_no_law_reads_is_refused() {
+    let bench = Bench::new(2.0);
+    bench.log("log.csv", [31.0, 31.0], 1);
+    let bare = "[[log]]\npath = \"bare_log.csv\"\n";
+    let mut constant = law("j2", 2.0);
+    constant["viscous"]["sigma2_slope"] = json!(0.0);
+    let refused = |laws: &[Value], stated: &str| {
+        std::fs::write(bench.path("friction.json"), friction_file(laws)).unwrap();
+        let config = bench.config(&format!("{KNOWN}\ntemperature = {stated}"), bare);
+        identify(&config, |_| {}).err().map(|e| e.to_string())
+    };
+    let both = [law("j1", 2.0), constant.clone()];
+    // One number for all joints serves those that read it.
+    for stated in ["31.0", "{ j1 = 31.0 }"] {
+        assert_eq!(refused(&both, stated), None, "{stated}");
+    }
+    let stated = "{ j1 = 31.0, j2 = 31.0 }";
+    for (laws, stated, found) in
+        [(&both[..], stated, "j2 = 31"), (&both[..1], stated, "j2 = 31"), (&[constant], "31.0", "31")]
+    {
+        let said = refused(laws, stated).unwrap();
+        assert!(said.contains("elements.temperature") && said.contains("changes with them"), "{said}");
+        assert!(said.ends_with(&format!("found {found}")), "{said}");
+    }
+}
+
+#[test]
 fn an_estimate_predicts_with_the_known_friction() {
     let bench = Bench::new(2.0);
     let log = bench.log("log.csv", [22.0, 34.0], 1);
