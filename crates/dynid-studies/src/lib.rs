@@ -6,8 +6,11 @@
 
 pub mod er16;
 mod error;
+mod excitation;
 pub mod indy7;
 mod record;
+mod reference;
+mod statistics;
 
 pub use error::StudyError;
 pub use record::{Row, StudyRecord};

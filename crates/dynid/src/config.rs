@@ -4,6 +4,7 @@ mod estimator;
 mod friction;
 mod online;
 mod per_joint;
+pub(crate) mod toml_file;
 
 pub use estimator::{
     BoundConfig, Consistency, EstimatorConfig, Method, PriorDistance, ShapeConfig, Variances,
@@ -193,10 +194,7 @@ impl Config {
     /// # Errors
     /// As [`Config::read`].
     pub fn read_for_stream(path: &Path) -> Result<Self, Error> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
-        let mut config = Self::parse_any(&text, &path.display().to_string())?;
-        let folder = path.parent().unwrap_or(Path::new(""));
+        let (mut config, folder) = toml_file::read(path, Self::parse_any)?;
         config.robot = folder.join(&config.robot);
         config.out = config.out.map(|o| folder.join(o));
         config.elements.known_friction = config.elements.known_friction.map(|f| folder.join(f));
@@ -223,21 +221,12 @@ impl Config {
         if !self.log.is_empty() {
             return Ok(());
         }
-        let message = "expected at least one `[[log]]` with a `path`".to_owned();
-        Err(Error::Config { file: file.to_owned(), line: None, message })
+        Err(toml_file::missing(file, "at least one `[[log]]` with a `path`"))
     }
 
     fn parse_any(text: &str, file: &str) -> Result<Self, Error> {
-        let config: Config = toml::from_str(text).map_err(|e| Error::Config {
-            file: file.to_owned(),
-            line: e.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count()),
-            message: e.message().lines().next().unwrap_or_default().to_owned(),
-        })?;
-        let missing = |what: &str| Error::Config {
-            file: file.to_owned(),
-            line: None,
-            message: format!("expected {what}"),
-        };
+        let config: Config = toml_file::parse(text, file)?;
+        let missing = |what: &str| toml_file::missing(file, what);
         if config.robot.as_os_str().is_empty() {
             return Err(missing("`robot = \"file\"`"));
         }
@@ -246,7 +235,7 @@ impl Config {
                 return Err(missing("a `path` in every `[[log]]` and `[[validation]]`"));
             }
         }
-        config.check().map_err(|e| Error::InFile { file: file.to_owned(), source: Box::new(e) })?;
+        toml_file::in_file(file, config.check())?;
         Ok(config)
     }
 

@@ -2,7 +2,7 @@
 
 mod figures;
 mod friction;
-mod known;
+pub(crate) mod known;
 mod shapes;
 mod structure;
 
@@ -252,7 +252,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         progress(Step::Validate(log.path.display().to_string()));
         let loaded = logs::load(log, &out.robot.mechanism, &config.columns, config.motor_side.as_ref())?;
         let prepared = loaded.prepare(&out.model, &out.settings)?;
-        out.warnings.extend(known::logged_beyond(&out.plan, &prepared));
+        out.warnings.extend(known::logged_beyond(&out.plan.known, &prepared));
         out.validation.push(out.agreement(out.values(), &prepared)?);
         if out.consistent.constrained() {
             let free = out.agreement(out.unconstrained_values(), &prepared)?;

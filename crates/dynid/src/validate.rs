@@ -10,8 +10,18 @@ use crate::Error;
 use crate::agreement::{Agreement, Alignment, compare};
 use crate::config::{LogConfig, MotorSide};
 use crate::estimate::{Estimate, Split};
+use crate::identify::known::logged_beyond;
 use crate::logs;
 pub use crate::result::log_fit;
+
+/// Logs as predicted and as measured.
+#[derive(Debug, Clone)]
+pub struct Validation {
+    /// Per log.
+    pub agreements: Vec<Agreement>,
+    /// What to know about them, in words: temperatures beyond the range of known friction.
+    pub warnings: Vec<String>,
+}
 
 /// Predicts logs by an estimate and compares.
 ///
@@ -28,7 +38,7 @@ pub fn validate(
     columns: &MappingSpec,
     motor_side: Option<&MotorSide>,
     filter_hz: Option<f64>,
-) -> Result<Vec<Agreement>, Error> {
+) -> Result<Validation, Error> {
     let model = estimate.effort_model(file, split)?;
     let values = estimate.values(split);
     let settings = ConditioningSettings::default();
@@ -38,12 +48,13 @@ pub fn validate(
         delay_rate_hz: estimate.conditioning.delay_rate_hz,
         filter_hz: filter_hz.unwrap_or(estimate.model.kernel_hz),
     };
-    logs.iter()
-        .map(|log| {
-            let loaded = logs::load(log, model.mechanism(), columns, motor_side)?;
-            let prepared = loaded.prepare(&model, &settings)?;
-            compare(&model, &values, &prepared, &alignment, &settings)
-        })
-        .inspect(|_| debug_assert_eq!(model.outputs().len(), estimate.joints.len()))
-        .collect()
+    debug_assert_eq!(model.outputs().len(), estimate.joints.len());
+    let mut out = Validation { agreements: Vec::new(), warnings: Vec::new() };
+    for log in logs {
+        let loaded = logs::load(log, model.mechanism(), columns, motor_side)?;
+        let prepared = loaded.prepare(&model, &settings)?;
+        out.warnings.extend(logged_beyond(&estimate.model.known_friction, &prepared));
+        out.agreements.push(compare(&model, &values, &prepared, &alignment, &settings)?);
+    }
+    Ok(out)
 }

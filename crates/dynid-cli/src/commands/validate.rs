@@ -6,7 +6,7 @@ use dynid::validate::{log_fit, validate};
 
 use super::{apply_log_args, table};
 use crate::args::ValidateArgs;
-use crate::message::{Failure, data, json};
+use crate::message::{Failure, data, json, note};
 
 pub(crate) fn run(args: &ValidateArgs) -> Result<u8, Failure> {
     let estimate = Estimate::read(&args.estimate)?;
@@ -32,9 +32,12 @@ pub(crate) fn run(args: &ValidateArgs) -> Result<u8, Failure> {
         .map(|path| LogConfig { path: path.clone(), rows: args.rows, ..LogConfig::default() })
         .collect();
     let split = args.split.of();
-    let agreements =
+    let validation =
         validate(&estimate, split, &args.estimate, &logs, &columns, motor_side.as_ref(), args.filter_hz)?;
-    let fits: Vec<_> = agreements.iter().map(log_fit).collect();
+    for warning in &validation.warnings {
+        note(&format!("warning: {warning}"));
+    }
+    let fits: Vec<_> = validation.agreements.iter().map(log_fit).collect();
     if args.json {
         json(&fits)?;
         return Ok(0);

@@ -168,7 +168,13 @@ fn a_flag_names_the_friction_file_and_predictions_ask_for_temperatures() {
     let risen = 1.0 - (-(0.4_f64).powf(0.8)).exp();
     assert!((effort(25.0) - effort(35.0) - 0.2 * risen).abs() < 1e-9);
     assert!((effort(40.0) - effort(60.0)).abs() < 1e-12);
-    run(folder.path(), &["validate", "out/estimate.json", "--log", "log.csv"], 0);
+    let validate = ["validate", "out/estimate.json", "--log", "log.csv"];
+    let said = |output: std::process::Output| String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!said(run(folder.path(), &validate, 0)).contains("warning"));
+    let log = std::fs::read_to_string(folder.path().join("log.csv")).unwrap();
+    std::fs::write(folder.path().join("log.csv"), log.replace(",31.0,29.0", ",45.0,29.0")).unwrap();
+    let said = said(run(folder.path(), &validate, 0));
+    assert!(said.contains("warning: log.csv: 100 % of the temperatures of `shoulder` lie outside"), "{said}");
     run(folder.path(), &["validate", "out/estimate.json", "--log", "bare.csv"], 2);
 }
 

@@ -88,7 +88,7 @@ fn indy7_holds_every_claim() {
 }
 
 #[test]
-#[ignore = "two minutes"]
+#[ignore = "two quick runs take two minutes; the ordinary run checks the claims once"]
 fn indy7_repeats_bit_by_bit() {
     let folder = tempfile::tempdir().unwrap();
     let first = quick("indy7", folder.path(), "one", "1");

@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::arm::{Arm, JOINTS};
 use super::measurement::Measurement;
-use super::search::median;
 use super::separable::identify_plain;
 use super::settings::Settings;
+use crate::statistics::median;
 use crate::{RunSettings, StudyError};
 
 const RATES_HZ: [f64; 4] = [1.0, 10.0, 50.0, 100.0];

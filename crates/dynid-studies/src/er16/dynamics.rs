@@ -1,16 +1,13 @@
 //! Rows 1 and 2: dynamics, friction and base parameters against an independent implementation.
 
-use dynid::model::{BaseParameters, BaseSettings, BodyPoint, Dynamics, EffortModel, MotionBlock};
-use dynid::model::{RegressorBlock, RobotModel, Vec3};
+use dynid::model::{BaseParameters, BaseSettings, EffortModel, MotionBlock, RegressorBlock, RobotModel};
 use serde_json::json;
 
 use super::arm::{Arm, INERTIAL, JOINTS, Place};
 use super::reference::{self, StateReference};
 use super::settings::Settings;
+use crate::reference::{PARAMETER_ORDER, pose_error};
 use crate::{Row, StudyError};
-
-/// Order of the reference's standard parameters, ours being `m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz`.
-const REFERENCE_ORDER: [usize; 10] = [4, 5, 6, 7, 8, 9, 1, 2, 3, 0];
 
 pub(super) fn rows(arm: &Arm, settings: &Settings) -> Result<[Row; 2], StudyError> {
     let reference = reference::dynamics()?;
@@ -30,7 +27,7 @@ pub(super) fn rows(arm: &Arm, settings: &Settings) -> Result<[Row; 2], StudyErro
                 worst[2] = worst[2].max((own - wanted).abs());
             }
         }
-        worst[3] = worst[3].max(pose_error(arm, state));
+        worst[3] = worst[3].max(pose_error(&arm.mechanism, &block, &state.rotation, &state.position));
     }
     let first = Row::new(
         "1",
@@ -85,28 +82,10 @@ fn regressor(arm: &Arm, block: &MotionBlock<'_>) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Frame 3 by its origin and a point on each of its axes.
-fn pose_error(arm: &Arm, state: &StateReference) -> f64 {
-    let body = Some(JOINTS - 1);
-    let at = |position: [f64; 3]| BodyPoint { body, position: Vec3(position) };
-    let points = [at([0.0; 3]), at([1.0, 0.0, 0.0]), at([0.0, 1.0, 0.0]), at([0.0, 0.0, 1.0])];
-    let mut out = [0.0; 12];
-    Dynamics::new(&arm.mechanism).points(&block(state), &points, 1, &mut out);
-    let mut worst = 0.0_f64;
-    for c in 0..3 {
-        worst = worst.max((out[c] - state.position[c]).abs());
-        for axis in 0..3 {
-            let along = out[3 * (axis + 1) + c] - out[c];
-            worst = worst.max((along - state.rotation[c][axis]).abs());
-        }
-    }
-    worst
-}
-
 fn grouping_error(base: &BaseParameters, symbols: &[&str], reference: &reference::DynamicsReference) -> f64 {
     let mut worst = 0.0_f64;
     for link in 0..JOINTS {
-        for (k, own) in REFERENCE_ORDER.iter().enumerate() {
+        for (k, own) in PARAMETER_ORDER.iter().enumerate() {
             let mut unit = vec![0.0; 10 * JOINTS];
             unit[10 * link + own] = 1.0;
             let values = base.values(&unit);

@@ -1,25 +1,19 @@
 //! Rows 4 and 5: the printed trajectory and one of our own.
 
-use std::sync::Arc;
-
-use dynid::excitation::constraint::{CartesianLimits, EffortLimits, FramePoint, Region};
-use dynid::excitation::criterion::{Criterion, Measure};
-use dynid::excitation::{
-    DEFAULT_SAMPLES_PER_HARMONIC, DEFAULT_SIGN_WIDTH, Outcome, Problem, RobotExcitation,
-    Settings as SearchSettings, StartConditions, design, information, limit_points,
-};
-use dynid::model::{BaseParameters, BaseSettings, EffortModel, RobotModel, Vec3};
-use dynid::motion::trajectory::{Form, Fourier, MotionLimits, RowOrder};
+use dynid::excitation::constraint::{FramePoint, Region};
+use dynid::excitation::{Outcome, Problem, Settings as SearchSettings, design, information, limit_points};
+use dynid::model::{RobotModel, Vec3};
+use dynid::motion::trajectory::{Form, Fourier, RowOrder};
 use serde_json::json;
 
 use super::arm::Arm;
 use super::reference;
 use super::settings::Settings;
+use crate::excitation::{Excitation, conditions_of_starts};
 use crate::{Row, RunSettings, StudyError};
 
 /// Wrist centre in frame 3, m.
 pub(super) const WRIST: [f64; 3] = [0.13, 0.65, 0.0];
-const HARMONICS: usize = 5;
 /// Samples of the period on which limits are checked: twenty times as many as the search uses.
 const FINE: usize = 2000;
 
@@ -43,43 +37,22 @@ pub(super) enum Columns {
 
 pub(super) fn problem(arm: &Arm, settings: &Settings, columns: Columns) -> Result<Problem, StudyError> {
     let mechanism = &arm.mechanism;
-    let model = Arc::new(match columns {
+    let model = match columns {
         Columns::Inertial => RobotModel::new(mechanism.clone(), Vec::new()),
         Columns::WithLinearFriction => arm.with_linear_friction(true),
-    });
-    let base = BaseParameters::of(model.as_ref(), mechanism, &[], &BaseSettings::default());
-    let limits = mechanism.bodies().iter().zip(settings.acceleration_deg).map(|(body, acceleration)| {
-        let stated = body.joint.limits;
-        MotionLimits {
-            position: stated.position.unwrap_or((-std::f64::consts::PI, std::f64::consts::PI)),
-            velocity: stated.velocity.unwrap_or(f64::INFINITY),
-            acceleration: acceleration.to_radians(),
-            jerk: f64::INFINITY,
-        }
-    });
-    let torque: Vec<Option<f64>> = mechanism.bodies().iter().map(|b| b.joint.limits.effort).collect();
+    };
     let wrist = FramePoint { frame: mechanism.bodies()[2].name.clone(), position: Vec3(WRIST) };
     let floor = Region::HalfSpace { normal: Vec3([0.0, 0.0, 1.0]), offset: settings.workspace.height };
     let axis = Region::OutsideCylinder { center: [0.0; 2], radius: settings.workspace.radius };
-    let regions = [(wrist.clone(), floor), (wrist, axis)];
-    Ok(Problem {
-        coordinates: mechanism.rate_names(),
-        limits: limits.collect(),
-        constraints: vec![
-            Box::new(EffortLimits::new(arm.model.clone(), arm.shape.clone(), arm.linear.clone(), &torque)?),
-            Box::new(CartesianLimits::new(mechanism, &regions)?),
-        ],
+    let excitation = Excitation {
+        mechanism,
         base: settings.base_frequency(),
-        harmonics: HARMONICS,
-        start: StartConditions::default(),
-        criterion: Criterion::raw(Measure::Condition),
-        output_weights: vec![1.0; model.outputs().len()],
-        effective_samples: FINE as f64,
-        prior: None,
-        sign_width: DEFAULT_SIGN_WIDTH,
-        samples: HARMONICS * DEFAULT_SAMPLES_PER_HARMONIC,
-        model: Box::new(RobotExcitation::new(model, Vec::new(), &base, None)),
-    })
+        samples: FINE,
+        acceleration: &settings.acceleration_deg.map(f64::to_radians),
+        regions: &[(wrist.clone(), floor), (wrist, axis)],
+        nominal: (arm.model.clone(), arm.shape.clone(), arm.linear.clone()),
+    };
+    excitation.problem(model)
 }
 
 fn condition(problem: &Problem, rows: &[Vec<f64>]) -> Option<f64> {
@@ -158,9 +131,7 @@ pub(super) fn designed(
         SearchSettings { starts: if run.quick { 4 } else { 8 }, seed: run.seed, ..SearchSettings::default() };
     let outcome = design(&problem, &search, Vec::new(), &mut |_| {})?;
     let Outcome::Found(design) = outcome else { return Ok(None) };
-    let mut starts: Vec<f64> =
-        design.starts.iter().filter(|s| s.is_feasible()).filter_map(|s| s.criterion.map(f64::exp)).collect();
-    starts.sort_by(f64::total_cmp);
+    let starts = conditions_of_starts(&design);
     let Some(condition) = condition(&problem, &design.coefficients) else { return Ok(None) };
     let broken = limit_points(&problem, &design.coefficients, 4 * FINE, 0.0);
     Ok(broken.is_empty().then_some(Designed { rows: design.coefficients, condition, starts }))

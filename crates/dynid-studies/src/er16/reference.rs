@@ -1,9 +1,9 @@
 //! Reference numbers of an independent implementation (NumPy), embedded.
 
 use serde::Deserialize;
-use serde::de::DeserializeOwned;
 
 use crate::StudyError;
+use crate::reference::parse;
 
 #[derive(Debug, Deserialize)]
 pub(super) struct DynamicsReference {
@@ -89,10 +89,6 @@ pub(super) struct ObjectiveCase {
 #[derive(Debug, Deserialize)]
 pub(super) struct LeastSquaresReference {
     pub(super) rss: f64,
-}
-
-fn parse<T: DeserializeOwned>(file: &'static str, text: &str) -> Result<T, StudyError> {
-    serde_json::from_str(text).map_err(|e| StudyError::Data { file, message: e.to_string() })
 }
 
 pub(super) fn dynamics() -> Result<DynamicsReference, StudyError> {

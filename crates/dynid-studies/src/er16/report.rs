@@ -11,6 +11,7 @@ use super::search::{Searched, Searches, unknowns};
 use super::separable::{FrictionComparison, Identified, objective_of};
 use super::settings::Settings;
 use super::{REVERSAL_RATE_HZ, TITLE};
+use crate::statistics::median;
 use crate::{StudyError, StudyRecord};
 
 /// What the report is made of.
@@ -106,7 +107,7 @@ impl Contents<'_> {
                 Value::from(at(0.0)),
                 Value::from(searched.median()),
                 Value::from(at(1.0)),
-                Value::from(super::search::median(of_three)),
+                Value::from(median(of_three)),
                 Value::from(searched.results[0].evaluations),
             ]
         };

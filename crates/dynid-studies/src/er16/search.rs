@@ -10,6 +10,7 @@ use super::arm::{Arm, JOINTS, Place};
 use super::measurement::Measurement;
 use super::reference;
 use super::settings::Settings;
+use crate::statistics::median;
 use crate::{Row, RunSettings, StudyError};
 
 /// A search with the results of all seeds.
@@ -65,16 +66,6 @@ pub(super) struct Searches {
 impl Searches {
     pub(super) fn all(&self) -> [&Searched; 3] {
         [&self.ics, &self.cs, &self.pso]
-    }
-}
-
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() % 2 {
-        _ if values.is_empty() => f64::NAN,
-        1 => values[middle],
-        _ => 0.5 * (values[middle - 1] + values[middle]),
     }
 }
 

@@ -2,18 +2,18 @@
 
 use dynid::model::element::{Coulomb, JointElement, Offset, RotorInertia, Viscous};
 use dynid::model::{
-    BaseParameters, BaseSettings, BodyPoint, Dynamics, EffortModel, History, MotionBlock, RegressorBlock,
-    RobotModel, Vec3,
+    BaseParameters, BaseSettings, EffortModel, History, MotionBlock, RegressorBlock, RobotModel,
 };
 use dynid::motion::filter::{butterworth, forward_backward};
 use dynid::motion::trajectory::{Point, Trajectory};
 use serde_json::json;
 
 use super::experiment::trajectory;
-use super::reference::{self, StateReference};
+use super::reference;
 use super::robot::{Indy7, rigid};
 use super::settings::Settings;
 use super::{JOINTS, excitation, fault};
+use crate::reference::pose_error;
 use crate::{Row, StudyError};
 
 pub(super) fn rows(arm: &Indy7, settings: &Settings) -> Result<Vec<Row>, StudyError> {
@@ -45,7 +45,7 @@ fn efforts(arm: &Indy7) -> Result<Row, StudyError> {
                 worst[1] = worst[1].max((rows.effort(row, &unit)[0] - wanted).abs());
             }
         }
-        worst[2] = worst[2].max(pose_error(arm, state, &block));
+        worst[2] = worst[2].max(pose_error(&arm.mechanism, &block, &state.rotation, &state.position));
     }
     Ok(Row::new(
         "1",
@@ -55,23 +55,6 @@ fn efforts(arm: &Indy7) -> Result<Row, StudyError> {
         format!("{:.1e} N m, {:.1e}, {:.1e}", worst[0], worst[1], worst[2]),
         worst.iter().all(|w| *w <= 1e-9),
     ))
-}
-
-/// Frame 6 by its origin and a point on each of its axes.
-fn pose_error(arm: &Indy7, state: &StateReference, block: &MotionBlock<'_>) -> f64 {
-    let at = |position: [f64; 3]| BodyPoint { body: Some(JOINTS - 1), position: Vec3(position) };
-    let points = [at([0.0; 3]), at([1.0, 0.0, 0.0]), at([0.0, 1.0, 0.0]), at([0.0, 0.0, 1.0])];
-    let mut out = [0.0; 12];
-    Dynamics::new(&arm.mechanism).points(block, &points, 1, &mut out);
-    let mut worst = 0.0_f64;
-    for c in 0..3 {
-        worst = worst.max((out[c] - state.position[c]).abs());
-        for axis in 0..3 {
-            let along = out[3 * (axis + 1) + c] - out[c];
-            worst = worst.max((along - state.rotation[c][axis]).abs());
-        }
-    }
-    worst
 }
 
 fn base_parameters(arm: &Indy7) -> Result<Row, StudyError> {

@@ -200,8 +200,9 @@ fn noise_free(arm: &Indy7, settings: &Settings) -> Result<Row, StudyError> {
     let known: Vec<KnownElement> = settings
         .friction
         .iter()
+        .zip(arm.mechanism.rate_names())
         .enumerate()
-        .flat_map(|(rate, f)| f.known(rate, settings.thermal.valid))
+        .flat_map(|(rate, (f, name))| f.known(&name, settings.thermal.valid).elements(rate))
         .collect();
     let model = arm.regression().with_known(known);
     let base = BaseParameters::of(&model, &arm.mechanism, &[], &BaseSettings::default());

@@ -2,23 +2,18 @@
 
 use std::sync::Arc;
 
-use dynid::excitation::constraint::{CartesianLimits, EffortLimits, FramePoint, Region};
-use dynid::excitation::criterion::{Criterion, Measure};
-use dynid::excitation::{
-    DEFAULT_SAMPLES_PER_HARMONIC, DEFAULT_SIGN_WIDTH, Outcome, Problem, RobotExcitation,
-    Settings as SearchSettings, StartConditions, design, information, limit_points,
-};
-use dynid::model::{BaseParameters, BaseSettings, RobotModel, Vec3};
-use dynid::motion::trajectory::{Form, MotionLimits, RowOrder};
+use dynid::excitation::constraint::{FramePoint, Region};
+use dynid::excitation::{Outcome, Problem, Settings as SearchSettings, design, information, limit_points};
+use dynid::model::{RobotModel, Vec3};
+use dynid::motion::trajectory::{Form, RowOrder};
 use serde_json::json;
 
-use super::JOINTS;
 use super::experiment::{BASE, trajectory};
 use super::robot::{Indy7, rigid};
 use super::settings::Settings;
+use crate::excitation::{Excitation, conditions_of_starts};
 use crate::{Row, RunSettings, StudyError};
 
-const HARMONICS: usize = 5;
 /// Samples of the period at 50 Hz.
 const SAMPLES: usize = 1000;
 
@@ -40,18 +35,6 @@ pub(super) fn plain_rows(settings: &Settings) -> Result<Vec<Vec<f64>>, StudyErro
 
 fn problem(arm: &Indy7, settings: &Settings, model: RobotModel) -> Result<Problem, StudyError> {
     let mechanism = &arm.mechanism;
-    let model = Arc::new(model);
-    let base = BaseParameters::of(model.as_ref(), mechanism, &[], &BaseSettings::default());
-    let limits = mechanism.bodies().iter().zip(settings.limits.acceleration).map(|(body, acceleration)| {
-        let stated = body.joint.limits;
-        MotionLimits {
-            position: stated.position.unwrap_or((-std::f64::consts::PI, std::f64::consts::PI)),
-            velocity: stated.velocity.unwrap_or(f64::INFINITY),
-            acceleration,
-            jerk: f64::INFINITY,
-        }
-    });
-    let torque: Vec<Option<f64>> = mechanism.bodies().iter().map(|b| b.joint.limits.effort).collect();
     let mut regions = Vec::new();
     for body in &mechanism.bodies()[3..] {
         let point = FramePoint { frame: body.name.clone(), position: Vec3([0.0; 3]) };
@@ -63,26 +46,16 @@ fn problem(arm: &Indy7, settings: &Settings, model: RobotModel) -> Result<Proble
         };
         regions.extend([(point.clone(), floor), (point, column)]);
     }
-    // Torque limits are far away; the rigid arm with its rotors stands for the whole.
-    let nominal = Arc::new(rigid(mechanism));
-    Ok(Problem {
-        coordinates: mechanism.rate_names(),
-        limits: limits.collect(),
-        constraints: vec![
-            Box::new(EffortLimits::new(nominal, Vec::new(), arm.standard.clone(), &torque)?),
-            Box::new(CartesianLimits::new(mechanism, &regions)?),
-        ],
+    let excitation = Excitation {
+        mechanism,
         base: BASE,
-        harmonics: HARMONICS,
-        start: StartConditions::default(),
-        criterion: Criterion::raw(Measure::Condition),
-        output_weights: vec![1.0; JOINTS],
-        effective_samples: SAMPLES as f64,
-        prior: None,
-        sign_width: DEFAULT_SIGN_WIDTH,
-        samples: HARMONICS * DEFAULT_SAMPLES_PER_HARMONIC,
-        model: Box::new(RobotExcitation::new(model, Vec::new(), &base, None)),
-    })
+        samples: SAMPLES,
+        acceleration: &settings.limits.acceleration,
+        regions: &regions,
+        // Torque limits are far away; the rigid arm with its rotors stands for the whole.
+        nominal: (Arc::new(rigid(mechanism)), Vec::new(), arm.standard.clone()),
+    };
+    excitation.problem(model)
 }
 
 /// Condition numbers of the stacked matrix at 50 Hz with 58 and with 40 columns; rows in plain amplitudes.
@@ -112,9 +85,7 @@ pub(super) fn designed(
     if !limit_points(&problem, &found.coefficients, 4 * SAMPLES, 0.0).is_empty() {
         return Ok(None);
     }
-    let mut starts: Vec<f64> =
-        found.starts.iter().filter(|s| s.is_feasible()).filter_map(|s| s.criterion.map(f64::exp)).collect();
-    starts.sort_by(f64::total_cmp);
+    let starts = conditions_of_starts(&found);
     let [condition, condition_40] = conditions(arm, settings, &found.coefficients)?;
     let plain = dynid::motion::trajectory::FourierTrajectory::from_rows(
         BASE,

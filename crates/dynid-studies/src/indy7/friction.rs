@@ -2,7 +2,8 @@
 
 use dynid::estimators::separable::SteadyFrictionRow;
 use dynid::estimators::steady_friction::{FrictionLaw, SteadyFriction, SteadyPoint, SteadySettings, analyse};
-use dynid::friction::{HoldName, PreslidingTest, fit_presliding};
+use dynid::friction::model::BristleModel;
+use dynid::friction::{HoldName, KnownFriction, PreslidingTest, fit_presliding};
 use dynid::model::KnownElement;
 use dynid::model::element::{ExponentialViscous, LuGre, ShapeSetting};
 use dynid::motion::Log;
@@ -19,6 +20,7 @@ use crate::{RunSettings, StudyError};
 /// What the experiment of one joint gave.
 #[derive(Debug)]
 pub(super) struct JointFriction {
+    joint: String,
     pub(super) points: Vec<SteadyPoint>,
     pub(super) fit: SteadyFriction,
     /// `σ0, σ1` with standard deviations.
@@ -35,38 +37,22 @@ impl JointFriction {
         self.fit.law.value(symbol).ok_or_else(|| lacking(symbol))
     }
 
-    /// Elements with these values, `stated`: a temperature in place of the measured one.
+    /// Elements of these laws, `stated`: a temperature in place of the measured one.
     pub(super) fn known(
         &self,
         rate: usize,
         valid: [f64; 2],
         stated: Option<f64>,
-    ) -> Result<[KnownElement; 2], StudyError> {
-        let (fc, fs, [(sigma0, _), (sigma1, _)]) = (self.value("fc")?, self.value("fs")?, self.bristles);
-        let held = |symbol: &str| Ok::<_, StudyError>(ShapeSetting::held(self.value(symbol)?));
-        let slope = |symbol: &str| ShapeSetting::held(self.fit.law.value(symbol).unwrap_or(0.0));
-        let bristles = LuGre {
-            rate,
-            kappa: ShapeSetting::held(sigma0 / fc),
-            rho: ShapeSetting::held(fs / fc),
-            vs: held("vs")?,
-            delta: ShapeSetting::held(2.0),
-        };
-        let viscous = ExponentialViscous {
-            rate,
-            sigma3: held("sigma3")?,
-            sigma3_slope: slope("sigma3_slope"),
-            sigma4: held("sigma4")?,
-            sigma4_slope: slope("sigma4_slope"),
-            reference_temperature: self.fit.law.reference_temperature,
-            temperature_range: (valid[0], valid[1]),
+    ) -> Result<Vec<KnownElement>, StudyError> {
+        let [(sigma0, _), (sigma1, _)] = self.bristles;
+        let law = KnownFriction::of_law(&self.joint, &self.fit.law).ok_or_else(|| lacking("fc"))?;
+        let known = KnownFriction {
+            bristle: Some(BristleModel { sigma0, sigma1, prior: false }),
+            temperature_range: Some(valid),
             temperature: stated,
+            ..law
         };
-        let amplitude = vec![self.value("sigma2")?, self.fit.law.value("sigma2_slope").unwrap_or(0.0)];
-        Ok([
-            KnownElement { element: Box::new(bristles), linear: vec![fc, sigma1], shape: Vec::new() },
-            KnownElement { element: Box::new(viscous), linear: amplitude, shape: Vec::new() },
-        ])
+        Ok(known.elements(rate))
     }
 
     /// Where a fit of friction together with inertias starts: all but the bristles' stiffness is free.
@@ -133,7 +119,7 @@ pub(super) fn experiment(
             let points = points(&logs)?;
             let fit = analyse(&points, &SteadySettings::default()).map_err(fault)?;
             let bristles = bristles(joint, &single, settings, &fit.law, seed)?;
-            Ok(JointFriction { points, fit, bristles })
+            Ok(JointFriction { joint: single.name, points, fit, bristles })
         })
         .collect()
 }

@@ -1,10 +1,10 @@
 //! Reference numbers of an independent implementation (NumPy, SciPy and a conic solver), embedded.
 
 use serde::Deserialize;
-use serde::de::DeserializeOwned;
 
 use super::settings::PerJoint;
 use crate::StudyError;
+use crate::reference::{PARAMETER_ORDER, parse};
 
 #[derive(Debug, Deserialize)]
 pub(super) struct DynamicsReference {
@@ -104,13 +104,10 @@ pub(super) struct ProjectionReference {
     pub(super) solution_pseudo_inertia: Option<Vec<f64>>,
 }
 
-/// The reference's order of a link's parameters, ours being `m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz`; rotor last.
-const ORDER: [usize; 10] = [4, 5, 6, 7, 8, 9, 1, 2, 3, 0];
-
-/// Column of the reference's 66 in ours: ten per link, then the rotors.
+/// Column of the reference's 66, in which each link's rotor is its last parameter, in ours: ten per link, then the rotors.
 pub(super) fn column(reference: usize) -> usize {
     let (link, k) = (reference / 11, reference % 11);
-    if k == 10 { 10 * super::JOINTS + link } else { 10 * link + ORDER[k] }
+    if k == 10 { 10 * super::JOINTS + link } else { 10 * link + PARAMETER_ORDER[k] }
 }
 
 /// Standard parameters in our order.
@@ -125,10 +122,6 @@ pub(super) fn standard(reference: &[f64]) -> Vec<f64> {
 /// Joint after joint, one number per row.
 pub(super) fn transposed(rows: &[PerJoint]) -> Vec<f64> {
     (0..super::JOINTS).flat_map(|j| rows.iter().map(move |r| r[j])).collect()
-}
-
-fn parse<T: DeserializeOwned>(file: &'static str, text: &str) -> Result<T, StudyError> {
-    serde_json::from_str(text).map_err(|e| StudyError::Data { file, message: e.to_string() })
 }
 
 macro_rules! embedded {

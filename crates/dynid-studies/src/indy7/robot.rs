@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
-use dynid::model::element::{
-    Coulomb, CyclicTorque, ExponentialViscous, JointElement, LuGre, Offset, RotorInertia, ShapeSetting,
-    Viscous,
-};
-use dynid::model::{BaseParameters, BaseSettings, EffortModel, KnownElement, Mechanism, RobotModel};
+use dynid::friction::KnownFriction;
+use dynid::friction::model::{BristleModel, ExponentialModel, ViscousModel};
+use dynid::model::element::{Coulomb, CyclicTorque, JointElement, Offset, RotorInertia, Viscous};
+use dynid::model::{BaseParameters, BaseSettings, EffortModel, Mechanism, RobotModel};
 use dynid::sim::Plant;
 use dynid::{Robot, RobotOptions};
 
@@ -60,7 +59,7 @@ impl SingleJoint {
         let mechanism = load(&options)?.mechanism;
         let mut linear = mechanism.inertia_vector();
         let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
-        for known in settings.friction[joint].known(0, settings.thermal.valid) {
+        for known in settings.friction[joint].known(&names[joint], settings.thermal.valid).elements(0) {
             elements.push(known.element);
             linear.extend(known.linear);
         }
@@ -111,8 +110,8 @@ impl Indy7 {
         }
         let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
         let mut linear = mechanism.inertia_vector();
-        for (rate, friction) in settings.friction.iter().enumerate() {
-            for known in friction.known(rate, settings.thermal.valid) {
+        for (rate, (friction, name)) in settings.friction.iter().zip(&names).enumerate() {
+            for known in friction.known(name, settings.thermal.valid).elements(rate) {
                 elements.push(known.element);
                 linear.extend(known.linear);
             }
@@ -175,33 +174,27 @@ pub(super) fn rigid(mechanism: &Mechanism) -> RobotModel {
 }
 
 impl Friction {
-    /// Bristles and viscous friction with these values.
-    pub(super) fn known(&self, rate: usize, valid: [f64; 2]) -> [KnownElement; 2] {
-        let held = ShapeSetting::held;
-        let bristles = LuGre {
-            rate,
-            kappa: held(self.sigma0 / self.coulomb),
-            rho: held(self.fixed / self.coulomb),
-            vs: held(self.stribeck_speed),
-            delta: held(2.0),
-        };
-        let viscous = ExponentialViscous {
-            sigma3: held(self.sigma3[0]),
-            sigma3_slope: held(self.sigma3[1]),
-            sigma4: held(self.sigma4[0]),
-            sigma4_slope: held(self.sigma4[1]),
-            reference_temperature: 0.0,
-            temperature_range: (valid[0], valid[1]),
-            ..ExponentialViscous::new(rate)
-        };
-        [
-            KnownElement {
-                element: Box::new(bristles),
-                linear: vec![self.coulomb, self.sigma1],
-                shape: Vec::new(),
-            },
-            KnownElement { element: Box::new(viscous), linear: self.sigma2.to_vec(), shape: Vec::new() },
-        ]
+    /// Friction of a joint with these values; `valid`: temperatures for which it holds.
+    pub(super) fn known(&self, joint: &str, valid: [f64; 2]) -> KnownFriction {
+        KnownFriction {
+            joint: joint.to_owned(),
+            coulomb: self.coulomb,
+            static_: Some(self.fixed),
+            stribeck_speed: Some(self.stribeck_speed),
+            stribeck_exponent: None,
+            viscous: Some(ViscousModel::Exponential(ExponentialModel {
+                reference_temperature: 0.0,
+                sigma2: self.sigma2[0],
+                sigma2_slope: self.sigma2[1],
+                sigma3: self.sigma3[0],
+                sigma3_slope: self.sigma3[1],
+                sigma4: self.sigma4[0],
+                sigma4_slope: self.sigma4[1],
+            })),
+            bristle: Some(BristleModel { sigma0: self.sigma0, sigma1: self.sigma1, prior: false }),
+            temperature_range: Some(valid),
+            temperature: None,
+        }
     }
 
     /// Steady friction at a speed (rad/s) and a temperature, N m.

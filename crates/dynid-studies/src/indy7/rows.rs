@@ -7,7 +7,8 @@ use super::friction::JointFriction;
 use super::identification::{Identified, margins};
 use super::robot::Indy7;
 use super::settings::Settings;
-use super::validation::{Ends, NAMES, Realisation, Scored, Table, changed, improvement, known, median};
+use super::validation::{Ends, NAMES, Realisation, Scored, Table, changed, improvement, known};
+use crate::statistics::median;
 use crate::{Row, StudyError};
 use dynid::model::EffortModel;
 

@@ -225,16 +225,6 @@ pub(super) fn improvement(before: &Table, after: &Table) -> [PerJoint; 3] {
     std::array::from_fn(|k| std::array::from_fn(|j| 1.0 - after[k][j] / before[k][j]))
 }
 
-/// Median of numbers.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    match n {
-        0 => f64::NAN,
-        _ => 0.5 * (values[(n - 1) / 2] + values[n / 2]),
-    }
-}
-
 /// Base values that change by more than a fifth from one estimate to another; those of 0.001 and less count as 0.001.
 pub(super) fn changed(cold: &[f64], hot: &[f64]) -> usize {
     cold.iter().zip(hot).filter(|(a, b)| (*a - *b).abs() > 0.2 * a.abs().max(1e-3)).count()

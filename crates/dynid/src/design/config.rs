@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::Error;
-use crate::config::{ElementsConfig, PerJoint, exactly, just};
+use crate::config::{ElementsConfig, PerJoint, exactly, just, toml_file};
 
 /// Seeds count up from start to start.
 const LARGEST_SEED: u64 = u64::MAX - 1_000_000;
@@ -303,10 +303,7 @@ impl DesignConfig {
     /// # Errors
     /// [`Error::Read`], and as [`DesignConfig::parse`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
-        let mut config = Self::parse(&text, &path.display().to_string())?;
-        let folder = path.parent().unwrap_or(Path::new(""));
+        let (mut config, folder) = toml_file::read(path, Self::parse)?;
         config.robot = folder.join(&config.robot);
         config.out = config.out.map(|o| folder.join(o));
         config.search.checkpoint = config.search.checkpoint.map(|c| folder.join(c));
@@ -321,19 +318,11 @@ impl DesignConfig {
     /// # Errors
     /// [`Error::Config`] with the line; [`Error::InFile`] with what [`DesignConfig::check`] finds.
     pub fn parse(text: &str, file: &str) -> Result<Self, Error> {
-        let config: DesignConfig = toml::from_str(text).map_err(|e| Error::Config {
-            file: file.to_owned(),
-            line: e.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count()),
-            message: e.message().lines().next().unwrap_or_default().to_owned(),
-        })?;
+        let config: DesignConfig = toml_file::parse(text, file)?;
         if config.robot.as_os_str().is_empty() {
-            return Err(Error::Config {
-                file: file.to_owned(),
-                line: None,
-                message: "expected `robot = \"file\"`".to_owned(),
-            });
+            return Err(toml_file::missing(file, "`robot = \"file\"`"));
         }
-        config.check().map_err(|e| Error::InFile { file: file.to_owned(), source: Box::new(e) })?;
+        toml_file::in_file(file, config.check())?;
         Ok(config)
     }
 

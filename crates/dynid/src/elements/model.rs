@@ -5,7 +5,7 @@ use dynid_model::{Mechanism, RobotModel};
 
 use super::{ElementPlan, friction};
 use crate::Error;
-use crate::config::{Config, FrictionErrors};
+use crate::config::{Config, FrictionErrors, PerJoint};
 use crate::friction::KnownFriction;
 use crate::robot::Robot;
 
@@ -40,6 +40,7 @@ impl ElementPlan {
         if let Some(file) = &config.elements.known_friction {
             let temperatures = config.elements.temperature.finite("elements.temperature", &names)?;
             plan.known = KnownFriction::load(file, &names, &temperatures)?;
+            check_temperature(&config.elements.temperature, &plan.known)?;
             plan.free_errors = config.elements.friction_errors == FrictionErrors::Free;
         }
         Ok(plan)
@@ -96,4 +97,18 @@ impl ElementPlan {
             friction::COEFFICIENTS.contains(&symbol) && self.known_friction(joint).is_some()
         })
     }
+}
+
+/// Refuses a temperature that no law reads: of a joint whose known friction does not change with it, or of all joints where
+/// none's does.
+fn check_temperature(stated: &PerJoint, known: &[KnownFriction]) -> Result<(), Error> {
+    let reads = |joint: &str| known.iter().any(|law| law.joint == joint && law.is_thermal());
+    let unread = match stated {
+        PerJoint::All(t) => (!known.iter().any(KnownFriction::is_thermal)).then(|| t.to_string()),
+        PerJoint::Each(map) => {
+            map.iter().find(|(joint, _)| !reads(joint)).map(|(joint, t)| format!("{joint} = {t}"))
+        }
+    };
+    let expected = "temperatures of joints whose known friction changes with them";
+    unread.map_or(Ok(()), |found| Err(Error::setting("elements.temperature", expected, found)))
 }

@@ -9,7 +9,7 @@ use dynid_motion::constant_speed::{PairSettings, SegmentSettings};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::config::{LogConfig, exactly};
+use crate::config::{LogConfig, exactly, toml_file};
 
 /// Friction experiments and how they are to be understood. Every key but `robot` and `log` has a default.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
@@ -268,10 +268,7 @@ impl FrictionConfig {
     /// # Errors
     /// [`Error::Read`], and as [`FrictionConfig::parse`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
-        let mut config = Self::parse(&text, &path.display().to_string())?;
-        let folder = path.parent().unwrap_or(Path::new(""));
+        let (mut config, folder) = toml_file::read(path, Self::parse)?;
         config.robot = folder.join(&config.robot);
         config.out = config.out.map(|o| folder.join(o));
         config.log.iter_mut().for_each(|log| log.path = folder.join(&log.path));
@@ -284,16 +281,8 @@ impl FrictionConfig {
     /// # Errors
     /// [`Error::Config`] with the line; [`Error::InFile`] with what [`FrictionConfig::check`] finds.
     pub fn parse(text: &str, file: &str) -> Result<Self, Error> {
-        let config: FrictionConfig = toml::from_str(text).map_err(|e| Error::Config {
-            file: file.to_owned(),
-            line: e.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count()),
-            message: e.message().lines().next().unwrap_or_default().to_owned(),
-        })?;
-        let missing = |what: &str| Error::Config {
-            file: file.to_owned(),
-            line: None,
-            message: format!("expected {what}"),
-        };
+        let config: FrictionConfig = toml_file::parse(text, file)?;
+        let missing = |what: &str| toml_file::missing(file, what);
         if config.robot.as_os_str().is_empty() {
             return Err(missing("`robot = \"file\"`"));
         }
@@ -304,7 +293,7 @@ impl FrictionConfig {
         if paths.into_iter().any(|p| p.as_os_str().is_empty()) {
             return Err(missing("a `path` in every `[[log]]` and `[[presliding]]`"));
         }
-        config.check().map_err(|e| Error::InFile { file: file.to_owned(), source: Box::new(e) })?;
+        toml_file::in_file(file, config.check())?;
         Ok(config)
     }
 

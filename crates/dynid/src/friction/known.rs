@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use dynid_estimate::steady_friction::FrictionLaw;
 use dynid_model::KnownElement;
 use dynid_model::element::{Coulomb, ExponentialViscous, LuGre, ShapeSetting, Stribeck, Viscous};
 use dynid_motion::temperature::PLAUSIBLE;
@@ -56,6 +57,22 @@ impl KnownFriction {
             viscous: law.viscous,
             bristle: law.bristle,
             temperature_range: law.temperature_range,
+            temperature: None,
+        })
+    }
+
+    /// Friction of a joint by a fitted law, without bristles; `None` if the law has no Coulomb friction.
+    pub fn of_law(joint: &str, law: &FrictionLaw) -> Option<Self> {
+        let (low, high) = law.temperature_range;
+        Some(KnownFriction {
+            joint: joint.to_owned(),
+            coulomb: law.value("fc")?,
+            static_: law.value("fs"),
+            stribeck_speed: law.value("vs"),
+            stribeck_exponent: None,
+            viscous: ViscousModel::of_law(law),
+            bristle: None,
+            temperature_range: (low.is_finite() && high.is_finite()).then_some([low, high]),
             temperature: None,
         })
     }

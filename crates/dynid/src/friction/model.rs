@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use dynid_estimate::steady_friction::FrictionLaw;
 use serde::{Deserialize, Serialize};
 
 use super::error::FrictionError;
@@ -103,6 +104,26 @@ pub enum ViscousModel {
         /// N m s/rad or N s/m.
         coefficient: f64,
     },
+}
+
+impl ViscousModel {
+    /// Viscous friction of a fitted law; slopes that it lacks are 0.
+    pub fn of_law(law: &FrictionLaw) -> Option<Self> {
+        if let Some(coefficient) = law.value("fv") {
+            return Some(ViscousModel::Linear { coefficient });
+        }
+        let ((sigma2, sigma2_slope), (sigma3, sigma3_slope), (sigma4, sigma4_slope)) =
+            (law.line("sigma2")?, law.line("sigma3")?, law.line("sigma4")?);
+        Some(ViscousModel::Exponential(ExponentialModel {
+            reference_temperature: law.reference_temperature,
+            sigma2,
+            sigma2_slope,
+            sigma3,
+            sigma3_slope,
+            sigma4,
+            sigma4_slope,
+        }))
+    }
 }
 
 /// Coefficients of exponential viscous friction.

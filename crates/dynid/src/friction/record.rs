@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use dynid_estimate::steady_friction::{FrictionLaw, LevelFit, SteadyFriction};
+use dynid_estimate::steady_friction::{LevelFit, SteadyFriction};
 use dynid_sim::presliding::EffortHold;
 
 use super::config::FrictionConfig;
 use super::model::{
-    BristleModel, ExponentialModel, FrictionModel, FrictionVerdict, JointFrictionModel, LawRecord,
-    LevelRecord, LineRecord, PointRecord, PreslidingRecord, SCHEMA, UnpairedRecord, ViscousModel,
+    BristleModel, FrictionModel, FrictionVerdict, JointFrictionModel, LawRecord, LevelRecord, LineRecord,
+    PointRecord, PreslidingRecord, SCHEMA, UnpairedRecord, ViscousModel,
 };
 use super::{FrictionIdentification, IdentifiedJoint, PreslidingFit};
 use crate::Error;
@@ -171,7 +171,7 @@ fn law(
     out.stribeck_speed = law.value("vs");
     out.stribeck_exponent = out.stribeck_speed.map(|_| 2.0);
     out.offset = law.value("fo");
-    out.viscous = viscous(law);
+    out.viscous = ViscousModel::of_law(law);
     for (symbol, name) in NAMES.into_iter().chain([("fo", "offset")]) {
         if let Some(std) = law.std(symbol) {
             out.std.insert(name.to_owned(), std);
@@ -254,23 +254,6 @@ fn check_range(out: &mut JointFrictionModel, found: &SteadyFriction, experiment:
 
 fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)])
-}
-
-fn viscous(law: &FrictionLaw) -> Option<ViscousModel> {
-    if let Some(coefficient) = law.value("fv") {
-        return Some(ViscousModel::Linear { coefficient });
-    }
-    let ((sigma2, sigma2_slope), (sigma3, sigma3_slope), (sigma4, sigma4_slope)) =
-        (law.line("sigma2")?, law.line("sigma3")?, law.line("sigma4")?);
-    Some(ViscousModel::Exponential(ExponentialModel {
-        reference_temperature: law.reference_temperature,
-        sigma2,
-        sigma2_slope,
-        sigma3,
-        sigma3_slope,
-        sigma4,
-        sigma4_slope,
-    }))
 }
 
 fn level(level: &LevelFit) -> LevelRecord {

@@ -29,13 +29,13 @@ pub(super) fn warnings(plan: &ElementPlan, mechanism: &Mechanism, logs: &[Prepar
         ));
     }
     out.extend(plan.known.iter().filter_map(stated_beyond));
-    out.extend(logs.iter().flat_map(|log| logged_beyond(plan, log)));
+    out.extend(logs.iter().flat_map(|log| logged_beyond(&plan.known, log)));
     out
 }
 
 /// Temperatures of a log beyond the range of known friction that changes with them.
-pub(super) fn logged_beyond(plan: &ElementPlan, log: &PreparedLog) -> Vec<String> {
-    plan.known.iter().filter_map(|law| beyond(law, log)).collect()
+pub(crate) fn logged_beyond(known: &[KnownFriction], log: &PreparedLog) -> Vec<String> {
+    known.iter().filter_map(|law| beyond(law, log)).collect()
 }
 
 fn range(law: &KnownFriction) -> Option<[f64; 2]> {

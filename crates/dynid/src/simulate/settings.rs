@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde::Deserialize;
 
 use crate::Error;
-use crate::config::PerJoint;
+use crate::config::{PerJoint, toml_file};
 
 /// What a virtual log is made of.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -217,11 +217,7 @@ impl SimulateSettings {
     /// # Errors
     /// [`Error::Config`] with the line.
     pub fn parse(text: &str, file: &str) -> Result<Self, Error> {
-        toml::from_str(text).map_err(|e| Error::Config {
-            file: file.to_owned(),
-            line: e.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count()),
-            message: e.message().lines().next().unwrap_or_default().to_owned(),
-        })
+        toml_file::parse(text, file)
     }
 
     /// Fails unless all values make sense on their own.

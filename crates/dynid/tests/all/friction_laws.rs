@@ -138,7 +138,7 @@ fn same_predictions(bench: &Bench, found: &Identification, read: &Estimate) {
         let logs = std::slice::from_ref(&config);
         let again = validate(read, split, &file, logs, &Default::default(), None, None).unwrap();
         let own = log_fit(&found.agreement(values, &found.logs[0]).unwrap());
-        let again = log_fit(&again[0]);
+        let again = log_fit(&again.agreements[0]);
         for (a, b) in own.raw.rms.iter().zip(&again.raw.rms) {
             assert!(
                 (a.unwrap() - b.unwrap()).abs() <= 1e-12 * a.unwrap(),

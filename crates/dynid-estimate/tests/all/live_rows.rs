@@ -1,11 +1,8 @@
 //! Rows of a stream against rows of the same motion as a log.
-#![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
-
-mod arm;
 
 use std::sync::Arc;
 
-use arm::{JOINTS, RATE_HZ, model, motion};
+use crate::arm::{JOINTS, RATE_HZ, model, motion};
 use dynid_estimate::Factor;
 use dynid_estimate::FactorBuilder;
 use dynid_estimate::conditioning::{LiveRow, LiveRowSettings, LiveRows};
