@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use crate::state::Transfer;
 
 /// Longest correlation time that is looked for, samples.
-const LONGEST: usize = 100;
+pub(crate) const LONGEST: usize = 100;
 /// Autocorrelation that passes for none, beside one standard error.
 const NEGLIGIBLE: f64 = 0.1;
 /// Learned figures rest on at most this many times the samples first asked for; older ones fade.
@@ -141,12 +141,15 @@ impl InnovationCorrelation {
 
     pub(crate) fn transfer(&mut self, transfer: &mut Transfer<'_>) {
         for value in [&mut self.seen, &mut self.count, &mut self.next_look, &mut self.looks] {
-            transfer.integer(value);
+            transfer.counter(value);
         }
         transfer.reals(&mut self.ring);
         transfer.count(&mut self.newest, LONGEST);
         transfer.reals(&mut self.sums);
         transfer.count(&mut self.time, LONGEST);
+        if self.time == 0 {
+            transfer.fail();
+        }
         transfer.real(&mut self.inflation);
         transfer.reals(&mut self.variance);
     }

@@ -154,7 +154,7 @@ impl RowWindow {
         transfer.count(&mut self.held, self.length);
         transfer.reals(&mut self.amplified);
         transfer.count(&mut self.age, self.length);
-        transfer.integer(&mut self.refreshes);
+        transfer.counter(&mut self.refreshes);
         if self.held < self.blocks.samples() {
             transfer.fail();
         }

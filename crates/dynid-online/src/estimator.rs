@@ -323,7 +323,7 @@ impl Estimator {
             _ => 1.0,
         };
         let Memory::Recursive(root) = &mut self.memory else { return 1.0 };
-        if lambda >= 1.0 || (0..self.x.len()).any(|j| root.row(j)[0] < LEAST_PIVOT) {
+        if lambda.is_nan() || lambda >= 1.0 || (0..self.x.len()).any(|j| root.row(j)[0] < LEAST_PIVOT) {
             return 1.0;
         }
         match (&self.settings.forgetting, &mut self.directional, &mut self.monitor) {
@@ -355,7 +355,9 @@ impl Estimator {
     }
 
     fn solve(&mut self) {
-        if self.memory.root().solve(&mut self.scaled) {
+        let found = &mut self.scratch[..self.x.len()];
+        if self.memory.root().solve(found) && found.iter().all(|x| x.is_finite()) {
+            self.scaled.copy_from_slice(found);
             self.publish();
         }
     }
@@ -490,9 +492,12 @@ impl Estimator {
     fn transfer(&mut self, transfer: &mut Transfer<'_>) {
         transfer.fingerprint(STATE_VERSION);
         transfer.fingerprint(self.fingerprint);
-        transfer.integer(&mut self.samples);
+        transfer.counter(&mut self.samples);
         transfer.reals(&mut self.scaled);
         self.memory.transfer(transfer);
+        if !self.memory.root().is_regular() {
+            transfer.fail();
+        }
         if let Some(bounded) = &mut self.bounded {
             bounded.transfer(transfer);
         }

@@ -164,45 +164,47 @@ fn norm(v: &[f64]) -> f64 {
     largest * libm::sqrt(v.iter().map(|v| (v / largest) * (v / largest)).sum())
 }
 
+/// Share of its floor that a parameter may lose before it is put back.
+const RIPPLE: f64 = 0.05;
+
 /// Floor under the information: where nothing comes in, each parameter keeps about the information `δ_j`.
 ///
-/// After a discount by `λ`, `n` rows `√(δ_i p (1 - λ)/n) e_i` with target `x_i` are added, `i` running through the
-/// parameters. `n` is the least for which the share of a round stays below 0.1, so that the floor ripples by no more than
-/// some 5 % either way. The estimate stays.
+/// A parameter that has been discounted to `c < 0.95` in all since its last turn gets the row `√(1.025 δ_j (1 - c)) e_j` with target
+/// `x_j`, so that the floor ripples by 2.5 % either way, or by what a single sample forgets. Turns are staggered. The estimate
+/// stays.
 #[derive(Debug, Clone)]
 pub struct BoundedCovariance {
     floor: Vec<f64>,
-    next: usize,
+    left: Vec<f64>,
     row: Vec<f64>,
 }
 
 impl BoundedCovariance {
     /// `floor`: least information `δ_j` per parameter, in inverse squares of its unit.
     pub fn new(floor: &[f64]) -> Self {
-        Self { floor: floor.to_vec(), next: 0, row: vec![0.0; floor.len() + 1] }
+        let p = floor.len();
+        let left = (0..p).map(|j| 1.0 - RIPPLE * j as f64 / p as f64).collect();
+        Self { floor: floor.to_vec(), left, row: vec![0.0; p + 1] }
     }
 
     /// Puts back what a discount by `lambda` takes from the floor; `x` is the estimate.
     pub fn hold(&mut self, root: &mut SquareRoot, x: &[f64], lambda: f64) {
         let p = root.columns();
-        let round = p as f64 * (1.0 - lambda);
-        if round <= 0.0 {
-            return;
-        }
-        let count = (libm::ceil(round / 0.1) as usize).clamp(1, p);
-        for _ in 0..count {
-            let i = self.next;
-            self.next = (i + 1) % p;
-            let size = libm::sqrt(self.floor[i] * round / count as f64);
+        for (j, x) in x.iter().enumerate().take(p) {
+            self.left[j] *= lambda;
+            if self.left[j] > 1.0 - RIPPLE {
+                continue;
+            }
+            let size = libm::sqrt((1.0 + 0.5 * RIPPLE) * self.floor[j] * (1.0 - self.left[j]));
+            self.left[j] = 1.0;
             self.row.fill(0.0);
-            self.row[i] = size;
-            self.row[p] = size * x[i];
-            root.push_pseudo(i, &mut self.row);
+            self.row[j] = size;
+            self.row[p] = size * x;
+            root.push_pseudo(j, &mut self.row);
         }
     }
 
     pub(crate) fn transfer(&mut self, transfer: &mut crate::state::Transfer<'_>) {
-        let last = self.floor.len() - 1;
-        transfer.count(&mut self.next, last);
+        transfer.reals(&mut self.left);
     }
 }
