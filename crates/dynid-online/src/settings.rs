@@ -113,13 +113,15 @@ pub struct ReactionSettings {
     pub share: f64,
     /// Standard deviation added to what changed, in scales. Default 0.3.
     pub opening: f64,
-    /// An alarm counts as false if chance alone would give its total gain with more than this probability. Default 0.01.
+    /// An alarm counts as false if chance alone would give its total gain with more than this probability. Default 1e-6: real
+    /// changes are far beyond, while opening everything by mistake costs all that is known, and stated noise is never quite
+    /// right.
     pub level: f64,
 }
 
 impl Default for ReactionSettings {
     fn default() -> Self {
-        Self { samples: 100, share: 0.6, opening: 0.3, level: 0.01 }
+        Self { samples: 100, share: 0.6, opening: 0.3, level: 1e-6 }
     }
 }
 

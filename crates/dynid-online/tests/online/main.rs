@@ -5,6 +5,7 @@ mod excitation;
 mod false_alarms;
 mod forgetting;
 mod golden;
+mod harmonic_drive;
 mod long_runs;
 mod modes;
 mod reaction;
