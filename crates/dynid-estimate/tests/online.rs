@@ -164,6 +164,13 @@ fn without_forgetting_every_estimate_is_the_batch_solution() {
     }
     assert!((back.rss() / estimator.information().rss() - 1.0).abs() < 1e-11);
     assert!((back.weight() - 1200.0).abs() < 1e-9);
+    // A run that starts from the log's factor.
+    let started = Estimator::starting_from(settings.clone(), back).unwrap();
+    for (found, expected) in started.x().iter().zip(estimator.x()) {
+        assert!((found / expected - 1.0).abs() < 1e-11);
+    }
+    assert!(Estimator::starting_from(settings.clone(), SquareRoot::new(p)).is_err());
+    assert!(Estimator::starting_from(settings, SquareRoot::new(p + 1)).is_err());
 }
 
 #[test]

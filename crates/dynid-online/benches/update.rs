@@ -65,6 +65,11 @@ fn step_of_60_by_6(bencher: Bencher<'_, '_>, kind: &str) {
     bencher.bench_local(|| run.step());
 }
 
+#[divan::bench(args = [1, 6], sample_count = 20)]
+fn threshold(rows: usize) -> f64 {
+    dynid_online::cusum_threshold(black_box(rows), 1.5, 1e8)
+}
+
 /// Rows of 64 samples, again and again.
 struct Rows {
     entries: Vec<f64>,

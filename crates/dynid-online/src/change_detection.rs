@@ -1,6 +1,6 @@
 //! Alarms: whether innovations have become larger than they should be.
 
-use crate::correlation::{InnovationCorrelation, LONGEST};
+use crate::correlation::InnovationCorrelation;
 use crate::settings::{DetectionSettings, FalseAlarms, Whiteness};
 use crate::state::Transfer;
 use crate::thresholds::{cusum_threshold, run_length_for_rate};
@@ -103,9 +103,10 @@ impl ChangeDetection {
 
     pub(crate) fn transfer(&mut self, transfer: &mut Transfer<'_>) {
         transfer.real(&mut self.statistic);
-        transfer.count(&mut self.waiting, self.every.max(LONGEST));
         if let Some(correlation) = &mut self.correlation {
             correlation.transfer(transfer);
         }
+        let longest = self.correlation.as_ref().map_or(self.every, InnovationCorrelation::longest);
+        transfer.count(&mut self.waiting, longest);
     }
 }

@@ -144,14 +144,37 @@ impl Estimator {
     /// # Errors
     /// [`SettingsError`] of [`Settings::validate`].
     pub fn new(settings: Settings) -> Result<Self, SettingsError> {
+        Self::prepare(settings, None)
+    }
+
+    /// Estimator that starts from what is known already, such as a log reduced to a factor, in place of the prior.
+    ///
+    /// `information` has its parameters in scales, and rows divided by their deviations; it should contain a prior where the log
+    /// tells nothing. The estimate starts at its solution. Resets go back to the deviations of the settings, and with windows it
+    /// always counts, as a prior does.
+    ///
+    /// # Errors
+    /// [`SettingsError`] of [`Settings::validate`], and if `information` has other parameters or is singular.
+    pub fn starting_from(settings: Settings, information: SquareRoot) -> Result<Self, SettingsError> {
+        Self::prepare(settings, Some(information))
+    }
+
+    fn prepare(settings: Settings, information: Option<SquareRoot>) -> Result<Self, SettingsError> {
         settings.validate()?;
         let (p, m) = (settings.columns(), settings.rows);
         let in_scales =
             |list: &[f64]| -> Vec<f64> { list.iter().zip(&settings.scale).map(|(v, s)| v / s).collect() };
-        let (start, prior_std) = (in_scales(&settings.start), in_scales(&settings.prior_std));
-        let information: Vec<f64> = prior_std.iter().map(|s| 1.0 / (s * s)).collect();
-        let shares = |share: f64| -> Vec<f64> { information.iter().map(|i| share * i).collect() };
-        let root = SquareRoot::from_prior(&start, &prior_std);
+        let (mut start, prior_std) = (in_scales(&settings.start), in_scales(&settings.prior_std));
+        let shares = |share: f64| -> Vec<f64> { prior_std.iter().map(|s| share / (s * s)).collect() };
+        let root = information.unwrap_or_else(|| SquareRoot::from_prior(&start, &prior_std));
+        if root.columns() != p {
+            let what = "parameters of the information to start from";
+            return Err(SettingsError::Length { what, expected: p, found: root.columns() });
+        }
+        if !root.solve(&mut start) || start.iter().any(|x| !x.is_finite()) {
+            let what = "the information to start from is singular: add a prior";
+            return Err(SettingsError::Combination { what });
+        }
         let memory = match settings.forgetting {
             Forgetting::BlockWindow { samples, blocks } => {
                 Memory::Blocks(BlockWindow::new(root, samples / blocks, blocks, m))
@@ -173,6 +196,7 @@ impl Estimator {
         let mut fingerprint = Fingerprint::new();
         // Writing into a hash cannot fail.
         let _ = write!(fingerprint, "{settings:?}");
+        let x = start.iter().zip(&settings.scale).map(|(x, scale)| x * scale).collect();
         Ok(Self {
             fingerprint: fingerprint.0,
             memory,
@@ -184,7 +208,7 @@ impl Estimator {
             reaction: settings.reaction.map(|s| TargetedReaction::new(&s, p, m)),
             innovation: Innovation::new(p, m),
             samples: 0,
-            x: settings.start.clone(),
+            x,
             scaled: start,
             error: vec![0.0; m],
             rows: vec![0.0; m * (p + 1)],
@@ -468,7 +492,8 @@ impl Estimator {
 
     /// The whole state as words of 64 bits, for any file format. Real numbers are their bits.
     ///
-    /// An estimator that loads them continues with the same bits as one that was never interrupted. Allocates.
+    /// An estimator that loads them continues with the same bits as one that was never interrupted. What [`Step`] and the accessors
+    /// say of the last sample is not part of it. Allocates.
     pub fn save(&self) -> Vec<u64> {
         let mut words = Vec::new();
         self.clone().transfer(&mut Transfer::Save(&mut words));

@@ -72,8 +72,8 @@ pub enum Whiteness {
     White,
     /// One of so many samples is used; their noise is as stated.
     Every(usize),
-    /// Nothing: size and correlation time are learned ([`crate::InnovationCorrelation`]); no alarm before the end of the first
-    /// `samples`.
+    /// Nothing: size and correlation time (up to a fifth of `samples`) are learned ([`crate::InnovationCorrelation`]); no alarm
+    /// before the end of the first `samples`. Alarms are then rarer than asked for, up to ten times with coloured innovations.
     Learned {
         /// Samples to learn from at first, at least 50.
         samples: usize,
@@ -317,6 +317,10 @@ fn length(what: &'static str, expected: usize, list: &[f64]) -> Result<(), Setti
 }
 
 fn count(what: &'static str, found: usize, least: usize) -> Result<(), SettingsError> {
-    let fine = found >= least && found <= 1 << 40;
-    number(what, 0, "a count that is large enough", found as f64, fine)
+    let expected = match least {
+        1 => "at least 1",
+        50 => "at least 50",
+        _ => "at least one per block",
+    };
+    number(what, 0, expected, found as f64, found >= least && found <= 1 << 40)
 }
