@@ -32,8 +32,10 @@ fn plain(columns: usize, rows: usize, forgetting: Forgetting) -> Settings {
 /// Twelve columns of norms 1e-9 to 1e3, one row a sample; `excited` says which columns a sample has.
 struct Graded {
     random: ChaCha8Rng,
-    excited: fn(usize, usize) -> bool,
+    excited: Excited,
 }
+
+type Excited = fn(usize, usize) -> bool;
 
 const COLUMNS: usize = 12;
 
@@ -72,7 +74,7 @@ fn worst(root: &SquareRoot, expected: &[f64]) -> f64 {
 #[test]
 fn windows_over_graded_columns_keep_eight_digits() {
     const LENGTH: usize = 200;
-    let cases: [(&str, fn(usize, usize) -> bool); 3] = [
+    let cases: [(&str, Excited); 3] = [
         ("steady", |_, _| true),
         // A third of the columns is silent but for 20 samples of every 150.
         ("intermittent", |sample, column| column % 3 != 0 || sample % 150 < 20),

@@ -12,10 +12,11 @@ const MEMORY: u64 = 64;
 
 /// Autocorrelation of the whitened innovations of each row, from running sums.
 ///
-/// Innovations of real machines are neither white nor of the size that stated noise lets expect, and a detector that takes
-/// them so raises alarms without end. What is learned serves innovations whose size and colour stay as they are; where they
-/// change with the motion, so does the rate of alarms. The first `settling` samples are passed over, then sums over `samples`
-/// are formed and looked at, and again whenever their number has doubled; later on old ones fade.
+/// Innovations of real machines are neither white nor of the size that stated noise lets expect, and a
+/// detector that takes them so raises alarms without end. What is learned serves innovations whose size and
+/// colour stay as they are; where they change with the motion, so does the rate of alarms. The first
+/// `settling` samples are passed over, then sums over `samples` are formed and looked at, and again whenever
+/// their number has doubled; later on old ones fade.
 #[derive(Debug, Clone)]
 pub struct InnovationCorrelation {
     rows: usize,
@@ -37,8 +38,9 @@ pub struct InnovationCorrelation {
 }
 
 impl InnovationCorrelation {
-    /// For `rows` rows; figures are first given after `samples`, of which the first fifth is passed over. Correlation times up to a
-    /// fifth of `samples` are found, at `rows · samples/5` multiplications per sample.
+    /// For `rows` rows; figures are first given after `samples`, of which the first fifth is passed over.
+    /// Correlation times up to a fifth of `samples` are found, at `rows · samples/5` multiplications per
+    /// sample.
     pub fn new(rows: usize, samples: usize) -> Self {
         let longest = (samples / 5).max(1);
         let samples = samples as u64;
@@ -126,13 +128,14 @@ impl InnovationCorrelation {
         self.looks > 0
     }
 
-    /// Correlation time, samples: the first lag at which no row's autocorrelation exceeds 0.1 by more than a standard error.
+    /// Correlation time, samples: the first lag at which no row's autocorrelation exceeds 0.1 by more than a
+    /// standard error.
     pub fn time(&self) -> usize {
         self.time
     }
 
-    /// `1 + 2 Σ autocorrelation` up to the correlation time, of the row where it is largest: by so much information that
-    /// innovations carry is overstated.
+    /// `1 + 2 Σ autocorrelation` up to the correlation time, of the row where it is largest: by so much
+    /// information that innovations carry is overstated.
     pub fn inflation(&self) -> f64 {
         self.inflation
     }

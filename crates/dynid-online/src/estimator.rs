@@ -21,7 +21,8 @@ use crate::window::BlockWindow;
 
 /// Entries of weighted rows beyond this are refused, since squares of gains could overflow.
 const LARGEST: f64 = 1e75;
-/// Nothing is discounted once a diagonal entry of `R` is below this (parameters in scales): it would become zero.
+/// Nothing is discounted once a diagonal entry of `R` is below this (parameters in scales): it would become
+/// zero.
 const LEAST_PIVOT: f64 = 1e-50;
 /// First word of a saved state.
 const STATE_VERSION: u64 = 1;
@@ -31,8 +32,8 @@ const STATE_VERSION: u64 = 1;
 pub enum RowNoise<'a> {
     /// Standard deviation of each row, in the unit of its effort; independent of each other.
     Std(&'a [f64]),
-    /// Covariance of the rows, `m × m`, row by row; the lower triangle is read. Where regressors are measured, this is
-    /// the place for `xᵀ Σ_φ x`, which rows may have in common.
+    /// Covariance of the rows, `m × m`, row by row; the lower triangle is read. Where regressors are
+    /// measured, this is the place for `xᵀ Σ_φ x`, which rows may have in common.
     Covariance(&'a [f64]),
 }
 
@@ -41,8 +42,8 @@ pub enum RowNoise<'a> {
 pub struct Step {
     /// Number of the sample, from 0.
     pub sample: u64,
-    /// Factor by which old information was discounted (along the sample's directions, for directional forgetting); 1 if nothing
-    /// was.
+    /// Factor by which old information was discounted (along the sample's directions, for directional
+    /// forgetting); 1 if nothing was.
     pub lambda: f64,
     /// Mean square of the whitened innovations: 1 on average while model and noise are right.
     pub normalised_square: f64,
@@ -95,8 +96,9 @@ impl Memory {
 
 /// Recursive estimator of `y = Φ x + noise`, sample by sample.
 ///
-/// Per sample: drift; innovations with the estimate so far; forgetting; the new rows; the new estimate; change detection. After
-/// an alarm, samples are held back until the reaction is decided ([`TargetedReaction`]).
+/// Per sample: drift; innovations with the estimate so far; forgetting; the new rows; the new estimate;
+/// change detection. After an alarm, samples are held back until the reaction is decided
+/// ([`TargetedReaction`]).
 ///
 /// Everything is allocated by [`Estimator::new`]. No state becomes non-finite whatever finite samples come.
 ///
@@ -139,7 +141,8 @@ pub struct Estimator {
 }
 
 impl Estimator {
-    /// Estimator before its first sample. Allocates all it needs; with change detection it takes some milliseconds.
+    /// Estimator before its first sample. Allocates all it needs; with change detection it takes some
+    /// milliseconds.
     ///
     /// # Errors
     /// [`SettingsError`] of [`Settings::validate`].
@@ -147,11 +150,12 @@ impl Estimator {
         Self::prepare(settings, None)
     }
 
-    /// Estimator that starts from what is known already, such as a log reduced to a factor, in place of the prior.
+    /// Estimator that starts from what is known already, such as a log reduced to a factor, in place of the
+    /// prior.
     ///
-    /// `information` has its parameters in scales, and rows divided by their deviations; it should contain a prior where the log
-    /// tells nothing. The estimate starts at its solution. Resets go back to the deviations of the settings, and with windows it
-    /// always counts, as a prior does.
+    /// `information` has its parameters in scales, and rows divided by their deviations; it should contain a
+    /// prior where the log tells nothing. The estimate starts at its solution. Resets go back to the
+    /// deviations of the settings, and with windows it always counts, as a prior does.
     ///
     /// # Errors
     /// [`SettingsError`] of [`Settings::validate`], and if `information` has other parameters or is singular.
@@ -225,7 +229,8 @@ impl Estimator {
     /// `regressor`: `m × p`, row by row, effort per parameter unit; `effort`: `m` entries.
     ///
     /// # Errors
-    /// [`SampleError`]: lengths that do not fit, numbers that are not finite, noise that is none. The estimator is then as it was before.
+    /// [`SampleError`]: lengths that do not fit, numbers that are not finite, noise that is none. The
+    /// estimator is then as it was before.
     pub fn step(
         &mut self,
         regressor: &[f64],
@@ -399,8 +404,8 @@ impl Estimator {
 
     /// Writes the standard deviation of each parameter, in its unit (`p` entries).
     ///
-    /// They hold for row noise as stated and white; [`ChangeDetection::inflation`] says by how much variances fall short where
-    /// it was learned.
+    /// They hold for row noise as stated and white; [`ChangeDetection::inflation`] says by how much variances
+    /// fall short where it was learned.
     pub fn std(&mut self, out: &mut [f64]) {
         assert_eq!(out.len(), self.x.len(), "one deviation per parameter");
         let root = self.memory.root();
@@ -470,10 +475,12 @@ impl Estimator {
         Ok(())
     }
 
-    /// Adds the standard deviation `std`, in the parameter's unit, to parameter `j` alone; the estimate stays.
+    /// Adds the standard deviation `std`, in the parameter's unit, to parameter `j` alone; the estimate
+    /// stays.
     ///
     /// # Errors
-    /// [`SettingsError`] with windows, for `j` beyond the last parameter, and unless `std` is finite and not negative.
+    /// [`SettingsError`] with windows, for `j` beyond the last parameter, and unless `std` is finite and not
+    /// negative.
     pub fn open(&mut self, j: usize, std: f64) -> Result<(), SettingsError> {
         let p = self.x.len();
         let Memory::Recursive(root) = &mut self.memory else { return Err(WINDOW) };
@@ -492,8 +499,8 @@ impl Estimator {
 
     /// The whole state as words of 64 bits, for any file format. Real numbers are their bits.
     ///
-    /// An estimator that loads them continues with the same bits as one that was never interrupted. What [`Step`] and the accessors
-    /// say of the last sample is not part of it. Allocates.
+    /// An estimator that loads them continues with the same bits as one that was never interrupted. What
+    /// [`Step`] and the accessors say of the last sample is not part of it. Allocates.
     pub fn save(&self) -> Vec<u64> {
         let mut words = Vec::new();
         self.clone().transfer(&mut Transfer::Save(&mut words));

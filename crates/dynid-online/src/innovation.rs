@@ -10,11 +10,12 @@ const LARGEST: f64 = 1e100;
 
 /// Errors of the prediction before a sample is used, and what is to be expected of them.
 ///
-/// `e = y - Φ x`, `Σ_e = Σ_row + Φ P Φᵀ` with `P = (RᵀR)⁻¹`, `u = chol(Σ_e)⁻¹ e`, which is `N(0, 1)` while the model holds.
-/// Rows come whitened, that is multiplied by `chol(Σ_row)⁻¹`, so that `Σ_e = 1 + GᵀG` with `G = R⁻ᵀ Φᵀ`; `u` is the same.
+/// `e = y - Φ x`, `Σ_e = Σ_row + Φ P Φᵀ` with `P = (RᵀR)⁻¹`, `u = chol(Σ_e)⁻¹ e`, which is `N(0, 1)` while
+/// the model holds. Rows come whitened, that is multiplied by `chol(Σ_row)⁻¹`, so that `Σ_e = 1 + GᵀG` with
+/// `G = R⁻ᵀ Φᵀ`; `u` is the same.
 ///
-/// `Σ_row` should contain the noise of a measured regressor, `xᵀ Σ_φ x`, also where it is common to rows: without it
-/// the rate of false alarms is off by orders of magnitude.
+/// `Σ_row` should contain the noise of a measured regressor, `xᵀ Σ_φ x`, also where it is common to rows:
+/// without it the rate of false alarms is off by orders of magnitude.
 #[derive(Debug, Clone)]
 pub struct Innovation {
     columns: usize,
@@ -55,8 +56,8 @@ impl Innovation {
             column[p + i] = 1.0;
         }
         self.whitened[..m].copy_from_slice(&self.error[..m]);
-        // Gram-Schmidt on [G; 1] instead of Cholesky on 1 + GᵀG: entry i of the lower part of column i stays 1, so no
-        // pivot falls below 1 however large and parallel the gains.
+        // Gram-Schmidt on [G; 1] instead of Cholesky on 1 + GᵀG: entry i of the lower part of column i stays
+        // 1, so no pivot falls below 1 however large and parallel the gains.
         for i in 0..m {
             let (done, later) = self.gain[i * length..m * length].split_at_mut(length);
             let size = libm::sqrt(dot(done, done));
@@ -88,7 +89,8 @@ impl Innovation {
     }
 }
 
-/// Cholesky factor `L` in the lower triangle of a symmetric `m × m` matrix; the first row without a positive pivot on failure.
+/// Cholesky factor `L` in the lower triangle of a symmetric `m × m` matrix; the first row without a positive
+/// pivot on failure.
 pub(crate) fn cholesky(a: &mut [f64], m: usize) -> Result<(), usize> {
     for j in 0..m {
         for i in j..m {

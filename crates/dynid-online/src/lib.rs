@@ -1,7 +1,7 @@
 //! Recursive estimation in square-root information form.
 //!
-//! For programs that estimate while a machine runs: no standard library, no allocation after construction, bounded work per
-//! sample.
+//! For programs that estimate while a machine runs: no standard library, no allocation after construction,
+//! bounded work per sample.
 //!
 //! | question | type |
 //! |---|---|
@@ -14,8 +14,9 @@
 //! | what changed | [`TargetedReaction`] |
 //! | what is excited | [`ExcitationMonitor`] |
 //!
-//! Notation: `Φ` regressor of a sample (`m` rows, `p` columns), `y` effort, `x` parameters, `P` covariance, `λ` forgetting factor,
-//! `u` whitened innovations. Nothing here knows of robots: an effort model gives the rows.
+//! Notation: `Φ` regressor of a sample (`m` rows, `p` columns), `y` effort, `x` parameters, `P` covariance,
+//! `λ` forgetting factor, `u` whitened innovations. Nothing here knows of robots: an effort model gives the
+//! rows.
 
 #![no_std]
 

@@ -5,13 +5,15 @@ use dynid_online::{
     ChangeDetection, DetectionSettings, Estimator, FalseAlarms, Forgetting, RowNoise, Whiteness,
 };
 
-/// Bounds that a binomial count of 1000 trials leaves with probability 1e-6 on either side (normal, 4.75 deviations).
+/// Bounds that a binomial count of 1000 trials leaves with probability 1e-6 on either side (normal, 4.75
+/// deviations).
 fn within(alarms: usize, rate: f64) -> bool {
     let spread = 4.75 * (1000.0 * rate * (1.0 - rate)).sqrt();
     (alarms as f64 - 1000.0 * rate).abs() <= spread
 }
 
-/// The chain leaves clipping out and puts the sum on a grid, so the rate asked for is met up to a few percent of itself.
+/// The chain leaves clipping out and puts the sum on a grid, so the rate asked for is met up to a few percent
+/// of itself.
 #[test]
 fn white_innovations_raise_as_many_as_asked_for() {
     for (m, rate, samples) in [(1, 0.05, 2000), (2, 0.1, 2000), (6, 0.1, 1000)] {
@@ -34,7 +36,8 @@ fn white_innovations_raise_as_many_as_asked_for() {
     }
 }
 
-/// The same with an estimator in front, from its first sample on: innovations are white while it still converges.
+/// The same with an estimator in front, from its first sample on: innovations are white while it still
+/// converges.
 #[test]
 fn an_estimator_raises_as_many_as_asked_for() {
     let rate = 0.1;
@@ -54,7 +57,8 @@ fn an_estimator_raises_as_many_as_asked_for() {
     assert!(within(alarms, rate), "{alarms}");
 }
 
-/// Regressor noise that rows have in common: with its covariance the rate holds, with the efforts' noise alone it is off by orders.
+/// Regressor noise that rows have in common: with its covariance the rate holds, with the efforts' noise
+/// alone it is off by orders.
 #[test]
 fn common_regressor_noise_belongs_into_the_row_covariance() {
     let rate = 0.05;
@@ -88,8 +92,8 @@ fn common_regressor_noise_belongs_into_the_row_covariance() {
     assert!(omitted > 900);
 }
 
-/// Coloured innovations of unknown size: the default raises no more alarms than asked for, but up to ten times fewer, since it uses
-/// upper ends of intervals; taken for white they raise one every time.
+/// Coloured innovations of unknown size: the default raises no more alarms than asked for, but up to ten
+/// times fewer, since it uses upper ends of intervals; taken for white they raise one every time.
 #[test]
 fn coloured_innovations_of_unknown_size_raise_no_more_than_asked_for() {
     let rate = 0.1;

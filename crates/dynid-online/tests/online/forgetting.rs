@@ -60,8 +60,8 @@ fn directional_forgetting_keeps_what_is_not_excited() {
     assert!((after[2] * 400.0 / 0.02 - 1.0).abs() < 1e-9, "{}", after[2]);
 }
 
-/// Any direction and correlation: samples along it also tell of what is correlated with it, so covariances across it shrink by that
-/// within the memory, and then stay.
+/// Any direction and correlation: samples along it also tell of what is correlated with it, so covariances
+/// across it shrink by that within the memory, and then stay.
 #[test]
 fn directional_forgetting_loses_nothing_across_the_direction() {
     let directional = Forgetting::Directional { lambda: 0.98, tolerance: 1e-6 };
@@ -220,7 +220,8 @@ fn opening_adds_to_one_variance_and_resetting_restores_all() {
     assert_eq!(estimator.x(), x);
 }
 
-/// A jump: the normalised rule forgets while it lasts, the published one hardly, since errors are small beside the effort.
+/// A jump: the normalised rule forgets while it lasts, the published one hardly, since errors are small
+/// beside the effort.
 #[test]
 fn noise_normalised_forgetting_answers_to_noise_not_to_effort() {
     let normalised = Forgetting::NoiseNormalised { alpha: 0.05, beta: -4.68, dead_zone: 3.0 };

@@ -9,7 +9,8 @@ use rand_chacha::ChaCha8Rng;
 const TRUTH: [f64; 6] = [3.965e5, 1.336e11, 0.035, 0.135, 635.663, 30.96];
 const UNITS: [f64; 6] = [4e5, 1e11, 0.05, 0.1, 500.0, 50.0];
 const RATIO: f64 = 290.0;
-/// Standard deviations of deformation (rad), motor torque and joint torque (N m), motor and joint speed (rad/s).
+/// Standard deviations of deformation (rad), motor torque and joint torque (N m), motor and joint speed
+/// (rad/s).
 const NOISE: [f64; 5] = [6e-6, 0.02, 3.0, 0.05, 2e-4];
 
 /// Deformation under the torque `k1 d + k2 d³`.
@@ -54,7 +55,8 @@ struct Run {
     settled: usize,
 }
 
-/// Three shuffled cycles of five speeds in both directions before and after the stiffness falls by 15 %, at 50 Hz.
+/// Three shuffled cycles of five speeds in both directions before and after the stiffness falls by 15 %, at
+/// 50 Hz.
 fn run(detection: DetectionSettings, seed: u64) -> Run {
     let mut settings = Settings::new(vec![0.0; 6], UNITS.map(|u| 1e3 * u).to_vec(), 2);
     settings.scale = UNITS.to_vec();

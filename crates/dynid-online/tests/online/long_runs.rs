@@ -5,7 +5,8 @@ use dynid_online::SquareRoot;
 
 const TRUTH: [f64; 6] = [1.0, -2.0, 3.0, 0.5, -0.25, 10.0];
 
-/// Updates with 4096 rows of noise 0.1, over and over; returns the largest error in standard deviations of the mean of those rows.
+/// Updates with 4096 rows of noise 0.1, over and over; returns the largest error in standard deviations of
+/// the mean of those rows.
 fn run(updates: u64, lambda: f64) {
     let mut random = random(21);
     let rows: Vec<[f64; 7]> = (0..4096)
@@ -23,7 +24,8 @@ fn run(updates: u64, lambda: f64) {
         }
         root.push(&mut row);
     }
-    // What it must be: the rows with their weights, summed anew from the last to the first until they weigh nothing.
+    // What it must be: the rows with their weights, summed anew from the last to the first until they weigh
+    // nothing.
     let mut expected = SquareRoot::new(6);
     let held = if lambda < 1.0 { (40.0 / (1.0 - lambda)) as u64 } else { 4096 };
     for back in (0..held.min(updates)).rev() {
@@ -44,7 +46,8 @@ fn run(updates: u64, lambda: f64) {
         assert!((x[j] - TRUTH[j]).abs() < 0.05, "{x:?}");
     }
     println!("{updates} updates, lambda {lambda}: diagonal off by {:.1e}, x by {:.1e}", worst.0, worst.1);
-    // Roundings of k updates add up like √k at best and k ε at worst; measured some 1e-11 after 1e8. The prior weighs 1e-8 of a row.
+    // Roundings of k updates add up like √k at best and k ε at worst; measured some 1e-11 after 1e8. The
+    // prior weighs 1e-8 of a row.
     let rounding = f64::EPSILON * (updates as f64).sqrt() * 100.0;
     assert!(worst.0 < rounding + 1e-11 && worst.1 < rounding + 1e-10, "{worst:?}");
 }
