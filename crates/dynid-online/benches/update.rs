@@ -70,6 +70,15 @@ fn threshold(rows: usize) -> f64 {
     dynid_online::cusum_threshold(black_box(rows), 1.5, 1e8)
 }
 
+/// Blocks of a window are merged twice each on average, and as many as the window has when its front runs out.
+#[divan::bench(args = [6, 60])]
+fn merge(bencher: Bencher<'_, '_>, p: usize) {
+    let mut run = Root::new(p, 6);
+    (0..100).for_each(|_| run.update());
+    let (other, mut scratch) = (run.root.clone(), vec![0.0; p * (p + 1)]);
+    bencher.bench_local(|| run.root.merge(&other, &mut scratch));
+}
+
 /// Rows of 64 samples, again and again.
 struct Rows {
     entries: Vec<f64>,
