@@ -5,37 +5,25 @@ use alloc::vec::Vec;
 use core::fmt::Write;
 
 use crate::change_detection::ChangeDetection;
-use crate::downdating::RowWindow;
 use crate::drift::Drift;
 use crate::error::{SampleError, SettingsError, StateError};
 use crate::excitation_monitor::ExcitationMonitor;
 use crate::forgetting::{
     BoundedCovariance, DirectionalForgetting, Forgetting, error_driven_factor, excess_error, relative_error,
 };
-use crate::innovation::{Innovation, cholesky, solve_lower};
+use crate::innovation::Innovation;
+use crate::memory::Memory;
 use crate::reaction::{Reaction, TargetedReaction};
+use crate::rows::{RowNoise, WeightedRows};
 use crate::settings::Settings;
 use crate::square_root::{SquareRoot, dot};
 use crate::state::{Fingerprint, Transfer};
-use crate::window::BlockWindow;
 
-/// Entries of weighted rows beyond this are refused, since squares of gains could overflow.
-const LARGEST: f64 = 1e75;
 /// Nothing is discounted once a diagonal entry of `R` is below this (parameters in scales): it would become
 /// zero.
 const LEAST_PIVOT: f64 = 1e-50;
 /// First word of a saved state.
 const STATE_VERSION: u64 = 1;
-
-/// Noise of the rows of a sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum RowNoise<'a> {
-    /// Standard deviation of each row, in the unit of its effort; independent of each other.
-    Std(&'a [f64]),
-    /// Covariance of the rows, `m × m`, row by row; the lower triangle is read. Where regressors are
-    /// measured, this is the place for `xᵀ Σ_φ x`, which rows may have in common.
-    Covariance(&'a [f64]),
-}
 
 /// What a sample did.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,41 +45,6 @@ pub struct Step {
     pub reaction: Option<Reaction>,
     /// Number of parameters that do not forget because nothing excites them.
     pub frozen: usize,
-}
-
-/// Where information is kept.
-#[derive(Debug, Clone)]
-enum Memory {
-    Recursive(SquareRoot),
-    Blocks(BlockWindow),
-    Rows(RowWindow),
-}
-
-impl Memory {
-    fn root(&self) -> &SquareRoot {
-        match self {
-            Memory::Recursive(root) => root,
-            Memory::Blocks(window) => window.total(),
-            Memory::Rows(window) => window.total(),
-        }
-    }
-
-    /// Adds rows; a recursive memory uses them up.
-    fn push(&mut self, rows: &mut [f64]) {
-        match self {
-            Memory::Recursive(root) => root.push(rows),
-            Memory::Blocks(window) => window.push(rows),
-            Memory::Rows(window) => window.push(rows),
-        }
-    }
-
-    fn transfer(&mut self, transfer: &mut Transfer<'_>) {
-        match self {
-            Memory::Recursive(root) => root.transfer(transfer),
-            Memory::Blocks(window) => window.transfer(transfer),
-            Memory::Rows(window) => window.transfer(transfer),
-        }
-    }
 }
 
 /// Recursive estimator of `y = Φ x + noise`, sample by sample.
@@ -133,8 +86,7 @@ pub struct Estimator {
     scaled: Vec<f64>,
     x: Vec<f64>,
     error: Vec<f64>,
-    rows: Vec<f64>,
-    noise: Vec<f64>,
+    rows: WeightedRows,
     never_frozen: Vec<bool>,
     prior_std: Vec<f64>,
     scratch: Vec<f64>,
@@ -179,15 +131,7 @@ impl Estimator {
             let what = "the information to start from is singular: add a prior";
             return Err(SettingsError::Combination { what });
         }
-        let memory = match settings.forgetting {
-            Forgetting::BlockWindow { samples, blocks } => {
-                Memory::Blocks(BlockWindow::new(root, samples / blocks, blocks, m))
-            }
-            Forgetting::RowWindow { samples, blocks } => {
-                Memory::Rows(RowWindow::new(root, samples / blocks, blocks, m))
-            }
-            _ => Memory::Recursive(root),
-        };
+        let memory = Memory::new(&settings.forgetting, root, m);
         let drift = match &settings.forgetting {
             Forgetting::Drift { rate, interval } => {
                 let variance: Vec<f64> = in_scales(rate).iter().map(|r| r * r * interval).collect();
@@ -215,8 +159,7 @@ impl Estimator {
             x,
             scaled: start,
             error: vec![0.0; m],
-            rows: vec![0.0; m * (p + 1)],
-            noise: vec![0.0; m * m],
+            rows: WeightedRows::new(&settings.scale, m),
             never_frozen: vec![false; p],
             prior_std,
             scratch: vec![0.0; 2 * p + 1],
@@ -238,8 +181,7 @@ impl Estimator {
         noise: RowNoise<'_>,
     ) -> Result<Step, SampleError> {
         let m = effort.len();
-        self.weigh(regressor, effort, noise)?;
-        let rows = &mut self.rows[..m * (self.x.len() + 1)];
+        self.rows.load(regressor, effort, noise)?;
         let frozen = self.monitor.as_ref().map_or(self.never_frozen.as_slice(), |m| m.frozen());
         if let (Some(drift), Memory::Recursive(root)) = (&mut self.drift, &mut self.memory) {
             drift.advance(root, frozen);
@@ -249,17 +191,17 @@ impl Estimator {
         {
             *error = y - dot(phi, &self.x);
         }
-        self.innovation.evaluate(self.memory.root(), &self.scaled, rows);
+        self.innovation.evaluate(self.memory.root(), &self.scaled, self.rows.get());
         if let Some(monitor) = &mut self.monitor {
-            monitor.push(rows);
+            monitor.push(self.rows.get());
         }
         let held_back = self.reaction.as_ref().is_some_and(TargetedReaction::is_active);
         let (mut lambda, mut alarm, mut reaction) = (1.0, false, None);
         if held_back {
-            reaction = self.hold_back(m);
+            reaction = self.hold_back();
         } else {
             lambda = self.forget(effort);
-            self.memory.push(&mut self.rows[..m * (self.x.len() + 1)]);
+            self.memory.push(self.rows.get_mut());
             self.solve();
             if let Some(detection) = &mut self.detection {
                 alarm = detection.push(self.innovation.whitened());
@@ -282,62 +224,6 @@ impl Estimator {
         })
     }
 
-    /// Writes whitened rows `[φ y]` with parameters in scales; on errors only this workspace has changed.
-    fn weigh(&mut self, regressor: &[f64], effort: &[f64], noise: RowNoise<'_>) -> Result<(), SampleError> {
-        let (p, m) = (self.x.len(), effort.len());
-        if m == 0 || m > self.settings.rows {
-            return Err(SampleError::Rows { most: self.settings.rows, found: m });
-        }
-        let (what, list, expected) = match noise {
-            RowNoise::Std(list) => ("row deviations", list, m),
-            RowNoise::Covariance(list) => ("row covariance", list, m * m),
-        };
-        for (what, list, expected) in [("regressor", regressor, m * p), (what, list, expected)] {
-            if list.len() != expected {
-                return Err(SampleError::Length { what, expected, found: list.len() });
-            }
-        }
-        for (what, list) in [("regressor", regressor), ("effort", effort), (what, list)] {
-            if let Some(index) = list.iter().position(|v| !v.is_finite()) {
-                return Err(SampleError::NotFinite { what, index });
-            }
-        }
-        let rows = &mut self.rows[..m * (p + 1)];
-        let given = regressor.chunks_exact(p).zip(effort);
-        for (row, (phi, y)) in rows.chunks_exact_mut(p + 1).zip(given) {
-            for (entry, (f, s)) in row.iter_mut().zip(phi.iter().zip(&self.settings.scale)) {
-                *entry = f * s;
-            }
-            row[p] = *y;
-        }
-        match noise {
-            RowNoise::Std(list) => {
-                for (i, (row, std)) in rows.chunks_exact_mut(p + 1).zip(list).enumerate() {
-                    if *std <= 0.0 {
-                        return Err(SampleError::Noise { row: i });
-                    }
-                    row.iter_mut().for_each(|v| *v /= std);
-                }
-            }
-            RowNoise::Covariance(list) => {
-                let factor = &mut self.noise[..m * m];
-                factor.copy_from_slice(list);
-                cholesky(factor, m).map_err(|row| SampleError::Noise { row })?;
-                solve_lower(factor, m, rows, p + 1);
-            }
-        }
-        match rows.iter().position(|v| v.is_nan() || v.abs() > LARGEST) {
-            Some(place) if place % (p + 1) == p => {
-                Err(SampleError::NotFinite { what: "effort", index: place / (p + 1) })
-            }
-            Some(place) => {
-                let index = place / (p + 1) * p + place % (p + 1);
-                Err(SampleError::NotFinite { what: "regressor", index })
-            }
-            None => Ok(()),
-        }
-    }
-
     /// Forgets and returns the factor.
     fn forget(&mut self, effort: &[f64]) -> f64 {
         let m = effort.len();
@@ -357,7 +243,7 @@ impl Estimator {
         }
         match (&self.settings.forgetting, &mut self.directional, &mut self.monitor) {
             (Forgetting::Directional { tolerance, .. }, Some(directional), _) => {
-                directional.forget(root, &self.rows[..m * (self.x.len() + 1)], lambda, *tolerance);
+                directional.forget(root, self.rows.get(), lambda, *tolerance);
             }
             (_, _, Some(monitor)) => monitor.discount(root, lambda),
             _ => root.discount(lambda),
@@ -369,11 +255,11 @@ impl Estimator {
     }
 
     /// Gives the sample to the reaction, which it may complete.
-    fn hold_back(&mut self, m: usize) -> Option<Reaction> {
+    fn hold_back(&mut self) -> Option<Reaction> {
         let (Some(reaction), Memory::Recursive(root)) = (&mut self.reaction, &mut self.memory) else {
             return None;
         };
-        if !reaction.push(&self.rows[..m * (self.x.len() + 1)]) {
+        if !reaction.push(self.rows.get()) {
             return None;
         }
         let inflation = self.detection.as_ref().map_or(1.0, ChangeDetection::inflation);

@@ -32,7 +32,9 @@ mod estimator;
 mod excitation_monitor;
 mod forgetting;
 mod innovation;
+mod memory;
 mod reaction;
+mod rows;
 mod settings;
 mod square_root;
 mod state;
@@ -44,13 +46,14 @@ pub use correlation::InnovationCorrelation;
 pub use downdating::{RowWindow, downdate};
 pub use drift::Drift;
 pub use error::{SampleError, SettingsError, StateError};
-pub use estimator::{Estimator, RowNoise, Step};
+pub use estimator::{Estimator, Step};
 pub use excitation_monitor::ExcitationMonitor;
 pub use forgetting::{
     BoundedCovariance, DirectionalForgetting, Forgetting, error_driven_factor, excess_error, relative_error,
 };
 pub use innovation::Innovation;
 pub use reaction::{Reaction, TargetedReaction};
+pub use rows::RowNoise;
 pub use settings::{DetectionSettings, FalseAlarms, MonitorSettings, ReactionSettings, Settings, Whiteness};
 pub use square_root::SquareRoot;
 pub use thresholds::{average_run_length, cusum_threshold, run_length_for_rate};
