@@ -126,7 +126,7 @@ impl BlockWindow {
         for stack in [&mut self.front, &mut self.back] {
             stack.iter_mut().for_each(|root| root.transfer(transfer));
         }
-        for root in [&mut self.back_sum, &mut self.open, &mut self.total] {
+        for root in [&mut self.prior, &mut self.back_sum, &mut self.open, &mut self.total] {
             root.transfer(transfer);
         }
     }

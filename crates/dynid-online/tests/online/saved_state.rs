@@ -2,7 +2,7 @@
 
 use crate::modes::all_modes;
 use crate::stream::Stream;
-use dynid_online::{Estimator, StateError};
+use dynid_online::{Estimator, RowNoise, SquareRoot, StateError};
 
 #[test]
 fn a_resumed_run_is_bit_equal() {
@@ -36,6 +36,27 @@ fn a_resumed_run_is_bit_equal() {
         assert_eq!(whole.save(), straight.save(), "{name}");
         assert!(settings.detection.is_none() || alarms > 0, "{name}: alarms are part of what is tested");
         assert!(settings.reaction.is_none() || reactions > 0, "{name}: so are reactions");
+    }
+}
+
+/// What a run started from is part of its state where it keeps counting.
+#[test]
+fn a_run_that_started_from_information_resumes_without_it() {
+    for (name, settings) in all_modes(3, 2) {
+        let known = SquareRoot::from_prior(&[1.0, 2.0, 3.0], &[0.5, 0.2, 0.1]);
+        let mut whole = Estimator::starting_from(settings.clone(), known).unwrap();
+        let mut stream = Stream::new(15, &[1.0, 2.0, -1.0], 2, 0.3);
+        stream.feed_all(&mut whole, 100);
+        let mut resumed = Estimator::new(settings).unwrap();
+        resumed.load(&whole.save()).unwrap();
+        for _ in 0..100 {
+            let (phi, effort) = stream.sample();
+            for run in [&mut whole, &mut resumed] {
+                run.step(&phi, &effort, RowNoise::Std(&[0.3, 0.3])).unwrap();
+            }
+            assert_eq!(whole.x(), resumed.x(), "{name}");
+        }
+        assert_eq!(whole.save(), resumed.save(), "{name}");
     }
 }
 
