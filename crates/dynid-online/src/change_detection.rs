@@ -8,11 +8,12 @@ use crate::thresholds::{cusum_threshold, run_length_for_rate};
 /// Thresholds are not lowered below this, however long the correlation time.
 const LEAST_THRESHOLD: f64 = 2.0;
 
-/// Cumulative sum over whitened innovations, `g ← max(0, g + ½ [(1 - 1/κ) Σ min(u², clip) - m ln κ])`, alarm at `g ≥ h`.
+/// Cumulative sum over whitened innovations, `g ← max(0, g + ½ [(1 - 1/κ) Σ min(u², clip) - m ln κ])`, alarm
+/// at `g ≥ h`.
 ///
-/// It is the log-likelihood ratio of innovations with variance `κ` against variance 1. Coloured innovations are thinned to one sample per
-/// correlation time first; the threshold then falls by the logarithm of that time, since the mean run length of the sum grows as
-/// `exp(h)`.
+/// It is the log-likelihood ratio of innovations with variance `κ` against variance 1. Coloured innovations
+/// are thinned to one sample per correlation time first; the threshold then falls by the logarithm of that
+/// time, since the mean run length of the sum grows as `exp(h)`.
 ///
 /// Sources: Page 1954; Brook & Evans 1972 (threshold).
 #[derive(Debug, Clone)]
@@ -48,7 +49,8 @@ impl ChangeDetection {
         Self { kappa, clip, threshold, every, correlation, statistic: 0.0, waiting: 0 }
     }
 
-    /// Takes the whitened innovations of a sample; true on an alarm, after which the sum starts again from zero.
+    /// Takes the whitened innovations of a sample; true on an alarm, after which the sum starts again from
+    /// zero.
     pub fn push(&mut self, whitened: &[f64]) -> bool {
         let due = self.waiting == 0;
         let known = self.correlation.as_ref().is_none_or(InnovationCorrelation::is_known);
@@ -90,8 +92,8 @@ impl ChangeDetection {
         self.correlation.as_ref().map_or(self.every, |c| c.time())
     }
 
-    /// By how much gains in the residual sum of squares are overstated, at least 1: learned size and colour of the innovations, or the
-    /// samples per sample used.
+    /// By how much gains in the residual sum of squares are overstated, at least 1: learned size and colour
+    /// of the innovations, or the samples per sample used.
     pub fn inflation(&self) -> f64 {
         self.correlation.as_ref().map_or(self.every as f64, |c| c.inflation() * c.mean_variance()).max(1.0)
     }
@@ -103,9 +105,10 @@ impl ChangeDetection {
 
     pub(crate) fn transfer(&mut self, transfer: &mut Transfer<'_>) {
         transfer.real(&mut self.statistic);
-        transfer.count(&mut self.waiting, usize::MAX >> 1);
         if let Some(correlation) = &mut self.correlation {
             correlation.transfer(transfer);
         }
+        let longest = self.correlation.as_ref().map_or(self.every, InnovationCorrelation::longest);
+        transfer.count(&mut self.waiting, longest);
     }
 }

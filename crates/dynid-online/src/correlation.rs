@@ -5,8 +5,6 @@ use alloc::vec::Vec;
 
 use crate::state::Transfer;
 
-/// Longest correlation time that is looked for, samples.
-const LONGEST: usize = 100;
 /// Autocorrelation that passes for none, beside one standard error.
 const NEGLIGIBLE: f64 = 0.1;
 /// Learned figures rest on at most this many times the samples first asked for; older ones fade.
@@ -14,19 +12,22 @@ const MEMORY: u64 = 64;
 
 /// Autocorrelation of the whitened innovations of each row, from running sums.
 ///
-/// Innovations of real machines are neither white nor of the size that stated noise lets expect, and a detector that takes
-/// them so raises alarms without end. The first `settling` samples are passed over, then sums over `samples`
-/// are formed and looked at, and again whenever their number has doubled; later on old ones fade.
+/// Innovations of real machines are neither white nor of the size that stated noise lets expect, and a
+/// detector that takes them so raises alarms without end. What is learned serves innovations whose size and
+/// colour stay as they are; where they change with the motion, so does the rate of alarms. The first
+/// `settling` samples are passed over, then sums over `samples` are formed and looked at, and again whenever
+/// their number has doubled; later on old ones fade.
 #[derive(Debug, Clone)]
 pub struct InnovationCorrelation {
     rows: usize,
     samples: u64,
+    longest: usize,
     settling: u64,
     seen: u64,
     count: u64,
     next_look: u64,
     looks: u64,
-    /// Innovations of the last samples, a ring of `LONGEST + 1`.
+    /// Innovations of the last samples, a ring of `longest + 1`.
     ring: Vec<f64>,
     newest: usize,
     /// Sums of products, by lag and row.
@@ -38,19 +39,23 @@ pub struct InnovationCorrelation {
 
 impl InnovationCorrelation {
     /// For `rows` rows; figures are first given after `samples`, of which the first fifth is passed over.
+    /// Correlation times up to a fifth of `samples` are found, at `rows · samples/5` multiplications per
+    /// sample.
     pub fn new(rows: usize, samples: usize) -> Self {
+        let longest = (samples / 5).max(1);
         let samples = samples as u64;
         Self {
             rows,
+            longest,
             samples: samples - samples / 5,
             settling: samples / 5,
             seen: 0,
             count: 0,
             next_look: samples - samples / 5,
             looks: 0,
-            ring: vec![0.0; (LONGEST + 1) * rows],
+            ring: vec![0.0; (longest + 1) * rows],
             newest: 0,
-            sums: vec![0.0; (LONGEST + 1) * rows],
+            sums: vec![0.0; (longest + 1) * rows],
             time: 1,
             inflation: 1.0,
             variance: vec![1.0; rows],
@@ -63,7 +68,7 @@ impl InnovationCorrelation {
             return;
         }
         self.seen += 1;
-        self.newest = (self.newest + 1) % (LONGEST + 1);
+        self.newest = (self.newest + 1) % (self.longest + 1);
         self.ring[self.newest * self.rows..][..self.rows].copy_from_slice(whitened);
         if self.seen <= self.settling {
             return;
@@ -73,7 +78,7 @@ impl InnovationCorrelation {
             if lag as u64 >= self.seen {
                 break;
             }
-            let place = (self.newest + LONGEST + 1 - lag) % (LONGEST + 1);
+            let place = (self.newest + self.longest + 1 - lag) % (self.longest + 1);
             let earlier = &self.ring[place * self.rows..][..self.rows];
             for (sum, (u, v)) in sums.iter_mut().zip(whitened.iter().zip(earlier)) {
                 *sum += u * v;
@@ -87,7 +92,7 @@ impl InnovationCorrelation {
     fn look(&mut self) {
         let n = self.count as f64;
         let level = NEGLIGIBLE + 1.0 / libm::sqrt(n);
-        let longest = (self.count / 5).min(LONGEST as u64) as usize;
+        let longest = (self.count / 5).min(self.longest as u64) as usize;
         self.time = 1;
         self.inflation = 1.0;
         for r in 0..self.rows {
@@ -113,18 +118,24 @@ impl InnovationCorrelation {
         self.next_look = (2 * self.count).min(MEMORY * self.samples);
     }
 
+    /// Longest correlation time that is looked for, samples.
+    pub fn longest(&self) -> usize {
+        self.longest
+    }
+
     /// Whether figures have been formed.
     pub fn is_known(&self) -> bool {
         self.looks > 0
     }
 
-    /// Correlation time, samples: the first lag at which no row's autocorrelation exceeds 0.1 by more than a standard error.
+    /// Correlation time, samples: the first lag at which no row's autocorrelation exceeds 0.1 by more than a
+    /// standard error.
     pub fn time(&self) -> usize {
         self.time
     }
 
-    /// `1 + 2 Σ autocorrelation` up to the correlation time, of the row where it is largest: by so much information that
-    /// innovations carry is overstated.
+    /// `1 + 2 Σ autocorrelation` up to the correlation time, of the row where it is largest: by so much
+    /// information that innovations carry is overstated.
     pub fn inflation(&self) -> f64 {
         self.inflation
     }
@@ -141,12 +152,15 @@ impl InnovationCorrelation {
 
     pub(crate) fn transfer(&mut self, transfer: &mut Transfer<'_>) {
         for value in [&mut self.seen, &mut self.count, &mut self.next_look, &mut self.looks] {
-            transfer.integer(value);
+            transfer.counter(value);
         }
         transfer.reals(&mut self.ring);
-        transfer.count(&mut self.newest, LONGEST);
+        transfer.count(&mut self.newest, self.longest);
         transfer.reals(&mut self.sums);
-        transfer.count(&mut self.time, LONGEST);
+        transfer.count(&mut self.time, self.longest);
+        if self.time == 0 {
+            transfer.fail();
+        }
         transfer.real(&mut self.inflation);
         transfer.reals(&mut self.variance);
     }

@@ -1,9 +1,10 @@
 //! `χ²` without the standard library.
 
-/// Probability that `χ²` with `freedom > 0` degrees of freedom does not exceed `value`: `P(freedom/2, value/2)`.
+/// Probability that `χ²` with `freedom > 0` degrees of freedom does not exceed `value`:
+/// `P(freedom/2, value/2)`.
 ///
-/// Series below `value = freedom + 2`, continued fraction above (Press et al., *Numerical Recipes*, section 6.2);
-/// some 14 digits.
+/// Series below `value = freedom + 2`, continued fraction above (Press et al., *Numerical Recipes*, section
+/// 6.2); some 14 digits.
 pub(crate) fn chi_squared_probability(value: f64, freedom: f64) -> f64 {
     if value <= 0.0 {
         return 0.0;

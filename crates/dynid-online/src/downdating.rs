@@ -12,11 +12,12 @@ const STEEPEST: f64 = 1.0 - 1e-8;
 /// Relative error, as estimated from the rotations, beyond which the factor is refreshed.
 const LARGEST_ERROR: f64 = 1e-11;
 
-/// Removes the weighted row `[φ y]` from a factor that holds it, by mixed hyperbolic rotations; `row` is used up.
+/// Removes the weighted row `[φ y]` from a factor that holds it, by mixed hyperbolic rotations; `row` is used
+/// up.
 ///
-/// With `s = φ_i/R_ii` and `c = √((1 - s)(1 + s))`: `R ← (R - s φ)/c`, `φ ← c φ - s R`. Returns the largest `|s|`, which is
-/// infinite, with the factor spoilt, where rounding leaves no information. `amplified` are relative errors per parameter, which grow by
-/// `1/c²`.
+/// With `s = φ_i/R_ii` and `c = √((1 - s)(1 + s))`: `R ← (R - s φ)/c`, `φ ← c φ - s R`. Returns the largest
+/// `|s|`, which is infinite, with the factor spoilt, where rounding leaves no information. `amplified` are
+/// relative errors per parameter, which grow by `1/c²`.
 ///
 /// Sources: Golub & Van Loan, section 6.5.4; Bojanczyk, Brent, Van Dooren & de Hoog 1987.
 pub fn downdate(root: &mut SquareRoot, row: &mut [f64], amplified: &mut [f64]) -> f64 {
@@ -48,9 +49,9 @@ pub fn downdate(root: &mut SquareRoot, row: &mut [f64], amplified: &mut [f64]) -
 
 /// Window that moves sample by sample: new rows are added, those of the oldest sample removed.
 ///
-/// Removing rows loses digits where they carried most of a parameter's information. Therefore the factor is put together anew
-/// from a [`BlockWindow`] and the rows of its oldest block, once per window length, on a rotation with `|s| > 1 - 1e-8`,
-/// and when the errors that rotations amplified may exceed 1e-11.
+/// Removing rows loses digits where they carried most of a parameter's information. Therefore the factor is
+/// put together anew from a [`BlockWindow`] and the rows of its oldest block, once per window length, on a
+/// rotation with `|s| > 1 - 1e-8`, and when the errors that rotations amplified may exceed 1e-11.
 #[derive(Debug, Clone)]
 pub struct RowWindow {
     length: usize,
@@ -69,7 +70,8 @@ pub struct RowWindow {
 }
 
 impl RowWindow {
-    /// Window of `blocks · block_samples` samples with up to `rows` rows each, beside a prior that always counts.
+    /// Window of `blocks · block_samples` samples with up to `rows` rows each, beside a prior that always
+    /// counts.
     ///
     /// Panics unless all three are positive.
     pub fn new(prior: SquareRoot, block_samples: usize, blocks: usize, rows: usize) -> Self {
@@ -154,7 +156,7 @@ impl RowWindow {
         transfer.count(&mut self.held, self.length);
         transfer.reals(&mut self.amplified);
         transfer.count(&mut self.age, self.length);
-        transfer.integer(&mut self.refreshes);
+        transfer.counter(&mut self.refreshes);
         if self.held < self.blocks.samples() {
             transfer.fail();
         }

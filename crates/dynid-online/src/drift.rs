@@ -7,8 +7,9 @@ use crate::square_root::SquareRoot;
 
 /// Time update `P ← P + diag(q)` in square-root form; no covariance is formed.
 ///
-/// QR of `[[Q^{-1/2}, 0, 0], [-R, R, z]]` one column of process noise at a time, so that `R` stays triangular: `2 p³`
-/// operations if every parameter wanders, `6 p²` at most for each that does. The estimate stays.
+/// QR of `[[Q^{-1/2}, 0, 0], [-R, R, z]]` one column of process noise at a time, so that `R` stays
+/// triangular: `2 p³` operations if every parameter wanders, `6 p²` at most for each that does. The estimate
+/// stays.
 ///
 /// Source: Bierman 1977, chapter 6.
 #[derive(Debug, Clone)]

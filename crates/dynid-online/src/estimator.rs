@@ -5,44 +5,33 @@ use alloc::vec::Vec;
 use core::fmt::Write;
 
 use crate::change_detection::ChangeDetection;
-use crate::downdating::RowWindow;
 use crate::drift::Drift;
 use crate::error::{SampleError, SettingsError, StateError};
 use crate::excitation_monitor::ExcitationMonitor;
 use crate::forgetting::{
     BoundedCovariance, DirectionalForgetting, Forgetting, error_driven_factor, excess_error, relative_error,
 };
-use crate::innovation::{Innovation, cholesky, solve_lower};
+use crate::innovation::Innovation;
+use crate::memory::Memory;
 use crate::reaction::{Reaction, TargetedReaction};
+use crate::rows::{RowNoise, WeightedRows};
 use crate::settings::Settings;
 use crate::square_root::{SquareRoot, dot};
 use crate::state::{Fingerprint, Transfer};
-use crate::window::BlockWindow;
 
-/// Entries of weighted rows beyond this are refused, since squares of gains could overflow.
-const LARGEST: f64 = 1e75;
-/// Nothing is discounted once a diagonal entry of `R` is below this (parameters in scales): it would become zero.
+/// Nothing is discounted once a diagonal entry of `R` is below this (parameters in scales): it would become
+/// zero.
 const LEAST_PIVOT: f64 = 1e-50;
 /// First word of a saved state.
 const STATE_VERSION: u64 = 1;
-
-/// Noise of the rows of a sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum RowNoise<'a> {
-    /// Standard deviation of each row, in the unit of its effort; independent of each other.
-    Std(&'a [f64]),
-    /// Covariance of the rows, `m × m`, row by row; the lower triangle is read. Where regressors are measured, this is
-    /// the place for `xᵀ Σ_φ x`, which rows may have in common.
-    Covariance(&'a [f64]),
-}
 
 /// What a sample did.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// Number of the sample, from 0.
     pub sample: u64,
-    /// Factor by which old information was discounted (along the sample's directions, for directional forgetting); 1 if nothing
-    /// was.
+    /// Factor by which old information was discounted (along the sample's directions, for directional
+    /// forgetting); 1 if nothing was.
     pub lambda: f64,
     /// Mean square of the whitened innovations: 1 on average while model and noise are right.
     pub normalised_square: f64,
@@ -58,45 +47,11 @@ pub struct Step {
     pub frozen: usize,
 }
 
-/// Where information is kept.
-#[derive(Debug, Clone)]
-enum Memory {
-    Recursive(SquareRoot),
-    Blocks(BlockWindow),
-    Rows(RowWindow),
-}
-
-impl Memory {
-    fn root(&self) -> &SquareRoot {
-        match self {
-            Memory::Recursive(root) => root,
-            Memory::Blocks(window) => window.total(),
-            Memory::Rows(window) => window.total(),
-        }
-    }
-
-    /// Adds rows; a recursive memory uses them up.
-    fn push(&mut self, rows: &mut [f64]) {
-        match self {
-            Memory::Recursive(root) => root.push(rows),
-            Memory::Blocks(window) => window.push(rows),
-            Memory::Rows(window) => window.push(rows),
-        }
-    }
-
-    fn transfer(&mut self, transfer: &mut Transfer<'_>) {
-        match self {
-            Memory::Recursive(root) => root.transfer(transfer),
-            Memory::Blocks(window) => window.transfer(transfer),
-            Memory::Rows(window) => window.transfer(transfer),
-        }
-    }
-}
-
 /// Recursive estimator of `y = Φ x + noise`, sample by sample.
 ///
-/// Per sample: drift; innovations with the estimate so far; forgetting; the new rows; the new estimate; change detection. After
-/// an alarm, samples are held back until the reaction is decided ([`TargetedReaction`]).
+/// Per sample: drift; innovations with the estimate so far; forgetting; the new rows; the new estimate;
+/// change detection. After an alarm, samples are held back until the reaction is decided
+/// ([`TargetedReaction`]).
 ///
 /// Everything is allocated by [`Estimator::new`]. No state becomes non-finite whatever finite samples come.
 ///
@@ -131,36 +86,52 @@ pub struct Estimator {
     scaled: Vec<f64>,
     x: Vec<f64>,
     error: Vec<f64>,
-    rows: Vec<f64>,
-    noise: Vec<f64>,
+    rows: WeightedRows,
     never_frozen: Vec<bool>,
     prior_std: Vec<f64>,
     scratch: Vec<f64>,
 }
 
 impl Estimator {
-    /// Estimator before its first sample. Allocates all it needs; with change detection it takes some milliseconds.
+    /// Estimator before its first sample. Allocates all it needs; with change detection it takes some
+    /// milliseconds.
     ///
     /// # Errors
     /// [`SettingsError`] of [`Settings::validate`].
     pub fn new(settings: Settings) -> Result<Self, SettingsError> {
+        Self::prepare(settings, None)
+    }
+
+    /// Estimator that starts from what is known already, such as a log reduced to a factor, in place of the
+    /// prior.
+    ///
+    /// `information` has its parameters in scales, and rows divided by their deviations; it should contain a
+    /// prior where the log tells nothing. The estimate starts at its solution. Resets go back to the
+    /// deviations of the settings, and with windows it always counts, as a prior does.
+    ///
+    /// # Errors
+    /// [`SettingsError`] of [`Settings::validate`], and if `information` has other parameters or is singular.
+    pub fn starting_from(settings: Settings, information: SquareRoot) -> Result<Self, SettingsError> {
+        Self::prepare(settings, Some(information))
+    }
+
+    fn prepare(settings: Settings, information: Option<SquareRoot>) -> Result<Self, SettingsError> {
         settings.validate()?;
         let (p, m) = (settings.columns(), settings.rows);
         let in_scales =
             |list: &[f64]| -> Vec<f64> { list.iter().zip(&settings.scale).map(|(v, s)| v / s).collect() };
-        let (start, prior_std) = (in_scales(&settings.start), in_scales(&settings.prior_std));
-        let information: Vec<f64> = prior_std.iter().map(|s| 1.0 / (s * s)).collect();
-        let shares = |share: f64| -> Vec<f64> { information.iter().map(|i| share * i).collect() };
-        let root = SquareRoot::from_prior(&start, &prior_std);
-        let memory = match settings.forgetting {
-            Forgetting::BlockWindow { samples, blocks } => {
-                Memory::Blocks(BlockWindow::new(root, samples / blocks, blocks, m))
-            }
-            Forgetting::RowWindow { samples, blocks } => {
-                Memory::Rows(RowWindow::new(root, samples / blocks, blocks, m))
-            }
-            _ => Memory::Recursive(root),
-        };
+        let (mut start, prior_std) = (in_scales(&settings.start), in_scales(&settings.prior_std));
+        let shares = |share: f64| -> Vec<f64> { prior_std.iter().map(|s| share / (s * s)).collect() };
+        let root = information.unwrap_or_else(|| SquareRoot::from_prior(&start, &prior_std));
+        if root.columns() != p {
+            let what = "parameters of the information to start from";
+            return Err(SettingsError::Length { what, expected: p, found: root.columns() });
+        }
+        if !root.solve(&mut start) || start.iter().any(|x| !x.is_finite()) {
+            let what = "the information to start from is singular: add a prior";
+            return Err(SettingsError::Combination { what });
+        }
+        let memory = Memory::new(&settings.forgetting, root, m);
         let drift = match &settings.forgetting {
             Forgetting::Drift { rate, interval } => {
                 let variance: Vec<f64> = in_scales(rate).iter().map(|r| r * r * interval).collect();
@@ -173,6 +144,7 @@ impl Estimator {
         let mut fingerprint = Fingerprint::new();
         // Writing into a hash cannot fail.
         let _ = write!(fingerprint, "{settings:?}");
+        let x = start.iter().zip(&settings.scale).map(|(x, scale)| x * scale).collect();
         Ok(Self {
             fingerprint: fingerprint.0,
             memory,
@@ -184,11 +156,10 @@ impl Estimator {
             reaction: settings.reaction.map(|s| TargetedReaction::new(&s, p, m)),
             innovation: Innovation::new(p, m),
             samples: 0,
-            x: settings.start.clone(),
+            x,
             scaled: start,
             error: vec![0.0; m],
-            rows: vec![0.0; m * (p + 1)],
-            noise: vec![0.0; m * m],
+            rows: WeightedRows::new(&settings.scale, m),
             never_frozen: vec![false; p],
             prior_std,
             scratch: vec![0.0; 2 * p + 1],
@@ -201,7 +172,8 @@ impl Estimator {
     /// `regressor`: `m × p`, row by row, effort per parameter unit; `effort`: `m` entries.
     ///
     /// # Errors
-    /// [`SampleError`]: lengths that do not fit, numbers that are not finite, noise that is none. The estimator is then as it was before.
+    /// [`SampleError`]: lengths that do not fit, numbers that are not finite, noise that is none. The
+    /// estimator is then as it was before.
     pub fn step(
         &mut self,
         regressor: &[f64],
@@ -209,8 +181,7 @@ impl Estimator {
         noise: RowNoise<'_>,
     ) -> Result<Step, SampleError> {
         let m = effort.len();
-        self.weigh(regressor, effort, noise)?;
-        let rows = &mut self.rows[..m * (self.x.len() + 1)];
+        self.rows.load(regressor, effort, noise)?;
         let frozen = self.monitor.as_ref().map_or(self.never_frozen.as_slice(), |m| m.frozen());
         if let (Some(drift), Memory::Recursive(root)) = (&mut self.drift, &mut self.memory) {
             drift.advance(root, frozen);
@@ -220,17 +191,17 @@ impl Estimator {
         {
             *error = y - dot(phi, &self.x);
         }
-        self.innovation.evaluate(self.memory.root(), &self.scaled, rows);
+        self.innovation.evaluate(self.memory.root(), &self.scaled, self.rows.get());
         if let Some(monitor) = &mut self.monitor {
-            monitor.push(rows);
+            monitor.push(self.rows.get());
         }
         let held_back = self.reaction.as_ref().is_some_and(TargetedReaction::is_active);
         let (mut lambda, mut alarm, mut reaction) = (1.0, false, None);
         if held_back {
-            reaction = self.hold_back(m);
+            reaction = self.hold_back();
         } else {
             lambda = self.forget(effort);
-            self.memory.push(&mut self.rows[..m * (self.x.len() + 1)]);
+            self.memory.push(self.rows.get_mut());
             self.solve();
             if let Some(detection) = &mut self.detection {
                 alarm = detection.push(self.innovation.whitened());
@@ -253,62 +224,6 @@ impl Estimator {
         })
     }
 
-    /// Writes whitened rows `[φ y]` with parameters in scales; on errors only this workspace has changed.
-    fn weigh(&mut self, regressor: &[f64], effort: &[f64], noise: RowNoise<'_>) -> Result<(), SampleError> {
-        let (p, m) = (self.x.len(), effort.len());
-        if m == 0 || m > self.settings.rows {
-            return Err(SampleError::Rows { most: self.settings.rows, found: m });
-        }
-        let (what, list, expected) = match noise {
-            RowNoise::Std(list) => ("row deviations", list, m),
-            RowNoise::Covariance(list) => ("row covariance", list, m * m),
-        };
-        for (what, list, expected) in [("regressor", regressor, m * p), (what, list, expected)] {
-            if list.len() != expected {
-                return Err(SampleError::Length { what, expected, found: list.len() });
-            }
-        }
-        for (what, list) in [("regressor", regressor), ("effort", effort), (what, list)] {
-            if let Some(index) = list.iter().position(|v| !v.is_finite()) {
-                return Err(SampleError::NotFinite { what, index });
-            }
-        }
-        let rows = &mut self.rows[..m * (p + 1)];
-        let given = regressor.chunks_exact(p).zip(effort);
-        for (row, (phi, y)) in rows.chunks_exact_mut(p + 1).zip(given) {
-            for (entry, (f, s)) in row.iter_mut().zip(phi.iter().zip(&self.settings.scale)) {
-                *entry = f * s;
-            }
-            row[p] = *y;
-        }
-        match noise {
-            RowNoise::Std(list) => {
-                for (i, (row, std)) in rows.chunks_exact_mut(p + 1).zip(list).enumerate() {
-                    if *std <= 0.0 {
-                        return Err(SampleError::Noise { row: i });
-                    }
-                    row.iter_mut().for_each(|v| *v /= std);
-                }
-            }
-            RowNoise::Covariance(list) => {
-                let factor = &mut self.noise[..m * m];
-                factor.copy_from_slice(list);
-                cholesky(factor, m).map_err(|row| SampleError::Noise { row })?;
-                solve_lower(factor, m, rows, p + 1);
-            }
-        }
-        match rows.iter().position(|v| v.is_nan() || v.abs() > LARGEST) {
-            Some(place) if place % (p + 1) == p => {
-                Err(SampleError::NotFinite { what: "effort", index: place / (p + 1) })
-            }
-            Some(place) => {
-                let index = place / (p + 1) * p + place % (p + 1);
-                Err(SampleError::NotFinite { what: "regressor", index })
-            }
-            None => Ok(()),
-        }
-    }
-
     /// Forgets and returns the factor.
     fn forget(&mut self, effort: &[f64]) -> f64 {
         let m = effort.len();
@@ -323,12 +238,12 @@ impl Estimator {
             _ => 1.0,
         };
         let Memory::Recursive(root) = &mut self.memory else { return 1.0 };
-        if lambda >= 1.0 || (0..self.x.len()).any(|j| root.row(j)[0] < LEAST_PIVOT) {
+        if lambda.is_nan() || lambda >= 1.0 || (0..self.x.len()).any(|j| root.row(j)[0] < LEAST_PIVOT) {
             return 1.0;
         }
         match (&self.settings.forgetting, &mut self.directional, &mut self.monitor) {
             (Forgetting::Directional { tolerance, .. }, Some(directional), _) => {
-                directional.forget(root, &self.rows[..m * (self.x.len() + 1)], lambda, *tolerance);
+                directional.forget(root, self.rows.get(), lambda, *tolerance);
             }
             (_, _, Some(monitor)) => monitor.discount(root, lambda),
             _ => root.discount(lambda),
@@ -340,11 +255,11 @@ impl Estimator {
     }
 
     /// Gives the sample to the reaction, which it may complete.
-    fn hold_back(&mut self, m: usize) -> Option<Reaction> {
+    fn hold_back(&mut self) -> Option<Reaction> {
         let (Some(reaction), Memory::Recursive(root)) = (&mut self.reaction, &mut self.memory) else {
             return None;
         };
-        if !reaction.push(&self.rows[..m * (self.x.len() + 1)]) {
+        if !reaction.push(self.rows.get()) {
             return None;
         }
         let inflation = self.detection.as_ref().map_or(1.0, ChangeDetection::inflation);
@@ -355,7 +270,9 @@ impl Estimator {
     }
 
     fn solve(&mut self) {
-        if self.memory.root().solve(&mut self.scaled) {
+        let found = &mut self.scratch[..self.x.len()];
+        if self.memory.root().solve(found) && found.iter().all(|x| x.is_finite()) {
+            self.scaled.copy_from_slice(found);
             self.publish();
         }
     }
@@ -373,8 +290,8 @@ impl Estimator {
 
     /// Writes the standard deviation of each parameter, in its unit (`p` entries).
     ///
-    /// They hold for row noise as stated and white; [`ChangeDetection::inflation`] says by how much variances fall short where
-    /// it was learned.
+    /// They hold for row noise as stated and white; [`ChangeDetection::inflation`] says by how much variances
+    /// fall short where it was learned.
     pub fn std(&mut self, out: &mut [f64]) {
         assert_eq!(out.len(), self.x.len(), "one deviation per parameter");
         let root = self.memory.root();
@@ -469,10 +386,12 @@ impl Estimator {
         Ok(())
     }
 
-    /// Adds the standard deviation `std`, in the parameter's unit, to parameter `j` alone; the estimate stays.
+    /// Adds the standard deviation `std`, in the parameter's unit, to parameter `j` alone; the estimate
+    /// stays.
     ///
     /// # Errors
-    /// [`SettingsError`] with windows, for `j` beyond the last parameter, and unless `std` is finite and not negative.
+    /// [`SettingsError`] with windows, for `j` beyond the last parameter, and unless `std` is finite and not
+    /// negative.
     pub fn open(&mut self, j: usize, std: f64) -> Result<(), SettingsError> {
         let p = self.x.len();
         let Memory::Recursive(root) = &mut self.memory else { return Err(WINDOW) };
@@ -491,7 +410,8 @@ impl Estimator {
 
     /// The whole state as words of 64 bits, for any file format. Real numbers are their bits.
     ///
-    /// An estimator that loads them continues with the same bits as one that was never interrupted. Allocates.
+    /// An estimator that loads them continues with the same bits as one that was never interrupted. What
+    /// [`Step`] and the accessors say of the last sample is not part of it. Allocates.
     pub fn save(&self) -> Vec<u64> {
         let mut words = Vec::new();
         self.clone().transfer(&mut Transfer::Save(&mut words));
@@ -515,9 +435,12 @@ impl Estimator {
     fn transfer(&mut self, transfer: &mut Transfer<'_>) {
         transfer.fingerprint(STATE_VERSION);
         transfer.fingerprint(self.fingerprint);
-        transfer.integer(&mut self.samples);
+        transfer.counter(&mut self.samples);
         transfer.reals(&mut self.scaled);
         self.memory.transfer(transfer);
+        if !self.memory.root().is_regular() {
+            transfer.fail();
+        }
         if let Some(bounded) = &mut self.bounded {
             bounded.transfer(transfer);
         }

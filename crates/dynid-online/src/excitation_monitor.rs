@@ -12,9 +12,10 @@ const REGULARISATION: f64 = 1e-8;
 
 /// Information gained along each parameter in a stretch of samples, and what is not excited by it.
 ///
-/// The figure is `1/((ΦᵀΦ)⁻¹)_jj` over the stretch: what is left of a parameter's information when all others are unknown too. The plain
-/// column norm would call viscous and Coulomb friction excited at any one speed, where only their sum is. Parameters that gain less
-/// than the threshold are frozen: their joint covariance is kept when the rest forgets.
+/// The figure is `1/((ΦᵀΦ)⁻¹)_jj` over the stretch: what is left of a parameter's information when all others
+/// are unknown too. The plain column norm would call viscous and Coulomb friction excited at any one speed,
+/// where only their sum is. Parameters that gain less than the threshold are frozen: their joint covariance
+/// is kept when the rest forgets.
 ///
 /// Figures are formed once per stretch and hold for the next; nothing is frozen in the first.
 #[derive(Debug, Clone)]
@@ -34,8 +35,8 @@ pub struct ExcitationMonitor {
 }
 
 impl ExcitationMonitor {
-    /// Stretches of `samples` with up to `rows` rows each; `threshold`: least information per parameter, in inverse squares of
-    /// its unit, positive.
+    /// Stretches of `samples` with up to `rows` rows each; `threshold`: least information per parameter, in
+    /// inverse squares of its unit, positive.
     pub fn new(threshold: &[f64], samples: usize, rows: usize) -> Self {
         let p = threshold.len();
         let std: Vec<f64> = threshold.iter().map(|t| 1.0 / libm::sqrt(REGULARISATION * t)).collect();
@@ -76,7 +77,8 @@ impl ExcitationMonitor {
         self.count = 0;
     }
 
-    /// Information gained per parameter in the last whole stretch, in inverse squares of its unit; zeros before.
+    /// Information gained per parameter in the last whole stretch, in inverse squares of its unit; zeros
+    /// before.
     pub fn information(&self) -> &[f64] {
         &self.information
     }
@@ -91,10 +93,11 @@ impl ExcitationMonitor {
         self.frozen_count
     }
 
-    /// Discounts information by `lambda`, but keeps the joint covariance of the frozen parameters; the estimate stays.
+    /// Discounts information by `lambda`, but keeps the joint covariance of the frozen parameters; the
+    /// estimate stays.
     ///
-    /// With `U` an orthonormal basis of the columns `R⁻ᵀ e_j` of frozen `j`, `RᵀR ← λ RᵀR + (1 - λ) RᵀU UᵀR`: a discount and one row
-    /// per frozen parameter. `root` must be regular.
+    /// With `U` an orthonormal basis of the columns `R⁻ᵀ e_j` of frozen `j`, `RᵀR ← λ RᵀR + (1 - λ) RᵀU UᵀR`:
+    /// a discount and one row per frozen parameter. `root` must be regular.
     pub fn discount(&mut self, root: &mut SquareRoot, lambda: f64) {
         let p = root.columns();
         if self.frozen_count == p {

@@ -16,8 +16,8 @@ pub enum Forgetting {
         /// `λ`.
         lambda: f64,
     },
-    /// [`error_driven_factor`] of the [`relative_error`] of the sample's efforts (Sun et al., Eq. 44). Published: `α = 0.05`,
-    /// `β = -4.68`.
+    /// [`error_driven_factor`] of the [`relative_error`] of the sample's efforts (Sun et al., Eq. 44).
+    /// Published: `α = 0.05`, `β = -4.68`.
     ErrorDriven {
         /// `α` in `[0, 1)`: the most that one sample forgets.
         alpha: f64,
@@ -26,8 +26,8 @@ pub enum Forgetting {
         /// Efforts below this count as this large, in their unit; positive.
         floor: f64,
     },
-    /// [`error_driven_factor`] of `max(0, rms(u) - d)/d` with the whitened innovations `u` and the dead zone `d`: errors
-    /// that noise explains forget nothing, whatever the size of the efforts.
+    /// [`error_driven_factor`] of `max(0, rms(u) - d)/d` with the whitened innovations `u` and the dead zone
+    /// `d`: errors that noise explains forget nothing, whatever the size of the efforts.
     NoiseNormalised {
         /// `α` in `[0, 1)`.
         alpha: f64,
@@ -36,12 +36,13 @@ pub enum Forgetting {
         /// Dead zone `d`, in standard deviations; positive, 3 is usual.
         dead_zone: f64,
     },
-    /// Information times `λ` in the directions of the sample alone: what it does not excite is kept (Cao & Schwartz 2000).
+    /// Information times `λ` in the directions of the sample alone: what it does not excite is kept (Cao &
+    /// Schwartz 2000).
     Directional {
         /// `λ` in `(0, 1]`.
         lambda: f64,
-        /// Directions with `‖R φ‖` below this share of `‖φ‖` are dropped (rows in units of their deviations, parameters in units of their
-        /// scales); 1e-6 is usual.
+        /// Directions with `‖R φ‖` below this share of `‖φ‖` are dropped (rows in units of their deviations,
+        /// parameters in units of their scales); 1e-6 is usual.
         tolerance: f64,
     },
     /// Parameters that wander: `P ← P + Q dt` with `Q = diag(rate²)`, the time update of the Kalman filter.
@@ -51,8 +52,8 @@ pub enum Forgetting {
         /// Time between samples, s.
         interval: f64,
     },
-    /// The last samples alone, in steps of a block: between `samples - samples/blocks + 1` and `samples` count
-    /// ([`crate::BlockWindow`]). The prior always counts.
+    /// The last samples alone, in steps of a block: between `samples - samples/blocks + 1` and `samples`
+    /// count ([`crate::BlockWindow`]). The prior always counts.
     BlockWindow {
         /// Length of the window, samples; a multiple of `blocks`.
         samples: usize,
@@ -73,7 +74,8 @@ pub fn error_driven_factor(relative_error: f64, alpha: f64, beta: f64) -> f64 {
     (1.0 - alpha) + alpha * libm::exp(beta * relative_error * relative_error)
 }
 
-/// `ε`: root mean square over rows of `|e|/max(|y|, floor)`, with the errors `e` of the prediction before the sample is used.
+/// `ε`: root mean square over rows of `|e|/max(|y|, floor)`, with the errors `e` of the prediction before the
+/// sample is used.
 ///
 /// The published rule leaves `ε` open; this is our choice.
 pub fn relative_error(errors: &[f64], efforts: &[f64], floor: f64) -> f64 {
@@ -87,10 +89,11 @@ pub fn excess_error(whitened: &[f64], dead_zone: f64) -> f64 {
     (libm::sqrt(square / whitened.len().max(1) as f64) - dead_zone).max(0.0) / dead_zone
 }
 
-/// Forgetting along the rows of a sample: `[R z] ← (1 - (1 - √λ) V Vᵀ) [R z]` with `V` an orthonormal basis of `R Φᵀ`.
+/// Forgetting along the rows of a sample: `[R z] ← (1 - (1 - √λ) V Vᵀ) [R z]` with `V` an orthonormal basis
+/// of `R Φᵀ`.
 ///
-/// Information falls by `(1 - λ) Rᵀ V Vᵀ R`, the estimate stays. Done by rotations that keep `R` triangular. `ρ²` and `N` lose the share
-/// `λ` whole.
+/// Information falls by `(1 - λ) Rᵀ V Vᵀ R`, the estimate stays. Done by rotations that keep `R` triangular.
+/// `ρ²` and `N` lose the share `λ` whole.
 ///
 /// Source: Cao & Schwartz 2000, for several rows.
 #[derive(Debug, Clone)]
@@ -164,45 +167,47 @@ fn norm(v: &[f64]) -> f64 {
     largest * libm::sqrt(v.iter().map(|v| (v / largest) * (v / largest)).sum())
 }
 
+/// Share of its floor that a parameter may lose before it is put back.
+const RIPPLE: f64 = 0.05;
+
 /// Floor under the information: where nothing comes in, each parameter keeps about the information `δ_j`.
 ///
-/// After a discount by `λ`, `n` rows `√(δ_i p (1 - λ)/n) e_i` with target `x_i` are added, `i` running through the
-/// parameters. `n` is the least for which the share of a round stays below 0.1, so that the floor ripples by no more than
-/// some 5 % either way. The estimate stays.
+/// A parameter that has been discounted to `c < 0.95` in all since its last turn gets the row
+/// `√(1.025 δ_j (1 - c)) e_j` with target `x_j`, so that the floor ripples by 2.5 % either way, or by what a
+/// single sample forgets. Turns are staggered. The estimate stays.
 #[derive(Debug, Clone)]
 pub struct BoundedCovariance {
     floor: Vec<f64>,
-    next: usize,
+    left: Vec<f64>,
     row: Vec<f64>,
 }
 
 impl BoundedCovariance {
     /// `floor`: least information `δ_j` per parameter, in inverse squares of its unit.
     pub fn new(floor: &[f64]) -> Self {
-        Self { floor: floor.to_vec(), next: 0, row: vec![0.0; floor.len() + 1] }
+        let p = floor.len();
+        let left = (0..p).map(|j| 1.0 - RIPPLE * j as f64 / p as f64).collect();
+        Self { floor: floor.to_vec(), left, row: vec![0.0; p + 1] }
     }
 
     /// Puts back what a discount by `lambda` takes from the floor; `x` is the estimate.
     pub fn hold(&mut self, root: &mut SquareRoot, x: &[f64], lambda: f64) {
         let p = root.columns();
-        let round = p as f64 * (1.0 - lambda);
-        if round <= 0.0 {
-            return;
-        }
-        let count = (libm::ceil(round / 0.1) as usize).clamp(1, p);
-        for _ in 0..count {
-            let i = self.next;
-            self.next = (i + 1) % p;
-            let size = libm::sqrt(self.floor[i] * round / count as f64);
+        for (j, x) in x.iter().enumerate().take(p) {
+            self.left[j] *= lambda;
+            if self.left[j] > 1.0 - RIPPLE {
+                continue;
+            }
+            let size = libm::sqrt((1.0 + 0.5 * RIPPLE) * self.floor[j] * (1.0 - self.left[j]));
+            self.left[j] = 1.0;
             self.row.fill(0.0);
-            self.row[i] = size;
-            self.row[p] = size * x[i];
-            root.push_pseudo(i, &mut self.row);
+            self.row[j] = size;
+            self.row[p] = size * x;
+            root.push_pseudo(j, &mut self.row);
         }
     }
 
     pub(crate) fn transfer(&mut self, transfer: &mut crate::state::Transfer<'_>) {
-        let last = self.floor.len() - 1;
-        transfer.count(&mut self.next, last);
+        transfer.reals(&mut self.left);
     }
 }

@@ -5,18 +5,24 @@ use alloc::vec::Vec;
 
 use crate::square_root::{SquareRoot, dot};
 
+/// Whitened innovations are cut off here, so that their squares stay finite.
+const LARGEST: f64 = 1e100;
+
 /// Errors of the prediction before a sample is used, and what is to be expected of them.
 ///
-/// `e = y - Φ x`, `Σ_e = Σ_row + Φ P Φᵀ` with `P = (RᵀR)⁻¹`, `u = chol(Σ_e)⁻¹ e`, which is `N(0, 1)` while the model holds.
-/// Rows come whitened, that is multiplied by `chol(Σ_row)⁻¹`, so that `Σ_e = 1 + GᵀG` with `G = R⁻ᵀ Φᵀ`; `u` is the same.
+/// `e = y - Φ x`, `Σ_e = Σ_row + Φ P Φᵀ` with `P = (RᵀR)⁻¹`, `u = chol(Σ_e)⁻¹ e`, which is `N(0, 1)` while
+/// the model holds. Rows come whitened, that is multiplied by `chol(Σ_row)⁻¹`, so that `Σ_e = 1 + GᵀG` with
+/// `G = R⁻ᵀ Φᵀ`; `u` is the same.
 ///
-/// `Σ_row` should contain the noise of a measured regressor, `xᵀ Σ_φ x`, also where it is common to rows: without it
-/// the rate of false alarms is off by orders of magnitude.
+/// `Σ_row` should contain the noise of a measured regressor, `xᵀ Σ_φ x`, also where it is common to rows:
+/// without it the rate of false alarms is off by orders of magnitude.
 #[derive(Debug, Clone)]
 pub struct Innovation {
     columns: usize,
     rows: usize,
+    /// Columns of `[G; 1]`, one after the other, orthonormalised in place.
     gain: Vec<f64>,
+    /// `T` with `TᵀT = Σ_e` of whitened rows, row by row.
     factor: Vec<f64>,
     error: Vec<f64>,
     whitened: Vec<f64>,
@@ -28,7 +34,7 @@ impl Innovation {
         Self {
             columns,
             rows: 0,
-            gain: vec![0.0; columns * rows],
+            gain: vec![0.0; (columns + rows) * rows],
             factor: vec![0.0; rows * rows],
             error: vec![0.0; rows],
             whitened: vec![0.0; rows],
@@ -38,29 +44,36 @@ impl Innovation {
     /// Evaluates whitened rows `[φ y]` of `p + 1` entries each at the estimate `x`; `root` must be regular.
     pub fn evaluate(&mut self, root: &SquareRoot, x: &[f64], rows: &[f64]) {
         let p = self.columns;
-        self.rows = rows.len() / (p + 1);
+        let m = rows.len() / (p + 1);
+        let length = p + m;
+        self.rows = m;
         for (i, row) in rows.chunks_exact(p + 1).enumerate() {
             self.error[i] = row[p] - dot(&row[..p], x);
-            self.gain[i * p..(i + 1) * p].copy_from_slice(&row[..p]);
+            let column = &mut self.gain[i * length..(i + 1) * length];
+            column[..p].copy_from_slice(&row[..p]);
+            root.solve_transposed(&mut column[..p]);
+            column[p..].fill(0.0);
+            column[p + i] = 1.0;
         }
-        for g in self.gain[..self.rows * p].chunks_exact_mut(p) {
-            root.solve_transposed(g);
-        }
-        let m = self.rows;
+        self.whitened[..m].copy_from_slice(&self.error[..m]);
+        // Gram-Schmidt on [G; 1] instead of Cholesky on 1 + GᵀG: entry i of the lower part of column i stays
+        // 1, so no pivot falls below 1 however large and parallel the gains.
         for i in 0..m {
-            for k in 0..=i {
-                let own = if i == k { 1.0 } else { 0.0 };
-                self.factor[i * m + k] =
-                    own + dot(&self.gain[i * p..(i + 1) * p], &self.gain[k * p..(k + 1) * p]);
+            let (done, later) = self.gain[i * length..m * length].split_at_mut(length);
+            let size = libm::sqrt(dot(done, done));
+            done.iter_mut().for_each(|q| *q /= size);
+            self.factor[i * m + i] = size;
+            self.whitened[i] = (self.whitened[i] / size).clamp(-LARGEST, LARGEST);
+            for (k, column) in (i + 1..m).zip(later.chunks_exact_mut(length)) {
+                let along = dot(done, column);
+                column.iter_mut().zip(done.iter()).for_each(|(g, q)| *g -= along * q);
+                self.factor[i * m + k] = along;
+                self.whitened[k] -= along * self.whitened[i];
             }
         }
-        let definite = cholesky(&mut self.factor[..m * m], m).is_ok();
-        debug_assert!(definite, "1 + GᵀG is positive definite");
-        self.whitened[..m].copy_from_slice(&self.error[..m]);
-        solve_lower(&self.factor[..m * m], m, &mut self.whitened[..m], 1);
     }
 
-    /// Whitened innovations `u`, one per row.
+    /// Whitened innovations `u`, one per row, within ±1e100.
     pub fn whitened(&self) -> &[f64] {
         &self.whitened[..self.rows]
     }
@@ -72,11 +85,12 @@ impl Innovation {
 
     /// Variance of the error of whitened row `row`, `1 + φ P φᵀ`.
     pub fn variance(&self, row: usize) -> f64 {
-        self.factor[row * self.rows..][..=row].iter().map(|l| l * l).sum()
+        (0..=row).map(|k| self.factor[k * self.rows + row]).map(|t| t * t).sum()
     }
 }
 
-/// Cholesky factor `L` in the lower triangle of a symmetric `m × m` matrix; the first row without a positive pivot on failure.
+/// Cholesky factor `L` in the lower triangle of a symmetric `m × m` matrix; the first row without a positive
+/// pivot on failure.
 pub(crate) fn cholesky(a: &mut [f64], m: usize) -> Result<(), usize> {
     for j in 0..m {
         for i in j..m {

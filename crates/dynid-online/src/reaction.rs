@@ -22,26 +22,30 @@ pub struct Reaction {
     pub share: f64,
     /// Estimated jump of `best`, in its unit.
     pub jump: f64,
-    /// Fall of the residual sum of squares when the samples before and after get parameters of their own (Chow 1960), in
-    /// units of the noise variance.
+    /// Fall of the residual sum of squares when the samples before and after get parameters of their own
+    /// (Chow 1960), in units of the noise variance.
     pub total_gain: f64,
-    /// Whether the total gain is more than chance would give; if not, the alarm was false and nothing was opened.
+    /// Whether the total gain is more than chance would give; if not, the alarm was false and nothing was
+    /// opened.
     pub confirmed: bool,
 }
 
 /// Compares the samples after an alarm with what was known before, and opens the covariance of what changed.
 ///
-/// With `(R, z)` of before and `(R_w, z_w)` of the samples after the alarm: the gain of a jump of parameter `j` is what the residual sum of
-/// squares of `[[R, 0, z], [R_w, R_w e_j, z_w]]` lies below that of `[[R, z], [R_w, z_w]]`; the total gain is that of two free fits. If the best
-/// `j` explains the wanted share, its variance grows by `(opening · unit)²`, else that of all. Then the samples are merged.
+/// With `(R, z)` of before and `(R_w, z_w)` of the samples after the alarm: the gain of a jump of parameter
+/// `j` is what the residual sum of squares of `[[R, 0, z], [R_w, R_w e_j, z_w]]` lies below that of
+/// `[[R, z], [R_w, z_w]]`; the total gain is that of two free fits. If the best `j` explains the wanted
+/// share, its variance grows by `(opening · unit)²`, else that of all. Then the samples are merged.
 ///
-/// Falling forgetting factors react to the same errors, but recover before old samples are gone; this names the parameter besides.
+/// Falling forgetting factors react to the same errors, but recover before old samples are gone; this names
+/// the parameter besides.
 #[derive(Debug, Clone)]
 pub struct TargetedReaction {
     samples: usize,
     share: f64,
     opening: f64,
     significant: f64,
+    significant_alone: f64,
     window: SquareRoot,
     none: SquareRoot,
     merged: SquareRoot,
@@ -57,7 +61,8 @@ pub struct TargetedReaction {
 }
 
 impl TargetedReaction {
-    /// For `columns` parameters and up to `rows` rows a sample. Settings must be valid ([`crate::Settings::validate`]).
+    /// For `columns` parameters and up to `rows` rows a sample. Settings must be valid
+    /// ([`crate::Settings::validate`]).
     pub fn new(settings: &ReactionSettings, columns: usize, rows: usize) -> Self {
         let p = columns;
         let none = SquareRoot::new(p);
@@ -66,6 +71,7 @@ impl TargetedReaction {
             share: settings.share,
             opening: settings.opening,
             significant: chi_squared_upper_quantile(settings.level, p as f64),
+            significant_alone: chi_squared_upper_quantile(settings.named_level / p as f64, 1.0),
             window: none.clone(),
             merged: none.clone(),
             none,
@@ -109,8 +115,8 @@ impl TargetedReaction {
 
     /// Judges the collected samples, opens what changed in `root` and merges them.
     ///
-    /// `inflation`: by how much gains are overstated because innovations are coloured or larger than stated, at least 1. Parameters count in
-    /// the units of `root`.
+    /// `inflation`: by how much gains are overstated because innovations are coloured or larger than stated,
+    /// at least 1. Parameters count in the units of `root`.
     pub fn finish(&mut self, root: &mut SquareRoot, inflation: f64) -> Reaction {
         self.active = false;
         let p = root.columns();
@@ -131,8 +137,9 @@ impl TargetedReaction {
                 }
             }
         }
-        let confirmed = total_gain > self.significant * inflation;
         let share = if total_gain > 0.0 { (best.1 / total_gain).min(1.0) } else { 0.0 };
+        let alone = share >= self.share && best.1 > self.significant_alone * inflation;
+        let confirmed = alone || total_gain > self.significant * inflation;
         let parameter = (confirmed && share >= self.share).then_some(best.0);
         let variance = self.opening * self.opening;
         match parameter {

@@ -15,22 +15,24 @@ pub struct Settings {
     pub start: Vec<f64>,
     /// Prior standard deviation of each parameter, in its unit; finite and positive.
     pub prior_std: Vec<f64>,
-    /// Scale of each parameter, in its unit: columns are multiplied by it, and openings and tolerances count in it. Default:
-    /// the prior standard deviations.
+    /// Scale of each parameter, in its unit: columns are multiplied by it, and openings and tolerances count
+    /// in it. Default: the prior standard deviations.
     pub scale: Vec<f64>,
     /// Most rows per sample, such as the number of joints.
     pub rows: usize,
     /// How old samples lose their weight. Default: they do not.
     pub forgetting: Forgetting,
-    /// Least information per parameter as a share of the prior's ([`crate::BoundedCovariance`]); 1 keeps variances from
-    /// growing beyond the prior's. With constant, error-driven and noise-normalised forgetting. Default: none.
+    /// Least information per parameter as a share of the prior's ([`crate::BoundedCovariance`]); 1 keeps
+    /// variances from growing beyond the prior's. With constant, error-driven and noise-normalised
+    /// forgetting. Default: none.
     pub bounded_covariance: Option<f64>,
-    /// Freezes what is not excited ([`crate::ExcitationMonitor`]). Not with directional forgetting and windows. Default: none.
+    /// Freezes what is not excited ([`crate::ExcitationMonitor`]). Not with directional forgetting and
+    /// windows. Default: none.
     pub monitor: Option<MonitorSettings>,
     /// Alarms on changes ([`crate::ChangeDetection`]). Default: with the defaults of [`DetectionSettings`].
     pub detection: Option<DetectionSettings>,
-    /// What an alarm is answered with ([`crate::TargetedReaction`]); needs `detection`, not with windows. Default: with the defaults of
-    /// [`ReactionSettings`].
+    /// What an alarm is answered with ([`crate::TargetedReaction`]); needs `detection`, not with windows.
+    /// Default: with the defaults of [`ReactionSettings`].
     pub reaction: Option<ReactionSettings>,
 }
 
@@ -72,8 +74,9 @@ pub enum Whiteness {
     White,
     /// One of so many samples is used; their noise is as stated.
     Every(usize),
-    /// Nothing: size and correlation time are learned ([`crate::InnovationCorrelation`]); no alarm before the end of the first
-    /// `samples`.
+    /// Nothing: size and correlation time (up to a fifth of `samples`) are learned
+    /// ([`crate::InnovationCorrelation`]); no alarm before the end of the first `samples`. Alarms are then
+    /// rarer than asked for, up to ten times with coloured innovations.
     Learned {
         /// Samples to learn from at first, at least 50.
         samples: usize,
@@ -83,9 +86,11 @@ pub enum Whiteness {
 /// Settings of change detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DetectionSettings {
-    /// Ratio `κ > 1` of variances that is looked for. Default 1.5.
+    /// Ratio `κ > 1` of variances that is looked for. What raises the mean square of innovations by less than
+    /// `κ ln κ/(κ - 1)` (1.22 at 1.5, 1.05 at 1.1) is never found; a smaller `κ` takes longer. Default 1.5.
     pub kappa: f64,
-    /// Squares of single whitened innovations are clipped at this, so that one outlier is no alarm. Default 25.
+    /// Squares of single whitened innovations are clipped at this, so that one outlier is no alarm. Default
+    /// 25.
     pub clip: f64,
     /// How often an alarm may be false. Default: 1 % in a million samples.
     pub false_alarms: FalseAlarms,
@@ -113,13 +118,18 @@ pub struct ReactionSettings {
     pub share: f64,
     /// Standard deviation added to what changed, in scales. Default 0.3.
     pub opening: f64,
-    /// An alarm counts as false if chance alone would give its total gain with more than this probability. Default 0.01.
+    /// Everything is opened if chance alone would give the total gain with less than this probability.
+    /// Default 1e-6: real changes are far beyond, while opening everything by mistake costs all that is
+    /// known, and stated noise is never quite right.
     pub level: f64,
+    /// A named parameter is opened if chance alone would give its gain, or that of any other parameter, with
+    /// less than this probability. Default 0.01: a mistake costs what is known of one parameter.
+    pub named_level: f64,
 }
 
 impl Default for ReactionSettings {
     fn default() -> Self {
-        Self { samples: 100, share: 0.6, opening: 0.3, level: 0.01 }
+        Self { samples: 100, share: 0.6, opening: 0.3, level: 1e-6, named_level: 0.01 }
     }
 }
 
@@ -279,11 +289,14 @@ impl DetectionSettings {
 impl ReactionSettings {
     fn validate(&self) -> Result<(), SettingsError> {
         count("samples of the reaction", self.samples, 1)?;
-        let (share, opening, level) = (self.share, self.opening, self.level);
+        let (share, opening) = (self.share, self.opening);
         number("share of the reaction", 0, "a number in (0, 1]", share, share > 0.0 && share <= 1.0)?;
         let fine = opening > 0.0 && opening < 1e15;
         number("opening of the reaction", 0, "a positive number below 1e15", opening, fine)?;
-        number("level of the reaction", 0, "a number in (0, 1)", level, level > 0.0 && level < 1.0)
+        for (what, level) in [("level of the reaction", self.level), ("named level", self.named_level)] {
+            number(what, 0, "a number in (0, 1)", level, level > 0.0 && level < 1.0)?;
+        }
+        Ok(())
     }
 }
 
@@ -315,6 +328,10 @@ fn length(what: &'static str, expected: usize, list: &[f64]) -> Result<(), Setti
 }
 
 fn count(what: &'static str, found: usize, least: usize) -> Result<(), SettingsError> {
-    let fine = found >= least && found <= 1 << 40;
-    number(what, 0, "a count that is large enough", found as f64, fine)
+    let expected = match least {
+        1 => "at least 1",
+        50 => "at least 50",
+        _ => "at least one per block",
+    };
+    number(what, 0, expected, found as f64, found >= least && found <= 1 << 40)
 }

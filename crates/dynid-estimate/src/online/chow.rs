@@ -17,8 +17,8 @@ pub struct MovedParameter {
     pub statistic: f64,
     /// Probability of as large a change by chance, two-sided.
     pub p_value: f64,
-    /// The same, adjusted for looking at all parameters (Holm 1979): below a level for no parameter in all but that share of
-    /// cases without change.
+    /// The same, adjusted for looking at all parameters (Holm 1979): below a level for no parameter in all
+    /// but that share of cases without change.
     pub adjusted: f64,
 }
 
@@ -43,8 +43,8 @@ impl ChowTest {
 /// Tests whether two stretches of samples, each reduced to a factor, share their parameters.
 ///
 /// `inflation ≥ 1`: by how much variances of plain least squares fall short because residuals are coloured
-/// ([`crate::covariance::variance_inflation`]); 1 if they are white. `None` unless both factors have full rank, the same columns, and
-/// together more than `2 p` rows and a residual.
+/// ([`crate::covariance::variance_inflation`]); 1 if they are white. `None` unless both factors have full
+/// rank, the same columns, and together more than `2 p` rows and a residual.
 ///
 /// Sources: Chow 1960; Holm 1979.
 pub fn chow_test(first: &Factor, second: &Factor, inflation: f64) -> Option<ChowTest> {

@@ -16,11 +16,13 @@ pub struct PublishedEstimate {
 
 /// Publishes the consistent parameters that fit a recursive state best, every so many samples.
 ///
-/// The state stays as it is: a state that was itself projected would be biased by all projections before. What is minimised is `‖R x - z‖²` over
-/// consistent `x` ([`crate::consistent`]), where `(R, z)` hold samples and prior of the estimator.
+/// The state stays as it is: a state that was itself projected would be biased by all projections before.
+/// What is minimised is `‖R x - z‖²` over consistent `x` ([`crate::consistent`]), where `(R, z)` hold samples
+/// and prior of the estimator.
 ///
-/// The solver starts anew each time, since interior-point methods gain little from a solution nearby; a robot of seven links takes some
-/// milliseconds. Call it beside the loop that feeds the estimator ([`Self::publish`] with a clone), or within where there is time.
+/// The solver starts anew each time, since interior-point methods gain little from a solution nearby; a robot
+/// of seven links takes some milliseconds. Call it beside the loop that feeds the estimator
+/// ([`Self::publish`] with a clone), or within where there is time.
 #[derive(Debug, Clone)]
 pub struct ConsistentPublisher {
     problem: Problem,
@@ -30,8 +32,8 @@ pub struct ConsistentPublisher {
 }
 
 impl ConsistentPublisher {
-    /// Publishes every `every ≥ 1` samples (0.5 s is usual). Links, scalars and bounds are those of `problem`, whose rows are not
-    /// used.
+    /// Publishes every `every ≥ 1` samples (0.5 s is usual). Links, scalars and bounds are those of
+    /// `problem`, whose rows are not used.
     pub fn new(problem: Problem, settings: Settings, every: u64) -> Self {
         Self { problem, settings, every: every.max(1), last: None }
     }

@@ -6,7 +6,8 @@ use crate::Factor;
 
 /// Recursive state with the information of a factor, parameters divided by `scale`, rows divided by `sigma`.
 ///
-/// A factor of fewer rows than parameters gives a singular state. Panics unless `scale` has one entry per column.
+/// A factor of fewer rows than parameters gives a singular state. Panics unless `scale` has one entry per
+/// column.
 pub fn root_from_factor(factor: &Factor, scale: &[f64], sigma: f64) -> SquareRoot {
     let p = factor.columns();
     assert_eq!(scale.len(), p, "one scale per column");
@@ -27,8 +28,8 @@ pub fn root_from_factor(factor: &Factor, scale: &[f64], sigma: f64) -> SquareRoo
 
 /// Factor with the information of a recursive state whose parameters are in units of `scale`.
 ///
-/// `N` is the discounted number of rows, rounded. Rows of the state were divided by their deviations, so the factor is weighted
-/// by `1/σ`. Panics unless `scale` has one entry per column.
+/// `N` is the discounted number of rows, rounded. Rows of the state were divided by their deviations, so the
+/// factor is weighted by `1/σ`. Panics unless `scale` has one entry per column.
 pub fn factor_from_root(root: &SquareRoot, scale: &[f64]) -> Factor {
     let p = root.columns();
     assert_eq!(scale.len(), p, "one scale per column");

@@ -1,8 +1,9 @@
 //! Estimates while a machine runs.
 //!
-//! The recursive estimator is a crate of its own, `dynid-online`, which needs no standard library and allocates at construction
-//! only; all of it is here again. Beside it stands what needs more: conversions between its state and [`Factor`](crate::Factor), physical
-//! consistency of the estimate, the Chow test, and hypotheses on what changed.
+//! The recursive estimator is a crate of its own, `dynid-online`, which needs no standard library and
+//! allocates at construction only; all of it is here again. Beside it stands what needs more: conversions
+//! between its state and [`Factor`](crate::Factor), physical consistency of the estimate, the Chow test,
+//! and hypotheses on what changed.
 
 mod chow;
 mod consistent;

@@ -160,9 +160,9 @@ const CONSTANT: [[f64; 6]; 3] = [
     ],
 ];
 
-/// The reference file comes from the covariance recursion in double precision, which starts at `P = 1e6` and sees rows of squared
-/// size 4e5 (parameters in units): its own rounding is `ε P φ² = 9e-5`. The square root is held to 1e-11 against
-/// exact arithmetic.
+/// The reference file comes from the covariance recursion in double precision, which starts at `P = 1e6` and
+/// sees rows of squared size 4e5 (parameters in units): its own rounding is `ε P φ² = 9e-5`. The square root
+/// is held to 1e-11 against exact arithmetic.
 #[test]
 fn harmonic_drive_sequences_match() {
     let Some(g) = load("hit_rls.json") else { return };
