@@ -17,13 +17,25 @@
 
 use dynid_model::element::{CubicSpring, JetMotion};
 use dynid_model::scalar::Jet;
-use dynid_model::{Dynamics, DynamicsWorkspace, EffortModel, MotionBlock, RobotModel, State};
+use dynid_model::{Dynamics, EffortModel, MotionBlock, RobotModel, State};
+
+use dynid_motion::trajectory::Fourier;
 
 use crate::controller::Wanted;
 use crate::error::{SimError, demand, demand_length};
 
-/// Position of a link and its first four derivatives by time.
+/// Position of a link and its first four derivatives by time. Without the fourth the motor's acceleration is wrong, without
+/// the third its rate too; its position needs the first two alone.
 pub type LinkMotion = [f64; 5];
+
+/// A link that follows a Fourier series, as a function of time.
+pub fn fourier_link(series: &Fourier) -> impl Fn(f64) -> LinkMotion + use<> {
+    let (series, second) = (series.clone(), series.derivative().derivative());
+    move |time| {
+        let (low, high) = (series.at(time), second.at(time));
+        [low.position, low.velocity, high.position, high.velocity, high.acceleration]
+    }
+}
 
 /// An elastic robot with values of its parameters, to be inverted.
 #[derive(Debug)]
@@ -33,7 +45,6 @@ pub struct ElasticInverse<'a> {
     shape: &'a [f64],
     sign_width: f64,
     dynamics: Dynamics,
-    work: DynamicsWorkspace<Jet>,
     inertias: Vec<Jet>,
     transmissions: Vec<Transmission>,
     /// Rates that are no motor of a transmission.
@@ -112,7 +123,6 @@ impl<'a> ElasticInverse<'a> {
         let inertias = linear[..dynamics.inertial_parameters()].iter().map(|x| Jet::new([*x, 0.0, 0.0]));
         Ok(ElasticInverse {
             inertias: inertias.collect(),
-            work: dynamics.workspace(),
             links: (0..rates).filter(|rate| transmissions.iter().all(|t| t.motor != *rate)).collect(),
             model,
             linear,
@@ -136,7 +146,7 @@ impl<'a> ElasticInverse<'a> {
     /// # Errors
     /// [`SimError::Length`]; [`SimError::Overloaded`] where a spring cannot carry the torque;
     /// [`SimError::NoTimeDerivatives`] for an element at a link behind a transmission that does not offer them.
-    pub fn at(&mut self, links: &[LinkMotion], channels: &[[f64; 3]]) -> Result<ElasticMotion, SimError> {
+    pub fn at(&self, links: &[LinkMotion], channels: &[[f64; 3]]) -> Result<ElasticMotion, SimError> {
         demand_length("motion of links", self.links.len(), links.len())?;
         demand_length("channels", self.model.channels().len(), channels.len())?;
         let torques = self.link_torques(links, channels)?;
@@ -176,7 +186,7 @@ impl<'a> ElasticInverse<'a> {
     }
 
     /// Torques of all transmissions.
-    fn link_torques(&mut self, links: &[LinkMotion], channels: &[[f64; 3]]) -> Result<Vec<Jet>, SimError> {
+    fn link_torques(&self, links: &[LinkMotion], channels: &[[f64; 3]]) -> Result<Vec<Jet>, SimError> {
         let rates = self.model.joints().len();
         let signal = |order: usize| {
             let mut jets = vec![Jet::default(); rates];
@@ -189,7 +199,8 @@ impl<'a> ElasticInverse<'a> {
         let joints = self.dynamics.rates();
         let state = State { q: &q[..joints], dq: &dq[..joints], ddq: &ddq[..joints], gravity: None };
         let mut effort = vec![Jet::default(); rates];
-        self.dynamics.inverse_dynamics(&state, &self.inertias, &mut self.work, &mut effort[..joints]);
+        let mut work = self.dynamics.workspace();
+        self.dynamics.inverse_dynamics(&state, &self.inertias, &mut work, &mut effort[..joints]);
         let names = self.model.channels().iter().map(String::as_str);
         let channels: Vec<(&str, Jet)> = names.zip(channels).map(|(n, c)| (n, Jet::new(*c))).collect();
         let motion =

@@ -12,7 +12,7 @@
 
 mod bodiless;
 mod controller;
-pub mod elastic;
+mod elastic;
 mod encoder;
 mod error;
 mod experiment;
@@ -26,7 +26,7 @@ mod recorder;
 pub mod streams;
 
 pub use controller::{ControlSettings, Wanted};
-pub use elastic::{ElasticInverse, ElasticMotion, LinkMotion};
+pub use elastic::{ElasticInverse, ElasticMotion, LinkMotion, fourier_link};
 pub use error::SimError;
 pub use experiment::{EnergyBalance, ExperimentResult, ExperimentSettings, run, wrong_model};
 pub use imperfections::Imperfections;

@@ -41,7 +41,8 @@ pub struct PlantEnergy {
 /// remember are in their steady state.
 ///
 /// Coordinates without bodies come after the joints; each needs an inertia, a [`RotorInertia`](dynid_model::element::RotorInertia)
-/// above 0. Springs of elastic transmissions couple them to their links.
+/// above 0. Springs of elastic transmissions couple them to their links. One `sign_width` serves motors and links, though
+/// motors run faster by their ratios.
 #[derive(Debug)]
 pub struct Plant {
     model: Arc<RobotModel>,

@@ -9,10 +9,12 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use arm::arm;
 use dynid_model::element::{
     Coulomb, CubicSpring, CyclicTorque, ElasticTransmission, ExternalLoad, JointElement, PowerLaw,
-    RotorInertia, Viscous,
+    RotorInertia, Transmission, Viscous,
 };
 use dynid_model::*;
 use dynid_sim::*;
+use rand::RngExt;
+use rand_distr::StandardNormal;
 
 // The joint of spec/hit-joint.md: link 0, motor 1, neither with a body.
 const RATIO: f64 = 290.0;
@@ -71,7 +73,7 @@ fn cruise(t: f64) -> LinkMotion {
 #[test]
 fn inverse_of_one_joint_is_the_closed_form() {
     let (model, values) = (joint_model(), joint_values());
-    let mut inverse = ElasticInverse::new(&model, &values, &[], 0.0).unwrap();
+    let inverse = ElasticInverse::new(&model, &values, &[], 0.0).unwrap();
     assert_eq!(inverse.links(), [0]);
     for k in 0..140 {
         let t = 0.1 * f64::from(k);
@@ -107,7 +109,7 @@ fn elastic_arm() -> (RobotModel, Vec<f64>) {
     ];
     let mechanism = arm();
     let mut values = mechanism.inertia_vector();
-    values.extend([6000.0, 4e7, 2500.0, 9e7]);
+    values.extend([3000.0, 2e8, 1000.0, 1e8]);
     for (rate, coulomb, viscous) in
         [(0, 1.5, 2.0), (1, 0.8, 1.2), (2, 0.4, 0.9), (3, 0.02, 8e-4), (4, 0.015, 6e-4)]
     {
@@ -138,11 +140,27 @@ fn swings(t: f64) -> Vec<LinkMotion> {
     (0..3).map(|j| swing(j, t)).collect()
 }
 
+#[test]
+fn fourier_series_have_four_derivatives() {
+    let series = dynid_motion::trajectory::Fourier::plain(1.3, 0.2, vec![0.4, -0.1], vec![0.3, 0.2]).unwrap();
+    let link = fourier_link(&series);
+    let (t, h) = (0.7, 1e-4);
+    let here = link(t);
+    assert_eq!([here[0], here[1]], [series.at(t).position, series.at(t).velocity]);
+    for (order, value) in here.iter().enumerate().skip(1) {
+        let slope = (link(t + h)[order - 1] - link(t - h)[order - 1]) / (2.0 * h);
+        assert!(
+            (value - slope).abs() < 1e-6 * value.abs().max(1.0),
+            "{order}: {value} {slope}"
+        );
+    }
+}
+
 /// Motors are where their springs say, with rates and accelerations that are derivatives of it, and links feel no drive.
 #[test]
 fn inverse_of_an_arm_is_consistent() {
     let (model, values) = elastic_arm();
-    let mut inverse = ElasticInverse::new(&model, &values, &[], 0.3).unwrap();
+    let inverse = ElasticInverse::new(&model, &values, &[], 0.3).unwrap();
     assert_eq!(inverse.links(), [0, 1, 2]);
     for t in [0.2, 1.0, 3.3, 5.9] {
         let h = 1e-4;
@@ -191,13 +209,13 @@ fn what_cannot_be_inverted_is_told() {
     let power: [Box<dyn JointElement>; 2] =
         [Box::new(ElasticTransmission::new(0, 1, 10.0)), Box::new(PowerLaw::new(0))];
     let power = model(power.into());
-    let mut inverse = ElasticInverse::new(&power, &[1.0; 3], &[0.5], 0.0).unwrap();
+    let inverse = ElasticInverse::new(&power, &[1.0; 3], &[0.5], 0.0).unwrap();
     let found = inverse.at(&[[0.0; 5]], &[]);
     assert_eq!(found, Err(SimError::NoTimeDerivatives { parameter: "link.fp".into() }));
     let soft: [Box<dyn JointElement>; 2] =
         [Box::new(ElasticTransmission::new(0, 1, 10.0)), Box::new(RotorInertia { rate: 0 })];
     let soft = model(soft.into());
-    let mut inverse = ElasticInverse::new(&soft, &[3.0, -4.0, 1.0], &[], 0.0).unwrap();
+    let inverse = ElasticInverse::new(&soft, &[3.0, -4.0, 1.0], &[], 0.0).unwrap();
     assert!(inverse.at(&[[0.0, 0.0, 0.9, 0.0, 0.0]], &[]).is_ok());
     let found = inverse.at(&[[0.0, 0.0, 1.1, 0.0, 0.0]], &[]);
     assert_eq!(found, Err(SimError::Overloaded { joint: "link".into(), torque: 1.1 }));
@@ -342,11 +360,9 @@ fn experiment_follows_the_inverse_simulation() {
     let (model, values) = (joint_model(), joint_values());
     let profile =
         Profile::new((0..=4000).map(|k| 1e-3 * f64::from(k)).map(|t| (t, brake(t)[0])).collect()).unwrap();
+    let inverse = ElasticInverse::new(&model, &values, &[], 0.0).unwrap();
     let errors = [1000.0, 4000.0].map(|rate_hz| {
-        let reference = |t: f64| {
-            let mut inverse = ElasticInverse::new(&model, &values, &[], 0.0).unwrap();
-            inverse.at(&[cruise(t)], &[brake(t)]).unwrap().wanted()
-        };
+        let reference = |t: f64| inverse.at(&[cruise(t)], &[brake(t)]).unwrap().wanted();
         let settings = ExperimentSettings {
             duration_s: 3.0,
             log_rate_hz: 500.0,
@@ -360,7 +376,6 @@ fn experiment_follows_the_inverse_simulation() {
         let result = run(&mut joint_plant(), &joint_plant(), &reference, &settings).unwrap();
         assert!(result.energy.residual().abs() < 1e-7 * result.energy.drive_work.abs());
         assert!(result.log.truth.effort[0].iter().all(|e| *e == 0.0), "the link has no drive");
-        let mut inverse = ElasticInverse::new(&model, &values, &[], 0.0).unwrap();
         let mut worst = [0.0_f64; 3];
         for (row, t) in result.log.time.iter().enumerate() {
             let wanted = inverse.at(&[cruise(*t)], &[brake(*t)]).unwrap();
@@ -376,5 +391,188 @@ fn experiment_follows_the_inverse_simulation() {
         // Efforts are held from the tick on: half a tick late, which is of first order.
         let ratio = coarse / fine;
         assert!((3.0..6.0).contains(&ratio), "{ratio}");
+    }
+}
+
+/// Accelerations under the drives' efforts are those that need these efforts, also where motors share inertia with each
+/// other and with a joint.
+#[test]
+fn accelerations_of_motors_and_joints_go_with_the_efforts() {
+    let (_, values) = elastic_arm();
+    let mut elements: Vec<Box<dyn JointElement>> = vec![
+        Box::new(ElasticTransmission { damping: true, ..ElasticTransmission::new(1, 3, ARM_RATIOS[0]) }),
+        Box::new(ElasticTransmission::new(2, 4, ARM_RATIOS[1])),
+        Box::new(Transmission {
+            joints: vec![0, 3, 4],
+            matrix: vec![vec![0.0, 1.0, 0.4], vec![2.0, 0.3, 1.0]],
+            motors: vec!["a".into(), "b".into()],
+        }),
+    ];
+    let mut linear = values[..30].to_vec();
+    linear.extend([6000.0, 4e7, 3.0, 2500.0, 9e7, 2e-4, 0.01, 1e-3, 1e-4, 0.02, 2e-3]);
+    for shared in [true, false] {
+        let motors = vec![Coordinate::turning("m2"), Coordinate::turning("m3")];
+        let model = RobotModel::with_coordinates(arm(), motors, elements);
+        let plant = Plant::new(model, linear.clone(), vec![], 1e-3).unwrap();
+        let mut work = plant.workspace();
+        let (q, dq) = ([0.3, -0.7, 0.4, -70.2, 32.5], [0.5, -0.2, 0.8, -15.0, 70.0]);
+        let drive = [3.0, 0.0, 0.0, 0.6, -0.3];
+        let mut ddq = [0.0; 5];
+        plant.acceleration((&q, &dq), &drive, &[], &mut work, &mut ddq).unwrap();
+        let back = plant.drive_effort([&q, &dq, &ddq], &[], &mut work);
+        for (found, expected) in back.iter().zip(&drive) {
+            assert!((found - expected).abs() < 1e-11, "shared {shared}: {back:?}");
+        }
+        let mass = plant.mass_matrix(&q, &mut work);
+        assert!((0..5).all(|i| (0..5).all(|j| (mass[5 * i + j] - mass[5 * j + i]).abs() < 1e-14)));
+        assert_eq!(mass[3] != 0.0, shared, "joint 1 and motor 2");
+        // The same with a rotor each.
+        elements = vec![
+            Box::new(ElasticTransmission { damping: true, ..ElasticTransmission::new(1, 3, ARM_RATIOS[0]) }),
+            Box::new(ElasticTransmission::new(2, 4, ARM_RATIOS[1])),
+            Box::new(RotorInertia { rate: 3 }),
+            Box::new(RotorInertia { rate: 4 }),
+        ];
+        linear.truncate(35);
+        linear.extend([1.5e-4, 0.8e-4]);
+    }
+}
+
+/// Upper triangle of a QR factorisation of `[A b]`, columns given one after the other.
+fn triangle(mut columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let rows = columns[0].len();
+    for k in 0..columns.len() {
+        let (done, rest) = columns.split_at_mut(k + 1);
+        let pivot = &mut done[k];
+        let length = pivot[k..].iter().map(|x| x * x).sum::<f64>().sqrt().copysign(pivot[k]);
+        let mut mirror = pivot[k..].to_vec();
+        mirror[0] += length;
+        let square: f64 = mirror.iter().map(|x| x * x).sum();
+        for column in rest {
+            let along: f64 = mirror.iter().zip(&column[k..]).map(|(a, b)| a * b).sum::<f64>() * 2.0 / square;
+            column[k..].iter_mut().zip(&mirror).for_each(|(c, m)| *c -= along * m);
+        }
+        pivot[k] = -length;
+        pivot[k + 1..rows].fill(0.0);
+    }
+    columns
+}
+
+/// Least squares: solution and the rows of `R⁻¹`, whose lengths are standard deviations for noise of unit size.
+fn least_squares(columns: &[Vec<f64>], effort: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+    let n = columns.len();
+    let length = |c: &Vec<f64>| c.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let scales: Vec<f64> = columns.iter().map(length).collect();
+    let mut all: Vec<Vec<f64>> =
+        columns.iter().zip(&scales).map(|(c, s)| c.iter().map(|x| x / s).collect()).collect();
+    all.push(effort.to_vec());
+    let r = triangle(all);
+    let solve = |mut right: Vec<f64>| {
+        for i in (0..n).rev() {
+            let sum: f64 = (i + 1..n).map(|j| r[j][i] * right[j]).sum();
+            right[i] = (right[i] - sum) / r[i][i];
+        }
+        right.iter().zip(&scales).map(|(x, s)| x / s).collect::<Vec<f64>>()
+    };
+    let unit = |k: usize| (0..n).map(|i| f64::from(u8::from(i == k))).collect();
+    let inverse: Vec<Vec<f64>> = (0..n).map(|k| solve(unit(k))).collect();
+    let rows = (0..n).map(|i| inverse.iter().map(|c| c[i]).collect()).collect();
+    (solve(r[n][..n].to_vec()), rows)
+}
+
+/// An elastic arm under its controller, and its parameters from motions and efforts of links and motors together.
+#[test]
+fn an_elastic_arm_is_identified_from_motors_and_links() {
+    let (model, values) = elastic_arm();
+    let width = 1e-2;
+    let mut plant = Plant::new(model, values.clone(), vec![], width).unwrap();
+    let nominal = Plant::new(elastic_arm().0, wrong_model(&values, 0.05, 3), vec![], width).unwrap();
+    let (inverted, wrong) = (elastic_arm().0, nominal.linear().to_vec());
+    let inverse = ElasticInverse::new(&inverted, &wrong, &[], width).unwrap();
+    let reference = |t: f64| inverse.at(&swings(t), &[]).unwrap().wanted();
+    let settings = ExperimentSettings {
+        duration_s: 12.0,
+        log_rate_hz: 250.0,
+        imperfections: Imperfections::none(),
+        ..Default::default()
+    };
+    let result = run(&mut plant, &nominal, &reference, &settings).unwrap();
+    assert!(result.energy.residual().abs() < 1e-6 * result.energy.drive_work.abs());
+    let truth = &result.log.truth;
+    let rows = truth.q[0].len();
+    let tracking =
+        truth.q[1].iter().zip(&result.log.time).fold(0.0_f64, |m, (q, t)| m.max((q - swing(1, *t)[0]).abs()));
+
+    let (q, dq, ddq) = (truth.q.concat(), truth.dq.concat(), truth.ddq.concat());
+    let motion = MotionBlock { sign_width: width, ..MotionBlock::plain(rows, &q, &dq, &ddq) };
+    let model = plant.model();
+    let mut block = RegressorBlock::new(model.layout().clone(), rows);
+    model.regressor(&motion, &[], &mut block);
+    let base = BaseParameters::of(model, model.mechanism(), &[], &BaseSettings::default());
+    let expected = base.values(&values);
+    assert!(base.len() > 30 && base.gap.ratio() > 1e8, "{} {:?}", base.len(), base.gap);
+    // Standard deviations of efforts: measured at drives, unmodelled loads at links.
+    let noise = [0.3, 0.5, 0.3, 0.005, 0.003];
+    let mut columns = vec![vec![0.0; 5 * rows]; base.len()];
+    let mut effort = Vec::with_capacity(5 * rows);
+    for (o, sd) in noise.iter().enumerate() {
+        effort.extend(truth.effort[o].iter().map(|e| e / sd));
+        for (k, column) in model.layout().columns(o).iter().enumerate() {
+            let Ok(place) = base.kept.binary_search(column) else { continue };
+            let to = &mut columns[place][o * rows..][..rows];
+            to.iter_mut().zip(block.column(o, k)).for_each(|(t, w)| *t = w / sd);
+        }
+    }
+
+    let name = |k: usize| model.parameters().linear[base.kept[k]].name.clone();
+    let (clean, inverse) = least_squares(&columns, &effort);
+    let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    // The truth leaves what rounding leaves of the efforts; no more than its length, times rows of R⁻¹, reaches a parameter.
+    let mut left = effort.clone();
+    for (column, x) in columns.iter().zip(&expected) {
+        left.iter_mut().zip(column).for_each(|(l, c)| *l -= c * x);
+    }
+    let largest = columns.iter().zip(&expected).map(|(c, x)| norm(c) * x.abs()).fold(0.0, f64::max);
+    let rounding = 10.0 * base.len() as f64 * f64::EPSILON * largest;
+    let mut worst = 0.0_f64;
+    for k in 0..base.len() {
+        let error = (clean[k] - expected[k]).abs();
+        worst = worst.max(error / norm(&inverse[k]));
+        assert!(
+            error <= norm(&inverse[k]) * (norm(&left) + rounding),
+            "{}: {} {}",
+            name(k),
+            clean[k],
+            expected[k]
+        );
+    }
+    println!(
+        "tracking {tracking:.1e} rad; {} parameters; truth leaves {:.1e} of {:.1e}; clean: worst error {worst:.1e} standard deviations",
+        base.len(),
+        norm(&left),
+        norm(&effort)
+    );
+
+    let mut rng = streams::generator(7, streams::Cause::Effort);
+    let noisy: Vec<f64> = effort.iter().map(|e| e + rng.sample::<f64, _>(StandardNormal)).collect();
+    let (found, inverse) = least_squares(&columns, &noisy);
+    let mut square = 0.0;
+    for k in 0..base.len() {
+        let sd = norm(&inverse[k]);
+        let z = (found[k] - expected[k]) / sd;
+        square += z * z;
+        // One in 3e5 lies beyond 4.5 deviations.
+        assert!(z.abs() < 4.5, "{}: {} ± {sd} for {}", name(k), found[k], expected[k]);
+        if ["k1", "k2", "Ia"].iter().any(|s| name(k).ends_with(s)) {
+            println!("{}: {:.5e} ± {sd:.1e} for {:.5e}", name(k), found[k], expected[k]);
+        }
+    }
+    let mean = square / base.len() as f64;
+    println!("mean square of errors over deviations {mean:.2}");
+    assert!((0.3..2.5).contains(&mean), "{mean}");
+    // The springs are seen.
+    for symbol in ["j2.k1", "j2.k2", "j3.k1", "j3.k2"] {
+        let k = (0..base.len()).find(|k| name(*k) == symbol).unwrap();
+        assert!(norm(&inverse[k]) < 0.05 * expected[k], "{symbol}");
     }
 }
