@@ -353,7 +353,7 @@ impl Plant {
         let (n, joints) = (self.joints(), self.dynamics.rates());
         let bodies = self.dynamics.mass_matrix(&q[..joints], self.inertias(), &mut work.dynamics);
         let mut mass = self.added.clone();
-        for (row, of_bodies) in mass.chunks_exact_mut(n).zip(bodies.chunks_exact(joints.max(1))) {
+        for (row, of_bodies) in mass.chunks_exact_mut(n.max(1)).zip(bodies.chunks_exact(joints.max(1))) {
             row.iter_mut().zip(of_bodies).for_each(|(m, b)| *m += b);
         }
         mass

@@ -149,10 +149,7 @@ fn fourier_series_have_four_derivatives() {
     assert_eq!([here[0], here[1]], [series.at(t).position, series.at(t).velocity]);
     for (order, value) in here.iter().enumerate().skip(1) {
         let slope = (link(t + h)[order - 1] - link(t - h)[order - 1]) / (2.0 * h);
-        assert!(
-            (value - slope).abs() < 1e-6 * value.abs().max(1.0),
-            "{order}: {value} {slope}"
-        );
+        assert!((value - slope).abs() < 1e-6 * value.abs().max(1.0), "{order}: {value} {slope}");
     }
 }
 
