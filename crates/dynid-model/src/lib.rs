@@ -29,6 +29,7 @@ pub use dynamics::{
     MotionAdjoint, MotionBlock, NotPositive, State,
 };
 pub use effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
+
 pub use inertia::Inertia;
 pub use mechanism::{Body, Frame, Joint, Mechanism, MechanismError, MechanismWarning};
 pub use parameter::{Owner, Parameter, ParameterTable, ShapeParameter};

@@ -88,7 +88,8 @@ impl RobotModel {
     /// The mechanism may be one [without bodies](Mechanism::without_bodies).
     ///
     /// # Panics
-    /// If an element names a rate that there is not, or two coordinates or joints share a name.
+    /// If an element names a rate that there is not, two coordinates or joints share a name, or an elastic transmission has
+    /// one rate for motor and link or a ratio that is 0 or not finite.
     pub fn with_coordinates(
         mechanism: Mechanism,
         coordinates: Vec<Coordinate>,
@@ -443,6 +444,7 @@ fn joint_infos(mechanism: &Mechanism, coordinates: &[Coordinate]) -> Vec<JointIn
 fn travels(elements: &[Box<dyn JointElement>], first_rate: usize, count: usize) -> Vec<f64> {
     let mut travels = vec![1.0; count];
     for e in elements.iter().filter_map(|e| e.elastic()) {
+        assert!(e.link != e.motor && e.ratio.is_finite() && e.ratio != 0.0, "elastic transmission {e:?}");
         if let Some(travel) = e.motor.checked_sub(first_rate).and_then(|k| travels.get_mut(k)) {
             *travel = e.ratio;
         }

@@ -257,6 +257,8 @@ fn outputs_parameters_and_rows_cover_motors() {
     assert_eq!(model.parameters().column("j2.k2"), None);
 
     let rigid = RobotModel::new(model.mechanism().clone(), vec![]);
+    let random = RandomMotion::new(model.mechanism(), &[], 5, 3);
+    assert_eq!(RandomMotion::of(&rigid, model.mechanism(), 5, 3), random, "nothing else without coordinates");
     let linear: Vec<f64> = (0..model.parameters().linear.len()).map(|k| 0.3 + 0.1 * (k % 7) as f64).collect();
     let at = |name: &str| linear[model.parameters().column(name).unwrap()];
     for samples in [2, 9] {
@@ -436,6 +438,12 @@ fn without_a_motor_position_only_the_sum_of_both_rows_is_seen() {
     let motion = MotionBlock::plain(50, &both, &both, &both);
     let base = BaseParameters::on_motion(&joint, &motion, &[], &BaseSettings::default());
     assert_eq!((base.kept, base.zero), (vec![2, 3], vec![0, 1]));
+}
+
+#[test]
+#[should_panic(expected = "elastic transmission")]
+fn transmissions_join_two_coordinates() {
+    bare_joint(vec![Box::new(ElasticTransmission::new(1, 1, 10.0))]);
 }
 
 #[test]

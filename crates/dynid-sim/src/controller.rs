@@ -11,7 +11,8 @@ pub struct ControlSettings {
     /// Ticks per second. Default 1000.
     pub rate_hz: f64,
     /// Natural frequency of the position loop, Hz: `K_p = (2π f)² m` and `K_d = 2 ζ 2π f m` with `m` the largest
-    /// diagonal entry of the nominal mass matrix along the reference. Default 5.
+    /// diagonal entry of the nominal mass matrix along the reference; for a motor behind an elastic transmission of ratio `N`
+    /// with that of its link over `N²` added. Default 5.
     pub bandwidth_hz: f64,
     /// Damping ratio ζ of the position loop. Default 1.
     pub damping: f64,
@@ -25,9 +26,10 @@ pub struct ControlSettings {
     pub velocity_cutoff_hz: f64,
     /// Time from a tick to the change of the drive's effort, ticks, whole or not. Default 0.
     pub delay_ticks: f64,
-    /// Largest effort of each joint; infinite: none. Default: the limits of the mechanism.
+    /// Largest effort of each joint; infinite: none. Default: the limits of the mechanism, none for motors of elastic
+    /// transmissions.
     pub effort_limit: Option<Vec<f64>>,
-    /// Joints without a drive, by rate. Default: none.
+    /// Joints without a drive, by rate, besides links behind elastic transmissions, which never have one. Default: none.
     pub passive: Vec<usize>,
 }
 
@@ -49,6 +51,11 @@ impl Default for ControlSettings {
 }
 
 impl ControlSettings {
+    /// Whether a joint has no drive.
+    pub(crate) fn is_passive(&self, model: &RobotModel, rate: usize) -> bool {
+        self.passive.contains(&rate) || model.elastic_motor(rate).is_some()
+    }
+
     pub(crate) fn check(&self, joints: usize) -> Result<(), SimError> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         demand(positive(self.rate_hz), "control rate", "a positive number", self.rate_hz)?;
@@ -93,6 +100,7 @@ pub(crate) struct Controller<'a> {
     settings: &'a ControlSettings,
     work: PlantWorkspace,
     gains: Vec<(f64, f64)>,
+    passive: Vec<bool>,
     limits: Vec<f64>,
     share: f64,
     /// Last reading and filtered velocity per joint.
@@ -111,6 +119,11 @@ impl<'a> Controller<'a> {
             let mass = nominal.mass_matrix(q, &mut work);
             inertia.iter_mut().enumerate().for_each(|(j, m)| *m = m.max(mass[j * (n + 1)]));
         }
+        for motor in 0..n {
+            if let Some((link, ratio)) = nominal.model().elastic_link(motor) {
+                inertia[motor] += inertia[link] / (ratio * ratio);
+            }
+        }
         let omega = std::f64::consts::TAU * settings.bandwidth_hz;
         let chosen = |given: &Option<Vec<f64>>, j: usize, default: f64| {
             given.as_ref().map_or(default, |gains| gains[j])
@@ -125,7 +138,8 @@ impl<'a> Controller<'a> {
             .collect();
         let limits = settings.effort_limit.clone().unwrap_or_else(|| effort_limits(nominal.model()));
         let share = 1.0 - (-std::f64::consts::TAU * settings.velocity_cutoff_hz / settings.rate_hz).exp();
-        Controller { nominal, settings, work, gains, limits, share, seen: None, saturated: 0 }
+        let passive = (0..n).map(|j| settings.is_passive(nominal.model(), j)).collect();
+        Controller { nominal, settings, work, gains, passive, limits, share, seen: None, saturated: 0 }
     }
 
     /// Effort of the drives for a tick.
@@ -149,7 +163,7 @@ impl<'a> Controller<'a> {
         };
         let mut cut = false;
         for (j, e) in effort.iter_mut().enumerate() {
-            if self.settings.passive.contains(&j) {
+            if self.passive[j] {
                 *e = 0.0;
                 continue;
             }
@@ -167,6 +181,6 @@ impl<'a> Controller<'a> {
 fn effort_limits(model: &RobotModel) -> Vec<f64> {
     let bodies = model.mechanism().bodies();
     let owners = model.mechanism().rate_bodies();
-    let limit = |j: usize| bodies[owners[j]].joint.limits.effort.filter(|l| *l > 0.0);
+    let limit = |j: usize| owners.get(j).and_then(|b| bodies[*b].joint.limits.effort).filter(|l| *l > 0.0);
     (0..model.outputs().len()).map(|j| limit(j).unwrap_or(f64::INFINITY)).collect()
 }

@@ -41,6 +41,28 @@ pub enum SimError {
         /// Rate whose row changes.
         rate: usize,
     },
+    /// A coordinate without bodies has no inertia to accelerate: a motor without a rotor.
+    #[error("coordinate `{name}` has no inertia: give it a rotor inertia above 0")]
+    NoInertia {
+        /// Name of the coordinate.
+        name: String,
+    },
+    /// A spring that softens cannot carry a torque.
+    #[error("the transmission of `{joint}` cannot carry {torque} (N m or N): its spring softens before")]
+    Overloaded {
+        /// Link behind the transmission.
+        joint: String,
+        /// The torque.
+        torque: f64,
+    },
+    /// An element offers no time derivatives of its effort.
+    #[error(
+        "the element of `{parameter}` offers no time derivatives: it cannot stand behind an elastic transmission"
+    )]
+    NoTimeDerivatives {
+        /// First parameter of the element.
+        parameter: String,
+    },
     /// The plant has a joint without inertia.
     #[error("at {time} s {source}")]
     Inertia {

@@ -350,8 +350,13 @@ fn ripple(
     let (share, cycles) = (settings.imperfections.ripple_share, settings.imperfections.ripple_cycles);
     squares
         .iter()
-        .map(|s| Ripple {
-            amplitude: share * f64::sqrt(s / count),
+        .enumerate()
+        .map(|(j, s)| Ripple {
+            amplitude: if settings.control.is_passive(nominal.model(), j) {
+                0.0
+            } else {
+                share * f64::sqrt(s / count)
+            },
             cycles,
             phase: rng.random_range(0.0..std::f64::consts::TAU),
         })

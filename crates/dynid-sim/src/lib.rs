@@ -6,9 +6,13 @@
 //!
 //! [`presliding`] moves a single joint within its friction, where bristles bend and hardly slip.
 //!
+//! [`ElasticInverse`] gives motors behind elastic transmissions the motion that goes with that of their links.
+//!
 //! Units are SI, angles rad.
 
+mod bodiless;
 mod controller;
+mod elastic;
 mod encoder;
 mod error;
 mod experiment;
@@ -22,6 +26,7 @@ mod recorder;
 pub mod streams;
 
 pub use controller::{ControlSettings, Wanted};
+pub use elastic::{ElasticInverse, ElasticMotion, LinkMotion, fourier_link};
 pub use error::SimError;
 pub use experiment::{EnergyBalance, ExperimentResult, ExperimentSettings, run, wrong_model};
 pub use imperfections::Imperfections;

@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
+use dynid_model::element::ElasticTransmission;
 use dynid_model::{
     AddedInertia, Dynamics, DynamicsWorkspace, EffortModel, ForwardDynamicsWorkspace, History, LoadedState,
     MotionAdjoint, MotionBlock, NotPositive, RobotModel, State,
 };
 
+use crate::bodiless::Bodiless;
 use crate::error::{SimError, demand, demand_length};
 
 /// Torque ripple of one drive: it delivers `effort + amplitude · sin(cycles · q + phase)`.
@@ -37,6 +39,10 @@ pub struct PlantEnergy {
 ///
 /// Values of channels may be followed by those of the model's signals ([`Plant::signals`]); without them elements that
 /// remember are in their steady state.
+///
+/// Coordinates without bodies come after the joints; each needs an inertia, a [`RotorInertia`](dynid_model::element::RotorInertia)
+/// above 0. Springs of elastic transmissions couple them to their links. One `sign_width` serves motors and links, though
+/// motors run faster by their ratios.
 #[derive(Debug)]
 pub struct Plant {
     model: Arc<RobotModel>,
@@ -47,8 +53,11 @@ pub struct Plant {
     ripple: Vec<Ripple>,
     /// Effort of the elements per acceleration, row-major.
     added: Vec<f64>,
+    /// What joints feel of it: the same where all rates are joints.
+    at_joints: Vec<f64>,
     /// Its diagonal, if there is nothing else.
     diagonal: Option<Vec<f64>>,
+    bodiless: Option<Bodiless>,
 }
 
 /// Memory of [`Plant::acceleration`] and its kin.
@@ -76,7 +85,8 @@ impl Plant {
     /// `linear`, `shape`: the model's parameters. `sign_width`: rad/s or m/s, above 0.
     ///
     /// # Errors
-    /// [`SimError::FloatingBase`], [`SimError::Length`], [`SimError::Setting`], [`SimError::VaryingInertia`].
+    /// [`SimError::FloatingBase`], [`SimError::Length`], [`SimError::Setting`], [`SimError::VaryingInertia`],
+    /// [`SimError::NoInertia`].
     pub fn new(
         model: impl Into<Arc<RobotModel>>,
         linear: Vec<f64>,
@@ -107,12 +117,21 @@ impl Plant {
             sign_width,
             ripple: Vec::new(),
             added: vec![0.0; n * n],
+            at_joints: Vec::new(),
             diagonal: None,
+            bodiless: None,
         };
         plant.added = plant.added_inertia()?;
-        let off_diagonal = |k: usize| k % n.max(1) != k / n.max(1);
-        if (0..n * n).all(|k| !off_diagonal(k) || plant.added[k] == 0.0) {
-            plant.diagonal = Some((0..n).map(|k| plant.added[k * (n + 1)]).collect());
+        let joints = plant.dynamics.rates();
+        plant.at_joints.clone_from(&plant.added);
+        if joints < n {
+            let (bodiless, left) = Bodiless::new(n, joints, &plant.added)
+                .map_err(|rate| SimError::NoInertia { name: plant.model.joints()[rate].name.clone() })?;
+            (plant.bodiless, plant.at_joints) = (Some(bodiless), left);
+        }
+        let off_diagonal = |k: usize| k % joints.max(1) != k / joints.max(1);
+        if (0..joints * joints).all(|k| !off_diagonal(k) || plant.at_joints[k] == 0.0) {
+            plant.diagonal = Some((0..joints).map(|k| plant.at_joints[k * (joints + 1)]).collect());
         }
         Ok(plant)
     }
@@ -143,9 +162,9 @@ impl Plant {
         self.sign_width
     }
 
-    /// Number of joints (rates).
+    /// Number of rates: joints, then coordinates without bodies.
     pub fn joints(&self) -> usize {
-        self.dynamics.rates()
+        self.model.joints().len()
     }
 
     /// Memory.
@@ -240,28 +259,15 @@ impl Plant {
     /// Effort of elements per acceleration, the same at some states of no special kind.
     fn added_inertia(&self) -> Result<Vec<f64>, SimError> {
         let n = self.joints();
-        let mut memory = Vec::new();
+        let mut work = self.workspace();
         let channels = vec![1.0; self.model.channels().len()];
         let mut found: Option<Vec<f64>> = None;
         for state in 0..3 {
             let at = |k: usize, scale: f64| scale * (1.0 + k as f64 + 2.7 * f64::from(state)).sin();
             let q: Vec<f64> = (0..n).map(|k| at(k, 1.0)).collect();
             let dq: Vec<f64> = (0..n).map(|k| at(k + 17, f64::from(state))).collect();
-            let (mut without, mut with) = (vec![0.0; n], vec![0.0; n]);
-            let mut ddq = vec![0.0; n];
-            self.element_effort([&q, &dq, &ddq], &channels, &mut memory, &mut without);
-            let mut added = vec![0.0; n * n];
-            for k in 0..n {
-                ddq[k] = 1.0;
-                self.element_effort([&q, &dq, &ddq], &channels, &mut memory, &mut with);
-                ddq[k] = 0.0;
-                for row in 0..n {
-                    // Efforts of hundreds of newton metres leave this much of a difference that ought to be zero.
-                    let rounding = 8.0 * f64::EPSILON * (with[row].abs() + without[row].abs());
-                    let change = with[row] - without[row];
-                    added[row * n + k] = if change.abs() <= rounding { 0.0 } else { change };
-                }
-            }
+            self.element_slopes((&q, &dq), &channels, &mut work);
+            let added: Vec<f64> = (0..n * n).map(|k| work.slopes.ddq[k % n * n + k / n]).collect();
             match &found {
                 None => found = Some(added),
                 Some(first) => {
@@ -300,12 +306,22 @@ impl Plant {
         for (e, (d, x)) in work.effort.iter_mut().zip(work.delivered.iter().zip(&work.element)) {
             *e = d - x;
         }
-        let state = LoadedState { q, dq, effort: &work.effort, gravity: None };
+        if let Some(bodiless) = &self.bodiless {
+            bodiless.eliminate(&mut work.effort);
+        }
+        let joints = self.dynamics.rates();
+        let effort = &work.effort[..joints];
+        let state = LoadedState { q: &q[..joints], dq: &dq[..joints], effort, gravity: None };
         let added = match &self.diagonal {
             Some(d) => AddedInertia::Diagonal(d),
-            None => AddedInertia::Full(&self.added),
+            None => AddedInertia::Full(&self.at_joints),
         };
-        self.dynamics.forward_dynamics(&state, self.inertias(), added, &mut work.forward, ddq)
+        let to = &mut ddq[..joints];
+        self.dynamics.forward_dynamics(&state, self.inertias(), added, &mut work.forward, to)?;
+        if let Some(bodiless) = &self.bodiless {
+            bodiless.complete(&work.effort, ddq);
+        }
+        Ok(())
     }
 
     /// Effort of the drives of a motion, without ripple: rigid bodies and elements.
@@ -316,8 +332,10 @@ impl Plant {
         work: &mut PlantWorkspace,
     ) -> Vec<f64> {
         let mut effort = vec![0.0; q.len()];
-        let state = State { q, dq, ddq, gravity: None };
-        self.dynamics.inverse_dynamics(&state, self.inertias(), &mut work.dynamics, &mut effort);
+        let joints = self.dynamics.rates();
+        let state = State { q: &q[..joints], dq: &dq[..joints], ddq: &ddq[..joints], gravity: None };
+        let to = &mut effort[..joints];
+        self.dynamics.inverse_dynamics(&state, self.inertias(), &mut work.dynamics, to);
         self.element_effort([q, dq, ddq], channels, &mut work.memory, &mut work.effort);
         effort.iter_mut().zip(&work.effort).for_each(|(e, x)| *e += x);
         effort
@@ -332,29 +350,55 @@ impl Plant {
 
     /// Mass matrix with the inertia of the elements, row-major.
     pub fn mass_matrix(&self, q: &[f64], work: &mut PlantWorkspace) -> Vec<f64> {
-        let mut mass = self.dynamics.mass_matrix(q, self.inertias(), &mut work.dynamics);
-        mass.iter_mut().zip(&self.added).for_each(|(m, a)| *m += a);
+        let (n, joints) = (self.joints(), self.dynamics.rates());
+        let bodies = self.dynamics.mass_matrix(&q[..joints], self.inertias(), &mut work.dynamics);
+        let mut mass = self.added.clone();
+        for (row, of_bodies) in mass.chunks_exact_mut(n.max(1)).zip(bodies.chunks_exact(joints.max(1))) {
+            row.iter_mut().zip(of_bodies).for_each(|(m, b)| *m += b);
+        }
         mass
     }
 
     /// Energies of a state.
     pub fn energy(&self, q: &[f64], dq: &[f64], work: &mut PlantWorkspace) -> PlantEnergy {
-        let bodies = self.dynamics.energy(q, dq, self.inertias(), &mut work.dynamics);
-        let n = self.joints();
+        let (n, joints) = (self.joints(), self.dynamics.rates());
+        let inertias = self.inertias();
+        let bodies = self.dynamics.energy(&q[..joints], &dq[..joints], inertias, &mut work.dynamics);
         let turning: f64 =
             (0..n).map(|i| 0.5 * dq[i] * (0..n).map(|j| self.added[i * n + j] * dq[j]).sum::<f64>()).sum();
         PlantEnergy { kinetic: bodies.kinetic + turning, potential: bodies.potential }
     }
 
+    /// Energy stored in the springs of elastic transmissions, J; part of the work of elements.
+    pub fn spring_energy(&self, q: &[f64]) -> f64 {
+        let energy = |(element, values): (&ElasticTransmission, Vec<f64>)| {
+            element.spring(&values).energy(q[element.motor] / element.ratio - q[element.link])
+        };
+        self.model.elastic_transmissions(&self.linear).into_iter().map(energy).sum()
+    }
+
     /// Stiffness `∂elements/∂q` and damping `∂elements/∂q̇`, row-major.
     pub(crate) fn stiffness_and_damping(
         &self,
-        (q, dq): (&[f64], &[f64]),
+        state: (&[f64], &[f64]),
         channels: &[f64],
         work: &mut PlantWorkspace,
         stiffness: &mut [f64],
         damping: &mut [f64],
     ) {
+        let n = self.joints();
+        self.element_slopes(state, channels, work);
+        for row in 0..n {
+            for k in 0..n {
+                stiffness[row * n + k] = work.slopes.q[k * n + row];
+                damping[row * n + k] = work.slopes.dq[k * n + row];
+            }
+        }
+    }
+
+    /// Derivatives of the elements' efforts by the motion, into `work.slopes`: that of effort `row` by coordinate `k` at
+    /// `k * n + row`.
+    fn element_slopes(&self, (q, dq): (&[f64], &[f64]), channels: &[f64], work: &mut PlantWorkspace) {
         let n = self.joints();
         let [copied_q, copied_dq, copied_ddq] = &mut work.copies;
         for k in 0..n {
@@ -383,11 +427,5 @@ impl Plant {
             &mut work.slopes,
             &mut work.memory,
         );
-        for row in 0..n {
-            for k in 0..n {
-                stiffness[row * n + k] = work.slopes.q[k * n + row];
-                damping[row * n + k] = work.slopes.dq[k * n + row];
-            }
-        }
     }
 }

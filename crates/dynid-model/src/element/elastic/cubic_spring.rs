@@ -1,5 +1,7 @@
 //! The spring of a harmonic drive.
 
+use crate::scalar::Jet;
+
 /// Spring with torque `T = k1 Δ + k2 Δ³` over the deformation `Δ` (rad, N m; or m, N).
 ///
 /// Source: Sun, Shi, Zhang, Wang & Liu, *Parameters Identification Applied to Large Space Robotic Manipulators*, Eqs. 9, 10
@@ -63,6 +65,16 @@ impl CubicSpring {
             return None;
         };
         Some(linear * share).filter(|x| x.is_finite())
+    }
+
+    /// [`CubicSpring::deformation`] with its time derivatives, `Δ̇ = Ṫ/S` and `Δ̈ = (T̈ - 6 k2 Δ Δ̇²)/S`, `S` the stiffness at
+    /// `Δ`; `None` also where that is not positive.
+    pub fn deformation_jet(&self, torque: Jet) -> Option<Jet> {
+        let value = self.deformation(torque.value)?;
+        let stiffness = self.stiffness(value);
+        let first = torque.first / stiffness;
+        let second = (torque.second - self.stiffness_slope(value) * first * first) / stiffness;
+        (stiffness > 0.0).then_some(Jet { value, first, second })
     }
 
     /// Deformation up to which the torque grows: `√(k1/(3 |k2|))` for a spring that softens, infinite otherwise; 0 unless

@@ -124,6 +124,15 @@ impl ElasticTransmission {
         (share < Self::LEAST_SHARE).then_some(ElasticDoubt::ConstantDeformation(share))
     }
 
+    /// Fills the motor's and the link's column of a torque.
+    fn put(&self, entry: usize, torque: impl Iterator<Item = f64>, out: &mut ElementColumns<'_>) {
+        let [motor, link] = out.two_columns(entry, entry + 1);
+        for ((m, l), t) in motor.iter_mut().zip(link).zip(torque) {
+            *m = t / self.ratio;
+            *l = -t;
+        }
+    }
+
     /// Entry of the motor's row of the damping; the link's is the next.
     fn damping_entry(&self) -> usize {
         if self.cubic { 4 } else { 2 }
@@ -154,20 +163,13 @@ impl JointElement for ElasticTransmission {
     }
     fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         let deformation = self.deformation(joints, motion);
-        let mut put = |entry: usize, torque: &mut dyn Iterator<Item = f64>| {
-            let [motor, link] = out.two_columns(entry, entry + 1);
-            for ((m, l), t) in motor.iter_mut().zip(link).zip(torque) {
-                *m = t / self.ratio;
-                *l = -t;
-            }
-        };
-        put(0, &mut deformation.iter().copied());
+        self.put(0, deformation.iter().copied(), out);
         if self.cubic {
-            put(2, &mut deformation.iter().map(|x| x * x * x));
+            self.put(2, deformation.iter().map(|x| x * x * x), out);
         }
         if self.damping {
-            let (theta, q) = (motion.rate(self.motor), motion.rate(self.link));
-            put(self.damping_entry(), &mut theta.iter().zip(q).map(|(t, q)| t / self.ratio - q));
+            let speeds = motion.rate(self.motor).iter().zip(motion.rate(self.link));
+            self.put(self.damping_entry(), speeds.map(|(theta, q)| theta / self.ratio - q), out);
         }
     }
     fn adjoint(
