@@ -25,6 +25,7 @@ mod nist;
 mod nist_nonlinear;
 mod nist_nonlinear_strd;
 mod nist_strd;
+mod online;
 mod periodic;
 mod posterior_and_folds;
 mod pruning;

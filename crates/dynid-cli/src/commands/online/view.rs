@@ -96,7 +96,6 @@ impl View {
                 "end: {} samples, {} rows, {} alarms, {} changes; {} samples before the clock, {} gaps",
                 counts.samples, counts.rows, counts.alarms, counts.changes, counts.backward, counts.gaps
             )),
-            _ => {}
         }
     }
 

@@ -1,9 +1,7 @@
 //! The recursive estimator against batch solutions of the same rows, and what stands beside it.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "in tests a panic is the report")]
 
-mod golden;
-mod random_problem;
-
+use crate::golden::{check_close, load, number, vector};
 use dynid_estimate::consistent::{Problem, Settings as ConsistentSettings, Status, estimate};
 use dynid_estimate::factor::{ExtendedBuilder, ExtendedFactor};
 use dynid_estimate::linear::{ols, ols_extended};
@@ -12,7 +10,6 @@ use dynid_estimate::online::{
     chow_test, factor_from_root, root_from_factor,
 };
 use dynid_estimate::{Factor, FactorBuilder, Mat};
-use golden::{check_close, load, number, vector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -238,7 +235,7 @@ fn chow_test_keeps_its_level_and_names_what_moved() {
 #[test]
 fn published_estimates_are_the_consistent_optimum_of_the_state() {
     for seed in [1, 4, 9] {
-        let (problem, _) = random_problem::random_problem(seed, Some(2));
+        let (problem, _) = crate::random_problem::random_problem(seed, Some(2));
         let p = problem.columns();
         let mut settings = plain(p, 1, Forgetting::None);
         settings.prior_std = vec![30.0; p];

@@ -2,11 +2,9 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
-mod arm;
-
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use arm::arm;
+use crate::arm::arm;
 use dynid_model::element::{
     Coulomb, CubicSpring, CyclicTorque, ElasticTransmission, ExternalLoad, JointElement, PowerLaw,
     RotorInertia, Transmission, Viscous,

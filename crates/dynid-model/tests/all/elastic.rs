@@ -2,11 +2,9 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
 
-#[expect(dead_code, reason = "shared with tests that use more of it")]
-mod random_tree;
-
 use std::path::PathBuf;
 
+use crate::random_tree::tree;
 use dynid_model::element::{
     Arctangent, Coulomb, CubicSpring, CyclicTorque, ElasticDoubt, ElasticTransmission, ExternalLoad,
     JetMotion, JointElement, Offset, PiecewiseSpring, PowerLaw, RotorInertia, ShapeSetting, Spring, Stribeck,
@@ -14,7 +12,6 @@ use dynid_model::element::{
 };
 use dynid_model::scalar::{Jet, Scalar as _};
 use dynid_model::*;
-use random_tree::tree;
 use serde_json::Value;
 
 fn golden(name: &str) -> Option<Value> {
