@@ -12,6 +12,7 @@ use sha2::{Digest, Sha256};
 use super::learning::{Learned, Structure};
 use super::running::Running;
 use super::samples::Samples;
+use super::usual::Innovations;
 use crate::Error;
 use crate::config::Config;
 use dynid_estimate::conditioning::LiveRowSettings;
@@ -185,10 +186,13 @@ fn transfer_learned(learned: &mut Learned, transfer: &mut Transfer<'_>) {
     for list in [&mut learned.start, &mut learned.prior_std, &mut learned.efforts, &mut learned.noise] {
         transfer.list(list, 1);
     }
-    transfer.count(&mut learned.row_samples, MOST_ROWS);
+    let Innovations { size, every, inflation } = &mut learned.innovations;
+    transfer.list(size, 1);
+    transfer.count(every, MOST_ROWS);
+    transfer.real(inflation);
 }
 
-/// Most rows of a first stretch that a checkpoint is believed.
+/// Longest correlation time that a checkpoint is believed, rows.
 const MOST_ROWS: usize = 1 << 40;
 
 fn blank(structure: &Structure) -> Learned {
@@ -202,6 +206,6 @@ fn blank(structure: &Structure) -> Learned {
         prior_std: Vec::new(),
         efforts: Vec::new(),
         noise: Vec::new(),
-        row_samples: 0,
+        innovations: Innovations::stated(structure.model.outputs().len()),
     }
 }

@@ -15,6 +15,7 @@ use dynid_motion::live::{LiveGrid, LiveSettings};
 use dynid_motion::{Channel, JointSignals, Log};
 
 use super::samples::Sample;
+use super::usual::Innovations;
 use crate::config::Config;
 use crate::elements::ElementPlan;
 use crate::identify::stated_values;
@@ -97,8 +98,8 @@ pub(super) struct Learned {
     pub(super) efforts: Vec<f64>,
     /// Covariance of a sample's rows, row by row.
     pub(super) noise: Vec<f64>,
-    /// Samples of rows in the stretch.
-    pub(super) row_samples: usize,
+    /// What innovations are usual.
+    pub(super) innovations: Innovations,
 }
 
 impl Learned {
@@ -151,7 +152,8 @@ impl Learned {
         let Some(noise) = noise(structure, &live)? else {
             return Ok(Err("an output has no usable rows".to_owned()));
         };
-        Ok(Ok(Learned { rows, start, prior_std, efforts, noise, row_samples: live.len() }))
+        let innovations = Innovations::stated(model.outputs().len());
+        Ok(Ok(Learned { rows, start, prior_std, efforts, noise, innovations }))
     }
 
     /// Whether lengths and numbers are those of a learned stretch of this robot.
@@ -167,6 +169,10 @@ impl Learned {
             && positive(&self.prior_std)
             && finite(&self.efforts)
             && finite(&self.noise)
+            && self.innovations.size.len() == outputs
+            && positive(&self.innovations.size)
+            && positive(&[self.innovations.inflation])
+            && self.innovations.every > 0
             && positive(&[states.rate_hz, states.state_hz, self.rows.kernel_hz])
     }
 

@@ -13,6 +13,7 @@ mod moved;
 mod running;
 mod samples;
 mod session;
+mod usual;
 
 pub use checkpoint::Checkpoint;
 pub use event::{Counts, Event, LearnedParameter, Moved, MovedParameter, ParameterValue, PlainValue};

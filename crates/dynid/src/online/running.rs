@@ -14,6 +14,7 @@ use super::event::{Counts, Event, ParameterValue, PlainValue};
 use super::learning::{Learned, Structure};
 use super::moved::Hypotheses;
 use super::samples::Sample;
+use super::usual::UsualInnovations;
 use crate::Error;
 use crate::config::{Config, ForgettingRule};
 use crate::consistency;
@@ -32,8 +33,9 @@ const DIRECTION_TOLERANCE: f64 = 1e-6;
 const BLOCKS: usize = 20;
 /// What parameters wander in the memory, as a share of their prior deviation.
 const WANDERING: f64 = 0.1;
-/// Share of the learned stretch that change detection learns from.
-const LEARNED_SHARE: f64 = 0.8;
+/// Weight of the prior where bodies are made possible, as a share of that of a Gaussian prior: it fills what rows do not
+/// see, and hardly moves what they do.
+const PRIOR_SHARE: f64 = 0.01;
 /// Prior of a stretch on its own, in prior deviations of the run.
 const NO_PRIOR: f64 = 1e9;
 /// Probability with which chance alone passes for a change once an alarm has been raised.
@@ -79,7 +81,7 @@ impl Running {
     pub(super) fn new(config: &Config, structure: &Structure, learned: Learned) -> Result<Running, Error> {
         let outputs = structure.model.outputs().len();
         let rows = learned.live_rows(structure)?;
-        let settings = settings(config, &learned, outputs, rows.spacing_s());
+        let settings = settings(config, &learned, outputs, rows.spacing_s(), true);
         let window = Settings {
             prior_std: learned.prior_std.iter().map(|s| NO_PRIOR * s).collect(),
             start: vec![0.0; learned.start.len()],
@@ -143,6 +145,57 @@ impl Running {
         self.grid.interrupt();
     }
 
+    /// Takes the learned stretch itself: no alarms yet, for what is usual is learned from it too.
+    pub(super) fn absorb(&mut self, config: &Config, samples: &[Sample]) -> Result<(), Error> {
+        let outputs = self.errors.len();
+        let calm = settings(config, &self.learned, outputs, self.rows.spacing_s(), false);
+        self.estimator = Estimator::new(calm)?;
+        samples.iter().for_each(|sample| self.sample(sample));
+        let Running { rows, waiting, .. } = self;
+        rows.drain(|row| waiting.push(row.clone()));
+        let mut usual = UsualInnovations::new(outputs);
+        let mut taken = Vec::new();
+        for row in std::mem::take(&mut self.waiting) {
+            let Some((used, effort)) = self.load(&row) else { continue };
+            let noise = self.noise(&used);
+            self.estimator.step(&self.regressor, &effort, RowNoise::Covariance(&noise))?;
+            usual.push(&used, self.estimator.innovation().whitened());
+            taken.push((used, effort, self.regressor.clone()));
+        }
+        let block = (config.online.reaction_s / self.rows.spacing_s()).ceil().max(1.0) as usize;
+        self.learned.innovations = usual.learned(block);
+        let armed = settings(config, &self.learned, outputs, self.rows.spacing_s(), true);
+        self.estimator = Estimator::new(armed)?;
+        for (used, effort, regressor) in taken {
+            let noise = self.noise(&used);
+            self.estimator.step(&regressor, &effort, RowNoise::Covariance(&noise))?;
+        }
+        self.unchanged.copy_from(self.estimator.information());
+        Ok(())
+    }
+
+    /// Puts the usable rows of a sample into place; their outputs and efforts.
+    fn load(&mut self, row: &LiveRow) -> Option<(Vec<usize>, Vec<f64>)> {
+        self.newest = row.time;
+        let used: Vec<usize> = (0..row.usable.len()).filter(|o| row.usable[*o]).collect();
+        if used.is_empty() {
+            return None;
+        }
+        self.regressor.clear();
+        used.iter().for_each(|o| self.regressor.extend_from_slice(&row.columns[*o]));
+        let effort = used.iter().map(|o| row.effort[*o]).collect();
+        self.counts.rows += 1;
+        Some((used, effort))
+    }
+
+    /// Covariance of the rows of some outputs, of the size that is usual.
+    fn noise(&self, used: &[usize]) -> Vec<f64> {
+        let outputs = self.errors.len();
+        let size = &self.learned.innovations.size;
+        let of = |i: usize, j: usize| self.learned.noise[i * outputs + j] * (size[i] * size[j]).sqrt();
+        used.iter().flat_map(|i| used.iter().map(move |j| of(*i, *j))).collect()
+    }
+
     /// Takes a sample; rows appear some samples later.
     pub(super) fn sample(&mut self, sample: &Sample) {
         let Running { grid, rows, waiting, .. } = self;
@@ -177,19 +230,8 @@ impl Running {
         row: &LiveRow,
         emit: &mut dyn FnMut(Event),
     ) -> Result<(), Error> {
-        self.newest = row.time;
-        let used: Vec<usize> = (0..row.usable.len()).filter(|o| row.usable[*o]).collect();
-        if !used.is_empty() {
-            let outputs = row.usable.len();
-            self.regressor.clear();
-            used.iter().for_each(|o| self.regressor.extend_from_slice(&row.columns[*o]));
-            let effort: Vec<f64> = used.iter().map(|o| row.effort[*o]).collect();
-            let noise: Vec<f64> = used
-                .iter()
-                .flat_map(|i| used.iter().map(move |j| i * outputs + j))
-                .map(|k| self.learned.noise[k])
-                .collect();
-            self.counts.rows += 1;
+        if let Some((used, effort)) = self.load(row) {
+            let noise = self.noise(&used);
             self.update(config, structure, &used, &effort, &noise, emit)?;
         }
         let due = *self.next_report.get_or_insert(row.time + config.online.report_s);
@@ -250,7 +292,7 @@ impl Running {
     /// Judges the samples since the change and takes over what is known after it.
     fn judge(&mut self, structure: &Structure, alarm: f64) -> Result<Event, Error> {
         let after = self.since.information();
-        let inflation = self.inflation();
+        let inflation = self.learned.innovations.inflation;
         let judgement = judge_change(&self.unchanged, after, &self.hypotheses.list, inflation, CHANCE);
         let known = match judgement.judged.first().filter(|_| judgement.confirmed) {
             Some(best) => after_change(&self.unchanged, after, &self.hypotheses.list[best.hypothesis]),
@@ -274,13 +316,9 @@ impl Running {
         self.estimator.detection().map_or(0.0, |d| d.statistic())
     }
 
-    fn inflation(&self) -> f64 {
-        self.estimator.detection().map_or(1.0, |d| d.inflation())
-    }
-
     /// The estimate as it is.
     pub(super) fn report(&mut self, config: &Config, structure: &Structure) -> Result<Event, Error> {
-        let coloured = self.inflation().sqrt();
+        let coloured = self.learned.innovations.inflation.sqrt();
         self.estimator.std(&mut self.std);
         let names = &structure.model.parameters().linear;
         let value = |(k, column): (usize, &usize)| ParameterValue {
@@ -327,8 +365,11 @@ impl Running {
             &self.prior,
             &structure.bounds,
         );
-        let settings =
-            ConsistentSettings { form, gaussian_weight: self.inflation(), ..ConsistentSettings::default() };
+        let settings = ConsistentSettings {
+            form,
+            gaussian_weight: PRIOR_SHARE * self.learned.innovations.inflation,
+            ..ConsistentSettings::default()
+        };
         let found = estimate(&problem, &settings)?;
         let names = structure.model.parameters().linear.iter();
         Ok(names.zip(found.x).map(|(p, value)| PlainValue { name: p.name.clone(), value }).collect())
@@ -410,7 +451,7 @@ fn transfer_root(root: &mut SquareRoot, transfer: &mut Transfer<'_>) {
     root.set_remainder(rss, weight);
 }
 
-fn settings(config: &Config, learned: &Learned, rows: usize, spacing_s: f64) -> Settings {
+fn settings(config: &Config, learned: &Learned, rows: usize, spacing_s: f64, armed: bool) -> Settings {
     let online = &config.online;
     let lambda = (-spacing_s / online.memory_s).exp();
     let largest = learned.efforts.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
@@ -435,18 +476,16 @@ fn settings(config: &Config, learned: &Learned, rows: usize, spacing_s: f64) -> 
         online.forgetting,
         ForgettingRule::Constant | ForgettingRule::ErrorDriven | ForgettingRule::NoiseNormalised
     );
-    let whiteness =
-        Whiteness::Learned { samples: ((LEARNED_SHARE * learned.row_samples as f64) as usize).max(50) };
     let hours = online.false_alarm_hours * 3600.0 / spacing_s;
     let detection = DetectionSettings {
         false_alarms: FalseAlarms::Rate { rate: online.false_alarm_rate, samples: hours.max(1.0) },
-        whiteness,
+        whiteness: Whiteness::Every(learned.innovations.every),
         ..DetectionSettings::default()
     };
     Settings {
         forgetting,
         bounded_covariance: discounts.then_some(1.0),
-        detection: online.alarms.then_some(detection),
+        detection: (armed && online.alarms).then_some(detection),
         reaction: None,
         ..Settings::new(learned.start.clone(), learned.prior_std.clone(), rows)
     }

@@ -182,11 +182,8 @@ impl Session {
             }
             Ok(learned) => {
                 let mut running = Running::new(&self.config, &self.structure, learned)?;
+                running.absorb(&self.config, samples)?;
                 emit(running.introduction(&self.structure, time));
-                for sample in std::mem::take(samples) {
-                    running.sample(&sample);
-                }
-                running.drain(&self.config, &self.structure, emit)?;
                 self.phase = Phase::Running(Box::new(running));
             }
         }
