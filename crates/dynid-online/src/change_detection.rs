@@ -11,9 +11,10 @@ const LEAST_THRESHOLD: f64 = 2.0;
 /// Cumulative sum over whitened innovations, `g ← max(0, g + ½ [(1 - 1/κ) Σ min(u², clip) - m ln κ])`, alarm
 /// at `g ≥ h`.
 ///
-/// It is the log-likelihood ratio of innovations with variance `κ` against variance 1. Coloured innovations
-/// are thinned to one sample per correlation time first; the threshold then falls by the logarithm of that
-/// time, since the mean run length of the sum grows as `exp(h)`.
+/// It is the log-likelihood ratio of innovations with variance `κ` against variance 1. Of coloured innovations
+/// every sample counts as one part of an independent one, `1/T` with the correlation time `T`; the threshold
+/// then falls by the logarithm of that time, since the mean run length of the sum grows as `exp(h)`.
+/// Thinning to one sample in `T` would hold the same information, but tell of it up to `T` samples later.
 ///
 /// Sources: Page 1954; Brook & Evans 1972 (threshold).
 #[derive(Debug, Clone)]
@@ -24,7 +25,6 @@ pub struct ChangeDetection {
     every: usize,
     correlation: Option<InnovationCorrelation>,
     statistic: f64,
-    waiting: usize,
 }
 
 impl ChangeDetection {
@@ -46,20 +46,18 @@ impl ChangeDetection {
             Whiteness::Learned { samples } => (1, Some(InnovationCorrelation::new(rows, samples))),
         };
         let (kappa, clip) = (settings.kappa, settings.clip);
-        Self { kappa, clip, threshold, every, correlation, statistic: 0.0, waiting: 0 }
+        Self { kappa, clip, threshold, every, correlation, statistic: 0.0 }
     }
 
     /// Takes the whitened innovations of a sample; true on an alarm, after which the sum starts again from
     /// zero.
     pub fn push(&mut self, whitened: &[f64]) -> bool {
-        let due = self.waiting == 0;
-        let known = self.correlation.as_ref().is_none_or(InnovationCorrelation::is_known);
-        self.waiting = if due { self.every() - 1 } else { self.waiting - 1 };
-        if due && known {
+        if self.correlation.as_ref().is_none_or(InnovationCorrelation::is_known) {
             let size = |row: usize| self.correlation.as_ref().map_or(1.0, |c| c.variance(row));
             let sum: f64 = whitened.iter().enumerate().map(|(r, u)| (u * u / size(r)).min(self.clip)).sum();
             let expected = whitened.len() as f64 * libm::log(self.kappa);
-            self.statistic = (self.statistic + 0.5 * ((1.0 - 1.0 / self.kappa) * sum - expected)).max(0.0);
+            let ratio = 0.5 * ((1.0 - 1.0 / self.kappa) * sum - expected);
+            self.statistic = (self.statistic + ratio / self.every() as f64).max(0.0);
         }
         if let Some(correlation) = &mut self.correlation {
             correlation.push(whitened);
@@ -74,7 +72,6 @@ impl ChangeDetection {
     /// The sum starts again from zero; what was learned stays.
     pub fn restart(&mut self) {
         self.statistic = 0.0;
-        self.waiting = 0;
     }
 
     /// The sum `g`.
@@ -87,13 +84,13 @@ impl ChangeDetection {
         (self.threshold - libm::log(self.every() as f64)).max(self.threshold.min(LEAST_THRESHOLD))
     }
 
-    /// Samples per sample used.
+    /// Samples that count as one independent sample.
     pub fn every(&self) -> usize {
         self.correlation.as_ref().map_or(self.every, |c| c.time())
     }
 
     /// By how much gains in the residual sum of squares are overstated, at least 1: learned size and colour
-    /// of the innovations, or the samples per sample used.
+    /// of the innovations, or the samples that count as one.
     pub fn inflation(&self) -> f64 {
         self.correlation.as_ref().map_or(self.every as f64, |c| c.inflation() * c.mean_variance()).max(1.0)
     }
@@ -108,7 +105,5 @@ impl ChangeDetection {
         if let Some(correlation) = &mut self.correlation {
             correlation.transfer(transfer);
         }
-        let longest = self.correlation.as_ref().map_or(self.every, InnovationCorrelation::longest);
-        transfer.count(&mut self.waiting, longest);
     }
 }

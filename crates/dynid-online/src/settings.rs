@@ -72,7 +72,7 @@ pub enum FalseAlarms {
 pub enum Whiteness {
     /// White, and their noise is as stated.
     White,
-    /// One of so many samples is used; their noise is as stated.
+    /// So many samples count as one independent sample; their noise is as stated.
     Every(usize),
     /// Nothing: size and correlation time (up to a fifth of `samples`) are learned
     /// ([`crate::InnovationCorrelation`]); no alarm before the end of the first `samples`. Alarms are then

@@ -16,17 +16,15 @@ pub struct ChangeHypothesis {
     pub std: Vec<f64>,
 }
 
-/// A hypothesis against the samples.
+/// A hypothesis against the samples, beside those selected before it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JudgedHypothesis {
     /// Index among the hypotheses.
     pub hypothesis: usize,
-    /// Share of the total gain that its jumps explain, 0 to 1.
+    /// Share of the total gain that all jumps so far explain, 0 to 1.
     pub share: f64,
-    /// Logarithm of the Bayes factor against "nothing changed".
+    /// Logarithm of the Bayes factor of all jumps so far against "nothing changed".
     pub evidence: f64,
-    /// Estimated jumps and their standard deviations.
-    pub jumps: Vec<(f64, f64)>,
 }
 
 /// What the samples after an alarm say.
@@ -37,19 +35,43 @@ pub struct ChangeJudgement {
     pub total_gain: f64,
     /// Whether that is more than chance would give.
     pub confirmed: bool,
-    /// All hypotheses, the largest evidence first.
-    pub judged: Vec<JudgedHypothesis>,
+    /// What moved, the most telling first; empty unless confirmed.
+    pub moved: Vec<JudgedHypothesis>,
+    /// Jumps of everything in `moved`, in that order, and their standard deviations.
+    pub jumps: Vec<(f64, f64)>,
+    /// All hypotheses on their own, the largest evidence first.
+    pub alone: Vec<JudgedHypothesis>,
 }
+
+/// Settings of [`judge_change`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JudgeSettings {
+    /// By how much squares of rows are overstated because rows are coloured, at least 1. Default 1.
+    pub inflation: f64,
+    /// Probability with which chance alone is called a change. Default 1e-6.
+    pub level: f64,
+    /// Gain in the logarithm of the Bayes factor that a further hypothesis must bring. Default 5.
+    pub least_gain: f64,
+    /// Most hypotheses that are selected. Default 6.
+    pub most: usize,
+}
+
+impl Default for JudgeSettings {
+    fn default() -> Self {
+        JudgeSettings { inflation: 1.0, level: 1e-6, least_gain: 5.0, most: 6 }
+    }
+}
+
+/// Hypotheses that come second are sought among so many, the best on their own.
+const CANDIDATES: usize = 24;
 
 /// Judges hypotheses on what moved between the samples behind `before` and those behind `after`.
 ///
-/// For a hypothesis with directions `E` and jumps `δ ~ N(0, diag(std²))` the rows are
+/// For hypotheses with directions `E` and jumps `δ ~ N(0, diag(std²))` the rows are
 /// `[[-R E, R, z], [0, R_a, z_a]]` in `(δ, x)`, with `x` the parameters after the change. The Bayes factor weighs what the jumps explain
-/// against how many there are and how far they might have gone, so a body that explains as much as all parameters together wins over
-/// them, and a single parameter over the body.
-///
-/// `inflation`: by how much squares of rows are overstated because rows are coloured, at least 1; `level`: probability with
-/// which chance alone is called a change.
+/// against how many there are and how far they might have gone, so a body that explains as much as several single parameters wins
+/// over them, and a single parameter over the body. Hypotheses are selected one after the other, each beside those before it, while
+/// the Bayes factor grows.
 ///
 /// # Panics
 /// If factors or hypotheses have different numbers of parameters.
@@ -57,47 +79,89 @@ pub fn judge_change(
     before: &SquareRoot,
     after: &SquareRoot,
     hypotheses: &[ChangeHypothesis],
-    inflation: f64,
-    level: f64,
+    settings: &JudgeSettings,
 ) -> ChangeJudgement {
     let p = before.columns();
-    let (before, after) = (deflated(before, inflation), deflated(after, inflation));
+    let (before, after) = (deflated(before, settings.inflation), deflated(after, settings.inflation));
     let mut together = before.clone();
     together.merge(&after, &mut vec![0.0; p * (p + 1)]);
     // What remains of both fits is in all of them.
     let total_gain = (together.rss() - before.rss() - after.rss()).max(0.0);
     let still = log_diagonal(&together);
-    let judged = |(hypothesis, candidate): (usize, &ChangeHypothesis)| {
-        let joint = joined(&before, &after, candidate);
+    let judged = |selected: &ChangeHypothesis, hypothesis: usize| {
+        let candidate = combined(selected, &hypotheses[hypothesis]);
+        let joint = joined(&before, &after, &candidate);
         let gain = (together.rss() - joint.rss()).max(0.0);
-        let jumps = candidate.std.len();
         let prior: f64 = candidate.std.iter().map(|s| -s.ln()).sum();
         let occam = log_diagonal(&joint) - still - prior;
-        let (mut x, mut scratch) = (vec![0.0; p + jumps], vec![0.0; p + jumps]);
-        let solved = joint.solve(&mut x);
         JudgedHypothesis {
             hypothesis,
             share: if total_gain > 0.0 { (gain / total_gain).min(1.0) } else { 0.0 },
             evidence: 0.5 * gain - occam,
-            jumps: match solved {
-                true => (0..jumps).map(|k| (x[k], joint.variance(k, &mut scratch).sqrt())).collect(),
-                false => Vec::new(),
-            },
         }
     };
-    let mut judged: Vec<JudgedHypothesis> = hypotheses.iter().enumerate().map(judged).collect();
-    judged.sort_by(|a, b| b.evidence.total_cmp(&a.evidence).then(a.hypothesis.cmp(&b.hypothesis)));
-    let significant = chi_squared_quantile(1.0 - level, p as f64).unwrap_or(f64::INFINITY);
-    ChangeJudgement { total_gain, confirmed: total_gain > significant, judged }
+    let nothing = ChangeHypothesis { name: String::new(), directions: Vec::new(), std: Vec::new() };
+    let mut alone: Vec<JudgedHypothesis> = (0..hypotheses.len()).map(|h| judged(&nothing, h)).collect();
+    let by_evidence = |a: &JudgedHypothesis, b: &JudgedHypothesis| {
+        b.evidence.total_cmp(&a.evidence).then(a.hypothesis.cmp(&b.hypothesis))
+    };
+    alone.sort_by(by_evidence);
+    let significant = chi_squared_quantile(1.0 - settings.level, p as f64).unwrap_or(f64::INFINITY);
+    let confirmed = total_gain > significant;
+    let (mut selected, mut moved) = (nothing, Vec::<JudgedHypothesis>::new());
+    while confirmed && moved.len() < settings.most {
+        let reached = moved.last().map_or(0.0, |m| m.evidence);
+        let left = alone.iter().take(CANDIDATES).map(|a| a.hypothesis);
+        let left = left.filter(|h| moved.iter().all(|m| m.hypothesis != *h));
+        let mut next: Vec<JudgedHypothesis> = left.map(|h| judged(&selected, h)).collect();
+        next.sort_by(by_evidence);
+        match next.into_iter().next() {
+            Some(best) if best.evidence > reached + settings.least_gain || moved.is_empty() => {
+                selected = combined(&selected, &hypotheses[best.hypothesis]);
+                moved.push(best);
+            }
+            _ => break,
+        }
+    }
+    let jumps = match moved.is_empty() {
+        true => Vec::new(),
+        false => jumps(&joined(&before, &after, &selected), selected.std.len()),
+    };
+    ChangeJudgement { total_gain, confirmed, moved, jumps, alone }
 }
 
-/// What is known of the parameters after the change if the hypothesis holds: the samples before count as far as its jumps leave them.
+/// Jumps and their standard deviations.
+fn jumps(joint: &SquareRoot, count: usize) -> Vec<(f64, f64)> {
+    let (mut x, mut scratch) = (vec![0.0; joint.columns()], vec![0.0; joint.columns()]);
+    match joint.solve(&mut x) {
+        true => (0..count).map(|k| (x[k], joint.variance(k, &mut scratch).sqrt())).collect(),
+        false => Vec::new(),
+    }
+}
+
+/// Both hypotheses.
+fn combined(first: &ChangeHypothesis, second: &ChangeHypothesis) -> ChangeHypothesis {
+    ChangeHypothesis {
+        name: format!("{}, {}", first.name, second.name),
+        directions: [&first.directions[..], &second.directions].concat(),
+        std: [&first.std[..], &second.std].concat(),
+    }
+}
+
+/// What is known of the parameters after a change of everything that is named: the samples before count as far as its jumps leave
+/// them.
 ///
 /// # Panics
-/// If the hypothesis has another number of parameters.
-pub fn after_change(before: &SquareRoot, after: &SquareRoot, hypothesis: &ChangeHypothesis) -> SquareRoot {
-    let joint = joined(before, after, hypothesis);
-    let (p, jumps) = (before.columns(), hypothesis.std.len());
+/// If a hypothesis has another number of parameters.
+pub fn after_change<'a>(
+    before: &SquareRoot,
+    after: &SquareRoot,
+    moved: impl IntoIterator<Item = &'a ChangeHypothesis>,
+) -> SquareRoot {
+    let nothing = ChangeHypothesis { name: String::new(), directions: Vec::new(), std: Vec::new() };
+    let all = moved.into_iter().fold(nothing, |all, one| combined(&all, one));
+    let joint = joined(before, after, &all);
+    let (p, jumps) = (before.columns(), all.std.len());
     let mut out = SquareRoot::new(p);
     for i in 0..p {
         out.set_row(i, joint.row(jumps + i));
@@ -178,33 +242,39 @@ mod tests {
         out
     }
 
+    fn judge(before: &SquareRoot, after: &SquareRoot) -> ChangeJudgement {
+        judge_change(before, after, &hypotheses(), &JudgeSettings::default())
+    }
+
     #[test]
     fn the_smallest_hypothesis_that_explains_all_wins() {
         let before = factor(&[1.0, 2.0, -1.0, 0.5], 0..4000);
-        let single =
-            judge_change(&before, &factor(&[1.0, 3.0, -1.0, 0.5], 5000..5400), &hypotheses(), 1.0, 0.01);
-        assert!(single.confirmed);
-        assert_eq!(single.judged[0].hypothesis, 1);
-        assert!(single.judged[0].share > 0.9);
-        let (jump, std) = single.judged[0].jumps[0];
+        let single = judge(&before, &factor(&[1.0, 3.0, -1.0, 0.5], 5000..5400));
+        assert!(single.confirmed && single.moved.len() == 1, "{single:?}");
+        assert_eq!(single.moved[0].hypothesis, 1);
+        assert!(single.moved[0].share > 0.9);
+        let (jump, std) = single.jumps[0];
         assert!((jump - 1.0).abs() < 3.0 * std && std < 0.15, "{jump} {std}");
         // Two parameters, in the proportion of a body.
-        let body =
-            judge_change(&before, &factor(&[0.2, 3.0, -0.5, 0.5], 5000..5400), &hypotheses(), 1.0, 0.01);
-        assert_eq!(body.judged[0].hypothesis, 4);
-        assert!(body.judged[0].share > 0.9);
-        let jumps: Vec<f64> = body.judged[0].jumps.iter().map(|(j, _)| *j).collect();
-        assert!((jumps[0] + 0.8).abs() < 0.3 && (jumps[1] - 1.0).abs() < 0.3, "{jumps:?}");
+        let body = judge(&before, &factor(&[0.2, 3.0, -0.5, 0.5], 5000..5400));
+        assert_eq!((body.moved.len(), body.moved[0].hypothesis), (1, 4));
+        assert!(body.moved[0].share > 0.9);
+        assert!((body.jumps[0].0 + 0.8).abs() < 0.3 && (body.jumps[1].0 - 1.0).abs() < 0.3, "{body:?}");
+        // The body and a parameter of its own.
+        let both = judge(&before, &factor(&[0.2, 3.0, -0.5, 2.0], 5000..5400));
+        let mut named: Vec<usize> = both.moved.iter().map(|m| m.hypothesis).collect();
+        named.sort_unstable();
+        assert_eq!(named, [3, 4], "{both:?}");
     }
 
     #[test]
     fn nothing_is_called_nothing_and_what_is_known_after_is_the_fit_with_jumps() {
         let truth = [1.0, 2.0, -1.0, 0.5];
         let before = factor(&truth, 0..4000);
-        let quiet = judge_change(&before, &factor(&truth, 5000..5400), &hypotheses(), 1.0, 0.01);
-        assert!(!quiet.confirmed && quiet.judged[0].evidence < 3.0);
+        let quiet = judge(&before, &factor(&truth, 5000..5400));
+        assert!(!quiet.confirmed && quiet.moved.is_empty() && quiet.alone[0].evidence < 3.0);
         let after = factor(&[1.0, 3.0, -1.0, 0.5], 5000..5400);
-        let known = after_change(&before, &after, &hypotheses()[1]);
+        let known = after_change(&before, &after, [&hypotheses()[1]]);
         let mut x = [0.0; 4];
         assert!(known.solve(&mut x));
         let mut scratch = [0.0; 4];
@@ -212,5 +282,9 @@ mod tests {
         // What did not move is known from both stretches, what did from the second.
         assert!(std[0] < 0.03 && std[1] > 0.05, "{std:?}");
         assert!((x[1] - 3.0).abs() < 3.0 * std[1] && (x[0] - 1.0).abs() < 4.0 * std[0]);
+        let merged = after_change(&before, &after, []);
+        let mut together = before.clone();
+        together.merge(&after, &mut [0.0; 20]);
+        assert!((merged.rss() - together.rss()).abs() < 1e-9 * together.rss());
     }
 }

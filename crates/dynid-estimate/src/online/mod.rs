@@ -14,4 +14,6 @@ pub use chow::{ChowTest, MovedParameter, chow_test};
 pub use consistent::{ConsistentPublisher, PublishedEstimate};
 pub use dynid_online::*;
 pub use factor::{factor_from_root, root_from_factor};
-pub use hypotheses::{ChangeHypothesis, ChangeJudgement, JudgedHypothesis, after_change, judge_change};
+pub use hypotheses::{
+    ChangeHypothesis, ChangeJudgement, JudgeSettings, JudgedHypothesis, after_change, judge_change,
+};

@@ -49,7 +49,7 @@ pub struct MovedParameter {
 pub struct Moved {
     /// What: a link, a joint's friction, a single parameter.
     pub what: String,
-    /// Share of the misfit that it explains, 0 to 1.
+    /// Share of the misfit that it explains, together with what stands before it, 0 to 1.
     pub share: f64,
     /// Jumps of its parameters that efforts can tell.
     pub parameters: Vec<MovedParameter>,
@@ -146,10 +146,10 @@ pub enum Event {
         alarm: f64,
         /// Whether something changed; if not, the alarm was false.
         confirmed: bool,
-        /// What explains it with the fewest parameters; none if it was false.
-        moved: Option<Moved>,
-        /// What else was tried, best first.
-        alternatives: Vec<Moved>,
+        /// What moved, the most telling first; empty if the alarm was false.
+        moved: Vec<Moved>,
+        /// What else would explain it alone, best first: name and share.
+        alternatives: Vec<(String, f64)>,
     },
     /// The stream has ended.
     End {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use dynid_estimate::Mat;
-use dynid_estimate::online::{ChangeHypothesis, JudgedHypothesis};
+use dynid_estimate::online::{ChangeHypothesis, ChangeJudgement};
 use dynid_model::{EffortModel, Owner};
 
 use super::event::{Moved, MovedParameter};
@@ -14,8 +14,11 @@ use crate::prior::Prior;
 const SILENT: f64 = 1e-9;
 /// A jump is told if it is known to this share of what was possible.
 const KNOWN: f64 = 0.3;
-/// Hypotheses reported beside the best.
+/// Hypotheses reported beside those that moved.
 const ALTERNATIVES: usize = 3;
+/// A body that is picked up or lost: its share of the robot's mass, and its size, m.
+const CARRIED: f64 = 0.1;
+const ACROSS: f64 = 0.15;
 
 /// Hypotheses with the standard parameters behind their jumps.
 #[derive(Debug)]
@@ -26,10 +29,11 @@ pub(super) struct Hypotheses {
 }
 
 impl Hypotheses {
-    /// Every link, the elements of every joint, every single parameter, and everything at once. Jumps may go as far as the prior
-    /// deviations say. `scale`: units of the base parameters.
+    /// Every link, the elements of every joint, every single parameter, and everything at once. Jumps may go as far as [`reaches`]
+    /// says. `scale`: units of the base parameters.
     pub(super) fn new(structure: &Structure, prior: &Prior, scale: &[f64]) -> Hypotheses {
         let parameters = &structure.model.parameters().linear;
+        let reach = reaches(structure, prior);
         let acting: Vec<usize> =
             (0..parameters.len()).filter(|c| acts(&structure.regrouping, *c, scale)).collect();
         let mut groups: BTreeMap<(u8, String), Vec<usize>> = BTreeMap::new();
@@ -50,7 +54,7 @@ impl Hypotheses {
             out.list.push(ChangeHypothesis {
                 name,
                 directions: columns.iter().flat_map(|c| (0..scale.len()).map(|row| entry(row, *c))).collect(),
-                std: columns.iter().map(|c| prior.std[*c]).collect(),
+                std: columns.iter().map(|c| reach[*c]).collect(),
             });
             out.columns.push(columns);
         };
@@ -72,32 +76,51 @@ impl Hypotheses {
         out
     }
 
-    /// The best hypothesis in words, then others.
+    /// What a judgement says in words, and what else would explain it alone.
     pub(super) fn tell(
         &self,
         structure: &Structure,
-        judged: &[JudgedHypothesis],
-    ) -> (Option<Moved>, Vec<Moved>) {
-        let mut told = judged.iter().map(|j| self.moved(structure, j));
-        let best = told.next();
-        (best, told.take(ALTERNATIVES).collect())
-    }
-
-    fn moved(&self, structure: &Structure, judged: &JudgedHypothesis) -> Moved {
-        let hypothesis = &self.list[judged.hypothesis];
-        let columns = &self.columns[judged.hypothesis];
+        judgement: &ChangeJudgement,
+    ) -> (Vec<Moved>, Vec<(String, f64)>) {
         let table = structure.model.parameters();
-        let known = columns.iter().zip(&judged.jumps).zip(&hypothesis.std);
-        let parameters = known
-            .filter(|((_, (_, std)), prior)| *std < KNOWN * **prior)
-            .map(|((column, (jump, std)), _)| MovedParameter {
-                name: table.linear[*column].name.clone(),
-                jump: *jump,
-                std: *std,
-            })
-            .collect();
-        Moved { what: hypothesis.name.clone(), share: judged.share, parameters }
+        let mut jumps = judgement.jumps.iter();
+        let moved = judgement.moved.iter().map(|judged| {
+            let hypothesis = &self.list[judged.hypothesis];
+            let own: Vec<&(f64, f64)> = jumps.by_ref().take(hypothesis.std.len()).collect();
+            let known = self.columns[judged.hypothesis].iter().zip(own).zip(&hypothesis.std);
+            let parameters = known
+                .filter(|((_, (_, std)), possible)| *std < KNOWN * **possible)
+                .map(|((column, (jump, std)), _)| MovedParameter {
+                    name: table.linear[*column].name.clone(),
+                    jump: *jump,
+                    std: *std,
+                })
+                .collect();
+            Moved { what: hypothesis.name.clone(), share: judged.share, parameters }
+        });
+        let moved: Vec<Moved> = moved.collect();
+        let others =
+            judgement.alone.iter().filter(|a| judgement.moved.iter().all(|m| m.hypothesis != a.hypothesis));
+        let others = others.take(ALTERNATIVES).map(|a| (self.list[a.hypothesis].name.clone(), a.share));
+        let others = if judgement.confirmed { others.collect() } else { Vec::new() };
+        (moved, others)
     }
+}
+
+/// How far a parameter may jump: as far as was not known of it, and what belongs to a body as far as something
+/// of a tenth of the robot's mass, 0.15 m across, would move it.
+fn reaches(structure: &Structure, prior: &Prior) -> Vec<f64> {
+    let bodies = structure.model.mechanism().bodies().len();
+    let total: f64 = (0..bodies).map(|b| prior.values[10 * b]).sum();
+    let mass = CARRIED * total;
+    let carried = [mass, mass * ACROSS, mass * ACROSS * ACROSS];
+    let of_body = |c: usize| carried[[0, 1, 1, 1, 2, 2, 2, 2, 2, 2][c % 10]];
+    prior
+        .std
+        .iter()
+        .enumerate()
+        .map(|(c, std)| if c < 10 * bodies { std.max(of_body(c)) } else { *std })
+        .collect()
 }
 
 fn acts(regrouping: &Mat<f64>, column: usize, scale: &[f64]) -> bool {

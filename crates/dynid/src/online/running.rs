@@ -3,8 +3,8 @@
 use dynid_estimate::conditioning::{LiveRow, LiveRows};
 use dynid_estimate::consistent::{Settings as ConsistentSettings, estimate};
 use dynid_estimate::online::{
-    DetectionSettings, Estimator, FalseAlarms, Forgetting, RowNoise, Settings, SquareRoot, Whiteness,
-    after_change, factor_from_root, judge_change,
+    DetectionSettings, Estimator, FalseAlarms, Forgetting, JudgeSettings, RowNoise, Settings, SquareRoot,
+    Whiteness, after_change, factor_from_root, judge_change,
 };
 use dynid_model::EffortModel;
 use dynid_motion::live::LiveGrid;
@@ -38,8 +38,6 @@ const WANDERING: f64 = 0.1;
 const PRIOR_SHARE: f64 = 0.01;
 /// Prior of a stretch on its own, in prior deviations of the run.
 const NO_PRIOR: f64 = 1e9;
-/// Probability with which chance alone passes for a change once an alarm has been raised.
-const CHANCE: f64 = 0.01;
 /// A parameter is determined if its deviation is below this share of that before any sample.
 const DETERMINED: f64 = 0.1;
 
@@ -292,23 +290,14 @@ impl Running {
     /// Judges the samples since the change and takes over what is known after it.
     fn judge(&mut self, structure: &Structure, alarm: f64) -> Result<Event, Error> {
         let after = self.since.information();
-        let inflation = self.learned.innovations.inflation;
-        let judgement = judge_change(&self.unchanged, after, &self.hypotheses.list, inflation, CHANCE);
-        let known = match judgement.judged.first().filter(|_| judgement.confirmed) {
-            Some(best) => after_change(&self.unchanged, after, &self.hypotheses.list[best.hypothesis]),
-            None => {
-                let mut merged = self.unchanged.clone();
-                let p = merged.columns();
-                merged.merge(after, &mut vec![0.0; p * (p + 1)]);
-                merged
-            }
-        };
+        let settings =
+            JudgeSettings { inflation: self.learned.innovations.inflation, ..JudgeSettings::default() };
+        let judgement = judge_change(&self.unchanged, after, &self.hypotheses.list, &settings);
+        let moved = judgement.moved.iter().map(|m| &self.hypotheses.list[m.hypothesis]);
+        let known = after_change(&self.unchanged, after, moved);
         self.counts.changes += u64::from(judgement.confirmed);
         self.estimator.set_information(&known)?;
-        let (moved, alternatives) = match judgement.confirmed {
-            true => self.hypotheses.tell(structure, &judgement.judged),
-            false => (None, Vec::new()),
-        };
+        let (moved, alternatives) = self.hypotheses.tell(structure, &judgement);
         Ok(Event::Change { time: self.newest, alarm, confirmed: judgement.confirmed, moved, alternatives })
     }
 

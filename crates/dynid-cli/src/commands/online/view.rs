@@ -84,11 +84,11 @@ impl View {
                 self.note(&format!("{time:.2} s: the alarm was false: nothing changed"));
             }
             Event::Change { time, moved, alternatives, .. } => {
-                if let Some(moved) = moved {
+                for moved in moved {
                     self.note(&format!("{time:.2} s: changed: {}", words(moved)));
                 }
-                for other in alternatives {
-                    self.note(&format!("    or: {}", words(other)));
+                for (what, share) in alternatives {
+                    self.note(&format!("    alone explains less: {what} ({} %)", (100.0 * share).round()));
                 }
             }
             Event::Estimate { .. } => self.estimate(event),
