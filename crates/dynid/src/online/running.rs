@@ -29,6 +29,8 @@ const EFFORT_FLOOR: f64 = 0.05;
 const DEAD_ZONE: f64 = 3.0;
 /// Directions that are excited by less than this share are not forgotten.
 const DIRECTION_TOLERANCE: f64 = 1e-6;
+/// Squares of innovations are clipped here. Rows are means over the kernel, so single outliers are small in them already.
+const CLIP: f64 = 100.0;
 /// Blocks of a window.
 const BLOCKS: usize = 20;
 /// What parameters wander in the memory, as a share of their prior deviation.
@@ -469,6 +471,7 @@ fn settings(config: &Config, learned: &Learned, rows: usize, spacing_s: f64, arm
     let detection = DetectionSettings {
         false_alarms: FalseAlarms::Rate { rate: online.false_alarm_rate, samples: hours.max(1.0) },
         whiteness: Whiteness::Every(learned.innovations.every),
+        clip: CLIP,
         ..DetectionSettings::default()
     };
     Settings {
