@@ -6,6 +6,7 @@ mod design;
 mod estimator_settings;
 mod export;
 mod friction;
+mod online;
 mod other_libraries;
 mod study;
 mod support;

@@ -13,6 +13,8 @@ use crate::config::Config;
 
 /// Time between records that follow each other, s.
 const BETWEEN_RECORDS: f64 = 1.0;
+/// Shortest stretch at the end of a stream that is learned from, in parts of the one asked for.
+const SHORTEST: f64 = 0.25;
 /// By how much a stretch grows that does not suffice.
 const GROWTH: f64 = 1.5;
 /// Longest stretch that is held while nothing can be learned, in parts of the first one.
@@ -197,8 +199,10 @@ impl Session {
     pub fn finish(&mut self, emit: &mut dyn FnMut(Event)) -> Result<(), Error> {
         self.flush(emit)?;
         if let Phase::Learning { samples, .. } = &self.phase {
-            let mut reason = format!("{} samples", samples.len());
-            if samples.len() > 1 {
+            let length = samples.last().map_or(0.0, |s| s.time - samples[0].time);
+            let least = SHORTEST * self.config.online.learn_s;
+            let mut reason = format!("expected at least {least:.2} s, found {length:.2} s");
+            if length >= least {
                 self.learn(&mut |event| match event {
                     Event::Learning { reason: why, .. } => reason = why,
                     event => emit(event),
