@@ -11,6 +11,7 @@ mod friction_recorded;
 mod friction_report;
 mod identifiability;
 mod least_squares;
+mod online;
 mod periodic;
 mod recorded_logs;
 mod support;

@@ -1,0 +1,188 @@
+//! On-line identification: recorded logs, every kind of forgetting, checkpoints.
+
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
+
+use std::path::{Path, PathBuf};
+
+use dynid::config::{ForgettingRule, LogConfig};
+use dynid::io::csv::{ReadOptions, read};
+use dynid::online::{Event, Session};
+use dynid::{Config, identify};
+
+use crate::support::data;
+
+/// Follows the logs of a configuration, with the index of the log that each event came from.
+fn follow(config: &Config) -> Vec<(usize, Event)> {
+    let mut session: Option<Session> = None;
+    let mut events = Vec::new();
+    for (index, log) in config.log.iter().enumerate() {
+        let table = read(&log.path, &ReadOptions { rows: log.rows, ..ReadOptions::default() }).unwrap();
+        let name = log.path.display().to_string();
+        match &mut session {
+            None => session = Some(Session::new(config, &name, &table.header, None).unwrap()),
+            Some(session) => {
+                session.source(&name, &table.header, None, &mut |e| events.push((index - 1, e))).unwrap();
+            }
+        }
+        let session = session.as_mut().unwrap();
+        for k in 0..table.rows {
+            let row: Vec<f64> = table.columns.iter().map(|c| c[k]).collect();
+            session.row(&row, &mut |e| events.push((index, e))).unwrap();
+        }
+    }
+    let last = config.log.len() - 1;
+    session.unwrap().finish(&mut |e| events.push((last, e))).unwrap();
+    events
+}
+
+fn last_estimate(events: &[(usize, Event)]) -> &Event {
+    &events.iter().rev().find(|(_, e)| matches!(e, Event::Estimate { .. })).unwrap().1
+}
+
+fn parsed(text: &str) -> Option<Config> {
+    let folder = data()?;
+    Some(Config::parse(&text.replace("{data}", &folder.display().to_string()), "test").unwrap())
+}
+
+#[test]
+fn emps_on_line_equals_off_line() {
+    let robot = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+    let text = r#"
+schema = 1
+name = "emps"
+body = [{ name = "carriage", parent = "ground", joint = { name = "x", kind = "prismatic", axis = [1, 0, 0] } }]
+"#;
+    std::fs::write(robot.path(), text).unwrap();
+    let text = r#"
+robot = "{robot}"
+[columns]
+position = ["qm"]
+effort = { columns = ["vir"], scale = 35.15065188 }
+[elements]
+default = ["coulomb", "viscous", "offset"]
+friction = "given"
+[estimator]
+consistency = "none"
+[online]
+learn_s = 8
+[[log]]
+path = "{data}/emps/emps_identification.csv.gz"
+"#;
+    let Some(config) = parsed(&text.replace("{robot}", &robot.path().display().to_string())) else { return };
+    let events = follow(&config);
+    assert!(!events.iter().any(|(_, e)| matches!(e, Event::Alarm { .. })), "nothing changed");
+    let off_line = identify(&config, |_| {}).unwrap();
+    let Event::Estimate { parameters, .. } = last_estimate(&events) else { unreachable!() };
+    for ((p, x), (std, _)) in parameters.iter().zip(&off_line.fit().x).zip(off_line.standard_deviations()) {
+        let std = std.unwrap();
+        println!("{}: on line {:.4} ± {:.4}, off line {x:.4} ± {std:.4}", p.name, p.value, p.std);
+        assert!((p.value - x).abs() < std.hypot(p.std), "{}: {} and {x}", p.name, p.value);
+        assert!((p.value / x - 1.0).abs() < 0.02, "{}: {} and {x}", p.name, p.value);
+    }
+}
+
+/// Four records without load, from three days, then one with 2.805 kg at the flange.
+#[test]
+fn a_payload_on_the_ur10e_is_found_and_named() {
+    let text = r#"
+robot = "{data}/ur10e-innopolis/ur10e.urdf"
+[columns]
+effort = { columns = "i{}", unit = "A", scale = [14.87, 13.26, 11.13, 10.62, 11.03, 11.47] }
+[online]
+learn_s = 30
+report_s = 5
+[[log]]
+path = "{data}/ur10e-innopolis/20_02_10-30sec_12harm.csv.gz"
+rows = [635, 3510]
+[[log]]
+path = "{data}/ur10e-innopolis/20_02_12-40sec_12harm.csv.gz"
+rows = [500, 4460]
+[[log]]
+path = "{data}/ur10e-innopolis/20_02_12-50sec_12harm.csv.gz"
+rows = [355, 5090]
+[[log]]
+path = "{data}/ur10e-innopolis/20_02_19_14harm50sec.csv.gz"
+rows = [195, 4966]
+[[log]]
+path = "{data}/ur10e-innopolis/20_02_19_14harm50secLoad.csv.gz"
+rows = [308, 5071]
+"#;
+    let Some(config) = parsed(text) else { return };
+    let events = follow(&config);
+    let alarms: Vec<usize> =
+        events.iter().filter(|(_, e)| matches!(e, Event::Alarm { .. })).map(|(log, _)| *log).collect();
+    assert_eq!(alarms, [4], "one alarm, on the record with the load");
+    let change = events.iter().find_map(|(_, e)| match e {
+        Event::Change { time, alarm, confirmed, moved, .. } => Some((*time, *alarm, *confirmed, moved)),
+        _ => None,
+    });
+    let (time, alarm, confirmed, moved) = change.unwrap();
+    println!("alarm at {alarm:.2} s, judged at {time:.2} s: {moved:?}");
+    assert!(confirmed);
+    assert_eq!(moved[0].what, "link `wrist_3_link`");
+    assert!(moved[0].share > 0.85);
+    let mass = moved[0].parameters.iter().find(|p| p.name == "wrist_3_link.m").unwrap();
+    assert!((mass.jump - 2.805).abs() < 2.0 * mass.std && mass.std < 1.0, "{mass:?}");
+}
+
+fn example(rule: ForgettingRule) -> Config {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut config = Config::read(&root.join("examples/indy7/identify.toml")).unwrap();
+    config.log = vec![LogConfig {
+        path: PathBuf::from(&root).join("examples/indy7/train.csv.gz"),
+        ..LogConfig::default()
+    }];
+    config.online.forgetting = rule;
+    config.online.learn_s = 12.0;
+    config.online.memory_s = 8.0;
+    config
+}
+
+/// Rows from `from` on, with a checkpoint after `cut` of them.
+fn session_events(config: &Config, cut: Option<usize>) -> Vec<Event> {
+    let table = read(&config.log[0].path, &ReadOptions::default()).unwrap();
+    let mut session = Session::new(config, "log", &table.header, None).unwrap();
+    let mut events = Vec::new();
+    for k in 0..table.rows {
+        if Some(k) == cut {
+            session.flush(&mut |e| events.push(e)).unwrap();
+            let checkpoint = session.checkpoint().unwrap().unwrap();
+            session = Session::new(config, "log", &table.header, None).unwrap();
+            session.resume(&checkpoint, "checkpoint", false).unwrap();
+        }
+        let row: Vec<f64> = table.columns.iter().map(|c| c[k]).collect();
+        session.row(&row, &mut |e| events.push(e)).unwrap();
+    }
+    session.finish(&mut |e| events.push(e)).unwrap();
+    events
+}
+
+#[test]
+fn every_kind_of_forgetting_follows_and_resumes_with_the_same_bits() {
+    for rule in [
+        ForgettingRule::None,
+        ForgettingRule::Constant,
+        ForgettingRule::Directional,
+        ForgettingRule::ErrorDriven,
+        ForgettingRule::NoiseNormalised,
+        ForgettingRule::Window,
+        ForgettingRule::Drift,
+    ] {
+        let config = example(rule);
+        let whole = session_events(&config, None);
+        let cut = session_events(&config, Some(4321));
+        let estimates = |events: &[Event]| -> Vec<Event> {
+            events.iter().filter(|e| matches!(e, Event::Estimate { .. })).cloned().collect()
+        };
+        assert!(estimates(&whole).len() > 15, "{rule:?}");
+        assert!(estimates(&whole) == estimates(&cut), "{rule:?}: resumed with other bits");
+        let changes = whole.iter().filter(|e| matches!(e, Event::Change { confirmed: true, .. })).count();
+        assert_eq!(changes, 0, "{rule:?}: nothing changed in this log");
+        let Some(Event::Estimate { parameters, standard, residual_rms, .. }) = estimates(&whole).pop() else {
+            panic!("{rule:?}: no estimate")
+        };
+        assert!(parameters.iter().all(|p| p.value.is_finite() && p.std > 0.0 && p.std.is_finite()));
+        assert!(standard.iter().filter(|p| p.name.ends_with(".m")).all(|p| p.value > 0.0));
+        println!("{rule:?}: last residuals {residual_rms:?}");
+    }
+}
