@@ -170,7 +170,7 @@ impl Run {
         let columns = log.and_then(|l| l.columns.as_ref());
         let Run { session, output, .. } = self;
         if let Some(session) = session {
-            output.passing(|emit| session.source(name, header, columns, emit))?;
+            output.passing(|emit| Ok(session.source(name, header, columns, emit)?))?;
             return Ok(());
         }
         let mut session = Session::new(&self.config, name, header, columns)?;
@@ -188,13 +188,13 @@ impl Run {
 
     fn row(&mut self, row: &[f64]) -> Result<(), Failure> {
         let Run { session: Some(session), output, .. } = self else { return Ok(()) };
-        let worked = output.passing(|emit| session.row(row, emit))?;
+        let worked = output.passing(|emit| Ok(session.row(row, emit)?))?;
         if worked { self.checkpoint_if_due() } else { Ok(()) }
     }
 
     fn flush(&mut self) -> Result<(), Failure> {
         let Run { session: Some(session), output, .. } = self else { return Ok(()) };
-        output.passing(|emit| session.flush(emit).map(|()| true))?;
+        output.passing(|emit| Ok(session.flush(emit)?))?;
         self.checkpoint_if_due()
     }
 
@@ -220,8 +220,7 @@ impl Run {
         self.flush()?;
         self.write_checkpoint()?;
         let Run { session: Some(session), output, .. } = self else { return Ok(()) };
-        output.passing(|emit| session.finish(emit).map(|()| true))?;
-        Ok(())
+        output.passing(|emit| Ok(session.finish(emit)?))
     }
 }
 
@@ -256,7 +255,7 @@ impl Output {
     /// Runs work that emits events; the first event that cannot be written ends it.
     fn passing<T>(
         &mut self,
-        work: impl FnOnce(&mut dyn FnMut(Event)) -> Result<T, dynid::Error>,
+        work: impl FnOnce(&mut dyn FnMut(Event)) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
         let mut written = Ok(());
         let done = work(&mut |event| {
@@ -266,7 +265,7 @@ impl Output {
             }
         });
         written?;
-        Ok(done?)
+        done
     }
 
     fn plain(&self, value: &impl Serialize) -> Result<(), Failure> {

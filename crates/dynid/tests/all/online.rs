@@ -1,6 +1,6 @@
 //! On-line identification: recorded logs, every kind of forgetting, checkpoints.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use std::path::{Path, PathBuf};
 
