@@ -10,6 +10,7 @@ mod checkpoint;
 mod event;
 mod learning;
 mod moved;
+mod rules;
 mod running;
 mod samples;
 mod session;

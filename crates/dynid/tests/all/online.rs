@@ -9,7 +9,7 @@ use dynid::io::csv::{ReadOptions, read};
 use dynid::online::{Event, Session};
 use dynid::{Config, identify};
 
-use crate::support::data;
+use crate::support::{data, emps_robot};
 
 /// Follows the logs of a configuration, with the index of the log that each event came from.
 fn follow(config: &Config) -> Vec<(usize, Event)> {
@@ -46,13 +46,7 @@ fn parsed(text: &str) -> Option<Config> {
 
 #[test]
 fn emps_on_line_equals_off_line() {
-    let robot = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
-    let text = r#"
-schema = 1
-name = "emps"
-body = [{ name = "carriage", parent = "ground", joint = { name = "x", kind = "prismatic", axis = [1, 0, 0] } }]
-"#;
-    std::fs::write(robot.path(), text).unwrap();
+    let robot = emps_robot();
     let text = r#"
 robot = "{robot}"
 [columns]

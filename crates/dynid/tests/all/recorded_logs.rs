@@ -3,7 +3,7 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
 
-use crate::support::{PANDA, TX40, UR10, data, geometric_mean, on_validation, rms, run};
+use crate::support::{PANDA, TX40, UR10, data, emps_robot, geometric_mean, on_validation, rms, run};
 use dynid::model::EffortModel;
 
 /// Runs a set and requires the geometric mean over joints of the RMS ratio to the baseline to stay below `limit`.
@@ -100,17 +100,6 @@ part = [0.7, 1.0]
 }
 
 /// One sliding axis; its robot file has no inertia, so the moving mass is the only rigid parameter.
-fn emps_robot() -> tempfile::NamedTempFile {
-    let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
-    let text = r#"
-schema = 1
-name = "emps"
-body = [{ name = "carriage", parent = "ground", joint = { name = "x", kind = "prismatic", axis = [1, 0, 0] } }]
-"#;
-    std::fs::write(file.path(), text).unwrap();
-    file
-}
-
 const EMPS: &str = r#"
 robot = "{robot}"
 [columns]

@@ -107,3 +107,15 @@ pub(crate) fn geometric_mean(ratios: impl Iterator<Item = f64>) -> f64 {
 pub(crate) fn rms(fit: &dynid::estimators::metrics::Fit) -> Vec<f64> {
     fit.channels.iter().map(|c| c.rms.unwrap()).collect()
 }
+
+/// Robot file of the EMPS, a carriage on a screw.
+pub(crate) fn emps_robot() -> tempfile::NamedTempFile {
+    let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+    let text = r#"
+schema = 1
+name = "emps"
+body = [{ name = "carriage", parent = "ground", joint = { name = "x", kind = "prismatic", axis = [1, 0, 0] } }]
+"#;
+    std::fs::write(file.path(), text).unwrap();
+    file
+}
