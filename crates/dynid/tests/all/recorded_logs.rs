@@ -1,7 +1,7 @@
 //! Recorded logs with default settings, against the plain fits of the data's READMEs on the same metric: RMS of effort and
 //! prediction through the same filter on a part of the record (or another record) that was not fitted.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
+#![expect(clippy::print_stdout, reason = "a test may stop, and says what it measured")]
 
 use crate::support::{PANDA, TX40, UR10, data, emps_robot, geometric_mean, on_validation, rms, run};
 use dynid::model::EffortModel;
