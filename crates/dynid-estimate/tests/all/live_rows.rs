@@ -1,5 +1,7 @@
 //! Rows of a stream against rows of the same motion as a log.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
 use std::sync::Arc;
 
 use crate::arm::{JOINTS, RATE_HZ, model, motion};

@@ -1,5 +1,5 @@
 //! The recursive estimator against batch solutions of the same rows, and what stands beside it.
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "in tests a panic is the report")]
+#![expect(clippy::print_stdout, reason = "in tests a panic is the report")]
 
 use crate::golden::{check_close, load, number, vector};
 use dynid_estimate::consistent::{Problem, Settings as ConsistentSettings, Status, estimate};
