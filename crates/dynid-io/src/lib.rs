@@ -24,5 +24,7 @@ pub use excerpt::closest;
 pub use output::OutputError;
 pub use robot::{Place, RobotFileError};
 pub use states::{StateJoint, States, StatesError};
-pub use toml_robot::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, RobotFile, SettingValue};
+pub use toml_robot::{
+    CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, RobotFile, SettingValue,
+};
 pub use trajectory::{TrajectoryFile, TrajectoryFileError};

@@ -1,5 +1,7 @@
 //! Coordinates that no body moves with.
 
+use crate::description::Limits;
+
 /// A coordinate of a model besides those of its mechanism: the angle of a motor behind an elastic transmission, or a link
 /// whose load is measured instead of modelled.
 ///
@@ -11,17 +13,19 @@ pub struct Coordinate {
     pub name: String,
     /// It slides (m, N) instead of turning (rad, N m).
     pub slides: bool,
+    /// Limits.
+    pub limits: Limits,
 }
 
 impl Coordinate {
     /// A coordinate that turns.
     pub fn turning(name: impl Into<String>) -> Self {
-        Coordinate { name: name.into(), slides: false }
+        Coordinate { name: name.into(), slides: false, limits: Limits::default() }
     }
 
     /// A coordinate that slides.
     pub fn sliding(name: impl Into<String>) -> Self {
-        Coordinate { name: name.into(), slides: true }
+        Coordinate { name: name.into(), slides: true, limits: Limits::default() }
     }
 
     /// Unit of its effort.

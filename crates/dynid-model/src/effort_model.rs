@@ -236,6 +236,10 @@ pub trait EffortModel: Send + Sync {
     fn travels(&self) -> &[f64] {
         &[]
     }
+    /// Whether nothing drives an output: its effort is known to be zero, and no log has a column for it. False by default.
+    fn is_undriven(&self, _output: usize) -> bool {
+        false
+    }
     /// Speeds whose change of sign spoils rows of an output: combinations `Σ factor · rate` that a sign is taken of.
     /// By default the output's own rate.
     fn reversal_speeds(&self, output: usize) -> Vec<Vec<(usize, f64)>> {

@@ -74,18 +74,23 @@ impl RandomMotion {
     /// size of joint positions: far too large for a spring, but of one size in all powers and columns.
     pub fn of(model: &dyn EffortModel, mechanism: &Mechanism, samples: usize, seed: u64) -> Self {
         let channels = model.channels().iter().chain(model.signals());
-        let mut motion = Self::new(mechanism, channels, samples, seed);
+        Self::new(mechanism, channels, samples, seed).with_coordinates(model, seed)
+    }
+
+    /// The same motion with that of a model's coordinates without bodies, as [`RandomMotion::of`] says.
+    pub fn with_coordinates(mut self, model: &dyn EffortModel, seed: u64) -> Self {
+        let samples = self.samples;
         let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(0x636f_6f72_6469));
         for travel in model.travels() {
             let mut uniform = |range: f64| -> Vec<f64> {
                 let range = range * travel.abs();
                 (0..samples).map(|_| rng.random_range(-range..=range)).collect()
             };
-            motion.q.extend(uniform(std::f64::consts::PI));
-            motion.dq.extend(uniform(2.0));
-            motion.ddq.extend(uniform(5.0));
+            self.q.extend(uniform(std::f64::consts::PI));
+            self.dq.extend(uniform(2.0));
+            self.ddq.extend(uniform(5.0));
         }
-        motion
+        self
     }
 
     /// Runs `work` on all samples as one block.

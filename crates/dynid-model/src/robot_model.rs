@@ -11,7 +11,7 @@ mod shaped;
 use std::sync::Arc;
 
 use crate::coordinate::Coordinate;
-use crate::description::JointKind;
+use crate::description::{JointKind, Limits};
 use crate::dynamics::{Dynamics, MotionAdjoint, MotionBlock, Slots};
 use crate::effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
 use crate::element::{ElementColumns, JointElement, JointInfo};
@@ -195,6 +195,17 @@ impl RobotModel {
         &self.coordinates
     }
 
+    /// Limits of the joint or coordinate of a rate.
+    ///
+    /// # Panics
+    /// If there is no such rate.
+    pub fn limits(&self, rate: usize) -> Limits {
+        match rate.checked_sub(self.mechanism.rates()) {
+            Some(own) => self.coordinates[own].limits,
+            None => self.mechanism.bodies()[self.mechanism.rate_bodies()[rate]].joint.limits,
+        }
+    }
+
     /// The same model with other values of its shape parameters: those that hold wherever nothing else is said
     /// ([`ParameterTable::shape_start`]).
     ///
@@ -268,6 +279,11 @@ impl EffortModel for RobotModel {
 
     fn travels(&self) -> &[f64] {
         &self.travels
+    }
+
+    /// Links with bodies behind an elastic transmission: their drive acts on the motor's row.
+    fn is_undriven(&self, output: usize) -> bool {
+        output < self.mechanism.rates() && self.elastic_motor(output).is_some()
     }
 
     fn reversal_speeds(&self, output: usize) -> Vec<Vec<(usize, f64)>> {
@@ -433,7 +449,7 @@ fn joint_infos(mechanism: &Mechanism, coordinates: &[Coordinate]) -> Vec<JointIn
         out.push(JointInfo { name, number: k + 1, position, slides: joint.kind == JointKind::Prismatic });
     }
     for (k, coordinate) in coordinates.iter().enumerate() {
-        let Coordinate { name, slides } = coordinate.clone();
+        let Coordinate { name, slides, .. } = coordinate.clone();
         assert!(out.iter().all(|j| j.name != name), "two coordinates named `{name}`");
         out.push(JointInfo { number: out.len() + 1, position: mechanism.positions() + k, name, slides });
     }

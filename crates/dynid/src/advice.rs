@@ -42,6 +42,8 @@ pub enum NoAdvice {
     Channels(Vec<String>),
     /// A joint has more than one coordinate (a floating base).
     FloatingJoint,
+    /// Motors stand behind springs: the motions are those of stiff joints.
+    ElasticJoints,
 }
 
 /// What the logs at hand tell.
@@ -91,6 +93,10 @@ pub fn advise(
         Advice { motions: Vec::new(), suggestions: Vec::new(), without: Vec::new(), unavailable: None };
     if !model.channels().is_empty() {
         advice.unavailable = Some(NoAdvice::Channels(model.channels().to_vec()));
+        return advice;
+    }
+    if !model.coordinates().is_empty() {
+        advice.unavailable = Some(NoAdvice::ElasticJoints);
         return advice;
     }
     if model.mechanism().positions() != model.mechanism().rates() {

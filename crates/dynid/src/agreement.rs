@@ -1,7 +1,7 @@
 //! Predicted against measured effort on a log.
 
 use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, predict};
-use dynid_estimate::metrics::{Fit, fit};
+use dynid_estimate::metrics::{Fit, MetricsError, fit};
 use dynid_model::EffortModel;
 use dynid_motion::filter::{butterworth, forward_backward};
 
@@ -97,8 +97,17 @@ pub fn compare(
             .collect()
     };
     let agree = |measured: &[Vec<f64>], predicted: &[Vec<f64>]| {
-        fit(&pick(measured), &pick(predicted))
-            .map_err(|e| Error::TooShort { file: log.name.clone(), message: e.to_string() })
+        let too_short = |e: MetricsError| Error::TooShort { file: log.name.clone(), message: e.to_string() };
+        let (measured, predicted) = (pick(measured), pick(predicted));
+        let whole = fit(&measured, &predicted).map_err(too_short)?;
+        // What is left over where nothing drives is no share of any effort.
+        let driven: Vec<usize> = (0..measured.len()).filter(|output| !model.is_undriven(*output)).collect();
+        let of = |signals: &[Vec<f64>]| driven.iter().map(|o| signals[*o].clone()).collect::<Vec<_>>();
+        let relative_error = match driven.len() == measured.len() {
+            true => whole.relative_error,
+            false => fit(&of(&measured), &of(&predicted)).map_err(too_short)?.relative_error,
+        };
+        Ok::<Fit, Error>(Fit { relative_error, ..whole })
     };
     let measured_filtered = filtered(&log.effort)?;
     Ok(Agreement {

@@ -1,24 +1,27 @@
 //! Joint elements by name.
 
+mod elastic;
 pub(crate) mod friction;
 mod model;
 mod pairs;
 
+pub use elastic::ElasticFault;
+pub(crate) use elastic::stated_springs;
 pub use pairs::AlikeElements;
 
 use dynid_estimate::conditioning::{FrictionShape, ShapeKind};
-use dynid_io::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, SettingValue};
+use dynid_io::{CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, SettingValue};
 use dynid_model::element::{
-    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, JointElement, LoadFriction, Offset,
-    RotorInertia, Spring, Transmission, Viscous, ViscousMagnitude,
+    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, ExternalLoad, JointElement,
+    LoadFriction, Offset, RotorInertia, Spring, Transmission, Viscous, ViscousMagnitude,
 };
-use dynid_model::{JointKind, Mechanism};
+use dynid_model::{Coordinate, JointKind, Mechanism};
 
 use crate::Error;
 use crate::friction::KnownFriction;
 
 /// Element names that a robot file or a configuration may use.
-pub const NAMES: [&str; 18] = [
+pub const NAMES: [&str; 21] = [
     "coulomb",
     "viscous",
     "offset",
@@ -37,6 +40,9 @@ pub const NAMES: [&str; 18] = [
     "load",
     "exponential_viscous",
     "lugre",
+    "stribeck_viscous",
+    "external_load",
+    "elastic",
 ];
 
 /// Friction that grows with the load of the gear.
@@ -48,8 +54,13 @@ pub const DEFAULTS: [&str; 4] = ["coulomb", "viscous", "offset", "rotor"];
 /// Which elements act at which joints of a mechanism, by name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ElementPlan {
-    /// Per rate of the mechanism: element names; empty for a floating base.
+    /// Per rate of the model: element names; empty for a floating base. Rates are those of the mechanism, then motors behind
+    /// springs ([`ElementPlan::names`]).
     pub per_rate: Vec<Vec<String>>,
+    /// Elastic joints.
+    pub elastic: Vec<ElasticSpec>,
+    /// Coordinates without bodies that go with them, the last of the rates.
+    coordinates: Vec<Coordinate>,
     /// Couplings.
     pub couplings: Vec<CouplingSpec>,
     /// Settings of elements.
@@ -65,18 +76,31 @@ pub struct ElementPlan {
 }
 
 impl ElementPlan {
-    /// Elements as the robot file (or the configuration) says; joints about which nothing is said get [`DEFAULTS`] if
-    /// they move.
+    /// Elements as the robot file (or the configuration) says; joints and motors about which nothing is said get
+    /// [`DEFAULTS`] if they move, joints behind a spring without `rotor`: theirs turns with the motor.
     ///
     /// `moves`: whether the logs move the joint of each rate.
+    ///
+    /// # Errors
+    /// [`Error::UnknownJoint`], [`Error::Elastic`].
     pub fn new(
         mechanism: &Mechanism,
         spec: &ElementSpec,
         default: Option<&[String]>,
         moves: impl Fn(usize) -> bool,
     ) -> Result<Self, Error> {
-        let names = mechanism.rate_names();
-        let owners = mechanism.rate_bodies();
+        elastic::check(mechanism, &spec.elastic)?;
+        let mut plan = ElementPlan {
+            per_rate: Vec::new(),
+            coordinates: elastic::coordinates(mechanism, &spec.elastic),
+            elastic: spec.elastic.clone(),
+            couplings: spec.couplings.clone(),
+            spec: spec.clone(),
+            load_reference: None,
+            known: Vec::new(),
+            free_errors: true,
+        };
+        let names = plan.names(mechanism);
         for (joint, _) in &spec.per_joint {
             if !names.contains(joint) {
                 return Err(Error::UnknownJoint { name: joint.clone(), known: names });
@@ -87,34 +111,49 @@ impl ElementPlan {
             None if !spec.defaults.is_empty() => spec.defaults.clone(),
             None => DEFAULTS.map(str::to_owned).to_vec(),
         };
-        let per_rate = names
-            .iter()
-            .enumerate()
-            .map(|(rate, name)| {
-                if mechanism.bodies()[owners[rate]].joint.kind == JointKind::Floating {
-                    return Vec::new();
+        let owners = mechanism.rate_bodies();
+        let measured = plan.is_measured();
+        let floats = |rate: usize| {
+            let own = owners.get(rate).filter(|_| !measured);
+            own.is_some_and(|body| mechanism.bodies()[*body].joint.kind == JointKind::Floating)
+        };
+        for (rate, name) in names.iter().enumerate() {
+            let stated = spec.per_joint.iter().find(|(joint, _)| joint == name);
+            let list = match stated {
+                _ if floats(rate) => Vec::new(),
+                Some((_, list)) => list.clone(),
+                None if moves(rate) => {
+                    let behind = spec.elastic.iter().any(|e| e.joint == *name);
+                    defaults.iter().filter(|d| !(behind && *d == elastic::ROTOR)).cloned().collect()
                 }
-                match spec.per_joint.iter().find(|(joint, _)| joint == name) {
-                    Some((_, list)) => list.clone(),
-                    None if moves(rate) => defaults.clone(),
-                    None => Vec::new(),
-                }
-            })
-            .collect();
-        Ok(ElementPlan {
-            per_rate,
-            couplings: spec.couplings.clone(),
-            spec: spec.clone(),
-            load_reference: None,
-            known: Vec::new(),
-            free_errors: true,
-        })
+                None => Vec::new(),
+            };
+            plan.per_rate.push(elastic::without_elastic(name, &list, &spec.elastic)?);
+        }
+        Ok(plan)
     }
 
     /// A plan with given names per rate, as an estimate file records it.
-    pub fn recorded(per_rate: Vec<Vec<String>>, couplings: Vec<CouplingSpec>, spec: ElementSpec) -> Self {
-        let (load_reference, known) = (None, Vec::new());
-        ElementPlan { per_rate, couplings, spec, load_reference, known, free_errors: true }
+    ///
+    /// # Errors
+    /// [`Error::UnknownJoint`], [`Error::Elastic`].
+    pub fn recorded(
+        mechanism: &Mechanism,
+        per_rate: Vec<Vec<String>>,
+        couplings: Vec<CouplingSpec>,
+        spec: ElementSpec,
+    ) -> Result<Self, Error> {
+        let plan = ElementPlan::new(mechanism, &spec, Some(&[]), |_| false)?;
+        Ok(ElementPlan { per_rate, couplings, ..plan })
+    }
+
+    /// A plan of the springs alone.
+    ///
+    /// # Errors
+    /// [`Error::UnknownJoint`], [`Error::Elastic`].
+    pub(crate) fn bare(mechanism: &Mechanism, spec: &ElementSpec) -> Result<Self, Error> {
+        let spec = ElementSpec { elastic: spec.elastic.clone(), ..ElementSpec::default() };
+        ElementPlan::new(mechanism, &spec, Some(&[]), |_| false)
     }
 
     /// Settings of the elements.
@@ -125,7 +164,7 @@ impl ElementPlan {
     /// The same with bounds of shape parameters for the speeds that a log reaches, per rate; `None`: not known. Settings that
     /// state a speed stand.
     pub fn with_speeds(mut self, mechanism: &Mechanism, speeds: &[Option<f64>]) -> Self {
-        let names = mechanism.rate_names();
+        let names = self.names(mechanism);
         for ((joint, list), speed) in names.iter().zip(&self.per_rate).zip(speeds) {
             let Some(speed) = speed.filter(|v| v.is_finite() && *v > 0.0) else { continue };
             for element in list.iter().filter(|name| friction::scales(name)) {
@@ -147,7 +186,7 @@ impl ElementPlan {
 
     /// Pairs of elements at a joint that only a suitable motion tells apart.
     pub fn alike(&self, mechanism: &Mechanism) -> Vec<AlikeElements> {
-        let names = mechanism.rate_names();
+        let names = self.names(mechanism);
         names.iter().zip(&self.per_rate).flat_map(|(joint, list)| pairs::alike(joint, list)).collect()
     }
 
@@ -185,21 +224,20 @@ impl ElementPlan {
         self.spec.settings.retain(|s| !(s.joint == joint && s.element == name));
     }
 
-    /// Builds the elements in joint order, but gear loads and couplings last.
+    /// Builds the elements in joint order, but gear loads, couplings and springs last.
     ///
     /// Shape parameters about which nothing is said get bounds for the speed limit of the joint, or for 1 rad/s (m/s)
     /// where there is none.
     ///
     /// # Errors
     /// [`Error::UnknownElement`], [`Error::ElementSetting`], [`Error::EqualElements`], [`Error::Coupling`],
-    /// [`Error::UnknownJoint`].
+    /// [`Error::UnknownJoint`], [`Error::Elastic`].
     pub fn build(&self, mechanism: &Mechanism) -> Result<Vec<Box<dyn JointElement>>, Error> {
-        let names = mechanism.rate_names();
-        let owners = mechanism.rate_bodies();
+        let names = self.names(mechanism);
         let mut out: Vec<Box<dyn JointElement>> = Vec::new();
         for (rate, list) in self.per_rate.iter().enumerate() {
             pairs::check(&names[rate], list)?;
-            let speed = mechanism.bodies()[owners[rate]].joint.limits.velocity;
+            let speed = self.limits(mechanism, rate).velocity;
             for name in list.iter().filter(|name| *name != LOAD) {
                 out.push(self.element(name, rate, &names[rate], speed)?);
             }
@@ -208,6 +246,7 @@ impl ElementPlan {
         for coupling in &self.couplings {
             out.push(build_coupling(coupling, &names)?);
         }
+        out.extend(self.transmissions(&names)?);
         Ok(out)
     }
 
@@ -230,6 +269,10 @@ impl ElementPlan {
             "rotor" => Box::new(RotorInertia { rate }),
             "spring" => Box::new(Spring { rate }),
             "drive_gain" => Box::new(DriveGain { rate }),
+            "external_load" => {
+                let brake = self.flag(joint, name, "brake")?.unwrap_or(false);
+                Box::new(ExternalLoad { rate, brake })
+            }
             "cyclic" => {
                 let cycles = self.number(joint, "cyclic", "cycles").unwrap_or(1.0);
                 if cycles <= 0.0 {
@@ -255,6 +298,11 @@ impl ElementPlan {
             joint: names[*first].clone(),
             fault: fault.to_owned(),
         };
+        if self.is_measured() || rates.iter().any(|rate| *rate >= mechanism.rates()) {
+            return Err(fault(
+                "it has no form for motors behind springs and for measured loads: no body acts on them",
+            ));
+        }
         if mechanism.follows().is_some() {
             return Err(fault("it has no form for joints that follow others: do not couple mimic joints"));
         }
@@ -272,12 +320,25 @@ impl ElementPlan {
         })
     }
 
+    fn flag(&self, joint: &str, element: &str, key: &str) -> Result<Option<bool>, Error> {
+        let own = |s: &&ElementSetting| s.joint == joint && s.element == element && s.key == key;
+        match self.spec.settings.iter().find(own).map(|s| &s.value) {
+            None => Ok(None),
+            Some(SettingValue::Flag(flag)) => Ok(Some(*flag)),
+            Some(other) => Err(Error::ElementSetting {
+                element: element.to_owned(),
+                joint: joint.to_owned(),
+                fault: format!("`{key}`: expected true or false, found {other:?}"),
+            }),
+        }
+    }
+
     /// Values that the robot file states for element parameters: `(parameter name, value)`. It states friction, not errors of
     /// known friction.
     ///
     /// `[element.j1] rotor = { inertia = 0.4 }` states `j1.Ia`; `coulomb = { effort = .. }`, `viscous = { coefficient = .. }`
     /// and `offset = { effort = .. }` state `fc`, `fv`, `fo`; `arctangent`, `tanh`, `sigmoid`, `sigmoid_offset` have an
-    /// `effort`, `power` and `viscous_magnitude` a `coefficient`, `stribeck` has `coulomb` and `static`.
+    /// `effort`, `power` and `viscous_magnitude` a `coefficient`, `stribeck` has `coulomb` and `static`; `elastic` has `k1`, `k2`, `d`.
     pub fn stated_values(&self) -> Vec<(String, f64)> {
         self.spec
             .settings
@@ -288,6 +349,7 @@ impl ElementPlan {
                     ("coulomb", "effort") => "fc",
                     ("viscous", "coefficient") => "fv",
                     ("offset", "effort") => "fo",
+                    ("external_load", "factor") => "load",
                     (element, key) => friction::STATED.iter().find(|(e, k, _)| *e == element && *k == key)?.2,
                 };
                 match s.value {
@@ -295,6 +357,7 @@ impl ElementPlan {
                     _ => None,
                 }
             })
+            .chain(stated_springs(&self.elastic))
             .filter(|(name, _)| !self.is_friction_error(name))
             .collect()
     }

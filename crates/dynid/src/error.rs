@@ -149,6 +149,14 @@ pub enum Error {
         /// What is wrong.
         fault: String,
     },
+    /// A joint cannot be elastic as it is stated.
+    #[error("element `elastic` at joint `{joint}`: {fault}")]
+    Elastic {
+        /// Joint.
+        joint: String,
+        /// What is wrong.
+        fault: crate::elements::ElasticFault,
+    },
     /// A joint that the run names does not exist.
     #[error("no joint is named `{name}`, the robot has {}", known.join(", "))]
     UnknownJoint {
@@ -314,6 +322,7 @@ impl Error {
             Error::RobotFile(e) => e.hint(),
             Error::LogFile(e) => e.hint(),
             Error::Export(e) => e.hint(),
+            Error::Elastic { fault, .. } => Some(fault.hint().to_owned()),
             Error::Friction(e) => e.hint(),
             Error::Design(dynid_excitation::ProblemError::RankDeficient { .. }) => Some(
                 "widen the limits that leave so little motion, or leave out elements that it cannot show".to_owned(),

@@ -388,12 +388,13 @@ impl Estimate {
         let fault = |message: String| Error::EstimateFile { file: file.display().to_string(), message };
         let description = self.model.description(&self.robot).map_err(&fault)?;
         let mechanism = description.build().map_err(|e| fault(e.to_string()))?;
-        let plan = self.model.plan();
-        if plan.per_rate.len() != mechanism.rates() {
+        let plan = self.model.plan(&mechanism).map_err(|e| fault(e.to_string()))?;
+        let efforts = plan.names(&mechanism).len();
+        if plan.per_rate.len() != efforts {
             return Err(fault(format!(
                 "elements for {} efforts, the robot has {}",
                 plan.per_rate.len(),
-                mechanism.rates()
+                efforts
             )));
         }
         for law in &plan.known {

@@ -250,7 +250,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     out.logs = prepared;
     for log in &config.validation {
         progress(Step::Validate(log.path.display().to_string()));
-        let loaded = logs::load(log, &out.robot.mechanism, &config.columns, config.motor_side.as_ref())?;
+        let loaded = logs::load(log, &out.robot.axes, &config.columns, config.motor_side.as_ref())?;
         let prepared = loaded.prepare(&out.model, &out.settings)?;
         out.warnings.extend(known::logged_beyond(&out.plan.known, &prepared));
         out.validation.push(out.agreement(out.values(), &prepared)?);
@@ -373,7 +373,7 @@ fn read_logs(
     for file in files {
         progress(Step::Read(file.path.display().to_string()));
         let motor_side = config.motor_side.as_ref();
-        loaded.push(logs::load(file, &robot.mechanism, &config.columns, motor_side)?);
+        loaded.push(logs::load(file, &robot.axes, &config.columns, motor_side)?);
     }
     // A joint without columns in any log is taken to stand still at zero.
     let mut still: Vec<(String, f64)> = Vec::new();
@@ -387,7 +387,7 @@ fn read_logs(
 }
 
 fn plan_elements(config: &Config, robot: &Robot, logs: &[LoadedLog]) -> Result<ElementPlan, Error> {
-    let names = robot.mechanism.rate_names();
+    let names = logs::names(&robot.axes);
     let moves =
         |rate: usize| logs.iter().any(|l| l.log.joints().iter().any(|j| j.name == names[rate] && j.moves()));
     let plan = ElementPlan::of_run(config, robot, moves)?;

@@ -18,6 +18,9 @@ pub struct Inspection {
     pub gravity: [f64; 3],
     /// Moving joints in file order.
     pub joints: Vec<JointRow>,
+    /// Motors behind springs.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub motors: Vec<MotorRow>,
     /// Number of standard parameters, elements included.
     pub standard_parameters: usize,
     /// Number of base parameters.
@@ -55,6 +58,27 @@ pub struct JointRow {
     pub elements: Vec<String>,
 }
 
+/// A motor that drives its joint through a spring.
+#[derive(Debug, Clone, Serialize)]
+pub struct MotorRow {
+    /// Number that symbols carry.
+    pub number: usize,
+    /// Motor.
+    pub name: String,
+    /// Its joint.
+    pub joint: String,
+    /// Travel of the motor over that of the joint with a stiff spring.
+    pub ratio: f64,
+    /// The spring has a cubic part.
+    pub cubic: bool,
+    /// The spring is damped.
+    pub damping: bool,
+    /// A sensor measures the torque behind the spring.
+    pub sensor: bool,
+    /// Elements.
+    pub elements: Vec<String>,
+}
+
 /// One base parameter.
 #[derive(Debug, Clone, Serialize)]
 pub struct BaseRow {
@@ -76,11 +100,15 @@ pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection,
     let default = elements.or(if robot.elements.defaults.is_empty() { Some(none) } else { None });
     let plan = ElementPlan::new(mechanism, &robot.elements, default, |_| true)?;
     let model = plan.model(mechanism)?;
-    let base =
-        BaseParameters::of(&model, mechanism, &model.parameters().shape_start(), &BaseSettings::default());
+    let base = BaseParameters::of(
+        &model,
+        model.mechanism(),
+        &model.parameters().shape_start(),
+        &BaseSettings::default(),
+    );
     let table = model.parameters();
     let expressions = base.expressions(table);
-    let names = mechanism.rate_names();
+    let names = plan.names(mechanism);
     let joints = mechanism
         .bodies()
         .iter()
@@ -102,11 +130,30 @@ pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection,
                 .map_or_else(Vec::new, |rate| plan.per_rate[rate].clone()),
         })
         .collect();
+    let rate_of = |name: &String| names.iter().position(|n| n == name);
+    let motors = plan
+        .elastic
+        .iter()
+        .map(|e| {
+            let rate = rate_of(&e.motor);
+            MotorRow {
+                number: rate.map_or(0, |r| r + 1),
+                name: e.motor.clone(),
+                joint: e.joint.clone(),
+                ratio: e.ratio,
+                cubic: e.cubic,
+                damping: e.damping,
+                sensor: e.sensor,
+                elements: rate.map_or_else(Vec::new, |r| plan.per_rate[r].clone()),
+            }
+        })
+        .collect();
     Ok(Inspection {
         robot: mechanism.name().to_owned(),
         base_link: mechanism.base_link().to_owned(),
         gravity: mechanism.gravity().0,
         joints,
+        motors,
         standard_parameters: table.linear.len(),
         base_parameter_count: base.len(),
         base_parameters: base

@@ -3,14 +3,18 @@
 use std::path::Path;
 
 use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, prepare};
-use dynid_io::{ColumnMapping, MappingSpec, ReadOptions, Signals};
+use dynid_io::columns::EffortColumn;
+use dynid_io::{ColumnMapping, MappingError, MappingSpec, ReadOptions, Signals};
 use dynid_model::element::{is_temperature, temperature_channel};
-use dynid_model::{EffortModel, JointKind, Mechanism};
+use dynid_model::{EffortModel, Limits};
 use dynid_motion::temperature::{self, TemperatureDoubt};
 use dynid_motion::{Channel, JointSignals, Log};
 use sha2::{Digest, Sha256};
 
+mod axes;
 mod known_motion;
+
+pub use axes::{LogAxis, as_logged, axes, names};
 
 use crate::Error;
 use crate::config::{LogConfig, MotorSide};
@@ -46,14 +50,14 @@ impl LoadedLog {
     }
 }
 
-/// Reads a log for a mechanism.
+/// Reads a log of a robot ([`Robot::axes`](crate::robot::Robot), [`axes`]).
 ///
 /// # Errors
 /// [`Error::LogFile`], [`Error::Columns`], [`Error::SurplusColumn`], [`Error::Setting`], [`Error::Log`],
 /// [`Error::Degrees`], [`Error::FarPosition`], [`Error::Temperature`], [`Error::TrajectoryFile`], [`Error::TrajectoryJoints`].
 pub fn load(
     config: &LogConfig,
-    mechanism: &Mechanism,
+    axes: &[LogAxis],
     run_columns: &MappingSpec,
     motor_side: Option<&MotorSide>,
 ) -> Result<LoadedLog, Error> {
@@ -61,9 +65,9 @@ pub fn load(
     let options = ReadOptions { rows: config.rows, ..ReadOptions::default() };
     let table = dynid_io::csv::read(&config.path, &options)?;
     let spec = config.columns.as_ref().unwrap_or(run_columns);
-    let joints = mechanism.rate_names();
+    let joints = names(axes);
     let named = |source| Error::Columns { file: file.clone(), source };
-    let mapping = ColumnMapping::from_spec(&table.header, &joints, spec).map_err(named)?;
+    let mapping = map_columns(&table.header, axes, spec).map_err(named)?;
     if spec.position.is_none() {
         check_surplus(&mapping, &joints, &table.header, &file)?;
     }
@@ -73,7 +77,7 @@ pub fn load(
     if let Some(transmission) = motor_side {
         to_joint_side(&mut signals, transmission)?;
     }
-    check_degrees(&signals, mechanism, &file)?;
+    check_degrees(&signals, axes, &file)?;
     check_reach(&signals, &file)?;
     check_temperatures(&signals, &file)?;
     let log = assemble(&file, &signals)?;
@@ -186,14 +190,13 @@ pub(crate) fn temperature_warnings(log: &Log) -> Vec<String> {
         .collect()
 }
 
-fn check_degrees(signals: &Signals, mechanism: &Mechanism, file: &str) -> Result<(), Error> {
-    let owners = mechanism.rate_bodies();
+fn check_degrees(signals: &Signals, axes: &[LogAxis], file: &str) -> Result<(), Error> {
+    // Motors turn as often as their gears say.
     let turning: Vec<usize> = (0..signals.joints.len())
-        .filter(|k| mechanism.bodies()[owners[signals.indices[*k]]].joint.kind != JointKind::Prismatic)
+        .filter(|k| !axes[signals.indices[*k]].slides && !axes[signals.indices[*k]].motor)
         .collect();
     let positions: Vec<Vec<f64>> = turning.iter().map(|k| signals.position[*k].clone()).collect();
-    let limits: Vec<_> =
-        turning.iter().map(|k| mechanism.bodies()[owners[signals.indices[*k]]].joint.limits).collect();
+    let limits: Vec<Limits> = turning.iter().map(|k| axes[signals.indices[*k]].limits).collect();
     match dynid_io::columns::degrees_suspected(&positions, &limits) {
         None => Ok(()),
         Some(evidence) => Err(Error::Degrees {
@@ -203,6 +206,16 @@ fn check_degrees(signals: &Signals, mechanism: &Mechanism, file: &str) -> Result
             limit: evidence.limit,
         }),
     }
+}
+
+/// Columns of a robot's signals. The sign of torque sensors is that of efforts from here on.
+pub(crate) fn map_columns(
+    header: &[String],
+    axes: &[LogAxis],
+    spec: &MappingSpec,
+) -> Result<ColumnMapping, MappingError> {
+    let efforts: Vec<EffortColumn> = axes.iter().map(|a| a.effort).collect();
+    ColumnMapping::with_efforts(header, &names(axes), &efforts, spec)
 }
 
 /// Largest position that is taken for one, rad or m: beyond any cable drum or track, below encoder counts.

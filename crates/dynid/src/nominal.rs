@@ -25,10 +25,12 @@ pub fn nominal_parameters(
     let table = model.parameters();
     let mut values = table.prior();
     let peaks = typical_efforts(model, &values);
-    let owners = model.mechanism().rate_bodies();
     let mut stated: Vec<(String, f64)> = Vec::new();
     for (j, joint) in model.joints().iter().enumerate() {
-        let speed = model.mechanism().bodies()[owners[j]].joint.limits.velocity.unwrap_or(2.0);
+        let speed = match model.elastic_link(j) {
+            Some((link, ratio)) => model.limits(link).velocity.unwrap_or(2.0) * ratio.abs(),
+            None => model.limits(j).velocity.unwrap_or(2.0),
+        };
         let typical = [
             ("fc", 0.1 * peaks[j]),
             ("fv", 0.1 * peaks[j] / speed),
@@ -75,13 +77,21 @@ pub fn with_nominal_shape(model: RobotModel, given: &BTreeMap<String, f64>) -> R
     Ok(model.with_shape(&shape))
 }
 
-/// Largest rigid effort of every joint over random states.
+/// Largest rigid effort of every joint over random states; of motors behind springs that of their joints, seen through the
+/// ratio.
 pub(crate) fn typical_efforts(model: &RobotModel, values: &[f64]) -> Vec<f64> {
     const STATES: usize = 100;
-    let motion = RandomMotion::new(model.mechanism(), model.channels(), STATES, TYPICAL_SEED);
+    let motion = RandomMotion::new(model.mechanism(), model.channels(), STATES, TYPICAL_SEED)
+        .with_coordinates(model, TYPICAL_SEED);
     let mut block = RegressorBlock::new(model.layout().clone(), STATES);
     motion.with_block(|m| model.regressor(m, &model.parameters().shape_start(), &mut block));
-    (0..model.outputs().len())
+    let mut peaks: Vec<f64> = (0..model.outputs().len())
         .map(|j| block.effort(j, values).iter().fold(0.0_f64, |m, x| m.max(x.abs())))
-        .collect()
+        .collect();
+    for motor in 0..peaks.len() {
+        if let Some((link, ratio)) = model.elastic_link(motor) {
+            peaks[motor] = peaks[link] / ratio.abs();
+        }
+    }
+    peaks
 }

@@ -58,26 +58,19 @@ impl Identification {
             .to_vec()
     }
 
-    /// Rate of each output of the model.
-    pub(crate) fn output_rates(&self) -> Vec<Option<usize>> {
-        let names = self.model.mechanism().rate_names();
-        self.model.outputs().iter().map(|o| names.iter().position(|n| *n == o.name)).collect()
-    }
-
     /// Passivity of the identified friction on the velocities that the training logs reach, joint by joint, at the worse of
     /// the coldest and the warmest state logged; joints without friction and those that no log moves are left out.
     pub fn friction_passivity(&self) -> Vec<PassivityRecord> {
         let (model, linear) = self.identified_model();
         let shape = model.parameters().shape_start();
-        let outputs = self.model.outputs().iter().zip(self.output_rates()).enumerate();
+        let outputs = self.model.outputs().iter().enumerate();
         outputs
-            .filter_map(|(k, (output, rate))| {
-                let rate = rate?;
+            .filter_map(|(rate, output)| {
                 let known = self.plan.known_friction(&output.name).is_some();
                 if !known && !self.plan.per_rate[rate].iter().any(|name| friction::is_law(name)) {
                     return None;
                 }
-                let (low, high) = velocities(&self.logs, k)?;
+                let (low, high) = velocities(&self.logs, rate)?;
                 let found = self
                     .held_channels()
                     .iter()

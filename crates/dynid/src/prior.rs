@@ -36,6 +36,8 @@ pub enum PriorError {
 ///   e_j/(v_j c_j))`, `c_j` at unit accelerations, `M_jj` the entry of the mass matrix averaged over random postures, `v_j`
 ///   the velocity limit: a drive takes about 0.03 s to start its own rotor;
 /// - one with both bounds: a third of its range;
+/// - the stiffness of a spring between motor and joint: `e/Δ` with a deformation `Δ` of 1e-3 rad (1e-4 m), or that under
+///   `e` which the stated stiffness gives; of its cubic part `e/Δ³`, of its damping 0.01 s times the former;
 /// - all others: `max(0.5 |stated|, 0.1 min_j e_j/c_j)`, `c_j` the largest at the velocity limits and at 1/4, 1/16, 1/64 and 1/256 of
 ///   them and next to rest, anywhere in the position range.
 ///   For Coulomb friction, offset, cyclic torques and the preload of a spring that is a tenth of the effort `e_j`; for viscous

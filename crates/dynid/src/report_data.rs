@@ -22,11 +22,27 @@ impl Identification {
         Ok(report::render(&self.report_data(config, estimate))?)
     }
 
+    /// Kind of the joint behind an output, in words.
+    fn joint_kind(&self, output: usize) -> String {
+        let (mechanism, joints) = (self.model.mechanism(), self.model.joints());
+        if let Some((link, ratio)) = self.model.elastic_link(output) {
+            return format!("motor of `{}` behind a spring, ratio {ratio}", joints[link].name);
+        }
+        match mechanism.rate_bodies().get(output) {
+            Some(body) => {
+                let kind = format!("{:?}", mechanism.bodies()[*body].joint.kind).to_lowercase();
+                let driven = self.model.elastic_motor(output);
+                driven
+                    .map_or(kind.clone(), |(motor, _)| format!("{kind}, driven by `{}`", joints[motor].name))
+            }
+            None => "torque sensor (its effort is the negative reading)".to_owned(),
+        }
+    }
+
     /// The report's content.
     pub fn report_data(&self, config: &Config, estimate: &Estimate) -> report::ReportData {
         use dynid_model::EffortModel;
         let mechanism = self.model.mechanism();
-        let owners = mechanism.rate_bodies();
         report::ReportData {
             title: format!("Identification of {}", estimate.robot),
             verdict: verdict(estimate),
@@ -54,7 +70,7 @@ impl Identification {
                 .map(|(k, o)| report::Joint {
                     name: o.name.clone(),
                     effort_unit: o.unit.to_owned(),
-                    kind: format!("{:?}", mechanism.bodies()[owners[k]].joint.kind).to_lowercase(),
+                    kind: self.joint_kind(k),
                     elements: self.plan.per_rate[k].clone(),
                 })
                 .collect(),

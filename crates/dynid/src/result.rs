@@ -29,7 +29,7 @@ impl Identification {
         let solution = &self.fit().solution;
         let finite = |x: f64| x.is_finite().then_some(x);
         let (_, verdict) = verdict::judge(self);
-        let mut model = ModelRecord::new(&self.robot.file.description, self.model.mechanism(), &self.plan);
+        let mut model = ModelRecord::new(&self.robot.file.description, &self.robot.mechanism, &self.plan);
         model.state_hz = self.state_hz;
         model.kernel_hz = self.kernel_hz;
         let names = |columns: &[usize]| -> Vec<String> {

@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use dynid_io::{ElementSpec, RobotFile};
-use dynid_model::{Mechanism, MechanismWarning};
+use dynid_model::{Description, EffortModel, JointKind, Mechanism, MechanismWarning, RobotModel};
 
 use crate::Error;
+use crate::elements::{ElasticFault, ElementPlan};
+use crate::logs::{self, LogAxis};
 
 /// How a robot file is to be read.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -27,6 +29,8 @@ pub struct Robot {
     pub path: PathBuf,
     /// The mechanism.
     pub mechanism: Mechanism,
+    /// What logs have columns for: joints, then motors behind springs.
+    pub axes: Vec<LogAxis>,
     /// What the file says about elements.
     pub elements: ElementSpec,
     /// The file itself; its description holds locked joints as fixed ones.
@@ -39,7 +43,7 @@ impl Robot {
     /// Reads a robot and compiles its mechanism.
     ///
     /// # Errors
-    /// [`Error::RobotFile`], [`Error::Mechanism`], [`Error::UnknownJoint`].
+    /// [`Error::RobotFile`], [`Error::Mechanism`], [`Error::UnknownJoint`], [`Error::Elastic`].
     pub fn load(path: &Path, options: &RobotOptions) -> Result<Robot, Error> {
         Self::of_file(path, dynid_io::robot::read(path)?, options)
     }
@@ -60,6 +64,9 @@ impl Robot {
         }
         d.couple_mimics |= options.couple_mimics;
         d.floating_base |= options.floating_base;
+        if let Some(e) = file.elements.elastic.iter().find(|e| is_fixed(d, &e.joint)) {
+            return Err(Error::Elastic { joint: e.joint.clone(), fault: ElasticFault::Fixed });
+        }
         Self::compile(path, file, &options.locked)
     }
 
@@ -70,19 +77,34 @@ impl Robot {
             other => named(other),
         })?;
         let mechanism = file.description.build().map_err(named)?;
-        let mut warnings: Vec<String> = mechanism.warnings().iter().map(ToString::to_string).collect();
+        // Where sensors measure the load, bodies are no matter.
+        let measured = file.elements.elastic.iter().any(|e| e.sensor);
+        let bodies = mechanism.warnings().iter().filter(|_| !measured);
+        let mut warnings: Vec<String> = bodies.map(ToString::to_string).collect();
         warnings.extend(held(locked));
         let mut elements = file.elements.clone();
-        let known = mechanism.rate_names();
-        elements.per_joint.retain(|(joint, _)| known.contains(joint));
-        Ok(Robot { path: path.to_owned(), mechanism, elements, file, warnings })
+        elements.elastic.retain(|e| !is_fixed(&file.description, &e.joint));
+        let axes = logs::axes(&ElementPlan::bare(&mechanism, &elements)?.model(&mechanism)?);
+        elements.per_joint.retain(|(joint, _)| axes.iter().any(|a| a.name == *joint));
+        Ok(Robot { path: path.to_owned(), mechanism, axes, elements, file, warnings })
     }
 
-    /// The same robot with more joints held still.
+    /// The same robot with more joints held still; a motor stands still with its joint.
     ///
     /// # Errors
     /// As [`Robot::load`].
     pub fn locked(&self, joints: &[(String, f64)]) -> Result<Robot, Error> {
+        let is_motor = |name: &String| self.axes.iter().any(|a| a.motor && a.name == *name);
+        let (motors, joints): (Vec<_>, Vec<_>) = joints.iter().cloned().partition(|(name, _)| is_motor(name));
+        let joints = joints.as_slice();
+        let driven = |motor: &str| self.elements.elastic.iter().find(|e| e.motor == motor);
+        for (motor, _) in &motors {
+            let Some(spec) = driven(motor) else { continue };
+            if !joints.iter().any(|(joint, _)| *joint == spec.joint) {
+                let fault = ElasticFault::MotorNotLogged(motor.clone());
+                return Err(Error::Elastic { joint: spec.joint.clone(), fault });
+            }
+        }
         let mut robot = Self::compile(&self.path, self.file.clone(), joints)?;
         let mut warnings = self.warnings.clone();
         warnings.extend(robot.warnings.iter().filter(|w| !self.warnings.contains(w)).cloned());
@@ -90,10 +112,34 @@ impl Robot {
         Ok(robot)
     }
 
+    /// The robot with its springs and without any other element; no bodies act where sensors measure the load.
+    ///
+    /// # Errors
+    /// [`Error::Elastic`].
+    pub fn skeleton(&self) -> Result<RobotModel, Error> {
+        ElementPlan::bare(&self.mechanism, &self.elements)?.model(&self.mechanism)
+    }
+
+    /// Values of the robot file for the parameters of [`Robot::skeleton`], 0 where it states none.
+    pub fn skeleton_values(&self, skeleton: &RobotModel) -> Vec<f64> {
+        let table = skeleton.parameters();
+        let mut values = table.prior();
+        for (name, value) in crate::elements::stated_springs(&self.elements.elastic) {
+            if let Some(column) = table.column(&name) {
+                values[column] = value;
+            }
+        }
+        values
+    }
+
     /// Coordinates as a states table names them.
     pub fn state_joints(&self) -> Vec<dynid_io::StateJoint> {
-        state_joints(&self.mechanism)
+        state_joints(&self.mechanism, &self.axes)
     }
+}
+
+fn is_fixed(description: &Description, joint: &str) -> bool {
+    description.joints.iter().any(|j| j.name == joint && j.kind == JointKind::Fixed)
 }
 
 /// Locked joints in words, those at one position together: a mobile robot may have dozens.
@@ -116,8 +162,14 @@ fn held(locked: &[(String, f64)]) -> Vec<String> {
         .collect()
 }
 
-/// Coordinates of a mechanism as a states table names them.
-pub fn state_joints(mechanism: &Mechanism) -> Vec<dynid_io::StateJoint> {
+/// Coordinates of a model as a states table names them.
+pub fn model_state_joints(model: &RobotModel) -> Vec<dynid_io::StateJoint> {
+    state_joints(model.mechanism(), &logs::axes(model))
+}
+
+/// Joints of a mechanism, then the axes behind them.
+fn state_joints(mechanism: &Mechanism, axes: &[LogAxis]) -> Vec<dynid_io::StateJoint> {
+    let others = axes.iter().skip(mechanism.rates()).map(|a| dynid_io::StateJoint::Scalar(a.name.clone()));
     mechanism
         .bodies()
         .iter()
@@ -130,5 +182,17 @@ pub fn state_joints(mechanism: &Mechanism) -> Vec<dynid_io::StateJoint> {
                 dynid_io::StateJoint::Scalar(name)
             }
         })
+        .chain(others)
         .collect()
+}
+
+/// Refuses robots with motors behind springs, for work that knows stiff joints alone. `what`: what they are not.
+pub(crate) fn refuse_elastic(robot: &Robot, what: &str) -> Result<(), Error> {
+    match robot.elements.elastic.first() {
+        None => Ok(()),
+        Some(e) => Err(Error::Unsupported(format!(
+            "joint `{}` is elastic, and elastic joints are not {what}: use the robot file without `elastic`",
+            e.joint
+        ))),
+    }
 }

@@ -1,6 +1,7 @@
 //! Virtual logs: trajectory, elements, noise, encoder, seeded; by inverse dynamics or in closed loop.
 
 mod closed_loop;
+mod elastic;
 mod settings;
 mod trajectory;
 
@@ -12,7 +13,7 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::Error;
 use crate::elements::{ElementPlan, LOAD};
 use crate::nominal::{nominal_parameters, with_nominal_shape};
-use crate::robot::Robot;
+use crate::robot::{Robot, refuse_elastic};
 pub use settings::{
     ControlTable, ImperfectionTable, PlantTable, SeriesSettings, SimulateMode, SimulateSettings,
 };
@@ -21,15 +22,17 @@ use trajectory::Reference;
 /// A virtual log with the truth beside it.
 #[derive(Debug, Clone)]
 pub struct SimulatedLog {
-    /// Joints.
+    /// Joints, then motors behind springs.
     pub joints: Vec<String>,
+    /// Per joint: no drive acts on it, so a log holds no effort of it.
+    pub undriven: Vec<bool>,
     /// Time, s.
     pub time: Vec<f64>,
     /// Per joint: position as the encoder reads it.
     pub position: Vec<Vec<f64>>,
     /// Per joint: velocity signal, where it is asked for.
     pub velocity: Option<Vec<Vec<f64>>>,
-    /// Per joint: effort with noise.
+    /// Per joint: effort with noise; of joints with a torque sensor its reading.
     pub effort: Vec<Vec<f64>>,
     /// Extra channels by name.
     pub channels: Vec<(String, Vec<f64>)>,
@@ -64,7 +67,8 @@ pub struct ExperimentSummary {
 
 /// Makes a virtual log of a random or given Fourier trajectory within the robot's limits.
 ///
-/// By inverse dynamics the robot is on the trajectory exactly. In closed loop a controller makes it follow (see
+/// By inverse dynamics the robot is on the trajectory exactly; motors behind springs move as their joints ask for
+/// ([`dynid_sim::ElasticInverse`]), with signs of velocities smooth over 1 % of the slowest joint's rms speed. In closed loop a controller makes it follow (see
 /// [`dynid_sim::run`]); signs of velocities are smooth there.
 ///
 /// Link inertias and stated element values come from the robot file; elements without a stated value get one that is
@@ -82,6 +86,9 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
         ));
     }
     let plan = ElementPlan::new(mechanism, &robot.elements, None, |_| true)?;
+    if settings.mode == SimulateMode::ClosedLoop {
+        refuse_elastic(robot, "simulated in closed loop")?;
+    }
     if settings.mode == SimulateMode::ClosedLoop && plan.per_rate.iter().flatten().any(|name| name == LOAD) {
         return Err(Error::Unsupported(format!(
             "`{LOAD}` friction depends on accelerations through its load, for which the equation of motion has no form: \
@@ -111,9 +118,7 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
     settings.check()?;
     let values = nominal_parameters(&model, &plan, &settings.values)?;
     match settings.mode {
-        SimulateMode::InverseDynamics => {
-            Ok(by_inverse_dynamics(&model, &reference, values, settings, &mut rng))
-        }
+        SimulateMode::InverseDynamics => by_inverse_dynamics(&model, &reference, values, settings, &mut rng),
         SimulateMode::ClosedLoop => closed_loop::experiment(model, &reference, values, settings),
     }
 }
@@ -124,7 +129,7 @@ fn by_inverse_dynamics(
     values: Vec<f64>,
     settings: &SimulateSettings,
     rng: &mut ChaCha8Rng,
-) -> SimulatedLog {
+) -> Result<SimulatedLog, Error> {
     let n = model.joints().len();
     let samples = (settings.duration_s * settings.rate_hz).round() as usize + 1;
     let sample = |shift: f64| {
@@ -140,11 +145,20 @@ fn by_inverse_dynamics(
         }
         signals
     };
-    let at = sample(0.0);
     let span = (samples, settings.rate_hz);
-    let clean_effort = efforts(model, &values, &at, span);
+    let moved = |shift: f64| -> Result<([Vec<f64>; 3], Vec<Vec<f64>>), Error> {
+        if !model.coordinates().is_empty() {
+            return elastic::along(model, reference, &values, shift, span);
+        }
+        let at = sample(shift);
+        let effort = efforts(model, &values, &at, span);
+        Ok((at, effort))
+    };
+    let (at, clean_effort) = moved(0.0)?;
     // The logged effort belongs to the motion that follows it.
-    let led = efforts(model, &values, &sample(settings.delay_samples.unwrap_or(HELD_COMMAND)), span);
+    let (_, led) = moved(settings.delay_samples.unwrap_or(HELD_COMMAND))?;
+    let (clean_effort, led) =
+        (crate::logs::as_logged(model, clean_effort), crate::logs::as_logged(model, led));
     let step = |j: usize| {
         let turn = if model.joints()[j].slides { 1.0 } else { std::f64::consts::TAU };
         turn / 2f64.powi(settings.encoder_bits as i32)
@@ -160,6 +174,7 @@ fn by_inverse_dynamics(
             q.iter().map(|x| (x / step(j)).round() * step(j)).collect()
         })
         .collect();
+    let undriven: Vec<bool> = (0..n).map(|j| model.is_undriven(j)).collect();
     let effort = led
         .iter()
         .map(|e| {
@@ -172,8 +187,9 @@ fn by_inverse_dynamics(
                 .collect()
         })
         .collect();
-    SimulatedLog {
-        joints: model.mechanism().rate_names(),
+    Ok(SimulatedLog {
+        joints: model.joints().iter().map(|j| j.name.clone()).collect(),
+        undriven,
         time: (0..samples).map(|s| s as f64 / settings.rate_hz).collect(),
         position,
         velocity: None,
@@ -182,7 +198,7 @@ fn by_inverse_dynamics(
         clean: [split(&at[0]), split(&at[1]), split(&at[2]), clean_effort],
         truth: named(model, values),
         experiment: None,
-    }
+    })
 }
 
 /// Lead of a command that is held over a sample, samples.

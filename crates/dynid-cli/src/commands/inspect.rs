@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use dynid::inspect::{Inspection, inspect};
+use dynid::inspect::{Inspection, MotorRow, inspect};
 
 use super::{element_names, load_robot, table};
 use crate::args::InspectArgs;
@@ -48,6 +48,20 @@ fn text(i: &Inspection) -> String {
         })
         .collect();
     out.push_str(&table::aligned(&["#", "joint", "kind", "parent", "link", "mass kg", "elements"], &rows));
+    if !i.motors.is_empty() {
+        let flags = |m: &MotorRow| {
+            let all = [(m.cubic, "cubic"), (m.damping, "damped"), (m.sensor, "sensor")];
+            let on = all.into_iter().filter(|(on, _)| *on).map(|(_, word)| word);
+            on.collect::<Vec<_>>().join(",")
+        };
+        let row = |m: &MotorRow| {
+            let (ratio, elements) = (m.ratio.to_string(), m.elements.join(","));
+            vec![m.number.to_string(), m.name.clone(), m.joint.clone(), ratio, flags(m), elements]
+        };
+        let rows: Vec<Vec<String>> = i.motors.iter().map(row).collect();
+        out.push('\n');
+        out.push_str(&table::aligned(&["#", "motor", "drives", "ratio", "spring", "elements"], &rows));
+    }
     let (kept, dropped) = i.rank_gap;
     let gap = dropped.map_or_else(|| "full rank".to_owned(), |d| format!("gap {kept:.1e} to {d:.1e}"));
     let _ = writeln!(

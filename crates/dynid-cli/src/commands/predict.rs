@@ -4,9 +4,10 @@ use std::fmt::Write;
 
 use dynid::Estimate;
 use dynid::io::{ReadOptions, states};
+use dynid::logs::as_logged;
 use dynid::model::EffortModel;
 use dynid::predict::efforts;
-use dynid::robot::state_joints;
+use dynid::robot::model_state_joints;
 
 use crate::args::PredictArgs;
 use crate::message::{Failure, data, note};
@@ -19,10 +20,10 @@ pub(crate) fn run(args: &PredictArgs) -> Result<u8, Failure> {
     let estimate = Estimate::read(&args.estimate)?;
     let split = args.split.of();
     let model = estimate.effort_model(&args.estimate, split)?;
-    let joints = state_joints(model.mechanism());
+    let joints = model_state_joints(&model);
     let states =
         states::read_with_channels(&args.states, &joints, model.channels(), &ReadOptions::default())?;
-    let effort = efforts(&model, &estimate.values(split), &states)?;
+    let effort = as_logged(&model, efforts(&model, &estimate.values(split), &states)?);
     match &args.out {
         None => data(&csv_text(&estimate.joints, &effort))?,
         Some(path) => {

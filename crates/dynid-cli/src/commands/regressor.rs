@@ -1,7 +1,7 @@
 //! `dynid regressor`.
 
 use dynid::io::{ReadOptions, states};
-use dynid::model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
+use dynid::model::{BaseParameters, BaseSettings, EffortModel};
 use dynid::predict::{efforts, regressors};
 use serde::Serialize;
 
@@ -21,8 +21,9 @@ struct Output {
 pub(crate) fn run(args: &RegressorArgs) -> Result<u8, Failure> {
     let robot = load_robot(&args.robot)?;
     let states = states::read(&args.states, &robot.state_joints(), &ReadOptions::default())?;
-    let model = RobotModel::new(robot.mechanism.clone(), Vec::new());
-    let effort = efforts(&model, &model.parameters().prior(), &states)?;
+    let model = robot.skeleton()?;
+    let values = robot.skeleton_values(&model);
+    let effort = efforts(&model, &values, &states)?;
     let joints: Vec<String> = model.outputs().iter().map(|o| o.name.clone()).collect();
     if !args.json {
         data(&csv_text(&joints, &effort))?;

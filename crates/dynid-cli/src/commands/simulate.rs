@@ -10,6 +10,9 @@ use crate::args::SimulateArgs;
 use crate::message::{Failure, note};
 use crate::outputs;
 
+/// Columns of efforts; joints without a drive have none.
+const EFFORT: &str = "tau";
+
 pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
     let files: Vec<(&str, &Path)> =
         [("--out", Some(&args.out)), ("--clean", args.clean.as_ref()), ("--truth", args.truth.as_ref())]
@@ -39,7 +42,7 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
     settings.encoder_bits = args.encoder_bits.unwrap_or(settings.encoder_bits);
     settings.seed = args.seed.unwrap_or(settings.seed);
     let log = simulate(&robot, &settings)?;
-    let mut signals = vec![("q", &log.position), ("tau", &log.effort)];
+    let mut signals = vec![("q", &log.position), (EFFORT, &log.effort)];
     if let Some(velocity) = &log.velocity {
         signals.insert(1, ("dq", velocity));
     }
@@ -58,7 +61,7 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
     }
     if let Some(path) = &args.clean {
         let [q, dq, ddq, tau] = &log.clean;
-        write(path, &log, &[("q", q), ("dq", dq), ("ddq", ddq), ("tau", tau)], &log.channels)?;
+        write(path, &log, &[("q", q), ("dq", dq), ("ddq", ddq), (EFFORT, tau)], &log.channels)?;
     }
     if let Some(path) = &args.truth {
         let mut truth: serde_json::Map<String, serde_json::Value> =
@@ -109,7 +112,10 @@ fn write(
     let mut header = vec!["t".to_owned()];
     let mut columns: Vec<&[f64]> = vec![&log.time];
     for (name, signal) in signals {
-        for (joint, values) in log.joints.iter().zip(*signal) {
+        for (k, (joint, values)) in log.joints.iter().zip(*signal).enumerate() {
+            if *name == EFFORT && log.undriven[k] {
+                continue;
+            }
             header.push(format!("{name}_{joint}"));
             columns.push(values);
         }

@@ -191,7 +191,9 @@ pub(crate) fn solve(groups: &[Group], unknowns: usize, passes: usize) -> (Vec<f6
     let mut variances = vec![1.0; groups.len()];
     for (v, g) in variances.iter_mut().zip(groups) {
         let y = g.gram.size - 1;
-        *v = (g.gram.at(y, y) / g.gram.rows.max(1.0)).max(f64::MIN_POSITIVE);
+        let square = g.gram.at(y, y) / g.gram.rows.max(1.0);
+        // Rows without effort, where nothing drives: what they leave over is known after the first fit to the others.
+        *v = if square > 0.0 { square } else { f64::INFINITY };
     }
     let mut x = vec![0.0; unknowns];
     for pass in 0..passes {
@@ -205,8 +207,8 @@ pub(crate) fn solve(groups: &[Group], unknowns: usize, passes: usize) -> (Vec<f6
             let freedom = group.gram.rows * (1.0 - share.min(0.9));
             let y = group.gram.size - 1;
             let least = 1e-18 * group.gram.at(y, y) / group.gram.rows.max(1.0);
-            *variance =
-                (rss(&group.gram, &group.unknowns, &x) / freedom.max(1.0)).max(least).max(f64::MIN_POSITIVE);
+            let found = (rss(&group.gram, &group.unknowns, &x) / freedom.max(1.0)).max(least);
+            *variance = if found > 0.0 { found } else { f64::INFINITY };
         }
     }
     (x, variances)

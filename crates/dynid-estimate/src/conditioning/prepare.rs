@@ -53,7 +53,7 @@ impl PreparedLog {
 
 /// Puts a log on a uniform grid, removes spikes, measures noise and band.
 ///
-/// Fails if a joint of the model is not logged, its effort never changes, a channel is missing, or the clock is beyond
+/// Fails if a joint of the model is not logged, its effort never changes though a drive acts on it, a channel is missing, or the clock is beyond
 /// repair.
 pub fn prepare(
     log: &Log,
@@ -67,12 +67,12 @@ pub fn prepare(
         }
     }
     let mut joints = Vec::with_capacity(model.outputs().len());
-    for output in model.outputs() {
+    for (number, output) in model.outputs().iter().enumerate() {
         let Some(index) = uniform.joints.iter().position(|j| j.name == output.name) else {
             return Err(ConditioningError::MissingJoint { log: uniform.name, joint: output.name.clone() });
         };
         let joint = uniform.joints.swap_remove(index);
-        if joint.effort_is_constant() {
+        if joint.effort_is_constant() && !model.is_undriven(number) {
             return Err(ConditioningError::ConstantEffort { log: uniform.name, joint: joint.name });
         }
         joints.push(joint);

@@ -89,6 +89,14 @@ pub enum MappingError {
         /// Column.
         column: String,
     },
+    /// A column for the effort of a joint on which no drive acts.
+    #[error("effort of `{joint}`: expected no column (no drive acts on it), found `{column}`")]
+    Undriven {
+        /// Joint.
+        joint: String,
+        /// Column.
+        column: String,
+    },
     /// A list whose length is not the number of joints.
     #[error("{signal}: {what}: expected {expected} entries (one per joint), found {found}")]
     Count {
@@ -155,6 +163,11 @@ impl MappingError {
             E::UnknownJoint { .. } => "use the joint names of the robot file".to_owned(),
             E::Unit { .. } => "correct the unit in the mapping or in the header's brackets".to_owned(),
             E::NoGain { .. } => "give `scale` in N m/A (or `current_gains`), one number per joint".to_owned(),
+            E::Undriven { .. } => {
+                "the drive of an elastic joint acts on its motor: name the column as the motor's, `effort = { <motor> = \"..\" }`; \
+                 a torque sensor behind the transmission is said by `sensor = true` in the robot file"
+                    .to_owned()
+            }
             E::Count { .. } => "one entry per joint in joint order; an empty name stands for `not logged`".to_owned(),
             E::Number { .. } => "correct the number in the mapping".to_owned(),
             E::Overflow { .. } => "check unit, scale and offset of the column".to_owned(),

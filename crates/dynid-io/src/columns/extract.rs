@@ -62,13 +62,24 @@ impl ColumnMapping {
             position: per_joint(table, Signal::Position, &self.position)?,
             velocity: optional(Signal::Velocity, &self.velocity)?,
             acceleration: optional(Signal::Acceleration, &self.acceleration)?,
-            effort: optional(Signal::Effort, &self.effort)?,
+            effort: self.efforts(table, &indices)?,
             temperature: temperature.transpose()?,
             channels: channels.collect::<Result<_, _>>()?,
             indices,
             time,
             time_origin,
         })
+    }
+
+    /// Efforts of the logged joints, zeros where no drive acts.
+    fn efforts(&self, table: &Table, indices: &[usize]) -> Result<Option<Vec<Vec<f64>>>, MappingError> {
+        let Some(columns) = &self.effort else { return Ok(None) };
+        let of_joint = |k: &usize| match &columns[*k] {
+            Some(column) => convert(table, &Signal::Effort.to_string(), column).map(Some),
+            None => Ok(self.undriven[*k].then(|| vec![0.0; table.rows])),
+        };
+        let efforts: Vec<Option<Vec<f64>>> = indices.iter().map(of_joint).collect::<Result<_, _>>()?;
+        Ok(Some(efforts.into_iter().flatten().collect()))
     }
 
     fn time(&self, table: &Table) -> Result<(Vec<f64>, f64), MappingError> {

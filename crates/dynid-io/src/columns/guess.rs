@@ -40,6 +40,7 @@ impl ColumnMapping {
             acceleration: optional(Signal::Acceleration)?,
             temperature: finder.find(Signal::Temperature)?.map(|columns| of_logged(columns, &logged)),
             effort: finder.effort(options, &logged)?,
+            undriven: vec![false; joints.len()],
             channels: Vec::new(),
             time,
             position,

@@ -28,6 +28,18 @@ pub struct ColumnUse {
     pub offset: f64,
 }
 
+/// What a log says of the effort of a joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EffortColumn {
+    /// The effort of its drive.
+    #[default]
+    Drive,
+    /// The reading of a torque sensor behind its drive, which counts the other way: the effort is the negative of it.
+    Sensor,
+    /// Nothing: no drive acts on it, so its effort is zero.
+    Absent,
+}
+
 /// Where the time comes from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TimeSource {
@@ -54,6 +66,8 @@ pub struct ColumnMapping {
     pub effort: Option<Vec<Option<ColumnUse>>>,
     /// Temperatures, °C, of every logged joint.
     pub temperature: Option<Vec<Option<ColumnUse>>>,
+    /// Per joint, whether its effort is known to be zero: it has no column then.
+    pub undriven: Vec<bool>,
     /// Other columns by the names the mapping gives them.
     pub channels: Vec<(String, ColumnUse)>,
 }

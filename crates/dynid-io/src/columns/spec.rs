@@ -8,7 +8,7 @@ use super::error::MappingError;
 use super::guess::{Finder, GuessOptions, PerJointColumns, of_logged};
 use super::names::{ColumnName, Signal};
 use super::units::{Conversion, conversion};
-use super::{ColumnMapping, ColumnUse, TimeSource};
+use super::{ColumnMapping, ColumnUse, EffortColumn, TimeSource};
 use crate::excerpt::closest;
 
 /// An explicit mapping; signals that it does not mention are found by name as in [`ColumnMapping::guess`].
@@ -124,8 +124,26 @@ impl ColumnMapping {
     /// # Errors
     /// [`MappingError`].
     pub fn from_spec(header: &[String], joints: &[String], spec: &MappingSpec) -> Result<Self, MappingError> {
+        Self::with_efforts(header, joints, &vec![EffortColumn::Drive; joints.len()], spec)
+    }
+
+    /// The same for joints whose effort is not always that of their drive.
+    ///
+    /// # Errors
+    /// [`MappingError`]; [`MappingError::Undriven`] for a column of an effort that is known to be zero.
+    ///
+    /// # Panics
+    /// If there is not one entry of `efforts` per joint.
+    pub fn with_efforts(
+        header: &[String],
+        joints: &[String],
+        efforts: &[EffortColumn],
+        spec: &MappingSpec,
+    ) -> Result<Self, MappingError> {
+        assert_eq!(efforts.len(), joints.len(), "one entry of efforts per joint");
         let finder = Finder::new(header, joints);
-        let resolver = Resolver { header, joints };
+        let undriven: Vec<bool> = efforts.iter().map(|e| *e == EffortColumn::Absent).collect();
+        let resolver = Resolver { header, joints, undriven: &undriven };
         let time = match &spec.time {
             Some(time) if spec.rate_hz.is_none() => resolver.time(time)?,
             _ => finder.time(spec.rate_hz)?,
@@ -146,16 +164,26 @@ impl ColumnMapping {
             };
             finder.covering(signal, columns, &logged)
         };
-        let effort = if spec.effort.is_some() {
-            optional(Signal::Effort, &spec.effort)?
+        let driven: Vec<bool> = logged.iter().zip(&undriven).map(|(logged, u)| *logged && !u).collect();
+        let mut effort = if let Some(stated) = &spec.effort {
+            let columns = resolver.signal(Signal::Effort, stated)?;
+            resolver.refuse_undriven(&columns)?;
+            finder.covering(Signal::Effort, Some(columns), &driven)?
         } else {
             let options = GuessOptions {
                 current_gains: spec.current_gains.clone(),
                 allow_no_effort: spec.allow_no_effort,
                 ..GuessOptions::default()
             };
-            finder.effort(&options, &logged)?
+            finder.effort(&options, &driven)?
         };
+        for (column, _) in
+            effort.iter_mut().flatten().zip(efforts).filter(|(_, e)| **e == EffortColumn::Sensor)
+        {
+            if let Some(column) = column {
+                (column.factor, column.offset) = (-column.factor, -column.offset);
+            }
+        }
         // Some joints may be without a sensor.
         let temperature = match &spec.temperature {
             Some(stated) => Some(resolver.signal(Signal::Temperature, stated)?),
@@ -168,6 +196,7 @@ impl ColumnMapping {
             acceleration: optional(Signal::Acceleration, &spec.acceleration)?,
             temperature: temperature.map(|columns| of_logged(columns, &logged)),
             effort,
+            undriven: undriven.clone(),
             channels: channels.collect::<Result<_, _>>()?,
             time,
             position,
@@ -180,6 +209,8 @@ impl ColumnMapping {
 struct Resolver<'a> {
     header: &'a [String],
     joints: &'a [String],
+    /// Joints whose effort a pattern does not mean; empty: none.
+    undriven: &'a [bool],
 }
 
 impl Resolver<'_> {
@@ -190,6 +221,21 @@ impl Resolver<'_> {
             header: self.header.to_vec(),
             meant: closest(name, self.header).map(str::to_owned),
         })
+    }
+
+    fn is_undriven(&self, joint: usize) -> bool {
+        self.undriven.get(joint).copied().unwrap_or(false)
+    }
+
+    /// Refuses a stated column for an effort that is known to be zero.
+    fn refuse_undriven(&self, columns: &PerJointColumns) -> Result<(), MappingError> {
+        let stated = self.joints.iter().zip(columns).enumerate().filter(|(k, _)| self.is_undriven(*k));
+        match stated.filter_map(|(_, (joint, column))| Some((joint, column.as_ref()?))).next() {
+            None => Ok(()),
+            Some((joint, column)) => {
+                Err(MappingError::Undriven { joint: joint.clone(), column: column.name.clone() })
+            }
+        }
     }
 
     fn channel(&self, name: &str, stated: &ChannelSpec) -> Result<(String, ColumnUse), MappingError> {
@@ -203,7 +249,7 @@ impl Resolver<'_> {
     }
 
     fn time(&self, stated: &SignalSpec) -> Result<TimeSource, MappingError> {
-        let alone = Resolver { header: self.header, joints: &["time".to_owned()] };
+        let alone = Resolver { header: self.header, joints: &["time".to_owned()], undriven: &[] };
         let mut columns = alone.signal(Signal::Time, stated)?;
         match columns.pop().flatten() {
             Some(column) => Ok(TimeSource::Column(column)),
@@ -264,7 +310,11 @@ impl Resolver<'_> {
                 let has = |k: usize| self.header.contains(&numbered(k));
                 let from = usize::from(!(pattern.contains("{}") && has(0) && !has(n)));
                 let named = self.joints.iter().enumerate();
-                Ok(named.map(|(k, joint)| Some(numbered(k + from).replace("{joint}", joint))).collect())
+                let meant = |k: usize| signal != Signal::Effort || !self.is_undriven(k);
+                let column = |(k, joint): (usize, &String)| {
+                    meant(k).then(|| numbered(k + from).replace("{joint}", joint))
+                };
+                Ok(named.map(column).collect())
             }
             ColumnNames::List(list) if list.len() == n => {
                 Ok(list.iter().map(|c| (!c.is_empty()).then(|| c.clone())).collect())

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use toml::Value;
 
 use super::Source;
+use super::elastic::{self, ElasticSpec};
 use super::schema::RobotToml;
 use crate::excerpt::excerpt;
 use crate::robot::RobotFileError;
@@ -21,6 +22,8 @@ pub struct ElementSpec {
     pub settings: Vec<ElementSetting>,
     /// Couplings: `[[coupling]]`.
     pub couplings: Vec<CouplingSpec>,
+    /// Elastic joints: `[element.<joint>] elastic = { .. }`, in joint order.
+    pub elastic: Vec<ElasticSpec>,
 }
 
 /// One setting: `[element.j1] stribeck = { vs = { start = 0.04 } }` has element `stribeck`, key `vs.start`.
@@ -81,10 +84,16 @@ pub(super) fn build(
     joints: &[&str],
 ) -> Result<ElementSpec, RobotFileError> {
     let mut spec = ElementSpec { defaults: robot.defaults.elements.clone(), ..ElementSpec::default() };
+    spec.elastic = elastic::build(source, robot, joints)?;
+    let motors = spec.elastic.iter().map(|e| e.motor.as_str());
+    let owners: Vec<&str> = joints.iter().copied().chain(motors).collect();
     for (joint, table) in &robot.element {
-        source.known("element", "joint", joint, joints)?;
+        source.known("element", "joint", joint, &owners)?;
         let offset = table.span().start;
         for (element, value) in table.get_ref() {
+            if element == elastic::ELASTIC && joints.contains(&joint.as_str()) {
+                continue;
+            }
             if element == "elements" {
                 let list = value.as_array().and_then(|a| texts(a));
                 let list = list.ok_or_else(|| {
@@ -124,7 +133,7 @@ fn texts(list: &[Value]) -> Option<Vec<String>> {
     list.iter().map(|v| v.as_str().map(str::to_owned)).collect()
 }
 
-fn number(value: &Value) -> Option<f64> {
+pub(super) fn number(value: &Value) -> Option<f64> {
     let x = value.as_float().or_else(|| value.as_integer().map(|i| i as f64))?;
     x.is_finite().then_some(x)
 }

@@ -2,6 +2,7 @@
 
 mod bodies;
 mod dh;
+mod elastic;
 mod elements;
 mod number;
 mod schema;
@@ -10,6 +11,7 @@ use std::path::Path;
 
 use dynid_model::{Description, Inertia, Mat3, Vec3};
 
+pub use elastic::ElasticSpec;
 pub use elements::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, SettingValue};
 
 use crate::excerpt::{closest, excerpt};
@@ -54,7 +56,8 @@ pub fn read(path: impl AsRef<Path>) -> Result<RobotFile, RobotFileError> {
 /// One of three forms: `joint = [..]` (DH rows, see below), `body = [..]` (a tree), `urdf = "file"`. Lengths m, angles
 /// rad or text such as `"90deg"`. Keys of every form: `schema` (1), `name`, `gravity` (m/s², base axes),
 /// `floating_base`, `couple_mimics`, `actuated`, `home`, `[defaults]`, `[element.<joint>]`, `[[coupling]]`. Unknown keys
-/// are errors.
+/// are errors. `[element.<joint>] elastic = { ratio = .. }` ([`ElasticSpec`]) puts a motor behind a spring;
+/// `[element.<motor>]` is then as for joints.
 ///
 /// DH rows (`dh = "modified"` or `"standard"`): `name`, `link` (default `link<k>`), `a`, `alpha`, `d`, `offset`, `kind`
 /// (`revolute`, `continuous`, `prismatic`), `limits`, and the inertia as `phi` (order m, mx, my, mz, Ixx, Ixy, Ixz, Iyy,

@@ -41,7 +41,7 @@ pub enum FrictionErrors {
 }
 
 /// Elements of all these laws.
-const FRICTION_ELEMENTS: [&str; 12] = [
+const FRICTION_ELEMENTS: [&str; 13] = [
     "coulomb",
     "viscous",
     "offset",
@@ -49,6 +49,7 @@ const FRICTION_ELEMENTS: [&str; 12] = [
     "viscous_magnitude",
     "arctangent",
     "stribeck",
+    "stribeck_viscous",
     "tanh",
     "sigmoid",
     "sigmoid_offset",

@@ -3,13 +3,13 @@
 use dynid_io::{ElementSetting, SettingValue};
 use dynid_model::element::{
     Arctangent, ExponentialViscous, JointElement, LuGre, PowerLaw, ShapeSetting, Sigmoid, SigmoidOffset,
-    Stribeck, TanhFriction,
+    Stribeck, StribeckViscous, TanhFriction,
 };
 
 use crate::Error;
 
 /// Settings that state a linear parameter: element, key, symbol of the parameter.
-pub(super) const STATED: [(&str, &str, &str); 13] = [
+pub(super) const STATED: [(&str, &str, &str); 14] = [
     ("arctangent", "effort", "fa"),
     ("stribeck", "coulomb", "fc"),
     ("stribeck", "static", "fs"),
@@ -18,6 +18,7 @@ pub(super) const STATED: [(&str, &str, &str); 13] = [
     ("sigmoid_offset", "effort", "fl"),
     ("power", "coefficient", "fp"),
     ("viscous_magnitude", "coefficient", "fva"),
+    ("stribeck_viscous", "coefficient", "fvs"),
     ("load", "coefficient", "mu"),
     ("exponential_viscous", "sigma2", "sigma2"),
     ("exponential_viscous", "sigma2_slope", "sigma2_slope"),
@@ -26,9 +27,10 @@ pub(super) const STATED: [(&str, &str, &str); 13] = [
 ];
 
 /// Shape parameters of every element, and whether its bounds scale with the speeds in use.
-const SHAPES: [(&str, &[&str], bool); 8] = [
+const SHAPES: [(&str, &[&str], bool); 9] = [
     ("arctangent", &["fb"], true),
     ("stribeck", &["vs", "delta"], true),
+    ("stribeck_viscous", &["vs", "delta"], true),
     ("tanh", &["w"], true),
     ("sigmoid", &["phi2", "phi3"], false),
     ("sigmoid_offset", &["alpha", "nu"], false),
@@ -46,8 +48,8 @@ const OPTIONS: [(&str, &str); 4] = [
 ];
 
 /// Friction coefficients that a passive law has positive; offsets and the difference between the directions have any sign.
-pub(crate) const COEFFICIENTS: [&str; 13] =
-    ["fc", "fs", "fv", "fa", "ft", "fg", "fl", "fp", "fcp", "fcn", "fvp", "fvn", "sigma2"];
+pub(crate) const COEFFICIENTS: [&str; 14] =
+    ["fc", "fs", "fv", "fvs", "fa", "ft", "fg", "fl", "fp", "fcp", "fcn", "fvp", "fvn", "sigma2"];
 
 /// Friction laws of the speed alone that have no shape parameters.
 const UNSHAPED: [&str; 4] = ["coulomb", "viscous", "asymmetric", "viscous_magnitude"];
@@ -110,6 +112,11 @@ impl Settings<'_> {
                 let Stribeck { vs, delta, .. } = Stribeck::scaled(rate, v_max);
                 let (vs, delta) = (self.shape("vs", vs, true)?, self.shape("delta", delta, true)?);
                 Box::new(Stribeck { rate, vs, delta })
+            }
+            "stribeck_viscous" => {
+                let StribeckViscous { vs, delta, .. } = StribeckViscous::scaled(rate, v_max);
+                let (vs, delta) = (self.shape("vs", vs, true)?, self.shape("delta", delta, true)?);
+                Box::new(StribeckViscous { rate, vs, delta })
             }
             "tanh" => {
                 let TanhFriction { w, .. } = TanhFriction::scaled(rate, v_max);

@@ -21,7 +21,6 @@ impl ElementPlan {
         robot: &Robot,
         moves: impl Fn(usize) -> bool,
     ) -> Result<ElementPlan, Error> {
-        let names = robot.mechanism.rate_names();
         let mut spec = robot.elements.clone();
         for (joint, list) in &config.elements.joint {
             spec.per_joint.retain(|(j, _)| j != joint);
@@ -34,6 +33,7 @@ impl ElementPlan {
             form: c.form,
         }));
         let mut plan = ElementPlan::new(&robot.mechanism, &spec, config.elements.default.as_deref(), moves)?;
+        let names = plan.names(&robot.mechanism);
         for list in &mut plan.per_rate {
             *list = config.elements.friction.of_joint(list);
         }
@@ -46,12 +46,14 @@ impl ElementPlan {
         Ok(plan)
     }
 
-    /// The effort model of the plan, known friction included.
+    /// The effort model of the plan, known friction included. Where sensors measure the load of all joints, the model has no
+    /// bodies.
     ///
     /// # Errors
     /// As [`ElementPlan::build`].
     pub fn model(&self, mechanism: &Mechanism) -> Result<RobotModel, Error> {
-        self.complete(mechanism, self.build(mechanism)?)
+        let bodies = self.bodies(mechanism);
+        self.complete(&bodies, self.build(&bodies)?)
     }
 
     /// A model of elements that stand for those of the plan, completed by known friction.
@@ -63,7 +65,7 @@ impl ElementPlan {
         mechanism: &Mechanism,
         elements: Vec<Box<dyn JointElement>>,
     ) -> Result<RobotModel, Error> {
-        let names = mechanism.rate_names();
+        let names = self.names(mechanism);
         let mut known = Vec::new();
         for law in &self.known {
             let Some(rate) = names.iter().position(|n| *n == law.joint) else {
@@ -79,7 +81,8 @@ impl ElementPlan {
             }
             known.extend(law.elements(rate));
         }
-        let model = RobotModel::new(mechanism.clone(), elements).with_known(known);
+        let coordinates = self.coordinates.clone();
+        let model = RobotModel::with_coordinates(mechanism.clone(), coordinates, elements).with_known(known);
         Ok(match self.free_errors {
             true => model.with_free_sign(|p| self.is_friction_error(&p.name)),
             false => model,

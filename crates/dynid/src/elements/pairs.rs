@@ -5,7 +5,7 @@ use std::fmt;
 use crate::Error;
 
 /// Elements whose columns depend on each other whatever the motion, the one to be left out first, and why.
-const EQUAL: [(&str, &str, &str); 9] = [
+const EQUAL: [(&str, &str, &str); 11] = [
     ("offset", "asymmetric", "its Coulomb columns differ by a constant"),
     ("coulomb", "asymmetric", "its Coulomb columns add up to the sign"),
     ("viscous", "asymmetric", "its viscous columns add up to the velocity"),
@@ -14,6 +14,8 @@ const EQUAL: [(&str, &str, &str); 9] = [
     ("coulomb", "stribeck", "its columns add up to the sign"),
     ("coulomb", "lugre", "its bristles, once bent, are the sign"),
     ("stribeck", "lugre", "its bristles, once bent, are Stribeck friction"),
+    ("stribeck_viscous", "stribeck", "both have a Stribeck speed `vs`"),
+    ("stribeck_viscous", "lugre", "both have a Stribeck speed `vs`"),
     ("asymmetric", "lugre", "its bristles, once bent, are the sign"),
 ];
 

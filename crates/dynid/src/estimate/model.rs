@@ -1,12 +1,13 @@
 //! The model in the result file, from which efforts can be predicted again.
 
-use dynid_io::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, SettingValue};
+use dynid_io::{CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, SettingValue};
 use dynid_model::{
     Description, Inertia, JointDescription, JointKind, Limits, LinkDescription, Mat3, Mechanism, Mimic,
     Placement, Vec3,
 };
 use serde::{Deserialize, Serialize};
 
+use crate::Error;
 use crate::elements::ElementPlan;
 use crate::friction::KnownFriction;
 
@@ -27,6 +28,9 @@ pub struct ModelRecord {
     pub elements: Vec<Vec<String>>,
     /// Couplings.
     pub couplings: Vec<CouplingRecord>,
+    /// Joints that motors drive through springs; their stiffness is among the parameters.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub elastic: Vec<ElasticRecord>,
     /// Settings of elements that are numbers or flags: joint, element, key, value.
     pub element_settings: Vec<(String, String, String, SettingRecord)>,
     /// Standard parameters of all bodies whose rigid effort loads the gears of `load` elements; absent: those of the links.
@@ -39,6 +43,45 @@ pub struct ModelRecord {
     pub state_hz: f64,
     /// Cut-off of the widest kernel, Hz.
     pub kernel_hz: f64,
+}
+
+/// A joint that its motor drives through a spring.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ElasticRecord {
+    /// Joint.
+    pub joint: String,
+    /// Its motor, an effort of its own.
+    pub motor: String,
+    /// Travel of the motor over that of the joint with a stiff spring.
+    pub ratio: f64,
+    /// The spring has a cubic part, `<joint>.k2`.
+    pub cubic: bool,
+    /// It is damped, `<joint>.d`.
+    pub damping: bool,
+    /// A sensor behind the spring measures its torque; efforts of the joint are the negative readings.
+    pub sensor: bool,
+}
+
+impl ElasticRecord {
+    fn new(e: &ElasticSpec) -> Self {
+        ElasticRecord {
+            joint: e.joint.clone(),
+            motor: e.motor.clone(),
+            ratio: e.ratio,
+            cubic: e.cubic,
+            damping: e.damping,
+            sensor: e.sensor,
+        }
+    }
+
+    fn spec(&self) -> Result<ElasticSpec, Error> {
+        if !(self.ratio.is_finite() && self.ratio != 0.0) {
+            return Err(Error::setting("elastic.ratio", "a finite number other than 0", self.ratio));
+        }
+        let (k1, k2, d) = (None, None, None);
+        let ElasticRecord { joint, motor, ratio, cubic, damping, sensor } = self.clone();
+        Ok(ElasticSpec { joint, motor, ratio, cubic, damping, sensor, k1, k2, d })
+    }
 }
 
 /// Value of an element's setting.
@@ -142,6 +185,7 @@ impl ModelRecord {
             joints,
             elements: plan.per_rate.clone(),
             couplings,
+            elastic: plan.elastic.iter().map(ElasticRecord::new).collect(),
             element_settings,
             load_reference: plan.load_reference.clone(),
             known_friction: plan.known.clone(),
@@ -164,7 +208,7 @@ impl ModelRecord {
         Ok(d)
     }
 
-    pub(super) fn plan(&self) -> ElementPlan {
+    pub(super) fn plan(&self, mechanism: &Mechanism) -> Result<ElementPlan, Error> {
         let couplings = self
             .couplings
             .iter()
@@ -188,12 +232,29 @@ impl ModelRecord {
                 },
             })
             .collect();
-        let spec = ElementSpec { settings, ..ElementSpec::default() };
-        let mut plan = ElementPlan::recorded(self.elements.clone(), couplings, spec);
+        let elastic = self.elastic.iter().map(ElasticRecord::spec).collect::<Result<Vec<_>, _>>()?;
+        if let Some(joint) = repeated(mechanism, &elastic) {
+            return Err(Error::setting("elastic", "names that occur once", joint));
+        }
+        let spec = ElementSpec { settings, elastic, ..ElementSpec::default() };
+        let mut plan = ElementPlan::recorded(mechanism, self.elements.clone(), couplings, spec)?;
         plan.load_reference.clone_from(&self.load_reference);
         plan.known.clone_from(&self.known_friction);
-        plan
+        Ok(plan)
     }
+}
+
+/// A joint or motor that stands twice.
+fn repeated(mechanism: &Mechanism, elastic: &[ElasticSpec]) -> Option<String> {
+    let mut names = mechanism.rate_names();
+    for e in elastic {
+        if names.contains(&e.motor) {
+            return Some(e.motor.clone());
+        }
+        names.push(e.motor.clone());
+    }
+    let twice = elastic.iter().enumerate().find(|(k, e)| elastic[..*k].iter().any(|b| b.joint == e.joint));
+    twice.map(|(_, e)| e.joint.clone())
 }
 
 fn joint_record(j: &JointDescription) -> JointRecord {

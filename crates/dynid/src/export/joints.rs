@@ -48,7 +48,10 @@ pub(super) fn split(identified: &Identified<'_>, format: Format) -> JointValues 
     let mut kept = values[..bodies].to_vec();
     kept.resize(values.len(), 0.0);
     let mut out = JointValues { joints: Vec::new(), values: kept, notes: Vec::new() };
-    for joint in model.joints() {
+    for (rate, joint) in model.joints().iter().enumerate() {
+        if model.elastic_link(rate).is_some() {
+            continue;
+        }
         let column = |symbol: &str| table.column(&format!("{}.{symbol}", joint.name));
         let law = known_friction.iter().find(|law| law.joint == joint.name);
         let mut state = |symbol: &str, what: &str, unit_of: usize, value: f64| {
@@ -159,12 +162,22 @@ fn known_left_out(
 /// What a format has no place for, one line per kind of element.
 fn left_out(model: &RobotModel, values: &[f64], format: Format) -> Vec<String> {
     let bodies = 10 * model.mechanism().bodies().len();
+    let joints = model.joints().iter().enumerate();
+    let motors: Vec<&str> = joints
+        .filter(|(rate, _)| model.elastic_link(*rate).is_some())
+        .map(|(_, j)| j.name.as_str())
+        .collect();
     let mut kinds: Vec<(&str, Vec<&str>)> = Vec::new();
     for (parameter, value) in model.parameters().linear.iter().zip(values).skip(bodies) {
         let Owner::Joint(joint) = &parameter.owner else { continue };
         // Couplings name their parameters by motors.
         let own = parameter.name.strip_prefix(joint.as_str()).and_then(|s| s.strip_prefix('.'));
+        let motor = motors.contains(&joint.as_str());
         let kind = match own {
+            _ if motor => "friction and rotor of motors behind springs",
+            Some("k1" | "k2" | "d") => "elasticity",
+            Some("load") => "external load",
+            Some("fvs") => "viscous friction that fades with speed",
             Some("fc" | "fv") => continue,
             Some("fcp" | "fcn" | "fvp" | "fvn") => "difference of friction between the directions",
             Some("Ia") if format == Format::Mjcf => continue,

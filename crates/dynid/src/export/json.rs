@@ -1,5 +1,6 @@
 //! The identified robot as compact JSON.
 
+use dynid_model::element::JointInfo;
 use dynid_model::{EffortModel, Inertia, JointKind, Mat3, RobotModel, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -25,8 +26,11 @@ pub struct RobotJson {
     pub gravity: [f64; 3],
     /// Moving links in the order of their joints.
     pub links: Vec<LinkJson>,
-    /// Joints in the order of the efforts.
+    /// Joints in the order of the efforts, then motors behind springs.
     pub joints: Vec<JointJson>,
+    /// Springs between motors and joints; their stiffness is among `other`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub elastic: Vec<ElasticJson>,
     /// Parameters of further elements (springs, couplings, asymmetric and nonlinear friction).
     pub other: Vec<OtherJson>,
     /// Shape parameters: those that enter the effort nonlinearly.
@@ -77,6 +81,17 @@ pub struct JointJson {
     pub offset: Option<f64>,
     /// Rotor inertia behind the gear `Ia`, kg m² or kg.
     pub rotor_inertia: Option<f64>,
+}
+
+/// A joint that its motor drives through a spring, `k1 Δ + k2 Δ³ + d Δ̇` with `Δ = motor/ratio - joint`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ElasticJson {
+    /// Joint; `<joint>.k1` and so on are its parameters.
+    pub joint: String,
+    /// Motor.
+    pub motor: String,
+    /// Travel of the motor over that of the joint with a stiff spring.
+    pub ratio: f64,
 }
 
 /// A parameter of another element, by the name it has in `estimate.json`.
@@ -142,7 +157,10 @@ impl RobotJson {
             .joints()
             .iter()
             .enumerate()
-            .filter(|(rate, _)| mechanism.bodies()[owners[*rate]].joint.kind != JointKind::Floating)
+            .filter(|(rate, _)| {
+                let body = owners.get(*rate).map(|body| &mechanism.bodies()[*body]);
+                body.is_none_or(|body| body.joint.kind != JointKind::Floating)
+            })
             .map(|(rate, joint)| {
                 let mut value = |symbol: &str| {
                     let column = element(model, &joint.name, symbol)?;
@@ -169,6 +187,7 @@ impl RobotJson {
             gravity: mechanism.gravity().0,
             links,
             joints,
+            elastic: elastic(model),
             other: other.collect(),
             shape: table
                 .shape
@@ -215,6 +234,15 @@ impl RobotJson {
         }
         values
     }
+}
+
+fn elastic(model: &RobotModel) -> Vec<ElasticJson> {
+    let joints = model.joints();
+    let of = |(motor, j): (usize, &JointInfo)| {
+        let (link, ratio) = model.elastic_link(motor)?;
+        Some(ElasticJson { joint: joints[link].name.clone(), motor: j.name.clone(), ratio })
+    };
+    joints.iter().enumerate().filter_map(of).collect()
 }
 
 /// Bodies that friction of the load refers to, if the model has such friction.

@@ -45,7 +45,7 @@ pub use error::{ExportError, LinkFault};
 use identified::inertias;
 pub use identified::{Identified, IdentifiedRobot, Source};
 use joints::{Format, JointValues};
-pub use json::{JointJson, LinkJson, OtherJson, ROBOT_JSON_SCHEMA, RobotJson, json};
+pub use json::{ElasticJson, JointJson, LinkJson, OtherJson, ROBOT_JSON_SCHEMA, RobotJson, json};
 pub use read_back::{CheckStates, READ_BACK_LIMIT};
 
 /// Text that is ready to be written.
@@ -92,6 +92,13 @@ impl<'a> RobotExport<'a> {
         still.lock(&held).map_err(named)?;
         let target = still.build().map_err(named)?;
         let all = inertias(identified.values).collect::<Vec<_>>();
+        // Where sensors measure all loads, no body was identified.
+        let measured = mechanism.bodies().is_empty();
+        if measured {
+            let (links, faults) = (Vec::new(), Vec::new());
+            let notes = vec!["sensors measure the load of the joints: no body was identified, links are those of the robot file".to_owned()];
+            return Ok(RobotExport { identified, source, description, held, links, faults, notes });
+        }
         let shared = target
             .bodies()
             .iter()
@@ -206,6 +213,9 @@ impl<'a> RobotExport<'a> {
         let (back, stated) = read_back::compile(read, joints, &self.held, model).map_err(|fault| {
             ExportError::OtherRobot { file: format!("exported {}", format.name()), fault }
         })?;
+        if model.mechanism().bodies().is_empty() {
+            return Ok(Exported { text, difference: 0.0, notes });
+        }
         let difference = read_back::largest_difference(
             (model, &model.parameters().shape_start(), values),
             (&back, &back.parameters().shape_start(), &stated),

@@ -83,7 +83,7 @@ pub(super) fn read(
         if let Some(name) = log.joint.as_ref().filter(|j| !names.contains(j)) {
             return Err(Error::UnknownJoint { name: name.clone(), known: names.clone() });
         }
-        let loaded = logs::load(&log.plain(), &robot.mechanism, &config.columns, None)?;
+        let loaded = logs::load(&log.plain(), &robot.axes, &config.columns, None)?;
         warnings.extend(logs::temperature_warnings(&loaded.log));
         match log.signal {
             LoggedSignal::Effort => passes(config, log, &loaded, &mut joints, warnings)?,

@@ -33,7 +33,7 @@ pub use presliding::{PreslidingFit, PreslidingTest, fit_presliding};
 use dynid_estimate::steady_friction::{SteadyError, SteadyFriction, analyse};
 
 use crate::Error;
-use crate::robot::{Robot, RobotOptions};
+use crate::robot::{Robot, RobotOptions, refuse_elastic};
 
 /// What is being worked on.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,6 +79,7 @@ pub fn identify_friction(
 ) -> Result<FrictionIdentification, Error> {
     config.check()?;
     let robot = Robot::load(&config.robot, &RobotOptions::default())?;
+    refuse_elastic(&robot, "evaluated by friction experiments")?;
     // What a robot file leaves open about bodies is no matter for friction.
     let mut warnings = Vec::new();
     let known = robot.mechanism.rate_names();

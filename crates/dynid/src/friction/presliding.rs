@@ -92,7 +92,7 @@ pub(super) fn find(
         columns: log.columns.clone(),
         ..crate::config::LogConfig::default()
     };
-    let loaded = logs::load(&plain, &robot.mechanism, &config.columns, None)?;
+    let loaded = logs::load(&plain, &robot.axes, &config.columns, None)?;
     warnings.extend(logs::temperature_warnings(&loaded.log));
     let grid = on_grid(&loaded)?;
     let unknown = || FrictionError::NoSteadyLaw { file: file.clone(), joint: log.joint.clone() };

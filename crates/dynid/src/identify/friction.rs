@@ -26,17 +26,13 @@ pub(super) fn choose(
     settings: &ConditioningSettings,
     progress: impl FnMut(Stage),
 ) -> Result<FrictionChoice, Error> {
-    let names = model.mechanism().rate_names();
     let follows = model.mechanism().follows().is_some();
-    let rates: Vec<Option<usize>> =
-        model.outputs().iter().map(|o| names.iter().position(|n| *n == o.name)).collect();
-    let kinds: Vec<Vec<ShapeKind>> = rates
-        .iter()
-        .map(|rate| match *rate {
+    let rates = model.mechanism().rates();
+    let kinds: Vec<Vec<ShapeKind>> = (model.outputs().iter().enumerate())
+        .map(|(rate, output)| match plan.known_friction(&output.name) {
             // Its shape is known already.
-            Some(r) if plan.known_friction(&names[r]).is_some() => Vec::new(),
-            Some(r) => kinds_beside(&plan.per_rate[r], follows),
-            None => Vec::new(),
+            Some(_) => Vec::new(),
+            None => kinds_beside(&plan.per_rate[rate], follows || rate >= rates),
         })
         .collect();
     let Structure { base, prior, regrouping, .. } = structure;
@@ -53,11 +49,9 @@ pub(super) fn choose(
         settings,
         progress,
     )?;
-    for (rate, joint) in rates.iter().zip(&found.per_output) {
+    for (rate, joint) in found.per_output.iter().enumerate() {
         for accepted in &joint.accepted {
-            if let Some(rate) = rate {
-                plan.add_shape(*rate, &names[*rate], &accepted.shape);
-            }
+            plan.add_shape(rate, &model.outputs()[rate].name, &accepted.shape);
         }
     }
     if !found.load.is_empty() {
@@ -80,10 +74,8 @@ pub(super) fn drop_unseen(
         let place = table.shape.iter().position(|s| s.name == name);
         place.is_some_and(|k| found.findings[k].verdict == ShapeVerdict::NotSeen)
     };
-    let names = model.mechanism().rate_names();
     let mut dropped = false;
-    for (output, joint) in model.outputs().iter().zip(chosen) {
-        let Some(rate) = names.iter().position(|n| *n == output.name) else { continue };
+    for (rate, (output, joint)) in model.outputs().iter().zip(chosen).enumerate() {
         let (gone, kept): (Vec<ShapeTrial>, Vec<ShapeTrial>) =
             joint.accepted.drain(..).partition(|trial| unseen(&output.name, trial));
         joint.accepted = kept;
@@ -96,8 +88,8 @@ pub(super) fn drop_unseen(
     dropped
 }
 
-/// Kinds of shapes that say something new beside given elements. `follows`: some joints follow others.
-fn kinds_beside(elements: &[String], follows: bool) -> Vec<ShapeKind> {
+/// Kinds of shapes that say something new beside given elements. `unloaded`: no rigid effort is to be had for a gear's load.
+fn kinds_beside(elements: &[String], unloaded: bool) -> Vec<ShapeKind> {
     let has = |name: &str| elements.iter().any(|e| e == name);
     let shaped = elements.iter().any(|name| is_shaped(name));
     let mut out = Vec::new();
@@ -110,7 +102,7 @@ fn kinds_beside(elements: &[String], follows: bool) -> Vec<ShapeKind> {
     if (has("coulomb") || has("viscous") || has("asymmetric")) && !shaped {
         out.push(ShapeKind::Tanh);
     }
-    if (has("coulomb") || has("stribeck")) && !has("load") && !follows {
+    if (has("coulomb") || has("stribeck")) && !has("load") && !unloaded {
         out.push(ShapeKind::Load);
     }
     out

@@ -14,7 +14,7 @@ pub(super) fn warnings(plan: &ElementPlan, mechanism: &Mechanism, logs: &[Prepar
     if plan.known.is_empty() {
         return Vec::new();
     }
-    let names = mechanism.rate_names();
+    let names = plan.names(mechanism);
     let without: Vec<&str> = names
         .iter()
         .enumerate()

@@ -19,6 +19,7 @@ use super::usual::Innovations;
 use crate::config::Config;
 use crate::elements::ElementPlan;
 use crate::identify::stated_values;
+use crate::logs::{self, LogAxis};
 use crate::prior::{self, Prior};
 use crate::robot::{Robot, RobotOptions};
 use crate::{Error, advice, bounds};
@@ -79,6 +80,11 @@ impl Structure {
             base,
             warnings,
         })
+    }
+
+    /// What a stream has columns for.
+    pub(super) fn axes(&self) -> Vec<LogAxis> {
+        logs::axes(&self.model)
     }
 
     /// Joints in the order of the outputs.

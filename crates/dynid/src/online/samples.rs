@@ -4,8 +4,9 @@ use dynid_io::columns::TimeSource;
 use dynid_io::{ColumnMapping, MappingSpec, Table};
 use dynid_model::element::temperature_channel;
 
+use crate::Error;
 use crate::config::Config;
-use crate::{Error, logs};
+use crate::logs::{self, LogAxis};
 
 /// Rows converted at a time.
 pub(super) const BATCH: usize = 256;
@@ -29,19 +30,19 @@ pub(super) struct Samples {
 }
 
 impl Samples {
-    /// For a stream with these columns. `joints`: of the robot, in their order.
+    /// For a stream with these columns. `axes`: of the robot, in their order.
     pub(super) fn new(
         name: &str,
         header: &[String],
-        joints: &[String],
+        axes: &[LogAxis],
         columns: &MappingSpec,
     ) -> Result<Samples, Error> {
         let named = |source| Error::Columns { file: name.to_owned(), source };
-        let mapping = ColumnMapping::from_spec(header, joints, columns).map_err(named)?;
+        let mapping = logs::map_columns(header, axes, columns).map_err(named)?;
         if columns.position.is_none() {
-            logs::check_surplus(&mapping, joints, header, name)?;
+            logs::check_surplus(&mapping, &logs::names(axes), header, name)?;
         }
-        logs::check_gains(columns, joints.len())?;
+        logs::check_gains(columns, axes.len())?;
         if mapping.effort.is_none() {
             return Err(Error::Unsupported(format!("{name}: a stream without efforts identifies nothing")));
         }

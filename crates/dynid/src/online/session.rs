@@ -64,8 +64,8 @@ impl Session {
         columns: Option<&MappingSpec>,
     ) -> Result<Session, Error> {
         config.check()?;
-        let joints = Structure::new(config, &[])?.joints();
-        let samples = Samples::new(name, header, &joints, columns.unwrap_or(&config.columns))?;
+        let axes = Structure::new(config, &[])?.axes();
+        let samples = Samples::new(name, header, &axes, columns.unwrap_or(&config.columns))?;
         let structure = Structure::new(config, &samples.not_logged())?;
         Ok(Session {
             phase: Phase::Learning { samples: Vec::new(), wanted_s: config.online.learn_s },
@@ -94,8 +94,8 @@ impl Session {
     ) -> Result<(), Error> {
         self.flush(emit)?;
         let still = self.samples.not_logged();
-        let joints = Structure::new(&self.config, &[])?.joints();
-        let samples = Samples::new(name, header, &joints, columns.unwrap_or(&self.config.columns))?;
+        let axes = Structure::new(&self.config, &[])?.axes();
+        let samples = Samples::new(name, header, &axes, columns.unwrap_or(&self.config.columns))?;
         if samples.not_logged() != still {
             return Err(Error::Unsupported(format!(
                 "{name}: expected columns of the same joints as before, not logged: {still:?}, found {:?}",

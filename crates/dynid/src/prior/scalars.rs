@@ -17,6 +17,12 @@ const STARTING_S: f64 = 0.03;
 /// Effort limits count up to this multiple of the logged effort.
 const LIMIT_OF_LOGGED: f64 = 10.0;
 
+/// Deformation of a spring under all the effort where no stiffness is stated: a few minutes of arc, as harmonic drives
+/// have; rad and m.
+const WIND_UP: [f64; 2] = [1e-3, 1e-4];
+/// Damping of a spring over its stiffness, s: some per cent of the critical one at the frequencies of drives.
+const SETTLING_S: f64 = 0.01;
+
 /// Shares of the velocity limits at which columns are looked at: some friction acts at low speeds only, Stribeck friction of
 /// a small speed next to rest alone.
 const SPEEDS: [f64; 6] = [1.0, 0.25, 0.0625, 0.015625, 0.00390625, 1e-9];
@@ -46,6 +52,7 @@ pub(super) fn standard_deviations(
     }
     let probe = Probe::new(model, inertias);
     let efforts: Vec<f64> = (0..logged.len()).map(|j| probe.effort(model, j, logged[j])).collect();
+    let springs = Spring::of(model, stated, &efforts, logged);
     let starting: Vec<f64> = efforts.iter().zip(&probe.limits).map(|(e, v)| STARTING_S * e / v).collect();
     (inertias.len()..table.len())
         .map(|column| {
@@ -60,10 +67,57 @@ pub(super) fn standard_deviations(
                 let starting = probe.least(column, &probe.accelerated, &starting).unwrap_or(0.0);
                 return known.max(ROTOR_SHARE * mass).max(starting);
             }
+            if let Some(spring) = springs.iter().find_map(|s| s.deviation(column)) {
+                return spring;
+            }
             let largest = probe.least(column, &probe.moving, &efforts).unwrap_or(1.0);
             (0.5 * known).max(EFFORT_SHARE * largest)
         })
         .collect()
+}
+
+/// Speed limits of all rates, motors behind springs as fast as their joints allow.
+fn speed_limits(model: &RobotModel) -> Vec<f64> {
+    let joints = model.joints();
+    let own = |rate: usize| speed_limit(joints[rate].slides, model.limits(rate).velocity);
+    let limit = |rate: usize| match model.elastic_link(rate) {
+        Some((link, ratio)) => own(link) * ratio.abs(),
+        None => own(rate),
+    };
+    (0..joints.len()).map(limit).collect()
+}
+
+/// Prior deviations of a spring: it carries all of the effort over a deformation of [`WIND_UP`], or of that which the
+/// stated stiffness gives.
+struct Spring {
+    /// Column and deviation of `k1`, `k2`, `d`.
+    deviations: Vec<(usize, f64)>,
+}
+
+impl Spring {
+    fn of(model: &RobotModel, stated: &[Option<f64>], efforts: &[f64], logged: &[f64]) -> Vec<Spring> {
+        let table = model.parameters();
+        let spring = |(link, (motor, ratio)): (usize, (usize, f64))| {
+            let name = &model.joints()[link].name;
+            let column = |symbol: &str| table.column(&format!("{name}.{symbol}"));
+            let torque = if logged[motor] > 0.0 { ratio.abs() * logged[motor] } else { efforts[link] };
+            let known = column("k1").and_then(|c| stated[c]).filter(|k| *k > 0.0);
+            let typical = WIND_UP[usize::from(model.joints()[link].slides)];
+            let wind_up = known.map_or(typical, |k| torque / k);
+            let k1 = torque / wind_up;
+            let all = [("k1", k1), ("k2", k1 / wind_up.powi(2)), ("d", SETTLING_S * k1)];
+            let of_stated = |c: usize| 0.5 * stated[c].unwrap_or(0.0).abs();
+            let deviations =
+                all.iter().filter_map(|(s, std)| column(s).map(|c| (c, std.max(of_stated(c))))).collect();
+            Spring { deviations }
+        };
+        let links = (0..model.joints().len()).filter_map(|link| Some((link, model.elastic_motor(link)?)));
+        links.map(spring).collect()
+    }
+
+    fn deviation(&self, column: usize) -> Option<f64> {
+        self.deviations.iter().find(|(c, _)| *c == column).map(|(_, std)| *std)
+    }
 }
 
 /// What random states say about a model.
@@ -83,17 +137,11 @@ struct Probe {
 impl Probe {
     fn new(model: &RobotModel, inertias: &[f64]) -> Self {
         let mechanism = model.mechanism();
-        let owners = mechanism.rate_bodies();
-        let limits: Vec<f64> = model
-            .joints()
-            .iter()
-            .zip(&owners)
-            .map(|(joint, body)| speed_limit(joint.slides, mechanism.bodies()[*body].joint.limits.velocity))
-            .collect();
+        let limits = speed_limits(model);
         let channels = typical_channels(model, STATES);
         let channels: Vec<(&str, &[f64])> =
             channels.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect();
-        RandomMotion::new(mechanism, &[], STATES, SEED).with_block(|motion| {
+        RandomMotion::new(mechanism, &[], STATES, SEED).with_coordinates(model, SEED).with_block(|motion| {
             let zero = vec![0.0; motion.dq.len()];
             let sign = |x: &f64| if *x < 0.0 { -1.0 } else { 1.0 };
             let unit: Vec<f64> = motion.ddq.iter().map(sign).collect();
@@ -111,6 +159,8 @@ impl Probe {
                 .map(|share| columns(&fast.iter().map(|v| share * v).collect::<Vec<f64>>(), &zero))
                 .collect();
             let (mass, rigid) = rigid_bodies(model, motion, inertias);
+            let [mass, rigid] =
+                [(mass, 2), (rigid, 1)].map(|(sizes, power)| with_motors(model, sizes, power));
             Probe {
                 accelerated: largest(model, |output, k, s| {
                     accelerated.column(output, k)[s] - rest.column(output, k)[s]
@@ -133,10 +183,8 @@ impl Probe {
 
     /// Size of the effort of an output, N m or N; positive.
     fn effort(&self, model: &RobotModel, output: usize, logged: f64) -> f64 {
-        let mechanism = model.mechanism();
-        let owner = mechanism.rate_bodies()[output];
         let positive = |x: &f64| x.is_finite() && *x > 0.0;
-        let limit = mechanism.bodies()[owner].joint.limits.effort.filter(positive);
+        let limit = model.limits(output).effort.filter(positive);
         let logged = Some(logged).filter(positive);
         let effort = match (limit, logged) {
             (Some(limit), Some(logged)) => limit.min(LIMIT_OF_LOGGED * logged),
@@ -162,18 +210,29 @@ fn largest(model: &RobotModel, entry: impl Fn(usize, usize, usize) -> f64) -> Ve
         .collect()
 }
 
+/// Sizes per joint of the mechanism, extended to motors behind springs: those of their joints over a power of the ratio. Loads
+/// that a sensor measures count as 0.
+fn with_motors(model: &RobotModel, mut sizes: Vec<f64>, power: i32) -> Vec<f64> {
+    for rate in sizes.len()..model.joints().len() {
+        let link = model.elastic_link(rate).filter(|(link, _)| *link < rate);
+        sizes.push(link.map_or(0.0, |(link, ratio)| sizes[link] / ratio.abs().powi(power)));
+    }
+    sizes
+}
+
 /// Mean diagonal of the mass matrix, and largest efforts over the states.
 fn rigid_bodies(model: &RobotModel, motion: &MotionBlock<'_>, inertias: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let dynamics = Dynamics::new(model.mechanism());
     let mut work = dynamics.workspace::<f64>();
-    let n = dynamics.rates();
+    let (n, positions) = (dynamics.rates(), model.mechanism().positions());
     let (mut mass, mut rigid) = (vec![0.0; n], vec![0.0_f64; n]);
     let mut effort = vec![0.0; n];
-    let at = |signal: &[f64], s: usize| -> Vec<f64> {
-        signal.chunks(motion.stride).map(|channel| channel[s]).collect()
+    // Bodies move with the first coordinates.
+    let at = |signal: &[f64], count: usize, s: usize| -> Vec<f64> {
+        signal.chunks(motion.stride).take(count).map(|channel| channel[s]).collect()
     };
     for s in 0..motion.samples {
-        let (q, dq, ddq) = (at(motion.q, s), at(motion.dq, s), at(motion.ddq, s));
+        let (q, dq, ddq) = (at(motion.q, positions, s), at(motion.dq, n, s), at(motion.ddq, n, s));
         let matrix = dynamics.mass_matrix(&q, inertias, &mut work);
         let state = State { q: &q, dq: &dq, ddq: &ddq, gravity: None };
         dynamics.inverse_dynamics(&state, inertias, &mut work, &mut effort);

@@ -15,10 +15,9 @@ const POINTS: usize = 200;
 impl Identification {
     /// Friction over velocity of joints that have a law with shape parameters, or whose friction is known.
     pub(super) fn friction_laws(&self, estimate: &Estimate) -> Vec<report::Chart> {
-        let outputs = estimate.joints.iter().zip(self.output_rates());
+        let outputs = estimate.joints.iter().enumerate();
         outputs
-            .filter_map(|(joint, rate)| {
-                let rate = rate?;
+            .filter_map(|(rate, joint)| {
                 let record = estimate.friction_passivity.iter().find(|r| r.joint == *joint)?;
                 let known = self.plan.known_friction(joint).is_some();
                 let shaped = self.plan.per_rate[rate].iter().any(|name| is_shaped(name));

@@ -52,6 +52,7 @@ pub(super) fn experiment(
     let log = result.log;
     Ok(SimulatedLog {
         joints: model.mechanism().rate_names(),
+        undriven: vec![false; model.outputs().len()],
         time: log.time,
         position: log.position,
         velocity: settings.log_velocity.then_some(log.velocity),

@@ -65,7 +65,7 @@ fn series(
     rng: &mut ChaCha8Rng,
 ) -> Result<Vec<Fourier>, Error> {
     let mut out = random(model, settings, rng)?;
-    let names: Vec<String> = model.joints().iter().map(|j| j.name.clone()).collect();
+    let names: Vec<String> = driven(model).map(|rate| model.joints()[rate].name.clone()).collect();
     for (joint, series) in &settings.trajectory {
         let Some(j) = names.iter().position(|n| n == joint) else {
             return Err(Error::UnknownJoint { name: joint.clone(), known: names });
@@ -76,6 +76,11 @@ fn series(
     Ok(out)
 }
 
+/// Rates whose motion is chosen: all but motors behind springs, which come last.
+fn driven(model: &RobotModel) -> impl Iterator<Item = usize> {
+    (0..model.joints().len()).filter(|rate| model.elastic_link(*rate).is_none())
+}
+
 /// One random Fourier series per joint, scaled so that position, speed and acceleration stay within their share.
 fn random(
     model: &RobotModel,
@@ -83,13 +88,11 @@ fn random(
     rng: &mut ChaCha8Rng,
 ) -> Result<Vec<Fourier>, Error> {
     let base = std::f64::consts::TAU / settings.period_s.unwrap_or(settings.duration_s);
-    let owners = model.mechanism().rate_bodies();
-    owners
-        .iter()
-        .map(|body| {
-            let joint = &model.mechanism().bodies()[*body].joint;
-            let reach = if joint.effort_unit() == "N" { 0.5 } else { 2.0 };
-            let (low, high) = joint.limits.position.unwrap_or((-reach, reach));
+    driven(model)
+        .map(|rate| {
+            let limits = model.limits(rate);
+            let reach = if model.joints()[rate].slides { 0.5 } else { 2.0 };
+            let (low, high) = limits.position.unwrap_or((-reach, reach));
             let (low, high) = (low.max(-2.0 * reach), high.min(2.0 * reach));
             let middle = 0.5 * (low + high);
             let mut draw = || -> Vec<f64> {
@@ -108,7 +111,7 @@ fn random(
                     .map(|k| pick(&unit.at(period * f64::from(k) / 2000.0)).abs())
                     .fold(f64::MIN_POSITIVE, f64::max)
             };
-            let speed = joint.limits.velocity.unwrap_or(2.0);
+            let speed = limits.velocity.unwrap_or(2.0);
             let scale = (settings.share * 0.5 * (high - low) / peak(&|p| p.position - middle))
                 .min(settings.share * speed / peak(&|p| p.velocity))
                 .min(settings.share * settings.acceleration / peak(&|p| p.acceleration));

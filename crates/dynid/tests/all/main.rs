@@ -3,6 +3,7 @@
 mod accuracy;
 mod bristles;
 mod design;
+mod elastic;
 mod elements;
 mod export;
 mod friction_experiments;

@@ -221,7 +221,7 @@ fn panda_beats_both_published_parameter_sets() {
             })
             .collect();
         let log = &config.validation[0];
-        let loaded = dynid::logs::load(log, &id.robot.mechanism, &config.columns, None).unwrap();
+        let loaded = dynid::logs::load(log, &id.robot.axes, &config.columns, None).unwrap();
         let mut prepared =
             dynid::estimators::conditioning::prepare(&loaded.log, &rigid, &id.settings).unwrap();
         let filter = dynid::motion::filter::butterworth(4, 5.0, prepared.rate_hz).unwrap();

@@ -79,13 +79,9 @@ pub(crate) fn run(text: &str) -> Option<(Config, Identification)> {
 
 /// Agreement on the first validation log through a filter of the given cut-off.
 pub(crate) fn on_validation(config: &Config, id: &Identification, filter_hz: f64) -> Agreement {
-    let log = dynid::logs::load(
-        &config.validation[0],
-        &id.robot.mechanism,
-        &config.columns,
-        config.motor_side.as_ref(),
-    )
-    .unwrap();
+    let log =
+        dynid::logs::load(&config.validation[0], &id.robot.axes, &config.columns, config.motor_side.as_ref())
+            .unwrap();
     let prepared = prepare(&log.log, &id.model, &id.settings).unwrap();
     let alignment = Alignment {
         state_hz: id.state_hz,
