@@ -7,6 +7,7 @@
 pub mod er16;
 mod error;
 mod excitation;
+pub mod hit_joint;
 pub mod indy7;
 mod record;
 mod reference;
@@ -66,8 +67,14 @@ pub struct Progress {
     pub steps: usize,
 }
 
-const STUDIES: [Study; 2] = [
+const STUDIES: [Study; 3] = [
     Study { name: er16::NAME, title: er16::TITLE, source: er16::SOURCE, driver: er16::run },
+    Study {
+        name: hit_joint::NAME,
+        title: hit_joint::TITLE,
+        source: hit_joint::SOURCE,
+        driver: hit_joint::run,
+    },
     Study { name: indy7::NAME, title: indy7::TITLE, source: indy7::SOURCE, driver: indy7::run },
 ];
 

@@ -29,7 +29,7 @@ fn list_names_every_study() {
     let listed: Json =
         serde_json::from_slice(&run(folder.path(), &["study", "list", "--json"], 0).stdout).unwrap();
     let listed = listed.as_array().unwrap();
-    assert!(["er16", "indy7"].iter().all(|name| listed.iter().any(|s| s["study"] == **name)));
+    assert!(["er16", "hit-joint", "indy7"].iter().all(|name| listed.iter().any(|s| s["study"] == **name)));
     for study in listed {
         for key in ["study", "title", "source"] {
             let value = study[key].as_str().unwrap();
@@ -78,6 +78,24 @@ fn er16_holds_every_claim_and_repeats_bit_by_bit() {
     let first = quick("er16", folder.path(), "one", "1");
     holds_every_claim("er16", &first);
     assert!(quick("er16", folder.path(), "two", "2") == first, "two threads give other bits than one");
+}
+
+#[test]
+fn hit_joint_holds_every_claim_and_repeats_bit_by_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = quick("hit-joint", folder.path(), "one", "1");
+    let ids = holds_every_claim("hit-joint", &first);
+    assert!((1..=11).all(|row| ids.contains(&row.to_string())), "{ids:?}");
+    assert!(quick("hit-joint", folder.path(), "two", "2") == first, "two threads give other bits than one");
+}
+
+#[test]
+#[ignore = "a full run takes a minute; the ordinary run checks the claims on fewer streams"]
+fn hit_joint_holds_every_claim_of_the_full_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["study", "hit-joint", "--json"], 0);
+    let study: Json = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&study["quick"], &study["pass"]), (&false.into(), &true.into()));
 }
 
 #[test]

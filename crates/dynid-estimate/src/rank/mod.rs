@@ -4,8 +4,10 @@
 //! Rank deficiency is a finding with numbers, never an error.
 
 mod regrouping;
+mod reliability;
 
 pub use regrouping::{BaseColumns, base_columns};
+pub use reliability::column_reliability;
 
 use crate::factor::Factor;
 use faer::dyn_stack::{MemBuffer, MemStack};

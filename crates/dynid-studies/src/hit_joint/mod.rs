@@ -1,0 +1,102 @@
+//! The harmonic-drive joint of a space manipulator: stiffness and damping off line and on line. See `README.md` in this folder.
+
+mod batch;
+mod golden;
+mod joint;
+mod measurement;
+mod offline;
+mod online;
+mod realisations;
+mod reference;
+mod report;
+mod settings;
+mod tracking;
+
+use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
+use joint::Extras;
+use offline::Tables;
+use online::Machine;
+use realisations::{Realisation, clean, decimated, noisy};
+use settings::Settings;
+use tracking::Tracks;
+
+/// Name on the command line.
+pub const NAME: &str = "hit-joint";
+/// What is studied.
+pub const TITLE: &str = "HIT joint: stiffness and damping of a harmonic drive, off line and while it runs";
+/// Where it was published.
+pub const SOURCE: &str =
+    "Sun, Shi, Zhang, Wang & Liu, Parameters Identification Applied to Large Space Robotic Manipulators";
+
+/// `k1, k2, b_in, b_inD, b_out, b_outC`.
+const PARAMETERS: usize = 6;
+/// Their names.
+const NAMES: [&str; PARAMETERS] = ["k1", "k2", "b_in", "b_inD", "b_out", "b_outC"];
+/// A value per parameter.
+type Values = [f64; PARAMETERS];
+
+/// A fault of this study's data or of the rooms below.
+fn fault(error: impl std::fmt::Display) -> StudyError {
+    StudyError::Data { file: "hit_joint", message: error.to_string() }
+}
+
+/// Runs the study.
+///
+/// # Errors
+/// [`StudyError`]: faults of the embedded data or of the rooms below.
+pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError> {
+    const STEPS: usize = 6;
+    let mut done = 0;
+    let mut step = |what: &str| {
+        progress(Progress { step: what.to_owned(), done, steps: STEPS });
+        done += 1;
+    };
+    let (realisations, streams, change_free) = if run.quick { (60, 2, 60) } else { (400, 10, 1000) };
+    let settings = Settings::read()?;
+    step("parts, batch and recursion against references");
+    let mut rows = vec![golden::parts_row(&settings)?];
+    rows.extend(golden::batch_rows(&settings)?);
+    rows.push(golden::recursion_row(&settings)?);
+
+    step("batch identification");
+    let raw = clean(&settings, Extras::default())?;
+    let measured = noisy(&settings, &raw, settings.noise.deformation, run.seed);
+    let data = decimated(&settings, &measured);
+    let tables = Tables::new(&settings, &data)?;
+    let all = Realisation::many(&settings, &raw, run.seed, realisations)?;
+    rows.push(batch::full_row(&settings, &tables, &data, &all)?);
+    rows.extend(batch::nested_rows(&settings, &tables));
+    rows.push(batch::single_speed_row(&settings, &raw, &data)?);
+    rows.push(tracking::batch_row(&settings, &data, &tables.full.x)?);
+    rows.push(batch::filtered_row(&settings, &all));
+    rows.push(batch::total_row(&settings, &all));
+    rows.push(batch::interval_row(&settings, &all));
+    rows.push(batch::cyclic_row(&settings, run.seed)?);
+    rows.push(batch::full_friction_row(&settings, run.seed)?);
+    rows.push(batch::catalogue_row(&settings, &tables)?);
+
+    step("a spring that softens");
+    let machine = Machine::new(&settings)?;
+    let tracks = Tracks::new(&settings, &machine, run.seed, streams)?;
+    rows.push(tracking::tracking_row(&machine, &tracks));
+    rows.push(tracking::reaction_row(&tracks));
+    step("streams without a change");
+    rows.push(tracking::false_alarm_row(&settings, &machine, run.seed, change_free)?);
+    step("one direction for long");
+    let (row, one_way) = tracking::one_way_row(&settings, &machine, run.seed)?;
+    rows.push(row);
+    rows.sort_by_key(|r| (r.id.parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
+
+    step("report");
+    let record = StudyRecord::new(NAME, run, rows);
+    let report = report::Contents {
+        settings: &settings,
+        data: &data,
+        tables: &tables,
+        all: &all,
+        tracks: &tracks,
+        one_way: &one_way,
+    }
+    .report(&record)?;
+    Ok(StudyRun { record, report })
+}
