@@ -19,6 +19,9 @@ pub use settings::{
 };
 use trajectory::Reference;
 
+/// Positions, velocities and accelerations, coordinate after coordinate, and the effort of every output.
+type Moved = ([Vec<f64>; 3], Vec<Vec<f64>>);
+
 /// A virtual log with the truth beside it.
 #[derive(Debug, Clone)]
 pub struct SimulatedLog {
@@ -146,7 +149,7 @@ fn by_inverse_dynamics(
         signals
     };
     let span = (samples, settings.rate_hz);
-    let moved = |shift: f64| -> Result<([Vec<f64>; 3], Vec<Vec<f64>>), Error> {
+    let moved = |shift: f64| -> Result<Moved, Error> {
         if !model.coordinates().is_empty() {
             return elastic::along(model, reference, &values, shift, span);
         }

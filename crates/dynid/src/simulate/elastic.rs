@@ -4,6 +4,7 @@ use dynid_model::{EffortModel, RobotModel};
 use dynid_motion::trajectory::Fourier;
 use dynid_sim::{ElasticInverse, LinkMotion, fourier_link};
 
+use super::Moved;
 use super::trajectory::Reference;
 use crate::Error;
 
@@ -22,7 +23,7 @@ pub(super) fn along(
     values: &[f64],
     shift: f64,
     (samples, rate_hz): (usize, f64),
-) -> Result<([Vec<f64>; 3], Vec<Vec<f64>>), Error> {
+) -> Result<Moved, Error> {
     let Reference::Series(series) = reference else {
         return Err(Error::Unsupported(
             "a robot with elastic joints follows Fourier series alone: leave out `follow`".to_owned(),
