@@ -3,6 +3,7 @@
 mod broken_input;
 mod contract;
 mod design;
+mod elastic;
 mod estimator_settings;
 mod export;
 mod friction;
