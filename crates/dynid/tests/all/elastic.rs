@@ -50,8 +50,8 @@ viscous = { coefficient = 2e-4 }
 rotor = { inertia = 6e-5 }
 "#;
 
-fn robot(text: &str) -> Result<Robot, dynid::Error> {
-    Robot::parse(text, Path::new("robot.toml"), &RobotOptions::default())
+fn robot(text: &str) -> Result<Robot, Box<dynid::Error>> {
+    Robot::parse(text, Path::new("robot.toml"), &RobotOptions::default()).map_err(Box::new)
 }
 
 /// Columns that a simulated log has.
@@ -256,7 +256,7 @@ fn bad_elastic_joints_are_told() {
     let unstated = ARM.replace("elastic = {", "rotor = { inertia = 1.0 } #");
     let unstated =
         unstated.replace("element.j1_motor", "element.j1.other").replace("element.m2", "element.j2.other");
-    let told = robot(&unstated).and_then(|r| dynid::inspect::inspect(&r, None).map(|_| ())).unwrap_err();
+    let told = dynid::inspect::inspect(&robot(&unstated).unwrap(), None).map(|_| ()).unwrap_err();
     assert!(told.to_string().contains("expected a ratio, found none"), "{told}");
 }
 
@@ -271,7 +271,7 @@ fn columns_of_undriven_joints_are_refused_and_unlogged_motors_told() {
         let text = format!("robot = \"r\"\n[columns]\n{columns}\n[[log]]\npath = \"l\"\n");
         let spec = Config::parse(&text, "run.toml").unwrap().columns;
         let file = dynid::config::LogConfig { path: path.clone(), ..Default::default() };
-        dynid::logs::load(&file, &arm.axes, &spec, None)
+        dynid::logs::load(&file, &arm.axes, &spec, None).map_err(Box::new)
     };
     assert_eq!(load("").unwrap().log.joints()[0].effort, vec![0.0; log.time.len()]);
     assert_eq!(load("effort = \"tau_{joint}\"").unwrap().log.joints()[3].effort, log.effort[3]);
