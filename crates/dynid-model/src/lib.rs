@@ -31,7 +31,7 @@ pub use dynamics::{
 pub use effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
 
 pub use inertia::Inertia;
-pub use mechanism::{Body, Frame, Joint, Mechanism, MechanismError, MechanismWarning};
+pub use mechanism::{Body, Frame, Joint, JournalPath, Mechanism, MechanismError, MechanismWarning};
 pub use parameter::{Owner, Parameter, ParameterTable, ShapeParameter};
 pub use random_motion::RandomMotion;
 pub use robot_model::{FrictionPassivity, KnownElement, Passivity, RobotModel};

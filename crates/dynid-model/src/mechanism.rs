@@ -1,8 +1,10 @@
 //! The compiled kinematic tree.
 
 mod build;
+mod clearance;
 mod fault;
 
+pub use clearance::{JournalPath, translation_names};
 pub use fault::{MechanismError, MechanismWarning};
 
 use crate::description::{JointKind, Limits, Mimic};

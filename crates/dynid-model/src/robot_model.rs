@@ -1,6 +1,7 @@
 //! The effort model of a robot: rigid bodies and joint elements.
 
 mod adjoint;
+mod clearance;
 mod elastic;
 mod elements;
 mod history;
@@ -281,9 +282,11 @@ impl EffortModel for RobotModel {
         &self.travels
     }
 
-    /// Links with bodies behind an elastic transmission: their drive acts on the motor's row.
+    /// Links with bodies behind an elastic transmission, whose drive acts on the motor's row, and translations of journals
+    /// in their bearings.
     fn is_undriven(&self, output: usize) -> bool {
-        output < self.mechanism.rates() && self.elastic_motor(output).is_some()
+        let behind = output < self.mechanism.rates() && self.elastic_motor(output).is_some();
+        behind || self.clearances().any(|contact| contact.translations.contains(&output))
     }
 
     fn reversal_speeds(&self, output: usize) -> Vec<Vec<(usize, f64)>> {

@@ -11,6 +11,7 @@
 //! Units are SI, angles rad.
 
 mod bodiless;
+mod collocation;
 mod controller;
 mod elastic;
 mod encoder;

@@ -58,6 +58,8 @@ pub struct Plant {
     /// Its diagonal, if there is nothing else.
     diagonal: Option<Vec<f64>>,
     bodiless: Option<Bodiless>,
+    /// Contacts of journals in their bearings are left out: somebody else adds them.
+    without_contacts: bool,
 }
 
 /// Memory of [`Plant::acceleration`] and its kin.
@@ -120,6 +122,7 @@ impl Plant {
             at_joints: Vec::new(),
             diagonal: None,
             bodiless: None,
+            without_contacts: false,
         };
         plant.added = plant.added_inertia()?;
         let joints = plant.dynamics.rates();
@@ -134,6 +137,12 @@ impl Plant {
             plant.diagonal = Some((0..joints).map(|k| plant.at_joints[k * (joints + 1)]).collect());
         }
         Ok(plant)
+    }
+
+    /// The same plant without contacts of journals in their bearings, for those who add them.
+    pub(crate) fn without_contacts(mut self) -> Self {
+        self.without_contacts = true;
+        self
     }
 
     /// Gives the drives their ripple, one entry per joint.
@@ -253,7 +262,11 @@ impl Plant {
             sign_width: self.sign_width,
         };
         to.fill(0.0);
-        self.model.element_efforts(&motion, &self.shape, &self.linear, 1, to, memory);
+        let (model, shape, linear) = (&self.model, &self.shape, &self.linear);
+        match self.without_contacts {
+            true => model.element_efforts_beside_contacts(&motion, shape, linear, 1, to, memory),
+            false => model.element_efforts(&motion, shape, linear, 1, to, memory),
+        }
     }
 
     /// Effort of elements per acceleration, the same at some states of no special kind.
@@ -419,13 +432,11 @@ impl Plant {
             sign_width: self.sign_width,
         };
         work.slopes.clear();
-        self.model.element_adjoint(
-            &motion,
-            &self.shape,
-            &self.linear,
-            (n, &work.asked),
-            &mut work.slopes,
-            &mut work.memory,
-        );
+        let (model, shape, linear) = (&self.model, &self.shape, &self.linear);
+        let (weights, slopes, memory) = ((n, work.asked.as_slice()), &mut work.slopes, &mut work.memory);
+        match self.without_contacts {
+            true => model.element_adjoint_beside_contacts(&motion, shape, linear, weights, slopes, memory),
+            false => model.element_adjoint(&motion, shape, linear, weights, slopes, memory),
+        }
     }
 }

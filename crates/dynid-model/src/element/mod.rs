@@ -4,6 +4,7 @@
 //! positive for positive speed. `s(v)` is the sign with `s(0) = 0`.
 
 mod channel;
+mod clearance;
 mod compliance;
 mod drive;
 mod elastic;
@@ -17,6 +18,7 @@ mod transmission;
 
 use channel::temperature_of;
 pub use channel::{current_channel, is_temperature, temperature_channel};
+pub use clearance::{ClearanceContact, FrictionLine, JournalContact, JournalMotion, impact_speed_signal};
 pub use compliance::{CyclicTorque, Spring};
 pub use drive::DriveGain;
 pub use elastic::{CubicFit, CubicSpring, ElasticDoubt, ElasticTransmission, PiecewiseFit, PiecewiseSpring};
@@ -171,6 +173,7 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     /// `step_s`: time between samples. `state`: empty at the start of a record; afterwards what the block before left.
     fn remember(
         &self,
+        _joints: &[JointInfo],
         _motion: &MotionBlock<'_>,
         _step_s: f64,
         _shape: &[f64],
@@ -184,6 +187,10 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     }
     /// The elastic transmission that it is, if it is one; none by default.
     fn elastic(&self) -> Option<&ElasticTransmission> {
+        None
+    }
+    /// The contact of a joint with clearance that it is, if it is one; none by default.
+    fn clearance(&self) -> Option<&ClearanceContact> {
         None
     }
     /// Fills the columns of all entries.

@@ -56,7 +56,7 @@ impl Description {
     }
 }
 
-fn unit_axis(joint: &JointDescription) -> Result<Vec3<f64>, MechanismError> {
+pub(super) fn unit_axis(joint: &JointDescription) -> Result<Vec3<f64>, MechanismError> {
     let axis = Vec3(joint.axis);
     if !axis.0.iter().all(|x| x.is_finite()) {
         return Err(MechanismError::NotFinite { what: "axis", name: joint.name.clone() });

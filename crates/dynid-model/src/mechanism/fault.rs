@@ -110,6 +110,14 @@ pub enum MechanismError {
         /// Names that exist.
         known: Vec<String>,
     },
+    /// A joint that cannot have clearance.
+    #[error("joint `{joint}`: expected a revolute joint on its own for a clearance, found {found}")]
+    NoJournal {
+        /// Joint.
+        joint: String,
+        /// What it is.
+        found: &'static str,
+    },
 }
 
 /// An oddity of a robot file that does not keep it from being used.

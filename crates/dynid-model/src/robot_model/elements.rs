@@ -26,9 +26,37 @@ impl RobotModel {
         effort: &mut [f64],
         memory: &mut Vec<f64>,
     ) {
+        self.efforts_of(|_| true, motion, (shape, linear), stride, effort, memory);
+    }
+
+    /// The same without contacts of journals in their bearings ([`RobotModel::clearance_contacts`]).
+    ///
+    /// # Panics
+    /// As [`EffortModel::efforts`](crate::EffortModel::efforts).
+    pub fn element_efforts_beside_contacts(
+        &self,
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        linear: &[f64],
+        stride: usize,
+        effort: &mut [f64],
+        memory: &mut Vec<f64>,
+    ) {
+        self.efforts_of(|placed| !placed.is_contact(), motion, (shape, linear), stride, effort, memory);
+    }
+
+    fn efforts_of(
+        &self,
+        counts: impl Fn(&PlacedElement) -> bool,
+        motion: &MotionBlock<'_>,
+        (shape, linear): (&[f64], &[f64]),
+        stride: usize,
+        effort: &mut [f64],
+        memory: &mut Vec<f64>,
+    ) {
         self.check_shapes(shape, Some(linear));
         let n = motion.samples;
-        for placed in &self.elements {
+        for placed in self.elements.iter().filter(|placed| counts(placed)) {
             memory.clear();
             memory.resize(placed.entries.len() * n, 0.0);
             let mut columns =
@@ -62,10 +90,38 @@ impl RobotModel {
         out: &mut MotionAdjoint,
         memory: &mut Vec<f64>,
     ) {
+        self.adjoint_of(|_| true, motion, (shape, linear), (stride, weights), out, memory);
+    }
+
+    /// The same without contacts of journals in their bearings.
+    ///
+    /// # Panics
+    /// As [`EffortModel::effort_adjoint`](crate::EffortModel::effort_adjoint).
+    pub fn element_adjoint_beside_contacts(
+        &self,
+        motion: &MotionBlock<'_>,
+        shape: &[f64],
+        linear: &[f64],
+        weights: (usize, &[f64]),
+        out: &mut MotionAdjoint,
+        memory: &mut Vec<f64>,
+    ) {
+        self.adjoint_of(|placed| !placed.is_contact(), motion, (shape, linear), weights, out, memory);
+    }
+
+    fn adjoint_of(
+        &self,
+        counts: impl Fn(&PlacedElement) -> bool,
+        motion: &MotionBlock<'_>,
+        (shape, linear): (&[f64], &[f64]),
+        (stride, weights): (usize, &[f64]),
+        out: &mut MotionAdjoint,
+        memory: &mut Vec<f64>,
+    ) {
         self.check_shapes(shape, Some(linear));
         let n = motion.samples;
         let known_weights = weights;
-        for placed in &self.elements {
+        for placed in self.elements.iter().filter(|placed| counts(placed)) {
             memory.clear();
             for (rate, column) in &placed.entries {
                 memory.extend(weights[rate * stride..][..n].iter().map(|u| u * linear[*column]));

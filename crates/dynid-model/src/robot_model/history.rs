@@ -40,7 +40,7 @@ impl RobotModel {
             }
             let mut rows: Vec<&mut [f64]> = rows.by_ref().take(*signals).collect();
             assert_eq!(rows.len(), *signals, "room for signals");
-            element.remember(motion, step_s, shape, state, &mut rows);
+            element.remember(&self.joints, motion, step_s, shape, state, &mut rows);
         }
     }
 }

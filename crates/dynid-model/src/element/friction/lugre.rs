@@ -166,6 +166,7 @@ impl JointElement for LuGre {
     }
     fn remember(
         &self,
+        _: &[JointInfo],
         motion: &MotionBlock<'_>,
         step_s: f64,
         shape: &[f64],
