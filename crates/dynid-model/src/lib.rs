@@ -2,11 +2,12 @@
 //!
 //! A [`Description`] (what a robot file says) becomes a checked [`Mechanism`]; [`Dynamics`] runs its recursions over any
 //! [`Scalar`]; a [`RobotModel`] adds joint elements and is the [`EffortModel`] that estimators see; [`BaseParameters`]
-//! names what of it can be identified.
+//! names what of it can be identified. [`contact`] holds the laws of joints with clearance.
 //!
 //! Units are SI, angles rad. Standard parameters are about the joint frame in the axes of the file.
 
 pub mod base_parameters;
+pub mod contact;
 mod coordinate;
 pub mod description;
 pub mod dynamics;
