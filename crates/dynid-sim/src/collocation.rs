@@ -256,13 +256,14 @@ impl Collocation {
             if change <= self.converged {
                 return Attempt::Solved(self.error(system, h, a0));
             }
-            let rate = change / before;
-            // What is left at this rate must be within reach of the iterations.
-            if rate >= 1.0 && before < f64::INFINITY {
-                return Attempt::Diverged;
-            }
-            if rate < 1.0 && change * rate / (1.0 - rate) <= 0.1 * self.converged {
-                return Attempt::Solved(self.error(system, h, a0));
+            if before < f64::INFINITY {
+                let rate = change / before;
+                if rate >= 1.0 {
+                    return Attempt::Diverged;
+                }
+                if change * rate / (1.0 - rate) <= self.converged {
+                    return Attempt::Solved(self.error(system, h, a0));
+                }
             }
             before = change;
         }

@@ -11,6 +11,7 @@
 //! Units are SI, angles rad.
 
 mod bodiless;
+pub mod clearance;
 mod collocation;
 mod controller;
 mod elastic;

@@ -354,6 +354,17 @@ impl Plant {
         effort
     }
 
+    /// Efforts of the elements at zero acceleration.
+    pub(crate) fn element_efforts(
+        &self,
+        (q, dq): (&[f64], &[f64]),
+        channels: &[f64],
+        work: &mut PlantWorkspace,
+    ) -> Vec<f64> {
+        self.element_effort([q, dq, &work.still], channels, &mut work.memory, &mut work.element);
+        work.element.clone()
+    }
+
     /// Efforts that joints feel, drive effort with ripple.
     pub fn delivered(&self, q: &[f64], drive: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; q.len()];

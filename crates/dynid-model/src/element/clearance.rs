@@ -18,8 +18,8 @@ pub fn impact_speed_signal(joint: &str) -> String {
 /// r = |p|, n = p/r, t = (-n_y, n_x)            n = (1, 0) where p = 0
 /// penetration   δ  = r - c,  δ̇ = ṗ·n           in contact iff δ > 0
 /// sliding speed v_t = ṗ·t + q̇ R2
-/// normal force  F_n = max(0, K E(δ) + D B(δ; v0) δ̇)
-/// friction      F_t = -mu c_d(v_t) max(0, E + B δ̇)
+/// normal force  F_n = K E(δ) + D B(δ; v0) δ̇     where E + B δ̇ > 0, else 0
+/// friction      F_t = -mu c_d(v_t) (E + B δ̇)    there, else 0
 /// journal feels F  = -F_n n + F_t t,  and the moment F_t R2 about its centre
 /// ```
 ///
@@ -112,9 +112,44 @@ impl ClearanceContact {
             penetration,
             penetration_rate,
             sliding,
-            normal_force: (k * force.elastic + d * force.damping * penetration_rate).max(0.0),
+            normal_force: if pressing > 0.0 {
+                k * force.elastic + d * force.damping * penetration_rate
+            } else {
+                0.0
+            },
             friction_force: -mu * self.friction.direction(sliding).0 * pressing,
         }
+    }
+
+    /// Efforts of the drives at the translations and the rotation.
+    ///
+    /// `line`: as for [`ClearanceContact::efforts_with_slopes`].
+    pub fn efforts(
+        &self,
+        motion: &JournalMotion,
+        [k, d, mu]: [f64; 3],
+        line: Option<FrictionLine>,
+    ) -> [f64; 3] {
+        let (normal, radius) = direction(motion.position);
+        let penetration = radius - self.law.clearance();
+        if penetration <= 0.0 {
+            return [0.0; 3];
+        }
+        let across = [-normal[1], normal[0]];
+        let sliding = dot(motion.rate, across) + motion.spin * self.journal_radius;
+        let value = line.map_or_else(|| self.friction.direction(sliding).0, |l| l.offset + l.slope * sliding);
+        let law = self.law.at(penetration, motion.impact_speed);
+        let damping = law.damping * dot(motion.rate, normal);
+        let pressing = law.elastic + damping;
+        if pressing <= 0.0 {
+            return [0.0; 3];
+        }
+        let (push, rub) = (k * law.elastic + d * damping, mu * value * pressing);
+        [
+            push * normal[0] + rub * across[0],
+            push * normal[1] + rub * across[1],
+            rub * self.journal_radius,
+        ]
     }
 
     /// Efforts of the drives at the translations and the rotation, with their derivatives by the journal's position

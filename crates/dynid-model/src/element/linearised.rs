@@ -102,13 +102,14 @@ impl JointElement for Linearised {
     }
     fn remember(
         &self,
+        joints: &[JointInfo],
         motion: &MotionBlock<'_>,
         step_s: f64,
         _: &[f64],
         state: &mut Vec<f64>,
         out: &mut [&mut [f64]],
     ) {
-        self.element.remember(motion, step_s, &self.shape, state, out);
+        self.element.remember(joints, motion, step_s, &self.shape, state, out);
     }
     fn reversal_speeds(&self) -> Vec<Vec<(usize, f64)>> {
         self.element.reversal_speeds()

@@ -5,7 +5,7 @@ use dynid_model::element::{ClearanceContact, FrictionLine, JournalContact, Journ
 
 use super::branch::{Branch, Sliding};
 use crate::collocation::Motion;
-use crate::lu::{Lu, add_product};
+use crate::lu::Lu;
 use crate::plant::{Plant, PlantWorkspace};
 
 /// A contact with values of its parameters.
@@ -34,14 +34,14 @@ struct Mass {
 /// Times whose masses are remembered: the stages of a step.
 const REMEMBERED: usize = 8;
 
-pub(super) struct System<'a> {
-    plant: &'a Plant,
+pub(super) struct System<'p, 'd> {
+    plant: &'p Plant,
     work: PlantWorkspace,
-    pub(super) contacts: Vec<Contact<'a>>,
+    pub(super) contacts: Vec<Contact<'p>>,
     pub(super) branches: Vec<Branch>,
     /// Follow the laws themselves instead of the branches; a contact is then closed wherever it penetrates.
     pub(super) laws: bool,
-    pub(super) drive: Drive<'a>,
+    pub(super) drive: Drive<'d>,
     /// Rates that are driven.
     pub(super) driven: Vec<usize>,
     /// Rates whose motion is computed: translations, and driven joints unless they are prescribed.
@@ -58,8 +58,8 @@ pub(super) struct System<'a> {
     contact: Vec<f64>,
 }
 
-impl<'a> System<'a> {
-    pub(super) fn new(plant: &'a Plant, drive: Drive<'a>, channels: Vec<f64>, gravity: f64) -> Self {
+impl<'p, 'd> System<'p, 'd> {
+    pub(super) fn new(plant: &'p Plant, drive: Drive<'d>, channels: Vec<f64>, gravity: f64) -> Self {
         let n = plant.joints();
         let contacts: Vec<Contact<'_>> = plant
             .model()
@@ -116,7 +116,7 @@ impl<'a> System<'a> {
         }
     }
 
-    pub(super) fn plant(&self) -> &'a Plant {
+    pub(super) fn plant(&self) -> &'p Plant {
         self.plant
     }
 
@@ -164,15 +164,11 @@ impl<'a> System<'a> {
         }
     }
 
-    fn acts(&self, contact: usize) -> bool {
-        self.laws || self.branches[contact] != Branch::Open
-    }
-
     /// Contact as it was last placed.
     pub(super) fn contact(&self, contact: usize) -> JournalContact {
         let Contact { element, parameters } = self.contacts[contact];
         let mut found = element.contact(&self.journal(contact), parameters);
-        if !self.acts(contact) {
+        if !self.is_closed(contact) {
             (found.normal_force, found.friction_force) = (0.0, 0.0);
         }
         found
@@ -189,7 +185,7 @@ impl<'a> System<'a> {
     fn form_contacts(&mut self) {
         self.contact.fill(0.0);
         for c in 0..self.contacts.len() {
-            if !self.acts(c) {
+            if !self.is_closed(c) {
                 continue;
             }
             let Contact { element, parameters } = self.contacts[c];
@@ -211,6 +207,16 @@ impl<'a> System<'a> {
         let mut effort = self.plant.drive_effort(motion, &self.channels, &mut self.work);
         effort.iter_mut().zip(&self.contact).for_each(|(e, c)| *e += c);
         effort
+    }
+
+    /// Efforts of other elements of the motion last given to [`System::efforts`], without their inertias' share.
+    pub(super) fn element_efforts(&mut self) -> Vec<f64> {
+        self.plant.element_efforts((&self.q, &self.dq), &self.channels, &mut self.work)
+    }
+
+    /// Whether a contact is closed.
+    pub(super) fn is_closed(&self, contact: usize) -> bool {
+        self.laws || self.branches[contact] != Branch::Open
     }
 
     /// Factored mass of the free coordinates as last placed, at a time.
@@ -237,7 +243,7 @@ impl<'a> System<'a> {
     }
 }
 
-impl Motion for System<'_> {
+impl Motion for System<'_, '_> {
     fn dimension(&self) -> usize {
         self.free.len()
     }
@@ -279,7 +285,7 @@ impl Motion for System<'_> {
             );
         }
         for c in 0..self.contacts.len() {
-            if !self.acts(c) {
+            if !self.is_closed(c) {
                 continue;
             }
             let Contact { element, parameters } = self.contacts[c];
@@ -311,9 +317,7 @@ impl Motion for System<'_> {
     }
 }
 
-/// `½ vᵀ M v` and the like need the mass itself; the sum of powers of two vectors.
+/// Power of efforts, W.
 pub(super) fn power(effort: &[f64], rate: &[f64]) -> f64 {
-    let mut sum = [0.0];
-    add_product(&mut sum, 1.0, effort, rate);
-    sum[0]
+    effort.iter().zip(rate).map(|(e, v)| e * v).sum()
 }
