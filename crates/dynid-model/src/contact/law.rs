@@ -113,7 +113,7 @@ impl ContactLaw {
     ///
     /// All zero unless the penetration is above 0. Where a slope jumps, at the limits of the stages, it is that of one side.
     pub fn at(&self, penetration: f64, impact_speed: f64) -> ContactForce {
-        if !(penetration > 0.0) {
+        if penetration <= 0.0 || penetration.is_nan() {
             return ContactForce::default();
         }
         match self {
@@ -126,7 +126,7 @@ impl ContactLaw {
 
     /// Energy `∫ elastic dδ` from 0 to a penetration, J; 0 unless that is above 0. Relative error below 1e-12.
     pub fn stored_energy(&self, penetration: f64) -> f64 {
-        if !(penetration > 0.0) {
+        if penetration <= 0.0 || penetration.is_nan() {
             return 0.0;
         }
         match self {

@@ -8,7 +8,8 @@ use super::material::Material;
 /// The factor `K_p` of mean pressure of elastic-plastic asperities.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum PressureFactor {
-    /// `0.454 + 0.41 ν` of the softer body (Kogut & Etsion), which keeps the load of an asperity continuous within 1 %.
+    /// `0.454 + 0.41 ν` of the softer body (Kogut & Etsion), which keeps the load of an asperity continuous within a few per
+    /// cent.
     #[default]
     Poisson,
     /// `K_p = K_H`, as the source literally reads (`literal_k`): the load jumps about fivefold at the critical area.

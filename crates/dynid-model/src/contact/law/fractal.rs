@@ -158,7 +158,7 @@ impl FractalLankaraniNikravesh {
     pub(super) fn at(&self, penetration: f64, impact_speed: f64) -> ContactForce {
         let u = self.curve.spot(penetration);
         let k = self.curve.stiffness(u);
-        if !(k.value > 0.0) {
+        if k.value <= 0.0 {
             return ContactForce::default();
         }
         let eta = self.curve.work_ratio(u);
