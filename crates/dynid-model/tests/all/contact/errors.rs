@@ -20,7 +20,7 @@ fn surfaces_that_cannot_be_are_refused() {
         (|s| s.roughness_um = f64::NAN, "roughness_um", "found NaN"),
         (|s| s.roughness_um = 0.002, "roughness_um", "Ra in (3.00e-3, 1.47e4) µm, found D = 3.0"),
         (|s| s.roughness_um = 2e4, "roughness_um", "found D = 1.98"),
-        (|s| s.roughness_um = 1.46e4, "roughness_um", "critical area a_c"),
+        (|s| s.roughness_um = 1.46e4, "roughness_um", "critical area a_c is a positive number, found inf"),
         (|s| s.friction = -0.1, "friction", "in [0, 0.9], found -0.1"),
         (|s| s.friction = 0.91, "friction", "in [0, 0.9], found 0.91"),
         (|s| s.softer.youngs_modulus = 0.0, "youngs_modulus", "above 0 Pa"),
@@ -93,4 +93,11 @@ fn friction_outside_its_range_is_refused() {
     check(SlidingFriction::new(0.1, -1e-5, 1e-4), "v_0", "at least 0 m/s");
     check(SlidingFriction::new(0.1, 1e-4, 1e-4), "v_m", "above `v_0`");
     check(SlidingFriction::new(0.1, 1e-5, f64::INFINITY), "v_m", "found inf");
+}
+
+#[test]
+fn surfaces_too_rough_for_the_bearing_are_refused() {
+    let contact = |ra| FractalLankaraniNikravesh::new(surface(ra), bearing(), FractalSettings::new(1.0));
+    assert!((contact(10.0).unwrap().stage_penetrations()[0] - 6.2e-8).abs() < 1e-9);
+    check(contact(25.0), "area_ratio", "plastic limit a_2");
 }
