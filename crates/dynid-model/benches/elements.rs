@@ -1,6 +1,10 @@
-//! Time to refill the column of a friction element over a block, beside the standard library's functions.
+//! Time to refill the column of a friction element over a block, beside the standard library's functions; time of a rough
+//! contact's force and of its stored energy.
 
 use divan::{Bencher, black_box, counter::ItemsCount};
+use dynid_model::contact::{
+    ContactLaw, FractalLankaraniNikravesh, FractalSettings, FractalSurface, JournalBearing, SurfaceSettings,
+};
 use dynid_model::element::{
     Arctangent, ExponentialViscous, JointElement, LuGre, ShapeSetting, Sigmoid, Stribeck, TanhFriction,
 };
@@ -165,4 +169,24 @@ fn bristles_sample_by_sample_with_the_standard_library(bencher: Bencher<'_, '_>)
 
 fn speeds_of_record() -> Vec<f64> {
     (0..RECORD).map(|k| 1.2 * (0.001 * k as f64).sin() + 0.3 * (0.0037 * k as f64).cos()).collect()
+}
+
+fn rough_contact() -> ContactLaw {
+    let surface = FractalSurface::new(SurfaceSettings::default()).expect("the default surface is sound");
+    let bearing = JournalBearing::with_gap(0.01, 5e-5, 0.02).expect("the bearing is sound");
+    let law = FractalLankaraniNikravesh::new(surface, bearing, FractalSettings::new(2.0));
+    law.expect("the contact is sound").into()
+}
+
+/// In the second stage, the first, and with elastic spots.
+#[divan::bench(args = [1e-10, 1e-8, 4e-6])]
+fn contact_force(bencher: Bencher<'_, '_>, penetration: f64) {
+    let law = rough_contact();
+    bencher.bench_local(|| black_box(law.at(black_box(penetration), 0.05)));
+}
+
+#[divan::bench]
+fn contact_energy(bencher: Bencher<'_, '_>) {
+    let law = rough_contact();
+    bencher.bench_local(|| black_box(law.stored_energy(black_box(4e-6))));
 }

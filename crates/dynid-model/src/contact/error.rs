@@ -43,8 +43,8 @@ pub enum ContactError {
     },
     /// Even the largest contact spot that the bearing can form is fully plastic: the law would have no stiffness.
     #[error(
-        "`area_ratio`: expected contact spots that can grow beyond the plastic limit a_2 = {limit:e} m², found at most \
-         {largest:e} m²"
+        "`area_ratio`: expected contact spots that can grow beyond the plastic limit a_2 = {limit:.3e} m², found at most \
+         {largest:.3e} m²: the surface is too rough for so small a share"
     )]
     AllPlastic {
         /// Largest spot at any penetration, m².

@@ -8,7 +8,8 @@ use super::material::Material;
 /// The factor `K_p` of mean pressure of elastic-plastic asperities.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum PressureFactor {
-    /// `0.454 + 0.41 ν` of the softer body (Kogut & Etsion), which keeps the load of an asperity continuous within 1 %.
+    /// `0.454 + 0.41 ν` of the softer body (Kogut & Etsion), which keeps the load of an asperity continuous within a few per
+    /// cent.
     #[default]
     Poisson,
     /// `K_p = K_H`, as the source literally reads (`literal_k`): the load jumps about fivefold at the critical area.
@@ -74,7 +75,7 @@ pub struct SurfaceConstants {
     pub pressure_factor: f64,
     /// `ϕ = σ_y/E*`.
     pub yield_ratio: f64,
-    /// Area `a_c` above which an asperity is elastic, m².
+    /// Area `a_c = [2^(3D-11) (33 k_μ ϕ/40)² π^(4-D)/ln γ]^(1/(2-D)) G²` above which an asperity is elastic, m².
     pub critical_area: f64,
     /// Area `a_1 = 6^(1/(2-D)) a_c` between the elastic-plastic stages, m².
     pub first_limit: f64,
@@ -190,12 +191,9 @@ impl FractalSurface {
         let g = 1e-3 * 10f64.powf(-5.26 / ra.powf(0.045));
         let k_mu = if mu <= 0.3 { 1.0 - 0.228 * mu } else { 0.932 * (-1.58 * (mu - 0.3)).exp() };
         let (ln_gamma, hardness, yield_ratio) = (gamma.ln(), k_h * sigma, sigma / e_star);
-        let critical_area = 2f64.powf((3.0 * d - 11.0) / (2.0 - d))
-            * (33.0 * k_mu * yield_ratio / 40.0).powf(2.0 / (2.0 - d))
-            * PI.powf((4.0 - d) / (2.0 - d))
-            * ln_gamma.powf(1.0 / (d - 2.0))
-            * g
-            * g;
+        let yielding = 33.0 * k_mu * yield_ratio / 40.0;
+        let base = 2f64.powf(3.0 * d - 11.0) * yielding * yielding * PI.powf(4.0 - d) / ln_gamma;
+        let critical_area = base.powf(1.0 / (2.0 - d)) * g * g;
         let phi = domain_extension(d);
         let spread = phi.powf(0.5 * (3.0 - d));
         let below = (d - 2.0) * (d - 3.0);

@@ -51,10 +51,6 @@ impl WorkStage {
         let span = if self.q == 0.0 { length } else { (self.q * length).exp_m1() / self.q };
         self.factor * span
     }
-
-    fn slope(&self, length: f64) -> f64 {
-        self.factor * (self.q * length).exp()
-    }
 }
 
 impl SpotCurve {
@@ -128,17 +124,15 @@ impl SpotCurve {
 
     /// `η`, whose slope is 0 at its limit.
     pub(super) fn work_ratio(&self, u: f64) -> Curved {
-        let (stage, elastic) = if u > 0.0 {
-            (self.work[3], self.first_elastic + self.work[3].up_to(u))
-        } else {
-            (self.work[2], self.work[2].up_to(u - self.first))
-        };
-        if !(elastic * self.limit > self.both_plastic) {
+        let (stage, length, below) =
+            if u > 0.0 { (self.work[3], u, self.first_elastic) } else { (self.work[2], u - self.first, 0.0) };
+        let grown = stage.up_to(length);
+        let elastic = below + grown;
+        if elastic * self.limit <= self.both_plastic {
             return Curved { value: self.limit, slope: 0.0 };
         }
         let value = self.both_plastic / elastic;
-        let by_u = if u > 0.0 { stage.slope(u) } else { stage.slope(u - self.first) };
-        Curved { value, slope: -value * by_u / elastic }
+        Curved { value, slope: -value * (stage.factor + stage.q * grown) / elastic }
     }
 
     /// `W_e` and `W_p`, J.
