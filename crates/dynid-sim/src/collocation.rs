@@ -54,9 +54,8 @@ impl Coefficients {
                 (0..STAGES).map(|k| inverse[k][j] * c[i].powi(k as i32 + 1) / (k + 1) as f64).sum()
             })
         });
-        let squared = std::array::from_fn(|i| {
-            std::array::from_fn(|j| (0..STAGES).map(|k| a[i][k] * a[k][j]).sum())
-        });
+        let squared =
+            std::array::from_fn(|i| std::array::from_fn(|j| (0..STAGES).map(|k| a[i][k] * a[k][j]).sum()));
         // Σ d_i c_i^k = -γ for k = 0 and 0 beyond.
         let error = std::array::from_fn(|i| -inverse[0][i] / REAL_EIGENVALUE);
         Coefficients { c, a, squared, error, inverse }
@@ -177,8 +176,8 @@ impl Collocation {
             method: Coefficients::new(),
             n,
             estimate,
-            // Newton's last change bounds its error from above by far.
-            converged: (0.03 * tolerance).max(1e-14),
+            // Fine enough for instants to be located to, however coarse the steps.
+            converged: (0.03 * tolerance).clamp(1e-14, 1e-9),
             stages: vec![0.0; n * STAGES],
             kept: vec![0.0; n * STAGES],
             kept_step: None,

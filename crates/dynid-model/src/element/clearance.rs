@@ -145,11 +145,7 @@ impl ClearanceContact {
             return [0.0; 3];
         }
         let (push, rub) = (k * law.elastic + d * damping, mu * value * pressing);
-        [
-            push * normal[0] + rub * across[0],
-            push * normal[1] + rub * across[1],
-            rub * self.journal_radius,
-        ]
+        [push * normal[0] + rub * across[0], push * normal[1] + rub * across[1], rub * self.journal_radius]
     }
 
     /// Efforts of the drives at the translations and the rotation, with their derivatives by the journal's position
@@ -197,8 +193,7 @@ impl ClearanceContact {
         let by = |px: [f64; 2], pv: [f64; 2], spin: f64| [px[0], px[1], pv[0], pv[1], spin];
         let of_depth = by(normal, [0.0; 2], 0.0);
         let of_rate = by(across.map(|t| around * turn * t), normal, 0.0);
-        let of_sliding =
-            by(across.map(|t| -penetration_rate * turn * t), across, self.journal_radius);
+        let of_sliding = by(across.map(|t| -penetration_rate * turn * t), across, self.journal_radius);
         let of_elastic = of_depth.map(|d| law.elastic_slope * d);
         let of_damping: [f64; 5] = std::array::from_fn(|k| {
             law.damping_slope * penetration_rate * of_depth[k] + law.damping * of_rate[k]
@@ -234,11 +229,7 @@ impl ClearanceContact {
     }
 
     /// Motions of the journal over a block.
-    fn motions(
-        &self,
-        joints: &[JointInfo],
-        motion: &MotionBlock<'_>,
-    ) -> impl Iterator<Item = JournalMotion> {
+    fn motions(&self, joints: &[JointInfo], motion: &MotionBlock<'_>) -> impl Iterator<Item = JournalMotion> {
         let [x, y] = self.translations.map(|r| motion.position(joints[r].position));
         let [dx, dy] = self.translations.map(|r| motion.rate(r));
         let spin = motion.rate(self.rotation);
@@ -316,13 +307,7 @@ impl JointElement for ClearanceContact {
             *to = state[0];
         }
     }
-    fn fill(
-        &self,
-        joints: &[JointInfo],
-        motion: &MotionBlock<'_>,
-        _: &[f64],
-        out: &mut ElementColumns<'_>,
-    ) {
+    fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         for (s, journal) in self.motions(joints, motion).enumerate() {
             let columns = self.columns(&journal, None);
             for (entry, value) in columns.values.into_iter().enumerate() {

@@ -14,13 +14,8 @@ pub(super) enum Sliding {
 }
 
 impl Sliding {
-    const ALL: [Sliding; 5] = [
-        Sliding::Backward,
-        Sliding::BackwardRamp,
-        Sliding::Sticking,
-        Sliding::ForwardRamp,
-        Sliding::Forward,
-    ];
+    const ALL: [Sliding; 5] =
+        [Sliding::Backward, Sliding::BackwardRamp, Sliding::Sticking, Sliding::ForwardRamp, Sliding::Forward];
 
     /// The branch of a speed.
     pub(super) fn at(friction: &SlidingFriction, v: f64) -> Self {

@@ -6,7 +6,7 @@ use super::branch::{Branch, Sliding};
 use super::energy::{Powers, stored};
 use super::record::{ClearanceRecord, ContactEvent, ContactEventKind, JournalRecord};
 use super::system::{Drive, System};
-use crate::collocation::{Attempt, Collocation, Motion, STAGES};
+use crate::collocation::{Attempt, Collocation, Motion, Path, STAGES};
 use crate::error::{SimError, demand, demand_length};
 use crate::plant::Plant;
 
@@ -16,13 +16,15 @@ const MOST_STEPS: usize = 2_000_000;
 const FIRST_STEP: f64 = 1e-6;
 /// Passages without progress before a simulation gives up.
 const MOST_PASSAGES: usize = 64;
+/// Instants of a step at which branches are looked at.
+const LOOKS: u32 = 12;
 
 /// How the equations are solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
     /// Radau IIA of order nine with steps for a tolerance: largest local error in units of the clearances.
     Collocation {
-        /// 1e-13 to 1e-3. Default: 1e-8.
+        /// 1e-13 to 1e-3. Default: 1e-9.
         tolerance: f64,
         /// Longest step, s. Default: none.
         longest_step: f64,
@@ -41,7 +43,7 @@ pub enum Method {
 
 impl Default for Method {
     fn default() -> Self {
-        Method::Collocation { tolerance: 1e-8, longest_step: f64::INFINITY }
+        Method::Collocation { tolerance: 1e-9, longest_step: f64::INFINITY }
     }
 }
 
@@ -110,6 +112,15 @@ struct Run<'p, 'd> {
     record: ClearanceRecord,
     evaluations: usize,
     closed_time: Vec<f64>,
+}
+
+/// Past which level, and in which direction, a contact has left its branch.
+struct Leaving {
+    /// Of the penetration, else of the sliding speed.
+    of_depth: bool,
+    level: f64,
+    sign: f64,
+    to: Option<Sliding>,
 }
 
 /// Where a contact leaves its branch within a step.
@@ -297,6 +308,9 @@ impl<'p, 'd> Run<'p, 'd> {
             h
         };
         self.collocation.linearise(&mut self.system, self.t, &self.x, &self.v);
+        // The step was shortened to end at this one.
+        let mut located: Option<Passage> = None;
+        let mut passed = false;
         for _ in 0..MOST_PASSAGES {
             let start = (&self.x[..], &self.v[..], &self.a[..]);
             let error = match self.collocation.attempt(&mut self.system, (self.t, h), start) {
@@ -308,6 +322,7 @@ impl<'p, 'd> Run<'p, 'd> {
                 let factor = 0.9 * error.powf(-1.0 / Collocation::ERROR_ORDER);
                 h *= if factor.is_finite() { factor.clamp(0.1, 0.8) } else { 0.25 };
                 self.step = h;
+                located = None;
                 if h < 1e-15 * (1.0 + self.t.abs()) {
                     return Err(SimError::TooFast { time: self.t, steps: 0 });
                 }
@@ -317,14 +332,21 @@ impl<'p, 'd> Run<'p, 'd> {
             match self.first_passage(h) {
                 // Close enough to the end of the step, or to its start.
                 Some(passage) if passage.tau * h < 1e-13 => {
+                    // One that enters a branch and leaves it again at once must be looked at more closely.
+                    if passed {
+                        h *= 0.25;
+                    }
+                    passed = true;
                     self.pass(&passage, true)?;
                     self.collocation.linearise(&mut self.system, self.t, &self.x, &self.v);
                 }
                 Some(passage) if passage.tau < 1.0 - 1e-9 => {
                     h *= passage.tau;
+                    located = Some(passage);
                     self.record.count.repeated += 1;
                 }
                 passage => {
+                    let passage = passage.or(located);
                     // A step cut short by the end says nothing against the longer one.
                     self.step = if h < self.step { self.step.max(h * growth) } else { h * growth };
                     self.accept(h, end);
@@ -368,60 +390,87 @@ impl<'p, 'd> Run<'p, 'd> {
         }
     }
 
-    /// Depth and sliding speed of a contact at a share of the last attempt.
-    fn depth_and_sliding(&mut self, contact: usize, h: f64, tau: f64) -> (f64, f64) {
-        let n = self.x.len();
-        let (mut x, mut v) = (vec![0.0; n], vec![0.0; n]);
-        for k in 0..n {
-            let [position, rate] = self.collocation.path(k, h, self.x[k], self.v[k]).at(tau);
-            (x[k], v[k]) = (position, rate / h);
-        }
-        self.system.place(self.t + tau * h, &x, &v);
-        let found = self.system.contact(contact);
-        (found.penetration, found.sliding)
-    }
-
-    /// The first instant of the last attempt at which a contact leaves its branch.
+    /// The first instant of the last attempt at which a contact leaves its branch. Looked for on a grid, so that a branch
+    /// left and entered again within a step is not missed.
     fn first_passage(&mut self, h: f64) -> Option<Passage> {
-        let mut first: Option<Passage> = None;
-        for c in 0..self.system.contacts.len() {
-            let friction = self.system.contacts[c].element.friction.clone();
-            let clearance = self.system.contacts[c].element.law.clearance();
-            let (depth, sliding) = self.depth_and_sliding(c, h, 1.0);
-            let mut leaves: Vec<(bool, f64, f64, Option<Sliding>)> = Vec::new();
-            match self.system.branches[c] {
-                Branch::Open => leaves.push((true, 0.0, depth, None)),
-                Branch::Closed { sliding: branch, .. } => {
-                    let (low, high) = branch.range(&friction);
-                    leaves.push((true, 0.0, -depth, None));
-                    leaves.push((false, low, low - sliding, Some(branch.beyond(false))));
-                    leaves.push((false, high, sliding - high, Some(branch.beyond(true))));
+        let n = self.x.len();
+        let paths: Vec<Path> = (0..n).map(|k| self.collocation.path(k, h, self.x[k], self.v[k])).collect();
+        let mut before = 0.0;
+        for k in 1..=LOOKS {
+            let tau = f64::from(k) / f64::from(LOOKS);
+            self.place_on(&paths, h, tau);
+            let left: Vec<(usize, Leaving)> =
+                (0..self.system.contacts.len()).filter_map(|c| Some((c, self.leaving(c)?))).collect();
+            let mut first: Option<Passage> = None;
+            for (contact, leaving) in left {
+                let tau = self.locate(&paths, h, (before, tau), contact, &leaving);
+                if first.as_ref().is_none_or(|f| tau < f.tau) {
+                    first = Some(Passage { contact, tau, to: leaving.to });
                 }
             }
-            let small = [1e-4 * friction.v_0.max(1e-3 * friction.v_m), 1e-9 * clearance];
-            for (of_depth, level, beyond, to) in leaves {
-                if !(beyond > small[usize::from(of_depth)]) {
-                    continue;
-                }
-                let sign = if beyond_is_upwards(of_depth, level, depth, sliding) { 1.0 } else { -1.0 };
-                let tau = self.locate(h, |run, tau| {
-                    let (depth, sliding) = run.depth_and_sliding(c, h, tau);
-                    sign * (if of_depth { depth } else { sliding } - level)
-                });
-                if first.as_ref().is_none_or(|f| tau < f.tau) {
-                    first = Some(Passage { contact: c, tau, to });
+            if first.is_some() {
+                return first;
+            }
+            before = tau;
+        }
+        None
+    }
+
+    fn place_on(&mut self, paths: &[Path], h: f64, tau: f64) {
+        let (x, v): (Vec<f64>, Vec<f64>) =
+            paths.iter().map(|path| path.at(tau)).map(|[x, v]| (x, v / h)).unzip();
+        self.system.place(self.t + tau * h, &x, &v);
+    }
+
+    /// How a contact has left its branch, as last placed.
+    fn leaving(&self, contact: usize) -> Option<Leaving> {
+        let element = self.system.contacts[contact].element;
+        let found = self.system.contact(contact);
+        let slow = 1e-4 * element.friction.v_0.max(1e-3 * element.friction.v_m);
+        let shallow = 1e-9 * element.law.clearance();
+        match self.system.branches[contact] {
+            Branch::Open => (found.penetration > shallow).then_some(Leaving {
+                of_depth: true,
+                level: 0.0,
+                sign: 1.0,
+                to: None,
+            }),
+            Branch::Closed { .. } if found.penetration < -shallow => {
+                Some(Leaving { of_depth: true, level: 0.0, sign: -1.0, to: None })
+            }
+            Branch::Closed { sliding, .. } => {
+                let (low, high) = sliding.range(&element.friction);
+                let to = |up: bool| Some(sliding.beyond(up));
+                if found.sliding > high + slow {
+                    Some(Leaving { of_depth: false, level: high, sign: 1.0, to: to(true) })
+                } else if found.sliding < low - slow {
+                    Some(Leaving { of_depth: false, level: low, sign: -1.0, to: to(false) })
+                } else {
+                    None
                 }
             }
         }
-        first
     }
 
-    /// Where a function that ends above zero last rises through it, by bisection and secants; 0 if it starts above.
-    fn locate(&mut self, h: f64, mut f: impl FnMut(&mut Self, f64) -> f64) -> f64 {
-        let (mut low, mut high) = (0.0, 1.0);
-        let (mut at_low, mut at_high) = (f(self, low), f(self, high));
+    /// Where between two shares of a step a contact leaves its branch, by secants and bisection; the first share if it has
+    /// left it there.
+    fn locate(
+        &mut self,
+        paths: &[Path],
+        h: f64,
+        (mut low, mut high): (f64, f64),
+        contact: usize,
+        leaving: &Leaving,
+    ) -> f64 {
+        let mut beyond = |tau: f64| {
+            self.place_on(paths, h, tau);
+            let found = self.system.contact(contact);
+            let value = if leaving.of_depth { found.penetration } else { found.sliding };
+            leaving.sign * (value - leaving.level)
+        };
+        let (mut at_low, mut at_high) = (beyond(low), beyond(high));
         if at_low >= 0.0 {
-            return 0.0;
+            return low;
         }
         for k in 0..200 {
             if high - low <= 1e-12 || (high - low) * h < 1e-16 {
@@ -429,7 +478,7 @@ impl<'p, 'd> Run<'p, 'd> {
             }
             let secant = low - at_low * (high - low) / (at_high - at_low);
             let tau = if k % 3 == 2 { 0.5 * (low + high) } else { secant.clamp(low, high) };
-            let value = f(self, tau);
+            let value = beyond(tau);
             if value < 0.0 {
                 (low, at_low) = (tau, value);
             } else {
@@ -584,11 +633,6 @@ impl<'p, 'd> Run<'p, 'd> {
         }
         fastest
     }
-}
-
-/// On which side of a level something ended.
-fn beyond_is_upwards(of_depth: bool, level: f64, depth: f64, sliding: f64) -> bool {
-    if of_depth { depth > level } else { sliding > level }
 }
 
 fn check(

@@ -290,8 +290,7 @@ impl Motion for System<'_, '_> {
             }
             let Contact { element, parameters } = self.contacts[c];
             let journal = self.journal(c);
-            let (_, of_position, of_rate) =
-                element.efforts_with_slopes(&journal, parameters, self.line(c));
+            let (_, of_position, of_rate) = element.efforts_with_slopes(&journal, parameters, self.line(c));
             let [px, py] = element.translations;
             let rates = [px, py, element.rotation];
             for (row, to) in rates.into_iter().enumerate() {

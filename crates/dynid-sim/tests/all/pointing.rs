@@ -20,8 +20,7 @@ const BASE: f64 = 0.4;
 const OFFSET: [f64; 2] = [0.111, -0.306];
 const SINES: [[f64; 5]; 2] =
     [[0.243, -6.5e-10, -0.028, -0.033, -0.005], [0.251, -0.029, -0.016, -0.015, -0.017]];
-const COSINES: [[f64; 5]; 2] =
-    [[-0.113, -0.01, 0.001, 0.013, -0.003], [0.372, -0.037, -0.033, 0.003, 0.001]];
+const COSINES: [[f64; 5]; 2] = [[-0.113, -0.01, 0.001, 0.013, -0.003], [0.372, -0.037, -0.033, 0.003, 0.001]];
 pub const PERIOD: f64 = std::f64::consts::TAU / BASE;
 
 /// Without clearance.
@@ -37,9 +36,7 @@ pub fn description() -> Description {
         limits: Limits::default(),
         mimic: None,
     };
-    let about = |xx: f64, yy: f64, zz: f64| {
-        Mat3::from_rows([[xx, 0.0, 0.0], [0.0, yy, 0.0], [0.0, 0.0, zz]])
-    };
+    let about = |xx: f64, yy: f64, zz: f64| Mat3::from_rows([[xx, 0.0, 0.0], [0.0, yy, 0.0], [0.0, 0.0, zz]]);
     let com = |x: f64| Vec3([x, 0.0, 0.0]);
     let quarter = std::f64::consts::FRAC_PI_2;
     let second = Placement {
@@ -53,10 +50,7 @@ pub fn description() -> Description {
             link("x", Some(Inertia::from_com(MASSES[0], com(LEVERS[0]), &about(0.01, 0.0175, 0.0175)))),
             link("y", Some(Inertia::from_com(MASSES[1], com(LEVERS[1]), &about(0.00467, 0.00533, 0.00181)))),
         ],
-        joints: vec![
-            joint("alpha", "base", "x", Placement::identity()),
-            joint("beta", "x", "y", second),
-        ],
+        joints: vec![joint("alpha", "base", "x", Placement::identity()), joint("beta", "x", "y", second)],
         ..Description::new("pointing")
     }
 }
