@@ -12,7 +12,7 @@ use super::reference;
 use super::settings::Settings;
 use crate::{Row, StudyError};
 
-/// Beyond this angular frequency no value with one digit keeps the limits, rad/s.
+/// An angular frequency at which joint 2 is too fast, rad/s.
 const TOO_FAST: f64 = 0.41;
 /// How nearly the printed coefficients, rounded to three decimals, start at rest at zero: rad, rad/s, rad/s².
 const START: [f64; 3] = [2e-3, 2e-3, 5e-3];
