@@ -11,10 +11,10 @@ use crate::feasibility::{Infeasible, diagnose, violated_at_start};
 use crate::grid::Grid;
 use crate::optimiser::{Curvature, Point, Settings as Steps, minimise};
 use crate::parametrisation::Parametrisation;
-use crate::problem::{Problem, ProblemError, value};
+use crate::problem::{Problem, ProblemError, count, finite, value};
 use crate::restoration::Restoration;
 use crate::search::{Observation, Search};
-use crate::start::{feasible_start, generator};
+use crate::start::{feasible_share, feasible_start, generator, shrunk};
 
 /// Settings of a design.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,21 +28,33 @@ pub struct Settings {
     pub time_budget_s: Option<f64>,
     /// Samples of a period on which the reported criterion is taken, with exact signs. Default 1000.
     pub report_samples: usize,
+    /// A trajectory that the first start sets out from instead of random ones: `[q0, a.., b..]` of every coordinate, plain
+    /// amplitudes. It need not keep the start conditions or the limits: the nearest that keeps the conditions is taken, and
+    /// its amplitudes are shrunk into the limits. Default `None`.
+    pub from: Option<Vec<Vec<f64>>>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { starts: 16, seed: 1, time_budget_s: None, report_samples: 1000 }
+        Settings { starts: 16, seed: 1, time_budget_s: None, report_samples: 1000, from: None }
     }
 }
 
 impl Settings {
-    fn check(&self) -> Result<(), ProblemError> {
+    fn check(&self, problem: &Problem) -> Result<(), ProblemError> {
         if self.starts == 0 || self.seed.checked_add(self.starts as u64).is_none() {
             return Err(value("starts", "at least one, seeds within 64 bits", self.starts as f64));
         }
         if self.report_samples > 1_000_000 {
             return Err(value("samples of the report", "at most 1000000", self.report_samples as f64));
+        }
+        if let Some(from) = &self.from {
+            count("trajectory to set out from", problem.coordinates.len(), from.len())?;
+            for (name, row) in problem.coordinates.iter().zip(from) {
+                count("coefficients to set out from", 1 + 2 * problem.harmonics, row.len())?;
+                let what = format!("coefficient of {name} to set out from");
+                row.iter().try_for_each(|x| finite(&what, *x))?;
+            }
         }
         Ok(())
     }
@@ -158,7 +170,7 @@ pub fn design(
 ) -> Result<Outcome, ProblemError> {
     let begun = Instant::now();
     problem.check()?;
-    settings.check()?;
+    settings.check(problem)?;
     let map = Parametrisation::new(&problem.limits, problem.base, problem.harmonics, &problem.start);
     let optimiser = StartOptimiser::new(problem, &map, settings);
     refuse_rank_deficient(problem, &optimiser.search)?;
@@ -215,6 +227,8 @@ pub fn design(
 /// Everything that starts share.
 struct StartOptimiser<'a> {
     problem: &'a Problem,
+    /// Seed and unknowns of the start that sets out from a given trajectory.
+    given: Option<(u64, Vec<f64>)>,
     search: Grid<'a>,
     finer: Grid<'a>,
     restoration: Restoration<'a>,
@@ -225,6 +239,7 @@ impl<'a> StartOptimiser<'a> {
     fn new(problem: &'a Problem, map: &'a Parametrisation, settings: &Settings) -> Self {
         StartOptimiser {
             problem,
+            given: settings.from.as_ref().map(|from| (settings.seed, map.nearest(from))),
             search: Grid::search(problem, map, problem.samples),
             finer: Grid::exact(problem, map, 2 * problem.samples),
             restoration: Restoration::new(problem, map),
@@ -239,9 +254,14 @@ impl<'a> StartOptimiser<'a> {
         let mut rng = generator(seed);
         let mut best: Option<Candidate> = None;
         let mut evaluations = 0;
+        let given = self.given.as_ref().filter(|(first, _)| *first == seed);
         // Some start points lead to far worse optima than others, which a few iterations tell.
-        for _ in 0..CANDIDATES {
-            let Some(z) = feasible_start(&self.search, &mut rng) else { continue };
+        for _ in 0..if given.is_some() { 1 } else { CANDIDATES } {
+            let start = match given {
+                Some((_, z)) => feasible_share(&self.search, z).map(|share| shrunk(&self.search, z, share)),
+                None => feasible_start(&self.search, &mut rng),
+            };
+            let Some(z) = start else { continue };
             let mut candidate = Candidate { z, point: Point::default(), curvature: None, evaluations: 0 };
             self.advance(&mut candidate, &warm[0], warm[0].iterations)?;
             candidate.curvature = None;

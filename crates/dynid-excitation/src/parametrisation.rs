@@ -33,6 +33,8 @@ pub struct Parametrisation {
 struct JointMap {
     /// First unknown.
     first: usize,
+    /// `S`: unit of every harmonic's amplitudes.
+    scale: Vec<f64>,
     /// `S N` for the sine and the cosine amplitudes: `L` rows, one column per unknown.
     sine: Vec<Vec<f64>>,
     cosine: Vec<Vec<f64>>,
@@ -85,6 +87,7 @@ impl Parametrisation {
                         Some(pose) => Offset::ByPose(pose[j]),
                         None => Offset::Free { middle: limit.middle(), scale: 0.5 * limit.half_range() },
                     },
+                    scale,
                 };
                 first += map.unknowns();
                 map
@@ -134,6 +137,32 @@ impl Parametrisation {
                 x
             })
             .collect()
+    }
+
+    /// Unknowns of the trajectory that meets the start conditions and is nearest to given coefficients `[q0, a.., b..]`:
+    /// every amplitude counts in its harmonic's unit.
+    ///
+    /// # Panics
+    /// If the coefficients do not fit the map.
+    pub fn nearest(&self, coefficients: &[Vec<f64>]) -> Vec<f64> {
+        let mut z = Vec::with_capacity(self.unknowns());
+        for (joint, x) in self.joints.iter().zip(coefficients) {
+            assert_eq!(x.len(), 1 + 2 * self.harmonics, "coefficients of a coordinate");
+            // N is orthonormal: z = Nᵀ S⁻¹ a, and the map holds S N.
+            for (rows, amplitudes) in
+                [(&joint.sine, &x[1..=self.harmonics]), (&joint.cosine, &x[1 + self.harmonics..])]
+            {
+                let unknowns = rows.first().map_or(0, Vec::len);
+                z.extend((0..unknowns).map(|u| {
+                    let terms = rows.iter().zip(amplitudes).zip(&joint.scale);
+                    terms.map(|((row, a), scale)| row[u] * a / (scale * scale)).sum::<f64>()
+                }));
+            }
+            if let Offset::Free { middle, scale } = joint.offset {
+                z.push((x[0] - middle) / scale);
+            }
+        }
+        z
     }
 
     /// Derivatives of coefficients turned into derivatives of unknowns: adds `∂c/∂z` of one coordinate from `∂c/∂x`.

@@ -179,11 +179,11 @@ impl Problem {
     }
 }
 
-fn count(what: &'static str, expected: usize, found: usize) -> Result<(), ProblemError> {
+pub(crate) fn count(what: &'static str, expected: usize, found: usize) -> Result<(), ProblemError> {
     if expected == found { Ok(()) } else { Err(ProblemError::Count { what, expected, found }) }
 }
 
-fn finite(what: &str, x: f64) -> Result<(), ProblemError> {
+pub(crate) fn finite(what: &str, x: f64) -> Result<(), ProblemError> {
     if x.is_finite() { Ok(()) } else { Err(value(what, "a finite number", x)) }
 }
 

@@ -12,6 +12,7 @@ pub mod indy7;
 mod record;
 mod reference;
 mod statistics;
+pub mod xy_pointing;
 
 pub use error::StudyError;
 pub use record::{Row, StudyRecord};
@@ -67,7 +68,7 @@ pub struct Progress {
     pub steps: usize,
 }
 
-const STUDIES: [Study; 3] = [
+const STUDIES: [Study; 4] = [
     Study { name: er16::NAME, title: er16::TITLE, source: er16::SOURCE, driver: er16::run },
     Study {
         name: hit_joint::NAME,
@@ -76,6 +77,12 @@ const STUDIES: [Study; 3] = [
         driver: hit_joint::run,
     },
     Study { name: indy7::NAME, title: indy7::TITLE, source: indy7::SOURCE, driver: indy7::run },
+    Study {
+        name: xy_pointing::NAME,
+        title: xy_pointing::TITLE,
+        source: xy_pointing::SOURCE,
+        driver: xy_pointing::run,
+    },
 ];
 
 /// All studies.

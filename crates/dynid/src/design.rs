@@ -100,6 +100,7 @@ pub fn design(config: &DesignConfig, mut progress: impl FnMut(DesignStep)) -> Re
         seed: config.search.seed,
         time_budget_s: config.search.time_budget_s,
         report_samples: REPORT_SAMPLES.max(20 * config.trajectory.harmonics),
+        from: None,
     };
     let mut ended = 0;
     let mut best: Option<f64> = None;

@@ -29,7 +29,11 @@ fn list_names_every_study() {
     let listed: Json =
         serde_json::from_slice(&run(folder.path(), &["study", "list", "--json"], 0).stdout).unwrap();
     let listed = listed.as_array().unwrap();
-    assert!(["er16", "hit-joint", "indy7"].iter().all(|name| listed.iter().any(|s| s["study"] == **name)));
+    assert!(
+        ["er16", "hit-joint", "indy7", "xy-pointing"]
+            .iter()
+            .all(|name| listed.iter().any(|s| s["study"] == **name))
+    );
     for study in listed {
         for key in ["study", "title", "source"] {
             let value = study[key].as_str().unwrap();
@@ -96,6 +100,15 @@ fn hit_joint_holds_every_claim_of_the_full_run() {
     let output = run(folder.path(), &["study", "hit-joint", "--json"], 0);
     let study: Json = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&study["quick"], &study["pass"]), (&false.into(), &true.into()));
+}
+
+#[test]
+fn xy_pointing_holds_every_claim_and_repeats_bit_by_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = quick("xy-pointing", folder.path(), "one", "1");
+    let ids = holds_every_claim("xy-pointing", &first);
+    assert!([1, 3, 4, 5, 10].iter().all(|row: &u32| ids.contains(&row.to_string())), "{ids:?}");
+    assert!(quick("xy-pointing", folder.path(), "two", "2") == first, "two threads give other bits than one");
 }
 
 #[test]

@@ -91,6 +91,32 @@ fn slides_jerk_limits_and_start_poses() {
     }
 }
 
+/// The first start alone sets out from the trajectory given, whatever it breaks.
+#[test]
+fn sets_out_from_a_given_trajectory() {
+    let mut problem = problems::gantry();
+    let pose = vec![0.1, 0.1, 0.2, -0.3];
+    problem.start = StartConditions { rest: true, zero_jerk: false, pose: Some(pose) };
+    let map = Parametrisation::new(&problem.limits, problem.base, problem.harmonics, &problem.start);
+    let found = |settings: &Settings| match design(&problem, settings, Vec::new(), &mut |_| {}).unwrap() {
+        Outcome::Found(found) => found,
+        other => panic!("{other:?}"),
+    };
+    let plain = found(&Settings { starts: 2, ..Settings::default() });
+    let large: Vec<Vec<f64>> =
+        plain.coefficients.iter().map(|row| row.iter().map(|x| 5.0 * x + 0.01).collect()).collect();
+    let settings = Settings { starts: 2, from: Some(large), ..Settings::default() };
+    let given = found(&settings);
+    assert_eq!(given.starts[1], plain.starts[1]);
+    assert!(given.starts[0] != plain.starts[0]);
+    assert!(given.starts[0].is_feasible(), "{given:?}");
+    let broken = limit_points(&problem, &map.coefficients(&given.starts[0].unknowns), 10_000, 1e-6);
+    assert!(broken.is_empty(), "{broken:?}");
+    // Another seed draws nothing else.
+    let one = |seed| found(&Settings { starts: 1, seed, ..settings.clone() }).coefficients;
+    assert_eq!(one(1), one(9));
+}
+
 #[test]
 fn results_depend_neither_on_threads_nor_on_interruptions() {
     let Some(problem) = problems::er16(false) else { return };

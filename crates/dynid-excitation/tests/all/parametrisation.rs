@@ -17,6 +17,28 @@ fn limits() -> Vec<MotionLimits> {
     ]
 }
 
+/// What the map gives is found again; anything else is taken to where the map gives it.
+#[test]
+fn nearest_unknowns_are_those_of_the_map() {
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    for posed in [false, true] {
+        let pose = posed.then(|| vec![0.3, 1.1, 0.55]);
+        let start = StartConditions { rest: true, zero_jerk: true, pose };
+        let map = Parametrisation::new(&limits(), 0.6, 5, &start);
+        let mut draw = |n: usize| -> Vec<f64> { (0..n).map(|_| rng.random_range(-2.0..=2.0)).collect() };
+        let z = draw(map.unknowns());
+        let other: Vec<Vec<f64>> = (0..3).map(|_| draw(11)).collect();
+        let of_other = map.nearest(&other);
+        for (given, wanted) in [(map.coefficients(&z), &z), (map.coefficients(&of_other), &of_other)] {
+            let found = map.nearest(&given);
+            let worst = found.iter().zip(wanted).map(|(a, b)| (a - b).abs());
+            // Unknowns of harmonics that limits hold small are large.
+            let unit = wanted.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+            assert!(worst.fold(0.0, f64::max) <= 1e-12 * unit, "{given:?}");
+        }
+    }
+}
+
 #[test]
 fn start_conditions_hold_for_any_unknowns() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);

@@ -19,6 +19,25 @@ fn refusal(change: impl FnOnce(&mut Problem)) -> String {
 }
 
 #[test]
+fn trajectories_to_set_out_from() {
+    let problem = problems::gantry();
+    let refusal = |from: Vec<Vec<f64>>| {
+        let settings = Settings { starts: 1, from: Some(from), ..Settings::default() };
+        design(&problem, &settings, Vec::new(), &mut |_| {}).err().map(|why| why.to_string())
+    };
+    let row = vec![0.0; 1 + 2 * problem.harmonics];
+    let wrong = [
+        ("trajectory to set out from: expected 4 entries, found 3", vec![row.clone(); 3]),
+        ("coefficients to set out from: expected 11 entries, found 2", vec![vec![0.0; 2]; 4]),
+        ("to set out from: expected a finite number", vec![vec![f64::NAN; row.len()]; 4]),
+    ];
+    for (expected, from) in wrong {
+        let why = refusal(from).unwrap_or_default();
+        assert!(why.contains(expected), "{why}");
+    }
+}
+
+#[test]
 fn sizes_and_numbers() {
     let nan = f64::NAN;
     let cases: Vec<(&str, Change)> = vec![

@@ -1,0 +1,90 @@
+//! The paper's figures, redone.
+
+use dynid::model::Limits;
+use dynid::report::{Chart, ChartAxis, ChartCurve, CurveStyle};
+
+use super::pointing::{JOINTS, Pointing};
+use super::rank::Identifiability;
+use super::settings::Settings;
+use super::trajectory::Motion;
+use crate::StudyError;
+
+const SAMPLES: usize = 600;
+
+fn axis(label: &str, unit: &str) -> ChartAxis {
+    ChartAxis { label: label.into(), unit: unit.into(), logarithmic: false }
+}
+
+fn curve(name: &str, points: Vec<[f64; 2]>, style: CurveStyle) -> ChartCurve {
+    ChartCurve { name: name.into(), points, style }
+}
+
+/// Positions, velocities and accelerations of every joint along trajectories, with their limits.
+pub(super) fn motion(
+    pointing: &Pointing,
+    settings: &Settings,
+    trajectories: &[(&str, &[Vec<f64>])],
+) -> Result<Vec<Chart>, StudyError> {
+    let mut motions = Vec::new();
+    for (name, rows) in trajectories {
+        motions.push((*name, Motion::of(settings, rows, SAMPLES)?));
+    }
+    let period = std::f64::consts::TAU / settings.base_frequency;
+    let bodies = pointing.mechanism().bodies();
+    let chart = |(joint, derivative): (usize, usize)| {
+        let (label, unit) =
+            [("position", "rad"), ("velocity", "rad/s"), ("acceleration", "rad/s²")][derivative];
+        let mut curves: Vec<ChartCurve> = motions
+            .iter()
+            .map(|(name, motion)| {
+                let s = &motion.sampled;
+                let signal = &[&s.q, &s.dq, &s.ddq][derivative][joint * SAMPLES..][..SAMPLES];
+                let time = |k: usize| period * k as f64 / SAMPLES as f64;
+                let points = signal.iter().enumerate().map(|(k, x)| [time(k), *x]).collect();
+                curve(name, points, CurveStyle::Line)
+            })
+            .collect();
+        if let Some((low, high)) =
+            range(&bodies[joint].joint.limits, settings.acceleration[joint], derivative)
+        {
+            let across = |level: f64| [[0.0, level], [period, level]];
+            let mut points = across(low).to_vec();
+            points.push([f64::NAN; 2]);
+            points.extend(across(high));
+            curves.push(curve("limits", points, CurveStyle::Dashed));
+        }
+        Chart {
+            title: format!("Joint {}: {label}", joint + 1),
+            x: axis("time", "s"),
+            y: axis(label, unit),
+            curves,
+            ..Chart::default()
+        }
+    };
+    Ok((0..JOINTS).flat_map(|joint| (0..3).map(move |d| (joint, d))).map(chart).collect())
+}
+
+fn range(limits: &Limits, acceleration: f64, derivative: usize) -> Option<(f64, f64)> {
+    let both = |most: f64| (-most, most);
+    match derivative {
+        0 => limits.position,
+        1 => limits.velocity.map(both),
+        _ => Some(both(acceleration)),
+    }
+}
+
+/// Singular values of the Jacobian with columns of unit length.
+pub(super) fn singular_values(found: &Identifiability) -> Chart {
+    let points = |values: &[f64]| values.iter().enumerate().map(|(k, s)| [(k + 1) as f64, *s]).collect();
+    Chart {
+        title: "Singular values of the 11 parameters, ideal joints".into(),
+        note: "Columns of unit length. What lies below the eighth is rounding.".into(),
+        x: axis("number", ""),
+        y: ChartAxis { logarithmic: true, ..axis("singular value", "") },
+        curves: vec![
+            curve("Table 1", points(&found.trajectory.singular_values), CurveStyle::Dots),
+            curve("random motion", points(&found.random.singular_values), CurveStyle::Dots),
+        ],
+        ..Chart::default()
+    }
+}

@@ -1,0 +1,66 @@
+//! X-Y pointing mechanism with clearance in its joints. See `README.md` in this folder.
+
+mod dynamics;
+mod excitation;
+mod figures;
+mod parameters;
+mod pointing;
+mod rank;
+mod reference;
+mod report;
+mod settings;
+mod table;
+mod trajectory;
+mod tree;
+
+use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
+use excitation::Designs;
+use pointing::Pointing;
+use settings::Settings;
+
+/// Name on the command line.
+pub const NAME: &str = "xy-pointing";
+/// What is studied.
+pub const TITLE: &str = "X-Y pointing mechanism: parameters of a mechanism whose joints have clearance";
+/// Where it was published.
+pub const SOURCE: &str = "Sun, Han, Li & Li, Robotics 2021, 10(1), 36";
+
+/// A fault of this study's data or of the rooms below.
+fn fault(error: impl std::fmt::Display) -> StudyError {
+    StudyError::Data { file: "xy_pointing", message: error.to_string() }
+}
+
+/// Runs the study.
+///
+/// # Errors
+/// [`StudyError`]: faults of the embedded data or of the rooms below.
+pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError> {
+    const STEPS: usize = 3;
+    let mut done = 0;
+    let mut step = |what: &str| {
+        progress(Progress { step: what.to_owned(), done, steps: STEPS });
+        done += 1;
+    };
+    step("dynamics and trajectory against references");
+    let settings = Settings::read()?;
+    let pointing = Pointing::ideal()?;
+    let mut rows = vec![dynamics::row()?, trajectory::row(&pointing, &settings)?, table::row(&settings)?];
+    let (identifiability, row) = rank::identifiability(&pointing, &settings, run)?;
+    rows.push(row);
+
+    step("designing trajectories");
+    let designs = Designs::new(&pointing, &settings, run)?;
+    rows.push(excitation::row(&designs));
+    rows.sort_by_key(|r| (r.id.parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
+
+    step("report");
+    let record = StudyRecord::new(NAME, run, rows);
+    let report = report::Contents {
+        pointing: &pointing,
+        settings: &settings,
+        identifiability: &identifiability,
+        designs: &designs,
+    }
+    .report(&record)?;
+    Ok(StudyRun { record, report })
+}
