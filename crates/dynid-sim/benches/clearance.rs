@@ -12,6 +12,9 @@ use dynid_sim::clearance::{ClearanceRecord, ClearanceSettings, ClearanceStart, D
 #[path = "../tests/all/pointing.rs"]
 mod pointing;
 
+/// The published period, s.
+const PERIOD: f64 = 5.0 * std::f64::consts::PI;
+
 fn run(method: Method, times: &[f64]) -> Result<(ClearanceRecord, f64), SimError> {
     let start = Instant::now();
     let settings = ClearanceSettings { method, channels: Vec::new() };
@@ -35,8 +38,8 @@ fn difference(a: &ClearanceRecord, b: &ClearanceRecord) -> [f64; 2] {
 }
 
 fn main() {
-    let span: f64 = std::env::args().find_map(|a| a.parse().ok()).unwrap_or(pointing::PERIOD);
-    let samples = (1571.0 * span / pointing::PERIOD).round() as usize;
+    let span: f64 = std::env::args().find_map(|a| a.parse().ok()).unwrap_or(PERIOD);
+    let samples = (1571.0 * span / PERIOD).round() as usize;
     let times: Vec<f64> = (0..=samples).map(|k| span * k as f64 / samples as f64).collect();
     let collocation = |tolerance| Method::Collocation { tolerance, longest_step: f64::INFINITY };
     let (reference, _) = run(collocation(1e-11), &times).unwrap();

@@ -139,6 +139,14 @@ impl Plant {
         Ok(plant)
     }
 
+    /// The same plant with other linear parameters.
+    ///
+    /// # Errors
+    /// As [`Plant::new`].
+    pub fn with_linear(self, linear: Vec<f64>) -> Result<Plant, SimError> {
+        Plant::new(self.model, linear, self.shape, self.sign_width)
+    }
+
     /// The same plant without contacts of journals in their bearings, for those who add them.
     pub(crate) fn without_contacts(mut self) -> Self {
         self.without_contacts = true;

@@ -649,6 +649,9 @@ fn check(
     if !start.journals.is_empty() {
         demand_length("journals", contacts, start.journals.len())?;
     }
+    let numbers = start.journals.iter().flat_map(|(e, de)| e.iter().chain(de));
+    let finite = numbers.clone().all(|x| x.is_finite());
+    demand(finite, "journals", "finite offsets and rates", "others")?;
     let ascending = times.windows(2).all(|w| w[0] < w[1]) && times.iter().all(|t| t.is_finite());
     demand(!times.is_empty() && ascending, "times", "ascending finite times, at least one", times.len())?;
     let positive = |x: f64| x > 0.0 && x.is_finite();

@@ -1,7 +1,9 @@
 //! All tests of the crate from outside, in one program: each program would be linked against everything again.
 
 mod arm;
+mod clearance;
 mod elastic;
 mod experiment;
 mod integration;
+mod pointing;
 mod presliding;

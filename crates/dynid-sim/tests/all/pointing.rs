@@ -11,20 +11,19 @@ use dynid_model::{
 };
 use dynid_sim::Plant;
 
-pub const CLEARANCE: f64 = 5e-5;
-pub const JOURNAL_RADIUS: f64 = 0.01;
-pub const MASSES: [f64; 2] = [2.1391, 0.8596];
-pub const LEVERS: [f64; 2] = [0.04821, 0.03419];
+pub(crate) const CLEARANCE: f64 = 5e-5;
+pub(crate) const JOURNAL_RADIUS: f64 = 0.01;
+pub(crate) const MASSES: [f64; 2] = [2.1391, 0.8596];
+pub(crate) const LEVERS: [f64; 2] = [0.04821, 0.03419];
 const ARM: f64 = 0.1;
 const BASE: f64 = 0.4;
 const OFFSET: [f64; 2] = [0.111, -0.306];
 const SINES: [[f64; 5]; 2] =
     [[0.243, -6.5e-10, -0.028, -0.033, -0.005], [0.251, -0.029, -0.016, -0.015, -0.017]];
 const COSINES: [[f64; 5]; 2] = [[-0.113, -0.01, 0.001, 0.013, -0.003], [0.372, -0.037, -0.033, 0.003, 0.001]];
-pub const PERIOD: f64 = std::f64::consts::TAU / BASE;
 
 /// Without clearance.
-pub fn description() -> Description {
+pub(crate) fn description() -> Description {
     let link = |name: &str, inertia: Option<Inertia>| LinkDescription { name: name.into(), inertia };
     let joint = |name: &str, parent: &str, child: &str, placement: Placement| JointDescription {
         name: name.into(),
@@ -56,7 +55,7 @@ pub fn description() -> Description {
 }
 
 /// The published law for a link's mass.
-pub fn rough(mass: f64) -> ContactLaw {
+pub(crate) fn rough(mass: f64) -> ContactLaw {
     let surface = FractalSurface::new(SurfaceSettings {
         roughness_um: 0.8,
         friction: 0.1,
@@ -72,7 +71,7 @@ pub fn rough(mass: f64) -> ContactLaw {
 }
 
 /// With clearance in both joints under given laws.
-pub fn plant_with(description: &Description, laws: [ContactLaw; 2]) -> Plant {
+pub(crate) fn plant_with(description: &Description, laws: [ContactLaw; 2]) -> Plant {
     let joints: Vec<String> = description.joints.iter().map(|j| j.name.clone()).collect();
     let mechanism = description.with_clearance(&joints).unwrap().build().unwrap();
     let contacts = laws.into_iter().enumerate().map(|(k, law)| {
@@ -91,12 +90,12 @@ pub fn plant_with(description: &Description, laws: [ContactLaw; 2]) -> Plant {
 }
 
 /// The published mechanism.
-pub fn plant() -> Plant {
+pub(crate) fn plant() -> Plant {
     plant_with(&description(), MASSES.map(rough))
 }
 
 /// The published excitation.
-pub fn excitation(t: f64, q: &mut [f64], dq: &mut [f64], ddq: &mut [f64]) {
+pub(crate) fn excitation(t: f64, q: &mut [f64], dq: &mut [f64], ddq: &mut [f64]) {
     for joint in 0..2 {
         (q[joint], dq[joint], ddq[joint]) = (OFFSET[joint], 0.0, 0.0);
         for (k, (a, b)) in SINES[joint].iter().zip(&COSINES[joint]).enumerate() {
