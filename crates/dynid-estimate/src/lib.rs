@@ -11,6 +11,7 @@
 //! | one time block or group of a log, and its rows again | [`groups`], [`rows`] |
 //! | every linear estimator through one call | [`linear::estimate`] |
 //! | shape parameters beside linear ones | [`separable`] |
+//! | clearance of a joint from its journal, or from the effort alone | [`clearance`] |
 //! | friction laws from constant-speed tests | [`steady_friction`] |
 //! | covariance that survives filtering | [`covariance`] |
 //! | held-out error over folds of blocks; several estimators on the same folds | [`folds`], [`held_out`] |
@@ -25,6 +26,7 @@
 //! Notation: `W` is the regressor (rows × `p` columns), `y` the effort, `x` the parameters,
 //! `(R, z, ρ, N)` a factor. Results do not depend on the number of threads.
 
+pub mod clearance;
 pub mod conditioning;
 pub mod consistent;
 pub mod covariance;

@@ -9,7 +9,7 @@
 //! Jacobian. Since the solution itself is of order nine, a tolerance is carried over to the estimate's order as there
 //! (`tolerance^((s+1)/2s)`).
 
-use crate::lu::Lu;
+use crate::lu::{Lu, add_product};
 
 /// Stages.
 pub(crate) const STAGES: usize = 5;
@@ -377,9 +377,7 @@ impl Collocation {
         }
         // (1 - hγJ)⁻¹ of both, reduced to the rates.
         let mut rates = by_v.clone();
-        for row in 0..n {
-            rates[row] += g * (0..n).map(|k| self.by_x[row * n + k] * by_x[k]).sum::<f64>();
-        }
+        add_product(&mut rates, g, &self.by_x, &by_x);
         self.filter.solve(&mut rates);
         let (of_x, of_v) = system.scales();
         let mut worst = 0.0_f64;

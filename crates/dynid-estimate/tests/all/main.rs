@@ -4,6 +4,7 @@ mod arm;
 mod blocks_and_choice;
 mod bootstrap;
 mod calibration;
+mod clearance;
 mod conditioned_rows;
 mod consistent_golden;
 mod consistent_random;

@@ -16,4 +16,4 @@ mod system;
 
 pub use energy::ClearanceEnergy;
 pub use record::{ClearanceRecord, ContactEvent, ContactEventKind, JournalRecord, RunCount};
-pub use run::{ClearanceSettings, ClearanceStart, Driving, Method, simulate};
+pub use run::{ClearanceSettings, ClearanceStart, Controller, Driving, Method, PrescribedMotion, simulate};

@@ -66,16 +66,22 @@ pub struct ClearanceStart {
     pub driven: Option<(Vec<f64>, Vec<f64>)>,
 }
 
+/// Writes positions, rates and accelerations of the driven joints at a time (s) into three slices.
+pub type PrescribedMotion<'a> = &'a dyn Fn(f64, &mut [f64], &mut [f64], &mut [f64]);
+
+/// From time (s), positions and rates of the driven joints to their efforts.
+pub type Controller<'a> = &'a mut dyn FnMut(f64, &[f64], &[f64], &mut [f64]);
+
 /// What drives the driven joints, in the order of their rates.
 pub enum Driving<'a> {
-    /// Positions, rates and accelerations at a time (s), written into three slices.
-    Prescribed(&'a dyn Fn(f64, &mut [f64], &mut [f64], &mut [f64])),
-    /// Efforts, formed at every multiple of `period` (s) from time, positions and rates of the driven joints, and held.
+    /// They follow a motion exactly.
+    Prescribed(PrescribedMotion<'a>),
+    /// Efforts are formed every `period` from the start on, and held.
     Controlled {
         /// s.
         period: f64,
-        /// Writes efforts.
-        controller: &'a mut dyn FnMut(f64, &[f64], &[f64], &mut [f64]),
+        /// Forms efforts.
+        controller: Controller<'a>,
     },
 }
 
@@ -100,7 +106,7 @@ struct Run<'p, 'd> {
     system: System<'p, 'd>,
     method: Method,
     collocation: Collocation,
-    controller: Option<(f64, &'d mut dyn FnMut(f64, &[f64], &[f64], &mut [f64]))>,
+    controller: Option<(f64, Controller<'d>)>,
     t: f64,
     x: Vec<f64>,
     v: Vec<f64>,

@@ -4,6 +4,7 @@ use dynid_model::EffortModel;
 use dynid_model::element::{ClearanceContact, FrictionLine, JournalContact, JournalMotion};
 
 use super::branch::{Branch, Sliding};
+use super::run::PrescribedMotion;
 use crate::collocation::Motion;
 use crate::lu::Lu;
 use crate::plant::{Plant, PlantWorkspace};
@@ -17,8 +18,7 @@ pub(super) struct Contact<'a> {
 
 /// What drives the driven joints.
 pub(super) enum Drive<'a> {
-    /// Positions, rates and accelerations at a time.
-    Prescribed(&'a dyn Fn(f64, &mut [f64], &mut [f64], &mut [f64])),
+    Prescribed(PrescribedMotion<'a>),
     /// Held efforts.
     Effort(Vec<f64>),
 }
