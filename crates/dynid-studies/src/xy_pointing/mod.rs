@@ -1,22 +1,32 @@
 //! X-Y pointing mechanism with clearance in its joints. See `README.md` in this folder.
 
+mod bearing;
+mod contact;
+mod data;
 mod dynamics;
 mod excitation;
 mod figures;
+mod fit;
 mod parameters;
 mod pointing;
 mod rank;
 mod reference;
 mod report;
+mod search;
 mod settings;
+mod simulation;
 mod table;
 mod trajectory;
 mod tree;
 
 use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
+use data::Data;
 use excitation::Designs;
+use fit::Fits;
 use pointing::Pointing;
+use search::Searches;
 use settings::Settings;
+use simulation::Solutions;
 
 /// Name on the command line.
 pub const NAME: &str = "xy-pointing";
@@ -35,7 +45,7 @@ fn fault(error: impl std::fmt::Display) -> StudyError {
 /// # Errors
 /// [`StudyError`]: faults of the embedded data or of the rooms below.
 pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError> {
-    const STEPS: usize = 3;
+    const STEPS: usize = 5;
     let mut done = 0;
     let mut step = |what: &str| {
         progress(Progress { step: what.to_owned(), done, steps: STEPS });
@@ -44,9 +54,27 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     step("dynamics and trajectory against references");
     let settings = Settings::read()?;
     let pointing = Pointing::ideal()?;
-    let mut rows = vec![dynamics::row()?, trajectory::row(&pointing, &settings)?, table::row(&settings)?];
+    let mut rows = vec![
+        dynamics::row()?,
+        contact::row()?,
+        trajectory::row(&pointing, &settings)?,
+        table::row(&settings)?,
+    ];
     let (identifiability, row) = rank::identifiability(&pointing, &settings, run)?;
     rows.push(row);
+
+    step("simulating clearance");
+    let record = simulation::published(&settings, &settings.bearing)?;
+    let data = Data::of(&pointing, record, settings.data.discarded)?;
+    let solutions = Solutions::new(&settings, run)?;
+    rows.push(simulation::row(&settings, &data, &solutions)?);
+    rows.extend(simulation::cost_rows(&data, &solutions));
+    let fits = Fits::new(&pointing, &data)?;
+    rows.extend(fits.rows());
+
+    step("searching with both models");
+    let searches = Searches::new(&pointing, &settings, &data, run)?;
+    rows.extend(searches.rows());
 
     step("designing trajectories");
     let designs = Designs::new(&pointing, &settings, run)?;

@@ -24,6 +24,14 @@ pub(super) const STANDARD: usize = JOINTS * PARAMETERS_PER_BODY;
 pub(super) const THETA: [&[usize]; PARAMETERS] =
     [&[14], &[15], &[16], &[17], &[18], &[19], &[10], &[11], &[17, 19], &[9], &[1]];
 
+/// Entries of `θ` whose columns stand for the base parameters, in the order of [`KEPT`].
+pub(super) const BASE_COLUMNS: [usize; BASE] = [9, 0, 1, 2, 4, 5, 7, 10];
+
+/// Entries `m2`, `Izz1 + m1 Ls1²` and `m1 Ls1` of `θ`.
+pub(super) const MASS_2: usize = 6;
+pub(super) const INERTIA_1: usize = 9;
+pub(super) const MOMENT_1: usize = 10;
+
 /// Values in the paper's order, see [`NAMES`]: inertias about centres of mass, which lie on the axes X of the links.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Parameters(pub(super) [f64; PARAMETERS]);
@@ -50,6 +58,12 @@ impl Parameters {
         let second = Mat3::from_rows([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
         let first = Mat3::from_rows([[0.0; 3], [0.0; 3], [0.0, 0.0, izz1]]);
         [Inertia::from_com(m1, along(l1), &first), Inertia::from_com(m2, along(l2), &second)]
+    }
+
+    /// Combinations that act linearly, see [`THETA`].
+    pub(super) fn theta(&self) -> [f64; PARAMETERS] {
+        let [xx, xy, xz, yy, yz, zz, m2, l2, izz1, l1, m1] = self.0;
+        [xx, xy, xz, yy, yz, zz, m2, m2 * l2, m2 * l2 * l2, izz1 + m1 * l1 * l1, m1 * l1]
     }
 
     /// `∂θ/∂p`, row by row.

@@ -1,5 +1,7 @@
 //! Reference numbers of an independent implementation (NumPy), embedded.
 
+use std::collections::BTreeMap;
+
 use serde::Deserialize;
 
 use super::parameters::PARAMETERS;
@@ -62,6 +64,97 @@ pub(super) struct RatioReference {
     pub(super) name: String,
     pub(super) recomputed: f64,
     pub(super) matches_3_digits: bool,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct ContactReference {
+    pub(super) cases: Vec<ContactCase>,
+    pub(super) friction_c_d: Vec<DirectionReference>,
+    pub(super) k_mu: Vec<FactorReference>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct ContactCase {
+    pub(super) constants: BTreeMap<String, f64>,
+    pub(super) points: Vec<PointReference>,
+    #[serde(rename = "K_m_literal_K")]
+    pub(super) literal: Vec<LiteralReference>,
+    /// Of the surface.
+    #[serde(flatten)]
+    pub(super) surface: BTreeMap<String, f64>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct PointReference {
+    pub(super) delta: f64,
+    pub(super) forces: Vec<ForceReference>,
+    #[serde(flatten)]
+    pub(super) values: BTreeMap<String, f64>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct ForceReference {
+    pub(super) delta_dot: f64,
+    #[serde(rename = "F_n")]
+    pub(super) force: f64,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct LiteralReference {
+    pub(super) delta: f64,
+    #[serde(rename = "K_m")]
+    pub(super) stiffness: f64,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct DirectionReference {
+    pub(super) v_t: f64,
+    pub(super) v_0: f64,
+    pub(super) v_m: f64,
+    pub(super) c_d: f64,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct FactorReference {
+    pub(super) mu: f64,
+    pub(super) k_mu: f64,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct SimulationReference {
+    pub(super) at_0_5s: InstantReference,
+    pub(super) full_period: PeriodReference,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct InstantReference {
+    pub(super) e: [f64; 2 * JOINTS],
+    #[serde(rename = "F_n")]
+    pub(super) force: [f64; JOINTS],
+    pub(super) penetration: [f64; JOINTS],
+    pub(super) tolerance_rel: f64,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct PeriodReference {
+    pub(super) rms_ideal_torque: [f64; JOINTS],
+    pub(super) rms_clearance_minus_ideal_no_friction: [f64; JOINTS],
+    pub(super) rms_friction_torque: [f64; JOINTS],
+    #[serde(rename = "F_n_min")]
+    pub(super) least_force: [f64; JOINTS],
+    #[serde(rename = "F_n_max")]
+    pub(super) largest_force: [f64; JOINTS],
+    pub(super) max_penetration_incl_impact: [f64; JOINTS],
+    pub(super) impacts: usize,
+    pub(super) tolerance_rel: f64,
+}
+
+pub(super) fn contact() -> Result<ContactReference, StudyError> {
+    parse("xy_pointing/reference/contact.json", include_str!("reference/contact.json"))
+}
+
+pub(super) fn simulation() -> Result<SimulationReference, StudyError> {
+    parse("xy_pointing/reference/simulation.json", include_str!("reference/simulation.json"))
 }
 
 pub(super) fn dynamics() -> Result<DynamicsReference, StudyError> {

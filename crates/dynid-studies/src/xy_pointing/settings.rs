@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 
+use super::bearing::Bearing;
 use super::pointing::JOINTS;
 use crate::StudyError;
 
@@ -18,6 +19,19 @@ pub(super) struct Settings {
     /// `[q0, a.., b..]` per joint, rad.
     pub(super) trajectory: Vec<Vec<f64>>,
     pub(super) table3: Vec<PrintedRow>,
+    pub(super) bearing: Bearing,
+    pub(super) data: DataSettings,
+}
+
+/// What is recorded of a period.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DataSettings {
+    pub(super) samples: usize,
+    /// At the start of the period, s.
+    pub(super) discarded: f64,
+    /// Standard deviation, N m.
+    pub(super) torque_noise: f64,
 }
 
 /// A row of the paper's Table 3.

@@ -1,40 +1,24 @@
-//! Clearance as two slides in front of a joint: the journal moves in the bearing's plane, then the joint turns.
+//! The mechanism with clearance: two translations of each journal besides the rotations.
 
-use dynid::model::{Description, JointDescription, JointKind, Limits, LinkDescription, Placement};
+use dynid::model::JournalPath;
 
+use super::fault;
 use super::pointing::{JOINTS, Pointing, description};
 use crate::StudyError;
 
-/// Rates of the tree: per joint the slides along X and Y of the bearing, then the rotation.
+/// Names of the joints.
+pub(super) const NAMES: [&str; JOINTS] = ["j1", "j2"];
+/// Rates of the tree: both rotations, then the translations of journal 1 and of journal 2.
 pub(super) const RATES: usize = 3 * JOINTS;
 
-/// The mechanism with slides in front of both joints.
-pub(super) fn with_clearance() -> Result<Pointing, StudyError> {
-    Pointing::new(&with_slides(description()?), ["j1", "j2"])
+/// Rates of the translations of a journal.
+pub(super) fn translations(joint: usize) -> [usize; 2] {
+    [JOINTS + 2 * joint, JOINTS + 2 * joint + 1]
 }
 
-fn with_slides(ideal: Description) -> Description {
-    let mut out = Description { joints: Vec::new(), ..ideal.clone() };
-    for joint in ideal.joints {
-        let mut parent = joint.parent.clone();
-        let mut placement = joint.placement;
-        for (axis, name) in [([1.0, 0.0, 0.0], "x"), ([0.0, 1.0, 0.0], "y")] {
-            let child = format!("{}_{name}", joint.child);
-            out.links.push(LinkDescription { name: child.clone(), inertia: None });
-            out.joints.push(JointDescription {
-                name: format!("{}_{name}", joint.name),
-                parent: std::mem::replace(&mut parent, child.clone()),
-                child,
-                kind: JointKind::Prismatic,
-                placement: std::mem::replace(&mut placement, Placement::identity()),
-                axis,
-                limits: Limits::default(),
-                mimic: None,
-            });
-        }
-        out.joints.push(JointDescription { parent, placement, ..joint });
-    }
-    out
+/// The mechanism with clearance in both joints, without contact.
+pub(super) fn with_clearance() -> Result<Pointing, StudyError> {
+    Pointing::new(&description()?.with_clearance(&NAMES).map_err(fault)?, NAMES)
 }
 
 /// Angles of both joints and offsets of both journals in the axes of their links, with two derivatives.
@@ -46,23 +30,19 @@ pub(super) struct ClearanceState {
 }
 
 impl ClearanceState {
-    /// Positions, rates and accelerations of the tree: `d = R(q) e` in the axes of the bearing.
+    /// Positions, rates and accelerations of the tree.
     pub(super) fn tree(&self) -> [[f64; RATES]; 3] {
         let mut out = [[0.0; RATES]; 3];
         for joint in 0..JOINTS {
-            let [q, dq, ddq] = self.q.map(|q| q[joint]);
-            let [e, de, dde] = self.e.map(|e| [e[2 * joint], e[2 * joint + 1]]);
-            let turned = [
-                e,
-                [de[0] - dq * e[1], de[1] + dq * e[0]],
-                [
-                    dde[0] - 2.0 * dq * de[1] - ddq * e[1] - dq * dq * e[0],
-                    dde[1] + 2.0 * dq * de[0] + ddq * e[0] - dq * dq * e[1],
-                ],
-            ];
-            for (derivative, (vector, angle)) in turned.into_iter().zip([q, dq, ddq]).enumerate() {
-                let [x, y] = rotated(q, vector);
-                out[derivative][3 * joint..][..3].copy_from_slice(&[x, y, angle]);
+            let turn = self.q.map(|q| q[joint]);
+            let [position, rate, acceleration] = self.e.map(|e| [e[2 * joint], e[2 * joint + 1]]);
+            let path = JournalPath { position, rate, acceleration }.in_bearing(turn);
+            for (derivative, centre) in [path.position, path.rate, path.acceleration].into_iter().enumerate()
+            {
+                out[derivative][joint] = turn[derivative];
+                for (rate, value) in translations(joint).into_iter().zip(centre) {
+                    out[derivative][rate] = value;
+                }
             }
         }
         out
@@ -70,9 +50,13 @@ impl ClearanceState {
 
     /// From the tree's efforts at one sample: torques, and forces on the journals in the axes of their links.
     pub(super) fn loads(&self, effort: &[f64]) -> [JointLoad; JOINTS] {
-        std::array::from_fn(|joint| JointLoad {
-            torque: effort[3 * joint + 2],
-            force: rotated(-self.q[0][joint], [effort[3 * joint], effort[3 * joint + 1]]),
+        std::array::from_fn(|joint| {
+            let force =
+                JournalPath { position: translations(joint).map(|r| effort[r]), ..JournalPath::default() };
+            JointLoad {
+                torque: effort[joint],
+                force: force.in_journal([self.q[0][joint], 0.0, 0.0]).position,
+            }
         })
     }
 }
@@ -84,9 +68,4 @@ pub(super) struct JointLoad {
     pub(super) torque: f64,
     /// On the journal, N.
     pub(super) force: [f64; 2],
-}
-
-fn rotated(angle: f64, [x, y]: [f64; 2]) -> [f64; 2] {
-    let (s, c) = angle.sin_cos();
-    [c * x - s * y, s * x + c * y]
 }
