@@ -90,21 +90,32 @@ impl Bearing {
             .into())
     }
 
-    /// The mechanism with clearance and contact in both joints.
-    pub(super) fn plant(&self) -> Result<Plant, StudyError> {
-        let mechanism = description()?.with_clearance(&NAMES).map_err(fault)?.build().map_err(fault)?;
+    /// The contacts of both joints.
+    pub(super) fn contacts(&self) -> Result<Vec<ClearanceContact>, StudyError> {
+        let mechanism = description()?.build().map_err(fault)?;
         let friction = SlidingFriction::new(self.friction, self.v_0, self.v_m).map_err(fault)?;
-        let contact = |joint: usize| -> Result<Box<dyn JointElement>, StudyError> {
-            Ok(Box::new(ClearanceContact {
+        let contact = |joint: usize| {
+            Ok(ClearanceContact {
                 rotation: joint,
                 translations: translations(joint),
                 law: self.law(mechanism.bodies()[joint].inertia.mass())?,
                 friction,
                 journal_radius: self.journal_radius,
-            }))
+            })
         };
-        let contacts = (0..JOINTS).map(contact).collect::<Result<_, _>>()?;
-        let model = RobotModel::new(mechanism, contacts);
+        (0..JOINTS).map(contact).collect()
+    }
+
+    /// The mechanism with clearance and contact in both joints.
+    pub(super) fn plant(&self) -> Result<Plant, StudyError> {
+        Self::plant_of(self.contacts()?)
+    }
+
+    /// The same with contacts that may differ.
+    pub(super) fn plant_of(contacts: Vec<ClearanceContact>) -> Result<Plant, StudyError> {
+        let mechanism = description()?.with_clearance(&NAMES).map_err(fault)?.build().map_err(fault)?;
+        let boxed = |contact| Box::new(contact) as Box<dyn JointElement>;
+        let model = RobotModel::new(mechanism, contacts.into_iter().map(boxed).collect());
         let linear = model.parameters().prior();
         Plant::new(model, linear, Vec::new(), 1e-3).map_err(fault)
     }

@@ -7,6 +7,7 @@ mod dynamics;
 mod excitation;
 mod figures;
 mod fit;
+mod gap;
 mod parameters;
 mod pointing;
 mod rank;
@@ -23,6 +24,7 @@ use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
 use data::Data;
 use excitation::Designs;
 use fit::Fits;
+use gap::Gaps;
 use pointing::Pointing;
 use search::Searches;
 use settings::Settings;
@@ -45,7 +47,7 @@ fn fault(error: impl std::fmt::Display) -> StudyError {
 /// # Errors
 /// [`StudyError`]: faults of the embedded data or of the rooms below.
 pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError> {
-    const STEPS: usize = 5;
+    const STEPS: usize = 6;
     let mut done = 0;
     let mut step = |what: &str| {
         progress(Progress { step: what.to_owned(), done, steps: STEPS });
@@ -71,6 +73,10 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     rows.extend(simulation::cost_rows(&data, &solutions));
     let fits = Fits::new(&pointing, &data)?;
     rows.extend(fits.rows());
+
+    step("the clearance itself");
+    let gaps = Gaps::new(&pointing, &settings, run)?;
+    rows.extend(gaps.rows());
 
     step("searching with both models");
     let searches = Searches::new(&pointing, &settings, &data, run)?;

@@ -1,0 +1,478 @@
+//! Rows x, y and z: the clearance itself, with probes at the journals, from the torque alone, and what can be known at all.
+
+use dynid::estimators::clearance::orbit::{self, OrbitEstimate, OrbitSample, OrbitSettings};
+use dynid::estimators::clearance::swing::{self, SwingEstimate, SwingSettings};
+use dynid::estimators::linear::ols;
+use dynid::model::contact::SlidingFriction;
+use dynid::model::{JournalPath, MotionBlock};
+use dynid::sim::clearance::{ClearanceRecord, ClearanceSettings, ClearanceStart, Driving, Method, simulate};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+use serde_json::json;
+
+use super::bearing::Bearing;
+use super::data::{Data, Knowledge, factor, rms};
+use super::fault;
+use super::parameters::Parameters;
+use super::pointing::{JOINTS, Pointing};
+use super::settings::Settings;
+use super::trajectory::trajectory;
+use super::tree::{RATES, translations, with_clearance};
+use crate::{Row, RunSettings, StudyError};
+
+/// Rate of the fast record, Hz; every tenth of its samples makes the slow one.
+const RATE_HZ: f64 = 1000.0;
+const SLOW: usize = 10;
+/// Noise of the probes, m, and of the torque, share of its rms.
+const PROBE_NOISE: f64 = 1e-6;
+const TORQUE_NOISE: f64 = 0.01;
+/// By how much masses are overrated where a load is computed.
+const MASS_ERROR: f64 = 1.05;
+/// Quantile of normal deviates for 95 % of them.
+const TWO_SIDED: f64 = 1.96;
+/// Parameters of a contact, relative: clearance, stiffness, damping, friction.
+const PARAMETERS: usize = 4;
+/// Their names.
+pub(super) const NAMES: [&str; PARAMETERS] = ["clearance", "stiffness", "damping", "friction"];
+/// Changes by which their effects are found.
+const CHANGES: [f64; PARAMETERS] = [2e-4, 1e-3, 1e-2, 1e-3];
+
+/// Where the journals start, four numbers each: offset (m) and rate (m/s).
+type Start = [[f64; 4]; JOINTS];
+/// Changes by which the effect of that is found.
+const START_CHANGES: [f64; 4] = [1e-8, 1e-8, 1e-6, 1e-6];
+
+/// The published motion at the fast rate with factors of every contact's parameters.
+fn fast(
+    settings: &Settings,
+    factors: &[[f64; PARAMETERS]; JOINTS],
+    from: &Start,
+) -> Result<ClearanceRecord, StudyError> {
+    let trajectory = trajectory(settings.base_frequency, &settings.trajectory)?;
+    let plants = factors.iter().map(|[clearance, ..]| {
+        let bearing = Bearing { clearance: clearance * settings.bearing.clearance, ..settings.bearing };
+        bearing.contacts()
+    });
+    let contacts: Vec<_> = plants.collect::<Result<_, _>>()?;
+    // Joint `k` takes its contact from the bearings with its clearance.
+    let own = contacts.into_iter().enumerate().filter_map(|(k, all)| all.into_iter().nth(k)).collect();
+    let plant = Bearing::plant_of(own)?;
+    let mut linear = plant.linear().to_vec();
+    let first = linear.len() - 3 * JOINTS;
+    for (values, [_, stiffness, damping, friction]) in linear[first..].chunks_exact_mut(3).zip(factors) {
+        for (value, factor) in values.iter_mut().zip([stiffness, damping, friction]) {
+            *value *= factor;
+        }
+    }
+    let plant = plant.with_linear(linear).map_err(fault)?;
+    let series = trajectory.series();
+    let motion = |t: f64, q: &mut [f64], dq: &mut [f64], ddq: &mut [f64]| {
+        for (joint, series) in series.iter().enumerate() {
+            let at = series.at(t);
+            (q[joint], dq[joint], ddq[joint]) = (at.position, at.velocity, at.acceleration);
+        }
+    };
+    let count = (trajectory.period() * RATE_HZ).floor() as usize;
+    let times: Vec<f64> = (0..=count).map(|k| k as f64 / RATE_HZ).collect();
+    let settings = ClearanceSettings { method: Method::default(), channels: Vec::new() };
+    simulate(plant, &ClearanceStart::default(), Driving::Prescribed(&motion), &times, &settings)
+        .map_err(fault)
+}
+
+/// Forces of the bearings on their journals in the journals' axes and what they carry, by a model whose joints have no
+/// clearance: per joint and sample.
+struct Loads {
+    force: [Vec<[f64; 2]>; JOINTS],
+    /// Force over mass carried, m/s².
+    gravity: [Vec<f64>; JOINTS],
+}
+
+impl Loads {
+    fn new(ideal: &Pointing, data: &Data) -> Result<Self, StudyError> {
+        let tree = with_clearance()?;
+        let n = data.samples;
+        let centred = |of: &[Vec<f64>]| -> Vec<f64> {
+            let rate =
+                |rate: usize| of[data.first..].iter().map(move |s| if rate < JOINTS { s[rate] } else { 0.0 });
+            (0..RATES).flat_map(rate).collect()
+        };
+        let [q, dq, ddq] = [&data.record.q, &data.record.dq, &data.record.ddq].map(|of| centred(of));
+        let links = Parameters::of(ideal.mechanism())?;
+        let effort = tree.efforts(&MotionBlock::plain(n, &q, &dq, &ddq), &tree.linear_of(&links));
+        let masses: Vec<f64> = ideal.mechanism().bodies().iter().map(|b| b.inertia.mass()).collect();
+        let force: [Vec<[f64; 2]>; JOINTS] = std::array::from_fn(|joint| {
+            (0..n)
+                .map(|s| {
+                    let position = translations(joint).map(|rate| MASS_ERROR * effort[rate * n + s]);
+                    let path = JournalPath { position, ..JournalPath::default() };
+                    path.in_journal([q[joint * n + s], 0.0, 0.0]).position
+                })
+                .collect()
+        });
+        let gravity = std::array::from_fn(|joint| {
+            let carried: f64 = masses[joint..].iter().sum::<f64>() * MASS_ERROR;
+            force[joint].iter().map(|[x, y]| x.hypot(*y) / carried).collect()
+        });
+        Ok(Loads { force, gravity })
+    }
+}
+
+/// What probes and torques give in one realisation of the noise.
+#[derive(Debug)]
+pub(super) struct Probed {
+    pub(super) orbit: [OrbitEstimate; JOINTS],
+}
+
+/// The clearance from torques alone.
+#[derive(Debug)]
+pub(super) struct Unprobed {
+    pub(super) swing: [SwingEstimate; JOINTS],
+    /// Clearance by the law's penetration, m, with its deviation.
+    pub(super) clearance: [[f64; 2]; JOINTS],
+    /// Friction coefficient from Coulomb columns of an ideal model.
+    pub(super) friction: [f64; JOINTS],
+    /// Shortest offset whose swing the slow record could show, m.
+    pub(super) slow_limit: f64,
+}
+
+/// Least deviations of the parameters of both contacts that any unbiased estimator could reach, relative: with probes and
+/// torque at the slow rate, with torque at the slow and at the fast rate.
+#[derive(Debug)]
+pub(super) struct Knowable {
+    pub(super) bounds: [[[f64; PARAMETERS]; JOINTS]; 3],
+}
+
+/// Everything about the clearance itself.
+#[derive(Debug)]
+pub(super) struct Gaps {
+    pub(super) probed: Vec<Probed>,
+    /// With a law whose stiffness is 30 % off, once.
+    pub(super) stiffer: Probed,
+    pub(super) unprobed: Vec<Unprobed>,
+    pub(super) knowable: Knowable,
+    clearance: f64,
+    friction: f64,
+    /// Offsets of both journals, mean over the record, m.
+    lengths: [f64; JOINTS],
+}
+
+/// Probes at the slow rate.
+fn probe(
+    settings: &Settings,
+    data: &Data,
+    loads: &Loads,
+    random: &mut ChaCha8Rng,
+) -> Result<Probed, StudyError> {
+    let bearing = &settings.bearing;
+    let sliding = SlidingFriction::new(bearing.friction, bearing.v_0, bearing.v_m).map_err(fault)?;
+    let contacts = bearing.contacts()?;
+    let orbit = (0..JOINTS)
+        .map(|joint| {
+            let offsets = data.counted(&data.record.journals[joint].offset);
+            let samples: Vec<OrbitSample> = (0..data.samples)
+                .step_by(SLOW)
+                .map(|s| {
+                    let mut noise = || -> f64 { StandardNormal.sample(random) };
+                    let offset = offsets[s].map(|e| e + PROBE_NOISE * noise());
+                    let speed = data.counted(&data.record.dq)[s][joint] * bearing.journal_radius;
+                    OrbitSample { offset, load: loads.force[joint][s], sliding: sliding.direction(speed).0 }
+                })
+                .collect();
+            orbit::estimate(&samples, &contacts[joint].law, &OrbitSettings::default()).map_err(fault)
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let orbit = orbit.try_into().map_err(|_| fault("one estimate per joint"))?;
+    Ok(Probed { orbit })
+}
+
+/// Torques at the fast rate, without probes.
+fn listen(
+    settings: &Settings,
+    data: &Data,
+    loads: &Loads,
+    random: &mut ChaCha8Rng,
+) -> Result<Unprobed, StudyError> {
+    let bearing = &settings.bearing;
+    let n = data.samples;
+    let mut torque = data.torque.clone();
+    for joint in 0..JOINTS {
+        let deviation = TORQUE_NOISE * rms(data.joint(&data.torque, joint).iter().copied());
+        for value in &mut torque[joint * n..(joint + 1) * n] {
+            let white: f64 = StandardNormal.sample(random);
+            *value += deviation * white;
+        }
+    }
+    let columns = data.base_columns(Knowledge::Coulomb);
+    let fitted = ols(&factor(&columns, &torque)?);
+    let mut residual = torque;
+    for (column, x) in columns.iter().zip(&fitted.x) {
+        residual.iter_mut().zip(column).for_each(|(r, w)| *r -= x * w);
+    }
+    let contacts = bearing.contacts()?;
+    let settings = SwingSettings::default();
+    let mut slow_limit = 0.0_f64;
+    let (mut swings, mut clearance, mut friction) = (Vec::new(), [[0.0; 2]; JOINTS], [0.0; JOINTS]);
+    for joint in 0..JOINTS {
+        let own = &residual[joint * n..(joint + 1) * n];
+        let gravity = &loads.gravity[joint];
+        let found = swing::estimate(own, gravity, 1.0 / RATE_HZ, &settings).map_err(fault)?;
+        let every = |x: &[f64]| x.iter().step_by(SLOW).copied().collect::<Vec<f64>>();
+        let slow = swing::estimate(&every(own), &every(gravity), SLOW as f64 / RATE_HZ, &settings);
+        slow_limit = slow_limit.max(slow.map_or(f64::INFINITY, |s| s.shortest));
+        let load = loads.force[joint].iter().map(|[x, y]| x.hypot(*y)).sum::<f64>() / n as f64;
+        let depth = |factor: f64| contacts[joint].law.static_penetration(load / factor);
+        // A stiffness that is known to 30 %.
+        let unsure = 0.5 * (depth(0.7) - depth(1.3));
+        clearance[joint] = [found.length.value - depth(1.0), found.length.std.hypot(unsure)];
+        let base = columns.len() - JOINTS + joint;
+        let tangent = fitted.x[base] / (bearing.journal_radius * load);
+        // M = μ R2 |F|/√(1 + μ²).
+        friction[joint] = tangent / (1.0 - tangent * tangent).sqrt();
+        swings.push(found);
+    }
+    let swing = swings.try_into().map_err(|_| fault("one swing per joint"))?;
+    Ok(Unprobed { swing, clearance, friction, slow_limit })
+}
+
+impl Knowable {
+    fn new(ideal: &Pointing, settings: &Settings) -> Result<Self, StudyError> {
+        let (unit, centred) = ([[1.0; PARAMETERS]; JOINTS], Start::default());
+        // Pairs of runs, with what their difference is divided by.
+        let mut wanted = Vec::new();
+        for joint in 0..JOINTS {
+            for (parameter, change) in CHANGES.into_iter().enumerate() {
+                for change in [change, -change] {
+                    let mut factors = unit;
+                    factors[joint][parameter] += change;
+                    wanted.push((factors, centred, change));
+                }
+            }
+        }
+        for joint in 0..JOINTS {
+            for (place, change) in START_CHANGES.into_iter().enumerate() {
+                for change in [change, -change] {
+                    let mut start = centred;
+                    start[joint][place] += change;
+                    wanted.push((unit, start, change));
+                }
+            }
+        }
+        let records: Vec<ClearanceRecord> = wanted
+            .par_iter()
+            .map(|(factors, start, _)| fast(settings, factors, start))
+            .collect::<Result<_, _>>()?;
+        let data = Data::of(ideal, fast(settings, &unit, &centred)?, settings.data.discarded)?;
+        let n = data.samples;
+        let deviations: [f64; JOINTS] =
+            std::array::from_fn(|joint| TORQUE_NOISE * rms(data.joint(&data.torque, joint).iter().copied()));
+        // Link parameters are not known either, nor where the journals start.
+        let nuisance = data.base_columns(Knowledge::Ideal);
+        let mut bounds = [[[0.0; PARAMETERS]; JOINTS]; 3];
+        for (case, (step, probes)) in [(SLOW, true), (SLOW, false), (1, false)].into_iter().enumerate() {
+            let rows: Vec<usize> = (0..n).step_by(step).collect();
+            let mut columns: Vec<Vec<f64>> = Vec::new();
+            for (k, pair) in records.chunks_exact(2).enumerate() {
+                let change = 2.0 * wanted[2 * k].2;
+                let mut column = Vec::new();
+                for joint in 0..JOINTS {
+                    let of = |r: &ClearanceRecord, s: usize| r.effort[data.first + s][joint];
+                    column.extend(
+                        rows.iter()
+                            .map(|s| (of(&pair[0], *s) - of(&pair[1], *s)) / change / deviations[joint]),
+                    );
+                }
+                for joint in (0..JOINTS).filter(|_| probes) {
+                    for axis in 0..2 {
+                        let of =
+                            |r: &ClearanceRecord, s: usize| r.journals[joint].offset[data.first + s][axis];
+                        column.extend(
+                            rows.iter().map(|s| (of(&pair[0], *s) - of(&pair[1], *s)) / change / PROBE_NOISE),
+                        );
+                    }
+                }
+                columns.push(column);
+            }
+            let length = columns[0].len();
+            for column in &nuisance {
+                let mut own: Vec<f64> = (0..JOINTS)
+                    .flat_map(|joint| rows.iter().map(move |s| column[joint * n + s] / deviations[joint]))
+                    .collect();
+                own.resize(length, 0.0);
+                columns.push(own);
+            }
+            let solution = ols(&factor(&columns, &vec![0.0; length])?);
+            let found = solution.standard_deviations(1.0);
+            for joint in 0..JOINTS {
+                for parameter in 0..PARAMETERS {
+                    bounds[case][joint][parameter] =
+                        found[joint * PARAMETERS + parameter].unwrap_or(f64::INFINITY);
+                }
+            }
+        }
+        Ok(Knowable { bounds })
+    }
+}
+
+impl Gaps {
+    pub(super) fn new(ideal: &Pointing, settings: &Settings, run: &RunSettings) -> Result<Self, StudyError> {
+        let (unit, centred) = ([[1.0; PARAMETERS]; JOINTS], Start::default());
+        let record = fast(settings, &unit, &centred)?;
+        let data = Data::of(ideal, record, settings.data.discarded)?;
+        let loads = Loads::new(ideal, &data)?;
+        let seed = |k: usize| ChaCha8Rng::seed_from_u64(run.seed.wrapping_add(1_000_003 * (k as u64 + 1)));
+        let realisations = if run.quick { 8 } else { 40 };
+        let probed = (0..realisations)
+            .into_par_iter()
+            .map(|k| probe(settings, &data, &loads, &mut seed(k)))
+            .collect::<Result<_, _>>()?;
+        let unprobed = (0..realisations)
+            .into_par_iter()
+            .map(|k| listen(settings, &data, &loads, &mut seed(k)))
+            .collect::<Result<_, _>>()?;
+        let mut stiff = unit;
+        stiff.iter_mut().for_each(|factors| factors[1] = 1.3);
+        let stiff = Data::of(ideal, fast(settings, &stiff, &centred)?, settings.data.discarded)?;
+        let stiffer = probe(settings, &stiff, &loads, &mut seed(0))?;
+        let lengths = std::array::from_fn(|joint| {
+            let offsets = data.counted(&data.record.journals[joint].offset);
+            offsets.iter().map(|[x, y]| x.hypot(*y)).sum::<f64>() / offsets.len() as f64
+        });
+        Ok(Gaps {
+            probed,
+            stiffer,
+            unprobed,
+            knowable: Knowable::new(ideal, settings)?,
+            clearance: settings.bearing.clearance,
+            friction: settings.bearing.friction,
+            lengths,
+        })
+    }
+
+    pub(super) fn rows(&self) -> [Row; 3] {
+        [self.probed_row(), self.unprobed_row(), self.knowable_row()]
+    }
+
+    /// Row x.
+    fn probed_row(&self) -> Row {
+        let all = || self.probed.iter().flat_map(|p| &p.orbit);
+        let off = |found: f64, truth: f64| (found / truth - 1.0).abs();
+        let gap = all().map(|o| off(o.clearance.value, self.clearance)).fold(0.0, f64::max);
+        let friction = all().map(|o| off(o.friction.value, self.friction)).fold(0.0, f64::max);
+        let stiffer =
+            self.stiffer.orbit.iter().map(|o| off(o.clearance.value, self.clearance)).fold(0.0, f64::max);
+        let inside =
+            |o: &&OrbitEstimate| (o.friction.value - self.friction).abs() <= TWO_SIDED * o.friction.std;
+        let covered = all().filter(inside).count();
+        let count = all().count();
+        let seen = all().map(|o| o.stiffness_seen).fold(0.0, f64::max);
+        let first = &self.probed[0].orbit;
+        Row::new(
+            "x",
+            "With probes at the journals (1 µm of noise, 100 Hz), masses overrated by 5 % and a stiffness known to 30 %: clearance and \
+             friction coefficient of both joints; the motion says nothing of the stiffness, since the load does not change",
+            "both within 5 % in every realisation, also where the contact is 30 % stiffer than its law",
+            json!({
+                "clearance": gap, "friction": friction, "clearance_of_stiffer_contact": stiffer, "realisations": self.probed.len(),
+                "friction_intervals_that_cover": covered, "of": count, "share_of_stiffness_seen": seen,
+                "first": first.iter().map(|o| json!({
+                    "clearance": [o.clearance.value, o.clearance.std], "friction": [o.friction.value, o.friction.std],
+                    "length": [o.length.value, o.length.std], "correlation": o.correlation })).collect::<Vec<_>>(),
+            }),
+            format!(
+                "clearance within {:.2} %, friction within {:.2} % in {} realisations ({covered} of {count} intervals of friction cover); \
+                 {:.2} % with the stiffer contact; first realisation {:.2} ± {:.2} and {:.2} ± {:.2} µm, of which the length of the offset is known to \
+                 {:.3} and {:.3} µm; stiffness: {:.1} % of its prior variance removed",
+                100.0 * gap,
+                100.0 * friction,
+                self.probed.len(),
+                100.0 * stiffer,
+                1e6 * first[0].clearance.value,
+                1e6 * first[0].clearance.std,
+                1e6 * first[1].clearance.value,
+                1e6 * first[1].clearance.std,
+                1e6 * first[0].length.std,
+                1e6 * first[1].length.std,
+                100.0 * seen,
+            ),
+            gap <= 0.05 && friction <= 0.05 && stiffer <= 0.05,
+        )
+    }
+
+    /// Row y.
+    fn unprobed_row(&self) -> Row {
+        let worst = |of: &dyn Fn(&Unprobed, usize) -> f64| -> [f64; JOINTS] {
+            std::array::from_fn(|joint| self.unprobed.iter().map(|u| of(u, joint)).fold(0.0, f64::max))
+        };
+        let length = worst(&|u, k| (u.swing[k].length.value / self.lengths[k] - 1.0).abs());
+        let gap = worst(&|u, k| (u.clearance[k][0] / self.clearance - 1.0).abs());
+        let friction = worst(&|u, k| (u.friction[k] / self.friction - 1.0).abs());
+        let found = self.unprobed.iter().flat_map(|u| &u.swing).filter(|s| s.found).count();
+        let limit = self.unprobed.iter().map(|u| u.slow_limit).fold(f64::INFINITY, f64::min);
+        let first = &self.unprobed[0];
+        let largest = |of: [f64; JOINTS]| of.into_iter().fold(0.0, f64::max);
+        Row::new(
+            "y",
+            "Without probes, torques with 1 % of noise: sampled at 1 kHz, the swing of the journals in their clearance shows in the residual \
+             of a model without clearance, and its frequency gives the offset and so the clearance; at 100 Hz it cannot be seen. \
+             Coulomb friction of that model over the load gives the friction coefficient",
+            "swing found and clearance within 5 % in every realisation at 1 kHz; told that 100 Hz are too slow",
+            json!({
+                "length": length, "clearance": gap, "friction": friction, "found": found, "of": JOINTS * self.unprobed.len(),
+                "shortest_at_100_hz": limit,
+                "swing_hz": first.swing.each_ref().map(|s| s.frequency_hz),
+                "amplitude": first.swing.each_ref().map(|s| s.amplitude),
+                "first": first.clearance, "friction_first": first.friction,
+            }),
+            format!(
+                "{found} of {} swings found ({:.2} and {:.2} Hz, {:.2e} and {:.2e} N m rms); offset within {:.2} and {:.2} %, clearance within {:.2} \
+                 and {:.2} %, friction within {:.1} and {:.1} % (masses overrated by 5 %); at 100 Hz only offsets beyond {:.0} µm would show",
+                JOINTS * self.unprobed.len(),
+                first.swing[0].frequency_hz,
+                first.swing[1].frequency_hz,
+                first.swing[0].amplitude,
+                first.swing[1].amplitude,
+                100.0 * length[0],
+                100.0 * length[1],
+                100.0 * gap[0],
+                100.0 * gap[1],
+                100.0 * friction[0],
+                100.0 * friction[1],
+                1e6 * limit,
+            ),
+            found == JOINTS * self.unprobed.len() && largest(gap) <= 0.05 && limit > 1.5 * self.clearance,
+        )
+    }
+
+    /// Row z.
+    fn knowable_row(&self) -> Row {
+        let [probes, slow, fast] = &self.knowable.bounds;
+        let words = |bounds: &[[f64; PARAMETERS]; JOINTS]| {
+            let one = |of: &[f64; PARAMETERS]| {
+                let parts: Vec<String> =
+                    NAMES.iter().zip(of).map(|(name, b)| format!("{name} {:.2e}", b)).collect();
+                parts.join(", ")
+            };
+            format!("joint 1 {}; joint 2 {}", one(&bounds[0]), one(&bounds[1]))
+        };
+        let of = |bounds: &[[f64; PARAMETERS]; JOINTS], p: usize| bounds[0][p].max(bounds[1][p]);
+        // Gap and friction can be known, and the fast torque tells of the gap what probes do.
+        let pass = [0, 3].iter().all(|p| of(probes, *p) < 0.05) && of(fast, 0) < 0.05;
+        Row::new(
+            "z",
+            "What any unbiased estimator could know of clearance, stiffness, damping and friction from this motion if the simulation \
+             were the truth, link parameters and the journals' start unknown (Cramér-Rao, relative): with probes at 100 Hz, torque \
+             at 100 Hz, torque at 1 kHz",
+            "clearance and friction below 5 % with probes, clearance also with torque at 1 kHz",
+            json!({ "parameters": NAMES, "probes_100_hz": probes, "torque_100_hz": slow, "torque_1_khz": fast }),
+            format!(
+                "probes: {}. Torque at 100 Hz: {}. Torque at 1 kHz: {}",
+                words(probes),
+                words(slow),
+                words(fast)
+            ),
+            pass,
+        )
+    }
+}
