@@ -1,5 +1,6 @@
 //! The main job: from a robot file and logs to an identified model.
 
+mod elastic;
 mod figures;
 mod friction;
 pub(crate) mod known;
@@ -201,6 +202,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     warnings.extend(prior.warnings.iter().cloned());
     warnings.extend(loaded.iter().flat_map(|l| logs::temperature_warnings(&l.log)));
     warnings.extend(log_warnings(&model, &prepared));
+    warnings.extend(elastic::warnings(&model, &prepared));
     warnings.extend(known::warnings(&plan, &robot.mechanism, &prepared));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
     let mut out = Identification {

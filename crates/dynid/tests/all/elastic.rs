@@ -301,3 +301,18 @@ fn further_elements_of_a_harmonic_drive_have_names() {
     }
     assert_eq!((seen.motors[0].number, seen.motors[1].name.as_str()), (3, "m2"));
 }
+
+#[test]
+fn a_motor_position_formed_from_the_joint_is_told() {
+    let arm = robot(ARM).unwrap();
+    let mut log = simulated(&arm, 1);
+    // As where the drive's resolver is divided by the ratio and logged twice.
+    log.position[2] = log.position[0].iter().map(|q| 100.0 * q).collect();
+    let config = "robot = \"robot.toml\"\n[[log]]\npath = \"train.csv\"\n";
+    let (_folder, found, _) = identified(ARM, &[("train.csv", table(&log))], config);
+    let told = |joint: &str| {
+        let about = format!("joint `{joint}`: the spring is never deformed");
+        found.warnings.iter().any(|w| w.contains(&about))
+    };
+    assert!(told("j1") && !told("j2"), "{:?}", found.warnings);
+}
