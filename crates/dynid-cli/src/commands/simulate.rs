@@ -122,7 +122,7 @@ fn in_json(experiment: &ExperimentSummary) -> serde_json::Value {
 fn in_words(c: &ClearanceSummary) -> Vec<String> {
     let journal = |j: &dynid::simulate::JournalSummary| {
         format!(
-            "{}: in contact {:.2} % of the time ({} onsets, {} losses), penetration up to {:.3} µm, normal force up to {:.4} N, \
+            "{}: in contact {:.2} % of the time ({} onsets, {} losses), penetration up to {:.3} µm, normal force up to {:.1} N, \
              friction moment {:.3e} N m rms",
             j.joint,
             100.0 * j.contact_share,
