@@ -427,6 +427,9 @@ pub(crate) struct SimulateArgs {
     /// Encoder resolution, bits per turn; 0: exact.
     #[arg(long, value_name = "BITS")]
     pub(crate) encoder_bits: Option<u32>,
+    /// Noise of the logged offsets of journals in their bearings (joints with clearance), m.
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub(crate) journal_noise: Option<f64>,
     /// Seed of trajectory and noise.
     #[arg(long)]
     pub(crate) seed: Option<u64>,

@@ -25,6 +25,7 @@ pub use output::OutputError;
 pub use robot::{Place, RobotFileError};
 pub use states::{StateJoint, States, StatesError};
 pub use toml_robot::{
-    CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, RobotFile, SettingValue,
+    ClearanceSpec, CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, RobotFile,
+    SettingValue,
 };
 pub use trajectory::{TrajectoryFile, TrajectoryFileError};

@@ -1,5 +1,6 @@
 //! Joint elements by name.
 
+pub(crate) mod clearance;
 mod elastic;
 pub(crate) mod friction;
 mod model;

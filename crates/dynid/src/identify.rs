@@ -168,6 +168,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         Route::Textbook => None,
     };
     let mut warnings = robot.warnings.clone();
+    warnings.extend(robot.clearance_warnings());
     warnings.extend(plan.alike(&robot.mechanism).iter().map(ToString::to_string));
     let Shaped { model, structure, conditioning, friction, found: shapes } = shapes::search(
         config,

@@ -1,11 +1,14 @@
 //! What a robot file holds and what of it can be identified.
 
+mod clearance;
+
 use dynid_model::{BaseParameters, BaseSettings, EffortModel};
 use serde::Serialize;
 
 use crate::Error;
 use crate::elements::ElementPlan;
 use crate::robot::Robot;
+pub use clearance::{ClearanceRow, RestingJournal};
 
 /// Structure of a robot.
 #[derive(Debug, Clone, Serialize)]
@@ -21,6 +24,9 @@ pub struct Inspection {
     /// Motors behind springs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub motors: Vec<MotorRow>,
+    /// Joints with clearance; all else takes them as ideal.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub clearances: Vec<ClearanceRow>,
     /// Number of standard parameters, elements included.
     pub standard_parameters: usize,
     /// Number of base parameters.
@@ -93,7 +99,7 @@ pub struct BaseRow {
 /// Analyses a robot with the given elements per joint (`None`: those of its file, else none: rigid bodies alone).
 ///
 /// # Errors
-/// [`Error::UnknownElement`].
+/// [`Error::UnknownElement`], [`Error::Mechanism`].
 pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection, Error> {
     let mechanism = &robot.mechanism;
     let none: &[String] = &[];
@@ -154,6 +160,7 @@ pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection,
         gravity: mechanism.gravity().0,
         joints,
         motors,
+        clearances: clearance::rows(robot)?,
         standard_parameters: table.linear.len(),
         base_parameter_count: base.len(),
         base_parameters: base

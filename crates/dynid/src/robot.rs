@@ -84,6 +84,7 @@ impl Robot {
         warnings.extend(held(locked));
         let mut elements = file.elements.clone();
         elements.elastic.retain(|e| !is_fixed(&file.description, &e.joint));
+        elements.clearance.retain(|c| !is_fixed(&file.description, &c.joint));
         let axes = logs::axes(&ElementPlan::bare(&mechanism, &elements)?.model(&mechanism)?);
         elements.per_joint.retain(|(joint, _)| axes.iter().any(|a| a.name == *joint));
         Ok(Robot { path: path.to_owned(), mechanism, axes, elements, file, warnings })

@@ -1,5 +1,6 @@
 //! Virtual logs: trajectory, elements, noise, encoder, seeded; by inverse dynamics or in closed loop.
 
+mod clearance;
 mod closed_loop;
 mod elastic;
 mod settings;
@@ -11,9 +12,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::Error;
+use crate::elements::clearance::refuse_clearance;
 use crate::elements::{ElementPlan, LOAD};
 use crate::nominal::{nominal_parameters, with_nominal_shape};
 use crate::robot::{Robot, refuse_elastic};
+pub use clearance::{ClearanceSummary, JournalSummary};
 pub use settings::{
     ControlTable, ImperfectionTable, PlantTable, SeriesSettings, SimulateMode, SimulateSettings,
 };
@@ -37,14 +40,20 @@ pub struct SimulatedLog {
     pub velocity: Option<Vec<Vec<f64>>>,
     /// Per joint: effort with noise; of joints with a torque sensor its reading.
     pub effort: Vec<Vec<f64>>,
-    /// Extra channels by name.
+    /// Extra channels by name, with noise.
     pub channels: Vec<(String, Vec<f64>)>,
+    /// The same without.
+    pub clean_channels: Vec<(String, Vec<f64>)>,
     /// Per joint: true position, velocity, acceleration, effort at the same times.
     pub clean: [Vec<Vec<f64>>; 4],
     /// Parameters of the truth: name, value.
     pub truth: Vec<(String, f64)>,
     /// What happened in closed loop.
     pub experiment: Option<ExperimentSummary>,
+    /// What journals did in their bearings.
+    pub clearance: Option<ClearanceSummary>,
+    /// What a user should know, in words.
+    pub warnings: Vec<String>,
 }
 
 /// What happened in a closed-loop experiment.
@@ -74,6 +83,9 @@ pub struct ExperimentSummary {
 /// ([`dynid_sim::ElasticInverse`]), with signs of velocities smooth over 1 % of the slowest joint's rms speed. In closed loop a controller makes it follow (see
 /// [`dynid_sim::run`]); signs of velocities are smooth there.
 ///
+/// On robots whose joints have clearance, joints are on the trajectory exactly and journals move in their bearings
+/// ([`dynid_sim::clearance`]), from the centre at rest; offsets of the journals, forces and penetrations are channels.
+///
 /// Link inertias and stated element values come from the robot file; elements without a stated value get one that is
 /// typical for the joint: Coulomb 10 % and viscous 10 % (at the speed limit) of the largest rigid effort over random
 /// states, no offset, no rotor. It does not depend on the trajectory, so logs of one robot have one truth.
@@ -91,12 +103,26 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
     let plan = ElementPlan::new(mechanism, &robot.elements, None, |_| true)?;
     if settings.mode == SimulateMode::ClosedLoop {
         refuse_elastic(robot, "simulated in closed loop")?;
+        refuse_clearance(robot, "simulated in closed loop")?;
     }
     if settings.mode == SimulateMode::ClosedLoop && plan.per_rate.iter().flatten().any(|name| name == LOAD) {
         return Err(Error::Unsupported(format!(
             "`{LOAD}` friction depends on accelerations through its load, for which the equation of motion has no form: \
              simulate by inverse dynamics"
         )));
+    }
+    let with_clearance = robot.with_clearance()?;
+    match with_clearance {
+        None => settings.check_ideal()?,
+        Some(_) => {
+            refuse_elastic(robot, "simulated beside joints with clearance")?;
+            if mechanism.follows().is_some() {
+                return Err(Error::Unsupported(
+                    "joints that follow others are not simulated beside joints with clearance: do not couple mimic joints"
+                        .to_owned(),
+                ));
+            }
+        }
     }
     let model = plan.model(mechanism)?;
     let model = with_nominal_shape(model, &settings.values)?;
@@ -121,13 +147,15 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
     settings.check()?;
     let values = nominal_parameters(&model, &plan, &settings.values)?;
     match settings.mode {
-        SimulateMode::InverseDynamics => by_inverse_dynamics(&model, &reference, values, settings, &mut rng),
+        SimulateMode::InverseDynamics => {
+            by_inverse_dynamics((&model, with_clearance), &reference, values, settings, &mut rng)
+        }
         SimulateMode::ClosedLoop => closed_loop::experiment(model, &reference, values, settings),
     }
 }
 
 fn by_inverse_dynamics(
-    model: &RobotModel,
+    (model, with_clearance): (&RobotModel, Option<RobotModel>),
     reference: &Reference,
     values: Vec<f64>,
     settings: &SimulateSettings,
@@ -157,9 +185,22 @@ fn by_inverse_dynamics(
         let effort = efforts(model, &values, &at, span);
         Ok((at, effort))
     };
-    let (at, clean_effort) = moved(0.0)?;
     // The logged effort belongs to the motion that follows it.
-    let (_, led) = moved(settings.delay_samples.unwrap_or(HELD_COMMAND))?;
+    let lead = settings.delay_samples.unwrap_or(HELD_COMMAND);
+    let (at, clean_effort, led, journals) = match with_clearance {
+        None => {
+            let (at, clean_effort) = moved(0.0)?;
+            (at, clean_effort, moved(lead)?.1, None)
+        }
+        Some(contacts) => {
+            let (at, ahead) = (sample(0.0), sample(lead));
+            let models = (model, contacts);
+            let found = clearance::along(models, reference, &values, [&at, &ahead], lead, settings)?;
+            let effort = (found.effort, found.led);
+            let journals = (found.offsets, found.contacts, found.parameters, found.summary);
+            (at, effort.0, effort.1, Some(journals))
+        }
+    };
     let (clean_effort, led) =
         (crate::logs::as_logged(model, clean_effort), crate::logs::as_logged(model, led));
     let step = |j: usize| {
@@ -178,7 +219,7 @@ fn by_inverse_dynamics(
         })
         .collect();
     let undriven: Vec<bool> = (0..n).map(|j| model.is_undriven(j)).collect();
-    let effort = led
+    let effort: Vec<Vec<f64>> = led
         .iter()
         .map(|e| {
             let sigma = settings.effort_noise * dynid_motion::signal::rms(e);
@@ -190,6 +231,20 @@ fn by_inverse_dynamics(
                 .collect()
         })
         .collect();
+    let mut truth = named(model, values);
+    let (mut channels, mut clean_channels, mut summary) = (Vec::new(), Vec::new(), None);
+    if let Some((offsets, forces, parameters, found)) = journals {
+        truth.extend(parameters);
+        let noisy = offsets.iter().map(|(name, x)| {
+            let mut noise = || -> f64 { StandardNormal.sample(rng) };
+            (name.clone(), x.iter().map(|x| x + settings.journal_noise * noise()).collect())
+        });
+        channels = noisy.collect();
+        channels.extend(forces.iter().cloned());
+        clean_channels = offsets;
+        clean_channels.extend(forces);
+        summary = Some(found);
+    }
     Ok(SimulatedLog {
         joints: model.joints().iter().map(|j| j.name.clone()).collect(),
         undriven,
@@ -197,10 +252,13 @@ fn by_inverse_dynamics(
         position,
         velocity: None,
         effort,
-        channels: Vec::new(),
+        channels,
+        clean_channels,
         clean: [split(&at[0]), split(&at[1]), split(&at[2]), clean_effort],
-        truth: named(model, values),
+        truth,
         experiment: None,
+        warnings: summary.iter().flat_map(|s| s.warnings(settings.rate_hz)).collect(),
+        clearance: summary,
     })
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use dynid::inspect::{Inspection, MotorRow, inspect};
+use dynid::inspect::{ClearanceRow, Inspection, MotorRow, inspect};
 
 use super::{element_names, load_robot, table};
 use crate::args::InspectArgs;
@@ -62,6 +62,9 @@ fn text(i: &Inspection) -> String {
         out.push('\n');
         out.push_str(&table::aligned(&["#", "motor", "drives", "ratio", "spring", "elements"], &rows));
     }
+    if !i.clearances.is_empty() {
+        out.push_str(&clearances(&i.clearances));
+    }
     let (kept, dropped) = i.rank_gap;
     let gap = dropped.map_or_else(|| "full rank".to_owned(), |d| format!("gap {kept:.1e} to {d:.1e}"));
     let _ = writeln!(
@@ -76,6 +79,56 @@ fn text(i: &Inspection) -> String {
     }
     if !i.never_seen.is_empty() {
         let _ = writeln!(out, "\nnever seen in any effort: {}", i.never_seen.join(", "));
+    }
+    out
+}
+
+/// Joints with clearance, and their journals at rest.
+fn clearances(rows: &[ClearanceRow]) -> String {
+    let mut out = String::from("\njoints with clearance (at rest: all joints at zero, under gravity)\n");
+    let header = [
+        "joint",
+        "gap µm",
+        "journal mm",
+        "bearing mm",
+        "law",
+        "friction",
+        "load N",
+        "penetration µm",
+        "stiffness N/m",
+        "swing Hz",
+        "sample Hz",
+    ];
+    let cells: Vec<Vec<String>> = rows
+        .iter()
+        .map(|c| {
+            let size = |x: f64, scale: f64| format!("{}", (x * scale * 1e6).round() / 1e6);
+            let mut row = vec![
+                c.joint.clone(),
+                size(c.gap, 1e6),
+                size(c.journal_radius, 1e3),
+                size(c.bearing_radius, 1e3),
+                c.law.to_owned(),
+                c.friction.to_string(),
+            ];
+            row.extend(match &c.at_rest {
+                None => ["none", "-", "-", "-", "-"].map(str::to_owned),
+                Some(r) => [
+                    format!("{:.3}", r.load),
+                    format!("{:.3}", r.penetration * 1e6),
+                    format!("{:.3e}", r.stiffness),
+                    format!("{:.1}", r.swing_hz),
+                    format!("{:.0}", r.sample_rate_hz.ceil()),
+                ],
+            });
+            row
+        })
+        .collect();
+    out.push_str(&table::aligned(&header, &cells));
+    for c in rows {
+        for remark in c.at_rest.iter().flat_map(|r| &r.remarks) {
+            let _ = writeln!(out, "{}: {remark}", c.joint);
+        }
     }
     out
 }

@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use dynid::io::csv;
-use dynid::simulate::{ExperimentSummary, SimulateMode, SimulateSettings, SimulatedLog, simulate};
+use dynid::sim::clearance::ContactEventKind;
+use dynid::simulate::{
+    ClearanceSummary, ExperimentSummary, SimulateMode, SimulateSettings, SimulatedLog, simulate,
+};
 
 use super::load_robot;
 use crate::args::SimulateArgs;
@@ -41,6 +44,7 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
     settings.effort_noise = args.effort_noise.unwrap_or(settings.effort_noise);
     settings.encoder_bits = args.encoder_bits.unwrap_or(settings.encoder_bits);
     settings.seed = args.seed.unwrap_or(settings.seed);
+    settings.journal_noise = args.journal_noise.unwrap_or(settings.journal_noise);
     let log = simulate(&robot, &settings)?;
     let mut signals = vec![("q", &log.position), (EFFORT, &log.effort)];
     if let Some(velocity) = &log.velocity {
@@ -59,15 +63,26 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
             e.saturated_ticks, e.ticks
         ));
     }
+    for warning in &log.warnings {
+        note(&format!("warning: {warning}"));
+    }
+    if let Some(clearance) = &log.clearance {
+        for line in in_words(clearance) {
+            note(&line);
+        }
+    }
     if let Some(path) = &args.clean {
         let [q, dq, ddq, tau] = &log.clean;
-        write(path, &log, &[("q", q), ("dq", dq), ("ddq", ddq), (EFFORT, tau)], &log.channels)?;
+        write(path, &log, &[("q", q), ("dq", dq), ("ddq", ddq), (EFFORT, tau)], &log.clean_channels)?;
     }
     if let Some(path) = &args.truth {
         let mut truth: serde_json::Map<String, serde_json::Value> =
             log.truth.iter().map(|(n, v)| (n.clone(), (*v).into())).collect();
         if let Some(experiment) = &log.experiment {
             truth.insert("experiment".to_owned(), in_json(experiment));
+        }
+        if let Some(clearance) = &log.clearance {
+            truth.insert("clearance".to_owned(), clearance_in_json(clearance));
         }
         let text = serde_json::to_string_pretty(&truth).map_err(|e| Failure::Output(e.into()))?;
         dynid::io::output::write_atomically(path, (text + "\n").as_bytes())?;
@@ -100,6 +115,70 @@ fn in_json(experiment: &ExperimentSummary) -> serde_json::Value {
         "drive_work_J": energy.drive_work,
         "element_work_J": energy.element_work,
         "energy_residual_J": energy.residual(),
+    })
+}
+
+/// What journals did, a line each, and where the energy went.
+fn in_words(c: &ClearanceSummary) -> Vec<String> {
+    let journal = |j: &dynid::simulate::JournalSummary| {
+        format!(
+            "{}: in contact {:.2} % of the time ({} onsets, {} losses), penetration up to {:.3} µm, normal force up to {:.1} N, \
+             friction moment {:.3e} N m rms",
+            j.joint,
+            100.0 * j.contact_share,
+            j.onsets,
+            j.losses,
+            1e6 * j.largest_penetration,
+            j.largest_normal_force,
+            j.friction_moment_rms
+        )
+    };
+    let e = &c.energy;
+    let energy = format!(
+        "energy of bodies and contacts, J: drives {:.4e}, gained by bodies {:.4e} and contacts {:.1e}, lost to damping {:.1e} and \
+         bearing friction {:.4e}, unbalanced {:.1e} of what was exchanged",
+        e.drives,
+        e.bodies,
+        e.contacts,
+        e.damping,
+        e.friction,
+        e.relative_error()
+    );
+    c.journals.iter().map(journal).chain([energy]).collect()
+}
+
+fn clearance_in_json(c: &ClearanceSummary) -> serde_json::Value {
+    let journals = c.journals.iter().enumerate().map(|(k, j)| {
+        let events = c.events.iter().filter(|e| e.joint == k).map(|e| match e.kind {
+            ContactEventKind::Onset(speed) => serde_json::json!({ "time": e.time, "onset_speed": speed }),
+            ContactEventKind::Loss => serde_json::json!({ "time": e.time, "loss": true }),
+        });
+        serde_json::json!({
+            "joint": j.joint,
+            "contact_share": j.contact_share,
+            "onsets": j.onsets,
+            "losses": j.losses,
+            "largest_penetration": j.largest_penetration,
+            "largest_normal_force": j.largest_normal_force,
+            "friction_moment_rms": j.friction_moment_rms,
+            "events": events.collect::<Vec<_>>(),
+        })
+    });
+    let e = &c.energy;
+    serde_json::json!({
+        "settle_s": c.settle_s,
+        "journals": journals.collect::<Vec<_>>(),
+        "swing_hz": c.swing_hz,
+        "needed_rate_hz": c.needed_rate_hz,
+        "drive_work_J": e.drives,
+        "bodies_gain_J": e.bodies,
+        "contacts_gain_J": e.contacts,
+        "damping_loss_J": e.damping,
+        "friction_loss_J": e.friction,
+        "energy_residual_J": e.unbalanced(),
+        "energy_relative_error": e.relative_error(),
+        "integration_steps": c.count.steps,
+        "rejected_steps": c.count.repeated,
     })
 }
 

@@ -1,6 +1,7 @@
 //! All tests of the crate from outside, in one program: each program would be linked against everything again.
 
 mod broken_input;
+mod clearance;
 mod contract;
 mod design;
 mod elastic;

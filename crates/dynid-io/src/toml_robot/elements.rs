@@ -2,10 +2,12 @@
 //!
 //! Which elements exist and which settings they take is decided by those who build them.
 
+use dynid_model::Description;
 use serde::Deserialize;
 use toml::Value;
 
 use super::Source;
+use super::clearance::{self, ClearanceSpec};
 use super::elastic::{self, ElasticSpec};
 use super::schema::RobotToml;
 use crate::excerpt::excerpt;
@@ -24,6 +26,8 @@ pub struct ElementSpec {
     pub couplings: Vec<CouplingSpec>,
     /// Elastic joints: `[element.<joint>] elastic = { .. }`, in joint order.
     pub elastic: Vec<ElasticSpec>,
+    /// Joints with clearance: `[element.<joint>] clearance = { .. }`, in joint order.
+    pub clearance: Vec<ClearanceSpec>,
 }
 
 /// One setting: `[element.j1] stribeck = { vs = { start = 0.04 } }` has element `stribeck`, key `vs.start`.
@@ -82,17 +86,24 @@ pub(super) fn build(
     source: &Source<'_>,
     robot: &RobotToml,
     joints: &[&str],
+    description: &Description,
 ) -> Result<ElementSpec, RobotFileError> {
     let mut spec = ElementSpec { defaults: robot.defaults.elements.clone(), ..ElementSpec::default() };
     spec.elastic = elastic::build(source, robot, joints)?;
+    spec.clearance = clearance::build(source, robot, description)?;
     let motors = spec.elastic.iter().map(|e| e.motor.as_str());
     let owners: Vec<&str> = joints.iter().copied().chain(motors).collect();
     for (joint, table) in &robot.element {
         source.known("element", "joint", joint, &owners)?;
         let offset = table.span().start;
         for (element, value) in table.get_ref() {
-            if element == elastic::ELASTIC && joints.contains(&joint.as_str()) {
+            let is_joint = joints.contains(&joint.as_str());
+            if is_joint && (element == elastic::ELASTIC || element == clearance::CLEARANCE) {
                 continue;
+            }
+            if element == clearance::CLEARANCE {
+                let owner = format!("element.{joint}");
+                return Err(source.value(offset, &owner, element, "a joint that turns", "a motor"));
             }
             if element == "elements" {
                 let list = value.as_array().and_then(|a| texts(a));

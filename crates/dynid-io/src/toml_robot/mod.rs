@@ -1,6 +1,7 @@
 //! Robots in TOML: DH tables, body trees, or a URDF with an element list.
 
 mod bodies;
+mod clearance;
 mod dh;
 mod elastic;
 mod elements;
@@ -11,6 +12,7 @@ use std::path::Path;
 
 use dynid_model::{Description, Inertia, Mat3, Vec3};
 
+pub use clearance::ClearanceSpec;
 pub use elastic::ElasticSpec;
 pub use elements::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, SettingValue};
 
@@ -57,7 +59,8 @@ pub fn read(path: impl AsRef<Path>) -> Result<RobotFile, RobotFileError> {
 /// rad or text such as `"90deg"`. Keys of every form: `schema` (1), `name`, `gravity` (m/s², base axes),
 /// `floating_base`, `couple_mimics`, `actuated`, `home`, `[defaults]`, `[element.<joint>]`, `[[coupling]]`. Unknown keys
 /// are errors. `[element.<joint>] elastic = { ratio = .. }` ([`ElasticSpec`]) puts a motor behind a spring;
-/// `[element.<motor>]` is then as for joints.
+/// `[element.<motor>]` is then as for joints. `clearance = { journal_radius = .., gap = .. }` ([`ClearanceSpec`]) gives the
+/// joint's journal room in its bearing.
 ///
 /// DH rows (`dh = "modified"` or `"standard"`): `name`, `link` (default `link<k>`), `a`, `alpha`, `d`, `offset`, `kind`
 /// (`revolute`, `continuous`, `prismatic`), `limits`, and the inertia as `phi` (order m, mx, my, mz, Ixx, Ixy, Ixz, Iyy,
@@ -114,7 +117,7 @@ pub fn parse(text: &str, source_name: &str) -> Result<RobotFile, RobotFileError>
     description.floating_base = robot.floating_base;
     description.couple_mimics = robot.couple_mimics;
     let joints: Vec<&str> = description.joints.iter().map(|j| j.name.as_str()).collect();
-    let elements = elements::build(&source, &robot, &joints)?;
+    let elements = elements::build(&source, &robot, &joints, &description)?;
     for name in robot.actuated.iter().flatten() {
         source.known("actuated", "joint", name, &joints)?;
     }

@@ -70,6 +70,7 @@ impl Structure {
             return Err(Error::Unsupported("no parameter of this robot acts on any effort".to_owned()));
         }
         let mut warnings = robot.warnings.clone();
+        warnings.extend(robot.clearance_warnings());
         warnings.extend(plan.alike(&robot.mechanism).iter().map(ToString::to_string));
         Ok(Structure {
             regrouping: advice::regrouping(&base),

@@ -50,6 +50,7 @@ pub(super) fn experiment(
     };
     let result = run(&mut truth, &nominal, &wanted, &experiment)?;
     let log = result.log;
+    let channels: Vec<(String, Vec<f64>)> = model.channels().iter().cloned().zip(log.channels).collect();
     Ok(SimulatedLog {
         joints: model.mechanism().rate_names(),
         undriven: vec![false; model.outputs().len()],
@@ -57,7 +58,8 @@ pub(super) fn experiment(
         position: log.position,
         velocity: settings.log_velocity.then_some(log.velocity),
         effort: log.effort,
-        channels: model.channels().iter().cloned().zip(log.channels).collect(),
+        channels: channels.clone(),
+        clean_channels: channels,
         clean: [log.truth.q, log.truth.dq, log.truth.ddq, log.truth.effort],
         truth: named(&model, values),
         experiment: Some(ExperimentSummary {
@@ -70,6 +72,8 @@ pub(super) fn experiment(
             dropped_rows: log.dropped_rows,
             sign_width: plant_table.sign_width,
         }),
+        clearance: None,
+        warnings: Vec::new(),
     })
 }
 

@@ -42,6 +42,10 @@ pub struct SimulateSettings {
     /// Trajectory file (`dynid design` writes them) to follow, approach and return included, in place of all settings of a
     /// trajectory and of the duration; relative to the settings' file.
     pub follow: Option<PathBuf>,
+    /// Only of robots with clearance on a periodic trajectory: time that is simulated before the log begins, s. Default 0.5.
+    pub settle_s: Option<f64>,
+    /// Only of robots with clearance: noise of the logged offsets of journals, m. Default 0.
+    pub journal_noise: f64,
     /// Only in closed loop: switches every imperfection off, noise, encoder steps and delay included. Default false.
     pub perfect: bool,
     /// Only in closed loop: whether velocity is logged, as `dq_<joint>`. Default false.
@@ -201,6 +205,8 @@ impl Default for SimulateSettings {
             seed: 1,
             trajectory: BTreeMap::new(),
             follow: None,
+            settle_s: None,
+            journal_noise: 0.0,
             perfect: false,
             log_velocity: false,
             control: None,
@@ -235,9 +241,12 @@ impl SimulateSettings {
                 return Err(Error::setting(name, "a positive number", x));
             }
         }
-        for (name, x) in
-            [("effort_noise", s.effort_noise), ("delay_samples", s.delay_samples.unwrap_or(0.0).abs())]
-        {
+        for (name, x) in [
+            ("effort_noise", s.effort_noise),
+            ("delay_samples", s.delay_samples.unwrap_or(0.0).abs()),
+            ("settle_s", s.settle_s.unwrap_or(0.0)),
+            ("journal_noise", s.journal_noise),
+        ] {
             if !(x.is_finite() && x >= 0.0) {
                 return Err(Error::setting(name, "a finite number", x));
             }
@@ -251,7 +260,20 @@ impl SimulateSettings {
         if s.encoder_bits > 40 {
             return Err(Error::setting("encoder_bits", "at most 40", s.encoder_bits));
         }
+        if let (Some(settle), Some(_)) = (s.settle_s, &s.follow) {
+            return Err(Error::setting("settle_s", "no value beside `follow`, which has a start", settle));
+        }
         s.check_mode()
+    }
+
+    /// Fails if something is said about clearance, for robots that have none.
+    pub(super) fn check_ideal(&self) -> Result<(), Error> {
+        let given =
+            [("settle_s", self.settle_s), ("journal_noise", Some(self.journal_noise).filter(|x| *x > 0.0))];
+        match given.into_iter().find_map(|(name, x)| Some((name, x?))) {
+            None => Ok(()),
+            Some((name, x)) => Err(Error::setting(name, "a robot with clearance in its joints", x)),
+        }
     }
 
     /// Keys that would do nothing are slips.

@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod bristles;
+mod clearance;
 mod design;
 mod elastic;
 mod elements;

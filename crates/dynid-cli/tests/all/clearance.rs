@@ -1,0 +1,89 @@
+//! A robot whose joints have clearance, through the commands.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::support::run;
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/xy-pointing.toml");
+    std::fs::copy(robot, folder.path().join("xy.toml")).unwrap();
+    folder
+}
+
+fn text(folder: &Path, name: &str) -> String {
+    std::fs::read_to_string(folder.join(name)).unwrap()
+}
+
+fn stderr(folder: &Path, args: &[&str], code: i32) -> String {
+    String::from_utf8(run(folder, args, code).stderr).unwrap()
+}
+
+#[test]
+fn joints_with_clearance_pass_through_the_commands() {
+    let folder = folder();
+    let at = folder.path();
+    let shown = String::from_utf8(run(at, &["inspect", "xy.toml"], 0).stdout).unwrap();
+    assert!(shown.contains("joints with clearance") && shown.contains("rough"), "{shown}");
+    let json: Value = serde_json::from_slice(&run(at, &["inspect", "xy.toml", "--json"], 0).stdout).unwrap();
+    assert_eq!(json["clearances"][1]["joint"], "j2");
+    assert!((json["clearances"][0]["at_rest"]["load"].as_f64().unwrap() - 29.407).abs() < 1e-3);
+
+    let simulate = |out: &str, more: &[&str]| {
+        let mut args = vec!["simulate", "xy.toml", "--out", out, "--duration", "30", "--seed", "3"];
+        args.extend(more);
+        stderr(at, &args, 0)
+    };
+    let said = simulate("log.csv", &["--truth", "truth.json", "--clean", "clean.csv"]);
+    assert!(
+        said.contains("j1: in contact") && said.contains("energy") && !said.contains("warning"),
+        "{said}"
+    );
+    let header = text(at, "log.csv").lines().next().unwrap().to_owned();
+    assert_eq!(
+        header,
+        "t,q_j1,q_j2,tau_j1,tau_j2,journal_j1_x,journal_j1_y,journal_j2_x,journal_j2_y,normal_force_j1,\
+         friction_force_j1,penetration_j1,normal_force_j2,friction_force_j2,penetration_j2"
+    );
+    assert!(text(at, "clean.csv").lines().next().unwrap().ends_with(",penetration_j2"));
+    let truth: Value = serde_json::from_str(&text(at, "truth.json")).unwrap();
+    assert_eq!(truth["j1.mu"], 0.1);
+    let found = &truth["clearance"];
+    assert!(found["energy_relative_error"].as_f64().unwrap() < 1e-8, "{found}");
+    assert_eq!(found["journals"][0]["onsets"], 1);
+    assert!(found["journals"][1]["events"][0]["onset_speed"].as_f64().unwrap() > 0.0);
+    simulate("again.csv", &[]);
+    assert!(text(at, "log.csv") == text(at, "again.csv"), "the same seed gave other bits");
+    assert!(simulate("slow.csv", &["--rate-hz", "100"]).contains("warning: journals swing"));
+    simulate("noisy.csv", &["--journal-noise", "1e-7"]);
+    assert!(text(at, "noisy.csv") != text(at, "log.csv"));
+
+    std::fs::write(at.join("run.toml"), "robot = \"xy.toml\"\nout = \"out\"\n[[log]]\npath = \"log.csv\"\n")
+        .unwrap();
+    let said = stderr(at, &["identify", "run.toml"], 0);
+    assert!(said.contains("joint `j2` has clearance (gap 50 µm), which is not part of the fit"), "{said}");
+    let estimate: Value = serde_json::from_str(&text(at, "out/estimate.json")).unwrap();
+    assert_eq!(estimate["joints"], serde_json::json!(["j1", "j2"]));
+    let base = estimate["base_parameters"].as_array().unwrap();
+    assert!(base.iter().all(|p| !p["name"].as_str().unwrap().contains("contact")));
+    let rows = run(at, &["regressor", "xy.toml", "--states", "clean.csv", "--json"], 0).stdout;
+    let rows: Value = serde_json::from_slice(&rows).unwrap();
+    assert_eq!(rows["joints"], serde_json::json!(["j1", "j2"]));
+}
+
+#[test]
+fn faults_of_clearance_are_told_with_file_and_field() {
+    let folder = folder();
+    let at = folder.path();
+    let robot = text(at, "xy.toml");
+    std::fs::write(at.join("bad.toml"), robot.replace("gap = 5e-5", "gap = 0")).unwrap();
+    let line = robot.lines().position(|l| l == "[element.j1]").unwrap() + 1;
+    let message = stderr(at, &["inspect", "bad.toml"], 2);
+    assert!(message.contains(&format!("bad.toml:{line}:1: element.j1: clearance.gap")), "{message}");
+    let message = stderr(at, &["simulate", "xy.toml", "--out", "log.csv", "--closed-loop"], 2);
+    assert!(message.contains("clearance") && message.contains("closed loop"), "{message}");
+}

@@ -1,0 +1,204 @@
+//! Virtual logs of robots whose joints have clearance.
+
+use dynid_model::{EffortModel, RobotModel};
+use dynid_motion::signal::rms;
+use dynid_sim::clearance::{
+    ClearanceEnergy, ClearanceRecord, ClearanceSettings, ClearanceStart, ContactEvent, ContactEventKind,
+    Driving, RunCount,
+};
+use dynid_sim::{Plant, clearance};
+
+use super::efforts;
+use super::settings::SimulateSettings;
+use super::trajectory::Reference;
+use crate::Error;
+
+/// Time that is simulated before a log of a periodic motion begins, s.
+const SETTLE: f64 = 0.5;
+
+/// What journals did in their bearings, the time before the log included.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClearanceSummary {
+    /// Time that was simulated before the log began, s.
+    pub settle_s: f64,
+    /// Joints with clearance.
+    pub journals: Vec<JournalSummary>,
+    /// Onsets and losses of contact; negative times are before the log.
+    pub events: Vec<ContactEvent>,
+    /// Where the energy of bodies and contacts went; other elements of the joints stand beside them and are not counted.
+    pub energy: ClearanceEnergy,
+    /// Work of the integrator.
+    pub count: RunCount,
+    /// Fastest swing of a journal at the end, Hz.
+    pub swing_hz: f64,
+    /// Least sample rate that shows it, Hz.
+    pub needed_rate_hz: f64,
+}
+
+/// What one journal did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JournalSummary {
+    /// Joint.
+    pub joint: String,
+    /// Share of the time in contact.
+    pub contact_share: f64,
+    /// How often contact began.
+    pub onsets: usize,
+    /// How often it ended.
+    pub losses: usize,
+    /// Largest penetration, between samples too, m.
+    pub largest_penetration: f64,
+    /// Largest normal force likewise, N.
+    pub largest_normal_force: f64,
+    /// RMS of the friction moment that the drive had to overcome, at the samples, N m.
+    pub friction_moment_rms: f64,
+}
+
+/// Efforts and channels of a log.
+pub(super) struct Journals {
+    /// Effort per joint at the samples.
+    pub(super) effort: Vec<Vec<f64>>,
+    /// The same at the shifted samples.
+    pub(super) led: Vec<Vec<f64>>,
+    /// Offsets of the journals.
+    pub(super) offsets: Vec<(String, Vec<f64>)>,
+    /// Forces and penetrations.
+    pub(super) contacts: Vec<(String, Vec<f64>)>,
+    /// Parameters of the contacts.
+    pub(super) parameters: Vec<(String, f64)>,
+    pub(super) summary: ClearanceSummary,
+}
+
+impl ClearanceSummary {
+    /// What a user of the log should know, in words.
+    pub(super) fn warnings(&self, rate_hz: f64) -> Vec<String> {
+        let slow = rate_hz < self.needed_rate_hz;
+        let warning = || {
+            format!(
+                "journals swing in their bearings at {:.1} Hz, which {rate_hz} Hz do not show: sample with at least {:.0} Hz, or \
+                 read single efforts as aliased",
+                self.swing_hz,
+                self.needed_rate_hz.ceil()
+            )
+        };
+        slow.then(warning).into_iter().collect()
+    }
+}
+
+/// Forces of bodies and contacts come from a simulation with prescribed joints; the other elements of the joints, which do
+/// not move journals, add what they do on an ideal robot.
+///
+/// `model`: the ideal robot with its elements. `with_clearance`: bodies and contacts. `at`: motion of the joints at times
+/// shifted by 0 and by `shift` samples.
+///
+/// # Errors
+/// [`Error::Experiment`].
+pub(super) fn along(
+    (model, with_clearance): (&RobotModel, RobotModel),
+    reference: &Reference,
+    values: &[f64],
+    at: [&[Vec<f64>; 3]; 2],
+    shift: f64,
+    settings: &SimulateSettings,
+) -> Result<Journals, Error> {
+    let rate_hz = settings.rate_hz;
+    let joints = model.joints().len();
+    let samples = at[0][0].len() / joints;
+    let settle_s = match reference {
+        Reference::Series(_) => settings.settle_s.unwrap_or(SETTLE),
+        Reference::File(..) => 0.0,
+    };
+    let instants = |shift: f64| (0..samples).map(move |s| (s as f64 + shift) / rate_hz).collect::<Vec<f64>>();
+    let (now, led) = (instants(0.0), instants(shift));
+    let start = led[0].min(0.0) - settle_s;
+    let mut times: Vec<f64> = std::iter::once(start).chain(now.clone()).chain(led.clone()).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+
+    let table = with_clearance.parameters();
+    let mut linear = table.prior();
+    for (parameter, value) in model.parameters().linear.iter().zip(values) {
+        if let Some(column) = table.column(&parameter.name) {
+            linear[column] = *value;
+        }
+    }
+    let own = table.linear.iter().zip(&linear).skip(with_clearance.mechanism().inertial_parameters());
+    let parameters = own.map(|(p, value)| (p.name.clone(), *value)).collect();
+    let motion = |time: f64, q: &mut [f64], dq: &mut [f64], ddq: &mut [f64]| {
+        for (k, [x, v, a]) in reference.at(time).into_iter().enumerate() {
+            (q[k], dq[k], ddq[k]) = (x, v, a);
+        }
+    };
+    // No element besides the contacts is in it, so no sign is smooth.
+    let plant = Plant::new(with_clearance, linear, Vec::new(), 1.0)?;
+    let record = clearance::simulate(
+        plant,
+        &ClearanceStart::default(),
+        Driving::Prescribed(&motion),
+        &times,
+        &ClearanceSettings::default(),
+    )?;
+
+    let mut others = values.to_vec();
+    others[..model.mechanism().inertial_parameters()].fill(0.0);
+    let places = |of: &[f64]| -> Vec<usize> {
+        of.iter().map(|t| times.partition_point(|known| known.total_cmp(t).is_lt())).collect()
+    };
+    let (now, led) = (places(&now), places(&led));
+    let effort = |places: &[usize], at: &[Vec<f64>; 3]| -> Vec<Vec<f64>> {
+        let mut out = efforts(model, &others, at, (samples, rate_hz));
+        for (joint, out) in out.iter_mut().enumerate() {
+            out.iter_mut().zip(places).for_each(|(e, row)| *e += record.effort[*row][joint]);
+        }
+        out
+    };
+    let (effort, led) = (effort(&now, at[0]), effort(&led, at[1]));
+    let (offsets, contacts) = channels(&record, &now);
+    Ok(Journals { effort, led, offsets, contacts, parameters, summary: summary(record, settle_s, &now) })
+}
+
+/// A channel of a log.
+type Named = (String, Vec<f64>);
+
+/// Offsets of the journals; forces and penetrations.
+fn channels(record: &ClearanceRecord, rows: &[usize]) -> (Vec<Named>, Vec<Named>) {
+    let (mut offsets, mut contacts) = (Vec::new(), Vec::new());
+    for journal in &record.journals {
+        let joint = &journal.joint;
+        let pick = |values: &[f64]| rows.iter().map(|row| values[*row]).collect::<Vec<f64>>();
+        for (axis, name) in ["x", "y"].into_iter().enumerate() {
+            let offset = rows.iter().map(|row| journal.offset[*row][axis]).collect();
+            offsets.push((format!("journal_{joint}_{name}"), offset));
+        }
+        contacts.push((format!("normal_force_{joint}"), pick(&journal.normal_force)));
+        contacts.push((format!("friction_force_{joint}"), pick(&journal.friction_force)));
+        contacts.push((format!("penetration_{joint}"), pick(&journal.penetration)));
+    }
+    (offsets, contacts)
+}
+
+fn summary(record: ClearanceRecord, settle_s: f64, rows: &[usize]) -> ClearanceSummary {
+    let counted = |joint: usize, onset: bool| {
+        let is =
+            |e: &&ContactEvent| e.joint == joint && matches!(e.kind, ContactEventKind::Onset(_)) == onset;
+        record.events.iter().filter(is).count()
+    };
+    let journals = record.journals.iter().enumerate().map(|(k, j)| JournalSummary {
+        joint: j.joint.clone(),
+        contact_share: j.contact_share,
+        onsets: counted(k, true),
+        losses: counted(k, false),
+        largest_penetration: j.largest_penetration,
+        largest_normal_force: j.largest_normal_force,
+        friction_moment_rms: rms(&rows.iter().map(|row| j.friction_moment[*row]).collect::<Vec<_>>()),
+    });
+    ClearanceSummary {
+        settle_s,
+        journals: journals.collect(),
+        energy: record.energy,
+        count: record.count,
+        swing_hz: record.swing_hz,
+        needed_rate_hz: record.needed_sample_rate(),
+        events: record.events,
+    }
+}
