@@ -31,6 +31,8 @@ pub(crate) enum Command {
     Simulate(SimulateArgs),
     /// Compare an identified model with other logs.
     Validate(ValidateArgs),
+    /// Clearances of an identified robot's joints from a log: by probes at the journals, by their swing in the effort.
+    Clearance(ClearanceArgs),
     /// Follow a stream or logs: estimates as JSON lines, alarms when something changes (exit code 1).
     Online(OnlineArgs),
     /// Published systems, every claim of their papers beside what is measured here.
@@ -464,6 +466,28 @@ pub(crate) struct ValidateArgs {
     /// Cut-off of the filter for the filtered figures, Hz (default: the kernel's).
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) filter_hz: Option<f64>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ClearanceArgs {
+    /// Robot file whose joints state a clearance; the gap is a guess.
+    pub(crate) robot: PathBuf,
+    /// estimate.json of the same robot: link parameters for the loads, friction for the residual.
+    pub(crate) estimate: PathBuf,
+    /// Log; columns journal_<joint>_x and journal_<joint>_y hold offsets of journals in axes that turn with their links, m.
+    #[arg(long, value_name = "LOG")]
+    pub(crate) log: PathBuf,
+    /// First and last data row of the log, from 1.
+    #[arg(long, value_name = "FIRST:LAST", value_parser = row_range)]
+    pub(crate) rows: Option<(usize, usize)>,
+    #[command(flatten)]
+    pub(crate) columns: LogArgs,
+    /// Configuration whose [columns] the log follows.
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) config: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,

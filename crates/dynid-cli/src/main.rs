@@ -33,6 +33,7 @@ fn main() -> ExitCode {
         Command::Design(args) => commands::design::run(&args),
         Command::Friction(args) => commands::friction::run(&args),
         Command::Simulate(args) => commands::simulate::run(&args),
+        Command::Clearance(args) => commands::clearance::run(&args),
         Command::Validate(args) => commands::validate::run(&args),
         Command::Online(args) => commands::online::run(&args),
         Command::Study(args) => commands::study::run(&args),

@@ -185,6 +185,35 @@ pub fn estimate(
     })
 }
 
+/// Clearance behind an offset of a given length under a load, `c = |e| - δ(c)`, with a stiffness known as well as
+/// `stiffness_prior` says ([`OrbitSettings::stiffness_prior`]).
+///
+/// # Errors
+/// [`OrbitError::NoClearance`], [`OrbitError::Law`].
+pub fn clearance_of_length(
+    law: &ContactLaw,
+    length: Estimate,
+    load: f64,
+    stiffness_prior: f64,
+) -> Result<Estimate, OrbitError> {
+    let mut clearance = length.value;
+    for _ in 0..50 {
+        let depth = law.with_clearance(clearance)?.static_penetration(load);
+        let next = length.value - depth;
+        if next <= 0.05 * length.value {
+            return Err(OrbitError::NoClearance { length: length.value });
+        }
+        let change = (next - clearance).abs();
+        clearance = next;
+        if change <= 1e-12 * length.value {
+            break;
+        }
+    }
+    let (_, slopes) = depth(&law.with_clearance(clearance)?, load, 0.0);
+    let unsure = stiffness_prior * slopes.by_ln;
+    Ok(Estimate { value: clearance, std: length.std.hypot(unsure) / (1.0 + slopes.by_clearance) })
+}
+
 fn prior(ln: f64, std: f64) -> f64 {
     if std > 0.0 { (ln / std).powi(2) } else { 0.0 }
 }

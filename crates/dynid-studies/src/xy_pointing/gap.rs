@@ -77,8 +77,9 @@ fn fast(
     let count = (trajectory.period() * RATE_HZ).floor() as usize;
     let times: Vec<f64> = (0..=count).map(|k| k as f64 / RATE_HZ).collect();
     let settings = ClearanceSettings { method: Method::default(), channels: Vec::new() };
-    simulate(plant, &ClearanceStart::default(), Driving::Prescribed(&motion), &times, &settings)
-        .map_err(fault)
+    let journals = from.iter().map(|[x, y, vx, vy]| ([*x, *y], [*vx, *vy])).collect();
+    let start = ClearanceStart { journals, driven: None };
+    simulate(plant, &start, Driving::Prescribed(&motion), &times, &settings).map_err(fault)
 }
 
 /// Forces of the bearings on their journals in the journals' axes and what they carry, by a model whose joints have no
@@ -222,10 +223,10 @@ fn listen(
         let slow = swing::estimate(&every(own), &every(gravity), SLOW as f64 / RATE_HZ, &settings);
         slow_limit = slow_limit.max(slow.map_or(f64::INFINITY, |s| s.shortest));
         let load = loads.force[joint].iter().map(|[x, y]| x.hypot(*y)).sum::<f64>() / n as f64;
-        let depth = |factor: f64| contacts[joint].law.static_penetration(load / factor);
-        // A stiffness that is known to 30 %.
-        let unsure = 0.5 * (depth(0.7) - depth(1.3));
-        clearance[joint] = [found.length.value - depth(1.0), found.length.std.hypot(unsure)];
+        let prior = OrbitSettings::default().stiffness_prior;
+        let own =
+            orbit::clearance_of_length(&contacts[joint].law, found.length, load, prior).map_err(fault)?;
+        clearance[joint] = [own.value, own.std];
         let base = columns.len() - JOINTS + joint;
         let tangent = fitted.x[base] / (bearing.journal_radius * load);
         // M = μ R2 |F|/√(1 + μ²).
