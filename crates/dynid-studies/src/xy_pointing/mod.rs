@@ -5,8 +5,10 @@ mod contact;
 mod data;
 mod dynamics;
 mod excitation;
+mod feasible;
 mod figures;
 mod fit;
+mod noise;
 mod parameters;
 mod pointing;
 mod rank;
@@ -15,6 +17,7 @@ mod report;
 mod search;
 mod settings;
 mod simulation;
+mod sweep;
 mod table;
 mod trajectory;
 mod tree;
@@ -23,10 +26,12 @@ use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
 use data::Data;
 use excitation::Designs;
 use fit::Fits;
+use noise::NoiseStudy;
 use pointing::Pointing;
 use search::Searches;
 use settings::Settings;
 use simulation::Solutions;
+use sweep::Sweeps;
 
 /// Name on the command line.
 pub const NAME: &str = "xy-pointing";
@@ -45,7 +50,7 @@ fn fault(error: impl std::fmt::Display) -> StudyError {
 /// # Errors
 /// [`StudyError`]: faults of the embedded data or of the rooms below.
 pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError> {
-    const STEPS: usize = 5;
+    const STEPS: usize = 6;
     let mut done = 0;
     let mut step = |what: &str| {
         progress(Progress { step: what.to_owned(), done, steps: STEPS });
@@ -75,6 +80,14 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     step("searching with both models");
     let searches = Searches::new(&pointing, &settings, &data, run)?;
     rows.extend(searches.rows());
+
+    rows.push(feasible::row(&pointing, &data, &searches, settings.data.torque_noise)?);
+
+    step("noise and other bearings");
+    let noise = NoiseStudy::new(&pointing, &data, run)?;
+    rows.push(noise.row());
+    let sweeps = Sweeps::new(&pointing, &settings, run)?;
+    rows.extend(sweeps.rows());
 
     step("designing trajectories");
     let designs = Designs::new(&pointing, &settings, run)?;

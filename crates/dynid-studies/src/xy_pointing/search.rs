@@ -8,6 +8,7 @@ use serde_json::json;
 use super::data::{Data, Knowledge};
 use super::fault;
 use super::fit::Fitted;
+use super::noise::MASS_SHARE;
 use super::parameters::{BASE, MASS_2, NAMES, PARAMETERS, Parameters};
 use super::pointing::Pointing;
 use super::settings::Settings;
@@ -221,7 +222,7 @@ impl Searches {
         let start = std::time::Instant::now();
         // As far as the searches know it: within 10 %.
         let mass = system.0[MASS_2];
-        let fit = Fitted::new(data, &torque, Knowledge::Clearance, Some([mass, 0.1 * mass]))?;
+        let fit = Fitted::new(data, &torque, Knowledge::Clearance, Some([mass, MASS_SHARE * mass]))?;
         let least_squares = Contestant {
             name: "least squares",
             median: fit.residual.iter().map(|r| r.abs()).sum::<f64>() / fit.residual.len() as f64,
