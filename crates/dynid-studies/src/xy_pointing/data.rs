@@ -139,6 +139,17 @@ impl Data {
         columns
     }
 
+    /// Torques of the paper's parameters, then friction entries.
+    pub(super) fn predicted(&self, knowledge: Knowledge, point: &[f64]) -> Vec<f64> {
+        let (parameters, friction) = point.split_at(PARAMETERS);
+        let theta = Parameters(std::array::from_fn(|k| parameters[k])).theta();
+        let mut out = vec![0.0; JOINTS * self.samples];
+        for (column, x) in self.columns(knowledge).iter().zip(theta.iter().chain(friction)) {
+            out.iter_mut().zip(column).for_each(|(out, w)| *out += x * w);
+        }
+        out
+    }
+
     /// Columns of all standard parameters of both links and of friction, with clearance.
     pub(super) fn standard_columns(&self) -> Vec<Vec<f64>> {
         self.standard.iter().cloned().chain(self.friction_columns(Knowledge::Clearance)).collect()

@@ -5,16 +5,19 @@ mod contact;
 mod data;
 mod dynamics;
 mod excitation;
+mod faster;
 mod feasible;
 mod figures;
 mod fit;
 mod noise;
 mod parameters;
+mod plots;
 mod pointing;
 mod rank;
 mod reference;
 mod report;
 mod search;
+mod sections;
 mod settings;
 mod simulation;
 mod sweep;
@@ -25,6 +28,7 @@ mod tree;
 use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
 use data::Data;
 use excitation::Designs;
+use faster::Excitations;
 use fit::Fits;
 use noise::NoiseStudy;
 use pointing::Pointing;
@@ -92,6 +96,8 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     step("designing trajectories");
     let designs = Designs::new(&pointing, &settings, run)?;
     rows.push(excitation::row(&designs));
+    let excitations = Excitations::new(&pointing, &settings, &designs, run)?;
+    rows.push(excitations.row());
     rows.sort_by_key(|r| (r.id.parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
 
     step("report");
@@ -101,6 +107,13 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
         settings: &settings,
         identifiability: &identifiability,
         designs: &designs,
+        data: &data,
+        solutions: &solutions,
+        searches: &searches,
+        fits: &fits,
+        noise: &noise,
+        excitations: &excitations,
+        sweeps: &sweeps,
     }
     .report(&record)?;
     Ok(StudyRun { record, report })

@@ -104,7 +104,7 @@ impl Sweeps {
     }
 
     /// Swing of a pendulum as long as the clearance, Hz.
-    fn pendulum(&self, variant: &Variant) -> f64 {
+    pub(super) fn pendulum(&self, variant: &Variant) -> f64 {
         (self.gravity / variant.bearing.clearance).sqrt() / std::f64::consts::TAU
     }
 
