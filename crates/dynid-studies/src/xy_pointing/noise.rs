@@ -79,7 +79,7 @@ impl NoiseStudy {
     pub(super) fn new(pointing: &Pointing, data: &Data, run: &RunSettings) -> Result<Self, StudyError> {
         let system = Parameters::of(pointing.mechanism())?;
         let truth = system.base(pointing.length());
-        let realisations = if run.quick { 40 } else { 200 };
+        let realisations = if run.quick { 40 } else { 1000 };
         let mass = Normal::new(system.0[MASS_2], MASS_SHARE * system.0[MASS_2]).map_err(fault)?;
         let mut spreads = Vec::new();
         for level in LEVELS {

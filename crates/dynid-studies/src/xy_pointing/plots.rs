@@ -153,7 +153,7 @@ pub(super) fn journals(data: &Data, landing: &Closeup, swing: &Closeup, clearanc
         at.filter(|(t, _)| range.contains(*t)).map(|(t, e)| [*t, 1e6 * e[1]]).collect::<Vec<_>>()
     };
     let mut ringing = swinging;
-    ringing.push(curve("joint 1, samples of the data", sampled(0), CurveStyle::Dots));
+    ringing.push(curve("joint 1, samples of the data", sampled(0), CurveStyle::Dashed));
     let time = data.counted(&data.record.time);
     let friction = joints(|joint| {
         curve(&joint_name(joint), over(time, data.friction[joint].iter().copied()), CurveStyle::Line)
@@ -169,7 +169,7 @@ pub(super) fn journals(data: &Data, landing: &Closeup, swing: &Closeup, clearanc
     vec![
         Chart {
             title: "Journals in their bearings".into(),
-            note: "In axes of the links, over the whole period. Both fall from the centre, land opposite to gravity's lift and swing."
+            note: "In axes of the links, X up at rest, over the whole period. Both fall from the centre, land at the bottom and swing there."
                 .into(),
             x: axis("e along X", "µm"),
             y: axis("e along Y", "µm"),
@@ -235,12 +235,8 @@ pub(super) fn sweeps(sweeps: &Sweeps) -> Vec<Chart> {
         curves,
         ..Chart::default()
     };
-    let both = |name: &str, f: &dyn Fn(&Variant) -> f64| {
-        [curve("", of(f), CurveStyle::Line), curve(name, of(f), CurveStyle::Dots)]
-    };
-    let error = |k: usize| move |v: &Variant| 100.0 * v.ideal[k];
-    let mut errors = both("π7", &error(0)).to_vec();
-    errors.extend(both("π8", &error(1)));
+    let error = |name: &str, k: usize| curve(name, of(&|v| 100.0 * v.ideal[k]), CurveStyle::Line);
+    let errors = vec![error("π7", 0), error("π8", 1)];
     let pendulum = |v: &Variant| sweeps.pendulum(v);
     vec![
         chart("Errors of the ideal model over the clearance", axis("relative error", "%"), errors),
@@ -249,7 +245,7 @@ pub(super) fn sweeps(sweeps: &Sweeps) -> Vec<Chart> {
             logarithmic("frequency", "Hz"),
             vec![
                 curve("pendulum as long as the clearance", of(&pendulum), CurveStyle::Dashed),
-                curve("simulated", of(&|v| v.swing_hz), CurveStyle::Dots),
+                curve("simulated", of(&|v| v.swing_hz), CurveStyle::Line),
             ],
         ),
     ]

@@ -2,9 +2,10 @@
 
 use dynid::report::{StudySection, StudyTable, Value};
 
+use super::data::Knowledge;
 use super::faster::Excitations;
 use super::fit::{Fits, SYMBOLS};
-use super::noise::NoiseStudy;
+use super::noise::{LEVELS, NoiseStudy};
 use super::parameters::{NAMES, PARAMETERS};
 use super::report::{Contents, table, text};
 use super::search::{Contestant, Searches};
@@ -132,18 +133,24 @@ impl Contents<'_> {
                 Value::from(ideal.half[k]),
             ]
         });
-        let spreads = noise.spreads.iter().flat_map(|s| {
-            (0..SYMBOLS.len()).filter(|_| s.level > 5e-4).map(|k| {
-                vec![
-                    text(s.knowledge.name()),
-                    text(SYMBOLS[k]),
-                    exponential(s.bias[k]),
-                    exponential(s.deviation[k]),
-                    exponential(s.stated[k]),
-                    text(&format!("{:.0} %", 100.0 * s.coverage[k])),
-                ]
-            })
+        let strongest: Vec<_> = noise.spreads.iter().filter(|s| s.level == LEVELS[1]).collect();
+        let spreads = (0..SYMBOLS.len()).map(|k| {
+            let of = strongest.iter().flat_map(|s| {
+                let share = text(&format!("{:.0} %", 100.0 * s.coverage[k]));
+                [exponential(s.bias[k]), exponential(s.deviation[k]), exponential(s.stated[k]), share]
+            });
+            std::iter::once(text(SYMBOLS[k])).chain(of).collect()
         });
+        let heads = strongest.iter().flat_map(|s| {
+            let short = match s.knowledge {
+                Knowledge::Clearance => "clearance",
+                Knowledge::Ideal => "ideal",
+                Knowledge::Coulomb => "Coulomb",
+            };
+            [&format!("{short}: bias"), "deviation", "stated", "coverage"].map(str::to_owned)
+        });
+        let heads: Vec<String> = std::iter::once(String::new()).chain(heads).collect();
+        let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
         StudySection {
             title: "Base parameters by least squares".into(),
             text: vec![
@@ -164,8 +171,8 @@ impl Contents<'_> {
                     values.collect(),
                 ),
                 table(
-                    &format!("{} realisations of 1e-3 N m of noise", noise.realisations),
-                    &["model", "", "bias", "deviation", "stated deviation", "coverage of 95 % intervals"],
+                    &format!("{} realisations of 1e-3 N m of noise: standard deviations, and coverage of 95 % intervals", noise.realisations),
+                    &heads,
                     spreads.collect(),
                 ),
             ],
