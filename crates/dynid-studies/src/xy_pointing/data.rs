@@ -60,6 +60,8 @@ pub(super) struct Data {
     pub(super) friction: [Vec<f64>; JOINTS],
     /// Columns of `θ` with the simulated offsets, and without any.
     with_clearance: Vec<Vec<f64>>,
+    /// Columns of all standard parameters of both links with the simulated offsets.
+    standard: Vec<Vec<f64>>,
     ideal: Vec<Vec<f64>>,
     system: Parameters,
     length: f64,
@@ -72,14 +74,16 @@ impl Data {
         let by_rate = |of: &[Vec<f64>], rates: usize| -> Vec<f64> {
             (0..rates).flat_map(|rate| of[first..].iter().map(move |sample| sample[rate])).collect()
         };
-        let columns = |pointing: &Pointing, rates: usize| {
-            let [q, dq, ddq] = [&record.q, &record.dq, &record.ddq].map(|of| by_rate(of, rates));
-            pointing.theta_columns(&MotionBlock::plain(samples, &q, &dq, &ddq))
-        };
+        let [q, dq, ddq] = [&record.q, &record.dq, &record.ddq].map(|of| by_rate(of, RATES));
+        let motion = MotionBlock::plain(samples, &q, &dq, &ddq);
+        let turning = JOINTS * samples;
+        let turns = MotionBlock::plain(samples, &q[..turning], &dq[..turning], &ddq[..turning]);
+        let tree = with_clearance()?;
         let friction = |joint: usize| record.journals[joint].friction_moment[first..].to_vec();
         Ok(Data {
-            with_clearance: columns(&with_clearance()?, RATES),
-            ideal: columns(ideal, JOINTS),
+            with_clearance: tree.theta_columns(&motion),
+            standard: tree.standard_columns(&motion),
+            ideal: ideal.theta_columns(&turns),
             torque: by_rate(&record.effort, JOINTS),
             friction: std::array::from_fn(friction),
             system: Parameters::of(ideal.mechanism())?,
@@ -131,6 +135,28 @@ impl Data {
             Knowledge::Clearance => self.with_clearance.clone(),
             Knowledge::Ideal | Knowledge::Coulomb => self.ideal.clone(),
         };
+        columns.extend(self.friction_columns(knowledge));
+        columns
+    }
+
+    /// Torques of the paper's parameters, then friction entries.
+    pub(super) fn predicted(&self, knowledge: Knowledge, point: &[f64]) -> Vec<f64> {
+        let (parameters, friction) = point.split_at(PARAMETERS);
+        let theta = Parameters(std::array::from_fn(|k| parameters[k])).theta();
+        let mut out = vec![0.0; JOINTS * self.samples];
+        for (column, x) in self.columns(knowledge).iter().zip(theta.iter().chain(friction)) {
+            out.iter_mut().zip(column).for_each(|(out, w)| *out += x * w);
+        }
+        out
+    }
+
+    /// Columns of all standard parameters of both links and of friction, with clearance.
+    pub(super) fn standard_columns(&self) -> Vec<Vec<f64>> {
+        self.standard.iter().cloned().chain(self.friction_columns(Knowledge::Clearance)).collect()
+    }
+
+    fn friction_columns(&self, knowledge: Knowledge) -> Vec<Vec<f64>> {
+        let mut columns = Vec::new();
         for joint in 0..knowledge.frictions() {
             let mut column = vec![0.0; JOINTS * self.samples];
             let own = &mut column[joint * self.samples..][..self.samples];

@@ -95,29 +95,33 @@ impl Designs {
         let problem = problem(pointing, settings, settings.base_frequency, raw.clone())?;
         Ok(Designs {
             printed: conditions(&problem, &settings.trajectory, settings.samples),
-            unit_norm: designed(pointing, settings, run, unit_norm)?,
-            raw: designed(pointing, settings, run, raw)?,
+            unit_norm: designed(pointing, settings, run, settings.base_frequency, unit_norm)?,
+            raw: designed(pointing, settings, run, settings.base_frequency, raw)?,
         })
     }
 }
 
-fn designed(
+/// From Table 1 at its own frequency, at others from random trajectories.
+pub(super) fn designed(
     pointing: &Pointing,
     settings: &Settings,
     run: &RunSettings,
+    base_frequency: f64,
     criterion: Criterion,
 ) -> Result<Option<Designed>, StudyError> {
-    let problem = problem(pointing, settings, settings.base_frequency, criterion)?;
+    let problem = problem(pointing, settings, base_frequency, criterion)?;
     let from_print = SearchSettings {
         starts: 1,
         seed: run.seed,
         from: Some(settings.trajectory.clone()),
         ..SearchSettings::default()
     };
-    let Outcome::Found(found) = design(&problem, &from_print, Vec::new(), &mut |_| {})? else {
+    let at_random =
+        SearchSettings { starts: if run.quick { 2 } else { 8 }, from: None, ..from_print.clone() };
+    let first = if base_frequency == settings.base_frequency { &from_print } else { &at_random };
+    let Outcome::Found(found) = design(&problem, first, Vec::new(), &mut |_| {})? else {
         return Ok(None);
     };
-    let at_random = SearchSettings { starts: if run.quick { 2 } else { 8 }, from: None, ..from_print };
     let random = match design(&problem, &at_random, Vec::new(), &mut |_| {})? {
         Outcome::Found(random) => conditions_of_starts(&random),
         Outcome::Infeasible(_) => Vec::new(),
@@ -126,7 +130,7 @@ fn designed(
     Ok(Some(Designed {
         conditions: conditions(&problem, &rows, settings.samples),
         broken: limit_points(&problem, &rows, FINE, 0.0).len(),
-        start: at_start(settings.base_frequency, &rows)?,
+        start: at_start(base_frequency, &rows)?,
         travel: travel(settings, &rows)?,
         random,
         rows,

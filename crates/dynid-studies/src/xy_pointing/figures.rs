@@ -4,18 +4,21 @@ use dynid::model::Limits;
 use dynid::report::{Chart, ChartAxis, ChartCurve, CurveStyle};
 
 use super::pointing::{JOINTS, Pointing};
-use super::rank::Identifiability;
 use super::settings::Settings;
 use super::trajectory::Motion;
 use crate::StudyError;
 
 const SAMPLES: usize = 600;
 
-fn axis(label: &str, unit: &str) -> ChartAxis {
+pub(super) fn axis(label: &str, unit: &str) -> ChartAxis {
     ChartAxis { label: label.into(), unit: unit.into(), logarithmic: false }
 }
 
-fn curve(name: &str, points: Vec<[f64; 2]>, style: CurveStyle) -> ChartCurve {
+pub(super) fn logarithmic(label: &str, unit: &str) -> ChartAxis {
+    ChartAxis { logarithmic: true, ..axis(label, unit) }
+}
+
+pub(super) fn curve(name: &str, points: Vec<[f64; 2]>, style: CurveStyle) -> ChartCurve {
     ChartCurve { name: name.into(), points, style }
 }
 
@@ -70,21 +73,5 @@ fn range(limits: &Limits, acceleration: f64, derivative: usize) -> Option<(f64, 
         0 => limits.position,
         1 => limits.velocity.map(both),
         _ => Some(both(acceleration)),
-    }
-}
-
-/// Singular values of the Jacobian with columns of unit length.
-pub(super) fn singular_values(found: &Identifiability) -> Chart {
-    let points = |values: &[f64]| values.iter().enumerate().map(|(k, s)| [(k + 1) as f64, *s]).collect();
-    Chart {
-        title: "Singular values of the 11 parameters, ideal joints".into(),
-        note: "Columns of unit length. What lies below the eighth is rounding.".into(),
-        x: axis("number", ""),
-        y: ChartAxis { logarithmic: true, ..axis("singular value", "") },
-        curves: vec![
-            curve("Table 1", points(&found.trajectory.singular_values), CurveStyle::Dots),
-            curve("random motion", points(&found.random.singular_values), CurveStyle::Dots),
-        ],
-        ..Chart::default()
     }
 }

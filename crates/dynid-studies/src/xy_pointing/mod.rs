@@ -5,17 +5,23 @@ mod contact;
 mod data;
 mod dynamics;
 mod excitation;
+mod faster;
+mod feasible;
 mod figures;
 mod fit;
 mod gap;
+mod noise;
 mod parameters;
+mod plots;
 mod pointing;
 mod rank;
 mod reference;
 mod report;
 mod search;
+mod sections;
 mod settings;
 mod simulation;
+mod sweep;
 mod table;
 mod trajectory;
 mod tree;
@@ -23,12 +29,15 @@ mod tree;
 use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
 use data::Data;
 use excitation::Designs;
+use faster::Excitations;
 use fit::Fits;
 use gap::Gaps;
+use noise::NoiseStudy;
 use pointing::Pointing;
 use search::Searches;
 use settings::Settings;
 use simulation::Solutions;
+use sweep::Sweeps;
 
 /// Name on the command line.
 pub const NAME: &str = "xy-pointing";
@@ -47,7 +56,7 @@ fn fault(error: impl std::fmt::Display) -> StudyError {
 /// # Errors
 /// [`StudyError`]: faults of the embedded data or of the rooms below.
 pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError> {
-    const STEPS: usize = 6;
+    const STEPS: usize = 7;
     let mut done = 0;
     let mut step = |what: &str| {
         progress(Progress { step: what.to_owned(), done, steps: STEPS });
@@ -82,9 +91,19 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     let searches = Searches::new(&pointing, &settings, &data, run)?;
     rows.extend(searches.rows());
 
+    rows.push(feasible::row(&pointing, &data, &searches, settings.data.torque_noise)?);
+
+    step("noise and other bearings");
+    let noise = NoiseStudy::new(&pointing, &data, run)?;
+    rows.push(noise.row());
+    let sweeps = Sweeps::new(&pointing, &settings, run)?;
+    rows.extend(sweeps.rows());
+
     step("designing trajectories");
     let designs = Designs::new(&pointing, &settings, run)?;
     rows.push(excitation::row(&designs));
+    let excitations = Excitations::new(&pointing, &settings, &designs, run)?;
+    rows.push(excitations.row());
     rows.sort_by_key(|r| (r.id.parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
 
     step("report");
@@ -94,6 +113,13 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
         settings: &settings,
         identifiability: &identifiability,
         designs: &designs,
+        data: &data,
+        solutions: &solutions,
+        searches: &searches,
+        fits: &fits,
+        noise: &noise,
+        excitations: &excitations,
+        sweeps: &sweeps,
     }
     .report(&record)?;
     Ok(StudyRun { record, report })

@@ -87,6 +87,17 @@ impl Pointing {
 
     /// Columns of `θ` in the torques of both joints: of joint 1 at all samples, then of joint 2.
     pub(super) fn theta_columns(&self, motion: &MotionBlock<'_>) -> Vec<Vec<f64>> {
+        self.columns(motion, &THETA)
+    }
+
+    /// Likewise of all standard parameters of both links.
+    pub(super) fn standard_columns(&self, motion: &MotionBlock<'_>) -> Vec<Vec<f64>> {
+        let each: [[usize; 1]; STANDARD] = std::array::from_fn(|k| [k]);
+        self.columns(motion, &each.each_ref().map(|k| &k[..]))
+    }
+
+    /// Sums of columns of standard parameters.
+    fn columns(&self, motion: &MotionBlock<'_>, sums: &[&[usize]]) -> Vec<Vec<f64>> {
         let mut rows = RegressorBlock::new(self.model.layout().clone(), motion.samples);
         self.model.regressor(motion, &[], &mut rows);
         let column = |standard: &&[usize]| {
@@ -95,7 +106,7 @@ impl Pointing {
             let linear = self.linear(&links);
             self.links.iter().flat_map(|rate| rows.effort(*rate, &linear)).collect()
         };
-        THETA.iter().map(column).collect()
+        sums.iter().map(column).collect()
     }
 
     /// Triangle of the Jacobian of the torques with respect to the paper's parameters.

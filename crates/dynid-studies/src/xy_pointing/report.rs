@@ -2,10 +2,18 @@
 
 use dynid::report::{Fact, Provenance, StudyReport, StudySection, StudyTable, Value};
 
+use super::data::Data;
 use super::excitation::{Designed, Designs};
+use super::faster::Excitations;
+use super::fit::Fits;
+use super::noise::NoiseStudy;
+use super::parameters::PARAMETERS;
 use super::pointing::Pointing;
 use super::rank::{Identifiability, unidentifiable};
+use super::search::Searches;
 use super::settings::Settings;
+use super::simulation::Solutions;
+use super::sweep::Sweeps;
 use super::trajectory::travel;
 use super::{TITLE, figures, table as table3};
 use crate::{StudyError, StudyRecord};
@@ -16,13 +24,20 @@ pub(super) struct Contents<'a> {
     pub(super) settings: &'a Settings,
     pub(super) identifiability: &'a Identifiability,
     pub(super) designs: &'a Designs,
+    pub(super) data: &'a Data,
+    pub(super) solutions: &'a Solutions,
+    pub(super) searches: &'a Searches,
+    pub(super) fits: &'a Fits,
+    pub(super) noise: &'a NoiseStudy,
+    pub(super) excitations: &'a Excitations,
+    pub(super) sweeps: &'a Sweeps,
 }
 
-fn text(words: &str) -> Value {
+pub(super) fn text(words: &str) -> Value {
     Value::from(words)
 }
 
-fn table(caption: &str, head: &[&str], rows: Vec<Vec<Value>>) -> StudyTable {
+pub(super) fn table(caption: &str, head: &[&str], rows: Vec<Vec<Value>>) -> StudyTable {
     StudyTable { caption: caption.into(), head: head.iter().map(|h| (*h).to_owned()).collect(), rows }
 }
 
@@ -42,7 +57,15 @@ impl Contents<'_> {
                     .into(),
             ],
             rows: record.report_rows(),
-            sections: vec![self.trajectory_section()?, self.identifiability_section()?, self.table_section()],
+            sections: vec![
+                self.simulation_section()?,
+                self.search_section(),
+                self.table_section(),
+                self.base_section(self.fits, self.noise),
+                self.beyond_section(self.excitations, self.sweeps),
+                self.identifiability_section()?,
+                self.trajectory_section()?,
+            ],
             provenance: Provenance {
                 version: dynid::VERSION.into(),
                 seed: Some(record.seed),
@@ -102,6 +125,11 @@ impl Contents<'_> {
             let acts = if entry.acts { "yes" } else { "no" };
             vec![text(&entry.expression), Value::from(entry.value), text(acts)]
         });
+        let values = [&found.trajectory, &found.random].map(|report| &report.singular_values);
+        let singular = (0..PARAMETERS).map(|k| {
+            let cell = |of: &Vec<f64>| text(&of.get(k).map_or_else(String::new, |s| format!("{s:.1e}")));
+            vec![text(&(k + 1).to_string()), cell(values[0]), cell(values[1])]
+        });
         Ok(StudySection {
             title: "What ideal joints show".into(),
             text: vec![
@@ -114,12 +142,18 @@ impl Contents<'_> {
                  on the axes X. Inertias are about joint frames here."
                     .into(),
             ],
-            tables: vec![table(
-                "Base parameters",
-                &["combination", "value of the system", "among the paper's 8"],
-                rows.collect(),
-            )],
-            charts: vec![figures::singular_values(found)],
+            tables: vec![
+                table(
+                    "Base parameters",
+                    &["combination", "value of the system", "among the paper's 8"],
+                    rows.collect(),
+                ),
+                table(
+                    "Singular values of the 11 parameters, columns of unit length",
+                    &["number", "Table 1", "random motion"],
+                    singular.collect(),
+                ),
+            ],
             ..StudySection::default()
         })
     }

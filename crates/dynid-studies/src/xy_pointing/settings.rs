@@ -13,6 +13,8 @@ const FILE: &str = "xy_pointing/settings.toml";
 pub(super) struct Settings {
     /// rad/s.
     pub(super) base_frequency: f64,
+    /// Of a trajectory of our own, rad/s.
+    pub(super) faster_frequency: f64,
     /// rad/s².
     pub(super) acceleration: [f64; JOINTS],
     pub(super) samples: usize,

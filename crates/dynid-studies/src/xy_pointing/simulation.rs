@@ -46,25 +46,43 @@ pub(super) fn along(
     simulate(bearing.plant()?, &start, Driving::Prescribed(&motion), times, &settings).map_err(fault)
 }
 
-/// A period of a trajectory at the rate of the data.
-pub(super) fn period(
+/// A trajectory at the rate of the data for as long as a period of the paper's.
+pub(super) fn recorded(
     settings: &Settings,
     bearing: &Bearing,
     rows: &[Vec<f64>],
     base_frequency: f64,
-    method: Method,
 ) -> Result<ClearanceRecord, StudyError> {
-    let trajectory = trajectory(base_frequency, rows)?;
-    let step = std::f64::consts::TAU / settings.base_frequency / settings.data.samples as f64;
-    let samples = (trajectory.period() / step).round() as usize;
-    let times: Vec<f64> = (0..=samples).map(|k| trajectory.period() * k as f64 / samples as f64).collect();
-    along(bearing, &trajectory, &times, method)
+    let samples = settings.data.samples;
+    let span = std::f64::consts::TAU / settings.base_frequency;
+    let times: Vec<f64> = (0..=samples).map(|k| span * k as f64 / samples as f64).collect();
+    let method = collocation(TOLERANCE, f64::INFINITY);
+    along(bearing, &trajectory(base_frequency, rows)?, &times, method)
 }
 
-/// The paper's trajectory at the study's tolerance.
+/// A period of the paper's trajectory.
 pub(super) fn published(settings: &Settings, bearing: &Bearing) -> Result<ClearanceRecord, StudyError> {
-    let method = collocation(TOLERANCE, f64::INFINITY);
-    period(settings, bearing, &settings.trajectory, settings.base_frequency, method)
+    recorded(settings, bearing, &settings.trajectory, settings.base_frequency)
+}
+
+/// A short span, finely sampled at its end.
+#[derive(Debug)]
+pub(super) struct Closeup {
+    pub(super) record: ClearanceRecord,
+    /// Samples of the span.
+    pub(super) samples: usize,
+}
+
+impl Closeup {
+    /// From start to end, s.
+    pub(super) fn new(settings: &Settings, [from, to]: [f64; 2]) -> Result<Self, StudyError> {
+        const SAMPLES: usize = 800;
+        let fine = (0..SAMPLES).map(|k| from + (to - from) * k as f64 / (SAMPLES - 1) as f64);
+        let times: Vec<f64> = std::iter::once(0.0).filter(|_| from > 0.0).chain(fine).collect();
+        let trajectory = trajectory(settings.base_frequency, &settings.trajectory)?;
+        let method = collocation(TOLERANCE, f64::INFINITY);
+        Ok(Closeup { record: along(&settings.bearing, &trajectory, &times, method)?, samples: SAMPLES })
+    }
 }
 
 /// RMS over time of differences of torques, the largest of both joints, N m.
