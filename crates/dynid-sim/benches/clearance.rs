@@ -70,7 +70,7 @@ fn main() {
             c.jacobians,
             c.passages,
             record.events.len(),
-            record.energy.relative_error(),
+            record.energy.relative_error().unwrap_or(f64::NAN),
         );
     }
 }

@@ -146,8 +146,11 @@ pub(crate) enum Attempt {
 pub(crate) struct Collocation {
     method: Coefficients,
     n: usize,
-    /// Tolerance of the error estimate.
+    tolerance: f64,
+    /// Tolerance of the error estimate where the solution is smooth.
     estimate: f64,
+    /// The solution is not smooth at the start of the step.
+    rough: bool,
     /// Largest change of the last Newton iteration.
     converged: f64,
     /// Accelerations of the stages of the last attempt, stage after stage.
@@ -175,7 +178,9 @@ impl Collocation {
         Collocation {
             method: Coefficients::new(),
             n,
+            tolerance,
             estimate,
+            rough: false,
             // Fine enough for instants to be located to, however coarse the steps.
             converged: (0.03 * tolerance).clamp(1e-14, 1e-9),
             stages: vec![0.0; n * STAGES],
@@ -201,6 +206,11 @@ impl Collocation {
     /// Accelerations asked for, Jacobians asked for.
     pub(crate) fn counts(&self) -> (usize, usize) {
         (self.evaluations, self.jacobians)
+    }
+
+    /// Says whether the solution is as good as singular at the start of the next steps, so that no order is to be hoped for.
+    pub(crate) fn set_rough(&mut self, rough: bool) {
+        self.rough = rough;
     }
 
     /// Forgets the last step: the equations have changed.
@@ -380,10 +390,11 @@ impl Collocation {
         add_product(&mut rates, g, &self.by_x, &by_x);
         self.filter.solve(&mut rates);
         let (of_x, of_v) = system.scales();
+        let tolerance = if self.rough { self.tolerance } else { self.estimate };
         let mut worst = 0.0_f64;
         for k in 0..n {
             let position = (by_x[k] + g * rates[k]).abs() / of_x[k];
-            let size = position.max(rates[k].abs() / of_v[k]) / self.estimate;
+            let size = position.max(rates[k].abs() / of_v[k]) / tolerance;
             worst = if size.is_nan() { f64::INFINITY } else { worst.max(size) };
         }
         worst

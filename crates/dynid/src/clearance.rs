@@ -5,8 +5,8 @@ use std::path::Path;
 use dynid_estimate::clearance::orbit::{self, OrbitSample, OrbitSettings};
 use dynid_estimate::clearance::swing::{self, SwingSettings};
 use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, States};
-use dynid_io::csv::ReadOptions;
 use dynid_io::columns::ChannelSpec;
+use dynid_io::csv::ReadOptions;
 use dynid_io::{ClearanceSpec, MappingSpec};
 use dynid_model::{EffortModel, JournalPath, MotionBlock, RobotModel};
 use serde::Serialize;
@@ -70,8 +70,6 @@ pub struct SwingClearance {
     pub offset: Valued,
     /// Radial clearance by the law's penetration, m; `None` unless found.
     pub gap: Option<Valued>,
-    /// Shortest offset whose swing the log's rate can show, m.
-    pub shortest_offset: f64,
 }
 
 /// The clearance of one joint.
@@ -85,7 +83,7 @@ pub struct JointClearance {
     pub load: f64,
     /// With probes.
     pub probed: Option<ProbedClearance>,
-    /// From the effort.
+    /// From the effort; `None` where the log is too slow for the stated clearance, since a line could be an alias.
     pub swing: Option<SwingClearance>,
     /// Coulomb friction of the fit over load and journal radius: a friction coefficient, if all of that friction is the
     /// bearing's.
@@ -247,7 +245,7 @@ impl Record<'_> {
                     .zip(&force)
                     .map(|(s, load)| {
                         let speed = self.states.dq[output * n + s] * contact.journal_radius;
-                        let sliding = contact.friction.direction(speed).0;
+                        let sliding = orbit::sliding_of(&contact.friction, speed);
                         OrbitSample { offset: [x[s], y[s]], load: *load, sliding }
                     })
                     .collect();
@@ -308,6 +306,16 @@ impl Record<'_> {
                     return Ok(None);
                 }
             };
+        if found.shortest > spec.gap() {
+            // A line may be the alias of a swing that is too fast.
+            remarks.push(format!(
+                "swing in the effort: {:.0} Hz are too slow for the stated gap, at least {:.0} Hz are needed",
+                self.log.rate_hz,
+                // As the root of the offset's length.
+                (self.log.rate_hz * (found.shortest / spec.gap()).sqrt()).ceil()
+            ));
+            return Ok(None);
+        }
         let prior = OrbitSettings::default().stiffness_prior;
         let gap = match found.found {
             true => match orbit::clearance_of_length(&spec.law, found.length, load, prior) {
@@ -319,22 +327,12 @@ impl Record<'_> {
             },
             false => None,
         };
-        if found.shortest > spec.gap() {
-            remarks.push(format!(
-                "at {:.0} Hz the effort shows swings of offsets beyond {:.1} µm alone: {:.0} Hz show that of the stated gap",
-                self.log.rate_hz,
-                1e6 * found.shortest,
-                // As the root of the offset's length.
-                (self.log.rate_hz * (found.shortest / spec.gap()).sqrt()).ceil()
-            ));
-        }
         Ok(Some(SwingClearance {
             found: found.found,
             frequency_hz: found.frequency_hz,
             amplitude: found.amplitude,
             offset: found.length.into(),
             gap,
-            shortest_offset: found.shortest,
         }))
     }
 }

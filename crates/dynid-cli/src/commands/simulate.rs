@@ -136,13 +136,13 @@ fn in_words(c: &ClearanceSummary) -> Vec<String> {
     let e = &c.energy;
     let energy = format!(
         "energy of bodies and contacts, J: drives {:.4e}, gained by bodies {:.4e} and contacts {:.1e}, lost to damping {:.1e} and \
-         bearing friction {:.4e}, unbalanced {:.1e} of what was exchanged",
+         bearing friction {:.4e}, unbalanced {} of what was exchanged",
         e.drives,
         e.bodies,
         e.contacts,
         e.damping,
         e.friction,
-        e.relative_error()
+        e.relative_error().map_or_else(|| "nothing".to_owned(), |x| format!("{x:.1e}"))
     );
     c.journals.iter().map(journal).chain([energy]).collect()
 }

@@ -13,7 +13,7 @@
 //! the stiffness, of which the offset tells only as far as the load changes: `κ`, the factor of the law's force, has a
 //! prior. The estimate minimises `Σ |e - e(c, μ, ln κ)|²/σ² + (ln κ/s)²` by damped Gauss-Newton steps.
 
-use dynid_model::contact::{ContactError, ContactLaw};
+use dynid_model::contact::{ContactError, ContactLaw, SlidingFriction};
 use faer::Mat;
 
 use super::Estimate;
@@ -99,6 +99,16 @@ pub struct OrbitEstimate {
 const MOST_ITERATIONS: usize = 50;
 /// Samples below this direction of friction are on the way between sticking and sliding.
 const LEAST_SLIDING: f64 = 0.5;
+
+/// How much faster than `v_m` a joint has to turn its journal's surface for the swing of the journal not to matter.
+const CLEAR_OF_SWING: f64 = 5.0;
+
+/// Direction of friction where the rotation of a joint alone gives the surface of its journal a speed (m/s): that of the law
+/// from `5 v_m` on, 0 below. Slower surfaces may stop when the journal swings, and count as less friction than there is:
+/// 2 % for a published pointing mechanism, nine standard deviations.
+pub fn sliding_of(friction: &SlidingFriction, speed: f64) -> f64 {
+    if speed.abs() < CLEAR_OF_SWING * friction.v_m { 0.0 } else { friction.direction(speed).0 }
+}
 
 /// Unknowns: clearance, friction, `ln κ`.
 type Unknowns = [f64; 3];

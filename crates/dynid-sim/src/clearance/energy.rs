@@ -27,9 +27,10 @@ impl ClearanceEnergy {
         self.drives - self.bodies - self.contacts - self.damping - self.friction - self.elements
     }
 
-    /// The same as a share of all that was exchanged.
-    pub fn relative_error(&self) -> f64 {
-        self.unbalanced().abs() / (self.exchanged + self.damping + self.friction).max(f64::MIN_POSITIVE)
+    /// The same as a share of all that was exchanged; `None` where nothing was.
+    pub fn relative_error(&self) -> Option<f64> {
+        let exchanged = self.exchanged + self.damping.abs() + self.friction + self.bodies.abs();
+        (exchanged > 0.0).then(|| self.unbalanced().abs() / exchanged)
     }
 }
 

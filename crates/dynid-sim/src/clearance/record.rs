@@ -86,7 +86,7 @@ pub struct ClearanceRecord {
     pub events: Vec<ContactEvent>,
     /// Work.
     pub count: RunCount,
-    /// Where the energy went.
+    /// Where the energy went; all zero by [`Method::RungeKutta4`](super::Method::RungeKutta4), which does not ask.
     pub energy: ClearanceEnergy,
     /// Fastest swing of a journal in its bearing at the end, Hz: a pendulum as long as its offset. 0 where all contacts are
     /// open.

@@ -14,6 +14,8 @@ use crate::plant::Plant;
 const MOST_STEPS: usize = 2_000_000;
 /// First step, and first step after a contact begins or ends, s.
 const FIRST_STEP: f64 = 1e-6;
+/// Steps are taken for rough as long as they are no shorter than this part of the time since a contact began or ended.
+const ROUGH_STEPS: f64 = 8.0;
 /// Passages without progress before a simulation gives up.
 const MOST_PASSAGES: usize = 64;
 /// Instants of a step at which branches are looked at.
@@ -118,6 +120,8 @@ struct Run<'p, 'd> {
     record: ClearanceRecord,
     evaluations: usize,
     closed_time: Vec<f64>,
+    /// When a contact last began or ended, s.
+    last_event: f64,
 }
 
 /// Past which level, and in which direction, a contact has left its branch.
@@ -211,6 +215,7 @@ impl<'p, 'd> Run<'p, 'd> {
             record,
             evaluations: 0,
             closed_time,
+            last_event: f64::NEG_INFINITY,
             system,
         })
     }
@@ -318,6 +323,8 @@ impl<'p, 'd> Run<'p, 'd> {
         let mut located: Option<Passage> = None;
         let mut passed = false;
         for _ in 0..MOST_PASSAGES {
+            // Forces grow from nothing as no polynomial does.
+            self.collocation.set_rough(self.t - self.last_event < ROUGH_STEPS * h);
             let start = (&self.x[..], &self.v[..], &self.a[..]);
             let error = match self.collocation.attempt(&mut self.system, (self.t, h), start) {
                 Attempt::Solved(error) => error,
@@ -527,6 +534,7 @@ impl<'p, 'd> Run<'p, 'd> {
     }
 
     fn event(&mut self, joint: usize, kind: ContactEventKind) {
+        self.last_event = self.t;
         self.record.events.push(ContactEvent { time: self.t, joint, kind });
     }
 

@@ -83,7 +83,7 @@ fn two_seconds_balance_their_energy_at_a_tenth_of_the_classical_effort() {
         assert!(change < 1e-5, "{change}");
     }
     assert_eq!(record.events.len(), 2);
-    assert!(record.energy.relative_error() < 1e-8, "{:?}", record.energy);
+    assert!(record.energy.relative_error().unwrap() < 1e-8, "{:?}", record.energy);
     assert!(record.energy.friction > 0.0 && record.energy.damping > 0.0);
     // sqrt(g/|e|) of both journals.
     assert!((record.swing_hz - 68.5).abs() < 1.5, "{}", record.swing_hz);
@@ -168,7 +168,7 @@ fn bouncing_journals_return_with_the_restitution_of_their_law() {
         );
         let back = -record.journals[0].offset_rate[10][0] / 0.1;
         assert!((back - expected).abs() < 1e-4, "{back} {expected}");
-        assert!(record.energy.relative_error() < 1e-7, "{:?}", record.energy);
+        assert!(record.energy.relative_error().unwrap() < 1e-7, "{:?}", record.energy);
     }
 }
 
@@ -192,7 +192,7 @@ fn elastic_impacts_have_their_closed_forms() {
     let speed = 0.1 * (-decay * t).exp() * ((w * t).cos() - decay / w * (w * t).sin());
     let found = record.journals[0].offset_rate[10][0];
     assert!((found / speed - 1.0).abs() < 1e-6, "{found} {speed}");
-    assert!(record.energy.relative_error() < 1e-7, "{:?}", record.energy);
+    assert!(record.energy.relative_error().unwrap() < 1e-7, "{:?}", record.energy);
 }
 
 #[test]
@@ -238,7 +238,7 @@ fn driven_joints_keep_the_energy_that_their_controller_gives() {
     let driving = Driving::Controlled { period: 1e-3, controller: &mut controller };
     let record = simulate(pointing::plant(), &start, driving, &times, &settings(Method::default())).unwrap();
     assert!((500..=502).contains(&work_seen), "{work_seen}");
-    assert!(record.energy.relative_error() < 1e-6, "{:?}", record.energy);
+    assert!(record.energy.relative_error().unwrap() < 1e-6, "{:?}", record.energy);
     let (mut want, mut rate, mut acceleration) = ([0.0; 2], [0.0; 2], [0.0; 2]);
     pointing::excitation(0.5, &mut want, &mut rate, &mut acceleration);
     for k in 0..2 {

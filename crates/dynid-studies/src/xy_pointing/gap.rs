@@ -178,7 +178,11 @@ fn probe(
                     let mut noise = || -> f64 { StandardNormal.sample(random) };
                     let offset = offsets[s].map(|e| e + PROBE_NOISE * noise());
                     let speed = data.counted(&data.record.dq)[s][joint] * bearing.journal_radius;
-                    OrbitSample { offset, load: loads.force[joint][s], sliding: sliding.direction(speed).0 }
+                    OrbitSample {
+                        offset,
+                        load: loads.force[joint][s],
+                        sliding: orbit::sliding_of(&sliding, speed),
+                    }
                 })
                 .collect();
             orbit::estimate(&samples, &contacts[joint].law, &OrbitSettings::default()).map_err(fault)

@@ -266,12 +266,13 @@ pub(super) fn cost_rows(data: &Data, solutions: &Solutions) -> [Row; 2] {
         factor >= 5.0,
     );
     let energy = &data.record.energy;
+    let relative = energy.relative_error().unwrap_or(f64::INFINITY);
     let audit = Row::new(
         "b",
         "The energy of the period balances: work of the drives, gain of bodies and contacts, losses by damping and friction",
         "1e-5 of what was exchanged",
         json!({
-            "relative": energy.relative_error(),
+            "relative": relative,
             "drives": energy.drives,
             "bodies": energy.bodies,
             "contacts": energy.contacts,
@@ -280,14 +281,9 @@ pub(super) fn cost_rows(data: &Data, solutions: &Solutions) -> [Row; 2] {
         }),
         format!(
             "{:.1e}: drives {:.4e} J, bodies {:.2e}, contacts {:.2e}, damping {:.2e}, friction {:.4e}",
-            energy.relative_error(),
-            energy.drives,
-            energy.bodies,
-            energy.contacts,
-            energy.damping,
-            energy.friction,
+            relative, energy.drives, energy.bodies, energy.contacts, energy.damping, energy.friction,
         ),
-        energy.relative_error() <= 1e-5,
+        relative <= 1e-5,
     );
     [cost, audit]
 }
