@@ -18,7 +18,6 @@ pub(super) const SYMBOLS: [&str; BASE] = ["π1", "π2", "π3", "π4", "π5", "π
 /// A fit of base parameters and friction.
 #[derive(Debug)]
 pub(super) struct Fitted {
-    pub(super) knowledge: Knowledge,
     /// Base parameters, friction entries, with clearance also mass 2.
     pub(super) x: Vec<f64>,
     /// Half widths of their intervals.
@@ -58,7 +57,7 @@ impl Fitted {
         for (column, x) in columns.iter().zip(&solution.x) {
             residual.iter_mut().zip(column).for_each(|(r, w)| *r -= x * w);
         }
-        Ok(Fitted { knowledge, x: solution.x, half, residual })
+        Ok(Fitted { x: solution.x, half, residual })
     }
 
     /// RMS of the residual of both joints, N m.

@@ -169,7 +169,7 @@ pub(super) fn journals(data: &Data, landing: &Closeup, swing: &Closeup, clearanc
     vec![
         Chart {
             title: "Journals in their bearings".into(),
-            note: "In axes of the links, X up at rest, over the whole period. Both fall from the centre, land at the bottom and swing there."
+            note: "In axes of the links, X up at angle zero, over the whole period. Both fall from the centre, land at the bottom and swing there."
                 .into(),
             x: axis("e along X", "µm"),
             y: axis("e along Y", "µm"),

@@ -160,7 +160,6 @@ pub(super) struct Contestant {
     pub(super) median: f64,
     /// Median over seeds of the largest relative error of π1, π7 and π8.
     pub(super) base_error: f64,
-    pub(super) seconds: f64,
 }
 
 /// All searches.
@@ -176,7 +175,7 @@ pub(super) struct Searches {
     pub(super) torque: Vec<f64>,
     /// Best first.
     pub(super) contest: Vec<Contestant>,
-    /// Objective, base error and time of least squares on the same torque.
+    /// Objective and base error of least squares on the same torque.
     pub(super) least_squares: Contestant,
 }
 
@@ -213,18 +212,11 @@ impl Searches {
         let mut contest = Vec::new();
         for name in Algorithm::NAMES {
             let algorithm: Algorithm = name.parse().map_err(fault)?;
-            let start = std::time::Instant::now();
             let found = Searched::new(data, &torque, &system, Knowledge::Clearance, &algorithm, fewer)?;
             let errors = found.parameters().map(|p| base_error(&p.base(length), &truth)).collect();
-            contest.push(Contestant {
-                name,
-                median: median(found.values()),
-                base_error: median(errors),
-                seconds: start.elapsed().as_secs_f64() / fewer.len() as f64,
-            });
+            contest.push(Contestant { name, median: median(found.values()), base_error: median(errors) });
         }
         contest.sort_by(|a, b| a.median.total_cmp(&b.median));
-        let start = std::time::Instant::now();
         // As far as the searches know it: within 10 %.
         let mass = system.0[MASS_2];
         let fit = Fitted::new(data, &torque, Knowledge::Clearance, Some([mass, MASS_SHARE * mass]))?;
@@ -232,7 +224,6 @@ impl Searches {
             name: "least squares",
             median: fit.residual.iter().map(|r| r.abs()).sum::<f64>() / fit.residual.len() as f64,
             base_error: base_error(&fit.x, &truth),
-            seconds: start.elapsed().as_secs_f64(),
         };
         Ok(Searches { system, length, clean, noisy, further, torque, contest, least_squares })
     }

@@ -136,18 +136,19 @@ impl Contents<'_> {
         let strongest: Vec<_> = noise.spreads.iter().filter(|s| s.level == LEVELS[1]).collect();
         let spreads = (0..SYMBOLS.len()).map(|k| {
             let of = strongest.iter().flat_map(|s| {
+                let first = if s.knowledge == Knowledge::Clearance { s.deviation[k] } else { s.bias[k] };
                 let share = text(&format!("{:.0} %", 100.0 * s.coverage[k]));
-                [exponential(s.bias[k]), exponential(s.deviation[k]), exponential(s.stated[k]), share]
+                [exponential(first), exponential(s.stated[k]), share]
             });
             std::iter::once(text(SYMBOLS[k])).chain(of).collect()
         });
         let heads = strongest.iter().flat_map(|s| {
-            let short = match s.knowledge {
-                Knowledge::Clearance => "clearance",
-                Knowledge::Ideal => "ideal",
-                Knowledge::Coulomb => "Coulomb",
+            let first = match s.knowledge {
+                Knowledge::Clearance => "clearance: deviation",
+                Knowledge::Ideal => "ideal: bias",
+                Knowledge::Coulomb => "Coulomb friction: bias",
             };
-            [&format!("{short}: bias"), "deviation", "stated", "coverage"].map(str::to_owned)
+            [first, "stated deviation", "coverage"].map(str::to_owned)
         });
         let heads: Vec<String> = std::iter::once(String::new()).chain(heads).collect();
         let heads: Vec<&str> = heads.iter().map(String::as_str).collect();

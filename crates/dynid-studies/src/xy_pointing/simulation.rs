@@ -168,7 +168,7 @@ pub(super) fn row(settings: &Settings, data: &Data, solutions: &Solutions) -> Re
     let start = along(&settings.bearing, &trajectory, &[0.0, 0.5], collocation(TOLERANCE, f64::INFINITY))?;
     let [mut instant, mut share, mut depth, mut period] = [0.0_f64, 1.0, 0.0, 0.0];
     let record = &data.record;
-    let mut ringing = [0.0; JOINTS];
+    let ringing: [f64; JOINTS] = std::array::from_fn(|joint| rms(data.ringing(joint)));
     for joint in 0..JOINTS {
         let (early, journal) = (&start.journals[joint], &record.journals[joint]);
         for k in 0..2 {
@@ -181,7 +181,6 @@ pub(super) fn row(settings: &Settings, data: &Data, solutions: &Solutions) -> Re
         let force = data.counted(&journal.normal_force);
         let least = force.iter().copied().fold(f64::INFINITY, f64::min);
         let largest = force.iter().copied().fold(0.0, f64::max);
-        ringing[joint] = rms(data.ringing(joint));
         for (own, wanted) in [
             (rms(data.ideal_torque(joint)), whole.rms_ideal_torque[joint]),
             (rms(data.friction[joint].iter().copied()), whole.rms_friction_torque[joint]),
