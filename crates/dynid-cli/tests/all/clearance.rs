@@ -87,3 +87,76 @@ fn faults_of_clearance_are_told_with_file_and_field() {
     let message = stderr(at, &["simulate", "xy.toml", "--out", "log.csv", "--closed-loop"], 2);
     assert!(message.contains("clearance") && message.contains("closed loop"), "{message}");
 }
+
+/// Every `step`-th row of a log without columns that begin with `left_out`.
+fn thinned(folder: &Path, from: &str, to: &str, step: usize, left_out: &str) {
+    let table = text(folder, from);
+    let header: Vec<&str> = table.lines().next().unwrap().split(',').collect();
+    let mut out = String::new();
+    for line in table.lines().take(1).chain(table.lines().skip(1).step_by(step)) {
+        let cells = line.split(',').zip(&header).filter(|(_, name)| !name.starts_with(left_out));
+        out += &(cells.map(|(cell, _)| cell).collect::<Vec<_>>().join(",") + "\n");
+    }
+    std::fs::write(folder.join(to), out).unwrap();
+}
+
+#[test]
+fn clearances_are_found_by_probes_and_by_the_swing_in_the_effort() {
+    let folder = folder();
+    let at = folder.path();
+    let simulate = [
+        "simulate",
+        "xy.toml",
+        "--out",
+        "log.csv",
+        "--duration",
+        "15.708",
+        "--rate-hz",
+        "1000",
+        "--effort-noise",
+        "0.01",
+        "--journal-noise",
+        "1e-6",
+        "--seed",
+        "1",
+    ];
+    run(at, &simulate, 0);
+    thinned(at, "log.csv", "bare.csv", 1, "journal_");
+    thinned(at, "log.csv", "slow.csv", 10, "none");
+    run(at, &["identify", "xy.toml", "--log", "log.csv", "--out", "out"], 0);
+    let found = |log: &str| -> Value {
+        let args = ["clearance", "xy.toml", "out/estimate.json", "--log", log, "--json"];
+        serde_json::from_slice(&run(at, &args, 0).stdout).unwrap()
+    };
+    let within = |value: &Value, truth: f64, share: f64| {
+        let (found, std) = (value["value"].as_f64().unwrap(), value["std"].as_f64().unwrap());
+        assert!((found / truth - 1.0).abs() < share && (found - truth).abs() < 4.0 * std, "{value} {truth}");
+    };
+    let fast = found("log.csv");
+    for joint in fast.as_array().unwrap() {
+        within(&joint["probed"]["gap"], 5e-5, 0.05);
+        within(&joint["probed"]["friction"], 0.1, 0.05);
+        assert_eq!(joint["swing"]["found"], true);
+        within(&joint["swing"]["gap"], 5e-5, 0.05);
+        assert_eq!(joint["remarks"].as_array().unwrap().len(), 0, "{joint}");
+    }
+    let bare = found("bare.csv");
+    assert!(bare[0]["probed"].is_null() && bare[0]["swing"] == fast[0]["swing"], "{bare}");
+    assert!(
+        bare[1]["remarks"][0].as_str().unwrap().contains("columns `journal_j2_x`, `journal_j2_y`"),
+        "{bare}"
+    );
+    // The line at 100 Hz would be an alias.
+    let slow = found("slow.csv");
+    within(&slow[1]["probed"]["gap"], 5e-5, 0.05);
+    assert!(slow[0]["swing"].is_null(), "{slow}");
+    assert!(slow[0]["remarks"][0].as_str().unwrap().contains("too slow for the stated gap"), "{slow}");
+
+    let shown = run(at, &["clearance", "xy.toml", "out/estimate.json", "--log", "log.csv"], 0).stdout;
+    let shown = String::from_utf8(shown).unwrap();
+    assert!(shown.contains("probes   gap") && shown.contains("effort   gap"), "{shown}");
+    let indy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/indy7.toml");
+    std::fs::copy(indy, at.join("indy7.toml")).unwrap();
+    let refused = stderr(at, &["clearance", "indy7.toml", "out/estimate.json", "--log", "log.csv"], 2);
+    assert!(refused.contains("no joint has clearance"), "{refused}");
+}

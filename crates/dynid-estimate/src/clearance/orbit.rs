@@ -246,7 +246,7 @@ fn start(used: &[&OrbitSample], law: &ContactLaw, load: f64, length: f64) -> Res
     for s in used {
         let ([ex, ey], [fx, fy]) = (s.offset, s.load);
         // n = -R(-φ) F/|F|: the offset lies φ behind the opposite of the load.
-        across += s.sliding.signum() * (ex * fy - ey * fx) * -1.0;
+        across += s.sliding.signum() * (ey * fx - ex * fy);
         along -= ex * fx + ey * fy;
     }
     Ok([clearance, (-across / along).clamp(-0.9, 0.9), 0.0])
@@ -330,14 +330,8 @@ impl System {
     /// Gauss-Newton's equations with the prior, scaled to unit diagonals.
     fn normal(&self, noise: f64, held: f64, ln: f64) -> Normal {
         let weight = 1.0 / (noise * noise);
-        let mut matrix = [[0.0; 3]; 3];
-        let mut right = [0.0; 3];
-        for i in 0..3 {
-            right[i] = weight * self.right[i];
-            for j in 0..3 {
-                matrix[i][j] = weight * self.gram[i][j];
-            }
-        }
+        let mut matrix = self.gram.map(|row| row.map(|x| weight * x));
+        let mut right = self.right.map(|x| weight * x);
         if held > 0.0 {
             matrix[2][2] += 1.0 / (held * held);
             right[2] -= ln / (held * held);

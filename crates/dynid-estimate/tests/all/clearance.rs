@@ -1,5 +1,7 @@
 //! Clearance of a joint from measured offsets and from a swing in the effort.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
 use dynid_estimate::clearance::{orbit, swing};
 use dynid_model::contact::{
     ContactLaw, FractalLankaraniNikravesh, FractalSettings, FractalSurface, Hertz, HertzStiffness,

@@ -1,6 +1,6 @@
 //! Joints with clearance: the tree, motions in and out of the bearing's axes, the contact element.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use std::path::PathBuf;
 
@@ -314,12 +314,13 @@ fn regressor_and_adjoint_of_the_model_hold_the_contact() {
     for (s, journal) in motions().iter().enumerate() {
         let (_, by_position, by_rate) = contact.efforts_with_slopes(journal, [1.3, 0.7, 0.2], None);
         let weight = |place: usize| weights[[2, 3, 1][place] * n + s];
-        for k in 0..2 {
-            let expected: f64 = (0..3).map(|row| weight(row) * by_position[row][k]).sum();
+        let slope = |of: &dyn Fn(usize) -> f64| (0..3).map(|row| weight(row) * of(row)).sum::<f64>();
+        for k in [0, 1] {
+            let expected = slope(&|row| by_position[row][k]);
             let found = adjoint.q[(2 + k) * n + s];
             assert!((found - expected).abs() <= 1e-9 * (1.0 + expected.abs()), "{found} {expected}");
         }
-        let expected: f64 = (0..3).map(|row| weight(row) * by_rate[row][2]).sum();
+        let expected = slope(&|row| by_rate[row][2]);
         let found = adjoint.dq[n + s];
         assert!((found - expected).abs() <= 1e-9 * (1.0 + expected.abs()), "{found} {expected}");
     }

@@ -1,5 +1,7 @@
 //! Journals in their bearings: against reference numbers, closed forms, the classical method, and their own energy.
 
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+
 use std::path::PathBuf;
 
 use dynid_model::contact::{

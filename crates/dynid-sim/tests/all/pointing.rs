@@ -1,5 +1,7 @@
 //! A two-axis pointing mechanism with clearance in both joints (Sun, Han, Li & Li 2021).
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
 use dynid_model::contact::{
     ContactLaw, FractalLankaraniNikravesh, FractalSettings, FractalSurface, JournalBearing, Material,
     PressureFactor, SlidingFriction, SurfaceSettings,

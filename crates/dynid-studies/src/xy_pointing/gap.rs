@@ -281,12 +281,10 @@ impl Knowable {
             for (k, pair) in records.chunks_exact(2).enumerate() {
                 let change = 2.0 * wanted[2 * k].2;
                 let mut column = Vec::new();
-                for joint in 0..JOINTS {
+                for (joint, deviation) in deviations.iter().enumerate() {
                     let of = |r: &ClearanceRecord, s: usize| r.effort[data.first + s][joint];
-                    column.extend(
-                        rows.iter()
-                            .map(|s| (of(&pair[0], *s) - of(&pair[1], *s)) / change / deviations[joint]),
-                    );
+                    let slope = |s: &usize| (of(&pair[0], *s) - of(&pair[1], *s)) / change / deviation;
+                    column.extend(rows.iter().map(slope));
                 }
                 for joint in (0..JOINTS).filter(|_| probes) {
                     for axis in 0..2 {

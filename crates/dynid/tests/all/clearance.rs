@@ -98,7 +98,7 @@ fn the_log_shows_the_friction_of_the_bearings() {
 
     let summary = log.clearance.unwrap();
     assert_eq!(summary.settle_s, 0.5);
-    assert!(summary.energy.relative_error() < 1e-8, "{:?}", summary.energy);
+    assert!(summary.energy.relative_error().unwrap() < 1e-8, "{:?}", summary.energy);
     for journal in &summary.journals {
         assert_eq!((journal.onsets, journal.losses), (1, 0));
         assert!(journal.contact_share > 0.999 && journal.largest_penetration < 1e-5);
