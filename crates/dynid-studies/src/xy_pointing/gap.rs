@@ -1,87 +1,37 @@
-//! Rows x, y and z: the clearance itself, with probes at the journals, from the torque alone, and what can be known at all.
+//! Rows x and y: the clearance itself, with probes at the journals and from the torque alone.
 
 use dynid::estimators::clearance::orbit::{self, OrbitEstimate, OrbitSample, OrbitSettings};
 use dynid::estimators::clearance::swing::{self, SwingEstimate, SwingSettings};
 use dynid::estimators::linear::ols;
 use dynid::model::contact::SlidingFriction;
 use dynid::model::{JournalPath, MotionBlock};
-use dynid::sim::clearance::{ClearanceRecord, ClearanceSettings, ClearanceStart, Driving, Method, simulate};
+use dynid::report::{StudySection, Value};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::bearing::Bearing;
 use super::data::{Data, Knowledge, factor, rms};
 use super::fault;
+use super::knowable::{Knowable, NAMES, PARAMETERS, Start, fast};
 use super::parameters::Parameters;
 use super::pointing::{JOINTS, Pointing};
+use super::report::{table, text};
 use super::settings::Settings;
-use super::trajectory::trajectory;
 use super::tree::{RATES, translations, with_clearance};
 use crate::{Row, RunSettings, StudyError};
 
 /// Rate of the fast record, Hz; every tenth of its samples makes the slow one.
-const RATE_HZ: f64 = 1000.0;
-const SLOW: usize = 10;
+pub(super) const RATE_HZ: f64 = 1000.0;
+pub(super) const SLOW: usize = 10;
 /// Noise of the probes, m, and of the torque, share of its rms.
-const PROBE_NOISE: f64 = 1e-6;
-const TORQUE_NOISE: f64 = 0.01;
+pub(super) const PROBE_NOISE: f64 = 1e-6;
+pub(super) const TORQUE_NOISE: f64 = 0.01;
 /// By how much masses are overrated where a load is computed.
 const MASS_ERROR: f64 = 1.05;
 /// Quantile of normal deviates for 95 % of them.
 const TWO_SIDED: f64 = 1.96;
-/// Parameters of a contact, relative: clearance, stiffness, damping, friction.
-const PARAMETERS: usize = 4;
-/// Their names.
-pub(super) const NAMES: [&str; PARAMETERS] = ["clearance", "stiffness", "damping", "friction"];
-/// Changes by which their effects are found.
-const CHANGES: [f64; PARAMETERS] = [2e-4, 1e-3, 1e-2, 1e-3];
-
-/// Where the journals start, four numbers each: offset (m) and rate (m/s).
-type Start = [[f64; 4]; JOINTS];
-/// Changes by which the effect of that is found.
-const START_CHANGES: [f64; 4] = [1e-8, 1e-8, 1e-6, 1e-6];
-
-/// The published motion at the fast rate with factors of every contact's parameters.
-fn fast(
-    settings: &Settings,
-    factors: &[[f64; PARAMETERS]; JOINTS],
-    from: &Start,
-) -> Result<ClearanceRecord, StudyError> {
-    let trajectory = trajectory(settings.base_frequency, &settings.trajectory)?;
-    let plants = factors.iter().map(|[clearance, ..]| {
-        let bearing = Bearing { clearance: clearance * settings.bearing.clearance, ..settings.bearing };
-        bearing.contacts()
-    });
-    let contacts: Vec<_> = plants.collect::<Result<_, _>>()?;
-    // Joint `k` takes its contact from the bearings with its clearance.
-    let own = contacts.into_iter().enumerate().filter_map(|(k, all)| all.into_iter().nth(k)).collect();
-    let plant = Bearing::plant_of(own)?;
-    let mut linear = plant.linear().to_vec();
-    let first = linear.len() - 3 * JOINTS;
-    for (values, [_, stiffness, damping, friction]) in linear[first..].chunks_exact_mut(3).zip(factors) {
-        for (value, factor) in values.iter_mut().zip([stiffness, damping, friction]) {
-            *value *= factor;
-        }
-    }
-    let plant = plant.with_linear(linear).map_err(fault)?;
-    let series = trajectory.series();
-    let motion = |t: f64, q: &mut [f64], dq: &mut [f64], ddq: &mut [f64]| {
-        for (joint, series) in series.iter().enumerate() {
-            let at = series.at(t);
-            (q[joint], dq[joint], ddq[joint]) = (at.position, at.velocity, at.acceleration);
-        }
-    };
-    let count = (trajectory.period() * RATE_HZ).floor() as usize;
-    let times: Vec<f64> = (0..=count).map(|k| k as f64 / RATE_HZ).collect();
-    let settings = ClearanceSettings { method: Method::default(), channels: Vec::new() };
-    let journals = from.iter().map(|[x, y, vx, vy]| ([*x, *y], [*vx, *vy])).collect();
-    let start = ClearanceStart { journals, driven: None };
-    simulate(plant, &start, Driving::Prescribed(&motion), &times, &settings).map_err(fault)
-}
-
 /// Forces of the bearings on their journals in the journals' axes and what they carry, by a model whose joints have no
 /// clearance: per joint and sample.
 struct Loads {
@@ -136,13 +86,6 @@ pub(super) struct Unprobed {
     pub(super) friction: [f64; JOINTS],
     /// Shortest offset whose swing the slow record could show, m.
     pub(super) slow_limit: f64,
-}
-
-/// Least deviations of the parameters of both contacts that any unbiased estimator could reach, relative: with probes and
-/// torque at the slow rate, with torque at the slow and at the fast rate.
-#[derive(Debug)]
-pub(super) struct Knowable {
-    pub(super) bounds: [[[f64; PARAMETERS]; JOINTS]; 3],
 }
 
 /// Everything about the clearance itself.
@@ -241,83 +184,6 @@ fn listen(
     Ok(Unprobed { swing, clearance, friction, slow_limit })
 }
 
-impl Knowable {
-    fn new(ideal: &Pointing, settings: &Settings) -> Result<Self, StudyError> {
-        let (unit, centred) = ([[1.0; PARAMETERS]; JOINTS], Start::default());
-        // Pairs of runs, with what their difference is divided by.
-        let mut wanted = Vec::new();
-        for joint in 0..JOINTS {
-            for (parameter, change) in CHANGES.into_iter().enumerate() {
-                for change in [change, -change] {
-                    let mut factors = unit;
-                    factors[joint][parameter] += change;
-                    wanted.push((factors, centred, change));
-                }
-            }
-        }
-        for joint in 0..JOINTS {
-            for (place, change) in START_CHANGES.into_iter().enumerate() {
-                for change in [change, -change] {
-                    let mut start = centred;
-                    start[joint][place] += change;
-                    wanted.push((unit, start, change));
-                }
-            }
-        }
-        let records: Vec<ClearanceRecord> = wanted
-            .par_iter()
-            .map(|(factors, start, _)| fast(settings, factors, start))
-            .collect::<Result<_, _>>()?;
-        let data = Data::of(ideal, fast(settings, &unit, &centred)?, settings.data.discarded)?;
-        let n = data.samples;
-        let deviations: [f64; JOINTS] =
-            std::array::from_fn(|joint| TORQUE_NOISE * rms(data.joint(&data.torque, joint).iter().copied()));
-        // Link parameters are not known either, nor where the journals start.
-        let nuisance = data.base_columns(Knowledge::Ideal);
-        let mut bounds = [[[0.0; PARAMETERS]; JOINTS]; 3];
-        for (case, (step, probes)) in [(SLOW, true), (SLOW, false), (1, false)].into_iter().enumerate() {
-            let rows: Vec<usize> = (0..n).step_by(step).collect();
-            let mut columns: Vec<Vec<f64>> = Vec::new();
-            for (k, pair) in records.chunks_exact(2).enumerate() {
-                let change = 2.0 * wanted[2 * k].2;
-                let mut column = Vec::new();
-                for (joint, deviation) in deviations.iter().enumerate() {
-                    let of = |r: &ClearanceRecord, s: usize| r.effort[data.first + s][joint];
-                    let slope = |s: &usize| (of(&pair[0], *s) - of(&pair[1], *s)) / change / deviation;
-                    column.extend(rows.iter().map(slope));
-                }
-                for joint in (0..JOINTS).filter(|_| probes) {
-                    for axis in 0..2 {
-                        let of =
-                            |r: &ClearanceRecord, s: usize| r.journals[joint].offset[data.first + s][axis];
-                        column.extend(
-                            rows.iter().map(|s| (of(&pair[0], *s) - of(&pair[1], *s)) / change / PROBE_NOISE),
-                        );
-                    }
-                }
-                columns.push(column);
-            }
-            let length = columns[0].len();
-            for column in &nuisance {
-                let mut own: Vec<f64> = (0..JOINTS)
-                    .flat_map(|joint| rows.iter().map(move |s| column[joint * n + s] / deviations[joint]))
-                    .collect();
-                own.resize(length, 0.0);
-                columns.push(own);
-            }
-            let solution = ols(&factor(&columns, &vec![0.0; length])?);
-            let found = solution.standard_deviations(1.0);
-            for joint in 0..JOINTS {
-                for parameter in 0..PARAMETERS {
-                    bounds[case][joint][parameter] =
-                        found[joint * PARAMETERS + parameter].unwrap_or(f64::INFINITY);
-                }
-            }
-        }
-        Ok(Knowable { bounds })
-    }
-}
-
 impl Gaps {
     pub(super) fn new(ideal: &Pointing, settings: &Settings, run: &RunSettings) -> Result<Self, StudyError> {
         let (unit, centred) = ([[1.0; PARAMETERS]; JOINTS], Start::default());
@@ -354,7 +220,7 @@ impl Gaps {
     }
 
     pub(super) fn rows(&self) -> [Row; 3] {
-        [self.probed_row(), self.unprobed_row(), self.knowable_row()]
+        [self.probed_row(), self.unprobed_row(), self.knowable.row()]
     }
 
     /// Row x.
@@ -448,34 +314,69 @@ impl Gaps {
         )
     }
 
-    /// Row z.
-    fn knowable_row(&self) -> Row {
-        let [probes, slow, fast] = &self.knowable.bounds;
-        let words = |bounds: &[[f64; PARAMETERS]; JOINTS]| {
-            let one = |of: &[f64; PARAMETERS]| {
-                let parts: Vec<String> =
-                    NAMES.iter().zip(of).map(|(name, b)| format!("{name} {:.2e}", b)).collect();
-                parts.join(", ")
-            };
-            format!("joint 1 {}; joint 2 {}", one(&bounds[0]), one(&bounds[1]))
+    /// The report's section.
+    pub(super) fn section(&self) -> StudySection {
+        let micro = |[value, std]: [f64; 2]| Value::from(format!("{:.2} ± {:.2}", 1e6 * value, 1e6 * std));
+        let (probed, stiffer) = (&self.probed[0].orbit, &self.stiffer.orbit);
+        let orbit = |name: &str, of: &[OrbitEstimate; JOINTS]| {
+            let mut cells = vec![text(name)];
+            for found in of {
+                cells.push(micro([found.clearance.value, found.clearance.std]));
+                cells.push(micro([found.length.value, found.length.std]));
+                cells.push(text(&format!("{:.4} ± {:.4}", found.friction.value, found.friction.std)));
+            }
+            cells
         };
-        let of = |bounds: &[[f64; PARAMETERS]; JOINTS], p: usize| bounds[0][p].max(bounds[1][p]);
-        // Gap and friction can be known, and the fast torque tells of the gap what probes do.
-        let pass = [0, 3].iter().all(|p| of(probes, *p) < 0.05) && of(fast, 0) < 0.05;
-        Row::new(
-            "z",
-            "What any unbiased estimator could know of clearance, stiffness, damping and friction from this motion if the simulation \
-             were the truth, link parameters and the journals' start unknown (Cramér-Rao, relative): with probes at 100 Hz, torque \
-             at 100 Hz, torque at 1 kHz",
-            "clearance and friction below 5 % with probes, clearance also with torque at 1 kHz",
-            json!({ "parameters": NAMES, "probes_100_hz": probes, "torque_100_hz": slow, "torque_1_khz": fast }),
-            format!(
-                "probes: {}. Torque at 100 Hz: {}. Torque at 1 kHz: {}",
-                words(probes),
-                words(slow),
-                words(fast)
-            ),
-            pass,
-        )
+        let first = &self.unprobed[0];
+        let mut swing = vec![text("torque at 1 kHz alone")];
+        for joint in 0..JOINTS {
+            let length = first.swing[joint].length;
+            swing.push(micro(first.clearance[joint]));
+            swing.push(micro([length.value, length.std]));
+            swing.push(text(&format!("{:.4}", first.friction[joint])));
+        }
+        let truth = (0..JOINTS).flat_map(|joint| {
+            [1e6 * self.clearance, 1e6 * self.lengths[joint]]
+                .map(|x| text(&format!("{x:.2}")))
+                .into_iter()
+                .chain([text(&format!("{:.4}", self.friction))])
+        });
+        let truth = std::iter::once(text("truth")).chain(truth).collect();
+        let cases = ["probes and torque at 100 Hz", "torque at 100 Hz", "torque at 1 kHz"];
+        let bounds = cases.iter().zip(&self.knowable.bounds).map(|(name, bounds)| {
+            let percent = |p: usize| text(&format!("{:.3} %", 100.0 * bounds[0][p].max(bounds[1][p])));
+            std::iter::once(text(name)).chain((0..PARAMETERS).map(percent)).collect()
+        });
+        StudySection {
+            title: "The clearance itself".into(),
+            text: vec![
+                "A journal sits where load and contact balance: the angle between offset and load is that of friction, the length of the \
+                 offset is clearance and penetration. The load hardly changes, so how the length is shared depends on a stiffness that \
+                 only the law knows (to 30 %). In a clearance a journal is a pendulum as long as its offset: torques sampled fast enough \
+                 tell that length by a frequency, without any probe, as long as something sets it swinging."
+                    .into(),
+                "How exact a fit of the whole simulation could be is another matter: it would take the swing's phase over a thousand \
+                 periods at its word, which no real bearing keeps."
+                    .into(),
+            ],
+            tables: vec![
+                table(
+                    "First realisation: clearance and offset in µm, friction coefficient (loads from masses 5 % too high)",
+                    &["", "clearance 1", "offset 1", "friction 1", "clearance 2", "offset 2", "friction 2"],
+                    vec![
+                        truth,
+                        orbit("probes at 100 Hz", probed),
+                        orbit("the same, contact 30 % stiffer", stiffer),
+                        swing,
+                    ],
+                ),
+                table(
+                    "Cramér-Rao bounds, the worse of both joints, link parameters and start unknown",
+                    &["", NAMES[0], NAMES[1], NAMES[2], NAMES[3]],
+                    bounds.collect(),
+                ),
+            ],
+            ..StudySection::default()
+        }
     }
 }

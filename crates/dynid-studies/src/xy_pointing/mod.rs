@@ -10,6 +10,7 @@ mod feasible;
 mod figures;
 mod fit;
 mod gap;
+mod knowable;
 mod noise;
 mod parameters;
 mod plots;
@@ -120,6 +121,7 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
         noise: &noise,
         excitations: &excitations,
         sweeps: &sweeps,
+        gaps: &gaps,
     }
     .report(&record)?;
     Ok(StudyRun { record, report })

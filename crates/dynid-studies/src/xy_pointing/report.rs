@@ -6,6 +6,7 @@ use super::data::Data;
 use super::excitation::{Designed, Designs};
 use super::faster::Excitations;
 use super::fit::Fits;
+use super::gap::Gaps;
 use super::noise::NoiseStudy;
 use super::parameters::PARAMETERS;
 use super::pointing::Pointing;
@@ -31,6 +32,7 @@ pub(super) struct Contents<'a> {
     pub(super) noise: &'a NoiseStudy,
     pub(super) excitations: &'a Excitations,
     pub(super) sweeps: &'a Sweeps,
+    pub(super) gaps: &'a Gaps,
 }
 
 pub(super) fn text(words: &str) -> Value {
@@ -59,6 +61,7 @@ impl Contents<'_> {
             rows: record.report_rows(),
             sections: vec![
                 self.simulation_section()?,
+                self.gaps.section(),
                 self.search_section(),
                 self.table_section(),
                 self.base_section(self.fits, self.noise),
