@@ -71,6 +71,8 @@ pub struct JournalContact {
     pub penetration_rate: f64,
     /// Sliding speed `v_t`, m/s.
     pub sliding: f64,
+    /// What the law itself presses with, `E + B δ̇`, N; there is no force where it is negative.
+    pub pressing: f64,
     /// Normal force `F_n`, N.
     pub normal_force: f64,
     /// Friction force `F_t` on the journal, N.
@@ -106,18 +108,19 @@ impl ClearanceContact {
         let penetration_rate = dot(motion.rate, normal);
         let sliding = dot(motion.rate, across) + motion.spin * self.journal_radius;
         let force = self.law.at(penetration, motion.impact_speed);
-        let pressing = (force.elastic + force.damping * penetration_rate).max(0.0);
+        let pressing = force.elastic + force.damping * penetration_rate;
         JournalContact {
             normal,
             penetration,
             penetration_rate,
             sliding,
+            pressing,
             normal_force: if pressing > 0.0 {
                 k * force.elastic + d * force.damping * penetration_rate
             } else {
                 0.0
             },
-            friction_force: -mu * self.friction.direction(sliding).0 * pressing,
+            friction_force: -mu * self.friction.direction(sliding).0 * pressing.max(0.0),
         }
     }
 
@@ -141,7 +144,7 @@ impl ClearanceContact {
         let law = self.law.at(penetration, motion.impact_speed);
         let damping = law.damping * dot(motion.rate, normal);
         let pressing = law.elastic + damping;
-        if pressing <= 0.0 {
+        if pressing <= 0.0 && line.is_none() {
             return [0.0; 3];
         }
         let (push, rub) = (k * law.elastic + d * damping, mu * value * pressing);
@@ -151,7 +154,8 @@ impl ClearanceContact {
     /// Efforts of the drives at the translations and the rotation, with their derivatives by the journal's position
     /// (`[effort][x, y]`) and by its rates (`[effort][x, y, spin]`).
     ///
-    /// `line`: what stands in for the direction of friction and its slope, `None`: what the speed says.
+    /// `line`: what stands in for the direction of friction and its slope; the contact is then taken to press, even if the law
+    /// would have it pull. `None`: what speed and law say.
     pub fn efforts_with_slopes(
         &self,
         motion: &JournalMotion,
@@ -185,7 +189,7 @@ impl ClearanceContact {
         };
         let law = self.law.at(penetration, motion.impact_speed);
         let damping = law.damping * penetration_rate;
-        if law.elastic + damping <= 0.0 {
+        if law.elastic + damping <= 0.0 && line.is_none() {
             return Columns::default();
         }
         // Derivatives of δ, δ̇ and v_t by (x, y, ẋ, ẏ, q̇).

@@ -67,6 +67,11 @@ pub(super) enum Branch {
         impact_speed: f64,
         sliding: Sliding,
     },
+    /// Still in the bearing's surface, which does not follow.
+    Released {
+        /// Normal speed at the start, m/s.
+        impact_speed: f64,
+    },
 }
 
 #[cfg(test)]

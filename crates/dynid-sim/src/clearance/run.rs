@@ -14,8 +14,8 @@ use crate::plant::Plant;
 const MOST_STEPS: usize = 2_000_000;
 /// First step, and first step after a contact begins or ends, s.
 const FIRST_STEP: f64 = 1e-6;
-/// Steps are taken for rough as long as they are no shorter than this part of the time since a contact began or ended.
-const ROUGH_STEPS: f64 = 8.0;
+/// Within how many steps of the surface of its bearing a journal is near it.
+const NEAR_STEPS: f64 = 8.0;
 /// Passages without progress before a simulation gives up.
 const MOST_PASSAGES: usize = 64;
 /// Instants of a step at which branches are looked at.
@@ -120,17 +120,31 @@ struct Run<'p, 'd> {
     record: ClearanceRecord,
     evaluations: usize,
     closed_time: Vec<f64>,
-    /// When a contact last began or ended, s.
-    last_event: f64,
+}
+
+/// What says that a contact leaves its branch.
+#[derive(Debug, Clone, Copy)]
+enum Measure {
+    Depth,
+    Sliding,
+    Pressing,
+}
+
+/// Where it goes.
+#[derive(Debug, Clone, Copy)]
+enum Next {
+    Open,
+    Closed,
+    Released,
+    Sliding(Sliding),
 }
 
 /// Past which level, and in which direction, a contact has left its branch.
 struct Leaving {
-    /// Of the penetration, else of the sliding speed.
-    of_depth: bool,
+    of: Measure,
     level: f64,
     sign: f64,
-    to: Option<Sliding>,
+    to: Next,
 }
 
 /// Where a contact leaves its branch within a step.
@@ -138,7 +152,7 @@ struct Passage {
     contact: usize,
     /// Share of the step.
     tau: f64,
-    to: Option<Sliding>,
+    to: Next,
 }
 
 impl<'p, 'd> Run<'p, 'd> {
@@ -215,7 +229,6 @@ impl<'p, 'd> Run<'p, 'd> {
             record,
             evaluations: 0,
             closed_time,
-            last_event: f64::NEG_INFINITY,
             system,
         })
     }
@@ -232,8 +245,10 @@ impl<'p, 'd> Run<'p, 'd> {
         }
         self.system.place(self.t, &self.x, &self.v);
         let [bodies_end, contacts_end] = stored(&mut self.system);
-        self.record.energy.bodies = bodies_end - bodies;
-        self.record.energy.contacts = contacts_end - contacts;
+        if !self.system.laws {
+            self.record.energy.bodies = bodies_end - bodies;
+            self.record.energy.contacts = contacts_end - contacts;
+        }
         self.record.swing_hz = self.swing();
         let (evaluations, jacobians) = self.collocation.counts();
         self.record.count.evaluations = evaluations + self.evaluations;
@@ -324,7 +339,8 @@ impl<'p, 'd> Run<'p, 'd> {
         let mut passed = false;
         for _ in 0..MOST_PASSAGES {
             // Forces grow from nothing as no polynomial does.
-            self.collocation.set_rough(self.t - self.last_event < ROUGH_STEPS * h);
+            let rough = self.near_the_surface(h);
+            self.collocation.set_rough(rough);
             let start = (&self.x[..], &self.v[..], &self.a[..]);
             let error = match self.collocation.attempt(&mut self.system, (self.t, h), start) {
                 Attempt::Solved(error) => error,
@@ -371,6 +387,15 @@ impl<'p, 'd> Run<'p, 'd> {
             }
         }
         Err(SimError::TooFast { time: self.t, steps: MOST_PASSAGES })
+    }
+
+    /// Whether a closed contact has just begun or is about to end, at its present speed.
+    fn near_the_surface(&mut self, h: f64) -> bool {
+        self.system.place(self.t, &self.x, &self.v);
+        (0..self.system.contacts.len()).any(|c| {
+            let found = self.system.contact(c);
+            self.system.is_closed(c) && found.penetration < NEAR_STEPS * h * found.penetration_rate.abs()
+        })
     }
 
     fn accept(&mut self, h: f64, end: f64) {
@@ -441,23 +466,27 @@ impl<'p, 'd> Run<'p, 'd> {
         let found = self.system.contact(contact);
         let slow = 1e-4 * element.friction.v_0.max(1e-3 * element.friction.v_m);
         let shallow = 1e-9 * element.law.clearance();
+        let weak = 1e-9 * element.law.at(found.penetration, 0.0).elastic;
+        let leaving = |of: Measure, level: f64, upwards: bool, to: Next| {
+            Some(Leaving { of, level, sign: if upwards { 1.0 } else { -1.0 }, to })
+        };
         match self.system.branches[contact] {
-            Branch::Open => (found.penetration > shallow).then_some(Leaving {
-                of_depth: true,
-                level: 0.0,
-                sign: 1.0,
-                to: None,
-            }),
-            Branch::Closed { .. } if found.penetration < -shallow => {
-                Some(Leaving { of_depth: true, level: 0.0, sign: -1.0, to: None })
+            Branch::Open if found.penetration > shallow => leaving(Measure::Depth, 0.0, true, Next::Closed),
+            Branch::Open => None,
+            _ if found.penetration < -shallow => leaving(Measure::Depth, 0.0, false, Next::Open),
+            Branch::Released { .. } if found.pressing > weak => {
+                leaving(Measure::Pressing, 0.0, true, Next::Closed)
+            }
+            Branch::Released { .. } => None,
+            Branch::Closed { .. } if found.pressing < -weak => {
+                leaving(Measure::Pressing, 0.0, false, Next::Released)
             }
             Branch::Closed { sliding, .. } => {
                 let (low, high) = sliding.range(&element.friction);
-                let to = |up: bool| Some(sliding.beyond(up));
                 if found.sliding > high + slow {
-                    Some(Leaving { of_depth: false, level: high, sign: 1.0, to: to(true) })
+                    leaving(Measure::Sliding, high, true, Next::Sliding(sliding.beyond(true)))
                 } else if found.sliding < low - slow {
-                    Some(Leaving { of_depth: false, level: low, sign: -1.0, to: to(false) })
+                    leaving(Measure::Sliding, low, false, Next::Sliding(sliding.beyond(false)))
                 } else {
                     None
                 }
@@ -478,7 +507,11 @@ impl<'p, 'd> Run<'p, 'd> {
         let mut beyond = |tau: f64| {
             self.place_on(paths, h, tau);
             let found = self.system.contact(contact);
-            let value = if leaving.of_depth { found.penetration } else { found.sliding };
+            let value = match leaving.of {
+                Measure::Depth => found.penetration,
+                Measure::Sliding => found.sliding,
+                Measure::Pressing => found.pressing,
+            };
             leaving.sign * (value - leaving.level)
         };
         let (mut at_low, mut at_high) = (beyond(low), beyond(high));
@@ -510,21 +543,21 @@ impl<'p, 'd> Run<'p, 'd> {
         self.system.place(self.t, &self.x, &self.v);
         let found = self.system.contact(contact);
         self.record.count.passages += 1;
-        match (self.system.branches[contact], to) {
-            (Branch::Open, _) => {
-                let speed = found.penetration_rate.abs();
-                self.system.branches[contact] = self.system.closed(contact, speed);
-                self.event(contact, ContactEventKind::Onset(speed));
-                self.step = FIRST_STEP;
-            }
-            (Branch::Closed { .. }, None) => {
-                self.system.branches[contact] = Branch::Open;
-                self.event(contact, ContactEventKind::Loss);
-                self.step = FIRST_STEP;
-            }
-            (Branch::Closed { impact_speed, .. }, Some(sliding)) => {
-                self.system.branches[contact] = Branch::Closed { impact_speed, sliding };
-            }
+        let before = self.system.branches[contact];
+        let impact_speed = match before {
+            Branch::Open => found.penetration_rate.abs(),
+            Branch::Closed { impact_speed, .. } | Branch::Released { impact_speed } => impact_speed,
+        };
+        self.system.branches[contact] = match to {
+            Next::Open => Branch::Open,
+            Next::Closed => self.system.closed(contact, impact_speed),
+            Next::Released => Branch::Released { impact_speed },
+            Next::Sliding(sliding) => Branch::Closed { impact_speed, sliding },
+        };
+        match (before, to) {
+            (Branch::Open, _) => self.event(contact, ContactEventKind::Onset(impact_speed)),
+            (_, Next::Open) => self.event(contact, ContactEventKind::Loss),
+            _ => {}
         }
         if !at_start {
             // Extrapolated over a kink, stages are no better than a constant.
@@ -534,7 +567,7 @@ impl<'p, 'd> Run<'p, 'd> {
     }
 
     fn event(&mut self, joint: usize, kind: ContactEventKind) {
-        self.last_event = self.t;
+        self.step = FIRST_STEP;
         self.record.events.push(ContactEvent { time: self.t, joint, kind });
     }
 

@@ -145,7 +145,7 @@ impl<'p, 'd> System<'p, 'd> {
         let at = |of: &[f64]| element.translations.map(|rate| of[rate]);
         let impact_speed = match self.branches[contact] {
             Branch::Open => 0.0,
-            Branch::Closed { impact_speed, .. } => impact_speed,
+            Branch::Closed { impact_speed, .. } | Branch::Released { impact_speed } => impact_speed,
         };
         JournalMotion {
             position: at(&self.q),
@@ -168,7 +168,7 @@ impl<'p, 'd> System<'p, 'd> {
     pub(super) fn contact(&self, contact: usize) -> JournalContact {
         let Contact { element, parameters } = self.contacts[contact];
         let mut found = element.contact(&self.journal(contact), parameters);
-        if !self.is_closed(contact) {
+        if !self.acts(contact) {
             (found.normal_force, found.friction_force) = (0.0, 0.0);
         }
         found
@@ -185,7 +185,7 @@ impl<'p, 'd> System<'p, 'd> {
     fn form_contacts(&mut self) {
         self.contact.fill(0.0);
         for c in 0..self.contacts.len() {
-            if !self.is_closed(c) {
+            if !self.acts(c) {
                 continue;
             }
             let Contact { element, parameters } = self.contacts[c];
@@ -214,7 +214,12 @@ impl<'p, 'd> System<'p, 'd> {
         self.plant.element_efforts((&self.q, &self.dq), &self.channels, &mut self.work)
     }
 
-    /// Whether a contact is closed.
+    /// Whether a contact exerts forces.
+    fn acts(&self, contact: usize) -> bool {
+        self.laws || matches!(self.branches[contact], Branch::Closed { .. })
+    }
+
+    /// Whether a journal is in its bearing's surface.
     pub(super) fn is_closed(&self, contact: usize) -> bool {
         self.laws || self.branches[contact] != Branch::Open
     }
@@ -285,7 +290,7 @@ impl Motion for System<'_, '_> {
             );
         }
         for c in 0..self.contacts.len() {
-            if !self.is_closed(c) {
+            if !self.acts(c) {
                 continue;
             }
             let Contact { element, parameters } = self.contacts[c];

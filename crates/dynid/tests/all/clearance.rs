@@ -162,7 +162,6 @@ fn every_law_moves_its_journals() {
         assert!(summary.journals.iter().all(|j| j.onsets > 0), "{law}");
         // The log begins with the journals in the middle.
         assert_eq!(log.clean_channels[0].1[0], 0.0);
-        // Measured: 4e-6 for the law without damping, below 1e-6 for the others.
         assert!(summary.energy.relative_error().unwrap() < 1e-6, "{law}: {:?}", summary.energy);
     }
 }
