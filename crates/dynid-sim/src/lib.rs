@@ -8,6 +8,8 @@
 //!
 //! [`ElasticInverse`] gives motors behind elastic transmissions the motion that goes with that of their links.
 //!
+//! [`clearance`] lets journals move, hit and slide in their bearings.
+//!
 //! Units are SI, angles rad.
 
 mod bodiless;

@@ -2,90 +2,22 @@
 
 use dynid_model::{EffortModel, JournalPath};
 
-use super::branch::{Branch, Sliding};
+use super::branch::Branch;
 use super::energy::{Powers, stored};
-use super::record::{ClearanceRecord, ContactEvent, ContactEventKind, JournalRecord};
+use super::passage::{FIRST_STEP, Passage};
+use super::record::{ClearanceRecord, JournalRecord};
+use super::settings::{ClearanceSettings, ClearanceStart, Controller, Driving, Method, check};
 use super::system::{Drive, System};
-use crate::collocation::{Attempt, Collocation, Motion, Path, STAGES};
-use crate::error::{SimError, demand, demand_length};
+use crate::collocation::{Attempt, Collocation, Motion, STAGES};
+use crate::error::SimError;
 use crate::plant::Plant;
 
 /// Steps between two samples before a simulation gives up.
 const MOST_STEPS: usize = 2_000_000;
-/// First step, and first step after a contact begins or ends, s.
-const FIRST_STEP: f64 = 1e-6;
 /// Within how many steps of the surface of its bearing a journal is near it.
 const NEAR_STEPS: f64 = 8.0;
 /// Passages without progress before a simulation gives up.
 const MOST_PASSAGES: usize = 64;
-/// Instants of a step at which branches are looked at.
-const LOOKS: u32 = 12;
-
-/// How the equations are solved.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Method {
-    /// Radau IIA of order nine with steps for a tolerance: largest local error in units of the clearances.
-    Collocation {
-        /// 1e-13 to 1e-3. Default: 1e-9.
-        tolerance: f64,
-        /// Longest step, s. Default: none.
-        longest_step: f64,
-    },
-    /// The same with equal steps, to see its order.
-    CollocationSteps {
-        /// Step between located instants, s.
-        step: f64,
-    },
-    /// The classical explicit method of order four with equal steps; nothing is located.
-    RungeKutta4 {
-        /// s.
-        step: f64,
-    },
-}
-
-impl Default for Method {
-    fn default() -> Self {
-        Method::Collocation { tolerance: 1e-9, longest_step: f64::INFINITY }
-    }
-}
-
-/// Settings of a simulation.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ClearanceSettings {
-    /// How the equations are solved.
-    pub method: Method,
-    /// Values of the channels that elements read, in the order of the model's; held.
-    pub channels: Vec<f64>,
-}
-
-/// A state to start from.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ClearanceStart {
-    /// Per joint with clearance, in the order of the model's contacts: offset of the journal's centre (m) and its rate (m/s)
-    /// in axes that turn with its link. Default: all centred and at rest there.
-    pub journals: Vec<([f64; 2], [f64; 2])>,
-    /// Positions and rates of the driven joints, unless they are prescribed.
-    pub driven: Option<(Vec<f64>, Vec<f64>)>,
-}
-
-/// Writes positions, rates and accelerations of the driven joints at a time (s) into three slices.
-pub type PrescribedMotion<'a> = &'a dyn Fn(f64, &mut [f64], &mut [f64], &mut [f64]);
-
-/// From time (s), positions and rates of the driven joints to their efforts.
-pub type Controller<'a> = &'a mut dyn FnMut(f64, &[f64], &[f64], &mut [f64]);
-
-/// What drives the driven joints, in the order of their rates.
-pub enum Driving<'a> {
-    /// They follow a motion exactly.
-    Prescribed(PrescribedMotion<'a>),
-    /// Efforts are formed every `period` from the start on, and held.
-    Controlled {
-        /// s.
-        period: f64,
-        /// Forms efforts.
-        controller: Controller<'a>,
-    },
-}
 
 /// Simulates a mechanism with clearance from the first of some times and gives its motion at all of them.
 ///
@@ -104,55 +36,22 @@ pub fn simulate(
     Run::new(&plant, start, driving, times, settings)?.all(times)
 }
 
-struct Run<'p, 'd> {
-    system: System<'p, 'd>,
-    method: Method,
-    collocation: Collocation,
-    controller: Option<(f64, Controller<'d>)>,
-    t: f64,
-    x: Vec<f64>,
-    v: Vec<f64>,
-    a: Vec<f64>,
+pub(super) struct Run<'p, 'd> {
+    pub(super) system: System<'p, 'd>,
+    pub(super) method: Method,
+    pub(super) collocation: Collocation,
+    pub(super) controller: Option<(f64, Controller<'d>)>,
+    pub(super) t: f64,
+    pub(super) x: Vec<f64>,
+    pub(super) v: Vec<f64>,
+    pub(super) a: Vec<f64>,
     /// Step that the error control asks for, s.
-    step: f64,
+    pub(super) step: f64,
     /// Time of the next control instant.
-    next_control: f64,
-    record: ClearanceRecord,
-    evaluations: usize,
-    closed_time: Vec<f64>,
-}
-
-/// What says that a contact leaves its branch.
-#[derive(Debug, Clone, Copy)]
-enum Measure {
-    Depth,
-    Sliding,
-    Pressing,
-}
-
-/// Where it goes.
-#[derive(Debug, Clone, Copy)]
-enum Next {
-    Open,
-    Closed,
-    Released,
-    Sliding(Sliding),
-}
-
-/// Past which level, and in which direction, a contact has left its branch.
-struct Leaving {
-    of: Measure,
-    level: f64,
-    sign: f64,
-    to: Next,
-}
-
-/// Where a contact leaves its branch within a step.
-struct Passage {
-    contact: usize,
-    /// Share of the step.
-    tau: f64,
-    to: Next,
+    pub(super) next_control: f64,
+    pub(super) record: ClearanceRecord,
+    pub(super) evaluations: usize,
+    pub(super) closed_time: Vec<f64>,
 }
 
 impl<'p, 'd> Run<'p, 'd> {
@@ -277,7 +176,7 @@ impl<'p, 'd> Run<'p, 'd> {
     }
 
     /// Acceleration at the present state.
-    fn refresh(&mut self) -> Result<(), SimError> {
+    pub(super) fn refresh(&mut self) -> Result<(), SimError> {
         let mut a = std::mem::take(&mut self.a);
         let ok = self.system.acceleration(self.t, &self.x, &self.v, &mut a);
         self.evaluations += 1;
@@ -428,200 +327,6 @@ impl<'p, 'd> Run<'p, 'd> {
         }
     }
 
-    /// The first instant of the last attempt at which a contact leaves its branch. Looked for on a grid, so that a branch
-    /// left and entered again within a step is not missed.
-    fn first_passage(&mut self, h: f64) -> Option<Passage> {
-        let n = self.x.len();
-        let paths: Vec<Path> = (0..n).map(|k| self.collocation.path(k, h, self.x[k], self.v[k])).collect();
-        let mut before = 0.0;
-        for k in 1..=LOOKS {
-            let tau = f64::from(k) / f64::from(LOOKS);
-            self.place_on(&paths, h, tau);
-            let left: Vec<(usize, Leaving)> =
-                (0..self.system.contacts.len()).filter_map(|c| Some((c, self.leaving(c)?))).collect();
-            let mut first: Option<Passage> = None;
-            for (contact, leaving) in left {
-                let tau = self.locate(&paths, h, (before, tau), contact, &leaving);
-                if first.as_ref().is_none_or(|f| tau < f.tau) {
-                    first = Some(Passage { contact, tau, to: leaving.to });
-                }
-            }
-            if first.is_some() {
-                return first;
-            }
-            before = tau;
-        }
-        None
-    }
-
-    fn place_on(&mut self, paths: &[Path], h: f64, tau: f64) {
-        let (x, v): (Vec<f64>, Vec<f64>) =
-            paths.iter().map(|path| path.at(tau)).map(|[x, v]| (x, v / h)).unzip();
-        self.system.place(self.t + tau * h, &x, &v);
-    }
-
-    /// How a contact has left its branch, as last placed.
-    fn leaving(&self, contact: usize) -> Option<Leaving> {
-        let element = self.system.contacts[contact].element;
-        let found = self.system.contact(contact);
-        let slow = 1e-4 * element.friction.v_0.max(1e-3 * element.friction.v_m);
-        let shallow = 1e-9 * element.law.clearance();
-        let weak = 1e-9 * element.law.at(found.penetration, 0.0).elastic;
-        let leaving = |of: Measure, level: f64, upwards: bool, to: Next| {
-            Some(Leaving { of, level, sign: if upwards { 1.0 } else { -1.0 }, to })
-        };
-        match self.system.branches[contact] {
-            Branch::Open if found.penetration > shallow => leaving(Measure::Depth, 0.0, true, Next::Closed),
-            Branch::Open => None,
-            _ if found.penetration < -shallow => leaving(Measure::Depth, 0.0, false, Next::Open),
-            Branch::Released { .. } if found.pressing > weak => {
-                leaving(Measure::Pressing, 0.0, true, Next::Closed)
-            }
-            Branch::Released { .. } => None,
-            Branch::Closed { .. } if found.pressing < -weak => {
-                leaving(Measure::Pressing, 0.0, false, Next::Released)
-            }
-            Branch::Closed { sliding, .. } => {
-                let (low, high) = sliding.range(&element.friction);
-                if found.sliding > high + slow {
-                    leaving(Measure::Sliding, high, true, Next::Sliding(sliding.beyond(true)))
-                } else if found.sliding < low - slow {
-                    leaving(Measure::Sliding, low, false, Next::Sliding(sliding.beyond(false)))
-                } else {
-                    None
-                }
-            }
-        }
-    }
-
-    /// Where between two shares of a step a contact leaves its branch, by secants and bisection; the first share if it has
-    /// left it there.
-    fn locate(
-        &mut self,
-        paths: &[Path],
-        h: f64,
-        (mut low, mut high): (f64, f64),
-        contact: usize,
-        leaving: &Leaving,
-    ) -> f64 {
-        let mut beyond = |tau: f64| {
-            self.place_on(paths, h, tau);
-            let found = self.system.contact(contact);
-            let value = match leaving.of {
-                Measure::Depth => found.penetration,
-                Measure::Sliding => found.sliding,
-                Measure::Pressing => found.pressing,
-            };
-            leaving.sign * (value - leaving.level)
-        };
-        let (mut at_low, mut at_high) = (beyond(low), beyond(high));
-        if at_low >= 0.0 {
-            return low;
-        }
-        for k in 0..200 {
-            if high - low <= 1e-12 || (high - low) * h < 1e-16 {
-                break;
-            }
-            let secant = low - at_low * (high - low) / (at_high - at_low);
-            let tau = if k % 3 == 2 { 0.5 * (low + high) } else { secant.clamp(low, high) };
-            let value = beyond(tau);
-            if value < 0.0 {
-                (low, at_low) = (tau, value);
-            } else {
-                (high, at_high) = (tau, value);
-                if value == 0.0 {
-                    break;
-                }
-            }
-        }
-        high
-    }
-
-    /// Takes a contact to its next branch at the present state.
-    fn pass(&mut self, passage: &Passage, at_start: bool) -> Result<(), SimError> {
-        let Passage { contact, to, .. } = *passage;
-        self.system.place(self.t, &self.x, &self.v);
-        let found = self.system.contact(contact);
-        self.record.count.passages += 1;
-        let before = self.system.branches[contact];
-        let impact_speed = match before {
-            Branch::Open => found.penetration_rate.abs(),
-            Branch::Closed { impact_speed, .. } | Branch::Released { impact_speed } => impact_speed,
-        };
-        self.system.branches[contact] = match to {
-            Next::Open => Branch::Open,
-            Next::Closed => self.system.closed(contact, impact_speed),
-            Next::Released => Branch::Released { impact_speed },
-            Next::Sliding(sliding) => Branch::Closed { impact_speed, sliding },
-        };
-        match (before, to) {
-            (Branch::Open, _) => self.event(contact, ContactEventKind::Onset(impact_speed)),
-            (_, Next::Open) => self.event(contact, ContactEventKind::Loss),
-            _ => {}
-        }
-        if !at_start {
-            // Extrapolated over a kink, stages are no better than a constant.
-            self.collocation.restart();
-        }
-        self.refresh()
-    }
-
-    fn event(&mut self, joint: usize, kind: ContactEventKind) {
-        self.step = FIRST_STEP;
-        self.record.events.push(ContactEvent { time: self.t, joint, kind });
-    }
-
-    /// One explicit step.
-    fn explicit_step(&mut self, h: f64, end: f64) -> Result<(), SimError> {
-        let n = self.x.len();
-        let mut slopes: Vec<(Vec<f64>, Vec<f64>)> = Vec::with_capacity(4);
-        for (k, share) in [0.0, 0.5, 0.5, 1.0].into_iter().enumerate() {
-            let (mut x, mut v) = (self.x.clone(), self.v.clone());
-            if k > 0 {
-                let (dx, dv) = &slopes[k - 1];
-                for m in 0..n {
-                    x[m] += share * h * dx[m];
-                    v[m] += share * h * dv[m];
-                }
-            }
-            let mut a = vec![0.0; n];
-            if !self.system.acceleration(self.t + share * h, &x, &v, &mut a) {
-                return Err(SimError::TooFast { time: self.t, steps: 0 });
-            }
-            self.evaluations += 1;
-            slopes.push((v, a));
-        }
-        for m in 0..n {
-            let sum = |f: &dyn Fn(usize) -> f64| (f(0) + 2.0 * f(1) + 2.0 * f(2) + f(3)) / 6.0;
-            self.x[m] += h * sum(&|k| slopes[k].0[m]);
-            self.v[m] += h * sum(&|k| slopes[k].1[m]);
-        }
-        let t = self.t + h;
-        self.t = if end - t <= 1e-9 * h { end } else { t };
-        self.record.count.steps += 1;
-        if self.x.iter().chain(&self.v).any(|x| !x.is_finite()) {
-            return Err(SimError::TooFast { time: self.t, steps: self.record.count.steps });
-        }
-        self.system.place(self.t, &self.x, &self.v);
-        for c in 0..self.system.contacts.len() {
-            let found = self.system.contact(c);
-            let (now, before) = (found.penetration > 0.0, self.system.branches[c] != Branch::Open);
-            if now && !before {
-                let speed = found.penetration_rate.abs();
-                self.system.branches[c] = self.system.closed(c, speed);
-                self.event(c, ContactEventKind::Onset(speed));
-            } else if before && !now {
-                self.system.branches[c] = Branch::Open;
-                self.event(c, ContactEventKind::Loss);
-            }
-            self.closed_time[c] += if now { h } else { 0.0 };
-            let journal = &mut self.record.journals[c];
-            journal.largest_penetration = journal.largest_penetration.max(found.penetration);
-            journal.largest_normal_force = journal.largest_normal_force.max(found.normal_force);
-        }
-        Ok(())
-    }
-
     fn sample(&mut self) {
         let mut a = vec![0.0; self.x.len()];
         // A true right-hand side, where collocation has converged to one.
@@ -680,46 +385,4 @@ impl<'p, 'd> Run<'p, 'd> {
         }
         fastest
     }
-}
-
-fn check(
-    plant: &Plant,
-    start: &ClearanceStart,
-    driving: &Driving<'_>,
-    times: &[f64],
-    settings: &ClearanceSettings,
-) -> Result<(), SimError> {
-    let model = plant.model();
-    let contacts = model.clearances().count();
-    demand(contacts > 0, "clearance", "a joint with clearance", "none")?;
-    demand_length("channels", model.channels().len(), settings.channels.len())?;
-    if !start.journals.is_empty() {
-        demand_length("journals", contacts, start.journals.len())?;
-    }
-    let numbers = start.journals.iter().flat_map(|(e, de)| e.iter().chain(de));
-    let finite = numbers.clone().all(|x| x.is_finite());
-    demand(finite, "journals", "finite offsets and rates", "others")?;
-    let ascending = times.windows(2).all(|w| w[0] < w[1]) && times.iter().all(|t| t.is_finite());
-    demand(!times.is_empty() && ascending, "times", "ascending finite times, at least one", times.len())?;
-    let positive = |x: f64| x > 0.0 && x.is_finite();
-    match settings.method {
-        Method::Collocation { tolerance, longest_step } => {
-            demand((1e-13..=1e-3).contains(&tolerance), "tolerance", "1e-13 to 1e-3", tolerance)?;
-            demand(longest_step > 0.0, "longest_step", "a positive time", longest_step)?;
-        }
-        Method::CollocationSteps { step } | Method::RungeKutta4 { step } => {
-            demand(positive(step), "step", "a positive time", step)?;
-        }
-    }
-    let driven = (0..plant.joints()).filter(|rate| !model.is_undriven(*rate)).count();
-    match driving {
-        Driving::Prescribed(_) => {}
-        Driving::Controlled { period, .. } => {
-            demand(positive(*period), "period", "a positive time", *period)?;
-            let (q, dq) = start.driven.as_ref().map_or((0, 0), |(q, dq)| (q.len(), dq.len()));
-            demand_length("positions of the driven joints", driven, q)?;
-            demand_length("rates of the driven joints", driven, dq)?;
-        }
-    }
-    Ok(())
 }

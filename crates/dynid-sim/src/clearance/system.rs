@@ -4,7 +4,7 @@ use dynid_model::EffortModel;
 use dynid_model::element::{ClearanceContact, FrictionLine, JournalContact, JournalMotion};
 
 use super::branch::{Branch, Sliding};
-use super::run::PrescribedMotion;
+use super::settings::PrescribedMotion;
 use crate::collocation::Motion;
 use crate::lu::Lu;
 use crate::plant::{Plant, PlantWorkspace};
