@@ -298,14 +298,14 @@ impl Record<'_> {
         // All that a joint carries swings with its journal.
         let carried = carried_mass(self.robot, self.values, output);
         let gravity: Vec<f64> = sizes.iter().map(|f| f / carried).collect();
-        let found =
-            match swing::estimate(residual, &gravity, 1.0 / self.log.rate_hz, &SwingSettings::default()) {
-                Ok(found) => found,
-                Err(error) => {
-                    remarks.push(format!("swing in the effort: {error}"));
-                    return Ok(None);
-                }
-            };
+        let settings = SwingSettings { friction: spec.friction.coefficient, ..SwingSettings::default() };
+        let found = match swing::estimate(residual, &gravity, 1.0 / self.log.rate_hz, &settings) {
+            Ok(found) => found,
+            Err(error) => {
+                remarks.push(format!("swing in the effort: {error}"));
+                return Ok(None);
+            }
+        };
         if found.shortest > spec.gap() {
             // A line may be the alias of a swing that is too fast.
             remarks.push(format!(

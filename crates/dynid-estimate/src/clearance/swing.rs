@@ -1,13 +1,15 @@
 //! Length of a journal's offset from the swing that the effort of a drive shows.
 //!
-//! A journal in its clearance is a pendulum as long as its offset: `ω² = a/|e|` with the apparent gravity `a` of what the
-//! journal carries, at right angles to the joint's axis (load over mass: both masses cancel). Impacts and reversals of
+//! A journal in its clearance is a pendulum as long as its offset: `ω² = a √(1 + μ²)/|e|` with the apparent gravity `a` of
+//! what the journal carries, at right angles to the joint's axis (load over mass: both masses cancel). The root is what
+//! sliding friction adds: with the load at the angle of friction to the offset, a swing by `ψ` changes the normal force by
+//! `μ F_n ψ` and so friction by `μ² F_n ψ`, against the swing, beside `F_n ψ` with `F_n = |F|/√(1 + μ²)`. Impacts and reversals of
 //! friction set it swinging, and saturated friction does not damp it. Where the effort is sampled fast enough, its residual
 //! holds the swing, however small, as a line.
 //!
 //! The phase `θ(t; ℓ) = ∫ √(a/ℓ) dt` of every candidate length `ℓ` follows the apparent gravity. Phases begin anew in every
 //! block, since each kick sets another, so powers of blocks add: `P(ℓ) = Σ_blocks |Σ r w e^{-iθ}|²`, with a window `w`. The length
-//! that takes most power is refined by a parabola, its deviation comes from leaving out blocks.
+//! that takes most power is refined by golden sections, its deviation comes from leaving out blocks.
 
 use super::Estimate;
 
@@ -18,11 +20,13 @@ pub struct SwingSettings {
     pub range: (f64, f64),
     /// Length of a block, s. Default: 1.
     pub block_s: f64,
+    /// Friction coefficient `μ` of the bearing. Default: 0.
+    pub friction: f64,
 }
 
 impl Default for SwingSettings {
     fn default() -> Self {
-        SwingSettings { range: (5e-6, 1e-3), block_s: 1.0 }
+        SwingSettings { range: (5e-6, 1e-3), block_s: 1.0, friction: 0.0 }
     }
 }
 
@@ -108,6 +112,9 @@ pub fn estimate(
     if let Some(row) = (0..residual.len()).find(|k| !good(k)) {
         return Err(SwingError::BadSample { row });
     }
+    let stiffer = (1.0 + settings.friction * settings.friction).sqrt();
+    let gravity: Vec<f64> = gravity.iter().map(|a| stiffer * a).collect();
+    let gravity = gravity.as_slice();
     let strongest = gravity.iter().copied().fold(0.0, f64::max);
     let mean = gravity.iter().sum::<f64>() / gravity.len() as f64;
     // ω < 2π/(SAMPLES_PER_PERIOD step).

@@ -1,6 +1,6 @@
 //! Mechanisms whose joints have clearance: journals that hit, slide and swing in their bearings.
 //!
-//! [`simulate`] moves a [`Plant`] whose model has [contacts](dynid_model::element::ClearanceContact), either along
+//! [`simulate`] moves a [`Plant`](crate::Plant) whose model has [contacts](dynid_model::element::ClearanceContact), either along
 //! prescribed motions of its driven joints or under efforts that a controller gives at fixed intervals. Contact is stiff
 //! and begins with a jump of the force; friction has kinks. Between such instants the equations are smooth, and they are
 //! found: onset and loss of contact, release where the bearing would have to pull, and every passage of a sliding speed from

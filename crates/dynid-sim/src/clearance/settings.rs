@@ -10,7 +10,7 @@ use crate::plant::Plant;
 pub enum Method {
     /// Radau IIA of order nine with steps for a tolerance: largest local error in units of the clearances.
     Collocation {
-        /// 1e-13 to 1e-3. Default: 1e-9.
+        /// 1e-13 to 1e-3. Default: 1e-10.
         tolerance: f64,
         /// Longest step, s. Default: none.
         longest_step: f64,
@@ -29,7 +29,7 @@ pub enum Method {
 
 impl Default for Method {
     fn default() -> Self {
-        Method::Collocation { tolerance: 1e-9, longest_step: f64::INFINITY }
+        Method::Collocation { tolerance: 1e-10, longest_step: f64::INFINITY }
     }
 }
 

@@ -159,7 +159,7 @@ fn listen(
         residual.iter_mut().zip(column).for_each(|(r, w)| *r -= x * w);
     }
     let contacts = bearing.contacts()?;
-    let settings = SwingSettings::default();
+    let settings = SwingSettings { friction: bearing.friction, ..SwingSettings::default() };
     let mut slow_limit = 0.0_f64;
     let (mut swings, mut clearance, mut friction) = (Vec::new(), [[0.0; 2]; JOINTS], [0.0; JOINTS]);
     for joint in 0..JOINTS {

@@ -7,10 +7,11 @@ use super::faster::Excitations;
 use super::fit::{Fits, SYMBOLS};
 use super::noise::{LEVELS, NoiseStudy};
 use super::parameters::{NAMES, PARAMETERS};
+use super::plots;
 use super::report::{Contents, table, text};
 use super::search::{Contestant, Searches};
+use super::simulation::{Closeup, TOLERANCE};
 use super::sweep::{Sweeps, Variant};
-use super::{plots, simulation::Closeup};
 use crate::StudyError;
 use crate::statistics::median;
 
@@ -45,7 +46,7 @@ impl Contents<'_> {
         let solutions = self.solutions;
         let (evaluations, error) = solutions.collocation;
         let mut rows = vec![vec![
-            text("implicit, steps for a tolerance of 1e-9"),
+            text(&format!("implicit, steps for a tolerance of {TOLERANCE:.0e}")),
             text(&evaluations.to_string()),
             exponential(error),
         ]];
