@@ -111,8 +111,8 @@ fn hit_joint_holds_every_claim_of_the_full_run() {
     assert_eq!((&study["quick"], &study["pass"]), (&false.into(), &true.into()));
 }
 
-/// The count of row 9 is decided by parameters that torques do not show, and by the last bits of the data: one seed in fifteen
-/// has 6 of 11.
+/// The count of row 9 is decided by parameters that torques do not show, and by the last bits of the data: one search in ten
+/// ends with 6 of 11.
 const XY_POINTING_MAY_MISS: [&str; 1] = ["9"];
 
 fn quick_xy_pointing(folder: &Path, out: &str, threads: &str) -> [String; 3] {

@@ -201,7 +201,8 @@ impl Gaps {
             .map(|k| listen(settings, &data, &loads, &mut seed(k)))
             .collect::<Result<_, _>>()?;
         let mut stiff = unit;
-        stiff.iter_mut().for_each(|factors| factors[1] = 1.3);
+        // Friction counts on the force of the law, which is not the stiffer one.
+        stiff.iter_mut().for_each(|factors| (factors[1], factors[3]) = (1.3, 1.3));
         let stiff = Data::of(ideal, fast(settings, &stiff, &centred)?, settings.data.discarded)?;
         let stiffer = probe(settings, &stiff, &loads, &mut seed(0))?;
         let lengths = std::array::from_fn(|joint| {
@@ -229,6 +230,8 @@ impl Gaps {
         let off = |found: f64, truth: f64| (found / truth - 1.0).abs();
         let gap = all().map(|o| off(o.clearance.value, self.clearance)).fold(0.0, f64::max);
         let friction = all().map(|o| off(o.friction.value, self.friction)).fold(0.0, f64::max);
+        let stiffer_friction =
+            self.stiffer.orbit.iter().map(|o| off(o.friction.value, self.friction)).fold(0.0, f64::max);
         let stiffer =
             self.stiffer.orbit.iter().map(|o| off(o.clearance.value, self.clearance)).fold(0.0, f64::max);
         let inside =
@@ -243,7 +246,8 @@ impl Gaps {
              friction coefficient of both joints; the motion says nothing of the stiffness, since the load does not change",
             "both within 5 % in every realisation, also where the contact is 30 % stiffer than its law",
             json!({
-                "clearance": gap, "friction": friction, "clearance_of_stiffer_contact": stiffer, "realisations": self.probed.len(),
+                "clearance": gap, "friction": friction, "clearance_of_stiffer_contact": stiffer,
+                "friction_of_stiffer_contact": stiffer_friction, "realisations": self.probed.len(),
                 "friction_intervals_that_cover": covered, "of": count, "share_of_stiffness_seen": seen,
                 "first": first.iter().map(|o| json!({
                     "clearance": [o.clearance.value, o.clearance.std], "friction": [o.friction.value, o.friction.std],
@@ -251,12 +255,13 @@ impl Gaps {
             }),
             format!(
                 "clearance within {:.2} %, friction within {:.2} % in {} realisations ({covered} of {count} intervals of friction cover); \
-                 {:.2} % with the stiffer contact; first realisation {:.2} ± {:.2} and {:.2} ± {:.2} µm, of which the length of the offset is known to \
+                 {:.2} and {:.2} % with the stiffer contact; first realisation {:.2} ± {:.2} and {:.2} ± {:.2} µm, of which the length of the offset is known to \
                  {:.3} and {:.3} µm; stiffness: {:.1} % of its prior variance removed",
                 100.0 * gap,
                 100.0 * friction,
                 self.probed.len(),
                 100.0 * stiffer,
+                100.0 * stiffer_friction,
                 1e6 * first[0].clearance.value,
                 1e6 * first[0].clearance.std,
                 1e6 * first[1].clearance.value,
@@ -265,7 +270,7 @@ impl Gaps {
                 1e6 * first[1].length.std,
                 100.0 * seen,
             ),
-            gap <= 0.05 && friction <= 0.05 && stiffer <= 0.05,
+            gap.max(friction).max(stiffer).max(stiffer_friction) <= 0.05,
         )
     }
 
