@@ -485,7 +485,7 @@ pub(crate) struct ClearanceArgs {
     pub(crate) rows: Option<(usize, usize)>,
     #[command(flatten)]
     pub(crate) columns: LogArgs,
-    /// Configuration whose [columns] the log follows.
+    /// Configuration whose [columns] and [motor_side] the log follows.
     #[arg(long, value_name = "FILE.toml")]
     pub(crate) config: Option<PathBuf>,
     /// Print JSON.

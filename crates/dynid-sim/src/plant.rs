@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dynid_model::element::ElasticTransmission;
+use dynid_model::element::{ElasticTransmission, JointElement};
 use dynid_model::{
     AddedInertia, Dynamics, DynamicsWorkspace, EffortModel, ForwardDynamicsWorkspace, History, LoadedState,
     MotionAdjoint, MotionBlock, NotPositive, RobotModel, State,
@@ -153,6 +153,10 @@ impl Plant {
         self
     }
 
+    fn counts(&self, element: &dyn JointElement) -> bool {
+        !(self.without_contacts && element.clearance().is_some())
+    }
+
     /// Gives the drives their ripple, one entry per joint.
     pub(crate) fn set_ripple(&mut self, ripple: Vec<Ripple>) {
         debug_assert_eq!(ripple.len(), self.joints(), "one ripple per joint");
@@ -270,11 +274,8 @@ impl Plant {
             sign_width: self.sign_width,
         };
         to.fill(0.0);
-        let (model, shape, linear) = (&self.model, &self.shape, &self.linear);
-        match self.without_contacts {
-            true => model.element_efforts_beside_contacts(&motion, shape, linear, 1, to, memory),
-            false => model.element_efforts(&motion, shape, linear, 1, to, memory),
-        }
+        let parameters = (self.shape.as_slice(), self.linear.as_slice());
+        self.model.efforts_of(|e| self.counts(e), &motion, parameters, 1, to, memory);
     }
 
     /// Effort of elements per acceleration, the same at some states of no special kind.
@@ -451,11 +452,8 @@ impl Plant {
             sign_width: self.sign_width,
         };
         work.slopes.clear();
-        let (model, shape, linear) = (&self.model, &self.shape, &self.linear);
-        let (weights, slopes, memory) = ((n, work.asked.as_slice()), &mut work.slopes, &mut work.memory);
-        match self.without_contacts {
-            true => model.element_adjoint_beside_contacts(&motion, shape, linear, weights, slopes, memory),
-            false => model.element_adjoint(&motion, shape, linear, weights, slopes, memory),
-        }
+        let parameters = (self.shape.as_slice(), self.linear.as_slice());
+        let (weights, memory) = ((n, work.asked.as_slice()), &mut work.memory);
+        self.model.adjoint_of(|e| self.counts(e), &motion, parameters, weights, &mut work.slopes, memory);
     }
 }

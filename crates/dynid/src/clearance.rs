@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use crate::Error;
 use crate::agreement::{Alignment, compare};
-use crate::config::LogConfig;
+use crate::config::{LogConfig, MotorSide};
 use crate::estimate::{Estimate, Split};
 use crate::logs;
 use crate::robot::Robot;
@@ -104,6 +104,7 @@ pub fn clearance(
     (estimate, file): (&Estimate, &Path),
     log: &LogConfig,
     columns: &MappingSpec,
+    motor_side: Option<&MotorSide>,
 ) -> Result<Vec<JointClearance>, Error> {
     let Some(journals) = robot.with_clearance()? else {
         return Err(Error::Unsupported(format!(
@@ -132,7 +133,7 @@ pub fn clearance(
     }
     let log = LogConfig { columns: None, ..log.clone() };
     let settings = ConditioningSettings::default();
-    let prepared = logs::load(&log, &logs::axes(&model), &columns, None)?.prepare(&model, &settings)?;
+    let prepared = logs::load(&log, &logs::axes(&model), &columns, motor_side)?.prepare(&model, &settings)?;
     let values = estimate.values(Split::Consistent);
     let alignment = Alignment {
         state_hz: estimate.model.state_hz,

@@ -12,13 +12,16 @@ use crate::message::{Failure, data, json};
 pub(crate) fn run(args: &ClearanceArgs) -> Result<u8, Failure> {
     let robot = Robot::load(&args.robot, &RobotOptions::default())?;
     let estimate = Estimate::read(&args.estimate)?;
-    let mut columns = match &args.config {
-        None => dynid::io::MappingSpec::default(),
-        Some(path) => Config::read(path)?.columns,
+    let (mut columns, motor_side) = match &args.config {
+        None => (dynid::io::MappingSpec::default(), None),
+        Some(path) => {
+            let config = Config::read(path)?;
+            (config.columns, config.motor_side)
+        }
     };
     apply_log_args(&mut columns, &args.columns);
     let log = LogConfig { path: args.log.clone(), rows: args.rows, ..LogConfig::default() };
-    let found = clearance(&robot, (&estimate, &args.estimate), &log, &columns)?;
+    let found = clearance(&robot, (&estimate, &args.estimate), &log, &columns, motor_side.as_ref())?;
     if args.json {
         json(&found)?;
         return Ok(0);

@@ -247,14 +247,6 @@ impl ClearanceContact {
     }
 }
 
-impl SlidingFriction {
-    /// The line on which the direction of friction lies at a sliding speed.
-    pub fn line(&self, v: f64) -> FrictionLine {
-        let (value, slope) = self.direction(v);
-        FrictionLine { offset: value - slope * v, slope }
-    }
-}
-
 fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[0] + a[1] * b[1]
 }

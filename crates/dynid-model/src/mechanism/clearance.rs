@@ -19,7 +19,7 @@ impl Description {
     /// the force on the journal in bearing axes (N); that of the rotation is the moment about the journal's centre (N m).
     ///
     /// Old coordinates keep their places, the translations come last, joint after joint in the order given. The links in
-    /// between have no mass.
+    /// between have no mass, of which the mechanism warns.
     ///
     /// # Errors
     /// [`MechanismError::UnknownJoint`], [`MechanismError::NoJournal`] for a joint that does not turn, follows another or

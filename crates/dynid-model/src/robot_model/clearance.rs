@@ -3,12 +3,6 @@
 use super::{PlacedElement, RobotModel};
 use crate::element::ClearanceContact;
 
-impl PlacedElement {
-    pub(super) fn is_contact(&self) -> bool {
-        self.element.clearance().is_some()
-    }
-}
-
 impl RobotModel {
     /// Contacts of journals in their bearings, in the order of the elements; not known ones.
     pub fn clearances(&self) -> impl Iterator<Item = &ClearanceContact> {

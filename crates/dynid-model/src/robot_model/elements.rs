@@ -2,7 +2,7 @@
 
 use super::{PlacedElement, RobotModel};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
-use crate::element::{ElementColumns, ElementWeights};
+use crate::element::{ElementColumns, ElementWeights, JointElement};
 
 impl PlacedElement {
     pub(super) fn shape<'a>(&self, shape: &'a [f64]) -> &'a [f64] {
@@ -29,25 +29,13 @@ impl RobotModel {
         self.efforts_of(|_| true, motion, (shape, linear), stride, effort, memory);
     }
 
-    /// The same without contacts of journals in their bearings ([`RobotModel::clearance_contacts`]).
+    /// The same of some elements; known ones all count.
     ///
     /// # Panics
     /// As [`EffortModel::efforts`](crate::EffortModel::efforts).
-    pub fn element_efforts_beside_contacts(
+    pub fn efforts_of(
         &self,
-        motion: &MotionBlock<'_>,
-        shape: &[f64],
-        linear: &[f64],
-        stride: usize,
-        effort: &mut [f64],
-        memory: &mut Vec<f64>,
-    ) {
-        self.efforts_of(|placed| !placed.is_contact(), motion, (shape, linear), stride, effort, memory);
-    }
-
-    fn efforts_of(
-        &self,
-        counts: impl Fn(&PlacedElement) -> bool,
+        counts: impl Fn(&dyn JointElement) -> bool,
         motion: &MotionBlock<'_>,
         (shape, linear): (&[f64], &[f64]),
         stride: usize,
@@ -56,7 +44,7 @@ impl RobotModel {
     ) {
         self.check_shapes(shape, Some(linear));
         let n = motion.samples;
-        for placed in self.elements.iter().filter(|placed| counts(placed)) {
+        for placed in self.elements.iter().filter(|placed| counts(placed.element.as_ref())) {
             memory.clear();
             memory.resize(placed.entries.len() * n, 0.0);
             let mut columns =
@@ -93,25 +81,13 @@ impl RobotModel {
         self.adjoint_of(|_| true, motion, (shape, linear), (stride, weights), out, memory);
     }
 
-    /// The same without contacts of journals in their bearings.
+    /// The same of some elements; known ones all count.
     ///
     /// # Panics
     /// As [`EffortModel::effort_adjoint`](crate::EffortModel::effort_adjoint).
-    pub fn element_adjoint_beside_contacts(
+    pub fn adjoint_of(
         &self,
-        motion: &MotionBlock<'_>,
-        shape: &[f64],
-        linear: &[f64],
-        weights: (usize, &[f64]),
-        out: &mut MotionAdjoint,
-        memory: &mut Vec<f64>,
-    ) {
-        self.adjoint_of(|placed| !placed.is_contact(), motion, (shape, linear), weights, out, memory);
-    }
-
-    fn adjoint_of(
-        &self,
-        counts: impl Fn(&PlacedElement) -> bool,
+        counts: impl Fn(&dyn JointElement) -> bool,
         motion: &MotionBlock<'_>,
         (shape, linear): (&[f64], &[f64]),
         (stride, weights): (usize, &[f64]),
@@ -121,7 +97,7 @@ impl RobotModel {
         self.check_shapes(shape, Some(linear));
         let n = motion.samples;
         let known_weights = weights;
-        for placed in self.elements.iter().filter(|placed| counts(placed)) {
+        for placed in self.elements.iter().filter(|placed| counts(placed.element.as_ref())) {
             memory.clear();
             for (rate, column) in &placed.entries {
                 memory.extend(weights[rate * stride..][..n].iter().map(|u| u * linear[*column]));

@@ -58,7 +58,7 @@ pub struct RunCount {
     pub steps: usize,
     /// Steps that were repeated.
     pub repeated: usize,
-    /// Accelerations of the whole mechanism (right-hand sides).
+    /// Accelerations of the whole mechanism (right-hand sides); not those that only tell of a sample or of powers.
     pub evaluations: usize,
     /// Jacobians of the contacts.
     pub jacobians: usize,

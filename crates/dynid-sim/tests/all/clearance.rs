@@ -280,5 +280,5 @@ fn what_cannot_be_simulated_is_refused() {
         &[0.0, 0.1],
         &settings(Method::RungeKutta4 { step: 1e-3 }),
     );
-    assert!(matches!(fails, Err(SimError::TooFast { .. })) || fails.unwrap().events.len() > 2);
+    assert!(matches!(fails, Err(SimError::TooFast { .. })), "{fails:?}");
 }

@@ -12,6 +12,7 @@ use super::efforts;
 use super::settings::SimulateSettings;
 use super::trajectory::Reference;
 use crate::Error;
+use crate::clearance::journal_channels;
 
 /// Time that is simulated before a log of a periodic motion begins, s.
 const SETTLE: f64 = 0.5;
@@ -166,9 +167,8 @@ fn channels(record: &ClearanceRecord, rows: &[usize]) -> (Vec<Named>, Vec<Named>
     for journal in &record.journals {
         let joint = &journal.joint;
         let pick = |values: &[f64]| rows.iter().map(|row| values[*row]).collect::<Vec<f64>>();
-        for (axis, name) in ["x", "y"].into_iter().enumerate() {
-            let offset = rows.iter().map(|row| journal.offset[*row][axis]).collect();
-            offsets.push((format!("journal_{joint}_{name}"), offset));
+        for (axis, name) in journal_channels(joint).into_iter().enumerate() {
+            offsets.push((name, rows.iter().map(|row| journal.offset[*row][axis]).collect()));
         }
         contacts.push((format!("normal_force_{joint}"), pick(&journal.normal_force)));
         contacts.push((format!("friction_force_{joint}"), pick(&journal.friction_force)));
