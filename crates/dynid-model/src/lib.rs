@@ -7,6 +7,7 @@
 //! Units are SI, angles rad. Standard parameters are about the joint frame in the axes of the file.
 
 pub mod base_parameters;
+pub mod closed;
 pub mod contact;
 mod coordinate;
 pub mod description;
