@@ -70,6 +70,7 @@ impl CutKind {
 
 /// What a closure demands.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "a mechanism has few closures, nearly all of them joints")]
 pub enum Condition {
     /// Two frames meet as in a joint.
     Joint {

@@ -1,5 +1,32 @@
 //! Closed mechanisms: trees with cut joints that close their loops (spec/mechanisms.md sections 9 to 14).
+//!
+//! A [`ClosedMechanism`] is a [`Mechanism`](crate::Mechanism) whose coordinates obey closures `Γ(q) = 0`. Some of them are
+//! *independent*; the others depend on them, which coordinates the poses of a motion solve for. Some are *driven*: efforts act
+//! there. With `J = ∂Γ/∂q̇`, `Γ̈ = J q̈ + b` and efforts `t` of the tree,
+//!
+//! ```text
+//! q̇ = G q̇_i,  q̈ = G q̈_i + c;   t = S τ + Jᵀ λ;   Gᵀ S τ = Gᵀ t
+//! ```
+//!
+//! where `S` selects driven coordinates and `λ` are the multipliers: forces (N) and couples (N m) in the cuts. Positive `λ` of a
+//! translation row pushes the body of frame `b` along that axis of frame `a`.
 
+mod build;
 mod closure;
+mod dynamics;
+mod error;
+mod factor;
+mod mechanism;
+mod pose;
+mod reaction;
+mod rows;
+mod singularity;
+mod sweep;
 
 pub use closure::{ClosureDescription, Condition, CutKind, LinkFrame};
+pub use dynamics::{ClosedDynamics, ClosedEffort, ClosedRegressor};
+pub use error::{ClosedError, ClosedWarning, NamedMotion, PoseError};
+pub use mechanism::ClosedMechanism;
+pub use pose::PoseWorkspace;
+pub use reaction::ReactionRows;
+pub use singularity::Singularity;

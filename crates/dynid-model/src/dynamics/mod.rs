@@ -12,10 +12,10 @@ mod forward_dynamics;
 mod groups;
 mod inverse_dynamics;
 mod kinematics;
-mod motion;
+pub(crate) mod motion;
 mod points;
-mod regressor;
-mod tree;
+pub(crate) mod regressor;
+pub(crate) mod tree;
 
 pub use adjoint_block::MotionAdjoint;
 pub use block::MotionBlock;

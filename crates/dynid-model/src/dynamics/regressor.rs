@@ -124,7 +124,7 @@ pub(super) fn own_axis<S: Scalar>(node: &Node) -> (Vec3<S>, Vec3<S>) {
 
 /// `[v·a | Bᵀv + a × z | Cᵀz]`.
 #[inline(always)]
-fn general_row<S: Scalar>(
+pub(crate) fn general_row<S: Scalar>(
     motion: &BodyMotion<S>,
     tensor: &TensorRows<S>,
     (z, v): (Vec3<S>, Vec3<S>),
@@ -136,13 +136,13 @@ fn general_row<S: Scalar>(
 }
 
 /// Columns of `C`: the moment per entry of the inertia tensor, `I α + ω × I ω = C (Ixx Ixy Ixz Iyy Iyz Izz)`.
-pub(super) struct TensorRows<S> {
+pub(crate) struct TensorRows<S> {
     pub(super) columns: [Vec3<S>; 6],
 }
 
 impl<S: Scalar> TensorRows<S> {
     #[inline(always)]
-    pub(super) fn new(omega: Vec3<S>, alpha: Vec3<S>) -> Self {
+    pub(crate) fn new(omega: Vec3<S>, alpha: Vec3<S>) -> Self {
         let [x, y, z] = omega.0;
         let [a1, a2, a3] = alpha.0;
         let (xy, xz, yz) = (x * y, x * z, y * z);

@@ -11,7 +11,7 @@ use dynid_model::element::{
 use dynid_model::*;
 use serde_json::Value;
 
-fn golden(name: &str) -> Option<Value> {
+pub(crate) fn golden(name: &str) -> Option<Value> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/golden").join(name);
     match std::fs::read_to_string(&path) {
         Ok(text) => Some(serde_json::from_str(&text).unwrap()),
@@ -22,23 +22,23 @@ fn golden(name: &str) -> Option<Value> {
     }
 }
 
-fn numbers(value: &Value) -> Vec<f64> {
+pub(crate) fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
 }
 
-fn flat(value: &Value) -> Vec<f64> {
+pub(crate) fn flat(value: &Value) -> Vec<f64> {
     match value {
         Value::Array(a) => a.iter().flat_map(flat).collect(),
         other => vec![other.as_f64().unwrap()],
     }
 }
 
-fn three(value: &Value) -> [f64; 3] {
+pub(crate) fn three(value: &Value) -> [f64; 3] {
     numbers(value).try_into().unwrap()
 }
 
 #[track_caller]
-fn check_close(found: &[f64], expected: &[f64], absolute: f64, relative: f64, what: &str) {
+pub(crate) fn check_close(found: &[f64], expected: &[f64], absolute: f64, relative: f64, what: &str) {
     assert_eq!(found.len(), expected.len(), "{what}: length");
     let scale = expected.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     for (k, (f, e)) in found.iter().zip(expected).enumerate() {
@@ -46,7 +46,7 @@ fn check_close(found: &[f64], expected: &[f64], absolute: f64, relative: f64, wh
     }
 }
 
-fn described(bodies: &[Value], gravity: [f64; 3]) -> Description {
+pub(crate) fn described(bodies: &[Value], gravity: [f64; 3]) -> Description {
     let mut d = Description::new("golden");
     d.gravity = gravity;
     d.links.push(LinkDescription { name: "ground".into(), inertia: None });
@@ -69,7 +69,7 @@ fn described(bodies: &[Value], gravity: [f64; 3]) -> Description {
             child: name.into(),
             kind,
             placement: Placement::from_xyz_rpy(three(&joint["xyz"]), three(&joint["rpy"])),
-            axis: three(&joint["axis"]),
+            axis: if joint["axis"].is_null() { [0.0, 0.0, 1.0] } else { three(&joint["axis"]) },
             limits: Limits::default(),
             mimic: None,
         });

@@ -2,6 +2,7 @@
 
 mod adjoint;
 mod clearance;
+mod closed;
 mod contact;
 mod elastic;
 mod forward_dynamics;

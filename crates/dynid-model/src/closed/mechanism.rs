@@ -1,0 +1,163 @@
+//! A mechanism with closures, and which of its coordinates are driven and independent.
+
+use super::build;
+use super::closure::ClosureDescription;
+use super::error::{ClosedError, ClosedWarning};
+use super::rows::Rows;
+use crate::dynamics::tree::Tree;
+use crate::mechanism::Mechanism;
+
+/// A tree with closures, checked and with a closed home position.
+///
+/// Poses are sought from the home position on, which thereby chooses among the ways to assemble the mechanism.
+#[derive(Clone, Debug)]
+pub struct ClosedMechanism {
+    pub(super) mechanism: Mechanism,
+    pub(super) closures: Vec<ClosureDescription>,
+    pub(super) tree: Tree,
+    pub(super) rows: Rows,
+    /// Length `L_c` that makes angles comparable to lengths, m.
+    pub(super) length: f64,
+    /// Factor of every row, and of every coordinate, that makes both lengths.
+    pub(super) row_scale: Vec<f64>,
+    pub(super) rate_scale: Vec<f64>,
+    pub(super) driven: Vec<usize>,
+    pub(super) independent: Vec<usize>,
+    /// All other rates, ascending.
+    pub(super) dependent: Vec<usize>,
+    /// Position entry of every rate; for floating joints that of the joint.
+    pub(super) position_of: Vec<usize>,
+    /// Whether a rate belongs to a joint that floats.
+    pub(super) floats: Vec<bool>,
+    pub(super) home: Vec<f64>,
+    /// Rows that decide on the assembly mode: as many as there are dependent coordinates.
+    pub(super) mode_rows: Vec<usize>,
+    pub(super) mode: f64,
+    pub(super) undetermined: Vec<bool>,
+    pub(super) warnings: Vec<ClosedWarning>,
+    pub(super) least_measure: f64,
+}
+
+/// Measure of singularity below which poses are refused (see [`ClosedMechanism::with_least_measure`]).
+const LEAST_MEASURE: f64 = 1e-4;
+
+impl ClosedMechanism {
+    /// Closes the loops of a mechanism.
+    ///
+    /// `driven`: names of the joints that drives act on; `None`: as many as needed are chosen. They are also the
+    /// independent coordinates if there are as many of them as free motions; otherwise some of them are. `home`: positions of
+    /// joints near a closed pose (seven numbers for a floating joint), 0 where nothing is said. With the independent joints
+    /// held there, the others are solved for.
+    ///
+    /// # Errors
+    /// [`ClosedError`].
+    pub fn new(
+        mechanism: Mechanism,
+        closures: Vec<ClosureDescription>,
+        driven: Option<&[String]>,
+        home: &[(String, Vec<f64>)],
+    ) -> Result<ClosedMechanism, ClosedError> {
+        build::build(mechanism, closures, driven, home, LEAST_MEASURE)
+    }
+
+    /// The same mechanism with other independent coordinates: a pose of the platform, say, in place of the drives.
+    ///
+    /// # Errors
+    /// [`ClosedError::IndependentCount`], [`ClosedError::Dependent`], [`ClosedError::SingularHome`], and those of names.
+    pub fn with_independent(self, joints: &[String]) -> Result<ClosedMechanism, ClosedError> {
+        build::with_independent(self, joints)
+    }
+
+    /// Refuses poses whose [measure of singularity](super::Singularity) is below `least`. Default: 1e-4.
+    pub fn with_least_measure(mut self, least: f64) -> Self {
+        self.least_measure = least;
+        self
+    }
+
+    /// The tree.
+    pub fn mechanism(&self) -> &Mechanism {
+        &self.mechanism
+    }
+
+    /// The same closures on another tree with the same joints: other inertias or another gravity.
+    ///
+    /// # Panics
+    /// If the joints differ.
+    pub fn with_mechanism(mut self, mechanism: Mechanism) -> Self {
+        let joints = |m: &Mechanism| -> Vec<_> { m.bodies().iter().map(|b| b.joint.clone()).collect() };
+        assert_eq!(joints(&mechanism), joints(&self.mechanism), "joints of another mechanism");
+        self.mechanism = mechanism;
+        self
+    }
+
+    /// The closures.
+    pub fn closures(&self) -> &[ClosureDescription] {
+        &self.closures
+    }
+
+    /// Number of conditions, which is the number of multipliers.
+    pub fn conditions(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// For every condition: the index of its closure.
+    pub fn condition_closures(&self) -> &[usize] {
+        &self.rows.owner
+    }
+
+    /// For every condition: whether it is about directions, so that its multiplier is a couple in N m, not a force in N.
+    pub fn is_couple(&self) -> &[bool] {
+        &self.rows.angular
+    }
+
+    /// For every condition: whether poses and efforts determine its multiplier. Where conditions repeat each other,
+    /// some multipliers are those of least norm.
+    pub fn is_determined(&self) -> Vec<bool> {
+        self.undetermined.iter().map(|u| !u).collect()
+    }
+
+    /// Number of free motions.
+    pub fn mobility(&self) -> usize {
+        self.independent.len()
+    }
+
+    /// Rates of the tree that drives act on, in the order stated.
+    pub fn driven(&self) -> &[usize] {
+        &self.driven
+    }
+
+    /// Rates of the tree that the others follow from.
+    pub fn independent(&self) -> &[usize] {
+        &self.independent
+    }
+
+    /// Rates of the tree that follow from the independent ones.
+    pub fn dependent(&self) -> &[usize] {
+        &self.dependent
+    }
+
+    /// Whether drives are the independent coordinates, one for one.
+    pub fn drives_are_independent(&self) -> bool {
+        self.driven == self.independent
+    }
+
+    /// A closed pose: positions of all joints.
+    pub fn home(&self) -> &[f64] {
+        &self.home
+    }
+
+    /// Positions of the independent coordinates at home.
+    pub fn home_independent(&self) -> Vec<f64> {
+        self.independent.iter().map(|r| self.home[self.position_of[*r]]).collect()
+    }
+
+    /// Position entry of a rate: its own, or the first of the seven of a floating joint.
+    pub fn position_of(&self, rate: usize) -> usize {
+        self.position_of[rate]
+    }
+
+    /// Oddities that were found.
+    pub fn warnings(&self) -> &[ClosedWarning] {
+        &self.warnings
+    }
+}

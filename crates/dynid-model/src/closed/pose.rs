@@ -1,0 +1,467 @@
+//! Closed poses: Newton's method, and continuation from pose to pose (spec/mechanisms.md section 11).
+
+use super::error::{NamedMotion, PoseError};
+use super::factor::Factor;
+use super::mechanism::ClosedMechanism;
+use super::sweep::World;
+
+/// Residual at which a pose counts as closed, m.
+const CLOSED: f64 = 1e-13;
+/// The same where rounding keeps it from falling further.
+const STALLED: f64 = 1e-11;
+const ITERATIONS: usize = 12;
+/// Longest step of a coordinate between two poses, m (or rad times `L_c`).
+const LONGEST: f64 = 0.5;
+/// Correction that a predicted pose may need, as a share of the step and beyond it.
+const CORRECTION: (f64, f64) = (0.3, 1e-3);
+/// Smallest part of the way to a pose that is tried.
+const SHORTEST: f64 = 1.0 / 4096.0;
+/// Flatness of the factors below which the measure of singularity is worked out.
+const DOUBTFUL: f64 = 10.0;
+
+/// A closed pose and what belongs to it; reusable, the next pose is sought from the last one.
+#[derive(Clone, Debug)]
+pub struct PoseWorkspace {
+    pub(super) world: World<f64>,
+    /// Positions of all joints.
+    pub(super) q: Vec<f64>,
+    residual: Vec<f64>,
+    /// Row-major.
+    pub(super) jacobian: Vec<f64>,
+    pub(super) bias: Vec<f64>,
+    /// Of the scaled Jacobian of the dependent coordinates at the pose.
+    pub(super) factor: Factor,
+    mode: Factor,
+    /// `G`: change of every rate per independent rate, row-major `rates × mobility`.
+    pub(super) map: Vec<f64>,
+    /// `c`: accelerations while no independent coordinate accelerates.
+    pub(super) drift: Vec<f64>,
+    right: Vec<f64>,
+    step: Vec<f64>,
+    before: Vec<f64>,
+    from: Vec<f64>,
+    /// Newton steps of the last search.
+    iterations: usize,
+    at_home: bool,
+}
+
+impl PoseWorkspace {
+    /// Positions of all joints.
+    pub fn positions(&self) -> &[f64] {
+        &self.q
+    }
+
+    /// `G = ∂q̇/∂q̇_i`, row-major, one row per rate of the tree; valid after [`ClosedMechanism::map`].
+    pub fn velocity_map(&self) -> &[f64] {
+        &self.map
+    }
+
+    /// `c` in `q̈ = G q̈_i + c`; valid after [`ClosedMechanism::drift`].
+    pub fn acceleration_drift(&self) -> &[f64] {
+        &self.drift
+    }
+
+    /// Jacobian `J` of the closures by all rates, row-major, SI units.
+    pub fn jacobian(&self) -> &[f64] {
+        &self.jacobian
+    }
+
+    /// `b` in `Γ̈ = J q̈ + b`; valid after [`ClosedMechanism::drift`].
+    pub fn bias(&self) -> &[f64] {
+        &self.bias
+    }
+
+    /// Residuals of the closures at the pose, m or 1.
+    pub fn residual(&self) -> &[f64] {
+        &self.residual
+    }
+
+    /// Newton steps that the last pose took, all steps on the way to it together.
+    pub fn iterations(&self) -> usize {
+        self.iterations
+    }
+}
+
+impl ClosedMechanism {
+    /// A workspace at the home position.
+    pub fn workspace(&self) -> PoseWorkspace {
+        let (m, n, d) = (self.rows.len(), self.tree.rates, self.independent.len());
+        let mut work = PoseWorkspace {
+            world: World::new(&self.tree),
+            q: self.home.clone(),
+            residual: vec![0.0; m],
+            jacobian: vec![0.0; m * n],
+            bias: vec![0.0; m],
+            factor: Factor::default(),
+            mode: Factor::default(),
+            map: vec![0.0; n * d],
+            drift: vec![0.0; n],
+            right: vec![0.0; m],
+            step: vec![0.0; n - d],
+            before: Vec::new(),
+            from: Vec::new(),
+            iterations: 0,
+            at_home: false,
+        };
+        self.go_home(&mut work);
+        work
+    }
+
+    /// Takes a workspace to the home position.
+    pub fn go_home(&self, work: &mut PoseWorkspace) {
+        if !work.at_home {
+            work.q.copy_from_slice(&self.home);
+            self.evaluate(work);
+            work.at_home = true;
+        }
+    }
+
+    /// Takes a workspace to a closed pose: positions of all joints, as a motion or a file states them.
+    ///
+    /// # Errors
+    /// As [`ClosedMechanism::reach`]; `q` may be off by rounding only, and dependent joints are corrected.
+    ///
+    /// # Panics
+    /// If `q` has the wrong length.
+    pub fn take(&self, work: &mut PoseWorkspace, q: &[f64]) -> Result<(), PoseError> {
+        assert_eq!(q.len(), self.tree.positions, "length of q");
+        if let Some(k) = q.iter().position(|x| !x.is_finite()) {
+            return Err(PoseError::NotFinite { joint: self.joint_at(k) });
+        }
+        work.at_home = false;
+        work.q.copy_from_slice(q);
+        work.iterations = 0;
+        self.evaluate(work);
+        match self.newton(work) {
+            Some(_) => self.accept(work),
+            None => Err(self.out_of_reach(work)),
+        }
+    }
+
+    /// Takes a workspace from its pose to the one with other positions of the independent coordinates, in short steps
+    /// along the straight line between them.
+    ///
+    /// # Errors
+    /// [`PoseError`]; the workspace then stays at its pose.
+    ///
+    /// # Panics
+    /// If `independent` has the wrong length.
+    pub fn reach(&self, work: &mut PoseWorkspace, independent: &[f64]) -> Result<(), PoseError> {
+        assert_eq!(independent.len(), self.independent.len(), "length of the independent positions");
+        if let Some(k) = independent.iter().position(|x| !x.is_finite()) {
+            return Err(PoseError::NotFinite { joint: self.rate_name(self.independent[k]) });
+        }
+        let mut start = std::mem::take(&mut work.before);
+        start.clone_from(&work.q);
+        work.at_home = false;
+        work.iterations = 0;
+        let result = self.follow(work, &start, independent);
+        if result.is_err() {
+            work.q.copy_from_slice(&start);
+            self.evaluate(work);
+        }
+        work.before = start;
+        result
+    }
+
+    fn follow(&self, work: &mut PoseWorkspace, start: &[f64], target: &[f64]) -> Result<(), PoseError> {
+        let mut done = 0.0;
+        let way = self
+            .independent
+            .iter()
+            .zip(target)
+            .map(|(r, to)| (to - start[self.position_of[*r]]).abs() * self.rate_scale[*r])
+            .fold(0.0, f64::max);
+        let mut part: f64 = (LONGEST / way).min(1.0);
+        let mut from = std::mem::take(&mut work.from);
+        let result = loop {
+            let next = if done + part >= 1.0 - 1e-9 { 1.0 } else { done + part };
+            from.clone_from(&work.q);
+            if self.try_step(work, start, target, next) {
+                if next >= 1.0 {
+                    break self.accept(work);
+                }
+                done = next;
+                part *= 2.0;
+                continue;
+            }
+            part *= 0.5;
+            let fault = if part < SHORTEST { Some(self.out_of_reach(work)) } else { None };
+            work.q.copy_from_slice(&from);
+            self.evaluate(work);
+            if let Some(fault) = fault {
+                // A pose next to a singular one is refused as that.
+                break self.accept(work).and(Err(fault));
+            }
+        };
+        work.from = from;
+        result
+    }
+
+    /// One predictor step and its correction; false if the pose is not plainly the continuation of the last.
+    fn try_step(&self, work: &mut PoseWorkspace, start: &[f64], target: &[f64], next: f64) -> bool {
+        let n = self.tree.rates;
+        work.right.fill(0.0);
+        for (r, to) in self.independent.iter().zip(target) {
+            let position = self.position_of[*r];
+            let at = if next >= 1.0 { *to } else { start[position] + next * (to - start[position]) };
+            let by = at - work.q[position];
+            for (row, b) in work.right.iter_mut().enumerate() {
+                *b -= work.jacobian[row * n + r] * by;
+            }
+            work.q[position] = at;
+        }
+        let predicted = self.solve_step(work);
+        if predicted > LONGEST || predicted.is_nan() {
+            return false;
+        }
+        self.apply_step(work, 1.0);
+        self.evaluate(work);
+        match self.newton(work) {
+            Some(corrected) => {
+                corrected <= CORRECTION.0 * predicted + CORRECTION.1 && self.mode_of(work) == self.mode
+            }
+            None => false,
+        }
+    }
+
+    /// Newton's method on the dependent coordinates from the pose evaluated last: by how much they moved, if the loops closed.
+    pub(super) fn newton(&self, work: &mut PoseWorkspace) -> Option<f64> {
+        let mut moved = 0.0;
+        let mut last = f64::INFINITY;
+        for _ in 0..ITERATIONS {
+            let gap = self.gap(work);
+            if gap <= CLOSED || (gap <= STALLED && gap > 0.5 * last) {
+                return Some(moved);
+            }
+            if !gap.is_finite() {
+                return None;
+            }
+            last = gap;
+            for (b, r) in work.right.iter_mut().zip(&work.residual) {
+                *b = -r;
+            }
+            let length = self.solve_step(work);
+            if !length.is_finite() {
+                return None;
+            }
+            let factor = (LONGEST / length).min(1.0);
+            self.apply_step(work, factor);
+            moved += factor * length;
+            work.iterations += 1;
+            self.evaluate(work);
+        }
+        (self.gap(work) <= STALLED).then_some(moved)
+    }
+
+    /// Largest residual, m.
+    fn gap(&self, work: &PoseWorkspace) -> f64 {
+        let size = |(r, s): (&f64, &f64)| (r * s).abs();
+        // Not `max`, which would lose what is not a number.
+        work.residual.iter().zip(&self.row_scale).map(size).fold(0.0, |m, x| if x <= m { m } else { x })
+    }
+
+    /// Residuals, Jacobian and its factors at the positions of the workspace.
+    pub(super) fn evaluate(&self, work: &mut PoseWorkspace) {
+        work.world.place(&self.tree, &work.q);
+        self.rows.evaluate(&work.world, &work.q, &mut work.residual, &mut work.jacobian);
+        let (n, jacobian) = (self.tree.rates, &work.jacobian);
+        work.factor.factor(self.rows.len(), self.dependent.len(), |i, j| {
+            let rate = self.dependent[j];
+            jacobian[i * n + rate] * self.row_scale[i] / self.rate_scale[rate]
+        });
+    }
+
+    /// Solves `J_dependent x = right` into `work.step`; length of the largest entry, m.
+    fn solve_step(&self, work: &mut PoseWorkspace) -> f64 {
+        self.solve_dependent(&mut work.factor, &mut work.right, &mut work.step);
+        let scaled = self.dependent.iter().zip(&work.step).map(|(r, x)| (x * self.rate_scale[*r]).abs());
+        scaled.fold(0.0, |m, x| if x <= m { m } else { x })
+    }
+
+    /// Least-squares solution of `J_dependent x = right`, in SI units.
+    pub(super) fn solve_dependent(&self, factor: &mut Factor, right: &mut [f64], x: &mut [f64]) {
+        right.iter_mut().zip(&self.row_scale).for_each(|(b, s)| *b *= s);
+        factor.solve(right, x);
+        for (x, rate) in x.iter_mut().zip(&self.dependent) {
+            *x /= self.rate_scale[*rate];
+        }
+    }
+
+    fn apply_step(&self, work: &mut PoseWorkspace, factor: f64) {
+        let mut rates = [0.0; 6];
+        let mut k = 0;
+        while k < self.dependent.len() {
+            let rate = self.dependent[k];
+            let position = self.position_of[rate];
+            if !self.floats[rate] {
+                work.q[position] += factor * work.step[k];
+                k += 1;
+                continue;
+            }
+            // All rates of a floating joint are dependent.
+            for (r, s) in rates.iter_mut().zip(&work.step[k..k + 6]) {
+                *r = factor * s;
+            }
+            float(&mut work.q[position..position + 7], &rates);
+            k += 6;
+        }
+    }
+
+    fn accept(&self, work: &mut PoseWorkspace) -> Result<(), PoseError> {
+        if work.factor.flatness() < DOUBTFUL * self.least_measure {
+            let found = self.singularity(work);
+            if found.measure < self.least_measure {
+                let (measure, motion) = (found.measure, found.motion);
+                return Err(PoseError::Singular { measure, least: self.least_measure, motion });
+            }
+        }
+        if self.mode_of(work) == self.mode { Ok(()) } else { Err(PoseError::OtherMode) }
+    }
+
+    /// Sign of the determinant of as many rows of the dependent Jacobian as it has columns.
+    pub(super) fn mode_of(&self, work: &mut PoseWorkspace) -> f64 {
+        if self.mode_rows.len() == self.rows.len() {
+            return work.factor.sign();
+        }
+        let (n, jacobian) = (self.tree.rates, &work.jacobian);
+        work.mode.factor(self.mode_rows.len(), self.dependent.len(), |i, j| {
+            jacobian[self.mode_rows[i] * n + self.dependent[j]]
+        });
+        work.mode.sign()
+    }
+
+    /// Velocity map `G` at the pose; see [`PoseWorkspace::velocity_map`].
+    pub fn map(&self, work: &mut PoseWorkspace) {
+        let (n, d) = (self.tree.rates, self.independent.len());
+        for (column, rate) in self.independent.iter().enumerate() {
+            for (row, b) in work.right.iter_mut().enumerate() {
+                *b = -work.jacobian[row * n + rate];
+            }
+            let PoseWorkspace { factor, right, step, map, .. } = work;
+            self.solve_dependent(factor, right, step);
+            for (r, x) in self.dependent.iter().zip(step) {
+                map[r * d + column] = *x;
+            }
+            for (other, r) in self.independent.iter().enumerate() {
+                map[r * d + column] = if other == column { 1.0 } else { 0.0 };
+            }
+        }
+    }
+
+    /// Rates `dq` of all coordinates and what remains of their accelerations; after [`ClosedMechanism::map`]. See
+    /// [`PoseWorkspace::acceleration_drift`].
+    ///
+    /// # Panics
+    /// If a slice has the wrong length.
+    pub fn drift(&self, work: &mut PoseWorkspace, independent: &[f64], dq: &mut [f64]) {
+        let d = self.independent.len();
+        assert_eq!(independent.len(), d, "length of the independent rates");
+        assert_eq!(dq.len(), self.tree.rates, "length of dq");
+        for (v, row) in dq.iter_mut().zip(work.map.chunks_exact(d)) {
+            *v = row.iter().zip(independent).map(|(g, v)| g * v).sum();
+        }
+        work.world.drift(&self.tree, dq);
+        self.rows.bias(&work.world, &mut work.bias);
+        for (right, b) in work.right.iter_mut().zip(&work.bias) {
+            *right = -b;
+        }
+        let PoseWorkspace { factor, right, step, drift, .. } = work;
+        self.solve_dependent(factor, right, step);
+        drift.fill(0.0);
+        for (r, x) in self.dependent.iter().zip(step) {
+            drift[*r] = *x;
+        }
+    }
+
+    /// Rates and accelerations of all coordinates from those of the independent ones, at the pose of the workspace.
+    ///
+    /// # Panics
+    /// If a slice has the wrong length.
+    pub fn motion(
+        &self,
+        work: &mut PoseWorkspace,
+        (rates, accelerations): (&[f64], &[f64]),
+        dq: &mut [f64],
+        ddq: &mut [f64],
+    ) {
+        let d = self.independent.len();
+        assert_eq!(accelerations.len(), d, "length of the independent accelerations");
+        assert_eq!(ddq.len(), self.tree.rates, "length of ddq");
+        self.map(work);
+        self.drift(work, rates, dq);
+        for ((a, row), c) in ddq.iter_mut().zip(work.map.chunks_exact(d)).zip(&work.drift) {
+            *a = c + row.iter().zip(accelerations).map(|(g, a)| g * a).sum::<f64>();
+        }
+    }
+
+    fn out_of_reach(&self, work: &PoseWorkspace) -> PoseError {
+        let (closure, gap) = self.largest_gap(&work.residual);
+        PoseError::OutOfReach { closure, gap }
+    }
+
+    /// Closure with the largest residual, and the residual in words.
+    pub(super) fn largest_gap(&self, residual: &[f64]) -> (String, String) {
+        let size = |k: usize| (residual[k] * self.row_scale[k]).abs();
+        let worst = (0..residual.len()).fold(0, |m, k| if size(k) > size(m) { k } else { m });
+        let gap = if self.rows.angular[worst] {
+            format!("{:.3e} rad", residual[worst])
+        } else {
+            format!("{:.4} mm", 1e3 * residual[worst])
+        };
+        (self.closures[self.rows.owner[worst]].name.clone(), gap)
+    }
+
+    pub(super) fn rate_name(&self, rate: usize) -> String {
+        self.mechanism.rate_names()[rate].clone()
+    }
+
+    fn joint_at(&self, position: usize) -> String {
+        let owns =
+            |b: &&crate::mechanism::Body| (b.position..b.position + b.joint.positions()).contains(&position);
+        self.mechanism.bodies().iter().find(owns).map_or_else(String::new, |b| b.joint.name.clone())
+    }
+
+    /// The largest entries of a motion of some rates.
+    pub(super) fn named_motion(&self, rates: &[usize], entries: &[f64]) -> NamedMotion {
+        let names = self.mechanism.rate_names();
+        let largest = entries.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let mut named: Vec<(String, f64)> = rates
+            .iter()
+            .zip(entries)
+            .filter(|(_, x)| x.abs() > 0.05 * largest)
+            .map(|(r, x)| (names[*r].clone(), x / largest))
+            .collect();
+        named.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+        named.truncate(6);
+        NamedMotion(named)
+    }
+}
+
+/// Moves a floating joint by body rates over a unit of time; the quaternion stays of length one.
+pub(super) fn float(q: &mut [f64], rates: &[f64; 6]) {
+    let [x, y, z, w] = [q[3], q[4], q[5], q[6]];
+    let rotate = |v: [f64; 3]| {
+        let cross = |a: [f64; 3], b: [f64; 3]| {
+            [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+        };
+        let t = cross([x, y, z], v).map(|c| 2.0 * c);
+        let u = cross([x, y, z], t);
+        [v[0] + w * t[0] + u[0], v[1] + w * t[1] + u[1], v[2] + w * t[2] + u[2]]
+    };
+    let moved = rotate([rates[0], rates[1], rates[2]]);
+    q.iter_mut().zip(moved).for_each(|(q, m)| *q += m);
+    let turn = [rates[3], rates[4], rates[5]];
+    let angle = turn.iter().map(|t| t * t).sum::<f64>().sqrt();
+    // sin(a/2)/a, by its series near zero.
+    let half = if angle > 1e-4 { (0.5 * angle).sin() / angle } else { 0.5 - angle * angle / 48.0 };
+    let ([a, b, c], d) = (turn.map(|t| t * half), (0.5 * angle).cos());
+    let product = [
+        w * a + x * d + y * c - z * b,
+        w * b - x * c + y * d + z * a,
+        w * c + x * b - y * a + z * d,
+        w * d - x * a - y * b - z * c,
+    ];
+    let norm = product.iter().map(|p| p * p).sum::<f64>().sqrt();
+    q[3..].iter_mut().zip(product).for_each(|(q, p)| *q = p / norm);
+}
