@@ -8,6 +8,7 @@
 
 pub mod base_parameters;
 pub mod closed;
+mod closed_model;
 pub mod contact;
 mod coordinate;
 pub mod description;
@@ -24,6 +25,7 @@ pub mod spatial;
 pub mod symmetric;
 
 pub use base_parameters::{BaseParameters, BaseSettings};
+pub use closed_model::{ClosedModel, PathError, Reaction};
 pub use coordinate::Coordinate;
 pub use description::{Description, JointDescription, JointKind, Limits, LinkDescription, Mimic};
 pub use dynamics::{

@@ -20,13 +20,16 @@ mod mechanism;
 mod pose;
 mod reaction;
 mod rows;
+mod sensitivity;
 mod singularity;
 mod sweep;
 
 pub use closure::{ClosureDescription, Condition, CutKind, LinkFrame};
+pub(crate) use dynamics::Drives;
 pub use dynamics::{ClosedDynamics, ClosedEffort, ClosedRegressor};
 pub use error::{ClosedError, ClosedWarning, NamedMotion, PoseError};
 pub use mechanism::ClosedMechanism;
 pub use pose::PoseWorkspace;
 pub use reaction::ReactionRows;
+pub(crate) use sensitivity::{CarryWorkspace, Seeds};
 pub use singularity::Singularity;

@@ -274,13 +274,13 @@ impl ClosedMechanism {
 
     /// Solves `J_dependent x = right` into `work.step`; length of the largest entry, m.
     fn solve_step(&self, work: &mut PoseWorkspace) -> f64 {
-        self.solve_dependent(&mut work.factor, &mut work.right, &mut work.step);
+        self.solve_dependent(&work.factor, &mut work.right, &mut work.step);
         let scaled = self.dependent.iter().zip(&work.step).map(|(r, x)| (x * self.rate_scale[*r]).abs());
         scaled.fold(0.0, |m, x| if x <= m { m } else { x })
     }
 
     /// Least-squares solution of `J_dependent x = right`, in SI units.
-    pub(super) fn solve_dependent(&self, factor: &mut Factor, right: &mut [f64], x: &mut [f64]) {
+    pub(super) fn solve_dependent(&self, factor: &Factor, right: &mut [f64], x: &mut [f64]) {
         right.iter_mut().zip(&self.row_scale).for_each(|(b, s)| *b *= s);
         factor.solve(right, x);
         for (x, rate) in x.iter_mut().zip(&self.dependent) {

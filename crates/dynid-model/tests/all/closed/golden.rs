@@ -70,7 +70,13 @@ fn states(parts: &Parts, golden: &Value, what: &str) {
             rows.chunks_exact(phi.len()).map(|r| r.iter().zip(&phi).map(|(a, b)| a * b).sum()).collect()
         };
         check_close(&product(&regressor.drives), &found.drives, 0.0, 1e-11, &format!("{what}: W phi"));
-        check_close(&product(&regressor.multipliers), &found.multipliers, 1e-12, 1e-11, &format!("{what}: L phi"));
+        check_close(
+            &product(&regressor.multipliers),
+            &found.multipliers,
+            1e-12,
+            1e-11,
+            &format!("{what}: L phi"),
+        );
 
         for (body, expected) in state["reaction_wrench"].as_object().unwrap() {
             let index = mechanism.joint_index(body).unwrap();
@@ -89,7 +95,12 @@ fn states(parts: &Parts, golden: &Value, what: &str) {
         if let Some(over) = state["over_actuated"].as_object() {
             let names: Vec<String> =
                 over["actuated"].as_array().unwrap().iter().map(|n| n.as_str().unwrap().to_owned()).collect();
-            let parts = Parts { driven: names, mechanism: mechanism.clone(), closures: machine.closures().to_vec(), home: parts.home.clone() };
+            let parts = Parts {
+                driven: names,
+                mechanism: mechanism.clone(),
+                closures: machine.closures().to_vec(),
+                home: parts.home.clone(),
+            };
             let mut dynamics = ClosedDynamics::new(parts.close());
             dynamics.take(&q).unwrap();
             let found = dynamics.inverse_dynamics((&qd, &qdd), None, &phi);

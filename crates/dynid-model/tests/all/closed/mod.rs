@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 mod golden;
+mod model;
 mod poses;
 
 use dynid_model::closed::{ClosedMechanism, ClosureDescription, Condition, CutKind, LinkFrame};
@@ -83,13 +84,8 @@ impl Parts {
     }
 
     pub(crate) fn close(&self) -> ClosedMechanism {
-        ClosedMechanism::new(
-            self.mechanism.clone(),
-            self.closures.clone(),
-            Some(&self.driven),
-            &self.home,
-        )
-        .unwrap()
+        ClosedMechanism::new(self.mechanism.clone(), self.closures.clone(), Some(&self.driven), &self.home)
+            .unwrap()
     }
 }
 
