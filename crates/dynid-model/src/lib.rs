@@ -25,7 +25,9 @@ pub mod spatial;
 pub mod symmetric;
 
 pub use base_parameters::{BaseParameters, BaseSettings};
-pub use closed_model::{ClosedModel, PathError, Reaction};
+pub use closed_model::{
+    ClosedModel, JointLoad, LoadError, LoadGroup, LoadReference, PathError, Reaction, Reactions,
+};
 pub use coordinate::Coordinate;
 pub use description::{Description, JointDescription, JointKind, Limits, LinkDescription, Mimic};
 pub use dynamics::{

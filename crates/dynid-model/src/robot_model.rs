@@ -7,6 +7,7 @@ mod elements;
 mod history;
 mod known;
 mod passivity;
+mod reaction_friction;
 mod shaped;
 
 use std::sync::Arc;

@@ -3,6 +3,7 @@
 mod adjoint;
 mod expand;
 mod fold;
+mod loads;
 mod reactions;
 
 use std::sync::Arc;
@@ -13,7 +14,9 @@ use crate::effort_model::{EffortModel, History, Output, RegressorBlock, Regresso
 use crate::parameter::ParameterTable;
 use crate::robot_model::RobotModel;
 use fold::Fold;
-pub use reactions::Reaction;
+use loads::Loads;
+pub use loads::{JointLoad, LoadError, LoadGroup, LoadReference};
+pub use reactions::{Reaction, Reactions};
 
 /// Rigid bodies and joint elements of a tree whose loops are closed.
 ///
@@ -34,6 +37,9 @@ pub struct ClosedModel {
     drives: Drives,
     outputs: Vec<Output>,
     fold: Fold,
+    /// Channels that a motion must bring.
+    channels: Vec<String>,
+    loads: Option<Loads>,
 }
 
 /// The sample of a motion at which poses cannot be followed, and why.
@@ -63,6 +69,8 @@ impl ClosedModel {
         ClosedModel {
             drives: Drives::new(&machine),
             fold: Fold::new(&tree, &machine),
+            channels: tree.channels().to_vec(),
+            loads: None,
             outputs,
             machine,
             tree,
@@ -79,7 +87,7 @@ impl ClosedModel {
         &self.machine
     }
 
-    /// The same closures around a changed model of the tree.
+    /// The same closures around a changed model of the tree, without loads.
     pub fn map_tree(self, change: impl FnOnce(RobotModel) -> RobotModel) -> Self {
         ClosedModel::new(change(self.tree), self.machine)
     }
@@ -99,7 +107,7 @@ impl EffortModel for ClosedModel {
     }
 
     fn channels(&self) -> &[String] {
-        self.tree.channels()
+        &self.channels
     }
 
     fn signals(&self) -> &[String] {
@@ -115,7 +123,9 @@ impl EffortModel for ClosedModel {
         stride: usize,
         out: &mut [f64],
     ) {
-        self.expand(motion).with_block(motion, |block| {
+        let expanded = self.expand(motion);
+        let pressed = self.pressed(motion, &expanded);
+        expanded.with_block(motion, &pressed.channels(), |block| {
             self.tree.remember(block, step_s, shape, history, stride, out);
         });
     }
@@ -139,8 +149,11 @@ impl EffortModel for ClosedModel {
     fn regressor(&self, motion: &MotionBlock<'_>, shape: &[f64], out: &mut RegressorBlock) {
         let expanded = self.expand(motion);
         let mut tree = RegressorBlock::new(self.tree.layout().clone(), motion.samples);
-        expanded.with_block(motion, |block| self.tree.regressor(block, shape, &mut tree));
+        let pressed = self.pressed(motion, &expanded);
+        expanded
+            .with_block(motion, &pressed.channels(), |block| self.tree.regressor(block, shape, &mut tree));
         self.fold.regressor(&expanded, &tree, out);
+        pressed.linearise(self, motion, &expanded, out);
     }
 
     fn shaped_columns(&self) -> &[(usize, usize)] {
@@ -164,7 +177,8 @@ impl EffortModel for ClosedModel {
         let wanted = |slice: &[f64], columns: usize| if slice.is_empty() { 0 } else { columns * n };
         let mut tree_values = vec![0.0; wanted(values, self.tree.shaped_columns().len())];
         let mut tree_derivatives = vec![0.0; wanted(derivatives, self.tree.shape_dependence().len())];
-        expanded.with_block(motion, |block| {
+        let pressed = self.pressed(motion, &expanded);
+        expanded.with_block(motion, &pressed.channels(), |block| {
             self.tree.shaped(block, shape, n, &mut tree_values, &mut tree_derivatives);
         });
         self.fold.shaped_values(&expanded, &tree_values, stride, values);
@@ -179,11 +193,22 @@ impl EffortModel for ClosedModel {
         stride: usize,
         effort: &mut [f64],
     ) {
-        let expanded = self.expand(motion);
         let n = motion.samples;
+        if self.loads.as_ref().is_some_and(Loads::is_linearised) {
+            let mut block = RegressorBlock::new(self.fold.layout.clone(), n);
+            self.regressor(motion, shape, &mut block);
+            for output in 0..self.outputs.len() {
+                effort[output * stride..][..n].copy_from_slice(&block.effort(output, linear));
+            }
+            return;
+        }
+        let expanded = self.expand(motion);
+        let pressed = self.pressed(motion, &expanded);
         let rates = self.machine.mechanism().rates();
         let mut tree = vec![0.0; rates * n];
-        expanded.with_block(motion, |block| self.tree.efforts(block, shape, linear, n, &mut tree));
+        expanded.with_block(motion, &pressed.channels(), |block| {
+            self.tree.efforts(block, shape, linear, n, &mut tree);
+        });
         for output in 0..self.outputs.len() {
             let to = &mut effort[output * stride..][..n];
             to.fill(0.0);
