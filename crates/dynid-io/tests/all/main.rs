@@ -3,6 +3,7 @@
 mod broken_files;
 mod clearance;
 mod logs;
+mod loops;
 mod mjcf;
 mod oracles;
 mod robot_files;
