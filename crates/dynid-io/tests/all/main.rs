@@ -2,6 +2,7 @@
 
 mod broken_files;
 mod clearance;
+mod closed_robots;
 mod logs;
 mod loops;
 mod mjcf;
