@@ -169,10 +169,14 @@ impl ClosedModel {
     /// If a reaction or a column does not exist.
     pub fn with_loads(mut self, joints: Vec<JointLoad>, reference: LoadReference) -> Result<Self, LoadError> {
         let loads = Loads::new(&self, joints, reference)?;
+        self.feed(loads);
+        Ok(self)
+    }
+
+    pub(super) fn feed(&mut self, loads: Loads) {
         let own = |name: &String| loads.channels.iter().flatten().any(|c| c == name);
         self.channels = self.tree.channels().iter().filter(|c| !own(c)).cloned().collect();
         self.loads = Some(loads);
-        Ok(self)
     }
 
     /// The same loads at other parameters.

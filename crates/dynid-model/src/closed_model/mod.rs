@@ -11,8 +11,9 @@ use std::sync::Arc;
 use crate::closed::{ClosedMechanism, Drives, PoseError};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
+use crate::element::JointInfo;
 use crate::parameter::ParameterTable;
-use crate::robot_model::RobotModel;
+use crate::tree_model::TreeModel;
 use fold::Fold;
 use loads::Loads;
 pub use loads::{JointLoad, LoadError, LoadGroup, LoadReference};
@@ -32,10 +33,11 @@ pub use reactions::{Reaction, Reactions};
 /// closed pose, or a singular one, all that would be computed there is not a number; [`ClosedModel::follow`] says where and why.
 #[derive(Debug)]
 pub struct ClosedModel {
-    tree: RobotModel,
+    tree: TreeModel,
     machine: Arc<ClosedMechanism>,
     drives: Drives,
     outputs: Vec<Output>,
+    joints: Vec<JointInfo>,
     fold: Fold,
     /// Channels that a motion must bring.
     channels: Vec<String>,
@@ -57,7 +59,7 @@ impl ClosedModel {
     ///
     /// # Panics
     /// If the tree's mechanism is not that of `machine` (but for inertias and gravity), or has coordinates without bodies.
-    pub fn new(tree: RobotModel, machine: impl Into<Arc<ClosedMechanism>>) -> Self {
+    pub fn new(tree: TreeModel, machine: impl Into<Arc<ClosedMechanism>>) -> Self {
         let machine = machine.into();
         assert!(tree.coordinates().is_empty(), "a closed mechanism with coordinates without bodies");
         let machine = if tree.mechanism() == machine.mechanism() {
@@ -66,10 +68,16 @@ impl ClosedModel {
             Arc::new(machine.as_ref().clone().with_mechanism(tree.mechanism().clone()))
         };
         let outputs = machine.driven().iter().map(|rate| tree.outputs()[*rate].clone()).collect();
+        let joints = machine.driven().iter().enumerate().map(|(k, rate)| JointInfo {
+            number: k + 1,
+            position: k,
+            ..tree.joints()[*rate].clone()
+        });
         ClosedModel {
             drives: Drives::new(&machine),
             fold: Fold::new(&tree, &machine),
             channels: tree.channels().to_vec(),
+            joints: joints.collect(),
             loads: None,
             outputs,
             machine,
@@ -78,8 +86,13 @@ impl ClosedModel {
     }
 
     /// The model of the tree.
-    pub fn tree(&self) -> &RobotModel {
+    pub fn tree(&self) -> &TreeModel {
         &self.tree
+    }
+
+    /// Driven joints.
+    pub fn joints(&self) -> &[JointInfo] {
+        &self.joints
     }
 
     /// The closed mechanism.
@@ -87,9 +100,14 @@ impl ClosedModel {
         &self.machine
     }
 
-    /// The same closures around a changed model of the tree, without loads.
-    pub fn map_tree(self, change: impl FnOnce(RobotModel) -> RobotModel) -> Self {
-        ClosedModel::new(change(self.tree), self.machine)
+    /// The same closures and loads around a changed model of the tree, whose elements keep their columns.
+    pub(crate) fn map_tree(self, change: impl FnOnce(TreeModel) -> TreeModel) -> Self {
+        let loads = self.loads;
+        let mut out = ClosedModel::new(change(self.tree), self.machine);
+        if let Some(loads) = loads {
+            out.feed(loads);
+        }
+        out
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::RobotModel;
+use super::TreeModel;
 use crate::element::ReactionFriction;
 
 /// Such friction, and where its parameters are.
@@ -14,7 +14,7 @@ pub(crate) struct PlacedReactionFriction<'a> {
     pub(crate) shape: Range<usize>,
 }
 
-impl RobotModel {
+impl TreeModel {
     pub(crate) fn reaction_frictions(&self) -> impl Iterator<Item = PlacedReactionFriction<'_>> {
         self.elements.iter().filter_map(|placed| {
             Some(PlacedReactionFriction {
