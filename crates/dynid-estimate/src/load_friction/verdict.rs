@@ -79,6 +79,9 @@ fn determined_sums(found: &Identifiability) -> Mat<f64> {
     let null = found.scaled_null_space();
     let (n, free) = (null.nrows(), null.ncols());
     let carriers = carriers(&null);
+    if carriers.len() < free {
+        return Mat::zeros(0, n);
+    }
     let block = Mat::from_fn(free, free, |i, j| null[(carriers[i], j)]);
     // Null vectors with the unit matrix at their carriers: Z Z_c⁻¹.
     let inverse = {

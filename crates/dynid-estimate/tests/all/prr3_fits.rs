@@ -233,21 +233,34 @@ fn free_directions_are_filled_from_the_design() {
 fn a_fit_gives_way_to_bodies_that_can_exist() {
     let problem = experiment(Model::Stribeck, 2.0, 1);
     let fit = fit_bounded(&problem, &bounds(), &start(), &FitSettings::default()).unwrap();
-    // Centres of mass in the lowest 45 % of the legs: leg 1 has 0.467, leg 2 has 0.502, leg 3 has 0.418.
-    let near = nearest_to_design(&problem, &bounds(), &fit.theta, &design(0.45)).unwrap();
-    println!(
-        "{:?}: gave way {:.4} N, distance {:.4}, gap {:.1e}",
-        near.status, near.gave_way, near.distance, near.gap
-    );
-    assert!(bounds().contain(&near.theta));
-    for (i, leg) in LEGS.into_iter().enumerate() {
-        assert!(near.theta[5 + i] <= 0.45 * leg * near.theta[1 + i] * (1.0 + 1e-12));
-    }
-    let efforts = problem.sum_of_squares(&near.theta).unwrap();
-    assert!(efforts >= fit.sum_of_squares * (1.0 - 1e-9));
-    match near.status {
-        DesignStatus::FreeDirections => assert!((efforts / fit.sum_of_squares - 1.0).abs() < 1e-9),
-        DesignStatus::GaveWay => assert!(near.gave_way > 0.0),
+    // Leg 1 has its centre of mass at 0.467 of its length, leg 2 at 0.502, leg 3 at 0.418.
+    let mut least = f64::INFINITY;
+    for (centre, status) in [(0.45, DesignStatus::FreeDirections), (0.30, DesignStatus::GaveWay)] {
+        let near = nearest_to_design(&problem, &bounds(), &fit.theta, &design(centre)).unwrap();
+        println!(
+            "centre {centre}: gave way {:.4} N, distance {:.4}, gap {:.1e}, central inertias {:.3?}",
+            near.gave_way, near.distance, near.gap, near.central_inertias
+        );
+        assert_eq!(near.status, status);
+        assert!(bounds().contain(&near.theta) && near.gap < 1e-8);
+        for (i, leg) in LEGS.into_iter().enumerate() {
+            assert!(near.theta[5 + i] <= centre * leg * near.theta[1 + i] * (1.0 + 1e-12));
+        }
+        let design = design(centre);
+        for (body, inertia) in design.bodies.iter().zip(&near.central_inertias) {
+            let of = DESIGN[body.inertia] - DESIGN[body.moments[0]].powi(2) / DESIGN[body.mass];
+            assert!(*inertia >= design.margin * of, "{}: {inertia}", body.name);
+        }
+        let misfit = problem.sum_of_squares(&near.theta).unwrap();
+        match status {
+            DesignStatus::FreeDirections => {
+                assert!((misfit / fit.sum_of_squares - 1.0).abs() < 1e-9 && near.gave_way == 0.0);
+                least = near.distance;
+            }
+            DesignStatus::GaveWay => {
+                assert!(misfit > fit.sum_of_squares && near.gave_way > 0.0 && near.distance > least);
+            }
+        }
     }
     // In the lowest fifth nothing within the bounds can be.
     let refused = nearest_to_design(&problem, &bounds(), &fit.theta, &design(0.20)).unwrap_err();
