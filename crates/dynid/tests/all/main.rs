@@ -3,6 +3,7 @@
 mod accuracy;
 mod bristles;
 mod clearance;
+mod closed_robots;
 mod design;
 mod elastic;
 mod elements;
