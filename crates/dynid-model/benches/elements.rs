@@ -141,7 +141,7 @@ fn bristles_of_six_joints_over_20_s_at_4_khz(bencher: Bencher<'_, '_>) {
         let channels: Vec<(&str, &[f64])> = warmth.chain(bristles).collect();
         let motion = MotionBlock { channels: &channels, ..plain };
         effort.fill(0.0);
-        model.element_efforts(&motion, &[], &linear, RECORD, &mut effort, &mut memory);
+        model.tree().element_efforts(&motion, &[], &linear, RECORD, &mut effort, &mut memory);
         black_box(&effort);
     });
 }

@@ -23,9 +23,12 @@ mod robot_model;
 pub mod scalar;
 pub mod spatial;
 pub mod symmetric;
+mod tree_model;
 
 pub use base_parameters::{BaseParameters, BaseSettings};
-pub use closed_model::{ClosedModel, PathError, Reaction};
+pub use closed_model::{
+    ClosedModel, JointLoad, LoadError, LoadGroup, LoadReference, PathError, Reaction, Reactions,
+};
 pub use coordinate::Coordinate;
 pub use description::{Description, JointDescription, JointKind, Limits, LinkDescription, Mimic};
 pub use dynamics::{
@@ -38,6 +41,7 @@ pub use inertia::Inertia;
 pub use mechanism::{Body, Frame, Joint, JournalPath, Mechanism, MechanismError, MechanismWarning};
 pub use parameter::{Owner, Parameter, ParameterTable, ShapeParameter};
 pub use random_motion::RandomMotion;
-pub use robot_model::{FrictionPassivity, KnownElement, Passivity, RobotModel};
+pub use robot_model::RobotModel;
 pub use scalar::Scalar;
 pub use spatial::{Mat3, Placement, Vec3};
+pub use tree_model::{FrictionPassivity, KnownElement, Passivity, TreeModel};

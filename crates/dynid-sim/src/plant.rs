@@ -275,7 +275,7 @@ impl Plant {
         };
         to.fill(0.0);
         let parameters = (self.shape.as_slice(), self.linear.as_slice());
-        self.model.efforts_of(|e| self.counts(e), &motion, parameters, 1, to, memory);
+        self.model.tree().efforts_of(|e| self.counts(e), &motion, parameters, 1, to, memory);
     }
 
     /// Effort of elements per acceleration, the same at some states of no special kind.
@@ -454,6 +454,13 @@ impl Plant {
         work.slopes.clear();
         let parameters = (self.shape.as_slice(), self.linear.as_slice());
         let (weights, memory) = ((n, work.asked.as_slice()), &mut work.memory);
-        self.model.adjoint_of(|e| self.counts(e), &motion, parameters, weights, &mut work.slopes, memory);
+        self.model.tree().adjoint_of(
+            |e| self.counts(e),
+            &motion,
+            parameters,
+            weights,
+            &mut work.slopes,
+            memory,
+        );
     }
 }

@@ -43,7 +43,8 @@ impl Robot {
     /// Reads a robot and compiles its mechanism.
     ///
     /// # Errors
-    /// [`Error::RobotFile`], [`Error::Mechanism`], [`Error::UnknownJoint`], [`Error::Elastic`].
+    /// [`Error::RobotFile`], [`Error::Mechanism`], [`Error::UnknownJoint`], [`Error::Elastic`]; [`Error::Unsupported`] for
+    /// robots with loops.
     pub fn load(path: &Path, options: &RobotOptions) -> Result<Robot, Error> {
         Self::of_file(path, dynid_io::robot::read(path)?, options)
     }
@@ -58,6 +59,13 @@ impl Robot {
     }
 
     fn of_file(path: &Path, mut file: RobotFile, options: &RobotOptions) -> Result<Robot, Error> {
+        if let Some(closure) = file.closures.first() {
+            return Err(Error::Unsupported(format!(
+                "{}: loop `{}`: closed loops are read but not worked with yet: describe an open tree, without `loop`",
+                path.display(),
+                closure.name
+            )));
+        }
         let d = &mut file.description;
         if let Some(g) = options.gravity {
             d.gravity = g;

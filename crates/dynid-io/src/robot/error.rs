@@ -182,10 +182,10 @@ pub enum RobotFileError {
         feature: &'static str,
     },
     /// A link or joint that is referred to does not exist.
-    #[error("{file}: {context}: expected the name of a {kind}, found `{name}`")]
+    #[error("{at}: {context}: expected the name of a {kind}, found `{name}`")]
     UnknownName {
-        /// File or source name.
-        file: String,
+        /// Where.
+        at: Place,
         /// Who refers to it.
         context: String,
         /// `link` or `joint`.
@@ -242,6 +242,7 @@ impl RobotFileError {
             E::Value { found, .. } if found.contains(',') => {
                 "numbers are separated by spaces, with a point as decimal mark".into()
             }
+            E::Value { expected, .. } if expected.starts_with("this key only") => "remove the key".into(),
             E::Value { .. } => "correct the value".into(),
             E::Duplicate { .. } => "rename one of them".into(),
             E::JointKind { found, .. } if found == "planar" => {

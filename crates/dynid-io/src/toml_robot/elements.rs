@@ -94,8 +94,8 @@ pub(super) fn build(
     let motors = spec.elastic.iter().map(|e| e.motor.as_str());
     let owners: Vec<&str> = joints.iter().copied().chain(motors).collect();
     for (joint, table) in &robot.element {
-        source.known("element", "joint", joint, &owners)?;
         let offset = table.span().start;
+        source.known(offset, "element", "joint", joint, &owners)?;
         for (element, value) in table.get_ref() {
             let is_joint = joints.contains(&joint.as_str());
             if is_joint && (element == elastic::ELASTIC || element == clearance::CLEARANCE) {
@@ -121,7 +121,7 @@ pub(super) fn build(
     for coupling in &robot.coupling {
         let (offset, c) = (coupling.span().start, coupling.get_ref());
         for joint in &c.joints {
-            source.known("coupling", "joint", joint, joints)?;
+            source.known(offset, "coupling", "joint", joint, joints)?;
         }
         let rows_fit = c.matrix.len() == c.motors.len();
         if c.motors.is_empty() || !rows_fit || c.matrix.iter().any(|r| r.len() != c.joints.len()) {

@@ -5,16 +5,22 @@ mod clearance;
 mod dh;
 mod elastic;
 mod elements;
+mod floating;
+mod home;
+mod loops;
 mod number;
 mod schema;
 
 use std::path::Path;
 
+use dynid_model::closed::ClosureDescription;
 use dynid_model::{Description, Inertia, Mat3, Vec3};
 
 pub use clearance::ClearanceSpec;
 pub use elastic::ElasticSpec;
 pub use elements::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, SettingValue};
+
+use toml::Spanned;
 
 use crate::excerpt::{closest, excerpt};
 use crate::robot::{Place, RobotFileError};
@@ -31,8 +37,10 @@ pub struct RobotFile {
     pub elements: ElementSpec,
     /// Actuated joints; `None` if the file does not say (all of them).
     pub actuated: Option<Vec<String>>,
-    /// Home position of joints, rad or m, sorted by name.
-    pub home: Vec<(String, f64)>,
+    /// Home position of joints, sorted by name: one value (rad or m), of a floating joint seven, `x y z qx qy qz qw`.
+    pub home: Vec<(String, Vec<f64>)>,
+    /// What closes loops of the tree, in the order of the file.
+    pub closures: Vec<ClosureDescription>,
     /// Path of the URDF that holds the tree, if the file is a URDF or refers to one.
     pub urdf: Option<String>,
 }
@@ -40,7 +48,14 @@ pub struct RobotFile {
 impl RobotFile {
     /// A description without anything besides.
     pub fn plain(description: Description, elements: ElementSpec) -> Self {
-        RobotFile { description, elements, actuated: None, home: Vec::new(), urdf: None }
+        RobotFile {
+            description,
+            elements,
+            actuated: None,
+            home: Vec::new(),
+            closures: Vec::new(),
+            urdf: None,
+        }
     }
 }
 
@@ -57,10 +72,25 @@ pub fn read(path: impl AsRef<Path>) -> Result<RobotFile, RobotFileError> {
 ///
 /// One of three forms: `joint = [..]` (DH rows, see below), `body = [..]` (a tree), `urdf = "file"`. Lengths m, angles
 /// rad or text such as `"90deg"`. Keys of every form: `schema` (1), `name`, `gravity` (m/s², base axes),
-/// `floating_base`, `couple_mimics`, `actuated`, `home`, `[defaults]`, `[element.<joint>]`, `[[coupling]]`. Unknown keys
-/// are errors. `[element.<joint>] elastic = { ratio = .. }` ([`ElasticSpec`]) puts a motor behind a spring;
-/// `[element.<motor>]` is then as for joints. `clearance = { journal_radius = .., gap = .. }` ([`ClearanceSpec`]) gives the
-/// joint's journal room in its bearing.
+/// `floating_base`, `couple_mimics`, `floating`, `loop`, `actuated`, `home`, `[defaults]`, `[element.<joint>]`,
+/// `[[coupling]]`. Unknown keys are errors. `[element.<joint>] elastic = { ratio = .. }` ([`ElasticSpec`]) puts a motor
+/// behind a spring; `[element.<motor>]` is then as for joints. `clearance = { journal_radius = .., gap = .. }`
+/// ([`ClearanceSpec`]) gives the joint's journal room in its bearing.
+///
+/// `floating = [..]` names links or joints: the joint that carries the link, or the joint itself, becomes a floating one,
+/// whatever its kind. `home = { joint = .. }`: a number or an angle, of a floating joint `[x, y, z, qx, qy, qz, qw]` with a
+/// quaternion of length 1 within 1e-3 (kept as it stands).
+///
+/// `loop = [..]` joins frames of two links where a joint has been cut ([`Condition`](dynid_model::closed::Condition)): `name`,
+/// `kind` (`spherical` or `point`, `planar_revolute`, `revolute`, `universal`, `cylindrical`, `prismatic`, `planar_prismatic`,
+/// `fixed`, `distance`), `a`, `b` (links; the root is `ground` of a body tree, `base` of a DH table), `a_xyz`, `a_rpy`,
+/// `b_xyz`, `b_rpy` (default 0), and `length` (m, positive) of a `distance`. `kind = "coordinate"` has `terms = { joint =
+/// factor, .. }` and `constant` (default 0, in the unit of the terms) instead of frames. Whether the loops can be closed is
+/// not decided here.
+///
+/// A body: `name`, `parent` (a body or `ground`), `joint = { name, kind, xyz, rpy, axis, pitch, limits }` with `kind`
+/// `revolute` (default), `continuous`, `prismatic`, `helical` (with `pitch`, m/rad), `floating`, `fixed`, and the inertia as in
+/// DH rows. The joint's name is by default that of the body.
 ///
 /// DH rows (`dh = "modified"` or `"standard"`): `name`, `link` (default `link<k>`), `a`, `alpha`, `d`, `offset`, `kind`
 /// (`revolute`, `continuous`, `prismatic`), `limits`, and the inertia as `phi` (order m, mx, my, mz, Ixx, Ixy, Ixz, Iyy,
@@ -76,17 +106,11 @@ pub fn read(path: impl AsRef<Path>) -> Result<RobotFile, RobotFileError> {
 /// - `tool = { xyz, rpy }` adds a massless fixed link `tool` to the last link (behind the tail, if there is one).
 ///
 /// # Errors
-/// [`RobotFileError`] with line and column. `loop` and `floating` are refused as not supported yet.
+/// [`RobotFileError`] with line and column.
 pub fn parse(text: &str, source_name: &str) -> Result<RobotFile, RobotFileError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let robot: RobotToml = toml::from_str(text).map_err(|e| syntax(text, source_name, &e))?;
     let source = Source { text, file: source_name };
-    for (key, value) in [("loop", &robot.loops), ("floating", &robot.floating)] {
-        if let Some(value) = value {
-            let (at, key) = (source.place(value.span().start), key.to_owned());
-            return Err(RobotFileError::Unsupported { at, key, feature: "loops" });
-        }
-    }
     let mut urdf_path = None;
     let mut description = match (&robot.joint, &robot.body, &robot.urdf) {
         (Some(rows), None, None) => dh::build(&source, &robot, rows)?,
@@ -116,17 +140,16 @@ pub fn parse(text: &str, source_name: &str) -> Result<RobotFile, RobotFileError>
     }
     description.floating_base = robot.floating_base;
     description.couple_mimics = robot.couple_mimics;
+    floating::release(&source, &robot.floating, &mut description)?;
     let joints: Vec<&str> = description.joints.iter().map(|j| j.name.as_str()).collect();
     let elements = elements::build(&source, &robot, &joints, &description)?;
     for name in robot.actuated.iter().flatten() {
-        source.known("actuated", "joint", name, &joints)?;
+        source.known(name.span().start, "actuated", "joint", name.get_ref(), &joints)?;
     }
-    let mut home = Vec::new();
-    for (name, value) in robot.home.iter().flatten() {
-        source.known("home", "joint", name, &joints)?;
-        home.push((name.clone(), value.0));
-    }
-    Ok(RobotFile { elements, actuated: robot.actuated, home, urdf: urdf_path, description })
+    let home = home::build(&source, &robot.home, &description)?;
+    let closures = loops::build(&source, &robot.loops, &description)?;
+    let actuated = robot.actuated.map(|names| names.into_iter().map(Spanned::into_inner).collect());
+    Ok(RobotFile { elements, actuated, home, closures, urdf: urdf_path, description })
 }
 
 /// `dh` and `tool` belong to DH tables.
@@ -174,6 +197,7 @@ impl Source<'_> {
 
     fn known(
         &self,
+        offset: usize,
         context: &str,
         kind: &'static str,
         name: &str,
@@ -183,7 +207,7 @@ impl Source<'_> {
             return Ok(());
         }
         Err(RobotFileError::UnknownName {
-            file: self.file.to_owned(),
+            at: self.place(offset),
             context: context.to_owned(),
             kind,
             name: excerpt(name),

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use serde::de::{Deserialize, Deserializer, Error, Unexpected, Visitor};
+use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Unexpected, Visitor};
 
 /// A finite number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -46,6 +46,44 @@ impl Visitor<'_> for NumberVisitor {
     }
 }
 
+/// Position of a joint: a number or an angle, or a list of them.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Position(pub(super) Vec<f64>);
+
+struct PositionVisitor;
+
+impl<'de> Visitor<'de> for PositionVisitor {
+    type Value = Position;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a finite number (rad, m), an angle like \"90deg\", or a list of them")
+    }
+
+    fn visit_f64<E: Error>(self, x: f64) -> Result<Position, E> {
+        NumberVisitor { angles: true }.visit_f64(x).map(|x| Position(vec![x]))
+    }
+
+    fn visit_i64<E: Error>(self, x: i64) -> Result<Position, E> {
+        self.visit_f64(x as f64)
+    }
+
+    fn visit_u64<E: Error>(self, x: u64) -> Result<Position, E> {
+        self.visit_f64(x as f64)
+    }
+
+    fn visit_str<E: Error>(self, text: &str) -> Result<Position, E> {
+        NumberVisitor { angles: true }.visit_str(text).map(|x| Position(vec![x]))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Position, A::Error> {
+        let mut values = Vec::new();
+        while let Some(Angle(x)) = list.next_element()? {
+            values.push(x);
+        }
+        Ok(Position(values))
+    }
+}
+
 /// `"90deg"`, `"-90 deg"`, `"1.5rad"` in rad.
 fn angle(text: &str) -> Option<f64> {
     let text = text.trim();
@@ -68,5 +106,11 @@ impl<'de> Deserialize<'de> for Number {
 impl<'de> Deserialize<'de> for Angle {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(NumberVisitor { angles: true }).map(Angle)
+    }
+}
+
+impl<'de> Deserialize<'de> for Position {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(PositionVisitor)
     }
 }

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::elements::CouplingForm;
-use super::number::{Angle, Number};
+use super::number::{Angle, Number, Position};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -21,14 +21,17 @@ pub(super) struct RobotToml {
     pub(super) body: Option<Vec<Spanned<Body>>>,
     pub(super) urdf: Option<Spanned<String>>,
     #[serde(rename = "loop")]
-    pub(super) loops: Option<Spanned<toml::Value>>,
-    pub(super) floating: Option<Spanned<toml::Value>>,
+    #[serde(default)]
+    pub(super) loops: Vec<Spanned<LoopToml>>,
+    #[serde(default)]
+    pub(super) floating: Vec<Spanned<String>>,
     #[serde(default)]
     pub(super) floating_base: bool,
     #[serde(default)]
     pub(super) couple_mimics: bool,
-    pub(super) actuated: Option<Vec<String>>,
-    pub(super) home: Option<BTreeMap<String, Angle>>,
+    pub(super) actuated: Option<Vec<Spanned<String>>>,
+    #[serde(default)]
+    pub(super) home: BTreeMap<Spanned<String>, Position>,
     #[serde(default)]
     pub(super) defaults: Defaults,
     #[serde(default)]
@@ -157,6 +160,39 @@ pub(super) enum BodyKind {
     Helical,
     Floating,
     Fixed,
+}
+
+/// What closes a loop.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table with `name`, `kind` and the keys of the kind")]
+pub(super) struct LoopToml {
+    pub(super) name: String,
+    pub(super) kind: LoopKind,
+    pub(super) a: Option<Spanned<String>>,
+    pub(super) b: Option<Spanned<String>>,
+    pub(super) a_xyz: Option<Spanned<[Number; 3]>>,
+    pub(super) a_rpy: Option<Spanned<[Angle; 3]>>,
+    pub(super) b_xyz: Option<Spanned<[Number; 3]>>,
+    pub(super) b_rpy: Option<Spanned<[Angle; 3]>>,
+    pub(super) length: Option<Spanned<Number>>,
+    pub(super) terms: Option<Spanned<BTreeMap<Spanned<String>, Number>>>,
+    pub(super) constant: Option<Spanned<Angle>>,
+}
+
+#[derive(Clone, Copy, Deserialize, PartialEq)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum LoopKind {
+    #[serde(alias = "point")]
+    Spherical,
+    PlanarRevolute,
+    Revolute,
+    Universal,
+    Cylindrical,
+    Prismatic,
+    PlanarPrismatic,
+    Fixed,
+    Distance,
+    Coordinate,
 }
 
 #[derive(Default, Deserialize)]

@@ -10,7 +10,7 @@ use quick_xml::escape::escape;
 use super::inertial::Inertial;
 use super::xml::{Attribute, Tag, Tags};
 use crate::excerpt::closest;
-use crate::robot::RobotFileError;
+use crate::robot::{Place, RobotFileError};
 
 /// Dissipation of a joint as `<dynamics>` states it.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,7 +52,7 @@ pub fn edit(
     ] {
         if let Some(name) = wanted.into_iter().find(|n| !seen.contains(n)) {
             return Err(RobotFileError::UnknownName {
-                file: source_name.to_owned(),
+                at: Place::start(source_name),
                 context: "edit".to_owned(),
                 kind,
                 name: name.clone(),

@@ -220,8 +220,8 @@ fn broken_toml_robots() {
         ),
         (
             "body = [{ name = \"b\", parent = \"ground\", joint = { kind = \"fixed\" } }]\nloop = [1]".into(),
-            vec!["r.toml:2:8", "`loop`", "loops are not supported yet by this version"],
-            "open tree",
+            vec!["r.toml:2:9", "invalid type", "a table with `name`, `kind`"],
+            "",
         ),
         ("urdf = \"no/such.urdf\"".into(), vec!["such.urdf", "cannot be read"], "path"),
     ];

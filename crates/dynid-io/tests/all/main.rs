@@ -2,7 +2,9 @@
 
 mod broken_files;
 mod clearance;
+mod closed_robots;
 mod logs;
+mod loops;
 mod mjcf;
 mod oracles;
 mod robot_files;

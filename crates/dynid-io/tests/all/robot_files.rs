@@ -230,7 +230,7 @@ fn elements_couplings_and_bodies() {
     assert_eq!((d.name.as_str(), d.gravity), ("two", [0.0, -9.81, 0.0]));
     assert_eq!(d.joints[1].kind, JointKind::Helical { pitch: 0.01 });
     assert_eq!((d.joints[1].name.as_str(), d.joints[1].parent.as_str()), ("s", "crank"));
-    assert_eq!(robot.home, [("crank".to_owned(), std::f64::consts::FRAC_PI_2)]);
+    assert_eq!(robot.home, [("crank".to_owned(), vec![std::f64::consts::FRAC_PI_2])]);
     assert_eq!(robot.elements.defaults, ["coulomb"]);
     assert_eq!(robot.elements.per_joint, [("crank".to_owned(), vec!["stribeck".to_owned()])]);
     let setting = |key: &str| {

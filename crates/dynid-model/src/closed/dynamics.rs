@@ -93,6 +93,11 @@ impl Drives {
 }
 
 impl ClosedMechanism {
+    /// Least-squares solution `x` of `J_dependent x = right` at a pose; `right` is overwritten.
+    pub(crate) fn solve(&self, pose: &PoseWorkspace, right: &mut [f64], x: &mut [f64]) {
+        self.solve_dependent(&pose.factor, right, x);
+    }
+
     /// `Gᵀ t` at a pose, of efforts of all rates of the tree.
     pub(crate) fn project(&self, pose: &PoseWorkspace, tree: &[f64], out: &mut [f64]) {
         let d = self.independent.len();

@@ -1,9 +1,10 @@
 //! Wrenches in the joints of the tree, linear in the inertias (spec/mechanisms.md sections 6 and 12).
 
 use super::dynamics::ClosedDynamics;
-use crate::dynamics::motion::{BodyMotion, Turns, placement, step};
+use super::mechanism::ClosedMechanism;
+use super::pose::PoseWorkspace;
+use crate::dynamics::motion::{BodyMotion, placement, step};
 use crate::dynamics::regressor::{TensorRows, general_row};
-use crate::dynamics::tree::Node;
 use crate::spatial::Vec3;
 
 /// A wrench on a body in terms of standard parameters and multipliers: `wrench = W φ - C λ`, force (N) then moment about
@@ -16,6 +17,100 @@ pub struct ReactionRows {
     pub closures: Vec<f64>,
 }
 
+impl ClosedMechanism {
+    /// Motions of all bodies at a pose, in the order of the nodes.
+    pub(crate) fn body_motions(
+        &self,
+        pose: &PoseWorkspace,
+        (dq, ddq): (&[f64], &[f64]),
+        gravity: Vec3<f64>,
+        out: &mut Vec<BodyMotion<f64>>,
+    ) {
+        let ground = BodyMotion::ground(gravity);
+        out.clear();
+        for node in &self.tree.nodes {
+            let (rotation, origin) = placement(node, &pose.world.turns, &pose.q);
+            let parent = node.parent.map_or(&ground, |p| &out[p]);
+            let motion = step(node, (&rotation, origin), parent, dq, ddq);
+            out.push(motion);
+        }
+    }
+
+    /// Nodes that hang on the joint of a body, its own first.
+    ///
+    /// # Panics
+    /// If there is no such body.
+    pub(crate) fn hanging(&self, body: usize) -> Vec<usize> {
+        let Some(at) = self.tree.nodes.iter().position(|n| n.body == body) else {
+            panic!("body {body} of {}", self.tree.nodes.len())
+        };
+        let mut hanging = vec![at];
+        for (index, node) in self.tree.nodes.iter().enumerate() {
+            if node.parent.is_some_and(|p| hanging.contains(&p)) {
+                hanging.push(index);
+            }
+        }
+        hanging
+    }
+
+    /// Body of a node.
+    pub(crate) fn body_of(&self, node: usize) -> usize {
+        self.tree.nodes[node].body
+    }
+
+    /// One component of the wrench through the joint of `hanging[0]` that the inertia of one of the nodes needs: ten
+    /// factors in the order and frame of the file.
+    pub(crate) fn inertial_entries(
+        &self,
+        pose: &PoseWorkspace,
+        motions: &[BodyMotion<f64>],
+        (at, node): (usize, usize),
+        component: usize,
+    ) -> [f64; 10] {
+        let (joint, carried) = (&pose.world.bodies[at], &pose.world.bodies[node]);
+        let axis = joint.rotation.0[self.internal_axis(at, component % 3)];
+        let (turn, slide) = if component < 3 {
+            (Vec3::zero(), axis)
+        } else {
+            (axis, axis.cross(carried.origin - joint.origin))
+        };
+        let unit = (carried.rotation.tr_mul_vec(turn), carried.rotation.tr_mul_vec(slide));
+        let motion = &motions[node];
+        let tensor = TensorRows::new(motion.omega, motion.alpha);
+        let mut entries = [0.0; 10];
+        for (column, value) in self.tree.nodes[node].columns.iter().zip(general_row(motion, &tensor, unit)) {
+            entries[*column] = value;
+        }
+        entries
+    }
+
+    /// One component of the wrench that unit multipliers exert on what hangs on the joint of `hanging[0]`.
+    pub(crate) fn closure_entries(
+        &self,
+        pose: &PoseWorkspace,
+        hanging: &[usize],
+        component: usize,
+        out: &mut [f64],
+    ) {
+        let joint = &pose.world.bodies[hanging[0]];
+        let axis = joint.rotation.0[self.internal_axis(hanging[0], component % 3)];
+        for (condition, entry) in out.iter_mut().enumerate() {
+            *entry = 0.0;
+            self.rows.wrenches(&pose.world, condition, |node, wrench, side| {
+                if hanging.contains(&node) {
+                    let moment = wrench.moment - joint.origin.cross(wrench.force);
+                    *entry += side * axis.dot(if component < 3 { wrench.force } else { moment });
+                }
+            });
+        }
+    }
+
+    /// Internal axis of an axis of the file's frame.
+    fn internal_axis(&self, node: usize, axis: usize) -> usize {
+        self.tree.nodes[node].axes.iter().position(|a| *a == axis).unwrap_or(axis)
+    }
+}
+
 impl ClosedDynamics {
     /// Terms of the wrench that the parent exerts on a body through its joint, at the pose.
     ///
@@ -26,72 +121,27 @@ impl ClosedDynamics {
     pub fn reaction_rows(
         &self,
         body: usize,
-        (dq, ddq): (&[f64], &[f64]),
+        motion: (&[f64], &[f64]),
         gravity: Option<Vec3<f64>>,
     ) -> ReactionRows {
         let (machine, pose) = (self.machine(), &self.pose);
-        let tree = &machine.tree;
-        let Some(at) = tree.nodes.iter().position(|n| n.body == body) else {
-            panic!("body {body} of {}", tree.nodes.len())
-        };
         let gravity = gravity.unwrap_or_else(|| machine.mechanism.gravity());
-        let mut turns = Turns::new(tree);
-        turns.fill(tree, &pose.q);
-        let ground = BodyMotion::ground(gravity);
-        let mut motions: Vec<BodyMotion<f64>> = Vec::with_capacity(tree.nodes.len());
-        let mut hangs: Vec<bool> = Vec::with_capacity(tree.nodes.len());
-        for (index, node) in tree.nodes.iter().enumerate() {
-            let (rotation, origin) = placement(node, &turns, &pose.q);
-            let parent = node.parent.map_or(&ground, |p| &motions[p]);
-            motions.push(step(node, (&rotation, origin), parent, dq, ddq));
-            hangs.push(index == at || node.parent.is_some_and(|p| hangs[p]));
-        }
-        let (columns, conditions) = (10 * tree.nodes.len(), machine.rows.len());
+        let mut motions = Vec::new();
+        machine.body_motions(pose, motion, gravity, &mut motions);
+        let hanging = machine.hanging(body);
+        let (columns, conditions) = (10 * machine.tree.nodes.len(), machine.rows.len());
         let mut out = ReactionRows { inertial: vec![0.0; 6 * columns], closures: vec![0.0; 6 * conditions] };
-        let joint = &pose.world.bodies[at];
-        let axes = file_axes(&tree.nodes[at]);
-        for (index, node) in tree.nodes.iter().enumerate().filter(|(k, _)| hangs[*k]) {
-            let carried = &pose.world.bodies[index];
-            let motion = &motions[index];
-            let tensor = TensorRows::new(motion.omega, motion.alpha);
-            for row in 0..6 {
-                let axis = joint.rotation.0[axes[row % 3]];
-                let (turn, slide) = if row < 3 {
-                    (Vec3::zero(), axis)
-                } else {
-                    (axis, axis.cross(carried.origin - joint.origin))
-                };
-                let unit = (carried.rotation.tr_mul_vec(turn), carried.rotation.tr_mul_vec(slide));
-                let to = &mut out.inertial[row * columns + 10 * node.body..][..10];
-                for (column, value) in node.columns.iter().zip(general_row(motion, &tensor, unit)) {
-                    to[*column] = value;
-                }
+        for component in 0..6 {
+            for node in &hanging {
+                let entries = machine.inertial_entries(pose, &motions, (hanging[0], *node), component);
+                let first = component * columns + 10 * machine.body_of(*node);
+                out.inertial[first..first + 10].copy_from_slice(&entries);
             }
-        }
-        for condition in 0..conditions {
-            machine.rows.wrenches(&pose.world, condition, |node, wrench, side| {
-                if !hangs[node] {
-                    return;
-                }
-                let moment = wrench.moment - joint.origin.cross(wrench.force);
-                for row in 0..6 {
-                    let axis = joint.rotation.0[axes[row % 3]];
-                    let part = if row < 3 { axis.dot(wrench.force) } else { axis.dot(moment) };
-                    out.closures[row * conditions + condition] += side * part;
-                }
-            });
+            let to = &mut out.closures[component * conditions..][..conditions];
+            machine.closure_entries(pose, &hanging, component, to);
         }
         out
     }
-}
-
-/// Axis of the file's frame → internal axis.
-fn file_axes(node: &Node) -> [usize; 3] {
-    let mut out = [0; 3];
-    for (internal, file) in node.axes.iter().enumerate() {
-        out[*file] = internal;
-    }
-    out
 }
 
 impl ReactionRows {

@@ -73,7 +73,7 @@ impl<S: Scalar> Screw<S> {
 /// Memory of the sweep.
 #[derive(Clone, Debug)]
 pub(super) struct World<S> {
-    turns: Turns<S>,
+    pub(super) turns: Turns<S>,
     /// One per node.
     pub(super) bodies: Vec<WorldBody<S>>,
     /// One per rate.

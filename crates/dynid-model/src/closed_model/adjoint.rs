@@ -28,7 +28,8 @@ impl ClosedModel {
         }
         let mut effort = vec![0.0; rates * n];
         let mut by = MotionAdjoint::new(rates, rates, n);
-        expanded.with_block(motion, |block| {
+        let pressed = self.pressed(motion, &expanded);
+        expanded.with_block(motion, &pressed.channels(), |block| {
             self.tree.efforts(block, shape, linear, n, &mut effort);
             self.tree.effort_adjoint(block, shape, linear, n, &tree_weights, &mut by);
         });
@@ -65,7 +66,8 @@ impl ClosedModel {
         let mut by = MotionAdjoint::new(rates, rates, n);
         // What the weights of an output make of the efforts of the tree: `effort[(output * rates + rate) * n + s]`.
         let mut effort = vec![0.0; outputs * rates * n];
-        expanded.with_block(motion, |block| {
+        let pressed = self.pressed(motion, &expanded);
+        expanded.with_block(motion, &pressed.channels(), |block| {
             self.tree.regressor(block, shape, &mut tree);
             for (output, terms) in self.fold.terms.iter().enumerate() {
                 for (k, terms) in terms.iter().enumerate() {
@@ -102,7 +104,7 @@ impl ClosedModel {
         );
         let mut poses = Vec::with_capacity(motion.samples);
         let expanded =
-            self.expand_with(motion, |_, pose, fault| poses.push(fault.is_none().then(|| pose.clone())));
+            self.expand_with(motion, |_, _, pose, fault| poses.push(fault.is_none().then(|| pose.clone())));
         (expanded, poses)
     }
 

@@ -17,11 +17,15 @@ pub(super) struct Expanded {
 
 impl Expanded {
     /// Hands on the motion of the tree with gravity and channels of the block that it came from.
+    ///
+    /// `more`: channels beside those of the block.
     pub(super) fn with_block<T>(
         &self,
         motion: &MotionBlock<'_>,
+        more: &[(&str, &[f64])],
         work: impl FnOnce(&MotionBlock<'_>) -> T,
     ) -> T {
+        let channels: Vec<(&str, &[f64])> = motion.channels.iter().chain(more).copied().collect();
         let gravity: Option<Vec<f64>> = motion
             .gravity
             .map(|g| (0..3).flat_map(|c| g[c * motion.stride..][..self.samples].iter().copied()).collect());
@@ -32,7 +36,7 @@ impl Expanded {
             dq: &self.dq,
             ddq: &self.ddq,
             gravity: gravity.as_deref(),
-            channels: motion.channels,
+            channels: &channels,
             sign_width: motion.sign_width,
         })
     }
@@ -53,14 +57,14 @@ impl Expanded {
 impl ClosedModel {
     /// Motion of all joints. Samples without a pose are not numbers.
     pub(super) fn expand(&self, motion: &MotionBlock<'_>) -> Expanded {
-        self.expand_with(motion, |_, _, _| ())
+        self.expand_with(motion, |_, _, _, _| ())
     }
 
-    /// The same; `visit(sample, pose, fault)` sees every pose, with its velocity map.
+    /// The same; `visit(sample, motion so far, pose, fault)` sees every pose, with its velocity map.
     pub(super) fn expand_with(
         &self,
         motion: &MotionBlock<'_>,
-        mut visit: impl FnMut(usize, &PoseWorkspace, Option<&PoseError>),
+        mut visit: impl FnMut(usize, &Expanded, &PoseWorkspace, Option<&PoseError>),
     ) -> Expanded {
         let (machine, samples) = (&self.machine, motion.samples);
         let (rates, positions) = (machine.mechanism().rates(), machine.mechanism().positions());
@@ -89,7 +93,7 @@ impl ClosedModel {
                     values.iter_mut().skip(sample).step_by(samples).for_each(|x| *x = f64::NAN);
                 };
                 [&mut out.q, &mut out.dq, &mut out.ddq, &mut out.shares].into_iter().for_each(|v| nan(v));
-                visit(sample, &work, Some(&fault));
+                visit(sample, &out, &work, Some(&fault));
                 continue;
             }
             machine.motion(&mut work, (&dq, &ddq), &mut all_dq, &mut all_ddq);
@@ -116,7 +120,7 @@ impl ClosedModel {
                     }
                 }
             }
-            visit(sample, &work, None);
+            visit(sample, &out, &work, None);
         }
         out
     }

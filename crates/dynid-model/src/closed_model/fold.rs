@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::expand::Expanded;
 use crate::closed::ClosedMechanism;
 use crate::effort_model::{EffortModel, RegressorBlock, RegressorLayout};
-use crate::robot_model::RobotModel;
+use crate::tree_model::TreeModel;
 
 /// A column of the tree that goes into one of an output.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +32,7 @@ pub(super) struct Fold {
 }
 
 impl Fold {
-    pub(super) fn new(tree: &RobotModel, machine: &ClosedMechanism) -> Fold {
+    pub(super) fn new(tree: &TreeModel, machine: &ClosedMechanism) -> Fold {
         let independent = machine.drives_are_independent();
         let rates: Vec<Vec<usize>> = machine
             .driven()
@@ -74,7 +74,7 @@ impl Fold {
         fold
     }
 
-    fn shapes(&mut self, tree: &RobotModel) {
+    fn shapes(&mut self, tree: &TreeModel) {
         for (output, rates) in self.rates.iter().enumerate() {
             for (index, (rate, column)) in tree.shaped_columns().iter().enumerate() {
                 if !rates.contains(rate) {

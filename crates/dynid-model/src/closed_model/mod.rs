@@ -3,6 +3,7 @@
 mod adjoint;
 mod expand;
 mod fold;
+mod loads;
 mod reactions;
 
 use std::sync::Arc;
@@ -10,10 +11,13 @@ use std::sync::Arc;
 use crate::closed::{ClosedMechanism, Drives, PoseError};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
+use crate::element::JointInfo;
 use crate::parameter::ParameterTable;
-use crate::robot_model::RobotModel;
+use crate::tree_model::TreeModel;
 use fold::Fold;
-pub use reactions::Reaction;
+use loads::Loads;
+pub use loads::{JointLoad, LoadError, LoadGroup, LoadReference};
+pub use reactions::{Reaction, Reactions};
 
 /// Rigid bodies and joint elements of a tree whose loops are closed.
 ///
@@ -29,11 +33,15 @@ pub use reactions::Reaction;
 /// closed pose, or a singular one, all that would be computed there is not a number; [`ClosedModel::follow`] says where and why.
 #[derive(Debug)]
 pub struct ClosedModel {
-    tree: RobotModel,
+    tree: TreeModel,
     machine: Arc<ClosedMechanism>,
     drives: Drives,
     outputs: Vec<Output>,
+    joints: Vec<JointInfo>,
     fold: Fold,
+    /// Channels that a motion must bring.
+    channels: Vec<String>,
+    loads: Option<Loads>,
 }
 
 /// The sample of a motion at which poses cannot be followed, and why.
@@ -51,7 +59,7 @@ impl ClosedModel {
     ///
     /// # Panics
     /// If the tree's mechanism is not that of `machine` (but for inertias and gravity), or has coordinates without bodies.
-    pub fn new(tree: RobotModel, machine: impl Into<Arc<ClosedMechanism>>) -> Self {
+    pub fn new(tree: TreeModel, machine: impl Into<Arc<ClosedMechanism>>) -> Self {
         let machine = machine.into();
         assert!(tree.coordinates().is_empty(), "a closed mechanism with coordinates without bodies");
         let machine = if tree.mechanism() == machine.mechanism() {
@@ -60,9 +68,17 @@ impl ClosedModel {
             Arc::new(machine.as_ref().clone().with_mechanism(tree.mechanism().clone()))
         };
         let outputs = machine.driven().iter().map(|rate| tree.outputs()[*rate].clone()).collect();
+        let joints = machine.driven().iter().enumerate().map(|(k, rate)| JointInfo {
+            number: k + 1,
+            position: k,
+            ..tree.joints()[*rate].clone()
+        });
         ClosedModel {
             drives: Drives::new(&machine),
             fold: Fold::new(&tree, &machine),
+            channels: tree.channels().to_vec(),
+            joints: joints.collect(),
+            loads: None,
             outputs,
             machine,
             tree,
@@ -70,8 +86,13 @@ impl ClosedModel {
     }
 
     /// The model of the tree.
-    pub fn tree(&self) -> &RobotModel {
+    pub fn tree(&self) -> &TreeModel {
         &self.tree
+    }
+
+    /// Driven joints.
+    pub fn joints(&self) -> &[JointInfo] {
+        &self.joints
     }
 
     /// The closed mechanism.
@@ -79,9 +100,14 @@ impl ClosedModel {
         &self.machine
     }
 
-    /// The same closures around a changed model of the tree.
-    pub fn map_tree(self, change: impl FnOnce(RobotModel) -> RobotModel) -> Self {
-        ClosedModel::new(change(self.tree), self.machine)
+    /// The same closures and loads around a changed model of the tree, whose elements keep their columns.
+    pub(crate) fn map_tree(self, change: impl FnOnce(TreeModel) -> TreeModel) -> Self {
+        let loads = self.loads;
+        let mut out = ClosedModel::new(change(self.tree), self.machine);
+        if let Some(loads) = loads {
+            out.feed(loads);
+        }
+        out
     }
 }
 
@@ -99,7 +125,7 @@ impl EffortModel for ClosedModel {
     }
 
     fn channels(&self) -> &[String] {
-        self.tree.channels()
+        &self.channels
     }
 
     fn signals(&self) -> &[String] {
@@ -115,7 +141,9 @@ impl EffortModel for ClosedModel {
         stride: usize,
         out: &mut [f64],
     ) {
-        self.expand(motion).with_block(motion, |block| {
+        let expanded = self.expand(motion);
+        let pressed = self.pressed(motion, &expanded);
+        expanded.with_block(motion, &pressed.channels(), |block| {
             self.tree.remember(block, step_s, shape, history, stride, out);
         });
     }
@@ -139,8 +167,11 @@ impl EffortModel for ClosedModel {
     fn regressor(&self, motion: &MotionBlock<'_>, shape: &[f64], out: &mut RegressorBlock) {
         let expanded = self.expand(motion);
         let mut tree = RegressorBlock::new(self.tree.layout().clone(), motion.samples);
-        expanded.with_block(motion, |block| self.tree.regressor(block, shape, &mut tree));
+        let pressed = self.pressed(motion, &expanded);
+        expanded
+            .with_block(motion, &pressed.channels(), |block| self.tree.regressor(block, shape, &mut tree));
         self.fold.regressor(&expanded, &tree, out);
+        pressed.linearise(self, motion, &expanded, out);
     }
 
     fn shaped_columns(&self) -> &[(usize, usize)] {
@@ -164,7 +195,8 @@ impl EffortModel for ClosedModel {
         let wanted = |slice: &[f64], columns: usize| if slice.is_empty() { 0 } else { columns * n };
         let mut tree_values = vec![0.0; wanted(values, self.tree.shaped_columns().len())];
         let mut tree_derivatives = vec![0.0; wanted(derivatives, self.tree.shape_dependence().len())];
-        expanded.with_block(motion, |block| {
+        let pressed = self.pressed(motion, &expanded);
+        expanded.with_block(motion, &pressed.channels(), |block| {
             self.tree.shaped(block, shape, n, &mut tree_values, &mut tree_derivatives);
         });
         self.fold.shaped_values(&expanded, &tree_values, stride, values);
@@ -179,11 +211,22 @@ impl EffortModel for ClosedModel {
         stride: usize,
         effort: &mut [f64],
     ) {
-        let expanded = self.expand(motion);
         let n = motion.samples;
+        if self.loads.as_ref().is_some_and(Loads::is_linearised) {
+            let mut block = RegressorBlock::new(self.fold.layout.clone(), n);
+            self.regressor(motion, shape, &mut block);
+            for output in 0..self.outputs.len() {
+                effort[output * stride..][..n].copy_from_slice(&block.effort(output, linear));
+            }
+            return;
+        }
+        let expanded = self.expand(motion);
+        let pressed = self.pressed(motion, &expanded);
         let rates = self.machine.mechanism().rates();
         let mut tree = vec![0.0; rates * n];
-        expanded.with_block(motion, |block| self.tree.efforts(block, shape, linear, n, &mut tree));
+        expanded.with_block(motion, &pressed.channels(), |block| {
+            self.tree.efforts(block, shape, linear, n, &mut tree);
+        });
         for output in 0..self.outputs.len() {
             let to = &mut effort[output * stride..][..n];
             to.fill(0.0);

@@ -25,7 +25,8 @@ pub use elastic::{CubicFit, CubicSpring, ElasticDoubt, ElasticTransmission, Piec
 pub use external_load::{ExternalLoad, load_channel};
 pub use friction::{
     Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, LoadFriction, LuGre, Offset, PowerLaw,
-    Sigmoid, SigmoidOffset, Stribeck, StribeckViscous, TanhFriction, Viscous, ViscousMagnitude,
+    ReactionFriction, Sigmoid, SigmoidOffset, Stribeck, StribeckViscous, TanhFriction, Viscous,
+    ViscousMagnitude, reaction_channel, weight_channel,
 };
 pub use jets::JetMotion;
 pub use linearised::{Linearised, change_name};
@@ -187,6 +188,10 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     }
     /// The elastic transmission that it is, if it is one; none by default.
     fn elastic(&self) -> Option<&ElasticTransmission> {
+        None
+    }
+    /// The friction that follows a reaction, if it is one; none by default.
+    fn reaction_friction(&self) -> Option<&ReactionFriction> {
         None
     }
     /// The contact of a joint with clearance that it is, if it is one; none by default.

@@ -316,7 +316,7 @@ fn er16_efforts_friction_regressor_and_poses() {
         rigid.efforts(&motion, &[], &linear[..30], 1, &mut effort);
         check_close(&effort, &numbers(&state["tau_rigid_from_standard"]), 1e-9, 0.0, "rigid");
         let mut effort = vec![0.0; 3];
-        model.element_efforts(&motion, &shape, &linear, 1, &mut effort, &mut Vec::new());
+        model.tree().element_efforts(&motion, &shape, &linear, 1, &mut effort, &mut Vec::new());
         check_close(&effort, &numbers(&state["friction"]), 1e-9, 0.0, "friction");
         model.efforts(&motion, &shape, &linear, 1, &mut effort);
         check_close(&effort, &numbers(&state["tau_total"]), 1e-9, 0.0, "total");

@@ -54,6 +54,13 @@ fn are_refused() {
         ),
         case(
             "bad.toml",
+            format!("{sound}\n[[loop]]\nname = \"pin\"\nkind = \"point\"\na = \"link6\"\nb = \"base\"\n"),
+            "inspect bad.toml",
+            &["bad.toml", "loop `pin`", "not worked with yet"],
+            "",
+        ),
+        case(
+            "bad.toml",
             changed("[element.j6]", "[element.j7]"),
             "inspect bad.toml",
             &["bad.toml", "j7"],

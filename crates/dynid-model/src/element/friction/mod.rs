@@ -7,6 +7,7 @@ mod linear;
 mod load;
 mod lugre;
 mod power_law;
+mod reaction;
 mod sigmoid;
 mod stribeck;
 mod stribeck_viscous;
@@ -18,6 +19,7 @@ pub use linear::{AsymmetricFriction, Coulomb, Offset, Viscous, ViscousMagnitude}
 pub use load::LoadFriction;
 pub use lugre::LuGre;
 pub use power_law::PowerLaw;
+pub use reaction::{ReactionFriction, reaction_channel, weight_channel};
 pub use sigmoid::{Sigmoid, SigmoidOffset};
 pub use stribeck::Stribeck;
 pub use stribeck_viscous::StribeckViscous;

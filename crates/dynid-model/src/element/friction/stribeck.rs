@@ -40,6 +40,12 @@ impl Stribeck {
         }
     }
 
+    /// `E` at one speed.
+    pub(super) fn falling(&self, v: f64, shape: &[f64]) -> f64 {
+        let [vs, delta] = values(self.settings(), shape);
+        decay(raised((v / vs).abs(), delta))
+    }
+
     fn settings(&self) -> [&ShapeSetting; 2] {
         [&self.vs, &self.delta]
     }

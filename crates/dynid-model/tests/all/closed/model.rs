@@ -43,7 +43,7 @@ impl Motion {
 
 fn model(name: &str, elements: Vec<Box<dyn JointElement>>) -> Option<ClosedModel> {
     let machine = robot(name)?.close();
-    Some(ClosedModel::new(RobotModel::new(machine.mechanism().clone(), elements), machine))
+    Some(ClosedModel::new(TreeModel::new(machine.mechanism().clone(), elements), machine))
 }
 
 /// Friction at all joints that turn or slide, also those without a drive.
@@ -104,7 +104,7 @@ fn efforts_in_other_coordinates_are_the_same_efforts() {
     let elements = |m: &ClosedMechanism| -> Vec<Box<dyn JointElement>> {
         (0..m.mechanism().rates()).map(|rate| Box::new(Coulomb { rate }) as _).collect()
     };
-    let tree = |m: &ClosedMechanism| RobotModel::new(m.mechanism().clone(), elements(m));
+    let tree = |m: &ClosedMechanism| TreeModel::new(m.mechanism().clone(), elements(m));
     let (by_drives, by_task) =
         (ClosedModel::new(tree(&drives), drives.clone()), ClosedModel::new(tree(&task), task));
     let mut rng = ChaCha8Rng::seed_from_u64(4);
@@ -140,7 +140,7 @@ fn derivatives_by_the_motion_are_those_of_differences() {
             machine = machine.with_independent(&joints.map(String::from)).unwrap();
         }
         let elements = friction(&machine);
-        let model = ClosedModel::new(RobotModel::new(machine.mechanism().clone(), elements), machine);
+        let model = ClosedModel::new(TreeModel::new(machine.mechanism().clone(), elements), machine);
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let motion = Motion::new(model.machine(), 6, 0.2, &mut rng);
         let (d, outputs) = (model.machine().mobility(), model.outputs().len());
@@ -209,7 +209,7 @@ fn shaped_columns_are_those_of_the_regressor() {
     let Some(parts) = robot("fivebar") else { return };
     let machine = parts.close();
     let elements = friction(&machine);
-    let model = ClosedModel::new(RobotModel::new(machine.mechanism().clone(), elements), machine);
+    let model = ClosedModel::new(TreeModel::new(machine.mechanism().clone(), elements), machine);
     let motion = Motion::new(model.machine(), 7, 0.2, &mut ChaCha8Rng::seed_from_u64(6));
     let shape = [0.7, 1.5, 0.9];
     let mut block = RegressorBlock::new(model.layout().clone(), 7);

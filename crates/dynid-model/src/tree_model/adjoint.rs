@@ -1,11 +1,11 @@
 //! Efforts without a regressor, and the adjoints of efforts and regressor.
 
-use super::{CoupledRegressor, RobotModel};
+use super::{CoupledRegressor, TreeModel};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::effort_model::{EffortModel, RegressorBlock};
 use crate::element::ElementWeights;
 
-impl RobotModel {
+impl TreeModel {
     pub(super) fn check_shapes(&self, shape: &[f64], linear: Option<&[f64]>) {
         assert_eq!(shape.len(), self.parameters.shape.len(), "length of shape");
         if let Some(linear) = linear {

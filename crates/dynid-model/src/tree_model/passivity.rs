@@ -1,6 +1,6 @@
 //! Whether the friction of a joint takes energy out of the motion.
 
-use super::{PlacedElement, RobotModel};
+use super::{PlacedElement, TreeModel};
 use crate::dynamics::MotionBlock;
 use crate::effort_model::EffortModel;
 use crate::element::ElementColumns;
@@ -32,7 +32,7 @@ const GRID: usize = 4000;
 /// Efforts against the motion that pass for rounding, as a share of the largest.
 const ROUNDING: f64 = 1e-12;
 
-impl RobotModel {
+impl TreeModel {
     /// Whether the friction elements of a joint together, known ones too, are passive, `v (e(v) - e(0)) >= 0`, for velocities from
     /// `range.0` to `range.1` (rad/s, m/s). The effort at rest is the offset of the joint and left out.
     ///
@@ -87,7 +87,7 @@ impl RobotModel {
     }
 
     /// Effort of the friction elements of a joint, known ones too, over velocities (rad/s, m/s), less that at rest, `e(v) - e(0)`, in N m or N;
-    /// what [`RobotModel::friction_passivity`] looks at.
+    /// what [`TreeModel::friction_passivity`] looks at.
     ///
     /// # Panics
     /// If there is no such rate, `shape` or `linear` has the wrong length, or a channel is missing.
@@ -115,7 +115,7 @@ impl RobotModel {
 
 /// The law of a joint's friction elements.
 struct Friction<'a> {
-    model: &'a RobotModel,
+    model: &'a TreeModel,
     elements: Vec<Law<'a>>,
     rate: usize,
     held: &'a [(&'a str, f64)],
@@ -142,7 +142,7 @@ struct Side {
 
 impl<'a> Friction<'a> {
     fn new(
-        model: &'a RobotModel,
+        model: &'a TreeModel,
         rate: usize,
         shape: &'a [f64],
         linear: &'a [f64],

@@ -1,9 +1,9 @@
 //! Joints with clearance of a model.
 
-use super::{PlacedElement, RobotModel};
+use super::{PlacedElement, TreeModel};
 use crate::element::ClearanceContact;
 
-impl RobotModel {
+impl TreeModel {
     /// Contacts of journals in their bearings, in the order of the elements; not known ones.
     pub fn clearances(&self) -> impl Iterator<Item = &ClearanceContact> {
         self.elements.iter().filter_map(|placed| placed.element.clearance())

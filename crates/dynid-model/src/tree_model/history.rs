@@ -1,10 +1,10 @@
 //! Signals that depend on the motion before.
 
-use super::{PlacedElement, RobotModel};
+use super::{PlacedElement, TreeModel};
 use crate::dynamics::MotionBlock;
 use crate::effort_model::History;
 
-impl RobotModel {
+impl TreeModel {
     /// Names of the signals of all elements, those of known elements last.
     pub(super) fn signal_names(&self) -> Vec<String> {
         let elements =

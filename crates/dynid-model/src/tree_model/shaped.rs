@@ -1,6 +1,6 @@
 //! The columns that change with shape parameters, without the rest of the regressor.
 
-use super::{PlacedElement, RobotModel};
+use super::{PlacedElement, TreeModel};
 use crate::dynamics::MotionBlock;
 use crate::element::ElementColumns;
 
@@ -60,7 +60,7 @@ impl Shaped {
     }
 }
 
-impl RobotModel {
+impl TreeModel {
     pub(super) fn fill_shaped(
         &self,
         motion: &MotionBlock<'_>,

@@ -1,11 +1,11 @@
 //! Which coordinates drive which joints, and efforts with their time derivatives.
 
-use super::{PlacedElement, RobotModel};
+use super::{PlacedElement, TreeModel};
 use crate::effort_model::EffortModel;
 use crate::element::{ElasticTransmission, JetMotion};
 use crate::scalar::Jet;
 
-impl RobotModel {
+impl TreeModel {
     fn elastic_elements(&self) -> impl Iterator<Item = &ElasticTransmission> {
         let all = self.elements.iter().chain(self.known.iter().map(|k| &k.placed));
         all.filter_map(|placed| placed.element.elastic())

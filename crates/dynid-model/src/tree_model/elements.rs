@@ -1,6 +1,6 @@
 //! Efforts of the elements alone, and their adjoint.
 
-use super::{PlacedElement, RobotModel};
+use super::{PlacedElement, TreeModel};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::element::{ElementColumns, ElementWeights, JointElement};
 
@@ -10,7 +10,7 @@ impl PlacedElement {
     }
 }
 
-impl RobotModel {
+impl TreeModel {
     /// Adds the efforts of the elements, known ones too, without those of the rigid bodies, to `effort[output * stride + s]`.
     ///
     /// `linear`: all linear parameters of the model. `memory`: scratch, of any length.

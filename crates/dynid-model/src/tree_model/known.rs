@@ -1,6 +1,6 @@
 //! Elements whose parameters are known: part of the effort that no parameter stands for.
 
-use super::{PlacedElement, RobotModel};
+use super::{PlacedElement, TreeModel};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::effort_model::RegressorBlock;
 use crate::element::{ElementColumns, ElementWeights, JointElement};
@@ -25,7 +25,7 @@ pub(super) struct PlacedKnown {
     pub(super) shape: Vec<f64>,
 }
 
-impl RobotModel {
+impl TreeModel {
     /// The same model with elements whose efforts are known: they go into the offset of the effort
     /// (`effort = W linear + offset`) and into predictions, not into the parameters.
     ///
