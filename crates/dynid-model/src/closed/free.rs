@@ -148,4 +148,19 @@ impl ClosedMechanism {
         free.world.drift(&self.tree, dq);
         self.rows.bias(&free.world, &mut free.bias);
     }
+
+    /// The wrench that unit multipliers exert on what hangs on the joint of a body: force (N) then moment about the joint
+    /// frame's origin (N m), axes of the joint frame; row-major, six rows, one column per condition. The joint carries
+    /// what the motion of the tree needs less this.
+    ///
+    /// # Panics
+    /// If there is no such body.
+    pub fn condition_wrenches(&self, free: &FreeMotions, body: usize) -> Vec<f64> {
+        let (hanging, conditions) = (self.hanging(body), self.rows.len());
+        let mut out = vec![0.0; 6 * conditions];
+        for (component, row) in out.chunks_exact_mut(conditions).enumerate() {
+            self.closure_entries_at(&free.world, &hanging, component, row);
+        }
+        out
+    }
 }

@@ -94,7 +94,7 @@ fn jacobian_and_bias_are_derivatives_off_closed_poses() {
         machine.bias_at(&mut free, &dq);
         let first: Vec<f64> =
             residual[2].iter().zip(&residual[0]).map(|(a, b)| (a - b) / (2.0 * h)).collect();
-        check_close(&first, &product(&free.jacobian()[..], &dq), 1e-6, 0.0, &format!("{name}: rates"));
+        check_close(&first, &product(free.jacobian(), &dq), 1e-6, 0.0, &format!("{name}: rates"));
         assert_eq!(free.jacobian().len(), n * machine.conditions());
         let rates = |sign: f64| {
             let mut at = q.clone();
