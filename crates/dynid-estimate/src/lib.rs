@@ -13,6 +13,7 @@
 //! | shape parameters beside linear ones | [`separable`] |
 //! | clearance of a joint from its journal, or from the effort alone | [`clearance`] |
 //! | friction laws from constant-speed tests | [`steady_friction`] |
+//! | friction that follows reaction forces | [`load_friction`] |
 //! | covariance that survives filtering | [`covariance`] |
 //! | held-out error over folds of blocks; several estimators on the same folds | [`folds`], [`held_out`] |
 //! | which parameters a model can do without | [`elimination`] |
@@ -39,6 +40,7 @@ pub mod groups;
 pub mod held_out;
 pub mod identifiability;
 pub mod linear;
+pub mod load_friction;
 pub mod metrics;
 pub mod online;
 pub mod rank;

@@ -10,6 +10,7 @@ use crate::effort_model::{EffortModel, History, Output, RegressorBlock, Regresso
 use crate::element::{ClearanceContact, ElasticTransmission, JetMotion, JointElement, JointInfo};
 use crate::mechanism::Mechanism;
 use crate::parameter::{Parameter, ParameterTable};
+use crate::random_motion::RandomMotion;
 use crate::scalar::Jet;
 use crate::tree_model::{FrictionPassivity, KnownElement, TreeModel};
 
@@ -263,6 +264,10 @@ impl EffortModel for RobotModel {
         out: &mut [f64],
     ) {
         self.model().remember(motion, step_s, shape, history, stride, out);
+    }
+
+    fn random_motion(&self, samples: usize, seed: u64) -> RandomMotion {
+        self.model().random_motion(samples, seed)
     }
 
     fn dimensions(&self) -> (usize, usize) {

@@ -44,6 +44,8 @@ pub enum NoAdvice {
     FloatingJoint,
     /// Motors stand behind springs: the motions are those of stiff joints.
     ElasticJoints,
+    /// Loops are closed: the motions are those of arms.
+    ClosedLoops,
 }
 
 /// What the logs at hand tell.
@@ -97,6 +99,10 @@ pub fn advise(
     }
     if !model.coordinates().is_empty() {
         advice.unavailable = Some(NoAdvice::ElasticJoints);
+        return advice;
+    }
+    if model.closed().is_some() {
+        advice.unavailable = Some(NoAdvice::ClosedLoops);
         return advice;
     }
     if model.mechanism().positions() != model.mechanism().rates() {

@@ -10,8 +10,11 @@ pub use elastic::ElasticFault;
 pub(crate) use elastic::stated_springs;
 pub use pairs::AlikeElements;
 
+use std::sync::Arc;
+
 use dynid_estimate::conditioning::{FrictionShape, ShapeKind};
 use dynid_io::{CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, SettingValue};
+use dynid_model::closed::ClosedMechanism;
 use dynid_model::element::{
     AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, ExternalLoad, JointElement,
     LoadFriction, Offset, RotorInertia, Spring, Transmission, Viscous, ViscousMagnitude,
@@ -74,6 +77,8 @@ pub struct ElementPlan {
     pub known: Vec<KnownFriction>,
     /// Whether these errors may have any sign.
     pub free_errors: bool,
+    /// The mechanism with its loops closed, if it has some.
+    pub closed: Option<Arc<ClosedMechanism>>,
 }
 
 impl ElementPlan {
@@ -100,6 +105,7 @@ impl ElementPlan {
             load_reference: None,
             known: Vec::new(),
             free_errors: true,
+            closed: None,
         };
         let names = plan.names(mechanism);
         for (joint, _) in &spec.per_joint {
@@ -155,6 +161,11 @@ impl ElementPlan {
     pub(crate) fn bare(mechanism: &Mechanism, spec: &ElementSpec) -> Result<Self, Error> {
         let spec = ElementSpec { elastic: spec.elastic.clone(), ..ElementSpec::default() };
         ElementPlan::new(mechanism, &spec, Some(&[]), |_| false)
+    }
+
+    /// The same plan for a mechanism whose loops are closed.
+    pub fn with_loops(self, closed: Option<Arc<ClosedMechanism>>) -> Self {
+        ElementPlan { closed, ..self }
     }
 
     /// Settings of the elements.

@@ -19,6 +19,24 @@ pub enum Error {
         /// The fault.
         source: dynid_model::MechanismError,
     },
+    /// The robot's loops cannot be closed, or its drives do not control it.
+    #[error("{file}: {source}")]
+    Loops {
+        /// Robot file.
+        file: String,
+        /// The fault.
+        source: Box<dynid_model::closed::ClosedError>,
+    },
+    /// A log in which a closed mechanism cannot be where its drives say.
+    #[error("{file}: row {row}: {fault}")]
+    Pose {
+        /// Log file.
+        file: String,
+        /// Data row, from 1.
+        row: usize,
+        /// Why.
+        fault: Box<dynid_model::closed::PoseError>,
+    },
     /// A log cannot be read.
     #[error(transparent)]
     LogFile(#[from] dynid_io::LogFileError),
@@ -317,6 +335,7 @@ impl Error {
         use dynid_estimate::consistent::ProblemError as P;
         use dynid_estimate::linear::LinearError as L;
         use dynid_model::MechanismError as M;
+        use dynid_model::closed::{ClosedError as Loops, PoseError as Pose};
         use dynid_model::element::is_temperature;
         match self {
             Error::RobotFile(e) => e.hint(),
@@ -362,6 +381,17 @@ impl Error {
                 M::NothingMoves { .. } => "a model needs at least one joint that is not fixed".to_owned(),
                 M::TooManyJoints { .. } => "lock joints that do not move, or split the robot".to_owned(),
                 _ => return None,
+            }),
+            Error::Loops { source, .. } => Some(match source.as_ref() {
+                Loops::NotClosed { .. } => "check the frames of the loop (lengths in m, angles in rad) and give `home` near a closed pose".to_owned(),
+                Loops::UnderActuated { .. } => "name more joints in `actuated`, or lock what does not move".to_owned(),
+                Loops::Dependent { .. } => "name other joints in `actuated`".to_owned(),
+                Loops::SingularHome { .. } => "give a `home` away from the singular pose".to_owned(),
+                _ => return None,
+            }),
+            Error::Pose { fault, .. } => Some(match fault.as_ref() {
+                Pose::Singular { .. } => "leave out this part of the log (`part`), or plan a motion that stays away from singular poses".to_owned(),
+                _ => "check the units, signs and zeros of the position columns, the lengths of the robot file, and that `home` is of the assembly mode of the log".to_owned(),
             }),
             Error::Conditioning(C::NothingMoves { .. }) => {
                 Some("a model of motion needs motion: check the columns, or record an excitation trajectory (`dynid design` makes one)".to_owned())

@@ -1,10 +1,12 @@
 //! The result file `estimate.json`: stable keys, added to but never renamed.
 
 mod friction;
+mod loops;
 mod model;
 mod trust;
 
 pub use friction::{FrictionTrial, PassivityRecord};
+pub use loops::{ClosureRecord, FrameRecord, LoopsRecord};
 pub use model::{CouplingRecord, JointRecord, LinkRecord, ModelRecord, SettingRecord};
 pub use trust::{
     ConsistencyRecord, HeldOutRecord, PrecisionRecord, PruningRecord, PruningStep, WhitenessRecord,
@@ -388,7 +390,9 @@ impl Estimate {
         let fault = |message: String| Error::EstimateFile { file: file.display().to_string(), message };
         let description = self.model.description(&self.robot).map_err(&fault)?;
         let mechanism = description.build().map_err(|e| fault(e.to_string()))?;
+        let closed = self.model.loops.as_ref().map(|l| l.close(&mechanism)).transpose().map_err(&fault)?;
         let plan = self.model.plan(&mechanism).map_err(|e| fault(e.to_string()))?;
+        let plan = plan.with_loops(closed.map(std::sync::Arc::new));
         let efforts = plan.names(&mechanism).len();
         if plan.per_rate.len() != efforts {
             return Err(fault(format!(

@@ -140,7 +140,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
     };
     let robot = Robot::load(&config.robot, &options)?;
-    if robot.mechanism.positions() != robot.mechanism.rates() {
+    if robot.closed.is_none() && robot.mechanism.positions() != robot.mechanism.rates() {
         return Err(Error::Unsupported(
             "a floating base cannot be identified from joint logs: lock the base or leave it out".to_owned(),
         ));
@@ -169,6 +169,11 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     };
     let mut warnings = robot.warnings.clone();
     warnings.extend(robot.clearance_warnings());
+    warnings.extend(
+        model.closed().iter().flat_map(|closed| {
+            loaded.iter().filter_map(|l| logs::poses::nearest_singularity(closed, &l.log))
+        }),
+    );
     warnings.extend(plan.alike(&robot.mechanism).iter().map(ToString::to_string));
     let Shaped { model, structure, conditioning, friction, found: shapes } = shapes::search(
         config,
@@ -385,12 +390,17 @@ fn read_logs(
             still.push((name.clone(), 0.0));
         }
     }
+    if let (Some(_), Some((name, _))) = (&robot.closed, still.first()) {
+        return Err(Error::Unsupported(format!(
+            "no column for the drive `{name}`: the logs of a mechanism with loops need all its drives"
+        )));
+    }
     let robot = if still.is_empty() { robot } else { robot.locked(&still)? };
     Ok((robot, loaded))
 }
 
 fn plan_elements(config: &Config, robot: &Robot, logs: &[LoadedLog]) -> Result<ElementPlan, Error> {
-    let names = logs::names(&robot.axes);
+    let names = robot.rate_names();
     let moves =
         |rate: usize| logs.iter().any(|l| l.log.joints().iter().any(|j| j.name == names[rate] && j.moves()));
     let plan = ElementPlan::of_run(config, robot, moves)?;

@@ -106,12 +106,7 @@ pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection,
     let default = elements.or(if robot.elements.defaults.is_empty() { Some(none) } else { None });
     let plan = ElementPlan::new(mechanism, &robot.elements, default, |_| true)?;
     let model = plan.model(mechanism)?;
-    let base = BaseParameters::of(
-        &model,
-        model.mechanism(),
-        &model.parameters().shape_start(),
-        &BaseSettings::default(),
-    );
+    let base = BaseParameters::of_model(&model, &model.parameters().shape_start(), &BaseSettings::default());
     let table = model.parameters();
     let expressions = base.expressions(table);
     let names = plan.names(mechanism);

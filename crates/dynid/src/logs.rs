@@ -6,13 +6,14 @@ use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, prepare};
 use dynid_io::columns::EffortColumn;
 use dynid_io::{ColumnMapping, MappingError, MappingSpec, ReadOptions, Signals};
 use dynid_model::element::{is_temperature, temperature_channel};
-use dynid_model::{EffortModel, Limits};
+use dynid_model::{Limits, RobotModel};
 use dynid_motion::temperature::{self, TemperatureDoubt};
 use dynid_motion::{Channel, JointSignals, Log};
 use sha2::{Digest, Sha256};
 
 mod axes;
 mod known_motion;
+pub(crate) mod poses;
 
 pub use axes::{LogAxis, as_logged, axes, names};
 
@@ -36,12 +37,11 @@ impl LoadedLog {
     /// Conditions the log's signals; states of a motion with a stated period come from its Fourier series.
     ///
     /// # Errors
-    /// [`Error::Conditioning`].
-    pub fn prepare(
-        &self,
-        model: &dyn EffortModel,
-        settings: &ConditioningSettings,
-    ) -> Result<PreparedLog, Error> {
+    /// [`Error::Conditioning`]; [`Error::Pose`] for mechanisms with loops.
+    pub fn prepare(&self, model: &RobotModel, settings: &ConditioningSettings) -> Result<PreparedLog, Error> {
+        if let Some(closed) = model.closed() {
+            poses::follow(closed, &self.log)?;
+        }
         let prepared = prepare(&self.log, model, settings)?;
         match self.period_s {
             Some(period_s) => Ok(prepared.with_period(period_s)?),

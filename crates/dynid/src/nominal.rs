@@ -81,8 +81,11 @@ pub fn with_nominal_shape(model: RobotModel, given: &BTreeMap<String, f64>) -> R
 /// ratio.
 pub(crate) fn typical_efforts(model: &RobotModel, values: &[f64]) -> Vec<f64> {
     const STATES: usize = 100;
-    let motion = RandomMotion::new(model.mechanism(), model.channels(), STATES, TYPICAL_SEED)
-        .with_coordinates(model, TYPICAL_SEED);
+    let motion = match model.closed() {
+        None => RandomMotion::new(model.mechanism(), model.channels(), STATES, TYPICAL_SEED)
+            .with_coordinates(model, TYPICAL_SEED),
+        Some(closed) => closed.random_motion(STATES, TYPICAL_SEED),
+    };
     let mut block = RegressorBlock::new(model.layout().clone(), STATES);
     motion.with_block(|m| model.regressor(m, &model.parameters().shape_start(), &mut block));
     let mut peaks: Vec<f64> = (0..model.outputs().len())

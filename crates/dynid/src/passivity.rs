@@ -67,7 +67,11 @@ impl Identification {
         outputs
             .filter_map(|(rate, output)| {
                 let known = self.plan.known_friction(&output.name).is_some();
-                if !known && !self.plan.per_rate[rate].iter().any(|name| friction::is_law(name)) {
+                if !known
+                    && !self.plan.per_rate[self.model.tree_rate(rate)]
+                        .iter()
+                        .any(|name| friction::is_law(name))
+                {
                     return None;
                 }
                 let (low, high) = velocities(&self.logs, rate)?;

@@ -28,7 +28,7 @@ impl Identification {
         if let Some((link, ratio)) = self.model.elastic_link(output) {
             return format!("motor of `{}` behind a spring, ratio {ratio}", joints[link].name);
         }
-        match mechanism.rate_bodies().get(output) {
+        match mechanism.rate_bodies().get(self.model.tree_rate(output)) {
             Some(body) => {
                 let kind = format!("{:?}", mechanism.bodies()[*body].joint.kind).to_lowercase();
                 let driven = self.model.elastic_motor(output);
@@ -71,7 +71,7 @@ impl Identification {
                     name: o.name.clone(),
                     effort_unit: o.unit.to_owned(),
                     kind: self.joint_kind(k),
-                    elements: self.plan.per_rate[k].clone(),
+                    elements: self.plan.per_rate[self.model.tree_rate(k)].clone(),
                 })
                 .collect(),
             logs: self

@@ -1,8 +1,10 @@
 //! From a robot file to a mechanism.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use dynid_io::{ElementSpec, RobotFile};
+use dynid_model::closed::ClosedMechanism;
 use dynid_model::{Description, EffortModel, JointKind, Mechanism, MechanismWarning, RobotModel};
 
 use crate::Error;
@@ -27,8 +29,10 @@ pub struct RobotOptions {
 pub struct Robot {
     /// Where it came from.
     pub path: PathBuf,
-    /// The mechanism.
+    /// The mechanism; of one with loops its tree.
     pub mechanism: Mechanism,
+    /// The mechanism with its loops closed, if it has some.
+    pub closed: Option<Arc<ClosedMechanism>>,
     /// What logs have columns for: joints, then motors behind springs.
     pub axes: Vec<LogAxis>,
     /// What the file says about elements.
@@ -43,8 +47,7 @@ impl Robot {
     /// Reads a robot and compiles its mechanism.
     ///
     /// # Errors
-    /// [`Error::RobotFile`], [`Error::Mechanism`], [`Error::UnknownJoint`], [`Error::Elastic`]; [`Error::Unsupported`] for
-    /// robots with loops.
+    /// [`Error::RobotFile`], [`Error::Mechanism`], [`Error::UnknownJoint`], [`Error::Elastic`], [`Error::Loops`].
     pub fn load(path: &Path, options: &RobotOptions) -> Result<Robot, Error> {
         Self::of_file(path, dynid_io::robot::read(path)?, options)
     }
@@ -59,13 +62,6 @@ impl Robot {
     }
 
     fn of_file(path: &Path, mut file: RobotFile, options: &RobotOptions) -> Result<Robot, Error> {
-        if let Some(closure) = file.closures.first() {
-            return Err(Error::Unsupported(format!(
-                "{}: loop `{}`: closed loops are read but not worked with yet: describe an open tree, without `loop`",
-                path.display(),
-                closure.name
-            )));
-        }
         let d = &mut file.description;
         if let Some(g) = options.gravity {
             d.gravity = g;
@@ -90,12 +86,17 @@ impl Robot {
         let bodies = mechanism.warnings().iter().filter(|_| !measured);
         let mut warnings: Vec<String> = bodies.map(ToString::to_string).collect();
         warnings.extend(held(locked));
+        let closed = closed(path, &mut file, &mechanism)?;
+        warnings.extend(closed.iter().flat_map(|c| c.warnings().iter().map(ToString::to_string)));
         let mut elements = file.elements.clone();
         elements.elastic.retain(|e| !is_fixed(&file.description, &e.joint));
         elements.clearance.retain(|c| !is_fixed(&file.description, &c.joint));
-        let axes = logs::axes(&ElementPlan::bare(&mechanism, &elements)?.model(&mechanism)?);
-        elements.per_joint.retain(|(joint, _)| axes.iter().any(|a| a.name == *joint));
-        Ok(Robot { path: path.to_owned(), mechanism, axes, elements, file, warnings })
+        let bare = ElementPlan::bare(&mechanism, &elements)?.with_loops(closed.clone());
+        let axes = logs::axes(&bare.model(&mechanism)?);
+        let inside = mechanism.rate_names();
+        let is_joint = |joint: &String| axes.iter().any(|a| a.name == *joint) || inside.contains(joint);
+        elements.per_joint.retain(|(joint, _)| is_joint(joint));
+        Ok(Robot { path: path.to_owned(), mechanism, closed, axes, elements, file, warnings })
     }
 
     /// The same robot with more joints held still; a motor stands still with its joint.
@@ -126,7 +127,9 @@ impl Robot {
     /// # Errors
     /// [`Error::Elastic`].
     pub fn skeleton(&self) -> Result<RobotModel, Error> {
-        ElementPlan::bare(&self.mechanism, &self.elements)?.model(&self.mechanism)
+        ElementPlan::bare(&self.mechanism, &self.elements)?
+            .with_loops(self.closed.clone())
+            .model(&self.mechanism)
     }
 
     /// Values of the robot file for the parameters of [`Robot::skeleton`], 0 where it states none.
@@ -141,10 +144,37 @@ impl Robot {
         values
     }
 
+    /// Names of the rates that elements act at: what logs have columns for, but all joints of a mechanism with loops.
+    pub fn rate_names(&self) -> Vec<String> {
+        match self.closed {
+            Some(_) => self.mechanism.rate_names(),
+            None => logs::names(&self.axes),
+        }
+    }
+
     /// Coordinates as a states table names them.
     pub fn state_joints(&self) -> Vec<dynid_io::StateJoint> {
         state_joints(&self.mechanism, &self.axes)
     }
+}
+
+/// Closes the loops of a file. Joints that are held are no longer driven and have no home position.
+fn closed(
+    path: &Path,
+    file: &mut RobotFile,
+    mechanism: &Mechanism,
+) -> Result<Option<Arc<ClosedMechanism>>, Error> {
+    if file.closures.is_empty() {
+        return Ok(None);
+    }
+    let moves = |name: &String| mechanism.bodies().iter().any(|b| b.joint.name == *name);
+    file.home.retain(|(name, _)| moves(name));
+    if let Some(driven) = &mut file.actuated {
+        driven.retain(moves);
+    }
+    ClosedMechanism::new(mechanism.clone(), file.closures.clone(), file.actuated.as_deref(), &file.home)
+        .map(|closed| Some(Arc::new(closed)))
+        .map_err(|source| Error::Loops { file: path.display().to_string(), source: Box::new(source) })
 }
 
 fn is_fixed(description: &Description, joint: &str) -> bool {

@@ -65,6 +65,14 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
     for (path, exported) in &exported {
         write_atomically(path, exported.text.as_bytes())?;
     }
+    if let Some(urdf) = &args.urdf {
+        let name = urdf.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        if let Some(loops) = export.loops(&name) {
+            let path = urdf.with_extension("loops.toml");
+            write_atomically(&path, loops.as_bytes())?;
+            note(&format!("written: {} (its loops)", path.display()));
+        }
+    }
     for (path, exported) in &exported {
         note(&format!(
             "written: {} (read back: effort within {:.1e} over {})",

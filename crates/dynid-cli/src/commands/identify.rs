@@ -20,7 +20,9 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     let config = configuration(args)?;
     let out = config.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
     let robot = config.robot.file_stem().map_or_else(|| "robot".into(), |s| s.to_string_lossy().into_owned());
-    let files = ["estimate.json", "report.html", &format!("{robot}.urdf")].map(|name| out.join(name));
+    let urdf_name = format!("{robot}.urdf");
+    let names = ["estimate.json", "report.html", &urdf_name, &format!("{robot}.loops.toml")];
+    let files = names.map(|name| out.join(name));
     let logs = config.log.iter().chain(&config.validation).map(|log| log.path.as_path());
     let friction = config.elements.known_friction.as_deref();
     let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).chain(friction).collect();
@@ -39,7 +41,9 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
 
     std::fs::create_dir_all(&out)
         .map_err(|error| OutputError::Unwritable { file: out.display().to_string(), error })?;
-    let texts = [Some(&estimate.to_json()), Some(&report), urdf.as_ref().ok().map(|u| &u.text)];
+    let loops = if urdf.is_ok() { identification.loops(&urdf_name)? } else { None };
+    let texts =
+        [Some(&estimate.to_json()), Some(&report), urdf.as_ref().ok().map(|u| &u.text), loops.as_ref()];
     let written: Vec<(&PathBuf, &String)> =
         files.iter().zip(texts).filter_map(|(path, text)| Some((path, text?))).collect();
     for (path, text) in &written {

@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! poll x + Δ s_j e_j for all j, then x - Δ s_j e_j for all j, clipped to the bounds, up to the first improvement
-//! improved: x ← that point, Δ ← 2Δ;  else Δ ← Δ/2
+//! improved: x ← that point, Δ ← min(2Δ, largest);  else Δ ← Δ/2
 //! ```
 //!
 //! until `Δ` is below its limit (converged) or the budget is used: by default 100 n iterations (polls) and 2000 n
@@ -26,24 +26,33 @@ pub struct PatternSearch {
     pub mesh: f64,
     /// Mesh below which the search has converged, positive. Default 1e-6.
     pub smallest_mesh: f64,
+    /// Mesh that successes do not exceed, at least the first one. Default infinite. With the first mesh as limit a search
+    /// wastes fewer polls on meshes far too wide.
+    pub largest_mesh: f64,
 }
 
 impl Default for PatternSearch {
     fn default() -> Self {
-        PatternSearch { mesh: 1.0, smallest_mesh: 1e-6 }
+        PatternSearch { mesh: 1.0, smallest_mesh: 1e-6, largest_mesh: f64::INFINITY }
     }
 }
 
 impl PatternSearch {
     pub(super) fn check(&self, algorithm: &'static str) -> Result<(), SearchError> {
         positive(algorithm, "mesh", self.mesh)?;
-        positive(algorithm, "smallest_mesh", self.smallest_mesh)
+        positive(algorithm, "smallest_mesh", self.smallest_mesh)?;
+        if self.largest_mesh < self.mesh || self.largest_mesh.is_nan() {
+            let (parameter, expected) = ("largest_mesh", "the first mesh or more");
+            return Err(SearchError::Parameter { algorithm, parameter, expected, found: self.largest_mesh });
+        }
+        Ok(())
     }
 }
 
 #[derive(Clone)]
 pub(super) struct Pattern {
     smallest_mesh: f64,
+    largest_mesh: f64,
     mesh: f64,
     scales: Vec<f64>,
     point: Vec<f64>,
@@ -54,6 +63,7 @@ impl Pattern {
     pub(super) fn new(parameters: &PatternSearch, dimensions: usize) -> Pattern {
         Pattern {
             smallest_mesh: parameters.smallest_mesh,
+            largest_mesh: parameters.largest_mesh,
             mesh: parameters.mesh,
             scales: vec![1.0; dimensions],
             point: vec![0.0; dimensions],
@@ -101,7 +111,7 @@ impl Method for Pattern {
         match self.poll(run) {
             Some((point, value)) => {
                 (self.point, self.value) = (point, value);
-                self.mesh *= 2.0;
+                self.mesh = (2.0 * self.mesh).min(self.largest_mesh);
             }
             None => self.mesh *= 0.5,
         }

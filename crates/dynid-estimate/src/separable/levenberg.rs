@@ -1,5 +1,6 @@
 //! Levenberg-Marquardt with bounds on the projected residual.
 
+use super::boxed::BoxedStep;
 use super::dense::{Columns, PivotedQr, add_scaled, dot, norm};
 use super::projection::{Point, Projection};
 use super::reduction::Target;
@@ -67,7 +68,7 @@ pub(super) fn search(
             break SearchStatus::IterationLimit;
         }
         scale.iter_mut().zip(&model.norms).for_each(|(s, n)| *s = s.max(*n));
-        let Some(trial) = model.step(damping, &scale).map(|step| moved(bounds, &u, &step)) else {
+        let Some(trial) = model.trial(damping, &scale, bounds, &u) else {
             break SearchStatus::NoProgress;
         };
         iterations += 1;
@@ -100,10 +101,6 @@ pub(super) fn search(
     Some(Search { u, point, iterations, status })
 }
 
-fn moved(bounds: &SearchBox, u: &[f64], step: &[f64]) -> Vec<f64> {
-    bounds.clipped(&u.iter().zip(step).map(|(u, s)| u + s).collect::<Vec<_>>())
-}
-
 /// The linear model about a point in searched coordinates.
 struct Model {
     /// One column per searched parameter.
@@ -114,6 +111,8 @@ struct Model {
     norms: Vec<f64>,
     /// Parameters that may move: not held, not at a bound that the descent would leave.
     free: Vec<usize>,
+    /// Parameters that are not held.
+    movable: Vec<usize>,
 }
 
 impl Model {
@@ -129,12 +128,42 @@ impl Model {
             (bounds.at_lower(k, u[k]) && gradient[k] > 0.0) || (bounds.at_upper(k, u[k]) && gradient[k] < 0.0)
         };
         let free = (0..u.len()).filter(|k| !held[*k] && !leaves(*k)).collect();
-        Model { jacobian, residual: point.residual.clone(), gradient, norms, free }
+        let movable = (0..u.len()).filter(|k| !held[*k]).collect();
+        Model { jacobian, residual: point.residual.clone(), gradient, norms, free, movable }
     }
 
     fn is_stationary(&self, tolerance: f64) -> bool {
         let size = norm(&self.residual);
         self.free.iter().all(|k| self.gradient[*k].abs() <= tolerance * self.norms[*k] * size)
+    }
+
+    /// The point of a damped step: that of the free parameters where it stays within the bounds, else the minimum of the
+    /// same model within them.
+    fn trial(&self, damping: f64, scale: &[f64], bounds: &SearchBox, u: &[f64]) -> Option<Vec<f64>> {
+        let step = self.step(damping, scale)?;
+        let next: Vec<f64> = u.iter().zip(&step).map(|(u, s)| u + s).collect();
+        if bounds.clipped(&next) == next {
+            return Some(next);
+        }
+        let moving: Vec<usize> = self.movable.iter().copied().filter(|k| self.norms[*k] > 0.0).collect();
+        let mut jacobian = Columns::zeros(self.jacobian.rows(), moving.len() + 1);
+        for (j, &k) in moving.iter().enumerate() {
+            jacobian.column_mut(j).copy_from_slice(self.jacobian.column(k));
+        }
+        jacobian.column_mut(moving.len()).copy_from_slice(&self.residual);
+        let of = |value: &dyn Fn(usize) -> f64| moving.iter().map(|k| value(*k)).collect::<Vec<f64>>();
+        let (lower, upper) = (of(&|k| bounds.lower[k] - u[k]), of(&|k| bounds.upper[k] - u[k]));
+        let damping = of(&|k| damping.sqrt() * scale[k]);
+        let step = BoxedStep::new(jacobian, damping, lower.clone(), upper.clone()).solve();
+        let mut next = u.to_vec();
+        for (j, &k) in moving.iter().enumerate() {
+            next[k] = match step[j] {
+                s if s <= lower[j] => bounds.lower[k],
+                s if s >= upper[j] => bounds.upper[k],
+                s => u[k] + s,
+            };
+        }
+        step.iter().all(|s| s.is_finite()).then(|| bounds.clipped(&next))
     }
 
     /// `min ‖r + J δ‖² + λ ‖D δ‖²` over the free parameters.

@@ -21,6 +21,7 @@
 //!
 //! Source: Golub & Pereyra 1973; Kaufman 1975; Moré 1978 for scaling and damping.
 
+mod boxed;
 mod dense;
 mod effort_problem;
 mod estimate;

@@ -6,8 +6,8 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use dynid_estimate::search::{
-    Algorithm, BeeColony, Bounds, BoundsError, Checkpoint, CheckpointError, Objective, PointObjective,
-    Progress, SearchError, SearchResult, Settings, Status, many, resume, run,
+    Algorithm, BeeColony, Bounds, BoundsError, Checkpoint, CheckpointError, Objective, PatternSearch,
+    PointObjective, Progress, SearchError, SearchResult, Settings, Status, many, resume, run,
 };
 
 const D: usize = 6;
@@ -279,6 +279,10 @@ fn bad_settings_are_refused() {
     let odd = Algorithm::BeeColony(BeeColony { acceleration: f64::NAN, ..BeeColony::published() });
     let error = run(&odd, &objective(), &bounds(), &Settings::default(), &mut quiet).unwrap_err();
     assert!(error.to_string().contains("acceleration is NaN"), "{error}");
+    let narrow_mesh =
+        Algorithm::PatternSearch(PatternSearch { largest_mesh: 0.5, ..PatternSearch::default() });
+    let error = run(&narrow_mesh, &objective(), &bounds(), &Settings::default(), &mut quiet).unwrap_err();
+    assert!(error.to_string().contains("largest_mesh is 0.5, expected the first mesh or more"), "{error}");
     let narrow = Bounds::new(vec![0.0], vec![1.0]).unwrap();
     let error = run(&algorithm("cs"), &objective(), &narrow, &Settings::default(), &mut quiet).unwrap_err();
     assert_eq!(error, SearchError::Dimensions { expected: D, found: 1 });

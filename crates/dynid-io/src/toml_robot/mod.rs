@@ -10,6 +10,7 @@ mod home;
 mod loops;
 mod number;
 mod schema;
+mod write;
 
 use std::path::Path;
 
@@ -21,6 +22,8 @@ pub use elastic::ElasticSpec;
 pub use elements::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, SettingValue};
 
 use toml::Spanned;
+
+pub use write::Loops;
 
 use crate::excerpt::{closest, excerpt};
 use crate::robot::{Place, RobotFileError};

@@ -52,6 +52,23 @@ impl CutKind {
         }
     }
 
+    /// The kind of a [name](CutKind::name); a rod has length 1.
+    pub fn named(name: &str) -> Option<CutKind> {
+        use CutKind::*;
+        let all = [
+            Spherical,
+            PlanarRevolute,
+            Revolute,
+            Universal,
+            Cylindrical,
+            Prismatic,
+            PlanarPrismatic,
+            Fixed,
+            Distance { length: 1.0 },
+        ];
+        all.into_iter().find(|kind| kind.name() == name)
+    }
+
     /// The word that stands for it in robot files.
     pub fn name(self) -> &'static str {
         match self {

@@ -151,6 +151,20 @@ impl ClosedMechanism {
         &self.home
     }
 
+    /// The home pose joint by joint, as [`ClosedMechanism::new`] takes it.
+    pub fn home_by_joint(&self) -> Vec<(String, Vec<f64>)> {
+        let own = |b: &crate::mechanism::Body| {
+            (b.joint.name.clone(), self.home[b.position..b.position + b.joint.positions()].to_vec())
+        };
+        self.mechanism.bodies().iter().map(own).collect()
+    }
+
+    /// Names of the driven joints.
+    pub fn driven_names(&self) -> Vec<String> {
+        let names = self.mechanism.rate_names();
+        self.driven.iter().map(|r| names[*r].clone()).collect()
+    }
+
     /// Positions of the independent coordinates at home.
     pub fn home_independent(&self) -> Vec<f64> {
         self.independent.iter().map(|r| self.home[self.position_of[*r]]).collect()
@@ -174,5 +188,17 @@ impl ClosedMechanism {
     /// Oddities that were found.
     pub fn warnings(&self) -> &[ClosedWarning] {
         &self.warnings
+    }
+}
+
+/// Equal if all follows from the same statements.
+impl PartialEq for ClosedMechanism {
+    fn eq(&self, other: &Self) -> bool {
+        self.mechanism == other.mechanism
+            && self.closures == other.closures
+            && self.driven == other.driven
+            && self.independent == other.independent
+            && self.home == other.home
+            && self.least_measure == other.least_measure
     }
 }

@@ -126,7 +126,7 @@ impl ClosedModel {
     }
 
     /// From the last pose, or from home where that fails.
-    fn next_pose(&self, work: &mut PoseWorkspace, independent: &[f64]) -> Result<(), PoseError> {
+    pub(super) fn next_pose(&self, work: &mut PoseWorkspace, independent: &[f64]) -> Result<(), PoseError> {
         if self.machine.reach(work, independent).is_ok() {
             return Ok(());
         }

@@ -4,6 +4,7 @@ mod adjoint;
 mod expand;
 mod fold;
 mod loads;
+mod random_motion;
 mod reactions;
 
 use std::sync::Arc;
@@ -13,6 +14,7 @@ use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
 use crate::element::JointInfo;
 use crate::parameter::ParameterTable;
+use crate::random_motion::RandomMotion;
 use crate::tree_model::TreeModel;
 use fold::Fold;
 use loads::Loads;
@@ -146,6 +148,10 @@ impl EffortModel for ClosedModel {
         expanded.with_block(motion, &pressed.channels(), |block| {
             self.tree.remember(block, step_s, shape, history, stride, out);
         });
+    }
+
+    fn random_motion(&self, samples: usize, seed: u64) -> RandomMotion {
+        self.random_states(samples, seed)
     }
 
     fn dimensions(&self) -> (usize, usize) {

@@ -1,7 +1,7 @@
 //! From a plan to an effort model, known friction included.
 
 use dynid_model::element::JointElement;
-use dynid_model::{Mechanism, RobotModel};
+use dynid_model::{ClosedModel, Mechanism, RobotModel, TreeModel};
 
 use super::{ElementPlan, friction};
 use crate::Error;
@@ -32,7 +32,8 @@ impl ElementPlan {
             matrix: c.matrix.clone(),
             form: c.form,
         }));
-        let mut plan = ElementPlan::new(&robot.mechanism, &spec, config.elements.default.as_deref(), moves)?;
+        let mut plan = ElementPlan::new(&robot.mechanism, &spec, config.elements.default.as_deref(), moves)?
+            .with_loops(robot.closed.clone());
         let names = plan.names(&robot.mechanism);
         for list in &mut plan.per_rate {
             *list = config.elements.friction.of_joint(list);
@@ -82,10 +83,14 @@ impl ElementPlan {
             known.extend(law.elements(rate));
         }
         let coordinates = self.coordinates.clone();
-        let model = RobotModel::with_coordinates(mechanism.clone(), coordinates, elements).with_known(known);
-        Ok(match self.free_errors {
-            true => model.with_free_sign(|p| self.is_friction_error(&p.name)),
-            false => model,
+        let tree = TreeModel::with_coordinates(mechanism.clone(), coordinates, elements).with_known(known);
+        let tree = match self.free_errors {
+            true => tree.with_free_sign(|p| self.is_friction_error(&p.name)),
+            false => tree,
+        };
+        Ok(match &self.closed {
+            None => tree.into(),
+            Some(closed) => ClosedModel::new(tree, closed.clone()).into(),
         })
     }
 

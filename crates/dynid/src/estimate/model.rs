@@ -7,6 +7,7 @@ use dynid_model::{
 };
 use serde::{Deserialize, Serialize};
 
+use super::loops::LoopsRecord;
 use crate::Error;
 use crate::elements::ElementPlan;
 use crate::friction::KnownFriction;
@@ -24,7 +25,10 @@ pub struct ModelRecord {
     pub links: Vec<LinkRecord>,
     /// Joints.
     pub joints: Vec<JointRecord>,
-    /// Element names per effort.
+    /// Cut joints that close loops, if there are some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub loops: Option<LoopsRecord>,
+    /// Element names per effort; per rate of the tree where loops are closed.
     pub elements: Vec<Vec<String>>,
     /// Couplings.
     pub couplings: Vec<CouplingRecord>,
@@ -183,6 +187,7 @@ impl ModelRecord {
             couple_mimics: description.couple_mimics,
             links,
             joints,
+            loops: plan.closed.as_deref().map(LoopsRecord::new),
             elements: plan.per_rate.clone(),
             couplings,
             elastic: plan.elastic.iter().map(ElasticRecord::new).collect(),

@@ -184,6 +184,11 @@ impl<'a> RobotExport<'a> {
                 self.description.gravity
             ));
         }
+        if self.identified.model.closed().is_some() {
+            notes.push(
+                "left out, URDF has no place for them: loops; they are in the file beside it".to_owned(),
+            );
+        }
         self.checked(Format::Urdf, text, (read, &found), &values, notes, states)
     }
 
@@ -192,11 +197,34 @@ impl<'a> RobotExport<'a> {
     /// # Errors
     /// [`Error::RobotFile`]: MJCF cannot state the robot; [`Error::Export`]: see [`ExportError::ReadBack`].
     pub fn mjcf(&self, states: &CheckStates) -> Result<Exported, Error> {
+        if self.identified.model.closed().is_some() {
+            return Err(Error::Unsupported(
+                "loops are not written as MJCF: export a URDF, which comes with a file of its loops"
+                    .to_owned(),
+            ));
+        }
         let JointValues { joints, values, notes } = joints::split(&self.identified, Format::Mjcf);
         let text = mjcf::from_description(&self.description, &joints)?;
         let read = mjcf::parse(&text, "exported MJCF")?;
         let notes = [self.notes.clone(), notes].concat();
         self.checked(Format::Mjcf, text, (read.description, &read.joints), &values, notes, states)
+    }
+
+    /// What its URDF cannot state of a mechanism with loops: a robot in TOML that names the URDF, by the file name `urdf`.
+    /// `None` for other robots.
+    pub fn loops(&self, urdf: &str) -> Option<String> {
+        let closed = self.identified.model.closed()?;
+        let machine = closed.machine();
+        let (driven, home) = (machine.driven_names(), machine.home_by_joint());
+        let loops = dynid_io::toml_robot::Loops {
+            name: &self.description.name,
+            urdf,
+            gravity: self.description.gravity,
+            closures: machine.closures(),
+            driven: &driven,
+            home: &home,
+        };
+        Some(loops.to_toml())
     }
 
     /// Compares what was read back with the model, of which only `values` have a place in the format.
@@ -258,5 +286,14 @@ impl Identification {
                 .map(|f| format!("link `{}` {}: simulators refuse such a robot", f.link, f.fault)),
         );
         Ok(exported)
+    }
+
+    /// The loops beside the URDF of a mechanism that has some, as [`RobotExport::loops`].
+    ///
+    /// # Errors
+    /// As [`Source::read`] and [`RobotExport::new`].
+    pub fn loops(&self, urdf: &str) -> Result<Option<String>, Error> {
+        let source = Source::read(&self.robot.path)?;
+        Ok(RobotExport::new(self.identified(), &source)?.loops(urdf))
     }
 }

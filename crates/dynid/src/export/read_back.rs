@@ -3,8 +3,11 @@
 use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, States};
 use dynid_io::MappingSpec;
 use dynid_io::mjcf::JointParameters;
+use dynid_model::closed::ClosedMechanism;
 use dynid_model::element::{Coulomb, JointElement, LuGre, RotorInertia, Viscous, sign};
-use dynid_model::{Description, EffortModel, MotionBlock, RandomMotion, RegressorBlock, RobotModel};
+use dynid_model::{
+    ClosedModel, Description, EffortModel, MotionBlock, RandomMotion, RegressorBlock, RobotModel, TreeModel,
+};
 use dynid_motion::Channel;
 
 use super::error::ExportError;
@@ -34,8 +37,11 @@ impl CheckStates {
     /// A thousand seeded random states within the limits of the model's joints (±π rad, ±1 m where there are none;
     /// rates within ±2, accelerations within ±5).
     pub fn random(model: &RobotModel) -> Self {
-        let motion = RandomMotion::new(model.mechanism(), model.channels(), STATES, SEED);
-        CheckStates(Kind::Random(motion.with_coordinates(model, SEED)))
+        CheckStates(Kind::Random(match model.closed() {
+            None => RandomMotion::new(model.mechanism(), model.channels(), STATES, SEED)
+                .with_coordinates(model, SEED),
+            Some(closed) => closed.random_motion(STATES, SEED),
+        }))
     }
 
     /// States of logs, positions filtered at `state_hz`: up to 64 runs of 256 samples from each, evenly spread.
@@ -135,7 +141,13 @@ pub(super) fn compile(
         elements.push(Box::new(RotorInertia { rate }));
         values.extend([p.damping, p.friction_loss, p.armature]);
     }
-    Ok((RobotModel::new(mechanism, elements), values))
+    let tree = TreeModel::new(mechanism.clone(), elements);
+    let Some(closed) = like.closed() else { return Ok((tree.into(), values)) };
+    let machine = closed.machine();
+    let (driven, home) = (machine.driven_names(), machine.home_by_joint());
+    let machine = ClosedMechanism::new(mechanism, machine.closures().to_vec(), Some(&driven), &home)
+        .map_err(|e| e.to_string())?;
+    Ok((ClosedModel::new(tree, machine).into(), values))
 }
 
 /// Largest difference of effort, without that of known elements, between two models of the same coordinates, each with shape and linear parameters, joint by joint relative to the largest effort

@@ -26,13 +26,13 @@ pub(super) fn choose(
     settings: &ConditioningSettings,
     progress: impl FnMut(Stage),
 ) -> Result<FrictionChoice, Error> {
-    let follows = model.mechanism().follows().is_some();
+    let unloaded = model.mechanism().follows().is_some() || model.closed().is_some();
     let rates = model.mechanism().rates();
     let kinds: Vec<Vec<ShapeKind>> = (model.outputs().iter().enumerate())
         .map(|(rate, output)| match plan.known_friction(&output.name) {
             // Its shape is known already.
             Some(_) => Vec::new(),
-            None => kinds_beside(&plan.per_rate[rate], follows || rate >= rates),
+            None => kinds_beside(&plan.per_rate[model.tree_rate(rate)], unloaded || rate >= rates),
         })
         .collect();
     let Structure { base, prior, regrouping, .. } = structure;
@@ -51,7 +51,7 @@ pub(super) fn choose(
     )?;
     for (rate, joint) in found.per_output.iter().enumerate() {
         for accepted in &joint.accepted {
-            plan.add_shape(rate, &model.outputs()[rate].name, &accepted.shape);
+            plan.add_shape(model.tree_rate(rate), &model.outputs()[rate].name, &accepted.shape);
         }
     }
     if !found.load.is_empty() {
@@ -80,7 +80,7 @@ pub(super) fn drop_unseen(
             joint.accepted.drain(..).partition(|trial| unseen(&output.name, trial));
         joint.accepted = kept;
         for trial in gone {
-            plan.remove_shape(rate, &output.name, &trial.shape);
+            plan.remove_shape(model.tree_rate(rate), &output.name, &trial.shape);
             joint.rejected.push(trial);
             dropped = true;
         }

@@ -36,7 +36,7 @@ impl Structure {
             preferred: preferred_columns(config, model)?,
             ..BaseSettings::default()
         };
-        let base = BaseParameters::of(model, model.mechanism(), &shape, &base_settings);
+        let base = BaseParameters::of_model(model, &shape, &base_settings);
         if base.is_empty() {
             return Err(Error::Unsupported("no parameter of this robot acts on any effort".to_owned()));
         }

@@ -136,12 +136,15 @@ struct Probe {
 
 impl Probe {
     fn new(model: &RobotModel, inertias: &[f64]) -> Self {
-        let mechanism = model.mechanism();
         let limits = speed_limits(model);
         let channels = typical_channels(model, STATES);
         let channels: Vec<(&str, &[f64])> =
             channels.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect();
-        RandomMotion::new(mechanism, &[], STATES, SEED).with_coordinates(model, SEED).with_block(|motion| {
+        let motion = match model.closed() {
+            None => RandomMotion::new(model.mechanism(), &[], STATES, SEED).with_coordinates(model, SEED),
+            Some(closed) => closed.random_motion(STATES, SEED),
+        };
+        motion.with_block(|motion| {
             let zero = vec![0.0; motion.dq.len()];
             let sign = |x: &f64| if *x < 0.0 { -1.0 } else { 1.0 };
             let unit: Vec<f64> = motion.ddq.iter().map(sign).collect();
@@ -158,7 +161,10 @@ impl Probe {
                 .iter()
                 .map(|share| columns(&fast.iter().map(|v| share * v).collect::<Vec<f64>>(), &zero))
                 .collect();
-            let (mass, rigid) = rigid_bodies(model, motion, inertias);
+            let (mass, rigid) = match model.closed() {
+                None => rigid_bodies(model, motion, inertias),
+                Some(_) => closed_bodies(model, motion, inertias),
+            };
             let [mass, rigid] =
                 [(mass, 2), (rigid, 1)].map(|(sizes, power)| with_motors(model, sizes, power));
             Probe {
@@ -242,4 +248,34 @@ fn rigid_bodies(model: &RobotModel, motion: &MotionBlock<'_>, inertias: &[f64]) 
         }
     }
     (mass, rigid)
+}
+
+/// The same for the drives of a mechanism with loops; elements play no part.
+fn closed_bodies(model: &RobotModel, motion: &MotionBlock<'_>, inertias: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let (n, samples) = (model.outputs().len(), motion.samples);
+    let mut linear = inertias.to_vec();
+    linear.resize(model.parameters().linear.len(), 0.0);
+    let shape = model.parameters().shape_start();
+    let channels = typical_channels(model, samples);
+    let channels: Vec<(&str, &[f64])> =
+        channels.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect();
+    let efforts = |dq: &[f64], ddq: &[f64], gravity: Option<&[f64]>| {
+        let mut effort = vec![0.0; n * samples];
+        let motion = MotionBlock { dq, ddq, gravity, channels: &channels, ..*motion };
+        model.efforts(&motion, &shape, &linear, samples, &mut effort);
+        effort
+    };
+    let mean = |x: &[f64]| x.iter().map(|e| e.abs()).sum::<f64>() / samples as f64;
+    let rest = vec![0.0; motion.dq.len()];
+    let weightless = vec![0.0; 3 * motion.stride];
+    let all = efforts(motion.dq, motion.ddq, None);
+    let rigid = all.chunks_exact(samples).map(|e| e.iter().fold(0.0, |m: f64, x| m.max(x.abs())));
+    let mass = (0..n).map(|k| {
+        let mut unit = rest.clone();
+        if let Some(own) = unit.get_mut(k * motion.stride..(k + 1) * motion.stride) {
+            own.fill(1.0);
+        }
+        mean(&efforts(&rest, &unit, Some(&weightless))[k * samples..(k + 1) * samples])
+    });
+    (mass.collect(), rigid.collect())
 }

@@ -1,0 +1,127 @@
+//! Loops of a mechanism in the result file.
+
+use dynid_model::closed::{ClosedMechanism, ClosureDescription, Condition, CutKind, LinkFrame};
+use dynid_model::{Mat3, Mechanism, Placement, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// Cut joints, and what chooses among the poses of a closed mechanism.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LoopsRecord {
+    /// Cut joints.
+    pub closures: Vec<ClosureRecord>,
+    /// Driven joints.
+    pub driven: Vec<String>,
+    /// Closed pose that others are sought from: positions by joint.
+    pub home: Vec<(String, Vec<f64>)>,
+}
+
+/// A cut joint, or a coupling of coordinates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ClosureRecord {
+    /// Name.
+    pub name: String,
+    /// Kind, as in robot files.
+    pub kind: String,
+    /// Frames on both links; absent for a coupling.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frames: Option<[FrameRecord; 2]>,
+    /// Length of a rod, m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub length: Option<f64>,
+    /// Coupled joints and their factors.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub terms: Vec<(String, f64)>,
+    /// What the terms sum to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub constant: Option<f64>,
+}
+
+/// A frame on a link.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FrameRecord {
+    /// Link.
+    pub link: String,
+    /// Rows of the rotation link ← frame.
+    pub rotation: [[f64; 3]; 3],
+    /// Origin in the link, m.
+    pub translation: [f64; 3],
+}
+
+const COUPLING: &str = "coordinate";
+
+impl LoopsRecord {
+    pub(super) fn new(closed: &ClosedMechanism) -> Self {
+        LoopsRecord {
+            closures: closed.closures().iter().map(ClosureRecord::new).collect(),
+            driven: closed.driven_names(),
+            home: closed.home_by_joint(),
+        }
+    }
+
+    /// Closes the loops again.
+    pub(super) fn close(&self, mechanism: &Mechanism) -> Result<ClosedMechanism, String> {
+        let closures = self.closures.iter().map(ClosureRecord::description).collect::<Result<_, _>>()?;
+        ClosedMechanism::new(mechanism.clone(), closures, Some(&self.driven), &self.home)
+            .map_err(|e| e.to_string())
+    }
+}
+
+impl ClosureRecord {
+    fn new(closure: &ClosureDescription) -> Self {
+        let name = closure.name.clone();
+        match &closure.condition {
+            Condition::Joint { kind, a, b } => ClosureRecord {
+                name,
+                kind: kind.name().to_owned(),
+                frames: Some([a, b].map(FrameRecord::new)),
+                length: match kind {
+                    CutKind::Distance { length } => Some(*length),
+                    _ => None,
+                },
+                terms: Vec::new(),
+                constant: None,
+            },
+            Condition::Coordinates { terms, constant } => ClosureRecord {
+                name,
+                kind: COUPLING.to_owned(),
+                frames: None,
+                length: None,
+                terms: terms.clone(),
+                constant: Some(*constant),
+            },
+        }
+    }
+
+    fn description(&self) -> Result<ClosureDescription, String> {
+        let name = self.name.clone();
+        if self.kind == COUPLING {
+            let constant = self.constant.unwrap_or(0.0);
+            let condition = Condition::Coordinates { terms: self.terms.clone(), constant };
+            return Ok(ClosureDescription { name, condition });
+        }
+        let kind = match (CutKind::named(&self.kind), self.length) {
+            (Some(CutKind::Distance { .. }), Some(length)) => CutKind::Distance { length },
+            (Some(CutKind::Distance { .. }), None) => return Err(format!("loop `{name}`: no length")),
+            (Some(kind), _) => kind,
+            (None, _) => return Err(format!("loop `{name}`: unknown kind `{}`", self.kind)),
+        };
+        let Some([a, b]) = &self.frames else { return Err(format!("loop `{name}`: no frames")) };
+        let condition = Condition::Joint { kind, a: a.frame(), b: b.frame() };
+        Ok(ClosureDescription { name, condition })
+    }
+}
+
+impl FrameRecord {
+    fn new(frame: &LinkFrame) -> Self {
+        FrameRecord {
+            link: frame.link.clone(),
+            rotation: frame.placement.rotation.rows(),
+            translation: frame.placement.translation.0,
+        }
+    }
+
+    fn frame(&self) -> LinkFrame {
+        let (rotation, translation) = (Mat3::from_rows(self.rotation), Vec3(self.translation));
+        LinkFrame { link: self.link.clone(), placement: Placement { rotation, translation } }
+    }
+}
