@@ -48,7 +48,11 @@ impl FreeMotions {
     pub fn gap(&self) -> f64 {
         let size = |(r, s): (&f64, &f64)| (r * s).abs();
         // Not `max`, which would lose what is not a number.
-        self.residual.iter().zip(&self.row_scale).map(size).fold(0.0, |m, x| if x <= m { m } else { x })
+        self.residual
+            .iter()
+            .zip(&self.row_scale)
+            .map(size)
+            .fold(0.0, |m, x| if x > m || x.is_nan() { x } else { m })
     }
 
     /// A cheap stand-in for `σ_r/σ_max` of the Jacobian at its usual rank `r`: 0 where the mobility changes.

@@ -227,8 +227,9 @@ impl ClosedPlant {
 /// Largest change, as a share of the largest force.
 fn difference(next: &[f64], forces: &[f64]) -> f64 {
     // Not `max`, which would lose what is not a number.
-    let worst =
-        |values: &mut dyn Iterator<Item = f64>| values.fold(0.0_f64, |m, x| if x <= m { m } else { x });
+    let worst = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold(0.0_f64, |m, x| if x > m || x.is_nan() { x } else { m })
+    };
     let change = worst(&mut next.iter().zip(forces).map(|(a, b)| (a - b).abs()));
     let largest = worst(&mut next.iter().map(|x| x.abs()));
     if change == 0.0 { 0.0 } else { change / largest }

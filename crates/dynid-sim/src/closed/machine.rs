@@ -156,7 +156,7 @@ impl Nominal for ClosedNominal<'_> {
         let found = self.plant.drive_positions(self.dynamics.pose().positions());
         for (drive, (wanted, found)) in wanted.iter().zip(found).enumerate() {
             let gap = (wanted[0] - found).abs();
-            if gap > TOGETHER {
+            if gap > TOGETHER || gap.is_nan() {
                 let drive = self.plant.model().outputs()[drive].name.clone();
                 return Err(SimError::Reference { time, drive, gap });
             }

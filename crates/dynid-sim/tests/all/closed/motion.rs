@@ -1,9 +1,11 @@
 //! Integrated motion: energy, loops that stay closed, order, floating platforms, singular poses of drives.
 
 use dynid_model::closed::FreeMotions;
+use dynid_model::element::{JointElement, LuGre, ShapeSetting};
+use dynid_model::{ClosedModel, EffortModel, RobotModel, TreeModel};
 use dynid_sim::{ClosedIntegrator, ClosedPlant, PlantState, Stepping};
 
-use super::{at, bare, robot, rough, worst};
+use super::{at, bare, dynamics_at, robot, rough, worst};
 
 const CONTROLLED: Stepping = Stepping::Controlled { tolerance: 1e-9 };
 
@@ -132,7 +134,7 @@ fn motion_goes_through_poses_where_the_drive_loses_control() {
     assert!(worst(&ends[0], &ends[1]) < 1e-9, "{ends:?}");
 }
 
-/// Massless legs and repeated conditions change nothing of the motion.
+/// Repeated conditions change nothing of the motion.
 #[test]
 fn redundant_rows_move_alike() {
     let Some(plain) = robot("fourbar", None, None) else { return };
@@ -144,4 +146,40 @@ fn redundant_rows_move_alike() {
         state.q
     });
     assert!(worst(&ends[0], &ends[1]) < 1e-9, "{ends:?}");
+}
+
+/// Bristles at passive joints hold and creep as with tiny steps of the classical method.
+#[test]
+fn bristles_at_passive_joints_converge() {
+    let Some(machine) = robot("fourbar", None, None) else { return };
+    let held = ShapeSetting::held;
+    let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
+    let mut linear = machine.mechanism().inertia_vector();
+    for rate in 0..3 {
+        let law = LuGre { rate, kappa: held(500.0), rho: held(1.3), vs: held(0.2), delta: held(2.0) };
+        elements.push(Box::new(law));
+        linear.extend([0.4, 0.5]);
+    }
+    let tree = TreeModel::new(machine.mechanism().clone(), elements);
+    let model = RobotModel::from(ClosedModel::new(tree, machine));
+    let plant = ClosedPlant::new(model, linear, vec![], 1e-3).unwrap();
+    let start = plant.state(&plant.machine().home_independent(), &[0.0]).unwrap();
+    let mut dynamics = dynamics_at(&plant, &plant.machine().home_independent());
+    let (still, mut work) = (vec![0.0; 3], plant.workspace());
+    let resting = vec![0.0; plant.model().signals().len()];
+    let weight = plant.drive_effort(&mut dynamics, (&still, &still), &resting, &mut work).unwrap().drives[0];
+    // From rest: beside the weight, an effort that bristles hold, and one that they do not.
+    for effort in [0.2, 5.0] {
+        let end = |stepping: Stepping| {
+            let mut state = start.clone();
+            run(&plant, &mut state, &[weight + effort], 0.2, stepping, |_| ());
+            [state.q, state.dq].concat()
+        };
+        let fine = end(Stepping::RungeKutta4 { step: 2e-5 });
+        let errors = [1e-6, 1e-9].map(|tolerance| worst(&end(Stepping::Controlled { tolerance }), &fine));
+        let moved = fine[0] - start.q[0];
+        println!("{effort} N m more than the weight: crank moves {moved:.1e} rad, errors {errors:?}");
+        assert!((moved.abs() < 1e-2) == (effort < 1.0), "{moved}");
+        assert!(errors[0] < 1e-3 && errors[1] < 1e-6 && errors[1] < 0.1 * errors[0], "{errors:?}");
+    }
 }
