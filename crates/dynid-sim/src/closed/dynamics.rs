@@ -136,8 +136,8 @@ impl ClosedPlant {
         out
     }
 
-    /// Forces that press on the joints of [`ClosedModel::loads`](dynid_model::ClosedModel::loads), N or N m, at the last [`ClosedPlant::acceleration`] or
-    /// [`ClosedPlant::drive_effort`].
+    /// Forces that press on the joints of the model's [loads](dynid_model::ClosedModel::loads), N or N m, at the last
+    /// [`ClosedPlant::acceleration`] or [`ClosedPlant::drive_effort`].
     pub fn load_forces<'w>(&self, work: &'w ClosedWorkspace) -> &'w [f64] {
         &work.forces
     }
