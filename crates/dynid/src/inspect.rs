@@ -1,6 +1,7 @@
 //! What a robot file holds and what of it can be identified.
 
 mod clearance;
+mod loops;
 
 use dynid_model::{BaseParameters, BaseSettings, EffortModel};
 use serde::Serialize;
@@ -9,6 +10,7 @@ use crate::Error;
 use crate::elements::ElementPlan;
 use crate::robot::Robot;
 pub use clearance::{ClearanceRow, RestingJournal};
+pub use loops::{ClosureRow, LoopsInspection};
 
 /// Structure of a robot.
 #[derive(Debug, Clone, Serialize)]
@@ -27,6 +29,9 @@ pub struct Inspection {
     /// Joints with clearance; all else takes them as ideal.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub clearances: Vec<ClearanceRow>,
+    /// Closed loops, if there are some.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loops: Option<LoopsInspection>,
     /// Number of standard parameters, elements included.
     pub standard_parameters: usize,
     /// Number of base parameters.
@@ -104,7 +109,8 @@ pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection,
     let mechanism = &robot.mechanism;
     let none: &[String] = &[];
     let default = elements.or(if robot.elements.defaults.is_empty() { Some(none) } else { None });
-    let plan = ElementPlan::new(mechanism, &robot.elements, default, |_| true)?;
+    let plan = ElementPlan::new(mechanism, &robot.elements, default, |rate| robot.is_driven(rate))?
+        .with_loops(robot.closed.clone());
     let model = plan.model(mechanism)?;
     let base = BaseParameters::of_model(&model, &model.parameters().shape_start(), &BaseSettings::default());
     let table = model.parameters();
@@ -156,6 +162,7 @@ pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection,
         joints,
         motors,
         clearances: clearance::rows(robot)?,
+        loops: model.closed().map(loops::of),
         standard_parameters: table.linear.len(),
         base_parameter_count: base.len(),
         base_parameters: base

@@ -152,6 +152,11 @@ impl Robot {
         }
     }
 
+    /// Whether a drive can be expected at a rate: not at passive joints of a mechanism with loops.
+    pub fn is_driven(&self, rate: usize) -> bool {
+        self.closed.as_ref().is_none_or(|closed| closed.driven().contains(&rate))
+    }
+
     /// Coordinates as a states table names them.
     pub fn state_joints(&self) -> Vec<dynid_io::StateJoint> {
         state_joints(&self.mechanism, &self.axes)
@@ -223,6 +228,16 @@ fn state_joints(mechanism: &Mechanism, axes: &[LogAxis]) -> Vec<dynid_io::StateJ
         })
         .chain(others)
         .collect()
+}
+
+/// Refuses mechanisms with loops, for work that knows trees alone. `what`: what they are not.
+pub(crate) fn refuse_loops(robot: &Robot, what: &str) -> Result<(), Error> {
+    match robot.file.closures.first() {
+        None => Ok(()),
+        Some(closure) => {
+            Err(Error::Unsupported(format!("mechanisms with loops (`{}`) are not {what}", closure.name)))
+        }
+    }
 }
 
 /// Refuses robots with motors behind springs, for work that knows stiff joints alone. `what`: what they are not.

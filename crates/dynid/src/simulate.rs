@@ -6,7 +6,7 @@ mod elastic;
 mod settings;
 mod trajectory;
 
-use dynid_model::{EffortModel, History, MotionBlock, RegressorBlock, RobotModel};
+use dynid_model::{ClosedModel, EffortModel, History, MotionBlock, RegressorBlock, RobotModel};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -15,7 +15,7 @@ use crate::Error;
 use crate::elements::clearance::refuse_clearance;
 use crate::elements::{ElementPlan, LOAD};
 use crate::nominal::{nominal_parameters, with_nominal_shape};
-use crate::robot::{Robot, refuse_elastic};
+use crate::robot::{Robot, refuse_elastic, refuse_loops};
 pub use clearance::{ClearanceSummary, JournalSummary};
 pub use settings::{
     ControlTable, ImperfectionTable, PlantTable, SeriesSettings, SimulateMode, SimulateSettings,
@@ -95,15 +95,17 @@ pub struct ExperimentSummary {
 pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedLog, Error> {
     settings.check()?;
     let mechanism = &robot.mechanism;
-    if mechanism.positions() != mechanism.rates() {
+    if robot.closed.is_none() && mechanism.positions() != mechanism.rates() {
         return Err(Error::Unsupported(
             "a floating base has no joint log: simulate the arm alone".to_owned(),
         ));
     }
-    let plan = ElementPlan::new(mechanism, &robot.elements, None, |_| true)?;
+    let plan = ElementPlan::new(mechanism, &robot.elements, None, |rate| robot.is_driven(rate))?
+        .with_loops(robot.closed.clone());
     if settings.mode == SimulateMode::ClosedLoop {
         refuse_elastic(robot, "simulated in closed loop")?;
         refuse_clearance(robot, "simulated in closed loop")?;
+        refuse_loops(robot, "simulated in closed loop")?;
     }
     if settings.mode == SimulateMode::ClosedLoop && plan.per_rate.iter().flatten().any(|name| name == LOAD) {
         return Err(Error::Unsupported(format!(
@@ -116,6 +118,7 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
         None => settings.check_ideal()?,
         Some(_) => {
             refuse_elastic(robot, "simulated beside joints with clearance")?;
+            refuse_loops(robot, "simulated beside joints with clearance")?;
             if mechanism.follows().is_some() {
                 return Err(Error::Unsupported(
                     "joints that follow others are not simulated beside joints with clearance: do not couple mimic joints"
@@ -177,6 +180,9 @@ fn by_inverse_dynamics(
         signals
     };
     let span = (samples, settings.rate_hz);
+    if let Some(closed) = model.closed() {
+        reachable(closed, &sample(0.0)[0], samples)?;
+    }
     let moved = |shift: f64| -> Result<Moved, Error> {
         if !model.coordinates().is_empty() {
             return elastic::along(model, reference, &values, shift, span);
@@ -259,6 +265,17 @@ fn by_inverse_dynamics(
         experiment: None,
         warnings: summary.iter().flat_map(|s| s.warnings(settings.rate_hz)).collect(),
         clearance: summary,
+    })
+}
+
+/// Refuses a motion that a mechanism with loops cannot make.
+fn reachable(closed: &ClosedModel, positions: &[f64], samples: usize) -> Result<(), Error> {
+    let still = vec![0.0; positions.len()];
+    let found = closed.follow(&MotionBlock::plain(samples, positions, &still, &still), |_, _| ());
+    found.map_err(|e| Error::Pose {
+        file: "simulated motion".to_owned(),
+        row: e.sample + 1,
+        fault: Box::new(e.fault),
     })
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use dynid::inspect::{ClearanceRow, Inspection, MotorRow, inspect};
+use dynid::inspect::{ClearanceRow, Inspection, LoopsInspection, MotorRow, inspect};
 
 use super::{element_names, load_robot, table};
 use crate::args::InspectArgs;
@@ -65,6 +65,9 @@ fn text(i: &Inspection) -> String {
     if !i.clearances.is_empty() {
         out.push_str(&clearances(&i.clearances));
     }
+    if let Some(found) = &i.loops {
+        out.push_str(&loops(found));
+    }
     let (kept, dropped) = i.rank_gap;
     let gap = dropped.map_or_else(|| "full rank".to_owned(), |d| format!("gap {kept:.1e} to {d:.1e}"));
     let _ = writeln!(
@@ -80,6 +83,32 @@ fn text(i: &Inspection) -> String {
     if !i.never_seen.is_empty() {
         let _ = writeln!(out, "\nnever seen in any effort: {}", i.never_seen.join(", "));
     }
+    out
+}
+
+/// Closed loops.
+fn loops(found: &LoopsInspection) -> String {
+    let mut out = format!(
+        "\nloops: {} free motions, driven by {}; {:.2} from a singular pose at home (0: singular, at most 1)\n",
+        found.mobility,
+        found.driven.join(", "),
+        found.singularity_at_home
+    );
+    let rows: Vec<Vec<String>> = found
+        .closures
+        .iter()
+        .map(|c| {
+            let forces = if c.determined { "determined" } else { "shared out" };
+            let conditions = c.conditions.to_string();
+            vec![c.name.clone(), c.kind.clone(), c.between.join(" - "), conditions, forces.to_owned()]
+        })
+        .collect();
+    out.push_str(&table::aligned(&["loop", "kind", "between", "conditions", "forces"], &rows));
+    let _ = writeln!(
+        out,
+        "{} base parameters if the forces in the loops were measured too",
+        found.base_parameters_with_multipliers
+    );
     out
 }
 

@@ -17,7 +17,7 @@ use crate::Error;
 use crate::config::known;
 use crate::elements::ElementPlan;
 use crate::nominal::{nominal_parameters, typical_efforts, with_nominal_shape};
-use crate::robot::{Robot, refuse_elastic};
+use crate::robot::{Robot, refuse_elastic, refuse_loops};
 
 /// A nominal base parameter below this share of the largest of the same unit counts as so large: relative errors of what
 /// is next to nothing are not worth motion.
@@ -66,6 +66,7 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
         ));
     }
     refuse_elastic(robot, "designed for")?;
+    refuse_loops(robot, "designed for by this command")?;
     let joints = mechanism.rate_names();
     let mut elements = robot.elements.clone();
     for (joint, list) in &config.elements.joint {

@@ -17,6 +17,9 @@ impl Robot {
     /// # Errors
     /// [`Error::Mechanism`], [`Error::UnknownJoint`].
     pub fn with_clearance(&self) -> Result<Option<RobotModel>, Error> {
+        if !self.elements.clearance.is_empty() {
+            crate::robot::refuse_loops(self, "simulated with clearance")?;
+        }
         if self.elements.clearance.is_empty() {
             return Ok(None);
         }

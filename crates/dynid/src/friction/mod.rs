@@ -33,7 +33,7 @@ pub use presliding::{PreslidingFit, PreslidingTest, fit_presliding};
 use dynid_estimate::steady_friction::{SteadyError, SteadyFriction, analyse};
 
 use crate::Error;
-use crate::robot::{Robot, RobotOptions, refuse_elastic};
+use crate::robot::{Robot, RobotOptions, refuse_elastic, refuse_loops};
 
 /// What is being worked on.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,6 +80,7 @@ pub fn identify_friction(
     config.check()?;
     let robot = Robot::load(&config.robot, &RobotOptions::default())?;
     refuse_elastic(&robot, "evaluated by friction experiments")?;
+    refuse_loops(&robot, "evaluated by friction experiments")?;
     // What a robot file leaves open about bodies is no matter for friction.
     let mut warnings = Vec::new();
     let known = robot.mechanism.rate_names();

@@ -21,7 +21,7 @@ use crate::elements::ElementPlan;
 use crate::identify::stated_values;
 use crate::logs::{self, LogAxis};
 use crate::prior::{self, Prior};
-use crate::robot::{Robot, RobotOptions};
+use crate::robot::{Robot, RobotOptions, refuse_loops};
 use crate::{Error, advice, bounds};
 
 /// Rows per base parameter that a stretch must give.
@@ -51,6 +51,7 @@ impl Structure {
             locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
         };
         let mut robot = Robot::load(&config.robot, &options)?;
+        refuse_loops(&robot, "identified on line")?;
         if robot.mechanism.positions() != robot.mechanism.rates() {
             return Err(Error::Unsupported(
                 "a floating base cannot be identified from joint logs: lock the base or leave it out"

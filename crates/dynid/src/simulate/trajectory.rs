@@ -1,8 +1,8 @@
 //! Wanted motion of a virtual robot.
 
 use dynid_io::TrajectoryFile;
-use dynid_model::RobotModel;
-use dynid_motion::trajectory::{Fourier, Point, Sequence, Trajectory};
+use dynid_model::{ClosedModel, MotionBlock, RobotModel};
+use dynid_motion::trajectory::{Form, Fourier, Point, Sequence, Trajectory};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -65,6 +65,11 @@ fn series(
     rng: &mut ChaCha8Rng,
 ) -> Result<Vec<Fourier>, Error> {
     let mut out = random(model, settings, rng)?;
+    if let Some(closed) = model.closed()
+        && settings.trajectory.is_empty()
+    {
+        out = within_reach(closed, out, settings)?;
+    }
     let names: Vec<String> = driven(model).map(|rate| model.joints()[rate].name.clone()).collect();
     for (joint, series) in &settings.trajectory {
         let Some(j) = names.iter().position(|n| n == joint) else {
@@ -88,12 +93,23 @@ fn random(
     rng: &mut ChaCha8Rng,
 ) -> Result<Vec<Fourier>, Error> {
     let base = std::f64::consts::TAU / settings.period_s.unwrap_or(settings.duration_s);
+    let homes = model.closed().map(|closed| homes(closed));
     driven(model)
         .map(|rate| {
             let limits = model.limits(rate);
             let reach = if model.joints()[rate].slides { 0.5 } else { 2.0 };
-            let (low, high) = limits.position.unwrap_or((-reach, reach));
-            let (low, high) = (low.max(-2.0 * reach), high.min(2.0 * reach));
+            let (low, high) = match homes.as_ref().map(|h| h[rate]) {
+                None => {
+                    let (low, high) = limits.position.unwrap_or((-reach, reach));
+                    (low.max(-2.0 * reach), high.min(2.0 * reach))
+                }
+                // Drives of a mechanism with loops move about its home position.
+                Some(home) => {
+                    let (low, high) = limits.position.unwrap_or((home - reach, home + reach));
+                    let room = (high - home).min(home - low).clamp(0.0, reach);
+                    (home - room, home + room)
+                }
+            };
             let middle = 0.5 * (low + high);
             let mut draw = || -> Vec<f64> {
                 (0..settings.harmonics).map(|k| rng.random_range(-1.0..=1.0) / (1.0 + k as f64)).collect()
@@ -118,4 +134,59 @@ fn random(
             fourier(scale)
         })
         .collect()
+}
+
+/// Home positions of the drives of a mechanism with loops.
+fn homes(closed: &ClosedModel) -> Vec<f64> {
+    let machine = closed.machine();
+    machine.driven().iter().map(|rate| machine.home()[machine.position_of(*rate)]).collect()
+}
+
+/// Times per period at which poses are tried, and how often the motion is made smaller.
+const TRIED: usize = 1000;
+const SMALLER: usize = 60;
+/// Share of the measure of singularity at home that all poses keep.
+const LEAST_MEASURE: f64 = 0.25;
+
+/// The same motion, all drives smaller by the same factor until the mechanism can follow it away from singular poses.
+fn within_reach(
+    closed: &ClosedModel,
+    series: Vec<Fourier>,
+    settings: &SimulateSettings,
+) -> Result<Vec<Fourier>, Error> {
+    let machine = closed.machine();
+    let least = LEAST_MEASURE * machine.singularity(&machine.workspace()).measure;
+    let period = settings.period_s.unwrap_or(settings.duration_s);
+    let time = |k: usize| period * k as f64 / TRIED as f64;
+    let mut scale = 1.0;
+    let homes = homes(closed);
+    for _ in 0..SMALLER {
+        let moved: Vec<f64> = series
+            .iter()
+            .zip(&homes)
+            .flat_map(|(s, home)| (0..=TRIED).map(move |k| home + scale * (s.at(time(k)).position - home)))
+            .collect();
+        let still = vec![0.0; moved.len()];
+        let mut measure = f64::INFINITY;
+        let block = MotionBlock::plain(TRIED + 1, &moved, &still, &still);
+        let reached = closed.follow(&block, |sample, pose| {
+            if sample % 10 == 0 {
+                measure = measure.min(machine.singularity(pose).measure);
+            }
+        });
+        if reached.is_ok() && measure >= least {
+            return series
+                .iter()
+                .zip(&homes)
+                .map(|(s, home)| {
+                    let (a, b) = s.coefficients(Form::Plain);
+                    let scaled = |x: Vec<f64>| x.into_iter().map(|x| scale * x).collect::<Vec<f64>>();
+                    Fourier::plain(s.base(), *home, scaled(a), scaled(b))
+                        .map_err(|e| Error::setting("harmonics", "a trajectory", e))
+                })
+                .collect();
+        }
+        scale *= 0.85;
+    }
+    Err(Error::Unsupported("no random motion about the home position stays within reach".to_owned()))
 }
