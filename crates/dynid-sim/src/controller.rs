@@ -1,9 +1,9 @@
 //! The robot's controller: feed-forward of a nominal model, position and velocity feedback, held between its ticks.
 
-use dynid_model::{EffortModel, RobotModel};
+use dynid_model::RobotModel;
 
 use crate::error::{SimError, demand, demand_length};
-use crate::plant::{Plant, PlantWorkspace};
+use crate::machine::{Nominal, Reference};
 
 /// Settings of the controller.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +29,8 @@ pub struct ControlSettings {
     /// Largest effort of each joint; infinite: none. Default: the limits of the mechanism, none for motors of elastic
     /// transmissions.
     pub effort_limit: Option<Vec<f64>>,
-    /// Joints without a drive, by rate, besides links behind elastic transmissions, which never have one. Default: none.
+    /// Joints without a drive, by rate, besides links behind elastic transmissions, which never have one; of closed mechanisms
+    /// drives that are switched off, by number. Default: none.
     pub passive: Vec<usize>,
 }
 
@@ -93,12 +94,10 @@ impl ControlSettings {
 pub type Wanted = [f64; 3];
 
 /// The controller at work.
-#[derive(Debug)]
 pub(crate) struct Controller<'a> {
     /// What the controller believes the robot to be.
-    nominal: &'a Plant,
+    nominal: &'a mut dyn Nominal,
     settings: &'a ControlSettings,
-    work: PlantWorkspace,
     gains: Vec<(f64, f64)>,
     passive: Vec<bool>,
     limits: Vec<f64>,
@@ -110,42 +109,42 @@ pub(crate) struct Controller<'a> {
 }
 
 impl<'a> Controller<'a> {
-    /// `reference`: positions at some instants of the motion, for the gains.
-    pub(crate) fn new(nominal: &'a Plant, settings: &'a ControlSettings, reference: &[Vec<f64>]) -> Self {
-        let n = nominal.joints();
-        let mut work = nominal.workspace();
-        let mut inertia = vec![0.0_f64; n];
-        for q in reference {
-            let mass = nominal.mass_matrix(q, &mut work);
-            inertia.iter_mut().enumerate().for_each(|(j, m)| *m = m.max(mass[j * (n + 1)]));
-        }
-        for motor in 0..n {
-            if let Some((link, ratio)) = nominal.model().elastic_link(motor) {
-                inertia[motor] += inertia[link] / (ratio * ratio);
-            }
-        }
+    /// `inertia`: what every joint moves, for the gains.
+    pub(crate) fn new(nominal: &'a mut dyn Nominal, settings: &'a ControlSettings, inertia: &[f64]) -> Self {
         let omega = std::f64::consts::TAU * settings.bandwidth_hz;
         let chosen = |given: &Option<Vec<f64>>, j: usize, default: f64| {
             given.as_ref().map_or(default, |gains| gains[j])
         };
-        let gains = (0..n)
-            .map(|j| {
+        let gains = inertia
+            .iter()
+            .enumerate()
+            .map(|(j, inertia)| {
                 (
-                    chosen(&settings.position_gain, j, omega * omega * inertia[j]),
-                    chosen(&settings.velocity_gain, j, 2.0 * settings.damping * omega * inertia[j]),
+                    chosen(&settings.position_gain, j, omega * omega * inertia),
+                    chosen(&settings.velocity_gain, j, 2.0 * settings.damping * omega * inertia),
                 )
             })
             .collect();
-        let limits = settings.effort_limit.clone().unwrap_or_else(|| effort_limits(nominal.model()));
+        let limits = settings.effort_limit.clone().unwrap_or_else(|| nominal.effort_limits());
         let share = 1.0 - (-std::f64::consts::TAU * settings.velocity_cutoff_hz / settings.rate_hz).exp();
-        let passive = (0..n).map(|j| settings.is_passive(nominal.model(), j)).collect();
-        Controller { nominal, settings, work, gains, passive, limits, share, seen: None, saturated: 0 }
+        let passive = nominal.passive(settings);
+        Controller { nominal, settings, gains, passive, limits, share, seen: None, saturated: 0 }
     }
 
-    /// Effort of the drives for a tick.
-    pub(crate) fn command(&mut self, wanted: &[Wanted], reading: &[f64], channels: &[f64]) -> Vec<f64> {
+    /// Effort of the drives for a tick at a time.
+    ///
+    /// # Errors
+    /// [`SimError`] where the reference cannot be followed.
+    pub(crate) fn command(
+        &mut self,
+        reference: Reference<'_>,
+        time: f64,
+        reading: &[f64],
+        channels: &[f64],
+    ) -> Result<Vec<f64>, SimError> {
+        let wanted = self.nominal.follow(reference, time)?;
         let seen = match self.seen.take() {
-            None => reading.iter().zip(wanted).map(|(q, w)| (*q, w[1])).collect(),
+            None => reading.iter().zip(&wanted).map(|(q, w)| (*q, w[1])).collect(),
             Some(mut seen) => {
                 for ((last, velocity), q) in seen.iter_mut().zip(reading) {
                     let difference = (q - *last) * self.settings.rate_hz;
@@ -156,8 +155,7 @@ impl<'a> Controller<'a> {
             }
         };
         let mut effort = if self.settings.feed_forward {
-            let of = |k: usize| wanted.iter().map(|w| w[k]).collect::<Vec<f64>>();
-            self.nominal.drive_effort([&of(0), &of(1), &of(2)], channels, &mut self.work)
+            self.nominal.effort(&wanted, channels)?
         } else {
             vec![0.0; wanted.len()]
         };
@@ -174,13 +172,6 @@ impl<'a> Controller<'a> {
         }
         self.saturated += usize::from(cut);
         self.seen = Some(seen);
-        effort
+        Ok(effort)
     }
-}
-
-fn effort_limits(model: &RobotModel) -> Vec<f64> {
-    let bodies = model.mechanism().bodies();
-    let owners = model.mechanism().rate_bodies();
-    let limit = |j: usize| owners.get(j).and_then(|b| bodies[*b].joint.limits.effort).filter(|l| *l > 0.0);
-    (0..model.outputs().len()).map(|j| limit(j).unwrap_or(f64::INFINITY)).collect()
 }

@@ -3,10 +3,9 @@
 use rand_chacha::ChaCha8Rng;
 
 use crate::imperfections::Imperfections;
-use crate::plant::Plant;
 use crate::streams::{Cause, generator, normal};
 
-/// Encoders of all joints.
+/// Encoders of all joints with one.
 #[derive(Debug)]
 pub(crate) struct Encoders {
     /// Distance between readings, rad or m; 0: exact.
@@ -17,15 +16,14 @@ pub(crate) struct Encoders {
 }
 
 impl Encoders {
-    pub(crate) fn new(plant: &Plant, imperfections: &Imperfections, seed: u64) -> Self {
-        let steps = plant
-            .model()
-            .joints()
+    /// `slides`: for every joint, whether it does.
+    pub(crate) fn new(slides: &[bool], imperfections: &Imperfections, seed: u64) -> Self {
+        let steps = slides
             .iter()
-            .map(|joint| match imperfections.encoder_bits {
+            .map(|slides| match imperfections.encoder_bits {
                 0 => 0.0,
                 bits => {
-                    let turn = if joint.slides { 1.0 } else { std::f64::consts::TAU };
+                    let turn = if *slides { 1.0 } else { std::f64::consts::TAU };
                     turn / 2f64.powi(bits as i32)
                 }
             })

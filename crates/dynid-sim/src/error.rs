@@ -1,6 +1,9 @@
 //! What can keep an experiment from running.
 
 use dynid_model::NotPositive;
+use dynid_model::closed::{ClosedError, PoseError};
+
+use crate::closed::ForwardError;
 
 /// Why an experiment was refused or had to stop.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -70,6 +73,43 @@ pub enum SimError {
         time: f64,
         /// Which joint.
         source: NotPositive,
+    },
+    /// A robot with loops where one without is needed.
+    #[error("expected a robot without loops, found one with loops: it is a plant of its own kind")]
+    ClosedMechanism,
+    /// A robot without loops where one with loops is needed.
+    #[error("expected a robot with loops, found one without")]
+    NoLoops,
+    /// Loops of a mechanism do not go with its drives.
+    #[error(transparent)]
+    Loops(#[from] ClosedError),
+    /// The reference leads a closed mechanism where it cannot be, or next to a singular pose.
+    #[error("at {time:.4} s the reference cannot be followed: {source}")]
+    Pose {
+        /// Time, s.
+        time: f64,
+        /// Why.
+        source: PoseError,
+    },
+    /// Drives of an over-actuated mechanism are wanted where they cannot be together.
+    #[error(
+        "at {time:.4} s the reference of `{drive}` is off by {gap:.2e} (rad or m) from where the other drives put it"
+    )]
+    Reference {
+        /// Time, s.
+        time: f64,
+        /// Name of the drive.
+        drive: String,
+        /// Difference of positions.
+        gap: f64,
+    },
+    /// A closed mechanism does not move on from a state.
+    #[error("at {time} s {source}")]
+    Forward {
+        /// Time, s.
+        time: f64,
+        /// Why.
+        source: ForwardError,
     },
     /// The motion changes faster than the integrator may follow: an unstable control loop, or nearly no inertia.
     #[error(

@@ -2,21 +2,20 @@
 
 use std::collections::VecDeque;
 
-use dynid_model::{EffortModel, History};
 use rand::RngExt;
 
+use crate::closed::{ClosedMotion, ClosedNominal, ClosedPlant};
 use crate::controller::{ControlSettings, Controller, Wanted};
 use crate::encoder::Encoders;
-use crate::error::{SimError, demand, demand_length};
+use crate::error::{SimError, demand_length};
 use crate::imperfections::Imperfections;
-use crate::integrator::{IntegrationCount, Integrator, PlantState};
+use crate::integrator::IntegrationCount;
+use crate::machine::{Instant, Motion, Nominal, PlantMotion, PlantNominal, Reference};
 use crate::plant::{Plant, PlantEnergy, Ripple};
 use crate::profile::Profile;
 use crate::recorder::{Recording, VirtualLog};
+use crate::schedule::Schedule;
 use crate::streams::{Cause, generator, normal};
-
-/// Largest number of controller ticks of one experiment.
-const MOST_TICKS: f64 = 1e8;
 
 /// Settings of an experiment.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +24,7 @@ pub struct ExperimentSettings {
     pub duration_s: f64,
     /// Rows of the log per second; the control rate must be a whole multiple. Default 1000.
     pub log_rate_hz: f64,
-    /// Largest local error of an integration step (see [`Integrator::new`]). Default 1e-9.
+    /// Largest local error of an integration step (see [`Integrator::new`](crate::Integrator::new)). Default 1e-9.
     pub tolerance: f64,
     /// The controller.
     pub control: ControlSettings,
@@ -98,66 +97,6 @@ pub fn wrong_model(linear: &[f64], share: f64, seed: u64) -> Vec<f64> {
     linear.iter().map(|x| x * (1.0 + share * normal(&mut rng))).collect()
 }
 
-/// How the ticks of the controller, the rows of the log and the cuts within a tick lie to each other.
-struct Schedule {
-    period: f64,
-    /// Ticks per row.
-    stride: usize,
-    rows: usize,
-    /// Whole ticks that the motion of a row comes after the row's effort, and the part of a tick.
-    motion_later: isize,
-    motion_part: f64,
-    command_late: usize,
-    command_part: f64,
-}
-
-impl Schedule {
-    fn new(settings: &ExperimentSettings) -> Result<Schedule, SimError> {
-        let (duration, rate) = (settings.duration_s, settings.log_rate_hz);
-        let positive = |x: f64| x.is_finite() && x > 0.0;
-        demand(positive(duration), "duration", "a positive number", duration)?;
-        demand(positive(rate), "log rate", "a positive number", rate)?;
-        let control = settings.control.rate_hz;
-        demand(duration * control <= MOST_TICKS, "duration", "at most 1e8 control ticks", duration)?;
-        let ratio = control / rate;
-        let whole = ratio >= 0.999 && (ratio - ratio.round()).abs() <= 1e-9 * ratio;
-        let expected = "the control rate divided by a whole number";
-        demand(whole, "log rate", expected, format!("{rate} Hz at a control rate of {control} Hz"))?;
-        let stride = ratio.round() as usize;
-        let (motion, command) =
-            (settings.imperfections.effort_delay_samples * ratio, settings.control.delay_ticks);
-        Ok(Schedule {
-            period: 1.0 / control,
-            stride,
-            rows: (duration * rate).round() as usize + 1,
-            motion_later: motion.floor() as isize,
-            motion_part: motion - motion.floor(),
-            command_late: command.floor() as usize,
-            command_part: command - command.floor(),
-        })
-    }
-
-    fn ticks(&self) -> usize {
-        (self.rows - 1) * self.stride + self.motion_later.unsigned_abs() + 1
-    }
-
-    fn row_at(&self, tick: usize, later: usize) -> Option<usize> {
-        let since = tick.checked_sub(later)?;
-        let row = since / self.stride;
-        (since.is_multiple_of(self.stride) && row < self.rows).then_some(row)
-    }
-
-    /// Row whose motion is sampled within a tick.
-    fn motion_row(&self, tick: usize) -> Option<usize> {
-        self.row_at(tick, self.motion_later.max(0).unsigned_abs())
-    }
-
-    /// Row whose effort is taken at a tick.
-    fn effort_row(&self, tick: usize) -> Option<usize> {
-        self.row_at(tick, self.motion_later.min(0).unsigned_abs())
-    }
-}
-
 /// What happens within a tick, in this order where times are equal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Event {
@@ -171,12 +110,10 @@ enum Event {
 
 /// An experiment under way.
 struct Run<'a> {
-    plant: &'a Plant,
+    motion: &'a mut dyn Motion,
     schedule: Schedule,
-    integrator: Integrator<'a>,
     encoders: Encoders,
     recording: Recording,
-    state: PlantState,
     /// Effort of the drives.
     in_force: Vec<f64>,
     /// Commands that are still on their way, oldest first.
@@ -223,22 +160,14 @@ impl Run<'_> {
         }
         let period = self.schedule.period;
         let time = start + from * period;
-        self.integrator.advance(&mut self.state, &self.in_force, channels, time, (to - from) * period)
+        self.motion.advance(&self.in_force, channels, time, (to - from) * period)
     }
 
     fn sample(&mut self, row: usize, time: f64, reading: &[f64], channels: &[f64]) -> Result<(), SimError> {
-        let PlantState { q, dq, history, .. } = &self.state;
-        let mut ddq = vec![0.0; q.len()];
-        let mut all = channels.to_vec();
-        if self.plant.remembers() {
-            all.extend(self.plant.signals(history, None, dq));
-        }
-        self.plant
-            .acceleration((q, dq), &self.in_force, &all, self.integrator.workspace(), &mut ddq)
-            .map_err(|source| SimError::Inertia { time, source })?;
-        let between = (self.schedule.motion_part > 0.0).then(|| self.encoders.between_ticks(q));
-        let felt = self.plant.delivered(q, &self.in_force);
-        self.recording.motion(row, between.as_deref().unwrap_or(reading), [q, dq, &ddq, &felt], channels);
+        let Instant { q, dq, ddq, effort } = self.motion.instant(&self.in_force, channels, time)?;
+        let between = (self.schedule.motion_part > 0.0).then(|| self.encoders.between_ticks(&q));
+        let truth = [&q[..], &dq, &ddq, &effort];
+        self.recording.motion(row, between.as_deref().unwrap_or(reading), truth, channels);
         Ok(())
     }
 }
@@ -261,65 +190,116 @@ pub fn run(
     reference: &dyn Fn(f64) -> Vec<Wanted>,
     settings: &ExperimentSettings,
 ) -> Result<ExperimentResult, SimError> {
-    let n = plant.joints();
-    settings.control.check(n)?;
-    settings.imperfections.check(n)?;
-    let schedule = Schedule::new(settings)?;
-    demand_length("joints of the nominal model", n, nominal.joints())?;
-    let start = reference(0.0);
-    demand_length("joints of the reference", n, start.len())?;
-    let channels = plant.model().channels();
-    if let Some(name) = channels.get(settings.channels.len()) {
-        return Err(SimError::Channel { name: name.clone() });
-    }
-    demand_length("channel profiles", channels.len(), settings.channels.len())?;
-    let ripple =
-        settings.imperfections.ripple.clone().unwrap_or_else(|| ripple(nominal, reference, settings));
-    plant.set_ripple(ripple.clone());
+    let mut believed = PlantNominal::new(nominal);
+    demand_length("joints of the nominal model", plant.joints(), nominal.joints())?;
+    let prepared = Prepared::new(&mut believed, reference, settings)?;
+    plant.set_ripple(prepared.ripple.clone());
+    let mut motion = PlantMotion::new(plant, &prepared.start, settings.tolerance)?;
+    prepared.run(&mut motion, &mut believed, reference, settings)
+}
 
-    let poses: Vec<Vec<f64>> =
-        instants(settings).map(|t| reference(t).iter().map(|w| w[0]).collect()).collect();
-    let mut controller = Controller::new(nominal, &settings.control, &poses);
-    let mut run = Run {
-        plant,
-        integrator: Integrator::new(plant, settings.tolerance)?,
-        encoders: Encoders::new(plant, &settings.imperfections, settings.seed),
-        recording: Recording::new(n, settings.channels.len(), schedule.rows),
-        schedule,
-        state: PlantState {
-            q: start.iter().map(|w| w[0]).collect(),
-            dq: start.iter().map(|w| w[1]).collect(),
-            history: History::default(),
-            drive_work: 0.0,
-            element_work: 0.0,
-        },
-        in_force: Vec::new(),
-        coming: VecDeque::new(),
-    };
-    let before = plant.energy(&run.state.q, &run.state.dq, run.integrator.workspace());
-    let ticks = run.schedule.ticks();
-    for tick in 0..ticks {
-        let time = tick as f64 * run.schedule.period;
-        let channels: Vec<f64> = settings.channels.iter().map(|p| p.at(time)).collect();
-        let reading = run.encoders.at_tick(&run.state.q);
-        let command = controller.command(&reference(time), &reading, &channels);
-        if tick == 0 {
-            // Until the first command arrives the drives already hold it.
-            run.in_force.clone_from(&command);
+/// Runs an experiment with a closed mechanism: as [`run`], with encoders and drives at its driven joints alone, of which
+/// reference and log have one column each.
+///
+/// The mechanism starts from home on the straight way of the drives to the reference. Of an over-actuated mechanism the
+/// reference of all drives must be of one motion.
+///
+/// # Errors
+/// As [`run`]; [`SimError::Pose`] where the reference leaves the workspace or comes next to a singular pose,
+/// [`SimError::Reference`], [`SimError::Forward`].
+pub fn run_closed(
+    plant: &mut ClosedPlant,
+    nominal: &ClosedPlant,
+    reference: &dyn Fn(f64) -> Vec<Wanted>,
+    settings: &ExperimentSettings,
+) -> Result<ExperimentResult, SimError> {
+    let mut believed = ClosedNominal::new(nominal, 1.0 / settings.control.rate_hz);
+    demand_length("drives of the nominal model", plant.drives(), nominal.drives())?;
+    let prepared = Prepared::new(&mut believed, reference, settings)?;
+    plant.set_ripple(prepared.ripple.clone());
+    let mut motion = ClosedMotion::new(plant, &prepared.start, settings.tolerance)?;
+    prepared.run(&mut motion, &mut believed, reference, settings)
+}
+
+/// What an experiment fixes before anything moves.
+struct Prepared {
+    schedule: Schedule,
+    start: Vec<Wanted>,
+    inertia: Vec<f64>,
+    ripple: Vec<Ripple>,
+}
+
+impl Prepared {
+    fn new(
+        nominal: &mut dyn Nominal,
+        reference: Reference<'_>,
+        settings: &ExperimentSettings,
+    ) -> Result<Prepared, SimError> {
+        let n = nominal.drives();
+        settings.control.check(n)?;
+        settings.imperfections.check(n)?;
+        let schedule = Schedule::new(settings)?;
+        let channels = nominal.channels();
+        if let Some(name) = channels.get(settings.channels.len()) {
+            return Err(SimError::Channel { name: name.clone() });
         }
-        run.tick(tick, &reading, command, &channels)?;
+        demand_length("channel profiles", channels.len(), settings.channels.len())?;
+        let start = nominal.follow(reference, 0.0)?;
+        let times: Vec<f64> = instants(settings).collect();
+        Ok(Prepared {
+            schedule,
+            start,
+            inertia: nominal.largest_inertia(reference, &times)?,
+            ripple: match &settings.imperfections.ripple {
+                Some(given) => given.clone(),
+                None => ripple(nominal, reference, settings)?,
+            },
+        })
     }
-    let PlantState { q, dq, drive_work, element_work, .. } = &run.state;
-    let after = plant.energy(q, dq, run.integrator.workspace());
-    Ok(ExperimentResult {
-        energy: EnergyBalance { before, after, drive_work: *drive_work, element_work: *element_work },
-        integration: run.integrator.count(),
-        log: run.recording.finish(settings),
-        imperfections: settings.imperfections.active(),
-        ripple,
-        ticks,
-        saturated_ticks: controller.saturated,
-    })
+
+    fn run(
+        self,
+        motion: &mut dyn Motion,
+        nominal: &mut dyn Nominal,
+        reference: Reference<'_>,
+        settings: &ExperimentSettings,
+    ) -> Result<ExperimentResult, SimError> {
+        let before = motion.energy();
+        let encoders = Encoders::new(&nominal.slides(), &settings.imperfections, settings.seed);
+        let recording = Recording::new(nominal.drives(), settings.channels.len(), self.schedule.rows);
+        let mut controller = Controller::new(nominal, &settings.control, &self.inertia);
+        let ticks = self.schedule.ticks();
+        let mut run = Run {
+            motion,
+            encoders,
+            recording,
+            schedule: self.schedule,
+            in_force: Vec::new(),
+            coming: VecDeque::new(),
+        };
+        for tick in 0..ticks {
+            let time = tick as f64 * run.schedule.period;
+            let channels: Vec<f64> = settings.channels.iter().map(|p| p.at(time)).collect();
+            let reading = run.encoders.at_tick(&run.motion.positions());
+            let command = controller.command(reference, time, &reading, &channels)?;
+            if tick == 0 {
+                // Until the first command arrives the drives already hold it.
+                run.in_force.clone_from(&command);
+            }
+            run.tick(tick, &reading, command, &channels)?;
+        }
+        let after = run.motion.energy();
+        let [drive_work, element_work] = run.motion.work();
+        Ok(ExperimentResult {
+            energy: EnergyBalance { before, after, drive_work, element_work },
+            integration: run.motion.count(),
+            log: run.recording.finish(settings),
+            imperfections: settings.imperfections.active(),
+            ripple: self.ripple,
+            ticks,
+            saturated_ticks: controller.saturated,
+        })
+    }
 }
 
 /// Some instants of the motion, s.
@@ -331,34 +311,26 @@ fn instants(settings: &ExperimentSettings) -> impl Iterator<Item = f64> + use<> 
 
 /// Ripple in proportion to the rms of the efforts that the nominal model needs along the reference.
 fn ripple(
-    nominal: &Plant,
-    reference: &dyn Fn(f64) -> Vec<Wanted>,
+    nominal: &mut dyn Nominal,
+    reference: Reference<'_>,
     settings: &ExperimentSettings,
-) -> Vec<Ripple> {
+) -> Result<Vec<Ripple>, SimError> {
     let mut rng = generator(settings.seed, Cause::Ripple);
-    let mut work = nominal.workspace();
-    let mut squares = vec![0.0; nominal.joints()];
+    let mut squares = vec![0.0; nominal.drives()];
     let mut count = 0.0;
     for time in instants(settings) {
-        let wanted = reference(time);
-        let of = |k: usize| wanted.iter().map(|w| w[k]).collect::<Vec<f64>>();
+        let wanted = nominal.follow(reference, time)?;
         let channels: Vec<f64> = settings.channels.iter().map(|p| p.at(time)).collect();
-        let effort = nominal.drive_effort([&of(0), &of(1), &of(2)], &channels, &mut work);
+        let effort = nominal.effort(&wanted, &channels)?;
         squares.iter_mut().zip(&effort).for_each(|(s, e)| *s += e * e);
         count += 1.0;
     }
     let (share, cycles) = (settings.imperfections.ripple_share, settings.imperfections.ripple_cycles);
-    squares
-        .iter()
-        .enumerate()
-        .map(|(j, s)| Ripple {
-            amplitude: if settings.control.is_passive(nominal.model(), j) {
-                0.0
-            } else {
-                share * f64::sqrt(s / count)
-            },
-            cycles,
-            phase: rng.random_range(0.0..std::f64::consts::TAU),
-        })
-        .collect()
+    let passive = nominal.passive(&settings.control);
+    let of_drive = |(square, passive): (&f64, bool)| Ripple {
+        amplitude: if passive { 0.0 } else { share * f64::sqrt(square / count) },
+        cycles,
+        phase: rng.random_range(0.0..std::f64::consts::TAU),
+    };
+    Ok(squares.iter().zip(passive).map(of_drive).collect())
 }

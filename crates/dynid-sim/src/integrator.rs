@@ -18,34 +18,10 @@ use dynid_model::History;
 use crate::error::{SimError, demand};
 use crate::lu::{Lu, add_product};
 use crate::plant::{Plant, PlantWorkspace};
-
-const GAMMA: f64 = 0.435_866_521_508_459;
-const STAGES: usize = 4;
-/// `α_ij`: states of the stages.
-const ALPHA: [[f64; 3]; STAGES] = [
-    [0.0, 0.0, 0.0],
-    [0.871_733_043_016_918, 0.0, 0.0],
-    [0.844_570_600_153_694_2, -0.112_990_642_364_841_85, 0.0],
-    [0.0, 0.0, 1.0],
-];
-/// `γ_ij`, j < i: products with the Jacobian.
-const GAMMAS: [[f64; 3]; STAGES] = [
-    [0.0, 0.0, 0.0],
-    [-0.871_733_043_016_918, 0.0, 0.0],
-    [-0.903_380_570_130_440_8, 0.054_180_672_388_095_326, 0.0],
-    [0.242_123_807_060_953_46, -1.223_250_583_904_514_7, 0.545_260_255_335_102_1],
-];
-const WEIGHTS: [f64; STAGES] =
-    [0.242_123_807_060_953_46, -1.223_250_583_904_514_7, 1.545_260_255_335_102, 0.435_866_521_508_459];
-/// Weights of the embedded method of order two.
-const EMBEDDED: [f64; STAGES] =
-    [0.378_109_031_458_193_7, -0.096_042_292_212_423_18, 0.5, 0.217_933_260_754_229_5];
-
-/// Steps within one interval before the integrator gives up.
-const MOST_STEPS: usize = 20_000;
+use crate::rosenbrock::{ALPHA, EMBEDDED, GAMMA, GAMMAS, STAGES, StepControl, WEIGHTS};
 
 /// State of a plant, and work done since the start.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlantState {
     /// Positions.
     pub q: Vec<f64>,
@@ -76,9 +52,8 @@ pub struct Integrator<'a> {
     plant: &'a Plant,
     tolerance: f64,
     work: PlantWorkspace,
-    /// Step size that the error control asks for, s.
-    step: f64,
-    count: IntegrationCount,
+    control: StepControl,
+    evaluations: usize,
     lu: Lu,
     stiffness: Vec<f64>,
     damping: Vec<f64>,
@@ -107,20 +82,14 @@ impl<'a> Integrator<'a> {
         demand((1e-13..=1e-2).contains(&tolerance), "tolerance", "1e-13 to 1e-2", tolerance)?;
         let n = plant.joints();
         let zeros = || vec![0.0; n];
-        let state = PlantState {
-            q: zeros(),
-            dq: zeros(),
-            history: History::default(),
-            drive_work: 0.0,
-            element_work: 0.0,
-        };
+        let state = PlantState { q: zeros(), dq: zeros(), ..PlantState::default() };
         let stage = Increment { q: zeros(), dq: zeros(), work: [0.0; 2] };
         Ok(Integrator {
             plant,
             tolerance,
             work: plant.workspace(),
-            step: f64::INFINITY,
-            count: IntegrationCount::default(),
+            control: StepControl::default(),
+            evaluations: 0,
             lu: Lu::default(),
             stiffness: vec![0.0; n * n],
             damping: vec![0.0; n * n],
@@ -135,7 +104,7 @@ impl<'a> Integrator<'a> {
 
     /// Work so far.
     pub fn count(&self) -> IntegrationCount {
-        self.count
+        self.control.count(self.evaluations)
     }
 
     /// Memory of the plant, for use between intervals.
@@ -157,15 +126,12 @@ impl<'a> Integrator<'a> {
     ) -> Result<(), SimError> {
         if state.history == History::default() {
             // A record starts at the steady state of its own velocity, not at that of a step's mean.
-            self.plant.pass(&mut state.history, duration, &state.dq);
+            self.plant.elements().pass(&mut state.history, duration, &state.dq);
         }
-        let mut done = 0.0;
-        let mut steps = 0;
-        while done < duration {
-            let left = duration - done;
-            let mut h = self.step.min(left);
+        let mut interval = self.control.interval(time, duration);
+        while let Some(mut h) = self.control.next(&interval) {
             let mass = self.plant.mass_matrix(&state.q, &mut self.work);
-            let now = self.with_signals(channels, |plant| plant.signals(&state.history, None, &state.dq));
+            let now = self.plant.elements().with_signals(channels, &state.history, None, &state.dq);
             self.plant.stiffness_and_damping(
                 (&state.q, &state.dq),
                 &now,
@@ -174,46 +140,19 @@ impl<'a> Integrator<'a> {
                 &mut self.damping,
             );
             loop {
-                steps += 1;
-                // A last sliver would cost a step of its own.
-                if left - h < 0.01 * h {
-                    h = left;
-                }
-                if steps > MOST_STEPS || h <= 1e-14 * duration {
-                    return Err(SimError::TooFast { time: time + done, steps });
-                }
+                let time = interval.now();
+                h = interval.attempt(h)?;
                 let error = self
                     .attempt(state, drive, channels, &mass, h)
-                    .map_err(|source| SimError::Inertia { time: time + done, source })?;
-                // A step that is not finite must shrink too, and NaN fails every comparison.
-                let factor = if error.is_finite() {
-                    (0.9 * error.max(1e-9).powf(-1.0 / 3.0)).clamp(0.1, 5.0)
-                } else {
-                    0.1
-                };
-                if error <= 1.0 {
-                    self.count.accepted += 1;
-                    // A step cut short by the end of the interval says nothing against the longer one.
-                    self.step = if h < self.step { self.step.max(h * factor) } else { h * factor };
-                    std::mem::swap(state, &mut self.next);
-                    done = if h == left { duration } else { done + h };
-                    break;
+                    .map_err(|source| SimError::Inertia { time, source })?;
+                match self.control.judge(&mut interval, h, error) {
+                    Some(shorter) => h = shorter,
+                    None => break,
                 }
-                self.count.rejected += 1;
-                h *= factor.min(0.9);
-                self.step = h;
             }
+            std::mem::swap(state, &mut self.next);
         }
         Ok(())
-    }
-
-    /// Channels followed by signals.
-    fn with_signals(&self, channels: &[f64], signals: impl FnOnce(&Plant) -> Vec<f64>) -> Vec<f64> {
-        let mut all = channels.to_vec();
-        if self.plant.remembers() {
-            all.extend(signals(self.plant));
-        }
-        all
     }
 
     /// Tries one step into `self.next` and gives its error in units of the tolerance.
@@ -234,20 +173,18 @@ impl<'a> Integrator<'a> {
         }
         for (i, alpha) in ALPHA.iter().enumerate() {
             self.load_stage(from, i);
-            let channels = self.with_signals(channels, |plant| {
-                let step = h * alpha.iter().sum::<f64>();
-                let between = mean(&from.dq, &self.at.dq);
-                let step = (step > 0.0).then_some((step, between.as_slice()));
-                plant.signals(&from.history, step, &self.at.dq)
-            });
+            let step = h * alpha.iter().sum::<f64>();
+            let between = mean(&from.dq, &self.at.dq);
+            let step = (step > 0.0).then_some((step, between.as_slice()));
+            let channels = self.plant.elements().with_signals(channels, &from.history, step, &self.at.dq);
             let state = (&self.at.q[..], &self.at.dq[..]);
             self.plant.acceleration(state, drive, &channels, &mut self.work, &mut self.acceleration)?;
-            self.count.evaluations += 1;
+            self.evaluations += 1;
             self.solve_stage(i, mass, h);
         }
         let error = self.finish(from);
         let between = mean(&from.dq, &self.next.dq);
-        self.plant.pass(&mut self.next.history, h, &between);
+        self.plant.elements().pass(&mut self.next.history, h, &between);
         Ok(error)
     }
 
@@ -315,41 +252,6 @@ impl<'a> Integrator<'a> {
     }
 }
 
-fn mean(a: &[f64], b: &[f64]) -> Vec<f64> {
+pub(crate) fn mean(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Conditions of order three that hold whatever matrix is used (Hairer & Wanner 1996, table IV.7.1 and W-methods).
-    #[test]
-    fn the_coefficients_meet_the_order_conditions_for_any_matrix() {
-        let alpha = |i: usize, j: usize| if j < 3 { ALPHA[i][j] } else { 0.0 };
-        let gamma = |i: usize, j: usize| match j {
-            _ if i == j => GAMMA,
-            j if j < 3 => GAMMAS[i][j],
-            _ => 0.0,
-        };
-        let sum = |f: &dyn Fn(usize) -> f64| (0..STAGES).map(f).sum::<f64>();
-        let row = |m: &dyn Fn(usize, usize) -> f64, i: usize| sum(&|j| m(i, j));
-        let twice = |m: &dyn Fn(usize, usize) -> f64, o: &dyn Fn(usize, usize) -> f64| {
-            sum(&|i| WEIGHTS[i] * sum(&|j| m(i, j) * row(o, j)))
-        };
-        let check = |found: f64, expected: f64, what: &str| {
-            assert!((found - expected).abs() < 1e-14, "{what}: {found} {expected}");
-        };
-        check(sum(&|i| WEIGHTS[i]), 1.0, "order 1");
-        check(sum(&|i| WEIGHTS[i] * row(&alpha, i)), 0.5, "order 2");
-        check(sum(&|i| WEIGHTS[i] * row(&gamma, i)), 0.0, "order 2, matrix");
-        check(sum(&|i| WEIGHTS[i] * row(&alpha, i).powi(2)), 1.0 / 3.0, "order 3, bushy");
-        check(twice(&alpha, &alpha), 1.0 / 6.0, "order 3, tall");
-        check(twice(&alpha, &gamma), 0.0, "order 3, matrix above");
-        check(twice(&gamma, &alpha), 0.0, "order 3, matrix below");
-        check(twice(&gamma, &gamma), 0.0, "order 3, matrix twice");
-        check(sum(&|i| EMBEDDED[i]), 1.0, "embedded, order 1");
-        check(sum(&|i| EMBEDDED[i] * row(&alpha, i)), 0.5, "embedded, order 2");
-        check(sum(&|i| EMBEDDED[i] * row(&gamma, i)), 0.0, "embedded, order 2, matrix");
-    }
 }

@@ -4,6 +4,8 @@
 //! gives a log as a real robot would, with the truth beside it. Every fault of sensors, drives and logger is a setting of
 //! its own ([`Imperfections`]).
 //!
+//! A [`ClosedPlant`] is the same for mechanisms with loops, parallel robots; [`run_closed`] moves it by its drives.
+//!
 //! [`presliding`] moves a single joint within its friction, where bristles bend and hardly slip.
 //!
 //! [`ElasticInverse`] gives motors behind elastic transmissions the motion that goes with that of their links.
@@ -14,25 +16,31 @@
 
 mod bodiless;
 pub mod clearance;
+mod closed;
 mod collocation;
 mod controller;
 mod elastic;
+mod elements;
 mod encoder;
 mod error;
 mod experiment;
 mod imperfections;
 mod integrator;
 mod lu;
+mod machine;
 mod plant;
 pub mod presliding;
 mod profile;
 mod recorder;
+mod rosenbrock;
+mod schedule;
 pub mod streams;
 
+pub use closed::{ClosedIntegrator, ClosedPlant, ClosedWorkspace, ForwardError, Stepping};
 pub use controller::{ControlSettings, Wanted};
 pub use elastic::{ElasticInverse, ElasticMotion, LinkMotion, fourier_link};
 pub use error::SimError;
-pub use experiment::{EnergyBalance, ExperimentResult, ExperimentSettings, run, wrong_model};
+pub use experiment::{EnergyBalance, ExperimentResult, ExperimentSettings, run, run_closed, wrong_model};
 pub use imperfections::Imperfections;
 pub use integrator::{IntegrationCount, Integrator, PlantState};
 pub use plant::{Plant, PlantEnergy, PlantWorkspace, Ripple};

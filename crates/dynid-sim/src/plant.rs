@@ -2,14 +2,15 @@
 
 use std::sync::Arc;
 
-use dynid_model::element::{ElasticTransmission, JointElement};
+use dynid_model::element::ElasticTransmission;
 use dynid_model::{
     AddedInertia, Dynamics, DynamicsWorkspace, EffortModel, ForwardDynamicsWorkspace, History, LoadedState,
-    MotionAdjoint, MotionBlock, NotPositive, RobotModel, State,
+    NotPositive, RobotModel, State,
 };
 
 use crate::bodiless::Bodiless;
-use crate::error::{SimError, demand, demand_length};
+use crate::elements::{ElementMemory, Elements, check_parameters};
+use crate::error::SimError;
 
 /// Torque ripple of one drive: it delivers `effort + amplitude · sin(cycles · q + phase)`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -67,18 +68,12 @@ pub struct Plant {
 pub struct PlantWorkspace {
     forward: ForwardDynamicsWorkspace<f64>,
     dynamics: DynamicsWorkspace<f64>,
-    memory: Vec<f64>,
+    elements: ElementMemory,
     effort: Vec<f64>,
     /// Effort of elements at zero acceleration, of the last call.
     pub(crate) element: Vec<f64>,
     /// Effort of drives with ripple, of the last call.
     pub(crate) delivered: Vec<f64>,
-    still: Vec<f64>,
-    /// One copy of the state per joint: positions, rates, accelerations.
-    copies: [Vec<f64>; 3],
-    /// Copy `k` asks for the effort of joint `k`.
-    asked: Vec<f64>,
-    slopes: MotionAdjoint,
 }
 
 impl Plant {
@@ -87,7 +82,7 @@ impl Plant {
     /// `linear`, `shape`: the model's parameters. `sign_width`: rad/s or m/s, above 0.
     ///
     /// # Errors
-    /// [`SimError::FloatingBase`], [`SimError::Length`], [`SimError::Setting`], [`SimError::VaryingInertia`],
+    /// [`SimError::ClosedMechanism`], [`SimError::FloatingBase`], [`SimError::Length`], [`SimError::Setting`], [`SimError::VaryingInertia`],
     /// [`SimError::NoInertia`].
     pub fn new(
         model: impl Into<Arc<RobotModel>>,
@@ -96,20 +91,14 @@ impl Plant {
         sign_width: f64,
     ) -> Result<Plant, SimError> {
         let model = model.into();
+        if model.closed().is_some() {
+            return Err(SimError::ClosedMechanism);
+        }
         let (positions, n) = model.dimensions();
         if positions != n {
             return Err(SimError::FloatingBase);
         }
-        demand_length("linear parameters", model.parameters().linear.len(), linear.len())?;
-        demand_length("shape parameters", model.parameters().shape.len(), shape.len())?;
-        demand(sign_width > 0.0 && sign_width.is_finite(), "sign_width", "a positive number", sign_width)?;
-        if let Some(x) = linear.iter().chain(&shape).find(|x| !x.is_finite()) {
-            return Err(SimError::Setting {
-                name: "parameters",
-                expected: "finite numbers",
-                found: x.to_string(),
-            });
-        }
+        check_parameters(model.tree(), &linear, &shape, sign_width)?;
         let dynamics = Dynamics::new(model.mechanism());
         let mut plant = Plant {
             model,
@@ -124,7 +113,7 @@ impl Plant {
             bodiless: None,
             without_contacts: false,
         };
-        plant.added = plant.added_inertia()?;
+        plant.added = plant.elements().added_inertia()?;
         let joints = plant.dynamics.rates();
         plant.at_joints.clone_from(&plant.added);
         if joints < n {
@@ -153,8 +142,14 @@ impl Plant {
         self
     }
 
-    fn counts(&self, element: &dyn JointElement) -> bool {
-        !(self.without_contacts && element.clearance().is_some())
+    pub(crate) fn elements(&self) -> Elements<'_> {
+        Elements {
+            model: self.model.tree(),
+            linear: &self.linear,
+            shape: &self.shape,
+            sign_width: self.sign_width,
+            without_contacts: self.without_contacts,
+        }
     }
 
     /// Gives the drives their ripple, one entry per joint.
@@ -191,117 +186,29 @@ impl Plant {
     /// Memory.
     pub fn workspace(&self) -> PlantWorkspace {
         let n = self.joints();
-        let mut asked = vec![0.0; n * n];
-        (0..n).for_each(|k| asked[k * n + k] = 1.0);
         PlantWorkspace {
             forward: self.dynamics.forward_workspace(),
             dynamics: self.dynamics.workspace(),
-            memory: Vec::new(),
+            elements: self.elements().memory(),
             effort: vec![0.0; n],
             element: vec![0.0; n],
             delivered: vec![0.0; n],
-            still: vec![0.0; n],
-            copies: [(); 3].map(|()| vec![0.0; n * n]),
-            asked,
-            slopes: MotionAdjoint::new(n, n, n),
         }
-    }
-
-    fn channel_names(&self) -> impl Iterator<Item = &str> {
-        self.model.channels().iter().chain(self.model.signals()).map(String::as_str)
     }
 
     /// Whether elements remember the motion before.
     pub fn remembers(&self) -> bool {
-        !self.model.signals().is_empty()
+        self.elements().remember()
     }
 
     /// Values of the model's signals at velocities `dq`, a time `step` (s) after what `history` remembers, with velocities
     /// `between` on the way; at that instant itself without a step.
     pub fn signals(&self, history: &History, step: Option<(f64, &[f64])>, dq: &[f64]) -> Vec<f64> {
-        match step {
-            None => self.remember(&mut history.clone(), &[dq], 1.0),
-            Some((step, between)) => {
-                let both = self.remember(&mut history.clone(), &[between, dq], step);
-                both.into_iter().skip(1).step_by(2).collect()
-            }
-        }
-    }
-
-    /// Takes what elements remember on by `step` seconds at velocities `dq`.
-    pub(crate) fn pass(&self, history: &mut History, step: f64, dq: &[f64]) {
-        if self.remembers() {
-            self.remember(history, &[dq], step);
-        }
-    }
-
-    /// Signals of some instants, signal after signal.
-    fn remember(&self, history: &mut History, velocities: &[&[f64]], step: f64) -> Vec<f64> {
-        let (joints, samples) = (self.joints(), velocities.len());
-        let dq: Vec<f64> = (0..joints).flat_map(|j| velocities.iter().map(move |v| v[j])).collect();
-        let rest = vec![0.0; dq.len()];
-        let mut out = vec![0.0; self.model.signals().len() * samples];
-        let motion = MotionBlock::plain(samples, &rest, &dq, &rest);
-        self.model.remember(&motion, step, &self.shape, history, samples, &mut out);
-        out
+        self.elements().signals(history, step, dq)
     }
 
     fn inertias(&self) -> &[f64] {
         &self.linear[..self.dynamics.inertial_parameters()]
-    }
-
-    /// Effort of elements at one state.
-    fn element_effort(
-        &self,
-        [q, dq, ddq]: [&[f64]; 3],
-        channels: &[f64],
-        memory: &mut Vec<f64>,
-        to: &mut [f64],
-    ) {
-        let channels: Vec<(&str, &[f64])> = self
-            .channel_names()
-            .zip(channels)
-            .map(|(name, value)| (name, std::slice::from_ref(value)))
-            .collect();
-        let motion = MotionBlock {
-            samples: 1,
-            stride: 1,
-            q,
-            dq,
-            ddq,
-            gravity: None,
-            channels: &channels,
-            sign_width: self.sign_width,
-        };
-        to.fill(0.0);
-        let parameters = (self.shape.as_slice(), self.linear.as_slice());
-        self.model.tree().efforts_of(|e| self.counts(e), &motion, parameters, 1, to, memory);
-    }
-
-    /// Effort of elements per acceleration, the same at some states of no special kind.
-    fn added_inertia(&self) -> Result<Vec<f64>, SimError> {
-        let n = self.joints();
-        let mut work = self.workspace();
-        let channels = vec![1.0; self.model.channels().len()];
-        let mut found: Option<Vec<f64>> = None;
-        for state in 0..3 {
-            let at = |k: usize, scale: f64| scale * (1.0 + k as f64 + 2.7 * f64::from(state)).sin();
-            let q: Vec<f64> = (0..n).map(|k| at(k, 1.0)).collect();
-            let dq: Vec<f64> = (0..n).map(|k| at(k + 17, f64::from(state))).collect();
-            self.element_slopes((&q, &dq), &channels, &mut work);
-            let added: Vec<f64> = (0..n * n).map(|k| work.slopes.ddq[k % n * n + k / n]).collect();
-            match &found {
-                None => found = Some(added),
-                Some(first) => {
-                    let scale = first.iter().fold(1e-3_f64, |m, x| m.max(x.abs()));
-                    let differs = (0..n * n).find(|k| (first[*k] - added[*k]).abs() > 1e-9 * scale);
-                    if let Some(k) = differs {
-                        return Err(SimError::VaryingInertia { rate: k / n });
-                    }
-                }
-            }
-        }
-        Ok(found.unwrap_or_default())
     }
 
     fn deliver(&self, q: &[f64], effort: &[f64], to: &mut [f64]) {
@@ -324,7 +231,7 @@ impl Plant {
         ddq: &mut [f64],
     ) -> Result<(), NotPositive> {
         self.deliver(q, drive, &mut work.delivered);
-        self.element_effort([q, dq, &work.still], channels, &mut work.memory, &mut work.element);
+        self.elements().still_effort((q, dq), channels, &mut work.elements, &mut work.element);
         for (e, (d, x)) in work.effort.iter_mut().zip(work.delivered.iter().zip(&work.element)) {
             *e = d - x;
         }
@@ -358,7 +265,7 @@ impl Plant {
         let state = State { q: &q[..joints], dq: &dq[..joints], ddq: &ddq[..joints], gravity: None };
         let to = &mut effort[..joints];
         self.dynamics.inverse_dynamics(&state, self.inertias(), &mut work.dynamics, to);
-        self.element_effort([q, dq, ddq], channels, &mut work.memory, &mut work.effort);
+        self.elements().effort([q, dq, ddq], channels, &mut work.elements, &mut work.effort);
         effort.iter_mut().zip(&work.effort).for_each(|(e, x)| *e += x);
         effort
     }
@@ -370,7 +277,7 @@ impl Plant {
         channels: &[f64],
         work: &mut PlantWorkspace,
     ) -> Vec<f64> {
-        self.element_effort([q, dq, &work.still], channels, &mut work.memory, &mut work.element);
+        self.elements().still_effort((q, dq), channels, &mut work.elements, &mut work.element);
         work.element.clone()
     }
 
@@ -420,47 +327,12 @@ impl Plant {
         damping: &mut [f64],
     ) {
         let n = self.joints();
-        self.element_slopes(state, channels, work);
+        let slopes = self.elements().slopes(state, channels, &mut work.elements);
         for row in 0..n {
             for k in 0..n {
-                stiffness[row * n + k] = work.slopes.q[k * n + row];
-                damping[row * n + k] = work.slopes.dq[k * n + row];
+                stiffness[row * n + k] = slopes.q[k * n + row];
+                damping[row * n + k] = slopes.dq[k * n + row];
             }
         }
-    }
-
-    /// Derivatives of the elements' efforts by the motion, into `work.slopes`: that of effort `row` by coordinate `k` at
-    /// `k * n + row`.
-    fn element_slopes(&self, (q, dq): (&[f64], &[f64]), channels: &[f64], work: &mut PlantWorkspace) {
-        let n = self.joints();
-        let [copied_q, copied_dq, copied_ddq] = &mut work.copies;
-        for k in 0..n {
-            copied_q[k * n..(k + 1) * n].fill(q[k]);
-            copied_dq[k * n..(k + 1) * n].fill(dq[k]);
-        }
-        let repeated: Vec<Vec<f64>> = channels.iter().map(|c| vec![*c; n]).collect();
-        let channels: Vec<(&str, &[f64])> =
-            self.channel_names().zip(&repeated).map(|(n, v)| (n, v.as_slice())).collect();
-        let motion = MotionBlock {
-            samples: n,
-            stride: n,
-            q: copied_q,
-            dq: copied_dq,
-            ddq: copied_ddq,
-            gravity: None,
-            channels: &channels,
-            sign_width: self.sign_width,
-        };
-        work.slopes.clear();
-        let parameters = (self.shape.as_slice(), self.linear.as_slice());
-        let (weights, memory) = ((n, work.asked.as_slice()), &mut work.memory);
-        self.model.tree().adjoint_of(
-            |e| self.counts(e),
-            &motion,
-            parameters,
-            weights,
-            &mut work.slopes,
-            memory,
-        );
     }
 }

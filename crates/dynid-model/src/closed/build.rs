@@ -8,7 +8,7 @@ use super::closure::ClosureDescription;
 use super::error::{ClosedError, ClosedWarning};
 use super::factor::Factor;
 use super::mechanism::ClosedMechanism;
-use super::pose::{PoseWorkspace, float};
+use super::pose::PoseWorkspace;
 use super::rows::Rows;
 use super::singularity::smallest;
 use crate::description::JointKind;
@@ -265,7 +265,7 @@ impl ClosedMechanism {
                 .iter()
                 .map(|scale| SPREAD * self.length / scale * rng.random_range(-1.0..=1.0))
                 .collect();
-            self.move_by(&mut q, &step);
+            self.displace(&mut q, &step);
             if let Ok(q) = self.closed(&q) {
                 poses.push(q);
             }
@@ -274,16 +274,6 @@ impl ClosedMechanism {
             }
         }
         Ok(poses)
-    }
-
-    fn move_by(&self, q: &mut [f64], step: &[f64]) {
-        for body in self.mechanism.bodies() {
-            let own = &step[body.rate..body.rate + body.joint.rates()];
-            match <&[f64; 6]>::try_from(own) {
-                Ok(rates) => float(&mut q[body.position..body.position + 7], rates),
-                Err(_) => q[body.position] += own[0],
-            }
-        }
     }
 
     /// The nearest closed pose, by Gauss-Newton steps of least norm on all coordinates.
@@ -304,7 +294,7 @@ impl ClosedMechanism {
             for (x, scale) in step.iter_mut().zip(&self.rate_scale) {
                 *x *= short / scale;
             }
-            self.move_by(&mut q, &step);
+            self.displace(&mut q, &step);
         }
         self.residual_at(&q, &mut residual);
         let (closure, gap) = self.largest_gap(&residual);

@@ -1,4 +1,4 @@
-//! Orthogonal factors of small matrices with at least as many rows as columns.
+//! Orthogonal factors of small matrices.
 
 /// `A P = Q R` by Householder reflections with column exchanges, reusable.
 #[derive(Clone, Debug, Default)]
@@ -15,9 +15,19 @@ pub(super) struct Factor {
 }
 
 impl Factor {
-    /// Factors a matrix given column after column.
+    /// Factors a matrix with at least as many rows as columns.
     pub(super) fn factor(&mut self, rows: usize, columns: usize, matrix: impl Fn(usize, usize) -> f64) {
-        debug_assert!(rows >= columns, "{rows} rows for {columns} columns");
+        self.factor_to(columns, (rows, columns), matrix);
+    }
+
+    /// Factors a matrix of given rank and any shape: after `rank` columns the others are taken to depend on them.
+    pub(super) fn factor_to(
+        &mut self,
+        rank: usize,
+        (rows, columns): (usize, usize),
+        matrix: impl Fn(usize, usize) -> f64,
+    ) {
+        debug_assert!(rank <= rows.min(columns), "rank {rank} of {rows} rows and {columns} columns");
         (self.rows, self.columns, self.exchanges) = (rows, columns, 0);
         self.data.clear();
         for j in 0..columns {
@@ -27,7 +37,7 @@ impl Factor {
         self.pivots.extend(0..columns);
         self.diagonal.clear();
         self.weights.clear();
-        for j in 0..columns {
+        for j in 0..rank {
             self.pivot(j);
             self.reflect(j);
         }
@@ -95,13 +105,35 @@ impl Factor {
         if turns.is_multiple_of(2) { 1.0 } else { -1.0 }
     }
 
+    /// `x ← Qᵀ x`, one entry per row.
+    pub(super) fn turn(&self, x: &mut [f64]) {
+        for (j, weight) in self.weights.iter().enumerate() {
+            mirror(&self.data[j * self.rows + j..(j + 1) * self.rows], *weight, &mut x[j..]);
+        }
+    }
+
+    /// `x ← Q x`.
+    pub(super) fn turn_back(&self, x: &mut [f64]) {
+        for (j, weight) in self.weights.iter().enumerate().rev() {
+            mirror(&self.data[j * self.rows + j..(j + 1) * self.rows], *weight, &mut x[j..]);
+        }
+    }
+
+    /// Entry of `R`, columns in the order of the pivots.
+    pub(super) fn upper(&self, i: usize, j: usize) -> f64 {
+        match i.cmp(&j) {
+            std::cmp::Ordering::Less => self.data[j * self.rows + i],
+            std::cmp::Ordering::Equal => self.diagonal[j],
+            std::cmp::Ordering::Greater => 0.0,
+        }
+    }
+
     /// The least-squares solution of `A x = b`: `b` has one entry per row and is overwritten, `x` one per column.
+    /// Columns beyond the rank are not written.
     pub(super) fn solve(&self, b: &mut [f64], x: &mut [f64]) {
         let rows = self.rows;
-        for (j, weight) in self.weights.iter().enumerate() {
-            mirror(&self.data[j * rows + j..(j + 1) * rows], *weight, &mut b[j..]);
-        }
-        for j in (0..self.columns).rev() {
+        self.turn(b);
+        for j in (0..self.diagonal.len()).rev() {
             let value = b[j] / self.diagonal[j];
             x[self.pivots[j]] = value;
             for (to, r) in b[..j].iter_mut().zip(&self.data[j * rows..]) {
@@ -110,18 +142,17 @@ impl Factor {
         }
     }
 
-    /// The shortest solution of `Aᵀ y = t`: `t` has one entry per column, `y` one per row.
+    /// The shortest solution of `Aᵀ y = t`: `t` has one entry per column, `y` one per row. Columns beyond the rank are not
+    /// looked at.
     pub(super) fn solve_transposed(&self, t: &[f64], y: &mut [f64]) {
-        let rows = self.rows;
-        y[self.columns..].fill(0.0);
-        for j in 0..self.columns {
+        let (rows, rank) = (self.rows, self.diagonal.len());
+        y[rank..].fill(0.0);
+        for j in 0..rank {
             let above = &self.data[j * rows..j * rows + j];
             let sum: f64 = above.iter().zip(&y[..j]).map(|(r, y)| r * y).sum();
             y[j] = (t[self.pivots[j]] - sum) / self.diagonal[j];
         }
-        for (j, weight) in self.weights.iter().enumerate().rev() {
-            mirror(&self.data[j * rows + j..(j + 1) * rows], *weight, &mut y[j..]);
-        }
+        self.turn_back(y);
     }
 
     /// For every row of `A`: length of its part in the null space of `Aᵀ`.
@@ -133,9 +164,7 @@ impl Factor {
             unit.clear();
             unit.resize(rows, 0.0);
             unit[k] = 1.0;
-            for (j, weight) in self.weights.iter().enumerate().rev() {
-                mirror(&self.data[j * rows + j..(j + 1) * rows], *weight, &mut unit[j..]);
-            }
+            self.turn_back(&mut unit);
             squares.iter_mut().zip(&unit).for_each(|(s, u)| *s += u * u);
         }
         squares.into_iter().map(f64::sqrt).collect()

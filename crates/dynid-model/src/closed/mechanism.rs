@@ -74,6 +74,11 @@ impl ClosedMechanism {
         self
     }
 
+    /// The measure of singularity below which poses are refused.
+    pub fn least_measure(&self) -> f64 {
+        self.least_measure
+    }
+
     /// The tree.
     pub fn mechanism(&self) -> &Mechanism {
         &self.mechanism
@@ -163,6 +168,16 @@ impl ClosedMechanism {
     /// Positions of the independent coordinates at home.
     pub fn home_independent(&self) -> Vec<f64> {
         self.independent.iter().map(|r| self.home[self.position_of[*r]]).collect()
+    }
+
+    /// What makes the change of every rate a length: 1, or `L_c` (m) where it turns.
+    pub fn rate_scales(&self) -> &[f64] {
+        &self.rate_scale
+    }
+
+    /// Whether a rate belongs to a joint that floats.
+    pub fn floats(&self, rate: usize) -> bool {
+        self.floats[rate]
     }
 
     /// Position entry of a rate: its own, or the first of the seven of a floating joint.

@@ -13,9 +13,11 @@
 
 mod build;
 mod closure;
+mod displacement;
 mod dynamics;
 mod error;
 mod factor;
+mod free;
 mod mechanism;
 mod pose;
 mod reaction;
@@ -28,6 +30,7 @@ pub use closure::{ClosureDescription, Condition, CutKind, LinkFrame};
 pub(crate) use dynamics::Drives;
 pub use dynamics::{ClosedDynamics, ClosedEffort, ClosedRegressor};
 pub use error::{ClosedError, ClosedWarning, NamedMotion, PoseError};
+pub use free::FreeMotions;
 pub use mechanism::ClosedMechanism;
 pub use pose::PoseWorkspace;
 pub use reaction::ReactionRows;

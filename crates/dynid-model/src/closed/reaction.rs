@@ -3,6 +3,7 @@
 use super::dynamics::ClosedDynamics;
 use super::mechanism::ClosedMechanism;
 use super::pose::PoseWorkspace;
+use super::sweep::World;
 use crate::dynamics::motion::{BodyMotion, placement, step};
 use crate::dynamics::regressor::{TensorRows, general_row};
 use crate::spatial::Vec3;
@@ -92,11 +93,21 @@ impl ClosedMechanism {
         component: usize,
         out: &mut [f64],
     ) {
-        let joint = &pose.world.bodies[hanging[0]];
+        self.closure_entries_at(&pose.world, hanging, component, out);
+    }
+
+    pub(super) fn closure_entries_at(
+        &self,
+        world: &World<f64>,
+        hanging: &[usize],
+        component: usize,
+        out: &mut [f64],
+    ) {
+        let joint = &world.bodies[hanging[0]];
         let axis = joint.rotation.0[self.internal_axis(hanging[0], component % 3)];
         for (condition, entry) in out.iter_mut().enumerate() {
             *entry = 0.0;
-            self.rows.wrenches(&pose.world, condition, |node, wrench, side| {
+            self.rows.wrenches(world, condition, |node, wrench, side| {
                 if hanging.contains(&node) {
                     let moment = wrench.moment - joint.origin.cross(wrench.force);
                     *entry += side * axis.dot(if component < 3 { wrench.force } else { moment });

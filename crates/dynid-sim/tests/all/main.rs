@@ -2,6 +2,7 @@
 
 mod arm;
 mod clearance;
+mod closed;
 mod elastic;
 mod experiment;
 mod integration;

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
+mod free;
 mod golden;
 mod model;
 mod poses;
