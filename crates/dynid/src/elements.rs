@@ -310,6 +310,9 @@ impl ElementPlan {
             joint: names[*first].clone(),
             fault: fault.to_owned(),
         };
+        if self.closed.is_some() {
+            return Err(fault("it has no form for mechanisms with loops"));
+        }
         if self.is_measured() || rates.iter().any(|rate| *rate >= mechanism.rates()) {
             return Err(fault(
                 "it has no form for motors behind springs and for measured loads: no body acts on them",

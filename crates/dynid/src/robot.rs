@@ -172,6 +172,17 @@ fn closed(
     if file.closures.is_empty() {
         return Ok(None);
     }
+    if let Some(e) = file.elements.elastic.first() {
+        return Err(Error::Unsupported(format!(
+            "joint `{}` is elastic, and mechanisms with loops have stiff joints here: leave out `elastic`",
+            e.joint
+        )));
+    }
+    if mechanism.bodies().iter().any(|b| b.joint.name == dynid_model::mechanism::ROOT_JOINT) {
+        return Err(Error::Unsupported(
+            "a mechanism with loops stands on the ground: no floating base".to_owned(),
+        ));
+    }
     let moves = |name: &String| mechanism.bodies().iter().any(|b| b.joint.name == *name);
     file.home.retain(|(name, _)| moves(name));
     if let Some(driven) = &mut file.actuated {

@@ -105,7 +105,6 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
     if settings.mode == SimulateMode::ClosedLoop {
         refuse_elastic(robot, "simulated in closed loop")?;
         refuse_clearance(robot, "simulated in closed loop")?;
-        refuse_loops(robot, "simulated in closed loop")?;
     }
     if settings.mode == SimulateMode::ClosedLoop && plan.per_rate.iter().flatten().any(|name| name == LOAD) {
         return Err(Error::Unsupported(format!(

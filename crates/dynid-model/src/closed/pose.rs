@@ -258,7 +258,11 @@ impl ClosedMechanism {
     fn gap(&self, work: &PoseWorkspace) -> f64 {
         let size = |(r, s): (&f64, &f64)| (r * s).abs();
         // Not `max`, which would lose what is not a number.
-        work.residual.iter().zip(&self.row_scale).map(size).fold(0.0, |m, x| if x <= m { m } else { x })
+        work.residual
+            .iter()
+            .zip(&self.row_scale)
+            .map(size)
+            .fold(0.0, |m: f64, x| if x <= m || m.is_nan() { m } else { x })
     }
 
     /// Residuals, Jacobian and its factors at the positions of the workspace.
@@ -276,7 +280,7 @@ impl ClosedMechanism {
     fn solve_step(&self, work: &mut PoseWorkspace) -> f64 {
         self.solve_dependent(&work.factor, &mut work.right, &mut work.step);
         let scaled = self.dependent.iter().zip(&work.step).map(|(r, x)| (x * self.rate_scale[*r]).abs());
-        scaled.fold(0.0, |m, x| if x <= m { m } else { x })
+        scaled.fold(0.0, |m: f64, x| if x <= m || m.is_nan() { m } else { x })
     }
 
     /// Least-squares solution of `J_dependent x = right`, in SI units.

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use dynid_model::{EffortModel, RobotModel};
 use dynid_sim::{
-    ControlSettings, ExperimentSettings, Imperfections, Plant, Profile, Wanted, run, wrong_model,
+    ClosedPlant, ControlSettings, ExperimentSettings, Imperfections, Plant, Profile, Wanted, run, run_closed,
+    wrong_model,
 };
 
 use super::settings::SimulateSettings;
@@ -27,10 +28,8 @@ pub(super) fn experiment(
     if !(0.0..=1.0).contains(&table.model_error) {
         return Err(Error::setting("control.model_error", "0 to 1", table.model_error));
     }
-    let shape = model.parameters().shape_start();
-    let plant = |values: Vec<f64>| Plant::new(model.clone(), values, shape.clone(), plant_table.sign_width);
-    let nominal = plant(wrong_model(&values, table.model_error, settings.seed))?;
-    let mut truth = plant(values.clone())?;
+    let (shape, joints) = (model.parameters().shape_start(), names(&model));
+    let believed = wrong_model(&values, table.model_error, settings.seed);
     let wanted = |time: f64| -> Vec<Wanted> { reference.at(time) };
     let channels = model.channels().iter().map(|name| {
         let points = settings.channels.get(name).map_or(&[][..], Vec::as_slice);
@@ -44,15 +43,21 @@ pub(super) fn experiment(
         log_rate_hz: settings.rate_hz,
         tolerance: plant_table.tolerance,
         control: control(&model, &table, settings.rate_hz)?,
-        imperfections: imperfections(settings, &model.mechanism().rate_names())?,
+        imperfections: imperfections(settings, &joints)?,
         channels: channels.collect::<Result<_, _>>()?,
         seed: settings.seed,
     };
-    let result = run(&mut truth, &nominal, &wanted, &experiment)?;
+    let result = if model.closed().is_some() {
+        let plant = |values| ClosedPlant::new(model.clone(), values, shape.clone(), plant_table.sign_width);
+        run_closed(&mut plant(values.clone())?, &plant(believed)?, &wanted, &experiment)?
+    } else {
+        let plant = |values| Plant::new(model.clone(), values, shape.clone(), plant_table.sign_width);
+        run(&mut plant(values.clone())?, &plant(believed)?, &wanted, &experiment)?
+    };
     let log = result.log;
     let channels: Vec<(String, Vec<f64>)> = model.channels().iter().cloned().zip(log.channels).collect();
     Ok(SimulatedLog {
-        joints: model.mechanism().rate_names(),
+        joints,
         undriven: vec![false; model.outputs().len()],
         time: log.time,
         position: log.position,
@@ -77,12 +82,16 @@ pub(super) fn experiment(
     })
 }
 
+fn names(model: &RobotModel) -> Vec<String> {
+    model.joints().iter().map(|j| j.name.clone()).collect()
+}
+
 fn control(
     model: &RobotModel,
     table: &super::ControlTable,
     log_rate_hz: f64,
 ) -> Result<ControlSettings, Error> {
-    let joints = model.mechanism().rate_names();
+    let joints = names(model);
     let passive = table
         .passive
         .iter()

@@ -75,9 +75,8 @@ fn check_errors(name: &str, id: &Identification, truth: &[f64]) {
     let expected = id.base.values(truth);
     let quantile = t_quantile(0.995, id.blocks() as f64 - 1.0).unwrap();
     let deviations = id.standard_deviations();
-    let errors: Vec<f64> = (0..id.base.len())
-        .filter_map(|k| Some((id.fit().x[k] - expected[k]) / deviations[k].0?))
-        .collect();
+    let errors: Vec<f64> =
+        (0..id.base.len()).filter_map(|k| Some((id.fit().x[k] - expected[k]) / deviations[k].0?)).collect();
     let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
     let inside = errors.iter().filter(|e| e.abs() <= quantile).count();
     println!(

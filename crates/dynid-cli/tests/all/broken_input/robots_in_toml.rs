@@ -54,10 +54,12 @@ fn are_refused() {
         ),
         case(
             "bad.toml",
-            format!("{sound}\n[[loop]]\nname = \"pin\"\nkind = \"point\"\na = \"link6\"\nb = \"base\"\n"),
+            format!(
+                "{sound}\n[[loop]]\nname = \"rod\"\nkind = \"distance\"\na = \"link6\"\nb = \"base\"\nlength = 100.0\n"
+            ),
             "inspect bad.toml",
-            &["bad.toml", "loop `pin`", "not worked with yet"],
-            "",
+            &["bad.toml", "loop `rod`", "does not close", "gap"],
+            "home",
         ),
         case(
             "bad.toml",
