@@ -6,6 +6,7 @@ pub use expression::{linear_combination, significant};
 
 use faer::Mat;
 
+use crate::closed_model::{ClosedModel, Reaction};
 use crate::dynamics::MotionBlock;
 use crate::effort_model::{EffortModel, RegressorBlock};
 use crate::mechanism::Mechanism;
@@ -32,6 +33,15 @@ pub struct BaseSettings {
 impl Default for BaseSettings {
     fn default() -> Self {
         BaseSettings { tolerance: 1e-7, states: 0, seed: 1, preferred: Vec::new() }
+    }
+}
+
+impl BaseSettings {
+    fn states_for(&self, model: &dyn EffortModel) -> usize {
+        match self.states {
+            0 => 100.max((3 * model.layout().parameters()).div_ceil(model.outputs().len())),
+            n => n,
+        }
     }
 }
 
@@ -78,14 +88,34 @@ impl BaseParameters {
         shape: &[f64],
         settings: &BaseSettings,
     ) -> Self {
-        let columns = model.layout().parameters();
-        let states = match settings.states {
-            0 => 100.max((3 * columns).div_ceil(model.outputs().len())),
-            n => n,
-        };
         // What elements remember takes values of its own: any of them may come before a state.
-        let motion = RandomMotion::of(model, mechanism, states, settings.seed);
+        let motion = RandomMotion::of(model, mechanism, settings.states_for(model), settings.seed);
         motion.with_block(|block| Self::on_motion(model, block, shape, settings))
+    }
+
+    /// The same for any effort model, on [its own random states](EffortModel::random_motion).
+    pub fn of_model(model: &dyn EffortModel, shape: &[f64], settings: &BaseSettings) -> Self {
+        let motion = model.random_motion(settings.states_for(model), settings.seed);
+        motion.with_block(|block| Self::on_motion(model, block, shape, settings))
+    }
+
+    /// Analyses a closed mechanism of which reactions are known beside the efforts: measured, or felt through friction.
+    ///
+    /// Efforts alone tell combinations that belong to the mechanism; what reactions add belongs to the place of the cuts
+    /// (spec/mechanisms.md section 12).
+    pub fn with_reactions(
+        model: &ClosedModel,
+        reactions: &[Reaction],
+        shape: &[f64],
+        settings: &BaseSettings,
+    ) -> Self {
+        let motion = model.random_motion(settings.states_for(model), settings.seed);
+        let reactions = model.reactions(reactions);
+        let mut effort = RegressorBlock::new(model.layout().clone(), motion.samples());
+        let mut rows = RegressorBlock::new(reactions.layout().clone(), motion.samples());
+        motion
+            .with_block(|block| model.reaction_regressor(block, shape, &reactions, &mut effort, &mut rows));
+        Self::of_blocks(&[&effort, &rows], model.parameters(), settings)
     }
 
     /// Analyses an effort model on given motion.
@@ -95,18 +125,30 @@ impl BaseParameters {
         shape: &[f64],
         settings: &BaseSettings,
     ) -> Self {
-        let layout = model.layout().clone();
-        let mut block = RegressorBlock::new(layout.clone(), motion.samples);
+        let mut block = RegressorBlock::new(model.layout().clone(), motion.samples);
         model.regressor(motion, shape, &mut block);
-        let rows = layout.outputs() * motion.samples;
-        let mut stacked = vec![vec![0.0; rows]; layout.parameters()];
-        for output in 0..layout.outputs() {
-            for (k, &column) in layout.columns(output).iter().enumerate() {
-                stacked[column][output * motion.samples..][..motion.samples]
-                    .copy_from_slice(block.column(output, k));
+        Self::of_blocks(&[&block], model.parameters(), settings)
+    }
+
+    /// Analyses regressors in the same parameters, one below the other.
+    ///
+    /// # Panics
+    /// If a block has another number of parameters than the table.
+    pub fn of_blocks(blocks: &[&RegressorBlock], table: &ParameterTable, settings: &BaseSettings) -> Self {
+        let rows = blocks.iter().map(|b| b.layout().outputs() * b.samples()).sum();
+        let mut stacked = vec![vec![0.0; rows]; table.linear.len()];
+        let mut first = 0;
+        for block in blocks {
+            let (layout, samples) = (block.layout(), block.samples());
+            assert_eq!(layout.parameters(), table.linear.len(), "parameters of a regressor");
+            for output in 0..layout.outputs() {
+                for (k, &column) in layout.columns(output).iter().enumerate() {
+                    stacked[column][first..first + samples].copy_from_slice(block.column(output, k));
+                }
+                first += samples;
             }
         }
-        Self::of_columns(stacked, model.parameters(), settings)
+        Self::of_columns(stacked, table, settings)
     }
 
     /// Analyses the columns of a stacked regressor.

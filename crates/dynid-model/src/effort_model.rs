@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::ParameterTable;
+use crate::random_motion::RandomMotion;
 
 /// Which columns of the regressor can differ from zero, row by row.
 #[derive(Debug, Clone, PartialEq)]
@@ -229,6 +230,9 @@ pub trait EffortModel: Send + Sync {
         _out: &mut [f64],
     ) {
     }
+    /// Random states, with all that the model reads, for questions about structure that need no log: of closed mechanisms
+    /// closed poses. The same seed gives the same numbers.
+    fn random_motion(&self, samples: usize, seed: u64) -> RandomMotion;
     /// Number of entries of the position vector, number of rates.
     fn dimensions(&self) -> (usize, usize);
     /// For every coordinate without bodies, the last of the rates and of the positions: how far it travels per travel of a

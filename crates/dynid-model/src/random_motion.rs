@@ -37,16 +37,7 @@ impl RandomMotion {
         let rates = mechanism.rates();
         let dq = uniform(2.0, rates * samples);
         let ddq = uniform(5.0, rates * samples);
-        let channels = channels
-            .into_iter()
-            .map(|name| {
-                let mut values = uniform(1.0, samples);
-                if is_temperature(name) {
-                    values.iter_mut().for_each(|t| *t = 30.0 + 10.0 * *t);
-                }
-                (name.clone(), values)
-            })
-            .collect();
+        let channels = channel_values(channels, |range| uniform(range, samples));
         for body in mechanism.bodies() {
             if mechanism.follows().is_some() && body.joint.mimic.is_some() {
                 continue;
@@ -93,6 +84,20 @@ impl RandomMotion {
         self
     }
 
+    /// From positions, rates and accelerations, `[k * samples + s]`, and named channels.
+    pub(crate) fn from_parts(
+        samples: usize,
+        [q, dq, ddq]: [Vec<f64>; 3],
+        channels: Vec<(String, Vec<f64>)>,
+    ) -> Self {
+        RandomMotion { samples, q, dq, ddq, channels }
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
     /// Runs `work` on all samples as one block.
     pub fn with_block<T>(&self, work: impl FnOnce(&MotionBlock<'_>) -> T) -> T {
         let channels: Vec<(&str, &[f64])> =
@@ -108,6 +113,23 @@ impl RandomMotion {
             sign_width: 0.0,
         })
     }
+}
+
+/// Values in ±1 for named channels, temperatures in 20 .. 40 °C, from values in ± a range.
+pub(crate) fn channel_values<'a>(
+    names: impl IntoIterator<Item = &'a String>,
+    mut uniform: impl FnMut(f64) -> Vec<f64>,
+) -> Vec<(String, Vec<f64>)> {
+    names
+        .into_iter()
+        .map(|name| {
+            let mut values = uniform(1.0);
+            if is_temperature(name) {
+                values.iter_mut().for_each(|t| *t = 30.0 + 10.0 * *t);
+            }
+            (name.clone(), values)
+        })
+        .collect()
 }
 
 fn floating_positions(rng: &mut impl Rng, samples: usize) -> Vec<f64> {

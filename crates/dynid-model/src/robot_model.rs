@@ -20,6 +20,7 @@ use crate::element::{ElementColumns, JointElement, JointInfo};
 use crate::inertia::{PARAMETER_NAMES, PARAMETER_UNITS};
 use crate::mechanism::{Body, Mechanism};
 use crate::parameter::{Owner, Parameter, ParameterTable};
+use crate::random_motion::RandomMotion;
 pub use known::KnownElement;
 use known::PlacedKnown;
 pub use passivity::{FrictionPassivity, Passivity};
@@ -272,6 +273,11 @@ impl EffortModel for RobotModel {
         out: &mut [f64],
     ) {
         self.form_signals(motion, step_s, shape, history, stride, out);
+    }
+
+    /// As [`RandomMotion::of`].
+    fn random_motion(&self, samples: usize, seed: u64) -> RandomMotion {
+        RandomMotion::of(self, &self.mechanism, samples, seed)
     }
 
     fn dimensions(&self) -> (usize, usize) {

@@ -23,6 +23,8 @@ const SPREAD: f64 = 0.2;
 /// Change of a coordinate at home that is worth a word.
 const MOVED: f64 = 1e-3;
 const CLOSED: f64 = 1e-12;
+/// Smallest part of a step towards a closed pose that is tried.
+const SHORTEST: f64 = 1.0 / 1024.0;
 
 pub(super) fn build(
     mechanism: Mechanism,
@@ -286,13 +288,14 @@ impl ClosedMechanism {
         }
     }
 
-    /// The nearest closed pose, by Gauss-Newton steps of least norm on all coordinates.
+    /// The nearest closed pose, by Gauss-Newton steps of least norm on all coordinates, each shortened until it closes the
+    /// loops further.
     fn closed(&self, q: &[f64]) -> Result<Vec<f64>, ClosedError> {
         let all: Vec<usize> = (0..self.tree.rates).collect();
         let mut q = q.to_vec();
         let mut residual = vec![0.0; self.rows.len()];
+        let mut jacobian = self.residual_at(&q, &mut residual);
         for _ in 0..100 {
-            let jacobian = self.residual_at(&q, &mut residual);
             let scaled: Vec<f64> = residual.iter().zip(&self.row_scale).map(|(r, s)| -r * s).collect();
             let gap = scaled.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             if gap <= CLOSED {
@@ -304,9 +307,28 @@ impl ClosedMechanism {
             for (x, scale) in step.iter_mut().zip(&self.rate_scale) {
                 *x *= short / scale;
             }
-            self.move_by(&mut q, &step);
+            let size = |residual: &[f64]| -> f64 {
+                residual.iter().zip(&self.row_scale).map(|(r, s)| (r * s).powi(2)).sum()
+            };
+            let before = size(&residual);
+            let mut part = 1.0;
+            let (next, next_jacobian) = loop {
+                let mut next = q.clone();
+                self.move_by(&mut next, &step.iter().map(|x| part * x).collect::<Vec<_>>());
+                let jacobian = self.residual_at(&next, &mut residual);
+                // Near round-off nothing falls any more.
+                if size(&residual) <= before * (1.0 - 0.1 * part) || gap < 1e3 * CLOSED {
+                    break (next, jacobian);
+                }
+                part *= 0.5;
+                if part < SHORTEST {
+                    self.residual_at(&q, &mut residual);
+                    let (closure, gap) = self.largest_gap(&residual);
+                    return Err(ClosedError::NotClosed { closure, gap });
+                }
+            };
+            (q, jacobian) = (next, next_jacobian);
         }
-        self.residual_at(&q, &mut residual);
         let (closure, gap) = self.largest_gap(&residual);
         Err(ClosedError::NotClosed { closure, gap })
     }

@@ -15,7 +15,7 @@ const LONGEST: f64 = 0.5;
 /// Correction that a predicted pose may need, as a share of the step and beyond it.
 const CORRECTION: (f64, f64) = (0.3, 1e-3);
 /// Smallest part of the way to a pose that is tried.
-const SHORTEST: f64 = 1.0 / 4096.0;
+const SHORTEST: f64 = 1.0 / 65536.0;
 /// Flatness of the factors below which the measure of singularity is worked out.
 const DOUBTFUL: f64 = 10.0;
 

@@ -4,6 +4,7 @@ mod adjoint;
 mod expand;
 mod fold;
 mod loads;
+mod random_motion;
 mod reactions;
 
 use std::sync::Arc;
@@ -12,6 +13,7 @@ use crate::closed::{ClosedMechanism, Drives, PoseError};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
 use crate::parameter::ParameterTable;
+use crate::random_motion::RandomMotion;
 use crate::robot_model::RobotModel;
 use fold::Fold;
 use loads::Loads;
@@ -128,6 +130,10 @@ impl EffortModel for ClosedModel {
         expanded.with_block(motion, &pressed.channels(), |block| {
             self.tree.remember(block, step_s, shape, history, stride, out);
         });
+    }
+
+    fn random_motion(&self, samples: usize, seed: u64) -> RandomMotion {
+        self.random_states(samples, seed)
     }
 
     fn dimensions(&self) -> (usize, usize) {
