@@ -113,8 +113,7 @@ impl BaseParameters {
         let reactions = model.reactions(reactions);
         let mut effort = RegressorBlock::new(model.layout().clone(), motion.samples());
         let mut rows = RegressorBlock::new(reactions.layout().clone(), motion.samples());
-        motion
-            .with_block(|block| model.reaction_regressor(block, shape, &reactions, &mut effort, &mut rows));
+        motion.with_block(|block| model.reaction_regressor(block, shape, &reactions, &mut effort, &mut rows));
         Self::of_blocks(&[&effort, &rows], model.parameters(), settings)
     }
 

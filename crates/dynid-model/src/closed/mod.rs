@@ -16,6 +16,7 @@ mod closure;
 mod dynamics;
 mod error;
 mod factor;
+mod lu;
 mod mechanism;
 mod pose;
 mod reaction;

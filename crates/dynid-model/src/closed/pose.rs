@@ -6,7 +6,7 @@ use super::mechanism::ClosedMechanism;
 use super::sweep::World;
 
 /// Residual at which a pose counts as closed, m.
-const CLOSED: f64 = 1e-13;
+const CLOSED: f64 = 1e-14;
 /// The same where rounding keeps it from falling further.
 const STALLED: f64 = 1e-11;
 const ITERATIONS: usize = 12;
@@ -38,11 +38,35 @@ pub struct PoseWorkspace {
     pub(super) drift: Vec<f64>,
     right: Vec<f64>,
     step: Vec<f64>,
+    rights: Vec<f64>,
+    steps: Vec<f64>,
+    bend: Bend,
     before: Vec<f64>,
     from: Vec<f64>,
     /// Newton steps of the last search.
     iterations: usize,
     at_home: bool,
+}
+
+/// How far the last step led off its tangent: along a smooth path the next one does the same.
+#[derive(Clone, Debug)]
+struct Bend {
+    /// The step of the independent coordinates.
+    by: Vec<f64>,
+    /// What was added to the step of the dependent coordinates along the tangent.
+    sum: Vec<f64>,
+    /// Squared length of the step; `None` while there is none.
+    known: Option<f64>,
+}
+
+impl Bend {
+    /// Square of how many times as long as the last step the next one is, if it goes on the same way.
+    fn ratio(&self, next: impl Iterator<Item = f64> + Clone) -> Option<f64> {
+        let squared = self.known?;
+        let along = next.clone().zip(&self.by).map(|(a, b)| a * b).sum::<f64>() / squared;
+        let off: f64 = next.zip(&self.by).map(|(a, b)| (a - along * b).powi(2)).sum();
+        ((0.3..3.0).contains(&along) && off < 0.1 * squared).then_some(along * along)
+    }
 }
 
 impl PoseWorkspace {
@@ -98,6 +122,9 @@ impl ClosedMechanism {
             drift: vec![0.0; n],
             right: vec![0.0; m],
             step: vec![0.0; n - d],
+            rights: vec![0.0; m * d],
+            steps: vec![0.0; (n - d) * d],
+            bend: Bend { by: vec![0.0; d], sum: vec![0.0; n - d], known: None },
             before: Vec::new(),
             from: Vec::new(),
             iterations: 0,
@@ -111,6 +138,7 @@ impl ClosedMechanism {
     pub fn go_home(&self, work: &mut PoseWorkspace) {
         if !work.at_home {
             work.q.copy_from_slice(&self.home);
+            work.bend.known = None;
             self.evaluate(work);
             work.at_home = true;
         }
@@ -129,6 +157,7 @@ impl ClosedMechanism {
             return Err(PoseError::NotFinite { joint: self.joint_at(k) });
         }
         work.at_home = false;
+        work.bend.known = None;
         work.q.copy_from_slice(q);
         work.iterations = 0;
         self.evaluate(work);
@@ -202,27 +231,47 @@ impl ClosedMechanism {
     fn try_step(&self, work: &mut PoseWorkspace, start: &[f64], target: &[f64], next: f64) -> bool {
         let n = self.tree.rates;
         work.right.fill(0.0);
-        for (r, to) in self.independent.iter().zip(target) {
-            let position = self.position_of[*r];
-            let at = if next >= 1.0 { *to } else { start[position] + next * (to - start[position]) };
-            let by = at - work.q[position];
+        let target = self.independent.iter().zip(target).map(|(r, to)| {
+            let from = start[self.position_of[*r]];
+            if next >= 1.0 { *to } else { from + next * (to - from) }
+        });
+        let by = target.clone().zip(&self.independent).map(|(at, r)| at - work.q[self.position_of[*r]]);
+        let ratio = work.bend.ratio(by.clone());
+        work.bend.by.clear();
+        work.bend.by.extend(by);
+        for (r, by) in self.independent.iter().zip(&work.bend.by) {
             for (row, b) in work.right.iter_mut().enumerate() {
                 *b -= work.jacobian[row * n + r] * by;
             }
-            work.q[position] = at;
+        }
+        for (r, at) in self.independent.iter().zip(target) {
+            work.q[self.position_of[*r]] = at;
         }
         let predicted = self.solve_step(work);
+        match ratio {
+            Some(ratio) => {
+                for (x, sum) in work.step.iter_mut().zip(&mut work.bend.sum) {
+                    *sum *= ratio;
+                    *x += *sum;
+                }
+            }
+            None => work.bend.sum.fill(0.0),
+        }
+        work.bend.known = None;
         if predicted > LONGEST || predicted.is_nan() {
             return false;
         }
         self.apply_step(work, 1.0);
         self.evaluate(work);
-        match self.newton(work) {
+        let good = match self.newton(work) {
             Some(corrected) => {
                 corrected <= CORRECTION.0 * predicted + CORRECTION.1 && self.mode_of(work) == self.mode
             }
             None => false,
-        }
+        };
+        let squared: f64 = work.bend.by.iter().map(|x| x * x).sum();
+        work.bend.known = (good && squared > 0.0).then_some(squared);
+        good
     }
 
     /// Newton's method on the dependent coordinates from the pose evaluated last: by how much they moved, if the loops closed.
@@ -248,6 +297,7 @@ impl ClosedMechanism {
             let factor = (LONGEST / length).min(1.0);
             self.apply_step(work, factor);
             moved += factor * length;
+            work.bend.sum.iter_mut().zip(&work.step).for_each(|(sum, x)| *sum += factor * x);
             work.iterations += 1;
             self.evaluate(work);
         }
@@ -334,18 +384,19 @@ impl ClosedMechanism {
     /// Velocity map `G` at the pose; see [`PoseWorkspace::velocity_map`].
     pub fn map(&self, work: &mut PoseWorkspace) {
         let (n, d) = (self.tree.rates, self.independent.len());
+        let PoseWorkspace { factor, rights, steps, map, jacobian, .. } = work;
+        for ((row, b), s) in jacobian.chunks_exact(n).zip(rights.chunks_exact_mut(d)).zip(&self.row_scale) {
+            b.iter_mut().zip(&self.independent).for_each(|(b, rate)| *b = -s * row[*rate]);
+        }
+        factor.solve_many(d, rights, steps);
+        for (rate, x) in self.dependent.iter().zip(steps.chunks_exact(d)) {
+            let scale = 1.0 / self.rate_scale[*rate];
+            map[rate * d..][..d].iter_mut().zip(x).for_each(|(g, x)| *g = scale * x);
+        }
         for (column, rate) in self.independent.iter().enumerate() {
-            for (row, b) in work.right.iter_mut().enumerate() {
-                *b = -work.jacobian[row * n + rate];
-            }
-            let PoseWorkspace { factor, right, step, map, .. } = work;
-            self.solve_dependent(factor, right, step);
-            for (r, x) in self.dependent.iter().zip(step) {
-                map[r * d + column] = *x;
-            }
-            for (other, r) in self.independent.iter().enumerate() {
-                map[r * d + column] = if other == column { 1.0 } else { 0.0 };
-            }
+            let row = &mut map[rate * d..][..d];
+            row.fill(0.0);
+            row[column] = 1.0;
         }
     }
 

@@ -73,8 +73,7 @@ fn a_mass_moved_across_a_pin_is_felt_by_the_cut_only() {
         direction
     };
     let tree = at(&[(1, M, 1.0), (0, MX, -l1), (0, IZZ, -l1 * l1)]);
-    let cut =
-        at(&[(1, M, 1.0), (1, MX, l2), (1, IZZ, l2 * l2), (2, MX, -l3), (2, IZZ, -l3 * l3)]);
+    let cut = at(&[(1, M, 1.0), (1, MX, l2), (1, IZZ, l2 * l2), (2, MX, -l3), (2, IZZ, -l3 * l3)]);
     let known = felt(&model, &multipliers(&model), &model.tree().mechanism().inertia_vector());
     let [size, pressing] = known.map(|v| largest(&v));
     for (direction, seen) in [(tree, false), (cut, true)] {

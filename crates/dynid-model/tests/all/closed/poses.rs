@@ -55,9 +55,10 @@ fn a_start_next_to_home_closes_in_a_few_steps() {
             most = most.max(work.iterations());
             check_close(work.positions(), machine.home(), 1e-9, 0.0, name);
 
-            let home = machine.mechanism().bodies().iter().map(|b| {
-                (b.joint.name.clone(), q[b.position..b.position + b.joint.positions()].to_vec())
-            });
+            let home =
+                machine.mechanism().bodies().iter().map(|b| {
+                    (b.joint.name.clone(), q[b.position..b.position + b.joint.positions()].to_vec())
+                });
             let moved = Robot { home: home.collect(), ..stated.clone() }.close();
             check_close(moved.home(), machine.home(), 1e-9, 0.0, name);
             assert!(matches!(moved.warnings(), [ClosedWarning::HomeMoved { .. }]), "{:?}", moved.warnings());
@@ -101,7 +102,9 @@ fn a_path_takes_two_steps_a_sample_at_most() {
 
 #[test]
 fn a_large_step_leads_where_small_ones_do() {
-    for (name, way) in [("fourbar", 3.0), ("fivebar", -0.8), ("prr3", 0.05), ("delta", 0.5), ("stewart", 0.08)] {
+    for (name, way) in
+        [("fourbar", 3.0), ("fivebar", -0.8), ("prr3", 0.05), ("delta", 0.5), ("stewart", 0.08)]
+    {
         let machine = robot(name).close();
         let home = machine.home_independent();
         let at = |share: f64| -> Vec<f64> {
@@ -128,7 +131,10 @@ fn a_pose_of_the_other_assembly_is_refused() {
     let line = (-y).atan2(0.4 - x);
     let mirrored = [*crank, 2.0 * line - (crank + coupler) - crank, 2.0 * line - rocker];
     assert_eq!(machine.take(&mut work, &mirrored), Err(PoseError::OtherMode));
-    assert_eq!(PoseError::OtherMode.to_string(), "the pose belongs to another assembly mode than the home position");
+    assert_eq!(
+        PoseError::OtherMode.to_string(),
+        "the pose belongs to another assembly mode than the home position"
+    );
     // A workspace that was refused a pose finds its way back.
     machine.go_home(&mut work);
     machine.reach(&mut work, &[1.0]).unwrap();
@@ -150,12 +156,8 @@ fn poses_out_of_reach_name_the_loop() {
     assert_eq!(fault, PoseError::NotFinite { joint: "left_crank".into() });
 
     let model = robot("fivebar").model();
-    let motion = Motion {
-        samples: 3,
-        q: vec![2.2, 3.1, 2.2, 0.8, 0.0, 0.8],
-        dq: vec![0.1; 6],
-        ddq: vec![0.1; 6],
-    };
+    let motion =
+        Motion { samples: 3, q: vec![2.2, 3.1, 2.2, 0.8, 0.0, 0.8], dq: vec![0.1; 6], ddq: vec![0.1; 6] };
     let fault = model.follow(&motion.block(), |_, _| ()).unwrap_err();
     assert_eq!(fault.sample, 1);
     assert!(fault.to_string().starts_with("sample 1: the loops cannot close"), "{fault}");

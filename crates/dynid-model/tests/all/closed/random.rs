@@ -38,16 +38,9 @@ fn condition(rng: &mut impl Rng, mechanism: &Mechanism, at: &[Placement], joints
             _ => Placement::identity(),
         };
         let meeting = world(&a.link).then(&a.placement).then(&away);
-        b.placement = inverse(&world(&b.link)).then(&meeting);
+        b.placement = world(&b.link).inverse().then(&meeting);
     }
     Condition::Joint { kind, a, b }
-}
-
-fn inverse(at: &Placement) -> Placement {
-    let columns = at.rotation.0;
-    let rotation = Mat3([0, 1, 2].map(|k| Vec3(columns.map(|c| c.0[k]))));
-    let translation = rotation.mul_vec(at.translation).scale(-1.0);
-    Placement { rotation, translation }
 }
 
 fn link(rng: &mut impl Rng, joints: usize) -> String {
@@ -76,15 +69,14 @@ fn loops_on_random_trees_are_closed_or_refused() {
                 condition: condition(rng, &mechanism, &at, joints),
             })
             .collect();
-        let names: Vec<String> = (0..rng.random_range(1..4)).map(|_| format!("j{}", rng.random_range(1..=joints))).collect();
+        let names: Vec<String> =
+            (0..rng.random_range(1..4)).map(|_| format!("j{}", rng.random_range(1..=joints))).collect();
         let driven = rng.random_bool(0.3).then_some(names.as_slice());
         let home: Vec<(String, Vec<f64>)> = mechanism
             .bodies()
             .iter()
             .filter(|_| rng.random_bool(0.95))
-            .map(|b| {
-                (b.joint.name.clone(), state.q[b.position..b.position + b.joint.positions()].to_vec())
-            })
+            .map(|b| (b.joint.name.clone(), state.q[b.position..b.position + b.joint.positions()].to_vec()))
             .collect();
         let machine = match ClosedMechanism::new(mechanism, closures, driven, &home) {
             Ok(machine) => machine,
@@ -101,7 +93,8 @@ fn loops_on_random_trees_are_closed_or_refused() {
         let d = machine.mobility();
         let mut dynamics = ClosedDynamics::new(machine);
         for step in 0..5 {
-            let target: Vec<f64> = home.iter().map(|h| h + 0.1 * f64::from(step) * numbers::<1>(rng)[0]).collect();
+            let target: Vec<f64> =
+                home.iter().map(|h| h + 0.1 * f64::from(step) * numbers::<1>(rng)[0]).collect();
             if dynamics.reach(&target).is_err() {
                 continue;
             }
