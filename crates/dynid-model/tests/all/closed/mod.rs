@@ -1,6 +1,6 @@
 //! Closed mechanisms.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
 
 mod balance;
 mod base;
