@@ -4,11 +4,12 @@ use faer::Mat;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::bend::float;
 use super::closure::ClosureDescription;
 use super::error::{ClosedError, ClosedWarning};
 use super::factor::Factor;
 use super::mechanism::ClosedMechanism;
-use super::pose::{PoseWorkspace, float};
+use super::pose::PoseWorkspace;
 use super::rows::Rows;
 use super::singularity::smallest;
 use crate::description::JointKind;

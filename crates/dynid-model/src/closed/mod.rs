@@ -11,6 +11,7 @@
 //! where `S` selects driven coordinates and `λ` are the multipliers: forces (N) and couples (N m) in the cuts. Positive `λ` of a
 //! translation row pushes the body of frame `b` along that axis of frame `a`.
 
+mod bend;
 mod build;
 mod closure;
 mod dynamics;
