@@ -23,6 +23,10 @@ const SPREAD: f64 = 0.2;
 /// Change of a coordinate at home that is worth a word.
 const MOVED: f64 = 1e-3;
 const CLOSED: f64 = 1e-12;
+/// The same where steps along all of them do not close the loops further.
+const STRETCHED: f64 = 0.1;
+/// Smallest part of a step towards a closed pose that is tried.
+const SHORTEST: f64 = 1.0 / 1024.0;
 
 pub(super) fn build(
     mechanism: Mechanism,
@@ -210,7 +214,7 @@ impl ClosedMechanism {
         // Rows that are wanted most come first: those of largest part outside of the others.
         let mut order = Factor::default();
         let transposed = self.scaled(&work.jacobian, &self.dependent);
-        order.factor(n.max(m), m, |i, j| if i < rank { transposed[(j, i)] } else { 0.0 });
+        order.reflect_all(n.max(m), m, |i, j| if i < rank { transposed[(j, i)] } else { 0.0 });
         let mut kept = order.pivots()[..rank].to_vec();
         kept.sort_unstable();
         self.mode_rows = kept;
@@ -276,27 +280,59 @@ impl ClosedMechanism {
         Ok(poses)
     }
 
-    /// The nearest closed pose, by Gauss-Newton steps of least norm on all coordinates.
+    /// The nearest closed pose, by Gauss-Newton steps of least norm on all coordinates, each shortened until it closes the
+    /// loops further.
     fn closed(&self, q: &[f64]) -> Result<Vec<f64>, ClosedError> {
         let all: Vec<usize> = (0..self.tree.rates).collect();
         let mut q = q.to_vec();
         let mut residual = vec![0.0; self.rows.len()];
+        let mut jacobian = self.residual_at(&q, &mut residual);
+        let mut cut = RANK;
         for _ in 0..100 {
-            let jacobian = self.residual_at(&q, &mut residual);
             let scaled: Vec<f64> = residual.iter().zip(&self.row_scale).map(|(r, s)| -r * s).collect();
             let gap = scaled.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             if gap <= CLOSED {
                 return Ok(q);
             }
-            let mut step = least_norm(&self.scaled(&jacobian, &all), &scaled);
+            let mut step = least_norm(&self.scaled(&jacobian, &all), &scaled, cut);
             let longest = step.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let short = (0.5 * self.length / longest).min(1.0);
             for (x, scale) in step.iter_mut().zip(&self.rate_scale) {
                 *x *= short / scale;
             }
-            self.displace(&mut q, &step);
+            let size = |residual: &[f64]| -> f64 {
+                residual.iter().zip(&self.row_scale).map(|(r, s)| (r * s).powi(2)).sum()
+            };
+            let before = size(&residual);
+            let mut part = 1.0;
+            let better = loop {
+                let mut next = q.clone();
+                self.displace(&mut next, &step.iter().map(|x| part * x).collect::<Vec<_>>());
+                let jacobian = self.residual_at(&next, &mut residual);
+                // Near round-off nothing falls any more.
+                if size(&residual) <= before * (1.0 - 0.1 * part) || gap < 1e3 * CLOSED {
+                    break Some((next, jacobian));
+                }
+                part *= 0.5;
+                if part < SHORTEST {
+                    break None;
+                }
+            };
+            match better {
+                Some(better) => {
+                    (q, jacobian) = better;
+                    cut = RANK;
+                }
+                None => {
+                    // Nearly singular directions lead nowhere: without them.
+                    self.residual_at(&q, &mut residual);
+                    if cut > RANK {
+                        break;
+                    }
+                    cut = STRETCHED;
+                }
+            }
         }
-        self.residual_at(&q, &mut residual);
         let (closure, gap) = self.largest_gap(&residual);
         Err(ClosedError::NotClosed { closure, gap })
     }
@@ -337,14 +373,14 @@ fn rank_of(values: &[f64]) -> usize {
     values.iter().filter(|v| **v > RANK * largest).count()
 }
 
-/// `A⁺ b`.
-fn least_norm(matrix: &Mat<f64>, b: &[f64]) -> Vec<f64> {
+/// `A⁺ b`, without singular values below a share of the largest.
+fn least_norm(matrix: &Mat<f64>, b: &[f64], cut: f64) -> Vec<f64> {
     let mut x = vec![0.0; matrix.ncols()];
     let Ok(svd) = matrix.svd() else { return vec![f64::NAN; matrix.ncols()] };
     let (u, s, v) = (svd.U(), svd.S().column_vector(), svd.V());
     let largest = s.iter().fold(0.0_f64, |m, x| m.max(*x));
     for k in 0..s.nrows() {
-        if s[k] > RANK * largest {
+        if s[k] > cut * largest {
             let along = b.iter().enumerate().map(|(i, b)| u[(i, k)] * b).sum::<f64>() / s[k];
             x.iter_mut().enumerate().for_each(|(i, x)| *x += along * v[(i, k)]);
         }

@@ -1,7 +1,7 @@
 //! Finite displacements: coordinates of a chart around a pose, one per rate.
 
+use super::bend::float;
 use super::mechanism::ClosedMechanism;
-use super::pose::float;
 use crate::spatial::Vec3;
 
 impl ClosedMechanism {

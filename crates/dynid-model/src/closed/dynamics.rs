@@ -93,9 +93,17 @@ impl Drives {
 }
 
 impl ClosedMechanism {
-    /// Least-squares solution `x` of `J_dependent x = right` at a pose; `right` is overwritten.
-    pub(crate) fn solve(&self, pose: &PoseWorkspace, right: &mut [f64], x: &mut [f64]) {
-        self.solve_dependent(&pose.factor, right, x);
+    /// Least-squares solutions of `J_dependent x = right` at a pose for `count` right-hand sides, row after row, as are the
+    /// solutions; `right` is overwritten.
+    pub(crate) fn solve_many(&self, pose: &PoseWorkspace, count: usize, right: &mut [f64], x: &mut [f64]) {
+        for (b, s) in right.chunks_exact_mut(count).zip(&self.row_scale) {
+            b.iter_mut().for_each(|b| *b *= s);
+        }
+        pose.factor.solve_many(count, right, x);
+        for (x, rate) in x.chunks_exact_mut(count).zip(&self.dependent) {
+            let scale = 1.0 / self.rate_scale[*rate];
+            x.iter_mut().for_each(|x| *x *= scale);
+        }
     }
 
     /// `Gᵀ t` at a pose, of efforts of all rates of the tree.

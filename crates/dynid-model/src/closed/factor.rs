@@ -1,6 +1,8 @@
-//! Orthogonal factors of small matrices.
+//! Factors of small matrices.
 
-/// `A P = Q R` by Householder reflections with column exchanges, reusable.
+use super::lu::Lu;
+
+/// `A P = Q R` by Householder reflections with column exchanges, or for a square matrix `P A = L U`; reusable.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Factor {
     rows: usize,
@@ -12,15 +14,28 @@ pub(super) struct Factor {
     weights: Vec<f64>,
     pivots: Vec<usize>,
     exchanges: usize,
+    square: bool,
+    lu: Lu,
 }
 
 impl Factor {
     /// Factors a matrix with at least as many rows as columns.
     pub(super) fn factor(&mut self, rows: usize, columns: usize, matrix: impl Fn(usize, usize) -> f64) {
+        if rows == columns {
+            (self.rows, self.columns, self.square) = (rows, columns, true);
+            self.lu.factor(rows, matrix);
+        } else {
+            self.factor_to(columns, (rows, columns), matrix);
+        }
+    }
+
+    /// Factors a matrix by reflections, also a square one: columns are taken by what is left of them.
+    pub(super) fn reflect_all(&mut self, rows: usize, columns: usize, matrix: impl Fn(usize, usize) -> f64) {
         self.factor_to(columns, (rows, columns), matrix);
     }
 
-    /// Factors a matrix of given rank and any shape: after `rank` columns the others are taken to depend on them.
+    /// Factors a matrix of given rank and any shape by reflections: after `rank` columns the others are taken to depend on
+    /// them.
     pub(super) fn factor_to(
         &mut self,
         rank: usize,
@@ -28,7 +43,7 @@ impl Factor {
         matrix: impl Fn(usize, usize) -> f64,
     ) {
         debug_assert!(rank <= rows.min(columns), "rank {rank} of {rows} rows and {columns} columns");
-        (self.rows, self.columns, self.exchanges) = (rows, columns, 0);
+        (self.rows, self.columns, self.exchanges, self.square) = (rows, columns, 0, false);
         self.data.clear();
         for j in 0..columns {
             self.data.extend((0..rows).map(|i| matrix(i, j)));
@@ -78,9 +93,12 @@ impl Factor {
         }
     }
 
-    /// Smallest over largest entry of the diagonal of `R`; 1 for a matrix without columns. A cheap stand-in for the
-    /// inverse of the condition: at most a small factor too large.
+    /// Smallest over largest singular value, but for a small factor; 1 for a matrix without columns.
     pub(super) fn flatness(&self) -> f64 {
+        if self.square && self.columns > 0 {
+            return self.lu.flatness();
+        }
+        // By the diagonal of R.
         let size = |x: &f64| x.abs();
         let largest = self.diagonal.iter().map(size).fold(0.0, f64::max);
         let smallest = self.diagonal.iter().map(size).fold(f64::INFINITY, f64::min);
@@ -100,6 +118,9 @@ impl Factor {
 
     /// Sign of the determinant of a square matrix.
     pub(super) fn sign(&self) -> f64 {
+        if self.square {
+            return self.lu.sign();
+        }
         let reflections = self.weights.iter().filter(|w| **w > 0.0).count();
         let turns = self.exchanges + reflections + self.diagonal.iter().filter(|d| **d < 0.0).count();
         if turns.is_multiple_of(2) { 1.0 } else { -1.0 }
@@ -131,6 +152,9 @@ impl Factor {
     /// The least-squares solution of `A x = b`: `b` has one entry per row and is overwritten, `x` one per column.
     /// Columns beyond the rank are not written.
     pub(super) fn solve(&self, b: &mut [f64], x: &mut [f64]) {
+        if self.square {
+            return self.lu.solve(b, x);
+        }
         let rows = self.rows;
         self.turn(b);
         for j in (0..self.diagonal.len()).rev() {
@@ -142,9 +166,25 @@ impl Factor {
         }
     }
 
+    /// The same for `count` right-hand sides, which lie row after row, as do the solutions.
+    pub(super) fn solve_many(&self, count: usize, b: &[f64], x: &mut [f64]) {
+        if self.square {
+            return self.lu.solve_many(count, b, x);
+        }
+        let (mut right, mut solution) = (vec![0.0; self.rows], vec![0.0; self.columns]);
+        for k in 0..count {
+            right.iter_mut().zip(b.iter().skip(k).step_by(count)).for_each(|(r, b)| *r = *b);
+            self.solve(&mut right, &mut solution);
+            x.iter_mut().skip(k).step_by(count).zip(&solution).for_each(|(x, s)| *x = *s);
+        }
+    }
+
     /// The shortest solution of `Aᵀ y = t`: `t` has one entry per column, `y` one per row. Columns beyond the rank are not
     /// looked at.
     pub(super) fn solve_transposed(&self, t: &[f64], y: &mut [f64]) {
+        if self.square {
+            return self.lu.solve_transposed(t, y);
+        }
         let (rows, rank) = (self.rows, self.diagonal.len());
         y[rank..].fill(0.0);
         for j in 0..rank {
@@ -207,6 +247,32 @@ mod tests {
     }
 
     #[test]
+    fn square_matrices_are_solved_by_either_kind_of_factors() {
+        let matrix =
+            [[0.0, 2.0, -1.0, 0.0], [0.5, -3.0, 2.0, 0.1], [4.0, 0.0, 1.0, -2.0], [0.0, 0.0, 1.0, 3.0]];
+        let (mut lu, mut qr) = (Factor::default(), Factor::default());
+        lu.factor(4, 4, |i, j| matrix[i][j]);
+        qr.reflect_all(4, 4, |i, j| matrix[i][j]);
+        assert_eq!(lu.sign(), qr.sign());
+        assert!((0.2..5.0).contains(&(lu.flatness() / qr.flatness())), "{} {}", lu.flatness(), qr.flatness());
+        let right = [1.0, -2.0, 0.5, 3.0];
+        let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-13);
+        let (mut x, mut y) = ([[0.0; 4]; 2], [[0.0; 4]; 2]);
+        for (k, factor) in [&lu, &qr].into_iter().enumerate() {
+            factor.solve(&mut right.clone(), &mut x[k]);
+            factor.solve_transposed(&right, &mut y[k]);
+        }
+        assert!(close(&x[0], &x[1]) && close(&y[0], &y[1]), "{x:?} {y:?}");
+        let both: Vec<f64> = right.iter().flat_map(|r| [*r, -3.0 * r]).collect();
+        for factor in [&lu, &qr] {
+            let mut solutions = [0.0; 8];
+            factor.solve_many(2, &both, &mut solutions);
+            let expected: Vec<f64> = x[0].iter().flat_map(|x| [*x, -3.0 * x]).collect();
+            assert!(solutions.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-13), "{solutions:?}");
+        }
+    }
+
+    #[test]
     fn signs_are_those_of_determinants() {
         for (matrix, sign) in [
             ([[0.0, 1.0], [1.0, 0.0]], -1.0),
@@ -223,6 +289,8 @@ mod tests {
     fn missing_rank_is_seen() {
         let mut factor = Factor::default();
         factor.factor(3, 2, |i, j| (i + 1) as f64 * (j + 1) as f64);
+        assert!(factor.flatness() < 1e-14);
+        factor.factor(3, 3, |i, j| 0.1 * (i + 1) as f64 * (j + 1) as f64 + (i * j) as f64);
         assert!(factor.flatness() < 1e-14);
     }
 }

@@ -11,6 +11,7 @@
 //! where `S` selects driven coordinates and `λ` are the multipliers: forces (N) and couples (N m) in the cuts. Positive `λ` of a
 //! translation row pushes the body of frame `b` along that axis of frame `a`.
 
+mod bend;
 mod build;
 mod closure;
 mod displacement;
@@ -18,6 +19,7 @@ mod dynamics;
 mod error;
 mod factor;
 mod free;
+mod lu;
 mod mechanism;
 mod pose;
 mod reaction;

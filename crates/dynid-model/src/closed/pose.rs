@@ -1,12 +1,13 @@
 //! Closed poses: Newton's method, and continuation from pose to pose (spec/mechanisms.md section 11).
 
+use super::bend::{Bend, float};
 use super::error::{NamedMotion, PoseError};
 use super::factor::Factor;
 use super::mechanism::ClosedMechanism;
 use super::sweep::World;
 
 /// Residual at which a pose counts as closed, m.
-const CLOSED: f64 = 1e-13;
+const CLOSED: f64 = 1e-14;
 /// The same where rounding keeps it from falling further.
 const STALLED: f64 = 1e-11;
 const ITERATIONS: usize = 12;
@@ -15,7 +16,7 @@ const LONGEST: f64 = 0.5;
 /// Correction that a predicted pose may need, as a share of the step and beyond it.
 const CORRECTION: (f64, f64) = (0.3, 1e-3);
 /// Smallest part of the way to a pose that is tried.
-const SHORTEST: f64 = 1.0 / 4096.0;
+const SHORTEST: f64 = 1.0 / 65536.0;
 /// Flatness of the factors below which the measure of singularity is worked out.
 const DOUBTFUL: f64 = 10.0;
 
@@ -38,6 +39,9 @@ pub struct PoseWorkspace {
     pub(super) drift: Vec<f64>,
     right: Vec<f64>,
     step: Vec<f64>,
+    rights: Vec<f64>,
+    steps: Vec<f64>,
+    bend: Bend,
     before: Vec<f64>,
     from: Vec<f64>,
     /// Newton steps of the last search.
@@ -98,6 +102,9 @@ impl ClosedMechanism {
             drift: vec![0.0; n],
             right: vec![0.0; m],
             step: vec![0.0; n - d],
+            rights: vec![0.0; m * d],
+            steps: vec![0.0; (n - d) * d],
+            bend: Bend { by: vec![0.0; d], sum: vec![0.0; n - d], known: None },
             before: Vec::new(),
             from: Vec::new(),
             iterations: 0,
@@ -111,6 +118,7 @@ impl ClosedMechanism {
     pub fn go_home(&self, work: &mut PoseWorkspace) {
         if !work.at_home {
             work.q.copy_from_slice(&self.home);
+            work.bend.known = None;
             self.evaluate(work);
             work.at_home = true;
         }
@@ -129,6 +137,7 @@ impl ClosedMechanism {
             return Err(PoseError::NotFinite { joint: self.joint_at(k) });
         }
         work.at_home = false;
+        work.bend.known = None;
         work.q.copy_from_slice(q);
         work.iterations = 0;
         self.evaluate(work);
@@ -202,27 +211,47 @@ impl ClosedMechanism {
     fn try_step(&self, work: &mut PoseWorkspace, start: &[f64], target: &[f64], next: f64) -> bool {
         let n = self.tree.rates;
         work.right.fill(0.0);
-        for (r, to) in self.independent.iter().zip(target) {
-            let position = self.position_of[*r];
-            let at = if next >= 1.0 { *to } else { start[position] + next * (to - start[position]) };
-            let by = at - work.q[position];
+        let target = self.independent.iter().zip(target).map(|(r, to)| {
+            let from = start[self.position_of[*r]];
+            if next >= 1.0 { *to } else { from + next * (to - from) }
+        });
+        let by = target.clone().zip(&self.independent).map(|(at, r)| at - work.q[self.position_of[*r]]);
+        let ratio = work.bend.ratio(by.clone());
+        work.bend.by.clear();
+        work.bend.by.extend(by);
+        for (r, by) in self.independent.iter().zip(&work.bend.by) {
             for (row, b) in work.right.iter_mut().enumerate() {
                 *b -= work.jacobian[row * n + r] * by;
             }
-            work.q[position] = at;
+        }
+        for (r, at) in self.independent.iter().zip(target) {
+            work.q[self.position_of[*r]] = at;
         }
         let predicted = self.solve_step(work);
+        match ratio {
+            Some(ratio) => {
+                for (x, sum) in work.step.iter_mut().zip(&mut work.bend.sum) {
+                    *sum *= ratio;
+                    *x += *sum;
+                }
+            }
+            None => work.bend.sum.fill(0.0),
+        }
+        work.bend.known = None;
         if predicted > LONGEST || predicted.is_nan() {
             return false;
         }
         self.apply_step(work, 1.0);
         self.evaluate(work);
-        match self.newton(work) {
+        let good = match self.newton(work) {
             Some(corrected) => {
                 corrected <= CORRECTION.0 * predicted + CORRECTION.1 && self.mode_of(work) == self.mode
             }
             None => false,
-        }
+        };
+        let squared: f64 = work.bend.by.iter().map(|x| x * x).sum();
+        work.bend.known = (good && squared > 0.0).then_some(squared);
+        good
     }
 
     /// Newton's method on the dependent coordinates from the pose evaluated last: by how much they moved, if the loops closed.
@@ -248,6 +277,7 @@ impl ClosedMechanism {
             let factor = (LONGEST / length).min(1.0);
             self.apply_step(work, factor);
             moved += factor * length;
+            work.bend.sum.iter_mut().zip(&work.step).for_each(|(sum, x)| *sum += factor * x);
             work.iterations += 1;
             self.evaluate(work);
         }
@@ -338,18 +368,19 @@ impl ClosedMechanism {
     /// Velocity map `G` at the pose; see [`PoseWorkspace::velocity_map`].
     pub fn map(&self, work: &mut PoseWorkspace) {
         let (n, d) = (self.tree.rates, self.independent.len());
+        let PoseWorkspace { factor, rights, steps, map, jacobian, .. } = work;
+        for ((row, b), s) in jacobian.chunks_exact(n).zip(rights.chunks_exact_mut(d)).zip(&self.row_scale) {
+            b.iter_mut().zip(&self.independent).for_each(|(b, rate)| *b = -s * row[*rate]);
+        }
+        factor.solve_many(d, rights, steps);
+        for (rate, x) in self.dependent.iter().zip(steps.chunks_exact(d)) {
+            let scale = 1.0 / self.rate_scale[*rate];
+            map[rate * d..][..d].iter_mut().zip(x).for_each(|(g, x)| *g = scale * x);
+        }
         for (column, rate) in self.independent.iter().enumerate() {
-            for (row, b) in work.right.iter_mut().enumerate() {
-                *b = -work.jacobian[row * n + rate];
-            }
-            let PoseWorkspace { factor, right, step, map, .. } = work;
-            self.solve_dependent(factor, right, step);
-            for (r, x) in self.dependent.iter().zip(step) {
-                map[r * d + column] = *x;
-            }
-            for (other, r) in self.independent.iter().enumerate() {
-                map[r * d + column] = if other == column { 1.0 } else { 0.0 };
-            }
+            let row = &mut map[rate * d..][..d];
+            row.fill(0.0);
+            row[column] = 1.0;
         }
     }
 
@@ -440,32 +471,4 @@ impl ClosedMechanism {
         named.truncate(6);
         NamedMotion(named)
     }
-}
-
-/// Moves a floating joint by body rates over a unit of time; the quaternion stays of length one.
-pub(super) fn float(q: &mut [f64], rates: &[f64; 6]) {
-    let [x, y, z, w] = [q[3], q[4], q[5], q[6]];
-    let rotate = |v: [f64; 3]| {
-        let cross = |a: [f64; 3], b: [f64; 3]| {
-            [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-        };
-        let t = cross([x, y, z], v).map(|c| 2.0 * c);
-        let u = cross([x, y, z], t);
-        [v[0] + w * t[0] + u[0], v[1] + w * t[1] + u[1], v[2] + w * t[2] + u[2]]
-    };
-    let moved = rotate([rates[0], rates[1], rates[2]]);
-    q.iter_mut().zip(moved).for_each(|(q, m)| *q += m);
-    let turn = [rates[3], rates[4], rates[5]];
-    let angle = turn.iter().map(|t| t * t).sum::<f64>().sqrt();
-    // sin(a/2)/a, by its series near zero.
-    let half = if angle > 1e-4 { (0.5 * angle).sin() / angle } else { 0.5 - angle * angle / 48.0 };
-    let ([a, b, c], d) = (turn.map(|t| t * half), (0.5 * angle).cos());
-    let product = [
-        w * a + x * d + y * c - z * b,
-        w * b - x * c + y * d + z * a,
-        w * c + x * b - y * a + z * d,
-        w * d - x * a - y * b - z * c,
-    ];
-    let norm = product.iter().map(|p| p * p).sum::<f64>().sqrt();
-    q[3..].iter_mut().zip(product).for_each(|(q, p)| *q = p / norm);
 }

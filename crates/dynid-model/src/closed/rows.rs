@@ -382,3 +382,6 @@ fn coordinates(
     }
     Ok(Cut::Coordinates { terms: compiled, constant })
 }
+
+#[cfg(test)]
+mod tests;

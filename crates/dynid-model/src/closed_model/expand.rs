@@ -18,14 +18,14 @@ pub(super) struct Expanded {
 impl Expanded {
     /// Hands on the motion of the tree with gravity and channels of the block that it came from.
     ///
-    /// `more`: channels beside those of the block.
+    /// `more`: channels beside those of the block, in place of channels of the same name.
     pub(super) fn with_block<T>(
         &self,
         motion: &MotionBlock<'_>,
         more: &[(&str, &[f64])],
         work: impl FnOnce(&MotionBlock<'_>) -> T,
     ) -> T {
-        let channels: Vec<(&str, &[f64])> = motion.channels.iter().chain(more).copied().collect();
+        let channels: Vec<(&str, &[f64])> = more.iter().chain(motion.channels).copied().collect();
         let gravity: Option<Vec<f64>> = motion
             .gravity
             .map(|g| (0..3).flat_map(|c| g[c * motion.stride..][..self.samples].iter().copied()).collect());

@@ -38,8 +38,9 @@ pub struct LoadReference {
     /// Shape parameters.
     pub shape: Vec<f64>,
     /// Whether the regressor tells how friction changes with the loads' own parameters (Gauss-Newton): its columns are
-    /// then the derivatives of the effort at the reference, its offset what makes up for that there. Otherwise loads are
-    /// frozen.
+    /// then the derivatives of the effort at the reference, its offset what makes up for that there; of friction that acts on
+    /// its own loads (in joints without drive) only the first round counts, which leaves a few per cent of its share.
+    /// Otherwise loads are frozen.
     pub linearised: bool,
 }
 

@@ -17,7 +17,7 @@ const LEAST_MEASURE: f64 = 0.1;
 impl ClosedModel {
     /// Random closed poses with random motion: independent positions inside the limits (±π and ±1 m about home where the file
     /// states none), rates in ±2, accelerations in ±5, channels and signals as [`RandomMotion::new`]. A pose that cannot be
-    /// reached, is nearly singular or leaves the limits of another joint is moved half-way to home until it will do. The same
+    /// reached straight from home, is nearly singular or leaves the limits of another joint is moved half-way to home until it will do. The same
     /// seed gives the same numbers.
     pub(super) fn random_states(&self, samples: usize, seed: u64) -> RandomMotion {
         let machine = &self.machine;
@@ -50,7 +50,6 @@ impl ClosedModel {
             .collect();
 
         let mut work = machine.workspace();
-        let at_home = work.clone();
         let least = LEAST_MEASURE * machine.singularity(&work).measure;
         // Limits that home itself breaks mean nothing here.
         let limits: Vec<(usize, (f64, f64))> = machine
@@ -71,20 +70,15 @@ impl ClosedModel {
                 .collect();
             let mut reached = false;
             for _ in 0..HALVINGS {
-                // As a model will follow the states: from the one before, or from home.
-                let mut next = work.clone();
-                if self.next_pose(&mut next, &target).is_ok() && good(&next) {
-                    work = next;
-                    reached = true;
+                machine.go_home(&mut work);
+                reached = machine.reach(&mut work, &target).is_ok() && good(&work);
+                if reached {
                     break;
                 }
                 target.iter_mut().zip(&home).for_each(|(t, h)| *t = 0.5 * (*t + h));
             }
             if !reached {
                 target.clone_from(&home);
-                if self.next_pose(&mut work, &target).is_err() {
-                    work.clone_from(&at_home);
-                }
             }
             target.iter().enumerate().for_each(|(k, x)| q[k * samples + sample] = *x);
         }

@@ -140,7 +140,7 @@ impl ClosedModel {
             inertial: reactions.hanging.iter().map(|h| vec![0.0; 10 * h.len() * samples]).collect(),
             reactions,
         };
-        let mut memory = Memory::new(self);
+        let mut memory = Memory::new(self, reactions.list.len());
         let expanded = self.expand_with(motion, |sample, expanded, pose, fault| {
             if fault.is_some() {
                 let nan = |v: &mut Vec<f64>| {
@@ -160,19 +160,22 @@ impl ClosedModel {
 struct Memory {
     motions: Vec<BodyMotion<f64>>,
     right: Vec<f64>,
-    step: Vec<f64>,
+    /// One column per reaction.
+    rights: Vec<f64>,
+    steps: Vec<f64>,
     by_rate: Vec<f64>,
     dq: Vec<f64>,
     ddq: Vec<f64>,
 }
 
 impl Memory {
-    fn new(model: &ClosedModel) -> Self {
+    fn new(model: &ClosedModel, reactions: usize) -> Self {
         let rates = model.machine.mechanism().rates();
         Memory {
             motions: Vec::new(),
             right: vec![0.0; model.machine.conditions()],
-            step: vec![0.0; model.machine.dependent().len()],
+            rights: vec![0.0; model.machine.conditions() * reactions],
+            steps: vec![0.0; model.machine.dependent().len() * reactions],
             by_rate: vec![0.0; rates],
             dq: vec![0.0; rates],
             ddq: vec![0.0; rates],
@@ -190,7 +193,11 @@ impl ReactionShares<'_> {
         memory: &mut Memory,
     ) {
         let (machine, n) = (&model.machine, self.samples);
-        let Memory { motions, right, step, by_rate, dq, ddq } = memory;
+        let Memory { motions, right, rights, steps, by_rate, dq, ddq } = memory;
+        let count = self.reactions.list.len();
+        if count == 0 {
+            return;
+        }
         if self.reactions.hanging.iter().any(|h| !h.is_empty()) {
             for (rate, (v, a)) in dq.iter_mut().zip(ddq.iter_mut()).enumerate() {
                 (*v, *a) = (expanded.dq[rate * n + sample], expanded.ddq[rate * n + sample]);
@@ -202,7 +209,7 @@ impl ReactionShares<'_> {
             machine.body_motions(pose, (dq, ddq), gravity, motions);
         }
         for (k, reaction) in self.reactions.list.iter().enumerate() {
-            let sign = match *reaction {
+            match *reaction {
                 Reaction::Joint { component, .. } => {
                     let hanging = &self.reactions.hanging[k];
                     for (place, node) in hanging.iter().enumerate() {
@@ -212,18 +219,20 @@ impl ReactionShares<'_> {
                         }
                     }
                     machine.closure_entries(pose, hanging, component, right);
-                    -1.0
+                    right.iter_mut().for_each(|x| *x = -*x);
                 }
                 Reaction::Multiplier { condition } => {
                     right.fill(0.0);
                     right[condition] = 1.0;
-                    1.0
                 }
-            };
-            machine.solve(pose, right, step);
+            }
+            rights.iter_mut().skip(k).step_by(count).zip(&*right).for_each(|(to, x)| *to = *x);
+        }
+        machine.solve_many(pose, count, rights, steps);
+        for k in 0..count {
             by_rate.fill(0.0);
-            for (rate, z) in machine.dependent().iter().zip(&*step) {
-                by_rate[*rate] = sign * z;
+            for (rate, z) in machine.dependent().iter().zip(steps.iter().skip(k).step_by(count)) {
+                by_rate[*rate] = *z;
             }
             // What drives on dependent coordinates take off.
             let mut taken: Vec<(usize, f64)> = Vec::new();

@@ -15,3 +15,6 @@ mod passivity;
 mod points;
 mod random_tree;
 mod structure;
+
+#[path = "../robots/mod.rs"]
+mod robots;

@@ -1,11 +1,17 @@
 //! Closed mechanisms.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
 
+mod balance;
+mod base;
+mod faults;
 mod free;
 mod golden;
+mod loads;
 mod model;
+mod pinocchio;
 mod poses;
+mod random;
 
 use dynid_model::closed::{ClosedMechanism, ClosureDescription, Condition, CutKind, LinkFrame};
 use dynid_model::{Mechanism, Placement};
@@ -92,4 +98,17 @@ impl Parts {
 
 pub(crate) fn robot(name: &str) -> Option<Parts> {
     Some(Parts::new(&spec(&format!("robots/{name}.json"))?, None))
+}
+
+/// Rank of columns scaled to length one, at 1e-9 of the largest singular value.
+pub(crate) fn rank(columns: &[Vec<f64>]) -> usize {
+    let singular = scaled(columns).singular_values().unwrap();
+    singular.iter().filter(|s| **s > 1e-9 * singular[0]).count()
+}
+
+fn scaled(columns: &[Vec<f64>]) -> faer::Mat<f64> {
+    let norms: Vec<f64> = columns.iter().map(|c| c.iter().map(|x| x * x).sum::<f64>().sqrt()).collect();
+    faer::Mat::from_fn(columns[0].len(), columns.len(), |i, j| {
+        if norms[j] > 0.0 { columns[j][i] / norms[j] } else { 0.0 }
+    })
 }
