@@ -21,6 +21,8 @@ mod factor;
 mod free;
 mod lu;
 mod mechanism;
+mod naming;
+mod path;
 mod pose;
 mod reaction;
 mod rows;

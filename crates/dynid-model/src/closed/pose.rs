@@ -1,22 +1,11 @@
-//! Closed poses: Newton's method, and continuation from pose to pose (spec/mechanisms.md section 11).
+//! Closed poses, and how all coordinates move there with the independent ones (spec/mechanisms.md sections 10 and 11).
 
-use super::bend::{Bend, float};
-use super::error::{NamedMotion, PoseError};
+use super::bend::Bend;
+use super::error::PoseError;
 use super::factor::Factor;
 use super::mechanism::ClosedMechanism;
 use super::sweep::World;
 
-/// Residual at which a pose counts as closed, m.
-const CLOSED: f64 = 1e-14;
-/// The same where rounding keeps it from falling further.
-const STALLED: f64 = 1e-11;
-const ITERATIONS: usize = 12;
-/// Longest step of a coordinate between two poses, m (or rad times `L_c`).
-const LONGEST: f64 = 0.5;
-/// Correction that a predicted pose may need, as a share of the step and beyond it.
-const CORRECTION: (f64, f64) = (0.3, 1e-3);
-/// Smallest part of the way to a pose that is tried.
-const SHORTEST: f64 = 1.0 / 65536.0;
 /// Flatness of the factors below which the measure of singularity is worked out.
 const DOUBTFUL: f64 = 10.0;
 
@@ -26,7 +15,7 @@ pub struct PoseWorkspace {
     pub(super) world: World<f64>,
     /// Positions of all joints.
     pub(super) q: Vec<f64>,
-    residual: Vec<f64>,
+    pub(super) residual: Vec<f64>,
     /// Row-major.
     pub(super) jacobian: Vec<f64>,
     pub(super) bias: Vec<f64>,
@@ -37,16 +26,16 @@ pub struct PoseWorkspace {
     pub(super) map: Vec<f64>,
     /// `c`: accelerations while no independent coordinate accelerates.
     pub(super) drift: Vec<f64>,
-    right: Vec<f64>,
-    step: Vec<f64>,
+    pub(super) right: Vec<f64>,
+    pub(super) step: Vec<f64>,
     rights: Vec<f64>,
     steps: Vec<f64>,
-    bend: Bend,
-    before: Vec<f64>,
-    from: Vec<f64>,
+    pub(super) bend: Bend,
+    pub(super) before: Vec<f64>,
+    pub(super) from: Vec<f64>,
     /// Newton steps of the last search.
-    iterations: usize,
-    at_home: bool,
+    pub(super) iterations: usize,
+    pub(super) at_home: bool,
 }
 
 impl PoseWorkspace {
@@ -147,154 +136,6 @@ impl ClosedMechanism {
         }
     }
 
-    /// Takes a workspace from its pose to the one with other positions of the independent coordinates, in short steps
-    /// along the straight line between them.
-    ///
-    /// # Errors
-    /// [`PoseError`]; the workspace then stays at its pose.
-    ///
-    /// # Panics
-    /// If `independent` has the wrong length.
-    pub fn reach(&self, work: &mut PoseWorkspace, independent: &[f64]) -> Result<(), PoseError> {
-        assert_eq!(independent.len(), self.independent.len(), "length of the independent positions");
-        if let Some(k) = independent.iter().position(|x| !x.is_finite()) {
-            return Err(PoseError::NotFinite { joint: self.rate_name(self.independent[k]) });
-        }
-        let mut start = std::mem::take(&mut work.before);
-        start.clone_from(&work.q);
-        work.at_home = false;
-        work.iterations = 0;
-        let result = self.follow(work, &start, independent);
-        if result.is_err() {
-            work.q.copy_from_slice(&start);
-            self.evaluate(work);
-        }
-        work.before = start;
-        result
-    }
-
-    fn follow(&self, work: &mut PoseWorkspace, start: &[f64], target: &[f64]) -> Result<(), PoseError> {
-        let mut done = 0.0;
-        let way = self
-            .independent
-            .iter()
-            .zip(target)
-            .map(|(r, to)| (to - start[self.position_of[*r]]).abs() * self.rate_scale[*r])
-            .fold(0.0, f64::max);
-        let mut part: f64 = (LONGEST / way).min(1.0);
-        let mut from = std::mem::take(&mut work.from);
-        let result = loop {
-            let next = if done + part >= 1.0 - 1e-9 { 1.0 } else { done + part };
-            from.clone_from(&work.q);
-            if self.try_step(work, start, target, next) {
-                if next >= 1.0 {
-                    break self.accept(work);
-                }
-                done = next;
-                part *= 2.0;
-                continue;
-            }
-            part *= 0.5;
-            let fault = if part < SHORTEST { Some(self.out_of_reach(work)) } else { None };
-            work.q.copy_from_slice(&from);
-            self.evaluate(work);
-            if let Some(fault) = fault {
-                // A pose next to a singular one is refused as that.
-                break self.accept(work).and(Err(fault));
-            }
-        };
-        work.from = from;
-        result
-    }
-
-    /// One predictor step and its correction; false if the pose is not plainly the continuation of the last.
-    fn try_step(&self, work: &mut PoseWorkspace, start: &[f64], target: &[f64], next: f64) -> bool {
-        let n = self.tree.rates;
-        work.right.fill(0.0);
-        let target = self.independent.iter().zip(target).map(|(r, to)| {
-            let from = start[self.position_of[*r]];
-            if next >= 1.0 { *to } else { from + next * (to - from) }
-        });
-        let by = target.clone().zip(&self.independent).map(|(at, r)| at - work.q[self.position_of[*r]]);
-        let ratio = work.bend.ratio(by.clone());
-        work.bend.by.clear();
-        work.bend.by.extend(by);
-        for (r, by) in self.independent.iter().zip(&work.bend.by) {
-            for (row, b) in work.right.iter_mut().enumerate() {
-                *b -= work.jacobian[row * n + r] * by;
-            }
-        }
-        for (r, at) in self.independent.iter().zip(target) {
-            work.q[self.position_of[*r]] = at;
-        }
-        let predicted = self.solve_step(work);
-        match ratio {
-            Some(ratio) => {
-                for (x, sum) in work.step.iter_mut().zip(&mut work.bend.sum) {
-                    *sum *= ratio;
-                    *x += *sum;
-                }
-            }
-            None => work.bend.sum.fill(0.0),
-        }
-        work.bend.known = None;
-        if predicted > LONGEST || predicted.is_nan() {
-            return false;
-        }
-        self.apply_step(work, 1.0);
-        self.evaluate(work);
-        let good = match self.newton(work) {
-            Some(corrected) => {
-                corrected <= CORRECTION.0 * predicted + CORRECTION.1 && self.mode_of(work) == self.mode
-            }
-            None => false,
-        };
-        let squared: f64 = work.bend.by.iter().map(|x| x * x).sum();
-        work.bend.known = (good && squared > 0.0).then_some(squared);
-        good
-    }
-
-    /// Newton's method on the dependent coordinates from the pose evaluated last: by how much they moved, if the loops closed.
-    pub(super) fn newton(&self, work: &mut PoseWorkspace) -> Option<f64> {
-        let mut moved = 0.0;
-        let mut last = f64::INFINITY;
-        for _ in 0..ITERATIONS {
-            let gap = self.gap(work);
-            if gap <= CLOSED || (gap <= STALLED && gap > 0.5 * last) {
-                return Some(moved);
-            }
-            if !gap.is_finite() {
-                return None;
-            }
-            last = gap;
-            for (b, r) in work.right.iter_mut().zip(&work.residual) {
-                *b = -r;
-            }
-            let length = self.solve_step(work);
-            if !length.is_finite() {
-                return None;
-            }
-            let factor = (LONGEST / length).min(1.0);
-            self.apply_step(work, factor);
-            moved += factor * length;
-            work.bend.sum.iter_mut().zip(&work.step).for_each(|(sum, x)| *sum += factor * x);
-            work.iterations += 1;
-            self.evaluate(work);
-        }
-        (self.gap(work) <= STALLED).then_some(moved)
-    }
-
-    /// Largest residual, m.
-    fn gap(&self, work: &PoseWorkspace) -> f64 {
-        let size = |(r, s): (&f64, &f64)| (r * s).abs();
-        // Not `max`, which would lose what is not a number.
-        work.residual
-            .iter()
-            .zip(&self.row_scale)
-            .map(size)
-            .fold(0.0, |m: f64, x| if x <= m || m.is_nan() { m } else { x })
-    }
-
     /// Residuals, Jacobian and its factors at the positions of the workspace.
     pub(super) fn evaluate(&self, work: &mut PoseWorkspace) {
         work.world.place(&self.tree, &work.q);
@@ -306,13 +147,6 @@ impl ClosedMechanism {
         });
     }
 
-    /// Solves `J_dependent x = right` into `work.step`; length of the largest entry, m.
-    fn solve_step(&self, work: &mut PoseWorkspace) -> f64 {
-        self.solve_dependent(&work.factor, &mut work.right, &mut work.step);
-        let scaled = self.dependent.iter().zip(&work.step).map(|(r, x)| (x * self.rate_scale[*r]).abs());
-        scaled.fold(0.0, |m: f64, x| if x <= m || m.is_nan() { m } else { x })
-    }
-
     /// Least-squares solution of `J_dependent x = right`, in SI units.
     pub(super) fn solve_dependent(&self, factor: &Factor, right: &mut [f64], x: &mut [f64]) {
         right.iter_mut().zip(&self.row_scale).for_each(|(b, s)| *b *= s);
@@ -322,27 +156,7 @@ impl ClosedMechanism {
         }
     }
 
-    fn apply_step(&self, work: &mut PoseWorkspace, factor: f64) {
-        let mut rates = [0.0; 6];
-        let mut k = 0;
-        while k < self.dependent.len() {
-            let rate = self.dependent[k];
-            let position = self.position_of[rate];
-            if !self.floats[rate] {
-                work.q[position] += factor * work.step[k];
-                k += 1;
-                continue;
-            }
-            // All rates of a floating joint are dependent.
-            for (r, s) in rates.iter_mut().zip(&work.step[k..k + 6]) {
-                *r = factor * s;
-            }
-            float(&mut work.q[position..position + 7], &rates);
-            k += 6;
-        }
-    }
-
-    fn accept(&self, work: &mut PoseWorkspace) -> Result<(), PoseError> {
+    pub(super) fn accept(&self, work: &mut PoseWorkspace) -> Result<(), PoseError> {
         if work.factor.flatness() < DOUBTFUL * self.least_measure {
             let found = self.singularity(work);
             if found.measure < self.least_measure {
@@ -430,45 +244,8 @@ impl ClosedMechanism {
         }
     }
 
-    fn out_of_reach(&self, work: &PoseWorkspace) -> PoseError {
+    pub(super) fn out_of_reach(&self, work: &PoseWorkspace) -> PoseError {
         let (closure, gap) = self.largest_gap(&work.residual);
         PoseError::OutOfReach { closure, gap }
-    }
-
-    /// Closure with the largest residual, and the residual in words.
-    pub(super) fn largest_gap(&self, residual: &[f64]) -> (String, String) {
-        let size = |k: usize| (residual[k] * self.row_scale[k]).abs();
-        let worst = (0..residual.len()).fold(0, |m, k| if size(k) > size(m) { k } else { m });
-        let gap = if self.rows.angular[worst] {
-            format!("{:.3e} rad", residual[worst])
-        } else {
-            format!("{:.4} mm", 1e3 * residual[worst])
-        };
-        (self.closures[self.rows.owner[worst]].name.clone(), gap)
-    }
-
-    pub(super) fn rate_name(&self, rate: usize) -> String {
-        self.mechanism.rate_names()[rate].clone()
-    }
-
-    fn joint_at(&self, position: usize) -> String {
-        let owns =
-            |b: &&crate::mechanism::Body| (b.position..b.position + b.joint.positions()).contains(&position);
-        self.mechanism.bodies().iter().find(owns).map_or_else(String::new, |b| b.joint.name.clone())
-    }
-
-    /// The largest entries of a motion of some rates.
-    pub(super) fn named_motion(&self, rates: &[usize], entries: &[f64]) -> NamedMotion {
-        let names = self.mechanism.rate_names();
-        let largest = entries.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        let mut named: Vec<(String, f64)> = rates
-            .iter()
-            .zip(entries)
-            .filter(|(_, x)| x.abs() > 0.05 * largest)
-            .map(|(r, x)| (names[*r].clone(), x / largest))
-            .collect();
-        named.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
-        named.truncate(6);
-        NamedMotion(named)
     }
 }
