@@ -263,9 +263,13 @@ impl<'a> StartOptimiser<'a> {
             };
             let Some(z) = start else { continue };
             let mut candidate = Candidate { z, point: Point::default(), curvature: None, evaluations: 0 };
-            self.advance(&mut candidate, &warm[0], warm[0].iterations)?;
+            if self.advance(&mut candidate, &warm[0], warm[0].iterations).is_none() {
+                continue;
+            }
             candidate.curvature = None;
-            self.advance(&mut candidate, &rest[0], TRIAL_ITERATIONS)?;
+            if self.advance(&mut candidate, &rest[0], TRIAL_ITERATIONS).is_none() {
+                continue;
+            }
             evaluations += std::mem::take(&mut candidate.evaluations);
             if best.as_ref().is_none_or(|b| candidate.merit() < b.merit()) {
                 best = Some(candidate);
@@ -326,8 +330,18 @@ pub(crate) fn exact_triangle(problem: &Problem, grid: &Grid<'_>, z: &[f64]) -> M
 
 /// Columns that no motion tells apart would make every criterion infinite: find out on one random motion.
 fn refuse_rank_deficient(problem: &Problem, grid: &Grid<'_>) -> Result<(), ProblemError> {
+    const HALVINGS: usize = 10;
+    let mut share = 1.0;
     let z = crate::start::draw(grid, &mut generator(1));
-    let triangle = exact_triangle(problem, grid, &z);
+    let mut triangle = exact_triangle(problem, grid, &z);
+    for _ in 0..HALVINGS {
+        if triangle.col_iter().all(|c| c.iter().all(|x| x.is_finite())) {
+            break;
+        }
+        // Mechanisms with loops have no pose where a large motion leads.
+        share *= 0.5;
+        triangle = exact_triangle(problem, grid, &crate::start::shrunk(grid, &z, share));
+    }
     let columns = problem.model.columns();
     let n = triangle.ncols();
     let lengths: Vec<f64> = (0..n).map(|j| triangle.col(j).norm_l2()).collect();

@@ -35,6 +35,9 @@ impl std::fmt::Display for LimitKind {
             LimitKind::Path(ConstraintKind::Cylinder) => f.write_str("distance from a cylinder"),
             LimitKind::Path(ConstraintKind::Column) => f.write_str("distance from the column"),
             LimitKind::Path(ConstraintKind::Capsule) => f.write_str("distance of bodies"),
+            LimitKind::Path(ConstraintKind::JointPosition) => f.write_str("position"),
+            LimitKind::Path(ConstraintKind::JointRate) => f.write_str("velocity"),
+            LimitKind::Path(ConstraintKind::JointAcceleration) => f.write_str("acceleration"),
         }
     }
 }

@@ -73,9 +73,10 @@ pub(crate) struct LimitValue {
 }
 
 impl LimitValue {
-    /// By how much a sample is outside; negative: inside.
+    /// By how much a sample is outside; negative: inside. What is not a number is infinitely far outside.
     pub(crate) fn excess(&self, sample: usize) -> f64 {
-        (self.values[sample] - self.upper).max(self.lower - self.values[sample])
+        let value = self.values[sample];
+        if value.is_nan() { f64::INFINITY } else { (value - self.upper).max(self.lower - value) }
     }
 }
 
@@ -93,9 +94,7 @@ impl LimitValues {
         for limit in &self.limits {
             for sample in 0..self.motion.samples {
                 let excess = limit.excess(sample);
-                // A value that is not a number counts as outside.
-                if excess > worst.0 || excess.is_nan() {
-                    let excess = if excess.is_nan() { f64::INFINITY } else { excess };
+                if excess > worst.0 {
                     worst = (excess, Some(RowId { limit: limit.id, sample }));
                 }
             }

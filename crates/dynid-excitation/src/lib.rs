@@ -1,5 +1,6 @@
 //! Optimal excitation trajectories within all limits.
 
+mod closed;
 pub mod constraint;
 pub mod criterion;
 mod design;
@@ -18,6 +19,7 @@ mod robot;
 mod search;
 mod start;
 
+pub use closed::{ClosedExcitation, TiedColumn};
 pub use design::{Design, Outcome, Settings, StartOutcome, design};
 pub use duals::{DualConstraint, DualMap, DualModel, DualState};
 pub use dynid_motion::trajectory::MotionLimits;

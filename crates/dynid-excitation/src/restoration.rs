@@ -131,8 +131,11 @@ fn excess_at(values: &LimitValues, peaks: &[(LimitId, f64)]) -> f64 {
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// The least step that meets all rows; false if there is none.
+/// The least step that meets all rows; false if there is none, or a row is not known.
 fn step(z: &mut [f64], rows: Vec<Row>) -> bool {
+    if rows.iter().any(|r| !r.bound.is_finite() || r.values.iter().any(|x| !x.is_finite())) {
+        return false;
+    }
     let n = z.len();
     let mut hessian = vec![0.0; n * n];
     for i in 0..n {

@@ -118,9 +118,13 @@ impl<'a> Search<'a> {
             self.evaluations += 1;
             self.last = None;
             let values = self.grid.values(z);
+            let violation = values.worst().0.max(0.0);
+            // Out of reach: there is nothing to evaluate.
+            if !violation.is_finite() {
+                return None;
+            }
             let observation = Observation::new(self.grid.problem, &values.motion, self.grid.sign_width);
             let (value, sensitivity) = self.criterion.sensitivity(&observation.triangle, self.smoothing)?;
-            let violation = values.worst().0.max(0.0);
             let point = Point { objective: self.scale * value, violation };
             self.last = Some(Evaluation { z: z.to_vec(), values, observation, sensitivity, point });
         }

@@ -27,7 +27,7 @@ mod tree_model;
 
 pub use base_parameters::{BaseParameters, BaseSettings};
 pub use closed_model::{
-    ClosedModel, JointLoad, LoadError, LoadGroup, LoadReference, PathError, Reaction, Reactions,
+    ClosedModel, JointLoad, JointMotion, LoadError, LoadGroup, LoadReference, PathError, Reaction, Reactions,
 };
 pub use coordinate::Coordinate;
 pub use description::{Description, JointDescription, JointKind, Limits, LinkDescription, Mimic};

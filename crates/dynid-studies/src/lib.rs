@@ -9,6 +9,7 @@ mod error;
 mod excitation;
 pub mod hit_joint;
 pub mod indy7;
+pub mod prr3;
 mod record;
 mod reference;
 mod statistics;
@@ -68,7 +69,7 @@ pub struct Progress {
     pub steps: usize,
 }
 
-const STUDIES: [Study; 4] = [
+const STUDIES: [Study; 5] = [
     Study { name: er16::NAME, title: er16::TITLE, source: er16::SOURCE, driver: er16::run },
     Study {
         name: hit_joint::NAME,
@@ -77,6 +78,7 @@ const STUDIES: [Study; 4] = [
         driver: hit_joint::run,
     },
     Study { name: indy7::NAME, title: indy7::TITLE, source: indy7::SOURCE, driver: indy7::run },
+    Study { name: prr3::NAME, title: prr3::TITLE, source: prr3::SOURCE, driver: prr3::run },
     Study {
         name: xy_pointing::NAME,
         title: xy_pointing::TITLE,

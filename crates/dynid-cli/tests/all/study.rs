@@ -35,7 +35,7 @@ fn list_names_every_study() {
         serde_json::from_slice(&run(folder.path(), &["study", "list", "--json"], 0).stdout).unwrap();
     let listed = listed.as_array().unwrap();
     assert!(
-        ["er16", "hit-joint", "indy7", "xy-pointing"]
+        ["er16", "hit-joint", "indy7", "prr3", "xy-pointing"]
             .iter()
             .all(|name| listed.iter().any(|s| s["study"] == **name))
     );
@@ -153,4 +153,20 @@ fn indy7_repeats_bit_by_bit() {
     let folder = tempfile::tempdir().unwrap();
     let first = quick("indy7", folder.path(), "one", "1");
     assert!(quick("indy7", folder.path(), "two", "2") == first, "two threads give other bits than one");
+}
+
+#[test]
+fn prr3_holds_every_claim() {
+    let folder = tempfile::tempdir().unwrap();
+    let ids = holds_every_claim("prr3", &quick("prr3", folder.path(), "one", "2"));
+    let expected = (1..=12).map(|row: u32| format!("B{row}")).chain(('a'..='e').map(String::from));
+    assert!(expected.into_iter().all(|row| ids.contains(&row)), "{ids:?}");
+}
+
+#[test]
+#[ignore = "two quick runs take minutes; the ordinary run checks the claims once"]
+fn prr3_repeats_bit_by_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = quick("prr3", folder.path(), "one", "1");
+    assert!(quick("prr3", folder.path(), "two", "2") == first, "two threads give other bits than one");
 }

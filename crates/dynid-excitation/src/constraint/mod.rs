@@ -8,11 +8,14 @@ mod capsule;
 mod cartesian;
 mod clearance;
 mod effort;
+mod gathered;
+mod joints;
 mod segment;
 
 pub use capsule::{Capsule, CapsulePairs, Capsules};
 pub use cartesian::{CartesianLimits, FramePoint, Region};
 pub use effort::EffortLimits;
+pub use joints::{JointLimits, JointQuantity, JointRange};
 
 use dynid_model::{BodyPoint, Dynamics, MechanismError, MotionBlock, Vec3};
 use thiserror::Error;
@@ -143,6 +146,12 @@ pub enum ConstraintKind {
     Column,
     /// Distance between two capsules on the robot.
     Capsule,
+    /// Position of joints that follow from the coordinates.
+    JointPosition,
+    /// Rate of such joints.
+    JointRate,
+    /// Acceleration of such joints.
+    JointAcceleration,
 }
 
 /// One row of a path constraint.
@@ -158,13 +167,14 @@ pub struct ConstraintRow {
     pub upper: f64,
     /// Factor from the normalised value to [`ConstraintRow::unit`].
     pub scale: f64,
-    /// Unit of the value times `scale`: `N m`, `N` or `m`.
+    /// Unit of the value times `scale`: `N m`, `N`, `m`, of joints also `rad` and their derivatives.
     pub unit: &'static str,
 }
 
 /// Functions of the motion at one instant, normalised to the order of one.
 ///
-/// Values and gradients are finite at every pose, allowed or not: searches start far outside.
+/// Values and gradients are finite at every pose, allowed or not: searches start far outside. Where a mechanism with loops
+/// has no pose, they are not numbers, which counts as outside.
 pub trait PathConstraint: Send + Sync {
     /// Rows in the order of their values.
     fn rows(&self) -> &[ConstraintRow];

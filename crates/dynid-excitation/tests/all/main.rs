@@ -1,5 +1,6 @@
 //! All tests of the crate from outside, in one program: each program would be linked against everything again.
 
+mod closed;
 mod constraints;
 mod designs;
 mod forecasts;

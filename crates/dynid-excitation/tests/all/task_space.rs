@@ -10,8 +10,8 @@ use dynid_model::scalar::{Dual, Scalar};
 
 type D = Dual<9>;
 
-const LENGTH: [f64; 3] = [0.600, 0.475, 0.604];
-const JOINT: [f64; 3] = [0.280, 0.0, 0.280];
+pub(crate) const LENGTH: [f64; 3] = [0.600, 0.475, 0.604];
+pub(crate) const JOINT: [f64; 3] = [0.280, 0.0, 0.280];
 
 fn number(x: f64) -> D {
     D::from_f64(x)
@@ -115,7 +115,7 @@ fn row(kind: ConstraintKind, subject: &str, lower: f64, upper: f64) -> Constrain
 }
 
 /// Sliders, their speeds and accelerations, leg heights, distances between sliders.
-fn workspace() -> DualConstraint<9> {
+pub(crate) fn workspace() -> DualConstraint<9> {
     let inf = f64::INFINITY;
     let mut rows = Vec::new();
     for i in 1..=3 {
@@ -145,7 +145,7 @@ fn workspace() -> DualConstraint<9> {
     )
 }
 
-fn problem() -> Problem {
+pub(crate) fn problem() -> Problem {
     let names = ["m_p", "mu1", "mu2", "mu3", "sigma", "I_L1", "I_L2", "I_L3", "I_p"];
     let columns =
         names.iter().map(|n| ColumnInfo { name: (*n).into(), unit: String::new(), nominal: None }).collect();

@@ -111,7 +111,7 @@ impl ClosedModel {
     /// Carries derivatives by the motion of all joints to the independent ones, and adds what projections change by.
     ///
     /// `work(sample)`: pairs of efforts of the tree and weights of the outputs.
-    fn carry_all(
+    pub(super) fn carry_all(
         &self,
         expanded: &Expanded,
         poses: &[Option<PoseWorkspace>],

@@ -3,6 +3,7 @@
 mod adjoint;
 mod expand;
 mod fold;
+mod joint_motion;
 mod loads;
 mod random_motion;
 mod reactions;
@@ -17,6 +18,7 @@ use crate::parameter::ParameterTable;
 use crate::random_motion::RandomMotion;
 use crate::tree_model::TreeModel;
 use fold::Fold;
+pub use joint_motion::JointMotion;
 use loads::Loads;
 pub use loads::{JointLoad, LoadError, LoadGroup, LoadReference};
 pub use reactions::{Reaction, Reactions};

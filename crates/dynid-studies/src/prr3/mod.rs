@@ -1,0 +1,108 @@
+//! Planar 3PRR mechanism whose friction follows the forces on its guideway. See `README.md` in this folder.
+
+mod beyond;
+mod dynamics;
+mod encoders;
+mod excitation;
+mod experiment;
+mod figures;
+mod fits;
+mod friction;
+mod knowable;
+mod machine;
+mod rank;
+mod reference;
+mod report;
+mod sections;
+mod settings;
+mod trajectory;
+
+use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
+use beyond::{Shares, Upright};
+use encoders::Encoders;
+use excitation::Designs;
+use fits::Fits;
+use knowable::Knowable;
+use machine::{Machine, Plane};
+use rank::Rank;
+use settings::Settings;
+
+/// Name on the command line.
+pub const NAME: &str = "prr3";
+/// What is studied.
+pub const TITLE: &str = "3PRR mechanism: friction of sliders that follows the forces on their guideway";
+/// Where it was published.
+pub const SOURCE: &str = "Rosyid & El-Khasawneh, Applied Sciences 2020, 10(14), 4820";
+
+/// A fault of this study's data or of the rooms below.
+fn fault(error: impl std::fmt::Display) -> StudyError {
+    StudyError::Data { file: "prr3", message: error.to_string() }
+}
+
+/// The larger; not a number if either is none.
+fn worst(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
+/// Runs the study.
+///
+/// # Errors
+/// [`StudyError`]: faults of the embedded data or of the rooms below.
+pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError> {
+    const STEPS: usize = 5;
+    let mut done = 0;
+    let mut step = |what: &str| {
+        progress(Progress { step: what.to_owned(), done, steps: STEPS });
+        done += 1;
+    };
+    step("dynamics and trajectory against references");
+    let settings = Settings::read()?;
+    let machine = Machine::new(&settings)?;
+    let motion = trajectory::identification_motion(&settings, settings.trajectory.samples)?;
+    let forces = trajectory::true_forces(&machine, &settings, &motion, Plane::Horizontal)?;
+    let shares = trajectory::shares(&forces);
+    let rank = Rank::new(&machine, &settings)?;
+    let mut rows = vec![
+        dynamics::golden_row(&machine)?,
+        dynamics::ways_row(&machine, &settings, run)?,
+        friction::row(&machine, &settings)?,
+        trajectory::row(&machine, &settings)?,
+        rank.row(&settings),
+        trajectory::friction_row(&shares),
+    ];
+    step("fitting three laws of friction");
+    let fits = Fits::new(&machine, &settings, &rank, run)?;
+    rows.extend(fits.rows());
+    let knowable = Knowable::new(&settings, &rank, &fits)?;
+    rows.push(knowable.row(&settings, &fits));
+    rows.push(knowable::separated_row(&fits));
+    step("beyond the paper");
+    let upright = Upright::new(&machine, &settings, &fits, run)?;
+    rows.push(upright.row());
+    let weights = Shares::new(&machine, &settings, &fits, &rank)?;
+    rows.push(weights.row());
+    let encoders = Encoders::new(&machine, &settings, &fits, &rank, run)?;
+    rows.push(encoders.row(&settings));
+    step("designing trajectories");
+    let designs = Designs::new(&machine, &settings, run)?;
+    rows.push(designs.row());
+    step("report");
+    rows.sort_by_key(|r| (r.id.trim_start_matches('B').parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
+    let record = StudyRecord::new(NAME, run, rows);
+    let report = report::Contents {
+        machine: &machine,
+        settings: &settings,
+        motion: &motion,
+        forces: &forces,
+        shares: &shares,
+        rank: &rank,
+        fits: &fits,
+        knowable: &knowable,
+        upright: &upright,
+        weights: &weights,
+        encoders: &encoders,
+        designs: &designs,
+    }
+    .report(&record)?;
+    Ok(StudyRun { record, report })
+}
