@@ -82,7 +82,7 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     let weights = Shares::new(&machine, &settings, &fits, &rank)?;
     rows.push(weights.row());
     let encoders = Encoders::new(&machine, &settings, &fits, &rank, run)?;
-    rows.push(encoders.row(&settings));
+    rows.push(encoders.row());
     step("designing trajectories");
     let designs = Designs::new(&machine, &settings, run)?;
     rows.push(designs.row());

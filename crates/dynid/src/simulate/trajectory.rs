@@ -93,7 +93,7 @@ fn random(
     rng: &mut ChaCha8Rng,
 ) -> Result<Vec<Fourier>, Error> {
     let base = std::f64::consts::TAU / settings.period_s.unwrap_or(settings.duration_s);
-    let homes = model.closed().map(|closed| homes(closed));
+    let homes = model.closed().map(homes);
     driven(model)
         .map(|rate| {
             let limits = model.limits(rate);
