@@ -28,7 +28,7 @@ use crate::fitting::{self, Fitted};
 use crate::logs::{self, LoadedLog};
 use crate::passivity::SPEED_SPAN_S;
 use crate::prior::Prior;
-use crate::robot::{Robot, RobotOptions};
+use crate::robot::{Robot, RobotOptions, refuse_internal_load};
 use crate::shape::{self, ShapeFit};
 use crate::trust::{Evidence, Trust};
 use shapes::Shaped;
@@ -145,6 +145,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
             "a floating base cannot be identified from joint logs: lock the base or leave it out".to_owned(),
         ));
     }
+    refuse_internal_load(&robot, "identified")?;
     let (robot, loaded) = read_logs(config, &config.training_logs(), robot, &mut progress)?;
     let mut plan = plan_elements(config, &robot, &loaded)?;
     let model = plan.model(&robot.mechanism)?;

@@ -251,6 +251,20 @@ pub(crate) fn refuse_loops(robot: &Robot, what: &str) -> Result<(), Error> {
     }
 }
 
+/// Refuses mechanisms with more drives than free motions: what drives do against each other shows in no motion, so a model
+/// says nothing about the effort of a single one.
+pub(crate) fn refuse_internal_load(robot: &Robot, what: &str) -> Result<(), Error> {
+    let Some(closed) = robot.closed.as_ref().filter(|c| c.driven().len() > c.mobility()) else {
+        return Ok(());
+    };
+    Err(Error::Unsupported(format!(
+        "{} drives ({}) for {} free motions: their efforts hold an internal load that no model of motion knows, so they are not {what}; name in `actuated` only as many as there are free motions if the others are idle",
+        closed.driven().len(),
+        closed.driven_names().join(", "),
+        closed.mobility()
+    )))
+}
+
 /// Refuses robots with motors behind springs, for work that knows stiff joints alone. `what`: what they are not.
 pub(crate) fn refuse_elastic(robot: &Robot, what: &str) -> Result<(), Error> {
     match robot.elements.elastic.first() {

@@ -15,7 +15,7 @@ use crate::Error;
 use crate::elements::clearance::refuse_clearance;
 use crate::elements::{ElementPlan, LOAD};
 use crate::nominal::{nominal_parameters, with_nominal_shape};
-use crate::robot::{Robot, refuse_elastic, refuse_loops};
+use crate::robot::{Robot, refuse_elastic, refuse_internal_load, refuse_loops};
 pub use clearance::{ClearanceSummary, JournalSummary};
 pub use settings::{
     ControlTable, ImperfectionTable, PlantTable, SeriesSettings, SimulateMode, SimulateSettings,
@@ -100,6 +100,7 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
             "a floating base has no joint log: simulate the arm alone".to_owned(),
         ));
     }
+    refuse_internal_load(robot, "simulated by this command")?;
     let plan = ElementPlan::new(mechanism, &robot.elements, None, |rate| robot.is_driven(rate))?
         .with_loops(robot.closed.clone());
     if settings.mode == SimulateMode::ClosedLoop {

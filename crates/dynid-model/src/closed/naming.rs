@@ -9,9 +9,9 @@ impl ClosedMechanism {
         let size = |k: usize| (residual[k] * self.row_scale[k]).abs();
         let worst = (0..residual.len()).fold(0, |m, k| if size(k) > size(m) { k } else { m });
         let gap = if self.rows.angular[worst] {
-            format!("{:.3e} rad", residual[worst])
+            format!("{:.3e} rad", residual[worst].abs())
         } else {
-            format!("{:.4} mm", 1e3 * residual[worst])
+            format!("{:.4} mm", 1e3 * residual[worst].abs())
         };
         (self.closures[self.rows.owner[worst]].name.clone(), gap)
     }

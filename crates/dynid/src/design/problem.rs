@@ -59,6 +59,7 @@ pub(super) fn pose(problem: &RobotProblem, config: &DesignConfig) -> Result<Opti
 }
 
 pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProblem, Error> {
+    refuse_loops(robot, "designed for by this command")?;
     let mechanism = &robot.mechanism;
     if mechanism.positions() != mechanism.rates() {
         return Err(Error::Unsupported(
@@ -66,7 +67,6 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
         ));
     }
     refuse_elastic(robot, "designed for")?;
-    refuse_loops(robot, "designed for by this command")?;
     let joints = mechanism.rate_names();
     let mut elements = robot.elements.clone();
     for (joint, list) in &config.elements.joint {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use dynid::estimators::distribution::t_quantile;
 use dynid::identify::{Identification, identify};
 use dynid::model::EffortModel;
-use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
+use dynid::simulate::{SimulateMode, SimulateSettings, SimulatedLog, simulate};
 use dynid::{Config, Robot, RobotOptions};
 
 fn robot_file(name: &str) -> PathBuf {
@@ -100,4 +100,71 @@ fn a_stewart_platform_gives_its_base_parameters_back_within_their_deviations() {
     let (id, truth) = identified("stewart", "stewart", r#"["coulomb", "viscous"]"#, &[1, 2, 3, 4]);
     assert_eq!(id.base.len(), 88 + 12);
     check_errors("stewart", &id, &truth);
+}
+
+/// A robot file of this repository with a line replaced.
+fn changed(name: &str, from: &str, to: &str) -> Result<Robot, String> {
+    let text = std::fs::read_to_string(robot_file(name)).unwrap();
+    assert!(text.contains(from), "{from}");
+    let text = text.replace(from, to);
+    Robot::parse(&text, Path::new("robot.toml"), &RobotOptions::default()).map_err(|e| e.to_string())
+}
+
+#[test]
+fn too_few_drives_open_loops_and_internal_loads_are_named() {
+    let few = changed("fivebar", "\"left_crank\", \"right_crank\"", "\"left_crank\"").unwrap_err();
+    assert!(few.contains("1 driven joints") && few.contains("`right_crank`"), "{few}");
+    let open = changed("fourbar", "a_xyz = [0.35", "a_xyz = [3.35").unwrap_err();
+    assert!(open.contains("loop `C` does not close") && open.contains("3000.0000 mm"), "{open}");
+    let over = changed("fourbar", "actuated = [\"crank\"]", "actuated = [\"crank\", \"rocker\"]").unwrap();
+    assert!(over.warnings.iter().any(|w| w.contains("2 drives for 1 free motions")), "{:?}", over.warnings);
+    let refused = simulate(&over, &SimulateSettings::default()).unwrap_err().to_string();
+    assert!(refused.contains("internal load") && refused.contains("crank, rocker"), "{refused}");
+    let spatial = changed("fourbar", "planar_revolute", "revolute").unwrap();
+    assert!(spatial.warnings.iter().any(|w| w.contains("5 conditions of which 2")), "{:?}", spatial.warnings);
+}
+
+#[test]
+fn rows_that_the_mechanism_cannot_follow_are_named() {
+    let folder = folder("poses");
+    let (robot, log) = (load("fivebar"), folder.join("log.csv"));
+    let mut made = simulate(&robot, &SimulateSettings::default()).unwrap();
+    made.position[0][700] += 3.0;
+    write(&made, &log);
+    let text = format!("robot = {:?}\n[[log]]\npath = {log:?}\n", robot_file("fivebar"));
+    let config = Config::parse(&text, "run.toml").unwrap();
+    let error = identify(&config, |_| ()).unwrap_err();
+    let message = error.to_string();
+    assert!(message.contains("row 701") && message.contains("`tool_pin`"), "{message}");
+    assert!(error.hint().is_some());
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn a_controlled_delta_is_identified_and_comes_back_as_urdf_and_loops() {
+    let (robot, folder) = (load("delta"), folder("round"));
+    let settings = SimulateSettings {
+        mode: SimulateMode::ClosedLoop,
+        duration_s: 10.0,
+        period_s: Some(5.0),
+        acceleration: 30.0,
+        ..SimulateSettings::default()
+    };
+    let path = folder.join("log.csv");
+    write(&simulate(&robot, &settings).unwrap(), &path);
+    let text = format!("robot = {:?}\n[[log]]\npath = {path:?}\n", robot_file("delta"));
+    let id = identify(&Config::parse(&text, "run.toml").unwrap(), |_| ()).unwrap();
+    let urdf = id.urdf().unwrap();
+    assert!(urdf.difference < 1e-6, "{}", urdf.difference);
+    std::fs::write(folder.join("delta.urdf"), &urdf.text).unwrap();
+    let loops = id.loops("delta.urdf").unwrap().unwrap();
+    std::fs::write(folder.join("delta.loops.toml"), loops).unwrap();
+    let back = Robot::load(&folder.join("delta.loops.toml"), &RobotOptions::default()).unwrap();
+    let (found, expected) = (back.closed.unwrap(), robot.closed.unwrap());
+    assert_eq!(found.driven_names(), expected.driven_names());
+    assert_eq!(found.closures().len(), 3);
+    for (a, b) in found.home().iter().zip(expected.home()) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
+    std::fs::remove_dir_all(folder).unwrap();
 }
