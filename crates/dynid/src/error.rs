@@ -27,7 +27,7 @@ pub enum Error {
         /// The fault.
         source: Box<dynid_model::closed::ClosedError>,
     },
-    /// A log in which a closed mechanism cannot be where its drives say.
+    /// A log or table of states in which a closed mechanism cannot be where its drives say.
     #[error("{file}: row {row}: {fault}")]
     Pose {
         /// Log file.

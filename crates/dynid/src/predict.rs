@@ -46,6 +46,13 @@ impl Flat {
             channels: &channels,
             sign_width: 0.0,
         };
+        if let Some(closed) = model.closed() {
+            closed.reachable(&motion).map_err(|e| Error::Pose {
+                file: "states".to_owned(),
+                row: e.sample + 1,
+                fault: Box::new(e.fault),
+            })?;
+        }
         model.regressor(&motion, &model.parameters().shape_start(), &mut block);
         Ok(block)
     }
@@ -55,7 +62,8 @@ impl Flat {
 /// the motion (LuGre) is in its steady state.
 ///
 /// # Errors
-/// [`Error::StatesChannel`]: the states lack a channel that the model reads, a temperature.
+/// [`Error::StatesChannel`]: the states lack a channel that the model reads, a temperature; [`Error::Pose`]: a mechanism with
+/// loops cannot be in a state.
 pub fn efforts(model: &RobotModel, values: &[f64], states: &States) -> Result<Vec<Vec<f64>>, Error> {
     let block = Flat::new(states).regressor(model)?;
     Ok((0..model.outputs().len()).map(|output| block.effort(output, values)).collect())

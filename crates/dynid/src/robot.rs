@@ -159,7 +159,7 @@ impl Robot {
 
     /// Coordinates as a states table names them.
     pub fn state_joints(&self) -> Vec<dynid_io::StateJoint> {
-        state_joints(&self.mechanism, &self.axes)
+        state_joints(&self.mechanism, self.closed.as_deref(), &self.axes)
     }
 }
 
@@ -219,11 +219,21 @@ fn held(locked: &[(String, f64)]) -> Vec<String> {
 
 /// Coordinates of a model as a states table names them.
 pub fn model_state_joints(model: &RobotModel) -> Vec<dynid_io::StateJoint> {
-    state_joints(model.mechanism(), &logs::axes(model))
+    let closed = model.closed().map(|closed| closed.machine().as_ref());
+    state_joints(model.mechanism(), closed, &logs::axes(model))
 }
 
-/// Joints of a mechanism, then the axes behind them.
-fn state_joints(mechanism: &Mechanism, axes: &[LogAxis]) -> Vec<dynid_io::StateJoint> {
+/// Joints of a mechanism, then the axes behind them; of one with loops the independent joints alone.
+fn state_joints(
+    mechanism: &Mechanism,
+    closed: Option<&ClosedMechanism>,
+    axes: &[LogAxis],
+) -> Vec<dynid_io::StateJoint> {
+    if let Some(closed) = closed {
+        let names = mechanism.rate_names();
+        let scalar = |rate: &usize| dynid_io::StateJoint::Scalar(names[*rate].clone());
+        return closed.independent().iter().map(scalar).collect();
+    }
     let others = axes.iter().skip(mechanism.rates()).map(|a| dynid_io::StateJoint::Scalar(a.name.clone()));
     mechanism
         .bodies()

@@ -30,12 +30,7 @@ pub(crate) fn run(args: &RegressorArgs) -> Result<u8, Failure> {
         return Ok(0);
     }
     let base = args.base.then(|| {
-        BaseParameters::of(
-            &model,
-            model.mechanism(),
-            &model.parameters().shape_start(),
-            &BaseSettings::default(),
-        )
+        BaseParameters::of_model(&model, &model.parameters().shape_start(), &BaseSettings::default())
     });
     let table = &model.parameters().linear;
     let columns = match &base {

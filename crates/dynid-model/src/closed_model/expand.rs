@@ -134,6 +134,24 @@ impl ClosedModel {
         self.machine.reach(work, independent)
     }
 
+    /// Whether all poses of a motion can be reached, each from the one before or straight from home, as the model itself
+    /// seeks them: states need not follow each other.
+    ///
+    /// # Errors
+    /// [`PathError`] at the first sample without a pose, where all that the model computes is not a number.
+    ///
+    /// # Panics
+    /// If the motion has other dimensions than the model.
+    pub fn reachable(&self, motion: &MotionBlock<'_>) -> Result<(), PathError> {
+        let mut first = None;
+        self.expand_with(motion, |sample, _, _, fault| {
+            if let (None, Some(fault)) = (&first, fault) {
+                first = Some(PathError { sample, fault: fault.clone() });
+            }
+        });
+        first.map_or(Ok(()), Err)
+    }
+
     /// Follows a motion through all its poses, each from the one before.
     ///
     /// `visit(sample, pose)` sees every pose.

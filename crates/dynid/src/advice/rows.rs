@@ -234,7 +234,7 @@ mod tests {
 
     /// Information `Σ w²` on a constant effort.
     fn offset_information(model: &RobotModel, scales_hz: &[f64], motion: &Motion) -> Option<f64> {
-        let base = BaseParameters::of(model, model.mechanism(), &[], &BaseSettings::default());
+        let base = BaseParameters::of_model(model, &[], &BaseSettings::default());
         let rows = FitRows { scales_hz: scales_hz.to_vec(), sigma: vec![Some(0.5)], mask: vec![None] };
         let reduction = CandidateRows::new(model, &base, &rows, &MotionSettings::default());
         let offset = model.parameters().column("j.fo").unwrap();

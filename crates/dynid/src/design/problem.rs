@@ -190,12 +190,12 @@ fn noise(
 
 fn columns(config: &DesignConfig, model: &Arc<RobotModel>, nominal: Option<&[f64]>) -> RobotExcitation {
     let shape = model.parameters().shape_start();
-    let base = BaseParameters::of(model.as_ref(), model.mechanism(), &shape, &BaseSettings::default());
+    let base = BaseParameters::of_model(model.as_ref(), &shape, &BaseSettings::default());
     match config.criterion.columns {
         ColumnsName::All => RobotExcitation::new(model.clone(), shape, &base, nominal),
         ColumnsName::Inertial => {
             let rigid = Arc::new(RobotModel::new(model.mechanism().clone(), Vec::new()));
-            let base = BaseParameters::of(rigid.as_ref(), rigid.mechanism(), &[], &BaseSettings::default());
+            let base = BaseParameters::of_model(rigid.as_ref(), &[], &BaseSettings::default());
             let links = rigid.parameters().linear.len();
             RobotExcitation::new(rigid, Vec::new(), &base, nominal.map(|n| &n[..links]))
         }

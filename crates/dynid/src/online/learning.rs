@@ -66,7 +66,7 @@ impl Structure {
         let model = plan.model(&robot.mechanism)?;
         let shape = model.parameters().shape_start();
         let settings = BaseSettings { seed: config.seed.unwrap_or(1), ..BaseSettings::default() };
-        let base = BaseParameters::of(&model, model.mechanism(), &shape, &settings);
+        let base = BaseParameters::of_model(&model, &shape, &settings);
         if base.is_empty() {
             return Err(Error::Unsupported("no parameter of this robot acts on any effort".to_owned()));
         }

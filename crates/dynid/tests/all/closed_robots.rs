@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use dynid::estimators::distribution::t_quantile;
 use dynid::identify::{Identification, identify};
 use dynid::model::EffortModel;
+use dynid::model::closed::ClosedDynamics;
 use dynid::simulate::{SimulateMode, SimulateSettings, SimulatedLog, simulate};
 use dynid::{Config, Robot, RobotOptions};
 
@@ -166,5 +167,49 @@ fn a_controlled_delta_is_identified_and_comes_back_as_urdf_and_loops() {
     for (a, b) in found.home().iter().zip(expected.home()) {
         assert!((a - b).abs() < 1e-9, "{a} {b}");
     }
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// States name the drives, whose efforts are those of the mechanism whatever the order of its joints; a pose out of reach is an
+/// error, not a number.
+#[test]
+fn states_of_a_stewart_platform_are_those_of_its_drives() {
+    let robot = load("stewart");
+    let names: Vec<String> = (1..=6).map(|k| format!("rod{k}")).collect();
+    let table = |first: f64| {
+        let header =
+            |signal: &str| names.iter().map(|n| format!("{signal}_{n}")).collect::<Vec<_>>().join(",");
+        let row = |scale: f64| {
+            let values = (0..18).map(|k| (scale * (0.3 + f64::from(k).sin())).to_string());
+            values.collect::<Vec<_>>().join(",")
+        };
+        format!("{},{},{}\n{}\n{}\n", header("q"), header("dq"), header("ddq"), row(first), row(-0.03))
+    };
+    let folder = folder("states");
+    let path = folder.join("states.csv");
+    let read = |text: String| {
+        std::fs::write(&path, text).unwrap();
+        dynid::io::states::read(&path, &robot.state_joints(), &dynid::io::ReadOptions::default()).unwrap()
+    };
+    let model = robot.skeleton().unwrap();
+    let values = robot.skeleton_values(&model);
+    let states = read(table(0.02));
+    let efforts = dynid::predict::efforts(&model, &values, &states).unwrap();
+    let mut dynamics = ClosedDynamics::new(robot.closed.clone().unwrap());
+    for row in 0..2 {
+        let at = |signal: &[Vec<f64>]| signal.iter().map(|s| s[row]).collect::<Vec<f64>>();
+        dynamics.reach(&at(&states.position)).unwrap();
+        let (dq, ddq) = dynamics.motion(&at(&states.velocity), &at(&states.acceleration));
+        let expected = dynamics.inverse_dynamics((&dq, &ddq), None, &robot.mechanism.inertia_vector());
+        for (effort, expected) in efforts.iter().zip(expected.drives) {
+            assert!(
+                (effort[row] - expected).abs() < 1e-9 * (1.0 + expected.abs()),
+                "{} {expected}",
+                effort[row]
+            );
+        }
+    }
+    let error = dynid::predict::efforts(&model, &values, &read(table(30.0))).unwrap_err().to_string();
+    assert!(error.contains("states: row 1") && error.contains("ball"), "{error}");
     std::fs::remove_dir_all(folder).unwrap();
 }
