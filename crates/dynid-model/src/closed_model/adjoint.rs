@@ -28,7 +28,7 @@ impl ClosedModel {
         }
         let mut effort = vec![0.0; rates * n];
         let mut by = MotionAdjoint::new(rates, rates, n);
-        let pressed = self.pressed(motion, &expanded);
+        let pressed = self.pressed(motion);
         expanded.with_block(motion, &pressed.channels(), |block| {
             self.tree.efforts(block, shape, linear, n, &mut effort);
             self.tree.effort_adjoint(block, shape, linear, n, &tree_weights, &mut by);
@@ -66,7 +66,7 @@ impl ClosedModel {
         let mut by = MotionAdjoint::new(rates, rates, n);
         // What the weights of an output make of the efforts of the tree: `effort[(output * rates + rate) * n + s]`.
         let mut effort = vec![0.0; outputs * rates * n];
-        let pressed = self.pressed(motion, &expanded);
+        let pressed = self.pressed(motion);
         expanded.with_block(motion, &pressed.channels(), |block| {
             self.tree.regressor(block, shape, &mut tree);
             for (output, terms) in self.fold.terms.iter().enumerate() {
@@ -102,6 +102,11 @@ impl ClosedModel {
             self.machine.mobility(),
             "derivatives of efforts that drives share out among themselves"
         );
+        self.expand_keeping(motion)
+    }
+
+    /// The motion of all joints with its poses; `None` where there is none.
+    pub(super) fn expand_keeping(&self, motion: &MotionBlock<'_>) -> (Expanded, Vec<Option<PoseWorkspace>>) {
         let mut poses = Vec::with_capacity(motion.samples);
         let expanded =
             self.expand_with(motion, |_, _, pose, fault| poses.push(fault.is_none().then(|| pose.clone())));

@@ -1,7 +1,6 @@
 //! Motion of all joints along a motion of the independent coordinates, and its derivatives.
 
 use super::ClosedModel;
-use crate::closed::PoseWorkspace;
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 
 /// Motion of all joints of the tree over a block: rate `r`, sample `s` at `[r * samples + s]`.
@@ -49,9 +48,7 @@ impl ClosedModel {
         assert_eq!(tree.positions(), tree.rates(), "derivatives by the orientation of a joint that floats");
         weights.check((tree.positions(), tree.rates()), motion.samples);
         out.check((self.machine.mobility(), self.machine.mobility()), motion.samples);
-        let mut poses: Vec<Option<PoseWorkspace>> = Vec::with_capacity(motion.samples);
-        let expanded =
-            self.expand_with(motion, |_, _, pose, fault| poses.push(fault.is_none().then(|| pose.clone())));
+        let (expanded, poses) = self.expand_keeping(motion);
         self.carry_all(&expanded, &poses, weights, |_| Vec::new(), out);
     }
 }

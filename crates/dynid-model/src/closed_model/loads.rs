@@ -2,7 +2,7 @@
 
 use super::ClosedModel;
 use super::expand::Expanded;
-use super::reactions::{Reaction, Reactions};
+use super::reactions::{Reaction, ReactionShares, Reactions};
 use crate::dynamics::MotionBlock;
 use crate::effort_model::{EffortModel, RegressorBlock};
 use crate::element::{reaction_channel, weight_channel};
@@ -199,17 +199,32 @@ impl ClosedModel {
     /// Forces `F` and `F_w` of every load over a block, at the parameters of the reference, and the largest relative change
     /// in the last round of an iteration (0 without one).
     pub fn load_forces(&self, motion: &MotionBlock<'_>) -> (Vec<[Vec<f64>; 2]>, f64) {
-        let pressed = self.pressed(motion, &self.expand(motion));
+        let pressed = self.pressed(motion);
         (pressed.forces, pressed.change)
     }
 
-    pub(super) fn pressed(&self, motion: &MotionBlock<'_>, expanded: &Expanded) -> Pressed<'_> {
-        let Some(loads) = &self.loads else {
-            return Pressed { loads: None, forces: Vec::new(), gradients: Vec::new(), change: 0.0 };
-        };
+    /// Motion of all joints, and the forces on them.
+    pub(super) fn prepared(&self, motion: &MotionBlock<'_>) -> (Expanded, Pressed<'_>) {
+        let Some(loads) = &self.loads else { return (self.expand(motion), Pressed::nothing()) };
+        let (expanded, shares) = self.expand_reactions(motion, &loads.reactions);
+        let pressed = self.press(loads, motion, &expanded, &shares);
+        (expanded, pressed)
+    }
+
+    /// The forces alone.
+    pub(super) fn pressed(&self, motion: &MotionBlock<'_>) -> Pressed<'_> {
+        if self.loads.is_some() { self.prepared(motion).1 } else { Pressed::nothing() }
+    }
+
+    fn press<'a>(
+        &self,
+        loads: &'a Loads,
+        motion: &MotionBlock<'_>,
+        expanded: &Expanded,
+        shares: &ReactionShares<'_>,
+    ) -> Pressed<'a> {
         let n = motion.samples;
         let LoadReference { linear, shape, linearised } = &loads.reference;
-        let (_, shares) = self.expand_reactions(motion, &loads.reactions);
         let weight = |j: &JointLoad| {
             let steady: f64 = j.weight.iter().map(|(column, factor)| factor * linear[*column]).sum();
             vec![(j.constant + steady).max(0.0); n]
@@ -254,6 +269,10 @@ pub(super) struct Pressed<'a> {
 }
 
 impl Pressed<'_> {
+    fn nothing() -> Self {
+        Pressed { loads: None, forces: Vec::new(), gradients: Vec::new(), change: 0.0 }
+    }
+
     /// Channels that elements read.
     pub(super) fn channels(&self) -> Vec<(&str, &[f64])> {
         let names = self.loads.into_iter().flat_map(|l| l.channels.iter().flatten());

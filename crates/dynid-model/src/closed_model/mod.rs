@@ -145,8 +145,7 @@ impl EffortModel for ClosedModel {
         stride: usize,
         out: &mut [f64],
     ) {
-        let expanded = self.expand(motion);
-        let pressed = self.pressed(motion, &expanded);
+        let (expanded, pressed) = self.prepared(motion);
         expanded.with_block(motion, &pressed.channels(), |block| {
             self.tree.remember(block, step_s, shape, history, stride, out);
         });
@@ -173,9 +172,8 @@ impl EffortModel for ClosedModel {
     }
 
     fn regressor(&self, motion: &MotionBlock<'_>, shape: &[f64], out: &mut RegressorBlock) {
-        let expanded = self.expand(motion);
+        let (expanded, pressed) = self.prepared(motion);
         let mut tree = RegressorBlock::new(self.tree.layout().clone(), motion.samples);
-        let pressed = self.pressed(motion, &expanded);
         expanded
             .with_block(motion, &pressed.channels(), |block| self.tree.regressor(block, shape, &mut tree));
         self.fold.regressor(&expanded, &tree, out);
@@ -199,11 +197,10 @@ impl EffortModel for ClosedModel {
         derivatives: &mut [f64],
     ) {
         let n = motion.samples;
-        let expanded = self.expand(motion);
+        let (expanded, pressed) = self.prepared(motion);
         let wanted = |slice: &[f64], columns: usize| if slice.is_empty() { 0 } else { columns * n };
         let mut tree_values = vec![0.0; wanted(values, self.tree.shaped_columns().len())];
         let mut tree_derivatives = vec![0.0; wanted(derivatives, self.tree.shape_dependence().len())];
-        let pressed = self.pressed(motion, &expanded);
         expanded.with_block(motion, &pressed.channels(), |block| {
             self.tree.shaped(block, shape, n, &mut tree_values, &mut tree_derivatives);
         });
@@ -228,8 +225,7 @@ impl EffortModel for ClosedModel {
             }
             return;
         }
-        let expanded = self.expand(motion);
-        let pressed = self.pressed(motion, &expanded);
+        let (expanded, pressed) = self.prepared(motion);
         let rates = self.machine.mechanism().rates();
         let mut tree = vec![0.0; rates * n];
         expanded.with_block(motion, &pressed.channels(), |block| {

@@ -117,7 +117,7 @@ impl ClosedModel {
         out: &mut RegressorBlock,
     ) {
         let (expanded, shares) = self.expand_reactions(motion, reactions);
-        let pressed = self.pressed(motion, &expanded);
+        let pressed = self.pressed(motion);
         let mut tree = RegressorBlock::new(self.tree.layout().clone(), motion.samples);
         expanded
             .with_block(motion, &pressed.channels(), |block| self.tree.regressor(block, shape, &mut tree));
