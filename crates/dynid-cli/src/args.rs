@@ -19,6 +19,8 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
     /// Effort and regressor rows at given states.
     Regressor(RegressorArgs),
+    /// Pre-flight of logs: clock, joint order, signs, units, delay, saturation, excitation (exit code 1 on an error).
+    Check(CheckArgs),
     /// Identify a robot from logs: writes estimate.json, report.html and an updated robot file.
     Identify(Box<IdentifyArgs>),
     /// Effort of an identified model at given states.
@@ -188,6 +190,36 @@ pub(crate) struct LogArgs {
     /// Hold joints without columns still at zero instead of refusing the log.
     #[arg(long)]
     pub(crate) allow_unlogged: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CheckArgs {
+    /// Logs, CSV or CSV.gz, together with --robot; or a configuration (TOML), whose logs are examined.
+    #[arg(required = true, value_name = "LOG | CONFIG")]
+    pub(crate) input: Vec<PathBuf>,
+    /// Robot file: URDF or TOML.
+    #[arg(long, value_name = "ROBOT")]
+    pub(crate) robot: Option<PathBuf>,
+    /// Write the configuration that applies the remedies.
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) fix: Option<PathBuf>,
+    /// Write the report page.
+    #[arg(long, value_name = "FILE.html")]
+    pub(crate) report: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) columns: LogArgs,
+    /// Hold a joint at a position, rad or m.
+    #[arg(long, value_name = "JOINT=POSITION", value_parser = joint_value)]
+    pub(crate) lock: Vec<(String, f64)>,
+    /// Gravity in base axes, m/s² (default: the robot file's, else 0,0,-9.81).
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    pub(crate) gravity: Option<[f64; 3]>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print nothing but results and errors.
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
 }
 
 #[derive(Debug, Args)]

@@ -44,6 +44,10 @@ impl Progress {
 }
 
 impl Progress {
+    pub(crate) fn examining(&self, log: &str) {
+        self.0.set_message(format!("examining {log}"));
+    }
+
     pub(crate) fn friction(&self, step: FrictionStep) {
         self.0.set_message(match step {
             FrictionStep::Read(file) => format!("reading {file}"),

@@ -43,6 +43,7 @@ pub mod linear;
 pub mod load_friction;
 pub mod metrics;
 pub mod online;
+pub mod preflight;
 pub mod rank;
 pub mod rows;
 pub mod search;

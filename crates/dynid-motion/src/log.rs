@@ -213,6 +213,26 @@ impl Log {
         )
     }
 
+    /// The rows for which `keep` holds as a log of the same name. Fails if fewer than two are left.
+    ///
+    /// # Panics
+    /// Unless there is one entry per row.
+    pub fn retain(&self, keep: &[bool]) -> Result<Self, LogError> {
+        assert_eq!(keep.len(), self.rows(), "one entry per row");
+        let take = |values: &[f64]| -> Vec<f64> {
+            values.iter().zip(keep).filter(|(_, keep)| **keep).map(|(x, _)| *x).collect()
+        };
+        let joints = self.joints.iter().map(|j| JointSignals {
+            name: j.name.clone(),
+            position: take(&j.position),
+            velocity: j.velocity.as_deref().map(take),
+            effort: take(&j.effort),
+        });
+        let channels =
+            self.channels.iter().map(|c| Channel { name: c.name.clone(), values: take(&c.values) });
+        Self::new(self.name.clone(), take(&self.time), joints.collect(), channels.collect())
+    }
+
     fn check_shape(&self) -> Result<(), LogError> {
         let log = || self.name.clone();
         if self.joints.is_empty() {

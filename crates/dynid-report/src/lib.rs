@@ -1,5 +1,6 @@
 //! Reports: one HTML file that tells a customer what was identified and how far it can be trusted, another that shows a
-//! designed trajectory and what its log will tell, a third that holds the claims of a study against what was measured.
+//! designed trajectory and what its log will tell, others that hold the claims of a study against what was measured and that
+//! say what is wrong with a log.
 //!
 //! Fill a [`ReportData`], a [`DesignReport`] or a [`StudyReport`], call [`render`], [`render_design`] or [`render_study`], write the text to a file. The crate
 //! knows nothing of models or estimators, and a page needs nothing but a browser: no network, no second file.
@@ -36,5 +37,6 @@ pub use data::{
     Trajectory, UnidentifiableColumn, ValidationPrice, Value, Verdict, Warning, Whiteness,
 };
 pub use data::{CurvesByTemperature, FrictionReport, FrictionTest, Surface, TemperatureLevel};
+pub use data::{FindingRow, LogPage};
 pub use error::ReportError;
-pub use page::{render, render_design, render_friction, render_study};
+pub use page::{render, render_design, render_friction, render_log_page, render_study};

@@ -130,6 +130,11 @@ pub struct LogConfig {
     /// First and last part of the record to use, as shares of its rows, e.g. `[0.0, 0.7]`. Default: all.
     #[serde(deserialize_with = "pair")]
     pub part: Option<(f64, f64)>,
+    /// Data rows to leave out, from 1, each range with both ends, e.g. `[[120, 180]]`; what borders on them is not used
+    /// either. Default: none.
+    pub leave_out: Vec<(usize, usize)>,
+    /// Leave out rows in which no signal differs from the row before although a joint moves. Default false.
+    pub drop_repeated: bool,
     /// Columns of this log in place of the run's.
     pub columns: Option<MappingSpec>,
     /// Trajectory file of a periodic motion, relative to the configuration: states come from a Fourier series of its period.
@@ -291,6 +296,15 @@ impl Config {
         check_motion(self.trajectory.as_deref(), self.period_s)?;
         for log in self.log.iter().chain(&self.validation) {
             check_motion(log.trajectory.as_deref(), log.period_s)?;
+            if let Some((first, last)) =
+                log.leave_out.iter().find(|(first, last)| *first == 0 || last < first)
+            {
+                return Err(Error::setting(
+                    "leave_out",
+                    "ranges [first, last] of data rows, counted from 1",
+                    format!("[{first}, {last}]"),
+                ));
+            }
             if let Some((a, b)) = log.part
                 && !(0.0..1.0).contains(&a) | !(b > a && b <= 1.0)
             {

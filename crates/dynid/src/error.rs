@@ -129,6 +129,9 @@ pub enum Error {
     /// A log cannot be conditioned.
     #[error(transparent)]
     Conditioning(#[from] dynid_estimate::conditioning::ConditioningError),
+    /// A log cannot be examined.
+    #[error(transparent)]
+    Preflight(#[from] dynid_estimate::preflight::PreflightError),
     /// An element name is unknown.
     #[error("unknown element `{name}` for joint `{joint}`, expected one of {}", crate::elements::NAMES.join(", "))]
     UnknownElement {

@@ -6,6 +6,7 @@
 pub mod advice;
 pub mod agreement;
 pub mod bounds;
+pub mod check;
 pub mod clearance;
 pub mod config;
 pub mod consistency;

@@ -31,6 +31,8 @@ pub struct LoadedLog {
     pub columns: Vec<(String, String)>,
     /// Period of the motion, if one was stated, s.
     pub period_s: Option<f64>,
+    /// Columns of every signal with their factors.
+    pub mapping: ColumnMapping,
 }
 
 impl LoadedLog {
@@ -61,6 +63,34 @@ pub fn load(
     run_columns: &MappingSpec,
     motor_side: Option<&MotorSide>,
 ) -> Result<LoadedLog, Error> {
+    let (signals, mapping) = read(config, axes, run_columns, motor_side)?;
+    let file = config.path.display().to_string();
+    check_degrees(&signals, axes, &file)?;
+    check_reach(&signals, &file)?;
+    check_temperatures(&signals, &file)?;
+    finish(config, &file, &signals, mapping)
+}
+
+/// The same without refusing numbers for what they seem to be: units of angles, counts, temperatures.
+///
+/// # Errors
+/// As [`load`], without [`Error::Degrees`], [`Error::FarPosition`] and [`Error::Temperature`].
+pub(crate) fn load_as_it_is(
+    config: &LogConfig,
+    axes: &[LogAxis],
+    run_columns: &MappingSpec,
+    motor_side: Option<&MotorSide>,
+) -> Result<LoadedLog, Error> {
+    let (signals, mapping) = read(config, axes, run_columns, motor_side)?;
+    finish(config, &config.path.display().to_string(), &signals, mapping)
+}
+
+fn read(
+    config: &LogConfig,
+    axes: &[LogAxis],
+    run_columns: &MappingSpec,
+    motor_side: Option<&MotorSide>,
+) -> Result<(Signals, ColumnMapping), Error> {
     let file = config.path.display().to_string();
     let options = ReadOptions { rows: config.rows, ..ReadOptions::default() };
     let table = dynid_io::csv::read(&config.path, &options)?;
@@ -73,14 +103,20 @@ pub fn load(
     }
     check_gains(spec, joints.len())?;
     let mut signals = mapping.extract(&table).map_err(named)?;
-    drop(table);
     if let Some(transmission) = motor_side {
         to_joint_side(&mut signals, transmission)?;
     }
-    check_degrees(&signals, axes, &file)?;
-    check_reach(&signals, &file)?;
-    check_temperatures(&signals, &file)?;
-    let log = assemble(&file, &signals)?;
+    Ok((signals, mapping))
+}
+
+fn finish(
+    config: &LogConfig,
+    file: &str,
+    signals: &Signals,
+    mapping: ColumnMapping,
+) -> Result<LoadedLog, Error> {
+    let joints: Vec<String> = mapping.joints.clone();
+    let log = left_out(assemble(file, signals)?, config)?;
     let log = match config.part {
         None => log,
         Some((from, to)) => {
@@ -96,7 +132,25 @@ pub fn load(
         }
         None => (log, config.period_s),
     };
-    Ok(LoadedLog { period_s, log, not_logged: signals.not_logged.clone(), columns: describe(&mapping) })
+    let (not_logged, columns) = (signals.not_logged.clone(), describe(&mapping));
+    Ok(LoadedLog { period_s, log, not_logged, columns, mapping })
+}
+
+/// The log without the rows that its configuration leaves out; the clock takes what is missing for a gap.
+fn left_out(log: Log, config: &LogConfig) -> Result<Log, Error> {
+    let mut keep = vec![true; log.rows()];
+    let first_row = config.rows.map_or(1, |(first, _)| first);
+    for (from, to) in &config.leave_out {
+        let from = from.saturating_sub(first_row).min(keep.len());
+        let to = (to + 1).saturating_sub(first_row).min(keep.len());
+        keep[from..to.max(from)].fill(false);
+    }
+    if config.drop_repeated {
+        for row in dynid_motion::faults::repeated(&log).rows {
+            keep[row] = false;
+        }
+    }
+    if keep.iter().all(|k| *k) { Ok(log) } else { Ok(log.retain(&keep)?) }
 }
 
 /// Turns motor positions and efforts into those of the joints.

@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub(crate) mod check;
 pub(crate) mod clearance;
 pub(crate) mod design;
 pub(crate) mod export;

@@ -32,6 +32,7 @@ pub use periodic::PeriodicMotion;
 pub use predict::predict;
 pub use prepare::{PreparedLog, prepare};
 pub use reduce::reduce;
+pub(crate) use rows::KeptColumns;
 pub use settings::ConditioningSettings;
 pub use shaped_rows::{RefineError, ShapedRows, refine};
 pub use states::States;

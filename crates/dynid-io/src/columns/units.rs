@@ -17,11 +17,14 @@ impl Conversion {
     pub(super) const IDENTITY: Conversion = Conversion { factor: 1.0, offset: 0.0, current: false };
 }
 
-/// The conversion of a unit; case, blanks, `*` and `·` do not matter.
+/// The conversion of a unit (`SI`: none); case, blanks, `*` and `·` do not matter.
 pub(super) fn conversion(signal: Signal, unit: &str, column: &str) -> Result<Conversion, MappingError> {
     let plain: String =
         unit.to_lowercase().chars().filter(|c| !matches!(c, ' ' | '*' | '·' | '.' | '^' | '_')).collect();
     let plain = plain.replace('²', "2").replace(['µ', 'μ'], "u").replace('°', "deg");
+    if plain == "si" {
+        return Ok(Conversion::IDENTITY);
+    }
     let degree = PI / 180.0;
     let factor = match signal {
         Signal::Time => match plain.as_str() {

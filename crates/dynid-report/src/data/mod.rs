@@ -16,6 +16,7 @@ mod design;
 mod friction;
 mod friction_test;
 mod log;
+mod log_page;
 mod parameters;
 mod precision;
 mod provenance;
@@ -32,6 +33,7 @@ pub use design::{
 pub use friction::{FrictionTrial, ShapeParameter, ShapeVerdict};
 pub use friction_test::{CurvesByTemperature, FrictionReport, FrictionTest, Surface, TemperatureLevel};
 pub use log::{JointQuality, JointSeries, LogReport, LogRole, LogSeries, Quality};
+pub use log_page::{FindingRow, LogPage};
 pub use parameters::{BaseParameter, OwnerKind, ParameterVerdict, StandardParameter};
 pub use precision::{LogWhiteness, Precision, Whiteness};
 pub use provenance::{InputFile, Provenance};

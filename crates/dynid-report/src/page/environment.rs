@@ -11,10 +11,11 @@ use crate::number::{self, UNDEFINED};
 pub(super) const PAGE: &str = "page.html";
 pub(super) const DESIGN_PAGE: &str = "design/page.html";
 pub(super) const FRICTION_PAGE: &str = "friction_test/page.html";
+pub(super) const LOG_PAGE: &str = "log/page.html";
 pub(super) const STUDY_PAGE: &str = "study/page.html";
 
 /// Every name ends in `.html`, which switches automatic escaping on.
-const TEMPLATES: [(&str, &str); 26] = [
+const TEMPLATES: [(&str, &str); 28] = [
     ("shell.html", include_str!("../../template/shell.html")),
     (PAGE, include_str!("../../template/page.html")),
     ("macros.html", include_str!("../../template/macros.html")),
@@ -39,6 +40,8 @@ const TEMPLATES: [(&str, &str); 26] = [
     ("design/paths.html", include_str!("../../template/design/paths.html")),
     ("design/starts.html", include_str!("../../template/design/starts.html")),
     (FRICTION_PAGE, include_str!("../../template/friction_test/page.html")),
+    ("sections.html", include_str!("../../template/sections.html")),
+    (LOG_PAGE, include_str!("../../template/log/page.html")),
     (STUDY_PAGE, include_str!("../../template/study/page.html")),
     ("provenance.html", include_str!("../../template/provenance.html")),
 ];

@@ -6,13 +6,14 @@ mod context;
 mod design;
 mod environment;
 mod friction_test;
+mod log_page;
 mod prose;
 mod pruning;
 mod script_data;
 mod study;
 mod trust;
 
-use crate::data::{DesignReport, FrictionReport, ReportData, StudyReport, StudyTable};
+use crate::data::{DesignReport, FrictionReport, LogPage, ReportData, StudyReport, StudyTable};
 use crate::error::ReportError;
 
 /// Lays the report out as one HTML file that needs nothing else.
@@ -80,4 +81,16 @@ pub fn render_study(data: &StudyReport) -> Result<String, ReportError> {
     check_tables(data.sections.iter().flat_map(|s| &s.tables))?;
     let environment = environment::environment()?;
     Ok(environment.get_template(environment::STUDY_PAGE)?.render(study::context(data))?)
+}
+
+/// Lays a page about logs out as one HTML file, with the properties of [`render`]'s; it is complete without a script.
+///
+/// # Errors
+///
+/// [`ReportError::Length`] if a row of a table has more cells than the table has headings. The other variants would be
+/// faults of this crate.
+pub fn render_log_page(data: &LogPage) -> Result<String, ReportError> {
+    check_tables(data.sections.iter().flat_map(|s| &s.tables))?;
+    let environment = environment::environment()?;
+    Ok(environment.get_template(environment::LOG_PAGE)?.render(log_page::context(data))?)
 }

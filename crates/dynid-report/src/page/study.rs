@@ -8,7 +8,6 @@ use super::chart::{ChartView, chart};
 use crate::data::{Fact, StudyReport, StudySection, StudyTable};
 
 pub(super) fn context(data: &StudyReport) -> Value {
-    let sections: Vec<SectionView<'_>> = data.sections.iter().map(section).collect();
     context! {
         title => data.title.as_str(),
         verdict => Serde(&data.verdict),
@@ -16,13 +15,18 @@ pub(super) fn context(data: &StudyReport) -> Value {
         introduction => Serde(&data.introduction),
         rows => Serde(&data.rows),
         passed => data.rows.iter().filter(|r| r.pass).count(),
-        sections => Serde(sections),
+        sections => Serde(sections(&data.sections)),
         provenance => Serde(&data.provenance),
     }
 }
 
+/// Sections as their template sees them.
+pub(super) fn sections(list: &[StudySection]) -> Vec<SectionView<'_>> {
+    list.iter().map(section).collect()
+}
+
 #[derive(Debug, Serialize)]
-struct SectionView<'a> {
+pub(super) struct SectionView<'a> {
     title: &'a str,
     text: &'a [String],
     facts: &'a [Fact],

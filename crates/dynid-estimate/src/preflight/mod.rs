@@ -1,0 +1,37 @@
+//! What is wrong with a log, as far as it takes a model to tell.
+//!
+//! [`Trial::search`]: which column is whose, with which sign and unit ([`Wiring`]). Every candidate is judged by how well
+//! bodies that can exist, with friction that takes energy, explain the efforts ([`crate::consistent`]): a flipped sign asks
+//! for negative friction and mass, exchanged columns for motions that the effort does not follow. [`delay()`], [`tilt()`] and
+//! [`excitation()`] examine what the columns then say.
+
+mod delay;
+mod excitation;
+mod rows;
+mod samples;
+mod search;
+mod stated;
+mod tilt;
+mod wiring;
+
+pub use delay::{Delay, delay};
+pub use excitation::{Excitation, excitation};
+pub use samples::Samples;
+pub use search::{Found, Trial, WiringSearch};
+pub use stated::{AgainstStated, against_stated};
+pub use tilt::{GaussianPrior, Tilt, tilt};
+pub use wiring::{Rewiring, Source, Wiring};
+
+use crate::factor::FactorError;
+
+/// Why a log cannot be examined.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PreflightError {
+    /// A signal cannot be filtered.
+    #[error("signal: {0}")]
+    Signal(#[from] dynid_motion::SignalError),
+    /// A row of a trial cannot be used.
+    #[error("trial: {0}")]
+    Rows(#[from] FactorError),
+}

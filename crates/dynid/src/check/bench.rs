@@ -1,0 +1,288 @@
+//! What it takes a model to find: whose columns these are, delays, the direction of gravity, excitation.
+
+use dynid_estimate::Factor;
+use dynid_estimate::consistent::Problem;
+use dynid_estimate::preflight::{
+    AgainstStated, Delay, Excitation, GaussianPrior, PreflightError, Samples, Tilt, Trial, Wiring,
+    WiringSearch, against_stated, delay, excitation, tilt,
+};
+use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
+use dynid_motion::UniformLog;
+
+use super::finding::{Findings, Fix, Severity};
+use crate::config::Config;
+use crate::elements::ElementPlan;
+use crate::identify::stated_values;
+use crate::prior::{self, Origin, Prior};
+use crate::robot::Robot;
+use crate::{Error, advice, consistency};
+
+/// Weight of the prior: it decides only what the log leaves open.
+const PRIOR_WEIGHT: f64 = 0.01;
+/// Delays between these are ordinary, samples: a command is held over a sample, a sensor filters.
+const ORDINARY_DELAY: (f64, f64) = (-1.0, 2.5);
+/// Largest delay that identification finds by itself, samples and s.
+const FOUND_BY_ITSELF: (f64, f64) = (3.0, 0.02);
+/// Tilt that is worth a word, rad.
+const TILT: f64 = 0.035;
+/// A tilt or delay counts beyond this many standard errors.
+const SURE: f64 = 6.0;
+/// Condition number of the weighted regressor with unit columns that asks for better excitation.
+const CONDITION: f64 = 100.0;
+/// Stated inertias that leave more of the efforts' variance unexplained say nothing about gains.
+const STATED: f64 = 0.3;
+/// Efforts this many times larger or smaller than stated inertias ask for are in another unit.
+const OFF: f64 = 5.0;
+/// Share of the efforts' power (root) left unexplained above which a model explains too little to judge by.
+const UNEXPLAINED: f64 = 0.5;
+
+/// A robot as trial models need it.
+pub(super) struct Bench {
+    model: RobotModel,
+    shape: Vec<f64>,
+    base: BaseParameters,
+    regrouping: dynid_estimate::Mat<f64>,
+    slides: Vec<bool>,
+    stated: Vec<Option<f64>>,
+    gravity: [f64; 3],
+    robot: String,
+}
+
+/// What a model found in a log.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Examined {
+    pub(super) wiring: Option<WiringSearch>,
+    pub(super) delay: Option<Delay>,
+    pub(super) tilt: Option<Tilt>,
+    pub(super) excitation: Option<Excitation>,
+}
+
+impl Bench {
+    /// With the elements of the configuration, or the usual ones.
+    pub(super) fn new(config: &Config, robot: &Robot) -> Result<Bench, Error> {
+        let plan = ElementPlan::of_run(config, robot, |rate| robot.is_driven(rate))?;
+        let model = plan.model(&robot.mechanism)?;
+        let shape = model.parameters().shape_start();
+        let base = BaseParameters::of_model(&model, &shape, &BaseSettings::default());
+        Ok(Bench {
+            regrouping: advice::regrouping(&base),
+            slides: robot.axes.iter().map(|a| a.slides).collect(),
+            stated: stated_values(&model, &plan),
+            gravity: robot.file.description.gravity,
+            robot: robot.path.display().to_string(),
+            model,
+            shape,
+            base,
+        })
+    }
+
+    /// Names of the outputs.
+    pub(super) fn names(&self) -> Vec<String> {
+        self.model.outputs().iter().map(|o| o.name.clone()).collect()
+    }
+
+    /// Number of base parameters.
+    pub(super) fn parameters(&self) -> usize {
+        self.base.len()
+    }
+
+    /// Brings the joints of a log into the order of the outputs.
+    pub(super) fn order(&self, log: &mut UniformLog) {
+        let names = self.names();
+        log.joints.retain(|j| names.contains(&j.name));
+        log.joints.sort_by_key(|j| names.iter().position(|n| *n == j.name));
+    }
+
+    /// Why this robot's columns are not tried in other ways, if they are not.
+    fn refusal(&self, log: &UniformLog) -> Option<String> {
+        if let Some(missing) =
+            self.model.channels().iter().find(|c| !log.channels.iter().any(|have| have.name == **c))
+        {
+            return Some(format!("an element reads the channel `{missing}`, which the log does not hold"));
+        }
+        if self.model.closed().is_some() {
+            return Some("positions of a mechanism with loops cannot be exchanged one by one".to_owned());
+        }
+        if !self.model.coordinates().is_empty() {
+            return Some("motors behind springs are measured beside their joints".to_owned());
+        }
+        if log.joints.iter().any(|j| j.effort_is_constant()) {
+            return Some("an effort never changes".to_owned());
+        }
+        None
+    }
+
+    fn prior(&self, log: &UniformLog) -> Result<Prior, Error> {
+        let largest = |e: &[f64]| e.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let sizes: Vec<f64> = log.joints.iter().map(|j| largest(&j.effort)).collect();
+        Ok(prior::of(&self.model, &self.stated, &sizes, &self.robot)?)
+    }
+
+    /// Examines a log on its grid, joints in the order of the outputs.
+    pub(super) fn examine(
+        &self,
+        log: &UniformLog,
+        idle: &[String],
+        out: &mut Findings<'_>,
+    ) -> Result<Examined, Error> {
+        let mut found = Examined::default();
+        let not_examined = |out: &mut Findings<'_>, reason: String| {
+            let remedy = "nothing: order, signs and units of its columns were not examined";
+            out.add("not_examined", Severity::Info, None, reason, remedy);
+        };
+        if let Some(reason) = self.refusal(log) {
+            not_examined(out, reason);
+            return Ok(found);
+        }
+        let moves: Vec<bool> = log.joints.iter().map(|j| !idle.contains(&j.name)).collect();
+        let Some(samples) = Samples::new(log, &moves).map_err(PreflightError::from)? else {
+            not_examined(out, "too little motion, or too short a log, for a model to be tried".to_owned());
+            return Ok(found);
+        };
+        let prior = self.prior(log)?;
+        let problem = |factor: &Factor| -> Problem {
+            consistency::problem(&self.model, &self.regrouping, factor, &prior, &[])
+        };
+        let trial = Trial {
+            model: &self.model,
+            shape: &self.shape,
+            kept: &self.base.kept,
+            samples: &samples,
+            slides: &self.slides,
+            problem: &problem,
+            prior_weight: PRIOR_WEIGHT,
+        };
+        let search = trial.search(true).map_err(PreflightError::from)?;
+        super::columns::wiring(&search, &self.names(), out);
+        super::columns::velocities(log, &moves, Some(&search), samples.cutoff_hz, out);
+        let mut wiring = search.wiring.clone();
+        let explained = search.misfit() < UNEXPLAINED * UNEXPLAINED * search.nothing;
+        found.wiring = Some(search);
+        found.excitation = Some(excitation(&self.model, &self.shape, &self.base.kept, &samples, &wiring)?);
+        self.weak_excitation(found.excitation.as_ref(), out);
+        if found.excitation.as_ref().is_some_and(|e| e.excited == self.base.len()) {
+            self.scale(&samples, &mut wiring, &prior, out)?;
+        }
+        if !explained {
+            return Ok(found);
+        }
+        found.delay = delay(&self.model, &self.shape, &self.base.kept, log, &moves, &wiring)?;
+        late(found.delay, log.rate_hz, out);
+        let known = GaussianPrior { values: &prior.values, std: &prior.std, weight: PRIOR_WEIGHT };
+        found.tilt = tilt(&self.model, &self.shape, &samples, &wiring, self.gravity, &self.base.kept, known)?;
+        tilted(found.tilt, out);
+        Ok(found)
+    }
+
+    /// The scale of all efforts together, against inertias that the robot file states.
+    fn scale(
+        &self,
+        samples: &Samples,
+        wiring: &mut Wiring,
+        prior: &Prior,
+        out: &mut Findings<'_>,
+    ) -> Result<(), Error> {
+        let stated = prior.bodies.iter().all(|b| b.origin != Origin::Invented);
+        let first = prior.bodies.first().map(|b| b.inertia);
+        let alike = prior.bodies.len() > 1 && prior.bodies.iter().all(|b| Some(b.inertia) == first);
+        if !stated || alike {
+            return Ok(());
+        }
+        let bodies = 10 * prior.bodies.len();
+        let found = against_stated(&self.model, &self.shape, samples, wiring, bodies, &prior.values)?;
+        let names = wiring.effort.len();
+        // Joints whose efforts stated inertias explain, and elements alone do not.
+        let told: Vec<(usize, AgainstStated)> = found
+            .into_iter()
+            .enumerate()
+            .filter_map(|(j, f)| Some((j, f?)))
+            .filter(|(_, f)| {
+                f.ratio > 0.0 && f.unexplained < STATED && f.unexplained < 0.5 * f.elements_alone
+            })
+            .collect();
+        let off: Vec<&(usize, AgainstStated)> =
+            told.iter().filter(|(_, f)| !(1.0 / OFF..OFF).contains(&f.ratio)).collect();
+        let orders: Vec<f64> = off.iter().map(|(_, f)| f.ratio.log10().round()).collect();
+        let alike = orders.iter().all(|o| *o == orders[0] && *o != 0.0);
+        let enough = off.len() >= 2 || names == 1;
+        if !(enough && off.len() == told.len() && alike && !off.is_empty()) {
+            return Ok(());
+        }
+        let factor = 10f64.powf(-orders[0]);
+        let evidence = format!(
+            "efforts of {} joints are {:.3e} to {:.3e} times those of the bodies that the robot file states",
+            off.len(),
+            off.iter().map(|(_, f)| f.ratio).fold(f64::INFINITY, f64::min),
+            off.iter().map(|(_, f)| f.ratio).fold(0.0, f64::max)
+        );
+        wiring.effort.iter_mut().for_each(|e| e.factor *= factor);
+        let remedy = "state the unit or the drive gains of the efforts; or the masses of the robot file are off by this factor";
+        out.add("drive_gain", Severity::Error, None, evidence, remedy).fixes =
+            vec![Fix::Wiring(wiring.clone())];
+        Ok(())
+    }
+
+    fn weak_excitation(&self, excitation: Option<&Excitation>, out: &mut Findings<'_>) {
+        let Some(found) = excitation else { return };
+        let total = self.base.len();
+        if found.excited == total && found.condition <= CONDITION {
+            return;
+        }
+        let table = &self.model.parameters().linear;
+        let name = |k: &usize| table[self.base.kept[*k]].name.clone();
+        let unseen: Vec<String> = (0..total).filter(|k| found.std[*k].is_none()).map(|k| name(&k)).collect();
+        let mut evidence = format!(
+            "condition number {:.0} (unit columns), {} of {total} base parameters excited",
+            found.condition, found.excited
+        );
+        if !unseen.is_empty() {
+            evidence += &format!("; not excited: {}", first_of(&unseen));
+        }
+        let remedy = "record a trajectory made for identification (`dynid design`); verdicts say which parameters this log still tells";
+        out.add("weak_excitation", Severity::Warning, None, evidence, remedy);
+    }
+}
+
+fn first_of(names: &[String]) -> String {
+    let shown = names.iter().take(6).cloned().collect::<Vec<_>>().join(", ");
+    if names.len() > 6 { format!("{shown} and {} more", names.len() - 6) } else { shown }
+}
+
+fn late(delay: Option<Delay>, rate_hz: f64, out: &mut Findings<'_>) {
+    let Some(found) = delay else { return };
+    let (low, high) = ORDINARY_DELAY;
+    let beyond = (found.samples - high).max(low - found.samples);
+    if beyond <= 0.0 || beyond < SURE * found.error {
+        return;
+    }
+    let evidence = format!(
+        "the motion follows the effort of the same row by {:.2} ± {:.2} samples ({:.1} ms)",
+        found.samples,
+        found.error,
+        1e3 * found.samples / rate_hz
+    );
+    let by_itself = (FOUND_BY_ITSELF.1 * rate_hz).max(FOUND_BY_ITSELF.0);
+    let fix = vec![Fix::Delay(found.samples)];
+    if found.samples > -2.0 && found.samples < by_itself {
+        let remedy = "nothing: identification finds and removes a delay of this size";
+        out.add("delay", Severity::Info, None, evidence, remedy).fixes = fix;
+    } else {
+        let remedy = "state the delay (`conditioning.delay_samples`), or log motion and effort by one clock";
+        out.add("delay", Severity::Warning, None, evidence, remedy).fixes = fix;
+    }
+}
+
+fn tilted(tilt: Option<Tilt>, out: &mut Findings<'_>) {
+    let Some(found) = tilt.filter(|t| t.angle > TILT && t.angle > SURE * t.error) else { return };
+    let g = found.gravity;
+    let evidence = format!(
+        "efforts show gravity {:.2} ± {:.2} degrees away from the direction stated: ({:.3}, {:.3}, {:.3}) m/s² in base axes",
+        found.angle.to_degrees(),
+        found.error.to_degrees(),
+        g[0],
+        g[1],
+        g[2]
+    );
+    let remedy = "state gravity in base axes, or level the base";
+    out.add("base_tilt", Severity::Warning, None, evidence, remedy).fixes = vec![Fix::Gravity(g)];
+}

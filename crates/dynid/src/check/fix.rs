@@ -1,0 +1,297 @@
+//! The configuration that applies the remedies.
+
+use std::path::Path;
+
+use dynid_estimate::preflight::Wiring;
+use dynid_io::ColumnMapping;
+use dynid_io::columns::{ColumnUse, TimeSource};
+use toml::{Table, Value};
+
+use super::finding::Fix;
+use super::{Check, Finding, short};
+use crate::Error;
+use crate::config::{Config, LogConfig};
+
+/// Columns of a log, and its joints in the order of a wiring.
+#[derive(Debug, Clone)]
+pub(super) struct Mapped {
+    pub(super) columns: ColumnMapping,
+    pub(super) joints: Vec<String>,
+}
+
+impl Check {
+    /// Findings that change the configuration.
+    pub fn mended(&self) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(|f| !f.fixes.is_empty())
+    }
+
+    /// The configuration with the remedies applied, as a TOML text with absolute paths.
+    ///
+    /// Columns of a log that are put right are stated in full: names, factors and offsets to SI. Behind a transmission
+    /// (`motor_side`) they are left as they are, since joints have no columns of their own there. `source`: the file that
+    /// `config` was read from, whose other keys stay as they are.
+    ///
+    /// # Errors
+    /// [`Error::Read`], [`Error::Config`] for `source`.
+    pub fn corrected(&self, config: &Config, source: Option<&Path>) -> Result<String, Error> {
+        let mut table = match source {
+            Some(path) => read(path)?,
+            None => Table::new(),
+        };
+        table.insert("robot".to_owned(), absolute(&config.robot));
+        let training = config.training_logs();
+        let count = training.len();
+        for (key, logs, first) in [("log", &training, 0), ("validation", &config.validation, count)] {
+            let entries: Vec<Value> = logs
+                .iter()
+                .enumerate()
+                .map(|(k, log)| self.log_entry(first + k, log, config, as_read(&table, key, k)))
+                .collect();
+            if !entries.is_empty() {
+                table.insert(key.to_owned(), Value::Array(entries));
+            }
+        }
+        table.remove("trajectory");
+        table.remove("period_s");
+        if source.is_none() {
+            self.run_columns(config, &mut table);
+        } else {
+            make_absolute(&mut table, config);
+        }
+        for fix in self.findings.iter().flat_map(|f| &f.fixes) {
+            match fix {
+                Fix::Delay(samples) => {
+                    let section = table.entry("conditioning").or_insert_with(|| Value::Table(Table::new()));
+                    if let Some(section) = section.as_table_mut() {
+                        section.insert("delay_samples".to_owned(), Value::Float(round(*samples)));
+                    }
+                }
+                Fix::Gravity(g) => {
+                    table.insert("gravity".to_owned(), numbers(g.iter().map(|x| round(*x))));
+                }
+                _ => {}
+            }
+        }
+        let mut out = String::from("# Configuration with remedies for what a pre-flight found:\n");
+        for finding in self.mended() {
+            let joint = finding.joint.as_ref().map_or_else(String::new, |j| format!(" of {j}"));
+            out += &format!("# - {}: {}{joint}: {}\n", short(&finding.log), finding.id, finding.evidence);
+        }
+        out += &toml::to_string(&table).unwrap_or_default();
+        Ok(out)
+    }
+
+    fn log_entry(&self, number: usize, log: &LogConfig, config: &Config, mut entry: Table) -> Value {
+        entry.insert("path".to_owned(), absolute(&log.path));
+        if let Some(trajectory) = &log.trajectory {
+            entry.insert("trajectory".to_owned(), absolute(trajectory));
+        }
+        if let Some(period) = log.period_s {
+            entry.insert("period_s".to_owned(), Value::Float(period));
+        }
+        if let (Some((first, last)), false) = (log.rows, entry.contains_key("rows")) {
+            entry.insert("rows".to_owned(), Value::Array(vec![whole(first), whole(last)]));
+        }
+        let own: Vec<&Fix> =
+            self.findings.iter().filter(|f| f.number == number).flat_map(|f| &f.fixes).collect();
+        let mut leave_out = log.leave_out.clone();
+        for fix in &own {
+            match fix {
+                Fix::LeaveOut(ranges) => leave_out.extend(ranges),
+                Fix::DropRepeated => {
+                    entry.insert("drop_repeated".to_owned(), Value::Boolean(true));
+                }
+                _ => {}
+            }
+        }
+        if !leave_out.is_empty() {
+            let ranges = merged(leave_out);
+            let ranges = ranges.into_iter().map(|(a, b)| Value::Array(vec![whole(a), whole(b)]));
+            entry.insert("leave_out".to_owned(), Value::Array(ranges.collect()));
+        }
+        let columns = own.iter().any(|f| matches!(f, Fix::Wiring(_) | Fix::VelocityScale(..) | Fix::Rate(_)));
+        if let (true, None, Some(mapped)) = (columns, &config.motor_side, self.mapped.get(number)) {
+            entry.insert("columns".to_owned(), Value::Table(mapped.stated(&own)));
+        }
+        Value::Table(entry)
+    }
+
+    /// What flags said of the columns, for logs whose columns are not stated in full.
+    fn run_columns(&self, config: &Config, table: &mut Table) {
+        let mut columns = Table::new();
+        let spec = &config.columns;
+        if let Some(rate) = spec.rate_hz {
+            columns.insert("rate_hz".to_owned(), Value::Float(rate));
+        }
+        if let Some(gains) = &spec.current_gains {
+            columns.insert("current_gains".to_owned(), numbers(gains.iter().copied()));
+        }
+        if spec.allow_unlogged {
+            columns.insert("allow_unlogged".to_owned(), Value::Boolean(true));
+        }
+        if !columns.is_empty() {
+            table.insert("columns".to_owned(), Value::Table(columns));
+        }
+        if let Some(g) = config.gravity {
+            table.insert("gravity".to_owned(), numbers(g.into_iter()));
+        }
+        if !config.locked.is_empty() {
+            let locked = config.locked.iter().map(|(j, x)| (j.clone(), Value::Float(*x)));
+            table.insert("locked".to_owned(), Value::Table(locked.collect()));
+        }
+    }
+}
+
+impl Mapped {
+    /// All columns in full, put right.
+    fn stated(&self, fixes: &[&Fix]) -> Table {
+        let mut mapping = self.columns.clone();
+        let place = |joint: usize| mapping.joints.iter().position(|j| *j == self.joints[joint]);
+        let places: Vec<Option<usize>> = (0..self.joints.len()).map(place).collect();
+        let mut rate = None;
+        for fix in fixes {
+            match fix {
+                Fix::Wiring(wiring) => rewire(&mut mapping, &self.columns, &places, wiring),
+                Fix::VelocityScale(joint, factor) => {
+                    let column = places[*joint].zip(mapping.velocity.as_mut());
+                    if let Some(Some(column)) = column.map(|(k, list)| &mut list[k]) {
+                        column.factor *= factor;
+                        column.offset *= factor;
+                    }
+                }
+                Fix::Rate(hz) => rate = Some(*hz),
+                _ => {}
+            }
+        }
+        let mut out = Table::new();
+        match (rate, &mapping.time) {
+            (Some(hz), _) => drop(out.insert("rate_hz".to_owned(), Value::Float(hz))),
+            (None, TimeSource::Rate(hz)) => drop(out.insert("rate_hz".to_owned(), Value::Float(*hz))),
+            (None, TimeSource::Column(time)) => {
+                out.insert("time".to_owned(), Value::Table(signal(&[Some(time.clone())], Some("s"))));
+            }
+        }
+        let lists = [
+            ("position", Some(&mapping.position)),
+            ("velocity", mapping.velocity.as_ref()),
+            ("acceleration", mapping.acceleration.as_ref()),
+            ("effort", mapping.effort.as_ref()),
+            ("temperature", mapping.temperature.as_ref()),
+        ];
+        for (name, list) in lists {
+            if let Some(list) = list {
+                let unit = if name == "temperature" { Some("degC") } else { None };
+                out.insert(name.to_owned(), Value::Table(signal(list, unit)));
+            }
+        }
+        if !mapping.channels.is_empty() {
+            let channels = mapping.channels.iter().map(|(name, column)| {
+                let entry = Table::from_iter([
+                    ("column".to_owned(), Value::String(column.name.clone())),
+                    ("scale".to_owned(), Value::Float(column.factor)),
+                    ("offset".to_owned(), Value::Float(column.offset)),
+                ]);
+                (name.clone(), Value::Table(entry))
+            });
+            out.insert("channels".to_owned(), Value::Table(channels.collect()));
+        }
+        if mapping.position.iter().any(Option::is_none) {
+            out.insert("allow_unlogged".to_owned(), Value::Boolean(true));
+        }
+        out
+    }
+}
+
+fn rewire(to: &mut ColumnMapping, from: &ColumnMapping, places: &[Option<usize>], wiring: &Wiring) {
+    let scaled = |column: &Option<ColumnUse>, factor: f64| {
+        column.as_ref().map(|c| ColumnUse {
+            factor: factor * c.factor,
+            offset: factor * c.offset,
+            ..c.clone()
+        })
+    };
+    for (joint, place) in places.iter().enumerate() {
+        let Some(place) = place else { continue };
+        let (position, effort) = (wiring.position[joint], wiring.effort[joint]);
+        if let Some(source) = places[position.joint] {
+            to.position[*place] = scaled(&from.position[source], position.factor);
+        }
+        if let (Some(source), Some(of), Some(list)) =
+            (places[effort.joint], from.effort.as_ref(), to.effort.as_mut())
+        {
+            list[*place] = scaled(&of[source], effort.factor);
+        }
+    }
+}
+
+/// `{ columns, unit, scale, offset }`; SI if no unit is given.
+fn signal(list: &[Option<ColumnUse>], unit: Option<&str>) -> Table {
+    let name = |c: &Option<ColumnUse>| Value::String(c.as_ref().map_or_else(String::new, |c| c.name.clone()));
+    let mut out = Table::new();
+    out.insert("columns".to_owned(), Value::Array(list.iter().map(name).collect()));
+    out.insert("unit".to_owned(), Value::String(unit.unwrap_or("SI").to_owned()));
+    out.insert("scale".to_owned(), numbers(list.iter().map(|c| c.as_ref().map_or(1.0, |c| c.factor))));
+    if list.iter().flatten().any(|c| c.offset != 0.0) {
+        out.insert("offset".to_owned(), numbers(list.iter().map(|c| c.as_ref().map_or(0.0, |c| c.offset))));
+    }
+    out
+}
+
+fn read(path: &Path) -> Result<Table, Error> {
+    let text =
+        std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
+    crate::config::toml_file::parse(&text, &path.display().to_string())
+}
+
+/// Entry of a log as the configuration file states it.
+fn as_read(table: &Table, key: &str, number: usize) -> Table {
+    let entry = table.get(key).and_then(|list| list.get(number)).and_then(Value::as_table);
+    entry.cloned().unwrap_or_default()
+}
+
+fn make_absolute(table: &mut Table, config: &Config) {
+    if let (Some(file), Some(elements)) =
+        (&config.elements.known_friction, table.get_mut("elements").and_then(Value::as_table_mut))
+    {
+        elements.insert("known_friction".to_owned(), absolute(file));
+    }
+    if let Some(out) = &config.out {
+        table.insert("out".to_owned(), absolute(out));
+    }
+    if let (Some(file), Some(online)) =
+        (&config.online.checkpoint, table.get_mut("online").and_then(Value::as_table_mut))
+    {
+        online.insert("checkpoint".to_owned(), absolute(file));
+    }
+}
+
+fn absolute(path: &Path) -> Value {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    Value::String(path.display().to_string())
+}
+
+fn whole(n: usize) -> Value {
+    Value::Integer(i64::try_from(n).unwrap_or(i64::MAX))
+}
+
+fn numbers(list: impl Iterator<Item = f64>) -> Value {
+    Value::Array(list.map(Value::Float).collect())
+}
+
+/// To four decimals: more is noise.
+fn round(x: f64) -> f64 {
+    (1e4 * x).round() / 1e4
+}
+
+/// Ranges in order, those that touch as one.
+fn merged(mut ranges: Vec<(usize, usize)>) -> Vec<(usize, usize)> {
+    ranges.sort_unstable();
+    let mut out: Vec<(usize, usize)> = Vec::new();
+    for (first, last) in ranges {
+        match out.last_mut() {
+            Some(before) if first <= before.1 + 1 => before.1 = before.1.max(last),
+            _ => out.push((first, last)),
+        }
+    }
+    out
+}

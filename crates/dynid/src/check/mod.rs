@@ -1,0 +1,159 @@
+//! Pre-flight of logs: what is wrong with them before anything is identified.
+//!
+//! [`check`] looks at the record alone (clock, repetitions, frozen and cut-off signals, spikes, velocities) and tries the
+//! robot's model on it: columns in other orders, with other signs and units, the delay between effort and motion, the
+//! direction of gravity, the excitation of the parameters. Every [`Finding`] has its evidence in numbers and a remedy;
+//! [`Check::corrected`] writes the configuration that applies the remedies.
+
+mod bench;
+mod columns;
+mod finding;
+mod fix;
+mod record;
+mod report;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::Error;
+use crate::config::{Config, LogConfig};
+use crate::logs::{self, LoadedLog};
+use crate::robot::{Robot, RobotOptions};
+use bench::{Bench, Examined};
+use finding::Findings;
+pub use finding::{Finding, IDS, Severity};
+
+/// What was measured of one log, whether or not it is a fault.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CheckedLog {
+    /// Log file.
+    pub log: String,
+    /// Rows.
+    pub rows: usize,
+    /// Sample rate, Hz.
+    pub rate_hz: f64,
+    /// Duration, s.
+    pub duration_s: f64,
+    /// Standard deviation of the clock's steps, samples.
+    pub jitter: f64,
+    /// Share of the efforts (root mean square, over all joints) that the best trial model leaves unexplained.
+    pub unexplained: Option<f64>,
+    /// Delay of the motion behind the effort with its standard error, samples.
+    pub delay_samples: Option<[f64; 2]>,
+    /// Angle of gravity to the direction stated with its standard error, degrees.
+    pub tilt_deg: Option<[f64; 2]>,
+    /// Condition number of the weighted regressor with unit columns.
+    pub condition: Option<f64>,
+    /// Base parameters that the log excites, of all.
+    pub excited: Option<[usize; 2]>,
+}
+
+/// Outcome of [`check`].
+#[derive(Debug, Clone, Serialize)]
+pub struct Check {
+    /// Robot file.
+    pub robot: String,
+    /// What was found, errors first, in the order of the logs.
+    pub findings: Vec<Finding>,
+    /// What was measured.
+    pub logs: Vec<CheckedLog>,
+    #[serde(skip)]
+    traces: Vec<report::Trace>,
+    /// Per log: its columns and the joints that are logged.
+    #[serde(skip)]
+    mapped: Vec<fix::Mapped>,
+}
+
+impl Check {
+    /// The worst severity found.
+    pub fn worst(&self) -> Option<Severity> {
+        self.findings.iter().map(|f| f.severity).max()
+    }
+
+    /// Findings of one log.
+    pub fn of_log<'a>(&'a self, log: &'a str) -> impl Iterator<Item = &'a Finding> {
+        self.findings.iter().filter(move |f| f.log == log)
+    }
+
+    /// The result as JSON.
+    pub fn to_json(&self) -> String {
+        let value = serde_json::to_value(self).unwrap_or_default();
+        serde_json::to_string_pretty(&value).unwrap_or_default()
+    }
+}
+
+/// Examines all logs of a configuration, validation logs too. `progress` is told the file that is being examined.
+///
+/// # Errors
+/// Bad input: files that cannot be read, columns that cannot be assigned. What is wrong with the numbers is a finding.
+pub fn check(config: &Config, mut progress: impl FnMut(&str)) -> Result<Check, Error> {
+    config.check()?;
+    let options = RobotOptions {
+        gravity: config.gravity,
+        couple_mimics: config.couple_mimics.unwrap_or(false),
+        floating_base: false,
+        locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
+    };
+    let robot = Robot::load(&config.robot, &options)?;
+    let mut out = Check {
+        robot: config.robot.display().to_string(),
+        findings: Vec::new(),
+        logs: Vec::new(),
+        traces: Vec::new(),
+        mapped: Vec::new(),
+    };
+    let mut bench: Option<(Vec<String>, Bench)> = None;
+    let training = config.training_logs();
+    for log in training.iter().chain(&config.validation) {
+        let file = log.path.display().to_string();
+        progress(&file);
+        let loaded = logs::load_as_it_is(log, &robot.axes, &config.columns, config.motor_side.as_ref())?;
+        if bench.as_ref().is_none_or(|(still, _)| *still != loaded.not_logged) {
+            let still: Vec<(String, f64)> = loaded.not_logged.iter().map(|n| (n.clone(), 0.0)).collect();
+            let held = if still.is_empty() { robot.clone() } else { robot.locked(&still)? };
+            bench = Some((loaded.not_logged.clone(), Bench::new(config, &held)?));
+        }
+        let Some((_, bench)) = &bench else { continue };
+        let mut findings = Findings { log: &file, number: out.logs.len(), list: Vec::new() };
+        let (checked, trace) = examine(&loaded, log, bench, &mut findings)?;
+        out.findings.extend(findings.list);
+        out.logs.push(checked);
+        out.traces.push(trace);
+        out.mapped.push(fix::Mapped { columns: loaded.mapping, joints: bench.names() });
+    }
+    out.findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
+    Ok(out)
+}
+
+fn examine(
+    loaded: &LoadedLog,
+    config: &LogConfig,
+    bench: &Bench,
+    out: &mut Findings<'_>,
+) -> Result<(CheckedLog, report::Trace), Error> {
+    let first_row = config.rows.map_or(1, |(first, _)| first);
+    let mut on_grid = record::examine(&loaded.log, first_row, out)?;
+    bench.order(&mut on_grid);
+    let idle: Vec<String> =
+        loaded.log.joints().iter().filter(|j| !j.moves()).map(|j| j.name.clone()).collect();
+    let Examined { wiring, delay, tilt, excitation } = bench.examine(&on_grid, &idle, out)?;
+    let checked = CheckedLog {
+        log: out.log.to_owned(),
+        rows: loaded.log.rows(),
+        rate_hz: on_grid.rate_hz,
+        duration_s: on_grid.samples() as f64 / on_grid.rate_hz,
+        jitter: on_grid.report.jitter,
+        unexplained: wiring.as_ref().map(|w| (w.misfit() / w.nothing).sqrt()),
+        delay_samples: delay.map(|d| [d.samples, d.error]),
+        tilt_deg: tilt.map(|t| [t.angle.to_degrees(), t.error.to_degrees()]),
+        condition: excitation.as_ref().map(|e| e.condition),
+        excited: excitation.as_ref().map(|e| [e.excited, bench.parameters()]),
+    };
+    Ok((checked, report::Trace::of(&on_grid)))
+}
+
+/// Name of a file without its folders.
+fn short(path: &str) -> String {
+    Path::new(path).file_name().map_or_else(|| path.to_owned(), |n| n.to_string_lossy().into_owned())
+}
