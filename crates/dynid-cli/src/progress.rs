@@ -28,6 +28,7 @@ impl Progress {
     pub(crate) fn step(&self, step: Step) {
         self.0.set_message(match step {
             Step::Read(file) => format!("reading {file}"),
+            Step::Preflight => "examining logs".to_owned(),
             Step::Structure => "finding base parameters".to_owned(),
             Step::Conditioning(Stage::Kernel(k, n)) => format!("summing rows, kernel {} of {n}", k + 1),
             Step::Conditioning(Stage::Veto) => "choosing the kernel".to_owned(),

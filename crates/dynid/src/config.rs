@@ -51,6 +51,8 @@ pub struct Config {
     pub motor_side: Option<MotorSide>,
     /// Conditioning.
     pub conditioning: ConditioningConfig,
+    /// What the pre-flight of the training logs may do. Default `refuse`.
+    pub preflight: Preflight,
     /// Estimator.
     pub estimator: EstimatorConfig,
     /// Bounds on masses, centres of mass and parameters.
@@ -142,6 +144,19 @@ pub struct LogConfig {
     pub trajectory: Option<PathBuf>,
     /// The period alone, s, where the whole record is periodic.
     pub period_s: Option<f64>,
+}
+
+/// What an identification does about what its pre-flight finds ([`crate::check`]).
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum Preflight {
+    /// Refuses logs of which nonsense would come; warns of the rest.
+    #[default]
+    Refuse,
+    /// Warns.
+    Warn,
+    /// Is not made.
+    Off,
 }
 
 /// Which way from samples to rows.

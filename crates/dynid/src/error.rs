@@ -129,6 +129,15 @@ pub enum Error {
     /// A log cannot be conditioned.
     #[error(transparent)]
     Conditioning(#[from] dynid_estimate::conditioning::ConditioningError),
+    /// The pre-flight found a log of which nonsense would come.
+    #[error(
+        "{}: {}{}: {}",
+        .0.log,
+        .0.id,
+        .0.joint.as_ref().map_or_else(String::new, |j| format!(" of `{j}`")),
+        .0.evidence
+    )]
+    PreflightFault(Box<crate::check::Finding>),
     /// A log cannot be examined.
     #[error(transparent)]
     Preflight(#[from] dynid_estimate::preflight::PreflightError),
@@ -344,6 +353,10 @@ impl Error {
             Error::RobotFile(e) => e.hint(),
             Error::LogFile(e) => e.hint(),
             Error::Export(e) => e.hint(),
+            Error::PreflightFault(found) => Some(format!(
+                "{}: `dynid check` with `--fix FILE.toml` writes the configuration; `preflight = \"warn\"` goes on regardless",
+                found.remedy
+            )),
             Error::Elastic { fault, .. } => Some(fault.hint().to_owned()),
             Error::Friction(e) => e.hint(),
             Error::Design(dynid_excitation::ProblemError::RankDeficient { .. }) => Some(

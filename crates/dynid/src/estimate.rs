@@ -73,6 +73,9 @@ pub struct Estimate {
     pub fit: FitSummary,
     /// Validation, log by log.
     pub validation: Vec<LogFit>,
+    /// What the pre-flight of the training logs found, the remedies it took for granted included.
+    #[serde(default)]
+    pub preflight: Vec<FindingRecord>,
     /// Verdict in words and checks.
     pub verdict: Verdict,
     /// Choices of the conditioning, with reasons.
@@ -81,6 +84,33 @@ pub struct Estimate {
     pub model: ModelRecord,
     /// Inputs and settings.
     pub provenance: Provenance,
+}
+
+/// A finding of the pre-flight ([`crate::check`]).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FindingRecord {
+    /// Which fault.
+    pub id: String,
+    /// `info`, `warning` or `error`.
+    pub severity: String,
+    /// Joint, if it is a joint's own.
+    pub joint: Option<String>,
+    /// Log file.
+    pub log: String,
+    /// What was measured.
+    pub evidence: String,
+}
+
+impl From<&crate::check::Finding> for FindingRecord {
+    fn from(of: &crate::check::Finding) -> Self {
+        FindingRecord {
+            id: of.id.to_owned(),
+            severity: of.severity.word().to_owned(),
+            joint: of.joint.clone(),
+            log: of.log.clone(),
+            evidence: of.evidence.clone(),
+        }
+    }
 }
 
 /// Which standard parameters stand for the base values.

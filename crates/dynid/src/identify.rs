@@ -20,7 +20,8 @@ use dynid_motion::Log;
 
 use crate::Error;
 use crate::agreement::{self, Agreement};
-use crate::config::{Config, LogConfig, Route};
+use crate::check::{self, Finding, Severity};
+use crate::config::{Config, LogConfig, Preflight, Route};
 use crate::consistency::{self, Consistent};
 use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
@@ -40,6 +41,8 @@ pub(crate) use structure::{effort_sizes, stated_values};
 pub enum Step {
     /// Reading a file.
     Read(String),
+    /// Pre-flight of the logs.
+    Preflight,
     /// Structural analysis.
     Structure,
     /// A step of the conditioning.
@@ -121,6 +124,8 @@ pub struct Identification {
     pub pruning: Option<Pruning>,
     /// Warnings, in words.
     pub warnings: Vec<String>,
+    /// What the pre-flight of the training logs found.
+    pub findings: Vec<Finding>,
     /// Settings of the conditioning.
     pub settings: ConditioningSettings,
 }
@@ -147,6 +152,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     }
     refuse_internal_load(&robot, "identified")?;
     let (robot, loaded) = read_logs(config, &config.training_logs(), robot, &mut progress)?;
+    let findings = preflight(config, &robot, &loaded, &mut progress)?;
     let mut plan = plan_elements(config, &robot, &loaded)?;
     let model = plan.model(&robot.mechanism)?;
     let prepared = loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
@@ -206,6 +212,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     };
     let row_rms = figures::row_rms(&groups, &fitted.estimate.x, base.len());
     let residual_ratio = figures::residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
+    warnings.extend(findings.iter().filter_map(Finding::warning));
     warnings.extend(prior.warnings.iter().cloned());
     warnings.extend(loaded.iter().flat_map(|l| logs::temperature_warnings(&l.log)));
     warnings.extend(log_warnings(&model, &prepared));
@@ -238,6 +245,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         whiteness: Vec::new(),
         pruning: None,
         warnings,
+        findings,
         settings,
         logs: Vec::new(),
         robot,
@@ -398,6 +406,26 @@ fn read_logs(
     }
     let robot = if still.is_empty() { robot } else { robot.locked(&still)? };
     Ok((robot, loaded))
+}
+
+/// Examines the training logs before anything is made of them.
+fn preflight(
+    config: &Config,
+    robot: &Robot,
+    loaded: &[LoadedLog],
+    progress: &mut impl FnMut(Step),
+) -> Result<Vec<Finding>, Error> {
+    if config.preflight == Preflight::Off {
+        return Ok(Vec::new());
+    }
+    progress(Step::Preflight);
+    let findings = check::of_loaded(config, robot, loaded)?;
+    match findings.iter().find(|f| f.severity == Severity::Error) {
+        Some(fault) if config.preflight == Preflight::Refuse => {
+            Err(Error::PreflightFault(Box::new(fault.clone())))
+        }
+        _ => Ok(findings),
+    }
 }
 
 fn plan_elements(config: &Config, robot: &Robot, logs: &[LoadedLog]) -> Result<ElementPlan, Error> {

@@ -273,7 +273,7 @@ pub(crate) fn map_columns(
 }
 
 /// Largest position that is taken for one, rad or m: beyond any cable drum or track, below encoder counts.
-const LARGEST_POSITION: f64 = 1e6;
+pub(crate) const LARGEST_POSITION: f64 = 1e6;
 
 fn check_reach(signals: &Signals, file: &str) -> Result<(), Error> {
     for (joint, position) in signals.joints.iter().zip(&signals.position) {

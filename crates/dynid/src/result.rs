@@ -65,6 +65,7 @@ impl Identification {
             motions_that_would_help: self.trust.motions.clone(),
             fit: self.fit_summary(),
             validation: self.validation.iter().map(log_fit).collect(),
+            preflight: self.findings.iter().map(Into::into).collect(),
             verdict,
             conditioning: self.conditioning_record(config),
             model,

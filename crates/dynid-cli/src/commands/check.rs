@@ -84,11 +84,7 @@ fn text(found: &Check) -> String {
         let mut own: Vec<&Finding> = found.findings.iter().filter(|f| f.log == log.log).collect();
         own.dedup();
         for finding in own {
-            let severity = match finding.severity {
-                Severity::Error => "error",
-                Severity::Warning => "warning",
-                Severity::Info => "info",
-            };
+            let severity = finding.severity.word();
             let joint = finding.joint.as_ref().map_or_else(String::new, |j| format!(" {j}"));
             line(format!("  [{severity}] {}{joint}: {}", finding.id, finding.evidence));
             line(format!("      remedy: {}", finding.remedy));

@@ -6,9 +6,11 @@ use dynid_estimate::preflight::{
     AgainstStated, Delay, Excitation, GaussianPrior, PreflightError, Samples, Tilt, Trial, Wiring,
     WiringSearch, against_stated, delay, excitation, tilt,
 };
+use dynid_io::columns::degrees_suspected;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
 use dynid_motion::UniformLog;
 
+use super::columns::Velocities;
 use super::finding::{Findings, Fix, Severity};
 use crate::config::Config;
 use crate::elements::ElementPlan;
@@ -21,6 +23,8 @@ use crate::{Error, advice, consistency};
 const PRIOR_WEIGHT: f64 = 0.01;
 /// Delays between these are ordinary, samples: a command is held over a sample, a sensor filters.
 const ORDINARY_DELAY: (f64, f64) = (-1.0, 2.5);
+/// Deviation from a stated delay that is no fault, samples.
+const AS_STATED: f64 = 1.0;
 /// Largest delay that identification finds by itself, samples and s.
 const FOUND_BY_ITSELF: (f64, f64) = (3.0, 0.02);
 /// Tilt that is worth a word, rad.
@@ -45,6 +49,7 @@ pub(super) struct Bench {
     slides: Vec<bool>,
     stated: Vec<Option<f64>>,
     gravity: [f64; 3],
+    stated_delay: Option<f64>,
     robot: String,
 }
 
@@ -69,6 +74,7 @@ impl Bench {
             slides: robot.axes.iter().map(|a| a.slides).collect(),
             stated: stated_values(&model, &plan),
             gravity: robot.file.description.gravity,
+            stated_delay: config.conditioning.delay_samples,
             robot: robot.path.display().to_string(),
             model,
             shape,
@@ -153,25 +159,52 @@ impl Bench {
             prior_weight: PRIOR_WEIGHT,
         };
         let search = trial.search(true).map_err(PreflightError::from)?;
-        super::columns::wiring(&search, &self.names(), out);
-        super::columns::velocities(log, &moves, Some(&search), samples.cutoff_hz, out);
+        let velocities = Velocities::new(log, &moves, samples.cutoff_hz);
+        let follow = velocities.follow_positions();
+        super::columns::wiring(&search, follow, &self.names(), out);
+        let mut search = search;
+        self.beyond_limits(log, &mut search.wiring, follow, out);
+        velocities.examine(log, &moves, samples.cutoff_hz, &search.wiring, out);
         let mut wiring = search.wiring.clone();
         let explained = search.misfit() < UNEXPLAINED * UNEXPLAINED * search.nothing;
         found.wiring = Some(search);
         found.excitation = Some(excitation(&self.model, &self.shape, &self.base.kept, &samples, &wiring)?);
         self.weak_excitation(found.excitation.as_ref(), out);
         if found.excitation.as_ref().is_some_and(|e| e.excited == self.base.len()) {
-            self.scale(&samples, &mut wiring, &prior, out)?;
+            self.scale(&samples, &mut wiring, &prior, follow, out)?;
         }
         if !explained {
             return Ok(found);
         }
         found.delay = delay(&self.model, &self.shape, &self.base.kept, log, &moves, &wiring)?;
-        late(found.delay, log.rate_hz, out);
+        late(found.delay, self.stated_delay, log.rate_hz, out);
         let known = GaussianPrior { values: &prior.values, std: &prior.std, weight: PRIOR_WEIGHT };
         found.tilt = tilt(&self.model, &self.shape, &samples, &wiring, self.gravity, &self.base.kept, known)?;
         tilted(found.tilt, out);
         Ok(found)
+    }
+
+    /// Positions far beyond the limits of a joint that keep them as degrees: what no effort tells of a symmetric wrist.
+    fn beyond_limits(&self, log: &UniformLog, wiring: &mut Wiring, velocities: bool, out: &mut Findings<'_>) {
+        for (j, joint) in log.joints.iter().enumerate() {
+            let limits = self.model.limits(j);
+            let plain = wiring.position[j].factor.abs() == 1.0;
+            if self.slides[j] || !plain || limits.position.is_none() {
+                continue;
+            }
+            let source = &log.joints[wiring.position[j].joint].position;
+            let Some(found) = degrees_suspected(std::slice::from_ref(source), &[limits]) else { continue };
+            let evidence = format!(
+                "positions reach {:.1}, {:.0} times the limit of {:.3} rad that they keep as degrees",
+                found.largest,
+                found.largest / found.limit.unwrap_or(1.0),
+                found.limit.unwrap_or(0.0)
+            );
+            wiring.position[j].factor *= 1f64.to_radians();
+            let remedy = "state the unit of the position";
+            out.add("degrees", Severity::Error, Some(&joint.name), evidence, remedy).fixes =
+                vec![Fix::Wiring { wiring: wiring.clone(), velocities }];
+        }
     }
 
     /// The scale of all efforts together, against inertias that the robot file states.
@@ -180,6 +213,7 @@ impl Bench {
         samples: &Samples,
         wiring: &mut Wiring,
         prior: &Prior,
+        velocities: bool,
         out: &mut Findings<'_>,
     ) -> Result<(), Error> {
         let stated = prior.bodies.iter().all(|b| b.origin != Origin::Invented);
@@ -218,7 +252,7 @@ impl Bench {
         wiring.effort.iter_mut().for_each(|e| e.factor *= factor);
         let remedy = "state the unit or the drive gains of the efforts; or the masses of the robot file are off by this factor";
         out.add("drive_gain", Severity::Error, None, evidence, remedy).fixes =
-            vec![Fix::Wiring(wiring.clone())];
+            vec![Fix::Wiring { wiring: wiring.clone(), velocities }];
         Ok(())
     }
 
@@ -248,9 +282,10 @@ fn first_of(names: &[String]) -> String {
     if names.len() > 6 { format!("{shown} and {} more", names.len() - 6) } else { shown }
 }
 
-fn late(delay: Option<Delay>, rate_hz: f64, out: &mut Findings<'_>) {
+/// `stated`: by the configuration, which is then what is expected.
+fn late(delay: Option<Delay>, stated: Option<f64>, rate_hz: f64, out: &mut Findings<'_>) {
     let Some(found) = delay else { return };
-    let (low, high) = ORDINARY_DELAY;
+    let (low, high) = stated.map_or(ORDINARY_DELAY, |d| (d - AS_STATED, d + AS_STATED));
     let beyond = (found.samples - high).max(low - found.samples);
     if beyond <= 0.0 || beyond < SURE * found.error {
         return;

@@ -1,8 +1,8 @@
 //! Columns that are not what the log says they are.
 
-use dynid_estimate::preflight::{Found, Rewiring, WiringSearch};
+use dynid_estimate::preflight::{Found, Rewiring, Wiring, WiringSearch};
 use dynid_motion::UniformLog;
-use dynid_motion::velocity::{VelocityComparison, compare};
+use dynid_motion::velocity::compare;
 
 use super::finding::{Findings, Fix, Severity};
 
@@ -17,8 +17,8 @@ const LEAST_RANGE: f64 = 0.05;
 /// Scales that differ by less than this agree.
 const AGREE: f64 = 0.004;
 
-/// Findings of the search for the right wiring.
-pub(super) fn wiring(search: &WiringSearch, names: &[String], out: &mut Findings<'_>) {
+/// Findings of the search for the right wiring. `velocities`: whether velocities go with positions.
+pub(super) fn wiring(search: &WiringSearch, velocities: bool, names: &[String], out: &mut Findings<'_>) {
     for (k, found) in search.found.iter().enumerate() {
         let (id, joint, what) = describe(&found.change, names);
         let share = |misfit: f64| 100.0 * (misfit / search.nothing).sqrt();
@@ -39,7 +39,7 @@ pub(super) fn wiring(search: &WiringSearch, names: &[String], out: &mut Findings
         };
         let finding = out.add(id, Severity::Error, joint.as_deref(), evidence, remedy);
         if k + 1 == search.found.len() {
-            finding.fixes = vec![Fix::Wiring(search.wiring.clone())];
+            finding.fixes = vec![Fix::Wiring { wiring: search.wiring.clone(), velocities }];
         }
     }
 }
@@ -103,81 +103,114 @@ fn alternative(change: &Rewiring, names: &[String]) -> String {
     }
 }
 
-/// Measured velocities against derivatives of the positions, as the wiring takes these.
-pub(super) fn velocities(
-    log: &UniformLog,
-    moves: &[bool],
-    search: Option<&WiringSearch>,
-    cutoff_hz: f64,
-    out: &mut Findings<'_>,
-) {
-    let position = |j: usize| -> Vec<f64> {
-        let source = search.map_or((j, 1.0), |s| (s.wiring.position[j].joint, s.wiring.position[j].factor));
-        log.joints[source.0].position.iter().map(|q| source.1 * q).collect()
-    };
-    let n = log.joints.len();
-    let derived: Vec<Vec<f64>> = (0..n).map(position).collect();
-    let against = |j: usize, of: usize| -> Option<VelocityComparison> {
-        let measured = log.joints[of].velocity.as_deref()?;
-        compare(&derived[j], measured, log.rate_hz, cutoff_hz).ok()
-    };
-    let own: Vec<Option<(f64, f64)>> = (0..n)
-        .map(|j| {
-            let found = against(j, j)?;
-            let (low, high) = derived[j]
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
-            (moves[j] && high - low > LEAST_RANGE).then_some((found.scale?, found.mismatch))
-        })
-        .collect();
-    let good: Vec<f64> = own
-        .iter()
-        .flatten()
-        .filter(|(scale, rest)| (scale - 1.0).abs() < SCALE && *rest < REST)
-        .map(|(scale, _)| *scale)
-        .collect();
-    let mean = good.iter().sum::<f64>() / good.len().max(1) as f64;
-    let agree = good.iter().all(|s| (s - mean).abs() < AGREE);
-    if good.len() >= 2 && agree && (mean - 1.0).abs() > CLOCK {
-        let evidence = format!(
-            "measured velocities of {} joints are {:.4} times the derivatives of their positions, all alike within {:.2} %",
-            good.len(),
-            mean,
-            100.0 * AGREE
-        );
-        let remedy = "the clock, not the velocities: state the rate that rows really come at";
-        out.add("clock_rate", Severity::Warning, None, evidence, remedy).fixes =
-            vec![Fix::Rate(mean * log.rate_hz)];
+/// What measured velocities of a log fit to.
+pub(super) struct Velocities {
+    /// Per joint: scale and rest against the joint's own column of positions; `None` without velocity or motion.
+    as_logged: Vec<Option<(f64, f64)>>,
+}
+
+impl Velocities {
+    /// Compares every velocity with the position of the same columns.
+    pub(super) fn new(log: &UniformLog, moves: &[bool], cutoff_hz: f64) -> Self {
+        let own = |j: usize| against(log, moves, cutoff_hz, (j, 1.0), j);
+        Velocities { as_logged: (0..log.joints.len()).map(own).collect() }
     }
-    for (j, measured) in own.iter().enumerate() {
-        let Some((scale, rest)) = *measured else { continue };
-        if (scale - 1.0).abs() < SCALE && rest < REST {
-            continue;
-        }
-        let other = (0..n).filter(|k| *k != j).find(|k| {
-            against(j, *k)
-                .is_some_and(|f| f.scale.is_some_and(|s| (s - 1.0).abs() < SCALE) && f.mismatch < 0.5 * REST)
-        });
-        let name = log.joints[j].name.clone();
-        let mut evidence = format!(
-            "the measured velocity is {scale:.4} times the derivative of the position and differs from that by {:.0} %",
-            100.0 * rest
-        );
-        let mut fixes = Vec::new();
-        if let Some(k) = other {
-            evidence += &format!("; the velocity column of `{}` fits", log.joints[k].name);
-        } else if rest < REST * scale.abs() {
-            fixes.push(Fix::VelocityScale(j, 1.0 / scale));
-            for (factor, words) in [
-                (-1.0, "its sign is reversed"),
-                (180.0 / std::f64::consts::PI, "it is in degrees per second"),
-            ] {
-                if (scale / factor - 1.0).abs() < SCALE {
-                    evidence += &format!(": {words}");
+
+    /// Whether they are derivatives of the positions in the columns as they are: where positions are put right, velocities
+    /// then go with them.
+    pub(super) fn follow_positions(&self) -> bool {
+        let told: Vec<bool> = self.as_logged.iter().flatten().map(fits).collect();
+        2 * told.iter().filter(|fits| **fits).count() >= told.len()
+    }
+
+    /// Findings; `wiring`: what positions are taken for.
+    pub(super) fn examine(
+        &self,
+        log: &UniformLog,
+        moves: &[bool],
+        cutoff_hz: f64,
+        wiring: &Wiring,
+        out: &mut Findings<'_>,
+    ) {
+        let n = log.joints.len();
+        let source = |j: usize| match self.follow_positions() {
+            true => (j, 1.0),
+            false => (wiring.position[j].joint, wiring.position[j].factor),
+        };
+        let own: Vec<Option<(f64, f64)>> = match self.follow_positions() {
+            true => self.as_logged.clone(),
+            false => (0..n).map(|j| against(log, moves, cutoff_hz, source(j), j)).collect(),
+        };
+        clock_rate(&own, log.rate_hz, out);
+        for (j, measured) in own.iter().enumerate() {
+            let Some((scale, rest)) = *measured else { continue };
+            if fits(&(scale, rest)) {
+                continue;
+            }
+            let other = (0..n)
+                .filter(|k| *k != j)
+                .find(|k| against(log, moves, cutoff_hz, source(j), *k).is_some_and(|f| fits(&f)));
+            let name = log.joints[j].name.clone();
+            let mut evidence = format!(
+                "the measured velocity is {scale:.4} times the derivative of the position and differs from that by {:.0} %",
+                100.0 * rest
+            );
+            let mut fixes = Vec::new();
+            if let Some(k) = other {
+                evidence += &format!("; the velocity column of `{}` fits", log.joints[k].name);
+            } else if rest < REST * scale.abs() {
+                fixes.push(Fix::VelocityScale(j, 1.0 / scale));
+                for (factor, words) in [
+                    (-1.0, "its sign is reversed"),
+                    (180.0 / std::f64::consts::PI, "it is in degrees per second"),
+                ] {
+                    if (scale / factor - 1.0).abs() < SCALE {
+                        evidence += &format!(": {words}");
+                    }
                 }
             }
+            let remedy = "identification differentiates positions and does not use this column; do not use it elsewhere before it is put right";
+            out.add("velocity_mismatch", Severity::Warning, Some(&name), evidence, remedy).fixes = fixes;
         }
-        let remedy = "identification differentiates positions and does not use this column; do not use it elsewhere before it is put right";
-        out.add("velocity_mismatch", Severity::Warning, Some(&name), evidence, remedy).fixes = fixes;
     }
+}
+
+fn fits((scale, rest): &(f64, f64)) -> bool {
+    (scale - 1.0).abs() < SCALE && *rest < REST
+}
+
+/// Scale and rest of the velocity of a column against a position times a factor.
+fn against(
+    log: &UniformLog,
+    moves: &[bool],
+    cutoff_hz: f64,
+    (source, factor): (usize, f64),
+    of: usize,
+) -> Option<(f64, f64)> {
+    let measured = log.joints[of].velocity.as_deref()?;
+    let position: Vec<f64> = log.joints[source].position.iter().map(|q| factor * q).collect();
+    let (low, high) =
+        position.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    if !moves[source] || high - low < LEAST_RANGE {
+        return None;
+    }
+    let found = compare(&position, measured, log.rate_hz, cutoff_hz).ok()?;
+    Some((found.scale?, found.mismatch))
+}
+
+/// Velocities that are all off by the same small factor tell of the clock.
+fn clock_rate(own: &[Option<(f64, f64)>], rate_hz: f64, out: &mut Findings<'_>) {
+    let good: Vec<f64> = own.iter().flatten().filter(|f| fits(f)).map(|(scale, _)| *scale).collect();
+    let mean = good.iter().sum::<f64>() / good.len().max(1) as f64;
+    let agree = good.iter().all(|s| (s - mean).abs() < AGREE);
+    if good.len() < 2 || !agree || (mean - 1.0).abs() <= CLOCK {
+        return;
+    }
+    let evidence = format!(
+        "measured velocities of {} joints are {mean:.4} times the derivatives of their positions, all alike within {:.2} %",
+        good.len(),
+        100.0 * AGREE
+    );
+    let remedy = "the clock, not the velocities: state the rate that rows really come at";
+    out.add("clock_rate", Severity::Warning, None, evidence, remedy).fixes = vec![Fix::Rate(mean * rate_hz)];
 }

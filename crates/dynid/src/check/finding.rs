@@ -14,6 +14,17 @@ pub enum Severity {
     Error,
 }
 
+impl Severity {
+    /// `info`, `warning` or `error`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Severity::Info => "info",
+            Severity::Warning => "warning",
+            Severity::Error => "error",
+        }
+    }
+}
+
 /// One fault of a log.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
@@ -37,8 +48,22 @@ pub struct Finding {
     pub(super) fixes: Vec<Fix>,
 }
 
+/// What an identification says by itself, in figures of its own.
+const SAID_ANYWAY: [&str; 4] = ["clock_gap", "idle_joint", "spikes", "weak_excitation"];
+
+impl Finding {
+    /// The finding as a warning of an identification; `None` for what it says anyway or takes care of.
+    pub(crate) fn warning(&self) -> Option<String> {
+        if self.severity == Severity::Info || SAID_ANYWAY.contains(&self.id) {
+            return None;
+        }
+        let joint = self.joint.as_ref().map_or_else(String::new, |j| format!(" of {j}"));
+        Some(format!("{}: {}{joint}: {}", super::short(&self.log), self.id.replace('_', " "), self.evidence))
+    }
+}
+
 /// Faults that are looked for.
-pub const IDS: [&str; 20] = [
+pub const IDS: [&str; 21] = [
     "base_tilt",
     "clock_backwards",
     "clock_gap",
@@ -54,6 +79,7 @@ pub const IDS: [&str; 20] = [
     "idle_joint",
     "joint_permutation",
     "not_examined",
+    "position_range",
     "position_sign",
     "saturation",
     "spikes",
@@ -65,7 +91,12 @@ pub const IDS: [&str; 20] = [
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Fix {
     /// Columns stand for other joints, or have other factors: per joint, whose position and effort it is, with a factor.
-    Wiring(dynid_estimate::preflight::Wiring),
+    Wiring {
+        /// What stands for what.
+        wiring: dynid_estimate::preflight::Wiring,
+        /// Whether velocities go with positions.
+        velocities: bool,
+    },
     /// Velocities are to be multiplied by a factor, joint by joint.
     VelocityScale(usize, f64),
     /// Data rows to leave out, from 1, both included.

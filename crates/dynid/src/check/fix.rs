@@ -109,7 +109,8 @@ impl Check {
             let ranges = ranges.into_iter().map(|(a, b)| Value::Array(vec![whole(a), whole(b)]));
             entry.insert("leave_out".to_owned(), Value::Array(ranges.collect()));
         }
-        let columns = own.iter().any(|f| matches!(f, Fix::Wiring(_) | Fix::VelocityScale(..) | Fix::Rate(_)));
+        let columns =
+            own.iter().any(|f| matches!(f, Fix::Wiring { .. } | Fix::VelocityScale(..) | Fix::Rate(_)));
         if let (true, None, Some(mapped)) = (columns, &config.motor_side, self.mapped.get(number)) {
             entry.insert("columns".to_owned(), Value::Table(mapped.stated(&own)));
         }
@@ -151,7 +152,9 @@ impl Mapped {
         let mut rate = None;
         for fix in fixes {
             match fix {
-                Fix::Wiring(wiring) => rewire(&mut mapping, &self.columns, &places, wiring),
+                Fix::Wiring { wiring, velocities } => {
+                    rewire(&mut mapping, &self.columns, &places, wiring, *velocities);
+                }
                 Fix::VelocityScale(joint, factor) => {
                     let column = places[*joint].zip(mapping.velocity.as_mut());
                     if let Some(Some(column)) = column.map(|(k, list)| &mut list[k]) {
@@ -202,7 +205,13 @@ impl Mapped {
     }
 }
 
-fn rewire(to: &mut ColumnMapping, from: &ColumnMapping, places: &[Option<usize>], wiring: &Wiring) {
+fn rewire(
+    to: &mut ColumnMapping,
+    from: &ColumnMapping,
+    places: &[Option<usize>],
+    wiring: &Wiring,
+    velocities: bool,
+) {
     let scaled = |column: &Option<ColumnUse>, factor: f64| {
         column.as_ref().map(|c| ColumnUse {
             factor: factor * c.factor,
@@ -215,6 +224,9 @@ fn rewire(to: &mut ColumnMapping, from: &ColumnMapping, places: &[Option<usize>]
         let (position, effort) = (wiring.position[joint], wiring.effort[joint]);
         if let Some(source) = places[position.joint] {
             to.position[*place] = scaled(&from.position[source], position.factor);
+            if let (true, Some(of), Some(list)) = (velocities, from.velocity.as_ref(), to.velocity.as_mut()) {
+                list[*place] = scaled(&of[source], position.factor);
+            }
         }
         if let (Some(source), Some(of), Some(list)) =
             (places[effort.joint], from.effort.as_ref(), to.effort.as_mut())

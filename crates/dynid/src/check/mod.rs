@@ -126,6 +126,20 @@ pub fn check(config: &Config, mut progress: impl FnMut(&str)) -> Result<Check, E
     Ok(out)
 }
 
+/// Examines logs that were read already. `robot`: joints that are not logged are locked.
+pub(crate) fn of_loaded(config: &Config, robot: &Robot, loaded: &[LoadedLog]) -> Result<Vec<Finding>, Error> {
+    let bench = Bench::new(config, robot)?;
+    let training = config.training_logs();
+    let mut out = Vec::new();
+    for (number, (log, entry)) in loaded.iter().zip(&training).enumerate() {
+        let file = entry.path.display().to_string();
+        let mut findings = Findings { log: &file, number, list: Vec::new() };
+        examine(log, entry, &bench, &mut findings)?;
+        out.extend(findings.list);
+    }
+    Ok(out)
+}
+
 fn examine(
     loaded: &LoadedLog,
     config: &LogConfig,

@@ -8,6 +8,7 @@ use dynid_motion::{ClockReport, Log, UniformLog};
 
 use super::finding::{Findings, Fix, Severity};
 use crate::Error;
+use crate::logs::LARGEST_POSITION;
 
 /// Jitter that is worth a word, samples.
 const JITTER: f64 = 0.05;
@@ -90,6 +91,7 @@ pub(super) fn examine(log: &Log, first_row: usize, out: &mut Findings<'_>) -> Re
             out.add("idle_joint", Severity::Warning, name, evidence, remedy);
         }
     }
+    far(log, first_row, out);
     let mut on_grid = uniform(log, &ClockSettings::default())
         .map_err(dynid_estimate::conditioning::ConditioningError::from)?;
     clock(&on_grid.report, out);
@@ -139,6 +141,29 @@ fn moves_during(log: &Log, run: &Run) -> bool {
         let steps: Vec<f64> = j.position.windows(2).map(|w| w[1] - w[0]).collect();
         high - low > (AT_SPEED * rms(&steps) * run.length as f64).max(MOVED * quantum(&j.position))
     })
+}
+
+/// Positions that no joint reaches.
+fn far(log: &Log, first_row: usize, out: &mut Findings<'_>) {
+    for joint in log.joints() {
+        let rows: Vec<Run> = (0..log.rows())
+            .filter(|k| joint.position[*k].abs() > LARGEST_POSITION)
+            .map(|first| Run { first, length: 1 })
+            .collect();
+        let Some(first) = rows.first() else { continue };
+        let evidence = format!(
+            "{} of {} positions are beyond {LARGEST_POSITION:e} rad or m (row {}: {:e})",
+            rows.len(),
+            log.rows(),
+            first_row + first.first,
+            joint.position[first.first]
+        );
+        let few = rows.len() < log.rows() / 100 && rows.len() <= MOST_RANGES;
+        let remedy =
+            if few { LEAVE_OUT } else { "state the scale of the position: encoder counts are no angles" };
+        out.add("position_range", Severity::Error, Some(&joint.name), evidence, remedy).fixes =
+            if few { leave_out(&rows, first_row) } else { Vec::new() };
+    }
 }
 
 const LEAVE_OUT: &str = "leave these rows out; what borders on them is not used either";

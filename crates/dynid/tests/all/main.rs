@@ -16,6 +16,7 @@ mod identifiability;
 mod least_squares;
 mod online;
 mod periodic;
+mod preflight;
 mod recorded_logs;
 mod support;
 mod trust;

@@ -1,0 +1,448 @@
+//! Corruptions of a clean log, several sizes each: found, rightly named, and put right by the corrected configuration.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "helpers of tests outside of test functions; what was found is said"
+)]
+
+use std::path::{Path, PathBuf};
+
+use dynid::Config;
+use dynid::check::{Check, Severity, check};
+use dynid::config::LogConfig;
+use dynid::identify::identify;
+use dynid::io::csv::{ReadOptions, read};
+
+const JOINTS: usize = 6;
+
+fn example(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../examples/indy7").join(name)
+}
+
+/// The example's log: columns `t`, `q_j1` .. `q_j6`, `tau_j1` .. `tau_j6`, and velocities made of the positions.
+#[derive(Clone)]
+struct Record {
+    header: Vec<String>,
+    columns: Vec<Vec<f64>>,
+}
+
+impl Record {
+    fn clean() -> Self {
+        let table = read(example("train.csv.gz"), &ReadOptions::default()).unwrap();
+        let mut record = Record { header: table.header, columns: table.columns };
+        for joint in 1..=JOINTS {
+            let q = record.columns[joint].clone();
+            // The mean slope over nine samples: encoder noise is not what is looked for.
+            let slope = |k: usize| {
+                let (a, b) = (k.saturating_sub(4), (k + 4).min(q.len() - 1));
+                (q[b] - q[a]) / (record.columns[0][b] - record.columns[0][a])
+            };
+            let speed: Vec<f64> = (0..q.len()).map(slope).collect();
+            record.header.push(format!("dq_j{joint}"));
+            record.columns.push(speed);
+        }
+        record
+    }
+
+    fn rows(&self) -> usize {
+        self.columns[0].len()
+    }
+
+    fn position(&mut self, joint: usize) -> &mut Vec<f64> {
+        &mut self.columns[joint]
+    }
+
+    fn effort(&mut self, joint: usize) -> &mut Vec<f64> {
+        &mut self.columns[JOINTS + joint]
+    }
+
+    fn velocity(&mut self, joint: usize) -> &mut Vec<f64> {
+        &mut self.columns[2 * JOINTS + joint]
+    }
+
+    fn swap(&mut self, a: usize, b: usize) {
+        self.columns.swap(a, b);
+    }
+
+    fn remove_rows(&mut self, range: std::ops::Range<usize>) {
+        for column in &mut self.columns {
+            column.drain(range.clone());
+        }
+    }
+
+    fn write(&self, path: &Path) {
+        let mut text = self.header.join(",") + "\n";
+        for k in 0..self.rows() {
+            let row: Vec<String> = self.columns.iter().map(|c| format!("{}", c[k])).collect();
+            text += &(row.join(",") + "\n");
+        }
+        std::fs::write(path, text).unwrap();
+    }
+}
+
+/// Repeatable numbers between -1 and 1.
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
+fn config(log: &Path) -> Config {
+    Config {
+        robot: example("robot.toml"),
+        log: vec![LogConfig { path: log.to_owned(), ..LogConfig::default() }],
+        ..Config::default()
+    }
+}
+
+struct Case {
+    name: String,
+    id: &'static str,
+    joint: Option<&'static str>,
+    /// Whether the corrected configuration makes the finding go away; elsewhere identification takes care of it.
+    mended: bool,
+    corrupt: Box<dyn Fn(&mut Record)>,
+}
+
+fn case(
+    name: impl Into<String>,
+    id: &'static str,
+    joint: Option<&'static str>,
+    mended: bool,
+    corrupt: impl Fn(&mut Record) + 'static,
+) -> Case {
+    Case { name: name.into(), id, joint, mended, corrupt: Box::new(corrupt) }
+}
+
+fn examine(config: &Config) -> Check {
+    check(config, |_| {}).unwrap()
+}
+
+/// Runs all cases; gives the corrected configuration of each.
+fn run(cases: Vec<Case>) {
+    let folder = tempfile::tempdir().unwrap();
+    let clean = Record::clean();
+    for (k, case) in cases.into_iter().enumerate() {
+        let mut record = clean.clone();
+        (case.corrupt)(&mut record);
+        let path = folder.path().join(format!("{k}.csv"));
+        record.write(&path);
+        let config = config(&path);
+        let found = examine(&config);
+        let ours: Vec<_> = found.findings.iter().filter(|f| f.id == case.id).collect();
+        let all: Vec<String> =
+            found.findings.iter().map(|f| format!("{} {:?}: {}", f.id, f.joint, f.evidence)).collect();
+        assert!(!ours.is_empty(), "{}: no `{}` in {all:#?}", case.name, case.id);
+        let named = |f: &&dynid::check::Finding| case.joint.is_none_or(|j| f.joint.as_deref() == Some(j));
+        assert!(ours.iter().any(named), "{}: {all:#?}", case.name);
+        let others: Vec<&String> = all
+            .iter()
+            .zip(&found.findings)
+            .filter(|(_, f)| f.id != case.id && f.severity != Severity::Info)
+            .map(|(text, _)| text)
+            .collect();
+        println!("{}: {}; beside it {}", case.name, ours[0].evidence, others.len());
+        assert!(others.len() <= 2, "{}: {others:#?}", case.name);
+        if !case.mended {
+            continue;
+        }
+        let corrected = folder.path().join(format!("{k}.toml"));
+        std::fs::write(&corrected, found.corrected(&config, None).unwrap()).unwrap();
+        let again = examine(&Config::read(&corrected).unwrap());
+        let left: Vec<String> = again
+            .findings
+            .iter()
+            .filter(|f| f.id == case.id || f.severity == Severity::Error)
+            .map(|f| format!("{} {:?}: {}", f.id, f.joint, f.evidence))
+            .collect();
+        assert!(left.is_empty(), "{}: after the remedy {left:#?}", case.name);
+    }
+}
+
+#[test]
+fn a_clean_log_has_no_findings() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("clean.csv");
+    Record::clean().write(&path);
+    let found = examine(&config(&path));
+    assert!(found.findings.is_empty(), "{:#?}", found.findings);
+    assert_eq!(found.worst(), None);
+}
+
+#[test]
+fn signs_and_orders_of_columns() {
+    let mut cases = vec![
+        case("all efforts reversed", "effort_sign", None, true, |r| {
+            (1..=JOINTS).for_each(|j| r.effort(j).iter_mut().for_each(|x| *x = -*x));
+        }),
+        case("columns of all joints in reverse", "joint_permutation", None, true, |r| {
+            for (a, b) in [(1, 6), (2, 5), (3, 4)] {
+                r.swap(a, b);
+                r.swap(JOINTS + a, JOINTS + b);
+                r.swap(2 * JOINTS + a, 2 * JOINTS + b);
+            }
+        }),
+        case("efforts one joint on", "joint_permutation", None, true, |r| {
+            r.columns[JOINTS + 1..=2 * JOINTS].rotate_left(1);
+        }),
+        case("two pairs of efforts", "joint_permutation", None, true, |r| {
+            r.swap(JOINTS + 1, JOINTS + 2);
+            r.swap(JOINTS + 4, JOINTS + 5);
+        }),
+    ];
+    for (joint, name) in [(1, "j1"), (2, "j2"), (3, "j3"), (5, "j5"), (6, "j6")] {
+        cases.push(case(format!("effort of {name} reversed"), "effort_sign", Some(name), true, move |r| {
+            r.effort(joint).iter_mut().for_each(|x| *x = -*x);
+        }));
+    }
+    for (joint, name) in [(2, "j2"), (3, "j3"), (4, "j4")] {
+        cases.push(case(
+            format!("position of {name} reversed"),
+            "position_sign",
+            Some(name),
+            true,
+            move |r| {
+                r.position(joint).iter_mut().for_each(|x| *x = -*x);
+                r.velocity(joint).iter_mut().for_each(|x| *x = -*x);
+            },
+        ));
+    }
+    for (a, b, names) in [(1, 2, "j1, j2"), (2, 3, "j2, j3"), (4, 5, "j4, j5"), (3, 6, "j3, j6")] {
+        cases.push(case(format!("efforts {names}"), "joint_permutation", Some(names), true, move |r| {
+            r.swap(JOINTS + a, JOINTS + b);
+        }));
+        cases.push(case(format!("joints {names}"), "joint_permutation", Some(names), true, move |r| {
+            r.swap(a, b);
+            r.swap(JOINTS + a, JOINTS + b);
+            r.swap(2 * JOINTS + a, 2 * JOINTS + b);
+        }));
+    }
+    run(cases);
+}
+
+#[test]
+fn units_and_gains() {
+    let mut cases = vec![
+        case("all positions in degrees", "degrees", None, true, |r| {
+            for j in 1..=JOINTS {
+                r.position(j).iter_mut().for_each(|x| *x = x.to_degrees());
+                r.velocity(j).iter_mut().for_each(|x| *x = x.to_degrees());
+            }
+        }),
+        case("velocities in degrees", "velocity_mismatch", Some("j3"), true, |r| {
+            (1..=JOINTS).for_each(|j| r.velocity(j).iter_mut().for_each(|x| *x = x.to_degrees()));
+        }),
+        case("a velocity reversed", "velocity_mismatch", Some("j4"), true, |r| {
+            r.velocity(4).iter_mut().for_each(|x| *x = -*x);
+        }),
+        case("velocities of two joints", "velocity_mismatch", Some("j2"), false, |r| {
+            r.swap(2 * JOINTS + 2, 2 * JOINTS + 5);
+        }),
+    ];
+    for (joint, name) in [(2, "j2"), (4, "j4")] {
+        cases.push(case(format!("{name} in degrees"), "degrees", Some(name), true, move |r| {
+            r.position(joint).iter_mut().for_each(|x| *x = x.to_degrees());
+            r.velocity(joint).iter_mut().for_each(|x| *x = x.to_degrees());
+        }));
+    }
+    for scale in [1e3, 1e-3, 1e2] {
+        cases.push(case(format!("all efforts times {scale}"), "drive_gain", None, true, move |r| {
+            (1..=JOINTS).for_each(|j| r.effort(j).iter_mut().for_each(|x| *x *= scale));
+        }));
+    }
+    for (joint, name, scale) in [(2, "j2", 1e3), (3, "j3", 10.0), (3, "j3", 0.1), (1, "j1", 1e3)] {
+        cases.push(case(
+            format!("effort of {name} times {scale}"),
+            "drive_gain",
+            Some(name),
+            true,
+            move |r| {
+                r.effort(joint).iter_mut().for_each(|x| *x *= scale);
+            },
+        ));
+    }
+    run(cases);
+}
+
+#[test]
+fn clocks() {
+    let mut cases = Vec::new();
+    for share in [0.1, 0.25] {
+        cases.push(case(format!("jitter of {share}"), "clock_jitter", None, false, move |r| {
+            let mut numbers = Numbers(7);
+            r.columns[0].iter_mut().for_each(|t| *t += 3f64.sqrt() * share * 0.005 * numbers.next());
+        }));
+    }
+    for length in [5, 60, 400] {
+        cases.push(case(format!("a gap of {length}"), "clock_gap", None, false, move |r| {
+            r.remove_rows(2000..2000 + length);
+        }));
+    }
+    for count in [1, 20] {
+        cases.push(case(
+            format!("{count} rows with an old time"),
+            "clock_backwards",
+            None,
+            false,
+            move |r| {
+                for k in 0..count {
+                    r.columns[0][500 + 200 * k] = r.columns[0][400 + 200 * k];
+                }
+            },
+        ));
+    }
+    for factor in [0.98, 1.05] {
+        cases.push(case(format!("a clock that runs {factor}"), "clock_rate", None, true, move |r| {
+            r.columns[0].iter_mut().for_each(|t| *t *= factor);
+        }));
+    }
+    for every in [2, 40] {
+        cases.push(case(format!("every row {every} held"), "duplicate_samples", None, true, move |r| {
+            for column in &mut r.columns[1..] {
+                for k in (every..column.len()).step_by(every) {
+                    column[k] = column[k - 1];
+                }
+            }
+        }));
+    }
+    run(cases);
+}
+
+#[test]
+fn faults_of_signals() {
+    let mut cases = vec![
+        case("an effort that never changes", "frozen_signal", Some("j4"), false, |r| r.effort(4).fill(1.25)),
+        case("a joint at rest", "idle_joint", Some("j6"), false, |r| r.position(6).fill(0.3)),
+        case("a row of nonsense", "position_range", Some("j2"), true, |r| r.position(2)[3000] = 9e9),
+    ];
+    for length in [40, 200, 600] {
+        cases.push(case(
+            format!("position frozen for {length}"),
+            "frozen_signal",
+            Some("j2"),
+            true,
+            move |r| {
+                let at = fast(&r.columns[2], length);
+                let value = r.position(2)[at];
+                r.position(2)[at..at + length].fill(value);
+            },
+        ));
+        cases.push(case(
+            format!("effort frozen for {length}"),
+            "frozen_signal",
+            Some("j3"),
+            true,
+            move |r| {
+                let value = r.effort(3)[2500];
+                r.effort(3)[2500..2500 + length].fill(value);
+            },
+        ));
+    }
+    for share in [0.5, 0.8, 0.95] {
+        cases.push(case(format!("effort cut off at {share}"), "saturation", Some("j2"), true, move |r| {
+            let limit = share * r.effort(2).iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            r.effort(2).iter_mut().for_each(|x| *x = x.clamp(-limit, limit));
+        }));
+    }
+    for (count, size) in [(3, 1.0), (30, 0.3), (55, 2.0)] {
+        cases.push(case(format!("{count} spikes of {size}"), "spikes", Some("j5"), false, move |r| {
+            let peak = r.effort(5).iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            for k in 0..count {
+                r.effort(5)[100 + 100 * k] += size * 4.0 * peak;
+            }
+        }));
+    }
+    for size in [0.02, 0.3] {
+        cases.push(case(format!("position spikes of {size}"), "spikes", Some("j1"), false, move |r| {
+            (0..5).for_each(|k| r.position(1)[300 + 700 * k] += size);
+        }));
+    }
+    run(cases);
+}
+
+/// Where a joint keeps its speed for some samples.
+fn fast(position: &[f64], length: usize) -> usize {
+    let travel = |k: &usize| (position[k + length] - position[*k]).abs();
+    (200..position.len() - 200 - length).max_by(|a, b| travel(a).total_cmp(&travel(b))).unwrap()
+}
+
+#[test]
+fn delays_and_the_base() {
+    let mut cases = Vec::new();
+    for samples in [4, 8, 20] {
+        cases.push(case(format!("motion late by {samples}"), "delay", None, true, move |r| {
+            let rows = r.rows();
+            for column in r.columns[JOINTS + 1..=2 * JOINTS].iter_mut() {
+                column.copy_within(samples..rows, 0);
+            }
+            r.remove_rows(rows - samples..rows);
+        }));
+    }
+    run(cases);
+    // Gravity of the log against that of a configuration that says otherwise.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("clean.csv");
+    Record::clean().write(&path);
+    for degrees in [3.0_f64, 10.0, 30.0, 90.0] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let tilted = Config { gravity: Some([9.81 * sin, 0.0, -9.81 * cos]), ..config(&path) };
+        let found = examine(&tilted);
+        let tilt = found.findings.iter().find(|f| f.id == "base_tilt");
+        assert!(tilt.is_some(), "{degrees}: {:#?}", found.findings);
+        let measured = found.logs[0].tilt_deg.unwrap();
+        println!("tilt of {degrees}: {measured:?}");
+        assert!((measured[0] - degrees).abs() < 1.0, "{degrees}: {measured:?}");
+        let corrected = folder.path().join("corrected.toml");
+        std::fs::write(&corrected, found.corrected(&tilted, None).unwrap()).unwrap();
+        let again = examine(&Config::read(&corrected).unwrap());
+        assert!(again.findings.is_empty(), "{degrees}: {:#?}", again.findings);
+    }
+}
+
+#[test]
+fn weak_excitation_is_said() {
+    let cases = [500, 900]
+        .map(|rows| {
+            case(format!("{rows} rows"), "weak_excitation", None, false, move |r| {
+                let all = r.rows();
+                r.remove_rows(rows..all);
+            })
+        })
+        .into_iter()
+        .collect();
+    run(cases);
+}
+
+/// What is identified from a corrupted log with its corrected configuration is what the clean log gives, and without it the
+/// log is refused.
+#[test]
+fn identification_refuses_nonsense_and_accepts_what_was_put_right() {
+    let folder = tempfile::tempdir().unwrap();
+    let clean = folder.path().join("clean.csv");
+    Record::clean().write(&clean);
+    let truth = identify(&config(&clean), |_| {}).unwrap();
+    assert!(truth.findings.is_empty());
+    let mut record = Record::clean();
+    record.swap(2, 3);
+    record.swap(JOINTS + 2, JOINTS + 3);
+    record.effort(5).iter_mut().for_each(|x| *x = -*x);
+    let path = folder.path().join("wrong.csv");
+    record.write(&path);
+    let wrong = config(&path);
+    let error = identify(&wrong, |_| {}).unwrap_err();
+    assert!(matches!(&error, dynid::Error::PreflightFault(_)), "{error}");
+    assert!(error.hint().unwrap().contains("--fix"), "{error}");
+    let warned = Config { preflight: dynid::config::Preflight::Warn, ..wrong.clone() };
+    let warned = identify(&warned, |_| {}).unwrap();
+    assert!(warned.warnings.iter().any(|w| w.contains("joint permutation")), "{:?}", warned.warnings);
+    let corrected = folder.path().join("right.toml");
+    std::fs::write(&corrected, examine(&wrong).corrected(&wrong, None).unwrap()).unwrap();
+    let right = identify(&Config::read(&corrected).unwrap(), |_| {}).unwrap();
+    for (a, b) in right.fit().x.iter().zip(&truth.fit().x) {
+        assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{a} against {b}");
+    }
+}
