@@ -142,7 +142,9 @@ impl Bench {
         }
         let moves: Vec<bool> = log.joints.iter().map(|j| !idle.contains(&j.name)).collect();
         let Some(samples) = Samples::new(log, &moves).map_err(PreflightError::from)? else {
-            not_examined(out, "too little motion, or too short a log, for a model to be tried".to_owned());
+            let evidence = "too little motion, or too short a log, for a model to be tried".to_owned();
+            let remedy = "record for longer: order, signs and units of the columns were not examined";
+            out.add("not_examined", Severity::Warning, None, evidence, remedy);
             return Ok(found);
         };
         let prior = self.prior(log)?;

@@ -405,7 +405,7 @@ fn delays_and_the_base() {
 
 #[test]
 fn weak_excitation_is_said() {
-    let cases = [500, 900]
+    let cases = [700, 1100]
         .map(|rows| {
             case(format!("{rows} rows"), "weak_excitation", None, false, move |r| {
                 let all = r.rows();
