@@ -22,6 +22,7 @@ mod golden_reduction;
 mod golden_tls;
 mod identifiability;
 mod instruments;
+mod instruments_power;
 mod linear_methods;
 mod live_rows;
 mod nist;
