@@ -2,6 +2,7 @@
 
 mod estimator;
 mod friction;
+mod instruments;
 mod online;
 mod per_joint;
 pub(crate) mod toml_file;
@@ -10,6 +11,8 @@ pub use estimator::{
     BoundConfig, Consistency, EstimatorConfig, Method, PriorDistance, ShapeConfig, Variances,
 };
 pub use friction::{Friction, FrictionErrors};
+pub(crate) use instruments::reference_channel;
+pub use instruments::{InstrumentsConfig, NominalModel, ReferenceColumns};
 pub use online::{ForgettingRule, OnlineConfig};
 pub use per_joint::PerJoint;
 pub(crate) use per_joint::known;
@@ -53,6 +56,8 @@ pub struct Config {
     pub conditioning: ConditioningConfig,
     /// Estimator.
     pub estimator: EstimatorConfig,
+    /// Closed loop of the logs, for instrumental variables and the test of least squares against them. Default: none.
+    pub instruments: Option<InstrumentsConfig>,
     /// Bounds on masses, centres of mass and parameters.
     pub bound: Vec<BoundConfig>,
     /// Columns to keep as base parameters where there is a choice, by name (`link2.Izz`) or symbol (`Izz2`).
@@ -203,6 +208,9 @@ impl Config {
             log.trajectory = log.trajectory.as_ref().map(|t| folder.join(t));
         }
         config.trajectory = config.trajectory.map(|t| folder.join(t));
+        if let Some(table) = &mut config.instruments {
+            table.trajectory = table.trajectory.as_ref().map(|t| folder.join(t));
+        }
         config.online.checkpoint = config.online.checkpoint.map(|c| folder.join(c));
         Ok(config)
     }
@@ -283,6 +291,7 @@ impl Config {
         self.elements.check()?;
         self.online.check()?;
         self.check_estimator()?;
+        self.check_instruments()?;
         for (joint, position) in &self.locked {
             if !position.is_finite() {
                 return Err(Error::setting(&format!("locked.{joint}"), "a finite number", position));

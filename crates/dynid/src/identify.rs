@@ -20,11 +20,12 @@ use dynid_motion::Log;
 
 use crate::Error;
 use crate::agreement::{self, Agreement};
-use crate::config::{Config, LogConfig, Route};
+use crate::config::{Config, LogConfig, Method, Route};
 use crate::consistency::{self, Consistent};
 use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
 use crate::fitting::{self, Fitted};
+use crate::instruments::{self, Comparison, InstrumentRun};
 use crate::logs::{self, LoadedLog};
 use crate::passivity::SPEED_SPAN_S;
 use crate::prior::Prior;
@@ -48,6 +49,8 @@ pub enum Step {
     Shapes,
     /// Final fit with its covariance.
     Fit,
+    /// Simulations of the closed loop for instruments.
+    Instruments,
     /// Physically consistent standard parameters.
     Consistency,
     /// Verdicts and motions that would help.
@@ -123,6 +126,10 @@ pub struct Identification {
     pub warnings: Vec<String>,
     /// Settings of the conditioning.
     pub settings: ConditioningSettings,
+    /// How the instruments of the fit came about; `None` for other estimators.
+    pub instruments: Option<InstrumentRun>,
+    /// Least squares against instruments; `None` if the configuration says nothing about the closed loop.
+    pub comparison: Option<Comparison>,
 }
 
 /// Reads robot and logs, conditions, fits, validates.
@@ -146,7 +153,11 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         ));
     }
     refuse_internal_load(&robot, "identified")?;
-    let (robot, loaded) = read_logs(config, &config.training_logs(), robot, &mut progress)?;
+    let mut files = config.training_logs();
+    if let Some(table) = &config.instruments {
+        table.read_reference(&mut files, &config.columns, &logs::names(&robot.axes))?;
+    }
+    let (robot, loaded) = read_logs(config, &files, robot, &mut progress)?;
     let mut plan = plan_elements(config, &robot, &loaded)?;
     let model = plan.model(&robot.mechanism)?;
     let prepared = loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
@@ -191,6 +202,25 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     let source =
         fitting::rows(config, &model, &shape, &base.kept, &prepared, conditioning.as_ref(), &settings)?;
     let (fit, groups) = fitting::fit(config, base.len(), &method, &*source)?;
+    let (fit, instruments) = match config.estimator.method {
+        Method::Iv => {
+            let parts = instruments::Parts {
+                robot: &robot,
+                plan: &plan,
+                model: &model,
+                shapes: shapes.as_ref(),
+                base: &base,
+                prior: &prior,
+                logs: &prepared,
+                conditioning: conditioning.as_ref(),
+                settings: &settings,
+            };
+            progress(Step::Instruments);
+            let (fit, run) = instruments::fit(config, &parts, fit)?;
+            (fit, Some(run))
+        }
+        _ => (fit, None),
+    };
     let residuals = fitting::residuals(&*source, &fit)?;
     drop(source);
     let fitted = fitting::with_precision(fit, &residuals, &prepared, config.conditioning.block_s.is_some());
@@ -244,6 +274,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         model,
         shapes,
         nonlinear: None,
+        instruments,
+        comparison: None,
     };
     out.nonlinear = out.unfolded(out.values())?;
     for (l, log) in prepared.iter().enumerate() {
@@ -257,6 +289,10 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         out.training.push(agreement);
     }
     out.logs = prepared;
+    if config.instruments.is_some() {
+        progress(Step::Instruments);
+        out.comparison = Some(instruments::compare(&out, config)?);
+    }
     for log in &config.validation {
         progress(Step::Validate(log.path.display().to_string()));
         let loaded = logs::load(log, &out.robot.axes, &config.columns, config.motor_side.as_ref())?;
