@@ -155,6 +155,9 @@ pub enum Route {
     Textbook,
 }
 
+/// Share of samples that a mask must leave for instruments: few rows of sure signs are better than many of doubtful ones.
+const LEAST_USABLE_BY_INSTRUMENTS: f64 = 0.05;
+
 /// Settings of the conditioning; those left out are found from the data.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
@@ -167,7 +170,8 @@ pub struct ConditioningConfig {
     pub state_hz: Option<f64>,
     /// Delay of the motion behind the logged effort, samples.
     pub delay_samples: Option<f64>,
-    /// Reversal mask as a share of rms speed; negative: none.
+    /// Reversal mask as a share of rms speed; negative: none. Default: found; 0 for instrumental variables, which noise in signs
+    /// of velocities biases: speeds within four standard deviations of their noise are left out.
     pub reversal_mask: Option<f64>,
     /// Remove spikes. Default true.
     pub remove_spikes: Option<bool>,
@@ -344,11 +348,13 @@ impl Config {
     pub fn conditioning_settings(&self) -> ConditioningSettings {
         let c = &self.conditioning;
         let defaults = ConditioningSettings::default();
+        let instruments = self.estimator.method == Method::Iv;
         ConditioningSettings {
             kernel_hz: c.kernel_hz,
             state_hz: c.state_hz,
             delay_samples: c.delay_samples,
-            reversal_mask: c.reversal_mask,
+            reversal_mask: c.reversal_mask.or(instruments.then_some(0.0)),
+            least_usable: if instruments { LEAST_USABLE_BY_INSTRUMENTS } else { defaults.least_usable },
             remove_spikes: c.remove_spikes.unwrap_or(defaults.remove_spikes),
             block_s: c.block_s.unwrap_or(defaults.block_s),
             ..defaults

@@ -6,6 +6,11 @@
 //!
 //! [`InstrumentsConfig`](crate::config::InstrumentsConfig) says what the simulation must know: reference and controller. They need not
 //! be exact. Whatever the simulation gets wrong makes instruments weaker, not wrong, as long as they know nothing of the noise.
+//!
+//! What instruments do not cure is noise that goes through a kink: a sign of velocity that noise turns near reversal is an error that
+//! depends on the motion itself. Such rows must be left out, and are unless the configuration says otherwise
+//! ([`ConditioningConfig::reversal_mask`](crate::config::ConditioningConfig)). Shape parameters of friction are those that all rows
+//! gave; simulations hold them.
 
 mod reference;
 mod simulation;

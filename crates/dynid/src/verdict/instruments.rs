@@ -117,11 +117,23 @@ pub(crate) fn in_words(id: &Identification) -> Option<String> {
             };
             format!(
                 "{test}and least squares is off by more than its limit for {more} of {} base parameters, most for {largest}: position noise \
-                 that the controller feeds back, or an error of the model; {cure}",
-                found.effects.len()
+                 that the controller feeds back, or an error of the model; {cure}{}",
+                found.effects.len(),
+                if signs_in_doubt(id) {
+                    ". Rows near reversal, where noise turns signs of velocities, are among those compared, which biases both: a \
+                     `reversal_mask` leaves them out"
+                } else {
+                    ""
+                }
             )
         }
     })
+}
+
+/// Whether rows are in at which noise decides the sign of a velocity.
+fn signs_in_doubt(id: &Identification) -> bool {
+    let without = |output: usize| id.conditioning.as_ref().is_none_or(|c| c.mask[output].is_none());
+    (0..id.model.outputs().len()).any(|o| without(o) && !id.model.reversal_speeds(o).is_empty())
 }
 
 fn diverged(id: &Identification, run: &InstrumentRun) -> String {
