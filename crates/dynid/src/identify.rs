@@ -128,7 +128,8 @@ pub struct Identification {
     pub settings: ConditioningSettings,
     /// How the instruments of the fit came about; `None` for other estimators.
     pub instruments: Option<InstrumentRun>,
-    /// Least squares against instruments; `None` if the configuration says nothing about the closed loop.
+    /// Least squares against instruments; `None` if the configuration says nothing about the closed loop, or what was identified is not
+    /// simulated in closed loop, which is then a warning.
     pub comparison: Option<Comparison>,
 }
 
@@ -291,7 +292,13 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     out.logs = prepared;
     if config.instruments.is_some() {
         progress(Step::Instruments);
-        out.comparison = Some(instruments::compare(&out, config)?);
+        match instruments::compare(&out, config) {
+            Ok(found) => out.comparison = Some(found),
+            Err(Error::Unsupported(why)) => {
+                out.warnings.push(format!("least squares was not compared with instruments: {why}"));
+            }
+            Err(other) => return Err(other),
+        }
     }
     for log in &config.validation {
         progress(Step::Validate(log.path.display().to_string()));

@@ -136,6 +136,9 @@ pub fn exogeneity(
 ) -> Option<Exogeneity> {
     assert_eq!(sizes.len(), total, "one size per base column");
     let blocks = time_blocks(paired, weights, 2 * total);
+    if blocks.is_empty() {
+        return None;
+    }
     let merged = Factor::merge(&blocks.iter().collect::<Vec<_>>());
     let oblique = Oblique::new(&merged);
     let p = oblique.kept.len();

@@ -215,7 +215,10 @@ pub(crate) fn assemble(
     let total = x.len();
     let weights: Vec<f64> = groups.iter().map(|g| g.weight).collect();
     let blocks = time_blocks(&reduced, &weights, total);
-    let factor = Factor::merge(&blocks.iter().collect::<Vec<_>>());
+    let factor = match blocks.is_empty() {
+        true => Factor::empty(total),
+        false => Factor::merge(&blocks.iter().collect::<Vec<_>>()),
+    };
     let mut solution = ols(&factor);
     if solution.kept != kept {
         let restricted = ols(&factor.select(kept));

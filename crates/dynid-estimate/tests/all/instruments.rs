@@ -259,3 +259,15 @@ fn rounds_end_when_estimates_settle_and_tell_a_diverged_simulation() {
     assert!(found.estimate.is_some());
     assert_eq!(found.end, IterationEnd::Diverged { distance: 0.7, log: 0, output: 1 });
 }
+
+#[test]
+fn without_rows_nothing_is_estimated_and_nothing_breaks() {
+    let paired = reduced(&rows(10, 0.2));
+    let second: Vec<ReducedGroup> = half(&half(&paired, true), false);
+    assert_eq!(second.iter().map(ReducedGroup::rows).sum::<usize>(), 0);
+    let found = instrumental(&second, TOTAL, &InstrumentSettings::default()).unwrap();
+    assert_eq!((found.linear.x, found.linear.solution.kept), (vec![0.0; TOTAL], vec![]));
+    let none: Option<_> =
+        exogeneity(&second, &[1.0, 1.0], TOTAL, &[1.0; TOTAL], &ExogeneitySettings::default());
+    assert!(none.is_none());
+}

@@ -139,7 +139,7 @@ fn signs_in_doubt(id: &Identification) -> bool {
 fn diverged(id: &Identification, run: &InstrumentRun) -> String {
     match run.end {
         IterationEnd::Diverged { distance, log, output } if distance.is_finite() => format!(
-            "the simulation of {} left its reference by {distance:.2} (rad or m) at `{}` after {} rounds",
+            "the simulation of {} left its reference by {distance:.2} (rad or m) at `{}` in round {}",
             id.logs.get(log).map_or("a log", |l| &l.name),
             id.model.outputs()[output].name,
             run.rounds

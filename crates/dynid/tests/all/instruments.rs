@@ -289,6 +289,13 @@ fn columns_of_the_reference_serve_as_its_trajectory_file_does() {
     for (a, b) in by_file.fit().x.iter().zip(&by_columns.fit().x) {
         assert!((a - b).abs() < 1e-4 * a.abs(), "{a} {b}");
     }
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let again = alone.install(|| identify(&config, |_| {}).unwrap());
+    assert_eq!(
+        (&again.fit().x, &again.comparison),
+        (&by_columns.fit().x, &by_columns.comparison),
+        "same bits"
+    );
     let estimate = by_columns.estimate(&config).unwrap();
     assert_eq!(estimate.provenance.settings["instruments"]["reference"], "goal{}");
 }
