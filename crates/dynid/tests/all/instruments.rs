@@ -254,8 +254,12 @@ phi = [2.0, 0.3, 0.02, 0.0, 0.01, 0.0, 0.0, 0.06, 0.0, 0.06]
     }
 
     fn config(&self, more: &str) -> Result<Config, String> {
+        self.config_of_log(more, "")
+    }
+
+    fn config_of_log(&self, more: &str, log: &str) -> Result<Config, String> {
         let text = format!(
-            "robot = {:?}\n{more}\n[[log]]\npath = {:?}\n",
+            "robot = {:?}\n{more}\n[[log]]\npath = {:?}\n{log}\n",
             self.folder.path().join("robot.toml"),
             self.folder.path().join("log.csv")
         );
@@ -298,6 +302,39 @@ fn columns_of_the_reference_serve_as_its_trajectory_file_does() {
     );
     let estimate = by_columns.estimate(&config).unwrap();
     assert_eq!(estimate.provenance.settings["instruments"]["reference"], "goal{}");
+}
+
+/// The log's own trajectory as reference, states from its Fourier series; friction with a shape parameter, which is searched, then
+/// linearised for the fit and unfolded for simulations; feed-forward of the identified model.
+#[test]
+fn periodic_logs_and_friction_with_shapes_are_simulated_too() {
+    let pendulum = Pendulum::new(2e-5);
+    let iv = |friction: &str, table: &str| {
+        format!(
+            "[elements]\nfriction = \"{friction}\"\n[estimator]\nmethod = \"iv\"\n[instruments]\n{table}\n{}",
+            Pendulum::LOOP
+        )
+    };
+    let file = format!("trajectory = {:?}", pendulum.folder.path().join("motion.json"));
+    let config = pendulum.config_of_log(&iv("given", ""), &file).unwrap();
+    let periodic = identify(&config, |_| {}).unwrap();
+    assert!(periodic.logs[0].periodic.is_some());
+    let columns = "reference = [\"goal1\"]\nreference_scale = 0.01\n";
+    let fed = format!("{columns}feed_forward = true\nnominal = \"identified\"\n");
+    let (_, forward) = pendulum.identify(&iv("given", &fed));
+    let (_, shaped) = pendulum.identify(&iv("arctangent", columns));
+    assert!(shaped.shapes.is_some());
+    for (name, id) in [("periodic", &periodic), ("feed-forward", &forward), ("shaped", &shaped)] {
+        let run = id.instruments.as_ref().unwrap();
+        let inertia = id.base.kept.iter().position(|c| id.model.parameters().linear[*c].name == "link1.Izz");
+        let found = id.fit().x[inertia.unwrap()];
+        println!(
+            "{name}: {} rounds, {:?}, strength {:.2?}, inertia {found:.4}",
+            run.rounds, run.end, run.strength
+        );
+        assert!(run.succeeded() && run.strength.unwrap().1 > 0.5, "{name}: {run:?}");
+        assert!((found - 0.06).abs() < 0.002, "{name}: {found}");
+    }
 }
 
 #[test]
