@@ -16,6 +16,12 @@ pub fn f_quantile(probability: f64, numerator: f64, denominator: f64) -> Option<
     inside(probability).then(|| law.inverse_cdf(probability))
 }
 
+/// Probability that Fisher's F with `(numerator, denominator)` degrees of freedom exceeds `value ≥ 0`.
+pub fn f_exceedance(value: f64, numerator: f64, denominator: f64) -> Option<f64> {
+    let law = FisherSnedecor::new(numerator, denominator).ok()?;
+    (value >= 0.0).then(|| law.sf(value))
+}
+
 /// Quantile of `χ²` with `freedom` degrees of freedom.
 pub fn chi_squared_quantile(probability: f64, freedom: f64) -> Option<f64> {
     let law = ChiSquared::new(freedom).ok()?;

@@ -10,6 +10,7 @@
 //! | which columns are excited, which depend on others | [`rank`] |
 //! | one time block or group of a log, and its rows again | [`groups`], [`rows`] |
 //! | every linear estimator through one call | [`linear::estimate`] |
+//! | rows spoilt by noise that a control loop feeds back | [`instruments`] |
 //! | shape parameters beside linear ones | [`separable`] |
 //! | clearance of a joint from its journal, or from the effort alone | [`clearance`] |
 //! | friction laws from constant-speed tests | [`steady_friction`] |
@@ -39,6 +40,7 @@ pub mod folds;
 pub mod groups;
 pub mod held_out;
 pub mod identifiability;
+pub mod instruments;
 pub mod linear;
 pub mod load_friction;
 pub mod metrics;

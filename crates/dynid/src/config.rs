@@ -2,6 +2,7 @@
 
 mod estimator;
 mod friction;
+mod instruments;
 mod online;
 mod per_joint;
 pub(crate) mod toml_file;
@@ -10,6 +11,8 @@ pub use estimator::{
     BoundConfig, Consistency, EstimatorConfig, Method, PriorDistance, ShapeConfig, Variances,
 };
 pub use friction::{Friction, FrictionErrors};
+pub(crate) use instruments::reference_channel;
+pub use instruments::{InstrumentsConfig, NominalModel, ReferenceColumns};
 pub use online::{ForgettingRule, OnlineConfig};
 pub use per_joint::PerJoint;
 pub(crate) use per_joint::known;
@@ -55,6 +58,8 @@ pub struct Config {
     pub preflight: Preflight,
     /// Estimator.
     pub estimator: EstimatorConfig,
+    /// Closed loop of the logs, for instrumental variables and the test of least squares against them. Default: none.
+    pub instruments: Option<InstrumentsConfig>,
     /// Bounds on masses, centres of mass and parameters.
     pub bound: Vec<BoundConfig>,
     /// Columns to keep as base parameters where there is a choice, by name (`link2.Izz`) or symbol (`Izz2`).
@@ -170,6 +175,9 @@ pub enum Route {
     Textbook,
 }
 
+/// Share of samples that a mask must leave for instruments: few rows of sure signs are better than many of doubtful ones.
+const LEAST_USABLE_BY_INSTRUMENTS: f64 = 0.05;
+
 /// Settings of the conditioning; those left out are found from the data.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
@@ -182,7 +190,8 @@ pub struct ConditioningConfig {
     pub state_hz: Option<f64>,
     /// Delay of the motion behind the logged effort, samples.
     pub delay_samples: Option<f64>,
-    /// Reversal mask as a share of rms speed; negative: none.
+    /// Reversal mask as a share of rms speed; negative: none. Default: found; 0 for instrumental variables, which noise in signs
+    /// of velocities biases: speeds within four standard deviations of their noise are left out.
     pub reversal_mask: Option<f64>,
     /// Remove spikes. Default true.
     pub remove_spikes: Option<bool>,
@@ -223,6 +232,9 @@ impl Config {
             log.trajectory = log.trajectory.as_ref().map(|t| folder.join(t));
         }
         config.trajectory = config.trajectory.map(|t| folder.join(t));
+        if let Some(table) = &mut config.instruments {
+            table.trajectory = table.trajectory.as_ref().map(|t| folder.join(t));
+        }
         config.online.checkpoint = config.online.checkpoint.map(|c| folder.join(c));
         Ok(config)
     }
@@ -303,6 +315,7 @@ impl Config {
         self.elements.check()?;
         self.online.check()?;
         self.check_estimator()?;
+        self.check_instruments()?;
         for (joint, position) in &self.locked {
             if !position.is_finite() {
                 return Err(Error::setting(&format!("locked.{joint}"), "a finite number", position));
@@ -364,11 +377,13 @@ impl Config {
     pub fn conditioning_settings(&self) -> ConditioningSettings {
         let c = &self.conditioning;
         let defaults = ConditioningSettings::default();
+        let instruments = self.estimator.method == Method::Iv;
         ConditioningSettings {
             kernel_hz: c.kernel_hz,
             state_hz: c.state_hz,
             delay_samples: c.delay_samples,
-            reversal_mask: c.reversal_mask,
+            reversal_mask: c.reversal_mask.or(instruments.then_some(0.0)),
+            least_usable: if instruments { LEAST_USABLE_BY_INSTRUMENTS } else { defaults.least_usable },
             remove_spikes: c.remove_spikes.unwrap_or(defaults.remove_spikes),
             block_s: c.block_s.unwrap_or(defaults.block_s),
             ..defaults

@@ -1,11 +1,13 @@
 //! The result file `estimate.json`: stable keys, added to but never renamed.
 
 mod friction;
+mod instruments;
 mod loops;
 mod model;
 mod trust;
 
 pub use friction::{FrictionTrial, PassivityRecord};
+pub use instruments::{EffectRecord, ExogeneityRecord, InstrumentRecord};
 pub use loops::{ClosureRecord, FrameRecord, LoopsRecord};
 pub use model::{CouplingRecord, JointRecord, LinkRecord, ModelRecord, SettingRecord};
 pub use trust::{
@@ -63,6 +65,9 @@ pub struct Estimate {
     /// How the residuals bear on the precision.
     #[serde(default)]
     pub precision: PrecisionRecord,
+    /// Least squares against instrumental variables; absent unless the configuration describes the closed loop.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exogeneity: Option<ExogeneityRecord>,
     /// Models with fewer base parameters.
     #[serde(default)]
     pub pruning: Option<PruningRecord>,

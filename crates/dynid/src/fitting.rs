@@ -128,16 +128,20 @@ pub(crate) fn fit(
             ),
         });
     }
-    let settings = LinearSettings {
+    let estimate = estimate(&groups, Some(source), columns, method, &linear_settings(config))?;
+    Ok((estimate, groups))
+}
+
+/// Settings of linear estimators that a run asks for.
+pub(crate) fn linear_settings(config: &Config) -> LinearSettings {
+    LinearSettings {
         sharing: match config.estimator.variances {
             Variances::Group => VarianceSharing::Group,
             Variances::JointAndLog => VarianceSharing::JointAndLog,
             Variances::Joint => VarianceSharing::Joint,
         },
         ..LinearSettings::default()
-    };
-    let estimate = estimate(&groups, Some(source), columns, method, &settings)?;
-    Ok((estimate, groups))
+    }
 }
 
 /// Residuals of the widest kernel's rows.
@@ -227,7 +231,7 @@ pub(crate) fn with_precision(
     }
 }
 
-fn conditioning_fault(source: &dyn RowSource, e: dynid_estimate::rows::RowsError) -> Error {
+pub(crate) fn conditioning_fault(source: &dyn RowSource, e: dynid_estimate::rows::RowsError) -> Error {
     let output = source.groups()[e.group].output;
     Error::Conditioning(dynid_estimate::conditioning::ConditioningError::Rows { output, source: e.source })
 }
@@ -245,7 +249,8 @@ pub(crate) fn method(
 ) -> Result<LinearMethod, Error> {
     Ok(match config.method {
         Method::Ols => LinearMethod::Ols,
-        Method::Wls => LinearMethod::Wls,
+        // Instruments start from weighted least squares.
+        Method::Wls | Method::Iv => LinearMethod::Wls,
         Method::Huber => LinearMethod::Huber,
         Method::Tukey => LinearMethod::Tukey,
         Method::Ridge => LinearMethod::Ridge {

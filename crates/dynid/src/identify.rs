@@ -21,11 +21,12 @@ use dynid_motion::Log;
 use crate::Error;
 use crate::agreement::{self, Agreement};
 use crate::check::{self, Finding, Severity};
-use crate::config::{Config, LogConfig, Preflight, Route};
+use crate::config::{Config, LogConfig, Method, Preflight, Route};
 use crate::consistency::{self, Consistent};
 use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
 use crate::fitting::{self, Fitted};
+use crate::instruments::{self, Comparison, InstrumentRun};
 use crate::logs::{self, LoadedLog};
 use crate::passivity::SPEED_SPAN_S;
 use crate::prior::Prior;
@@ -51,6 +52,8 @@ pub enum Step {
     Shapes,
     /// Final fit with its covariance.
     Fit,
+    /// Simulations of the closed loop for instruments.
+    Instruments,
     /// Physically consistent standard parameters.
     Consistency,
     /// Verdicts and motions that would help.
@@ -128,6 +131,11 @@ pub struct Identification {
     pub findings: Vec<Finding>,
     /// Settings of the conditioning.
     pub settings: ConditioningSettings,
+    /// How the instruments of the fit came about; `None` for other estimators.
+    pub instruments: Option<InstrumentRun>,
+    /// Least squares against instruments; `None` if the configuration says nothing about the closed loop, or what was identified is not
+    /// simulated in closed loop, which is then a warning.
+    pub comparison: Option<Comparison>,
 }
 
 /// Reads robot and logs, conditions, fits, validates.
@@ -151,7 +159,11 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         ));
     }
     refuse_internal_load(&robot, "identified")?;
-    let (robot, loaded) = read_logs(config, &config.training_logs(), robot, &mut progress)?;
+    let mut files = config.training_logs();
+    if let Some(table) = &config.instruments {
+        table.read_reference(&mut files, &config.columns, &logs::names(&robot.axes))?;
+    }
+    let (robot, loaded) = read_logs(config, &files, robot, &mut progress)?;
     let findings = preflight(config, &robot, &loaded, &mut progress)?;
     let mut plan = plan_elements(config, &robot, &loaded)?;
     let model = plan.model(&robot.mechanism)?;
@@ -197,6 +209,25 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     let source =
         fitting::rows(config, &model, &shape, &base.kept, &prepared, conditioning.as_ref(), &settings)?;
     let (fit, groups) = fitting::fit(config, base.len(), &method, &*source)?;
+    let (fit, instruments) = match config.estimator.method {
+        Method::Iv => {
+            let parts = instruments::Parts {
+                robot: &robot,
+                plan: &plan,
+                model: &model,
+                shapes: shapes.as_ref(),
+                base: &base,
+                prior: &prior,
+                logs: &prepared,
+                conditioning: conditioning.as_ref(),
+                settings: &settings,
+            };
+            progress(Step::Instruments);
+            let (fit, run) = instruments::fit(config, &parts, fit)?;
+            (fit, Some(run))
+        }
+        _ => (fit, None),
+    };
     let residuals = fitting::residuals(&*source, &fit)?;
     drop(source);
     let fitted = fitting::with_precision(fit, &residuals, &prepared, config.conditioning.block_s.is_some());
@@ -252,6 +283,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         model,
         shapes,
         nonlinear: None,
+        instruments,
+        comparison: None,
     };
     out.nonlinear = out.unfolded(out.values())?;
     for (l, log) in prepared.iter().enumerate() {
@@ -265,6 +298,16 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         out.training.push(agreement);
     }
     out.logs = prepared;
+    if config.instruments.is_some() {
+        progress(Step::Instruments);
+        match instruments::compare(&out, config) {
+            Ok(found) => out.comparison = Some(found),
+            Err(Error::Unsupported(why)) => {
+                out.warnings.push(format!("least squares was not compared with instruments: {why}"));
+            }
+            Err(other) => return Err(other),
+        }
+    }
     for log in &config.validation {
         progress(Step::Validate(log.path.display().to_string()));
         let loaded = logs::load(log, &out.robot.axes, &config.columns, config.motor_side.as_ref())?;

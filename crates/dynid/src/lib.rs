@@ -19,6 +19,7 @@ pub mod fitting;
 pub mod friction;
 pub mod identify;
 pub mod inspect;
+pub mod instruments;
 pub mod logs;
 pub mod nominal;
 pub mod online;

@@ -3,6 +3,7 @@
 mod friction;
 mod trust;
 
+use dynid_estimate::linear::LinearMethod;
 use dynid_report as report;
 use dynid_report::{Fact, Status, Value};
 
@@ -91,6 +92,10 @@ impl Identification {
                         Method::Tukey => "Tukey's biweight, scales found along the way",
                         Method::Ridge => "weighted least squares with the robot file as Gaussian prior",
                         Method::Tls => "total least squares",
+                        Method::Iv if self.fit().method == LinearMethod::Instrumental => {
+                            "instrumental variables from simulations, residual variances found along the way"
+                        }
+                        Method::Iv => "weighted least squares, since no instruments came about",
                     },
                     "",
                 ),

@@ -1,6 +1,7 @@
 //! From an identification to its result file.
 
 mod friction;
+mod instruments;
 mod trust;
 
 use dynid_model::element::change_name;
@@ -61,6 +62,7 @@ impl Identification {
             consistency: self.consistency_record(config),
             held_out: self.held_out_record(),
             precision: self.precision_record(),
+            exogeneity: self.exogeneity_record(),
             pruning: self.pruning_record(),
             motions_that_would_help: self.trust.motions.clone(),
             fit: self.fit_summary(),
@@ -477,7 +479,14 @@ fn provenance(config: &Config) -> Result<Provenance, Error> {
             sha256: sha256(path)?,
         });
     }
-    let settings = json!({
+    if let Some(path) = config.instruments.as_ref().and_then(|t| t.trajectory.as_ref()) {
+        inputs.push(InputRecord {
+            path: path.display().to_string(),
+            kind: "trajectory".to_owned(),
+            sha256: sha256(path)?,
+        });
+    }
+    let mut settings = json!({
         "gravity": config.gravity,
         "couple_mimics": config.couple_mimics.unwrap_or(false),
         "locked": config.locked,
@@ -489,5 +498,8 @@ fn provenance(config: &Config) -> Result<Provenance, Error> {
         "log": training.iter().map(rows).collect::<Vec<_>>(),
         "validation": config.validation.iter().map(rows).collect::<Vec<_>>(),
     });
+    if let Some(table) = &config.instruments {
+        settings["instruments"] = json!(table);
+    }
     Ok(Provenance { version: crate::VERSION.to_owned(), inputs, settings, seed: config.seed.unwrap_or(1) })
 }

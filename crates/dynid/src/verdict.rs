@@ -2,7 +2,11 @@
 
 use dynid_estimate::consistent::Status as ConsistentStatus;
 use dynid_estimate::identifiability::Verdict as ParameterVerdict;
+mod instruments;
+
 use dynid_estimate::whiteness::InBandWhiteness;
+
+pub(crate) use instruments::in_words as closed_loop_bias_in_words;
 
 use crate::consistency::UNCONSTRAINED;
 use crate::estimate::{CheckResult, Verdict};
@@ -73,6 +77,8 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
     checks.push(blocks(id));
     checks.extend(consistency(id));
     checks.extend(whiteness(id));
+    checks.extend(instruments::instruments(id));
+    checks.extend(instruments::closed_loop_bias(id));
     let status = checks.iter().map(|(s, _)| *s).max().unwrap_or(Status::Ok);
     let relative = |a: &[crate::agreement::Agreement]| {
         a.iter().filter_map(|v| v.filtered.relative_error).fold(f64::NAN, f64::max)

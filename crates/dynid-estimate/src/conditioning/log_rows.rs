@@ -6,6 +6,7 @@ use dynid_motion::{Kernel, shift};
 use super::rows::{KeptColumns, Kernels, Pass, RowBatch, RowConsumer, masks};
 use super::states::{Masks, States};
 use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog};
+use crate::instruments::paired_columns;
 use crate::rows::{GroupShape, RowSource, RowVisitor, Rows, RowsError};
 
 /// Most time blocks per log.
@@ -34,6 +35,8 @@ impl std::fmt::Debug for LogRows<'_> {
 pub(super) struct ConditionedLog<'a> {
     pub(super) log: &'a PreparedLog,
     pub(super) states: States,
+    /// Those of a simulated motion, where rows are paired with instruments.
+    instruments: Option<States>,
     masks: Vec<Masks>,
     pub(super) kernels: Kernels,
     /// Per output: effort led by the delay.
@@ -62,7 +65,7 @@ impl<'a> ConditionedLog<'a> {
         let longest = (settings.block_s * log.rate_hz).max(5.0 * log.rate_hz / choices.kernel_hz);
         let block_length = (longest.ceil() as usize).max(log.samples().div_ceil(MAX_BLOCKS)).max(1);
         let blocks = (log.samples() / block_length).max(1);
-        Ok(ConditionedLog { log, states, masks, kernels, efforts, block_length, blocks })
+        Ok(ConditionedLog { log, states, instruments: None, masks, kernels, efforts, block_length, blocks })
     }
 }
 
@@ -82,6 +85,33 @@ impl<'a> LogRows<'a> {
         settings: &ConditioningSettings,
     ) -> Result<Self, ConditioningError> {
         Self::of(model, shape, kept, logs.iter().enumerate(), choices, settings)
+    }
+
+    /// The same rows paired with instruments, `[Z | W | y]`: `Z` is the regressor of another motion on the logs' grids, through the
+    /// state filter, kernels, masks and centres of the measured one (see [`crate::instruments`]).
+    ///
+    /// `motions`: one per log, per output its positions at the log's samples, rad or m. Columns of the groups are those of
+    /// [`crate::instruments::paired_columns`] for all base columns; `settings` as in [`LogRows::new`].
+    ///
+    /// # Errors
+    /// [`ConditioningError::Signal`] for a position that is not finite.
+    ///
+    /// # Panics
+    /// Unless there is one motion per log with a position per output and sample, or if the rows are paired already.
+    pub fn with_instruments(
+        mut self,
+        motions: &[Vec<Vec<f64>>],
+        settings: &ConditioningSettings,
+    ) -> Result<Self, ConditioningError> {
+        assert_eq!(motions.len(), self.logs.len(), "one motion per log");
+        for (log, motion) in self.logs.iter_mut().zip(motions) {
+            assert!(log.instruments.is_none(), "rows are paired once");
+            log.instruments = Some(log.states.along(motion, settings)?);
+        }
+        for group in &mut self.groups {
+            group.columns = paired_columns(&group.columns, self.columns.total);
+        }
+        Ok(self)
     }
 
     pub(super) fn of(
@@ -133,7 +163,7 @@ impl RowSource for LogRows<'_> {
                     first_group: first_group + output * scales,
                     effort: &log.efforts[output],
                     kernels: &log.kernels.kernels,
-                    columns: self.columns.local[output].len(),
+                    columns: self.columns.local[output].len() * (1 + usize::from(log.instruments.is_some())),
                     block_length: log.block_length,
                     blocks: log.blocks,
                     net_effort: Vec::new(),
@@ -145,6 +175,7 @@ impl RowSource for LogRows<'_> {
                 columns: &self.columns,
                 log: log.log,
                 states: &log.states,
+                instruments: log.instruments.as_ref(),
                 masks: &log.masks,
                 kernels: &log.kernels,
                 wanted: &self.wanted,

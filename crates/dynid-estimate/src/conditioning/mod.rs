@@ -36,7 +36,7 @@ pub(crate) use rows::KeptColumns;
 pub use settings::ConditioningSettings;
 pub use shaped_rows::{RefineError, ShapedRows, refine};
 pub use states::States;
-pub use textbook::{TextbookRoute, reduce_textbook, textbook_rows};
+pub use textbook::{TextbookRoute, paired_textbook_rows, reduce_textbook, textbook_rows};
 
 use dynid_model::EffortModel;
 use dynid_motion::cutoff::KernelLimit;

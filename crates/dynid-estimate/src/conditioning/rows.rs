@@ -1,7 +1,7 @@
 //! Rows of the regression: columns and efforts through the compact kernels.
 
 use dynid_model::{EffortModel, RegressorBlock};
-use dynid_motion::{Kernel, SignalError};
+use dynid_motion::{Channel, Kernel, SignalError};
 use rayon::prelude::*;
 
 use super::friction::{FrictionShape, ShapeKind};
@@ -88,7 +88,7 @@ pub(crate) struct RowBatch<'a> {
     /// Rungs at which each row is used.
     pub(crate) rungs: &'a [u8],
     /// Kept regressor columns, then columns of friction shapes, column-major with stride `centres.len()`; the model's known
-    /// offset is the last column.
+    /// offset is the last column. Where the pass has instruments, their kept columns come before all.
     pub(crate) columns: &'a [f64],
     /// Half width of the kernel.
     pub(crate) half_width: usize,
@@ -106,6 +106,8 @@ pub(crate) struct Pass<'a> {
     pub(crate) columns: &'a KeptColumns,
     pub(crate) log: &'a PreparedLog,
     pub(crate) states: &'a States,
+    /// States of another motion whose kept regressor columns pass through the same kernels at the same centres.
+    pub(crate) instruments: Option<&'a States>,
     pub(crate) masks: &'a [Masks],
     pub(crate) kernels: &'a Kernels,
     /// Only rows used at one of these rungs are computed, per output.
@@ -126,24 +128,44 @@ impl Pass<'_> {
         let reach = self.kernels.kernels[0].half_width();
         let block = BLOCK.max(6 * reach);
         let mut regressor = RegressorBlock::new(self.model.layout().clone(), block + 2 * reach);
-        let remembered = self.states.remembered(self.model, self.shape, &self.log.channels);
+        let mut instruments = self.instruments.map(|_| regressor.clone());
+        let remembered = self.remembered(self.states);
+        let simulated = self.instruments.map(|states| self.remembered(states));
         let mut start = 0;
         while start < samples {
             let end = (start + block).min(samples);
             let range = start.saturating_sub(reach)..(end + reach).min(samples);
-            self.states.with_block(range.clone(), &self.log.channels, &remembered, |motion| {
-                self.model.regressor(motion, self.shape, &mut regressor);
-            });
+            self.fill(self.states, range.clone(), &remembered, &mut regressor);
+            if let (Some(states), Some(signals), Some(block)) =
+                (self.instruments, &simulated, &mut instruments)
+            {
+                self.fill(states, range.clone(), signals, block);
+            }
+            let blocks = (&regressor, instruments.as_ref());
             consumers
                 .par_iter_mut()
                 .enumerate()
-                .map(|(output, consumer)| {
-                    self.output_rows(output, start..end, range.start, &regressor, consumer)
-                })
+                .map(|(output, consumer)| self.output_rows(output, start..end, range.start, blocks, consumer))
                 .collect::<Result<Vec<()>, _>>()?;
             start = end;
         }
         Ok(())
+    }
+
+    fn remembered(&self, states: &States) -> Vec<Channel> {
+        states.remembered(self.model, self.shape, &self.log.channels)
+    }
+
+    fn fill(
+        &self,
+        states: &States,
+        range: std::ops::Range<usize>,
+        remembered: &[Channel],
+        block: &mut RegressorBlock,
+    ) {
+        states.with_block(range, &self.log.channels, remembered, |motion| {
+            self.model.regressor(motion, self.shape, block);
+        });
     }
 
     fn output_rows<C: RowConsumer>(
@@ -151,7 +173,7 @@ impl Pass<'_> {
         output: usize,
         centres_in: std::ops::Range<usize>,
         first: usize,
-        regressor: &RegressorBlock,
+        (regressor, instruments): (&RegressorBlock, Option<&RegressorBlock>),
         consumer: &mut C,
     ) -> Result<(), RowsError> {
         let speed = &self.states.velocity(output)[first..first + regressor.samples()];
@@ -180,10 +202,12 @@ impl Pass<'_> {
             }
             let local = &self.columns.local[output];
             columns.clear();
-            columns.resize((local.len() + shaped.len() + 1) * centres.len(), 0.0);
-            let sources = local
+            let own = local.len() * (1 + usize::from(instruments.is_some()));
+            columns.resize((own + shaped.len() + 1) * centres.len(), 0.0);
+            let sources = instruments
                 .iter()
-                .map(|k| regressor.column(output, *k))
+                .flat_map(|block| local.iter().map(|k| block.column(output, *k)))
+                .chain(local.iter().map(|k| regressor.column(output, *k)))
                 .chain(shaped.iter().map(Vec::as_slice))
                 .chain([regressor.offset(output)]);
             for (source, out) in sources.zip(columns.chunks_exact_mut(centres.len())) {

@@ -3,7 +3,7 @@
 use dynid_model::{EffortModel, History, MotionBlock};
 use dynid_motion::Channel;
 use dynid_motion::difference::central;
-use dynid_motion::filter::{butterworth, forward_backward};
+use dynid_motion::filter::{Sections, butterworth, forward_backward};
 use dynid_motion::mask::{near_reversal, reversal_threshold};
 use dynid_motion::spectrum::velocity_noise;
 use rayon::prelude::*;
@@ -48,9 +48,7 @@ impl States {
                     let (q, dq, ddq) = (motion.q[j].clone(), motion.dq[j].clone(), motion.ddq[j].clone());
                     return Ok((q, dq, ddq, effort, motion.velocity_sigma[j]));
                 }
-                let q = forward_backward(&filter, &log.position[j])?;
-                let dq = central(&q, log.rate_hz)?;
-                let ddq = central(&dq, log.rate_hz)?;
+                let [q, dq, ddq] = motion(&filter, &log.position[j], log.rate_hz)?;
                 let floor = log.position_noise[j].floor_psd;
                 let sigma = velocity_noise(floor, settings.state_order, cutoff_hz, log.rate_hz)?;
                 Ok((q, dq, ddq, effort, sigma))
@@ -74,6 +72,39 @@ impl States {
             states.velocity_sigma.push(sigma);
         }
         Ok(states)
+    }
+
+    /// States of another motion on the same grid: through the same filter, differentiated alike. They have no effort and no
+    /// noise. Of a periodic log the filter at the state cut-off stands in for its series.
+    ///
+    /// `position`: per output, as many samples as this record has.
+    ///
+    /// # Errors
+    /// [`ConditioningError::Signal`] for a position that is not finite.
+    ///
+    /// # Panics
+    /// Unless there are as many outputs and samples.
+    pub fn along(
+        &self,
+        position: &[Vec<f64>],
+        settings: &ConditioningSettings,
+    ) -> Result<States, ConditioningError> {
+        assert_eq!(position.len(), self.effort.len(), "one motion per output");
+        let filter = butterworth(settings.state_order, self.cutoff_hz, self.rate_hz)?;
+        let moved = position.par_iter().map(|position| {
+            assert_eq!(position.len(), self.samples, "the motion is on the grid of the log");
+            motion(&filter, position, self.rate_hz)
+        });
+        let moved = moved.collect::<Result<Vec<_>, _>>()?;
+        let all = |k: usize| moved.iter().flat_map(|m| m[k].iter().copied()).collect();
+        Ok(States {
+            q: all(0),
+            dq: all(1),
+            ddq: all(2),
+            effort: Vec::new(),
+            velocity_sigma: vec![0.0; position.len()],
+            ..*self
+        })
     }
 
     /// Velocity of an output.
@@ -147,6 +178,14 @@ impl States {
         }
         (v, variance.sqrt())
     }
+}
+
+/// Filtered position, velocity and acceleration.
+fn motion(filter: &Sections, position: &[f64], rate_hz: f64) -> Result<[Vec<f64>; 3], ConditioningError> {
+    let q = forward_backward(filter, position)?;
+    let dq = central(&q, rate_hz)?;
+    let ddq = central(&dq, rate_hz)?;
+    Ok([q, dq, ddq])
 }
 
 /// Running counts of bad samples, so that any window is judged by two look-ups.

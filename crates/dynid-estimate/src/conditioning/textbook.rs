@@ -8,6 +8,7 @@ use super::rows::KeptColumns;
 use super::states::States;
 use super::{ConditioningError, ConditioningSettings, PreparedLog};
 use crate::groups::ReducedGroup;
+use crate::instruments::paired_columns;
 use crate::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
 
 /// Settings of the textbook route.
@@ -58,8 +59,8 @@ pub fn reduce_textbook(
     settings: &ConditioningSettings,
 ) -> Result<Vec<ReducedGroup>, ConditioningError> {
     let mut groups = Vec::new();
-    for one in logs.iter().enumerate() {
-        let rows = rows_of(model, shape, kept, std::iter::once(one), route, settings)?;
+    for (l, log) in logs.iter().enumerate() {
+        let rows = rows_of(model, shape, kept, std::iter::once((l, log, None)), route, settings)?;
         groups.extend(reduce_rows(&rows).map_err(|e| unusable_row(&rows, e))?);
     }
     Ok(groups)
@@ -74,30 +75,57 @@ pub fn textbook_rows(
     route: &TextbookRoute,
     settings: &ConditioningSettings,
 ) -> Result<MemoryRows, ConditioningError> {
-    rows_of(model, shape, kept, logs.iter().enumerate(), route, settings)
+    let logs = logs.iter().enumerate().map(|(l, log)| (l, log, None));
+    rows_of(model, shape, kept, logs, route, settings)
+}
+
+/// The same rows paired with instruments, `[Z | W | y]`: see [`super::LogRows::with_instruments`].
+///
+/// `motions`: one per log, per output its positions at the log's samples, rad or m.
+///
+/// # Panics
+/// Unless there is one motion per log with a position per output and sample.
+pub fn paired_textbook_rows(
+    model: &dyn EffortModel,
+    shape: &[f64],
+    kept: &[usize],
+    logs: &[PreparedLog],
+    route: &TextbookRoute,
+    motions: &[Vec<Vec<f64>>],
+    settings: &ConditioningSettings,
+) -> Result<MemoryRows, ConditioningError> {
+    assert_eq!(motions.len(), logs.len(), "one motion per log");
+    let logs = logs.iter().zip(motions).enumerate().map(|(l, (log, motion))| (l, log, Some(&motion[..])));
+    rows_of(model, shape, kept, logs, route, settings)
 }
 
 fn rows_of<'a>(
     model: &dyn EffortModel,
     shape: &[f64],
     kept: &[usize],
-    logs: impl Iterator<Item = (usize, &'a PreparedLog)>,
+    logs: impl Iterator<Item = (usize, &'a PreparedLog, Option<&'a [Vec<f64>]>)>,
     route: &TextbookRoute,
     settings: &ConditioningSettings,
 ) -> Result<MemoryRows, ConditioningError> {
     let columns = KeptColumns::new(model, kept);
     let settings = ConditioningSettings { state_order: route.order, ..settings.clone() };
     let mut out = MemoryRows::new();
-    for (l, log) in logs {
+    for (l, log, motion) in logs {
         let cutoff = route.cutoff_hz.min(settings.cutoff.state_rate * log.rate_hz);
         let states = States::new(log, cutoff, &settings)?;
         let filter = butterworth(route.order, cutoff, log.rate_hz)?;
         let samples = log.samples();
-        let mut regressor = RegressorBlock::new(model.layout().clone(), samples);
-        let remembered = states.remembered(model, shape, &log.channels);
-        states.with_block(0..samples, &log.channels, &remembered, |motion| {
-            model.regressor(motion, shape, &mut regressor);
-        });
+        let filled = |states: &States| {
+            let mut regressor = RegressorBlock::new(model.layout().clone(), samples);
+            let remembered = states.remembered(model, shape, &log.channels);
+            states.with_block(0..samples, &log.channels, &remembered, |motion| {
+                model.regressor(motion, shape, &mut regressor);
+            });
+            regressor
+        };
+        let regressor = filled(&states);
+        let instruments =
+            motion.map(|m| Ok::<_, ConditioningError>(filled(&states.along(m, &settings)?))).transpose()?;
         let trim = (route.trim_s * log.rate_hz).round() as usize;
         let inside = trim.min(samples)..samples.saturating_sub(trim).max(trim.min(samples));
         let factor = route.factor(log.rate_hz);
@@ -118,8 +146,12 @@ fn rows_of<'a>(
             };
             let offset = thin(regressor.offset(output))?;
             let effort: Vec<f64> = thin(&effort)?.iter().zip(offset).map(|(e, o)| e - o).collect();
-            let thinned =
-                local.iter().map(|k| thin(regressor.column(output, *k))).collect::<Result<Vec<_>, _>>()?;
+            let thinned = instruments
+                .iter()
+                .chain([&regressor])
+                .flat_map(|block| local.iter().map(|k| thin(block.column(output, *k))))
+                .collect::<Result<Vec<_>, _>>()?;
+            let positions = &columns.global[output];
             let per_block = ((settings.block_s * log.rate_hz / factor as f64).ceil() as usize)
                 .max(effort.len().div_ceil(64))
                 .max(1);
@@ -127,7 +159,10 @@ fn rows_of<'a>(
                 log: l,
                 output,
                 scale: 0,
-                columns: columns.global[output].clone(),
+                columns: match motion {
+                    Some(_) => paired_columns(positions, columns.total),
+                    None => positions.clone(),
+                },
                 blocks: effort.len().div_ceil(per_block).max(1),
             });
             for start in (0..effort.len()).step_by(per_block) {

@@ -126,6 +126,7 @@ impl Trial {
                 columns: &columns,
                 log,
                 states: &states,
+                instruments: None,
                 masks: &masks,
                 kernels: &kernels,
                 wanted: &wanted,

@@ -107,6 +107,25 @@ impl Factor {
         Factor { rows: self.rows, ..builder.finish() }
     }
 
+    /// Factor of `[W A, y + W b]`: other combinations of the same rows.
+    ///
+    /// `a`: `p × q`, `b`: `p` entries. Panics unless the shapes agree.
+    pub(crate) fn combined(&self, a: &Mat<f64>, b: &[f64]) -> Factor {
+        assert!(
+            a.nrows() == self.columns && b.len() == self.columns,
+            "one row of the combination per column"
+        );
+        let height = self.height();
+        let regressor = self.triangle.get(..height, ..self.columns);
+        let columns = regressor * a;
+        let effort = regressor * Mat::from_fn(b.len(), 1, |i, _| b[i]);
+        let mut builder = FactorBuilder::with_chunk_rows(a.ncols(), height);
+        builder.stack(height, |i, j| {
+            if j < a.ncols() { columns[(i, j)] } else { self.triangle[(i, self.columns)] + effort[(i, 0)] }
+        });
+        self.with_remainder(builder)
+    }
+
     /// Factor of `W` and `y` with the rows `D x ≈ D x0` added below, `D = diag(weights)`.
     ///
     /// The added rows do not count as samples. Panics unless both slices have `p` finite entries.

@@ -19,8 +19,8 @@ use crate::rows::{MemoryRows, RowSource};
 /// Rank deficiency and the iteration limit are statuses of the estimate.
 ///
 /// # Errors
-/// [`LinearError`]: no groups, a method whose entries do not fit the columns, missing or unusable rows, or no unique
-/// total least-squares solution.
+/// [`LinearError`]: no groups, a method whose entries do not fit the columns, missing or unusable rows, instruments asked
+/// for, or no unique total least-squares solution.
 pub fn estimate(
     groups: &[ReducedGroup],
     rows: Option<&dyn RowSource>,
@@ -50,6 +50,7 @@ pub fn estimate(
             Ok(squared(groups, total, method, start, prior))
         }
         LinearMethod::Tls(noise) => total_least_squares(groups, &factors, total, noise, start, settings),
+        LinearMethod::Instrumental => Err(LinearError::NeedsInstruments),
         LinearMethod::Huber | LinearMethod::Tukey => {
             let source = rows.ok_or(LinearError::NeedsRows)?;
             check_rows(groups, source)?;
@@ -111,6 +112,7 @@ fn squared(
         prior,
         loss: None,
         given_blocks: Vec::new(),
+        paired: Vec::new(),
     }
 }
 
@@ -203,7 +205,7 @@ fn robust(
 }
 
 /// Estimate from rows whose least-squares solution on the kept columns is `x`.
-fn assemble(
+pub(crate) fn assemble(
     method: LinearMethod,
     x: Vec<f64>,
     kept: &[usize],
@@ -213,7 +215,10 @@ fn assemble(
     let total = x.len();
     let weights: Vec<f64> = groups.iter().map(|g| g.weight).collect();
     let blocks = time_blocks(&reduced, &weights, total);
-    let factor = Factor::merge(&blocks.iter().collect::<Vec<_>>());
+    let factor = match blocks.is_empty() {
+        true => Factor::empty(total),
+        false => Factor::merge(&blocks.iter().collect::<Vec<_>>()),
+    };
     let mut solution = ols(&factor);
     if solution.kept != kept {
         let restricted = ols(&factor.select(kept));
@@ -240,5 +245,6 @@ fn assemble(
         prior: None,
         loss: None,
         given_blocks: Vec::new(),
+        paired: Vec::new(),
     }
 }

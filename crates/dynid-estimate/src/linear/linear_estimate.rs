@@ -7,6 +7,7 @@ use super::tls::{TlsNoise, tls};
 use crate::covariance::{Jackknife, block_sandwich_with, jackknife_by, jackknife_with};
 use crate::factor::Factor;
 use crate::groups::{ReducedGroup, time_blocks};
+use crate::instruments::{jackknife as instrumental_jackknife, paired_columns};
 use faer::Mat;
 
 /// What an estimator found about one group of rows.
@@ -54,7 +55,8 @@ pub struct LinearEstimate {
     /// One entry per group, in the order given.
     pub groups: Vec<GroupFit>,
     /// Rows as the estimator weighs them within each group, in the unit of effort: multiplied by `√ω` for robust losses,
-    /// freed of the columns' errors for total least squares, unchanged otherwise.
+    /// freed of the columns' errors for total least squares, with the regressor that instruments explain and the residual of the
+    /// measured one for instrumental variables, unchanged otherwise.
     pub reduced: Vec<ReducedGroup>,
     /// Merged weighted factor of all columns, without prior rows.
     pub factor: Factor,
@@ -70,6 +72,8 @@ pub struct LinearEstimate {
     pub(super) loss: Option<Loss>,
     /// Time blocks as given, for total least squares solved again without a block; else none.
     pub(super) given_blocks: Vec<Factor>,
+    /// Paired groups of instrumental variables, solved again without a block; else none.
+    pub(crate) paired: Vec<ReducedGroup>,
 }
 
 impl LinearEstimate {
@@ -84,6 +88,7 @@ impl LinearEstimate {
         let weights = self.weights();
         self.reduced = self.reduced.iter().map(|g| g.coarsened(factor)).collect();
         self.blocks = time_blocks(&self.reduced, &weights, total);
+        self.paired = self.paired.iter().map(|g| g.coarsened(factor)).collect();
         if !self.given_blocks.is_empty() {
             // Unweighted, as they were given.
             let merged =
@@ -156,8 +161,16 @@ impl LinearEstimate {
 
     /// Delete-a-block jackknife with weights fixed; `None` with fewer than two blocks. Total least squares is solved
     /// again without each block where the noisy columns act on all groups; elsewhere, and in the block sandwich and the
-    /// bootstrap, the linear step is taken, which understates the spread by the share of noise in the columns.
+    /// bootstrap, the linear step is taken, which understates the spread by the share of noise in the columns. Instrumental
+    /// variables are solved again without each block.
     pub fn jackknife(&self) -> Option<Jackknife> {
+        if !self.paired.is_empty() {
+            let total = self.x.len();
+            let columns = paired_columns(&self.solution.kept, total);
+            let blocks = time_blocks(&self.paired, &self.weights(), 2 * total);
+            let kept: Vec<Factor> = blocks.iter().map(|b| b.select(&columns)).collect();
+            return instrumental_jackknife(&kept, &self.kept_x());
+        }
         if let (LinearMethod::Tls(noise), false) = (&self.method, self.given_blocks.is_empty()) {
             let kept_noise = TlsNoise {
                 columns: self.solution.kept.iter().map(|&c| noise.columns[c]).collect(),

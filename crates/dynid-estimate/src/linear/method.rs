@@ -27,6 +27,9 @@ pub enum LinearMethod {
     },
     /// Total least squares; errors alike in all rows, none where a column does not act on a group.
     Tls(TlsNoise),
+    /// Instrumental variables, weighted as [`LinearMethod::Wls`]: [`crate::instruments::instrumental`] makes such estimates from
+    /// paired rows, [`super::estimate`] does not.
+    Instrumental,
 }
 
 impl LinearMethod {
@@ -117,6 +120,9 @@ pub enum LinearError {
     /// A robust loss looks at single rows, and there is no source of them.
     #[error("a robust loss needs the rows themselves, found factors only")]
     NeedsRows,
+    /// Instrumental variables need rows paired with instruments.
+    #[error("instrumental variables need rows paired with instruments, found measured rows only")]
+    NeedsInstruments,
     /// The source of rows does not hold the groups given.
     #[error(
         "rows of other groups: expected the {expected} groups of the factors in their order, found {found}"

@@ -10,6 +10,7 @@ mod ridge;
 mod tls;
 mod wls;
 
+pub(crate) use estimate::assemble;
 pub use estimate::estimate;
 pub use extended::ols_extended;
 pub(crate) use irls::robust_scales;
@@ -18,5 +19,5 @@ pub use method::{IrlsSettings, LinearError, LinearMethod, LinearSettings, Varian
 pub use ols::{LinearSolution, ols};
 pub use ridge::{RidgeSolution, ridge};
 pub use tls::{TlsNoise, TlsRefusal, TlsSolution, tls};
-pub(crate) use wls::merge_weighted;
 pub use wls::{GroupVariance, WlsEstimate, WlsSettings, wls};
+pub(crate) use wls::{floors, merge_weighted};

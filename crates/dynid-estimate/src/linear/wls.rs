@@ -171,7 +171,7 @@ fn group_variances(
 
 /// Least variance of each group's class, `(floor · rms effort)²`; a class of zero effort takes that of the group of
 /// largest effort.
-pub(super) fn floors(groups: &[Factor], classes: &[usize], floor: f64) -> Vec<f64> {
+pub(crate) fn floors(groups: &[Factor], classes: &[usize], floor: f64) -> Vec<f64> {
     let fallback =
         match groups.iter().map(|g| mean_square(g.effort_norm().powi(2), g.rows())).fold(0.0, f64::max) {
             0.0 => 1.0,

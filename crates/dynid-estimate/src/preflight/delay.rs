@@ -10,7 +10,7 @@ use super::samples::{BLOCKS, Samples};
 use super::wiring::Wiring;
 
 /// Gauss-Newton steps.
-const STEPS: usize = 6;
+const STEPS: usize = 16;
 /// A step below this ends them, samples.
 const SETTLED: f64 = 0.02;
 /// A last step below this is good enough, samples.

@@ -3,9 +3,10 @@
 
 use crate::arm::{self, Arm, JOINTS, RATE_HZ, model, motion};
 use dynid_estimate::conditioning::{
-    Conditioning, ConditioningSettings, LogRows, PreparedLog, TextbookRoute, condition, prepare, reduce,
-    reduce_textbook, textbook_rows,
+    Conditioning, ConditioningSettings, LogRows, PreparedLog, ReducedGroup, TextbookRoute, condition,
+    paired_textbook_rows, prepare, reduce, reduce_textbook, textbook_rows,
 };
+use dynid_estimate::instruments::measured;
 use dynid_estimate::linear::{IrlsSettings, LinearMethod, LinearSettings, estimate};
 use dynid_estimate::rows::{MemoryRows, RowSource, reduce_rows};
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RegressorBlock, RobotModel};
@@ -102,4 +103,66 @@ fn stretches_of_wrong_efforts_are_survived() {
     println!("error of all parameters: {:.3} by WLS, {:.3} by Tukey", error(&plain.x), error(&tukey.x));
     assert!(tukey.converged && 5.0 * error(&tukey.x) < error(&plain.x));
     assert_eq!(find(LinearMethod::Tukey, 0), tukey, "rows formed anew on every pass");
+}
+
+/// Both halves of paired groups: instruments with the effort, measured rows with the effort.
+fn halves(paired: &[ReducedGroup]) -> [Vec<ReducedGroup>; 2] {
+    let instruments = paired.iter().map(|group| {
+        let own: Vec<usize> = (0..group.columns.len() / 2).collect();
+        let blocks = group.blocks.iter().map(|b| b.select(&own)).collect();
+        ReducedGroup { columns: group.columns[..own.len()].to_vec(), blocks, ..*group }
+    });
+    [instruments.collect(), measured(paired)]
+}
+
+#[track_caller]
+fn assert_same(found: &[ReducedGroup], expected: &[ReducedGroup]) {
+    assert_eq!(found.len(), expected.len());
+    for (f, e) in found.iter().zip(expected) {
+        assert_eq!((f.log, f.output, f.scale, &f.columns), (e.log, e.output, e.scale, &e.columns));
+        assert_eq!(f.blocks.len(), e.blocks.len());
+        for (f, e) in f.blocks.iter().zip(&e.blocks) {
+            assert_eq!(f.rows(), e.rows());
+            let (size, x) = (e.effort_norm().max(1e-300), vec![0.1; e.columns()]);
+            for (f, e) in f.score(&x).iter().zip(e.score(&x)) {
+                assert!((f - e).abs() <= 1e-9 * size * size, "{f} against {e}");
+            }
+            assert!((f.rss(&x) - e.rss(&x)).abs() <= 1e-9 * size * size);
+        }
+    }
+}
+
+#[test]
+fn instruments_pass_through_kernels_centres_and_masks_of_the_measured_rows() {
+    let Case { model, base, logs, mut choices, .. } = case(2, 0.0);
+    let own: Vec<Vec<Vec<f64>>> = logs.iter().map(|l| l.position.clone()).collect();
+    let paired = |choices: &Conditioning, motions: &[Vec<Vec<f64>>]| {
+        let rows = LogRows::new(&model, &[], &base.kept, &logs, choices, &settings()).unwrap();
+        reduce_rows(&rows.with_instruments(motions, &settings()).unwrap()).unwrap()
+    };
+    let plain = reduce(&model, &[], &base.kept, &logs, &choices, &settings()).unwrap();
+    let [z, w] = halves(&paired(&choices, &own));
+    assert_same(&z, &plain);
+    assert_same(&w, &plain);
+
+    // Masks are those of the measured motion, so without any the other log's own rows come out.
+    choices.rung = vec![0; JOINTS];
+    let swapped: Vec<Vec<Vec<f64>>> = own.iter().rev().cloned().collect();
+    let exchanged: Vec<PreparedLog> = logs
+        .iter()
+        .zip(&swapped)
+        .map(|(log, position)| PreparedLog { position: position.clone(), ..log.clone() })
+        .collect();
+    let plain = reduce(&model, &[], &base.kept, &logs, &choices, &settings()).unwrap();
+    let other = reduce(&model, &[], &base.kept, &exchanged, &choices, &settings()).unwrap();
+    let [z, w] = halves(&paired(&choices, &swapped));
+    assert_same(&w, &plain);
+    assert_same(&z, &other);
+
+    let route = TextbookRoute { parallel_filter: true, ..TextbookRoute::default() };
+    let rows = paired_textbook_rows(&model, &[], &base.kept, &logs, &route, &swapped, &settings()).unwrap();
+    let [z, w] = halves(&reduce_rows(&rows).unwrap());
+    let thinned = |logs| reduce_textbook(&model, &[], &base.kept, logs, &route, &settings()).unwrap();
+    assert_same(&w, &thinned(&logs));
+    assert_same(&z, &thinned(&exchanged));
 }

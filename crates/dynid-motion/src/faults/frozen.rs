@@ -15,6 +15,9 @@ const SUDDEN: f64 = 0.25;
 /// Second differences, as many times their 99 % quantile, that no ordinary start or stop has.
 const BENDS: f64 = 3.0;
 
+/// A step back to where the joint has gone meanwhile, in 99 % quantiles of all steps.
+const JUMP: f64 = 3.0;
+
 fn high_quantile(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -36,13 +39,15 @@ pub fn frozen_position(position: &[f64], rate_hz: f64) -> Vec<Run> {
         let smallest = steps.iter().map(|s| s.abs()).fold(f64::INFINITY, f64::min);
         if steps.is_empty() { 0.0 } else { smallest }
     };
+    let jump = JUMP * high_quantile(steps.iter().map(|s| s.abs()).collect());
     runs(position, least)
         .into_iter()
         .filter(|run| {
             let end = run.first + run.length;
+            let back = steps.get(end - 1).is_some_and(|step| step.abs() > jump.max(sudden));
             let before = run.first.checked_sub(SIDE).and_then(|from| steps.get(from..run.first));
             let after = steps.get(end..end + SIDE);
-            speed(before) > sudden || speed(after) > sudden
+            back || speed(before) > sudden || speed(after) > sudden
         })
         .collect()
 }

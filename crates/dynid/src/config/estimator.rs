@@ -29,6 +29,9 @@ pub enum Method {
     Ridge,
     /// Total least squares: columns with errors of their own, see [`EstimatorConfig::column_noise`].
     Tls,
+    /// Instrumental variables from simulations of the closed loop, weighted as `wls`; needs
+    /// [`Config::instruments`](super::Config::instruments).
+    Iv,
 }
 
 /// Which rows share a residual variance.

@@ -13,6 +13,7 @@ mod friction_laws;
 mod friction_recorded;
 mod friction_report;
 mod identifiability;
+mod instruments;
 mod least_squares;
 mod online;
 mod periodic;

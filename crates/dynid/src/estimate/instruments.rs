@@ -1,0 +1,68 @@
+//! What the result file says about least squares against instruments.
+
+use serde::{Deserialize, Serialize};
+
+/// Least squares against instrumental variables on the training logs.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct ExogeneityRecord {
+    /// By the size of the differences: `exogenous` (regressors equal instruments), `harmless`, `material`; or `weak` instruments, `diverged`
+    /// simulation, `undetermined` (nothing to compare).
+    pub verdict: String,
+    /// The same in words.
+    pub summary: String,
+    /// Probability of differences as large by chance, by the jackknife over time blocks; absent without a test.
+    pub p_value: Option<f64>,
+    /// The same as if residuals were independent, which filtered ones are not: it rejects too often.
+    pub p_value_independent: Option<f64>,
+    /// Time blocks of the test.
+    pub blocks: Option<usize>,
+    /// Base parameters whose regressor instruments leave something of.
+    pub tested: Vec<String>,
+    /// Smallest singular value of `Q_ZᵀQ_W`, 0 to 1: cosine of the largest angle between instruments and regressors.
+    pub instrument_strength: Option<f64>,
+    /// Simulations made with parameters of the first halves of the logs, and of the second.
+    pub rounds: [usize; 2],
+    /// Largest distance of a simulation from its reference where one diverged, rad or m; absent if it could not go on.
+    pub distance: Option<f64>,
+    /// Differences, base parameter by base parameter.
+    pub parameters: Vec<EffectRecord>,
+    /// Instruments of the fit itself; absent for other estimators than `iv`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fit: Option<InstrumentRecord>,
+}
+
+/// One base parameter by least squares and by instruments.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct EffectRecord {
+    /// Name of the kept parameter.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Least squares.
+    pub least_squares: f64,
+    /// Instruments made from the other halves of the logs.
+    pub instruments: f64,
+    /// Standard deviation of least squares, jackknife over time blocks.
+    pub std_least_squares: f64,
+    /// The same of the instruments' value.
+    pub std_instruments: f64,
+    /// Least squares less instruments.
+    pub difference: f64,
+    /// Largest difference that is harmless: two standard deviations, or 1 % of the prior deviation.
+    pub limit: f64,
+    /// Length of what instruments do not explain of the regressor, in parts of its own.
+    pub unexplained: f64,
+}
+
+/// How the instruments of a fit came about.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct InstrumentRecord {
+    /// Simulations made.
+    pub rounds: usize,
+    /// `settled`, `limit` (of rounds) or `diverged` (the fit is that of weighted least squares).
+    pub end: String,
+    /// Largest change of a parameter in the last round.
+    pub last_change: Option<f64>,
+    /// Smallest singular value of `Q_ZᵀQ_W`.
+    pub strength: Option<f64>,
+}
