@@ -164,6 +164,11 @@ impl RobotModel {
         self.tree().payloads()
     }
 
+    /// See [`TreeModel::log_columns`].
+    pub fn log_columns(&self) -> std::ops::Range<usize> {
+        self.tree().log_columns()
+    }
+
     /// See [`TreeModel::elastic_motor`].
     pub fn elastic_motor(&self, link: usize) -> Option<(usize, f64)> {
         self.tree().elastic_motor(link)

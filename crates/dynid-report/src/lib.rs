@@ -37,4 +37,4 @@ pub use data::{
 };
 pub use data::{CurvesByTemperature, FrictionReport, FrictionTest, Surface, TemperatureLevel};
 pub use error::ReportError;
-pub use page::{render, render_design, render_friction, render_study};
+pub use page::{render, render_design, render_friction, render_kind, render_study};

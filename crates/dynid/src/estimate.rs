@@ -44,6 +44,10 @@ pub struct Estimate {
     pub rank: RankStatus,
     /// Standard parameters: links, then elements. Their split follows the robot file where only combinations are seen.
     pub parameters: Vec<ParameterValue>,
+    /// What belongs to single logs: payloads, and deviations of offset and friction named after their log. Predictions of
+    /// the robot alone do without.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub log_parameters: Vec<ParameterValue>,
     /// Base parameters.
     pub base_parameters: Vec<BaseValue>,
     /// Parameters that enter the effort nonlinearly.

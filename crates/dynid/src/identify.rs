@@ -25,6 +25,7 @@ use crate::consistency::{self, Consistent};
 use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
 use crate::fitting::{self, Fitted};
+use crate::log_terms::LogTerms;
 use crate::logs::{self, LoadedLog};
 use crate::passivity::SPEED_SPAN_S;
 use crate::prior::Prior;
@@ -146,8 +147,12 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         ));
     }
     refuse_internal_load(&robot, "identified")?;
-    let (robot, loaded) = read_logs(config, &config.training_logs(), robot, &mut progress)?;
+    let (robot, mut loaded) = read_logs(config, &config.training_logs(), robot, &mut progress)?;
     let mut plan = plan_elements(config, &robot, &loaded)?;
+    plan.log_terms = LogTerms::of(config, &robot)?;
+    for ((loaded, log), label) in loaded.iter_mut().zip(&config.log).zip(config.log_labels()) {
+        loaded.log = plan.log_terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
+    }
     let model = plan.model(&robot.mechanism)?;
     let prepared = loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
 
@@ -259,7 +264,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     out.logs = prepared;
     for log in &config.validation {
         progress(Step::Validate(log.path.display().to_string()));
-        let loaded = logs::load(log, &out.robot.axes, &config.columns, config.motor_side.as_ref())?;
+        let mut loaded = logs::load(log, &out.robot.axes, &config.columns, config.motor_side.as_ref())?;
+        loaded.log = out.plan.log_terms.of_validation(loaded.log, log);
         let prepared = loaded.prepare(&out.model, &out.settings)?;
         out.warnings.extend(known::logged_beyond(&out.plan.known, &prepared));
         out.validation.push(out.agreement(out.values(), &prepared)?);

@@ -7,6 +7,7 @@ pub(crate) mod friction;
 pub(crate) mod identify;
 pub(crate) mod inspect;
 pub(crate) mod online;
+pub(crate) mod payload;
 pub(crate) mod predict;
 pub(crate) mod regressor;
 pub(crate) mod simulate;

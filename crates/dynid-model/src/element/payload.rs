@@ -19,10 +19,14 @@ pub struct Payload {
     body: usize,
     /// Which of the ten parameters are unknown, ascending.
     unknown: Vec<usize>,
+    rated_mass: f64,
     rates: Vec<usize>,
     dynamics: Dynamics,
     slots: Slots,
 }
+
+/// Mass that an unknown payload is thought to have at most, where nothing is said, kg.
+const RATED_MASS: f64 = 5.0;
 
 impl Payload {
     /// A payload on a body of a mechanism, all ten parameters unknown.
@@ -45,7 +49,17 @@ impl Payload {
         // What belongs to other bodies goes to a place behind that nobody reads.
         let own = |rate: usize, of: usize| rates.iter().position(|r| of == body && *r == rate);
         let slots = Slots::new(&dynamics, |rate, of| 10 * own(rate, of).unwrap_or(rates.len()));
-        Payload { name: name.to_owned(), body, unknown, rates, dynamics, slots }
+        Payload { name: name.to_owned(), body, unknown, rated_mass: RATED_MASS, rates, dynamics, slots }
+    }
+
+    /// The same with another largest mass thought possible, kg (5 by default): for priors, it bounds nothing.
+    pub fn with_rated_mass(self, rated_mass: f64) -> Self {
+        Payload { rated_mass, ..self }
+    }
+
+    /// Largest mass thought possible, kg.
+    pub fn rated_mass(&self) -> f64 {
+        self.rated_mass
     }
 
     /// Name.
