@@ -36,6 +36,8 @@ pub(crate) enum Command {
     /// Payloads from logs with and without them: mass, centre of mass, inertia; writes payload.json, payload.html and a URDF
     /// link.
     Payload(PayloadArgs),
+    /// Drive gains from logs with and without a payload of known mass.
+    Gains(GainsArgs),
     /// Follow a stream or logs: estimates as JSON lines, alarms when something changes (exit code 1).
     Online(OnlineArgs),
     /// Published systems, every claim of their papers beside what is measured here.
@@ -415,6 +417,18 @@ pub(crate) struct PayloadArgs {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print payload.json to stdout in place of the table.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Say only what went wrong.
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct GainsArgs {
+    /// Configuration (TOML) with one `[[payload]]` of known mass, a `[[log]]` that carries it and one that does not.
+    pub(crate) input: PathBuf,
+    /// Print JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
     /// Say only what went wrong.

@@ -185,8 +185,9 @@ pub(crate) fn problem(
         first_column: p.first_column,
         prior: p.inertia,
     });
-    let of_payload =
-        |column: usize| prior.payloads.iter().any(|p| (p.first_column..p.first_column + 10).contains(&column));
+    let of_payload = |column: usize| {
+        prior.payloads.iter().any(|p| (p.first_column..p.first_column + 10).contains(&column))
+    };
     let links = bodies
         .iter()
         .zip(&prior.bodies)

@@ -19,6 +19,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
 use crate::Error;
+use crate::identify::OwnDelay;
+use crate::log_agreement::LogAgreement;
 
 /// Version of the file's layout.
 pub const SCHEMA: u32 = 1;
@@ -48,6 +50,12 @@ pub struct Estimate {
     /// the robot alone do without.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub log_parameters: Vec<ParameterValue>,
+    /// Whether the training logs agree in what the fit holds the same; absent with one log.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub log_agreement: Option<LogAgreement>,
+    /// Delays of single logs, taken off their efforts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub log_delays: Vec<OwnDelay>,
     /// Base parameters.
     pub base_parameters: Vec<BaseValue>,
     /// Parameters that enter the effort nonlinearly.

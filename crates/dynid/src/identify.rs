@@ -4,6 +4,7 @@ mod elastic;
 mod figures;
 mod friction;
 pub(crate) mod known;
+mod own_delay;
 mod shapes;
 mod structure;
 
@@ -25,6 +26,7 @@ use crate::consistency::{self, Consistent};
 use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
 use crate::fitting::{self, Fitted};
+use crate::log_agreement::{self, LogAgreement};
 use crate::log_terms::LogTerms;
 use crate::logs::{self, LoadedLog};
 use crate::passivity::SPEED_SPAN_S;
@@ -32,6 +34,7 @@ use crate::prior::Prior;
 use crate::robot::{Robot, RobotOptions, refuse_internal_load};
 use crate::shape::{self, ShapeFit};
 use crate::trust::{Evidence, Trust};
+pub use own_delay::OwnDelay;
 use shapes::Shaped;
 use structure::Structure;
 pub(crate) use structure::{effort_sizes, stated_values};
@@ -120,6 +123,10 @@ pub struct Identification {
     pub whiteness: Vec<Vec<Option<InBandWhiteness>>>,
     /// Models with fewer and fewer base parameters, and how well they do.
     pub pruning: Option<Pruning>,
+    /// Whether the training logs agree in what the fit holds the same; `None` with one log, or where it could not be told.
+    pub log_agreement: Option<LogAgreement>,
+    /// Delays of single logs, taken off their efforts.
+    pub own_delays: Vec<OwnDelay>,
     /// Warnings, in words.
     pub warnings: Vec<String>,
     /// Settings of the conditioning.
@@ -154,7 +161,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         loaded.log = plan.log_terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
     }
     let model = plan.model(&robot.mechanism)?;
-    let prepared = loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
+    let mut prepared =
+        loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
 
     for log in &prepared {
         config.check_cutoffs(&log.name, log.rate_hz)?;
@@ -164,6 +172,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     // Names that do not exist are told before the long work.
     let structure = Structure::of(config, &model, &plan, &prepared)?;
     let start = model.parameters().shape_start();
+    let own_delays = own_delay::take_off(config, &model, &start, &structure.base, &mut prepared, &settings)?;
 
     let conditioning = match config.conditioning.route {
         Route::Compact => {
@@ -216,6 +225,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     warnings.extend(log_warnings(&model, &prepared));
     warnings.extend(elastic::warnings(&model, &prepared));
     warnings.extend(known::warnings(&plan, &robot.mechanism, &prepared));
+    let log_agreement = log_agreement::test(config, &model, &base, &fitted, &plan.log_terms);
+    warnings.extend(log_agreement.iter().flat_map(LogAgreement::warnings));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
     let mut out = Identification {
         plan,
@@ -242,6 +253,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         validation_unconstrained: Vec::new(),
         whiteness: Vec::new(),
         pruning: None,
+        log_agreement,
+        own_delays,
         warnings,
         settings,
         logs: Vec::new(),
@@ -266,7 +279,10 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         progress(Step::Validate(log.path.display().to_string()));
         let mut loaded = logs::load(log, &out.robot.axes, &config.columns, config.motor_side.as_ref())?;
         loaded.log = out.plan.log_terms.of_validation(loaded.log, log);
-        let prepared = loaded.prepare(&out.model, &out.settings)?;
+        let mut prepared = loaded.prepare(&out.model, &out.settings)?;
+        if let Some(own) = out.own_delays.iter().find(|d| Some(&d.log) == log.like.as_ref()) {
+            own.take_off(&mut prepared)?;
+        }
         out.warnings.extend(known::logged_beyond(&out.plan.known, &prepared));
         out.validation.push(out.agreement(out.values(), &prepared)?);
         if out.consistent.constrained() {
@@ -378,7 +394,7 @@ impl Identification {
     }
 }
 
-fn read_logs(
+pub(crate) fn read_logs(
     config: &Config,
     files: &[LogConfig],
     robot: Robot,
@@ -406,7 +422,11 @@ fn read_logs(
     Ok((robot, loaded))
 }
 
-fn plan_elements(config: &Config, robot: &Robot, logs: &[LoadedLog]) -> Result<ElementPlan, Error> {
+pub(crate) fn plan_elements(
+    config: &Config,
+    robot: &Robot,
+    logs: &[LoadedLog],
+) -> Result<ElementPlan, Error> {
     let names = robot.rate_names();
     let moves =
         |rate: usize| logs.iter().any(|l| l.log.joints().iter().any(|j| j.name == names[rate] && j.moves()));

@@ -80,7 +80,11 @@ impl LogTerms {
     }
 
     /// Elements with unknown parameters: payloads, then deviations. `per_rate`: names of the elements of every rate.
-    pub(crate) fn elements(&self, mechanism: &Mechanism, per_rate: &[Vec<String>]) -> Vec<Box<dyn JointElement>> {
+    pub(crate) fn elements(
+        &self,
+        mechanism: &Mechanism,
+        per_rate: &[Vec<String>],
+    ) -> Vec<Box<dyn JointElement>> {
         let mut out: Vec<Box<dyn JointElement>> = Vec::new();
         for term in self.payloads.iter().filter(|term| term.known.is_none()) {
             let payload = Payload::new(mechanism, term.body, &term.config.name);

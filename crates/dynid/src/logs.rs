@@ -31,6 +31,8 @@ pub struct LoadedLog {
     pub columns: Vec<(String, String)>,
     /// Period of the motion, if one was stated, s.
     pub period_s: Option<f64>,
+    /// Factors from effort columns to efforts, drive gains with currents, in the order of the log's joints; empty without.
+    pub effort_factors: Vec<f64>,
 }
 
 impl LoadedLog {
@@ -96,7 +98,9 @@ pub fn load(
         }
         None => (log, config.period_s),
     };
-    Ok(LoadedLog { period_s, log, not_logged: signals.not_logged.clone(), columns: describe(&mapping) })
+    let effort_factors = mapping.effort.iter().flatten().flatten().map(|c| c.factor).collect();
+    let (not_logged, columns) = (signals.not_logged.clone(), describe(&mapping));
+    Ok(LoadedLog { period_s, log, not_logged, columns, effort_factors })
 }
 
 /// Turns motor positions and efforts into those of the joints.

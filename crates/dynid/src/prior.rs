@@ -92,7 +92,8 @@ pub fn of(
     let first = values.len();
     values.extend(stated[first..].iter().map(|v| v.unwrap_or(0.0)));
     std.extend(scalars::standard_deviations(model, &inertias, stated, efforts));
-    let payloads: Vec<PayloadPrior> = model.payloads().map(|(p, column)| PayloadPrior::new(p, column)).collect();
+    let payloads: Vec<PayloadPrior> =
+        model.payloads().map(|(p, column)| PayloadPrior::new(p, column)).collect();
     for payload in &payloads {
         payload.fill(&mut values, &mut std);
     }

@@ -54,6 +54,8 @@ impl Identification {
                 never_seen: names(&self.base.zero),
             },
             parameters: self.parameter_values(0..self.model.log_columns().start),
+            log_agreement: self.log_agreement.clone(),
+            log_delays: self.own_delays.clone(),
             log_parameters: self.parameter_values(self.model.log_columns()),
             base_parameters: self.base_values(),
             shape_parameters: self.shape_values(),

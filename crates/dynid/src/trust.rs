@@ -96,7 +96,6 @@ impl Evidence<'_> {
         trust
     }
 
-
     /// Standard deviations of all base parameters; `None` where a column was dropped.
     fn base_deviations(&self) -> Vec<Option<f64>> {
         let mut out = vec![None; self.base.len()];

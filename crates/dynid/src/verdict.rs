@@ -1,5 +1,7 @@
 //! What an identification is worth, in plain words.
 
+mod logs;
+
 use dynid_estimate::consistent::Status as ConsistentStatus;
 use dynid_estimate::identifiability::Verdict as ParameterVerdict;
 use dynid_estimate::whiteness::InBandWhiteness;
@@ -73,6 +75,7 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
     checks.push(blocks(id));
     checks.extend(consistency(id));
     checks.extend(whiteness(id));
+    checks.extend(logs::checks(id));
     let status = checks.iter().map(|(s, _)| *s).max().unwrap_or(Status::Ok);
     let relative = |a: &[crate::agreement::Agreement]| {
         a.iter().filter_map(|v| v.filtered.relative_error).fold(f64::NAN, f64::max)

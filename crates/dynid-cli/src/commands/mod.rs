@@ -4,6 +4,7 @@ pub(crate) mod clearance;
 pub(crate) mod design;
 pub(crate) mod export;
 pub(crate) mod friction;
+pub(crate) mod gains;
 pub(crate) mod identify;
 pub(crate) mod inspect;
 pub(crate) mod online;

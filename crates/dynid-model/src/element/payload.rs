@@ -189,7 +189,11 @@ impl JointElement for KnownLoad {
         self.rates.clone()
     }
     fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
-        self.rates.iter().map(|rate| joints[*rate].parameter("h", ["A/(N m)", "A/N"], None)).collect()
+        let of = |rate: &usize| Parameter {
+            fold_first: true,
+            ..joints[*rate].parameter("h", ["A/(N m)", "A/N"], None)
+        };
+        self.rates.iter().map(of).collect()
     }
     fn entries(&self) -> Vec<(usize, usize)> {
         self.rates.iter().copied().enumerate().map(|(k, rate)| (rate, k)).collect()

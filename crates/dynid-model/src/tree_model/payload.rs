@@ -18,7 +18,8 @@ impl TreeModel {
     /// last.
     pub fn log_columns(&self) -> Range<usize> {
         let total = self.parameters.linear.len();
-        let gated = self.elements.iter().filter(|p| p.element.channels(&self.joints).iter().any(|c| is_gate(c)));
+        let gated =
+            self.elements.iter().filter(|p| p.element.channels(&self.joints).iter().any(|c| is_gate(c)));
         let columns = gated.flat_map(|placed| placed.entries.iter().map(|(_, column)| *column));
         columns.min().unwrap_or(total)..total
     }

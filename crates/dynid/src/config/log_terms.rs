@@ -79,7 +79,8 @@ impl PayloadConfig {
         if let Some(std) = self.mass_std.filter(|s| !(s.is_finite() && *s >= 0.0)) {
             return Err(Error::setting(&key("mass_std"), "a number that is not negative", std));
         }
-        let beside = |name: &str, with: &str| Error::setting(&key(name), &format!("`{with}` beside it"), "none");
+        let beside =
+            |name: &str, with: &str| Error::setting(&key(name), &format!("`{with}` beside it"), "none");
         if self.mass.is_none() && self.mass_std.is_some() {
             return Err(beside("mass_std", "mass"));
         }

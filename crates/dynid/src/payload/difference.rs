@@ -41,8 +41,7 @@ pub(super) fn difference(
     };
     let (with, without) = (fit(true)?, fit(false)?);
     let map = Mat::from_fn(id.base.len(), 10, |i, j| regrouping[(i, 10 * body + j)]);
-    let found =
-        explain_difference([&with, &without], [inflation_of(&with), inflation_of(&without)], &map)?;
+    let found = explain_difference([&with, &without], [inflation_of(&with), inflation_of(&without)], &map)?;
     let phi = Inertia(std::array::from_fn(|j| found.x[j]));
     let about = about_com(&phi);
     Some(Difference {

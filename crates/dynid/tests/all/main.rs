@@ -15,6 +15,7 @@ mod friction_report;
 mod identifiability;
 mod least_squares;
 mod online;
+mod payload;
 mod periodic;
 mod recorded_logs;
 mod support;
