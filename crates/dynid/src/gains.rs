@@ -170,7 +170,12 @@ impl Evidence<'_> {
         let column = self.apart.columns(output).find(|c| table[*c].name == load);
         let place = column.and_then(|c| self.base.kept.binary_search(&c).ok());
         let mut out = JointGain::without(name, unit, scale);
-        let Some(place) = place else { return out };
+        let Some(place) = place else {
+            if column.is_some_and(|c| !self.base.zero.contains(&c)) {
+                out.verdict = "what is not known of the load explains the same effort".to_owned();
+            }
+            return out;
+        };
         let estimate = &self.fitted.estimate;
         let beside = self.beside(output, place);
         out.share = beside.share;

@@ -45,9 +45,23 @@ pub struct OneRobot {
     pub f: f64,
     /// Value that 99 % of logs alike stay below.
     pub limit: f64,
-    /// Log, joint, RMS of the residual of the common fit and of the log's own, N m or N: those that a fit of its own betters
-    /// by a fifth at least.
-    pub better_alone: Vec<(String, String, f64, f64)>,
+    /// Logs and joints whose residual a fit of the log's own brings down by a fifth at least.
+    pub better_alone: Vec<BetterAlone>,
+}
+
+/// A log that a fit of its own describes better, in the rows of one joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BetterAlone {
+    /// Log.
+    pub log: String,
+    /// Joint.
+    pub joint: String,
+    /// RMS of the residual of the common fit.
+    pub common: f64,
+    /// RMS of the residual of the log's own fit.
+    pub alone: f64,
+    /// Unit of both.
+    pub unit: String,
 }
 
 /// Agreement of the training logs of an identification.
@@ -103,7 +117,9 @@ pub(crate) fn test(
             })
             .filter_map(|(log, output, rms)| {
                 let (common, alone) = rms.filter(|(common, alone)| *alone < (1.0 - BETTER_ALONE) * common)?;
-                Some((labels[log].clone(), model.outputs()[output].name.clone(), common, alone))
+                let (log, output) = (labels[log].clone(), &model.outputs()[output]);
+                let (joint, unit) = (output.name.clone(), output.unit.to_owned());
+                Some(BetterAlone { log, joint, common, alone, unit })
             })
             .collect(),
     });
@@ -178,14 +194,14 @@ impl LogAgreement {
             let joints: Vec<String> = rest
                 .better_alone
                 .iter()
-                .map(|(log, joint, common, alone)| {
-                    format!("`{joint}` in {log} from {common:.3} to {alone:.3} N m")
+                .map(|b| {
+                    format!("`{}` in {} from {:.3} to {:.3} {}", b.joint, b.log, b.common, b.alone, b.unit)
                 })
                 .collect();
             out.push(format!(
                 "beside offsets and friction the logs have different parameters: F = {:.1} where logs of one robot stay \
-                 below {:.1}; a fit of its own brings the residual of {} down (effort of a slide: N). Was something mounted \
-                 (`[[payload]]`), or is it another robot?",
+                 below {:.1}; a fit of its own brings down the residual of {}. Was something mounted (`[[payload]]`), has a log \
+                 a delay of its own (`own = [\"delay\"]`), or is it another robot?",
                 rest.f,
                 rest.limit,
                 joints.join(", ")

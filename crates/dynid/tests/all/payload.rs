@@ -33,9 +33,27 @@ struct Record {
     /// Lead of the effort, samples.
     lead: f64,
     seconds: u32,
+    rate_hz: u32,
+    encoder_bits: u32,
+    /// Largest acceleration, rad/s².
+    acceleration: f64,
 }
 
-const PLAIN: Record = Record { seed: 1, noise: 0.01, loaded: false, offset: 0.0, lead: 0.5, seconds: 40 };
+const PLAIN: Record = Record {
+    seed: 1,
+    noise: 0.01,
+    loaded: false,
+    offset: 0.0,
+    lead: 0.5,
+    seconds: 40,
+    rate_hz: 200,
+    encoder_bits: 19,
+    acceleration: 6.0,
+};
+
+/// As drives log: 1 kHz. With 40 s at 200 Hz noise of 1 % alone gives standard deviations of 0.05 % of the mass and 2 % of the
+/// inertia.
+const LONG: Record = Record { seconds: 60, rate_hz: 1000, acceleration: 10.0, ..PLAIN };
 
 struct Bench {
     folder: tempfile::TempDir,
@@ -52,13 +70,18 @@ impl Bench {
         self.folder.path().join(name)
     }
 
-    /// Writes a log of the Indy7: encoders of 19 bits, noise as a share of the rms of every effort; the effort of the payload
+    /// Writes a log of the Indy7: quantised positions, noise as a share of the rms of every effort; the effort of the payload
     /// is that of an independent model on the exact motion.
     fn log(&self, name: &str, record: &Record, columns: &[f64]) {
         let robot = Robot::load(&self.robot, &RobotOptions::default()).unwrap();
         let settings = format!(
-            "duration_s = {}\nperiod_s = 20\nrate_hz = 200\neffort_noise = 0\nencoder_bits = 19\nseed = {}\ndelay_samples = {}",
-            record.seconds, record.seed, record.lead
+            "duration_s = {}\nperiod_s = 20\nrate_hz = {}\neffort_noise = 0\nencoder_bits = {}\nseed = {}\ndelay_samples = {}\nacceleration = {}",
+            record.seconds,
+            record.rate_hz,
+            record.encoder_bits,
+            record.seed,
+            record.lead,
+            record.acceleration
         );
         let log = simulate(&robot, &SimulateSettings::parse(&settings, "test").unwrap()).unwrap();
         let rows = log.time.len();
@@ -139,8 +162,8 @@ fn errors(found: &PayloadRecord) -> [f64; 3] {
 fn a_simulated_payload_is_found_to_a_thousandth() {
     for seed in [1, 2, 3] {
         let bench = Bench::new();
-        bench.log("bare.csv", &Record { seed: 2 * seed, ..PLAIN }, &[1.0; 6]);
-        bench.log("loaded.csv", &loaded(2 * seed + 1), &[1.0; 6]);
+        bench.log("bare.csv", &Record { seed: 2 * seed, ..LONG }, &[1.0; 6]);
+        bench.log("loaded.csv", &Record { seed: 2 * seed + 1, loaded: true, ..LONG }, &[1.0; 6]);
         let config = bench.config(TWO_LOGS);
         let found = identify_payloads(&config, |_| {}).unwrap();
         let record = &found.payloads[0];
@@ -181,16 +204,16 @@ const GAINS: [f64; 6] = [14.0, 13.0, 11.0, 8.0, 9.0, 10.0];
 #[test]
 fn simulated_gains_are_found_where_plain_least_squares_are_off() {
     let bench = Bench::new();
-    let noisy = Record { noise: 0.2, ..PLAIN };
+    // Rows at 50 Hz are hardly averaged: what a textbook fit to raw samples sees.
+    let noisy = Record { noise: 0.04, seconds: 160, encoder_bits: 23, ..PLAIN };
     bench.log("bare.csv", &Record { seed: 4, ..noisy }, &GAINS);
     bench.log("loaded.csv", &Record { seed: 5, loaded: true, ..noisy }, &GAINS);
     let known = TWO_LOGS.replace(
         "name = \"tool\"\n",
         "name = \"tool\"\nmass = 2.6\ncom = [0.04, -0.03, 0.11]\ninertia = [0.031, 0.002, -0.003, 0.042, 0.004, 0.036]\n",
     );
-    let config = bench.config(&known);
+    let config = bench.config(&format!("[conditioning]\nkernel_hz = 50\n{known}"));
     let found = identify_gains(&config, |_| {}).unwrap();
-    let mut off = 0.0_f64;
     for (joint, truth) in found.joints.iter().zip(GAINS) {
         let share = |g: Option<f64>| g.map(|g| 100.0 * (g / truth - 1.0));
         println!(
@@ -204,14 +227,15 @@ fn simulated_gains_are_found_where_plain_least_squares_are_off() {
             joint.share,
             joint.verdict
         );
-        off = off.max(share(joint.plain_least_squares).unwrap().abs());
     }
-    // Gravity of the load acts on joints 2 and 3 over long levers.
-    for j in [1, 2] {
-        let gain = found.joints[j].gain.unwrap();
-        assert!((gain / GAINS[j] - 1.0).abs() < 0.01, "{:?}", found.joints[j]);
+    // Gravity of the load acts on joint 2 over a long lever, and most of its current is friction and the arm's own weight.
+    let joint = &found.joints[1];
+    assert!((joint.gain.unwrap() / GAINS[1] - 1.0).abs() < 0.01, "{joint:?}");
+    assert!(joint.plain_least_squares.unwrap() < 0.85 * GAINS[1], "{joint:?}");
+    for (joint, truth) in found.joints.iter().zip(GAINS) {
+        // Beyond four standard deviations chance puts less than one in ten thousand.
+        assert!(joint.gain.is_none_or(|g| (g - truth).abs() < 4.0 * joint.std.unwrap()), "{joint:?}");
     }
-    assert!(off > 15.0, "{off}");
     assert_eq!(found.file(&config).unwrap().status, "ok");
 }
 
