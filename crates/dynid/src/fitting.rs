@@ -227,12 +227,6 @@ pub(crate) fn with_precision(
     }
 }
 
-/// Variance inflation `κ` of an estimate by its jackknife; 1 with too few blocks for one.
-pub(crate) fn inflation_of(estimate: &LinearEstimate) -> f64 {
-    let jackknife = (estimate.blocks.len() >= MIN_BLOCKS).then(|| estimate.jackknife()).flatten();
-    jackknife.and_then(|j| variance_inflation(&j.covariance, &estimate.model_covariance())).unwrap_or(1.0)
-}
-
 fn conditioning_fault(source: &dyn RowSource, e: dynid_estimate::rows::RowsError) -> Error {
     let output = source.groups()[e.group].output;
     Error::Conditioning(dynid_estimate::conditioning::ConditioningError::Rows { output, source: e.source })

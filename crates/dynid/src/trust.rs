@@ -127,6 +127,8 @@ impl Evidence<'_> {
         );
         let lengths = link_lengths(self.model.mechanism());
         let table = self.model.parameters();
+        // Motions are proposed for the robot alone.
+        let of_logs = self.model.log_columns();
         (0..table.linear.len())
             .map(|j| {
                 let assessment = assessed.parameters[j].clone();
@@ -148,7 +150,9 @@ impl Evidence<'_> {
                     wide: std.is_some_and(|s| assessment.is_wide(value, quantile * s)),
                     at_boundary: self.constrained(j) && std.is_some_and(|s| moved > s),
                     combination: self.combination(j, &assessment, symbols, trust, &lengths),
-                    advice: advice.sentence(j, joints, symbols[j]).filter(|_| !in_combination),
+                    advice: advice
+                        .sentence(j, joints, symbols[j])
+                        .filter(|_| !in_combination && !of_logs.contains(&j)),
                     assessment,
                     unconstrained,
                     std,

@@ -22,6 +22,7 @@ mod golden_tls;
 mod identifiability;
 mod linear_methods;
 mod live_rows;
+mod log_terms;
 mod nist;
 mod nist_nonlinear;
 mod nist_nonlinear_strd;

@@ -104,6 +104,10 @@ impl Config {
     /// # Errors
     /// [`Error::Setting`].
     pub(super) fn check_log_terms(&self) -> Result<(), Error> {
+        for log in self.log.iter().chain(&self.validation) {
+            let known: Vec<String> = self.payload.iter().map(|p| p.name.clone()).collect();
+            one_of("payload", log.payload.as_ref(), &known, "[[payload]]")?;
+        }
         for (k, payload) in self.payload.iter().enumerate() {
             if payload.name.trim().is_empty() {
                 return Err(Error::setting("payload.name", "a name in every `[[payload]]`", "none"));
@@ -126,10 +130,6 @@ impl Config {
             if let Some(like) = &log.like {
                 return Err(Error::setting("log.like", "it in `[[validation]]` only", like));
             }
-        }
-        for log in self.log.iter().chain(&self.validation) {
-            let known: Vec<String> = self.payload.iter().map(|p| p.name.clone()).collect();
-            one_of("payload", log.payload.as_ref(), &known, "[[payload]]")?;
         }
         for log in &self.validation {
             one_of("validation.like", log.like.as_ref(), &labels, "[[log]]")?;

@@ -7,7 +7,6 @@ use dynid_model::Inertia;
 use serde::{Deserialize, Serialize};
 
 use super::body::about_com;
-use crate::fitting::inflation_of;
 use crate::identify::Identification;
 
 /// A payload from the difference of two fits of the robot, one to the logs that carry it and one to those that carry
@@ -41,7 +40,8 @@ pub(super) fn difference(
     };
     let (with, without) = (fit(true)?, fit(false)?);
     let map = Mat::from_fn(id.base.len(), 10, |i, j| regrouping[(i, 10 * body + j)]);
-    let found = explain_difference([&with, &without], [inflation_of(&with), inflation_of(&without)], &map)?;
+    // Blocks that are long enough for the residuals leave too few per side for an inflation of its own.
+    let found = explain_difference([&with, &without], [id.fitted.inflation; 2], &map)?;
     let phi = Inertia(std::array::from_fn(|j| found.x[j]));
     let about = about_com(&phi);
     Some(Difference {

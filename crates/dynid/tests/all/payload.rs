@@ -1,6 +1,6 @@
 //! Payloads, drive gains and terms of single logs: simulated logs with known truth, recorded logs, what configurations may say.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use std::path::{Path, PathBuf};
 
@@ -123,7 +123,7 @@ impl Bench {
         }
         let header: Vec<&str> = header.iter().map(String::as_str).collect();
         let table: Vec<&[f64]> = table.iter().map(Vec::as_slice).collect();
-        csv::write(&self.path(name), &header, &table).unwrap();
+        csv::write(self.path(name), &header, &table).unwrap();
     }
 
     fn config(&self, rest: &str) -> Config {
