@@ -26,13 +26,16 @@ pub struct LoadColumn {
 /// If there is no such column.
 pub fn load_column(factor: &Factor, load: usize) -> LoadColumn {
     let norms = factor.column_norms();
+    if norms[load] <= 0.0 {
+        return LoadColumn { share: 0.0, plain: None, total: None };
+    }
     let others: Vec<usize> = (0..factor.columns()).filter(|c| *c != load && norms[*c] > 0.0).collect();
     let rest = factor.select(&others);
     let kept: Vec<usize> = numerical_rank(&rest).independent.iter().map(|k| others[*k]).collect();
     let order: Vec<usize> = kept.iter().copied().chain([load]).collect();
     let ordered = factor.select(&order);
     let last = order.len() - 1;
-    let share = match ordered.height() > last && norms[load] > 0.0 {
+    let share = match ordered.height() > last {
         true => (ordered.r(last, last).abs() / norms[load]).min(1.0),
         false => 0.0,
     };
