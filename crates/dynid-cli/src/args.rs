@@ -35,6 +35,11 @@ pub(crate) enum Command {
     Validate(ValidateArgs),
     /// Clearances of an identified robot's joints from a log: by probes at the journals, by their swing in the effort.
     Clearance(ClearanceArgs),
+    /// Payloads from logs with and without them: mass, centre of mass, inertia; writes payload.json, payload.html and a URDF
+    /// link.
+    Payload(PayloadArgs),
+    /// Drive gains from logs with and without a payload of known mass.
+    Gains(GainsArgs),
     /// Follow a stream or logs: estimates as JSON lines, alarms when something changes (exit code 1).
     Online(OnlineArgs),
     /// Published systems, every claim of their papers beside what is measured here.
@@ -429,6 +434,33 @@ pub(crate) struct FrictionTestArgs {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print friction.json to stdout as well.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Say only what went wrong.
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct PayloadArgs {
+    /// Configuration (TOML) with a `[[payload]]`, a `[[log]]` that carries it and one that does not.
+    pub(crate) input: PathBuf,
+    /// Output folder (default: the configuration's, else dynid-payload).
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print payload.json to stdout in place of the table.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Say only what went wrong.
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct GainsArgs {
+    /// Configuration (TOML) with one `[[payload]]` of known mass, a `[[log]]` that carries it and one that does not.
+    pub(crate) input: PathBuf,
+    /// Print JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
     /// Say only what went wrong.

@@ -35,6 +35,8 @@ fn main() -> ExitCode {
         Command::Friction(args) => commands::friction::run(&args),
         Command::Simulate(args) => commands::simulate::run(&args),
         Command::Clearance(args) => commands::clearance::run(&args),
+        Command::Gains(args) => commands::gains::run(&args),
+        Command::Payload(args) => commands::payload::run(&args),
         Command::Validate(args) => commands::validate::run(&args),
         Command::Online(args) => commands::online::run(&args),
         Command::Study(args) => commands::study::run(&args),

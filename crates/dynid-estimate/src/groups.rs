@@ -23,6 +23,17 @@ impl ReducedGroup {
         Factor::merge(&self.blocks.iter().collect::<Vec<_>>()).embed(total, &self.columns)
     }
 
+    /// The same rows without base columns that are not among `columns`: their parameters are held at zero.
+    pub fn within(&self, columns: &[usize]) -> ReducedGroup {
+        let places: Vec<usize> =
+            (0..self.columns.len()).filter(|k| columns.contains(&self.columns[*k])).collect();
+        ReducedGroup {
+            columns: places.iter().map(|k| self.columns[*k]).collect(),
+            blocks: self.blocks.iter().map(|b| b.select(&places)).collect(),
+            ..*self
+        }
+    }
+
     /// Rows of all blocks.
     pub fn rows(&self) -> usize {
         self.blocks.iter().map(Factor::rows).sum()

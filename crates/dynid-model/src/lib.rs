@@ -18,6 +18,7 @@ pub mod element;
 pub mod inertia;
 pub mod mechanism;
 pub mod parameter;
+mod per_output;
 mod random_motion;
 mod robot_model;
 pub mod scalar;
@@ -40,6 +41,7 @@ pub use effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLa
 pub use inertia::Inertia;
 pub use mechanism::{Body, Frame, Joint, JournalPath, Mechanism, MechanismError, MechanismWarning};
 pub use parameter::{Owner, Parameter, ParameterTable, ShapeParameter};
+pub use per_output::PerOutput;
 pub use random_motion::RandomMotion;
 pub use robot_model::RobotModel;
 pub use scalar::Scalar;

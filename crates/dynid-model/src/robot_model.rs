@@ -7,7 +7,7 @@ use crate::coordinate::Coordinate;
 use crate::description::Limits;
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
-use crate::element::{ClearanceContact, ElasticTransmission, JetMotion, JointElement, JointInfo};
+use crate::element::{ClearanceContact, ElasticTransmission, JetMotion, JointElement, JointInfo, Payload};
 use crate::mechanism::Mechanism;
 use crate::parameter::{Parameter, ParameterTable};
 use crate::random_motion::RandomMotion;
@@ -157,6 +157,16 @@ impl RobotModel {
     /// As there.
     pub fn clearance_contacts(&self, linear: &[f64]) -> Vec<(&ClearanceContact, [f64; 3])> {
         self.tree().clearance_contacts(linear)
+    }
+
+    /// See [`TreeModel::payloads`].
+    pub fn payloads(&self) -> impl Iterator<Item = (&Payload, usize)> {
+        self.tree().payloads()
+    }
+
+    /// See [`TreeModel::log_columns`].
+    pub fn log_columns(&self) -> std::ops::Range<usize> {
+        self.tree().log_columns()
     }
 
     /// See [`TreeModel::elastic_motor`].

@@ -7,6 +7,7 @@ mod elements;
 mod history;
 mod known;
 mod passivity;
+mod payload;
 mod reaction_friction;
 mod shaped;
 
@@ -478,7 +479,8 @@ fn travels(elements: &[Box<dyn JointElement>], first_rate: usize, count: usize) 
     travels
 }
 
-fn ancestor_rates(mechanism: &Mechanism, body: usize) -> Vec<usize> {
+/// Rates of the joints between a body and the base, the body's own first.
+pub(crate) fn ancestor_rates(mechanism: &Mechanism, body: usize) -> Vec<usize> {
     let mut rates = Vec::new();
     let mut next = Some(body);
     while let Some(b) = next {

@@ -187,6 +187,12 @@ impl Log {
         &self.channels
     }
 
+    /// The same log with a further channel that never changes.
+    pub fn with_constant(mut self, channel: String, value: f64) -> Self {
+        self.channels.push(Channel { name: channel, values: vec![value; self.time.len()] });
+        self
+    }
+
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.time.len()

@@ -39,4 +39,4 @@ pub use data::{
 pub use data::{CurvesByTemperature, FrictionReport, FrictionTest, Surface, TemperatureLevel};
 pub use data::{FindingRow, LogPage};
 pub use error::ReportError;
-pub use page::{render, render_design, render_friction, render_log_page, render_study};
+pub use page::{render, render_design, render_friction, render_kind, render_log_page, render_study};

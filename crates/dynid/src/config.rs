@@ -3,6 +3,7 @@
 mod estimator;
 mod friction;
 mod instruments;
+mod log_terms;
 mod online;
 mod per_joint;
 pub(crate) mod toml_file;
@@ -13,6 +14,7 @@ pub use estimator::{
 pub use friction::{Friction, FrictionErrors};
 pub(crate) use instruments::reference_channel;
 pub use instruments::{InstrumentsConfig, NominalModel, ReferenceColumns};
+pub use log_terms::{Own, PayloadConfig, RATED_MASS};
 pub use online::{ForgettingRule, OnlineConfig};
 pub use per_joint::PerJoint;
 pub(crate) use per_joint::known;
@@ -68,6 +70,8 @@ pub struct Config {
     pub trajectory: Option<PathBuf>,
     /// Period of every `[[log]]` that states neither, s.
     pub period_s: Option<f64>,
+    /// Bodies that some logs carry.
+    pub payload: Vec<PayloadConfig>,
     /// Logs to identify from.
     pub log: Vec<LogConfig>,
     /// Logs to validate on.
@@ -149,6 +153,14 @@ pub struct LogConfig {
     pub trajectory: Option<PathBuf>,
     /// The period alone, s, where the whole record is periodic.
     pub period_s: Option<f64>,
+    /// Name in parameters and messages. Default: the file's name up to its first dot.
+    pub name: Option<String>,
+    /// The payload that it carries. Default: none.
+    pub payload: Option<String>,
+    /// What it has of its own, beside the other training logs. Default: nothing.
+    pub own: Vec<Own>,
+    /// Of a validation log: the training log whose own terms it shares. Default: none.
+    pub like: Option<String>,
 }
 
 /// What an identification does about what its pre-flight finds ([`crate::check`]).
@@ -314,6 +326,7 @@ impl Config {
         }
         self.elements.check()?;
         self.online.check()?;
+        self.check_log_terms()?;
         self.check_estimator()?;
         self.check_instruments()?;
         for (joint, position) in &self.locked {

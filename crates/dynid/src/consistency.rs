@@ -180,6 +180,14 @@ pub(crate) fn problem(
     bounds: &[Bound],
 ) -> Problem {
     let bodies = model.mechanism().bodies();
+    let payloads = prior.payloads.iter().map(|p| LinkPrior {
+        name: p.name.clone(),
+        first_column: p.first_column,
+        prior: p.inertia,
+    });
+    let of_payload = |column: usize| {
+        prior.payloads.iter().any(|p| (p.first_column..p.first_column + 10).contains(&column))
+    };
     let links = bodies
         .iter()
         .zip(&prior.bodies)
@@ -189,10 +197,12 @@ pub(crate) fn problem(
             first_column: 10 * b,
             prior: prior.inertia,
         })
+        .chain(payloads)
         .collect();
     let mut bounds = bounds.to_vec();
     let mut scalars = Vec::new();
-    for (column, p) in model.parameters().linear.iter().enumerate().skip(10 * bodies.len()) {
+    let table = &model.parameters().linear;
+    for (column, p) in table.iter().enumerate().skip(10 * bodies.len()).filter(|(c, _)| !of_payload(*c)) {
         scalars.push(ScalarPrior {
             name: p.name.clone(),
             column,

@@ -23,6 +23,7 @@ use dynid_model::{Coordinate, JointKind, Mechanism};
 
 use crate::Error;
 use crate::friction::KnownFriction;
+use crate::log_terms::LogTerms;
 
 /// Element names that a robot file or a configuration may use.
 pub const NAMES: [&str; 21] = [
@@ -79,6 +80,8 @@ pub struct ElementPlan {
     pub free_errors: bool,
     /// The mechanism with its loops closed, if it has some.
     pub closed: Option<Arc<ClosedMechanism>>,
+    /// Elements that act in some logs only; none in the model that a result file records.
+    pub log_terms: LogTerms,
 }
 
 impl ElementPlan {
@@ -106,6 +109,7 @@ impl ElementPlan {
             known: Vec::new(),
             free_errors: true,
             closed: None,
+            log_terms: LogTerms::default(),
         };
         let names = plan.names(mechanism);
         for (joint, _) in &spec.per_joint {
@@ -236,7 +240,7 @@ impl ElementPlan {
         self.spec.settings.retain(|s| !(s.joint == joint && s.element == name));
     }
 
-    /// Builds the elements in joint order, but gear loads, couplings and springs last.
+    /// Builds the elements in joint order, then gear loads, couplings and springs, last what belongs to single logs.
     ///
     /// Shape parameters about which nothing is said get bounds for the speed limit of the joint, or for 1 rad/s (m/s)
     /// where there is none.
@@ -259,6 +263,7 @@ impl ElementPlan {
             out.push(build_coupling(coupling, &names)?);
         }
         out.extend(self.transmissions(&names)?);
+        out.extend(self.log_terms.elements(mechanism, &self.per_rate));
         Ok(out)
     }
 

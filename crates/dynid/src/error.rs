@@ -514,6 +514,19 @@ fn setting_hint(name: &str) -> Option<&'static str> {
         _ if name.starts_with("trajectory.parking.") => {
             "a pose within the limits; joints left out are at zero or the nearest position within theirs"
         }
+        "payload" => {
+            "for example `[[payload]]` with `name = \"tool\"`, and `payload = \"tool\"` in the logs that carry it"
+        }
+        _ if name.starts_with("payload.") && name.ends_with(".link") => {
+            "`dynid inspect ROBOT` shows the links that move; a payload is mounted on one of them"
+        }
+        _ if name.starts_with("payload.") => {
+            "`[[payload]]` states `name`, `link`, `rated_mass`, and what is known: `mass`, `mass_std`, `com`, `inertia`; logs say `payload = \"name\"`"
+        }
+        "validation.like" | "validation.own" | "log.like" => {
+            "a validation log says `like = \"name\"` with the name (or file name) of the `[[log]]` whose own terms it shares"
+        }
+        "log.name" => "the default is the file's name up to its first dot",
         _ if name.starts_with("column_noise.") => {
             "a name of `dynid inspect ROBOT` among the base parameters with a standard deviation; 0: exact"
         }

@@ -21,6 +21,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
 use crate::Error;
+use crate::identify::OwnDelay;
+use crate::log_agreement::LogAgreement;
 
 /// Version of the file's layout.
 pub const SCHEMA: u32 = 1;
@@ -46,6 +48,16 @@ pub struct Estimate {
     pub rank: RankStatus,
     /// Standard parameters: links, then elements. Their split follows the robot file where only combinations are seen.
     pub parameters: Vec<ParameterValue>,
+    /// What belongs to single logs: payloads, and deviations of offset and friction named after their log. Predictions of
+    /// the robot alone do without.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub log_parameters: Vec<ParameterValue>,
+    /// Whether the training logs agree in what the fit holds the same; absent with one log.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub log_agreement: Option<LogAgreement>,
+    /// Delays of single logs, taken off their efforts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub log_delays: Vec<OwnDelay>,
     /// Base parameters.
     pub base_parameters: Vec<BaseValue>,
     /// Parameters that enter the effort nonlinearly.

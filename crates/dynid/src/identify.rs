@@ -4,6 +4,7 @@ mod elastic;
 mod figures;
 mod friction;
 pub(crate) mod known;
+mod own_delay;
 mod shapes;
 mod structure;
 
@@ -27,12 +28,15 @@ use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
 use crate::fitting::{self, Fitted};
 use crate::instruments::{self, Comparison, InstrumentRun};
+use crate::log_agreement::{self, LogAgreement};
+use crate::log_terms::LogTerms;
 use crate::logs::{self, LoadedLog};
 use crate::passivity::SPEED_SPAN_S;
 use crate::prior::Prior;
 use crate::robot::{Robot, RobotOptions, refuse_internal_load};
 use crate::shape::{self, ShapeFit};
 use crate::trust::{Evidence, Trust};
+pub use own_delay::OwnDelay;
 use shapes::Shaped;
 use structure::Structure;
 pub(crate) use structure::{effort_sizes, stated_values};
@@ -125,6 +129,10 @@ pub struct Identification {
     pub whiteness: Vec<Vec<Option<InBandWhiteness>>>,
     /// Models with fewer and fewer base parameters, and how well they do.
     pub pruning: Option<Pruning>,
+    /// Whether the training logs agree in what the fit holds the same; `None` with one log, or where it could not be told.
+    pub log_agreement: Option<LogAgreement>,
+    /// Delays of single logs, taken off their efforts.
+    pub own_delays: Vec<OwnDelay>,
     /// Warnings, in words.
     pub warnings: Vec<String>,
     /// What the pre-flight of the training logs found.
@@ -163,11 +171,16 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     if let Some(table) = &config.instruments {
         table.read_reference(&mut files, &config.columns, &logs::names(&robot.axes))?;
     }
-    let (robot, loaded) = read_logs(config, &files, robot, &mut progress)?;
+    let (robot, mut loaded) = read_logs(config, &files, robot, &mut progress)?;
     let findings = preflight(config, &robot, &loaded, &mut progress)?;
     let mut plan = plan_elements(config, &robot, &loaded)?;
+    plan.log_terms = LogTerms::of(config, &robot)?;
+    for ((loaded, log), label) in loaded.iter_mut().zip(&config.log).zip(config.log_labels()) {
+        loaded.log = plan.log_terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
+    }
     let model = plan.model(&robot.mechanism)?;
-    let prepared = loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
+    let mut prepared =
+        loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
 
     for log in &prepared {
         config.check_cutoffs(&log.name, log.rate_hz)?;
@@ -177,6 +190,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     // Names that do not exist are told before the long work.
     let structure = Structure::of(config, &model, &plan, &prepared)?;
     let start = model.parameters().shape_start();
+    let own_delays = own_delay::take_off(config, &model, &start, &structure.base, &mut prepared, &settings)?;
 
     let conditioning = match config.conditioning.route {
         Route::Compact => {
@@ -249,6 +263,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     warnings.extend(log_warnings(&model, &prepared));
     warnings.extend(elastic::warnings(&model, &prepared));
     warnings.extend(known::warnings(&plan, &robot.mechanism, &prepared));
+    let log_agreement = log_agreement::test(config, &model, &base, &fitted, &plan.log_terms);
+    warnings.extend(log_agreement.iter().flat_map(LogAgreement::warnings));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
     let mut out = Identification {
         plan,
@@ -275,6 +291,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         validation_unconstrained: Vec::new(),
         whiteness: Vec::new(),
         pruning: None,
+        log_agreement,
+        own_delays,
         warnings,
         findings,
         settings,
@@ -310,8 +328,12 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     }
     for log in &config.validation {
         progress(Step::Validate(log.path.display().to_string()));
-        let loaded = logs::load(log, &out.robot.axes, &config.columns, config.motor_side.as_ref())?;
-        let prepared = loaded.prepare(&out.model, &out.settings)?;
+        let mut loaded = logs::load(log, &out.robot.axes, &config.columns, config.motor_side.as_ref())?;
+        loaded.log = out.plan.log_terms.of_validation(loaded.log, log);
+        let mut prepared = loaded.prepare(&out.model, &out.settings)?;
+        if let Some(own) = out.own_delays.iter().find(|d| Some(&d.log) == log.like.as_ref()) {
+            own.take_off(&mut prepared)?;
+        }
         out.warnings.extend(known::logged_beyond(&out.plan.known, &prepared));
         out.validation.push(out.agreement(out.values(), &prepared)?);
         if out.consistent.constrained() {
@@ -423,7 +445,7 @@ impl Identification {
     }
 }
 
-fn read_logs(
+pub(crate) fn read_logs(
     config: &Config,
     files: &[LogConfig],
     robot: Robot,
@@ -471,7 +493,11 @@ fn preflight(
     }
 }
 
-fn plan_elements(config: &Config, robot: &Robot, logs: &[LoadedLog]) -> Result<ElementPlan, Error> {
+pub(crate) fn plan_elements(
+    config: &Config,
+    robot: &Robot,
+    logs: &[LoadedLog],
+) -> Result<ElementPlan, Error> {
     let names = robot.rate_names();
     let moves =
         |rate: usize| logs.iter().any(|l| l.log.joints().iter().any(|j| j.name == names[rate] && j.moves()));

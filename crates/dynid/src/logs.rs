@@ -36,6 +36,11 @@ pub struct LoadedLog {
 }
 
 impl LoadedLog {
+    /// Factors from effort columns to efforts, drive gains with currents, in the order of the log's joints; empty without.
+    pub fn effort_factors(&self) -> Vec<f64> {
+        self.mapping.effort.iter().flatten().flatten().map(|c| c.factor).collect()
+    }
+
     /// Conditions the log's signals; states of a motion with a stated period come from its Fourier series.
     ///
     /// # Errors

@@ -2,9 +2,11 @@
 //! may be.
 
 mod bodies;
+mod payload;
 mod scalars;
 
 pub use bodies::{BodyPrior, Origin};
+pub use payload::{PAYLOAD_SIZE, PayloadPrior};
 pub(crate) use scalars::{speed_limit, typical_channels};
 
 use dynid_model::{EffortModel, Mechanism, RobotModel};
@@ -44,6 +46,8 @@ pub enum PriorError {
 ///   friction the same divided by the velocity limit; for a spring, divided by the largest position; for motors behind a
 ///   transmission, carried through its matrix; for a drive gain, the effort per ampere.
 ///
+/// Payloads have the prior of [`PayloadPrior`], deviations of single logs that of the element that they deviate in.
+///
 /// `e_j` is the effort limit, but at most ten times the effort of the logs, since many robot files state limits that no
 /// drive has; without a limit, the effort of the logs; without that, the effort that the prior bodies need over random
 /// states. Velocity limits count up to 4π rad/s (2 m/s); where none is stated, 2 rad/s (0.5 m/s).
@@ -55,6 +59,8 @@ pub struct Prior {
     pub std: Vec<f64>,
     /// One entry per body of the mechanism.
     pub bodies: Vec<BodyPrior>,
+    /// One entry per payload that is estimated.
+    pub payloads: Vec<PayloadPrior>,
     /// Repairs and inventions, in words, each naming its link.
     pub warnings: Vec<String>,
 }
@@ -86,8 +92,13 @@ pub fn of(
     let first = values.len();
     values.extend(stated[first..].iter().map(|v| v.unwrap_or(0.0)));
     std.extend(scalars::standard_deviations(model, &inertias, stated, efforts));
+    let payloads: Vec<PayloadPrior> =
+        model.payloads().map(|(p, column)| PayloadPrior::new(p, column)).collect();
+    for payload in &payloads {
+        payload.fill(&mut values, &mut std);
+    }
     let warnings = bodies.iter().filter_map(BodyPrior::warning).collect();
-    Ok(Prior { values, std, bodies, warnings })
+    Ok(Prior { values, std, bodies, payloads, warnings })
 }
 
 /// Lengths of a robot with their words, to name constants of regroupings: `(0.45, "distance joint 2-3")`.

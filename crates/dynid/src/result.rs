@@ -54,7 +54,10 @@ impl Identification {
                 not_excited: names(&not_excited),
                 never_seen: names(&self.base.zero),
             },
-            parameters: self.parameter_values(),
+            parameters: self.parameter_values(0..self.model.log_columns().start),
+            log_agreement: self.log_agreement.clone(),
+            log_delays: self.own_delays.clone(),
+            log_parameters: self.parameter_values(self.model.log_columns()),
             base_parameters: self.base_values(),
             shape_parameters: self.shape_values(),
             friction_passivity: self.friction_passivity(),
@@ -99,14 +102,14 @@ impl Identification {
             .collect()
     }
 
-    fn parameter_values(&self) -> Vec<ParameterValue> {
+    pub(crate) fn parameter_values(&self, columns: std::ops::Range<usize>) -> Vec<ParameterValue> {
         self.model
             .parameters()
             .linear
             .iter()
             .zip(&self.trust.parameters)
             .enumerate()
-            .filter(|(_, (p, _))| shape::of_change(&p.name).is_none())
+            .filter(|(c, (p, _))| columns.contains(c) && shape::of_change(&p.name).is_none())
             .map(|(c, (p, trust))| {
                 let (link, joint) = match &p.owner {
                     Owner::Link(name) => (Some(name.clone()), None),
@@ -444,7 +447,7 @@ fn relative(value: Option<f64>, std: Option<f64>) -> Option<f64> {
     (value.abs() >= 2.0 * std && value != 0.0).then(|| 100.0 * std / value.abs())
 }
 
-fn provenance(config: &Config) -> Result<Provenance, Error> {
+pub(crate) fn provenance(config: &Config) -> Result<Provenance, Error> {
     let mut inputs = vec![InputRecord {
         path: config.robot.display().to_string(),
         kind: "robot".to_owned(),
@@ -468,6 +471,14 @@ fn provenance(config: &Config) -> Result<Provenance, Error> {
         if l.trajectory.is_some() || l.period_s.is_some() {
             value["trajectory"] = json!(l.trajectory);
             value["period_s"] = json!(l.period_s);
+        }
+        for (key, own) in [("name", &l.name), ("payload", &l.payload), ("like", &l.like)] {
+            if let Some(own) = own {
+                value[key] = json!(own);
+            }
+        }
+        if !l.own.is_empty() {
+            value["own"] = json!(l.own);
         }
         value
     };
@@ -495,11 +506,15 @@ fn provenance(config: &Config) -> Result<Provenance, Error> {
         "estimator": config.estimator,
         "bound": config.bound,
         "preferred": config.preferred,
+        "preflight": config.preflight,
         "log": training.iter().map(rows).collect::<Vec<_>>(),
         "validation": config.validation.iter().map(rows).collect::<Vec<_>>(),
     });
     if let Some(table) = &config.instruments {
         settings["instruments"] = json!(table);
+    }
+    if !config.payload.is_empty() {
+        settings["payload"] = json!(config.payload);
     }
     Ok(Provenance { version: crate::VERSION.to_owned(), inputs, settings, seed: config.seed.unwrap_or(1) })
 }

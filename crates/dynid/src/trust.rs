@@ -65,6 +65,16 @@ pub(crate) struct Evidence<'a> {
     pub explained: &'a [bool],
 }
 
+/// Half width of intervals of [`CONFIDENCE`] in standard deviations.
+pub(crate) fn interval_quantile(fitted: &Fitted) -> f64 {
+    let fit = &fitted.estimate;
+    let freedom = match fitted.jackknife {
+        Some(_) => fit.blocks.len() as f64 - 1.0,
+        None => fit.solution.rows as f64 - fit.solution.kept.len() as f64,
+    };
+    t_quantile(0.5 + 0.5 * CONFIDENCE, freedom.max(1.0)).unwrap_or(f64::INFINITY)
+}
+
 impl Evidence<'_> {
     /// Verdicts of all parameters.
     pub(crate) fn trust(&self) -> Trust {
@@ -72,7 +82,7 @@ impl Evidence<'_> {
         let assessed = self.space.assess(information, 1.0);
         let present = Present { space: self.space, information, inflation: 1.0, assessed: &assessed };
         let advice = advise(self.model, self.base, &present, self.rows, &MotionSettings::default());
-        let quantile = self.quantile();
+        let quantile = interval_quantile(self.fitted);
         let base_half_width = self.base_deviations().into_iter().map(|s| s.map(|s| quantile * s)).collect();
         let joints: Vec<String> = self.model.outputs().iter().map(|o| o.name.clone()).collect();
         let symbols: Vec<&str> = self.model.parameters().linear.iter().map(|p| p.symbol.as_str()).collect();
@@ -84,15 +94,6 @@ impl Evidence<'_> {
         };
         trust.parameters = self.parameters(&assessed, &advice, &joints, &symbols, quantile, &trust);
         trust
-    }
-
-    fn quantile(&self) -> f64 {
-        let fit = &self.fitted.estimate;
-        let freedom = match self.fitted.jackknife {
-            Some(_) => fit.blocks.len() as f64 - 1.0,
-            None => fit.solution.rows as f64 - fit.solution.kept.len() as f64,
-        };
-        t_quantile(0.5 + 0.5 * CONFIDENCE, freedom.max(1.0)).unwrap_or(f64::INFINITY)
     }
 
     /// Standard deviations of all base parameters; `None` where a column was dropped.
@@ -126,6 +127,8 @@ impl Evidence<'_> {
         );
         let lengths = link_lengths(self.model.mechanism());
         let table = self.model.parameters();
+        // Motions are proposed for the robot alone.
+        let of_logs = self.model.log_columns();
         (0..table.linear.len())
             .map(|j| {
                 let assessment = assessed.parameters[j].clone();
@@ -147,7 +150,9 @@ impl Evidence<'_> {
                     wide: std.is_some_and(|s| assessment.is_wide(value, quantile * s)),
                     at_boundary: self.constrained(j) && std.is_some_and(|s| moved > s),
                     combination: self.combination(j, &assessment, symbols, trust, &lengths),
-                    advice: advice.sentence(j, joints, symbols[j]).filter(|_| !in_combination),
+                    advice: advice
+                        .sentence(j, joints, symbols[j])
+                        .filter(|_| !in_combination && !of_logs.contains(&j)),
                     assessment,
                     unconstrained,
                     std,

@@ -1,5 +1,7 @@
 //! What an identification is worth, in plain words.
 
+mod logs;
+
 use dynid_estimate::consistent::Status as ConsistentStatus;
 use dynid_estimate::identifiability::Verdict as ParameterVerdict;
 mod instruments;
@@ -79,6 +81,7 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
     checks.extend(whiteness(id));
     checks.extend(instruments::instruments(id));
     checks.extend(instruments::closed_loop_bias(id));
+    checks.extend(logs::checks(id));
     let status = checks.iter().map(|(s, _)| *s).max().unwrap_or(Status::Ok);
     let relative = |a: &[crate::agreement::Agreement]| {
         a.iter().filter_map(|v| v.filtered.relative_error).fold(f64::NAN, f64::max)

@@ -27,8 +27,8 @@ pub(crate) fn run(args: &CheckArgs) -> Result<u8, Failure> {
     let progress = Progress::new(args.quiet);
     let found = check(&config, |log| progress.examining(log))?;
     drop(progress);
-    let page = args.report.as_ref().map(|_| found.report(&config)).transpose()?;
-    let fixed = args.fix.as_ref().map(|_| found.corrected(&config, source)).transpose()?;
+    let page = if args.report.is_some() { Some(found.report(&config)?) } else { None };
+    let fixed = if args.fix.is_some() { Some(found.corrected(&config, source)?) } else { None };
     for (path, text) in [(&args.report, page), (&args.fix, fixed)] {
         if let (Some(path), Some(text)) = (path, text) {
             write_atomically(path, text.as_bytes())?;

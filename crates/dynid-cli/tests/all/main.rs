@@ -10,5 +10,6 @@ mod export;
 mod friction;
 mod online;
 mod other_libraries;
+mod payload;
 mod study;
 mod support;

@@ -126,6 +126,29 @@ impl Factor {
         self.with_remainder(builder)
     }
 
+    /// Factor of the same rows in which the effort and a column have changed places: what was column `column` is to be
+    /// explained by the others and by the effort, which stands in its place.
+    ///
+    /// Panics if there is no such column.
+    pub fn with_effort_exchanged(&self, column: usize) -> Factor {
+        assert!(column < self.columns, "column {column} of {}", self.columns);
+        let height = self.height();
+        let mut builder = FactorBuilder::with_chunk_rows(self.columns, height + 1);
+        builder.stack(height + 1, |i, j| {
+            let from = match j {
+                _ if j == column => self.columns,
+                _ if j == self.columns => column,
+                _ => j,
+            };
+            match (i < height, from == self.columns) {
+                (true, _) => self.triangle[(i, from)],
+                (false, true) => self.rho,
+                (false, false) => 0.0,
+            }
+        });
+        Factor { rows: self.rows, ..builder.finish() }
+    }
+
     /// Factor of `W` and `y` with the rows `D x ≈ D x0` added below, `D = diag(weights)`.
     ///
     /// The added rows do not count as samples. Panics unless both slices have `p` finite entries.

@@ -13,6 +13,8 @@ pub struct Posterior {
     /// Standard deviations of these: of the noise as the robust covariance has it, and of the prior where the data leave
     /// room.
     pub std: Vec<f64>,
+    /// Covariance that these are the roots of the diagonal of, `p × p`.
+    pub covariance: Mat<f64>,
 }
 
 /// Posterior of `β = K x + noise` with the prior `x ~ N(x0, C0)`.
@@ -50,16 +52,18 @@ pub fn posterior(
     let missing: Vec<f64> =
         (0..k).map(|i| estimate[i] - (0..p).map(|j| regrouping[(i, j)] * prior[j]).sum::<f64>()).collect();
     let left = Mat::<f64>::identity(p, p) - &gain * &whitened;
-    let noise = &gain * covariance;
-    let mut out = Posterior { mean: Vec::with_capacity(p), std: Vec::with_capacity(p) };
-    for j in 0..p {
-        let step: f64 = (0..k).map(|i| gain[(j, i)] * missing[i]).sum();
-        let of_prior: f64 = (0..p).map(|m| left[(j, m)] * left[(j, m)]).sum();
-        let of_noise: f64 = (0..k).map(|i| noise[(j, i)] * gain[(j, i)]).sum();
-        out.mean.push(prior[j] + prior_std[j] * step);
-        out.std.push(prior_std[j] * (of_prior + of_noise.max(0.0)).sqrt());
-    }
-    Some(out)
+    let of_prior = &left * left.transpose();
+    let of_noise = &gain * covariance * gain.transpose();
+    let between = |i: usize, j: usize| {
+        let noise = if i == j { of_noise[(i, j)].max(0.0) } else { of_noise[(i, j)] };
+        prior_std[i] * prior_std[j] * (of_prior[(i, j)] + noise)
+    };
+    let mean = |j: usize| prior[j] + prior_std[j] * (0..k).map(|i| gain[(j, i)] * missing[i]).sum::<f64>();
+    Some(Posterior {
+        mean: (0..p).map(mean).collect(),
+        std: (0..p).map(|j| between(j, j).sqrt()).collect(),
+        covariance: Mat::from_fn(p, p, between),
+    })
 }
 
 /// Regrouping of the base parameters that a log tells apart: what the dropped columns contribute is folded into the kept

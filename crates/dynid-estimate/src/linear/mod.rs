@@ -1,5 +1,6 @@
 //! Linear least squares on factors: ordinary, weighted by group, with a quadratic prior, and total.
 
+mod difference;
 mod estimate;
 mod extended;
 mod irls;
@@ -10,6 +11,7 @@ mod ridge;
 mod tls;
 mod wls;
 
+pub use difference::{DifferenceFit, explain_difference};
 pub(crate) use estimate::assemble;
 pub use estimate::estimate;
 pub use extended::ols_extended;

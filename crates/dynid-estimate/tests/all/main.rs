@@ -25,6 +25,7 @@ mod instruments;
 mod instruments_power;
 mod linear_methods;
 mod live_rows;
+mod log_terms;
 mod nist;
 mod nist_nonlinear;
 mod nist_nonlinear_strd;

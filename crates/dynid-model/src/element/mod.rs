@@ -10,8 +10,10 @@ mod drive;
 mod elastic;
 mod external_load;
 mod friction;
+mod gated;
 mod jets;
 mod linearised;
+mod payload;
 mod rotor;
 mod shape;
 mod transmission;
@@ -28,8 +30,10 @@ pub use friction::{
     ReactionFriction, Sigmoid, SigmoidOffset, Stribeck, StribeckViscous, TanhFriction, Viscous,
     ViscousMagnitude, reaction_channel, weight_channel,
 };
+pub use gated::{Gated, is_gate, log_channel, payload_channel};
 pub use jets::JetMotion;
 pub use linearised::{Linearised, change_name};
+pub use payload::{KnownLoad, Payload};
 pub use rotor::RotorInertia;
 pub use shape::{ShapeFault, ShapeSetting};
 pub use transmission::{CoupledWrist, Transmission};
@@ -196,6 +200,10 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     }
     /// The contact of a joint with clearance that it is, if it is one; none by default.
     fn clearance(&self) -> Option<&ClearanceContact> {
+        None
+    }
+    /// The payload that it is, if it is one; none by default.
+    fn payload(&self) -> Option<&Payload> {
         None
     }
     /// Fills the columns of all entries.

@@ -12,6 +12,7 @@ mod history;
 mod identities;
 mod linearised;
 mod passivity;
+mod payload;
 mod points;
 mod random_tree;
 mod structure;

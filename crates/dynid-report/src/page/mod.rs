@@ -78,9 +78,18 @@ fn check_tables<'a>(tables: impl Iterator<Item = &'a StudyTable>) -> Result<(), 
 /// [`ReportError::Length`] if a row of a table has more cells than the table has headings. The other variants would be
 /// faults of this crate.
 pub fn render_study(data: &StudyReport) -> Result<String, ReportError> {
+    render_kind("Study", data)
+}
+
+/// The same page for a result that is no study, under the name of its kind; without claims it has no part for them.
+///
+/// # Errors
+///
+/// As [`render_study`].
+pub fn render_kind(kind: &str, data: &StudyReport) -> Result<String, ReportError> {
     check_tables(data.sections.iter().flat_map(|s| &s.tables))?;
     let environment = environment::environment()?;
-    Ok(environment.get_template(environment::STUDY_PAGE)?.render(study::context(data))?)
+    Ok(environment.get_template(environment::STUDY_PAGE)?.render(study::context(kind, data))?)
 }
 
 /// Lays a page about logs out as one HTML file, with the properties of [`render`]'s; it is complete without a script.

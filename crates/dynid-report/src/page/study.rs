@@ -7,8 +7,9 @@ use serde::Serialize;
 use super::chart::{ChartView, chart};
 use crate::data::{Fact, StudyReport, StudySection, StudyTable};
 
-pub(super) fn context(data: &StudyReport) -> Value {
+pub(super) fn context(kind: &str, data: &StudyReport) -> Value {
     context! {
+        kind => kind,
         title => data.title.as_str(),
         verdict => Serde(&data.verdict),
         warnings => Serde(&data.warnings),

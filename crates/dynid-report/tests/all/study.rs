@@ -2,7 +2,7 @@
 
 use dynid_report::{
     Chart, ChartAxis, ChartCurve, CurveStyle, ReportError, StudyReport, StudyRow, StudySection, StudyTable,
-    Value, render_study,
+    Value, render_kind, render_study,
 };
 
 fn study() -> StudyReport {
@@ -65,6 +65,14 @@ fn claims_tables_and_charts_are_on_the_page() {
     let picture = page.split("<svg class=\"chart\"").nth(1).unwrap().split("</svg>").next().unwrap();
     assert!(picture.contains("c1 dashed") && !picture.contains("NaN"), "{picture}");
     assert_eq!(page, render_study(&study()).unwrap());
+}
+
+#[test]
+fn a_result_without_claims_goes_by_its_own_kind() {
+    let result = StudyReport { rows: Vec::new(), ..study() };
+    let page = render_kind("Payload", &result).unwrap();
+    assert!(page.contains("<p class=\"kind\">Payload</p>") && !page.contains("id=\"claims\""));
+    assert!(render_study(&study()).unwrap().contains("<p class=\"kind\">Study</p>"));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Rows of a motion, counted as the fit counts those of a log.
 
 use dynid_estimate::{Factor, FactorBuilder};
+use dynid_model::element::is_gate;
 use dynid_model::{BaseParameters, EffortModel, MotionBlock, RegressorBlock, RobotModel};
 use dynid_motion::Kernel;
 use dynid_motion::mask::{dilate, near_reversal};
@@ -94,7 +95,9 @@ impl<'a> CandidateRows<'a> {
         let widest = self.kernels.first()?;
         let samples = (self.duration_s * self.rate_hz).round() as usize;
         let [q, dq, ddq] = self.signals(motion, samples, widest.cutoff_hz());
-        let values = typical_channels(self.model, samples);
+        let mut values = typical_channels(self.model, samples);
+        // Another log of the robot alone.
+        values.iter_mut().filter(|(name, _)| is_gate(name)).for_each(|(_, gate)| gate.fill(0.0));
         let channels = named(&values);
         let block = MotionBlock { channels: &channels, ..MotionBlock::plain(samples, &q, &dq, &ddq) };
         let mut regressor = RegressorBlock::new(self.model.layout().clone(), samples);

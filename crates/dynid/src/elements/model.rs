@@ -82,6 +82,7 @@ impl ElementPlan {
             }
             known.extend(law.elements(rate));
         }
+        known.extend(self.log_terms.known(mechanism));
         let coordinates = self.coordinates.clone();
         let tree = TreeModel::with_coordinates(mechanism.clone(), coordinates, elements).with_known(known);
         let tree = match self.free_errors {

@@ -64,6 +64,11 @@ impl Session {
         columns: Option<&MappingSpec>,
     ) -> Result<Session, Error> {
         config.check()?;
+        if config.log.iter().any(|log| log.payload.is_some() || !log.own.is_empty()) {
+            return Err(Error::Unsupported(
+                "on-line identification of logs with a payload or terms of their own: it follows the robot alone".to_owned(),
+            ));
+        }
         let axes = Structure::new(config, &[])?.axes();
         let samples = Samples::new(name, header, &axes, columns.unwrap_or(&config.columns))?;
         let structure = Structure::new(config, &samples.not_logged())?;

@@ -27,7 +27,8 @@ const SETTLING_S: f64 = 0.01;
 /// a small speed next to rest alone.
 const SPEEDS: [f64; 6] = [1.0, 0.25, 0.0625, 0.015625, 0.00390625, 1e-9];
 
-/// Channels that a model reads for motions without a log: currents of one ampere, the temperature of a warm joint, 35 °C.
+/// Channels that a model reads for motions without a log: currents of one ampere, the temperature of a warm joint, 35 °C,
+/// every payload and every log's own terms.
 pub(crate) fn typical_channels(model: &RobotModel, samples: usize) -> Vec<(String, Vec<f64>)> {
     let value = |name: &str| if is_temperature(name) { 35.0 } else { 1.0 };
     model.channels().iter().map(|name| (name.clone(), vec![value(name); samples])).collect()

@@ -16,6 +16,7 @@ mod identifiability;
 mod instruments;
 mod least_squares;
 mod online;
+mod payload;
 mod periodic;
 mod preflight;
 mod recorded_logs;

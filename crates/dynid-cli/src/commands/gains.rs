@@ -1,0 +1,55 @@
+//! `dynid gains`.
+
+use dynid::Config;
+use dynid::gains::{GainsFile, JointGain, identify_gains};
+
+use super::table;
+use crate::args::GainsArgs;
+use crate::message::{Failure, data, json, note};
+use crate::progress::Progress;
+
+pub(crate) fn run(args: &GainsArgs) -> Result<u8, Failure> {
+    let config = Config::read(&args.input)?;
+    let progress = Progress::new(args.quiet);
+    let found = identify_gains(&config, |step| progress.step(step))?;
+    let file = found.file(&config)?;
+    drop(progress);
+    if !args.quiet {
+        file.warnings.iter().for_each(|w| note(&format!("warning: {w}")));
+    }
+    match args.json {
+        true => json(&file)?,
+        false => data(&summary(&file))?,
+    }
+    Ok(u8::from(file.status == "fail"))
+}
+
+fn summary(file: &GainsFile) -> String {
+    let head =
+        ["joint", "stated", "gain", "std", "from", "to", "unit", "t", "left %", "plain LS", "TLS", "verdict"];
+    let rows: Vec<Vec<String>> = file.joints.iter().map(row).collect();
+    format!(
+        "payload {} of {} kg; known: {}\n{}",
+        file.payload,
+        file.mass,
+        file.known,
+        table::aligned(&head, &rows)
+    )
+}
+
+fn row(j: &JointGain) -> Vec<String> {
+    vec![
+        j.joint.clone(),
+        table::number(Some(j.stated)),
+        table::number(j.gain),
+        table::number(j.std),
+        table::number(j.interval.map(|i| i.0)),
+        table::number(j.interval.map(|i| i.1)),
+        j.unit.clone(),
+        format!("{:.1}", j.t),
+        format!("{:.1}", 100.0 * j.share),
+        table::number(j.plain_least_squares),
+        table::number(j.total_least_squares),
+        j.verdict.clone(),
+    ]
+}

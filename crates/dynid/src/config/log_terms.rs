@@ -1,0 +1,172 @@
+//! What differs from log to log: payloads and terms of their own.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Config, LogConfig, exactly};
+use crate::Error;
+
+/// A body that some logs carry.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct PayloadConfig {
+    /// Name, for `payload = "name"` in logs and for its parameters `name.m` ...
+    pub name: String,
+    /// Moving link that carries it. Default: the last one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub link: Option<String>,
+    /// Largest mass thought possible, kg: decides what is known of it without a log. Default 5.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rated_mass: Option<f64>,
+    /// Mass if it is known, kg.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mass: Option<f64>,
+    /// Standard deviation of that mass, kg. Default 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mass_std: Option<f64>,
+    /// Centre of mass if it is known, in the joint frame of the link, m.
+    #[serde(deserialize_with = "exactly", skip_serializing_if = "Option::is_none")]
+    pub com: Option<[f64; 3]>,
+    /// Inertia about the centre of mass in the axes of the link if it is known, `[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]`, kg m².
+    #[serde(deserialize_with = "exactly", skip_serializing_if = "Option::is_none")]
+    pub inertia: Option<[f64; 6]>,
+}
+
+/// Largest mass of a payload about which nothing is said, kg.
+pub const RATED_MASS: f64 = 5.0;
+
+/// What a log has of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Own {
+    /// Offset of every joint that has one: zero of its torque sensor or current.
+    Offset,
+    /// Coulomb and viscous friction of every joint that has friction: colder or warmer gears.
+    Friction,
+    /// Delay of the motion behind the logged effort.
+    Delay,
+}
+
+impl Own {
+    /// The word of the configuration.
+    pub fn word(self) -> &'static str {
+        match self {
+            Own::Offset => "offset",
+            Own::Friction => "friction",
+            Own::Delay => "delay",
+        }
+    }
+}
+
+impl PayloadConfig {
+    /// The rated mass, or [`RATED_MASS`].
+    pub fn rated(&self) -> f64 {
+        self.rated_mass.unwrap_or(RATED_MASS)
+    }
+
+    /// Whether mass, centre of mass and inertia are all known.
+    pub fn is_known(&self) -> bool {
+        self.mass.is_some() && self.com.is_some() && self.inertia.is_some()
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let key = |key: &str| format!("payload.{}.{key}", self.name);
+        let positive = [("rated_mass", self.rated_mass), ("mass", self.mass)];
+        for (name, value) in positive.into_iter().filter_map(|(n, v)| Some((n, v?))) {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::setting(&key(name), "a positive number", value));
+            }
+        }
+        if let Some(std) = self.mass_std.filter(|s| !(s.is_finite() && *s >= 0.0)) {
+            return Err(Error::setting(&key("mass_std"), "a number that is not negative", std));
+        }
+        let beside =
+            |name: &str, with: &str| Error::setting(&key(name), &format!("`{with}` beside it"), "none");
+        if self.mass.is_none() && self.mass_std.is_some() {
+            return Err(beside("mass_std", "mass"));
+        }
+        if self.mass.is_none() && self.com.is_some() {
+            return Err(beside("com", "mass"));
+        }
+        if self.com.is_none() && self.inertia.is_some() {
+            return Err(beside("inertia", "com"));
+        }
+        let numbers = self.com.iter().flatten().chain(self.inertia.iter().flatten());
+        match numbers.copied().find(|x| !x.is_finite()) {
+            Some(x) => Err(Error::setting(&key("com, inertia"), "finite numbers", x)),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Config {
+    /// Checks names and numbers of what differs from log to log.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub(super) fn check_log_terms(&self) -> Result<(), Error> {
+        for log in self.log.iter().chain(&self.validation) {
+            let known: Vec<String> = self.payload.iter().map(|p| p.name.clone()).collect();
+            one_of("payload", log.payload.as_ref(), &known, "[[payload]]")?;
+        }
+        for (k, payload) in self.payload.iter().enumerate() {
+            if payload.name.trim().is_empty() {
+                return Err(Error::setting("payload.name", "a name in every `[[payload]]`", "none"));
+            }
+            if self.payload[..k].iter().any(|p| p.name == payload.name) {
+                return Err(Error::setting("payload.name", "names that occur once", &payload.name));
+            }
+            payload.check()?;
+            let carried = |log: &LogConfig| log.payload.as_ref() == Some(&payload.name);
+            if !self.log.is_empty() && !self.log.iter().any(carried) {
+                let expected = format!("`payload = \"{}\"` in a `[[log]]` at least", payload.name);
+                return Err(Error::setting(&format!("payload.{}", payload.name), &expected, "none"));
+            }
+        }
+        let labels = self.log_labels();
+        for (k, (log, label)) in self.log.iter().zip(&labels).enumerate() {
+            if log.name.is_some() && labels[..k].contains(label) {
+                return Err(Error::setting("log.name", "names that occur once", label));
+            }
+            if let Some(like) = &log.like {
+                return Err(Error::setting("log.like", "it in `[[validation]]` only", like));
+            }
+        }
+        for log in &self.validation {
+            one_of("validation.like", log.like.as_ref(), &labels, "[[log]]")?;
+            if let Some(own) = log.own.first() {
+                return Err(Error::setting(
+                    "validation.own",
+                    "`like = \"a log\"` there: what a log has of its own is found from `[[log]]` alone",
+                    own.word(),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Names of the training logs in parameters and messages: as stated, else the file's name, with `#2` where it comes again.
+    pub fn log_labels(&self) -> Vec<String> {
+        let mut labels: Vec<String> = Vec::new();
+        for log in &self.log {
+            let own = log.name.clone().unwrap_or_else(|| stem(log));
+            let again = (2..).map(|k| format!("{own}#{k}")).find(|label| !labels.contains(label));
+            let taken = labels.contains(&own) && log.name.is_none();
+            labels.push(again.filter(|_| taken).unwrap_or(own));
+        }
+        labels
+    }
+}
+
+fn one_of(key: &str, name: Option<&String>, known: &[String], section: &str) -> Result<(), Error> {
+    let Some(name) = name.filter(|name| !known.contains(name)) else { return Ok(()) };
+    let expected = match known {
+        [] => format!("a name of a `{section}`, of which there are none"),
+        _ => format!("a name of a `{section}`: `{}`", known.join("`, `")),
+    };
+    Err(Error::setting(key, &expected, name))
+}
+
+fn stem(log: &LogConfig) -> String {
+    let name = log.path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    name.split('.').next().unwrap_or_default().to_owned()
+}

@@ -1,0 +1,208 @@
+//! Drive gains from a known payload (spec/estimation.md section 10).
+
+mod record;
+
+pub use record::{GainsFile, JointGain};
+
+use dynid_estimate::Factor;
+use dynid_estimate::conditioning::{LogRows, condition};
+use dynid_estimate::drive_gain::{LoadColumn, load_column};
+use dynid_estimate::linear::LinearMethod;
+use dynid_model::element::{JointElement, KnownLoad, Payload};
+use dynid_model::{
+    BaseParameters, BaseSettings, EffortModel, Inertia, Mat3, Output, PerOutput, RobotModel, Vec3,
+};
+
+use crate::Error;
+use crate::config::{Config, PayloadConfig, Route};
+use crate::elements::ElementPlan;
+use crate::fitting::{self, Fitted};
+use crate::identify::{Step, plan_elements, read_logs};
+use crate::log_terms::{LogTerms, known_inertia};
+use crate::logs::LoadedLog;
+use crate::robot::{Robot, RobotOptions, refuse_internal_load};
+use crate::trust::interval_quantile;
+
+/// Drive gains, with the fit that they come from.
+#[derive(Debug)]
+pub struct GainIdentification {
+    /// The fit of all drives, each with parameters of its own.
+    pub fitted: Fitted,
+    /// Per drive: what was found.
+    pub joints: Vec<JointGain>,
+    /// The payload.
+    pub payload: PayloadConfig,
+    /// Warnings, in words.
+    pub warnings: Vec<String>,
+    robot: String,
+}
+
+/// Finds the drive gains from logs with and without a payload of known mass.
+///
+/// Efforts of the logs are `scale · current`. Per drive and for all logs together, `current = W (x/g) + w_L (1/g)`: the noisy
+/// current is regressed on exact columns, no drive shares a parameter with another, and `w_L` is the effort of what is known
+/// of the payload. What is not known of it (centre of mass, inertia about it) has columns of its own, gated alike. Shape
+/// parameters of friction stay where they start; deviations of single logs are those of `own`.
+///
+/// # Errors
+/// [`Error::Setting`] unless there is one payload, with its mass, carried by a log and missing in another;
+/// [`Error::Unsupported`] for motor-side logs and the textbook route; as [`crate::identify()`] for logs and robot.
+pub fn identify_gains(config: &Config, mut progress: impl FnMut(Step)) -> Result<GainIdentification, Error> {
+    config.check()?;
+    let payload = known_payload(config)?;
+    if config.motor_side.is_some() {
+        let why = "drive gains behind a transmission matrix: give currents and positions of the joints";
+        return Err(Error::Unsupported(why.to_owned()));
+    }
+    if config.conditioning.route == Route::Textbook {
+        return Err(Error::Unsupported("drive gains by the textbook route: leave `route` out".to_owned()));
+    }
+    let settings = config.conditioning_settings();
+    progress(Step::Read(config.robot.display().to_string()));
+    let options = RobotOptions {
+        gravity: config.gravity,
+        couple_mimics: config.couple_mimics.unwrap_or(false),
+        floating_base: false,
+        locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
+    };
+    let robot = Robot::load(&config.robot, &options)?;
+    refuse_internal_load(&robot, "identified")?;
+    let (robot, mut loaded) = read_logs(config, &config.training_logs(), robot, &mut progress)?;
+    let scale = common_scale(&loaded)?;
+    let mut plan = plan_elements(config, &robot, &loaded)?;
+    let terms = LogTerms::of(config, &robot)?;
+    for ((loaded, log), label) in loaded.iter_mut().zip(&config.log).zip(config.log_labels()) {
+        loaded.log = terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
+    }
+    let body = terms.payloads[0].body;
+    plan.log_terms = LogTerms { payloads: Vec::new(), ..terms };
+    let model = model(&plan, &robot, payload, body)?;
+    let prepared = loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, _>>()?;
+    progress(Step::Structure);
+    let shape = model.parameters().shape_start();
+    let apart = PerOutput::new(&model);
+    let base_settings = BaseSettings { seed: config.seed.unwrap_or(1), ..BaseSettings::default() };
+    let base = BaseParameters::of_model(&apart, &shape, &base_settings);
+    let choices = condition(&apart, &shape, &base.kept, &prepared, &settings, |stage| {
+        progress(Step::Conditioning(stage));
+    })?;
+    progress(Step::Fit);
+    let source = LogRows::new(&apart, &shape, &base.kept, &prepared, &choices, &settings)?;
+    let (fit, _) = fitting::fit(config, base.len(), &LinearMethod::Wls, &source)?;
+    let residuals = fitting::residuals(&source, &fit)?;
+    drop(source);
+    let fitted = fitting::with_precision(fit, &residuals, &prepared, config.conditioning.block_s.is_some());
+    let evidence = Evidence { apart: &apart, base: &base, fitted: &fitted, payload };
+    let joints = (0..apart.outputs().len()).map(|output| evidence.gain(output, scale[output])).collect();
+    let mut warnings = robot.warnings.clone();
+    if !shape.is_empty() {
+        warnings.push("shape parameters of friction are held where they start".to_owned());
+    }
+    let robot = model.mechanism().name().to_owned();
+    Ok(GainIdentification { fitted, joints, payload: payload.clone(), warnings, robot })
+}
+
+fn known_payload(config: &Config) -> Result<&PayloadConfig, Error> {
+    let [payload] = &config.payload[..] else {
+        return Err(Error::setting("payload", "one `[[payload]]`", config.payload.len()));
+    };
+    let key = |key: &str| format!("payload.{}{key}", payload.name);
+    if payload.mass.is_none() {
+        return Err(Error::setting(&key(".mass"), "the known mass, kg", "none"));
+    }
+    if config.log.iter().all(|log| log.payload.is_some()) {
+        let expected = "a `[[log]]` without it beside those that carry it";
+        return Err(Error::setting(&key(""), expected, "it in every log"));
+    }
+    Ok(payload)
+}
+
+/// Factors from the columns of the drives to efforts, the same in all logs.
+fn common_scale(loaded: &[LoadedLog]) -> Result<Vec<f64>, Error> {
+    let first = &loaded[0];
+    let own = first.effort_factors();
+    match loaded.iter().find(|l| l.effort_factors() != own) {
+        None => Ok(own),
+        Some(other) => Err(Error::setting(
+            "columns.effort.scale",
+            &format!("the same scale in all logs, {own:?} as in {}", first.log.name()),
+            format!("{:?} in {}", other.effort_factors(), other.log.name()),
+        )),
+    }
+}
+
+/// The robot's elements, the known part of the payload with a factor per joint, and the unknown rest.
+fn model(
+    plan: &ElementPlan,
+    robot: &Robot,
+    payload: &PayloadConfig,
+    body: usize,
+) -> Result<RobotModel, Error> {
+    let mechanism = &robot.mechanism;
+    let mut elements: Vec<Box<dyn JointElement>> = plan.build(mechanism)?;
+    let mass = payload.mass.unwrap_or_default();
+    let (known, unknown) = match (known_inertia(payload), payload.com) {
+        (Some(inertia), _) => (inertia, 10..10),
+        (None, Some(com)) => (Inertia::from_com(mass, Vec3(com), &(Mat3::identity() * 0.0)), 4..10),
+        (None, None) => (Inertia([mass, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), 1..10),
+    };
+    elements.push(Box::new(KnownLoad::new(mechanism, body, &payload.name, &known)));
+    if !unknown.is_empty() {
+        let rest = Payload::with_unknown(mechanism, body, &payload.name, unknown.collect());
+        elements.push(Box::new(rest));
+    }
+    plan.complete(mechanism, elements)
+}
+
+/// What the gain of a drive rests on.
+struct Evidence<'a> {
+    apart: &'a PerOutput<'a, RobotModel>,
+    base: &'a BaseParameters,
+    fitted: &'a Fitted,
+    payload: &'a PayloadConfig,
+}
+
+impl Evidence<'_> {
+    /// The gain of one drive. `scale`: effort per unit of its column.
+    fn gain(&self, output: usize, scale: f64) -> JointGain {
+        let Output { name, unit } = &self.apart.outputs()[output];
+        let table = &self.apart.parameters().linear;
+        let load = format!("{name}: {name}.h");
+        let column = self.apart.columns(output).find(|c| table[*c].name == load);
+        let place = column.and_then(|c| self.base.kept.binary_search(&c).ok());
+        let mut out = JointGain::without(name, unit, scale);
+        let Some(place) = place else {
+            if column.is_some_and(|c| !self.base.zero.contains(&c)) {
+                out.verdict = "what is not known of the load explains the same effort".to_owned();
+            }
+            return out;
+        };
+        let estimate = &self.fitted.estimate;
+        let beside = self.beside(output, place);
+        out.share = beside.share;
+        out.plain_least_squares = beside.plain.map(|g| g * scale);
+        out.total_least_squares = beside.total.map(|g| g * scale);
+        let Some(kept) = estimate.solution.kept.iter().position(|c| *c == place) else { return out };
+        let h = estimate.x[place];
+        let std = self.fitted.covariance()[(kept, kept)].max(0.0).sqrt();
+        let mass = self.payload.mass_std.unwrap_or(0.0) / self.payload.mass.unwrap_or(1.0);
+        out.found(scale, h, std, mass, interval_quantile(self.fitted));
+        out
+    }
+
+    /// Other forms on the weighted rows of the drive.
+    fn beside(&self, output: usize, place: usize) -> LoadColumn {
+        let estimate = &self.fitted.estimate;
+        let own: Vec<usize> =
+            self.apart.columns(output).filter_map(|c| self.base.kept.binary_search(&c).ok()).collect();
+        let parts: Vec<Factor> = estimate
+            .reduced
+            .iter()
+            .zip(estimate.weights())
+            .filter(|(group, _)| group.output == output)
+            .map(|(group, weight)| group.merged(self.base.len()).select(&own).scaled(weight))
+            .collect();
+        let local = own.iter().position(|c| *c == place).unwrap_or_default();
+        load_column(&Factor::merge(&parts.iter().collect::<Vec<_>>()), local)
+    }
+}

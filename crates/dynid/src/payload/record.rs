@@ -1,0 +1,246 @@
+//! What is found of a payload, and the file `payload.json`.
+
+use dynid_estimate::identifiability::{excited_regrouping, posterior};
+use dynid_estimate::{Mat, identifiability};
+use dynid_model::Inertia;
+use serde::{Deserialize, Serialize};
+
+use super::body::{Body, NAMES, about_com};
+use super::difference::{Difference, difference};
+use super::{PayloadIdentification, quantile};
+use crate::config::{Config, PayloadConfig};
+use crate::estimate::{ConsistencyRecord, ParameterValue, Provenance, SCHEMA, Verdict};
+use crate::identify::Identification;
+use crate::prior::PAYLOAD_SIZE;
+use crate::{Error, advice};
+
+/// Share of the prior variance that the logs must remove for a value to count as seen (spec/estimation.md section 6).
+const SEEN: f64 = 0.9;
+
+/// A value with its uncertainty.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Quantity {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Value of a body that can exist.
+    pub value: f64,
+    /// Value without constraints; absent if the mass without constraints is not positive.
+    pub unconstrained: Option<f64>,
+    /// Standard deviation, the prior's doubt included where the data leave room.
+    pub std: f64,
+    /// 95 % interval around the value without constraints; absent unless the value is seen in the data.
+    pub interval: Option<(f64, f64)>,
+    /// Share of the prior variance that the logs remove, 0 to 1.
+    pub share: f64,
+    /// `seen in the data` or `carried by the prior`.
+    pub verdict: String,
+    /// Physical consistency moved the value by more than a standard deviation.
+    pub at_boundary: bool,
+}
+
+/// A payload as identified.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct PayloadRecord {
+    /// Name.
+    pub name: String,
+    /// Link that carries it. All coordinates are those of this link's joint frame.
+    pub link: String,
+    /// Mass.
+    pub mass: Quantity,
+    /// Centre of mass, three entries.
+    pub com: Vec<Quantity>,
+    /// Inertia about the centre of mass in the axes of the link: `Jxx, Jxy, Jxz, Jyy, Jyz, Jzz`.
+    pub inertia: Vec<Quantity>,
+    /// The ten standard parameters about the joint frame.
+    pub parameters: Vec<ParameterValue>,
+    /// Whether the ten parameters without constraints are those of a body that can exist.
+    pub unconstrained_feasible: bool,
+    /// The difference of two separate fits, as a check; absent where the logs do not allow it.
+    pub difference: Option<Difference>,
+    /// Mass that the configuration states, kg.
+    pub stated_mass: Option<f64>,
+    /// What it comes down to, in a sentence.
+    pub sentence: String,
+    /// A URDF link of the payload and the fixed joint that mounts it.
+    pub urdf: String,
+}
+
+/// The file `payload.json`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct PayloadFile {
+    /// Layout version.
+    pub schema: u32,
+    /// Robot.
+    pub robot: String,
+    /// `ok`: mass and centre of mass of every payload are seen in the data; `warn`: their masses; `fail`: not even these, or
+    /// the model behind them is not to be trusted.
+    pub status: String,
+    /// Payloads.
+    pub payloads: Vec<PayloadRecord>,
+    /// Deviations of single logs that were identified beside.
+    pub log_parameters: Vec<ParameterValue>,
+    /// What consistency of robot and payloads together costs.
+    pub consistency: Option<ConsistencyRecord>,
+    /// What the identification of robot and payloads is worth.
+    pub verdict: Verdict,
+    /// Inputs and settings.
+    pub provenance: Provenance,
+}
+
+/// The record of one payload. `run`: the configuration of the identification; `stated`: what was said about the payload.
+pub(super) fn of(id: &Identification, run: &Config, stated: &PayloadConfig) -> PayloadRecord {
+    let (payload, first) = id
+        .model
+        .payloads()
+        .find(|(p, _)| p.name() == stated.name)
+        .unwrap_or_else(|| unreachable!("every payload of the run is one of the model"));
+    let ten = |values: &[f64]| Inertia(std::array::from_fn(|k| values[first + k]));
+    let regrouping = advice::regrouping(&id.base);
+    let (covariance, std) = covariance(id, &regrouping, first);
+    let consistent = ten(id.values());
+    let body = Body::new(&consistent, &covariance);
+    let free = Some(ten(id.unconstrained_values())).filter(|i| i.mass() > 0.0);
+    let about = free.map(|inertia| about_com(&inertia));
+    let half_mass = 0.5 * stated.rated();
+    let t = quantile(id);
+    let quantities: Vec<Quantity> = (0..10)
+        .map(|k| {
+            let prior = half_mass.powi(i32::from(!(1..4).contains(&k))) * PAYLOAD_SIZE.powi(degree(k));
+            let share = (1.0 - (body.std[k] / prior).powi(2)).clamp(0.0, 1.0);
+            let seen = share >= SEEN;
+            let unconstrained = about.map(|a| a[k]);
+            let moved = unconstrained.map_or(f64::INFINITY, |u| (body.values[k] - u).abs());
+            Quantity {
+                name: NAMES[k].0.to_owned(),
+                unit: NAMES[k].1.to_owned(),
+                value: body.values[k],
+                unconstrained,
+                std: body.std[k],
+                interval: unconstrained.filter(|_| seen).map(|u| (u - t * body.std[k], u + t * body.std[k])),
+                share,
+                verdict: match seen {
+                    true => identifiability::Verdict::Seen.words().to_owned(),
+                    false => "carried by the prior".to_owned(),
+                },
+                at_boundary: moved > body.std[k].max(1e-9 * prior),
+            }
+        })
+        .collect();
+    let carries: Vec<Option<bool>> = run
+        .log
+        .iter()
+        .map(|log| match &log.payload {
+            None => Some(false),
+            Some(name) if *name == stated.name => Some(true),
+            Some(_) => None,
+        })
+        .collect();
+    let link = id.model.mechanism().bodies()[payload.body()].name.clone();
+    let mut parameters = id.parameter_values(first..first + 10);
+    // The posterior's deviations hold whether or not the data see a parameter alone.
+    parameters.iter_mut().zip(&std).for_each(|(p, s)| p.std = p.std.or(Some(*s)));
+    PayloadRecord {
+        sentence: sentence(&stated.name, &quantities, stated),
+        urdf: super::report::urdf(&stated.name, &link, &body.values),
+        name: stated.name.clone(),
+        link,
+        mass: quantities[0].clone(),
+        com: quantities[1..4].to_vec(),
+        inertia: quantities[4..].to_vec(),
+        parameters,
+        unconstrained_feasible: ten(id.unconstrained_values()).physical_fault().is_none(),
+        difference: difference(id, &regrouping, payload.body(), &carries),
+        stated_mass: stated.mass,
+    }
+}
+
+/// Power of the size in the prior of a value.
+fn degree(k: usize) -> i32 {
+    match k {
+        0 => 0,
+        1..=3 => 1,
+        _ => 2,
+    }
+}
+
+/// Covariance and standard deviations of ten parameters, data and prior put together.
+fn covariance(id: &Identification, regrouping: &Mat<f64>, first: usize) -> (Mat<f64>, Vec<f64>) {
+    let fit = id.fit();
+    let after = posterior(
+        &excited_regrouping(&fit.factor, &fit.solution.kept, regrouping),
+        &fit.kept_x(),
+        &id.fitted.white,
+        0.0,
+        id.fitted.covariance(),
+        &id.prior.values,
+        &id.prior.std,
+    );
+    let entry = |i: usize, j: usize| match &after {
+        Some(after) => after.covariance[(first + i, first + j)],
+        // Nothing but the prior where base parameters cannot be put together with it.
+        None if i == j => id.prior.std[first + i].powi(2),
+        None => 0.0,
+    };
+    (Mat::from_fn(10, 10, entry), (0..10).map(|k| entry(k, k).max(0.0).sqrt()).collect())
+}
+
+fn sentence(name: &str, found: &[Quantity], stated: &PayloadConfig) -> String {
+    let mass = &found[0];
+    let Some((low, high)) = mass.interval else {
+        return format!(
+            "the logs do not show the mass of `{name}`: what is said of it is prior knowledge (data {:.0} %)",
+            100.0 * mass.share
+        );
+    };
+    let centre: Vec<String> = found[1..4].iter().map(|c| format!("{:.1}", 1e3 * c.value)).collect();
+    let beside = stated.mass.map_or_else(String::new, |m| {
+        let within = if (low..=high).contains(&m) { "within" } else { "outside of" };
+        format!("; the stated {m} kg lie {within} the interval")
+    });
+    format!(
+        "`{name}` weighs {:.3} kg (95 % interval {low:.3} to {high:.3} kg), its centre of mass at ({}) mm{beside}",
+        mass.value,
+        centre.join(", ")
+    )
+}
+
+impl PayloadIdentification {
+    /// The file `payload.json`.
+    ///
+    /// # Errors
+    /// [`Error::Read`] if an input file cannot be hashed any more.
+    pub fn file(&self, config: &Config) -> Result<PayloadFile, Error> {
+        let estimate = self.identification.estimate(config)?;
+        let all = |of: &dyn Fn(&PayloadRecord) -> bool| self.payloads.iter().all(of);
+        let mass = all(&|p| p.mass.interval.is_some());
+        let centre = all(&|p| p.com.iter().all(|c| c.interval.is_some()));
+        let status = match (estimate.verdict.status.as_str(), mass, centre) {
+            ("fail", _, _) | (_, false, _) => "fail",
+            (_, true, true) => "ok",
+            (_, true, false) => "warn",
+        };
+        let of_payload = |p: &ParameterValue| p.link.is_some();
+        Ok(PayloadFile {
+            schema: SCHEMA,
+            robot: estimate.robot,
+            status: status.to_owned(),
+            payloads: self.payloads.clone(),
+            log_parameters: estimate.log_parameters.into_iter().filter(|p| !of_payload(p)).collect(),
+            consistency: estimate.consistency,
+            verdict: estimate.verdict,
+            provenance: estimate.provenance,
+        })
+    }
+}
+
+impl PayloadFile {
+    /// The file's text.
+    pub fn to_json(&self) -> String {
+        let mut text = serde_json::to_string_pretty(self)
+            .unwrap_or_else(|e| unreachable!("a record holds only plain data: {e}"));
+        text.push('\n');
+        text
+    }
+}

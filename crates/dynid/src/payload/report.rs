@@ -1,0 +1,155 @@
+//! The report page of payloads, and their URDF.
+
+use dynid_report as report;
+use dynid_report::{Fact, StudySection, StudyTable, Value};
+
+use super::record::{PayloadFile, PayloadRecord, Quantity};
+use crate::Error;
+use crate::report_data::settings_facts;
+
+impl PayloadFile {
+    /// The report as one HTML page.
+    ///
+    /// # Errors
+    /// [`Error::Report`].
+    pub fn report(&self) -> Result<String, Error> {
+        let sentences: Vec<String> = self.payloads.iter().map(|p| p.sentence.clone()).collect();
+        let p = &self.provenance;
+        let page = report::StudyReport {
+            title: format!("Payload of {}", self.robot),
+            verdict: report::Verdict {
+                status: match self.status.as_str() {
+                    "ok" => report::Status::Ok,
+                    "warn" => report::Status::Warn,
+                    _ => report::Status::Fail,
+                },
+                headline: sentences.join("; "),
+                sentences: vec![format!("Robot and payload together: {}", self.verdict.headline)],
+                ..report::Verdict::default()
+            },
+            warnings: self
+                .verdict
+                .warnings
+                .iter()
+                .map(|w| report::Warning { message: w.clone(), hint: String::new() })
+                .collect(),
+            introduction: vec![
+                "Robot and payload are identified together: the columns of the link that carries the payload count once \
+                 more in the logs that carry it, and the payload is one more body that must be able to exist."
+                    .to_owned(),
+            ],
+            rows: Vec::new(),
+            sections: self.sections(),
+            provenance: report::Provenance {
+                version: p.version.clone(),
+                inputs: p
+                    .inputs
+                    .iter()
+                    .map(|i| report::InputFile {
+                        path: i.path.clone(),
+                        kind: i.kind.clone(),
+                        sha256: Some(i.sha256.clone()),
+                    })
+                    .collect(),
+                seed: Some(p.seed),
+                settings: settings_facts(&p.settings),
+            },
+        };
+        Ok(report::render_kind("Payload", &page)?)
+    }
+
+    fn sections(&self) -> Vec<StudySection> {
+        let mut sections: Vec<StudySection> = self.payloads.iter().map(section).collect();
+        let mut facts = Vec::new();
+        if let Some(c) = &self.consistency {
+            facts.push(Fact::new("price of feasibility", c.price, "residual variances"));
+            facts.extend(c.price_over_chance.map(|x| Fact::new("the same over chance", x, "")));
+            facts.push(Fact::new("weight of the prior", c.prior_weight, "residual variances"));
+        }
+        let rows: Vec<Vec<Value>> = self
+            .log_parameters
+            .iter()
+            .map(|p| vec![p.name.clone().into(), p.value.into(), number(p.std), p.unit.clone().into()])
+            .collect();
+        let tables = match rows.is_empty() {
+            true => Vec::new(),
+            false => vec![StudyTable {
+                caption: "What single logs have of their own, beside the others".to_owned(),
+                head: ["parameter", "deviation", "std", "unit"].map(str::to_owned).to_vec(),
+                rows,
+            }],
+        };
+        sections.push(StudySection {
+            title: "Fit of robot and payload".to_owned(),
+            facts,
+            tables,
+            ..StudySection::default()
+        });
+        sections
+    }
+}
+
+fn number(x: Option<f64>) -> Value {
+    x.map_or_else(|| "-".into(), Value::from)
+}
+
+fn section(p: &PayloadRecord) -> StudySection {
+    let mut facts = vec![Fact::new("link that carries it", p.link.clone(), "")];
+    facts.extend(p.stated_mass.map(|m| Fact::new("stated mass", m, "kg")));
+    if let Some(d) = &p.difference {
+        facts.push(Fact::new("mass by the difference of two separate fits", d.mass, "kg"));
+        facts.push(Fact::new("its standard deviation", d.mass_std, "kg"));
+        let [x, y, z] = d.com.map(|c| format!("{:.1}", 1e3 * c));
+        facts.push(Fact::new("centre of mass by that difference", format!("{x}, {y}, {z}"), "mm"));
+    }
+    let feasible = if p.unconstrained_feasible { "a body can have them" } else { "no body can have them" };
+    facts.push(Fact::new("ten parameters without constraints", feasible, ""));
+    let rows = std::iter::once(&p.mass).chain(&p.com).chain(&p.inertia).map(row).collect();
+    StudySection {
+        title: format!("Payload {}", p.name),
+        text: vec![format!(
+            "Coordinates are those of the joint frame of {}; moments of inertia are about the centre of mass. Intervals are of 95 %, about the value without constraints.",
+            p.link
+        )],
+        facts,
+        tables: vec![StudyTable {
+            caption: "Mass, centre of mass, inertia".to_owned(),
+            head: ["quantity", "value", "unit", "std", "from", "to", "data, %", "verdict"]
+                .map(str::to_owned)
+                .to_vec(),
+            rows,
+        }],
+        charts: Vec::new(),
+    }
+}
+
+fn row(q: &Quantity) -> Vec<Value> {
+    let boundary = if q.at_boundary { ", at the boundary" } else { "" };
+    vec![
+        q.name.clone().into(),
+        q.value.into(),
+        q.unit.clone().into(),
+        q.std.into(),
+        number(q.interval.map(|i| i.0)),
+        number(q.interval.map(|i| i.1)),
+        (100.0 * q.share).into(),
+        format!("{}{boundary}", q.verdict).into(),
+    ]
+}
+
+/// A URDF link with the inertia of a payload and the fixed joint to the link that carries it. `values`: mass, centre of mass,
+/// inertia about it.
+pub(super) fn urdf(name: &str, link: &str, values: &[f64; 10]) -> String {
+    let [m, x, y, z, xx, xy, xz, yy, yz, zz] = values;
+    let [name, link] = [name, link].map(escaped);
+    format!(
+        "<link name=\"{name}\">\n  <inertial>\n    <origin xyz=\"{x} {y} {z}\" rpy=\"0 0 0\"/>\n    <mass value=\"{m}\"/>\n    \
+         <inertia ixx=\"{xx}\" ixy=\"{xy}\" ixz=\"{xz}\" iyy=\"{yy}\" iyz=\"{yz}\" izz=\"{zz}\"/>\n  </inertial>\n</link>\n\
+         <joint name=\"{link}_to_{name}\" type=\"fixed\">\n  <parent link=\"{link}\"/>\n  <child link=\"{name}\"/>\n  \
+         <origin xyz=\"0 0 0\" rpy=\"0 0 0\"/>\n</joint>\n"
+    )
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
