@@ -21,6 +21,8 @@ pub(crate) enum Command {
     Regressor(RegressorArgs),
     /// Pre-flight of logs: clock, joint order, signs, units, delay, saturation, excitation (exit code 1 on an error).
     Check(CheckArgs),
+    /// Every applicable estimator on the same logs, ranked on held-out time.
+    Compare(CompareArgs),
     /// Identify a robot from logs: writes estimate.json, report.html and an updated robot file.
     Identify(Box<IdentifyArgs>),
     /// Effort of an identified model at given states.
@@ -219,6 +221,26 @@ pub(crate) struct CheckArgs {
     /// Gravity in base axes, m/s² (default: the robot file's, else 0,0,-9.81).
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
     pub(crate) gravity: Option<[f64; 3]>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print nothing but results and errors.
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CompareArgs {
+    /// Configuration (TOML), or a robot file together with --log.
+    pub(crate) input: PathBuf,
+    /// Log, CSV or CSV.gz; repeat for several.
+    #[arg(long, value_name = "LOG")]
+    pub(crate) log: Vec<PathBuf>,
+    /// Write the report page.
+    #[arg(long, value_name = "FILE.html")]
+    pub(crate) report: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) columns: LogArgs,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,

@@ -29,6 +29,7 @@ fn main() -> ExitCode {
         Command::Inspect(args) => commands::inspect::run(&args),
         Command::Regressor(args) => commands::regressor::run(&args),
         Command::Check(args) => commands::check::run(&args),
+        Command::Compare(args) => commands::compare::run(&args),
         Command::Identify(args) => commands::identify::run(&args),
         Command::Predict(args) => commands::predict::run(&args),
         Command::Design(args) => commands::design::run(&args),

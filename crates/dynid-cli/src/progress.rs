@@ -75,6 +75,12 @@ impl DesignProgress {
         DesignProgress(bar)
     }
 
+    pub(crate) fn fit(&self, done: usize, of: usize, what: &str) {
+        self.0.set_length(of as u64);
+        self.0.set_position(done as u64);
+        self.0.set_message(what.to_owned());
+    }
+
     pub(crate) fn step(&self, step: DesignStep) {
         match step {
             DesignStep::Starts { ended, of, best } => {

@@ -4,6 +4,7 @@ mod elastic;
 mod figures;
 mod friction;
 pub(crate) mod known;
+mod model_fit;
 mod own_delay;
 mod shapes;
 mod structure;
@@ -22,11 +23,11 @@ use dynid_motion::Log;
 use crate::Error;
 use crate::agreement::{self, Agreement};
 use crate::check::{self, Finding, Severity};
-use crate::config::{Config, LogConfig, Method, Preflight, Route};
-use crate::consistency::{self, Consistent};
+use crate::config::{Config, LogConfig, Preflight, Route};
+use crate::consistency::Consistent;
 use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
-use crate::fitting::{self, Fitted};
+use crate::fitting::Fitted;
 use crate::instruments::{self, Comparison, InstrumentRun};
 use crate::log_agreement::{self, LogAgreement};
 use crate::log_terms::LogTerms;
@@ -36,9 +37,9 @@ use crate::prior::Prior;
 use crate::robot::{Robot, RobotOptions, refuse_internal_load};
 use crate::shape::{self, ShapeFit};
 use crate::trust::{Evidence, Trust};
+pub(crate) use model_fit::{ModelFit, fit as fit_model};
 pub use own_delay::OwnDelay;
-use shapes::Shaped;
-use structure::Structure;
+pub(crate) use structure::Structure;
 pub(crate) use structure::{effort_sizes, stated_values};
 
 /// What is being worked on, for progress displays.
@@ -151,47 +152,10 @@ pub struct Identification {
 /// # Errors
 /// [`Error`]: bad input. A rank-deficient log is a status of the result, not an error.
 pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Identification, Error> {
-    config.check()?;
     let settings = config.conditioning_settings();
-    progress(Step::Read(config.robot.display().to_string()));
-    let options = RobotOptions {
-        gravity: config.gravity,
-        couple_mimics: config.couple_mimics.unwrap_or(false),
-        floating_base: false,
-        locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
-    };
-    let robot = Robot::load(&config.robot, &options)?;
-    if robot.closed.is_none() && robot.mechanism.positions() != robot.mechanism.rates() {
-        return Err(Error::Unsupported(
-            "a floating base cannot be identified from joint logs: lock the base or leave it out".to_owned(),
-        ));
-    }
-    refuse_internal_load(&robot, "identified")?;
-    let mut files = config.training_logs();
-    if let Some(table) = &config.instruments {
-        table.read_reference(&mut files, &config.columns, &logs::names(&robot.axes))?;
-    }
-    let (robot, mut loaded) = read_logs(config, &files, robot, &mut progress)?;
-    let findings = preflight(config, &robot, &loaded, &mut progress)?;
-    let mut plan = plan_elements(config, &robot, &loaded)?;
-    plan.log_terms = LogTerms::of(config, &robot)?;
-    for ((loaded, log), label) in loaded.iter_mut().zip(&config.log).zip(config.log_labels()) {
-        loaded.log = plan.log_terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
-    }
-    let model = plan.model(&robot.mechanism)?;
-    let mut prepared =
-        loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
-
-    for log in &prepared {
-        config.check_cutoffs(&log.name, log.rate_hz)?;
-    }
-
-    progress(Step::Structure);
-    // Names that do not exist are told before the long work.
-    let structure = Structure::of(config, &model, &plan, &prepared)?;
+    let Opened { robot, loaded, mut plan, model, logs: prepared, structure, own_delays, findings } =
+        open(config, &mut progress)?;
     let start = model.parameters().shape_start();
-    let own_delays = own_delay::take_off(config, &model, &start, &structure.base, &mut prepared, &settings)?;
-
     let conditioning = match config.conditioning.route {
         Route::Compact => {
             Some(condition(&model, &start, &structure.base.kept, &prepared, &settings, |stage| {
@@ -208,46 +172,28 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         }),
     );
     warnings.extend(plan.alike(&robot.mechanism).iter().map(ToString::to_string));
-    let Shaped { model, structure, conditioning, friction, found: shapes } = shapes::search(
+    let ModelFit {
+        model,
+        structure,
+        conditioning,
+        friction,
+        shapes,
+        instruments,
+        residuals,
+        fitted,
+        groups,
+        consistent,
+    } = fit_model(
         config,
-        (model, structure),
+        &robot,
         &mut plan,
+        (model, structure),
         &prepared,
         conditioning,
         &settings,
         &mut progress,
     )?;
-    let shape = model.parameters().shape_start();
-    progress(Step::Fit);
-    let Structure { base, stated, prior, regrouping, space, bounds, method } = structure;
-    let source =
-        fitting::rows(config, &model, &shape, &base.kept, &prepared, conditioning.as_ref(), &settings)?;
-    let (fit, groups) = fitting::fit(config, base.len(), &method, &*source)?;
-    let (fit, instruments) = match config.estimator.method {
-        Method::Iv => {
-            let parts = instruments::Parts {
-                robot: &robot,
-                plan: &plan,
-                model: &model,
-                shapes: shapes.as_ref(),
-                base: &base,
-                prior: &prior,
-                logs: &prepared,
-                conditioning: conditioning.as_ref(),
-                settings: &settings,
-            };
-            progress(Step::Instruments);
-            let (fit, run) = instruments::fit(config, &parts, fit)?;
-            (fit, Some(run))
-        }
-        _ => (fit, None),
-    };
-    let residuals = fitting::residuals(&*source, &fit)?;
-    drop(source);
-    let fitted = fitting::with_precision(fit, &residuals, &prepared, config.conditioning.block_s.is_some());
-    progress(Step::Consistency);
-    let consistent =
-        consistency::consistent(config, &model, &base, &regrouping, &prior, &bounds, &fitted, &groups)?;
+    let Structure { base, stated, prior, regrouping, space, .. } = structure;
     let (state_hz, kernel_hz, delay_samples) = match &conditioning {
         Some(c) => (c.state_hz.iter().copied().fold(f64::INFINITY, f64::min), c.kernel_hz, c.delay.samples),
         None => {
@@ -471,6 +417,66 @@ pub(crate) fn read_logs(
     }
     let robot = if still.is_empty() { robot } else { robot.locked(&still)? };
     Ok((robot, loaded))
+}
+
+/// Robot, logs and model of a run, before anything is fitted.
+pub(crate) struct Opened {
+    pub(crate) robot: Robot,
+    pub(crate) loaded: Vec<LoadedLog>,
+    pub(crate) plan: ElementPlan,
+    pub(crate) model: RobotModel,
+    pub(crate) logs: Vec<PreparedLog>,
+    pub(crate) structure: Structure,
+    pub(crate) own_delays: Vec<OwnDelay>,
+    pub(crate) findings: Vec<Finding>,
+}
+
+/// Reads robot and logs, examines them, prepares them for a model with the elements asked for.
+///
+/// # Errors
+/// As [`identify`].
+pub(crate) fn open(config: &Config, progress: &mut impl FnMut(Step)) -> Result<Opened, Error> {
+    config.check()?;
+    let settings = config.conditioning_settings();
+    progress(Step::Read(config.robot.display().to_string()));
+    let options = RobotOptions {
+        gravity: config.gravity,
+        couple_mimics: config.couple_mimics.unwrap_or(false),
+        floating_base: false,
+        locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
+    };
+    let robot = Robot::load(&config.robot, &options)?;
+    if robot.closed.is_none() && robot.mechanism.positions() != robot.mechanism.rates() {
+        return Err(Error::Unsupported(
+            "a floating base cannot be identified from joint logs: lock the base or leave it out".to_owned(),
+        ));
+    }
+    refuse_internal_load(&robot, "identified")?;
+    let mut files = config.training_logs();
+    if let Some(table) = &config.instruments {
+        table.read_reference(&mut files, &config.columns, &logs::names(&robot.axes))?;
+    }
+    let (robot, mut loaded) = read_logs(config, &files, robot, progress)?;
+    let findings = preflight(config, &robot, &loaded, progress)?;
+    let mut plan = plan_elements(config, &robot, &loaded)?;
+    plan.log_terms = LogTerms::of(config, &robot)?;
+    for ((loaded, log), label) in loaded.iter_mut().zip(&config.log).zip(config.log_labels()) {
+        loaded.log = plan.log_terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
+    }
+    let model = plan.model(&robot.mechanism)?;
+    let mut prepared =
+        loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
+
+    for log in &prepared {
+        config.check_cutoffs(&log.name, log.rate_hz)?;
+    }
+
+    progress(Step::Structure);
+    // Names that do not exist are told before the long work.
+    let structure = Structure::of(config, &model, &plan, &prepared)?;
+    let start = model.parameters().shape_start();
+    let own_delays = own_delay::take_off(config, &model, &start, &structure.base, &mut prepared, &settings)?;
+    Ok(Opened { robot, loaded, plan, model, logs: prepared, structure, own_delays, findings })
 }
 
 /// Examines the training logs before anything is made of them.

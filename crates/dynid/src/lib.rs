@@ -8,6 +8,7 @@ pub mod agreement;
 pub mod bounds;
 pub mod check;
 pub mod clearance;
+pub mod compare;
 pub mod config;
 pub mod consistency;
 pub mod design;

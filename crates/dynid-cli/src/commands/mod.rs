@@ -2,6 +2,7 @@
 
 pub(crate) mod check;
 pub(crate) mod clearance;
+pub(crate) mod compare;
 pub(crate) mod design;
 pub(crate) mod export;
 pub(crate) mod friction;

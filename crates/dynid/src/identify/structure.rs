@@ -12,19 +12,19 @@ use crate::elements::ElementPlan;
 use crate::prior::{self, Prior};
 use crate::{Error, advice, bounds, fitting};
 
-pub(super) struct Structure {
-    pub(super) base: BaseParameters,
+pub(crate) struct Structure {
+    pub(crate) base: BaseParameters,
     /// Values stated by robot file, in parameter order.
-    pub(super) stated: Vec<Option<f64>>,
-    pub(super) prior: Prior,
-    pub(super) regrouping: Mat<f64>,
-    pub(super) space: VisibleSpace,
-    pub(super) bounds: Vec<Bound>,
-    pub(super) method: LinearMethod,
+    pub(crate) stated: Vec<Option<f64>>,
+    pub(crate) prior: Prior,
+    pub(crate) regrouping: Mat<f64>,
+    pub(crate) space: VisibleSpace,
+    pub(crate) bounds: Vec<Bound>,
+    pub(crate) method: LinearMethod,
 }
 
 impl Structure {
-    pub(super) fn of(
+    pub(crate) fn of(
         config: &Config,
         model: &RobotModel,
         plan: &ElementPlan,

@@ -1,0 +1,69 @@
+//! `dynid compare`.
+
+use std::path::Path;
+
+use dynid::compare::{ComparedEstimator, Comparison, compare};
+use dynid::config::{Config, LogConfig};
+use dynid::io::output::write_atomically;
+
+use super::{apply_log_args, table};
+use crate::args::CompareArgs;
+use crate::message::{Failure, data, note};
+use crate::outputs;
+use crate::progress::DesignProgress;
+
+pub(crate) fn run(args: &CompareArgs) -> Result<u8, Failure> {
+    let mut config = match args.log.is_empty() {
+        true => Config::read(&args.input)?,
+        false => Config {
+            robot: args.input.clone(),
+            log: args.log.iter().map(|p| LogConfig { path: p.clone(), ..LogConfig::default() }).collect(),
+            ..Config::default()
+        },
+    };
+    apply_log_args(&mut config.columns, &args.columns);
+    let outputs: Vec<(&str, &Path)> = args.report.iter().map(|p| ("--report", p.as_path())).collect();
+    let logs = config.log.iter().map(|log| log.path.as_path());
+    let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).collect();
+    outputs::check_files(&outputs, &inputs)?;
+    let progress = DesignProgress::new(args.quiet);
+    let found = compare(&config, |done, of, what| progress.fit(done, of, what))?;
+    drop(progress);
+    if let Some(path) = &args.report {
+        write_atomically(path, found.report(&config)?.as_bytes())?;
+    }
+    match args.json {
+        true => data(&(found.to_json() + "\n"))?,
+        false => data(&text(&found))?,
+    }
+    if let (Some(path), false) = (&args.report, args.quiet) {
+        note(&format!("written: {}", path.display()));
+    }
+    Ok(u8::from(found.estimators.iter().all(|e| e.rank.is_none())))
+}
+
+fn text(found: &Comparison) -> String {
+    let row = |e: &ComparedEstimator| -> Vec<String> {
+        let pair = |value: Option<[f64; 2]>| {
+            value.map_or_else(|| "-".to_owned(), |[value, error]| format!("{value:.3} ± {error:.3}"))
+        };
+        let joints: Vec<String> = e.joints.iter().map(|j| table::number(j.map(|j| j.rms))).collect();
+        vec![
+            e.rank.map_or_else(|| "-".to_owned(), |r| r.to_string()),
+            e.name.clone(),
+            pair(e.error.zip(e.standard_error).map(|(a, b)| [a, b])),
+            pair(e.behind),
+            e.seconds.map_or_else(|| "-".to_owned(), |s| format!("{s:.2}")),
+            e.failure.clone().unwrap_or_else(|| joints.join(" ")),
+        ]
+    };
+    let rows: Vec<Vec<String>> = found.estimators.iter().map(row).collect();
+    let head = ["rank", "estimator", "error, %", "behind, %", "s", "rms per joint"];
+    format!(
+        "{}\nheld-out error through a filter of {:.1} Hz, {} folds of time: {}\n",
+        table::aligned(&head, &rows).trim_end(),
+        found.filter_hz,
+        found.folds,
+        found.headline()
+    )
+}

@@ -1,0 +1,169 @@
+//! Every applicable estimator on the same logs, ranked on time that none of them saw.
+//!
+//! The training logs are cut into contiguous folds of time. Each estimator fits the model to all folds but one and predicts
+//! that one; what is compared is the effort through one filter, joint by joint. Kernel, reversal mask and delay are chosen
+//! once for all from the whole logs, and are alike for every estimator; friction shapes, weights, priors, simulations and
+//! searches are found again without the held-out fold.
+
+mod estimators;
+mod record;
+mod report;
+
+use std::time::Instant;
+
+use dynid_estimate::conditioning::{Conditioning, ConditioningSettings, PreparedLog, condition};
+use dynid_model::{EffortModel, RobotModel};
+use dynid_motion::mask::edges;
+
+use crate::Error;
+use crate::agreement::{Alignment, compare as against};
+use crate::config::{Config, Route};
+use crate::elements::ElementPlan;
+use crate::identify::{ModelFit, Opened, Step, Structure, fit_model, open};
+use estimators::{Contestant, contestants};
+pub use record::{ComparedEstimator, Comparison, JointError};
+
+/// Folds of time per log.
+pub const FOLDS: usize = 5;
+
+/// Errors of an estimator on one fold.
+#[derive(Debug, Clone)]
+struct FoldScore {
+    /// Per joint: mean squares of the error and of the effort through the filter; `None` where the joint does not move.
+    joints: Vec<Option<(f64, f64)>>,
+    /// Time of the fit, s.
+    seconds: f64,
+}
+
+/// Compares all estimators that a configuration allows. `progress`: fits done, of how many, and what is being fitted.
+///
+/// # Errors
+/// As [`crate::identify()`]. An estimator that fails is in the table with its reason, and no error.
+pub fn compare(config: &Config, mut progress: impl FnMut(usize, usize, &str)) -> Result<Comparison, Error> {
+    let settings = config.conditioning_settings();
+    progress(0, 1, "reading");
+    let opened = open(
+        &Config {
+            conditioning: crate::config::ConditioningConfig {
+                route: Route::Compact,
+                ..config.conditioning.clone()
+            },
+            ..config.clone()
+        },
+        &mut |_: Step| {},
+    )?;
+    progress(0, 1, "conditioning");
+    let start = opened.model.parameters().shape_start();
+    let conditioning =
+        condition(&opened.model, &start, &opened.structure.base.kept, &opened.logs, &settings, |_| {})?;
+    let bench = Bench { opened: &opened, conditioning: &conditioning, settings: &settings };
+    let list = contestants(config, &opened);
+    let folds: Vec<[Vec<PreparedLog>; 2]> = (0..FOLDS).map(|k| split(&opened.logs, k)).collect();
+    let total = list.len() * FOLDS;
+    let scores = list
+        .iter()
+        .enumerate()
+        .map(|(k, contestant)| {
+            let each = folds.iter().enumerate().map(|(fold, [training, held_out])| {
+                progress(k * FOLDS + fold, total, contestant.name);
+                bench.score(contestant, training, held_out)
+            });
+            each.collect::<Result<Vec<FoldScore>, Error>>().map_err(|e| e.to_string())
+        })
+        .collect();
+    Ok(record::ranked(config, &opened, &conditioning, &list, scores))
+}
+
+struct Bench<'a> {
+    opened: &'a Opened,
+    conditioning: &'a Conditioning,
+    settings: &'a ConditioningSettings,
+}
+
+impl Bench<'_> {
+    fn score(
+        &self,
+        contestant: &Contestant,
+        training: &[PreparedLog],
+        held_out: &[PreparedLog],
+    ) -> Result<FoldScore, Error> {
+        let start = Instant::now();
+        let (fit, plan) = self.fit(contestant, training)?;
+        let unfolded = fit.unfolded(&plan)?;
+        let seconds = start.elapsed().as_secs_f64();
+        let (model, values): (&RobotModel, &[f64]) = match &unfolded {
+            Some((model, values)) => (model, values),
+            None => (&fit.model, &fit.consistent.values),
+        };
+        let textbook = contestant.config.conditioning.route == Route::Textbook;
+        let alignment = Alignment {
+            state_hz: self.conditioning.state_hz.iter().copied().fold(f64::INFINITY, f64::min),
+            // The textbook route knows of no delay, and its predictions go without.
+            delay_samples: if textbook { 0.0 } else { self.conditioning.delay.samples },
+            delay_rate_hz: self.opened.logs[0].rate_hz,
+            filter_hz: self.conditioning.kernel_hz,
+        };
+        let mut sums = vec![(0.0, 0.0, 0.0); model.outputs().len()];
+        for log in held_out {
+            // A fold of a short log may hold nothing but edges.
+            let Ok(found) = against(model, values, log, &alignment, self.settings) else { continue };
+            let counted = found.counted.iter().filter(|c| **c).count() as f64;
+            for (j, sum) in sums.iter_mut().enumerate().filter(|(j, _)| found.moves[*j]) {
+                let channel = &found.filtered.channels[j];
+                if let (Some(rms), Some(relative)) = (channel.rms, channel.relative_error) {
+                    sum.0 += counted * rms * rms;
+                    sum.1 += counted * (100.0 * rms / relative.max(1e-12)).powi(2);
+                    sum.2 += counted;
+                }
+            }
+        }
+        let joints = sums.iter().map(|(e, y, n)| (*n > 0.0).then(|| (e / n, y / n))).collect();
+        Ok(FoldScore { joints, seconds })
+    }
+
+    fn fit(
+        &self,
+        contestant: &Contestant,
+        training: &[PreparedLog],
+    ) -> Result<(ModelFit, ElementPlan), Error> {
+        let config = &contestant.config;
+        let mut plan = self.opened.plan.clone();
+        let model = plan.model(&self.opened.robot.mechanism)?;
+        let structure = Structure::of(config, &model, &plan, training)?;
+        let conditioning = match config.conditioning.route {
+            Route::Compact => Some(self.conditioning.clone()),
+            Route::Textbook => None,
+        };
+        let fit = fit_model(
+            config,
+            &self.opened.robot,
+            &mut plan,
+            (model, structure),
+            training,
+            conditioning,
+            self.settings,
+            |_| {},
+        )?;
+        Ok((fit, plan))
+    }
+}
+
+/// Logs without a fold of their time, and that fold alone.
+fn split(logs: &[PreparedLog], fold: usize) -> [Vec<PreparedLog>; 2] {
+    let with = |inside: bool| -> Vec<PreparedLog> {
+        logs.iter()
+            .map(|log| {
+                let n = log.samples();
+                let range = fold * n / FOLDS..(fold + 1) * n / FOLDS;
+                let mut log = log.clone();
+                for (k, usable) in log.usable.iter_mut().enumerate() {
+                    *usable &= range.contains(&k) == inside;
+                }
+                let ends = edges(n, 1);
+                log.usable.iter_mut().zip(ends).for_each(|(usable, end)| *usable &= !end);
+                log
+            })
+            .collect()
+    };
+    [with(false), with(true)]
+}

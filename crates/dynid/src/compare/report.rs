@@ -1,0 +1,129 @@
+//! The page of a comparison.
+
+use dynid_report as report;
+use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, StudySection, StudyTable, Value};
+
+use super::{ComparedEstimator, Comparison};
+use crate::config::Config;
+use crate::{Error, VERSION, logs};
+
+impl Comparison {
+    /// The page as HTML.
+    ///
+    /// # Errors
+    /// [`Error::Report`]; [`Error::Read`] where an input has gone.
+    pub fn report(&self, config: &Config) -> Result<String, Error> {
+        let files =
+            std::iter::once(("robot", &config.robot)).chain(config.log.iter().map(|l| ("log", &l.path)));
+        let inputs = files
+            .map(|(kind, path)| {
+                Ok(report::InputFile {
+                    sha256: Some(logs::sha256(path)?),
+                    path: path.display().to_string(),
+                    kind: kind.to_owned(),
+                })
+            })
+            .collect::<Result<Vec<_>, Error>>()?;
+        let sections = vec![
+            StudySection {
+                title: "Errors on unseen time".to_owned(),
+                tables: vec![self.table()],
+                charts: vec![self.chart()],
+                ..StudySection::default()
+            },
+            StudySection {
+                title: "Joint by joint".to_owned(),
+                tables: vec![self.joint_table()],
+                ..StudySection::default()
+            },
+        ];
+        Ok(report::render_log_page(&report::LogPage {
+            kind: "Comparison of estimators".to_owned(),
+            title: format!("{} estimators on {} logs", self.estimators.len(), self.logs.len()),
+            robot: self.robot.clone(),
+            verdict: report::Verdict {
+                status: report::Status::Ok,
+                headline: self.headline(),
+                ..report::Verdict::default()
+            },
+            introduction: vec![format!(
+                "Each estimator was fitted to four fifths of every log and predicted the fifth that it had not seen, {} times. \
+                 Prediction and effort pass one filter of {:.1} Hz. Kernel, reversal mask and delay are the same for all; \
+                 friction shapes, weights and priors were found again each time.",
+                self.folds, self.filter_hz
+            )],
+            findings: Vec::new(),
+            sections,
+            provenance: report::Provenance {
+                version: VERSION.to_owned(),
+                inputs,
+                ..report::Provenance::default()
+            },
+        })?)
+    }
+
+    fn table(&self) -> StudyTable {
+        let with_error = |pair: Option<[f64; 2]>| match pair {
+            Some([value, error]) => Value::Text(format!("{value:.3} ± {error:.3}")),
+            None => Value::Undefined,
+        };
+        let row = |e: &ComparedEstimator| {
+            vec![
+                Value::Text(e.name.clone()),
+                e.rank.map_or(Value::Undefined, |r| Value::Count(r as u64)),
+                with_error(e.error.zip(e.standard_error).map(|(a, b)| [a, b])),
+                with_error(e.behind),
+                e.seconds.into(),
+                Value::Text(e.failure.clone().unwrap_or_else(|| e.what.clone())),
+            ]
+        };
+        let head = [
+            "Estimator",
+            "Rank",
+            "Error, % of the effort",
+            "Behind the best, %",
+            "Time of a fit, s",
+            "What it does",
+        ];
+        StudyTable {
+            caption: "Mean over joints of the relative error on held-out time, mean and standard error over folds; differences are paired by fold".to_owned(),
+            head: head.map(str::to_owned).to_vec(),
+            rows: self.estimators.iter().map(row).collect(),
+        }
+    }
+
+    fn joint_table(&self) -> StudyTable {
+        let mut head = vec!["Estimator".to_owned()];
+        head.extend(self.joints.iter().cloned());
+        let row = |e: &ComparedEstimator| {
+            let cells = e.joints.iter().map(|j| j.map_or(Value::Undefined, |j| Value::Number(j.rms)));
+            std::iter::once(Value::Text(e.name.clone())).chain(cells).collect()
+        };
+        StudyTable {
+            caption: "Root mean square of the held-out error, N m or N".to_owned(),
+            head,
+            rows: self.estimators.iter().filter(|e| e.failure.is_none()).map(row).collect(),
+        }
+    }
+
+    fn chart(&self) -> Chart {
+        let curve = |e: &ComparedEstimator| {
+            let (error, seconds) = (e.error?, e.seconds?);
+            let spread = e.standard_error.unwrap_or(0.0);
+            let points = [error - spread, error, error + spread].map(|y| [seconds.max(1e-4), y]).to_vec();
+            Some(ChartCurve { name: e.name.clone(), points, style: CurveStyle::Line })
+        };
+        Chart {
+            title: "accuracy and time".to_owned(),
+            note: "a bar per estimator, one standard error up and down".to_owned(),
+            x: ChartAxis { label: "time of a fit".to_owned(), unit: "s".to_owned(), logarithmic: true },
+            y: ChartAxis {
+                label: "held-out error".to_owned(),
+                unit: "% of the effort".to_owned(),
+                logarithmic: false,
+            },
+            curves: self.estimators.iter().filter_map(curve).collect(),
+            ..Chart::default()
+        }
+    }
+}
