@@ -88,7 +88,7 @@ fn the_difference_of_two_estimates_is_explained_by_what_was_added() {
     let found = explain_difference([&exact[0], &exact[1]], [1.0, 1.0], &map).unwrap();
     let noisy = [fit(group(0, &more, 0.1)), fit(group(1, &X, 0.1))];
     let estimated = explain_difference([&noisy[0], &noisy[1]], [1.0, 1.0], &map).unwrap();
-    for (j, added) in added.iter().enumerate() {
+    for (j, added) in added.into_iter().enumerate() {
         assert!((found.x[j] - added).abs() < 1e-7, "{found:?}");
         let std = estimated.covariance[(j, j)].sqrt();
         assert!(std > 1e-3 && (estimated.x[j] - added).abs() < 4.0 * std, "{estimated:?}");

@@ -4,6 +4,7 @@ mod accuracy;
 mod bristles;
 mod clearance;
 mod closed_robots;
+mod compare;
 mod design;
 mod elastic;
 mod elements;
