@@ -457,7 +457,6 @@ pub(crate) fn open(config: &Config, progress: &mut impl FnMut(Step)) -> Result<O
         table.read_reference(&mut files, &config.columns, &logs::names(&robot.axes))?;
     }
     let (robot, mut loaded) = read_logs(config, &files, robot, progress)?;
-    let findings = preflight(config, &robot, &loaded, progress)?;
     let mut plan = plan_elements(config, &robot, &loaded)?;
     plan.log_terms = LogTerms::of(config, &robot)?;
     for ((loaded, log), label) in loaded.iter_mut().zip(&config.log).zip(config.log_labels()) {
@@ -470,6 +469,8 @@ pub(crate) fn open(config: &Config, progress: &mut impl FnMut(Step)) -> Result<O
     for log in &prepared {
         config.check_cutoffs(&log.name, log.rate_hz)?;
     }
+    // What cannot be prepared says so in its own words.
+    let findings = preflight(config, &robot, &loaded, progress)?;
 
     progress(Step::Structure);
     // Names that do not exist are told before the long work.

@@ -27,6 +27,8 @@ pub struct Tilt {
     pub angle: f64,
     /// Standard error of the angle, jackknife over twelve parts of the record, rad.
     pub error: f64,
+    /// Misfit that is left, in the unit of [`super::WiringSearch::nothing`], the prior's part included.
+    pub misfit: f64,
 }
 
 /// Prior of all linear parameters of a model.
@@ -44,7 +46,7 @@ pub struct GaussianPrior<'a> {
 ///
 /// Gauss-Newton on the two components across the present direction; a Gaussian prior fills what the log does not see. What
 /// joints that turn about the vertical feel of gravity is due to the tilt alone, so that no inertia has to be known. `kept`:
-/// base columns.
+/// base columns; `start`: where Gauss-Newton begins.
 ///
 /// # Errors
 /// [`PreflightError`] if a regressor is not finite.
@@ -53,7 +55,7 @@ pub fn tilt(
     shape: &[f64],
     samples: &Samples,
     wiring: &Wiring,
-    stated: [f64; 3],
+    [stated, start]: [[f64; 3]; 2],
     kept: &[usize],
     prior: GaussianPrior<'_>,
 ) -> Result<Option<Tilt>, PreflightError> {
@@ -64,14 +66,14 @@ pub fn tilt(
     let all: Vec<usize> = (0..model.parameters().linear.len()).collect();
     let columns = KeptColumns::new(model, &all);
     let at = |gravity: [f64; 3]| regressor(model, shape, samples, &wiring.position, Some(gravity));
-    let mut gravity = stated;
+    let mut gravity = start;
     let mut values = None;
     for _ in 0..STEPS {
         let across = across(gravity);
         let block = at(gravity);
         let x = match values.take() {
             Some(x) => x,
-            None => solve(&blocks(&block, &columns, samples, wiring, &[])?, None, &prior, 0).0,
+            None => solve(&blocks(&block, &columns, samples, wiring, &[])?, None, &prior, 0).x,
         };
         // What a turn of gravity by one radian does to every effort.
         let turned: Vec<Vec<Vec<f64>>> = across
@@ -89,13 +91,13 @@ pub fn tilt(
         if !is_seen(&parts, kept, all.len()) {
             return Ok(None);
         }
-        let (x, turn) = solve(&parts, None, &prior, 2);
+        let Solved { x, turn, misfit } = solve(&parts, None, &prior, 2);
         let step = turn[0].hypot(turn[1]);
         gravity = turned_by(gravity, &across, [turn[0], turn[1]]);
         values = Some(x);
         if step < SETTLED {
             let angles: Vec<[f64; 2]> = (0..BLOCKS)
-                .map(|b| solve(&parts, Some(b), &prior, 2).1)
+                .map(|b| solve(&parts, Some(b), &prior, 2).turn)
                 .map(|turn| [turn[0], turn[1]])
                 .collect();
             let count = BLOCKS as f64;
@@ -110,6 +112,7 @@ pub fn tilt(
                 gravity,
                 angle: cosine.clamp(-1.0, 1.0).acos(),
                 error: ((count - 1.0) / count * spread).sqrt(),
+                misfit,
             }));
         }
     }
@@ -172,13 +175,14 @@ fn is_seen(parts: &[Factor], kept: &[usize], all: usize) -> bool {
     })
 }
 
+struct Solved {
+    x: Vec<f64>,
+    turn: Vec<f64>,
+    misfit: f64,
+}
+
 /// Parameters and turns of gravity, without one of the parts if it is given.
-fn solve(
-    parts: &[Factor],
-    without: Option<usize>,
-    prior: &GaussianPrior<'_>,
-    turns: usize,
-) -> (Vec<f64>, Vec<f64>) {
+fn solve(parts: &[Factor], without: Option<usize>, prior: &GaussianPrior<'_>, turns: usize) -> Solved {
     let kept: Vec<&Factor> =
         parts.iter().enumerate().filter(|(b, _)| without != Some(*b)).map(|(_, f)| f).collect();
     let root = prior.weight.sqrt();
@@ -187,9 +191,10 @@ fn solve(
     // Nothing is known of the direction, but where the log does not tell it either it stays.
     weights.extend(std::iter::repeat_n(1e-3, turns));
     centre.extend(std::iter::repeat_n(0.0, turns));
-    let mut x = ols(&Factor::merge(&kept).with_prior_rows(&weights, &centre)).x;
+    let solution = ols(&Factor::merge(&kept).with_prior_rows(&weights, &centre));
+    let mut x = solution.x;
     let turn = x.split_off(prior.values.len());
-    (x, turn)
+    Solved { x, turn, misfit: solution.rss }
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

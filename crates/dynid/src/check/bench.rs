@@ -168,6 +168,7 @@ impl Bench {
         self.beyond_limits(log, &mut search.wiring, follow, out);
         velocities.examine(log, &moves, samples.cutoff_hz, &search.wiring, out);
         let mut wiring = search.wiring.clone();
+        let (misfit, nothing) = (search.misfit(), search.nothing);
         let explained = search.misfit() < UNEXPLAINED * UNEXPLAINED * search.nothing;
         found.wiring = Some(search);
         found.excitation = Some(excitation(&self.model, &self.shape, &self.base.kept, &samples, &wiring)?);
@@ -175,13 +176,22 @@ impl Bench {
         if found.excitation.as_ref().is_some_and(|e| e.excited == self.base.len()) {
             self.scale(&samples, &mut wiring, &prior, follow, out)?;
         }
-        if !explained {
+        if explained {
+            found.delay = delay(&self.model, &self.shape, &self.base.kept, log, &moves, &wiring)?;
+            late(found.delay, self.stated_delay, log.rate_hz, out);
+        }
+        found.tilt = self.gravity_shown(&samples, &wiring, &prior, explained)?;
+        let limit = UNEXPLAINED * UNEXPLAINED * nothing;
+        if !explained && found.tilt.is_none_or(|t| t.misfit > limit) {
+            let evidence = format!(
+                "whatever column is taken for whose, bodies that can exist leave {:.0} % of the efforts unexplained",
+                100.0 * (misfit / nothing).sqrt()
+            );
+            let remedy =
+                "see whether robot file and log are of the same robot, and whether something else acts on it";
+            out.add("unexplained_effort", Severity::Warning, None, evidence, remedy);
             return Ok(found);
         }
-        found.delay = delay(&self.model, &self.shape, &self.base.kept, log, &moves, &wiring)?;
-        late(found.delay, self.stated_delay, log.rate_hz, out);
-        let known = GaussianPrior { values: &prior.values, std: &prior.std, weight: PRIOR_WEIGHT };
-        found.tilt = tilt(&self.model, &self.shape, &samples, &wiring, self.gravity, &self.base.kept, known)?;
         tilted(found.tilt, out);
         Ok(found)
     }
@@ -207,6 +217,35 @@ impl Bench {
             out.add("degrees", Severity::Error, Some(&joint.name), evidence, remedy).fixes =
                 vec![Fix::Wiring { wiring: wiring.clone(), velocities }];
         }
+    }
+
+    /// Gravity by Gauss-Newton from the direction stated; from all axes, too, where that explains too little.
+    fn gravity_shown(
+        &self,
+        samples: &Samples,
+        wiring: &Wiring,
+        prior: &Prior,
+        explained: bool,
+    ) -> Result<Option<Tilt>, Error> {
+        let size = self.gravity.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let mut starts = vec![self.gravity];
+        if !explained {
+            for axis in 0..3 {
+                for sign in [-1.0, 1.0] {
+                    starts.push(std::array::from_fn(|k| if k == axis { sign * size } else { 0.0 }));
+                }
+            }
+        }
+        let known = GaussianPrior { values: &prior.values, std: &prior.std, weight: PRIOR_WEIGHT };
+        let mut best: Option<Tilt> = None;
+        for start in starts {
+            let from = [self.gravity, start];
+            let found = tilt(&self.model, &self.shape, samples, wiring, from, &self.base.kept, known)?;
+            if let Some(found) = found.filter(|f| best.is_none_or(|b| f.misfit < b.misfit)) {
+                best = Some(found);
+            }
+        }
+        Ok(best)
     }
 
     /// The scale of all efforts together, against inertias that the robot file states.

@@ -63,7 +63,7 @@ impl Finding {
 }
 
 /// Faults that are looked for.
-pub const IDS: [&str; 21] = [
+pub const IDS: [&str; 22] = [
     "base_tilt",
     "clock_backwards",
     "clock_gap",
@@ -83,6 +83,7 @@ pub const IDS: [&str; 21] = [
     "position_sign",
     "saturation",
     "spikes",
+    "unexplained_effort",
     "velocity_mismatch",
     "weak_excitation",
 ];

@@ -34,7 +34,7 @@ fn identified(friction: impl Fn(f64) -> f64, elements: &str, settings: &str) -> 
     std::fs::write(folder.path().join("log.csv"), log).unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();
     let text = format!(
-        "robot = \"{}\"\n[elements]\ndefault = {elements}\n{settings}[[log]]\npath = \"{}\"\n",
+        "robot = \"{}\"\npreflight = \"warn\"\n[elements]\ndefault = {elements}\n{settings}[[log]]\npath = \"{}\"\n",
         path("turntable.toml"),
         path("log.csv")
     );
