@@ -5,10 +5,12 @@
 
 mod clipped;
 mod frozen;
+mod outliers;
 mod repeated;
 
 pub use clipped::{Clipping, clipped};
 pub use frozen::{frozen_effort, frozen_position};
+pub use outliers::outliers;
 pub use repeated::{Repeats, repeated};
 
 /// A run of samples, counted from 0.

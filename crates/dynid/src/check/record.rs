@@ -1,7 +1,7 @@
 //! Faults that a record shows by itself.
 
 use dynid_motion::clock::{ClockSettings, uniform};
-use dynid_motion::faults::{Run, clipped, frozen_effort, frozen_position, repeated};
+use dynid_motion::faults::{Run, clipped, frozen_effort, frozen_position, outliers, repeated};
 use dynid_motion::signal::{quantum, rms};
 use dynid_motion::spikes::{self, SpikeSettings};
 use dynid_motion::{ClockReport, Log, UniformLog};
@@ -92,10 +92,10 @@ pub(super) fn examine(log: &Log, first_row: usize, out: &mut Findings<'_>) -> Re
         }
     }
     far(log, first_row, out);
+    outlying(log, first_row, out);
     let mut on_grid = uniform(log, &ClockSettings::default())
         .map_err(dynid_estimate::conditioning::ConditioningError::from)?;
     clock(&on_grid.report, out);
-    let idle: Vec<&str> = log.joints().iter().filter(|j| !j.moves()).map(|j| j.name.as_str()).collect();
     for joint in &mut on_grid.joints {
         let name = joint.name.clone();
         let position = spikes::remove(&mut joint.position, &SpikeSettings::position());
@@ -103,8 +103,8 @@ pub(super) fn examine(log: &Log, first_row: usize, out: &mut Findings<'_>) -> Re
         for (what, found) in [("position", position), ("effort", effort)] {
             let found = found.map_err(dynid_estimate::conditioning::ConditioningError::from)?;
             let count = found.flagged.len();
-            // Of a joint at rest the flicker of its last digit stands out.
-            if count == 0 || what == "position" && idle.contains(&name.as_str()) {
+            // Of a joint at rest the flicker of its last digit stands out; single positions are found above.
+            if count == 0 || what == "position" {
                 continue;
             }
             let evidence = format!(
@@ -141,6 +141,25 @@ fn moves_during(log: &Log, run: &Run) -> bool {
         let steps: Vec<f64> = j.position.windows(2).map(|w| w[1] - w[0]).collect();
         high - low > (AT_SPEED * rms(&steps) * run.length as f64).max(MOVED * quantum(&j.position))
     })
+}
+
+/// Single positions off their neighbours.
+fn outlying(log: &Log, first_row: usize, out: &mut Findings<'_>) {
+    for joint in log.joints().iter().filter(|j| j.moves()) {
+        let rows: Vec<Run> = outliers(&joint.position)
+            .into_iter()
+            .filter(|k| joint.position[*k].abs() <= LARGEST_POSITION)
+            .map(|first| Run { first, length: 1 })
+            .collect();
+        let Some(first) = rows.first() else { continue };
+        let evidence = format!(
+            "{} single positions are off the line between their neighbours (first: row {})",
+            rows.len(),
+            first_row + first.first
+        );
+        out.add("spikes", Severity::Warning, Some(&joint.name), evidence, LEAVE_OUT).fixes =
+            leave_out(&rows, first_row);
+    }
 }
 
 /// Positions that no joint reaches.

@@ -356,8 +356,8 @@ fn faults_of_signals() {
             }
         }));
     }
-    for size in [0.1, 0.5] {
-        cases.push(case(format!("position spikes of {size}"), "spikes", Some("j1"), false, move |r| {
+    for size in [0.005, 0.02, 0.3] {
+        cases.push(case(format!("position spikes of {size}"), "spikes", Some("j1"), true, move |r| {
             (0..5).for_each(|k| r.position(1)[300 + 700 * k] += size);
         }));
     }
