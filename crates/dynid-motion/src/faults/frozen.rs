@@ -1,6 +1,6 @@
 //! Signals that stop changing although the machine does not.
 
-use super::{Run, is_no_accident, runs};
+use super::{Run, high_quantile, is_no_accident, runs};
 use crate::signal::{quantum, rms};
 
 /// Fewest equal samples that count.
@@ -17,14 +17,6 @@ const BENDS: f64 = 3.0;
 
 /// A step back to where the joint has gone meanwhile, in 99 % quantiles of all steps.
 const JUMP: f64 = 3.0;
-
-fn high_quantile(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let place = (values.len() - 1) * 99 / 100;
-    *values.select_nth_unstable_by(place, f64::total_cmp).1
-}
 
 /// Runs of equal positions that begin or end at speed: a joint comes to rest over many samples, a sensor that hangs within
 /// one.

@@ -45,3 +45,12 @@ fn is_no_accident(length: usize, repeats: f64, samples: usize) -> bool {
     let log_chance = (length as f64 - 1.0) * repeats.max(1e-3).ln() + (samples as f64).ln();
     log_chance < CHANCE.ln()
 }
+
+/// What 99 % of the values stay below; 0 of none.
+fn high_quantile(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let place = (values.len() - 1) * 99 / 100;
+    *values.select_nth_unstable_by(place, f64::total_cmp).1
+}
