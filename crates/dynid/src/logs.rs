@@ -33,6 +33,8 @@ pub struct LoadedLog {
     pub period_s: Option<f64>,
     /// Columns of every signal with their factors.
     pub mapping: ColumnMapping,
+    /// Per row of the log: its data row in the file, from 1.
+    pub rows: Vec<usize>,
 }
 
 impl LoadedLog {
@@ -121,7 +123,9 @@ fn finish(
     mapping: ColumnMapping,
 ) -> Result<LoadedLog, Error> {
     let joints: Vec<String> = mapping.joints.clone();
-    let log = left_out(assemble(file, signals)?, config)?;
+    let whole = assemble(file, signals)?;
+    let times = whole.time().to_vec();
+    let log = left_out(whole, config)?;
     let log = match config.part {
         None => log,
         Some((from, to)) => {
@@ -138,7 +142,22 @@ fn finish(
         None => (log, config.period_s),
     };
     let (not_logged, columns) = (signals.not_logged.clone(), describe(&mapping));
-    Ok(LoadedLog { period_s, log, not_logged, columns, mapping })
+    let rows = data_rows(&times, log.time(), config.rows.map_or(1, |(first, _)| first));
+    Ok(LoadedLog { period_s, log, not_logged, columns, mapping, rows })
+}
+
+/// Data rows of the rows that are left of a log, which keep their times and their order. `first`: data row of the first time.
+fn data_rows(times: &[f64], left: &[f64], first: usize) -> Vec<usize> {
+    let mut at = 0;
+    left.iter()
+        .map(|time| {
+            while at + 1 < times.len() && times[at] != *time {
+                at += 1;
+            }
+            at += 1;
+            first + at - 1
+        })
+        .collect()
 }
 
 /// The log without the rows that its configuration leaves out; the clock takes what is missing for a gap.

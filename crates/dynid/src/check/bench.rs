@@ -15,6 +15,7 @@ use super::finding::{Findings, Fix, Severity};
 use crate::config::Config;
 use crate::elements::ElementPlan;
 use crate::identify::stated_values;
+use crate::logs::LARGEST_POSITION;
 use crate::prior::{self, Origin, Prior};
 use crate::robot::Robot;
 use crate::{Error, advice, consistency};
@@ -111,6 +112,9 @@ impl Bench {
         }
         if !self.model.coordinates().is_empty() {
             return Some("motors behind springs are measured beside their joints".to_owned());
+        }
+        if log.joints.iter().any(|j| j.position.iter().any(|q| q.abs() > LARGEST_POSITION)) {
+            return Some("positions are beyond what any joint reaches".to_owned());
         }
         if log.joints.iter().any(|j| j.effort_is_constant()) {
             return Some("an effort never changes".to_owned());

@@ -92,6 +92,9 @@ impl Check {
         if let (Some((first, last)), false) = (log.rows, entry.contains_key("rows")) {
             entry.insert("rows".to_owned(), Value::Array(vec![whole(first), whole(last)]));
         }
+        if let (Some((from, to)), false) = (log.part, entry.contains_key("part")) {
+            entry.insert("part".to_owned(), numbers([from, to].into_iter()));
+        }
         let own: Vec<&Fix> =
             self.findings.iter().filter(|f| f.number == number).flat_map(|f| &f.fixes).collect();
         let mut leave_out = log.leave_out.clone();

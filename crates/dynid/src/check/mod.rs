@@ -17,7 +17,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::Error;
-use crate::config::{Config, LogConfig};
+use crate::config::Config;
 use crate::logs::{self, LoadedLog};
 use crate::robot::{Robot, RobotOptions};
 use bench::{Bench, Examined};
@@ -116,7 +116,7 @@ pub fn check(config: &Config, mut progress: impl FnMut(&str)) -> Result<Check, E
         }
         let Some((_, bench)) = &bench else { continue };
         let mut findings = Findings { log: &file, number: out.logs.len(), list: Vec::new() };
-        let (checked, trace) = examine(&loaded, log, bench, &mut findings)?;
+        let (checked, trace) = examine(&loaded, bench, &mut findings)?;
         out.findings.extend(findings.list);
         out.logs.push(checked);
         out.traces.push(trace);
@@ -134,7 +134,7 @@ pub(crate) fn of_loaded(config: &Config, robot: &Robot, loaded: &[LoadedLog]) ->
     for (number, (log, entry)) in loaded.iter().zip(&training).enumerate() {
         let file = entry.path.display().to_string();
         let mut findings = Findings { log: &file, number, list: Vec::new() };
-        examine(log, entry, &bench, &mut findings)?;
+        examine(log, &bench, &mut findings)?;
         out.extend(findings.list);
     }
     Ok(out)
@@ -142,12 +142,10 @@ pub(crate) fn of_loaded(config: &Config, robot: &Robot, loaded: &[LoadedLog]) ->
 
 fn examine(
     loaded: &LoadedLog,
-    config: &LogConfig,
     bench: &Bench,
     out: &mut Findings<'_>,
 ) -> Result<(CheckedLog, report::Trace), Error> {
-    let first_row = config.rows.map_or(1, |(first, _)| first);
-    let mut on_grid = record::examine(&loaded.log, first_row, out)?;
+    let mut on_grid = record::examine(&loaded.log, &loaded.rows, out)?;
     bench.order(&mut on_grid);
     let idle: Vec<String> =
         loaded.log.joints().iter().filter(|j| !j.moves()).map(|j| j.name.clone()).collect();

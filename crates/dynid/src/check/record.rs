@@ -27,9 +27,9 @@ const MOVED: f64 = 10.0;
 /// Most ranges that a configuration is to leave out.
 const MOST_RANGES: usize = 200;
 
-/// Looks at clock, repetitions, frozen and cut-off signals; gives the log on its grid without spikes.
-pub(super) fn examine(log: &Log, first_row: usize, out: &mut Findings<'_>) -> Result<UniformLog, Error> {
-    repetitions(log, out);
+/// Looks at clock, repetitions, frozen and cut-off signals; gives the log on its grid without spikes. `rows`: data row of every row.
+pub(super) fn examine(log: &Log, rows: &[usize], out: &mut Findings<'_>) -> Result<UniformLog, Error> {
+    repetitions(log, rows, out);
     let rate_hz = median_rate(log);
     for joint in log.joints() {
         let name = Some(joint.name.as_str());
@@ -37,10 +37,10 @@ pub(super) fn examine(log: &Log, first_row: usize, out: &mut Findings<'_>) -> Re
         if !frozen.is_empty() {
             let evidence = format!(
                 "the position stops changing within one sample, at speed: {}",
-                runs(&frozen, rate_hz)
+                runs(&frozen, rows, rate_hz)
             );
             out.add("frozen_signal", Severity::Warning, name, evidence, LEAVE_OUT).fixes =
-                leave_out(&frozen, first_row);
+                leave_out(&frozen, rows);
         }
         if joint.effort.is_empty() || joint.effort.iter().all(|e| *e == 0.0) {
             continue;
@@ -68,10 +68,10 @@ pub(super) fn examine(log: &Log, first_row: usize, out: &mut Findings<'_>) -> Re
         } else if !frozen.is_empty() {
             let evidence = format!(
                 "the effort stays exactly the same for longer than its other samples let one expect: {}",
-                runs(&frozen, rate_hz)
+                runs(&frozen, rows, rate_hz)
             );
             out.add("frozen_signal", Severity::Warning, name, evidence, LEAVE_OUT).fixes =
-                leave_out(&frozen, first_row);
+                leave_out(&frozen, rows);
         }
         for flat in clipped(&joint.effort) {
             let evidence = format!(
@@ -83,7 +83,7 @@ pub(super) fn examine(log: &Log, first_row: usize, out: &mut Findings<'_>) -> Re
             );
             let remedy = "leave these rows out: the true effort is larger than the log says; a slower trajectory keeps within the drive's limit";
             out.add("saturation", Severity::Warning, name, evidence, remedy).fixes =
-                leave_out(&flat.runs, first_row);
+                leave_out(&flat.runs, rows);
         }
         if !joint.moves() {
             let evidence = "the position does not leave its resolution and noise".to_owned();
@@ -91,11 +91,12 @@ pub(super) fn examine(log: &Log, first_row: usize, out: &mut Findings<'_>) -> Re
             out.add("idle_joint", Severity::Warning, name, evidence, remedy);
         }
     }
-    far(log, first_row, out);
-    outlying(log, first_row, out);
+    let within = far(log, rows, out);
+    let log = within.as_ref().unwrap_or(log);
+    outlying(log, rows, out);
     let mut on_grid = uniform(log, &ClockSettings::default())
         .map_err(dynid_estimate::conditioning::ConditioningError::from)?;
-    clock(&on_grid.report, out);
+    clock(&on_grid.report, rows, out);
     for joint in &mut on_grid.joints {
         let name = joint.name.clone();
         let position = spikes::remove(&mut joint.position, &SpikeSettings::position());
@@ -144,50 +145,70 @@ fn moves_during(log: &Log, run: &Run) -> bool {
 }
 
 /// Single positions off their neighbours.
-fn outlying(log: &Log, first_row: usize, out: &mut Findings<'_>) {
+fn outlying(log: &Log, rows: &[usize], out: &mut Findings<'_>) {
     for joint in log.joints().iter().filter(|j| j.moves()) {
-        let rows: Vec<Run> = outliers(&joint.position)
+        let wrong: Vec<Run> = outliers(&joint.position)
             .into_iter()
             .filter(|k| joint.position[*k].abs() <= LARGEST_POSITION)
             .map(|first| Run { first, length: 1 })
             .collect();
-        let Some(first) = rows.first() else { continue };
+        let Some(first) = wrong.first() else { continue };
         let evidence = format!(
             "{} single positions are off the line between their neighbours (first: row {})",
-            rows.len(),
-            first_row + first.first
+            wrong.len(),
+            rows[first.first]
         );
         out.add("spikes", Severity::Warning, Some(&joint.name), evidence, LEAVE_OUT).fixes =
-            leave_out(&rows, first_row);
+            leave_out(&wrong, rows);
     }
 }
 
-/// Positions that no joint reaches.
-fn far(log: &Log, first_row: usize, out: &mut Findings<'_>) {
-    for joint in log.joints() {
-        let rows: Vec<Run> = (0..log.rows())
+/// Positions that no joint reaches; gives the log with the neighbours' in their place where they are few.
+fn far(log: &Log, rows: &[usize], out: &mut Findings<'_>) -> Option<Log> {
+    let mut joints = log.joints().to_vec();
+    let mut replaced = false;
+    for joint in &mut joints {
+        let wrong: Vec<Run> = (0..log.rows())
             .filter(|k| joint.position[*k].abs() > LARGEST_POSITION)
             .map(|first| Run { first, length: 1 })
             .collect();
-        let Some(first) = rows.first() else { continue };
+        let Some(first) = wrong.first() else { continue };
         let evidence = format!(
             "{} of {} positions are beyond {LARGEST_POSITION:e} rad or m (row {}: {:e})",
-            rows.len(),
+            wrong.len(),
             log.rows(),
-            first_row + first.first,
+            rows[first.first],
             joint.position[first.first]
         );
-        let few = rows.len() < log.rows() / 100 && rows.len() <= MOST_RANGES;
+        let few = wrong.len() < log.rows() / 100 && wrong.len() <= MOST_RANGES;
         let remedy =
             if few { LEAVE_OUT } else { "state the scale of the position: encoder counts are no angles" };
         out.add("position_range", Severity::Error, Some(&joint.name), evidence, remedy).fixes =
-            if few { leave_out(&rows, first_row) } else { Vec::new() };
+            if few { leave_out(&wrong, rows) } else { Vec::new() };
+        if few {
+            replaced = true;
+            take_neighbours(&mut joint.position, &wrong);
+        }
+    }
+    if !replaced {
+        return None;
+    }
+    Log::new(log.name(), log.time().to_vec(), joints, log.channels().to_vec()).ok()
+}
+
+/// Puts the nearest good value before, or else after, in the place of wrong ones.
+fn take_neighbours(values: &mut [f64], wrong: &[Run]) {
+    let is_wrong = |k: usize| wrong.iter().any(|r| r.first == k);
+    let Some(first_good) = (0..values.len()).find(|k| !is_wrong(*k)) else { return };
+    for run in wrong {
+        let k = run.first;
+        values[k] = if k < first_good { values[first_good] } else { values[k - 1] };
     }
 }
 
 const LEAVE_OUT: &str = "leave these rows out; what borders on them is not used either";
 
-fn repetitions(log: &Log, out: &mut Findings<'_>) {
+fn repetitions(log: &Log, rows: &[usize], out: &mut Findings<'_>) {
     let found = repeated(log);
     if found.share() < SOME {
         return;
@@ -196,20 +217,20 @@ fn repetitions(log: &Log, out: &mut Findings<'_>) {
         "{} of {} rows in which a joint moves repeat the row before in every position and effort (first: row {})",
         found.rows.len(),
         found.examined,
-        found.rows[0] + 1
+        rows[found.rows[0]]
     );
     let severity = if found.share() > HELD { Severity::Warning } else { Severity::Info };
     let remedy = "drop these rows; if the log was written faster than the drives answer, log at their rate";
     out.add("duplicate_samples", severity, None, evidence, remedy).fixes = vec![Fix::DropRepeated];
 }
 
-fn clock(report: &ClockReport, out: &mut Findings<'_>) {
+fn clock(report: &ClockReport, rows: &[usize], out: &mut Findings<'_>) {
     if report.dropped > 0 {
         let evidence = format!(
             "{} of {} rows have a time that is not after every earlier one (first: row {})",
             report.dropped,
             report.rows,
-            report.first_dropped.unwrap_or(0) + 1
+            rows[report.first_dropped.unwrap_or(0)]
         );
         let remedy = "nothing: such rows are dropped; see why the logger writes them";
         out.add("clock_backwards", Severity::Info, None, evidence, remedy);
@@ -235,7 +256,7 @@ fn clock(report: &ClockReport, out: &mut Findings<'_>) {
             report.gaps.len(),
             total,
             longest.duration,
-            longest.row + 1,
+            rows[longest.row],
             longest.start
         );
         let remedy = "nothing: samples in gaps and what borders on them are not used; avoid gaps where the motion matters";
@@ -249,7 +270,7 @@ fn median_rate(log: &Log) -> f64 {
     dynid_motion::median::median(&steps).map_or(1.0, |s| 1.0 / s)
 }
 
-fn runs(list: &[Run], rate_hz: f64) -> String {
+fn runs(list: &[Run], rows: &[usize], rate_hz: f64) -> String {
     let samples: usize = list.iter().map(|r| r.length).sum();
     let first = list[0];
     format!(
@@ -257,15 +278,15 @@ fn runs(list: &[Run], rate_hz: f64) -> String {
         list.len(),
         samples,
         samples as f64 / rate_hz,
-        first.first + 1,
+        rows[first.first],
         first.length
     )
 }
 
-fn leave_out(list: &[Run], first_row: usize) -> Vec<Fix> {
+fn leave_out(list: &[Run], rows: &[usize]) -> Vec<Fix> {
     if list.len() > MOST_RANGES {
         return Vec::new();
     }
-    let range = |r: &Run| (first_row + r.first, first_row + r.first + r.length - 1);
+    let range = |r: &Run| (rows[r.first], rows[r.first + r.length - 1]);
     vec![Fix::LeaveOut(list.iter().map(range).collect())]
 }

@@ -318,6 +318,9 @@ fn faults_of_signals() {
         case("an effort that never changes", "frozen_signal", Some("j4"), false, |r| r.effort(4).fill(1.25)),
         case("a joint at rest", "idle_joint", Some("j6"), false, |r| r.position(6).fill(0.3)),
         case("a row of nonsense", "position_range", Some("j2"), true, |r| r.position(2)[3000] = 9e9),
+        case("counts for angles", "position_range", Some("j2"), false, |r| {
+            r.position(2).iter_mut().for_each(|q| *q = 4e9 + 1e8 * *q);
+        }),
     ];
     for length in [40, 200, 600] {
         cases.push(case(
@@ -444,5 +447,36 @@ fn identification_refuses_nonsense_and_accepts_what_was_put_right() {
     let right = identify(&Config::read(&corrected).unwrap(), |_| {}).unwrap();
     for (a, b) in right.fit().x.iter().zip(&truth.fit().x) {
         assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{a} against {b}");
+    }
+}
+
+/// Rows to leave out are those of the file, whatever part of it is read and whatever is left out already.
+#[test]
+fn rows_are_those_of_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let mut record = Record::clean();
+    record.position(2)[3499] = 9e9;
+    record.position(4)[4499] = 9e9;
+    record.write(&path);
+    let cut = |rows, part, leave_out| {
+        let mut config = config(&path);
+        config.log[0] = LogConfig { rows, part, leave_out, ..config.log[0].clone() };
+        config
+    };
+    for config in [
+        cut(Some((1001, 6001)), None, vec![(1200, 1300)]),
+        cut(None, Some((0.3, 1.0)), vec![]),
+        cut(Some((11, 5500)), Some((0.25, 0.95)), vec![(20, 40), (3000, 3010)]),
+    ] {
+        let found = examine(&config);
+        let evidence: Vec<&str> =
+            found.findings.iter().filter(|f| f.id == "position_range").map(|f| f.evidence.as_str()).collect();
+        assert_eq!(evidence.len(), 2, "{:#?}", found.findings);
+        assert!(evidence[0].contains("row 3500") && evidence[1].contains("row 4500"), "{evidence:?}");
+        let text = found.corrected(&config, None).unwrap();
+        let again = Config::parse(&text, "corrected").unwrap();
+        let ranges = &again.log[0].leave_out;
+        assert!(ranges.contains(&(3500, 3500)) && ranges.contains(&(4500, 4500)), "{ranges:?}");
     }
 }
