@@ -37,6 +37,8 @@ pub(crate) enum Command {
     Validate(ValidateArgs),
     /// Clearances of an identified robot's joints from a log: by probes at the journals, by their swing in the effort.
     Clearance(ClearanceArgs),
+    /// Backlash of an identified robot's drives from ordinary logs: what gaps would have done to the effort.
+    Backlash(BacklashArgs),
     /// Payloads from logs with and without them: mass, centre of mass, inertia; writes payload.json, payload.html and a URDF
     /// link.
     Payload(PayloadArgs),
@@ -553,6 +555,26 @@ pub(crate) struct ValidateArgs {
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) filter_hz: Option<f64>,
     /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BacklashArgs {
+    /// estimate.json of the robot: link parameters for the loads, friction for the residual.
+    pub(crate) estimate: PathBuf,
+    /// Log to look at; repeat for several (default: the training logs of the configuration).
+    #[arg(long, value_name = "LOG", required_unless_present = "config")]
+    pub(crate) log: Vec<PathBuf>,
+    /// First and last data row of the logs, from 1.
+    #[arg(long, value_name = "FIRST:LAST", value_parser = row_range, requires = "log")]
+    pub(crate) rows: Option<(usize, usize)>,
+    #[command(flatten)]
+    pub(crate) columns: LogArgs,
+    /// Configuration whose [columns] and [motor_side] the logs follow.
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) config: Option<PathBuf>,
+    /// Print JSON, with the evidence at every load at which flanks may part.
     #[arg(long)]
     pub(crate) json: bool,
 }

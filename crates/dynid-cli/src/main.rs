@@ -35,6 +35,7 @@ fn main() -> ExitCode {
         Command::Design(args) => commands::design::run(&args),
         Command::Friction(args) => commands::friction::run(&args),
         Command::Simulate(args) => commands::simulate::run(&args),
+        Command::Backlash(args) => commands::backlash::run(&args),
         Command::Clearance(args) => commands::clearance::run(&args),
         Command::Gains(args) => commands::gains::run(&args),
         Command::Payload(args) => commands::payload::run(&args),

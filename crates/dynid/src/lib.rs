@@ -5,6 +5,7 @@
 
 pub mod advice;
 pub mod agreement;
+pub mod backlash;
 pub mod bounds;
 pub mod check;
 pub mod clearance;

@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub(crate) mod backlash;
 pub(crate) mod check;
 pub(crate) mod clearance;
 pub(crate) mod compare;

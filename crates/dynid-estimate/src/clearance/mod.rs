@@ -1,6 +1,7 @@
-//! The clearance of a joint from records: with probes at the journal ([`orbit`]), or from the effort of the drive alone
-//! ([`swing`]).
+//! The clearance of a joint from records: with probes at the journal ([`orbit`]), from the effort of the drive alone ([`swing`]),
+//! and backlash of the drive itself ([`backlash`]).
 
+pub mod backlash;
 pub mod orbit;
 pub mod swing;
 

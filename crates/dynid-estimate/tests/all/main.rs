@@ -1,6 +1,7 @@
 //! All tests of the crate from outside, in one program: each program would be linked against everything again.
 
 mod arm;
+mod backlash;
 mod blocks_and_choice;
 mod bootstrap;
 mod calibration;

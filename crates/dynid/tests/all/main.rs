@@ -1,6 +1,7 @@
 //! All tests of the crate from outside, in one program: each program would be linked against everything again.
 
 mod accuracy;
+mod backlash;
 mod bristles;
 mod clearance;
 mod closed_robots;
