@@ -9,8 +9,8 @@
 //!
 //! The trace of every candidate gap is followed along the log and passed through what lies between it and the residual: motion
 //! measured at the drive shows what the drive gave way below the cut-off of the states; above it, the position loop answers,
-//! `H = S + (1 - S) L`, with a loop `L` of unknown speed, and flanks that are soft spread the impact, `H = (S + (1 - S) L) C`. The log-likelihood ratio against no gap, with the amplitude that physics
-//! asks for, decides, in noise as coloured as the residual is. Deviations of load, friction and its reach are regressors.
+//! `H = S + (1 - S) L`, with a loop `L` of unknown speed, and flanks that are soft spread the impact, `H = (S + (1 - S) L) C`.
+//! The log-likelihood ratio against no gap, with the amplitude that physics asks for, decides, in noise as coloured as the residual is. Deviations of load, friction and its reach are regressors.
 //!
 //! A gap can be told only if its flight lasts longer than the load's zero is uncertain: deviations of the load of slow motion
 //! (the residual below the cut-off of the states) move crossings, and smaller gaps are never ruled out.
@@ -165,7 +165,7 @@ pub struct BacklashEstimate {
 const SAMPLES: usize = 400;
 /// Loads tried, in root mean squares of the load.
 const REACH: f64 = 1.5;
-/// Evidence from which a gap is believed: traces at loads where no gap acts reach 6.8 on 44 joints of eight recorded logs, since
+/// Evidence from which a gap is believed: traces at loads where no gap acts reach 6.8 on 45 joints of nine recorded logs, since
 /// residuals of real drives are no Gaussian noise.
 const BELIEVED: f64 = 10.0;
 /// Times the evidence of placebos that a gap must have: recorded residuals have longer tails than Gaussian noise.
