@@ -1,7 +1,6 @@
 //! Backlash of a drive from a log, through the whole pipeline.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
-#![expect(clippy::print_stdout, reason = "says what was measured")]
 
 use std::fmt::Write;
 
