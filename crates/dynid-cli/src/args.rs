@@ -201,6 +201,19 @@ pub(crate) struct LogArgs {
     pub(crate) allow_unlogged: bool,
 }
 
+/// How the logs of a command that works with an estimate are read.
+#[derive(Debug, Args)]
+pub(crate) struct ReadingArgs {
+    /// First and last data row of the logs, from 1.
+    #[arg(long, value_name = "FIRST:LAST", value_parser = row_range, requires = "log")]
+    pub(crate) rows: Option<(usize, usize)>,
+    #[command(flatten)]
+    pub(crate) columns: LogArgs,
+    /// Configuration whose [columns] and [motor_side] the logs follow.
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) config: Option<PathBuf>,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
     /// Logs, CSV or CSV.gz, together with --robot; or a configuration (TOML), whose logs are examined.
@@ -543,14 +556,8 @@ pub(crate) struct ValidateArgs {
     /// Log to compare with; repeat for several.
     #[arg(long, value_name = "LOG", required = true)]
     pub(crate) log: Vec<PathBuf>,
-    /// First and last data row of the logs, from 1.
-    #[arg(long, value_name = "FIRST:LAST", value_parser = row_range)]
-    pub(crate) rows: Option<(usize, usize)>,
     #[command(flatten)]
-    pub(crate) columns: LogArgs,
-    /// Configuration whose [columns] and [motor_side] the logs follow.
-    #[arg(long, value_name = "FILE.toml")]
-    pub(crate) config: Option<PathBuf>,
+    pub(crate) reading: ReadingArgs,
     /// Cut-off of the filter for the filtered figures, Hz (default: the kernel's).
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) filter_hz: Option<f64>,
@@ -566,14 +573,8 @@ pub(crate) struct BacklashArgs {
     /// Log to look at; repeat for several (default: the training logs of the configuration).
     #[arg(long, value_name = "LOG", required_unless_present = "config")]
     pub(crate) log: Vec<PathBuf>,
-    /// First and last data row of the logs, from 1.
-    #[arg(long, value_name = "FIRST:LAST", value_parser = row_range, requires = "log")]
-    pub(crate) rows: Option<(usize, usize)>,
     #[command(flatten)]
-    pub(crate) columns: LogArgs,
-    /// Configuration whose [columns] and [motor_side] the logs follow.
-    #[arg(long, value_name = "FILE.toml")]
-    pub(crate) config: Option<PathBuf>,
+    pub(crate) reading: ReadingArgs,
     /// Print JSON, with the evidence at every load at which flanks may part.
     #[arg(long)]
     pub(crate) json: bool,
@@ -588,14 +589,8 @@ pub(crate) struct ClearanceArgs {
     /// Log; columns journal_<joint>_x and journal_<joint>_y hold offsets of journals in axes that turn with their links, m.
     #[arg(long, value_name = "LOG")]
     pub(crate) log: PathBuf,
-    /// First and last data row of the log, from 1.
-    #[arg(long, value_name = "FIRST:LAST", value_parser = row_range)]
-    pub(crate) rows: Option<(usize, usize)>,
     #[command(flatten)]
-    pub(crate) columns: LogArgs,
-    /// Configuration whose [columns] and [motor_side] the log follows.
-    #[arg(long, value_name = "FILE.toml")]
-    pub(crate) config: Option<PathBuf>,
+    pub(crate) reading: ReadingArgs,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,

@@ -54,6 +54,7 @@ pub mod search;
 pub mod separable;
 pub mod steady_friction;
 mod triangular;
+mod vector;
 mod whitened;
 pub mod whiteness;
 

@@ -1,7 +1,8 @@
 //! Are residuals white, as far as the filter lets one see?
 
+use dynid_motion::spectrum::{lagged_products, periodogram};
+
 use crate::distribution::chi_squared_exceedance;
-use realfft::RealFftPlanner;
 
 /// Autocorrelations `ρ_1..ρ_lags` of a signal about its mean; `None` for a constant signal or one no longer
 /// than `lags`.
@@ -34,24 +35,6 @@ pub fn counted_autocorrelation(signal: &[f64], lags: usize) -> Option<Vec<f64>> 
     // Sums by transforms are exact to rounding, so that counts of pairs are whole numbers.
     let at = |lag: usize| if pairs[lag] < 0.5 { 0.0 } else { products[lag] / pairs[lag].round() / mean };
     Some((1..=lags).map(at).collect())
-}
-
-/// `Σ_k v_k v_{k+i}` for every lag, by the transform of the padded signal.
-fn lagged_products(signal: &[f64]) -> Option<Vec<f64>> {
-    let length = (2 * signal.len()).next_power_of_two();
-    let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, back) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
-    let mut input = signal.to_vec();
-    input.resize(length, 0.0);
-    let mut spectrum = forward.make_output_vec();
-    forward.process(&mut input, &mut spectrum).ok()?;
-    for value in &mut spectrum {
-        *value = realfft::num_complex::Complex::new(value.norm_sqr(), 0.0);
-    }
-    back.process(&mut spectrum, &mut input).ok()?;
-    input.truncate(signal.len());
-    input.iter_mut().for_each(|v| *v /= length as f64);
-    (!input.is_empty()).then_some(input)
 }
 
 /// First lag at which the autocorrelation falls below `level` in absolute value, in samples; `None` if it does
@@ -209,15 +192,4 @@ fn cumulative_test(
         frequencies: count,
         dominant_frequency: (largest + 1) as f64 * step,
     })
-}
-
-fn periodogram(signal: &[f64]) -> Option<Vec<f64>> {
-    if signal.is_empty() {
-        return None;
-    }
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(signal.len());
-    let mut input = signal.to_vec();
-    let mut spectrum = transform.make_output_vec();
-    transform.process(&mut input, &mut spectrum).ok()?;
-    Some(spectrum.iter().map(|c| c.norm_sqr()).collect())
 }

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use realfft::RealFftPlanner;
+use realfft::num_complex::Complex;
 
 use crate::median::{median, running_median};
 use crate::signal::{SignalError, check_finite, check_positive, check_signal};
@@ -75,6 +76,36 @@ pub fn welch(signal: &[f64], rate_hz: f64, segment: usize) -> Result<PowerSpectr
     }
     let frequency = (0..density.len()).map(|k| k as f64 * rate_hz / length as f64).collect();
     Ok(PowerSpectrum { frequency, density })
+}
+
+/// `|X_k|²` of the discrete Fourier transform of a signal, `k` from 0 to half its length; `None` for an empty signal.
+pub fn periodogram(signal: &[f64]) -> Option<Vec<f64>> {
+    if signal.is_empty() {
+        return None;
+    }
+    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(signal.len());
+    let mut input = signal.to_vec();
+    let mut bins = transform.make_output_vec();
+    transform.process(&mut input, &mut bins).ok()?;
+    Some(bins.iter().map(|c| c.norm_sqr()).collect())
+}
+
+/// `Σ_k x_k x_{k+i}` for every lag `i`, by the transform of the padded signal; `None` for an empty signal.
+pub fn lagged_products(signal: &[f64]) -> Option<Vec<f64>> {
+    let length = (2 * signal.len()).next_power_of_two();
+    let mut planner = RealFftPlanner::<f64>::new();
+    let (forward, back) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
+    let mut input = signal.to_vec();
+    input.resize(length, 0.0);
+    let mut bins = forward.make_output_vec();
+    forward.process(&mut input, &mut bins).ok()?;
+    for bin in &mut bins {
+        *bin = Complex::new(bin.norm_sqr(), 0.0);
+    }
+    back.process(&mut bins, &mut input).ok()?;
+    input.truncate(signal.len());
+    input.iter_mut().for_each(|v| *v /= length as f64);
+    (!input.is_empty()).then_some(input)
 }
 
 /// How noise is read from spectra.

@@ -1,25 +1,21 @@
 //! `dynid backlash`.
 
 use dynid::backlash::{BacklashVerdict, JointBacklash, backlash};
-use dynid::config::{Config, LogConfig};
 use dynid::estimate::Estimate;
 
-use super::apply_log_args;
+use super::Reading;
 use crate::args::BacklashArgs;
 use crate::message::{Failure, data, json};
 
 pub(crate) fn run(args: &BacklashArgs) -> Result<u8, Failure> {
     let estimate = Estimate::read(&args.estimate)?;
-    let config = args.config.as_deref().map(Config::read).transpose()?;
-    let stated = config.as_ref().map(Config::training_logs).unwrap_or_default();
-    let (mut columns, motor_side) =
-        config.map_or_else(Default::default, |config| (config.columns, config.motor_side));
-    apply_log_args(&mut columns, &args.columns);
-    let named =
-        |path: &std::path::PathBuf| LogConfig { path: path.clone(), rows: args.rows, ..LogConfig::default() };
-    let logs: Vec<LogConfig> =
-        if args.log.is_empty() { stated } else { args.log.iter().map(named).collect() };
-    let found = backlash((&estimate, &args.estimate), &logs, &columns, motor_side.as_ref())?;
+    let reading = Reading::of(&args.reading)?;
+    let logs = match args.log.is_empty() {
+        true => reading.stated.clone(),
+        false => args.log.iter().map(|path| reading.log(path)).collect(),
+    };
+    let motor_side = reading.motor_side.as_ref();
+    let found = backlash((&estimate, &args.estimate), &logs, &reading.columns, motor_side)?;
     if args.json {
         json(&found)?;
         return Ok(0);

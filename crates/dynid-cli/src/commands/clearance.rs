@@ -1,27 +1,20 @@
 //! `dynid clearance`.
 
 use dynid::clearance::{JointClearance, Valued, clearance};
-use dynid::config::{Config, LogConfig};
 use dynid::estimate::Estimate;
 use dynid::{Robot, RobotOptions};
 
-use super::apply_log_args;
+use super::Reading;
 use crate::args::ClearanceArgs;
 use crate::message::{Failure, data, json};
 
 pub(crate) fn run(args: &ClearanceArgs) -> Result<u8, Failure> {
     let robot = Robot::load(&args.robot, &RobotOptions::default())?;
     let estimate = Estimate::read(&args.estimate)?;
-    let (mut columns, motor_side) = match &args.config {
-        None => (dynid::io::MappingSpec::default(), None),
-        Some(path) => {
-            let config = Config::read(path)?;
-            (config.columns, config.motor_side)
-        }
-    };
-    apply_log_args(&mut columns, &args.columns);
-    let log = LogConfig { path: args.log.clone(), rows: args.rows, ..LogConfig::default() };
-    let found = clearance(&robot, (&estimate, &args.estimate), &log, &columns, motor_side.as_ref())?;
+    let reading = Reading::of(&args.reading)?;
+    let log = reading.log(&args.log);
+    let motor_side = reading.motor_side.as_ref();
+    let found = clearance(&robot, (&estimate, &args.estimate), &log, &reading.columns, motor_side)?;
     if args.json {
         json(&found)?;
         return Ok(0);

@@ -19,9 +19,12 @@ pub(crate) mod study;
 mod table;
 pub(crate) mod validate;
 
+use std::path::Path;
+
+use dynid::config::{Config, LogConfig};
 use dynid::{Robot, RobotOptions};
 
-use crate::args::{LogArgs, RobotArgs};
+use crate::args::{LogArgs, ReadingArgs, RobotArgs};
 use crate::message::Failure;
 
 fn load_robot(args: &RobotArgs) -> Result<Robot, Failure> {
@@ -47,4 +50,27 @@ fn apply_log_args(spec: &mut dynid::io::MappingSpec, args: &LogArgs) {
         spec.current_gains.clone_from(&args.gains);
     }
     spec.allow_unlogged |= args.allow_unlogged;
+}
+
+/// How logs are to be read: columns, side of the gear, and the configuration that said so.
+struct Reading {
+    columns: dynid::io::MappingSpec,
+    motor_side: Option<dynid::config::MotorSide>,
+    /// Training logs of the configuration.
+    stated: Vec<LogConfig>,
+    rows: Option<(usize, usize)>,
+}
+
+impl Reading {
+    fn of(args: &ReadingArgs) -> Result<Self, Failure> {
+        let config = args.config.as_deref().map(Config::read).transpose()?.unwrap_or_default();
+        let stated = config.training_logs();
+        let mut columns = config.columns;
+        apply_log_args(&mut columns, &args.columns);
+        Ok(Self { columns, motor_side: config.motor_side, stated, rows: args.rows })
+    }
+
+    fn log(&self, path: &Path) -> LogConfig {
+        LogConfig { path: path.to_owned(), rows: self.rows, ..LogConfig::default() }
+    }
 }

@@ -1,23 +1,15 @@
 //! `dynid validate`.
 
-use dynid::config::{Config, LogConfig};
 use dynid::estimate::{Estimate, FitValues};
 use dynid::validate::{log_fit, validate};
 
-use super::{apply_log_args, table};
+use super::{Reading, table};
 use crate::args::ValidateArgs;
 use crate::message::{Failure, data, json, note};
 
 pub(crate) fn run(args: &ValidateArgs) -> Result<u8, Failure> {
     let estimate = Estimate::read(&args.estimate)?;
-    let (mut columns, motor_side) = match &args.config {
-        None => (dynid::io::MappingSpec::default(), None),
-        Some(path) => {
-            let config = Config::read(path)?;
-            (config.columns, config.motor_side)
-        }
-    };
-    apply_log_args(&mut columns, &args.columns);
+    let reading = Reading::of(&args.reading)?;
     if let Some(hz) = args.filter_hz
         && !(hz.is_finite() && hz > 0.0)
     {
@@ -26,14 +18,11 @@ pub(crate) fn run(args: &ValidateArgs) -> Result<u8, Failure> {
             "leave it out to use the estimate's kernel cut-off",
         ));
     }
-    let logs: Vec<LogConfig> = args
-        .log
-        .iter()
-        .map(|path| LogConfig { path: path.clone(), rows: args.rows, ..LogConfig::default() })
-        .collect();
+    let logs: Vec<_> = args.log.iter().map(|path| reading.log(path)).collect();
     let split = args.split.of();
+    let motor_side = reading.motor_side.as_ref();
     let validation =
-        validate(&estimate, split, &args.estimate, &logs, &columns, motor_side.as_ref(), args.filter_hz)?;
+        validate(&estimate, split, &args.estimate, &logs, &reading.columns, motor_side, args.filter_hz)?;
     for warning in &validation.warnings {
         note(&format!("warning: {warning}"));
     }

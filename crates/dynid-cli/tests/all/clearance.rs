@@ -155,6 +155,22 @@ fn clearances_are_found_by_probes_and_by_the_swing_in_the_effort() {
     let shown = run(at, &["clearance", "xy.toml", "out/estimate.json", "--log", "log.csv"], 0).stdout;
     let shown = String::from_utf8(shown).unwrap();
     assert!(shown.contains("probes   gap") && shown.contains("effort   gap"), "{shown}");
+
+    // Journals that bounce in their bearings are no gap of the drive.
+    let backlash = |args: &[&str], code: i32| {
+        let output = run(at, &[&["backlash", "out/estimate.json"], args].concat(), code);
+        String::from_utf8(if code == 0 { output.stdout } else { output.stderr }).unwrap()
+    };
+    let file: Value = serde_json::from_str(&backlash(&["--log", "log.csv", "--json"], 0)).unwrap();
+    let joints = file[0]["joints"].as_array().unwrap();
+    assert_eq!(joints.len(), 2);
+    for joint in joints {
+        assert!(joint["verdict"] != "found" && joint["gap"].is_null() && joint["unit"] == "rad", "{joint}");
+    }
+    let shown = backlash(&["--log", "log.csv", "--rows", "1:12000"], 0);
+    assert!(shown.starts_with("log.csv (1000 Hz)\n  j1  ") && shown.contains("\n  j2  "), "{shown}");
+    assert!(backlash(&[], 2).contains("--log"));
+
     let indy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/indy7.toml");
     std::fs::copy(indy, at.join("indy7.toml")).unwrap();
     let refused = stderr(at, &["clearance", "indy7.toml", "out/estimate.json", "--log", "log.csv"], 2);

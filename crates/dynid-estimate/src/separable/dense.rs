@@ -1,5 +1,7 @@
 //! Small dense matrices, and Householder triangles of them with a rank.
 
+use crate::vector::{add_scaled, dot, norm};
+
 /// A dense matrix, column after column.
 #[derive(Debug, Clone)]
 pub(super) struct Columns {
@@ -38,31 +40,6 @@ impl Columns {
             let (left, right) = self.data.split_at_mut(j * rows);
             (&right[..rows], &mut left[k * rows..][..rows])
         }
-    }
-}
-
-/// Sum of products in eight interleaved sums, an order that the compiler turns into vector instructions.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    const LANES: usize = 8;
-    let (a_lanes, a_rest) = a.as_chunks::<LANES>();
-    let (b_lanes, b_rest) = b.as_chunks::<LANES>();
-    let mut sums = [0.0; LANES];
-    for (a, b) in a_lanes.iter().zip(b_lanes) {
-        for l in 0..LANES {
-            sums[l] += a[l] * b[l];
-        }
-    }
-    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
-}
-
-pub(super) fn norm(a: &[f64]) -> f64 {
-    dot(a, a).sqrt()
-}
-
-/// `to += factor * from`.
-pub(super) fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
-    for (t, f) in to.iter_mut().zip(from) {
-        *t += factor * f;
     }
 }
 

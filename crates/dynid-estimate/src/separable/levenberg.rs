@@ -1,10 +1,11 @@
 //! Levenberg-Marquardt with bounds on the projected residual.
 
 use super::boxed::BoxedStep;
-use super::dense::{Columns, PivotedQr, add_scaled, dot, norm};
+use super::dense::{Columns, PivotedQr};
 use super::projection::{Point, Projection};
 use super::reduction::Target;
 use super::scale::SearchBox;
+use crate::vector::{add_scaled, dot, norm};
 
 /// First damping, in units of the squared column norms.
 const FIRST_DAMPING: f64 = 1e-3;

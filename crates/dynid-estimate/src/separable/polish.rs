@@ -1,9 +1,10 @@
 //! The last digits: Gauss-Newton steps on linear and shape parameters together.
 
-use super::dense::{Columns, PivotedQr, norm};
+use super::dense::{Columns, PivotedQr};
 use super::projection::Projection;
 use super::reduction::Target;
 use super::scale::SearchBox;
+use crate::vector::norm;
 
 /// Most steps; two are the rule, slow ones belong to large residuals.
 const MOST_STEPS: usize = 60;

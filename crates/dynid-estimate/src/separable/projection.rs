@@ -1,8 +1,9 @@
 //! The projected residual `r(α) = (1 - QQᵀ) y` and its Kaufman Jacobian.
 
-use super::dense::{Columns, PivotedQr, add_scaled, dot, norm};
+use super::dense::{Columns, PivotedQr};
 use super::problem::{SeparableProblem, ShapedColumns};
 use super::reduction::{GroupReduction, Rotated, Target};
+use crate::vector::{add_scaled, dot, norm};
 use rayon::prelude::*;
 
 /// Values per group above which groups are rotated in parallel.

@@ -210,7 +210,7 @@ fn drives_without_a_gap_show_none() {
             ("slow loop", Drive { loop_hz: 8.0, ..DRIVE }),
             ("soft flanks", Drive { stiffness: 5e3, ..DRIVE }),
         ] {
-            let found = look(&Drive { seed, ..drive });
+            let found = look(&Drive { seed, rate_hz: 500.0, ..drive });
             assert_eq!(found.verdict, BacklashVerdict::NotFound, "{name}, seed {seed}: {found:?}");
         }
     }
@@ -244,7 +244,7 @@ fn a_load_of_one_sign_says_nothing() {
 
 #[test]
 fn the_same_bits_every_time() {
-    let signals = Signals::of(&Drive { gap: 1e-3, ..DRIVE });
+    let signals = Signals::of(&Drive { gap: 1e-3, rate_hz: 500.0, ..DRIVE });
     let once = estimate(&signals.borrowed(), &BacklashSettings::default()).unwrap();
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let again = one.install(|| estimate(&signals.borrowed(), &BacklashSettings::default()).unwrap());

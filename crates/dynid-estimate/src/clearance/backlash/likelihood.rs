@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::flight::{Trace, follow};
 use super::noise::{Response, filtered, whitening};
 use super::{BacklashSignals, Path};
+use crate::vector::{add_scaled, dot, norm};
 
 /// Share of the rms speed below which a joint counts as reversing.
 const REVERSAL: f64 = 0.1;
@@ -17,6 +18,8 @@ const WHITE: f64 = 0.01;
 /// What borders on a reversal, s.
 const REVERSAL_REACH: f64 = 0.03;
 
+/// Number of [`regressors`].
+const REGRESSORS: usize = 8;
 /// Fewest crossings that make an estimate.
 const CROSSINGS: usize = 6;
 
@@ -56,14 +59,22 @@ impl Trial {
     }
 }
 
+/// What a sample of a trace does along a path to the whitened residual, of which only samples that are used count.
+struct Effect {
+    response: Response,
+    /// Inner products with the residual and with each regressor, per sample of the trace.
+    inner: Vec<[f64; 1 + REGRESSORS]>,
+    /// Autocorrelation of the response: inner products of samples of the trace, per lag, where all of their responses count.
+    products: Vec<f64>,
+}
+
 /// Whitened residual with what regressors explain of it taken out.
 pub(super) struct Likelihood {
-    responses: Vec<Response>,
-    /// Orthonormal.
-    regressors: Vec<Vec<f64>>,
-    residual: Vec<f64>,
+    effects: Vec<Effect>,
     /// Samples that count, away from reversals.
     pub(super) used: Vec<bool>,
+    /// Samples before each that do not.
+    unused: Vec<usize>,
     variance: f64,
     /// Root mean square of the residual below the cut-off of the states, where it counts.
     pub(super) slow_rms: f64,
@@ -86,40 +97,45 @@ impl Likelihood {
         let through = |signal: &[f64]| -> Vec<f64> {
             filtered(signal, &filter).iter().zip(&used).map(|(x, u)| if *u { *x } else { 0.0 }).collect()
         };
-        let mut out = Likelihood {
-            responses: paths
-                .iter()
-                .map(|path| Response::new(signals.state_hz, *path, signals.step_s, &filter))
-                .collect(),
-            regressors: Vec::new(),
-            residual: Vec::new(),
-            variance: 0.0,
-            slow_rms: slow_rms(signals, &used),
-            used: used.clone(),
-        };
+        let mut known: Vec<Vec<f64>> = Vec::new();
         for regressor in regressors(signals) {
             let mut column = through(&regressor);
             let before = norm(&column);
-            out.take_out(&mut column);
+            take_out(&mut column, &known);
             let size = norm(&column);
             if size > 1e-6 * before {
                 column.iter_mut().for_each(|x| *x /= size);
-                out.regressors.push(column);
+                known.push(column);
             }
         }
         let mut residual = through(signals.residual);
-        out.take_out(&mut residual);
+        take_out(&mut residual, &known);
         let power = |signal: &[f64]| signal.iter().map(|r| r * r).sum::<f64>() / count as f64;
-        out.variance = power(&residual).max(WHITE * power(&masked));
-        out.residual = residual;
-        (out.variance > 0.0).then_some(out)
-    }
-
-    fn take_out(&self, column: &mut [f64]) {
-        for known in &self.regressors {
-            let along = dot(column, known);
-            column.iter_mut().zip(known).for_each(|(x, k)| *x -= along * k);
+        let variance = power(&residual).max(WHITE * power(&masked));
+        if variance <= 0.0 {
+            return None;
         }
+        let effect = |path: &Path| {
+            let response = Response::new(signals.state_hz, *path, signals.step_s, &filter);
+            let mut inner = vec![[0.0; 1 + REGRESSORS]; n];
+            for (i, column) in std::iter::once(&residual).chain(&known).enumerate() {
+                for (row, product) in inner.iter_mut().zip(response.adjoint(column)) {
+                    row[i] = product;
+                }
+            }
+            Effect { inner, products: response.products(), response }
+        };
+        let mut unused = vec![0; n + 1];
+        for k in 0..n {
+            unused[k + 1] = unused[k] + usize::from(!used[k]);
+        }
+        Some(Likelihood {
+            effects: paths.par_iter().map(effect).collect(),
+            unused,
+            variance,
+            slow_rms: slow_rms(signals, &used),
+            used,
+        })
     }
 
     /// Every candidate with every loop, in order.
@@ -137,12 +153,12 @@ impl Likelihood {
                     }
                     let trace = follow(torque, signals.inertia, signals.step_s, candidate.gap);
                     let crossings = trace.crossings.iter().filter(|k| self.used[**k]).count();
-                    self.responses
+                    self.effects
                         .iter()
-                        .map(|response| Trial {
+                        .map(|effect| Trial {
                             candidate: *candidate,
-                            path: response.path,
-                            ratio: self.ratio(&trace, response, buffer),
+                            path: effect.response.path,
+                            ratio: self.ratio(&trace, effect, buffer),
                             crossings,
                         })
                         .collect::<Vec<_>>()
@@ -153,39 +169,68 @@ impl Likelihood {
     }
 
     /// `(2 hᵀr - hᵀh)/σ²` of a trace `h`, what regressors explain taken out of it. `buffer`: zeros, and left so.
-    fn ratio(&self, trace: &Trace, response: &Response, buffer: &mut [f64]) -> f64 {
+    fn ratio(&self, trace: &Trace, effect: &Effect, buffer: &mut [f64]) -> f64 {
         let n = buffer.len();
-        let (lead, length) = (response.lead, response.values.len());
-        let (mut power, mut along) = (0.0, 0.0);
-        let mut explained = vec![0.0; self.regressors.len()];
+        let mut inner = [0.0; 1 + REGRESSORS];
+        for (row, value) in &trace.samples {
+            for (sum, product) in inner.iter_mut().zip(&effect.inner[*row]) {
+                *sum += value * product;
+            }
+        }
+        let mut power = -inner[1..].iter().map(|explained| explained * explained).sum::<f64>();
+        let (lead, values) = (effect.response.lead, effect.response.values.as_slice());
         let mut rest = trace.samples.as_slice();
         while let Some((first, _)) = rest.first() {
             // What overlaps is summed before it is squared.
             let (start, mut end, mut taken) = (first.saturating_sub(lead), 0, 0);
-            for (row, value) in rest {
+            for (row, _) in rest {
                 if taken > 0 && row.saturating_sub(lead) > end {
                     break;
                 }
-                let before = lead.saturating_sub(*row);
-                let from = (row + before) - lead;
-                end = (from + length - before).min(n);
-                for (b, r) in buffer[from..end].iter_mut().zip(&response.values[before..]) {
-                    *b += value * r;
-                }
+                end = (row + values.len()).saturating_sub(lead).min(n);
                 taken += 1;
             }
-            for k in start..end {
-                let h = std::mem::take(&mut buffer[k]);
-                if self.used[k] {
-                    power += h * h;
-                    along += h * self.residual[k];
-                    explained.iter_mut().zip(&self.regressors).for_each(|(e, r)| *e += h * r[k]);
+            let (together, later) = rest.split_at(taken);
+            rest = later;
+            let all_used = *first >= lead && end < n && self.unused[end] == self.unused[start];
+            power += if all_used {
+                quadratic(together, &effect.products, buffer)
+            } else {
+                for (row, value) in together {
+                    let before = lead.saturating_sub(*row);
+                    let from = (row + before) - lead;
+                    add_scaled(&mut buffer[from..n], *value, &values[before..]);
                 }
-            }
-            rest = &rest[taken..];
+                let squares = (start..end).map(|k| {
+                    let h = std::mem::take(&mut buffer[k]);
+                    if self.used[k] { h * h } else { 0.0 }
+                });
+                squares.sum()
+            };
         }
-        power -= explained.iter().map(|e| e * e).sum::<f64>();
-        (2.0 * along - power) / self.variance
+        (2.0 * inner[0] - power) / self.variance
+    }
+}
+
+/// `Σ v_i v_j c(|k_i - k_j|)` over samples `(k, v)` in order. `buffer`: zeros, and left so.
+fn quadratic(samples: &[(usize, f64)], products: &[f64], buffer: &mut [f64]) -> f64 {
+    let mut sum = 0.0;
+    let mut last = 0;
+    for (row, value) in samples.iter().rev() {
+        last = last.max(*row);
+        let later = &buffer[row + 1..last + 1];
+        let reach = later.len().min(products.len() - 1);
+        sum += value * (value * products[0] + 2.0 * dot(&later[..reach], &products[1..=reach]));
+        buffer[*row] = *value;
+    }
+    samples.iter().for_each(|(row, _)| buffer[*row] = 0.0);
+    sum
+}
+
+fn take_out(column: &mut [f64], known: &[Vec<f64>]) {
+    for known in known {
+        let along = dot(column, known);
+        add_scaled(column, -along, known);
     }
 }
 
@@ -200,7 +245,7 @@ fn slow_rms(signals: &BacklashSignals<'_>, used: &[bool]) -> f64 {
 
 /// What a residual may hold beside a gap: errors of load, delay and friction, and friction that follows the load, whose kink lies
 /// where flanks part.
-fn regressors(signals: &BacklashSignals<'_>) -> Vec<Vec<f64>> {
+fn regressors(signals: &BacklashSignals<'_>) -> [Vec<f64>; REGRESSORS] {
     let n = signals.load.len();
     let rate: Vec<f64> =
         (0..n).map(|k| signals.load[(k + 1).min(n - 1)] - signals.load[k.saturating_sub(1)]).collect();
@@ -208,7 +253,7 @@ fn regressors(signals: &BacklashSignals<'_>) -> Vec<Vec<f64>> {
     let direction: Vec<f64> = signals.velocity.iter().map(|v| sign(*v)).collect();
     let size: Vec<f64> = signals.load.iter().map(|t| t.abs()).collect();
     let with_direction = size.iter().zip(&direction).map(|(t, d)| t * d).collect();
-    vec![
+    [
         vec![1.0; n],
         signals.load.to_vec(),
         rate,
@@ -218,12 +263,4 @@ fn regressors(signals: &BacklashSignals<'_>) -> Vec<Vec<f64>> {
         size,
         with_direction,
     ]
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
-fn norm(a: &[f64]) -> f64 {
-    dot(a, a).sqrt()
 }

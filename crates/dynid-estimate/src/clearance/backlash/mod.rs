@@ -236,7 +236,7 @@ pub fn estimate(
     let Some(first) = most_likely(&at_zero) else {
         return Ok(nothing(BacklashVerdict::NoCrossings));
     };
-    let near = near(first, &gaps, spacing, shares[1]);
+    let near = near(&at_zero, &gaps, spacing, shares[1]);
     let near = likelihood.of(signals, &near);
     let best = most_likely(&near).unwrap_or(first);
 
@@ -316,17 +316,21 @@ fn smallest_timed(signals: &BacklashSignals<'_>, likelihood: &Likelihood, spacin
     }
 }
 
-/// Candidates beside the likeliest of a scan: all gaps with a finer share of friction and a finer load at which flanks part.
-fn near(first: &Trial, gaps: &[f64], spacing: f64, share: f64) -> Vec<Candidate> {
+/// Candidates beside the likeliest of every gap of a scan: finer shares of friction and finer loads at which flanks part.
+fn near(scanned: &[Trial], gaps: &[f64], spacing: f64, share: f64) -> Vec<Candidate> {
     let mut out = Vec::new();
-    for k in -2 * STEPS..=2 * STEPS {
-        let share = first.share() + share * f64::from(k) / f64::from(STEPS);
-        if !(0.0..=1.0).contains(&share) {
-            continue;
-        }
-        for l in -STEPS..=STEPS {
-            let level = first.candidate.level + spacing * f64::from(l) / f64::from(STEPS);
-            out.extend(gaps.iter().map(|gap| Candidate { share, level, gap: *gap }));
+    for gap in gaps {
+        let of_gap: Vec<Trial> = scanned.iter().filter(|t| t.candidate.gap == *gap).copied().collect();
+        let Some(first) = most_likely(&of_gap) else { continue };
+        for k in -STEPS..=STEPS {
+            let share = first.share() + share * f64::from(k) / f64::from(STEPS);
+            if !(0.0..=1.0).contains(&share) {
+                continue;
+            }
+            out.extend((-STEPS..=STEPS).map(|l| {
+                let level = first.candidate.level + spacing * f64::from(l) / f64::from(STEPS);
+                Candidate { share, level, gap: *gap }
+            }));
         }
     }
     out

@@ -83,6 +83,22 @@ impl Response {
         }
         Response { path, values, lead }
     }
+
+    /// Inner products of a signal with the response to an impulse at every sample.
+    pub(super) fn adjoint(&self, signal: &[f64]) -> Vec<f64> {
+        let of = |k: usize| {
+            let before = self.lead.saturating_sub(k);
+            let from = (k + before - self.lead).min(signal.len());
+            self.values[before..].iter().zip(&signal[from..]).map(|(v, s)| v * s).sum()
+        };
+        (0..signal.len()).map(of).collect()
+    }
+
+    /// Inner products of the response with itself, per lag.
+    pub(super) fn products(&self) -> Vec<f64> {
+        let of = |lag: usize| self.values[lag..].iter().zip(&self.values).map(|(a, b)| a * b).sum();
+        (0..self.values.len()).map(of).collect()
+    }
 }
 
 /// A signal through two real poles, longer by what they take to settle.
