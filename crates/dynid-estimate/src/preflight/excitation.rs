@@ -8,10 +8,13 @@ use super::samples::Samples;
 use super::wiring::Wiring;
 use crate::linear::ols;
 
+/// Condition number from which on a regressor counts as singular.
+const SINGULAR: f64 = 1e12;
+
 /// Excitation of the base parameters by a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excitation {
-    /// Condition number of the weighted regressor with unit columns.
+    /// Condition number of the weighted regressor with unit columns; infinite from 1e12 on, where rounding decides.
     pub condition: f64,
     /// Base parameters that the log excites at all.
     pub excited: usize,
@@ -38,5 +41,6 @@ pub fn excitation(
     for (k, column) in solution.kept.iter().enumerate() {
         std[*column] = Some(covariance[(k, k)].max(0.0).sqrt());
     }
-    Ok(Excitation { condition: solution.condition_scaled, excited: solution.kept.len(), std })
+    let condition = Some(solution.condition_scaled).filter(|c| *c < SINGULAR).unwrap_or(f64::INFINITY);
+    Ok(Excitation { condition, excited: solution.kept.len(), std })
 }

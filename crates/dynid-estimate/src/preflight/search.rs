@@ -181,8 +181,8 @@ impl Trial<'_> {
                 out.push(Rewiring::PositionUnit(j, 1f64.to_degrees()));
             }
         }
-        // That of all efforts together is the prior's alone to tell.
-        if scales && n > 1 {
+        // That of all efforts together, and of the only joint that moves, is the prior's alone to tell.
+        if scales && moving.len() > 1 {
             out.extend(moving.iter().flat_map(|j| SCALES.map(|s| Rewiring::EffortScale(*j, s))));
         }
         let farthest = if n > FEW { 1 } else { n };

@@ -8,7 +8,7 @@ use dynid_estimate::preflight::{
 };
 use dynid_io::columns::degrees_suspected;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
-use dynid_motion::UniformLog;
+use dynid_motion::{JointSignals, Log, UniformLog};
 
 use super::columns::Velocities;
 use super::finding::{Findings, Fix, Severity};
@@ -38,6 +38,9 @@ const CONDITION: f64 = 100.0;
 const STATED: f64 = 0.3;
 /// Efforts this many times larger or smaller than stated inertias ask for are in another unit.
 const OFF: f64 = 5.0;
+/// Share of the farthest travel of a joint of its kind below which a joint stands still: more than degrees taken for radians
+/// make of it.
+const STILL: f64 = 1e-3;
 /// Share of the efforts' power (root) left unexplained above which a model explains too little to judge by.
 const UNEXPLAINED: f64 = 0.5;
 
@@ -98,6 +101,39 @@ impl Bench {
         let names = self.names();
         log.joints.retain(|j| names.contains(&j.name));
         log.joints.sort_by_key(|j| names.iter().position(|n| *n == j.name));
+    }
+
+    /// Joints that stand still in a log.
+    pub(super) fn idle(&self, log: &Log, out: &mut Findings<'_>) -> Vec<String> {
+        let names = self.names();
+        let slides = |name: &str| names.iter().position(|n| n == name).is_some_and(|j| self.slides[j]);
+        let travel = |joint: &JointSignals| {
+            let within = joint.position.iter().filter(|q| q.abs() <= LARGEST_POSITION);
+            let (low, high) =
+                within.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| (a.min(*q), b.max(*q)));
+            (high - low).max(0.0)
+        };
+        let mut idle = Vec::new();
+        for joint in log.joints() {
+            let alike = log.joints().iter().filter(|other| slides(&other.name) == slides(&joint.name));
+            let (own, largest) = (travel(joint), alike.map(travel).fold(0.0, f64::max));
+            let evidence = if !joint.moves() {
+                "the position does not leave its resolution and noise".to_owned()
+            } else if own < STILL * largest {
+                let unit = if slides(&joint.name) { "m" } else { "rad" };
+                format!(
+                    "the position moves by {own:.1e} {unit}, that of another joint by {largest:.1e} {unit}"
+                )
+            } else {
+                continue;
+            };
+            idle.push(joint.name.clone());
+            if !joint.effort_is_constant() {
+                let remedy = "friction, drive and most inertias of this joint cannot be seen in this log; add one in which it moves";
+                out.add("idle_joint", Severity::Warning, Some(&joint.name), evidence, remedy);
+            }
+        }
+        idle
     }
 
     /// Why this robot's columns are not tried in other ways, if they are not.
@@ -310,10 +346,11 @@ impl Bench {
         let table = &self.model.parameters().linear;
         let name = |k: &usize| table[self.base.kept[*k]].name.clone();
         let unseen: Vec<String> = (0..total).filter(|k| found.std[*k].is_none()).map(|k| name(&k)).collect();
-        let mut evidence = format!(
-            "condition number {:.0} (unit columns), {} of {total} base parameters excited",
-            found.condition, found.excited
-        );
+        let condition = match found.condition {
+            c if c.is_finite() => format!("condition number {c:.0} (unit columns)"),
+            _ => "regressor singular".to_owned(),
+        };
+        let mut evidence = format!("{condition}, {} of {total} base parameters excited", found.excited);
         if !unseen.is_empty() {
             evidence += &format!("; not excited: {}", first_of(&unseen));
         }

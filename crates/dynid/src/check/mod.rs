@@ -147,8 +147,7 @@ fn examine(
 ) -> Result<(CheckedLog, report::Trace), Error> {
     let mut on_grid = record::examine(&loaded.log, &loaded.rows, out)?;
     bench.order(&mut on_grid);
-    let idle: Vec<String> =
-        loaded.log.joints().iter().filter(|j| !j.moves()).map(|j| j.name.clone()).collect();
+    let idle = bench.idle(&loaded.log, out);
     let Examined { wiring, delay, tilt, excitation } = bench.examine(&on_grid, &idle, out)?;
     let checked = CheckedLog {
         log: out.log.to_owned(),

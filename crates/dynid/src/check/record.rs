@@ -85,11 +85,6 @@ pub(super) fn examine(log: &Log, rows: &[usize], out: &mut Findings<'_>) -> Resu
             out.add("saturation", Severity::Warning, name, evidence, remedy).fixes =
                 leave_out(&flat.runs, rows);
         }
-        if !joint.moves() {
-            let evidence = "the position does not leave its resolution and noise".to_owned();
-            let remedy = "friction, drive and most inertias of this joint cannot be seen in this log; add one in which it moves";
-            out.add("idle_joint", Severity::Warning, name, evidence, remedy);
-        }
     }
     let within = far(log, rows, out);
     let log = within.as_ref().unwrap_or(log);

@@ -480,3 +480,32 @@ fn rows_are_those_of_the_file() {
         assert!(ranges.contains(&(3500, 3500)) && ranges.contains(&(4500, 4500)), "{ranges:?}");
     }
 }
+
+/// One joint moves, the others tremble by some 1e-5 rad: there is nothing to tell columns by, and nothing is made up.
+#[test]
+fn single_joint_runs_of_a_gen3_raise_no_error() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/kinova-gen3");
+    if !data.is_dir() {
+        println!("skipped: {} is not there", data.display());
+        return;
+    }
+    let mut text = format!(
+        "robot = \"{}/gen3.urdf\"\n[columns]\ntime = {{ columns = [\"Time\"], unit = \"ms\" }}\nposition = \"Position{{}}\"\n\
+         velocity = \"Velocity{{}}\"\neffort = \"TorqueCur{{}}\"\n",
+        data.display()
+    );
+    for k in 1..=7 {
+        text += &format!("[[log]]\npath = \"{}/joint_{k}_trapez.csv.gz\"\n", data.display());
+        if k == 5 {
+            text += "rows = [1, 5846]\n";
+        }
+    }
+    let found = examine(&Config::parse(&text, "test").unwrap());
+    let errors: Vec<_> = found.findings.iter().filter(|f| f.severity == Severity::Error).collect();
+    assert!(errors.is_empty(), "{errors:#?}");
+    let idle = |k: usize| {
+        let log = format!("joint_{k}_trapez.csv.gz");
+        found.findings.iter().filter(|f| f.id == "idle_joint" && f.log.ends_with(&log)).count()
+    };
+    assert_eq!((1..=7).map(idle).collect::<Vec<_>>(), [6; 7]);
+}
