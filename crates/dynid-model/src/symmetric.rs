@@ -206,9 +206,8 @@ pub fn right_singular<const N: usize>(a: &Square<N>) -> ([f64; N], Square<N>) {
 
 /// Cosine and sine of the rotation that annihilates an off-diagonal entry, from `cot 2θ`.
 fn rotation(theta: f64) -> (f64, f64) {
-    // A square that overflows leaves the angle zero, which it then is to rounding.
-    let t = if theta == 0.0 { 1.0 } else { theta.signum() / (theta.abs() + (1.0 + theta * theta).sqrt()) };
-    let c = 1.0 / (1.0 + t * t).sqrt();
+    let t = if theta == 0.0 { 1.0 } else { theta.signum() / (theta.abs() + theta.hypot(1.0)) };
+    let c = 1.0 / t.hypot(1.0);
     (c, t * c)
 }
 
