@@ -62,6 +62,11 @@ impl ParameterTable {
         self.linear.iter().position(|p| p.name == name)
     }
 
+    /// Start value of the shape parameter with this name.
+    pub fn shape_value(&self, name: &str) -> Option<f64> {
+        self.shape.iter().find(|s| s.name == name).map(|s| s.start)
+    }
+
     /// Start values of the shape parameters.
     pub fn shape_start(&self) -> Vec<f64> {
         self.shape.iter().map(|s| s.start).collect()

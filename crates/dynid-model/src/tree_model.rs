@@ -100,7 +100,7 @@ impl TreeModel {
         elements: Vec<Box<dyn JointElement>>,
     ) -> Self {
         let dynamics = Dynamics::new(&mechanism);
-        let joints = joint_infos(&mechanism, &coordinates);
+        let joints = JointInfo::of(&mechanism, &coordinates);
         let own_units = coordinates.iter().map(Coordinate::effort_unit);
         let outputs: Vec<Output> = joints
             .iter()
@@ -442,29 +442,6 @@ impl CoupledRegressor {
             }
         }
     }
-}
-
-fn joint_infos(mechanism: &Mechanism, coordinates: &[Coordinate]) -> Vec<JointInfo> {
-    let owners = mechanism.rate_bodies();
-    let names = mechanism.rate_names();
-    let mut position = 0;
-    let mut last = usize::MAX;
-    let mut out = Vec::with_capacity(names.len());
-    for (k, name) in names.into_iter().enumerate() {
-        let joint = &mechanism.bodies()[owners[k]].joint;
-        if owners[k] != last {
-            position =
-                out.last().map_or(0, |j: &JointInfo| j.position + mechanism.bodies()[last].joint.positions());
-            last = owners[k];
-        }
-        out.push(JointInfo { name, number: k + 1, position, slides: joint.kind == JointKind::Prismatic });
-    }
-    for (k, coordinate) in coordinates.iter().enumerate() {
-        let Coordinate { name, slides, .. } = coordinate.clone();
-        assert!(out.iter().all(|j| j.name != name), "two coordinates named `{name}`");
-        out.push(JointInfo { number: out.len() + 1, position: mechanism.positions() + k, name, slides });
-    }
-    out
 }
 
 /// How far each coordinate without bodies travels per travel of a joint.

@@ -16,8 +16,8 @@ use dynid_estimate::conditioning::{FrictionShape, ShapeKind};
 use dynid_io::{CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, SettingValue};
 use dynid_model::closed::ClosedMechanism;
 use dynid_model::element::{
-    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, ExternalLoad, JointElement,
-    LoadFriction, Offset, RotorInertia, Spring, Transmission, Viscous, ViscousMagnitude,
+    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, ExternalLoad, JointElement, JointInfo,
+    LoadFriction, LogScaled, Offset, RotorInertia, Spring, Transmission, Viscous, ViscousMagnitude,
 };
 use dynid_model::{Coordinate, JointKind, Mechanism};
 
@@ -172,6 +172,11 @@ impl ElementPlan {
         ElementPlan { closed, ..self }
     }
 
+    /// The plan of the robot alone: nothing that belongs to single logs.
+    pub(crate) fn without_logs(&self) -> Self {
+        ElementPlan { log_terms: LogTerms::default(), ..self.clone() }
+    }
+
     /// Settings of the elements.
     pub fn settings(&self) -> &[dynid_io::ElementSetting] {
         &self.spec.settings
@@ -240,7 +245,8 @@ impl ElementPlan {
         self.spec.settings.retain(|s| !(s.joint == joint && s.element == name));
     }
 
-    /// Builds the elements in joint order, then gear loads, couplings and springs, last what belongs to single logs.
+    /// Builds the elements in joint order, then gear loads, couplings and springs, last what belongs to single logs. Where logs
+    /// have a factor on friction, all friction stands after the other elements of joints.
     ///
     /// Shape parameters about which nothing is said get bounds for the speed limit of the joint, or for 1 rad/s (m/s)
     /// where there is none.
@@ -258,13 +264,40 @@ impl ElementPlan {
                 out.push(self.element(name, rate, &names[rate], speed)?);
             }
         }
-        out.extend(self.load(mechanism, &names)?);
+        let load = self.load(mechanism, &names)?;
+        match self.log_terms.scaled() {
+            logs if logs.is_empty() => out.extend(load),
+            logs => {
+                let (friction, others): (Vec<_>, Vec<_>) = out.into_iter().partition(|e| e.is_friction());
+                out = others;
+                out.push(self.scaled(mechanism, friction.into_iter().chain(load).collect(), logs)?);
+            }
+        }
         for coupling in &self.couplings {
             out.push(build_coupling(coupling, &names)?);
         }
         out.extend(self.transmissions(&names)?);
         out.extend(self.log_terms.elements(mechanism, &self.per_rate));
         Ok(out)
+    }
+
+    /// Friction with a factor for each of these logs.
+    fn scaled(
+        &self,
+        mechanism: &Mechanism,
+        friction: Vec<Box<dyn JointElement>>,
+        logs: Vec<String>,
+    ) -> Result<Box<dyn JointElement>, Error> {
+        let joints = JointInfo::of(mechanism, &self.coordinates);
+        let refused = match friction.is_empty() {
+            true => Some("where no joint has friction"),
+            false => (friction.iter().any(|e| !e.signals(&joints).is_empty()))
+                .then_some("beside `lugre`: friction with memory has no form for it"),
+        };
+        match refused {
+            Some(why) => Err(Error::Unsupported(format!("`own = [\"friction_scale\"]` {why}"))),
+            None => Ok(Box::new(LogScaled::new(friction, &joints, logs))),
+        }
     }
 
     fn element(

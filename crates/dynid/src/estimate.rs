@@ -58,6 +58,9 @@ pub struct Estimate {
     /// Delays of single logs, taken off their efforts.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub log_delays: Vec<OwnDelay>,
+    /// Factors on the friction of single logs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub log_scales: Vec<LogScale>,
     /// Base parameters.
     pub base_parameters: Vec<BaseValue>,
     /// Parameters that enter the effort nonlinearly.
@@ -128,6 +131,24 @@ impl From<&crate::check::Finding> for FindingRecord {
             evidence: of.evidence.clone(),
         }
     }
+}
+
+/// A log with a factor of its own on the friction of all joints.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LogScale {
+    /// Log.
+    pub log: String,
+    /// Friction in this log over that in the logs without such a factor.
+    pub value: f64,
+    /// Its standard deviation, where the logs show it.
+    pub std: Option<f64>,
+    /// Its 95 % interval, where the logs show it.
+    pub interval: Option<(f64, f64)>,
+    /// What the logs say of it.
+    pub verdict: String,
+    /// Why.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
 }
 
 /// Which standard parameters stand for the base values.

@@ -17,7 +17,8 @@ use dynid_estimate::conditioning::{
 use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::linear::LinearEstimate;
 use dynid_estimate::whiteness::InBandWhiteness;
-use dynid_model::{BaseParameters, EffortModel, RobotModel};
+use dynid_model::element::scale_name;
+use dynid_model::{BaseParameters, EffortModel, Parameter, RobotModel, ShapeParameter};
 use dynid_motion::Log;
 
 use crate::Error;
@@ -80,6 +81,8 @@ pub struct Identification {
     pub shapes: Option<ShapeFit>,
     /// The nonlinear model with its linear parameters that the fit's parameters stand for, where it was linearised.
     pub nonlinear: Option<(RobotModel, Vec<f64>)>,
+    /// The robot alone with its linear parameters, where the model has terms of single logs.
+    pub alone: Option<(RobotModel, Vec<f64>)>,
     /// Base parameters of the model.
     pub base: BaseParameters,
     /// Training logs.
@@ -209,7 +212,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     warnings.extend(log_warnings(&model, &prepared));
     warnings.extend(elastic::warnings(&model, &prepared));
     warnings.extend(known::warnings(&plan, &robot.mechanism, &prepared));
-    let log_agreement = log_agreement::test(config, &model, &base, &fitted, &plan.log_terms);
+    let scale = |log: &str| shapes.as_ref().and_then(|found| found.model.parameters().shape_value(&scale_name(log))).unwrap_or(1.0);
+    let log_agreement = log_agreement::test(config, &model, &base, &fitted, &plan.log_terms, scale);
     warnings.extend(log_agreement.iter().flat_map(LogAgreement::warnings));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
     let mut out = Identification {
@@ -247,10 +251,12 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         model,
         shapes,
         nonlinear: None,
+        alone: None,
         instruments,
         comparison: None,
     };
     out.nonlinear = out.unfolded(out.values())?;
+    out.alone = out.without_logs()?;
     for (l, log) in prepared.iter().enumerate() {
         progress(Step::Validate(log.name.clone()));
         let agreement = out.agreement(out.values(), log)?;
@@ -356,6 +362,26 @@ impl Identification {
         let mechanism = self.model.mechanism();
         let model = self.plan.model(mechanism)?;
         Ok(Some((model.with_shape(&unfolded.shape), unfolded.linear)))
+    }
+
+    /// The identified model without what belongs to single logs; `None` if nothing does.
+    fn without_logs(&self) -> Result<Option<(RobotModel, Vec<f64>)>, Error> {
+        if self.plan.log_terms.is_empty() {
+            return Ok(None);
+        }
+        let (model, values) = self.identified_model();
+        let alone = self.plan.without_logs().model(self.model.mechanism())?;
+        let (from, to) = (model.parameters(), alone.parameters());
+        let value = |p: &Parameter| from.column(&p.name).map_or(0.0, |c| values[c]);
+        let linear = to.linear.iter().map(value).collect();
+        let start = |s: &ShapeParameter| from.shape_value(&s.name).unwrap_or(s.start);
+        let shape: Vec<f64> = to.shape.iter().map(start).collect();
+        Ok(Some((alone.with_shape(&shape), linear)))
+    }
+
+    /// The robot alone and its linear parameters: [`Identification::identified_model`] without what belongs to single logs.
+    pub fn robot_alone(&self) -> (&RobotModel, &[f64]) {
+        self.alone.as_ref().map_or_else(|| self.identified_model(), |(model, values)| (model, values))
     }
 
     /// The identified model and its linear parameters: [`Identification::values`], or what they stand for where the fit's

@@ -73,13 +73,15 @@ pub struct LogAgreement {
     pub one_robot: Option<OneRobot>,
 }
 
-/// Tests the training logs; `None` with a single log or too few time blocks.
+/// Tests the training logs; `None` with a single log or too few time blocks. `scale`: factor on friction that a log has of its
+/// own, 1 without.
 pub(crate) fn test(
     config: &Config,
     model: &RobotModel,
     base: &BaseParameters,
     fitted: &Fitted,
     terms: &LogTerms,
+    scale: impl Fn(&str) -> f64,
 ) -> Option<LogAgreement> {
     if config.log.len() < 2 {
         return None;
@@ -104,7 +106,12 @@ pub(crate) fn test(
     }
     let groups = &fitted.estimate.reduced;
     let found = log_deviations(groups, base.len(), &own)?;
-    let deviations = deviations(&found, model, &labels, name_of, |c| table[base.kept[c]].unit);
+    let mut deviations = deviations(&found, model, &labels, name_of, |c| table[base.kept[c]].unit);
+    // Columns of friction are scaled in such logs.
+    for d in deviations.iter_mut().filter(|d| d.parameter != "fo") {
+        let scale = scale(&d.log);
+        (d.value, d.std) = (scale * d.value, scale * d.std);
+    }
     let one_robot = found.separate(fitted.inflation).map(|separate| OneRobot {
         f: separate.f,
         limit: separate.limit,

@@ -1,4 +1,5 @@
-//! Terms that belong to single logs, as elements gated by channels: payloads, and deviations of offset and friction.
+//! Terms that belong to single logs, as elements gated by channels: payloads, deviations of offset and friction, factors on
+//! friction.
 //!
 //! A gate is a channel that is 1 throughout the logs that a term belongs to and 0 in all others. Estimators therefore see
 //! ordinary columns, and a model whose gates are 0 is that of the robot alone.
@@ -10,7 +11,7 @@ use dynid_model::{Inertia, KnownElement, Mat3, Mechanism, Vec3};
 use dynid_motion::Log;
 
 use crate::Error;
-use crate::config::{Config, LogConfig, Own, PayloadConfig};
+use crate::config::{Config, LogConfig, Own, PayloadConfig, Route};
 use crate::robot::Robot;
 
 /// Elements that a plan has beside those of its joints, each in some logs only.
@@ -50,12 +51,27 @@ impl LogTerms {
             terms.payloads.push(PayloadTerm { config: payload.clone(), body, known });
         }
         terms.deviations = deviations(config);
-        Ok(terms)
+        let no_factor = match config.conditioning.route {
+            _ if terms.scaled().is_empty() => None,
+            Route::Textbook => Some("on the textbook route: it searches no shape parameters"),
+            _ if config.elements.known_friction.is_some() => Some("beside known friction, which it does not scale"),
+            Route::Compact => None,
+        };
+        match no_factor {
+            Some(why) => Err(Error::Unsupported(format!("`own = [\"friction_scale\"]` {why}"))),
+            None => Ok(terms),
+        }
     }
 
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.payloads.is_empty() && self.deviations.is_empty()
+    }
+
+    /// Logs whose friction has a factor of its own.
+    pub(crate) fn scaled(&self) -> Vec<String> {
+        let scaled = self.deviations.iter().filter(|(_, own)| *own == Own::FrictionScale);
+        scaled.map(|(log, _)| log.clone()).collect()
     }
 
     /// A log with its gates. `label`: the training log whose own terms it has; `payload`: what it carries.
@@ -132,7 +148,7 @@ fn deviations(config: &Config) -> Vec<(String, Own)> {
     let labels = config.log_labels();
     let mut out = Vec::new();
     for (k, (log, label)) in config.log.iter().zip(&labels).enumerate() {
-        for own in [Own::Offset, Own::Friction] {
+        for own in [Own::Offset, Own::Friction, Own::FrictionScale] {
             let all = config.log.iter().all(|l| l.own.contains(&own));
             if log.own.contains(&own) && !(all && k == 0) {
                 out.push((label.clone(), own));

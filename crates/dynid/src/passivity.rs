@@ -44,7 +44,7 @@ fn fed(found: &FrictionPassivity) -> f64 {
 impl Identification {
     /// Channels of the identified model at their least and at their greatest values of the training logs.
     pub(crate) fn held_channels(&self) -> Vec<Vec<(&str, f64)>> {
-        let (model, _) = self.identified_model();
+        let (model, _) = self.robot_alone();
         let names = model.channels();
         if names.is_empty() {
             return vec![Vec::new()];
@@ -61,7 +61,7 @@ impl Identification {
     /// Passivity of the identified friction on the velocities that the training logs reach, joint by joint, at the worse of
     /// the coldest and the warmest state logged; joints without friction and those that no log moves are left out.
     pub fn friction_passivity(&self) -> Vec<PassivityRecord> {
-        let (model, linear) = self.identified_model();
+        let (model, linear) = self.robot_alone();
         let shape = model.parameters().shape_start();
         let outputs = self.model.outputs().iter().enumerate();
         outputs
@@ -138,7 +138,7 @@ impl Identification {
 
     /// The remedy that keeps the law: coefficients that must not be negative.
     fn bound_on_friction(&self, joint: &str) -> String {
-        let (model, linear) = self.identified_model();
+        let (model, linear) = self.robot_alone();
         let table = &model.parameters().linear;
         let coefficient = |name: &str| match name.rsplit_once('.') {
             Some((owner, symbol)) => owner == joint && friction::COEFFICIENTS.contains(&symbol),

@@ -4,7 +4,7 @@ mod friction;
 mod instruments;
 mod trust;
 
-use dynid_model::element::change_name;
+use dynid_model::element::{change_name, scale_name};
 use dynid_model::{EffortModel, Inertia, Owner};
 use serde_json::json;
 
@@ -12,8 +12,8 @@ use crate::Error;
 use crate::agreement::Agreement;
 use crate::config::{Config, Route};
 use crate::estimate::{
-    BaseValue, Choice, ConditioningRecord, Estimate, FitSummary, FitValues, InputRecord, LogFit, ModelRecord,
-    ParameterValue, Provenance, RankStatus, SCHEMA, ShapeValue,
+    BaseValue, Choice, ConditioningRecord, Estimate, FitSummary, FitValues, InputRecord, LogFit, LogScale,
+    ModelRecord, ParameterValue, Provenance, RankStatus, SCHEMA, ShapeValue,
 };
 use crate::identify::Identification;
 use crate::logs::sha256;
@@ -54,12 +54,13 @@ impl Identification {
                 not_excited: names(&not_excited),
                 never_seen: names(&self.base.zero),
             },
-            parameters: self.parameter_values(0..self.model.log_columns().start),
+            parameters: self.robot_parameters(),
             log_agreement: self.log_agreement.clone(),
             log_delays: self.own_delays.clone(),
             log_parameters: self.parameter_values(self.model.log_columns()),
             base_parameters: self.base_values(),
-            shape_parameters: self.shape_values(),
+            shape_parameters: self.robot_shapes(),
+            log_scales: self.log_scales(),
             friction_passivity: self.friction_passivity(),
             feasible: self.unphysical_bodies().is_empty(),
             consistency: self.consistency_record(config),
@@ -138,6 +139,37 @@ impl Identification {
                 }
             })
             .collect()
+    }
+
+    /// Parameters of the robot alone, in the order of the model that the result file records.
+    fn robot_parameters(&self) -> Vec<ParameterValue> {
+        let table = self.robot_alone().0.parameters();
+        let mut out = self.parameter_values(0..self.model.log_columns().start);
+        out.sort_by_cached_key(|p| table.column(&p.name));
+        out
+    }
+
+    fn robot_shapes(&self) -> Vec<ShapeValue> {
+        let table = self.robot_alone().0.parameters();
+        let all = self.shape_values();
+        table.shape.iter().filter_map(|s| all.iter().find(|v| v.name == s.name).cloned()).collect()
+    }
+
+    /// Factors on friction of the logs that have one of their own.
+    pub(crate) fn log_scales(&self) -> Vec<LogScale> {
+        let all = self.shape_values();
+        let of = |log: String| {
+            let found = all.iter().find(|s| s.name == scale_name(&log))?.clone();
+            Some(LogScale {
+                log,
+                value: found.value,
+                std: found.std,
+                interval: found.interval,
+                verdict: found.verdict,
+                reason: found.reason,
+            })
+        };
+        self.plan.log_terms.scaled().into_iter().filter_map(of).collect()
     }
 
     fn base_values(&self) -> Vec<BaseValue> {

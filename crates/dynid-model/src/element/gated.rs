@@ -67,6 +67,9 @@ impl JointElement for Gated {
         channels.push(log_channel(&self.log));
         channels
     }
+    fn is_of_logs(&self) -> bool {
+        true
+    }
     fn reversal_speeds(&self) -> Vec<Vec<(usize, f64)>> {
         self.element.reversal_speeds()
     }

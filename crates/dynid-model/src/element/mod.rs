@@ -13,6 +13,7 @@ mod friction;
 mod gated;
 mod jets;
 mod linearised;
+mod log_scaled;
 mod payload;
 mod rotor;
 mod shape;
@@ -33,12 +34,16 @@ pub use friction::{
 pub use gated::{Gated, is_gate, log_channel, payload_channel};
 pub use jets::JetMotion;
 pub use linearised::{Linearised, change_name};
+pub use log_scaled::{LogScaled, ScaledPart, scale_name};
 pub use payload::{KnownLoad, Payload};
 pub use rotor::RotorInertia;
 pub use shape::{ShapeFault, ShapeSetting};
 pub use transmission::{CoupledWrist, Transmission};
 
+use crate::coordinate::Coordinate;
+use crate::description::JointKind;
 use crate::dynamics::{MotionAdjoint, MotionBlock};
+use crate::mechanism::Mechanism;
 use crate::parameter::{Owner, Parameter, ShapeParameter};
 use crate::scalar::Jet;
 use crate::scalar::elementary::{Curve, map_curve};
@@ -57,6 +62,33 @@ pub struct JointInfo {
 }
 
 impl JointInfo {
+    /// Outputs of a mechanism and of coordinates that no body moves with, the latter last.
+    ///
+    /// # Panics
+    /// If two share a name.
+    pub fn of(mechanism: &Mechanism, coordinates: &[Coordinate]) -> Vec<JointInfo> {
+        let owners = mechanism.rate_bodies();
+        let names = mechanism.rate_names();
+        let mut position = 0;
+        let mut last = usize::MAX;
+        let mut out = Vec::with_capacity(names.len());
+        for (k, name) in names.into_iter().enumerate() {
+            let joint = &mechanism.bodies()[owners[k]].joint;
+            if owners[k] != last {
+                position =
+                    out.last().map_or(0, |j: &JointInfo| j.position + mechanism.bodies()[last].joint.positions());
+                last = owners[k];
+            }
+            out.push(JointInfo { name, number: k + 1, position, slides: joint.kind == JointKind::Prismatic });
+        }
+        for (k, coordinate) in coordinates.iter().enumerate() {
+            let Coordinate { name, slides, .. } = coordinate.clone();
+            assert!(out.iter().all(|j| j.name != name), "two coordinates named `{name}`");
+            out.push(JointInfo { number: out.len() + 1, position: mechanism.positions() + k, name, slides });
+        }
+        out
+    }
+
     /// A linear parameter of this joint. `units`: for joints that turn and for joints that slide.
     pub fn parameter(&self, symbol: &str, units: [&'static str; 2], lower: Option<f64>) -> Parameter {
         Parameter {
@@ -205,6 +237,14 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     /// The payload that it is, if it is one; none by default.
     fn payload(&self) -> Option<&Payload> {
         None
+    }
+    /// The elements with a factor of some logs that it is, if it is such; none by default.
+    fn scaled(&self) -> Option<&LogScaled> {
+        None
+    }
+    /// Its linear parameters are of single logs: without [gate](is_gate) it has no effort. False by default.
+    fn is_of_logs(&self) -> bool {
+        false
     }
     /// Fills the columns of all entries.
     fn fill(

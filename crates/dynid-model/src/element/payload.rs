@@ -107,6 +107,9 @@ impl JointElement for Payload {
     fn channels(&self, _: &[JointInfo]) -> Vec<String> {
         vec![payload_channel(&self.name)]
     }
+    fn is_of_logs(&self) -> bool {
+        true
+    }
     fn payload(&self) -> Option<&Payload> {
         Some(self)
     }
@@ -200,6 +203,9 @@ impl JointElement for KnownLoad {
     }
     fn channels(&self, _: &[JointInfo]) -> Vec<String> {
         vec![payload_channel(&self.name)]
+    }
+    fn is_of_logs(&self) -> bool {
+        true
     }
     fn fill(&self, _: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         let n = motion.samples;

@@ -3,7 +3,7 @@
 use super::{PlacedElement, TreeModel};
 use crate::dynamics::MotionBlock;
 use crate::effort_model::EffortModel;
-use crate::element::ElementColumns;
+use crate::element::{ElementColumns, JointElement, ScaledPart};
 
 /// Where friction takes energy out of the motion.
 #[derive(Debug, Clone, PartialEq)]
@@ -124,9 +124,27 @@ struct Friction<'a> {
 
 /// One friction element with its shape parameters and the values that its entries point at.
 struct Law<'a> {
-    placed: &'a PlacedElement,
+    element: &'a dyn JointElement,
+    /// Rate and column of every entry.
+    entries: &'a [(usize, usize)],
     shape: &'a [f64],
     linear: &'a [f64],
+}
+
+impl<'a> Law<'a> {
+    /// The element, or those that it scales by log, as they are without a log of their own.
+    fn of(placed: &'a PlacedElement, shape: &'a [f64], linear: &'a [f64]) -> Vec<Law<'a>> {
+        let Some(scaled) = placed.element.scaled() else {
+            return vec![Law { element: &*placed.element, entries: &placed.entries, shape, linear }];
+        };
+        let part = |part: &'a ScaledPart| Law {
+            element: &*part.element,
+            entries: &placed.entries[part.entries()],
+            shape: part.shape(shape),
+            linear,
+        };
+        scaled.parts().iter().map(part).collect()
+    }
 }
 
 /// Friction of one direction of motion.
@@ -148,10 +166,9 @@ impl<'a> Friction<'a> {
         linear: &'a [f64],
         held: &'a [(&'a str, f64)],
     ) -> Self {
-        let own = model.elements.iter().map(|placed| Law { placed, shape: placed.shape(shape), linear });
-        let known = model.known.iter().map(|k| Law { placed: &k.placed, shape: &k.shape, linear: &k.linear });
-        let of_joint =
-            |law: &Law<'_>| law.placed.element.is_friction() && law.placed.element.rates() == [rate];
+        let own = model.elements.iter().flat_map(|placed| Law::of(placed, placed.shape(shape), linear));
+        let known = model.known.iter().flat_map(|k| Law::of(&k.placed, &k.shape, &k.linear));
+        let of_joint = |law: &Law<'_>| law.element.is_friction() && law.element.rates() == [rate];
         let elements = own.chain(known).filter(of_joint).collect();
         let mut friction = Friction { model, elements, rate, held, at_rest: 0.0 };
         friction.at_rest = friction.efforts(&[0.0])[0];
@@ -167,12 +184,12 @@ impl<'a> Friction<'a> {
             self.held.iter().zip(&held).map(|((name, _), x)| (*name, x.as_slice())).collect();
         let motion = MotionBlock { channels: &channels, ..MotionBlock::plain(n, &[], &dq, &[]) };
         let mut effort = vec![0.0; n];
-        for Law { placed, shape, linear } in &self.elements {
-            let mut data = vec![0.0; placed.entries.len() * n];
-            let slots = &placed.entry_numbers;
-            let mut columns = ElementColumns { data: &mut data, slots, stride: n, samples: n };
-            placed.element.fill(&self.model.joints, &motion, shape, &mut columns);
-            for ((_, column), values) in placed.entries.iter().zip(data.chunks_exact(n)) {
+        for Law { element, entries, shape, linear } in &self.elements {
+            let mut data = vec![0.0; entries.len() * n];
+            let slots: Vec<usize> = (0..entries.len()).collect();
+            let mut columns = ElementColumns { data: &mut data, slots: &slots, stride: n, samples: n };
+            element.fill(&self.model.joints, &motion, shape, &mut columns);
+            for ((_, column), values) in entries.iter().zip(data.chunks_exact(n)) {
                 for (e, w) in effort.iter_mut().zip(values) {
                     *e += w * linear[*column];
                 }

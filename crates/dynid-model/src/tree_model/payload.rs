@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::TreeModel;
-use crate::element::{Payload, is_gate};
+use crate::element::Payload;
 
 impl TreeModel {
     /// Payloads of which all ten parameters are unknown, each with the column of its mass; the other nine follow it.
@@ -18,9 +18,8 @@ impl TreeModel {
     /// last.
     pub fn log_columns(&self) -> Range<usize> {
         let total = self.parameters.linear.len();
-        let gated =
-            self.elements.iter().filter(|p| p.element.channels(&self.joints).iter().any(|c| is_gate(c)));
-        let columns = gated.flat_map(|placed| placed.entries.iter().map(|(_, column)| *column));
+        let of_logs = self.elements.iter().filter(|p| p.element.is_of_logs());
+        let columns = of_logs.flat_map(|placed| placed.entries.iter().map(|(_, column)| *column));
         columns.min().unwrap_or(total)..total
     }
 }

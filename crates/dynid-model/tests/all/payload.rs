@@ -4,7 +4,8 @@
 
 use crate::random_tree::{check_close, generator, inertia, numbers, tree};
 use dynid_model::element::{
-    Coulomb, Gated, JointElement, KnownLoad, Offset, Payload, Viscous, is_gate, log_channel, payload_channel,
+    Coulomb, Gated, JointElement, JointInfo, KnownLoad, Linearised, LoadFriction, LogScaled, Offset, Payload,
+    ShapeSetting, Stribeck, TanhFriction, Viscous, is_gate, log_channel, payload_channel, scale_name,
 };
 use dynid_model::*;
 
@@ -104,6 +105,7 @@ fn adjoints_are_the_derivatives_of_central_differences() {
 fn check_adjoints(model: &dyn EffortModel) {
     let (positions, rates) = model.dimensions();
     let linear = random(model.parameters().linear.len(), 7);
+    let shape = model.parameters().shape_start();
     let weights = random(rates * SAMPLES, 8);
     let mut of_entries = RegressorBlock::new(model.layout().clone(), SAMPLES);
     of_entries.set_samples(SAMPLES);
@@ -128,9 +130,9 @@ fn check_adjoints(model: &dyn EffortModel) {
             let mut sums = [0.0; 2];
             motion(state, &mut |block| {
                 let mut w = RegressorBlock::new(model.layout().clone(), SAMPLES);
-                model.regressor(block, &[], &mut w);
+                model.regressor(block, &shape, &mut w);
                 let mut effort = vec![0.0; rates * SAMPLES];
-                model.efforts(block, &[], &linear, SAMPLES, &mut effort);
+                model.efforts(block, &shape, &linear, SAMPLES, &mut effort);
                 for output in 0..model.outputs().len() {
                     let own = w.effort(output, &linear);
                     let direct = &effort[output * SAMPLES..][..SAMPLES];
@@ -151,8 +153,8 @@ fn check_adjoints(model: &dyn EffortModel) {
         };
         let mut found = [0, 1].map(|_| MotionAdjoint::new(positions, rates, SAMPLES));
         motion(&state, &mut |block| {
-            model.effort_adjoint(block, &[], &linear, SAMPLES, &weights, &mut found[0]);
-            model.regressor_adjoint(block, &[], &of_entries, &mut found[1]);
+            model.effort_adjoint(block, &shape, &linear, SAMPLES, &weights, &mut found[0]);
+            model.regressor_adjoint(block, &shape, &of_entries, &mut found[1]);
         });
         let scale = scalars(&state).iter().fold(1.0_f64, |m, x| m.max(x.abs()));
         let h = 1e-5;
@@ -198,4 +200,123 @@ fn outputs_of_a_copy_share_no_parameter() {
         let expected: Vec<f64> = one.iter().enumerate().map(|(k, e)| e * (k / SAMPLES + 1) as f64).collect();
         check_close(&other, &expected, 1e-11, "efforts output by output");
     });
+}
+
+/// Friction of three joints, two of them with shape parameters, scaled in logs `b` and `c`.
+fn scaled(mechanism: &Mechanism) -> LogScaled {
+    let reference: Vec<f64> = mechanism.inertia_vector();
+    let mut stribeck = Stribeck::new(2);
+    stribeck.vs = ShapeSetting { start: 0.4, lower: 0.1, upper: 1.0, held: false };
+    let friction: Vec<Box<dyn JointElement>> = vec![
+        Box::new(Coulomb { rate: 0 }),
+        Box::new(Viscous { rate: 0 }),
+        Box::new(stribeck),
+        Box::new(TanhFriction::new(3)),
+        Box::new(LoadFriction::new(mechanism, vec![0, 2], reference.into())),
+    ];
+    let joints = JointInfo::of(mechanism, &[]);
+    LogScaled::new(friction, &joints, vec!["b".to_owned(), "c".to_owned()])
+}
+
+/// Values of the shape parameters: those of the elements, then factors of 1.3 and 0.8.
+fn scaled_shape(model: &RobotModel) -> Vec<f64> {
+    let mut shape = model.parameters().shape_start();
+    let elements = shape.len() - 2;
+    shape[elements..].copy_from_slice(&[1.3, 0.8]);
+    shape
+}
+
+#[test]
+fn scaled_friction_is_the_elements_times_the_factor_of_the_log() {
+    let plain = mechanism(3);
+    let alone = scaled(&plain).parts().len();
+    assert_eq!(alone, 5);
+    let model = RobotModel::new(plain.clone(), vec![Box::new(scaled(&plain))]);
+    let names: Vec<&str> = model.parameters().shape.iter().map(|s| s.name.as_str()).collect();
+    assert_eq!(names[names.len() - 2..], [scale_name("b"), scale_name("c")]);
+    assert_eq!(model.channels(), [log_channel("b"), log_channel("c")]);
+    assert!(model.log_columns().is_empty(), "its parameters are those of the robot");
+    let shape = scaled_shape(&model);
+    let mut linear = random(model.parameters().linear.len(), 7);
+    linear[..plain.inertial_parameters()].fill(0.0);
+    let (zero, one) = (vec![0.0; SAMPLES], vec![1.0; SAMPLES]);
+    let (b, c) = (log_channel("b"), log_channel("c"));
+    model.random_motion(SAMPLES, 4).with_block(|block| {
+        let of = |gates: [&[f64]; 2]| {
+            let channels = [(b.as_str(), gates[0]), (c.as_str(), gates[1])];
+            let motion = MotionBlock { channels: &channels, ..*block };
+            let mut out = vec![0.0; model.outputs().len() * SAMPLES];
+            model.efforts(&motion, &shape, &linear, SAMPLES, &mut out);
+            out
+        };
+        let elements = of([&zero, &zero]);
+        assert!(elements.iter().any(|e| *e != 0.0));
+        for (gates, factor) in [([&one[..], &zero[..]], 1.3), ([&zero, &one], 0.8)] {
+            let expected: Vec<f64> = elements.iter().map(|e| factor * e).collect();
+            check_close(&of(gates), &expected, 1e-12, "scaled");
+        }
+    });
+    // Friction of the robot alone, whatever the logs.
+    let law = |elements: Vec<Box<dyn JointElement>>| RobotModel::new(plain.clone(), elements);
+    let without = law(vec![Box::new(Coulomb { rate: 0 }), Box::new(Viscous { rate: 0 })]);
+    let mut own = vec![0.0; without.parameters().linear.len()];
+    let first = plain.inertial_parameters();
+    own[first..].copy_from_slice(&linear[first..first + 2]);
+    let speeds = [-0.7, 0.2, 1.1];
+    assert_eq!(
+        model.friction_effort(0, &shape, &linear, &speeds, &[]),
+        without.friction_effort(0, &[], &own, &speeds, &[])
+    );
+    assert_eq!(
+        model.friction_passivity(0, &shape, &linear, (-1.0, 1.0), &[]).passivity,
+        without.friction_passivity(0, &[], &own, (-1.0, 1.0), &[]).passivity
+    );
+}
+
+#[test]
+fn shape_derivatives_of_scaled_friction_are_those_of_central_differences() {
+    let plain = mechanism(3);
+    let model = RobotModel::new(plain.clone(), vec![Box::new(scaled(&plain))]);
+    let shape = scaled_shape(&model);
+    let (columns, pairs) = (model.shaped_columns(), model.shape_dependence());
+    let gates = [alternating(), vec![0.3; SAMPLES]];
+    let (b, c) = (log_channel("b"), log_channel("c"));
+    let channels = [(b.as_str(), gates[0].as_slice()), (c.as_str(), gates[1].as_slice())];
+    model.random_motion(SAMPLES, 4).with_block(|block| {
+        let motion = MotionBlock { channels: &channels, ..*block };
+        let values = |shape: &[f64]| {
+            let mut values = vec![0.0; columns.len() * SAMPLES];
+            model.shaped(&motion, shape, SAMPLES, &mut values, &mut []);
+            values
+        };
+        let mut derivatives = vec![0.0; pairs.len() * SAMPLES];
+        model.shaped(&motion, &shape, SAMPLES, &mut [], &mut derivatives);
+        let h = 1e-6;
+        for parameter in 0..shape.len() {
+            let side = |step: f64| {
+                let mut moved = shape.clone();
+                moved[parameter] += step;
+                values(&moved)
+            };
+            let (up, down) = (side(h), side(-h));
+            for (column, (up, down)) in up.chunks(SAMPLES).zip(down.chunks(SAMPLES)).enumerate() {
+                let difference: Vec<f64> = up.iter().zip(down).map(|(u, d)| (u - d) / (2.0 * h)).collect();
+                let place = pairs.iter().position(|pair| *pair == (column, parameter));
+                let own = place.map_or(vec![0.0; SAMPLES], |k| derivatives[k * SAMPLES..][..SAMPLES].to_vec());
+                check_close(&own, &difference, 1e-6, "derivative");
+            }
+        }
+    });
+}
+
+#[test]
+fn adjoints_of_scaled_friction_are_the_derivatives_of_central_differences() {
+    let plain = mechanism(3);
+    let model = RobotModel::new(plain.clone(), vec![Box::new(scaled(&plain))]);
+    let shape = scaled_shape(&model);
+    let linear = random(model.parameters().linear.len(), 7)[plain.inertial_parameters()..].to_vec();
+    let free = vec![true; shape.len()];
+    let linearised = Linearised::new(Box::new(scaled(&plain)), model.joints(), shape.clone(), linear, free);
+    check_adjoints(&RobotModel::new(plain.clone(), vec![Box::new(linearised)]));
+    check_adjoints(&model.with_shape(&shape));
 }

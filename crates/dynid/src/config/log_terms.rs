@@ -42,6 +42,8 @@ pub enum Own {
     Offset,
     /// Coulomb and viscous friction of every joint that has friction: colder or warmer gears.
     Friction,
+    /// One factor on the friction of all joints: gears that are colder or warmer altogether.
+    FrictionScale,
     /// Delay of the motion behind the logged effort.
     Delay,
 }
@@ -52,6 +54,7 @@ impl Own {
         match self {
             Own::Offset => "offset",
             Own::Friction => "friction",
+            Own::FrictionScale => "friction_scale",
             Own::Delay => "delay",
         }
     }
@@ -126,6 +129,10 @@ impl Config {
         for (k, (log, label)) in self.log.iter().zip(&labels).enumerate() {
             if log.name.is_some() && labels[..k].contains(label) {
                 return Err(Error::setting("log.name", "names that occur once", label));
+            }
+            if log.own.contains(&Own::Friction) && log.own.contains(&Own::FrictionScale) {
+                let expected = "`friction` or `friction_scale`: friction joint by joint has any scale";
+                return Err(Error::setting("log.own", expected, "both"));
             }
             if let Some(like) = &log.like {
                 return Err(Error::setting("log.like", "it in `[[validation]]` only", like));

@@ -100,9 +100,9 @@ impl Source {
 }
 
 impl Identification {
-    /// The identified robot, for [`RobotExport`](super::RobotExport) and [`json`](super::json()).
+    /// The identified robot alone, for [`RobotExport`](super::RobotExport) and [`json`](super::json()).
     pub fn identified(&self) -> Identified<'_> {
-        let (model, values) = self.identified_model();
+        let (model, values) = self.robot_alone();
         Identified {
             description: &self.robot.file.description,
             model,

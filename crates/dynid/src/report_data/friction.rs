@@ -27,7 +27,7 @@ impl Identification {
     }
 
     fn law(&self, record: &PassivityRecord, rate: usize) -> report::Chart {
-        let (model, linear) = self.identified_model();
+        let (model, linear) = self.robot_alone();
         let shape = model.parameters().shape_start();
         let (low, high) = record.velocity_range;
         // Denser towards rest, where laws bend.

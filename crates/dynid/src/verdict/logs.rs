@@ -1,5 +1,7 @@
 //! Several logs: whether they agree, and what single ones have of their own.
 
+use dynid_model::element::scale_name;
+
 use super::{Status, check};
 use crate::estimate::CheckResult;
 use crate::identify::Identification;
@@ -30,24 +32,47 @@ fn agreement(id: &Identification) -> Option<(Status, CheckResult)> {
     ))
 }
 
+/// What a log has of its own: name, value, the value without it, standard deviation, unit.
+struct Own {
+    name: String,
+    value: f64,
+    nothing: f64,
+    std: f64,
+    unit: String,
+}
+
+impl Own {
+    /// Standard deviations off.
+    fn off(&self) -> f64 {
+        (self.value - self.nothing).abs() / self.std
+    }
+
+    fn words(&self) -> String {
+        let Own { name, value, std, unit, .. } = self;
+        match unit.as_str() {
+            "1" => format!("{name} = {value:.3} ± {std:.3}"),
+            _ => format!("{name} = {value:+.3} ± {std:.3} {unit}"),
+        }
+    }
+}
+
 fn own(id: &Identification) -> Option<(Status, CheckResult)> {
     let columns = id.model.log_columns();
-    let values: Vec<_> = id
-        .parameter_values(columns)
-        .into_iter()
-        .filter(|p| p.joint.is_some())
-        .filter_map(|p| Some((p.name, p.unconstrained?, p.std?, p.unit)))
-        .collect();
-    let mut clear: Vec<_> = values.iter().filter(|(_, value, std, _)| value.abs() > 3.0 * std).collect();
-    clear.sort_by(|a, b| (b.1 / b.2).abs().total_cmp(&(a.1 / a.2).abs()));
+    let deviations = id.parameter_values(columns).into_iter().filter(|p| p.joint.is_some());
+    let deviations = deviations.filter_map(|p| {
+        Some(Own { name: p.name, value: p.unconstrained?, nothing: 0.0, std: p.std?, unit: p.unit })
+    });
+    let scales = id.log_scales().into_iter().filter_map(|s| {
+        let name = scale_name(&s.log);
+        Some(Own { name, value: s.value, nothing: 1.0, std: s.std?, unit: "1".to_owned() })
+    });
+    let values: Vec<Own> = deviations.chain(scales).collect();
+    let mut clear: Vec<&Own> = values.iter().filter(|own| own.off() > 3.0).collect();
+    clear.sort_by(|a, b| b.off().total_cmp(&a.off()));
     if values.is_empty() {
         return None;
     }
-    let listed: Vec<String> = clear
-        .iter()
-        .take(SHOWN)
-        .map(|(name, value, std, unit)| format!("{name} = {value:+.3} ± {std:.3} {unit}"))
-        .collect();
+    let listed: Vec<String> = clear.iter().take(SHOWN).map(|own| own.words()).collect();
     let more = clear.len().saturating_sub(SHOWN);
     let meaning = match (listed.is_empty(), more) {
         (true, _) => {
@@ -60,7 +85,7 @@ fn own(id: &Identification) -> Option<(Status, CheckResult)> {
         Status::Ok,
         "terms of single logs",
         Some(clear.len() as f64),
-        &format!("of {} deviations", values.len()),
+        &format!("of {}", values.len()),
         "beyond three standard deviations; for information",
         meaning,
     ))

@@ -14,6 +14,7 @@ mod friction_experiments;
 mod friction_laws;
 mod friction_recorded;
 mod friction_report;
+mod friction_scale;
 mod identifiability;
 mod instruments;
 mod least_squares;
