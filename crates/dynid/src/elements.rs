@@ -16,8 +16,9 @@ use dynid_estimate::conditioning::{FrictionShape, ShapeKind};
 use dynid_io::{CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, SettingValue};
 use dynid_model::closed::ClosedMechanism;
 use dynid_model::element::{
-    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, ExternalLoad, JointElement, JointInfo,
-    LoadFriction, LogScaled, Offset, RotorInertia, Spring, Transmission, Viscous, ViscousMagnitude,
+    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, ExternalLoad, JointElement,
+    JointInfo, LoadFriction, LogScaled, Offset, RotorInertia, Spring, Transmission, Viscous,
+    ViscousMagnitude,
 };
 use dynid_model::{Coordinate, JointKind, Mechanism};
 
@@ -281,12 +282,12 @@ impl ElementPlan {
         Ok(out)
     }
 
-    /// Friction with a factor for each of these logs.
+    /// Friction with a factor for each of these logs, which has a start.
     fn scaled(
         &self,
         mechanism: &Mechanism,
         friction: Vec<Box<dyn JointElement>>,
-        logs: Vec<String>,
+        logs: Vec<(String, f64)>,
     ) -> Result<Box<dyn JointElement>, Error> {
         let joints = JointInfo::of(mechanism, &self.coordinates);
         let refused = match friction.is_empty() {

@@ -14,7 +14,7 @@ use dynid_model::{
 };
 
 use crate::Error;
-use crate::config::{Config, PayloadConfig, Route};
+use crate::config::{Config, Own, PayloadConfig, Route};
 use crate::elements::ElementPlan;
 use crate::fitting::{self, Fitted};
 use crate::identify::{Step, plan_elements, read_logs};
@@ -46,7 +46,7 @@ pub struct GainIdentification {
 ///
 /// # Errors
 /// [`Error::Setting`] unless there is one payload, with its mass, carried by a log and missing in another;
-/// [`Error::Unsupported`] for motor-side logs and the textbook route; as [`crate::identify()`] for logs and robot.
+/// [`Error::Unsupported`] for motor-side logs, the textbook route, and logs with a delay or a factor on friction of their own; as [`crate::identify()`] for logs and robot.
 pub fn identify_gains(config: &Config, mut progress: impl FnMut(Step)) -> Result<GainIdentification, Error> {
     config.check()?;
     let payload = known_payload(config)?;
@@ -56,6 +56,11 @@ pub fn identify_gains(config: &Config, mut progress: impl FnMut(Step)) -> Result
     }
     if config.conditioning.route == Route::Textbook {
         return Err(Error::Unsupported("drive gains by the textbook route: leave `route` out".to_owned()));
+    }
+    let own = config.log.iter().flat_map(|log| &log.own);
+    if let Some(own) = own.into_iter().find(|own| matches!(own, Own::FrictionScale | Own::Delay)) {
+        let why = format!("drive gains beside `own = [\"{}\"]`: take `offset` and `friction`", own.word());
+        return Err(Error::Unsupported(why));
     }
     let settings = config.conditioning_settings();
     progress(Step::Read(config.robot.display().to_string()));
@@ -75,7 +80,7 @@ pub fn identify_gains(config: &Config, mut progress: impl FnMut(Step)) -> Result
         loaded.log = terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
     }
     let body = terms.payloads[0].body;
-    plan.log_terms = LogTerms { payloads: Vec::new(), ..terms };
+    plan.log_terms = terms.without_payloads();
     let model = model(&plan, &robot, payload, body)?;
     let prepared = loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, _>>()?;
     progress(Step::Structure);

@@ -6,13 +6,14 @@ mod friction;
 pub(crate) mod known;
 mod model_fit;
 mod own_delay;
+mod own_scale;
 mod shapes;
 mod structure;
 
 use std::path::Path;
 
 use dynid_estimate::conditioning::{
-    Conditioning, ConditioningSettings, JointFriction, PreparedLog, ReducedGroup, Stage, condition, predict,
+    Conditioning, ConditioningSettings, JointFriction, PreparedLog, ReducedGroup, Stage, predict,
 };
 use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::linear::LinearEstimate;
@@ -40,6 +41,7 @@ use crate::shape::{self, ShapeFit};
 use crate::trust::{Evidence, Trust};
 pub(crate) use model_fit::{ModelFit, fit as fit_model};
 pub use own_delay::OwnDelay;
+pub(crate) use own_scale::conditioned;
 pub(crate) use structure::Structure;
 pub(crate) use structure::{effort_sizes, stated_values};
 
@@ -158,14 +160,13 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     let settings = config.conditioning_settings();
     let Opened { robot, loaded, mut plan, model, logs: prepared, structure, own_delays, findings } =
         open(config, &mut progress)?;
-    let start = model.parameters().shape_start();
-    let conditioning = match config.conditioning.route {
+    let (model, conditioning) = match config.conditioning.route {
         Route::Compact => {
-            Some(condition(&model, &start, &structure.base.kept, &prepared, &settings, |stage| {
-                progress(Step::Conditioning(stage));
-            })?)
+            let stages = |stage| progress(Step::Conditioning(stage));
+            let (model, found) = conditioned(model, &structure, &mut plan, &prepared, &settings, stages)?;
+            (model, Some(found))
         }
-        Route::Textbook => None,
+        Route::Textbook => (model, None),
     };
     let mut warnings = robot.warnings.clone();
     warnings.extend(robot.clearance_warnings());
@@ -212,7 +213,12 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     warnings.extend(log_warnings(&model, &prepared));
     warnings.extend(elastic::warnings(&model, &prepared));
     warnings.extend(known::warnings(&plan, &robot.mechanism, &prepared));
-    let scale = |log: &str| shapes.as_ref().and_then(|found| found.model.parameters().shape_value(&scale_name(log))).unwrap_or(1.0);
+    let scale = |log: &str| {
+        shapes
+            .as_ref()
+            .and_then(|found| found.model.parameters().shape_value(&scale_name(log)))
+            .unwrap_or(1.0)
+    };
     let log_agreement = log_agreement::test(config, &model, &base, &fitted, &plan.log_terms, scale);
     warnings.extend(log_agreement.iter().flat_map(LogAgreement::warnings));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();

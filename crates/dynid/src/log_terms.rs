@@ -21,6 +21,8 @@ pub struct LogTerms {
     pub payloads: Vec<PayloadTerm>,
     /// Deviations: log, and what deviates there.
     pub deviations: Vec<(String, Own)>,
+    /// Logs with a factor on friction, and where a search of it starts.
+    scales: Vec<(String, f64)>,
 }
 
 /// A payload on a body.
@@ -51,10 +53,14 @@ impl LogTerms {
             terms.payloads.push(PayloadTerm { config: payload.clone(), body, known });
         }
         terms.deviations = deviations(config);
+        let scaled = terms.deviations.iter().filter(|(_, own)| *own == Own::FrictionScale);
+        terms.scales = scaled.map(|(log, _)| (log.clone(), 1.0)).collect();
         let no_factor = match config.conditioning.route {
-            _ if terms.scaled().is_empty() => None,
+            _ if terms.scales.is_empty() => None,
             Route::Textbook => Some("on the textbook route: it searches no shape parameters"),
-            _ if config.elements.known_friction.is_some() => Some("beside known friction, which it does not scale"),
+            _ if config.elements.known_friction.is_some() => {
+                Some("beside known friction, which it does not scale")
+            }
             Route::Compact => None,
         };
         match no_factor {
@@ -68,10 +74,19 @@ impl LogTerms {
         self.payloads.is_empty() && self.deviations.is_empty()
     }
 
-    /// Logs whose friction has a factor of its own.
-    pub(crate) fn scaled(&self) -> Vec<String> {
-        let scaled = self.deviations.iter().filter(|(_, own)| *own == Own::FrictionScale);
-        scaled.map(|(log, _)| log.clone()).collect()
+    /// What does not belong to payloads.
+    pub(crate) fn without_payloads(self) -> Self {
+        LogTerms { payloads: Vec::new(), ..self }
+    }
+
+    /// Logs whose friction has a factor of its own, and where a search of it starts.
+    pub(crate) fn scaled(&self) -> Vec<(String, f64)> {
+        self.scales.clone()
+    }
+
+    /// Starts the search of a log's factor at a value.
+    pub(crate) fn set_scale(&mut self, log: &str, value: f64) {
+        self.scales.iter_mut().filter(|(name, _)| name == log).for_each(|(_, start)| *start = value);
     }
 
     /// A log with its gates. `label`: the training log whose own terms it has; `payload`: what it carries.

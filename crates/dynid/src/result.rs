@@ -158,7 +158,7 @@ impl Identification {
     /// Factors on friction of the logs that have one of their own.
     pub(crate) fn log_scales(&self) -> Vec<LogScale> {
         let all = self.shape_values();
-        let of = |log: String| {
+        let of = |(log, _): (String, f64)| {
             let found = all.iter().find(|s| s.name == scale_name(&log))?.clone();
             Some(LogScale {
                 log,

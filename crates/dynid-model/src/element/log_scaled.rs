@@ -9,13 +9,14 @@ use crate::parameter::{Parameter, ShapeParameter};
 /// [`log_channel`]: friction of a robot whose gears are colder in log `l`. Where all gates are 0 they act as they are.
 ///
 /// Parameters are those of the elements, one after the other; shape parameters, too, followed by one `λ_l` per log, named
-/// [`scale_name`], between 0.1 and 10, 1 where nothing else is said.
+/// [`scale_name`], between 0.1 and 10.
 ///
 /// One of the elements is seen by [`JointElement::scaled`]; effort and linear parameters are bilinear in `λ` and the others.
 #[derive(Debug)]
 pub struct LogScaled {
     parts: Vec<ScaledPart>,
-    logs: Vec<String>,
+    /// Logs, and where a search of their factors starts.
+    logs: Vec<(String, f64)>,
     entries: Vec<(usize, usize)>,
     shapes: usize,
     shape_entries: Vec<(usize, usize)>,
@@ -43,11 +44,11 @@ pub fn scale_name(log: &str) -> String {
 const FACTORS: (f64, f64) = (0.1, 10.0);
 
 impl LogScaled {
-    /// Elements with a factor for each of these logs. `joints`: one per rate of the mechanism.
+    /// Elements with a factor for each of these logs, a search of which starts at the value given. `joints`: one per rate of the mechanism.
     ///
     /// # Panics
     /// If there is no element or no log, or an element remembers the motion before.
-    pub fn new(elements: Vec<Box<dyn JointElement>>, joints: &[JointInfo], logs: Vec<String>) -> Self {
+    pub fn new(elements: Vec<Box<dyn JointElement>>, joints: &[JointInfo], logs: Vec<(String, f64)>) -> Self {
         assert!(!elements.is_empty() && !logs.is_empty(), "{} elements, {} logs", elements.len(), logs.len());
         let mut out = LogScaled {
             parts: Vec::with_capacity(elements.len()),
@@ -86,7 +87,7 @@ impl LogScaled {
     /// Factor of every sample.
     fn factors(&self, motion: &MotionBlock<'_>, shape: &[f64]) -> Vec<f64> {
         let mut factors = vec![1.0; motion.samples];
-        for (log, scale) in self.logs.iter().zip(&shape[self.shapes..]) {
+        for ((log, _), scale) in self.logs.iter().zip(&shape[self.shapes..]) {
             let gate = gate(motion, &log_channel(log));
             factors.iter_mut().zip(gate).for_each(|(f, g)| *f += (scale - 1.0) * g);
         }
@@ -117,10 +118,10 @@ impl JointElement for LogScaled {
         self.parts.iter().flat_map(|part| part.element.parameters(joints)).collect()
     }
     fn shape(&self, joints: &[JointInfo]) -> Vec<ShapeParameter> {
-        let scale = |log: &String| ShapeParameter {
+        let scale = |(log, start): &(String, f64)| ShapeParameter {
             name: scale_name(log),
             unit: "1",
-            start: 1.0,
+            start: *start,
             lower: FACTORS.0,
             upper: FACTORS.1,
             logarithmic: true,
@@ -133,7 +134,7 @@ impl JointElement for LogScaled {
     }
     fn channels(&self, joints: &[JointInfo]) -> Vec<String> {
         let own = self.parts.iter().flat_map(|part| part.element.channels(joints));
-        own.chain(self.logs.iter().map(|log| log_channel(log))).collect()
+        own.chain(self.logs.iter().map(|(log, _)| log_channel(log))).collect()
     }
     fn reversal_speeds(&self) -> Vec<Vec<(usize, f64)>> {
         self.parts.iter().flat_map(|part| part.element.reversal_speeds()).collect()
@@ -188,7 +189,7 @@ impl JointElement for LogScaled {
             let mut own = ElementColumns { data: &mut columns, slots, stride: n, samples: n };
             part.element.fill(joints, motion, part.shape(shape), &mut own);
         }
-        for log in &self.logs {
+        for (log, _) in &self.logs {
             let gate = gate(motion, &log_channel(log));
             for column in columns.chunks_exact(n.max(1)) {
                 for ((to, x), g) in out.column(pair).iter_mut().zip(column).zip(gate) {
@@ -229,7 +230,7 @@ impl JointElement for LogScaled {
             part.element.shape_adjoint(joints, motion, part.shape(shape), &own, out);
             pair += pairs;
         }
-        for log in &self.logs {
+        for (log, _) in &self.logs {
             let gate = gate(motion, &log_channel(log));
             let data = scaled_weights(weights, pair..pair + self.entries.len(), gate);
             self.parts_adjoint(joints, motion, shape, &data, out);

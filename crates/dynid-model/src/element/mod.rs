@@ -75,8 +75,9 @@ impl JointInfo {
         for (k, name) in names.into_iter().enumerate() {
             let joint = &mechanism.bodies()[owners[k]].joint;
             if owners[k] != last {
-                position =
-                    out.last().map_or(0, |j: &JointInfo| j.position + mechanism.bodies()[last].joint.positions());
+                position = out
+                    .last()
+                    .map_or(0, |j: &JointInfo| j.position + mechanism.bodies()[last].joint.positions());
                 last = owners[k];
             }
             out.push(JointInfo { name, number: k + 1, position, slides: joint.kind == JointKind::Prismatic });

@@ -215,7 +215,7 @@ fn scaled(mechanism: &Mechanism) -> LogScaled {
         Box::new(LoadFriction::new(mechanism, vec![0, 2], reference.into())),
     ];
     let joints = JointInfo::of(mechanism, &[]);
-    LogScaled::new(friction, &joints, vec!["b".to_owned(), "c".to_owned()])
+    LogScaled::new(friction, &joints, vec![("b".to_owned(), 1.0), ("c".to_owned(), 1.0)])
 }
 
 /// Values of the shape parameters: those of the elements, then factors of 1.3 and 0.8.
@@ -302,7 +302,8 @@ fn shape_derivatives_of_scaled_friction_are_those_of_central_differences() {
             for (column, (up, down)) in up.chunks(SAMPLES).zip(down.chunks(SAMPLES)).enumerate() {
                 let difference: Vec<f64> = up.iter().zip(down).map(|(u, d)| (u - d) / (2.0 * h)).collect();
                 let place = pairs.iter().position(|pair| *pair == (column, parameter));
-                let own = place.map_or(vec![0.0; SAMPLES], |k| derivatives[k * SAMPLES..][..SAMPLES].to_vec());
+                let own =
+                    place.map_or(vec![0.0; SAMPLES], |k| derivatives[k * SAMPLES..][..SAMPLES].to_vec());
                 check_close(&own, &difference, 1e-6, "derivative");
             }
         }

@@ -11,7 +11,7 @@ mod report;
 
 use std::time::Instant;
 
-use dynid_estimate::conditioning::{Conditioning, ConditioningSettings, PreparedLog, condition};
+use dynid_estimate::conditioning::{Conditioning, ConditioningSettings, PreparedLog};
 use dynid_model::{EffortModel, RobotModel};
 use dynid_motion::mask::edges;
 
@@ -19,7 +19,7 @@ use crate::Error;
 use crate::agreement::{Alignment, compare as against};
 use crate::config::{Config, Route};
 use crate::elements::ElementPlan;
-use crate::identify::{ModelFit, Opened, Step, Structure, fit_model, open};
+use crate::identify::{ModelFit, Opened, Step, Structure, conditioned, fit_model, open};
 use estimators::{Contestant, contestants};
 pub use record::{ComparedEstimator, Comparison, JointError};
 
@@ -42,7 +42,7 @@ struct FoldScore {
 pub fn compare(config: &Config, mut progress: impl FnMut(usize, usize, &str)) -> Result<Comparison, Error> {
     let settings = config.conditioning_settings();
     progress(0, 1, "reading");
-    let opened = open(
+    let mut opened = open(
         &Config {
             conditioning: crate::config::ConditioningConfig {
                 route: Route::Compact,
@@ -53,9 +53,9 @@ pub fn compare(config: &Config, mut progress: impl FnMut(usize, usize, &str)) ->
         &mut |_: Step| {},
     )?;
     progress(0, 1, "conditioning");
-    let start = opened.model.parameters().shape_start();
-    let conditioning =
-        condition(&opened.model, &start, &opened.structure.base.kept, &opened.logs, &settings, |_| {})?;
+    let (model, conditioning) =
+        conditioned(opened.model, &opened.structure, &mut opened.plan, &opened.logs, &settings, |_| {})?;
+    opened.model = model;
     let bench = Bench { opened: &opened, conditioning: &conditioning, settings: &settings };
     let list = contestants(config, &opened);
     let folds: Vec<[Vec<PreparedLog>; 2]> = (0..FOLDS).map(|k| split(&opened.logs, k)).collect();
