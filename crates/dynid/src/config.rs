@@ -157,6 +157,9 @@ pub struct LogConfig {
     pub name: Option<String>,
     /// The payload that it carries. Default: none.
     pub payload: Option<String>,
+    /// Temperature of joints throughout this log, °C, in place of the logged one. Default: what is logged.
+    #[serde(skip_serializing_if = "PerJoint::is_none")]
+    pub temperature: PerJoint,
     /// What it has of its own, beside the other training logs. Default: nothing.
     pub own: Vec<Own>,
     /// Of a validation log: the training log whose own terms it shares. Default: none.
@@ -428,7 +431,7 @@ impl ElementsConfig {
         if self.friction_errors != FrictionErrors::default() {
             return Err(Error::setting("elements.friction_errors", expected, "none"));
         }
-        if self.temperature != PerJoint::default() {
+        if !self.temperature.is_none() {
             return Err(Error::setting("elements.temperature", expected, "none"));
         }
         Ok(())

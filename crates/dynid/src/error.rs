@@ -422,7 +422,7 @@ impl Error {
                 "state the unit: `[columns] temperature = { columns = \"temp{}\", unit = \"K\" }` (or \"F\")".to_owned(),
             ),
             Error::Conditioning(C::MissingChannel { channel, .. }) => is_temperature(channel).then(|| {
-                "name the column under [columns] (`temperature`), or state a constant one: of known friction under [elements], \
+                "name the column under [columns] (`temperature`), or state a constant one: in the [[log]], of known friction under [elements], \
                  `temperature = 30`, of an element in the robot file, `exponential_viscous = { temperature = 30 }`"
                     .to_owned()
             }),

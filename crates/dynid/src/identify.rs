@@ -495,6 +495,7 @@ pub(crate) fn open(config: &Config, progress: &mut impl FnMut(Step)) -> Result<O
         loaded.log = plan.log_terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
     }
     let model = plan.model(&robot.mechanism)?;
+    logs::check_stated_temperatures(&config.log, &model)?;
     let mut prepared =
         loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
 

@@ -194,8 +194,13 @@ impl LogAgreement {
                 let own = self.deviations.iter().filter(move |d| d.log == log && d.disagrees);
                 own.filter(move |d| (d.parameter == "fo") == offset)
             };
-            out.extend(words(log, "offset", of(true).collect(), "offset", "zero of its sensors"));
-            out.extend(words(log, "friction", of(false).collect(), "friction", "colder or warmer gears"));
+            let (offset, friction) = (
+                "`own = [\"offset\"]` in the `[[log]]` gives it offsets of its own",
+                "`own = [\"friction\"]` in the `[[log]]` gives it friction of its own joint by joint, `own = [\"friction_scale\"]` \
+                 one factor on all friction",
+            );
+            out.extend(words(log, "offset", of(true).collect(), "zero of its sensors", offset));
+            out.extend(words(log, "friction", of(false).collect(), "colder or warmer gears", friction));
         }
         if let Some(rest) = self.one_robot.as_ref().filter(|_| self.is_not_one_robot()) {
             let joints: Vec<String> = rest
@@ -219,7 +224,7 @@ impl LogAgreement {
 }
 
 /// One sentence on the deviations of a log in one thing; `None` without any.
-fn words(log: &str, what: &str, found: Vec<&LogDeviation>, key: &str, cause: &str) -> Option<String> {
+fn words(log: &str, what: &str, found: Vec<&LogDeviation>, cause: &str, remedy: &str) -> Option<String> {
     let first = found.first()?;
     let parts: Vec<String> = found
         .iter()
@@ -231,7 +236,7 @@ fn words(log: &str, what: &str, found: Vec<&LogDeviation>, key: &str, cause: &st
     let most = found.iter().map(|d| d.effect / d.residual.max(f64::MIN_POSITIVE)).fold(0.0, f64::max);
     Some(format!(
         "{log} and {} contradict each other in {what} ({cause}): {log} lies off at {}; up to {most:.1} times the residual. \
-         `own = [\"{key}\"]` in the `[[log]]` gives it {what} of its own",
+         {remedy}",
         first.than,
         parts.join(", ")
     ))

@@ -6,7 +6,7 @@ use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, prepare};
 use dynid_io::columns::EffortColumn;
 use dynid_io::{ColumnMapping, MappingError, MappingSpec, ReadOptions, Signals};
 use dynid_model::element::{is_temperature, temperature_channel};
-use dynid_model::{Limits, RobotModel};
+use dynid_model::{EffortModel, Limits, RobotModel};
 use dynid_motion::temperature::{self, TemperatureDoubt};
 use dynid_motion::{Channel, JointSignals, Log};
 use sha2::{Digest, Sha256};
@@ -18,7 +18,7 @@ pub(crate) mod poses;
 pub use axes::{LogAxis, as_logged, axes, names};
 
 use crate::Error;
-use crate::config::{LogConfig, MotorSide};
+use crate::config::{LogConfig, MotorSide, PerJoint};
 
 /// A log that was read, with what was read besides signals.
 #[derive(Debug, Clone)]
@@ -63,7 +63,7 @@ impl LoadedLog {
 ///
 /// # Errors
 /// [`Error::LogFile`], [`Error::Columns`], [`Error::SurplusColumn`], [`Error::Setting`], [`Error::Log`],
-/// [`Error::Degrees`], [`Error::FarPosition`], [`Error::Temperature`], [`Error::TrajectoryFile`], [`Error::TrajectoryJoints`].
+/// [`Error::Degrees`], [`Error::FarPosition`], [`Error::Temperature`], [`Error::UnknownJoint`], [`Error::TrajectoryFile`], [`Error::TrajectoryJoints`].
 pub fn load(
     config: &LogConfig,
     axes: &[LogAxis],
@@ -113,7 +113,29 @@ fn read(
     if let Some(transmission) = motor_side {
         to_joint_side(&mut signals, transmission)?;
     }
+    state_temperatures(&mut signals, config, &joints)?;
     Ok((signals, mapping))
+}
+
+/// Puts the temperatures that a configuration states in place of the logged ones.
+fn state_temperatures(signals: &mut Signals, config: &LogConfig, joints: &[String]) -> Result<(), Error> {
+    if config.temperature.is_none() {
+        return Ok(());
+    }
+    let stated = config.temperature.finite("log.temperature", joints)?;
+    let implausible =
+        |t: &&f64| matches!(temperature::doubt(&[**t]), Some(TemperatureDoubt::Implausible { .. }));
+    if let Some(found) = stated.iter().flatten().find(implausible) {
+        return Err(Error::setting("log.temperature", "degrees Celsius that a joint may have", found));
+    }
+    let rows = signals.time.len();
+    let logged = signals.temperature.get_or_insert_with(|| vec![None; signals.joints.len()]);
+    for (joint, values) in signals.indices.iter().zip(logged) {
+        if let Some(t) = stated[*joint] {
+            *values = Some(vec![t; rows]);
+        }
+    }
+    Ok(())
 }
 
 fn finish(
@@ -248,6 +270,24 @@ fn check_temperatures(signals: &Signals, file: &str) -> Result<(), Error> {
         if let Some(TemperatureDoubt::Implausible { sample, found }) = doubt {
             let (file, joint) = (file.to_owned(), joint.clone());
             return Err(Error::Temperature { file, joint, row: sample + 1, found });
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a temperature stated for a log that no element of the model reads.
+pub(crate) fn check_stated_temperatures(logs: &[LogConfig], model: &RobotModel) -> Result<(), Error> {
+    let reads = |joint: &str| model.channels().contains(&temperature_channel(joint));
+    for log in logs {
+        let unread = match &log.temperature {
+            PerJoint::All(t) => (!model.joints().iter().any(|j| reads(&j.name))).then(|| t.to_string()),
+            PerJoint::Each(map) => {
+                map.iter().find(|(joint, _)| !reads(joint)).map(|(joint, t)| format!("{joint} = {t}"))
+            }
+        };
+        if let Some(found) = unread {
+            let expected = "temperatures of joints whose friction reads them from the log";
+            return Err(Error::setting("log.temperature", expected, found));
         }
     }
     Ok(())

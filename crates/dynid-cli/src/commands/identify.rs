@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use dynid::config::{Config, Consistency, Friction, LogConfig, Method, Route};
-use dynid::estimate::{Estimate, ShapeValue};
+use dynid::estimate::{Estimate, LogScale, ShapeValue};
 use dynid::io::OutputError;
 use dynid::io::output::write_atomically;
 use dynid::{Error, identify};
@@ -200,6 +200,9 @@ fn summary<'a>(estimate: &Estimate, files: impl Iterator<Item = &'a Path>) {
     for shape in &estimate.shape_parameters {
         note(&format!("  {}", shape_parameter(shape)));
     }
+    for scale in &estimate.log_scales {
+        note(&format!("  {}", log_scale(scale)));
+    }
     for motion in &estimate.motions_that_would_help {
         note(&format!("  {motion}"));
     }
@@ -211,12 +214,23 @@ fn summary<'a>(estimate: &Estimate, files: impl Iterator<Item = &'a Path>) {
 
 /// A parameter that enters nonlinearly: value, interval, verdict with its reason.
 fn shape_parameter(shape: &ShapeValue) -> String {
+    let of = format!("{} = {} {}", shape.name, table::number(Some(shape.value)), shape.unit);
+    judged(&of, shape.interval, &shape.verdict, shape.reason.as_deref())
+}
+
+/// Friction of a log over that of the others.
+fn log_scale(scale: &LogScale) -> String {
+    let of =
+        format!("friction in {} = {} of that in the others", scale.log, table::number(Some(scale.value)));
+    judged(&of, scale.interval, &scale.verdict, scale.reason.as_deref())
+}
+
+fn judged(of: &str, interval: Option<(f64, f64)>, verdict: &str, reason: Option<&str>) -> String {
     let number = |x: f64| table::number(Some(x));
-    let interval = shape
-        .interval
+    let interval = interval
         .map_or_else(String::new, |(low, high)| format!(" (95 %: {} to {})", number(low), number(high)));
-    let reason = shape.reason.as_ref().map_or_else(String::new, |r| format!(", {r}"));
-    format!("{} = {} {}{interval}: {}{reason}", shape.name, number(shape.value), shape.unit, shape.verdict)
+    let reason = reason.map_or_else(String::new, |r| format!(", {r}"));
+    format!("{of}{interval}: {verdict}{reason}")
 }
 
 fn verdict(estimate: &Estimate) -> String {

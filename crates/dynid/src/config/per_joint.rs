@@ -23,6 +23,11 @@ impl Default for PerJoint {
 }
 
 impl PerJoint {
+    /// Whether nothing is said.
+    pub(crate) fn is_none(&self) -> bool {
+        *self == PerJoint::default()
+    }
+
     /// Positive numbers per joint, `None` where nothing is said.
     ///
     /// # Errors

@@ -283,6 +283,40 @@ fn a_log_without_temperature_is_named_and_a_constant_one_helps() {
 }
 
 #[test]
+fn every_log_may_state_its_temperature() {
+    let bench = Bench::new(2.0);
+    bench.log("cold.csv", [21.0, 21.0], 1);
+    bench.log("warm.csv", [43.0, 43.0], 2);
+    let logs = |names: [&str; 2], stated: [&str; 2]| {
+        let log = |k: usize| format!("[[log]]\npath = \"{}.csv\"\n{}\n", names[k], stated[k]);
+        format!("{}{}", log(0), log(1))
+    };
+    let (_, logged) = bench.identify(KNOWN, &logs(["cold", "warm"], [""; 2]));
+    let stated = ["temperature = 21.0", "temperature = { j1 = 43.0, j2 = 43.0 }"];
+    let (_, told) = bench.identify(KNOWN, &logs(["bare_cold", "bare_warm"], stated));
+    for (a, b) in told.parameters.iter().zip(&logged.parameters) {
+        let off = (a.value - b.value).abs();
+        assert!(off <= 1e-9 * (1.0 + b.value.abs()), "{}: {} {}", a.name, a.value, b.value);
+    }
+    // What is stated stands in place of what is logged.
+    let (_, hot) = bench.identify(KNOWN, &logs(["cold", "warm"], ["temperature = 60.0", ""]));
+    let error = |e: &Estimate| e.fit.filtered.relative_error.unwrap();
+    assert!(error(&hot) > 2.0 * error(&logged), "{} {}", error(&hot), error(&logged));
+    let refused = |known: &str, stated: &str| {
+        let config = bench.config(known, &logs(["bare_cold", "bare_warm"], [stated, "temperature = 43.0"]));
+        identify(&config, |_| {}).unwrap_err().to_string()
+    };
+    for (known, stated, found) in [
+        (KNOWN.to_owned(), "temperature = 294.0", "found 294"),
+        (KNOWN.to_owned(), "temperature = { wrist = 21.0 }", "wrist"),
+        (format!("{KNOWN}\ntemperature = 30.0"), "temperature = 21.0", "reads them from the log"),
+    ] {
+        let said = refused(&known, stated);
+        assert!(said.contains(found), "{said}");
+    }
+}
+
+#[test]
 fn a_temperature_that_no_law_reads_is_refused() {
     let bench = Bench::new(2.0);
     bench.log("log.csv", [31.0, 31.0], 1);
