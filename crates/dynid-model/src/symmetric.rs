@@ -91,6 +91,25 @@ pub fn lower_inverse<const N: usize>(l: &Square<N>) -> Square<N> {
 pub fn eigen<const N: usize>(a: &Square<N>) -> ([f64; N], Square<N>) {
     let mut a = *a;
     let mut v = identity::<N>();
+    diagonalise(&mut a, |p, q, c, s| turn(&mut v, p, q, c, s));
+    let mut order: [usize; N] = std::array::from_fn(|i| i);
+    order.sort_by(|i, j| a[*i][*i].total_cmp(&a[*j][*j]));
+    (
+        std::array::from_fn(|k| a[order[k]][order[k]]),
+        std::array::from_fn(|i| std::array::from_fn(|k| v[i][order[k]])),
+    )
+}
+
+/// Smallest eigenvalue of a symmetric matrix.
+pub fn least_eigenvalue<const N: usize>(a: &Square<N>) -> f64 {
+    let mut a = *a;
+    diagonalise(&mut a, |_, _, _, _| {});
+    let diagonal = (0..N).map(|i| a[i][i]);
+    diagonal.min_by(f64::total_cmp).unwrap_or(f64::NAN)
+}
+
+/// Turns a symmetric matrix into a diagonal one; `turned`: columns, cosine and sine of every rotation.
+fn diagonalise<const N: usize>(a: &mut Square<N>, mut turned: impl FnMut(usize, usize, f64, f64)) {
     for _ in 0..SWEEPS {
         let off: f64 = (0..N).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| a[i][j].abs()).sum();
         let size: f64 = (0..N).map(|i| a[i][i].abs()).sum();
@@ -103,31 +122,23 @@ pub fn eigen<const N: usize>(a: &Square<N>) -> ([f64; N], Square<N>) {
                     continue;
                 }
                 let (c, s) = rotation((a[q][q] - a[p][p]) / (2.0 * a[p][q]));
-                for row in &mut a {
-                    (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
-                }
+                turn(a, p, q, c, s);
                 let (x, y) = (a[p], a[q]);
                 a[p] = std::array::from_fn(|k| c * x[k] - s * y[k]);
                 a[q] = std::array::from_fn(|k| s * x[k] + c * y[k]);
                 // What rounding leaves there would keep the sweeps going.
                 (a[p][q], a[q][p]) = (0.0, 0.0);
-                for row in &mut v {
-                    (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
-                }
+                turned(p, q, c, s);
             }
         }
     }
-    let mut order: [usize; N] = std::array::from_fn(|i| i);
-    order.sort_by(|i, j| a[*i][*i].total_cmp(&a[*j][*j]));
-    (
-        std::array::from_fn(|k| a[order[k]][order[k]]),
-        std::array::from_fn(|i| std::array::from_fn(|k| v[i][order[k]])),
-    )
 }
 
-/// Smallest eigenvalue of a symmetric matrix.
-pub fn least_eigenvalue<const N: usize>(a: &Square<N>) -> f64 {
-    eigen(a).0[0]
+/// Rotates two columns.
+fn turn<const N: usize>(a: &mut Square<N>, p: usize, q: usize, c: f64, s: f64) {
+    for row in a {
+        (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+    }
 }
 
 /// A symmetric matrix whose small eigenvalues were raised.
@@ -170,8 +181,19 @@ pub fn raise_eigenvalues<const N: usize>(matrix: &Square<N>, zero: f64, share: f
 ///
 /// Source: Demmel & Veselić 1992.
 pub fn right_singular<const N: usize>(a: &Square<N>) -> ([f64; N], Square<N>) {
-    let mut a = *a;
     let mut v = identity::<N>();
+    let lengths = orthogonalise(a, |p, q, c, s| turn(&mut v, p, q, c, s));
+    (lengths, v)
+}
+
+/// Singular values of a square matrix, as accurate as those of [`right_singular`], in its order.
+pub fn singular_values<const N: usize>(a: &Square<N>) -> [f64; N] {
+    orthogonalise(a, |_, _, _, _| {})
+}
+
+/// Lengths of the columns after rotations that make them orthogonal; `turned`: columns, cosine and sine of every rotation.
+fn orthogonalise<const N: usize>(a: &Square<N>, mut turned: impl FnMut(usize, usize, f64, f64)) -> [f64; N] {
+    let mut a = *a;
     for _ in 0..SWEEPS {
         let mut worst = 0.0_f64;
         for p in 0..N {
@@ -191,17 +213,15 @@ pub fn right_singular<const N: usize>(a: &Square<N>) -> ([f64; N], Square<N>) {
                     continue;
                 }
                 let (c, s) = rotation((qq - pp) / (2.0 * pq));
-                for row in a.iter_mut().chain(&mut v) {
-                    (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
-                }
+                turn(&mut a, p, q, c, s);
+                turned(p, q, c, s);
             }
         }
         if worst <= 16.0 * f64::EPSILON || worst.is_nan() {
             break;
         }
     }
-    let lengths = std::array::from_fn(|k| a.iter().map(|row| row[k] * row[k]).sum::<f64>().sqrt());
-    (lengths, v)
+    std::array::from_fn(|k| a.iter().map(|row| row[k] * row[k]).sum::<f64>().sqrt())
 }
 
 /// Cosine and sine of the rotation that annihilates an off-diagonal entry, from `cot 2θ`.

@@ -4,7 +4,7 @@
 //! `{X_i ⪰ M_i, tr X_i ≤ β_i, scalars in a box}` in closed form. Any multipliers `≥ 0` of the bounds may be used; no
 //! centrality is assumed, so that the bound checks any solver's answer.
 
-use dynid_model::symmetric::{Square, eigen, inner, least_eigenvalue, trace};
+use dynid_model::symmetric::{Square, cholesky, eigen, inner, least_eigenvalue, trace};
 
 use super::cone::{LINK, Lmi, add_scaled};
 use super::program::Program;
@@ -32,7 +32,7 @@ pub(super) fn gap<const N: usize>(
     }
     for (i, cone) in program.cones.iter().enumerate() {
         let slack = cone.slack(xi);
-        if least_eigenvalue(&slack) < 0.0 {
+        if cholesky(&slack).is_none() && least_eigenvalue(&slack) < 0.0 {
             return None;
         }
         let own = &cost[cone.first..cone.first + LINK];

@@ -1,7 +1,8 @@
 //! Cones of the interior-point method: linear matrix inequalities on one link, and half-lines.
 
 use dynid_model::symmetric::{
-    Square, cholesky, congruence, inner, least_eigenvalue, lower_inverse, product, right_singular, transpose,
+    Square, cholesky, congruence, inner, least_eigenvalue, lower_inverse, product, right_singular,
+    singular_values, transpose,
 };
 
 /// Unknowns of one link.
@@ -130,6 +131,6 @@ pub(super) fn diagonal<const N: usize>(values: [f64; N]) -> Square<N> {
 /// Least eigenvalue of `X S` for positive definite `X`, `S`; `None` if one is not.
 pub(super) fn least_product<const N: usize>(x: &Square<N>, s: &Square<N>) -> Option<f64> {
     let (l, k) = (cholesky(x)?, cholesky(s)?);
-    let (d, _) = right_singular(&product(&transpose(&k), &l));
+    let d = singular_values(&product(&transpose(&k), &l));
     Some(d.iter().map(|d| d * d).fold(f64::INFINITY, f64::min))
 }

@@ -11,8 +11,8 @@ use super::direction::Target;
 
 /// Factorised `2 AᵀA + 2 diag w + BᵀB + γ B_LᵀB_L`, `B` the scaled cones, `B_L` the entropic distance.
 pub(super) enum Newton {
-    /// Normal equations with the matrix, for refinement.
-    Normal(Box<Llt<f64>>, Mat<f64>),
+    /// Normal equations with the matrix, for refinement, and `∇F`.
+    Normal(Box<Llt<f64>>, Mat<f64>, Vec<f64>),
     /// QR of the stack `[√2 A; √(2w); B; √γ B_L]`.
     Stack(Box<Qr<f64>>),
 }
@@ -72,7 +72,7 @@ impl Newton {
             }
         }
         let factor = h.llt(Side::Lower).ok()?;
-        Some(Newton::Normal(Box::new(factor), h))
+        Some(Newton::Normal(Box::new(factor), h, program.gradient(xi)?))
     }
 
     /// Change of the unknowns; `None` if it is not finite.
@@ -84,8 +84,8 @@ impl Newton {
         target: &Target<N>,
     ) -> Option<Vec<f64>> {
         let change = match self {
-            Newton::Normal(factor, h) => {
-                let rhs = normal_side(program, xi, scalings, target)?;
+            Newton::Normal(factor, h, gradient) => {
+                let rhs = normal_side(program, gradient, scalings, target);
                 let mut change = factor.solve(&rhs);
                 let left = &rhs - h * &change;
                 change += factor.solve(&left);
@@ -101,11 +101,10 @@ impl Newton {
 /// `-∇F + Bᵀ target`.
 fn normal_side<const N: usize>(
     program: &Program<N>,
-    xi: &[f64],
+    gradient: &[f64],
     scalings: &Scalings<N>,
     target: &Target<N>,
-) -> Option<Mat<f64>> {
-    let gradient = program.gradient(xi)?;
+) -> Mat<f64> {
     let mut rhs = Mat::from_fn(program.unknowns(), 1, |k, _| -gradient[k]);
     for (i, (cone, scaling)) in program.cones.iter().zip(&scalings.links).enumerate() {
         for (j, basis) in scaling.basis.iter().enumerate() {
@@ -117,7 +116,7 @@ fn normal_side<const N: usize>(
             rhs[(*variable, 0)] -= ratio * f * target.rays[k];
         }
     }
-    Some(rhs)
+    rhs
 }
 
 /// Rows of a matrix inequality in the stack.
