@@ -11,6 +11,8 @@ const TOP: f64 = 8.0;
 const BOTTOM: f64 = 24.0;
 /// Curves with more points are thinned to the least and greatest of each pixel, or evenly if they run back and forth.
 const MOST_POINTS: usize = 1600;
+/// Up to so many dots are drawn large.
+const FEW_DOTS: usize = 40;
 /// Classes of lines, in order, then again from the first.
 const COLOURS: usize = 6;
 
@@ -58,9 +60,10 @@ pub(crate) fn chart_svg(chart: &Chart) -> String {
         let points: Vec<[f64; 2]> = thinned(points).iter().map(|p| [px(p[0]), py(p[1])]).collect();
         match curve.style {
             CurveStyle::Dots => {
+                let radius = if points.len() <= FEW_DOTS { 3.0 } else { 1.6 };
                 for p in points.iter().filter(|p| p[0].is_finite() && p[1].is_finite()) {
                     svg.push_str(&format!(
-                        r#"<circle class="c{class}" cx="{:.1}" cy="{:.1}" r="1.6"/>"#,
+                        r#"<circle class="c{class}" cx="{:.1}" cy="{:.1}" r="{radius}"/>"#,
                         p[0], p[1]
                     ));
                 }

@@ -71,6 +71,7 @@ pub(super) fn environment() -> Result<Environment<'static>, minijinja::Error> {
         u64::try_from(value.clone()).map_or_else(|_| UNDEFINED.to_owned(), number::count)
     });
     environment.add_filter("setting", setting);
+    environment.add_filter("wordy", wordy);
     environment.add_filter("unit", |unit: &str| number::unit(unit));
     environment.add_filter("sort_key", sort_key);
     environment.add_filter("value_to_std", |value: &Value, std: &Value| beside_std(value, std).0);
@@ -113,6 +114,28 @@ fn setting(value: &Value) -> String {
         _ => UNDEFINED.to_owned(),
     }
 }
+
+/// Columns of a table that hold sentences, which read from the left: every cell is text, one is longer than a number with
+/// its error.
+fn wordy(rows: &Value) -> Vec<usize> {
+    let rows: Vec<Vec<Value>> = rows
+        .try_iter()
+        .into_iter()
+        .flatten()
+        .map(|row| row.try_iter().into_iter().flatten().collect())
+        .collect();
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let cells = |column: usize| rows.iter().filter_map(move |row| row.get(column));
+    let text = |cell: &Value| cell.as_str().map_or(0, |text| text.chars().count());
+    let is_wordy = |column: &usize| {
+        cells(*column).all(|c| c.kind() == ValueKind::String)
+            && cells(*column).any(|c| text(c) > NUMBER_WITH_ERROR)
+    };
+    (0..columns).filter(is_wordy).collect()
+}
+
+/// Longest number with its error, characters.
+const NUMBER_WITH_ERROR: usize = 24;
 
 /// What a column is sorted by; empty where the number is undefined.
 fn sort_key(value: &Value) -> String {

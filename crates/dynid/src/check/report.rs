@@ -133,7 +133,7 @@ fn table(logs: &[CheckedLog]) -> StudyTable {
             Value::Count(log.rows as u64),
             Value::Number(log.rate_hz),
             Value::Number(log.duration_s),
-            Value::Number(log.jitter),
+            if log.jitter < 1e-6 { Value::Text("< 1e-6".to_owned()) } else { Value::Number(log.jitter) },
             log.unexplained.map(|u| 100.0 * u).into(),
             with_error(log.delay_samples),
             with_error(log.tilt_deg),

@@ -28,7 +28,7 @@ impl Comparison {
             StudySection {
                 title: "Errors on unseen time".to_owned(),
                 tables: vec![self.table()],
-                charts: vec![self.chart()],
+                charts: vec![self.by_rank(), self.by_time()],
                 ..StudySection::default()
             },
             StudySection {
@@ -39,7 +39,12 @@ impl Comparison {
         ];
         Ok(report::render_log_page(&report::LogPage {
             kind: "Comparison of estimators".to_owned(),
-            title: format!("{} estimators on {} logs", self.estimators.len(), self.logs.len()),
+            title: format!(
+                "{} estimators on {} log{}",
+                self.estimators.len(),
+                self.logs.len(),
+                if self.logs.len() == 1 { "" } else { "s" }
+            ),
             robot: self.robot.clone(),
             verdict: report::Verdict {
                 status: report::Status::Ok,
@@ -106,23 +111,46 @@ impl Comparison {
         }
     }
 
-    fn chart(&self) -> Chart {
-        let curve = |e: &ComparedEstimator| {
-            let (error, seconds) = (e.error?, e.seconds?);
-            let spread = e.standard_error.unwrap_or(0.0);
-            let points = [error - spread, error, error + spread].map(|y| [seconds.max(1e-4), y]).to_vec();
-            Some(ChartCurve { name: e.name.clone(), points, style: CurveStyle::Line })
+    fn by_rank(&self) -> Chart {
+        self.chart(
+            "errors in the order of the table",
+            &ChartAxis { label: "rank".to_owned(), ..ChartAxis::default() },
+            |e| e.rank.map(|rank| rank as f64),
+        )
+    }
+
+    fn by_time(&self) -> Chart {
+        let axis = ChartAxis { label: "time of a fit".to_owned(), unit: "s".to_owned(), logarithmic: true };
+        self.chart("errors over time of a fit", &axis, |e| e.seconds.map(|s| s.max(1e-4)))
+    }
+
+    /// Held-out errors of all estimators that came to an end, each with a standard error up and down.
+    fn chart(&self, title: &str, x: &ChartAxis, place: impl Fn(&ComparedEstimator) -> Option<f64>) -> Chart {
+        let placed: Vec<(f64, f64, f64)> = (self.estimators.iter())
+            .filter_map(|e| Some((place(e)?, e.error?, e.standard_error.unwrap_or(0.0))))
+            .collect();
+        let bar = |(at, error, spread): &(f64, f64, f64)| {
+            [[*at, error - spread], [*at, error + spread], [f64::NAN, f64::NAN]]
+        };
+        let bars = ChartCurve {
+            name: "one standard error up and down".to_owned(),
+            points: placed.iter().flat_map(bar).collect(),
+            style: CurveStyle::Line,
+        };
+        let means = ChartCurve {
+            name: "mean over folds".to_owned(),
+            points: placed.iter().map(|(at, error, _)| [*at, *error]).collect(),
+            style: CurveStyle::Dots,
         };
         Chart {
-            title: "accuracy and time".to_owned(),
-            note: "a bar per estimator, one standard error up and down".to_owned(),
-            x: ChartAxis { label: "time of a fit".to_owned(), unit: "s".to_owned(), logarithmic: true },
+            title: title.to_owned(),
+            x: x.clone(),
             y: ChartAxis {
                 label: "held-out error".to_owned(),
                 unit: "% of the effort".to_owned(),
                 logarithmic: false,
             },
-            curves: self.estimators.iter().filter_map(curve).collect(),
+            curves: vec![bars, means],
             ..Chart::default()
         }
     }

@@ -9,7 +9,7 @@ use super::body::{Body, NAMES, about_com};
 use super::difference::{Difference, difference};
 use super::{PayloadIdentification, quantile};
 use crate::config::{Config, PayloadConfig};
-use crate::estimate::{ConsistencyRecord, ParameterValue, Provenance, SCHEMA, Verdict};
+use crate::estimate::{ConsistencyRecord, LogScale, ParameterValue, Provenance, SCHEMA, Verdict};
 use crate::identify::Identification;
 use crate::prior::PAYLOAD_SIZE;
 use crate::{Error, advice};
@@ -74,13 +74,16 @@ pub struct PayloadFile {
     pub schema: u32,
     /// Robot.
     pub robot: String,
-    /// `ok`: mass and centre of mass of every payload are seen in the data; `warn`: their masses; `fail`: not even these, or
-    /// the model behind them is not to be trusted.
+    /// `ok`: mass and centre of mass of every payload are seen in the data, stated masses within their intervals; `warn`: masses
+    /// are seen; `fail`: not even these, or the model behind them is not to be trusted.
     pub status: String,
     /// Payloads.
     pub payloads: Vec<PayloadRecord>,
     /// Deviations of single logs that were identified beside.
     pub log_parameters: Vec<ParameterValue>,
+    /// Factors on the friction of single logs that were identified beside.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub log_scales: Vec<LogScale>,
     /// What consistency of robot and payloads together costs.
     pub consistency: Option<ConsistencyRecord>,
     /// What the identification of robot and payloads is worth.
@@ -216,7 +219,12 @@ impl PayloadIdentification {
         let all = |of: &dyn Fn(&PayloadRecord) -> bool| self.payloads.iter().all(of);
         let mass = all(&|p| p.mass.interval.is_some());
         let centre = all(&|p| p.com.iter().all(|c| c.interval.is_some()));
-        let status = match (estimate.verdict.status.as_str(), mass, centre) {
+        // A stated mass that the interval excludes says that the scale of the efforts is wrong, or the statement.
+        let agrees = |p: &PayloadRecord| match (p.stated_mass, p.mass.interval) {
+            (Some(stated), Some((low, high))) => (low..=high).contains(&stated),
+            _ => true,
+        };
+        let status = match (estimate.verdict.status.as_str(), mass, centre && all(&agrees)) {
             ("fail", _, _) | (_, false, _) => "fail",
             (_, true, true) => "ok",
             (_, true, false) => "warn",
@@ -228,6 +236,7 @@ impl PayloadIdentification {
             status: status.to_owned(),
             payloads: self.payloads.clone(),
             log_parameters: estimate.log_parameters.into_iter().filter(|p| !of_payload(p)).collect(),
+            log_scales: estimate.log_scales,
             consistency: estimate.consistency,
             verdict: estimate.verdict,
             provenance: estimate.provenance,

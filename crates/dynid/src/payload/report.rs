@@ -1,5 +1,6 @@
 //! The report page of payloads, and their URDF.
 
+use dynid_model::element::scale_name;
 use dynid_report as report;
 use dynid_report::{Fact, StudySection, StudyTable, Value};
 
@@ -66,16 +67,18 @@ impl PayloadFile {
             facts.extend(c.price_over_chance.map(|x| Fact::new("the same over chance", x, "")));
             facts.push(Fact::new("weight of the prior", c.prior_weight, "residual variances"));
         }
-        let rows: Vec<Vec<Value>> = self
-            .log_parameters
-            .iter()
-            .map(|p| vec![p.name.clone().into(), p.value.into(), number(p.std), p.unit.clone().into()])
-            .collect();
+        let parameters = self.log_parameters.iter();
+        let parameters = parameters
+            .map(|p| vec![p.name.clone().into(), p.value.into(), number(p.std), p.unit.clone().into()]);
+        let scales = self.log_scales.iter();
+        let scales =
+            scales.map(|s| vec![scale_name(&s.log).into(), s.value.into(), number(s.std), "1".into()]);
+        let rows: Vec<Vec<Value>> = parameters.chain(scales).collect();
         let tables = match rows.is_empty() {
             true => Vec::new(),
             false => vec![StudyTable {
                 caption: "What single logs have of their own, beside the others".to_owned(),
-                head: ["parameter", "deviation", "std", "unit"].map(str::to_owned).to_vec(),
+                head: ["parameter", "deviation or factor", "std", "unit"].map(str::to_owned).to_vec(),
                 rows,
             }],
         };
