@@ -13,11 +13,13 @@ pub struct WlsSettings {
     pub max_passes: usize,
     /// Least `σ_j` as a share of the root mean square effort of the group, for logs without noise. Default 1e-9.
     pub floor: f64,
+    /// Variances to start from, effort², one per group; empty: 1 for all. Default empty.
+    pub start: Vec<f64>,
 }
 
 impl Default for WlsSettings {
     fn default() -> Self {
-        Self { tolerance: 1e-6, max_passes: 20, floor: 1e-9 }
+        Self { tolerance: 1e-6, max_passes: 20, floor: 1e-9, start: Vec::new() }
     }
 }
 
@@ -62,11 +64,11 @@ impl WlsEstimate {
 /// Weighted least squares, `min Σ_j ‖y_j - W_j x‖²/σ_j²`, with variances estimated along the way.
 ///
 /// `groups`: one factor per group (a joint, or a joint of one log), all in the same columns. Starting from
-/// `σ_j = 1`, each pass solves the merged weighted factor and renews `σ_j² = rss_j/(N_j - ℓ_j)` by the exact
+/// `σ_j = 1` (or [`WlsSettings::start`]), each pass solves the merged weighted factor and renews `σ_j² = rss_j/(N_j - ℓ_j)` by the exact
 /// leverage of the group instead of a common `p/n`. A group without half a degree of freedom keeps its variance,
 /// a group of zero effort takes its floor from the group of largest effort.
 ///
-/// Panics on an empty list or unequal columns. Rank deficiency is reported in the solution.
+/// Panics on an empty list, unequal columns, or a start of another length. Rank deficiency is reported in the solution.
 pub fn wls(groups: &[Factor], settings: &WlsSettings) -> WlsEstimate {
     let classes: Vec<usize> = (0..groups.len()).collect();
     wls_with(groups, &classes, None, settings)
@@ -89,7 +91,9 @@ pub(super) fn wls_with(
     prior: Option<&PriorRows>,
     settings: &WlsSettings,
 ) -> WlsEstimate {
-    let mut variances = vec![1.0; groups.len()];
+    let mut variances =
+        if settings.start.is_empty() { vec![1.0; groups.len()] } else { settings.start.clone() };
+    assert_eq!(variances.len(), groups.len(), "length of the start");
     let mut passes = 0;
     loop {
         let factor = merge_weighted(groups, &variances);

@@ -246,7 +246,10 @@ impl<'a> Work<'a> {
             .iter()
             .map(|g| g.coarsened(g.blocks.len().max(1)))
             .collect();
-        let found = self.linear_estimate(&groups, active.len())?;
+        let mut settings = self.linear_settings();
+        settings.wls.start.clone_from(&self.variances);
+        let total = self.problem.linear() + active.len();
+        let found = estimate(&groups, None, total, &LinearMethod::Wls, &settings)?;
         let mut change = 0.0_f64;
         for (old, new) in self.variances.iter_mut().zip(&found.groups) {
             change = change.max((new.variance - *old).abs() / new.variance);
