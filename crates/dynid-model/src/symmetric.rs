@@ -264,6 +264,7 @@ mod tests {
         close(&congruence(&v, &diagonal), &A, 1e-14);
         close(&product(&transpose(&v), &v), &identity(), 1e-15);
         assert!(d.is_sorted() && (d.iter().sum::<f64>() - trace(&A)).abs() < 1e-14);
+        assert_eq!(least_eigenvalue(&A), d[0]);
     }
 
     #[test]
@@ -293,6 +294,7 @@ mod tests {
         let graded: Square<4> =
             std::array::from_fn(|i| std::array::from_fn(|j| 10f64.powi(-5 * i as i32) * v[j][i]));
         let (mut d, right) = right_singular(&graded);
+        assert_eq!(singular_values(&graded), d);
         close(&product(&transpose(&right), &right), &identity(), 1e-14);
         d.sort_by(|x, y| y.total_cmp(x));
         for (k, value) in d.iter().enumerate() {

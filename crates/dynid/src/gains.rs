@@ -46,7 +46,8 @@ pub struct GainIdentification {
 ///
 /// # Errors
 /// [`Error::Setting`] unless there is one payload, with its mass, carried by a log and missing in another;
-/// [`Error::Unsupported`] for motor-side logs, the textbook route, and logs with a delay or a factor on friction of their own; as [`crate::identify()`] for logs and robot.
+/// [`Error::Unsupported`] for motor-side logs, the textbook route, and logs with a delay or a factor on friction of their own;
+/// as [`crate::identify()`] for logs and robot.
 pub fn identify_gains(config: &Config, mut progress: impl FnMut(Step)) -> Result<GainIdentification, Error> {
     config.check()?;
     let payload = known_payload(config)?;

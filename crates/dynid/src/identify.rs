@@ -1,5 +1,6 @@
 //! The main job: from a robot file and logs to an identified model.
 
+mod alone;
 mod elastic;
 mod figures;
 mod friction;
@@ -19,7 +20,7 @@ use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::linear::LinearEstimate;
 use dynid_estimate::whiteness::InBandWhiteness;
 use dynid_model::element::scale_name;
-use dynid_model::{BaseParameters, EffortModel, Parameter, RobotModel, ShapeParameter};
+use dynid_model::{BaseParameters, EffortModel, RobotModel};
 use dynid_motion::Log;
 
 use crate::Error;
@@ -370,26 +371,6 @@ impl Identification {
         Ok(Some((model.with_shape(&unfolded.shape), unfolded.linear)))
     }
 
-    /// The identified model without what belongs to single logs; `None` if nothing does.
-    fn without_logs(&self) -> Result<Option<(RobotModel, Vec<f64>)>, Error> {
-        if self.plan.log_terms.is_empty() {
-            return Ok(None);
-        }
-        let (model, values) = self.identified_model();
-        let alone = self.plan.without_logs().model(self.model.mechanism())?;
-        let (from, to) = (model.parameters(), alone.parameters());
-        let value = |p: &Parameter| from.column(&p.name).map_or(0.0, |c| values[c]);
-        let linear = to.linear.iter().map(value).collect();
-        let start = |s: &ShapeParameter| from.shape_value(&s.name).unwrap_or(s.start);
-        let shape: Vec<f64> = to.shape.iter().map(start).collect();
-        Ok(Some((alone.with_shape(&shape), linear)))
-    }
-
-    /// The robot alone and its linear parameters: [`Identification::identified_model`] without what belongs to single logs.
-    pub fn robot_alone(&self) -> (&RobotModel, &[f64]) {
-        self.alone.as_ref().map_or_else(|| self.identified_model(), |(model, values)| (model, values))
-    }
-
     /// The identified model and its linear parameters: [`Identification::values`], or what they stand for where the fit's
     /// model is linearised.
     pub fn identified_model(&self) -> (&RobotModel, &[f64]) {
@@ -495,7 +476,7 @@ pub(crate) fn open(config: &Config, progress: &mut impl FnMut(Step)) -> Result<O
         loaded.log = plan.log_terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
     }
     let model = plan.model(&robot.mechanism)?;
-    logs::check_stated_temperatures(&config.log, &model)?;
+    logs::check_stated_temperatures(config.log.iter().chain(&config.validation), &model)?;
     let mut prepared =
         loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
 

@@ -276,7 +276,10 @@ fn check_temperatures(signals: &Signals, file: &str) -> Result<(), Error> {
 }
 
 /// Refuses a temperature stated for a log that no element of the model reads.
-pub(crate) fn check_stated_temperatures(logs: &[LogConfig], model: &RobotModel) -> Result<(), Error> {
+pub(crate) fn check_stated_temperatures<'a>(
+    logs: impl Iterator<Item = &'a LogConfig>,
+    model: &RobotModel,
+) -> Result<(), Error> {
     let reads = |joint: &str| model.channels().contains(&temperature_channel(joint));
     for log in logs {
         let unread = match &log.temperature {

@@ -64,11 +64,11 @@ impl WlsEstimate {
 /// Weighted least squares, `min Σ_j ‖y_j - W_j x‖²/σ_j²`, with variances estimated along the way.
 ///
 /// `groups`: one factor per group (a joint, or a joint of one log), all in the same columns. Starting from
-/// `σ_j = 1` (or [`WlsSettings::start`]), each pass solves the merged weighted factor and renews `σ_j² = rss_j/(N_j - ℓ_j)` by the exact
-/// leverage of the group instead of a common `p/n`. A group without half a degree of freedom keeps its variance,
+/// `σ_j = 1` (or [`WlsSettings::start`]), each pass solves the merged weighted factor and renews
+/// `σ_j² = rss_j/(N_j - ℓ_j)` by the exact leverage of the group instead of a common `p/n`. A group without half a degree of freedom keeps its variance,
 /// a group of zero effort takes its floor from the group of largest effort.
 ///
-/// Panics on an empty list, unequal columns, or a start of another length. Rank deficiency is reported in the solution.
+/// Panics on an empty list, unequal columns, or a start that is not one positive number per group. Rank deficiency is reported in the solution.
 pub fn wls(groups: &[Factor], settings: &WlsSettings) -> WlsEstimate {
     let classes: Vec<usize> = (0..groups.len()).collect();
     wls_with(groups, &classes, None, settings)
@@ -94,6 +94,7 @@ pub(super) fn wls_with(
     let mut variances =
         if settings.start.is_empty() { vec![1.0; groups.len()] } else { settings.start.clone() };
     assert_eq!(variances.len(), groups.len(), "length of the start");
+    assert!(variances.iter().all(|v| v.is_finite() && *v > 0.0), "variances to start from: {variances:?}");
     let mut passes = 0;
     loop {
         let factor = merge_weighted(groups, &variances);

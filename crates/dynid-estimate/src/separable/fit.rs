@@ -220,16 +220,20 @@ impl<'a> Work<'a> {
         }
     }
 
+    /// `start`: variances to start from; empty: 1 for all.
     fn linear_estimate(
         &self,
         groups: &[ReducedGroup],
         active: usize,
+        start: &[f64],
     ) -> Result<LinearEstimate, SeparableError> {
         let method = match self.settings.weighting {
             Weighting::Equal => LinearMethod::Ols,
             Weighting::Groups { .. } => LinearMethod::Wls,
         };
-        Ok(estimate(groups, None, self.problem.linear() + active, &method, &self.linear_settings())?)
+        let mut settings = self.linear_settings();
+        settings.wls.start = start.to_vec();
+        Ok(estimate(groups, None, self.problem.linear() + active, &method, &settings)?)
     }
 
     /// Variances of the linearised problem; returns the largest relative change.
@@ -246,10 +250,7 @@ impl<'a> Work<'a> {
             .iter()
             .map(|g| g.coarsened(g.blocks.len().max(1)))
             .collect();
-        let mut settings = self.linear_settings();
-        settings.wls.start.clone_from(&self.variances);
-        let total = self.problem.linear() + active.len();
-        let found = estimate(&groups, None, total, &LinearMethod::Wls, &settings)?;
+        let found = self.linear_estimate(&groups, active.len(), &self.variances)?;
         let mut change = 0.0_f64;
         for (old, new) in self.variances.iter_mut().zip(&found.groups) {
             change = change.max((new.variance - *old).abs() / new.variance);
@@ -262,7 +263,7 @@ impl<'a> Work<'a> {
     pub(super) fn linearised(&self) -> Result<LinearEstimate, SeparableError> {
         let active = self.active();
         let groups = self.linearisation.reduced(&self.linear, &self.shape(), &active)?;
-        self.linear_estimate(&groups, active.len())
+        self.linear_estimate(&groups, active.len(), &[])
     }
 
     fn findings(&self) -> Vec<ShapeFinding> {
@@ -320,7 +321,7 @@ impl<'a> Work<'a> {
             SeparableLoss::Absolute => None,
             SeparableLoss::Squares => {
                 let groups = self.linearisation.reduced(&polished.linear, &polished.shape, &active)?;
-                Some(self.linear_estimate(&groups, active.len())?)
+                Some(self.linear_estimate(&groups, active.len(), &[])?)
             }
             SeparableLoss::Huber => {
                 let total = polished.linear.len() + active.len();

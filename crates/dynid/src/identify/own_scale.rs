@@ -16,7 +16,7 @@ use crate::elements::ElementPlan;
 /// the kernel and the shapes of friction be chosen too coarse. The plan starts later searches from the factors found.
 ///
 /// # Errors
-/// [`Error::Conditioning`], [`Error::Refine`].
+/// [`Error::Conditioning`], [`Error::Shapes`].
 pub(crate) fn conditioned(
     model: RobotModel,
     structure: &Structure,

@@ -371,6 +371,8 @@ fn ur10e_payload_and_gains() {
     p.com.iter().chain(&p.inertia).for_each(|q| println!("  {q:?}"));
     assert_eq!(p.mass.verdict, "seen in the data");
     assert!((p.mass.value / 2.805 - 1.0).abs() < 0.15, "{:?}", p.mass);
+    assert!(p.mass.interval.unwrap().0 > 2.805, "{:?}", p.mass);
+    assert_eq!(found.file(&config).unwrap().status, "warn", "the stated mass is outside");
     let gains = identify_gains(&config, |_| {}).unwrap();
     for j in &gains.joints {
         println!("{j:?}");
