@@ -1,11 +1,13 @@
 //! The result file `estimate.json`: stable keys, added to but never renamed.
 
+mod exported;
 mod friction;
 mod instruments;
 mod loops;
 mod model;
 mod trust;
 
+pub use exported::{EXPORT_LOSS_LIMIT, ExportedJoint, ExportedLog, ExportedRecord, FileFit};
 pub use friction::{FrictionTrial, PassivityRecord};
 pub use instruments::{EffectRecord, ExogeneityRecord, InstrumentRecord};
 pub use loops::{ClosureRecord, FrameRecord, LoopsRecord};
@@ -93,6 +95,9 @@ pub struct Estimate {
     pub fit: FitSummary,
     /// Validation, log by log.
     pub validation: Vec<LogFit>,
+    /// Robot files beside the identified model: what they state, and what they lose.
+    #[serde(default)]
+    pub exported: ExportedRecord,
     /// What the pre-flight of the training logs found, the remedies it took for granted included.
     #[serde(default)]
     pub preflight: Vec<FindingRecord>,

@@ -29,7 +29,8 @@ use crate::check::{self, Finding, Severity};
 use crate::config::{Config, LogConfig, Preflight, Route};
 use crate::consistency::Consistent;
 use crate::elements::ElementPlan;
-use crate::estimate::LogFit;
+use crate::estimate::{ExportedRecord, LogFit};
+use crate::export::FileModels;
 use crate::fitting::Fitted;
 use crate::instruments::{self, Comparison, InstrumentRun};
 use crate::log_agreement::{self, LogAgreement};
@@ -140,6 +141,8 @@ pub struct Identification {
     pub log_agreement: Option<LogAgreement>,
     /// Delays of single logs, taken off their efforts.
     pub own_delays: Vec<OwnDelay>,
+    /// Robot files beside the identified model.
+    pub exported: ExportedRecord,
     /// Warnings, in words.
     pub warnings: Vec<String>,
     /// What the pre-flight of the training logs found.
@@ -259,11 +262,14 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         shapes,
         nonlinear: None,
         alone: None,
+        exported: ExportedRecord::default(),
         instruments,
         comparison: None,
     };
     out.nonlinear = out.unfolded(out.values())?;
     out.alone = out.without_logs()?;
+    let (files, projections) = FileModels::of(&out, &prepared)?;
+    let (mut files_training, mut files_validation) = (Vec::new(), Vec::new());
     for (l, log) in prepared.iter().enumerate() {
         progress(Step::Validate(log.name.clone()));
         let agreement = out.agreement(out.values(), log)?;
@@ -272,6 +278,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
             let free = out.agreement(out.unconstrained_values(), log)?;
             out.training_unconstrained.push(crate::result::log_fit(&free));
         }
+        files_training.extend(files.judge(&out, log, &agreement)?);
         out.training.push(agreement);
     }
     out.logs = prepared;
@@ -294,12 +301,15 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
             own.take_off(&mut prepared)?;
         }
         out.warnings.extend(known::logged_beyond(&out.plan.known, &prepared));
-        out.validation.push(out.agreement(out.values(), &prepared)?);
+        let agreement = out.agreement(out.values(), &prepared)?;
+        files_validation.extend(files.judge(&out, &prepared, &agreement)?);
+        out.validation.push(agreement);
         if out.consistent.constrained() {
             let free = out.agreement(out.unconstrained_values(), &prepared)?;
             out.validation_unconstrained.push(crate::result::log_fit(&free));
         }
     }
+    out.exported = files.record(projections, files_training, files_validation);
     progress(Step::Trust);
     out.explained = figures::explained(out.training.iter().chain(&out.validation), &out.consistent);
     out.pruning = prune(&out.fit().kept_blocks(), &out.fit().solution.kept, &PruneSettings::default());
@@ -375,6 +385,11 @@ impl Identification {
     /// model is linearised.
     pub fn identified_model(&self) -> (&RobotModel, &[f64]) {
         self.nonlinear.as_ref().map_or((&self.model, self.values()), |(model, values)| (model, values))
+    }
+
+    /// Lead of the effort that predictions of a log take into account, samples: that of the fit at the same rate, else 0.
+    pub(crate) fn delay_on(&self, log: &PreparedLog) -> f64 {
+        agreement::lead(log.rate_hz, self.delay_samples, self.delay_rate_hz)
     }
 
     /// Predicted effort on a prepared log, per output.

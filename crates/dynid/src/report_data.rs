@@ -1,5 +1,6 @@
 //! The report's content from an identification and its result file.
 
+mod files;
 mod friction;
 mod trust;
 
@@ -117,6 +118,7 @@ impl Identification {
             standard_parameters: self.standard_parameters(estimate),
             shape_parameters: friction::shape_parameters(estimate),
             friction_laws: self.friction_laws(estimate),
+            files: self.file_judgement(estimate),
             motions: estimate.motions_that_would_help.clone(),
             consistency: self.consistency_report(estimate),
             held_out: trust::held_out(estimate),

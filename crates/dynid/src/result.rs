@@ -71,6 +71,7 @@ impl Identification {
             motions_that_would_help: self.trust.motions.clone(),
             fit: self.fit_summary(),
             validation: self.validation.iter().map(log_fit).collect(),
+            exported: self.exported.clone(),
             preflight: self.findings.iter().map(Into::into).collect(),
             verdict,
             conditioning: self.conditioning_record(config),

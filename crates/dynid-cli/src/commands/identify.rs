@@ -56,7 +56,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
         note(&verdict(&estimate));
     }
     if !args.quiet || urdf.is_err() {
-        export::tell(&files[2], &urdf);
+        export::tell(&files[2], &urdf, &estimate);
     }
     if args.json {
         data(&estimate.to_json())?;

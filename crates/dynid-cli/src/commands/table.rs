@@ -1,6 +1,6 @@
 //! Aligned tables of numbers for people.
 
-use dynid::estimate::FitValues;
+use dynid::estimate::{FileFit, FitValues};
 
 /// A number with four significant digits, or a dash; whole numbers without decimals.
 pub(super) fn number(x: Option<f64>) -> String {
@@ -65,4 +65,23 @@ pub(super) fn agreement(joints: &[String], raw: &FitValues, filtered: &FitValues
         })
         .collect();
     aligned(&["joint", "rms raw", "rms filtered", "nrmse %", "R²", "relative error %"], &rows)
+}
+
+/// What a robot file loses per joint: effort, its share, and the file's own error; `with_rotor`: once rotor inertias are added.
+pub(super) fn loss(joints: &[String], file: &FileFit, with_rotor: Option<&FileFit>) -> String {
+    let cells = |fit: &FileFit, j: usize| {
+        [Some(fit.loss[j]), fit.loss_percent[j], fit.relative_error_per_joint[j]].map(number)
+    };
+    let row = |(j, name): (usize, &String)| {
+        let mut row = vec![format!("    {name}")];
+        row.extend(cells(file, j));
+        row.extend(with_rotor.iter().flat_map(|fit| cells(fit, j)));
+        row
+    };
+    let rows: Vec<Vec<String>> = joints.iter().enumerate().map(row).collect();
+    let mut header = vec!["    joint", "effort lost", "lost %", "error %"];
+    if with_rotor.is_some() {
+        header.extend(["with rotor: lost", "lost %", "error %"]);
+    }
+    aligned(&header, &rows).trim_end().to_owned()
 }

@@ -45,6 +45,7 @@ pub(crate) fn report(joints: usize, samples: usize) -> ReportData {
         standard_parameters: trust::standard_parameters(joints),
         shape_parameters: friction::shape_parameters(),
         friction_laws: friction::laws(),
+        files: None,
         motions: trust::motions(),
         consistency: Some(trust::consistency()),
         held_out: trust::held_out(joints),
