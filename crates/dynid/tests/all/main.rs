@@ -23,6 +23,7 @@ mod payload;
 mod periodic;
 mod preflight;
 mod recorded_logs;
+mod settings;
 mod support;
 mod trust;
 mod two_step;
