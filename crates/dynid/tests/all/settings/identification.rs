@@ -627,6 +627,26 @@ fn an_identification_without_logs_is_refused_by_the_library() {
 }
 
 #[test]
+fn settings_of_elements_that_nothing_reads_are_refused() {
+    let slips = [
+        ("coulmb = { effort = 3 }", "coulmb"),
+        ("coulomb = { efort = 3 }", "efort"),
+        ("coulomb = 3", "`effort`"),
+        ("stribeck = { vss = 0.1 }", "vss"),
+        ("rotor = { inertia = true }", "expected a number"),
+        ("cyclic = { cycle = 3 }", "`cycles`"),
+        ("spring = { k = 3 }", "no settings"),
+        ("external_load = { brake = 1 }", "true or false"),
+    ];
+    for (slip, words) in slips {
+        let text = format!("{ARM}[element.j1]\n{slip}\n");
+        let robot = Robot::parse(&text, Path::new("arm.toml"), &RobotOptions::default()).unwrap();
+        let error = simulate(&robot, &SimulateSettings::default()).unwrap_err().to_string();
+        assert!(error.contains(words), "{slip}: {error}");
+    }
+}
+
+#[test]
 fn a_bound_below_zero_takes_the_place_of_the_sign_of_friction() {
     let robot = Robot::parse(ARM, Path::new("arm.toml"), &RobotOptions::default()).unwrap();
     let settings = SimulateSettings {
