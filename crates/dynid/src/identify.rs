@@ -1,6 +1,7 @@
 //! The main job: from a robot file and logs to an identified model.
 
 mod alone;
+mod effect;
 mod elastic;
 mod figures;
 mod friction;
@@ -161,6 +162,8 @@ pub struct Identification {
 /// # Errors
 /// [`Error`]: bad input. A rank-deficient log is a status of the result, not an error.
 pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Identification, Error> {
+    config.demand_inputs()?;
+    config.check_effect()?;
     let settings = config.conditioning_settings();
     let Opened { robot, loaded, mut plan, model, logs: prepared, structure, own_delays, findings } =
         open(config, &mut progress)?;
@@ -201,6 +204,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         &settings,
         &mut progress,
     )?;
+    warnings.extend(effect::warnings(config, shapes.is_some()));
     let Structure { base, stated, prior, regrouping, space, .. } = structure;
     let (state_hz, kernel_hz, delay_samples) = match &conditioning {
         Some(c) => (c.state_hz.iter().copied().fold(f64::INFINITY, f64::min), c.kernel_hz, c.delay.samples),
@@ -465,6 +469,7 @@ pub(crate) struct Opened {
 /// As [`identify`].
 pub(crate) fn open(config: &Config, progress: &mut impl FnMut(Step)) -> Result<Opened, Error> {
     config.check()?;
+    config.demand_inputs()?;
     let settings = config.conditioning_settings();
     progress(Step::Read(config.robot.display().to_string()));
     let options = RobotOptions {
@@ -491,6 +496,7 @@ pub(crate) fn open(config: &Config, progress: &mut impl FnMut(Step)) -> Result<O
         loaded.log = plan.log_terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
     }
     let model = plan.model(&robot.mechanism)?;
+    effect::check(config, &plan, &model)?;
     logs::check_stated_temperatures(config.log.iter().chain(&config.validation), &model)?;
     let mut prepared =
         loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;

@@ -6,7 +6,7 @@ use dynid::compare::{ComparedEstimator, Comparison, compare};
 use dynid::config::{Config, LogConfig};
 use dynid::io::output::write_atomically;
 
-use super::{apply_log_args, table};
+use super::{apply_log_args_to, table};
 use crate::args::CompareArgs;
 use crate::message::{Failure, data, note};
 use crate::outputs;
@@ -21,7 +21,7 @@ pub(crate) fn run(args: &CompareArgs) -> Result<u8, Failure> {
             ..Config::default()
         },
     };
-    apply_log_args(&mut config.columns, &args.columns);
+    apply_log_args_to(&mut config, &args.columns);
     let outputs: Vec<(&str, &Path)> = args.report.iter().map(|p| ("--report", p.as_path())).collect();
     let logs = config.log.iter().map(|log| log.path.as_path());
     let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).collect();

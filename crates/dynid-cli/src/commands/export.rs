@@ -26,6 +26,12 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
             "for example `dynid export dynid-out/estimate.json --urdf robot.urdf`",
         ));
     }
+    if let Some(flag) = args.columns.given().filter(|_| args.log.is_empty()) {
+        return Err(Failure::Usage(
+            format!("{flag}: expected --log beside it, found none"),
+            "it says how a log is read; leave it out",
+        ));
+    }
     let estimate = Estimate::read(&args.estimate)?;
     let robot = robot_file(args, &estimate)?;
     let inputs: Vec<&Path> = [&args.estimate, &robot]

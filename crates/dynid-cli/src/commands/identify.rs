@@ -8,7 +8,7 @@ use dynid::io::OutputError;
 use dynid::io::output::write_atomically;
 use dynid::{Error, identify};
 
-use super::{apply_log_args, element_names, export, table};
+use super::{apply_log_args_to, element_names, export, table};
 use crate::args::{ConsistencyArg, FrictionArg, IdentifyArgs, MethodArg, RouteArg};
 use crate::message::{Failure, data, note};
 use crate::outputs;
@@ -109,7 +109,7 @@ fn configuration(args: &IdentifyArgs) -> Result<Config, Failure> {
     if args.known_friction.is_some() {
         config.elements.known_friction.clone_from(&args.known_friction);
     }
-    apply_log_args(&mut config.columns, &args.columns);
+    apply_log_args_to(&mut config, &args.columns);
     config.locked.extend(args.lock.iter().cloned());
     if args.couple_mimics {
         config.couple_mimics = Some(true);

@@ -90,6 +90,7 @@ impl Check {
 /// Bad input: files that cannot be read, columns that cannot be assigned. What is wrong with the numbers is a finding.
 pub fn check(config: &Config, mut progress: impl FnMut(&str)) -> Result<Check, Error> {
     config.check()?;
+    config.demand_inputs()?;
     let options = RobotOptions {
         gravity: config.gravity,
         couple_mimics: config.couple_mimics.unwrap_or(false),

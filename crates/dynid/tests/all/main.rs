@@ -25,6 +25,7 @@ mod payload;
 mod periodic;
 mod preflight;
 mod recorded_logs;
+mod settings;
 mod support;
 mod trust;
 mod two_step;
