@@ -31,6 +31,7 @@ use crate::consistency::Consistent;
 use crate::elements::ElementPlan;
 use crate::estimate::LogFit;
 use crate::fitting::Fitted;
+use crate::friction_power::FrictionPower;
 use crate::instruments::{self, Comparison, InstrumentRun};
 use crate::log_agreement::{self, LogAgreement};
 use crate::log_terms::LogTerms;
@@ -144,6 +145,8 @@ pub struct Identification {
     pub warnings: Vec<String>,
     /// What the pre-flight of the training logs found.
     pub findings: Vec<Finding>,
+    /// What friction had to obey.
+    pub(crate) power: FrictionPower,
     /// Settings of the conditioning.
     pub settings: ConditioningSettings,
     /// How the instruments of the fit came about; `None` for other estimators.
@@ -188,6 +191,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         fitted,
         groups,
         consistent,
+        power,
     } = fit_model(
         config,
         &robot,
@@ -199,12 +203,10 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         &mut progress,
     )?;
     let Structure { base, stated, prior, regrouping, space, .. } = structure;
-    let (state_hz, kernel_hz, delay_samples) = match &conditioning {
-        Some(c) => (c.state_hz.iter().copied().fold(f64::INFINITY, f64::min), c.kernel_hz, c.delay.samples),
-        None => {
-            let cutoff = config.textbook_route().cutoff_hz;
-            (cutoff, cutoff, 0.0)
-        }
+    let state_hz = model_fit::state_hz(config, conditioning.as_ref());
+    let (kernel_hz, delay_samples) = match &conditioning {
+        Some(c) => (c.kernel_hz, c.delay.samples),
+        None => (state_hz, 0.0),
     };
     let row_rms = figures::row_rms(&groups, &fitted.estimate.x, base.len());
     let residual_ratio = figures::residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
@@ -253,6 +255,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         warnings,
         findings,
         settings,
+        power,
         logs: Vec::new(),
         robot,
         model,
@@ -313,6 +316,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         consistent: &out.consistent,
         rows: &figures::fit_rows(out.fit(), out.conditioning.as_ref(), kernel_hz),
         explained: &out.explained,
+        power: &out.power,
     }
     .trust();
     Ok(out)
