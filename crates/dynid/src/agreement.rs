@@ -1,6 +1,6 @@
 //! Predicted against measured effort on a log.
 
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, predict};
+use dynid_estimate::conditioning::{ConditioningSettings, Moving, PreparedLog, predict};
 use dynid_estimate::metrics::{Fit, MetricsError, fit};
 use dynid_model::EffortModel;
 use dynid_motion::filter::{butterworth, forward_backward};
@@ -47,6 +47,15 @@ pub struct Agreement {
     pub filtered_unaligned: Fit,
     /// Cut-off of that filter, Hz.
     pub filter_hz: f64,
+    /// Where the joints move, over all samples.
+    pub motion: Moving,
+    /// As [`Agreement::filtered`], per output on the samples in which its joint moves.
+    pub moving: Fit,
+    /// The same on those in which it stands: friction may then have any value up to static friction, which no model of the speed
+    /// tells.
+    pub standing: Fit,
+    /// Per output: share of the counted samples in which its joint stands.
+    pub standing_share: Vec<f64>,
 }
 
 /// Cut from both ends before figures are formed, in periods of the lower of the two cut-offs.
@@ -90,14 +99,16 @@ pub fn compare(
             .map(|s| forward_backward(&filter, s).map_err(conditioning))
             .collect::<Result<Vec<_>, _>>()
     };
-    let pick = |signals: &[Vec<f64>]| -> Vec<Vec<f64>> {
-        signals
-            .iter()
-            .map(|s| s.iter().zip(&counted).filter(|(_, c)| **c).map(|(x, _)| *x).collect())
-            .collect()
-    };
-    let agree = |measured: &[Vec<f64>], predicted: &[Vec<f64>]| {
+    let motion = Moving::of(log, state_hz, settings)?;
+    let agree_on = |measured: &[Vec<f64>], predicted: &[Vec<f64>], part: Part| {
         let too_short = |e: MetricsError| Error::TooShort { file: log.name.clone(), message: e.to_string() };
+        let is_of = |output: usize, k: usize| counted[k] && part.holds(motion.samples[output][k]);
+        let pick = |signals: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            let own = |(output, s): (usize, &Vec<f64>)| {
+                s.iter().enumerate().filter(|(k, _)| is_of(output, *k)).map(|(_, x)| *x).collect()
+            };
+            signals.iter().enumerate().map(own).collect()
+        };
         let (measured, predicted) = (pick(measured), pick(predicted));
         let whole = fit(&measured, &predicted).map_err(too_short)?;
         // What is left over where nothing drives is no share of any effort.
@@ -109,20 +120,45 @@ pub fn compare(
         };
         Ok::<Fit, Error>(Fit { relative_error, ..whole })
     };
-    let measured_filtered = filtered(&log.effort)?;
+    let agree = |measured: &[Vec<f64>], predicted: &[Vec<f64>]| agree_on(measured, predicted, Part::All);
+    let (measured_filtered, predicted_filtered) = (filtered(&log.effort)?, filtered(&predicted)?);
+    let samples = counted.iter().filter(|c| **c).count() as f64;
+    let stands = |moves: &Vec<bool>| moves.iter().zip(&counted).filter(|(m, c)| !**m && **c).count() as f64;
     Ok(Agreement {
+        moving: agree_on(&measured_filtered, &predicted_filtered, Part::Moving)?,
+        standing: agree_on(&measured_filtered, &predicted_filtered, Part::Standing)?,
+        standing_share: motion.samples.iter().map(|moves| stands(moves) / samples).collect(),
         name: log.name.clone(),
         start: log.start,
         rate_hz: log.rate_hz,
         raw: agree(&log.effort, &predicted)?,
-        filtered: agree(&measured_filtered, &filtered(&predicted)?)?,
+        filtered: agree(&measured_filtered, &predicted_filtered)?,
         filtered_unaligned: agree(&measured_filtered, &filtered(&unaligned)?)?,
         measured: log.effort.clone(),
         predicted,
         moves: log.moves.clone(),
+        motion,
         counted,
         filter_hz,
     })
+}
+
+/// Which samples figures are formed on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Part {
+    All,
+    Moving,
+    Standing,
+}
+
+impl Part {
+    fn holds(self, moves: bool) -> bool {
+        match self {
+            Part::All => true,
+            Part::Moving => moves,
+            Part::Standing => !moves,
+        }
+    }
 }
 
 fn conditioning(e: dynid_motion::SignalError) -> Error {

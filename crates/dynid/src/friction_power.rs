@@ -1,8 +1,10 @@
 //! Friction that takes energy out of the motion, as rows of the consistent estimate.
 
-use dynid_estimate::conditioning::{ConditioningSettings, Moving, PreparedLog, States};
+use dynid_estimate::conditioning::{
+    ConditioningSettings, JointFriction, Moving, PreparedLog, ShapeKind, States,
+};
 use dynid_estimate::consistent::Bound;
-use dynid_model::{EffortModel, MotionBlock, RobotModel};
+use dynid_model::{EffortModel, MotionBlock, Output, RobotModel};
 
 use crate::Error;
 use crate::elements::ElementPlan;
@@ -85,6 +87,19 @@ pub(crate) fn limits(
         out.kept.extend(kept.map(|(_, column)| table[*column].name.clone()));
     }
     Ok(out)
+}
+
+/// `fs ≥ fc` where a fall from rest was chosen from the logs: what is named Stribeck friction is.
+pub(crate) fn falls(model: &RobotModel, chosen: &[JointFriction]) -> Vec<Bound> {
+    let table = model.parameters();
+    let of_joint = |(output, joint): (&Output, &JointFriction)| {
+        let column = |symbol: &str| table.column(&format!("{}.{symbol}", output.name));
+        joint.accepted.iter().find(|t| t.shape.kind == ShapeKind::Stribeck)?;
+        let (fs, fc) = (column("fs")?, column("fc")?);
+        let name = format!("static friction of {} at least its Coulomb friction", output.name);
+        Some(Bound { name, terms: vec![(fc, 1.0), (fs, -1.0)], upper: 0.0 })
+    };
+    model.outputs().iter().zip(chosen).filter_map(of_joint).collect()
 }
 
 impl FrictionPower {

@@ -18,6 +18,7 @@ use dynid_estimate::conditioning::{
 };
 use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::linear::LinearEstimate;
+use dynid_estimate::rank::numerical_rank;
 use dynid_estimate::whiteness::InBandWhiteness;
 use dynid_model::element::scale_name;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
@@ -337,6 +338,19 @@ impl Identification {
     /// The linear fit in base columns.
     pub fn fit(&self) -> &LinearEstimate {
         &self.fitted.estimate
+    }
+
+    /// Condition number of the base columns that the logs excite, at unit length, without the columns that shape parameters have
+    /// where the model was linearised: those say how a law bends, and stand close to the law itself by nature.
+    pub fn condition_without_shapes(&self) -> f64 {
+        let solution = &self.fit().solution;
+        let table = &self.model.parameters().linear;
+        let is_law = |k: &usize| shape::of_change(&table[self.base.kept[solution.kept[*k]]].name).is_none();
+        let laws: Vec<usize> = (0..solution.kept.len()).filter(is_law).collect();
+        match laws.len() == solution.kept.len() {
+            true => solution.condition_scaled,
+            false => numerical_rank(&solution.factor.select(&laws)).condition_scaled,
+        }
     }
 
     /// Number of time blocks behind the standard deviations.

@@ -60,6 +60,7 @@ pub(crate) fn fit(
     let power = friction_power::limits(&model, plan, logs, state_hz, settings)?;
     let model = power.free(model);
     structure.bounds.extend(power.bounds.iter().cloned());
+    structure.bounds.extend(friction_power::falls(&model, &friction));
     let shape = model.parameters().shape_start();
     progress(Step::Fit);
     let Structure { base, prior, regrouping, bounds, method, .. } = &structure;
