@@ -1,6 +1,6 @@
 //! Predicted against measured effort on a log.
 
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, predict};
+use dynid_estimate::conditioning::{ConditioningSettings, Moving, PreparedLog, predict};
 use dynid_estimate::metrics::{Fit, MetricsError, fit};
 use dynid_model::EffortModel;
 use dynid_motion::filter::{butterworth, forward_backward};
@@ -49,6 +49,15 @@ pub struct Agreement {
     pub filtered_unaligned: Fit,
     /// Cut-off of that filter, Hz.
     pub filter_hz: f64,
+    /// Where the joints move, over all samples.
+    pub motion: Moving,
+    /// As [`Agreement::filtered`], per output on the samples in which its joint moves.
+    pub moving: Fit,
+    /// The same on those in which it stands: friction may then have any value up to static friction, which no model of the speed
+    /// tells.
+    pub standing: Fit,
+    /// Per output: share of the counted samples in which its joint stands.
+    pub standing_share: Vec<f64>,
 }
 
 /// Lead of the effort to align a log by, samples: the one found, at the rate that it was found at.
@@ -97,33 +106,61 @@ pub fn compare(
             .map(|s| forward_backward(&filter, s).map_err(conditioning))
             .collect::<Result<Vec<_>, _>>()
     };
+    let motion = Moving::of(log, state_hz, settings)?;
     let driven: Vec<bool> = (0..log.effort.len()).map(|output| !model.is_undriven(output)).collect();
-    let agree = |measured: &[Vec<f64>], predicted: &[Vec<f64>]| {
-        let (measured, predicted) = (pick(measured, &counted), pick(predicted, &counted));
-        fit_driven(&measured, &predicted, &driven)
+    let agree_on = |measured: &[Vec<f64>], predicted: &[Vec<f64>], part: Part| {
+        let is_of = |output: usize, k: usize| counted[k] && part.holds(motion.samples[output][k]);
+        fit_driven(&pick(measured, is_of), &pick(predicted, is_of), &driven)
             .map_err(|e| Error::TooShort { file: log.name.clone(), message: e.to_string() })
     };
-    let measured_filtered = filtered(&log.effort)?;
+    let agree = |measured: &[Vec<f64>], predicted: &[Vec<f64>]| agree_on(measured, predicted, Part::All);
+    let (measured_filtered, predicted_filtered) = (filtered(&log.effort)?, filtered(&predicted)?);
+    let samples = counted.iter().filter(|c| **c).count() as f64;
+    let stands = |moves: &Vec<bool>| moves.iter().zip(&counted).filter(|(m, c)| !**m && **c).count() as f64;
     Ok(Agreement {
+        moving: agree_on(&measured_filtered, &predicted_filtered, Part::Moving)?,
+        standing: agree_on(&measured_filtered, &predicted_filtered, Part::Standing)?,
+        standing_share: motion.samples.iter().map(|moves| stands(moves) / samples).collect(),
         name: log.name.clone(),
         start: log.start,
         rate_hz: log.rate_hz,
         raw: agree(&log.effort, &predicted)?,
-        filtered: agree(&measured_filtered, &filtered(&predicted)?)?,
+        filtered: agree(&measured_filtered, &predicted_filtered)?,
         filtered_unaligned: agree(&measured_filtered, &filtered(&unaligned)?)?,
         measured: log.effort.clone(),
         driven: driven.clone(),
         predicted,
         moves: log.moves.clone(),
+        motion,
         counted,
         filter_hz,
     })
 }
 
-/// The counted samples of each signal.
-fn pick(signals: &[Vec<f64>], counted: &[bool]) -> Vec<Vec<f64>> {
-    let kept = |s: &Vec<f64>| s.iter().zip(counted).filter(|(_, c)| **c).map(|(x, _)| *x).collect();
-    signals.iter().map(kept).collect()
+/// Which samples figures are formed on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Part {
+    All,
+    Moving,
+    Standing,
+}
+
+impl Part {
+    fn holds(self, moves: bool) -> bool {
+        match self {
+            Part::All => true,
+            Part::Moving => moves,
+            Part::Standing => !moves,
+        }
+    }
+}
+
+/// The samples of each signal that are asked for, by output and sample.
+fn pick(signals: &[Vec<f64>], is_kept: impl Fn(usize, usize) -> bool) -> Vec<Vec<f64>> {
+    let kept = |(output, s): (usize, &Vec<f64>)| {
+        s.iter().enumerate().filter(|(k, _)| is_kept(output, *k)).map(|(_, x)| *x).collect()
+    };
+    signals.iter().enumerate().map(kept).collect()
 }
 
 /// Figures per joint; those over all joints leave out where nothing drives: what is left over there is no share of any effort.
@@ -148,7 +185,7 @@ impl Agreement {
         let filter = butterworth(4, self.filter_hz, self.rate_hz).map_err(conditioning)?;
         let through = |signals: &[Vec<f64>]| {
             let filtered = signals.iter().map(|s| forward_backward(&filter, s).map_err(conditioning));
-            Ok::<_, Error>(pick(&filtered.collect::<Result<Vec<_>, _>>()?, &self.counted))
+            Ok::<_, Error>(pick(&filtered.collect::<Result<Vec<_>, _>>()?, |_, k| self.counted[k]))
         };
         let (measured, whole, lost) = (through(&self.measured)?, through(&self.predicted)?, through(lost)?);
         let pairs = whole.iter().zip(&lost);

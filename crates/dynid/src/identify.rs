@@ -19,6 +19,7 @@ use dynid_estimate::conditioning::{
 };
 use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::linear::LinearEstimate;
+use dynid_estimate::rank::numerical_rank;
 use dynid_estimate::whiteness::InBandWhiteness;
 use dynid_model::element::scale_name;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
@@ -33,6 +34,7 @@ use crate::elements::ElementPlan;
 use crate::estimate::{ExportedRecord, LogFit};
 use crate::export::FileModels;
 use crate::fitting::Fitted;
+use crate::friction_power::FrictionPower;
 use crate::instruments::{self, Comparison, InstrumentRun};
 use crate::log_agreement::{self, LogAgreement};
 use crate::log_terms::LogTerms;
@@ -148,6 +150,8 @@ pub struct Identification {
     pub warnings: Vec<String>,
     /// What the pre-flight of the training logs found.
     pub findings: Vec<Finding>,
+    /// What friction had to obey.
+    pub(crate) power: FrictionPower,
     /// Settings of the conditioning.
     pub settings: ConditioningSettings,
     /// How the instruments of the fit came about; `None` for other estimators.
@@ -194,6 +198,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         fitted,
         groups,
         consistent,
+        power,
     } = fit_model(
         config,
         &robot,
@@ -206,12 +211,10 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     )?;
     warnings.extend(effect::warnings(config, shapes.is_some()));
     let Structure { base, stated, prior, regrouping, space, .. } = structure;
-    let (state_hz, kernel_hz, delay_samples) = match &conditioning {
-        Some(c) => (c.state_hz.iter().copied().fold(f64::INFINITY, f64::min), c.kernel_hz, c.delay.samples),
-        None => {
-            let cutoff = config.textbook_route().cutoff_hz;
-            (cutoff, cutoff, 0.0)
-        }
+    let state_hz = model_fit::state_hz(config, conditioning.as_ref());
+    let (kernel_hz, delay_samples) = match &conditioning {
+        Some(c) => (c.kernel_hz, c.delay.samples),
+        None => (state_hz, 0.0),
     };
     let row_rms = figures::row_rms(&groups, &fitted.estimate.x, base.len());
     let residual_ratio = figures::residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
@@ -260,6 +263,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         warnings,
         findings,
         settings,
+        power,
         logs: Vec::new(),
         robot,
         model,
@@ -327,6 +331,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         consistent: &out.consistent,
         rows: &figures::fit_rows(out.fit(), out.conditioning.as_ref(), kernel_hz),
         explained: &out.explained,
+        power: &out.power,
     }
     .trust();
     Ok(out)
@@ -347,6 +352,19 @@ impl Identification {
     /// The linear fit in base columns.
     pub fn fit(&self) -> &LinearEstimate {
         &self.fitted.estimate
+    }
+
+    /// Condition number of the base columns that the logs excite, at unit length, without the columns that shape parameters have
+    /// where the model was linearised: those say how a law bends, and stand close to the law itself by nature.
+    pub fn condition_without_shapes(&self) -> f64 {
+        let solution = &self.fit().solution;
+        let table = &self.model.parameters().linear;
+        let is_law = |k: &usize| shape::of_change(&table[self.base.kept[solution.kept[*k]]].name).is_none();
+        let laws: Vec<usize> = (0..solution.kept.len()).filter(is_law).collect();
+        match laws.len() == solution.kept.len() {
+            true => solution.condition_scaled,
+            false => numerical_rank(&solution.factor.select(&laws)).condition_scaled,
+        }
     }
 
     /// Number of time blocks behind the standard deviations.

@@ -59,9 +59,21 @@ fn text(found: &Comparison) -> String {
     };
     let rows: Vec<Vec<String>> = found.estimators.iter().map(row).collect();
     let head = ["rank", "estimator", "error, %", "behind, %", "s", "rms per joint"];
+    let best = found.estimators.first();
+    let at_rest =
+        best.into_iter().flat_map(|e| found.joints.iter().zip(&e.joints)).filter_map(|(name, joint)| {
+            let joint = joint.filter(|j| j.standing_share > table::STANDS)?;
+            Some(format!(
+                "{name} stands in {:.0} % of the samples: best estimator's rms {} moving, {} standing\n",
+                100.0 * joint.standing_share,
+                table::number(joint.rms_moving),
+                table::number(joint.rms_standing)
+            ))
+        });
     format!(
-        "{}\nheld-out error through a filter of {:.1} Hz, {} folds of time: {}\n",
+        "{}\n{}held-out error through a filter of {:.1} Hz, {} folds of time: {}\n",
         table::aligned(&head, &rows).trim_end(),
+        at_rest.collect::<String>(),
         found.filter_hz,
         found.folds,
         found.headline()
