@@ -248,6 +248,9 @@ pub(crate) struct CheckArgs {
     /// Gravity in base axes, m/s² (default: the robot file's, else 0,0,-9.81).
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
     pub(crate) gravity: Option<[f64; 3]>,
+    /// The size of the efforts is right, whatever robot file, effort limits and other arms say of it.
+    #[arg(long)]
+    pub(crate) known_effort_scale: bool,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
@@ -310,6 +313,9 @@ pub(crate) struct IdentifyArgs {
     /// Gravity in base axes, m/s².
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
     pub(crate) gravity: Option<[f64; 3]>,
+    /// The size of the efforts is right, whatever robot file, effort limits and other arms say of it.
+    #[arg(long)]
+    pub(crate) known_effort_scale: bool,
     /// Way from samples to rows.
     #[arg(long, value_enum)]
     pub(crate) route: Option<RouteArg>,

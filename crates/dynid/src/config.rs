@@ -58,6 +58,9 @@ pub struct Config {
     pub motor_side: Option<MotorSide>,
     /// Conditioning.
     pub conditioning: ConditioningConfig,
+    /// The size of the efforts is right, whatever the robot file, its effort limits and other arms say of it: the pre-flight then
+    /// tells the difference without a warning. Default false.
+    pub known_effort_scale: bool,
     /// What the pre-flight of the training logs may do. Default `refuse`.
     pub preflight: Preflight,
     /// Estimator.

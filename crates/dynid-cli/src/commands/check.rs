@@ -17,6 +17,7 @@ pub(crate) fn run(args: &CheckArgs) -> Result<u8, Failure> {
     apply_log_args_to(&mut config, &args.columns);
     config.locked.extend(args.lock.iter().cloned());
     config.gravity = args.gravity.or(config.gravity);
+    config.known_effort_scale |= args.known_effort_scale;
     let outputs: Vec<(&str, &Path)> = [("--fix", &args.fix), ("--report", &args.report)]
         .into_iter()
         .filter_map(|(name, path)| Some((name, path.as_deref()?)))

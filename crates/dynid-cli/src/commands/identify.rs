@@ -115,6 +115,7 @@ fn configuration(args: &IdentifyArgs) -> Result<Config, Failure> {
         config.couple_mimics = Some(true);
     }
     config.gravity = args.gravity.or(config.gravity);
+    config.known_effort_scale |= args.known_effort_scale;
     config.seed = args.seed.or(config.seed);
     config.preferred.extend(args.prefer.iter().cloned());
     let c = &mut config.conditioning;

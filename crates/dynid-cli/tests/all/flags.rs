@@ -160,6 +160,7 @@ fn prepared() -> tempfile::TempDir {
     dynid().current_dir(at).args(["identify", "bounded.toml", "--quiet"]).output().unwrap();
     std::fs::copy(at.join("out/estimate.json"), at.join("bounded.json")).unwrap();
     std::fs::remove_dir_all(at.join("out")).unwrap();
+    write("heavy.urdf", &TWO_LINKS.replace("mass value=\"", "mass value=\"2"));
     write("longer.urdf", &TWO_LINKS.replace("0 0 0.35", "0 0 0.6"));
     let law = "[element.shoulder]\nstribeck = { coulomb = 2, static = 5, vs = 0.3 }\n[element.elbow]\nstribeck = { coulomb = 1, static = 2, vs = 0.3 }\n";
     write(
@@ -356,6 +357,16 @@ fn cases() -> Vec<Case> {
             "regressor arm.urdf --states clean.csv --floating-base",
         ),
         refused("simulate --floating-base", "simulate arm.urdf --out s.csv --floating-base", "floating"),
+        case(
+            "check --known-effort-scale",
+            "check log.csv --robot heavy.urdf",
+            "check log.csv --robot heavy.urdf --known-effort-scale",
+        ),
+        case(
+            "identify --known-effort-scale",
+            "identify heavy.urdf --log log.csv",
+            "identify heavy.urdf --log log.csv --known-effort-scale",
+        ),
         case("check --robot", "check log.csv --robot arm.urdf", "check log.csv --robot longer.urdf"),
         case(
             "validate --unconstrained",

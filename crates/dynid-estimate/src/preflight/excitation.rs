@@ -34,7 +34,7 @@ pub fn excitation(
     samples: &Samples,
     wiring: &Wiring,
 ) -> Result<Excitation, PreflightError> {
-    let rows = TrialRows::new(model, shape, kept, samples, &wiring.position, false)?;
+    let rows = TrialRows::new(model, shape, kept, samples, wiring)?;
     let solution = ols(&rows.weighted(wiring));
     let covariance = solution.unit_covariance();
     let mut std = vec![None; kept.len()];

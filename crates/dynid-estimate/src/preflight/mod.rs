@@ -1,12 +1,13 @@
 //! What is wrong with a log, as far as it takes a model to tell.
 //!
-//! [`Trial::search`]: which column is whose, with which sign and unit ([`Wiring`]). Every candidate is judged by how well
-//! bodies that can exist, with friction that takes energy, explain the efforts ([`crate::consistent`]): a flipped sign asks
-//! for negative friction and mass, exchanged columns for motions that the effort does not follow. [`delay()`], [`tilt()`] and
-//! [`excitation()`] examine what the columns then say.
+//! [`Trial::search`]: which column is whose, with which sign, unit and zero, by which clock, at which time, under which gravity
+//! ([`Wiring`]). Every hypothesis is judged by how well bodies that can exist, with friction that takes energy, explain the
+//! efforts ([`crate::consistent`]): a flipped sign asks for negative friction and mass, exchanged columns for motions that the
+//! effort does not follow. [`tilt()`] and [`excitation()`] examine what the columns then say.
 
-mod delay;
 mod excitation;
+mod hypotheses;
+mod refine;
 mod rows;
 mod samples;
 mod search;
@@ -14,12 +15,13 @@ mod stated;
 mod tilt;
 mod wiring;
 
-pub use delay::{Delay, delay};
 pub use excitation::{Excitation, excitation};
+pub use refine::GaussianPrior;
+pub use rows::efforts_at_rest;
 pub use samples::Samples;
 pub use search::{Found, Trial, WiringSearch};
 pub use stated::{AgainstStated, against_stated};
-pub use tilt::{GaussianPrior, Tilt, tilt};
+pub use tilt::{Tilt, tilt};
 pub use wiring::{Rewiring, Source, Wiring};
 
 use crate::factor::FactorError;

@@ -2,7 +2,8 @@
 
 use dynid_model::{EffortModel, MotionBlock, RegressorBlock};
 
-use super::samples::{BLOCKS, Samples};
+use super::samples::Samples;
+use super::search::Trial;
 use super::wiring::{Source, Wiring};
 use crate::conditioning::KeptColumns;
 use crate::factor::{Factor, FactorBuilder, FactorError};
@@ -14,11 +15,11 @@ const PER_SECOND: f64 = 4.0;
 /// Rows stacked before a triangle is renewed.
 const CHUNK_ROWS: usize = 256;
 
-/// Factors of `[W | every effort | every slope of an effort]` for one wiring of positions, per output and part of the record.
+/// Factors of `[W | every effort]` for one wiring of positions, per output.
 #[derive(Debug, Clone)]
 pub(crate) struct TrialRows {
-    /// Per output, per block.
-    factors: Vec<Vec<Factor>>,
+    /// Per output.
+    factors: Vec<Factor>,
     columns: KeptColumns,
     joints: usize,
     /// Per column of effort: standard deviation over the record.
@@ -35,15 +36,20 @@ struct Wired {
 }
 
 impl Wired {
-    fn new(samples: &Samples, position: &[Source]) -> Self {
-        let take = |signal: fn(&super::samples::JointSamples) -> &Vec<f64>| -> Vec<f64> {
-            let of = |s: &Source| {
-                let factor = s.factor;
-                signal(&samples.joints[s.joint]).iter().map(move |x| factor * x)
+    fn new(samples: &Samples, wiring: &Wiring) -> Self {
+        let take =
+            |signal: fn(&super::samples::JointSamples) -> &Vec<f64>, per: f64, zero: f64| -> Vec<f64> {
+                let of = |s: &Source| {
+                    let (factor, offset) = (s.factor / per, zero * s.offset);
+                    signal(&samples.joints[s.joint]).iter().map(move |x| factor * x + offset)
+                };
+                wiring.position.iter().flat_map(of).collect()
             };
-            position.iter().flat_map(of).collect()
-        };
-        Wired { q: take(|j| &j.position), dq: take(|j| &j.velocity), ddq: take(|j| &j.acceleration) }
+        Wired {
+            q: take(|j| &j.position, 1.0, 1.0),
+            dq: take(|j| &j.velocity, wiring.clock, 0.0),
+            ddq: take(|j| &j.acceleration, wiring.clock * wiring.clock, 0.0),
+        }
     }
 
     fn block<'a>(
@@ -65,28 +71,38 @@ impl Wired {
     }
 }
 
-/// Regressor of a model along wired positions. `gravity`: in place of the model's, m/s².
+/// Regressor of a model along wired positions, under the wiring's gravity.
 pub(crate) fn regressor(
     model: &dyn EffortModel,
     shape: &[f64],
     samples: &Samples,
-    position: &[Source],
-    gravity: Option<[f64; 3]>,
+    wiring: &Wiring,
 ) -> RegressorBlock {
     let n = samples.len();
-    let wired = Wired::new(samples, position);
+    let wired = Wired::new(samples, wiring);
     let channels: Vec<(&str, &[f64])> =
         samples.channels.iter().map(|c| (c.name.as_str(), c.values.as_slice())).collect();
     let constant: Option<Vec<f64>> =
-        gravity.map(|g| g.iter().flat_map(|x| std::iter::repeat_n(*x, n)).collect());
+        wiring.gravity.map(|g| g.iter().flat_map(|x| std::iter::repeat_n(*x, n)).collect());
     let mut block = RegressorBlock::new(model.layout().clone(), n);
     model.regressor(&wired.block(n, &channels, constant.as_deref()), shape, &mut block);
     block
 }
 
+/// Efforts that parameters ask for at rest, in every sample, output by output.
+pub fn efforts_at_rest(trial: &Trial<'_>, wiring: &Wiring, values: &[f64]) -> Vec<Vec<f64>> {
+    let samples = trial.samples;
+    let mut still = samples.clone();
+    for joint in &mut still.joints {
+        joint.velocity.fill(0.0);
+        joint.acceleration.fill(0.0);
+    }
+    let block = regressor(trial.model, trial.shape, &still, wiring);
+    (0..samples.joints.len()).map(|output| block.effort(output, values)).collect()
+}
+
 impl TrialRows {
-    /// Rows off reversal of every output along wired positions, with every effort (and `slopes`: its derivative) beside them;
-    /// whole (one block) without slopes.
+    /// Rows off reversal of every output along wired positions, with every effort beside them.
     ///
     /// # Errors
     /// [`FactorError`] where the regressor is not finite.
@@ -95,17 +111,16 @@ impl TrialRows {
         shape: &[f64],
         kept: &[usize],
         samples: &Samples,
-        position: &[Source],
-        slopes: bool,
+        wiring: &Wiring,
     ) -> Result<Self, FactorError> {
-        let block = regressor(model, shape, samples, position, None);
+        let block = regressor(model, shape, samples, wiring);
         let columns = KeptColumns::new(model, kept);
         let efforts: Vec<&[f64]> = samples.joints.iter().map(|j| j.effort.as_slice()).collect();
-        let slope = samples.joints.iter().map(|j| j.slope.as_slice());
-        let beside: Vec<&[f64]> = efforts.iter().copied().chain(slope.filter(|_| slopes)).collect();
-        let blocks = if slopes { BLOCKS } else { 1 };
         let factors = (0..samples.joints.len())
-            .map(|output| reduce(&block, &columns, samples, position, output, &beside, blocks))
+            .map(|output| {
+                let parts = reduce(&block, &columns, samples, &wiring.position, output, &efforts, 1)?;
+                Ok(Factor::merge(&parts.iter().collect::<Vec<_>>()))
+            })
             .collect::<Result<Vec<_>, FactorError>>()?;
         Ok(TrialRows {
             factors,
@@ -141,34 +156,13 @@ impl TrialRows {
     /// Factor of one output's own columns with the effort of a source; `None` without rows.
     fn output(&self, output: usize, source: Source) -> Option<Factor> {
         let p = self.columns.local[output].len();
-        let all = self.merged(output, None)?;
+        let all = Some(&self.factors[output]).filter(|f| f.rows() > 0)?;
         let height = all.height();
         let r = |i: usize, k: usize| if i < height { all.r(i, k) } else { 0.0 };
         let effort = |i: usize| source.factor * r(i, p + source.joint);
         let entry = |i: usize, k: usize| if k < p { r(i, k) } else { effort(i) };
         let below = (p..height).map(|i| effort(i).powi(2)).sum::<f64>().sqrt();
         Some(Factor::from_triangle(p, entry, below, all.rows()))
-    }
-
-    /// What the model leaves of an effort and of its derivative, each in one vector of the same rows, every one fitted by the
-    /// output's own columns; `None` without rows.
-    pub(crate) fn rests(
-        &self,
-        output: usize,
-        source: Source,
-        without: Option<usize>,
-    ) -> Option<[Vec<f64>; 2]> {
-        let p = self.columns.local[output].len();
-        let all = self.merged(output, without)?;
-        let take = |column: usize| (p..all.height()).map(|i| all.r(i, column)).collect::<Vec<_>>();
-        Some([take(p + source.joint), take(p + self.joints + source.joint)])
-    }
-
-    fn merged(&self, output: usize, without: Option<usize>) -> Option<Factor> {
-        let blocks = self.factors[output].iter().enumerate();
-        let parts: Vec<&Factor> =
-            blocks.filter(|(b, f)| without != Some(*b) && f.rows() > 0).map(|(_, f)| f).collect();
-        (!parts.is_empty()).then(|| Factor::merge(&parts))
     }
 }
 

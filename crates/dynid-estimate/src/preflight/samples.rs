@@ -1,5 +1,6 @@
 //! A record as trial models see it: filtered, thinned, away from edges.
 
+use super::wiring::{Source, Wiring};
 use dynid_motion::cutoff::{CutoffSettings, kernel_limit};
 use dynid_motion::difference::central;
 use dynid_motion::filter::{butterworth, forward_backward};
@@ -28,8 +29,8 @@ pub(crate) struct JointSamples {
     pub(crate) velocity: Vec<f64>,
     pub(crate) acceleration: Vec<f64>,
     pub(crate) effort: Vec<f64>,
-    /// Time derivative of the effort.
-    pub(crate) slope: Vec<f64>,
+    /// The filtered effort at every sample of the log.
+    pub(crate) whole_effort: Vec<f64>,
     /// Whether the joint is away from reversal.
     pub(crate) sliding: Vec<bool>,
     /// Whether the joint moves at all.
@@ -43,6 +44,8 @@ pub struct Samples {
     pub(crate) channels: Vec<Channel>,
     /// Per sample: which of [`BLOCKS`] parts of the record it belongs to.
     pub(crate) block: Vec<usize>,
+    /// Per sample: its place in the log.
+    pub(crate) kept: Vec<usize>,
     /// Cut-off, Hz.
     pub cutoff_hz: f64,
     /// Time that the samples stand for, s.
@@ -95,7 +98,6 @@ impl Samples {
                 let velocity = central(&position, log.rate_hz)?;
                 let acceleration = central(&velocity, log.rate_hz)?;
                 let effort = forward_backward(&filter, &joint.effort)?;
-                let slope = central(&effort, log.rate_hz)?;
                 let reversing = near_reversal(&velocity, REVERSAL * rms(&velocity));
                 let reversing = dilate(&reversing, reach / 4);
                 Ok(JointSamples {
@@ -103,7 +105,7 @@ impl Samples {
                     velocity: pick(&velocity),
                     acceleration: pick(&acceleration),
                     effort: pick(&effort),
-                    slope: pick(&slope),
+                    whole_effort: effort,
                     sliding: kept.iter().map(|k| !reversing[*k]).collect(),
                     moves: *moves,
                 })
@@ -116,10 +118,17 @@ impl Samples {
             joints,
             channels,
             block: (0..count).map(|k| k * BLOCKS / count).collect(),
+            kept,
             cutoff_hz,
             duration_s: count as f64 * thin as f64 / log.rate_hz,
             rate_hz: log.rate_hz,
         }))
+    }
+
+    /// Efforts as a wiring reads them, joint by joint, at the kept samples.
+    pub fn efforts(&self, wiring: &Wiring) -> Vec<Vec<f64>> {
+        let of = |s: &Source| self.joints[s.joint].effort.iter().map(|e| s.factor * e).collect();
+        wiring.effort.iter().map(of).collect()
     }
 
     pub(crate) fn len(&self) -> usize {

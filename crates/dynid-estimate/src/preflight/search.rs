@@ -1,11 +1,17 @@
-//! The search for the wiring that a log was made with.
+//! The search for what a log is to be read by.
+
+use std::borrow::Cow;
 
 use dynid_model::EffortModel;
+use dynid_motion::UniformLog;
+use dynid_motion::shift::shift;
 use rayon::prelude::*;
 
+use super::refine::{self, GaussianPrior};
 use super::rows::TrialRows;
 use super::samples::Samples;
 use super::wiring::{Rewiring, Wiring};
+use super::{PreflightError, hypotheses};
 use crate::consistent::{Problem, Settings, estimate};
 use crate::factor::{Factor, FactorError};
 
@@ -18,11 +24,13 @@ const SCALES: [f64; 6] = [1e-3, 1e-2, 1e-1, 1e1, 1e2, 1e3];
 /// A difference counts if the misfit falls to at most this share ...
 const SHARE: f64 = 0.6;
 /// ... and by at least this much: natural logarithms of odds, twice.
-const LEAST_GAIN: f64 = 60.0;
+const LEAST_GAIN: f64 = 40.0;
 /// Robots with more joints have neighbours exchanged only.
 const FEW: usize = 12;
-/// Explanations whose misfit lies this close to the best one's, as a share of what it gained, are named beside it.
-const ALIKE: f64 = 0.05;
+/// Explanations are alike up to this multiple of the best one's misfit, or this difference ...
+const ALIKE: (f64, f64) = (2.0, 10.0);
+/// ... and a simpler one takes the place of the best up to these.
+const SIMPLER: (f64, f64) = (1.3, 5.0);
 
 /// What a trial is made with.
 pub struct Trial<'a> {
@@ -32,14 +40,24 @@ pub struct Trial<'a> {
     pub shape: &'a [f64],
     /// Its base columns, ascending.
     pub kept: &'a [usize],
-    /// Samples.
+    /// The log, joints in the order of the outputs.
+    pub log: &'a UniformLog,
+    /// Per joint, whether it moves.
+    pub moves: &'a [bool],
+    /// Its samples.
     pub samples: &'a Samples,
     /// Per joint, whether it slides.
     pub slides: &'a [bool],
     /// From the weighted factor of the base columns to the problem in standard columns, with its prior.
     pub problem: &'a (dyn Fn(&Factor) -> Problem + Sync),
-    /// Weight of the prior, of that of a Gaussian prior.
-    pub prior_weight: f64,
+    /// Prior of all linear parameters, for what is fitted beside them.
+    pub prior: GaussianPrior<'a>,
+    /// Gravity as stated, m/s².
+    pub gravity: [f64; 3],
+    /// Delay as stated: what the motion is later than the effort of the same row, s.
+    pub delay_s: f64,
+    /// Seconds per second of the log's clock, as measured velocities show them; `None` without such.
+    pub clock: Option<f64>,
 }
 
 /// A difference that was found, with what it does.
@@ -76,76 +94,148 @@ impl WiringSearch {
 }
 
 impl Trial<'_> {
-    fn rows(&self, wiring: &Wiring) -> Result<TrialRows, FactorError> {
-        TrialRows::new(self.model, self.shape, self.kept, self.samples, &wiring.position, false)
+    /// What Gauss-Newton needs of the trial.
+    pub(super) fn refinement<'b>(&'b self, samples: &'b Samples) -> refine::Problem<'b> {
+        refine::Problem {
+            model: self.model,
+            shape: self.shape,
+            kept: self.kept,
+            samples,
+            gravity: self.gravity,
+            prior: self.prior,
+        }
+    }
+
+    fn rows(&self, samples: &Samples, wiring: &Wiring) -> Result<TrialRows, FactorError> {
+        TrialRows::new(self.model, self.shape, self.kept, samples, wiring)
+    }
+
+    /// Samples of the log with its efforts moved to the motion that they belong to; `None` if they cannot be formed.
+    fn samples_at(&self, delay_s: f64) -> Option<Cow<'_, Samples>> {
+        if delay_s == 0.0 {
+            return Some(Cow::Borrowed(self.samples));
+        }
+        let mut moved = self.log.clone();
+        for joint in &mut moved.joints {
+            let shifted = shift(&joint.effort, -delay_s * self.log.rate_hz).ok()?;
+            joint.effort = shifted.values;
+            // Beyond the ends of the record nothing is known of the efforts.
+            let known = |k: usize| shifted.valid.contains(&k);
+            moved.usable.iter_mut().enumerate().for_each(|(k, usable)| *usable &= known(k));
+        }
+        Samples::new(&moved, self.moves).ok().flatten().map(Cow::Owned)
     }
 
     /// How badly bodies that can exist, with friction that takes energy, explain efforts: `min ‖R x - z‖² + ρ²` plus the
     /// distance from the prior. Infinite where there is no such estimate.
     pub(super) fn misfit(&self, factor: &Factor) -> f64 {
-        let settings = Settings { gaussian_weight: self.prior_weight, ..Settings::default() };
-        match estimate(&(self.problem)(factor), &settings) {
+        match estimate(&(self.problem)(factor), &self.settings()) {
             Ok(found) => found.objective + factor.rho().powi(2),
             Err(_) => f64::INFINITY,
         }
     }
 
-    /// Misfit of the log as it is, and of explaining nothing.
+    /// Standard parameters of bodies that can exist, as they explain a wiring best; `None` where there are none.
     ///
-    /// # Errors
-    /// [`FactorError`] where the regressor is not finite.
-    pub fn as_logged(&self) -> Result<(f64, f64), FactorError> {
-        let wiring = Wiring::identity(self.samples.joints.len());
-        let factor = self.rows(&wiring)?.weighted(&wiring);
-        Ok((self.misfit(&factor), factor.effort_norm().powi(2)))
+    /// With them, the share of the efforts (root mean square) that they leave unexplained.
+    pub fn parameters(&self, wiring: &Wiring) -> Option<(Vec<f64>, f64)> {
+        let samples = self.samples_at(wiring.delay_s)?;
+        let factor = self.rows(&samples, wiring).ok()?.weighted(wiring);
+        let found = estimate(&(self.problem)(&factor), &self.settings()).ok()?;
+        let left = (found.objective + factor.rho().powi(2)) / factor.effort_norm().powi(2);
+        Some((found.x, left.sqrt()))
     }
 
-    /// Looks for columns that stand for other joints, count the other way or have another unit.
+    fn settings(&self) -> Settings {
+        Settings { gaussian_weight: self.prior.weight, ..Settings::default() }
+    }
+
+    /// Misfit of a wiring; infinite where there is none.
+    fn misfit_of(&self, samples: &Samples, wiring: &Wiring) -> f64 {
+        self.rows(samples, wiring).map_or(f64::INFINITY, |rows| self.misfit(&rows.weighted(wiring)))
+    }
+
+    /// Looks for what the log may be read by instead: columns that stand for other joints, count the other way, from another zero or in
+    /// another unit, gravity along another axis, a clock in another unit, efforts of another time.
     ///
-    /// One difference after another is taken, always the one whose misfit is least, as long as the misfit falls to 60 % and
-    /// by 60. `scales`: whether factors of efforts are tried.
+    /// One difference after another is taken, as long as the least misfit falls to 60 % and by 40. Of those that do nearly as well, the
+    /// simplest is taken; the others are named. `scales`: whether factors of efforts are tried.
     ///
     /// # Errors
-    /// [`FactorError`] where the regressor of the log as it is is not finite.
-    pub fn search(&self, scales: bool) -> Result<WiringSearch, FactorError> {
+    /// [`PreflightError`] where the regressor of the log as it is is not finite.
+    pub fn search(&self, scales: bool) -> Result<WiringSearch, PreflightError> {
         let joints = self.samples.joints.len();
-        let mut wiring = Wiring::identity(joints);
-        let mut rows = self.rows(&wiring)?;
-        let factor = rows.weighted(&wiring);
+        let mut wiring = Wiring { delay_s: self.delay_s, ..Wiring::identity(joints) };
+        let factor = {
+            let samples = self.samples_at(self.delay_s).unwrap_or(Cow::Borrowed(self.samples));
+            self.rows(&samples, &wiring)?.weighted(&wiring)
+        };
         let (as_logged, nothing) = (self.misfit(&factor), factor.effort_norm().powi(2));
         let mut found: Vec<Found> = Vec::new();
         let mut now = as_logged;
         for _ in 0..2 * joints.max(2) {
-            let moves = self.candidates(&wiring, scales);
-            let tried: Vec<(usize, f64)> = (0..moves.len())
-                .into_par_iter()
-                .map(|k| {
-                    let changed = wiring.with(&moves[k], self.slides);
-                    let misfit = if changed.position == wiring.position {
+            let Some(samples) = self.samples_at(wiring.delay_s) else { break };
+            let rows = self.rows(&samples, &wiring)?;
+            let mut moves = self.candidates(&wiring, scales);
+            moves.extend(hypotheses::of(self, &samples, &wiring)?);
+            let tried: Vec<f64> = moves
+                .par_iter()
+                .map(|change| {
+                    let changed = wiring.with(change, self.slides);
+                    let same_motion = Wiring { effort: wiring.effort.clone(), ..changed.clone() } == wiring;
+                    if same_motion {
                         self.misfit(&rows.weighted(&changed))
+                    } else if changed.delay_s == wiring.delay_s {
+                        self.misfit_of(&samples, &changed)
                     } else {
-                        let rows = self.rows(&changed);
-                        rows.map_or(f64::INFINITY, |r| self.misfit(&r.weighted(&changed)))
-                    };
-                    (k, misfit)
+                        let moved = self.samples_at(changed.delay_s);
+                        moved.map_or(f64::INFINITY, |samples| self.misfit_of(&samples, &changed))
+                    }
                 })
                 .collect();
-            let Some((best, after)) = tried.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1)) else { break };
-            if after > SHARE * now || now - after < LEAST_GAIN {
+            let best = tried.iter().copied().fold(f64::INFINITY, f64::min);
+            if best > SHARE * now || now - best < LEAST_GAIN {
                 break;
             }
-            let close = |misfit: f64| misfit <= after + ALIKE * (now - after);
-            let alternatives = tried
+            let within = |(times, gain): (f64, f64)| (times * best).max(best + gain).min(now - LEAST_GAIN);
+            let simpler = within(SIMPLER);
+            let order = |a: &usize, b: &usize| {
+                moves[*a].cost().cmp(&moves[*b].cost()).then(tried[*a].total_cmp(&tried[*b]))
+            };
+            let chosen = (0..moves.len()).filter(|k| tried[*k] <= simpler).min_by(order);
+            let Some(chosen) = chosen else { break };
+            let (change, after) = (&moves[chosen], tried[chosen]);
+            let next = wiring.with(change, self.slides);
+            let alike = within(ALIKE);
+            let alternatives = moves
                 .iter()
-                .filter(|(k, misfit)| *k != best && close(*misfit))
-                .map(|(k, misfit)| (moves[*k].clone(), *misfit))
+                .zip(&tried)
+                .filter(|(other, misfit)| {
+                    **misfit <= alike && !other.is_like(change) && wiring.with(other, self.slides) != next
+                })
+                .map(|(other, misfit)| (other.clone(), *misfit))
                 .collect();
-            wiring = wiring.with(&moves[best], self.slides);
-            rows = self.rows(&wiring)?;
-            found.push(Found { change: moves[best].clone(), before: now, after, alternatives });
+            found.push(Found { change: change.clone(), before: now, after, alternatives });
+            wiring = next;
             now = after;
         }
+        self.drop_refuted(&mut found, now);
         Ok(WiringSearch { wiring, found, as_logged, nothing })
+    }
+
+    /// Drops alternatives of earlier differences that do not explain the log together with the later ones.
+    fn drop_refuted(&self, found: &mut [Found], least: f64) {
+        let start = Wiring { delay_s: self.delay_s, ..Wiring::identity(self.samples.joints.len()) };
+        let changes: Vec<Rewiring> = found.iter().map(|f| f.change.clone()).collect();
+        for (step, found) in found.iter_mut().enumerate().take(changes.len().saturating_sub(1)) {
+            found.alternatives.retain(|(other, _)| {
+                let taken = |k: usize| if k == step { other } else { &changes[k] };
+                let wiring = (0..changes.len()).fold(start.clone(), |w, k| w.with(taken(k), self.slides));
+                let samples = self.samples_at(wiring.delay_s);
+                let misfit = samples.map_or(f64::INFINITY, |s| self.misfit_of(&s, &wiring));
+                !changes.contains(other) && misfit <= (ALIKE.0 * least).max(least + ALIKE.1)
+            });
+        }
     }
 
     /// Differences to try from a wiring, simple ones first.
@@ -154,7 +244,7 @@ impl Trial<'_> {
         let largest = |j: usize| {
             let source = wiring.position[j];
             let of = self.samples.joints[source.joint].position.iter();
-            of.fold(0.0_f64, |m, x| m.max((source.factor * x).abs()))
+            of.fold(0.0_f64, |m, x| m.max((source.factor * x + source.offset).abs()))
         };
         let turning: Vec<usize> = (0..n).filter(|j| !self.slides[*j]).collect();
         // What stands still says next to nothing about whose column it is.

@@ -37,7 +37,7 @@ pub fn against_stated(
 ) -> Result<Vec<Option<AgainstStated>>, PreflightError> {
     let elements: Vec<usize> = (bodies..values.len()).collect();
     let columns = KeptColumns::new(model, &elements);
-    let block = regressor(model, shape, samples, &wiring.position, None);
+    let block = regressor(model, shape, samples, wiring);
     let mut rigid = values.to_vec();
     rigid[bodies..].fill(0.0);
     (0..samples.joints.len())
@@ -64,7 +64,7 @@ pub fn against_stated(
 }
 
 /// Least squares of column `effort` on the first `columns`.
-fn fit(part: &Factor, columns: usize, effort: usize) -> LinearSolution {
+pub(crate) fn fit(part: &Factor, columns: usize, effort: usize) -> LinearSolution {
     let height = part.height();
     let entry = |i: usize, k: usize| if i < height { part.r(i, k) } else { 0.0 };
     let below = (columns..height).map(|i| part.r(i, effort).powi(2)).sum::<f64>().sqrt();

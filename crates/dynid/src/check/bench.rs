@@ -1,10 +1,9 @@
-//! What it takes a model to find: whose columns these are, delays, the direction of gravity, excitation.
+//! What it takes a model to find: whose columns these are, the direction of gravity, excitation.
 
 use dynid_estimate::Factor;
 use dynid_estimate::consistent::Problem;
 use dynid_estimate::preflight::{
-    AgainstStated, Delay, Excitation, GaussianPrior, PreflightError, Samples, Tilt, Trial, Wiring,
-    WiringSearch, against_stated, delay, excitation, tilt,
+    Excitation, GaussianPrior, PreflightError, Samples, Tilt, Trial, Wiring, WiringSearch, excitation, tilt,
 };
 use dynid_io::columns::degrees_suspected;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, Mechanism, RobotModel};
@@ -12,56 +11,48 @@ use dynid_motion::{JointSignals, Log, UniformLog};
 
 use super::columns::Velocities;
 use super::finding::{Findings, Fix, Severity};
+use super::plausibility;
 use crate::config::Config;
 use crate::elements::ElementPlan;
 use crate::identify::stated_values;
 use crate::logs::LARGEST_POSITION;
-use crate::prior::{self, Origin, Prior};
+use crate::prior::{self, Prior};
 use crate::robot::Robot;
 use crate::{Error, advice, consistency};
 
 /// Weight of the prior: it decides only what the log leaves open.
 const PRIOR_WEIGHT: f64 = 0.01;
-/// Delays between these are ordinary, samples: a command is held over a sample, a sensor filters.
-const ORDINARY_DELAY: (f64, f64) = (-1.0, 2.5);
-/// Deviation from a stated delay that is no fault, samples.
-const AS_STATED: f64 = 1.0;
-/// Largest delay that identification finds by itself, samples and s.
-const FOUND_BY_ITSELF: (f64, f64) = (3.0, 0.02);
 /// Tilt that is worth a word, rad.
 const TILT: f64 = 0.035;
-/// A tilt or delay counts beyond this many standard errors.
+/// A tilt counts beyond this many standard errors.
 const SURE: f64 = 6.0;
 /// Condition number of the weighted regressor with unit columns that asks for better excitation.
 const CONDITION: f64 = 100.0;
-/// Stated inertias that leave more of the efforts' variance unexplained say nothing about gains.
-const STATED: f64 = 0.3;
-/// Efforts this many times larger or smaller than stated inertias ask for are in another unit.
-const OFF: f64 = 5.0;
 /// Share of the farthest travel of a joint of its kind below which a joint stands still: more than degrees taken for radians
 /// make of it.
 const STILL: f64 = 1e-3;
 /// Share of the efforts' power (root) left unexplained above which a model explains too little to judge by.
-const UNEXPLAINED: f64 = 0.5;
+pub(super) const UNEXPLAINED: f64 = 0.5;
 
 /// A robot as trial models need it.
 pub(super) struct Bench {
-    model: RobotModel,
-    shape: Vec<f64>,
-    base: BaseParameters,
+    pub(super) model: RobotModel,
+    pub(super) shape: Vec<f64>,
+    pub(super) base: BaseParameters,
     regrouping: dynid_estimate::Mat<f64>,
-    slides: Vec<bool>,
+    pub(super) slides: Vec<bool>,
     stated: Vec<Option<f64>>,
     gravity: [f64; 3],
-    stated_delay: Option<f64>,
+    /// Delay as stated, samples.
+    stated_delay: f64,
     robot: String,
+    known_effort_scale: bool,
 }
 
 /// What a model found in a log.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Examined {
     pub(super) wiring: Option<WiringSearch>,
-    pub(super) delay: Option<Delay>,
     pub(super) tilt: Option<Tilt>,
     pub(super) excitation: Option<Excitation>,
 }
@@ -78,8 +69,9 @@ impl Bench {
             slides: robot.axes.iter().map(|a| a.slides).collect(),
             stated: stated_values(&model, &plan),
             gravity: robot.file.description.gravity,
-            stated_delay: config.conditioning.delay_samples,
+            stated_delay: config.conditioning.delay_samples.unwrap_or(0.0),
             robot: robot.path.display().to_string(),
+            known_effort_scale: config.known_effort_scale,
             model,
             shape,
             base,
@@ -196,20 +188,30 @@ impl Bench {
         let problem = |factor: &Factor| -> Problem {
             consistency::problem(&self.model, &self.regrouping, factor, &prior, &[])
         };
+        let velocities = Velocities::new(log, &moves, samples.cutoff_hz);
         let trial = Trial {
             model: &self.model,
             shape: &self.shape,
             kept: &self.base.kept,
+            log,
+            moves: &moves,
             samples: &samples,
             slides: &self.slides,
             problem: &problem,
-            prior_weight: PRIOR_WEIGHT,
+            prior: GaussianPrior { values: &prior.values, std: &prior.std, weight: PRIOR_WEIGHT },
+            gravity: self.gravity,
+            delay_s: self.stated_delay / log.rate_hz,
+            clock: velocities.clock(),
         };
-        let search = trial.search(true).map_err(PreflightError::from)?;
-        let velocities = Velocities::new(log, &moves, samples.cutoff_hz);
+        let mut search = trial.search(true)?;
         let follow = velocities.follow_positions();
-        super::columns::wiring(&search, follow, &self.names(), out);
-        let mut search = search;
+        let told = super::columns::wiring(
+            &search,
+            follow,
+            (log.rate_hz, velocities.clock(), self.gravity),
+            &self.names(),
+            out,
+        );
         self.beyond_limits(log, &mut search.wiring, follow, out);
         velocities.examine(log, &moves, samples.cutoff_hz, &search.wiring, out);
         let mut wiring = search.wiring.clone();
@@ -218,16 +220,15 @@ impl Bench {
         found.wiring = Some(search);
         found.excitation = Some(excitation(&self.model, &self.shape, &self.base.kept, &samples, &wiring)?);
         self.weak_excitation(found.excitation.as_ref(), out);
-        if found.excitation.as_ref().is_some_and(|e| e.excited == self.base.len()) {
-            self.scale(&samples, &mut wiring, &prior, follow, out)?;
+        let mut explained = explained;
+        if told {
+            let known = (follow, self.known_effort_scale);
+            explained |= plausibility::examine(self, &trial, &mut wiring, &prior, known, out)?;
         }
-        if explained {
-            found.delay = delay(&self.model, &self.shape, &self.base.kept, log, &moves, &wiring)?;
-            late(found.delay, self.stated_delay, log.rate_hz, out);
+        if wiring.delay_s == self.stated_delay / log.rate_hz {
+            found.tilt = tilt(&trial, &wiring)?;
         }
-        found.tilt = self.gravity_shown(&samples, &wiring, &prior, explained)?;
-        let limit = UNEXPLAINED * UNEXPLAINED * nothing;
-        if !explained && found.tilt.is_none_or(|t| t.misfit > limit) {
+        if !explained && told {
             let evidence = format!(
                 "whatever column is taken for whose, bodies that can exist leave {:.0} % of the efforts unexplained",
                 100.0 * (misfit / nothing).sqrt()
@@ -237,7 +238,9 @@ impl Bench {
             out.add("unexplained_effort", Severity::Warning, None, evidence, remedy);
             return Ok(found);
         }
-        tilted(found.tilt, out);
+        if wiring.gravity.is_none() {
+            tilted(found.tilt, out);
+        }
         Ok(found)
     }
 
@@ -262,84 +265,6 @@ impl Bench {
             out.add("degrees", Severity::Error, Some(&joint.name), evidence, remedy).fixes =
                 vec![Fix::Wiring { wiring: wiring.clone(), velocities }];
         }
-    }
-
-    /// Gravity by Gauss-Newton from the direction stated; from all axes, too, where that explains too little.
-    fn gravity_shown(
-        &self,
-        samples: &Samples,
-        wiring: &Wiring,
-        prior: &Prior,
-        explained: bool,
-    ) -> Result<Option<Tilt>, Error> {
-        let size = self.gravity.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let mut starts = vec![self.gravity];
-        if !explained {
-            for axis in 0..3 {
-                for sign in [-1.0, 1.0] {
-                    starts.push(std::array::from_fn(|k| if k == axis { sign * size } else { 0.0 }));
-                }
-            }
-        }
-        let known = GaussianPrior { values: &prior.values, std: &prior.std, weight: PRIOR_WEIGHT };
-        let mut best: Option<Tilt> = None;
-        for start in starts {
-            let from = [self.gravity, start];
-            let found = tilt(&self.model, &self.shape, samples, wiring, from, &self.base.kept, known)?;
-            if let Some(found) = found.filter(|f| best.is_none_or(|b| f.misfit < b.misfit)) {
-                best = Some(found);
-            }
-        }
-        Ok(best)
-    }
-
-    /// The scale of all efforts together, against inertias that the robot file states.
-    fn scale(
-        &self,
-        samples: &Samples,
-        wiring: &mut Wiring,
-        prior: &Prior,
-        velocities: bool,
-        out: &mut Findings<'_>,
-    ) -> Result<(), Error> {
-        let stated = prior.bodies.iter().all(|b| b.origin != Origin::Invented);
-        let first = prior.bodies.first().map(|b| b.inertia);
-        let alike = prior.bodies.len() > 1 && prior.bodies.iter().all(|b| Some(b.inertia) == first);
-        if !stated || alike {
-            return Ok(());
-        }
-        let bodies = 10 * prior.bodies.len();
-        let found = against_stated(&self.model, &self.shape, samples, wiring, bodies, &prior.values)?;
-        let names = wiring.effort.len();
-        // Joints whose efforts stated inertias explain, and elements alone do not.
-        let told: Vec<(usize, AgainstStated)> = found
-            .into_iter()
-            .enumerate()
-            .filter_map(|(j, f)| Some((j, f?)))
-            .filter(|(_, f)| {
-                f.ratio > 0.0 && f.unexplained < STATED && f.unexplained < 0.5 * f.elements_alone
-            })
-            .collect();
-        let off: Vec<&(usize, AgainstStated)> =
-            told.iter().filter(|(_, f)| !(1.0 / OFF..OFF).contains(&f.ratio)).collect();
-        let orders: Vec<f64> = off.iter().map(|(_, f)| f.ratio.log10().round()).collect();
-        let alike = orders.iter().all(|o| *o == orders[0] && *o != 0.0);
-        let enough = off.len() >= 2 || names == 1;
-        if !(enough && off.len() == told.len() && alike && !off.is_empty()) {
-            return Ok(());
-        }
-        let factor = 10f64.powf(-orders[0]);
-        let evidence = format!(
-            "efforts of {} joints are {:.3e} to {:.3e} times those of the bodies that the robot file states",
-            off.len(),
-            off.iter().map(|(_, f)| f.ratio).fold(f64::INFINITY, f64::min),
-            off.iter().map(|(_, f)| f.ratio).fold(0.0, f64::max)
-        );
-        wiring.effort.iter_mut().for_each(|e| e.factor *= factor);
-        let remedy = "state the unit or the drive gains of the efforts; or the masses of the robot file are off by this factor";
-        out.add("drive_gain", Severity::Error, None, evidence, remedy).fixes =
-            vec![Fix::Wiring { wiring: wiring.clone(), velocities }];
-        Ok(())
     }
 
     fn weak_excitation(&self, excitation: Option<&Excitation>, out: &mut Findings<'_>) {
@@ -367,31 +292,6 @@ impl Bench {
 fn first_of(names: &[String]) -> String {
     let shown = names.iter().take(6).cloned().collect::<Vec<_>>().join(", ");
     if names.len() > 6 { format!("{shown} and {} more", names.len() - 6) } else { shown }
-}
-
-/// `stated`: by the configuration, which is then what is expected.
-fn late(delay: Option<Delay>, stated: Option<f64>, rate_hz: f64, out: &mut Findings<'_>) {
-    let Some(found) = delay else { return };
-    let (low, high) = stated.map_or(ORDINARY_DELAY, |d| (d - AS_STATED, d + AS_STATED));
-    let beyond = (found.samples - high).max(low - found.samples);
-    if beyond <= 0.0 || beyond < SURE * found.error {
-        return;
-    }
-    let evidence = format!(
-        "the motion follows the effort of the same row by {:.2} ± {:.2} samples ({:.1} ms)",
-        found.samples,
-        found.error,
-        1e3 * found.samples / rate_hz
-    );
-    let by_itself = (FOUND_BY_ITSELF.1 * rate_hz).max(FOUND_BY_ITSELF.0);
-    let fix = vec![Fix::Delay(found.samples)];
-    if found.samples > -2.0 && found.samples < by_itself {
-        let remedy = "nothing: identification finds and removes a delay of this size";
-        out.add("delay", Severity::Info, None, evidence, remedy).fixes = fix;
-    } else {
-        let remedy = "state the delay (`conditioning.delay_samples`), or log motion and effort by one clock";
-        out.add("delay", Severity::Warning, None, evidence, remedy).fixes = fix;
-    }
 }
 
 fn tilted(tilt: Option<Tilt>, out: &mut Findings<'_>) {

@@ -17,11 +17,44 @@ const LEAST_RANGE: f64 = 0.05;
 /// Scales that differ by less than this agree.
 const AGREE: f64 = 0.004;
 
-/// Findings of the search for the right wiring. `velocities`: whether velocities go with positions.
-pub(super) fn wiring(search: &WiringSearch, velocities: bool, names: &[String], out: &mut Findings<'_>) {
+/// Share of the efforts (root mean square) that a remedy may leave unexplained: what leaves more is no explanation.
+const EXPLAINED: f64 = 0.2;
+
+/// Gravity this close to the direction stated is a base that is not level, rad; what is farther off is mounted another way.
+const SLIGHT: f64 = 0.18;
+
+/// Findings of the search for what the log is to be read by; `false` if nothing tried explains the log. `velocities`: whether
+/// velocities go with positions; `rate_hz`: of the log; `shown`: the clock that velocities show;
+/// `gravity`: as stated.
+pub(super) fn wiring(
+    search: &WiringSearch,
+    velocities: bool,
+    (rate_hz, shown, gravity): (f64, Option<f64>, [f64; 3]),
+    names: &[String],
+    out: &mut Findings<'_>,
+) -> bool {
+    let share = |misfit: f64| 100.0 * (misfit / search.nothing).sqrt();
+    if !search.found.is_empty() && search.misfit() > EXPLAINED * EXPLAINED * search.nothing {
+        let tried: Vec<String> =
+            search.found.iter().map(|f| describe(&f.change, names)).map(in_full).collect();
+        let evidence = format!(
+            "bodies that can exist leave {:.1} % of the efforts unexplained as the log is; of all that was tried (order, signs, units and zeros \
+             of columns, direction of gravity, clock, delay) the best leaves {:.1} %, more than the {:.0} % of an explanation: {}",
+            share(search.as_logged),
+            share(search.misfit()),
+            100.0 * EXPLAINED,
+            tried.join(", and ")
+        );
+        let remedy = "see whether robot file and log are of the same robot and configuration, and whether something else acts on it; several \
+                      columns may be wrong at once";
+        out.add("unexplained_effort", Severity::Error, None, evidence, remedy);
+        return false;
+    }
+    // Efforts alone tell a clock to some per cent.
+    let clock_told = search.wiring.clock == 1.0 || shown.is_some() || !clock(search.wiring.clock).is_empty();
+    let clear = clock_told && search.found.iter().all(|f| f.alternatives.is_empty());
     for (k, found) in search.found.iter().enumerate() {
         let (id, joint, what) = describe(&found.change, names);
-        let share = |misfit: f64| 100.0 * (misfit / search.nothing).sqrt();
         let evidence = format!(
             "bodies that can exist leave {:.3} % of the efforts unexplained as the log is, {:.3} % {what}{}",
             share(found.before),
@@ -35,13 +68,66 @@ pub(super) fn wiring(search: &WiringSearch, velocities: bool, names: &[String], 
                 "reverse the sign, or turn the joint's axis in the robot file if the log is right"
             }
             "degrees" => "state the unit of the position",
+            "position_zero" => "state the offset of the position, or the zero of the joint in the robot file",
+            "base_tilt" => {
+                "state gravity in base axes (`gravity`): the robot is mounted another way than the file says"
+            }
+            "clock_rate" => "state the unit of the time",
+            "delay" => {
+                "state the delay (`conditioning.delay_samples`), or log motion and effort by one clock"
+            }
             _ => "state the unit or the drive gain of the effort",
         };
-        let finding = out.add(id, Severity::Error, joint.as_deref(), evidence, remedy);
-        if k + 1 == search.found.len() {
-            finding.fixes = vec![Fix::Wiring { wiring: search.wiring.clone(), velocities }];
+        let unclear;
+        let remedy = match clear {
+            true => remedy,
+            false => {
+                unclear = format!("see what it is, since the log does not tell for sure, then: {remedy}");
+                unclear.as_str()
+            }
+        };
+        let severity = match &found.change {
+            Rewiring::Gravity(g) if angle(*g, gravity) < SLIGHT => Severity::Warning,
+            _ => Severity::Error,
+        };
+        let finding = out.add(id, severity, joint.as_deref(), evidence, remedy);
+        if clear && k + 1 == search.found.len() {
+            finding.fixes = fixes(search, velocities, rate_hz);
         }
     }
+    true
+}
+
+/// What the configuration has to say for a log to be read as found.
+fn fixes(search: &WiringSearch, velocities: bool, rate_hz: f64) -> Vec<Fix> {
+    let wiring = &search.wiring;
+    let mut out = Vec::new();
+    let plain = Wiring::identity(wiring.position.len());
+    if wiring.position != plain.position || wiring.effort != plain.effort {
+        out.push(Fix::Wiring { wiring: wiring.clone(), velocities });
+    }
+    if wiring.clock != 1.0 {
+        out.push(Fix::Clock(wiring.clock));
+    }
+    out.extend(wiring.gravity.map(Fix::Gravity));
+    if search.found.iter().any(|f| matches!(f.change, Rewiring::Delay(_))) {
+        out.push(Fix::Delay(wiring.delay_s * rate_hz));
+    }
+    out
+}
+
+/// A difference in words that stand alone.
+fn in_full((_, joint, what): (&'static str, Option<String>, String)) -> String {
+    match joint.filter(|_| what.contains("its ")) {
+        Some(joint) => format!("{what} (`{joint}`)"),
+        None => what,
+    }
+}
+
+/// Angle between two directions, rad.
+fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+    (dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()).clamp(-1.0, 1.0).acos()
 }
 
 fn list(joints: &[usize], names: &[String]) -> String {
@@ -76,6 +162,23 @@ fn describe(change: &Rewiring, names: &[String]) -> (&'static str, Option<String
         Rewiring::EffortScale(j, factor) => {
             ("drive_gain", one(j), format!("with its effort multiplied by {factor}"))
         }
+        Rewiring::Zero(j, angle) => {
+            ("position_zero", one(j), format!("with {:.1} degrees added to its position", angle.to_degrees()))
+        }
+        Rewiring::Gravity(g) => (
+            "base_tilt",
+            None,
+            format!("with gravity ({:.2}, {:.2}, {:.2}) m/s² in base axes", g[0], g[1], g[2]),
+        ),
+        Rewiring::Clock(factor) => {
+            ("clock_rate", None, format!("with times multiplied by {factor:.4e}{}", clock(*factor)))
+        }
+        Rewiring::Delay(s) if *s > 0.0 => {
+            ("delay", None, format!("with efforts {s:.3} s before the motion of the same row"))
+        }
+        Rewiring::Delay(s) => {
+            ("delay", None, format!("with efforts {:.3} s after the motion of the same row", -s))
+        }
     }
 }
 
@@ -91,16 +194,19 @@ fn alternatives(found: &Found, names: &[String]) -> String {
         return String::new();
     }
     let words: Vec<String> =
-        found.alternatives.iter().take(3).map(|(change, _)| alternative(change, names)).collect();
+        found.alternatives.iter().take(3).map(|(change, _)| in_full(describe(change, names))).collect();
     format!("; nearly as well {}", words.join(", or "))
 }
 
-fn alternative(change: &Rewiring, names: &[String]) -> String {
-    let (_, joint, what) = describe(change, names);
-    match joint.filter(|_| what.contains("its ")) {
-        Some(joint) => format!("{what} (`{joint}`)"),
-        None => what,
-    }
+/// The unit that a clock counts in, in words.
+fn clock(factor: f64) -> &'static str {
+    const UNITS: [(f64, &str); 4] = [
+        (1e-3, " (milliseconds)"),
+        (1e-6, " (microseconds)"),
+        (1e-9, " (nanoseconds)"),
+        (60.0, " (minutes)"),
+    ];
+    UNITS.iter().find(|(f, _)| (factor / f - 1.0).abs() < 1e-9).map_or("", |(_, word)| word)
 }
 
 /// What measured velocities of a log fit to.
@@ -123,6 +229,25 @@ impl Velocities {
         2 * told.iter().filter(|fits| **fits).count() >= told.len()
     }
 
+    /// Seconds per second of the log's clock as the velocities show them; `None` where they disagree, or tell of a unit of
+    /// their own.
+    pub(super) fn clock(&self) -> Option<f64> {
+        const UNITS: [f64; 3] =
+            [180.0 / std::f64::consts::PI, 30.0 / std::f64::consts::PI, 0.5 / std::f64::consts::PI];
+        let steady = |(scale, rest): &&(f64, f64)| *rest < REST * scale.abs();
+        let mut scales: Vec<f64> = self.as_logged.iter().flatten().filter(steady).map(|(s, _)| *s).collect();
+        if scales.len() < 2 || 2 * scales.len() < self.as_logged.iter().flatten().count() {
+            return None;
+        }
+        scales.sort_by(f64::total_cmp);
+        let middle = scales[scales.len() / 2];
+        let near = |s: f64, to: f64| (s / to - 1.0).abs() < SCALE;
+        let alike = scales.iter().filter(|s| near(**s, middle)).count();
+        let unit = UNITS.iter().any(|u| near(middle, *u) || near(middle, 1.0 / u));
+        (4 * alike >= 3 * scales.len() && middle > 0.0 && !unit)
+            .then(|| if near(middle, 1.0) { 1.0 } else { 1.0 / middle })
+    }
+
     /// Findings; `wiring`: what positions are taken for.
     pub(super) fn examine(
         &self,
@@ -142,9 +267,14 @@ impl Velocities {
             false => (0..n).map(|j| against(log, moves, cutoff_hz, source(j), j)).collect(),
         };
         clock_rate(&own, log.rate_hz, out);
+        let shown = self.clock().filter(|c| *c != 1.0);
+        if let (Some(shown), true) = (shown, wiring.clock == 1.0) {
+            other_clock(shown, out);
+        }
         for (j, measured) in own.iter().enumerate() {
             let Some((scale, rest)) = *measured else { continue };
-            if fits(&(scale, rest)) {
+            let by_clock = shown.is_some_and(|c| fits(&(scale * c, rest * c)));
+            if by_clock || fits(&(scale, rest)) {
                 continue;
             }
             let other = (0..n)
@@ -196,6 +326,18 @@ fn against(
     }
     let found = compare(&position, measured, log.rate_hz, cutoff_hz).ok()?;
     Some((found.scale?, found.mismatch))
+}
+
+/// Velocities that are all off by the same factor, where the efforts do not say which of the two it is.
+fn other_clock(shown: f64, out: &mut Findings<'_>) {
+    let evidence = format!(
+        "measured velocities are alike {:.4e} times the derivatives of their positions: the time is to be multiplied by {shown:.4e}{}, or \
+         velocities are in another unit; the efforts do not tell",
+        1.0 / shown,
+        clock(shown)
+    );
+    let remedy = "see whether the time counts seconds, and state the unit of the one that is wrong";
+    out.add("clock_rate", Severity::Warning, None, evidence, remedy);
 }
 
 /// Velocities that are all off by the same small factor tell of the clock.

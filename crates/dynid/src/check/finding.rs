@@ -63,7 +63,7 @@ impl Finding {
 }
 
 /// Faults that are looked for.
-pub const IDS: [&str; 23] = [
+pub const IDS: [&str; 24] = [
     "base_tilt",
     "clock_backwards",
     "clock_gap",
@@ -82,6 +82,7 @@ pub const IDS: [&str; 23] = [
     "not_examined",
     "position_range",
     "position_sign",
+    "position_zero",
     "saturation",
     "spikes",
     "unexplained_effort",
@@ -111,6 +112,8 @@ pub(super) enum Fix {
     Gravity([f64; 3]),
     /// Rows per second, in place of the time column.
     Rate(f64),
+    /// Times are to be multiplied by a factor.
+    Clock(f64),
 }
 
 /// A finding of a log.

@@ -112,8 +112,9 @@ impl Check {
             let ranges = ranges.into_iter().map(|(a, b)| Value::Array(vec![whole(a), whole(b)]));
             entry.insert("leave_out".to_owned(), Value::Array(ranges.collect()));
         }
-        let columns =
-            own.iter().any(|f| matches!(f, Fix::Wiring { .. } | Fix::VelocityScale(..) | Fix::Rate(_)));
+        let columns = own
+            .iter()
+            .any(|f| !matches!(f, Fix::LeaveOut(_) | Fix::DropRepeated | Fix::Delay(_) | Fix::Gravity(_)));
         if let (true, None, Some(mapped)) = (columns, &config.motor_side, self.mapped.get(number)) {
             entry.insert("columns".to_owned(), Value::Table(mapped.stated(&own)));
         }
@@ -166,6 +167,13 @@ impl Mapped {
                     }
                 }
                 Fix::Rate(hz) => rate = Some(*hz),
+                Fix::Clock(factor) => match &mut mapping.time {
+                    TimeSource::Column(time) => {
+                        time.factor *= factor;
+                        time.offset *= factor;
+                    }
+                    TimeSource::Rate(hz) => *hz /= factor,
+                },
                 _ => {}
             }
         }
@@ -215,10 +223,10 @@ fn rewire(
     wiring: &Wiring,
     velocities: bool,
 ) {
-    let scaled = |column: &Option<ColumnUse>, factor: f64| {
+    let scaled = |column: &Option<ColumnUse>, factor: f64, offset: f64| {
         column.as_ref().map(|c| ColumnUse {
             factor: factor * c.factor,
-            offset: factor * c.offset,
+            offset: factor * c.offset + offset,
             ..c.clone()
         })
     };
@@ -226,15 +234,15 @@ fn rewire(
         let Some(place) = place else { continue };
         let (position, effort) = (wiring.position[joint], wiring.effort[joint]);
         if let Some(source) = places[position.joint] {
-            to.position[*place] = scaled(&from.position[source], position.factor);
+            to.position[*place] = scaled(&from.position[source], position.factor, position.offset);
             if let (true, Some(of), Some(list)) = (velocities, from.velocity.as_ref(), to.velocity.as_mut()) {
-                list[*place] = scaled(&of[source], position.factor);
+                list[*place] = scaled(&of[source], position.factor, 0.0);
             }
         }
         if let (Some(source), Some(of), Some(list)) =
             (places[effort.joint], from.effort.as_ref(), to.effort.as_mut())
         {
-            list[*place] = scaled(&of[source], effort.factor);
+            list[*place] = scaled(&of[source], effort.factor, 0.0);
         }
     }
 }

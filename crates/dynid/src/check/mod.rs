@@ -8,8 +8,10 @@
 mod assignment;
 mod bench;
 mod columns;
+mod delay;
 mod finding;
 mod fix;
+mod plausibility;
 mod record;
 mod report;
 
@@ -22,8 +24,8 @@ use crate::config::Config;
 use crate::logs::{self, LoadedLog};
 use crate::robot::{Robot, RobotOptions};
 use bench::{Bench, Examined};
-use finding::Findings;
 pub use finding::{Finding, IDS, Severity};
+use finding::{Findings, Fix};
 
 /// What was measured of one log, whether or not it is a fault.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -118,7 +120,10 @@ pub fn check(config: &Config, mut progress: impl FnMut(&str)) -> Result<Check, E
         }
         let Some((_, bench)) = &bench else { continue };
         let mut findings = Findings { log: &file, number: out.logs.len(), list: Vec::new() };
-        let (checked, trace) = examine(config, &loaded, bench, &mut findings)?;
+        let (mut checked, trace) = examine(config, &loaded, bench, &mut findings)?;
+        if let Some(found) = late(config, &loaded, bench, &checked, &mut findings)? {
+            checked.delay_samples = Some([found.samples, found.error]);
+        }
         out.findings.extend(findings.list);
         out.logs.push(checked);
         out.traces.push(trace);
@@ -142,6 +147,33 @@ pub(crate) fn of_loaded(config: &Config, robot: &Robot, loaded: &[LoadedLog]) ->
     Ok(out)
 }
 
+/// The delay of a log that is read as it should be. Identification, which finds it itself, does not ask for it twice.
+fn late(
+    config: &Config,
+    loaded: &LoadedLog,
+    bench: &Bench,
+    checked: &CheckedLog,
+    out: &mut Findings<'_>,
+) -> Result<Option<delay::Delay>, Error> {
+    let spoilt = out.list.iter().any(|f| f.severity == Severity::Error && f.id != "delay");
+    if spoilt || checked.unexplained.is_none_or(|share| share > bench::UNEXPLAINED) {
+        return Ok(None);
+    }
+    let stated = config.conditioning.delay_samples;
+    let long = out.list.iter_mut().flat_map(|f| &mut f.fixes).find_map(|fix| match fix {
+        Fix::Delay(samples) => Some(samples),
+        _ => None,
+    });
+    let start = long.as_ref().map_or(stated.unwrap_or(0.0), |samples| **samples);
+    let found = delay::find(config, bench, loaded, start)?;
+    match (found, long) {
+        (Some(found), Some(long)) => *long = found.samples,
+        (Some(found), None) => delay::judge(found, stated, checked.rate_hz, out),
+        (None, _) => {}
+    }
+    Ok(found)
+}
+
 fn examine(
     config: &Config,
     loaded: &LoadedLog,
@@ -154,7 +186,7 @@ fn examine(
     let mut on_grid = record::examine(&loaded.log, &loaded.rows, out)?;
     bench.order(&mut on_grid);
     let idle = bench.idle(&loaded.log, out);
-    let Examined { wiring, delay, tilt, excitation } = bench.examine(&on_grid, &idle, out)?;
+    let Examined { wiring, tilt, excitation } = bench.examine(&on_grid, &idle, out)?;
     let checked = CheckedLog {
         log: out.log.to_owned(),
         rows: loaded.log.rows(),
@@ -162,7 +194,7 @@ fn examine(
         duration_s: on_grid.samples() as f64 / on_grid.rate_hz,
         jitter: on_grid.report.jitter,
         unexplained: wiring.as_ref().map(|w| (w.misfit() / w.nothing).sqrt()),
-        delay_samples: delay.map(|d| [d.samples, d.error]),
+        delay_samples: None,
         tilt_deg: tilt.map(|t| [t.angle.to_degrees(), t.error.to_degrees()]),
         condition: excitation.as_ref().map(|e| e.condition),
         excited: excitation.as_ref().map(|e| [e.excited, bench.parameters()]),

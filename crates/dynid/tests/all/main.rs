@@ -24,6 +24,7 @@ mod online;
 mod payload;
 mod periodic;
 mod preflight;
+mod preflight_causes;
 mod recorded_logs;
 mod settings;
 mod support;

@@ -90,6 +90,9 @@ pub(super) fn folder() -> &'static TempDir {
         write("stribeck.csv", &csv(&simulate(&stribeck, &settings).unwrap()));
         write("arm.toml", ARM);
         write("longer.toml", &ARM.replace("a = 0.4", "a = 0.5"));
+        let heavy =
+            ARM.replace("phi = [3, 0.6, ", "phi = [60, 12, ").replace("phi = [1.5, 0.25, ", "phi = [30, 5, ");
+        write("heavy.toml", &heavy);
         write("mimic.urdf", MIMIC);
         write("a.csv", &a);
         write("b.csv", &b);
@@ -171,6 +174,12 @@ fn cases() -> Vec<Case> {
         top("robot", "robot = \"longer.toml\"", Changes),
         with("seed", text("", "", "", STRIBECK), text("seed = 7", "", "", STRIBECK), Changes),
         top("gravity", "gravity = [0, -9.7, 0]", Changes),
+        with(
+            "known_effort_scale",
+            text("robot = \"heavy.toml\"", "", "", ""),
+            text("robot = \"heavy.toml\"\nknown_effort_scale = true", "", "", ""),
+            Changes,
+        ),
         with(
             "couple_mimics",
             text("robot = \"mimic.urdf\"", "", "", ""),

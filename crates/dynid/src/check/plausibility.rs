@@ -1,0 +1,234 @@
+//! Whether efforts have the size that a robot like this one asks for. No log tells the unit of all efforts together: bodies of any
+//! mass move alike. The robot file, effort limits and the arms that exist do.
+
+use dynid_estimate::preflight::{AgainstStated, Trial, Wiring, against_stated, efforts_at_rest};
+use dynid_model::{EffortModel, Mechanism};
+
+use super::bench::{Bench, UNEXPLAINED};
+use super::finding::{Findings, Fix, Severity};
+use crate::Error;
+use crate::prior::{Origin, Prior};
+
+/// Efforts this many times larger or smaller than expected are worth a word ...
+const WARN: f64 = 2.5;
+/// ... and from here on in another unit.
+const OTHER_UNIT: f64 = 8.0;
+/// Gravity counts from this share of what stated bodies weigh at their size on (root mean square over the joints).
+const GRAVITY_SHARE: f64 = 0.02;
+/// Factors of all efforts that are tried where bodies that can exist explain nothing.
+const SCALES: [f64; 8] = [0.1, 10.0, 1e-2, 1e2, 1e-3, 1e3, 1e-4, 1e4];
+/// Stated inertias that leave more of the efforts' variance unexplained say nothing where gravity does not act.
+const STATED: f64 = 0.3;
+/// Mass that an arm moves over the cube of its reach, kg/m³: light servo arms of 0.4 m to cast arms of 2.5 m, with room for trajectories that
+/// keep the arm folded.
+const ARMS: (f64, f64) = (2.0, 250.0);
+/// Standard gravity, m/s².
+const G: f64 = 9.81;
+/// Fewest joints that carry each other in an arm.
+const ARM_JOINTS: usize = 3;
+/// A ratio this close to a power of ten (its decimal logarithm) is a unit.
+const A_UNIT: f64 = 0.15;
+
+/// Efforts against what one source expects of them.
+struct Evidence {
+    /// Logged over expected; 1 within the range of a source that states one.
+    ratio: f64,
+    words: String,
+}
+
+impl Evidence {
+    fn off(&self) -> f64 {
+        self.ratio.max(1.0 / self.ratio)
+    }
+}
+
+/// Compares efforts with the bodies of the robot file; where it has none that count, with effort limits and with arms that exist.
+///
+/// `known`: whether the configuration states that the efforts are right. Gives whether bodies that can exist explain efforts of some
+/// size.
+///
+/// # Errors
+/// [`Error`] if a regressor is not finite.
+pub(super) fn examine(
+    bench: &Bench,
+    trial: &Trial<'_>,
+    wiring: &mut Wiring,
+    prior: &Prior,
+    (velocities, known): (bool, bool),
+    out: &mut Findings<'_>,
+) -> Result<bool, Error> {
+    let sized = |factor: f64| {
+        let mut sized = wiring.clone();
+        sized.effort.iter_mut().for_each(|e| e.factor *= factor);
+        let (mut x, left) = trial.parameters(&sized)?;
+        x.iter_mut().for_each(|x| *x /= factor);
+        (left < UNEXPLAINED).then_some(x)
+    };
+    let Some(mut identified) = std::iter::once(1.0).chain(SCALES).find_map(sized) else { return Ok(false) };
+    let bodies = 10 * prior.bodies.len();
+    identified[bodies..].fill(0.0);
+    let mut stated = prior.values.clone();
+    stated[bodies..].fill(0.0);
+    let at_rest = |values: &[f64]| efforts_at_rest(trial, wiring, values);
+    let (identified, stated) = (at_rest(&identified), at_rest(&stated));
+    let file = match is_told(prior) {
+        true => from_file(bench, trial, wiring, prior, (&identified, &stated))?,
+        false => None,
+    };
+    let limits = from_limits(bench, trial, wiring);
+    // What stands still may stand where gravity does not act.
+    let least = if trial.moves.iter().all(|m| *m) { ARMS.0 } else { 0.0 };
+    let arm = density(bench, &identified).map(|(found, joint)| Evidence {
+        ratio: if found < least { found / least } else { (found / ARMS.1).max(1.0) },
+        words: format!(
+            "gravity at `{joint}` asks for {found:.3e} kg per cube of the reach in m, arms that exist for {} to {}",
+            ARMS.0, ARMS.1
+        ),
+    });
+    let judged = match &file {
+        Some(file) => Some(file),
+        None => limits.iter().chain(&arm).max_by(|a, b| a.off().total_cmp(&b.off())),
+    };
+    let Some(judged) = judged.filter(|e| e.off() >= WARN) else { return Ok(true) };
+    let (ratio, off) = (judged.ratio, judged.off());
+    let words: Vec<&str> = [&file, &limits, &arm].into_iter().flatten().map(|e| e.words.as_str()).collect();
+    let evidence = words.join("; ");
+    if known {
+        let remedy =
+            "nothing: the configuration states that the size of the efforts is right (`known_effort_scale`)";
+        out.add("drive_gain", Severity::Info, None, evidence, remedy);
+        return Ok(true);
+    }
+    let severity = if off >= OTHER_UNIT { Severity::Error } else { Severity::Warning };
+    let remedy = "state the unit or the drive gains of the efforts, or put right the masses of the robot file (efforts without gravity are \
+                  no efforts of the joints either); if the efforts are right, say so: `known_effort_scale = true` (`--known-effort-scale`)";
+    let finding = out.add("drive_gain", severity, None, evidence, remedy);
+    let order = ratio.log10().round();
+    if severity == Severity::Error && file.is_some() && order != 0.0 && (ratio.log10() - order).abs() < A_UNIT
+    {
+        wiring.effort.iter_mut().for_each(|e| e.factor *= 10f64.powf(-order));
+        finding.fixes = vec![Fix::Wiring { wiring: wiring.clone(), velocities }];
+    }
+    Ok(true)
+}
+
+/// Whether the robot file states bodies of its own: not none, and not the same for all.
+fn is_told(prior: &Prior) -> bool {
+    let first = prior.bodies.first().map(|b| b.inertia);
+    let alike = prior.bodies.len() > 1 && prior.bodies.iter().all(|b| Some(b.inertia) == first);
+    !alike && prior.bodies.iter().all(|b| b.origin != Origin::Invented)
+}
+
+fn rms(signals: &[Vec<f64>]) -> f64 {
+    let count = signals.iter().map(Vec::len).sum::<usize>().max(1) as f64;
+    (signals.iter().flatten().map(|x| x * x).sum::<f64>() / count).sqrt()
+}
+
+/// Gravity of the identified bodies against that of the stated ones, over all joints; without gravity, all their efforts.
+fn from_file(
+    bench: &Bench,
+    trial: &Trial<'_>,
+    wiring: &Wiring,
+    prior: &Prior,
+    (identified, stated): (&[Vec<f64>], &[Vec<f64>]),
+) -> Result<Option<Evidence>, Error> {
+    let (found, expected) = (rms(identified), rms(stated));
+    let weight: f64 = prior.bodies.iter().map(|b| G * b.inertia.mass() * b.size).sum();
+    if expected > GRAVITY_SHARE * weight && found > 0.0 {
+        let ratio = found / expected;
+        let words = format!(
+            "gravity asks for {ratio:.3e} times the effort of the bodies that the robot file states (root mean square over all joints \
+             {found:.3e} against {expected:.3e})"
+        );
+        return Ok(Some(Evidence { ratio, words }));
+    }
+    let each = against_stated(
+        &bench.model,
+        &bench.shape,
+        trial.samples,
+        wiring,
+        10 * prior.bodies.len(),
+        &prior.values,
+    )?;
+    let explains =
+        |f: &AgainstStated| f.ratio > 0.0 && f.unexplained < STATED && f.unexplained < 0.5 * f.elements_alone;
+    let mut told: Vec<f64> = each.into_iter().flatten().filter(explains).map(|f| f.ratio).collect();
+    if told.len() < 2.min(wiring.effort.len()) {
+        return Ok(None);
+    }
+    told.sort_by(f64::total_cmp);
+    let ratio = told[told.len() / 2];
+    let words = format!(
+        "efforts of {} joints are {:.3e} to {:.3e} times those of the bodies that the robot file states",
+        told.len(),
+        told[0],
+        told[told.len() - 1]
+    );
+    Ok(Some(Evidence { ratio, words }))
+}
+
+/// Largest efforts against effort limits, the median over the joints; limits that are all alike are placeholders.
+fn from_limits(bench: &Bench, trial: &Trial<'_>, wiring: &Wiring) -> Option<Evidence> {
+    let efforts = trial.samples.efforts(wiring);
+    let mut shares: Vec<(f64, f64)> = efforts
+        .iter()
+        .enumerate()
+        .filter_map(|(j, effort)| {
+            let limit = bench.model.limits(j).effort.filter(|l| l.is_finite() && *l > 0.0)?;
+            Some((effort.iter().fold(0.0_f64, |m, x| m.max(x.abs())) / limit, limit))
+        })
+        .collect();
+    let alike = shares.len() > 1 && shares.iter().all(|(_, limit)| *limit == shares[0].1);
+    if shares.is_empty() || alike {
+        return None;
+    }
+    shares.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let middle = shares[shares.len() / 2].0;
+    let words = format!(
+        "efforts reach {middle:.3e} times the effort limits of the robot file (median over {} joints)",
+        shares.len()
+    );
+    // A robot may move as slowly and lightly as it likes.
+    Some(Evidence { ratio: middle.max(1.0), words })
+}
+
+/// Mass over the cube of the reach that the largest effort of gravity asks for if the mass sits half way out, kg/m³, and the joint.
+fn density(bench: &Bench, at_rest: &[Vec<f64>]) -> Option<(f64, String)> {
+    let tree = bench.tree()?;
+    let depth = |mut body: usize| {
+        let mut joints = 1;
+        while let Some(parent) = tree.bodies()[body].parent {
+            (body, joints) = (parent, joints + 1);
+        }
+        joints
+    };
+    if (0..tree.bodies().len()).map(depth).max().is_none_or(|joints| joints < ARM_JOINTS) {
+        return None;
+    }
+    let peak = |signal: &Vec<f64>| signal.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let (joint, effort) = at_rest
+        .iter()
+        .map(peak)
+        .enumerate()
+        .filter(|(j, _)| !bench.slides[*j])
+        .max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let reach = reach(tree, *tree.rate_bodies().get(joint)?);
+    let name = bench.model.outputs()[joint].name.clone();
+    (reach > 0.0 && effort > 0.0).then(|| (effort / (G * 0.5 * reach) / reach.powi(3), name))
+}
+
+/// Way from a body's joint to the end of what it carries, m: to the farthest joint, and once more the last part of that way, since no robot
+/// file states how long the last link is.
+fn reach(tree: &Mechanism, body: usize) -> f64 {
+    fn farthest(tree: &Mechanism, body: usize) -> (f64, f64) {
+        let carried = tree.bodies().iter().enumerate().filter(|(_, b)| b.parent == Some(body));
+        let ways = carried.map(|(k, b)| {
+            let own = b.joint.placement.translation.norm();
+            let (way, last) = farthest(tree, k);
+            (own + way, if last > 0.0 { last } else { own })
+        });
+        ways.fold((0.0, 0.0), |far, way| if way.0 > far.0 { way } else { far })
+    }
+    let (way, last) = farthest(tree, body);
+    way + last
+}
