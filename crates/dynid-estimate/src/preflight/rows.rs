@@ -1,6 +1,8 @@
 //! Rows of a trial: the regressor along rewired positions, with every column of effort beside it.
 
-use dynid_model::{EffortModel, MotionBlock, RegressorBlock};
+use std::borrow::Cow;
+
+use dynid_model::{EffortModel, MotionBlock, RegressorBlock, ShapeParameter};
 
 use super::samples::Samples;
 use super::search::Trial;
@@ -71,6 +73,21 @@ impl Wired {
     }
 }
 
+/// Shape parameters under another clock: speeds at which friction changes go with the clock. They are starts that nothing is known of, and
+/// where they are off, a clock must not win by putting them right.
+fn under_clock<'a>(model: &dyn EffortModel, shape: &'a [f64], clock: f64) -> Cow<'a, [f64]> {
+    let table = &model.parameters().shape;
+    if clock == 1.0 || table.is_empty() {
+        return Cow::Borrowed(shape);
+    }
+    let value = |(x, p): (&f64, &ShapeParameter)| match p.unit {
+        "rad/s" | "m/s" => x / clock,
+        "s/rad" | "s/m" => x * clock,
+        _ => *x,
+    };
+    Cow::Owned(shape.iter().zip(table).map(value).collect())
+}
+
 /// Regressor of a model along wired positions, under the wiring's gravity.
 pub(crate) fn regressor(
     model: &dyn EffortModel,
@@ -85,7 +102,8 @@ pub(crate) fn regressor(
     let constant: Option<Vec<f64>> =
         wiring.gravity.map(|g| g.iter().flat_map(|x| std::iter::repeat_n(*x, n)).collect());
     let mut block = RegressorBlock::new(model.layout().clone(), n);
-    model.regressor(&wired.block(n, &channels, constant.as_deref()), shape, &mut block);
+    let shape = under_clock(model, shape, wiring.clock);
+    model.regressor(&wired.block(n, &channels, constant.as_deref()), &shape, &mut block);
     block
 }
 

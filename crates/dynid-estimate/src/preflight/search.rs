@@ -25,6 +25,8 @@ const SCALES: [f64; 6] = [1e-3, 1e-2, 1e-1, 1e1, 1e2, 1e3];
 const SHARE: f64 = 0.6;
 /// ... and by at least this much: natural logarithms of odds, twice.
 const LEAST_GAIN: f64 = 40.0;
+/// The size of all efforts together is only in question where this share of them (root mean square) is left unexplained.
+const UNEXPLAINED: f64 = 0.2;
 /// Robots with more joints have neighbours exchanged only.
 const FEW: usize = 12;
 /// Explanations are alike up to this multiple of the best one's misfit, or this difference ...
@@ -136,14 +138,10 @@ impl Trial<'_> {
     }
 
     /// Standard parameters of bodies that can exist, as they explain a wiring best; `None` where there are none.
-    ///
-    /// With them, the share of the efforts (root mean square) that they leave unexplained.
-    pub fn parameters(&self, wiring: &Wiring) -> Option<(Vec<f64>, f64)> {
+    pub fn parameters(&self, wiring: &Wiring) -> Option<Vec<f64>> {
         let samples = self.samples_at(wiring.delay_s)?;
         let factor = self.rows(&samples, wiring).ok()?.weighted(wiring);
-        let found = estimate(&(self.problem)(&factor), &self.settings()).ok()?;
-        let left = (found.objective + factor.rho().powi(2)) / factor.effort_norm().powi(2);
-        Some((found.x, left.sqrt()))
+        estimate(&(self.problem)(&factor), &self.settings()).ok().map(|found| found.x)
     }
 
     fn settings(&self) -> Settings {
@@ -174,22 +172,35 @@ impl Trial<'_> {
         let mut found: Vec<Found> = Vec::new();
         let mut now = as_logged;
         for _ in 0..2 * joints.max(2) {
+            if now <= LEAST_GAIN {
+                break;
+            }
             let Some(samples) = self.samples_at(wiring.delay_s) else { break };
             let rows = self.rows(&samples, &wiring)?;
-            let mut moves = self.candidates(&wiring, scales);
+            let unexplained = now > UNEXPLAINED * UNEXPLAINED * nothing;
+            let mut moves = self.candidates(&wiring, scales, unexplained);
             moves.extend(hypotheses::of(self, &samples, &wiring)?);
+            // What any parameters leave more than this of does not count, however they are restrained.
+            let most = now - LEAST_GAIN;
+            let misfit = |factor: &Factor| match factor.rho().powi(2) > most {
+                true => f64::INFINITY,
+                false => self.misfit(factor),
+            };
+            let misfit_of = |samples: &Samples, wiring: &Wiring| {
+                self.rows(samples, wiring).map_or(f64::INFINITY, |rows| misfit(&rows.weighted(wiring)))
+            };
             let tried: Vec<f64> = moves
                 .par_iter()
                 .map(|change| {
                     let changed = wiring.with(change, self.slides);
                     let same_motion = Wiring { effort: wiring.effort.clone(), ..changed.clone() } == wiring;
                     if same_motion {
-                        self.misfit(&rows.weighted(&changed))
+                        misfit(&rows.weighted(&changed))
                     } else if changed.delay_s == wiring.delay_s {
-                        self.misfit_of(&samples, &changed)
+                        misfit_of(&samples, &changed)
                     } else {
                         let moved = self.samples_at(changed.delay_s);
-                        moved.map_or(f64::INFINITY, |samples| self.misfit_of(&samples, &changed))
+                        moved.map_or(f64::INFINITY, |samples| misfit_of(&samples, &changed))
                     }
                 })
                 .collect();
@@ -238,8 +249,9 @@ impl Trial<'_> {
         }
     }
 
-    /// Differences to try from a wiring, simple ones first.
-    fn candidates(&self, wiring: &Wiring, scales: bool) -> Vec<Rewiring> {
+    /// Differences to try from a wiring, simple ones first. `scales`: whether factors of efforts are tried; `unexplained`: whether the
+    /// wiring explains little.
+    fn candidates(&self, wiring: &Wiring, scales: bool, unexplained: bool) -> Vec<Rewiring> {
         let n = self.samples.joints.len();
         let largest = |j: usize| {
             let source = wiring.position[j];
@@ -271,7 +283,11 @@ impl Trial<'_> {
                 out.push(Rewiring::PositionUnit(j, 1f64.to_degrees()));
             }
         }
-        // That of all efforts together, and of the only joint that moves, is the prior's alone to tell.
+        // Within what a prior of bodies bears, no log tells the size of all efforts together.
+        if scales && unexplained {
+            out.extend(SCALES.map(Rewiring::AllEffortScales));
+        }
+        // That of the only joint that moves is the prior's alone to tell.
         if scales && moving.len() > 1 {
             out.extend(moving.iter().flat_map(|j| SCALES.map(|s| Rewiring::EffortScale(*j, s))));
         }

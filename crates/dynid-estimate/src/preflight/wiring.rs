@@ -62,6 +62,8 @@ pub enum Rewiring {
     AllPositionUnits(f64),
     /// The effort of a joint is to be multiplied by this.
     EffortScale(usize, f64),
+    /// All efforts are to be multiplied by this.
+    AllEffortScales(f64),
     /// The position of a joint counts from another zero: this is to be added, rad.
     Zero(usize, f64),
     /// Gravity points elsewhere, m/s² in base axes.
@@ -79,7 +81,8 @@ impl Rewiring {
             (Rewiring::Zero(a, _), Rewiring::Zero(b, _)) => a == b,
             (Rewiring::Gravity(_), Rewiring::Gravity(_))
             | (Rewiring::Clock(_), Rewiring::Clock(_))
-            | (Rewiring::Delay(_), Rewiring::Delay(_)) => true,
+            | (Rewiring::Delay(_), Rewiring::Delay(_))
+            | (Rewiring::AllEffortScales(_), Rewiring::AllEffortScales(_)) => true,
             _ => false,
         }
     }
@@ -89,6 +92,7 @@ impl Rewiring {
     pub(crate) fn cost(&self) -> u8 {
         match self {
             Rewiring::AllEffortSigns
+            | Rewiring::AllEffortScales(_)
             | Rewiring::AllPositionUnits(_)
             | Rewiring::Gravity(_)
             | Rewiring::Clock(_)
@@ -151,6 +155,7 @@ impl Wiring {
                 }
             }
             Rewiring::EffortScale(j, factor) => out.effort[*j].factor *= factor,
+            Rewiring::AllEffortScales(factor) => out.effort.iter_mut().for_each(|e| e.factor *= factor),
             Rewiring::Zero(j, offset) => out.position[*j].offset += offset,
             Rewiring::Gravity(gravity) => out.gravity = Some(*gravity),
             Rewiring::Clock(factor) => out.clock *= factor,

@@ -3,7 +3,8 @@
 use dynid_estimate::Factor;
 use dynid_estimate::consistent::Problem;
 use dynid_estimate::preflight::{
-    Excitation, GaussianPrior, PreflightError, Samples, Tilt, Trial, Wiring, WiringSearch, excitation, tilt,
+    Excitation, Found, GaussianPrior, PreflightError, Rewiring, Samples, Tilt, Trial, Wiring, WiringSearch,
+    excitation, tilt,
 };
 use dynid_io::columns::degrees_suspected;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, Mechanism, RobotModel};
@@ -203,7 +204,7 @@ impl Bench {
             delay_s: self.stated_delay / log.rate_hz,
             clock: velocities.clock(),
         };
-        let mut search = trial.search(true)?;
+        let mut search = trial.search(!self.known_effort_scale)?;
         let follow = velocities.follow_positions();
         let told = super::columns::wiring(
             &search,
@@ -217,13 +218,17 @@ impl Bench {
         let mut wiring = search.wiring.clone();
         let (misfit, nothing) = (search.misfit(), search.nothing);
         let explained = search.misfit() < UNEXPLAINED * UNEXPLAINED * search.nothing;
+        let of_all = |f: &Found| match f.change {
+            Rewiring::AllEffortScales(factor) => factor,
+            _ => 1.0,
+        };
+        let applied: f64 = search.found.iter().map(of_all).product();
         found.wiring = Some(search);
         found.excitation = Some(excitation(&self.model, &self.shape, &self.base.kept, &samples, &wiring)?);
         self.weak_excitation(found.excitation.as_ref(), out);
-        let mut explained = explained;
-        if told {
-            let known = (follow, self.known_effort_scale);
-            explained |= plausibility::examine(self, &trial, &mut wiring, &prior, known, out)?;
+        if explained && told {
+            let known = (follow, self.known_effort_scale, applied);
+            plausibility::examine(self, &trial, &mut wiring, &prior, known, out)?;
         }
         if wiring.delay_s == self.stated_delay / log.rate_hz {
             found.tilt = tilt(&trial, &wiring)?;

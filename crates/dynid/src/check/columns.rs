@@ -20,6 +20,9 @@ const AGREE: f64 = 0.004;
 /// Share of the efforts (root mean square) that a remedy may leave unexplained: what leaves more is no explanation.
 const EXPLAINED: f64 = 0.2;
 
+/// Share of the efforts below which what is left may as well be a law of friction that the model does not have: what comes in any amount
+/// then improves it by chance, and is no error.
+const BEARABLE: f64 = 0.1;
 /// Gravity this close to the direction stated is a base that is not level, rad; what is farther off is mounted another way.
 const SLIGHT: f64 = 0.18;
 
@@ -52,7 +55,9 @@ pub(super) fn wiring(
     }
     // Efforts alone tell a clock to some per cent.
     let clock_told = search.wiring.clock == 1.0 || shown.is_some() || !clock(search.wiring.clock).is_empty();
-    let clear = clock_told && search.found.iter().all(|f| f.alternatives.is_empty());
+    // The size of all efforts together is judged by what else is known of it.
+    let sized = search.found.iter().any(|f| matches!(f.change, Rewiring::AllEffortScales(_)));
+    let clear = clock_told && !sized && search.found.iter().all(|f| f.alternatives.is_empty());
     for (k, found) in search.found.iter().enumerate() {
         let (id, joint, what) = describe(&found.change, names);
         let evidence = format!(
@@ -86,10 +91,14 @@ pub(super) fn wiring(
                 unclear.as_str()
             }
         };
-        let severity = match &found.change {
-            Rewiring::Gravity(g) if angle(*g, gravity) < SLIGHT => Severity::Warning,
-            _ => Severity::Error,
+        let slight = match &found.change {
+            Rewiring::Gravity(g) => angle(*g, gravity) < SLIGHT,
+            Rewiring::Clock(_) | Rewiring::Zero(..) | Rewiring::Delay(_) | Rewiring::EffortScale(..) => {
+                found.before < BEARABLE * BEARABLE * search.nothing
+            }
+            _ => false,
         };
+        let severity = if slight { Severity::Warning } else { Severity::Error };
         let finding = out.add(id, severity, joint.as_deref(), evidence, remedy);
         if clear && k + 1 == search.found.len() {
             finding.fixes = fixes(search, velocities, rate_hz);
@@ -161,6 +170,9 @@ fn describe(change: &Rewiring, names: &[String]) -> (&'static str, Option<String
         Rewiring::AllPositionUnits(factor) => ("degrees", None, unit(*factor, "all positions")),
         Rewiring::EffortScale(j, factor) => {
             ("drive_gain", one(j), format!("with its effort multiplied by {factor}"))
+        }
+        Rewiring::AllEffortScales(factor) => {
+            ("drive_gain", None, format!("with all efforts multiplied by {factor}"))
         }
         Rewiring::Zero(j, angle) => {
             ("position_zero", one(j), format!("with {:.1} degrees added to its position", angle.to_degrees()))

@@ -1,4 +1,4 @@
-//! One cause at a time spoils the logs of five robots: the pre-flight names the right one first, and what it writes puts it right.
+//! One cause at a time spoils the logs of seven robots: the pre-flight names the right one first, and what it writes puts it right.
 
 #![expect(
     clippy::unwrap_used,
@@ -34,11 +34,18 @@ impl Record {
         let log = logs::load(&config.log[0], &robot.axes, &config.columns, None).unwrap().log;
         let of_axis = |name: &String| log.joints().iter().find(|j| j.name == *name).unwrap().clone();
         let joints: Vec<_> = robot.axes.iter().map(|a| of_axis(&a.name)).collect();
+        // Rows that repeat the row before are another fault.
+        let repeats = |k: &usize| {
+            let same = |x: &[f64]| *k > 0 && x[*k] == x[*k - 1];
+            joints.iter().all(|j| same(&j.position) && same(&j.effort))
+        };
+        let kept: Vec<usize> = (0..log.rows()).filter(|k| !repeats(k)).collect();
+        let pick = |x: &[f64]| kept.iter().map(|k| x[*k]).collect::<Vec<f64>>();
         Record {
             robot: config.robot.clone(),
-            time: log.time().to_vec(),
-            position: joints.iter().map(|j| j.position.clone()).collect(),
-            effort: joints.iter().map(|j| j.effort.clone()).collect(),
+            time: pick(log.time()),
+            position: joints.iter().map(|j| pick(&j.position)).collect(),
+            effort: joints.iter().map(|j| pick(&j.effort)).collect(),
             settings: String::new(),
         }
     }
@@ -173,7 +180,9 @@ fn spoil(name: &str, clean: &Record) -> (usize, usize) {
         corrupt(&mut record);
         let config = record.write(folder.path(), "spoilt");
         let found = check(&config, |_| {}).unwrap();
-        let first = found.findings.first().filter(|f| f.severity != Severity::Info);
+        let of_record = ["clock_gap", "weak_excitation"];
+        let worse = |f: &&dynid::check::Finding| f.severity != Severity::Info && !of_record.contains(&f.id);
+        let first = found.findings.iter().find(worse);
         let right = first.is_some_and(|f| f.id == id);
         tried += 1;
         named += usize::from(right);
@@ -214,8 +223,8 @@ fn the_right_cause_is_named_first_on_the_example() {
 }
 
 #[test]
-#[ignore = "two minutes; the ordinary run takes the example alone"]
-fn the_right_cause_is_named_first_on_five_robots() {
+#[ignore = "minutes; the ordinary run takes the example alone"]
+fn the_right_cause_is_named_first_on_seven_robots() {
     let Some(data) = data() else { return };
     let file = |path: &str| data.join(path).display().to_string();
     let log = |robot: &str, log: &str, more: &str| {
@@ -230,6 +239,11 @@ fn the_right_cause_is_named_first_on_five_robots() {
         ),
         ("panda", log("panda-gaz2019/panda_kinematics.urdf", "panda-gaz2019/exciting_trajectory.csv.gz", "")),
         ("ur10", log("ur10-unisa/ur10_kinematics.urdf", "ur10-unisa/exciting_trajectory.csv.gz", "")),
+        (
+            "rokae",
+            log("rokae-xmate/xmate_kinematics.urdf", "rokae-xmate/run_b.csv.gz", "[columns]\nrate_hz = 1000"),
+        ),
+        ("ur5", log("oracles/logs/ur5_1k/nominal.urdf", "oracles/logs/ur5_1k/train.csv.gz", "")),
         ("iiwa", log("oracles/logs/iiwa_250/nominal.urdf", "oracles/logs/iiwa_250/train.csv.gz", "")),
     ];
     let found: Vec<(usize, usize)> = robots.iter().map(|(name, clean)| spoil(name, clean)).collect();
