@@ -123,7 +123,7 @@ pub(crate) struct RegressorArgs {
     #[arg(long, value_name = "FILE.csv")]
     pub(crate) states: PathBuf,
     /// Give base columns instead of standard ones.
-    #[arg(long)]
+    #[arg(long, requires = "json")]
     pub(crate) base: bool,
     /// Print JSON (joints, columns, effort, regressor); without it only efforts, as CSV.
     #[arg(long)]
@@ -199,6 +199,18 @@ pub(crate) struct LogArgs {
     /// Hold joints without columns still at zero instead of refusing the log.
     #[arg(long)]
     pub(crate) allow_unlogged: bool,
+}
+
+impl LogArgs {
+    /// The first flag that is given.
+    pub(crate) fn given(&self) -> Option<&'static str> {
+        match (self.rate_hz, &self.gains, self.allow_unlogged) {
+            (Some(_), _, _) => Some("--rate-hz"),
+            (_, Some(_), _) => Some("--gains"),
+            (_, _, true) => Some("--allow-unlogged"),
+            (None, None, false) => None,
+        }
+    }
 }
 
 /// How the logs of a command that works with an estimate are read.
@@ -618,7 +630,7 @@ pub(crate) struct ExportArgs {
     #[command(flatten)]
     pub(crate) columns: LogArgs,
     /// Configuration whose [columns] and [motor_side] the logs follow.
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, value_name = "FILE.toml", requires = "log")]
     pub(crate) config: Option<PathBuf>,
     /// Write links that no body could be all the same; simulators refuse them.
     #[arg(long)]

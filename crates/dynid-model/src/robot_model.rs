@@ -220,6 +220,19 @@ impl RobotModel {
         self.tree().friction_passivity(self.tree_rate(rate), shape, linear, range, held)
     }
 
+    /// Columns of the friction of an output's joint over a motion of the tree; see [`TreeModel::friction_columns`].
+    ///
+    /// # Panics
+    /// As there.
+    pub fn friction_columns(
+        &self,
+        rate: usize,
+        shape: &[f64],
+        motion: &MotionBlock<'_>,
+    ) -> Vec<(usize, Vec<f64>)> {
+        self.tree().friction_columns(self.tree_rate(rate), shape, motion)
+    }
+
     /// Friction of an output's joint over velocities; see [`TreeModel::friction_effort`].
     ///
     /// # Panics

@@ -4,6 +4,7 @@ mod adjoint;
 mod clearance;
 mod elastic;
 mod elements;
+mod friction_columns;
 mod history;
 mod known;
 mod passivity;

@@ -29,12 +29,12 @@ mod series;
 pub use data::{
     BaseParameter, Chart, ChartAxis, ChartCurve, Check, Chosen, ConfoundedPair, Consistency,
     ConsistencyStatus, CurveStyle, DesignJoint, DesignParameter, DesignQuality, DesignReport, DesignStart,
-    Fact, FramePath, FrictionTrial, HeldOut, HeldOutJoint, InputFile, Joint, JointDelay, JointMotion,
-    JointQuality, JointSeries, Ladder, Limit, LimitUse, LogReport, LogRole, LogSeries, LogWhiteness,
-    Observation, Obstacle, Origin, OwnerKind, ParameterShare, ParameterVerdict, Precision, Provenance,
-    Pruning, PruningStep, Quality, RandomMotion, ReportData, Robot, Rung, Shape, ShapeParameter,
-    ShapeVerdict, StandardParameter, Starts, Status, StudyReport, StudyRow, StudySection, StudyTable,
-    Trajectory, UnidentifiableColumn, ValidationPrice, Value, Verdict, Warning, Whiteness,
+    Fact, FileJoint, FileJudgement, FileLoss, FramePath, FrictionTrial, HeldOut, HeldOutJoint, InputFile,
+    Joint, JointDelay, JointMotion, JointQuality, JointSeries, Ladder, Limit, LimitUse, LogReport, LogRole,
+    LogSeries, LogWhiteness, Observation, Obstacle, Origin, OwnerKind, ParameterShare, ParameterVerdict,
+    Precision, Provenance, Pruning, PruningStep, Quality, RandomMotion, ReportData, Robot, Rung, Shape,
+    ShapeParameter, ShapeVerdict, StandardParameter, Starts, Status, StudyReport, StudyRow, StudySection,
+    StudyTable, Trajectory, UnidentifiableColumn, ValidationPrice, Value, Verdict, Warning, Whiteness,
 };
 pub use data::{CurvesByTemperature, FrictionReport, FrictionTest, Surface, TemperatureLevel};
 pub use data::{FindingRow, LogPage};

@@ -17,7 +17,7 @@
 
 use dynid_model::element::{CubicSpring, JetMotion};
 use dynid_model::scalar::Jet;
-use dynid_model::{Dynamics, EffortModel, MotionBlock, RobotModel, State};
+use dynid_model::{Dynamics, EffortModel, Mechanism, MotionBlock, RobotModel, State};
 
 use dynid_motion::trajectory::Fourier;
 
@@ -46,6 +46,8 @@ pub struct ElasticInverse<'a> {
     sign_width: f64,
     dynamics: Dynamics,
     inertias: Vec<Jet>,
+    /// Per joint of the bodies: its rate in the model.
+    carried: Vec<usize>,
     transmissions: Vec<Transmission>,
     /// Rates that are no motor of a transmission.
     links: Vec<usize>,
@@ -123,6 +125,7 @@ impl<'a> ElasticInverse<'a> {
         let inertias = linear[..dynamics.inertial_parameters()].iter().map(|x| Jet::new([*x, 0.0, 0.0]));
         Ok(ElasticInverse {
             inertias: inertias.collect(),
+            carried: (0..joints).collect(),
             links: (0..rates).filter(|rate| transmissions.iter().all(|t| t.motor != *rate)).collect(),
             model,
             linear,
@@ -131,6 +134,25 @@ impl<'a> ElasticInverse<'a> {
             dynamics,
             transmissions,
         })
+    }
+
+    /// Bodies behind torque sensors, which a model without bodies does not have: joints of `mechanism` are links of the model by
+    /// name, and what its bodies ask for is the load of their transmissions.
+    ///
+    /// # Errors
+    /// [`SimError::Setting`] for a model that has bodies, or a joint that is no link of it.
+    pub fn with_load(mut self, mechanism: &Mechanism) -> Result<Self, SimError> {
+        let none = self.dynamics.rates() == 0;
+        demand(none, "load", "a model whose sensors measure all loads", "one with bodies")?;
+        let joints = self.model.joints();
+        let rate = |name: String| match self.links.iter().find(|rate| joints[**rate].name == name) {
+            Some(rate) => Ok(*rate),
+            None => Err(SimError::Setting { name: "load", expected: "links of the model", found: name }),
+        };
+        self.carried = mechanism.rate_names().into_iter().map(rate).collect::<Result<_, _>>()?;
+        self.dynamics = Dynamics::new(mechanism);
+        self.inertias = mechanism.inertia_vector().into_iter().map(|x| Jet::new([x, 0.0, 0.0])).collect();
+        Ok(self)
     }
 
     /// The rates whose motion is to be given, ascending: all but the motors of transmissions.
@@ -196,11 +218,13 @@ impl<'a> ElasticInverse<'a> {
             jets
         };
         let (q, dq, ddq) = (signal(0), signal(1), signal(2));
-        let joints = self.dynamics.rates();
-        let state = State { q: &q[..joints], dq: &dq[..joints], ddq: &ddq[..joints], gravity: None };
+        let of_bodies = |signal: &[Jet]| self.carried.iter().map(|rate| signal[*rate]).collect::<Vec<Jet>>();
+        let carried = [of_bodies(&q), of_bodies(&dq), of_bodies(&ddq)];
+        let state = State { q: &carried[0], dq: &carried[1], ddq: &carried[2], gravity: None };
+        let mut rigid = vec![Jet::default(); self.carried.len()];
+        self.dynamics.inverse_dynamics(&state, &self.inertias, &mut self.dynamics.workspace(), &mut rigid);
         let mut effort = vec![Jet::default(); rates];
-        let mut work = self.dynamics.workspace();
-        self.dynamics.inverse_dynamics(&state, &self.inertias, &mut work, &mut effort[..joints]);
+        self.carried.iter().zip(rigid).for_each(|(rate, own)| effort[*rate] = own);
         let names = self.model.channels().iter().map(String::as_str);
         let channels: Vec<(&str, Jet)> = names.zip(channels).map(|(n, c)| (n, Jet::new(*c))).collect();
         let motion =

@@ -30,6 +30,15 @@ impl Profile {
             (None, first) => first.map_or(0.0, |(_, x)| *x),
         }
     }
+
+    /// Rate of change at a time, 1/s; at a point that after it.
+    pub fn slope(&self, time: f64) -> f64 {
+        let next = self.points.partition_point(|(t, _)| *t <= time);
+        match (next.checked_sub(1).map(|k| self.points[k]), self.points.get(next)) {
+            (Some((t0, x0)), Some((t1, x1))) => (x1 - x0) / (t1 - t0),
+            _ => 0.0,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -41,6 +50,7 @@ mod tests {
         let p = Profile::new(vec![(1.0, 20.0), (3.0, 30.0), (4.0, 29.0)]).unwrap();
         let found = [0.0, 1.0, 2.0, 3.0, 3.5, 9.0].map(|t| p.at(t));
         assert_eq!(found, [20.0, 20.0, 25.0, 30.0, 29.5, 29.0]);
+        assert_eq!([0.0, 1.0, 2.0, 3.0, 9.0].map(|t| p.slope(t)), [0.0, 5.0, 5.0, -1.0, 0.0]);
         assert!(Profile::new(vec![]).is_err() && Profile::new(vec![(1.0, 0.0), (1.0, 2.0)]).is_err());
     }
 }

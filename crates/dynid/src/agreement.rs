@@ -1,12 +1,12 @@
 //! Predicted against measured effort on a log.
 
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, predict};
+use dynid_estimate::conditioning::{ConditioningSettings, Moving, PreparedLog, predict};
 use dynid_estimate::metrics::{Fit, MetricsError, fit};
 use dynid_model::EffortModel;
 use dynid_motion::filter::{butterworth, forward_backward};
 
 use crate::Error;
-use crate::estimate::FitValues;
+use crate::estimate::{FileFit, FitValues};
 
 /// How prediction and measurement are brought together.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,6 +35,8 @@ pub struct Agreement {
     pub measured: Vec<Vec<f64>>,
     /// Per output: predicted effort.
     pub predicted: Vec<Vec<f64>>,
+    /// Per output: a drive acts there, so that its effort counts in figures over all joints.
+    pub driven: Vec<bool>,
     /// Per output: the joint moves in this log.
     pub moves: Vec<bool>,
     /// Per sample: counted (not near an end or a gap of the clock).
@@ -47,6 +49,21 @@ pub struct Agreement {
     pub filtered_unaligned: Fit,
     /// Cut-off of that filter, Hz.
     pub filter_hz: f64,
+    /// Where the joints move, over all samples.
+    pub motion: Moving,
+    /// As [`Agreement::filtered`], per output on the samples in which its joint moves.
+    pub moving: Fit,
+    /// The same on those in which it stands: friction may then have any value up to static friction, which no model of the speed
+    /// tells.
+    pub standing: Fit,
+    /// Per output: share of the counted samples in which its joint stands.
+    pub standing_share: Vec<f64>,
+}
+
+/// Lead of the effort to align a log by, samples: the one found, at the rate that it was found at.
+pub(crate) fn lead(rate_hz: f64, delay_samples: f64, delay_rate_hz: f64) -> f64 {
+    let same_rate = (rate_hz / delay_rate_hz - 1.0).abs() <= 0.05;
+    if same_rate { delay_samples } else { 0.0 }
 }
 
 /// Cut from both ends before figures are formed, in periods of the lower of the two cut-offs.
@@ -69,8 +86,7 @@ pub fn compare(
     let filter_hz = alignment.filter_hz.min(0.4 * log.rate_hz);
     let shape = model.parameters().shape_start();
     let run = |delay: f64| predict(model, &shape, values, log, state_hz, delay, settings);
-    let same_rate = (log.rate_hz / alignment.delay_rate_hz - 1.0).abs() <= 0.05;
-    let predicted = run(if same_rate { alignment.delay_samples } else { 0.0 })?;
+    let predicted = run(lead(log.rate_hz, alignment.delay_samples, alignment.delay_rate_hz))?;
     let unaligned = run(0.0)?;
     let margin = (EDGE_PERIODS * log.rate_hz / filter_hz.min(state_hz)).ceil() as usize;
     let mut bad: Vec<bool> = log.usable.iter().map(|u| !u).collect();
@@ -90,39 +106,107 @@ pub fn compare(
             .map(|s| forward_backward(&filter, s).map_err(conditioning))
             .collect::<Result<Vec<_>, _>>()
     };
-    let pick = |signals: &[Vec<f64>]| -> Vec<Vec<f64>> {
-        signals
-            .iter()
-            .map(|s| s.iter().zip(&counted).filter(|(_, c)| **c).map(|(x, _)| *x).collect())
-            .collect()
+    let motion = Moving::of(log, state_hz, settings)?;
+    let driven: Vec<bool> = (0..log.effort.len()).map(|output| !model.is_undriven(output)).collect();
+    let agree_on = |measured: &[Vec<f64>], predicted: &[Vec<f64>], part: Part| {
+        let is_of = |output: usize, k: usize| counted[k] && part.holds(motion.samples[output][k]);
+        fit_driven(&pick(measured, is_of), &pick(predicted, is_of), &driven)
+            .map_err(|e| Error::TooShort { file: log.name.clone(), message: e.to_string() })
     };
-    let agree = |measured: &[Vec<f64>], predicted: &[Vec<f64>]| {
-        let too_short = |e: MetricsError| Error::TooShort { file: log.name.clone(), message: e.to_string() };
-        let (measured, predicted) = (pick(measured), pick(predicted));
-        let whole = fit(&measured, &predicted).map_err(too_short)?;
-        // What is left over where nothing drives is no share of any effort.
-        let driven: Vec<usize> = (0..measured.len()).filter(|output| !model.is_undriven(*output)).collect();
-        let of = |signals: &[Vec<f64>]| driven.iter().map(|o| signals[*o].clone()).collect::<Vec<_>>();
-        let relative_error = match driven.len() == measured.len() {
-            true => whole.relative_error,
-            false => fit(&of(&measured), &of(&predicted)).map_err(too_short)?.relative_error,
-        };
-        Ok::<Fit, Error>(Fit { relative_error, ..whole })
-    };
-    let measured_filtered = filtered(&log.effort)?;
+    let agree = |measured: &[Vec<f64>], predicted: &[Vec<f64>]| agree_on(measured, predicted, Part::All);
+    let (measured_filtered, predicted_filtered) = (filtered(&log.effort)?, filtered(&predicted)?);
+    let samples = counted.iter().filter(|c| **c).count() as f64;
+    let stands = |moves: &Vec<bool>| moves.iter().zip(&counted).filter(|(m, c)| !**m && **c).count() as f64;
     Ok(Agreement {
+        moving: agree_on(&measured_filtered, &predicted_filtered, Part::Moving)?,
+        standing: agree_on(&measured_filtered, &predicted_filtered, Part::Standing)?,
+        standing_share: motion.samples.iter().map(|moves| stands(moves) / samples).collect(),
         name: log.name.clone(),
         start: log.start,
         rate_hz: log.rate_hz,
         raw: agree(&log.effort, &predicted)?,
-        filtered: agree(&measured_filtered, &filtered(&predicted)?)?,
+        filtered: agree(&measured_filtered, &predicted_filtered)?,
         filtered_unaligned: agree(&measured_filtered, &filtered(&unaligned)?)?,
         measured: log.effort.clone(),
+        driven: driven.clone(),
         predicted,
         moves: log.moves.clone(),
+        motion,
         counted,
         filter_hz,
     })
+}
+
+/// Which samples figures are formed on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Part {
+    All,
+    Moving,
+    Standing,
+}
+
+impl Part {
+    fn holds(self, moves: bool) -> bool {
+        match self {
+            Part::All => true,
+            Part::Moving => moves,
+            Part::Standing => !moves,
+        }
+    }
+}
+
+/// The samples of each signal that are asked for, by output and sample.
+fn pick(signals: &[Vec<f64>], is_kept: impl Fn(usize, usize) -> bool) -> Vec<Vec<f64>> {
+    let kept = |(output, s): (usize, &Vec<f64>)| {
+        s.iter().enumerate().filter(|(k, _)| is_kept(output, *k)).map(|(_, x)| *x).collect()
+    };
+    signals.iter().enumerate().map(kept).collect()
+}
+
+/// Figures per joint; those over all joints leave out where nothing drives: what is left over there is no share of any effort.
+fn fit_driven(measured: &[Vec<f64>], predicted: &[Vec<f64>], driven: &[bool]) -> Result<Fit, MetricsError> {
+    let whole = fit(measured, predicted)?;
+    if driven.iter().all(|d| *d) {
+        return Ok(whole);
+    }
+    let of = |signals: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        signals.iter().zip(driven).filter(|(_, d)| **d).map(|(s, _)| s.clone()).collect()
+    };
+    let relative_error = fit(&of(measured), &of(predicted))?.relative_error;
+    Ok(Fit { relative_error, ..whole })
+}
+
+impl Agreement {
+    /// Figures of a prediction that lacks `lost` of each output's effort, through the same filter.
+    ///
+    /// # Errors
+    /// [`Error::Conditioning`], [`Error::TooShort`].
+    pub(crate) fn without(&self, lost: &[Vec<f64>]) -> Result<FileFit, Error> {
+        let filter = butterworth(4, self.filter_hz, self.rate_hz).map_err(conditioning)?;
+        let through = |signals: &[Vec<f64>]| {
+            let filtered = signals.iter().map(|s| forward_backward(&filter, s).map_err(conditioning));
+            Ok::<_, Error>(pick(&filtered.collect::<Result<Vec<_>, _>>()?, |_, k| self.counted[k]))
+        };
+        let (measured, whole, lost) = (through(&self.measured)?, through(&self.predicted)?, through(lost)?);
+        let pairs = whole.iter().zip(&lost);
+        let predicted: Vec<Vec<f64>> =
+            pairs.map(|(w, l)| w.iter().zip(l).map(|(w, l)| w - l).collect()).collect();
+        let found = fit_driven(&measured, &predicted, &self.driven)
+            .map_err(|e| Error::TooShort { file: self.name.clone(), message: e.to_string() })?;
+        let rms = |s: &[f64]| (s.iter().map(|x| x * x).sum::<f64>() / s.len() as f64).sqrt();
+        let loss: Vec<f64> = lost.iter().map(|l| rms(l)).collect();
+        let percent = |(loss, measured): (&f64, &Vec<f64>)| {
+            let whole = rms(measured);
+            (whole > 0.0).then(|| 100.0 * loss / whole)
+        };
+        Ok(FileFit {
+            rms: found.channels.iter().map(|c| c.rms).collect(),
+            relative_error_per_joint: found.channels.iter().map(|c| c.relative_error).collect(),
+            relative_error: found.relative_error,
+            loss_percent: loss.iter().zip(&measured).map(percent).collect(),
+            loss,
+        })
+    }
 }
 
 fn conditioning(e: dynid_motion::SignalError) -> Error {

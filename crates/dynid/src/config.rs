@@ -1,5 +1,6 @@
 //! The configuration of a run, a TOML file.
 
+mod effect;
 mod estimator;
 mod friction;
 mod instruments;
@@ -8,6 +9,7 @@ mod online;
 mod per_joint;
 pub(crate) mod toml_file;
 
+pub(crate) use effect::serde_name;
 pub use estimator::{
     BoundConfig, Consistency, EstimatorConfig, Method, PriorDistance, ShapeConfig, Variances,
 };
@@ -284,6 +286,21 @@ impl Config {
         }
         toml_file::in_file(file, config.check())?;
         Ok(config)
+    }
+
+    /// Fails unless there is a robot and a log to identify it from: a configuration that was read has both, one that a program
+    /// made may not.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub(crate) fn demand_inputs(&self) -> Result<(), Error> {
+        if self.robot.as_os_str().is_empty() {
+            return Err(Error::setting("robot", "a robot file", "none"));
+        }
+        if self.log.is_empty() {
+            return Err(Error::setting("log", "at least one log to identify from", "none"));
+        }
+        Ok(())
     }
 
     /// Checks that every number makes sense.

@@ -199,6 +199,9 @@ pub(crate) fn problem(
         })
         .chain(payloads)
         .collect();
+    // A lower limit that the user states takes the place of zero.
+    let stated = |column: usize| bounds.iter().any(|b| b.terms[..] == [(column, -1.0)]);
+    let above_zero: Vec<bool> = (0..model.parameters().linear.len()).map(|c| !stated(c)).collect();
     let mut bounds = bounds.to_vec();
     let mut scalars = Vec::new();
     let table = &model.parameters().linear;
@@ -208,7 +211,7 @@ pub(crate) fn problem(
             column,
             prior: prior.values[column],
             scale: prior.std[column],
-            nonnegative: p.lower == Some(0.0),
+            nonnegative: p.lower == Some(0.0) && above_zero[column],
         });
         let limit = |side: &str, factor: f64, value: f64| Bound {
             name: match shape::of_change(&p.name) {

@@ -5,6 +5,7 @@ mod elastic;
 pub(crate) mod friction;
 mod model;
 mod pairs;
+mod settings;
 
 pub use elastic::ElasticFault;
 pub(crate) use elastic::stated_springs;
@@ -92,7 +93,8 @@ impl ElementPlan {
     /// `moves`: whether the logs move the joint of each rate.
     ///
     /// # Errors
-    /// [`Error::UnknownJoint`], [`Error::Elastic`].
+    /// [`Error::UnknownJoint`], [`Error::Elastic`]; [`Error::UnknownElement`], [`Error::ElementSetting`] for settings that nothing
+    /// reads.
     pub fn new(
         mechanism: &Mechanism,
         spec: &ElementSpec,
@@ -100,6 +102,7 @@ impl ElementPlan {
         moves: impl Fn(usize) -> bool,
     ) -> Result<Self, Error> {
         elastic::check(mechanism, &spec.elastic)?;
+        settings::check(&spec.settings)?;
         let mut plan = ElementPlan {
             per_rate: Vec::new(),
             coordinates: elastic::coordinates(mechanism, &spec.elastic),

@@ -488,6 +488,13 @@ fn welded_or_meant(name: &str, welded_to: Option<&str>, known: &[String]) -> Str
 /// What a user can do about a setting that makes no sense.
 fn setting_hint(name: &str) -> Option<&'static str> {
     Some(match name {
+        _ if name.starts_with("channels.") => {
+            "for example `channels = { temperature = [[0, 20], [600, 35]] }`: time in s, value; `temperature_<joint>` for one joint"
+        }
+        "log" => {
+            "`[[log]]` with `path = \"log.csv\"`; in the library `log: vec![LogConfig { path, ..LogConfig::default() }]`"
+        }
+        "robot" => "`robot = \"robot.urdf\"`, a URDF or a robot in TOML",
         "bound" => {
             "for example `links = [\"forearm\"]`, `mass = [0.5, 2.0]`; one entry of [[bound]] for each subject"
         }

@@ -1,11 +1,13 @@
 //! The result file `estimate.json`: stable keys, added to but never renamed.
 
+mod exported;
 mod friction;
 mod instruments;
 mod loops;
 mod model;
 mod trust;
 
+pub use exported::{EXPORT_LOSS_LIMIT, ExportedJoint, ExportedLog, ExportedRecord, FileFit};
 pub use friction::{FrictionTrial, PassivityRecord};
 pub use instruments::{EffectRecord, ExogeneityRecord, InstrumentRecord};
 pub use loops::{ClosureRecord, FrameRecord, LoopsRecord};
@@ -44,6 +46,9 @@ pub struct Estimate {
     pub condition_number: Option<f64>,
     /// The same with columns scaled to unit length.
     pub condition_number_scaled: Option<f64>,
+    /// The same without columns of shape parameters, which the check judges.
+    #[serde(default)]
+    pub condition_number_without_shapes: Option<f64>,
     /// Rank found in the logs against the structural rank.
     pub rank: RankStatus,
     /// Standard parameters: links, then elements. Their split follows the robot file where only combinations are seen.
@@ -93,6 +98,9 @@ pub struct Estimate {
     pub fit: FitSummary,
     /// Validation, log by log.
     pub validation: Vec<LogFit>,
+    /// Robot files beside the identified model: what they state, and what they lose.
+    #[serde(default)]
+    pub exported: ExportedRecord,
     /// What the pre-flight of the training logs found, the remedies it took for granted included.
     #[serde(default)]
     pub preflight: Vec<FindingRecord>,
@@ -301,6 +309,21 @@ pub struct FitValues {
     pub relative_error: Option<f64>,
 }
 
+/// Agreement in motion and at rest apart, on equally filtered effort.
+///
+/// A joint moves where `|v| ≥ max(4 σ_v, 3 % of its rms speed)`, `σ_v` the noise of its speed: below, the sign of the speed is chance.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct ByMotion {
+    /// On samples in which the joint moves.
+    pub moving: FitValues,
+    /// On samples in which it stands, where friction may have any value up to static friction.
+    pub standing: FitValues,
+    /// Share of the samples in which it stands, per joint.
+    pub standing_share: Vec<f64>,
+    /// Least speed that counts as motion, per joint, rad/s or m/s; the least of several logs.
+    pub least_speed: Vec<f64>,
+}
+
 /// Fit on training logs.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FitSummary {
@@ -311,6 +334,9 @@ pub struct FitSummary {
     pub filtered: FitValues,
     /// Cut-off of that filter (zero-phase Butterworth of order 4), Hz.
     pub filter_hz: f64,
+    /// In motion and at rest apart.
+    #[serde(default)]
+    pub by_motion: ByMotion,
 }
 
 /// Fit on one log.
@@ -327,6 +353,9 @@ pub struct LogFit {
     pub filter_hz: f64,
     /// The same on filtered effort without aligning prediction and effort by the identified delay.
     pub filtered_unaligned: FitValues,
+    /// In motion and at rest apart.
+    #[serde(default)]
+    pub by_motion: ByMotion,
 }
 
 /// Verdict of a run.

@@ -50,6 +50,7 @@ pub struct GainIdentification {
 /// as [`crate::identify()`] for logs and robot.
 pub fn identify_gains(config: &Config, mut progress: impl FnMut(Step)) -> Result<GainIdentification, Error> {
     config.check()?;
+    config.demand_inputs()?;
     let payload = known_payload(config)?;
     if config.motor_side.is_some() {
         let why = "drive gains behind a transmission matrix: give currents and positions of the joints";

@@ -1,6 +1,7 @@
 //! The main job: from a robot file and logs to an identified model.
 
 mod alone;
+mod effect;
 mod elastic;
 mod figures;
 mod friction;
@@ -18,6 +19,7 @@ use dynid_estimate::conditioning::{
 };
 use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::linear::LinearEstimate;
+use dynid_estimate::rank::numerical_rank;
 use dynid_estimate::whiteness::InBandWhiteness;
 use dynid_model::element::scale_name;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
@@ -29,8 +31,10 @@ use crate::check::{self, Finding, Severity};
 use crate::config::{Config, LogConfig, Preflight, Route};
 use crate::consistency::Consistent;
 use crate::elements::ElementPlan;
-use crate::estimate::LogFit;
+use crate::estimate::{ExportedRecord, LogFit};
+use crate::export::FileModels;
 use crate::fitting::Fitted;
+use crate::friction_power::FrictionPower;
 use crate::instruments::{self, Comparison, InstrumentRun};
 use crate::log_agreement::{self, LogAgreement};
 use crate::log_terms::LogTerms;
@@ -140,10 +144,14 @@ pub struct Identification {
     pub log_agreement: Option<LogAgreement>,
     /// Delays of single logs, taken off their efforts.
     pub own_delays: Vec<OwnDelay>,
+    /// Robot files beside the identified model.
+    pub exported: ExportedRecord,
     /// Warnings, in words.
     pub warnings: Vec<String>,
     /// What the pre-flight of the training logs found.
     pub findings: Vec<Finding>,
+    /// What friction had to obey.
+    pub(crate) power: FrictionPower,
     /// Settings of the conditioning.
     pub settings: ConditioningSettings,
     /// How the instruments of the fit came about; `None` for other estimators.
@@ -158,6 +166,8 @@ pub struct Identification {
 /// # Errors
 /// [`Error`]: bad input. A rank-deficient log is a status of the result, not an error.
 pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Identification, Error> {
+    config.demand_inputs()?;
+    config.check_effect()?;
     let settings = config.conditioning_settings();
     let Opened { robot, loaded, mut plan, model, logs: prepared, structure, own_delays, findings } =
         open(config, &mut progress)?;
@@ -188,6 +198,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         fitted,
         groups,
         consistent,
+        power,
     } = fit_model(
         config,
         &robot,
@@ -198,13 +209,12 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         &settings,
         &mut progress,
     )?;
+    warnings.extend(effect::warnings(config, shapes.is_some()));
     let Structure { base, stated, prior, regrouping, space, .. } = structure;
-    let (state_hz, kernel_hz, delay_samples) = match &conditioning {
-        Some(c) => (c.state_hz.iter().copied().fold(f64::INFINITY, f64::min), c.kernel_hz, c.delay.samples),
-        None => {
-            let cutoff = config.textbook_route().cutoff_hz;
-            (cutoff, cutoff, 0.0)
-        }
+    let state_hz = model_fit::state_hz(config, conditioning.as_ref());
+    let (kernel_hz, delay_samples) = match &conditioning {
+        Some(c) => (c.kernel_hz, c.delay.samples),
+        None => (state_hz, 0.0),
     };
     let row_rms = figures::row_rms(&groups, &fitted.estimate.x, base.len());
     let residual_ratio = figures::residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
@@ -253,17 +263,21 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         warnings,
         findings,
         settings,
+        power,
         logs: Vec::new(),
         robot,
         model,
         shapes,
         nonlinear: None,
         alone: None,
+        exported: ExportedRecord::default(),
         instruments,
         comparison: None,
     };
     out.nonlinear = out.unfolded(out.values())?;
     out.alone = out.without_logs()?;
+    let (files, projections) = FileModels::of(&out, &prepared)?;
+    let (mut files_training, mut files_validation) = (Vec::new(), Vec::new());
     for (l, log) in prepared.iter().enumerate() {
         progress(Step::Validate(log.name.clone()));
         let agreement = out.agreement(out.values(), log)?;
@@ -272,6 +286,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
             let free = out.agreement(out.unconstrained_values(), log)?;
             out.training_unconstrained.push(crate::result::log_fit(&free));
         }
+        files_training.extend(files.judge(&out, log, &agreement)?);
         out.training.push(agreement);
     }
     out.logs = prepared;
@@ -294,12 +309,15 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
             own.take_off(&mut prepared)?;
         }
         out.warnings.extend(known::logged_beyond(&out.plan.known, &prepared));
-        out.validation.push(out.agreement(out.values(), &prepared)?);
+        let agreement = out.agreement(out.values(), &prepared)?;
+        files_validation.extend(files.judge(&out, &prepared, &agreement)?);
+        out.validation.push(agreement);
         if out.consistent.constrained() {
             let free = out.agreement(out.unconstrained_values(), &prepared)?;
             out.validation_unconstrained.push(crate::result::log_fit(&free));
         }
     }
+    out.exported = files.record(projections, files_training, files_validation);
     progress(Step::Trust);
     out.explained = figures::explained(out.training.iter().chain(&out.validation), &out.consistent);
     out.pruning = prune(&out.fit().kept_blocks(), &out.fit().solution.kept, &PruneSettings::default());
@@ -313,6 +331,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         consistent: &out.consistent,
         rows: &figures::fit_rows(out.fit(), out.conditioning.as_ref(), kernel_hz),
         explained: &out.explained,
+        power: &out.power,
     }
     .trust();
     Ok(out)
@@ -333,6 +352,19 @@ impl Identification {
     /// The linear fit in base columns.
     pub fn fit(&self) -> &LinearEstimate {
         &self.fitted.estimate
+    }
+
+    /// Condition number of the base columns that the logs excite, at unit length, without the columns that shape parameters have
+    /// where the model was linearised: those say how a law bends, and stand close to the law itself by nature.
+    pub fn condition_without_shapes(&self) -> f64 {
+        let solution = &self.fit().solution;
+        let table = &self.model.parameters().linear;
+        let is_law = |k: &usize| shape::of_change(&table[self.base.kept[solution.kept[*k]]].name).is_none();
+        let laws: Vec<usize> = (0..solution.kept.len()).filter(is_law).collect();
+        match laws.len() == solution.kept.len() {
+            true => solution.condition_scaled,
+            false => numerical_rank(&solution.factor.select(&laws)).condition_scaled,
+        }
     }
 
     /// Number of time blocks behind the standard deviations.
@@ -375,6 +407,11 @@ impl Identification {
     /// model is linearised.
     pub fn identified_model(&self) -> (&RobotModel, &[f64]) {
         self.nonlinear.as_ref().map_or((&self.model, self.values()), |(model, values)| (model, values))
+    }
+
+    /// Lead of the effort that predictions of a log take into account, samples: that of the fit at the same rate, else 0.
+    pub(crate) fn delay_on(&self, log: &PreparedLog) -> f64 {
+        agreement::lead(log.rate_hz, self.delay_samples, self.delay_rate_hz)
     }
 
     /// Predicted effort on a prepared log, per output.
@@ -450,6 +487,7 @@ pub(crate) struct Opened {
 /// As [`identify`].
 pub(crate) fn open(config: &Config, progress: &mut impl FnMut(Step)) -> Result<Opened, Error> {
     config.check()?;
+    config.demand_inputs()?;
     let settings = config.conditioning_settings();
     progress(Step::Read(config.robot.display().to_string()));
     let options = RobotOptions {
@@ -476,6 +514,7 @@ pub(crate) fn open(config: &Config, progress: &mut impl FnMut(Step)) -> Result<O
         loaded.log = plan.log_terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
     }
     let model = plan.model(&robot.mechanism)?;
+    effect::check(config, &plan, &model)?;
     logs::check_stated_temperatures(config.log.iter().chain(&config.validation), &model)?;
     let mut prepared =
         loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;

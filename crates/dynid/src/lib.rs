@@ -19,6 +19,7 @@ pub mod estimate;
 pub mod export;
 pub mod fitting;
 pub mod friction;
+mod friction_power;
 pub mod gains;
 pub mod identify;
 pub mod inspect;

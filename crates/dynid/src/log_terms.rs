@@ -154,7 +154,7 @@ impl LogTerms {
 const NO_FRICTION: [&str; 8] =
     ["offset", "rotor", "spring", "cyclic", "drive_gain", "external_load", "elastic", "load"];
 
-fn is_friction(name: &str) -> bool {
+pub(crate) fn is_friction(name: &str) -> bool {
     !NO_FRICTION.contains(&name)
 }
 

@@ -10,10 +10,15 @@ use crate::elements::ElementPlan;
 /// Seed of the states that typical friction is scaled by: the same robot always gets the same truth.
 const TYPICAL_SEED: u64 = 1;
 
+/// Share of the largest rigid effort over random states that typical friction has.
+const RIGID_SHARE: f64 = 0.1;
+/// Share of the effort limit that it has at most: drives have effort to spare for their load.
+const LIMIT_SHARE: f64 = 0.03;
+
 /// Values of all linear parameters of `model`: link inertias and element values of the robot file, `given` values by name
-/// over them. Friction about which neither says anything is typical for the joint: Coulomb 10 % (static 13 %, sigmoids
-/// from -10 to 10 %) and viscous 10 % (at the speed limit) of the largest rigid effort over random states. Offsets, rotors
-/// and what else elements may have are zero then.
+/// over them. Friction about which neither says anything is typical for the joint: Coulomb `e` (static `1.3 e`, sigmoids
+/// from `-e` to `e`) and viscous `e` at the speed limit, with `e` 10 % of the largest rigid effort over random states, but
+/// at most 3 % of the effort limit. Offsets, rotors and what else elements may have are zero then.
 ///
 /// # Errors
 /// [`Error::Setting`] if a given name is no parameter, linear or shape, or its value not finite.
@@ -24,20 +29,20 @@ pub fn nominal_parameters(
 ) -> Result<Vec<f64>, Error> {
     let table = model.parameters();
     let mut values = table.prior();
-    let peaks = typical_efforts(model, &values);
+    let rigid = typical_efforts(model, &values);
     let mut stated: Vec<(String, f64)> = Vec::new();
     for (j, joint) in model.joints().iter().enumerate() {
-        let speed = match model.elastic_link(j) {
-            Some((link, ratio)) => model.limits(link).velocity.unwrap_or(2.0) * ratio.abs(),
-            None => model.limits(j).velocity.unwrap_or(2.0),
-        };
+        let (at, ratio) = model.elastic_link(j).map_or((j, 1.0), |(link, ratio)| (link, ratio.abs()));
+        let speed = model.limits(at).velocity.unwrap_or(2.0) * ratio;
+        let limit = model.limits(at).effort.filter(|e| e.is_finite() && *e > 0.0);
+        let friction = (RIGID_SHARE * rigid[j]).min(limit.map_or(f64::INFINITY, |e| LIMIT_SHARE * e / ratio));
         let typical = [
-            ("fc", 0.1 * peaks[j]),
-            ("fv", 0.1 * peaks[j] / speed),
-            ("fs", 0.13 * peaks[j]),
-            ("ft", 0.1 * peaks[j]),
-            ("fg", 0.2 * peaks[j]),
-            ("fl", 0.2 * peaks[j]),
+            ("fc", friction),
+            ("fv", friction / speed),
+            ("fs", 1.3 * friction),
+            ("ft", friction),
+            ("fg", 2.0 * friction),
+            ("fl", 2.0 * friction),
         ];
         stated.extend(typical.map(|(symbol, value)| (format!("{}.{symbol}", joint.name), value)));
     }
@@ -78,7 +83,8 @@ pub fn with_nominal_shape(model: RobotModel, given: &BTreeMap<String, f64>) -> R
 }
 
 /// Largest rigid effort of every joint over random states; of motors behind springs that of their joints, seen through the
-/// ratio.
+/// ratio. Of mechanisms with loops three times the median, since the largest one says how near a state came to a singular
+/// pose.
 pub(crate) fn typical_efforts(model: &RobotModel, values: &[f64]) -> Vec<f64> {
     const STATES: usize = 100;
     let motion = match model.closed() {
@@ -88,9 +94,12 @@ pub(crate) fn typical_efforts(model: &RobotModel, values: &[f64]) -> Vec<f64> {
     };
     let mut block = RegressorBlock::new(model.layout().clone(), STATES);
     motion.with_block(|m| model.regressor(m, &model.parameters().shape_start(), &mut block));
-    let mut peaks: Vec<f64> = (0..model.outputs().len())
-        .map(|j| block.effort(j, values).iter().fold(0.0_f64, |m, x| m.max(x.abs())))
-        .collect();
+    let largest = |mut sizes: Vec<f64>| match model.closed() {
+        None => sizes.into_iter().fold(0.0, f64::max),
+        Some(_) => 3.0 * *sizes.select_nth_unstable_by(STATES / 2, f64::total_cmp).1,
+    };
+    let sizes = |j: usize| block.effort(j, values).iter().map(|x| x.abs()).collect();
+    let mut peaks: Vec<f64> = (0..model.outputs().len()).map(|j| largest(sizes(j))).collect();
     for motor in 0..peaks.len() {
         if let Some((link, ratio)) = model.elastic_link(motor) {
             peaks[motor] = peaks[link] / ratio.abs();

@@ -35,6 +35,7 @@ pub fn identify_payloads(
     progress: impl FnMut(Step),
 ) -> Result<PayloadIdentification, Error> {
     config.check()?;
+    config.demand_inputs()?;
     if config.payload.is_empty() {
         return Err(Error::setting("payload", "a `[[payload]]` with a `name`", "none"));
     }

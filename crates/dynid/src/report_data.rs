@@ -1,5 +1,6 @@
 //! The report's content from an identification and its result file.
 
+mod files;
 mod friction;
 mod trust;
 
@@ -117,6 +118,7 @@ impl Identification {
             standard_parameters: self.standard_parameters(estimate),
             shape_parameters: friction::shape_parameters(estimate),
             friction_laws: self.friction_laws(estimate),
+            files: self.file_judgement(estimate),
             motions: estimate.motions_that_would_help.clone(),
             consistency: self.consistency_report(estimate),
             held_out: trust::held_out(estimate),
@@ -189,9 +191,13 @@ impl Identification {
                 .channels
                 .iter()
                 .zip(&a.filtered.channels)
-                .map(|(raw, filtered)| report::JointQuality {
+                .enumerate()
+                .map(|(j, (raw, filtered))| report::JointQuality {
                     raw: quality(raw),
                     filtered: quality(filtered),
+                    moving: quality(&a.moving.channels[j]),
+                    standing: quality(&a.standing.channels[j]),
+                    standing_percent: Some(100.0 * a.standing_share[j]),
                 })
                 .collect(),
             relative_error_raw_percent: a.raw.relative_error,
@@ -379,12 +385,15 @@ fn json_value(value: &serde_json::Value) -> Value {
             None => n.as_f64().map_or(Value::Undefined, Value::Number),
         },
         serde_json::Value::String(s) => Value::Text(s.clone()),
-        serde_json::Value::Array(list) => Value::Text(
-            list.iter()
-                .map(|x| x.as_f64().map_or_else(|| x.to_string(), |x| format!("{x:.2}")))
-                .collect::<Vec<_>>()
-                .join(", "),
-        ),
+        serde_json::Value::Array(list) if list.is_empty() => Value::Text("none".to_owned()),
+        serde_json::Value::Array(list) => {
+            let word = |x: &serde_json::Value| match (x.as_str(), x.as_f64()) {
+                (Some(word), _) => word.to_owned(),
+                (None, Some(x)) => format!("{x:.2}"),
+                (None, None) => x.to_string(),
+            };
+            Value::Text(list.iter().map(word).collect::<Vec<_>>().join(", "))
+        }
         other => Value::Text(other.to_string()),
     }
 }

@@ -12,8 +12,8 @@ use crate::Error;
 use crate::agreement::Agreement;
 use crate::config::{Config, Route};
 use crate::estimate::{
-    BaseValue, Choice, ConditioningRecord, Estimate, FitSummary, FitValues, InputRecord, LogFit, LogScale,
-    ModelRecord, ParameterValue, Provenance, RankStatus, SCHEMA, ShapeValue,
+    BaseValue, ByMotion, Choice, ConditioningRecord, Estimate, FitSummary, FitValues, InputRecord, LogFit,
+    LogScale, ModelRecord, ParameterValue, Provenance, RankStatus, SCHEMA, ShapeValue,
 };
 use crate::identify::Identification;
 use crate::logs::sha256;
@@ -47,6 +47,7 @@ impl Identification {
             rows: self.rows,
             condition_number: finite(solution.condition),
             condition_number_scaled: finite(solution.condition_scaled),
+            condition_number_without_shapes: finite(self.condition_without_shapes()),
             rank: RankStatus {
                 structural: self.base.len(),
                 excited: solution.kept.len(),
@@ -71,6 +72,7 @@ impl Identification {
             motions_that_would_help: self.trust.motions.clone(),
             fit: self.fit_summary(),
             validation: self.validation.iter().map(log_fit).collect(),
+            exported: self.exported.clone(),
             preflight: self.findings.iter().map(Into::into).collect(),
             verdict,
             conditioning: self.conditioning_record(config),
@@ -250,6 +252,7 @@ impl Identification {
             raw: pooled(&|a| FitValues::from(&a.raw)),
             filtered: pooled(&|a| FitValues::from(&a.filtered)),
             filter_hz: self.kernel_hz,
+            by_motion: by_motion(&self.training),
         }
     }
 
@@ -438,6 +441,43 @@ pub fn log_fit(a: &Agreement) -> LogFit {
         filtered: FitValues::from(&a.filtered),
         filter_hz: a.filter_hz,
         filtered_unaligned: FitValues::from(&a.filtered_unaligned),
+        by_motion: by_motion(std::slice::from_ref(a)),
+    }
+}
+
+/// Figures in motion and at rest, those of several logs pooled joint by joint over the samples of either kind.
+fn by_motion(all: &[Agreement]) -> ByMotion {
+    let joints = all.first().map_or(0, |a| a.standing_share.len());
+    let counted = |a: &Agreement| a.counted.iter().filter(|c| **c).count() as f64;
+    let stands = |a: &Agreement, j: usize| counted(a) * a.standing_share[j];
+    let pooled = |fit: &dyn Fn(&Agreement) -> FitValues, count: &dyn Fn(&Agreement, usize) -> f64| {
+        let each: Vec<(FitValues, &Agreement)> = all.iter().map(|a| (fit(a), a)).collect();
+        if let [(only, _)] = &each[..] {
+            return only.clone();
+        }
+        let mean = |j: usize, pick: &dyn Fn(&FitValues) -> Option<f64>| -> Option<f64> {
+            let parts = || each.iter().filter_map(|(f, a)| Some((pick(f)?, count(a, j))));
+            let total: f64 = parts().map(|(_, n)| n).sum();
+            (total > 0.0).then(|| parts().map(|(x, n)| x * n).sum::<f64>() / total)
+        };
+        let of = |pick: &dyn Fn(&FitValues, usize) -> Option<f64>| -> Vec<Option<f64>> {
+            (0..joints).map(|j| mean(j, &|f| pick(f, j))).collect()
+        };
+        FitValues {
+            rms: of(&|f, j| f.rms[j].map(|r| r * r)).into_iter().map(|m| m.map(f64::sqrt)).collect(),
+            nrmse: of(&|f, j| f.nrmse[j]),
+            r2: of(&|f, j| f.r2[j]),
+            relative_error_per_joint: of(&|f, j| f.relative_error_per_joint[j]),
+            relative_error: None,
+        }
+    };
+    let total: f64 = all.iter().map(counted).sum();
+    let least = |j: usize| all.iter().map(|a| a.motion.least_speed[j]).fold(f64::INFINITY, f64::min);
+    ByMotion {
+        moving: pooled(&|a| FitValues::from(&a.moving), &|a, j| counted(a) - stands(a, j)),
+        standing: pooled(&|a| FitValues::from(&a.standing), &stands),
+        standing_share: (0..joints).map(|j| all.iter().map(|a| stands(a, j)).sum::<f64>() / total).collect(),
+        least_speed: (0..joints).map(least).collect(),
     }
 }
 

@@ -69,20 +69,20 @@ pub fn linearised(
 ) -> Result<RobotModel, Error> {
     assert_eq!(free.len(), model.parameters().shape.len(), "length of free");
     assert_eq!(linear.len(), model.parameters().linear.len(), "length of linear");
-    let mechanism = model.mechanism();
+    let (mechanism, joints) = (model.mechanism(), model.tree().joints());
     let shape = model.parameters().shape_start();
     let (mut shape, mut free) = (shape.as_slice(), free);
     let mut linear = &linear[mechanism.inertial_parameters()..];
     let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
     for element in plan.build(mechanism)? {
-        let own_shape = take(&mut shape, element.shape(model.joints()).len());
-        let own_linear = take(&mut linear, element.parameters(model.joints()).len());
+        let own_shape = take(&mut shape, element.shape(joints).len());
+        let own_linear = take(&mut linear, element.parameters(joints).len());
         let own_free = take(&mut free, own_shape.len());
         elements.push(match own_shape {
             [] => element,
             _ => Box::new(Linearised::new(
                 element,
-                model.joints(),
+                joints,
                 own_shape.to_vec(),
                 own_linear.to_vec(),
                 own_free.to_vec(),

@@ -1,12 +1,14 @@
 //! Virtual logs: trajectory, elements, noise, encoder, seeded; by inverse dynamics or in closed loop.
 
+mod channels;
 mod clearance;
 mod closed_loop;
 mod elastic;
 mod settings;
 mod trajectory;
 
-use dynid_model::{ClosedModel, EffortModel, History, MotionBlock, RegressorBlock, RobotModel};
+use dynid_model::{ClosedModel, EffortModel, History, Mechanism, MotionBlock, RegressorBlock, RobotModel};
+use dynid_sim::Profile;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -87,13 +89,14 @@ pub struct ExperimentSummary {
 /// ([`dynid_sim::clearance`]), from the centre at rest; offsets of the journals, forces and penetrations are channels.
 ///
 /// Link inertias and stated element values come from the robot file; elements without a stated value get one that is
-/// typical for the joint: Coulomb 10 % and viscous 10 % (at the speed limit) of the largest rigid effort over random
-/// states, no offset, no rotor. It does not depend on the trajectory, so logs of one robot have one truth.
+/// typical for the joint ([`nominal_parameters`]): Coulomb and viscous friction (at the speed limit) of 10 % of the largest
+/// rigid effort over random states each, at most 3 % of the effort limit; no offset, no rotor. It does not depend on the trajectory, so logs of one robot have one truth.
 ///
 /// # Errors
 /// [`Error::Setting`], [`Error::UnknownJoint`], [`Error::Unsupported`], [`Error::Experiment`].
 pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedLog, Error> {
     settings.check()?;
+    settings.check_effect()?;
     let mechanism = &robot.mechanism;
     if robot.closed.is_none() && mechanism.positions() != mechanism.rates() {
         return Err(Error::Unsupported(
@@ -129,18 +132,7 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
     }
     let model = plan.model(mechanism)?;
     let model = with_nominal_shape(model, &settings.values)?;
-    let missing: Vec<&str> = model
-        .channels()
-        .iter()
-        .map(String::as_str)
-        .filter(|name| !settings.channels.contains_key(*name))
-        .collect();
-    if !missing.is_empty() {
-        return Err(Error::Unsupported(format!(
-            "elements that read the channels {} cannot be simulated: inverse dynamics makes no such channel",
-            missing.join(", ")
-        )));
-    }
+    let profiles = channels::profiles(model.channels(), &settings.channels)?;
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
     let reference = Reference::new(&model, settings, &mut rng)?;
     let settings = &match reference.duration() {
@@ -151,15 +143,22 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
     let values = nominal_parameters(&model, &plan, &settings.values)?;
     match settings.mode {
         SimulateMode::InverseDynamics => {
-            by_inverse_dynamics((&model, with_clearance), &reference, values, settings, &mut rng)
+            let load = plan.is_measured().then_some(mechanism);
+            by_inverse_dynamics(
+                (&model, with_clearance, load),
+                (&reference, &profiles),
+                values,
+                settings,
+                &mut rng,
+            )
         }
-        SimulateMode::ClosedLoop => closed_loop::experiment(model, &reference, values, settings),
+        SimulateMode::ClosedLoop => closed_loop::experiment(model, &reference, values, profiles, settings),
     }
 }
 
 fn by_inverse_dynamics(
-    (model, with_clearance): (&RobotModel, Option<RobotModel>),
-    reference: &Reference,
+    (model, with_clearance, load): (&RobotModel, Option<RobotModel>, Option<&Mechanism>),
+    (reference, profiles): (&Reference, &[Profile]),
     values: Vec<f64>,
     settings: &SimulateSettings,
     rng: &mut ChaCha8Rng,
@@ -185,10 +184,10 @@ fn by_inverse_dynamics(
     }
     let moved = |shift: f64| -> Result<Moved, Error> {
         if !model.coordinates().is_empty() {
-            return elastic::along(model, reference, &values, shift, span);
+            return elastic::along((model, load), (reference, profiles), &values, shift, span);
         }
         let at = sample(shift);
-        let effort = efforts(model, &values, &at, span);
+        let effort = efforts(model, &values, &at, &channels::sampled(profiles, shift, span), span);
         Ok((at, effort))
     };
     // The logged effort belongs to the motion that follows it.
@@ -201,7 +200,8 @@ fn by_inverse_dynamics(
         Some(contacts) => {
             let (at, ahead) = (sample(0.0), sample(lead));
             let models = (model, contacts);
-            let found = clearance::along(models, reference, &values, [&at, &ahead], lead, settings)?;
+            let found =
+                clearance::along(models, (reference, profiles), &values, [&at, &ahead], lead, settings)?;
             let effort = (found.effort, found.led);
             let journals = (found.offsets, found.contacts, found.parameters, found.summary);
             (at, effort.0, effort.1, Some(journals))
@@ -238,19 +238,25 @@ fn by_inverse_dynamics(
         })
         .collect();
     let mut truth = named(model, values);
-    let (mut channels, mut clean_channels, mut summary) = (Vec::new(), Vec::new(), None);
+    let read = model.channels().iter().cloned().zip(channels::sampled(profiles, 0.0, span));
+    let mut channels: Vec<(String, Vec<f64>)> = read.collect();
+    let (mut clean_channels, mut summary) = (channels.clone(), None);
     if let Some((offsets, forces, parameters, found)) = journals {
         truth.extend(parameters);
         let noisy = offsets.iter().map(|(name, x)| {
             let mut noise = || -> f64 { StandardNormal.sample(rng) };
             (name.clone(), x.iter().map(|x| x + settings.journal_noise * noise()).collect())
         });
-        channels = noisy.collect();
+        channels.extend(noisy);
         channels.extend(forces.iter().cloned());
-        clean_channels = offsets;
+        clean_channels.extend(offsets);
         clean_channels.extend(forces);
         summary = Some(found);
     }
+    let warnings = (summary.iter().flat_map(|s| s.warnings(settings.rate_hz)))
+        .chain(load.and_then(elastic::unloaded))
+        .chain(beyond_limits(model, &clean_effort))
+        .collect();
     Ok(SimulatedLog {
         joints: model.joints().iter().map(|j| j.name.clone()).collect(),
         undriven,
@@ -263,8 +269,24 @@ fn by_inverse_dynamics(
         clean: [split(&at[0]), split(&at[1]), split(&at[2]), clean_effort],
         truth,
         experiment: None,
-        warnings: summary.iter().flat_map(|s| s.warnings(settings.rate_hz)).collect(),
+        warnings,
         clearance: summary,
+    })
+}
+
+/// Drives that the motion asks for more than they have, in words.
+fn beyond_limits(model: &RobotModel, efforts: &[Vec<f64>]) -> Option<String> {
+    let beyond = efforts.iter().enumerate().filter_map(|(j, effort)| {
+        let limit = model.limits(j).effort.filter(|e| e.is_finite() && *e > 0.0)?;
+        let most = effort.iter().fold(0.0, |m: f64, e| m.max(e.abs()));
+        (most > limit).then(|| format!("{most:.0} at `{}`, limit {limit}", model.joints()[j].name))
+    });
+    let beyond: Vec<String> = beyond.collect();
+    (!beyond.is_empty()).then(|| {
+        format!(
+            "efforts beyond the limits of the robot file ({}): lower `acceleration` or `share`",
+            beyond.join("; ")
+        )
     })
 }
 
@@ -293,15 +315,20 @@ fn efforts(
     model: &RobotModel,
     values: &[f64],
     signals: &[Vec<f64>; 3],
+    read: &[Vec<f64>],
     (samples, rate_hz): (usize, f64),
 ) -> Vec<Vec<f64>> {
     let mut block = RegressorBlock::new(model.layout().clone(), samples);
     let shape = model.parameters().shape_start();
+    let names = model.channels().iter().map(String::as_str);
+    let read: Vec<(&str, &[f64])> = names.zip(read.iter().map(Vec::as_slice)).collect();
     let plain = MotionBlock::plain(samples, &signals[0], &signals[1], &signals[2]);
+    let plain = MotionBlock { channels: &read, ..plain };
     let mut remembered = vec![0.0; model.signals().len() * samples];
     model.remember(&plain, 1.0 / rate_hz, &shape, &mut History::default(), samples, &mut remembered);
     let named = model.signals().iter().zip(remembered.chunks_exact(samples));
-    let channels: Vec<(&str, &[f64])> = named.map(|(name, values)| (name.as_str(), values)).collect();
+    let named = named.map(|(name, values)| (name.as_str(), values));
+    let channels: Vec<(&str, &[f64])> = read.iter().copied().chain(named).collect();
     model.regressor(&MotionBlock { channels: &channels, ..plain }, &shape, &mut block);
     (0..model.outputs().len()).map(|output| block.effort(output, values)).collect()
 }

@@ -12,6 +12,7 @@ use dynid_model::{BaseParameters, EffortModel, Owner, RobotModel};
 use crate::advice::{Advice, FitRows, MotionSettings, Present, advise};
 use crate::consistency::Consistent;
 use crate::fitting::Fitted;
+use crate::friction_power::{self, FrictionPower};
 use crate::prior::{Prior, link_lengths};
 
 /// Confidence of the intervals.
@@ -63,6 +64,7 @@ pub(crate) struct Evidence<'a> {
     pub rows: &'a FitRows,
     /// Per output: whether the model explains its effort.
     pub explained: &'a [bool],
+    pub power: &'a FrictionPower,
 }
 
 /// Half width of intervals of [`CONFIDENCE`] in standard deviations.
@@ -168,6 +170,9 @@ impl Evidence<'_> {
         let Some(estimate) = &self.consistent.estimate else { return false };
         estimate.active.iter().any(|a| match (a, &p.owner) {
             (ActiveConstraint::AtZero { parameter }, _) => *parameter == p.name,
+            (ActiveConstraint::AtBound { bound }, Owner::Joint(joint)) => {
+                self.power.kept.contains(&p.name) && *bound == friction_power::bound_name(joint)
+            }
             (ActiveConstraint::AtBound { .. }, _) => false,
             (on_link, Owner::Link(link)) => on_link.name() == link,
             _ => false,

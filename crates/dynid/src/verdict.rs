@@ -159,21 +159,26 @@ fn rank_gap(id: &Identification) -> (Status, CheckResult) {
 }
 
 fn condition(id: &Identification) -> (Status, CheckResult) {
-    let condition = id.fit().solution.condition_scaled;
+    let condition = id.condition_without_shapes();
+    // It amplifies errors, and standard deviations know of it: no reason to throw a model away.
     check(
-        Status::of(condition < 100.0, condition < 1000.0),
+        Status::of(condition < 100.0, true),
         "condition number (scaled columns)",
         condition.is_finite().then_some(condition),
         "",
         "below 100",
-        "how strongly errors of the effort are amplified; a better excitation trajectory (`dynid design`) lowers it",
+        "how strongly errors of the effort are amplified, columns of shape parameters left out; a better excitation trajectory \
+         (`dynid design`) lowers it",
     )
 }
 
+/// Of samples in which the joint moves; of a joint that never does, of all.
 fn worst_r2(agreements: &[crate::agreement::Agreement]) -> Option<f64> {
     agreements
         .iter()
-        .flat_map(|a| a.filtered.channels.iter().filter_map(|c| c.r2))
+        .flat_map(|a| {
+            a.moving.channels.iter().zip(&a.filtered.channels).filter_map(|(m, all)| m.r2.or(all.r2))
+        })
         .fold(None, |m: Option<f64>, x| Some(m.map_or(x, |m| m.min(x))))
 }
 
@@ -186,8 +191,27 @@ fn fit_check(name: &str, agreements: &[crate::agreement::Agreement], where_: &st
         worst,
         "",
         "R² of every joint at least 0.9",
-        format!("share of the effort's variance explained on {where_}, worst joint"),
+        format!(
+            "share of the effort's variance explained on {where_} where the joint moves, worst joint{}",
+            standing_apart(agreements)
+        ),
     )
+}
+
+/// Share of the samples at rest from which on they are told apart.
+const STANDS: f64 = 0.05;
+
+/// What the error is where joints stand, of the joint that stands longest.
+fn standing_apart(agreements: &[crate::agreement::Agreement]) -> String {
+    let joints = agreements.iter().flat_map(|a| a.standing_share.iter().copied().zip(&a.standing.channels));
+    let longest = joints.filter(|(share, _)| *share > STANDS).max_by(|a, b| a.0.total_cmp(&b.0));
+    longest.map_or_else(String::new, |(share, standing)| {
+        let error = standing.relative_error.map_or_else(String::new, |e| format!(", error there {e:.1} % of its effort"));
+        format!(
+            "; samples at rest (up to {:.0} % of a joint's{error}) are shown apart, since friction has any value there",
+            100.0 * share
+        )
+    })
 }
 
 fn training_fit(id: &Identification) -> (Status, CheckResult) {

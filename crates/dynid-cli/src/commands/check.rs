@@ -6,7 +6,7 @@ use dynid::check::{Check, Finding, Severity, check};
 use dynid::config::{Config, LogConfig};
 use dynid::io::output::write_atomically;
 
-use super::apply_log_args;
+use super::apply_log_args_to;
 use crate::args::CheckArgs;
 use crate::message::{Failure, data, note};
 use crate::outputs;
@@ -14,7 +14,7 @@ use crate::progress::Progress;
 
 pub(crate) fn run(args: &CheckArgs) -> Result<u8, Failure> {
     let (mut config, source) = configuration(args)?;
-    apply_log_args(&mut config.columns, &args.columns);
+    apply_log_args_to(&mut config, &args.columns);
     config.locked.extend(args.lock.iter().cloned());
     config.gravity = args.gravity.or(config.gravity);
     let outputs: Vec<(&str, &Path)> = [("--fix", &args.fix), ("--report", &args.report)]

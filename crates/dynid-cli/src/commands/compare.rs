@@ -6,7 +6,7 @@ use dynid::compare::{ComparedEstimator, Comparison, compare};
 use dynid::config::{Config, LogConfig};
 use dynid::io::output::write_atomically;
 
-use super::{apply_log_args, table};
+use super::{apply_log_args_to, table};
 use crate::args::CompareArgs;
 use crate::message::{Failure, data, note};
 use crate::outputs;
@@ -21,7 +21,7 @@ pub(crate) fn run(args: &CompareArgs) -> Result<u8, Failure> {
             ..Config::default()
         },
     };
-    apply_log_args(&mut config.columns, &args.columns);
+    apply_log_args_to(&mut config, &args.columns);
     let outputs: Vec<(&str, &Path)> = args.report.iter().map(|p| ("--report", p.as_path())).collect();
     let logs = config.log.iter().map(|log| log.path.as_path());
     let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).collect();
@@ -59,9 +59,21 @@ fn text(found: &Comparison) -> String {
     };
     let rows: Vec<Vec<String>> = found.estimators.iter().map(row).collect();
     let head = ["rank", "estimator", "error, %", "behind, %", "s", "rms per joint"];
+    let best = found.estimators.first();
+    let at_rest =
+        best.into_iter().flat_map(|e| found.joints.iter().zip(&e.joints)).filter_map(|(name, joint)| {
+            let joint = joint.filter(|j| j.standing_share > table::STANDS)?;
+            Some(format!(
+                "{name} stands in {:.0} % of the samples: best estimator's rms {} moving, {} standing\n",
+                100.0 * joint.standing_share,
+                table::number(joint.rms_moving),
+                table::number(joint.rms_standing)
+            ))
+        });
     format!(
-        "{}\nheld-out error through a filter of {:.1} Hz, {} folds of time: {}\n",
+        "{}\n{}held-out error through a filter of {:.1} Hz, {} folds of time: {}\n",
         table::aligned(&head, &rows).trim_end(),
+        at_rest.collect::<String>(),
         found.filter_hz,
         found.folds,
         found.headline()

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use dynid::config::{Config, LogConfig};
-use dynid::estimate::Estimate;
+use dynid::estimate::{EXPORT_LOSS_LIMIT, Estimate, FileFit};
 use dynid::export::{CheckStates, Exported, IdentifiedRobot, RobotExport, Source, json};
 use dynid::io::MappingSpec;
 use dynid::io::output::write_atomically;
 use dynid::logs::sha256;
 
-use super::apply_log_args;
+use super::{apply_log_args, table};
 use crate::args::ExportArgs;
 use crate::message::{Failure, note};
 use crate::outputs;
@@ -24,6 +24,12 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
         return Err(Failure::Usage(
             "nothing to write: expected at least one of --urdf, --mjcf, --json".to_owned(),
             "for example `dynid export dynid-out/estimate.json --urdf robot.urdf`",
+        ));
+    }
+    if let Some(flag) = args.columns.given().filter(|_| args.log.is_empty()) {
+        return Err(Failure::Usage(
+            format!("{flag}: expected --log beside it, found none"),
+            "it says how a log is read; leave it out",
         ));
     }
     let estimate = Estimate::read(&args.estimate)?;
@@ -44,7 +50,10 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
     {
         note(&format!("warning: {} has changed since it was identified", robot.display()));
     }
-    let export = RobotExport::new(identified.identified(), &source)?;
+    let mut export = RobotExport::new(identified.identified(), &source)?;
+    if args.log.is_empty() {
+        export = export.with_projections(&estimate.exported.projections);
+    }
     if !args.allow_unphysical {
         export.require_physical()?;
     }
@@ -59,10 +68,10 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
                 "--mjcf" => export.mjcf(&states),
                 _ => json(&identified.identified(), &states),
             };
-            Ok((*path, exported?))
+            Ok((*argument, *path, exported?))
         })
         .collect::<Result<Vec<_>, Failure>>()?;
-    for (path, exported) in &exported {
+    for (_, path, exported) in &exported {
         write_atomically(path, exported.text.as_bytes())?;
     }
     if let Some(urdf) = &args.urdf {
@@ -73,7 +82,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
             note(&format!("written: {} (its loops)", path.display()));
         }
     }
-    for (path, exported) in &exported {
+    for (argument, path, exported) in &exported {
         note(&format!(
             "written: {} (read back: effort within {:.1e} over {})",
             path.display(),
@@ -81,14 +90,18 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
             states.describe()
         ));
         notes(exported);
+        loss(&estimate, argument);
     }
     Ok(0)
 }
 
-/// Tells what `identify` did with its robot file.
-pub(super) fn tell(path: &Path, exported: &Result<Exported, dynid::Error>) {
+/// Tells what `identify` did with its URDF.
+pub(super) fn tell(path: &Path, exported: &Result<Exported, dynid::Error>, estimate: &Estimate) {
     match exported {
-        Ok(exported) => notes(exported),
+        Ok(exported) => {
+            notes(exported);
+            loss(estimate, "--urdf");
+        }
         Err(reason) => note(&format!("not written: {}: {reason}", path.display())),
     }
 }
@@ -96,6 +109,44 @@ pub(super) fn tell(path: &Path, exported: &Result<Exported, dynid::Error>) {
 fn notes(exported: &Exported) {
     for line in &exported.notes {
         note(&format!("  {line}"));
+    }
+}
+
+/// Tells what a file (`--urdf`, `--mjcf`) loses of the identified model, on the log that files were judged on.
+fn loss(estimate: &Estimate, argument: &str) {
+    let Some(log) = estimate.exported.judged() else { return };
+    let (format, alone, with_rotor): (_, _, Option<&FileFit>) = match argument {
+        "--mjcf" => ("MJCF", &log.mjcf, None),
+        "--urdf" if log.urdf == log.mjcf => ("URDF", &log.urdf, None),
+        "--urdf" => ("URDF", &log.urdf, Some(&log.mjcf)),
+        _ => return,
+    };
+    let percent = |x: Option<f64>| table::number(x);
+    let fits = estimate.validation.iter().find(|f| f.log == log.log);
+    let model = fits.map_or(&estimate.fit.filtered, |f| &f.filtered).relative_error;
+    let rotor = with_rotor.map_or_else(String::new, |fit| {
+        format!(", {} % with the rotor inertias added", percent(fit.relative_error))
+    });
+    note(&format!(
+        "  the {format} predicts {} with an error of {} % of the effort{rotor}, the identified model with {} %",
+        log.log,
+        percent(alone.relative_error),
+        percent(model)
+    ));
+    note(&table::loss(&estimate.joints, alone, with_rotor));
+    for (fit, what) in [(Some(alone), ""), (with_rotor, " with the rotor inertias added")] {
+        let Some(fit) = fit else { continue };
+        let pairs = estimate.joints.iter().zip(&fit.loss_percent);
+        let above: Vec<String> = pairs
+            .filter_map(|(joint, lost)| Some((joint, lost.filter(|l| *l > EXPORT_LOSS_LIMIT)?)))
+            .map(|(joint, lost)| format!("{joint} ({lost:.1} %)"))
+            .collect();
+        if !above.is_empty() {
+            note(&format!(
+                "  warning: the {format}{what} loses more than {EXPORT_LOSS_LIMIT} % of the effort of {}: it is not the model that was judged; the JSON of `dynid export --json` is",
+                above.join(", ")
+            ));
+        }
     }
 }
 

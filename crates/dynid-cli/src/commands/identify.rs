@@ -8,7 +8,7 @@ use dynid::io::OutputError;
 use dynid::io::output::write_atomically;
 use dynid::{Error, identify};
 
-use super::{apply_log_args, element_names, export, table};
+use super::{apply_log_args_to, element_names, export, table};
 use crate::args::{ConsistencyArg, FrictionArg, IdentifyArgs, MethodArg, RouteArg};
 use crate::message::{Failure, data, note};
 use crate::outputs;
@@ -56,7 +56,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
         note(&verdict(&estimate));
     }
     if !args.quiet || urdf.is_err() {
-        export::tell(&files[2], &urdf);
+        export::tell(&files[2], &urdf, &estimate);
     }
     if args.json {
         data(&estimate.to_json())?;
@@ -109,7 +109,7 @@ fn configuration(args: &IdentifyArgs) -> Result<Config, Failure> {
     if args.known_friction.is_some() {
         config.elements.known_friction.clone_from(&args.known_friction);
     }
-    apply_log_args(&mut config.columns, &args.columns);
+    apply_log_args_to(&mut config, &args.columns);
     config.locked.extend(args.lock.iter().cloned());
     if args.couple_mimics {
         config.couple_mimics = Some(true);
@@ -160,8 +160,11 @@ fn summary<'a>(estimate: &Estimate, files: impl Iterator<Item = &'a Path>) {
                 note(&format!("  {} = none ({}: {})", choice.name, choice.origin, choice.reason));
                 continue;
             }
+            serde_json::Value::Array(list) if list.is_empty() => "none".to_owned(),
             serde_json::Value::Array(list) => {
-                list.iter().map(|x| table::number(x.as_f64())).collect::<Vec<_>>().join(" ")
+                let word = |x: &serde_json::Value| x.as_str().map(str::to_owned);
+                let words = list.iter().map(|x| word(x).unwrap_or_else(|| table::number(x.as_f64())));
+                words.collect::<Vec<_>>().join(" ")
             }
             other => other.to_string(),
         };
@@ -172,7 +175,8 @@ fn summary<'a>(estimate: &Estimate, files: impl Iterator<Item = &'a Path>) {
         estimate.fit.filter_hz,
         table::number(estimate.fit.filtered.relative_error)
     ));
-    note(table::agreement(&estimate.joints, &estimate.fit.raw, &estimate.fit.filtered).trim_end());
+    let fit = &estimate.fit;
+    note(table::agreement(&estimate.joints, &fit.raw, &fit.filtered, &fit.by_motion).trim_end());
     for fit in &estimate.validation {
         note(&format!(
             "\nvalidation on {} (filtered at {:.1} Hz, relative error {} %):",
@@ -180,7 +184,7 @@ fn summary<'a>(estimate: &Estimate, files: impl Iterator<Item = &'a Path>) {
             fit.filter_hz,
             table::number(fit.filtered.relative_error)
         ));
-        note(table::agreement(&estimate.joints, &fit.raw, &fit.filtered).trim_end());
+        note(table::agreement(&estimate.joints, &fit.raw, &fit.filtered, &fit.by_motion).trim_end());
     }
     note("\nchecks:");
     for check in &estimate.verdict.checks {

@@ -42,9 +42,16 @@ fn element_names(names: Option<&[String]>) -> Option<Vec<String>> {
     names.map(|list| if list == ["none"] { Vec::new() } else { list.to_vec() })
 }
 
+/// Flags over the columns of a configuration: of the run, and of logs that state their own.
+fn apply_log_args_to(config: &mut Config, args: &LogArgs) {
+    let logs = config.log.iter_mut().chain(&mut config.validation);
+    let own = logs.filter_map(|log| log.columns.as_mut());
+    own.chain([&mut config.columns]).for_each(|spec| apply_log_args(spec, args));
+}
+
 fn apply_log_args(spec: &mut dynid::io::MappingSpec, args: &LogArgs) {
     if args.rate_hz.is_some() {
-        spec.rate_hz = args.rate_hz;
+        (spec.rate_hz, spec.time) = (args.rate_hz, None);
     }
     if args.gains.is_some() {
         spec.current_gains.clone_from(&args.gains);

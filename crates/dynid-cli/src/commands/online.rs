@@ -3,7 +3,6 @@
 mod view;
 
 use std::io::{self, IsTerminal, Read};
-use std::path::PathBuf;
 
 use dynid::config::{Config, LogConfig};
 use dynid::io::csv::{ReadOptions, Table};
@@ -33,12 +32,12 @@ pub(crate) fn run(args: &OnlineArgs) -> Result<u8, Failure> {
         config.log =
             args.log.iter().map(|path| LogConfig { path: path.clone(), ..LogConfig::default() }).collect();
     }
-    let checkpoint = args.checkpoint.clone().or_else(|| config.online.checkpoint.clone());
+    if args.checkpoint.is_some() {
+        config.online.checkpoint.clone_from(&args.checkpoint);
+    }
     let mut run = Run {
-        checkpoint_s: config.online.checkpoint_s,
         output: Output::new(args),
         replay: args.replay || args.stream.is_none(),
-        checkpoint,
         written: None,
         session: None,
         config,
@@ -62,8 +61,6 @@ struct Run {
     config: Config,
     output: Output,
     replay: bool,
-    checkpoint: Option<PathBuf>,
-    checkpoint_s: f64,
     /// Time of the stream at which the last checkpoint was written.
     written: Option<f64>,
     session: Option<Session>,
@@ -175,7 +172,7 @@ impl Run {
         }
         let mut session = Session::new(&self.config, name, header, columns)?;
         self.output.view.begin(&session.joints());
-        if let Some(path) = &self.checkpoint
+        if let Some(path) = &self.config.online.checkpoint
             && let Some(found) = Checkpoint::read(path)?
         {
             session.resume(&found, &path.display().to_string(), self.replay)?;
@@ -201,13 +198,15 @@ impl Run {
     fn checkpoint_if_due(&mut self) -> Result<(), Failure> {
         let Some(latest) = self.session.as_ref().and_then(Session::latest) else { return Ok(()) };
         match self.written {
-            Some(written) if latest - written < self.checkpoint_s => Ok(()),
+            Some(written) if latest - written < self.config.online.checkpoint_s => Ok(()),
             _ => self.write_checkpoint(),
         }
     }
 
     fn write_checkpoint(&mut self) -> Result<(), Failure> {
-        let (Some(session), Some(path)) = (&mut self.session, &self.checkpoint) else { return Ok(()) };
+        let (Some(session), Some(path)) = (&mut self.session, &self.config.online.checkpoint) else {
+            return Ok(());
+        };
         if let Some(checkpoint) = session.checkpoint()? {
             checkpoint.write(path)?;
             self.written = session.latest();

@@ -41,7 +41,7 @@ pub(crate) fn run(args: &ValidateArgs) -> Result<u8, Failure> {
             fit.filter_hz
         ));
         let (raw, filtered): (&FitValues, &FitValues) = (&fit.raw, &fit.filtered);
-        out.push_str(&table::agreement(&estimate.joints, raw, filtered));
+        out.push_str(&table::agreement(&estimate.joints, raw, filtered, &fit.by_motion));
     }
     data(&out)?;
     Ok(0)

@@ -145,7 +145,7 @@ fn a_flag_names_the_friction_file_and_predictions_ask_for_temperatures() {
         said.contains("known friction of shoulder = \"Coulomb and exponential viscous friction"),
         "{said}"
     );
-    assert!(said.contains("left out of the known friction of `shoulder` in URDF"), "{said}");
+    assert!(said.contains("friction of `shoulder` has a form that URDF has no place for"), "{said}");
     let text = std::fs::read_to_string(folder.path().join("out/estimate.json")).unwrap();
     let estimate: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(estimate["model"]["known_friction"][1]["joint"], "elbow");

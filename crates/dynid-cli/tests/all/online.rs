@@ -18,16 +18,17 @@ default = ["coulomb", "viscous", "offset"]
 [online]
 learn_s = 6
 report_s = 2
-checkpoint_s = 0.5
 [[log]]
 path = "log.csv"
 "#;
 
-/// Arm, configuration and a log of 30 s at 500 Hz.
+/// Arm, configurations (`kept.toml` for runs with checkpoints) and a log of 30 s at 500 Hz.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("arm.urdf"), TWO_LINKS).unwrap();
     std::fs::write(folder.path().join("run.toml"), CONFIG).unwrap();
+    let often = CONFIG.replace("report_s = 2", "report_s = 2\ncheckpoint_s = 0.5");
+    std::fs::write(folder.path().join("kept.toml"), often).unwrap();
     let args = ["simulate", "arm.urdf", "--duration", "30", "--rate-hz", "500", "--seed", "3"];
     run(folder.path(), &[&args[..], &["--out", "log.csv"]].concat(), 0);
     folder
@@ -149,7 +150,7 @@ fn a_closed_pipe_ends_a_run_and_keeps_its_state() {
     let folder = folder();
     let mut child = Process::new(env!("CARGO_BIN_EXE_dynid"))
         .current_dir(folder.path())
-        .args(["online", "run.toml", "--stream", "csv", "--checkpoint", "state.json"])
+        .args(["online", "kept.toml", "--stream", "csv", "--checkpoint", "state.json"])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -179,14 +180,14 @@ fn a_stream_cut_in_two_goes_on_from_its_checkpoint() {
     let whole = events(&run(folder.path(), &["online", "run.toml"], 0).stdout);
     let text = std::fs::read_to_string(folder.path().join("log.csv")).unwrap();
     let lines: Vec<&str> = text.lines().collect();
-    let args = ["online", "run.toml", "--stream", "csv", "--checkpoint", "state.json"];
+    let args = ["online", "kept.toml", "--stream", "csv", "--checkpoint", "state.json"];
     let first = lines[..9000].join("\n") + "\n";
     run_piped(folder.path(), &args, &first);
     let second = format!("{}\n{}\n", lines[0], lines[9000..].join("\n"));
     let found = run_piped(folder.path(), &args, &second);
     assert_eq!(last(&found), last(&whole));
     // The same from the start, and from a checkpoint of another robot or damaged.
-    let args = ["online", "run.toml", "--stream", "csv", "--checkpoint", "state.json", "--replay"];
+    let args = ["online", "kept.toml", "--stream", "csv", "--checkpoint", "state.json", "--replay"];
     let replayed = run_piped(folder.path(), &args, &text);
     assert_eq!(last(&replayed)["parameters"], last(&whole)["parameters"]);
     assert_eq!(of_kind(&replayed, "end")[0]["already_seen"], lines.len() as u64 - 1);
@@ -219,7 +220,7 @@ fn killed_a_hundred_times_it_ends_where_an_uninterrupted_run_does() {
     for _ in 0..100 {
         let mut child = Process::new(env!("CARGO_BIN_EXE_dynid"))
             .current_dir(folder.path())
-            .args(["online", "run.toml", "--checkpoint", "state.json", "-q"])
+            .args(["online", "kept.toml", "--checkpoint", "state.json", "-q"])
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
@@ -233,7 +234,7 @@ fn killed_a_hundred_times_it_ends_where_an_uninterrupted_run_does() {
         }
     }
     assert_eq!(torn, 0, "of {resumed} checkpoints");
-    let output = run(folder.path(), &["online", "run.toml", "--checkpoint", "state.json"], 0);
+    let output = run(folder.path(), &["online", "kept.toml", "--checkpoint", "state.json"], 0);
     assert_eq!(last(&events(&output.stdout))["parameters"], last(&whole)["parameters"]);
     let left = std::fs::read_dir(folder.path()).unwrap();
     println!("{resumed} runs left a checkpoint, {} files in the folder", left.count());

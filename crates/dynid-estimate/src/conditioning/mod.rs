@@ -9,6 +9,7 @@ mod friction;
 mod gram;
 mod live_rows;
 mod log_rows;
+mod moving;
 mod periodic;
 mod predict;
 mod prepare;
@@ -28,6 +29,7 @@ pub use friction::{
 };
 pub use live_rows::{LiveRow, LiveRowSettings, LiveRows};
 pub use log_rows::LogRows;
+pub use moving::Moving;
 pub use periodic::PeriodicMotion;
 pub use predict::predict;
 pub use prepare::{PreparedLog, prepare};

@@ -20,8 +20,7 @@ pub fn predict(
     settings: &ConditioningSettings,
 ) -> Result<Vec<Vec<f64>>, ConditioningError> {
     const BLOCK: usize = 2048;
-    let cutoff = state_hz.min(settings.cutoff.state_rate * log.rate_hz);
-    let states = States::new(log, cutoff, settings)?;
+    let states = States::of(log, state_hz, settings)?;
     let outputs = model.outputs().len();
     let mut predicted = vec![Vec::with_capacity(log.samples()); outputs];
     let mut block = RegressorBlock::new(model.layout().clone(), BLOCK);

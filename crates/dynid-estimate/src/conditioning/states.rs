@@ -74,6 +74,18 @@ impl States {
         Ok(states)
     }
 
+    /// States at a cut-off that counts up to what the sample rate of the log allows.
+    ///
+    /// # Errors
+    /// As [`States::new`].
+    pub fn of(
+        log: &PreparedLog,
+        state_hz: f64,
+        settings: &ConditioningSettings,
+    ) -> Result<States, ConditioningError> {
+        States::new(log, state_hz.min(settings.cutoff.state_rate * log.rate_hz), settings)
+    }
+
     /// States of another motion on the same grid: through the same filter, differentiated alike. They have no effort and no
     /// noise. Of a periodic log the filter at the state cut-off stands in for its series.
     ///

@@ -116,5 +116,7 @@ pub(super) fn constraints<const N: usize>(
             out.push(ActiveConstraint::AtBound { bound: bound.name.clone() });
         }
     }
+    // Of several bounds that say one thing, one is told.
+    out.dedup();
     out
 }

@@ -12,6 +12,10 @@ use super::program::Program;
 const ROOM: f64 = 1e-9;
 /// Multipliers above this share of the largest belong to the conflict.
 const SHARE: f64 = 0.01;
+/// Slack that [`lift`] seeks, in whitened units.
+const LIFTED: f64 = 0.1;
+/// Sweeps of [`lift`] over all half-lines of scalars.
+const SWEEPS: usize = 100;
 /// Pull towards the prior while a start is sought.
 const PULL: f64 = 1e-8;
 
@@ -66,7 +70,29 @@ fn inside<const N: usize>(program: &Program<N>) -> Vec<f64> {
     for (k, least) in &program.lower {
         xi[*k] = xi[*k].max(least + 1.0);
     }
+    lift(program, &mut xi);
     xi
+}
+
+/// Moves scalars inside the half-lines that hold for scalars alone, by projection onto one after the other (Agmon 1954). Where
+/// these leave no such room the start stays where that ends.
+fn lift<const N: usize>(program: &Program<N>, xi: &mut [f64]) {
+    let of_scalars = |ray: &&Ray| ray.terms.iter().all(|(k, _)| program.scalars.contains(k));
+    let rays: Vec<&Ray> = program.rays.iter().filter(of_scalars).collect();
+    for _ in 0..SWEEPS {
+        let mut inside = true;
+        for ray in &rays {
+            let missing = LIFTED - ray.slack(xi);
+            if missing > 0.0 {
+                inside &= missing < 0.5 * LIFTED;
+                let length: f64 = ray.terms.iter().map(|(_, f)| f * f).sum();
+                ray.terms.iter().for_each(|(k, f)| xi[*k] -= f * missing / length);
+            }
+        }
+        if inside {
+            return;
+        }
+    }
 }
 
 /// `min (s + 1)² + pull` with every bound relaxed by `s`: the bounds can be met exactly if the optimum has `s < 0`.
@@ -128,17 +154,16 @@ fn contradiction(bounds: &[Bound]) -> Result<(), ProblemError> {
         terms.sort_by_key(|(column, _)| *column);
         terms
     };
-    for (i, first) in bounds.iter().enumerate() {
-        let terms = normal(first);
-        for second in &bounds[..i] {
-            let others = normal(second);
+    let normals: Vec<Vec<(usize, f64)>> = bounds.iter().map(normal).collect();
+    for (i, (first, terms)) in bounds.iter().zip(&normals).enumerate() {
+        for (second, others) in bounds[..i].iter().zip(&normals) {
             if terms.len() != others.len() || others[0].1 == 0.0 {
                 continue;
             }
             let ratio = -terms[0].1 / others[0].1;
             let opposite = terms
                 .iter()
-                .zip(&others)
+                .zip(others)
                 .all(|(a, b)| a.0 == b.0 && (a.1 + ratio * b.1).abs() <= 1e-12 * a.1.abs());
             if ratio > 0.0 && opposite && first.upper + ratio * second.upper < 0.0 {
                 let (first, second) = (second.name.clone(), first.name.clone());

@@ -56,8 +56,8 @@ pub struct ConsistentEstimate {
     /// Interior-point iterations, phase I included; 0 if unconstrained.
     pub iterations: usize,
     /// Least `λ_min(X_i)` over the links, `X_i = L⁻¹ P_i L⁻ᵀ` (or the 6 × 6 form whitened alike): at least the margin, to
-    /// rounding of the largest.
-    pub least_eigenvalue: f64,
+    /// rounding of the largest. `None` without links.
+    pub least_eigenvalue: Option<f64>,
     /// Largest `tr X_i` over the links; above 100 the prior is off by two orders of magnitude.
     pub largest_trace: f64,
     /// Constraints that hold the estimate back.
@@ -120,10 +120,11 @@ fn report<const N: usize>(
     unconstrained_fit: f64,
     status: Status,
 ) -> ConsistentEstimate {
-    let (mut least, mut largest) = (f64::INFINITY, 0.0_f64);
+    let (mut least, mut largest) = (None, 0.0_f64);
     for cone in &program.cones {
         let whole = cone.matrix(&ended.xi);
-        least = least.min(dynid_model::symmetric::least_eigenvalue(&whole));
+        let own = dynid_model::symmetric::least_eigenvalue(&whole);
+        least = Some(least.map_or(own, |least: f64| least.min(own)));
         largest = largest.max(dynid_model::symmetric::trace(&whole));
     }
     ConsistentEstimate {

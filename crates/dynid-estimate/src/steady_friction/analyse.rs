@@ -6,6 +6,7 @@ use super::levels::{mean, speed_levels, temperature_levels};
 use super::lines::{ThermalLine, line};
 use super::solve::{Rows, Solved, solve};
 use super::{SteadyError, SteadyPoint, SteadySettings};
+use crate::covariance::{BlockLengthSettings, BlockLengthStatus, MIN_BLOCKS, ResidualSignal, block_length};
 
 /// Gain of AICc that a law with more coefficients must bring.
 const GAIN: f64 = 2.0;
@@ -67,7 +68,8 @@ pub struct SteadyFriction {
     pub common_error: Option<CurveError>,
     /// Lines through the coefficients of the common fit; empty without lines.
     pub lines: Vec<ThermalLine>,
-    /// Factor of standard deviations to intervals: Student's quantile of the residuals' degrees of freedom.
+    /// Factor of standard deviations to intervals: Student's quantile of the residuals' degrees of freedom; of a series, of its
+    /// blocks of time less one.
     pub quantile: f64,
     /// What the points could not tell, in words.
     pub notes: Vec<String>,
@@ -94,12 +96,18 @@ pub fn analyse(points: &[SteadyPoint], settings: &SteadySettings) -> Result<Stea
     };
     let known = notes.is_empty();
     let thermal = known && thermal_levels(&rows, &levels, settings, &mut notes);
-    let (solved, ladder) = climb(&rows, thermal, settings, &mut notes)?;
-    let law = solved.laws[0].clone();
+    let (mut solved, ladder) = climb(&rows, thermal, settings, &mut notes)?;
     let error = solved.error();
-    let quantile =
-        crate::distribution::t_quantile(0.5 + 0.5 * settings.confidence, error.freedom.max(1) as f64)
-            .unwrap_or(f64::NAN);
+    let mut freedom = error.freedom;
+    if settings.series {
+        let block = time_block(&solved.residuals[0], &mut notes);
+        freedom = rows.len().div_ceil(block).saturating_sub(1);
+        let form = solved.laws[0].form;
+        solved = solve(std::slice::from_ref(&rows), &form, &[], Some(block), settings)?;
+    }
+    let law = solved.laws[0].clone();
+    let quantile = crate::distribution::t_quantile(0.5 + 0.5 * settings.confidence, freedom.max(1) as f64)
+        .unwrap_or(f64::NAN);
     let mut out = SteadyFriction {
         error,
         residuals: solved.residuals.concat(),
@@ -204,7 +212,7 @@ fn climb(
             ladder.push(rung);
             continue;
         }
-        let solved = solve(&parts, &form, &[], settings)?;
+        let solved = solve(&parts, &form, &[], None, settings)?;
         let effective = *samples.get_or_insert_with(|| match settings.series {
             true => independent(&solved.residuals[0]),
             false => rows.len() as f64,
@@ -252,6 +260,21 @@ fn aicc(solved: &Solved, samples: f64) -> Option<f64> {
     let left = samples - k - 1.0;
     let variance = (solved.chi_squared / solved.rows as f64).max(1e-12);
     (left > 0.0).then(|| samples * variance.ln() + 2.0 * k + 2.0 * k * (k + 1.0) / left)
+}
+
+/// Samples of a block of time after which residuals of a series count as independent, at most a tenth of the series.
+fn time_block(residual: &[f64], notes: &mut Vec<String>) -> usize {
+    let signal = ResidualSignal { log: 0, rate_hz: 1.0, residual };
+    let found = block_length(&[signal], &BlockLengthSettings::default());
+    let wanted = found.seconds.ceil() as usize;
+    if let BlockLengthStatus::TooShort { .. } = found.status {
+        notes.push(format!(
+            "the residual stays correlated for so long that a block of time takes {wanted} samples, found {} for {MIN_BLOCKS} blocks: \
+             standard deviations are somewhat too small",
+            residual.len() / MIN_BLOCKS
+        ));
+    }
+    wanted.min(residual.len() / MIN_BLOCKS).max(1)
 }
 
 /// Samples of a series that count as independent: one per correlation time of the residual.
@@ -313,11 +336,12 @@ fn by_temperature(out: &mut SteadyFriction, rows: &Rows, levels: Vec<Vec<usize>>
     // In the common fit, a temperature needs speeds for its own three coefficients only.
     let shared: Vec<usize> = (0..parts.len()).filter(|k| speeds(&parts[*k]) >= 4).collect();
     let picked: Vec<Rows> = shared.iter().map(|k| parts[*k].clone()).collect();
-    let common = if picked.len() >= 2 { solve(&picked, &form, &COMMON, settings).ok() } else { None };
+    let common = if picked.len() >= 2 { solve(&picked, &form, &COMMON, None, settings).ok() } else { None };
     for (k, (points, part)) in levels.into_iter().zip(&parts).enumerate() {
         let temperature = mean(&rows.temperature, &points);
         let enough = speeds(part) >= form.speeds_needed();
-        let own = enough.then(|| solve(std::slice::from_ref(part), &form, &[], settings).ok()).flatten();
+        let own =
+            enough.then(|| solve(std::slice::from_ref(part), &form, &[], None, settings).ok()).flatten();
         if !enough {
             out.notes.push(format!(
                 "{temperature:.1} degC: {} speeds are too few for a law of this temperature alone",

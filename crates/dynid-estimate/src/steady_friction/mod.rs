@@ -62,7 +62,8 @@ pub struct SteadySettings {
     /// Whether slopes over temperature may be estimated. Default true.
     pub thermal: bool,
     /// Points are successive samples of a signal, whose residuals are correlated: AICc counts one sample per correlation
-    /// time. Default false.
+    /// time, and standard deviations of the law come from leaving out one block of time after the other, blocks of five correlation
+    /// times ([`block_length`](crate::covariance::block_length())). Default false.
     pub series: bool,
     /// Confidence of intervals. Default 0.95.
     pub confidence: f64,

@@ -8,6 +8,8 @@ pub(super) struct Part<'a> {
     pub(super) problem: EffortProblem<'a>,
     /// Per row.
     pub(super) weights: Vec<f64>,
+    /// Rows of a block of time.
+    pub(super) block: usize,
     /// Place of every linear parameter.
     pub(super) linear: Vec<usize>,
     /// Place of every shape parameter.
@@ -33,6 +35,8 @@ impl<'a> Shared<'a> {
 fn weighted(part: &Part<'_>) -> RowGroup {
     let mut group = part.problem.groups()[0].clone();
     let rows = group.rows();
+    let block = part.block.max(1);
+    group.block_rows = (0..rows).step_by(block).map(|start| block.min(rows - start)).collect();
     for column in group.fixed_values.chunks_exact_mut(rows.max(1)) {
         scale(column, &part.weights);
     }

@@ -6,9 +6,10 @@ use super::SteadySettings;
 use super::form::LawForm;
 use super::law::{Coefficient, CurveError, FrictionLaw, ShapeScale, build, motion};
 use super::shared::{Part, Shared};
+use crate::linear::LinearEstimate;
 use crate::separable::{
-    EffortBlock, EffortProblem, SeparableError, SeparableEstimate, SeparableProblem, SeparableSettings,
-    Weighting, fit,
+    Deviations, EffortBlock, EffortProblem, SeparableError, SeparableEstimate, SeparableProblem,
+    SeparableSettings, Weighting, fit,
 };
 
 /// Points as columns.
@@ -94,10 +95,14 @@ impl Solved {
 }
 
 /// Fits one form to all parts; coefficients named in `shared` are the same in all of them.
+///
+/// `length`: rows of a block of time of a single part, for standard deviations by leaving out one block after the other. `None`: rows
+/// are independent.
 pub(super) fn solve(
     parts: &[Rows],
     form: &LawForm,
     shared: &[&str],
+    length: Option<usize>,
     settings: &SteadySettings,
 ) -> Result<Solved, SeparableError> {
     let scale = parts.iter().map(Rows::scale).reduce(|a, b| ShapeScale {
@@ -134,6 +139,7 @@ pub(super) fn solve(
         problems.push(Part {
             problem: EffortProblem::new(&built.model, &built.kept, &[block])?,
             weights: rows.std.iter().map(|s| 1.0 / s).collect(),
+            block: length.unwrap_or(rows.len()),
             linear: place(&linear, &mut linear_count, &mut first_linear),
             shape: place(&shape, &mut shape_count, &mut first_shape),
         });
@@ -157,21 +163,24 @@ pub(super) fn solve(
             ..SeparableSettings::default()
         },
     )?;
-    Ok(solved(parts, form, settings, &found, &places, (linear_count, range)))
+    let covariance = match length {
+        Some(_) => jackknifed(&found),
+        None => covariance(&found),
+    };
+    Ok(solved(parts, form, settings, (&found, covariance), &places, (linear_count, range)))
 }
 
 fn solved(
     parts: &[Rows],
     form: &LawForm,
     settings: &SteadySettings,
-    found: &SeparableEstimate,
+    (found, mut covariance): (&SeparableEstimate, Mat<f64>),
     places: &[(Vec<usize>, Vec<usize>)],
     (linear_count, range): (usize, (f64, f64)),
 ) -> Solved {
     let chi_squared: f64 = found.residuals.iter().flatten().map(|r| r * r).sum();
     let rows: usize = parts.iter().map(Rows::len).sum();
     let coefficients = linear_count + found.shape.len();
-    let mut covariance = covariance(found);
     // Points that state their errors are not better than these because most of them fit better: where friction is large, the few
     // that decide need not.
     let freedom = rows.saturating_sub(coefficients) as f64;
@@ -216,13 +225,39 @@ fn solved(
     }
 }
 
-/// Covariance of linear and shape parameters, NaN where there is none.
+/// Covariance of linear and shape parameters for independent rows, NaN where there is none.
 fn covariance(found: &SeparableEstimate) -> Mat<f64> {
+    match (&found.linearised, found.standard_deviations()) {
+        (Some(fit), Some(deviations)) => placed(found, fit, &fit.model_covariance(), deviations),
+        _ => nothing(found),
+    }
+}
+
+/// The same from the delete-a-block jackknife.
+fn jackknifed(found: &SeparableEstimate) -> Mat<f64> {
+    let jackknife = found.linearised.as_ref().and_then(LinearEstimate::jackknife);
+    match (&found.linearised, jackknife, found.jackknife_deviations()) {
+        (Some(fit), Some(jackknife), Some(deviations)) => {
+            placed(found, fit, &jackknife.covariance, deviations)
+        }
+        _ => nothing(found),
+    }
+}
+
+fn nothing(found: &SeparableEstimate) -> Mat<f64> {
+    let n = found.linear.len() + found.shape.len();
+    Mat::from_fn(n, n, |_, _| f64::NAN)
+}
+
+/// A covariance of kept columns, scaled to standard deviations, in the places of all parameters.
+fn placed(
+    found: &SeparableEstimate,
+    fit: &LinearEstimate,
+    unit: &Mat<f64>,
+    deviations: Deviations,
+) -> Mat<f64> {
     let linear = found.linear.len();
-    let n = linear + found.shape.len();
-    let mut all = Mat::from_fn(n, n, |_, _| f64::NAN);
-    let (Some(fit), Some(deviations)) = (&found.linearised, found.standard_deviations()) else { return all };
-    let unit = fit.model_covariance();
+    let mut all = nothing(found);
     let std: Vec<Option<f64>> = deviations.linear.into_iter().chain(deviations.shape).collect();
     let place = |column: usize| if column < linear { column } else { linear + found.active[column - linear] };
     let kept: Vec<usize> = fit.solution.kept.iter().map(|c| place(*c)).collect();

@@ -89,6 +89,14 @@ pub enum MappingError {
         /// Column.
         column: String,
     },
+    /// Two settings of which one would do nothing.
+    #[error("{key}: expected no value beside {beside}")]
+    Idle {
+        /// The setting that would do nothing.
+        key: &'static str,
+        /// What takes its place.
+        beside: String,
+    },
     /// A column for the effort of a joint on which no drive acts.
     #[error("effort of `{joint}`: expected no column (no drive acts on it), found `{column}`")]
     Undriven {
@@ -142,6 +150,12 @@ impl MappingError {
     pub fn hint(&self) -> Option<String> {
         use MappingError as E;
         Some(match self {
+            E::Idle { key: "current_gains", .. } => {
+                "gains (`--gains`, `current_gains`) are for current columns that are found by name: leave them out, or state \
+                 `effort = { columns = \"i{}\", unit = \"A\", scale = [..] }`"
+                    .to_owned()
+            }
+            E::Idle { .. } => "leave out one of the two".to_owned(),
             E::Missing { signal: Signal::Time, .. } => {
                 "name the time column in the mapping, or give the sampling rate (`rate_hz`)".to_owned()
             }

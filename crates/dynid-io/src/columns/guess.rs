@@ -158,7 +158,14 @@ impl<'a> Finder<'a> {
     ) -> Result<Option<PerJointColumns>, MappingError> {
         let effort = match (self.find(Signal::Effort)?, &options.current_gains) {
             (None, Some(gains)) => self.currents(gains)?,
-            (effort, _) => effort,
+            (Some(effort), Some(_)) => {
+                let column = effort.iter().flatten().next().map_or_else(String::new, |c| c.name.clone());
+                return Err(MappingError::Idle {
+                    key: "current_gains",
+                    beside: format!("columns of the effort itself (`{column}`)"),
+                });
+            }
+            (effort, None) => effort,
         };
         match self.covering(Signal::Effort, effort, logged)? {
             None if !options.allow_no_effort => Err(self.missing(Signal::Effort, logged)),

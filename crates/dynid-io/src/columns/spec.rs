@@ -144,9 +144,14 @@ impl ColumnMapping {
         let finder = Finder::new(header, joints);
         let undriven: Vec<bool> = efforts.iter().map(|e| *e == EffortColumn::Absent).collect();
         let resolver = Resolver { header, joints, undriven: &undriven };
-        let time = match &spec.time {
-            Some(time) if spec.rate_hz.is_none() => resolver.time(time)?,
-            _ => finder.time(spec.rate_hz)?,
+        let idle = |key, beside: &str| Err(MappingError::Idle { key, beside: beside.to_owned() });
+        if spec.effort.is_some() && spec.current_gains.is_some() {
+            return idle("current_gains", "`effort`, which states its own `scale`");
+        }
+        let time = match (&spec.time, spec.rate_hz) {
+            (Some(_), Some(_)) => return idle("time", "`rate_hz`, which takes the place of a time column"),
+            (Some(time), None) => resolver.time(time)?,
+            (None, rate_hz) => finder.time(rate_hz)?,
         };
         let position = match &spec.position {
             Some(stated) => {

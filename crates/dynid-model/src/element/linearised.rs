@@ -117,6 +117,9 @@ impl JointElement for Linearised {
     fn elastic(&self) -> Option<&ElasticTransmission> {
         self.element.elastic()
     }
+    fn opposes_motion(&self) -> bool {
+        self.element.opposes_motion()
+    }
     fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         let own = self.own_entries();
         let mut columns = ElementColumns {

@@ -142,6 +142,9 @@ impl JointElement for LogScaled {
     fn scaled(&self) -> Option<&LogScaled> {
         Some(self)
     }
+    fn opposes_motion(&self) -> bool {
+        self.parts.iter().all(|part| part.element.opposes_motion())
+    }
     fn fill(
         &self,
         joints: &[JointInfo],

@@ -197,6 +197,11 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     fn is_friction(&self) -> bool {
         false
     }
+    /// The effort of every entry is friction of the rate that it acts on, whatever else it depends on (loads, temperatures,
+    /// factors of logs). By default: [`JointElement::is_friction`].
+    fn opposes_motion(&self) -> bool {
+        self.is_friction()
+    }
     /// Extra channels that it reads.
     fn channels(&self, _joints: &[JointInfo]) -> Vec<String> {
         Vec::new()

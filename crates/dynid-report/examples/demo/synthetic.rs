@@ -45,6 +45,7 @@ pub(crate) fn report(joints: usize, samples: usize) -> ReportData {
         standard_parameters: trust::standard_parameters(joints),
         shape_parameters: friction::shape_parameters(),
         friction_laws: friction::laws(),
+        files: None,
         motions: trust::motions(),
         consistency: Some(trust::consistency()),
         held_out: trust::held_out(joints),
@@ -234,7 +235,7 @@ fn quality(series: &JointSeries) -> JointQuality {
         r2: Some(1.0 - factor * factor * errors / spread),
         relative_error_percent: Some(100.0 * factor * (errors / energy).sqrt()),
     };
-    JointQuality { raw: scaled(1.4), filtered: scaled(1.0) }
+    JointQuality { raw: scaled(1.4), filtered: scaled(1.0), ..JointQuality::default() }
 }
 
 fn base_parameters(joints: usize) -> Vec<BaseParameter> {

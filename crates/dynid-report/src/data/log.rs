@@ -49,6 +49,12 @@ pub struct JointQuality {
     pub raw: Quality,
     /// Against the filtered effort, the prediction passed through the same filter.
     pub filtered: Quality,
+    /// As `filtered`, on samples in which the joint moves.
+    pub moving: Quality,
+    /// As `filtered`, on samples in which it stands.
+    pub standing: Quality,
+    /// Share of the samples in which it stands, %.
+    pub standing_percent: Option<f64>,
 }
 
 /// Measures of the residual `e = measured - predicted`.

@@ -13,6 +13,7 @@
 mod conditioning;
 mod consistency;
 mod design;
+mod files;
 mod friction;
 mod friction_test;
 mod log;
@@ -30,6 +31,7 @@ pub use design::{
     ConfoundedPair, DesignJoint, DesignParameter, DesignQuality, DesignReport, DesignStart, FramePath,
     JointMotion, LimitUse, Obstacle, ParameterShare, RandomMotion, Shape, Starts, Trajectory,
 };
+pub use files::{FileJoint, FileJudgement, FileLoss};
 pub use friction::{FrictionTrial, ShapeParameter, ShapeVerdict};
 pub use friction_test::{CurvesByTemperature, FrictionReport, FrictionTest, Surface, TemperatureLevel};
 pub use log::{JointQuality, JointSeries, LogReport, LogRole, LogSeries, Quality};
@@ -70,6 +72,8 @@ pub struct ReportData {
     pub shape_parameters: Vec<ShapeParameter>,
     /// Effort of friction over velocity, a chart per joint whose law is not linear in its parameters.
     pub friction_laws: Vec<Chart>,
+    /// Robot files beside the model; `None` where files do not hold its efforts.
+    pub files: Option<FileJudgement>,
     /// Motions that would reveal what the logs do not, most helpful first, a sentence each.
     pub motions: Vec<String>,
     /// Physical consistency and its price; `None` if none was asked for.

@@ -30,6 +30,7 @@ pub(super) fn context(data: &ReportData) -> Result<Value, ReportError> {
         trust => Serde(trust(data)),
         shape_parameters => Serde(&data.shape_parameters),
         friction_laws => Serde(data.friction_laws.iter().map(chart).collect::<Vec<_>>()),
+        files => Serde(&data.files),
         friction_trials => Serde(&data.friction_trials),
         motions => Serde(&data.motions),
         consistency => Serde(&data.consistency),

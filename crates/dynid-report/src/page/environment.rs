@@ -15,13 +15,14 @@ pub(super) const LOG_PAGE: &str = "log/page.html";
 pub(super) const STUDY_PAGE: &str = "study/page.html";
 
 /// Every name ends in `.html`, which switches automatic escaping on.
-const TEMPLATES: [(&str, &str); 28] = [
+const TEMPLATES: [(&str, &str); 29] = [
     ("shell.html", include_str!("../../template/shell.html")),
     (PAGE, include_str!("../../template/page.html")),
     ("macros.html", include_str!("../../template/macros.html")),
     ("verdict.html", include_str!("../../template/verdict.html")),
     ("warnings.html", include_str!("../../template/warnings.html")),
     ("trust.html", include_str!("../../template/trust.html")),
+    ("files.html", include_str!("../../template/files.html")),
     ("consistency.html", include_str!("../../template/consistency.html")),
     ("precision.html", include_str!("../../template/precision.html")),
     ("essential.html", include_str!("../../template/essential.html")),

@@ -4,10 +4,11 @@
 mod synthetic;
 
 use dynid_report::{
-    BaseParameter, Chart, ChartAxis, ChartCurve, Check, Chosen, Consistency, Fact, FrictionTrial, HeldOut,
-    HeldOutJoint, InputFile, Joint, JointDelay, JointQuality, JointSeries, Ladder, Limit, LogReport,
-    LogSeries, LogWhiteness, Precision, Pruning, PruningStep, ReportData, ReportError, Rung, ShapeParameter,
-    ShapeVerdict, StandardParameter, UnidentifiableColumn, ValidationPrice, Verdict, Warning, render,
+    BaseParameter, Chart, ChartAxis, ChartCurve, Check, Chosen, Consistency, Fact, FileJoint, FileJudgement,
+    FrictionTrial, HeldOut, HeldOutJoint, InputFile, Joint, JointDelay, JointQuality, JointSeries, Ladder,
+    Limit, LogReport, LogSeries, LogWhiteness, Precision, Pruning, PruningStep, ReportData, ReportError,
+    Rung, ShapeParameter, ShapeVerdict, StandardParameter, UnidentifiableColumn, ValidationPrice, Verdict,
+    Warning, render,
 };
 
 const HOSTILE: &str = "</script><script>alert('x')</script><img src=\"https://example.org/x.png\">&";
@@ -79,6 +80,11 @@ fn hollow(text: &str) -> ReportData {
             curves: vec![ChartCurve { name: text(), ..Default::default() }; 2],
             ..Default::default()
         }],
+        files: Some(FileJudgement {
+            log: text(),
+            joints: vec![FileJoint { joint: text(), effort_unit: text(), ..Default::default() }],
+            ..Default::default()
+        }),
         friction_trials: vec![FrictionTrial {
             joint: text(),
             element: text(),

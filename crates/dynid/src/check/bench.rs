@@ -7,7 +7,7 @@ use dynid_estimate::preflight::{
     WiringSearch, against_stated, delay, excitation, tilt,
 };
 use dynid_io::columns::degrees_suspected;
-use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
+use dynid_model::{BaseParameters, BaseSettings, EffortModel, Mechanism, RobotModel};
 use dynid_motion::{JointSignals, Log, UniformLog};
 
 use super::columns::Velocities;
@@ -89,6 +89,11 @@ impl Bench {
     /// Names of the outputs.
     pub(super) fn names(&self) -> Vec<String> {
         self.model.outputs().iter().map(|o| o.name.clone()).collect()
+    }
+
+    /// The tree of joints; `None` where loops tie its branches together.
+    pub(super) fn tree(&self) -> Option<&Mechanism> {
+        self.model.closed().is_none().then(|| self.model.mechanism())
     }
 
     /// Number of base parameters.

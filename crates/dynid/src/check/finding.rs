@@ -63,13 +63,14 @@ impl Finding {
 }
 
 /// Faults that are looked for.
-pub const IDS: [&str; 22] = [
+pub const IDS: [&str; 23] = [
     "base_tilt",
     "clock_backwards",
     "clock_gap",
     "clock_jitter",
     "clock_rate",
     "coarse_signal",
+    "column_order",
     "degrees",
     "delay",
     "drive_gain",

@@ -5,6 +5,7 @@
 //! direction of gravity, the excitation of the parameters. Every [`Finding`] has its evidence in numbers and a remedy;
 //! [`Check::corrected`] writes the configuration that applies the remedies.
 
+mod assignment;
 mod bench;
 mod columns;
 mod finding;
@@ -89,6 +90,7 @@ impl Check {
 /// Bad input: files that cannot be read, columns that cannot be assigned. What is wrong with the numbers is a finding.
 pub fn check(config: &Config, mut progress: impl FnMut(&str)) -> Result<Check, Error> {
     config.check()?;
+    config.demand_inputs()?;
     let options = RobotOptions {
         gravity: config.gravity,
         couple_mimics: config.couple_mimics.unwrap_or(false),
@@ -116,7 +118,7 @@ pub fn check(config: &Config, mut progress: impl FnMut(&str)) -> Result<Check, E
         }
         let Some((_, bench)) = &bench else { continue };
         let mut findings = Findings { log: &file, number: out.logs.len(), list: Vec::new() };
-        let (checked, trace) = examine(&loaded, bench, &mut findings)?;
+        let (checked, trace) = examine(config, &loaded, bench, &mut findings)?;
         out.findings.extend(findings.list);
         out.logs.push(checked);
         out.traces.push(trace);
@@ -134,17 +136,21 @@ pub(crate) fn of_loaded(config: &Config, robot: &Robot, loaded: &[LoadedLog]) ->
     for (number, (log, entry)) in loaded.iter().zip(&training).enumerate() {
         let file = entry.path.display().to_string();
         let mut findings = Findings { log: &file, number, list: Vec::new() };
-        examine(log, &bench, &mut findings)?;
+        examine(config, log, &bench, &mut findings)?;
         out.extend(findings.list);
     }
     Ok(out)
 }
 
 fn examine(
+    config: &Config,
     loaded: &LoadedLog,
     bench: &Bench,
     out: &mut Findings<'_>,
 ) -> Result<(CheckedLog, report::Trace), Error> {
+    if let Some(tree) = bench.tree() {
+        assignment::examine(config, tree, &loaded.mapping, out);
+    }
     let mut on_grid = record::examine(&loaded.log, &loaded.rows, out)?;
     bench.order(&mut on_grid);
     let idle = bench.idle(&loaded.log, out);

@@ -31,6 +31,8 @@ pub const FOLDS: usize = 5;
 struct FoldScore {
     /// Per joint: mean squares of the error and of the effort through the filter; `None` where the joint does not move.
     joints: Vec<Option<(f64, f64)>>,
+    /// Per joint, in motion and at rest: sum of squared errors and number of samples.
+    apart: Vec<[(f64, f64); 2]>,
     /// Time of the fit, s.
     seconds: f64,
 }
@@ -104,11 +106,21 @@ impl Bench<'_> {
             filter_hz: self.conditioning.kernel_hz,
         };
         let mut sums = vec![(0.0, 0.0, 0.0); model.outputs().len()];
+        // Squared errors and samples in motion and at rest.
+        let mut apart = vec![[(0.0, 0.0); 2]; model.outputs().len()];
         for log in held_out {
             // A fold of a short log may hold nothing but edges.
             let Ok(found) = against(model, values, log, &alignment, self.settings) else { continue };
             let counted = found.counted.iter().filter(|c| **c).count() as f64;
             for (j, sum) in sums.iter_mut().enumerate().filter(|(j, _)| found.moves[*j]) {
+                let stands = counted * found.standing_share[j];
+                let parts = [(&found.moving, counted - stands), (&found.standing, stands)];
+                for (sum, (fit, samples)) in apart[j].iter_mut().zip(parts) {
+                    if let Some(rms) = fit.channels[j].rms {
+                        sum.0 += samples * rms * rms;
+                        sum.1 += samples;
+                    }
+                }
                 let channel = &found.filtered.channels[j];
                 if let (Some(rms), Some(relative)) = (channel.rms, channel.relative_error) {
                     sum.0 += counted * rms * rms;
@@ -118,7 +130,7 @@ impl Bench<'_> {
             }
         }
         let joints = sums.iter().map(|(e, y, n)| (*n > 0.0).then(|| (e / n, y / n))).collect();
-        Ok(FoldScore { joints, seconds })
+        Ok(FoldScore { joints, apart, seconds })
     }
 
     fn fit(

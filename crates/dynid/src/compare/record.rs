@@ -16,6 +16,12 @@ pub struct JointError {
     pub rms: f64,
     /// The same relative to the root mean square of the effort, %.
     pub relative: f64,
+    /// The root mean square of samples in which the joint moves, N m or N.
+    pub rms_moving: Option<f64>,
+    /// Of samples in which it stands, where friction has any value up to static friction.
+    pub rms_standing: Option<f64>,
+    /// Share of the samples in which it stands.
+    pub standing_share: f64,
 }
 
 /// An estimator with its errors on time that it did not see.
@@ -170,9 +176,16 @@ fn entry(contestant: &Contestant, score: Result<Vec<FoldScore>, String>) -> Comp
             let of: Vec<(f64, f64)> = folds.iter().filter_map(|f| f.joints[j]).collect();
             let count = of.len() as f64;
             let (e, y) = of.iter().fold((0.0, 0.0), |(e, y), f| (e + f.0 / count, y + f.1 / count));
+            let [moving, standing] = [0, 1].map(|part| {
+                folds.iter().map(|f| f.apart[j][part]).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1))
+            });
+            let rms = |(sum, samples): (f64, f64)| (samples > 0.0).then(|| (sum / samples).sqrt());
             (count > 0.0).then(|| JointError {
                 rms: e.sqrt(),
                 relative: 100.0 * (e / y.max(f64::MIN_POSITIVE)).sqrt(),
+                rms_moving: rms(moving),
+                rms_standing: rms(standing),
+                standing_share: standing.1 / (moving.1 + standing.1).max(1.0),
             })
         })
         .collect();

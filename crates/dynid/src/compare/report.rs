@@ -3,7 +3,7 @@
 use dynid_report as report;
 use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, StudySection, StudyTable, Value};
 
-use super::{ComparedEstimator, Comparison};
+use super::{ComparedEstimator, Comparison, JointError};
 use crate::config::Config;
 use crate::{Error, VERSION, logs};
 
@@ -33,7 +33,17 @@ impl Comparison {
             },
             StudySection {
                 title: "Joint by joint".to_owned(),
-                tables: vec![self.joint_table()],
+                tables: vec![
+                    self.joint_table("Root mean square of the held-out error, N m or N", |e| Some(e.rms)),
+                    self.joint_table(
+                        "The same where the joint moves (at least 3 % of its rms speed and four standard deviations of its noise)",
+                        |e| e.rms_moving,
+                    ),
+                    self.joint_table(
+                        "The same where it stands: friction has any value up to static friction there",
+                        |e| e.rms_standing,
+                    ),
+                ],
                 ..StudySection::default()
             },
         ];
@@ -97,15 +107,16 @@ impl Comparison {
         }
     }
 
-    fn joint_table(&self) -> StudyTable {
+    fn joint_table(&self, caption: &str, figure: impl Fn(&JointError) -> Option<f64>) -> StudyTable {
         let mut head = vec!["Estimator".to_owned()];
         head.extend(self.joints.iter().cloned());
         let row = |e: &ComparedEstimator| {
-            let cells = e.joints.iter().map(|j| j.map_or(Value::Undefined, |j| Value::Number(j.rms)));
+            let cells =
+                e.joints.iter().map(|j| j.and_then(|j| figure(&j)).map_or(Value::Undefined, Value::Number));
             std::iter::once(Value::Text(e.name.clone())).chain(cells).collect()
         };
         StudyTable {
-            caption: "Root mean square of the held-out error, N m or N".to_owned(),
+            caption: caption.to_owned(),
             head,
             rows: self.estimators.iter().filter(|e| e.failure.is_none()).map(row).collect(),
         }

@@ -72,6 +72,12 @@ impl Friction {
         })
     }
 
+    /// Whether the law takes the place of something; what is no law need not.
+    pub(crate) fn replaces_any(self, lists: &[Vec<String>]) -> bool {
+        let is_friction = |name: &String| FRICTION_ELEMENTS.contains(&name.as_str());
+        self.elements().is_none() || lists.iter().flatten().any(is_friction)
+    }
+
     /// Element names of a joint with this friction in place of the one listed; a joint without any keeps none.
     pub(crate) fn of_joint(self, listed: &[String]) -> Vec<String> {
         let is_friction = |name: &&String| FRICTION_ELEMENTS.contains(&name.as_str());

@@ -74,6 +74,40 @@ impl Default for OnlineConfig {
 }
 
 impl OnlineConfig {
+    /// Refuses settings that would do nothing beside the others.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub(crate) fn check_effect(&self) -> Result<(), Error> {
+        use ForgettingRule::{Constant, Directional, Drift, Window};
+        let usual = OnlineConfig::default();
+        let forgets = matches!(self.forgetting, Constant | Directional | Drift | Window);
+        let by_memory = "`forgetting` with a memory (`constant`, `directional`, `window`, `drift`) beside it";
+        let keys = [
+            ("online.memory_s", !forgets && self.memory_s != usual.memory_s, by_memory),
+            (
+                "online.false_alarm_rate",
+                !self.alarms && self.false_alarm_rate != usual.false_alarm_rate,
+                "`alarms` beside it",
+            ),
+            (
+                "online.false_alarm_hours",
+                !self.alarms && self.false_alarm_hours != usual.false_alarm_hours,
+                "`alarms` beside it",
+            ),
+            ("online.reaction_s", !self.alarms && self.reaction_s != usual.reaction_s, "`alarms` beside it"),
+            (
+                "online.checkpoint_s",
+                self.checkpoint.is_none() && self.checkpoint_s != usual.checkpoint_s,
+                "`checkpoint` beside it",
+            ),
+        ];
+        match keys.iter().find(|(_, idle, _)| *idle) {
+            Some((key, _, expected)) => Err(Error::setting(key, expected, "none")),
+            None => Ok(()),
+        }
+    }
+
     /// Checks that every number makes sense.
     ///
     /// # Errors

@@ -326,6 +326,33 @@ impl DesignConfig {
         Ok(config)
     }
 
+    /// Refuses settings that would do nothing: friction found on logs, and what the other settings switch off.
+    fn check_effect(&self) -> Result<(), Error> {
+        let (usual, e) = (ElementsConfig::default(), &self.elements);
+        let logs = "no value: a design has no logs; name laws in the lists of elements";
+        let mix = CriterionConfig::default().mix;
+        let keys = [
+            ("elements.friction", e.friction != usual.friction, logs),
+            ("elements.friction_errors", e.friction_errors != usual.friction_errors, logs),
+            ("elements.temperature", !e.temperature.is_none(), logs),
+            (
+                "criterion.mix",
+                self.criterion.mix != mix && self.criterion.name != Some(CriterionName::Mix),
+                "`name = \"mix\"` beside it",
+            ),
+            ("trajectory.zero_jerk", self.trajectory.zero_jerk && !self.trajectory.rest, "`rest` beside it"),
+            (
+                "limits.effort",
+                !self.limits.efforts && !self.limits.effort.is_none(),
+                "`efforts = true` beside it, which keeps these limits",
+            ),
+        ];
+        match keys.iter().find(|(_, idle, _)| *idle) {
+            Some((key, _, expected)) => Err(Error::setting(key, expected, "one")),
+            None => Ok(()),
+        }
+    }
+
     /// Checks numbers that need no robot.
     ///
     /// # Errors
@@ -386,6 +413,7 @@ impl DesignConfig {
             let expected = "at most 1e7 samples in all periods";
             return Err(Error::setting("trajectory.sample_rate_hz", expected, t.sample_rate_hz));
         }
+        self.check_effect()?;
         if self.capsule.len() == 1 {
             let expected = "two or more: pairs of capsules must not touch";
             return Err(Error::setting("capsule", expected, "one"));

@@ -136,7 +136,15 @@ pub(super) fn constraints(
             .map(|c| Capsule { frame: c.frame.clone(), ends: [Vec3(c.from), Vec3(c.to)], radius: c.radius })
             .collect();
         let ranges: Vec<(f64, f64)> = limits.iter().map(|l| l.position).collect();
-        out.push(Box::new(Capsules::new(mechanism, &capsules, &CapsulePairs::All, &ranges)?));
+        let capsules = Capsules::new(mechanism, &capsules, &CapsulePairs::All, &ranges)?;
+        if capsules.pairs().is_empty() {
+            assumptions.push(
+                "no two capsules are kept apart: they cannot touch within the position limits, or stand on one link or on two that \
+                 one joint joins"
+                    .to_owned(),
+            );
+        }
+        out.push(Box::new(capsules));
     }
     Ok(out)
 }

@@ -86,6 +86,18 @@ pub(super) fn build(
     Some(Settings { element, joint, own }.build(rate, shapes, scaled, speed))
 }
 
+/// Checks the settings of an element at a joint; whether it is one of these elements.
+///
+/// # Errors
+/// [`Error::ElementSetting`] for a key that the element does not take.
+pub(super) fn check(name: &str, joint: &str, settings: &[ElementSetting]) -> Result<bool, Error> {
+    let Some((element, shapes, scaled)) = SHAPES.iter().find(|(element, _, _)| *element == name) else {
+        return Ok(false);
+    };
+    let own = settings.iter().filter(|s| s.joint == joint && s.element == name).collect();
+    Settings { element, joint, own }.check_keys(shapes, *scaled).map(|()| true)
+}
+
 /// Settings of one element at one joint.
 struct Settings<'a> {
     element: &'static str,

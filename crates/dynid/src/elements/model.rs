@@ -5,7 +5,7 @@ use dynid_model::{ClosedModel, Mechanism, RobotModel, TreeModel};
 
 use super::{ElementPlan, friction};
 use crate::Error;
-use crate::config::{Config, FrictionErrors, PerJoint};
+use crate::config::{Config, FrictionErrors, PerJoint, serde_name};
 use crate::friction::KnownFriction;
 use crate::robot::Robot;
 
@@ -35,8 +35,17 @@ impl ElementPlan {
         let mut plan = ElementPlan::new(&robot.mechanism, &spec, config.elements.default.as_deref(), moves)?
             .with_loops(robot.closed.clone());
         let names = plan.names(&robot.mechanism);
+        let law = config.elements.friction;
+        if !law.replaces_any(&plan.per_rate) {
+            let found = format!("`{}` where no joint that moves has any", serde_name(&law));
+            return Err(Error::setting(
+                "elements.friction",
+                "a joint with friction, which the law replaces",
+                found,
+            ));
+        }
         for list in &mut plan.per_rate {
-            *list = config.elements.friction.of_joint(list);
+            *list = law.of_joint(list);
         }
         if let Some(file) = &config.elements.known_friction {
             let temperatures = config.elements.temperature.finite("elements.temperature", &names)?;

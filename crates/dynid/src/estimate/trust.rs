@@ -24,8 +24,8 @@ pub struct ConsistencyRecord {
     pub gap: f64,
     /// Iterations of the interior-point method.
     pub iterations: usize,
-    /// Least eigenvalue of the links' pseudo-inertias in units of the prior's; at least 1e-6.
-    pub least_eigenvalue: f64,
+    /// Least eigenvalue of the links' pseudo-inertias in units of the prior's; at least 1e-6. `None` without links.
+    pub least_eigenvalue: Option<f64>,
     /// Constraints that hold the estimate back, in words.
     pub active: Vec<String>,
     /// Figures of the parameters without constraints on the training logs; empty where they predict the same.

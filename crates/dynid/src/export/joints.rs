@@ -4,8 +4,7 @@ use dynid_io::mjcf::JointParameters;
 use dynid_model::{EffortModel, Owner, RobotModel};
 
 use super::Identified;
-use crate::friction::KnownFriction;
-use crate::friction::model::ViscousModel;
+use super::projection::FrictionProjection;
 
 /// A file format.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,72 +26,67 @@ impl Format {
 pub(super) struct JointValues {
     /// Per joint that has friction or a rotor that the format has a place for.
     pub(super) joints: Vec<JointParameters>,
-    /// Linear parameters of the model with everything zero that the format does not state.
-    pub(super) values: Vec<f64>,
     /// In words.
     pub(super) notes: Vec<String>,
 }
 
-/// Splits the values of a model into what a format states and what it leaves out.
+/// What a format states of a model's joints.
 ///
-/// `fc`, `fv` become friction and damping, of asymmetric friction the means of both directions; `Ia` is armature in
-/// MJCF and has no place in URDF. Negative values, which simulators refuse, are stated as 0. Stribeck friction becomes the
-/// Coulomb friction that it falls to, and so do bristles.
-///
-/// Of known friction the file states Coulomb friction and a linear viscous coefficient, each with its error; viscous friction
-/// that saturates has no place in it, and neither has the error beside it.
-pub(super) fn split(identified: &Identified<'_>, format: Format) -> JointValues {
-    let Identified { model, values, known_friction, .. } = *identified;
+/// `fc`, `fv` become friction and damping, of asymmetric friction the means of both directions; friction of other forms is
+/// stated as its projection (`projected`). `Ia` is armature in MJCF and has no place in URDF. Negative values, which simulators
+/// refuse, are stated as 0.
+pub(super) fn split(
+    identified: &Identified<'_>,
+    format: Format,
+    projected: &[FrictionProjection],
+) -> JointValues {
+    let Identified { model, values, .. } = *identified;
     let table = model.parameters();
-    let bodies = 10 * model.mechanism().bodies().len();
-    let mut kept = values[..bodies].to_vec();
-    kept.resize(values.len(), 0.0);
-    let mut out = JointValues { joints: Vec::new(), values: kept, notes: Vec::new() };
+    let mut out = JointValues { joints: Vec::new(), notes: Vec::new() };
+    let (mut rotors, mut offsets) = (Vec::new(), Vec::new());
     for (rate, joint) in model.joints().iter().enumerate() {
         if model.elastic_link(rate).is_some() {
             continue;
         }
         let column = |symbol: &str| table.column(&format!("{}.{symbol}", joint.name));
-        let law = known_friction.iter().find(|law| law.joint == joint.name);
-        let mut state = |symbol: &str, what: &str, unit_of: usize, value: f64| {
+        let mut state = |symbol: &str, what: &str| {
+            let single = column(symbol);
+            let both = column(&format!("{symbol}p")).zip(column(&format!("{symbol}n")));
+            let (at, value) = match (single, both) {
+                (Some(c), _) => (c, values[c]),
+                (None, Some((p, n))) => (p, 0.5 * (values[p] + values[n])),
+                (None, None) => return None,
+            };
             if value < 0.0 {
                 out.notes.push(format!(
                     "{what} of `{}` is negative ({value:.4e} {}), which simulators refuse: written as 0, so the effort of the file lacks it",
-                    joint.name, table.linear[unit_of].unit
+                    joint.name, table.linear[at].unit
                 ));
             }
-            let value = value.max(0.0);
-            for direction in ["", "p", "n"] {
-                if let Some(c) = column(&format!("{symbol}{direction}")) {
-                    out.values[c] = value;
-                }
-            }
-            value
+            Some(value.max(0.0))
         };
-        let mut friction = |symbol: &str, what: &str, known: Known| {
-            let single = column(symbol);
-            let both = column(&format!("{symbol}p")).zip(column(&format!("{symbol}n")));
-            let total = |own: f64| match known {
-                Known::Part(part) => part + own,
-                Known::NoPlace => 0.0,
-            };
-            match (single, both) {
-                (Some(c), _) => Some(state(symbol, what, c, total(values[c]))),
-                (None, Some((p, n))) => Some(state(symbol, what, p, total(0.5 * (values[p] + values[n])))),
-                (None, None) => None,
-            }
+        let projection = projected.iter().find(|p| p.joint == joint.name);
+        let (friction_loss, damping) = match projection {
+            Some(p) => (Some(p.friction_loss), Some(p.damping)),
+            None => (state("fc", "Coulomb friction"), state("fv", "viscous friction")),
         };
-        let friction_loss =
-            friction("fc", "Coulomb friction", Known::Part(law.map_or(0.0, |law| law.coulomb)));
-        let damping = friction("fv", "viscous friction", viscous(law));
-        let armature = match format {
-            Format::Mjcf => friction("Ia", "rotor inertia", Known::Part(0.0)),
-            Format::Urdf => None,
-        };
-        out.notes.extend(law.and_then(|law| known_left_out(law, format, friction_loss, damping)));
-        // Stribeck friction whose static friction equals Coulomb friction is Coulomb friction.
-        if let (Some(fixed), Some(coulomb)) = (column("fs"), friction_loss) {
-            out.values[fixed] = coulomb;
+        let rotor = projection.and_then(|p| p.rotor_inertia).or_else(|| state("Ia", "rotor inertia"));
+        let armature = if format == Format::Mjcf { rotor } else { None };
+        if let (Format::Urdf, Some(rotor)) = (format, rotor) {
+            let unit = if joint.slides { "kg" } else { "kg m²" };
+            rotors.push(format!("{} {rotor:.4} {unit}", joint.name));
+        }
+        if let Some(c) = column("fo")
+            && values[c] != 0.0
+        {
+            offsets.push(format!("{} {:.4} {}", joint.name, values[c], table.linear[c].unit));
+        }
+        if let Some(p) = projection {
+            let units = if joint.slides { ["N", "N s/m"] } else { ["N m", "N m s/rad"] };
+            out.notes.push(format!(
+                "friction of `{}` has a form that {} has no place for: stated as friction {:.4} {} and damping {:.4} {}, least squares over {}",
+                joint.name, format.name(), p.friction_loss, units[0], p.damping, units[1], p.states
+            ));
         }
         if friction_loss.or(damping).or(armature).is_some() {
             out.joints.push(JointParameters {
@@ -103,60 +97,21 @@ pub(super) fn split(identified: &Identified<'_>, format: Format) -> JointValues 
             });
         }
     }
+    if !rotors.is_empty() {
+        out.notes.push(format!(
+            "left out, URDF has no place for it: rotor inertia; add it where the simulator has an armature: {}",
+            rotors.join(", ")
+        ));
+    }
+    if !offsets.is_empty() {
+        out.notes.push(format!(
+            "left out, {} has no place for it: offset (the zero of a sensor, or a constant load): {}",
+            format.name(),
+            offsets.join(", ")
+        ));
+    }
     out.notes.extend(left_out(model, values, format));
     out
-}
-
-/// What known friction adds to a coefficient of a file.
-#[derive(Clone, Copy)]
-enum Known {
-    Part(f64),
-    /// Friction of a form that the file has no place for.
-    NoPlace,
-}
-
-fn viscous(law: Option<&KnownFriction>) -> Known {
-    match law.and_then(|law| law.viscous) {
-        None => Known::Part(0.0),
-        Some(ViscousModel::Linear { coefficient }) => Known::Part(coefficient),
-        Some(ViscousModel::Exponential(_)) => Known::NoPlace,
-    }
-}
-
-/// Parts of known friction that a file lacks, in words. `friction_loss`, `damping`: what it states.
-fn known_left_out(
-    law: &KnownFriction,
-    format: Format,
-    friction_loss: Option<f64>,
-    damping: Option<f64>,
-) -> Option<String> {
-    let mut parts = Vec::new();
-    if friction_loss.is_none() {
-        parts.push("Coulomb friction (the model has no `coulomb` for its error)");
-    }
-    match (law.viscous, damping) {
-        (Some(ViscousModel::Exponential(_)), _) => {
-            parts.push("viscous friction, which saturates, with its error")
-        }
-        (Some(ViscousModel::Linear { .. }), None) => {
-            parts.push("viscous friction (the model has no `viscous` for its error)");
-        }
-        _ => {}
-    }
-    if law.slipping_bristle().is_some() {
-        parts.push("bristles");
-    }
-    if law.static_.is_some_and(|fixed| fixed != law.coulomb) {
-        parts.push("rise towards rest");
-    }
-    (!parts.is_empty()).then(|| {
-        format!(
-            "left out of the known friction of `{}` in {}: {}",
-            law.joint,
-            format.name(),
-            parts.join(", ")
-        )
-    })
 }
 
 /// What a format has no place for, one line per kind of element.
@@ -177,25 +132,13 @@ fn left_out(model: &RobotModel, values: &[f64], format: Format) -> Vec<String> {
             _ if motor => "friction and rotor of motors behind springs",
             Some("k1" | "k2" | "d") => "elasticity",
             Some("load") => "external load",
-            Some("fvs") => "viscous friction that fades with speed",
-            Some("fc" | "fv") => continue,
             Some("fcp" | "fcn" | "fvp" | "fvn") => "difference of friction between the directions",
-            Some("Ia") if format == Format::Mjcf => continue,
-            Some("Ia") => "rotor inertia (armature in MJCF)",
-            Some("fo") => "offset",
-            Some("fs") => "rise of Stribeck friction towards rest",
-            Some("sigma1") => "bristles and the rise of their friction towards rest",
-            Some("sigma2" | "sigma2_slope") => "viscous friction that saturates and depends on temperature",
-            Some("fa") => "arctangent friction",
-            Some("ft") => "tanh friction",
-            Some("fg" | "fl") => "sigmoid friction",
-            Some("fp") => "power-law friction",
-            Some("fva") => "difference of friction between the directions",
-            Some("mu") => "friction that grows with the load",
             Some("k" | "kq0") => "spring",
             Some("ca" | "cb") => "cyclic effort",
             Some("K") => "drive gain",
-            _ => "coupling and other elements",
+            // Rotors are told one by one, other friction is projected.
+            Some(_) => continue,
+            None => "coupling",
         };
         if *value == 0.0 {
             continue;

@@ -5,13 +5,14 @@
 //! | inertia of a link | `<inertial>`: centre of mass, tensor about it, link axes | `<inertial>` with `fullinertia` |
 //! | viscous friction `fv` | `<dynamics damping>` | `damping` |
 //! | Coulomb friction `fc` | `<dynamics friction>` | `frictionloss` |
-//! | rotor inertia `Ia` | no place | `armature` |
-//! | Stribeck friction | as Coulomb friction `fc`, without its rise towards rest | the same |
-//! | arctangent, tanh, sigmoid, power law, friction of the load | no place | left out |
-//! | offset, spring, cyclic effort, couplings | no place | left out |
+//! | rotor inertia `Ia` | no place, printed | `armature` |
+//! | friction of any other form, known friction | projected onto both: [`FrictionProjection`] | the same |
+//! | offset, spring, cyclic effort | no place | left out |
 //! | gravity | no place | `<option gravity>` |
 //!
-//! What is left out is named in [`Exported::notes`]. The JSON holds everything: all parameters, shape parameters, and what
+//! What is left out is named in [`Exported::notes`]; what that costs is judged on the logs of the identification
+//! ([`ExportedRecord`](crate::estimate::ExportedRecord)). A rotor is not folded into its link: that would turn with the link and
+//! add to the efforts of other joints, and would count twice once the simulator is given an armature. The JSON holds everything: all parameters, shape parameters, and what
 //! friction of the load refers to.
 //!
 //! **Welded links.** A log shows the body that moves as one: a moving link with everything on fixed joints behind it.
@@ -30,6 +31,8 @@ mod error;
 mod identified;
 mod joints;
 mod json;
+mod judged;
+mod projection;
 mod read_back;
 
 use dynid_io::mjcf::{self, JointParameters};
@@ -46,6 +49,8 @@ use identified::inertias;
 pub use identified::{Identified, IdentifiedRobot, Source};
 use joints::{Format, JointValues};
 pub use json::{ElasticJson, JointJson, LinkJson, OtherJson, ROBOT_JSON_SCHEMA, RobotJson, json};
+pub(crate) use judged::FileModels;
+pub use projection::FrictionProjection;
 pub use read_back::{CheckStates, READ_BACK_LIMIT};
 
 /// Text that is ready to be written.
@@ -70,6 +75,7 @@ pub struct RobotExport<'a> {
     links: Vec<(String, Inertia)>,
     faults: Vec<LinkFault>,
     notes: Vec<String>,
+    projected: Vec<FrictionProjection>,
 }
 
 impl<'a> RobotExport<'a> {
@@ -97,7 +103,17 @@ impl<'a> RobotExport<'a> {
         if measured {
             let (links, faults) = (Vec::new(), Vec::new());
             let notes = vec!["sensors measure the load of the joints: no body was identified, links are those of the robot file".to_owned()];
-            return Ok(RobotExport { identified, source, description, held, links, faults, notes });
+            let projected = Vec::new();
+            return Ok(RobotExport {
+                identified,
+                source,
+                description,
+                held,
+                links,
+                faults,
+                notes,
+                projected,
+            });
         }
         let shared = target
             .bodies()
@@ -119,7 +135,33 @@ impl<'a> RobotExport<'a> {
                 link.inertia = Some(*inertia);
             }
         }
-        Ok(RobotExport { identified, source, description, held, links, faults, notes })
+        let projected = Vec::new();
+        Ok(RobotExport { identified, source, description, held, links, faults, notes, projected })
+    }
+
+    /// The same with projections that were formed when the robot was identified, over the states of its logs. They are used
+    /// where they stand for the very parameters of this robot; else friction is projected over the states of the check.
+    #[must_use]
+    pub fn with_projections(mut self, projected: &[FrictionProjection]) -> Self {
+        if projection::fits(projected, self.identified.model, self.identified.values, self.known()) {
+            self.projected = projected.to_vec();
+        }
+        self
+    }
+
+    /// Whether a joint has known friction.
+    fn known(&self) -> impl Fn(&str) -> bool + use<'a> {
+        let laws = self.identified.known_friction;
+        move |joint| laws.iter().any(|law| law.joint == joint)
+    }
+
+    fn joint_values(&self, format: Format, states: &CheckStates) -> JointValues {
+        let Identified { model, values, .. } = self.identified;
+        if model.mechanism().bodies().is_empty() || !self.projected.is_empty() {
+            return joints::split(&self.identified, format, &self.projected);
+        }
+        let projected = projection::project(model, values, self.known(), states);
+        joints::split(&self.identified, format, &projected)
     }
 
     /// Links that no body could be: simulators refuse them.
@@ -144,7 +186,7 @@ impl<'a> RobotExport<'a> {
     /// # Errors
     /// [`Error::RobotFile`]: URDF cannot state the robot; [`Error::Export`]: see [`ExportError::ReadBack`].
     pub fn urdf(&self, states: &CheckStates) -> Result<Exported, Error> {
-        let JointValues { joints, values, notes } = joints::split(&self.identified, Format::Urdf);
+        let JointValues { joints, notes } = self.joint_values(Format::Urdf, states);
         let source = match &self.source.urdf {
             Some(text) => text.clone(),
             None => urdf::from_description(&self.description)?,
@@ -189,7 +231,7 @@ impl<'a> RobotExport<'a> {
                 "left out, URDF has no place for them: loops; they are in the file beside it".to_owned(),
             );
         }
-        self.checked(Format::Urdf, text, (read, &found), &values, notes, states)
+        self.checked(Format::Urdf, text, (read, &found), &joints, notes, states)
     }
 
     /// MJCF, written anew; see [`dynid_io::mjcf::from_description`].
@@ -203,11 +245,11 @@ impl<'a> RobotExport<'a> {
                     .to_owned(),
             ));
         }
-        let JointValues { joints, values, notes } = joints::split(&self.identified, Format::Mjcf);
+        let JointValues { joints, notes } = self.joint_values(Format::Mjcf, states);
         let text = mjcf::from_description(&self.description, &joints)?;
         let read = mjcf::parse(&text, "exported MJCF")?;
         let notes = [self.notes.clone(), notes].concat();
-        self.checked(Format::Mjcf, text, (read.description, &read.joints), &values, notes, states)
+        self.checked(Format::Mjcf, text, (read.description, &read.joints), &joints, notes, states)
     }
 
     /// What its URDF cannot state of a mechanism with loops: a robot in TOML that names the URDF, by the file name `urdf`.
@@ -227,26 +269,28 @@ impl<'a> RobotExport<'a> {
         Some(loops.to_toml())
     }
 
-    /// Compares what was read back with the model, of which only `values` have a place in the format.
+    /// Compares what was read back with the identified bodies and with `stated`, what the file is to say of the joints.
     fn checked(
         &self,
         format: Format,
         text: String,
         (read, joints): (Description, &[JointParameters]),
-        values: &[f64],
+        stated: &[JointParameters],
         notes: Vec<String>,
         states: &CheckStates,
     ) -> Result<Exported, Error> {
         let model = self.identified.model;
-        let (back, stated) = read_back::compile(read, joints, &self.held, model).map_err(|fault| {
-            ExportError::OtherRobot { file: format!("exported {}", format.name()), fault }
-        })?;
+        let other = |fault| ExportError::OtherRobot { file: format!("exported {}", format.name()), fault };
+        let back = read_back::compile(read, joints, &self.held, model).map_err(other)?;
         if model.mechanism().bodies().is_empty() {
             return Ok(Exported { text, difference: 0.0, notes });
         }
+        let bodies = self.identified.values[..10 * model.mechanism().bodies().len()].to_vec();
+        let meant =
+            read_back::with_joints(model.mechanism().clone(), bodies, stated, model).map_err(other)?;
         let difference = read_back::largest_difference(
-            (model, &model.parameters().shape_start(), values),
-            (&back, &back.parameters().shape_start(), &stated),
+            (&meant.0, &meant.0.parameters().shape_start(), &meant.1),
+            (&back.0, &back.0.parameters().shape_start(), &back.1),
             states,
         );
         Ok(Exported { text, difference: read_back::judge(format.name(), difference)?, notes })
@@ -276,7 +320,8 @@ impl Identification {
     /// As [`Source::read`], [`RobotExport::new`] and [`RobotExport::urdf`].
     pub fn urdf(&self) -> Result<Exported, Error> {
         let source = Source::read(&self.robot.path)?;
-        let export = RobotExport::new(self.identified(), &source)?;
+        let export =
+            RobotExport::new(self.identified(), &source)?.with_projections(&self.exported.projections);
         let states = CheckStates::logs(&self.logs, self.state_hz, &self.settings)?;
         let mut exported = export.urdf(&states)?;
         exported.notes.extend(

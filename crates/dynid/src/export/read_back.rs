@@ -6,7 +6,8 @@ use dynid_io::mjcf::JointParameters;
 use dynid_model::closed::ClosedMechanism;
 use dynid_model::element::{Coulomb, JointElement, LuGre, RotorInertia, Viscous, sign};
 use dynid_model::{
-    ClosedModel, Description, EffortModel, MotionBlock, RandomMotion, RegressorBlock, RobotModel, TreeModel,
+    ClosedModel, Description, EffortModel, Mechanism, MotionBlock, RandomMotion, RegressorBlock, RobotModel,
+    TreeModel,
 };
 use dynid_motion::Channel;
 
@@ -87,7 +88,12 @@ impl CheckStates {
         }
     }
 
-    fn for_each_block(&self, mut work: impl FnMut(&MotionBlock<'_>)) {
+    /// Samples that a block may have.
+    pub(super) fn room(&self) -> usize {
+        if matches!(self.0, Kind::Random(_)) { STATES } else { BLOCK }
+    }
+
+    pub(super) fn for_each_block(&self, mut work: impl FnMut(&MotionBlock<'_>)) {
         match &self.0 {
             Kind::Random(motion) => motion.with_block(work),
             Kind::Logs(logs) => {
@@ -132,7 +138,21 @@ pub(super) fn compile(
             rates.join(", ")
         ));
     }
-    let mut values = mechanism.inertia_vector();
+    let values = mechanism.inertia_vector();
+    with_joints(mechanism, values, joints, like)
+}
+
+/// A model of what a file states: bodies, `joints` with friction and rotor, and the loops of the model that it is `like`.
+///
+/// `values`: ten inertial parameters per body. Returned with the values of the joints behind them. `Err` says which loop
+/// cannot be closed.
+pub(super) fn with_joints(
+    mechanism: Mechanism,
+    mut values: Vec<f64>,
+    joints: &[JointParameters],
+    like: &RobotModel,
+) -> Result<(RobotModel, Vec<f64>), String> {
+    let rates = mechanism.rate_names();
     let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
     for p in joints {
         let Some(rate) = rates.iter().position(|r| *r == p.joint) else { continue };
@@ -141,8 +161,10 @@ pub(super) fn compile(
         elements.push(Box::new(RotorInertia { rate }));
         values.extend([p.damping, p.friction_loss, p.armature]);
     }
+    let Some(closed) = like.closed() else {
+        return Ok((RobotModel::new(mechanism, elements), values));
+    };
     let tree = TreeModel::new(mechanism.clone(), elements);
-    let Some(closed) = like.closed() else { return Ok((tree.into(), values)) };
     let machine = closed.machine();
     let (driven, home) = (machine.driven_names(), machine.home_by_joint());
     let machine = ClosedMechanism::new(mechanism, machine.closures().to_vec(), Some(&driven), &home)
@@ -160,8 +182,7 @@ pub(super) fn largest_difference(
     // Motors behind springs have no place in files.
     let outputs = a.outputs().len().min(b.outputs().len());
     let (mut largest, mut difference) = (vec![0.0_f64; outputs], vec![0.0_f64; outputs]);
-    let room = if matches!(states.0, Kind::Random(_)) { STATES } else { BLOCK };
-    let mut blocks = [a, b].map(|model| RegressorBlock::new(model.layout().clone(), room));
+    let mut blocks = [a, b].map(|model| RegressorBlock::new(model.layout().clone(), states.room()));
     states.for_each_block(|motion| {
         let models = [(a, a_shape), (b, b_shape)];
         for ((model, shape), block) in models.into_iter().zip(&mut blocks) {
@@ -186,7 +207,11 @@ pub(super) fn largest_difference(
 }
 
 /// The same motion for elements that remember, bristles slipping as Coulomb friction does: what files have a place for.
-fn with_slipping_bristles(model: &RobotModel, motion: &MotionBlock<'_>, work: impl FnOnce(&MotionBlock<'_>)) {
+pub(super) fn with_slipping_bristles(
+    model: &RobotModel,
+    motion: &MotionBlock<'_>,
+    work: impl FnOnce(&MotionBlock<'_>),
+) {
     let still = vec![0.0; motion.samples];
     let slipping: Vec<(&str, Vec<f64>)> = model
         .joints()

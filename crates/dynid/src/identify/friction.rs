@@ -60,10 +60,11 @@ pub(super) fn choose(
     Ok(found)
 }
 
-/// Drops chosen shapes whose shape parameter the logs do not see after all; tells whether there were any.
-pub(super) fn drop_unseen(
+/// Drops chosen shapes whose shape parameter the logs do not see after all, and falls from rest that came out as rises (`fs` below
+/// `fc`); tells whether there were any.
+pub(super) fn drop_refuted(
     model: &RobotModel,
-    found: &ShapeFit,
+    (found, linear): (&ShapeFit, &[f64]),
     chosen: &mut [JointFriction],
     plan: &mut ElementPlan,
 ) -> bool {
@@ -74,10 +75,17 @@ pub(super) fn drop_unseen(
         let place = table.shape.iter().position(|s| s.name == name);
         place.is_some_and(|k| found.findings[k].verdict == ShapeVerdict::NotSeen)
     };
+    let rises = |joint: &str, trial: &ShapeTrial| {
+        let value = |symbol: &str| table.column(&format!("{joint}.{symbol}")).map(|c| linear[c]);
+        trial.shape.kind == ShapeKind::Stribeck
+            && matches!((value("fs"), value("fc")), (Some(fs), Some(fc)) if fs < fc)
+    };
     let mut dropped = false;
     for (rate, (output, joint)) in model.outputs().iter().zip(chosen).enumerate() {
-        let (gone, kept): (Vec<ShapeTrial>, Vec<ShapeTrial>) =
-            joint.accepted.drain(..).partition(|trial| unseen(&output.name, trial));
+        let (gone, kept): (Vec<ShapeTrial>, Vec<ShapeTrial>) = joint
+            .accepted
+            .drain(..)
+            .partition(|trial| unseen(&output.name, trial) || rises(&output.name, trial));
         joint.accepted = kept;
         for trial in gone {
             plan.remove_shape(model.tree_rate(rate), &output.name, &trial.shape);

@@ -13,6 +13,7 @@ use crate::config::{Config, Method};
 use crate::consistency::{self, Consistent};
 use crate::elements::ElementPlan;
 use crate::fitting::{self, Fitted, RowResiduals};
+use crate::friction_power::{self, FrictionPower};
 use crate::instruments::{self, InstrumentRun};
 use crate::robot::Robot;
 use crate::shape::{self, ShapeFit};
@@ -34,6 +35,8 @@ pub(crate) struct ModelFit {
     pub(crate) fitted: Fitted,
     pub(crate) groups: Vec<ReducedGroup>,
     pub(crate) consistent: Consistent,
+    /// What friction had to obey.
+    pub(crate) power: FrictionPower,
 }
 
 /// Fits a model to logs as a configuration asks for.
@@ -51,8 +54,13 @@ pub(crate) fn fit(
     settings: &ConditioningSettings,
     mut progress: impl FnMut(Step),
 ) -> Result<ModelFit, Error> {
-    let Shaped { model, structure, conditioning, friction, found: shapes } =
+    let Shaped { model, mut structure, conditioning, friction, found: shapes } =
         shapes::search(config, model, plan, logs, conditioning, settings, &mut progress)?;
+    let state_hz = state_hz(config, conditioning.as_ref());
+    let power = friction_power::limits(&model, plan, logs, state_hz, settings)?;
+    let model = power.free(model);
+    structure.bounds.extend(power.bounds.iter().cloned());
+    structure.bounds.extend(friction_power::falls(&model, &friction));
     let shape = model.parameters().shape_start();
     progress(Step::Fit);
     let Structure { base, prior, regrouping, bounds, method, .. } = &structure;
@@ -70,6 +78,7 @@ pub(crate) fn fit(
                 logs,
                 conditioning: conditioning.as_ref(),
                 settings,
+                power: &power,
             };
             progress(Step::Instruments);
             let (fit, run) = instruments::fit(config, &parts, fit)?;
@@ -94,7 +103,16 @@ pub(crate) fn fit(
         fitted,
         groups,
         consistent,
+        power,
     })
+}
+
+/// Cut-off of the states behind predictions, Hz.
+pub(crate) fn state_hz(config: &Config, conditioning: Option<&Conditioning>) -> f64 {
+    match conditioning {
+        Some(c) => c.state_hz.iter().copied().fold(f64::INFINITY, f64::min),
+        None => config.textbook_route().cutoff_hz,
+    }
 }
 
 impl ModelFit {

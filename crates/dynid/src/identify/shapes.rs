@@ -57,7 +57,7 @@ pub(super) fn search(
     while !out.model.parameters().shape.is_empty() {
         progress(Step::Shapes);
         let (found, linear) = shape::find(config, out.model, &out.structure.base, logs, (choices, settings))?;
-        if friction::drop_unseen(&found.model, &found, &mut out.friction, plan) {
+        if friction::drop_refuted(&found.model, (&found, &linear), &mut out.friction, plan) {
             (out.model, out.structure) = rebuilt(plan)?;
             continue;
         }

@@ -30,6 +30,7 @@ use crate::Error;
 use crate::config::{Config, Method};
 use crate::elements::ElementPlan;
 use crate::fitting;
+use crate::friction_power::FrictionPower;
 use crate::identify::Identification;
 use crate::prior::Prior;
 use crate::robot::Robot;
@@ -94,6 +95,7 @@ pub(crate) struct Parts<'a> {
     /// `None` on the textbook route.
     pub(crate) conditioning: Option<&'a Conditioning>,
     pub(crate) settings: &'a ConditioningSettings,
+    pub(crate) power: &'a FrictionPower,
 }
 
 impl Parts<'_> {
@@ -147,6 +149,7 @@ pub fn compare(id: &Identification, config: &Config) -> Result<Comparison, Error
         logs: &id.logs,
         conditioning: id.conditioning.as_ref(),
         settings: &id.settings,
+        power: &id.power,
     };
     let bench = Bench::new(config, table(config)?, &parts)?;
     let rows = bench.measured()?;

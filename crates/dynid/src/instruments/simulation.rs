@@ -70,7 +70,7 @@ impl<'a> Bench<'a> {
             parts,
             references,
             regrouping: advice::regrouping(parts.base),
-            bounds: bounds::rows(&config.bound, parts.model)?,
+            bounds: [bounds::rows(&config.bound, parts.model)?, parts.power.bounds.clone()].concat(),
             shape: parts.model.parameters().shape_start(),
         })
     }

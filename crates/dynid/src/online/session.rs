@@ -64,6 +64,7 @@ impl Session {
         columns: Option<&MappingSpec>,
     ) -> Result<Session, Error> {
         config.check()?;
+        config.online.check_effect()?;
         if config.log.iter().any(|log| log.payload.is_some() || !log.own.is_empty()) {
             return Err(Error::Unsupported(
                 "on-line identification of logs with a payload or terms of their own: it follows the robot alone".to_owned(),

@@ -11,6 +11,8 @@ const ZERO: f64 = 1e-9;
 const RAISED: f64 = 1e-3;
 /// Mass of a body of a robot that states none at all, kg.
 const DEFAULT_MASS: f64 = 5.0;
+/// Mass of a body for which zeros are stated, as a share of the mean of those with a mass.
+const MASSLESS_SHARE: f64 = 1e-3;
 /// Least size of a body, m.
 const LEAST_SIZE: f64 = 0.05;
 /// Rounding of a link's own mass, taken from that of the merged body, relative to the masses involved.
@@ -30,6 +32,9 @@ pub enum Origin {
     },
     /// Nothing or no mass is stated (or nothing that could be repaired): a uniform sphere.
     Invented,
+    /// The robot file states zeros beside bodies with a mass (carriers, crosses of universal joints): a sphere of 0.1 % of
+    /// their mean mass.
+    Massless,
 }
 
 /// Prior of one body: a moving link and what is welded to it.
@@ -67,7 +72,7 @@ impl BodyPrior {
             ),
         };
         match self.origin {
-            Origin::Stated => None,
+            Origin::Stated | Origin::Massless => None,
             Origin::Repaired { least, .. } => Some(format!(
                 "link `{link}`{welded}: no body has the inertia that the robot file states (least eigenvalue of its \
                  pseudo-inertia {:.1} % of the largest); the prior is the nearest body with at least {} %",
@@ -92,17 +97,21 @@ pub(super) fn bodies(
     for body in mechanism.bodies() {
         check_masses(body, file)?;
     }
-    let stated: Vec<Option<Inertia>> = (0..mechanism.bodies().len())
-        .map(|b| {
-            let mut phi = [0.0; 10];
-            for (to, from) in phi.iter_mut().zip(&stated[10 * b..]) {
-                *to = (*from)?;
-            }
-            Some(Inertia(phi)).filter(|i| i.mass() > 0.0)
-        })
-        .collect();
+    let written = |b: usize| {
+        let mut phi = [0.0; 10];
+        for (to, from) in phi.iter_mut().zip(&stated[10 * b..]) {
+            *to = (*from)?;
+        }
+        Some(Inertia(phi))
+    };
+    let written: Vec<Option<Inertia>> = (0..mechanism.bodies().len()).map(written).collect();
+    let stated: Vec<Option<Inertia>> = written.iter().map(|i| i.filter(|i| i.mass() > 0.0)).collect();
     let total: f64 = stated.iter().flatten().map(Inertia::mass).sum();
     let share = if total > 0.0 { total / stated.len() as f64 } else { DEFAULT_MASS };
+    let massless = |b: usize| {
+        let zeros = written[b] == Some(Inertia::default());
+        (zeros && total > 0.0).then(|| MASSLESS_SHARE * total / stated.iter().flatten().count() as f64)
+    };
     Ok(mechanism
         .bodies()
         .iter()
@@ -112,6 +121,7 @@ pub(super) fn bodies(
             let links = std::iter::once(&body.name).chain(body.fixed_links.iter().map(|l| &l.name));
             let (inertia, origin) = stated[b]
                 .and_then(|inertia| repaired(inertia, next.norm()))
+                .or_else(|| massless(b).map(|mass| (sphere(mass, next), Origin::Massless)))
                 .unwrap_or_else(|| (sphere(share, next), Origin::Invented));
             BodyPrior { links: links.cloned().collect(), size: size(&inertia, next.norm()), inertia, origin }
         })

@@ -20,7 +20,8 @@ impl Identification {
             .filter_map(|(rate, joint)| {
                 let record = estimate.friction_passivity.iter().find(|r| r.joint == *joint)?;
                 let known = self.plan.known_friction(joint).is_some();
-                let shaped = self.plan.per_rate[rate].iter().any(|name| is_shaped(name));
+                let shaped =
+                    self.plan.per_rate[self.model.tree_rate(rate)].iter().any(|name| is_shaped(name));
                 (known || shaped).then(|| self.law(record, rate))
             })
             .collect()
@@ -60,7 +61,10 @@ impl Identification {
             logarithmic: false,
         };
         let known = self.plan.known_friction(&record.joint).map(|law| law.in_words());
-        let own = self.plan.per_rate[rate].iter().map(String::as_str).filter(|name| is_law(name));
+        let own = self.plan.per_rate[self.model.tree_rate(rate)]
+            .iter()
+            .map(String::as_str)
+            .filter(|name| is_law(name));
         let laws: Vec<String> = match known {
             Some(law) => {
                 let errors: Vec<&str> = own.collect();

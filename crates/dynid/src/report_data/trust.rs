@@ -24,7 +24,7 @@ impl Identification {
             price_over_chance: record.price_over_chance,
             prior_weight: Some(record.prior_weight),
             gap: Some(record.gap),
-            least_eigenvalue: Some(record.least_eigenvalue),
+            least_eigenvalue: record.least_eigenvalue,
             limits: active.iter().map(|a| self.limit(a)).collect(),
             validation: validation_prices(estimate, record),
         })

@@ -6,8 +6,9 @@ use dynid_sim::clearance::{
     ClearanceEnergy, ClearanceRecord, ClearanceSettings, ClearanceStart, ContactEvent, ContactEventKind,
     Driving, RunCount,
 };
-use dynid_sim::{Plant, clearance};
+use dynid_sim::{Plant, Profile, clearance};
 
+use super::channels::sampled;
 use super::efforts;
 use super::settings::SimulateSettings;
 use super::trajectory::Reference;
@@ -96,7 +97,7 @@ impl ClearanceSummary {
 /// [`Error::Experiment`].
 pub(super) fn along(
     (model, with_clearance): (&RobotModel, RobotModel),
-    reference: &Reference,
+    (reference, profiles): (&Reference, &[Profile]),
     values: &[f64],
     at: [&[Vec<f64>; 3]; 2],
     shift: f64,
@@ -146,15 +147,16 @@ pub(super) fn along(
         of.iter().map(|t| times.partition_point(|known| known.total_cmp(t).is_lt())).collect()
     };
     let (now, led) = (places(&now), places(&led));
-    let effort = |places: &[usize], at: &[Vec<f64>; 3]| -> Vec<Vec<f64>> {
-        let mut out = efforts(model, &others, at, (samples, rate_hz));
+    let effort = |places: &[usize], at: &[Vec<f64>; 3], shift: f64| -> Vec<Vec<f64>> {
+        let channels = sampled(profiles, shift, (samples, rate_hz));
+        let mut out = efforts(model, &others, at, &channels, (samples, rate_hz));
         for (joint, out) in out.iter_mut().enumerate() {
             out.iter_mut().zip(places).for_each(|(e, row)| *e += record.effort[*row][joint]);
         }
         out
     };
-    let (effort, led) = (effort(&now, at[0]), effort(&led, at[1]));
-    let (offsets, contacts) = channels(&record, &now);
+    let (effort, led) = (effort(&now, at[0], 0.0), effort(&led, at[1], shift));
+    let (offsets, contacts) = contacts(&record, &now);
     Ok(Journals { effort, led, offsets, contacts, parameters, summary: summary(record, settle_s, &now) })
 }
 
@@ -162,7 +164,7 @@ pub(super) fn along(
 type Named = (String, Vec<f64>);
 
 /// Offsets of the journals; forces and penetrations.
-fn channels(record: &ClearanceRecord, rows: &[usize]) -> (Vec<Named>, Vec<Named>) {
+fn contacts(record: &ClearanceRecord, rows: &[usize]) -> (Vec<Named>, Vec<Named>) {
     let (mut offsets, mut contacts) = (Vec::new(), Vec::new());
     for journal in &record.journals {
         let joint = &journal.joint;

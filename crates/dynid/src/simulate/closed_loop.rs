@@ -20,6 +20,7 @@ pub(super) fn experiment(
     model: RobotModel,
     reference: &Reference,
     values: Vec<f64>,
+    channels: Vec<Profile>,
     settings: &SimulateSettings,
 ) -> Result<SimulatedLog, Error> {
     let model = Arc::new(model);
@@ -31,20 +32,13 @@ pub(super) fn experiment(
     let (shape, joints) = (model.parameters().shape_start(), names(&model));
     let believed = wrong_model(&values, table.model_error, settings.seed);
     let wanted = |time: f64| -> Vec<Wanted> { reference.at(time) };
-    let channels = model.channels().iter().map(|name| {
-        let points = settings.channels.get(name).map_or(&[][..], Vec::as_slice);
-        Profile::new(points.iter().map(|[t, x]| (*t, *x)).collect())
-    });
-    if let Some(name) = settings.channels.keys().find(|name| !model.channels().contains(name)) {
-        return Err(Error::setting(&format!("channels.{name}"), "a channel that an element reads", name));
-    }
     let experiment = ExperimentSettings {
         duration_s: settings.duration_s,
         log_rate_hz: settings.rate_hz,
         tolerance: plant_table.tolerance,
         control: control(&model, &table, settings.rate_hz)?,
         imperfections: imperfections(settings, &joints)?,
-        channels: channels.collect::<Result<_, _>>()?,
+        channels,
         seed: settings.seed,
     };
     let result = if model.closed().is_some() {

@@ -18,7 +18,8 @@ pub struct SimulateSettings {
     pub rate_hz: f64,
     /// Harmonics of the trajectory. Default 5.
     pub harmonics: usize,
-    /// Period of the trajectory, s. Default: the duration.
+    /// Period of the trajectory, s. Default: the duration; of a mechanism with loops the shortest whole part of it that speeds,
+    /// accelerations and 2 Hz leave room for.
     pub period_s: Option<f64>,
     /// Share of the position and velocity limits that the motion uses. Default 0.8.
     pub share: f64,
@@ -56,7 +57,8 @@ pub struct SimulateSettings {
     pub imperfections: Option<ImperfectionTable>,
     /// Only in closed loop: the equation of motion.
     pub plant: Option<PlantTable>,
-    /// Only in closed loop: extra channels such as a temperature, by name: `[time in s, value]`, linear in between.
+    /// Channels that elements read, such as temperatures, by name (`temperature_j1`, or `temperature` for all joints):
+    /// `[time in s, value]`, linear in between.
     pub channels: BTreeMap<String, Vec<[f64; 2]>>,
 }
 
@@ -266,6 +268,25 @@ impl SimulateSettings {
         s.check_mode()
     }
 
+    /// Fails if something is said about random motion where all joints have a stated one.
+    pub(super) fn check_random(&self, joints: &[String]) -> Result<(), Error> {
+        let usual = SimulateSettings::default();
+        let given = [
+            ("harmonics", self.harmonics != usual.harmonics),
+            ("share", self.share != usual.share),
+            ("acceleration", self.acceleration != usual.acceleration),
+        ];
+        let all = joints.iter().all(|joint| self.trajectory.contains_key(joint));
+        match given.iter().find(|(_, given)| all && *given) {
+            None => Ok(()),
+            Some((name, _)) => Err(Error::setting(
+                name,
+                "a joint without `[trajectory.<joint>]`, which moves at random",
+                "none",
+            )),
+        }
+    }
+
     /// Fails if something is said about clearance, for robots that have none.
     pub(super) fn check_ideal(&self) -> Result<(), Error> {
         let given =
@@ -274,6 +295,66 @@ impl SimulateSettings {
             None => Ok(()),
             Some((name, x)) => Err(Error::setting(name, "a robot with clearance in its joints", x)),
         }
+    }
+
+    /// Fails if a setting would do nothing beside the others.
+    pub(super) fn check_effect(&self) -> Result<(), Error> {
+        let usual = SimulateSettings::default();
+        let refuse = |keys: &[(&str, bool)], expected: &str, found: &str| match keys.iter().find(|k| k.1) {
+            Some((key, _)) => Err(Error::setting(key, expected, found)),
+            None => Ok(()),
+        };
+        let random = [
+            ("harmonics", self.harmonics != usual.harmonics),
+            ("share", self.share != usual.share),
+            ("acceleration", self.acceleration != usual.acceleration),
+        ];
+        if self.follow.is_some() {
+            let all = [
+                ("duration_s", self.duration_s != usual.duration_s),
+                ("period_s", self.period_s.is_some()),
+                ("trajectory", !self.trajectory.is_empty()),
+            ];
+            let expected = "no value beside `follow`, which decides the motion";
+            refuse(&[&random[..], &all].concat(), expected, "one")?;
+        }
+        if self.perfect {
+            let all = [
+                ("imperfections", self.imperfections.is_some()),
+                ("effort_noise", self.effort_noise != usual.effort_noise),
+                ("encoder_bits", self.encoder_bits != usual.encoder_bits),
+                ("delay_samples", self.delay_samples.is_some()),
+            ];
+            refuse(&all, "no value beside `perfect`, which switches all imperfections off", "one")?;
+        }
+        if let Some(table) = &self.imperfections {
+            let usual = ImperfectionTable::default();
+            let expected = "a share above 0 of what it describes";
+            let cycles = table.ripple_share == 0.0 && table.ripple_cycles != usual.ripple_cycles;
+            let size = table.outlier_share == 0.0 && table.outlier_size != usual.outlier_size;
+            refuse(
+                &[("imperfections.ripple_cycles", cycles), ("imperfections.outlier_size", size)],
+                expected,
+                "0",
+            )?;
+            let noise = table.velocity_noise > 0.0
+                && table.velocity_noise != usual.velocity_noise
+                && !self.log_velocity;
+            refuse(&[("imperfections.velocity_noise", noise)], "`log_velocity` beside it", "none")?;
+        }
+        self.control.iter().try_for_each(|table| {
+            let usual = ControlTable::default();
+            let [position, velocity] = [&table.position_gain, &table.velocity_gain].map(Option::is_some);
+            let keys = [
+                ("control.bandwidth_hz", position && velocity && table.bandwidth_hz != usual.bandwidth_hz),
+                ("control.damping", velocity && table.damping != usual.damping),
+                (
+                    "control.model_error",
+                    position && velocity && !table.feed_forward && table.model_error != usual.model_error,
+                ),
+            ];
+            refuse(&keys, "gains that it decides", "`position_gain`, `velocity_gain` that are stated")
+        })
     }
 
     /// Keys that would do nothing are slips.
@@ -285,7 +366,6 @@ impl SimulateSettings {
             ("control", self.control.is_some()),
             ("imperfections", self.imperfections.is_some()),
             ("plant", self.plant.is_some()),
-            ("channels", !self.channels.is_empty()),
             ("perfect", self.perfect),
             ("log_velocity", self.log_velocity),
         ];

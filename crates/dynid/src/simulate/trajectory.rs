@@ -68,9 +68,10 @@ fn series(
     if let Some(closed) = model.closed()
         && settings.trajectory.is_empty()
     {
-        out = within_reach(closed, out, settings)?;
+        out = within_reach((model, closed), out, settings)?;
     }
     let names: Vec<String> = driven(model).map(|rate| model.joints()[rate].name.clone()).collect();
+    settings.check_random(&names)?;
     for (joint, series) in &settings.trajectory {
         let Some(j) = names.iter().position(|n| n == joint) else {
             return Err(Error::UnknownJoint { name: joint.clone(), known: names });
@@ -96,20 +97,7 @@ fn random(
     let homes = model.closed().map(homes);
     driven(model)
         .map(|rate| {
-            let limits = model.limits(rate);
-            let reach = if model.joints()[rate].slides { 0.5 } else { 2.0 };
-            let (low, high) = match homes.as_ref().map(|h| h[rate]) {
-                None => {
-                    let (low, high) = limits.position.unwrap_or((-reach, reach));
-                    (low.max(-2.0 * reach), high.min(2.0 * reach))
-                }
-                // Drives of a mechanism with loops move about its home position.
-                Some(home) => {
-                    let (low, high) = limits.position.unwrap_or((home - reach, home + reach));
-                    let room = (high - home).min(home - low).clamp(0.0, reach);
-                    (home - room, home + room)
-                }
-            };
+            let (low, high) = window(model, rate, homes.as_ref().map(|h| h[rate]));
             let middle = 0.5 * (low + high);
             let mut draw = || -> Vec<f64> {
                 (0..settings.harmonics).map(|k| rng.random_range(-1.0..=1.0) / (1.0 + k as f64)).collect()
@@ -127,7 +115,7 @@ fn random(
                     .map(|k| pick(&unit.at(period * f64::from(k) / 2000.0)).abs())
                     .fold(f64::MIN_POSITIVE, f64::max)
             };
-            let speed = limits.velocity.unwrap_or(2.0);
+            let speed = speed_limit(model, rate);
             let scale = (settings.share * 0.5 * (high - low) / peak(&|p| p.position - middle))
                 .min(settings.share * speed / peak(&|p| p.velocity))
                 .min(settings.share * settings.acceleration / peak(&|p| p.acceleration));
@@ -142,51 +130,171 @@ fn homes(closed: &ClosedModel) -> Vec<f64> {
     machine.driven().iter().map(|rate| machine.home()[machine.position_of(*rate)]).collect()
 }
 
+/// Where a joint may move: within its limits, at most so far; drives of a mechanism with loops about `home`.
+fn window(model: &RobotModel, rate: usize, home: Option<f64>) -> (f64, f64) {
+    let limits = model.limits(rate).position;
+    let reach = if model.joints()[rate].slides { 0.5 } else { 2.0 };
+    match home {
+        None => {
+            let (low, high) = limits.unwrap_or((-reach, reach));
+            (low.max(-2.0 * reach), high.min(2.0 * reach))
+        }
+        Some(home) => {
+            let (low, high) = limits.unwrap_or((home - reach, home + reach));
+            (low.max(home - reach).min(home), high.min(home + reach).max(home))
+        }
+    }
+}
+
+/// Speed limit of a joint; 2 rad/s or m/s where none is stated.
+fn speed_limit(model: &RobotModel, rate: usize) -> f64 {
+    model.limits(rate).velocity.unwrap_or(2.0)
+}
+
+/// Highest frequency of the motion of a mechanism with loops, Hz.
+const MOST_HZ: f64 = 2.0;
 /// Times per period at which poses are tried, and how often the motion is made smaller.
 const TRIED: usize = 1000;
 const SMALLER: usize = 60;
 /// Share of the measure of singularity at home that all poses keep.
 const LEAST_MEASURE: f64 = 0.25;
+/// Ways from home to the middle of the drives' windows on which the middle of the motion may lie.
+const WAYS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
-/// The same motion, all drives smaller by the same factor until the mechanism can follow it away from singular poses.
+/// The same motion, all drives smaller by the same factor until the mechanism can follow it away from singular poses, about
+/// that place between home and the middle of the drives' windows that leaves most room.
 fn within_reach(
-    closed: &ClosedModel,
+    (model, closed): (&RobotModel, &ClosedModel),
     series: Vec<Fourier>,
     settings: &SimulateSettings,
 ) -> Result<Vec<Fourier>, Error> {
-    let machine = closed.machine();
-    let least = LEAST_MEASURE * machine.singularity(&machine.workspace()).measure;
-    let period = settings.period_s.unwrap_or(settings.duration_s);
-    let time = |k: usize| period * k as f64 / TRIED as f64;
-    let mut scale = 1.0;
     let homes = homes(closed);
-    for _ in 0..SMALLER {
-        let moved: Vec<f64> = series
-            .iter()
-            .zip(&homes)
-            .flat_map(|(s, home)| (0..=TRIED).map(move |k| home + scale * (s.at(time(k)).position - home)))
-            .collect();
+    let windows = homes.iter().enumerate().map(|(rate, home)| window(model, rate, Some(*home))).collect();
+    let swing = Swing::new(closed, (homes, windows), &series, settings);
+    let ways = if swing.home_is_middle() { &WAYS[..1] } else { &WAYS[..] };
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for way in ways {
+        let about = swing.about(*way);
+        let least = best.as_ref().map_or(0.0, |(scale, _)| *scale);
+        if let Some(scale) = swing.largest(&about).filter(|scale| *scale > least) {
+            best = Some((scale, about));
+        }
+    }
+    let Some((scale, about)) = best else {
+        return Err(Error::Unsupported(
+            "no random motion about the home position stays within reach".to_owned(),
+        ));
+    };
+    let moved = series.iter().zip(about).map(|(s, middle)| {
+        let (a, b) = s.coefficients(Form::Plain);
+        let scaled = |x: Vec<f64>| x.into_iter().map(|x| scale * x).collect::<Vec<f64>>();
+        Fourier::plain(s.base(), middle, scaled(a), scaled(b))
+            .map_err(|e| Error::setting("harmonics", "a trajectory", e))
+    });
+    let moved = moved.collect::<Result<Vec<Fourier>, Error>>()?;
+    match settings.period_s {
+        Some(_) => Ok(moved),
+        None => livelier(model, moved, settings),
+    }
+}
+
+/// The same motion, as many whole times in the log as speeds and accelerations leave room for: what had to be made smaller
+/// would be slow.
+fn livelier(
+    model: &RobotModel,
+    series: Vec<Fourier>,
+    settings: &SimulateSettings,
+) -> Result<Vec<Fourier>, Error> {
+    let times = series.iter().enumerate().map(|(rate, s)| {
+        let peak = |pick: fn(Point) -> f64| {
+            let sizes = (0..TRIED).map(|k| pick(s.at(s.period() * k as f64 / TRIED as f64)).abs());
+            sizes.fold(f64::MIN_POSITIVE, f64::max)
+        };
+        let speed = settings.share * speed_limit(model, rate) / peak(|p| p.velocity);
+        speed.min((settings.share * settings.acceleration / peak(|p| p.acceleration)).sqrt())
+    });
+    let fastest = MOST_HZ * settings.duration_s / settings.harmonics as f64;
+    let times = times.fold(fastest, f64::min).floor().max(1.0);
+    let faster = series.into_iter().map(|s| {
+        let (a, b) = s.coefficients(Form::Plain);
+        Fourier::plain(times * s.base(), s.offset(), a, b)
+            .map_err(|e| Error::setting("harmonics", "a trajectory", e))
+    });
+    faster.collect()
+}
+
+/// Drives of a mechanism with loops along a random motion, about the middles of their windows.
+struct Swing<'a> {
+    closed: &'a ClosedModel,
+    homes: Vec<f64>,
+    windows: Vec<(f64, f64)>,
+    /// Share of the windows that is used.
+    share: f64,
+    /// Per drive.
+    middles: Vec<f64>,
+    /// Per drive: positions along the motion, its middle taken away.
+    moved: Vec<Vec<f64>>,
+    /// Least measure of singularity.
+    least: f64,
+}
+
+impl<'a> Swing<'a> {
+    fn new(
+        closed: &'a ClosedModel,
+        (homes, windows): (Vec<f64>, Vec<(f64, f64)>),
+        series: &[Fourier],
+        settings: &SimulateSettings,
+    ) -> Self {
+        let period = settings.period_s.unwrap_or(settings.duration_s);
+        let machine = closed.machine();
+        let moved = |s: &Fourier| {
+            let at = |k: usize| s.at(period * k as f64 / TRIED as f64).position - s.offset();
+            (0..=TRIED).map(at).collect()
+        };
+        Swing {
+            closed,
+            homes,
+            windows,
+            share: settings.share,
+            middles: series.iter().map(Fourier::offset).collect(),
+            moved: series.iter().map(moved).collect(),
+            least: LEAST_MEASURE * machine.singularity(&machine.workspace()).measure,
+        }
+    }
+
+    fn home_is_middle(&self) -> bool {
+        self.homes.iter().zip(&self.middles).all(|(home, middle)| (home - middle).abs() < 1e-9)
+    }
+
+    /// A place on the way from home to the middles.
+    fn about(&self, way: f64) -> Vec<f64> {
+        self.homes.iter().zip(&self.middles).map(|(home, middle)| home + way * (middle - home)).collect()
+    }
+
+    /// Largest scale of the motion about a place that can be followed; `None` if there is none.
+    fn largest(&self, about: &[f64]) -> Option<f64> {
+        let room = |j: usize| {
+            let most = self.moved[j].iter().fold(f64::MIN_POSITIVE, |m: f64, x| m.max(x.abs()));
+            let (low, high) = self.windows[j];
+            self.share * (high - about[j]).min(about[j] - low) / most
+        };
+        let room = (0..about.len()).map(room).fold(1.0, f64::min);
+        let scales = (0..SMALLER).map(|k| room * 0.85f64.powi(k as i32));
+        (room > 0.0).then_some(scales).into_iter().flatten().find(|scale| self.follows(about, *scale))
+    }
+
+    fn follows(&self, about: &[f64], scale: f64) -> bool {
+        let drives = self.moved.iter().zip(about);
+        let moved: Vec<f64> = drives.flat_map(|(own, at)| own.iter().map(move |x| at + scale * x)).collect();
         let still = vec![0.0; moved.len()];
         let mut measure = f64::INFINITY;
         let block = MotionBlock::plain(TRIED + 1, &moved, &still, &still);
-        let reached = closed.follow(&block, |sample, pose| {
+        let machine = self.closed.machine();
+        let reached = self.closed.follow(&block, |sample, pose| {
             if sample % 10 == 0 {
                 measure = measure.min(machine.singularity(pose).measure);
             }
         });
-        if reached.is_ok() && measure >= least {
-            return series
-                .iter()
-                .zip(&homes)
-                .map(|(s, home)| {
-                    let (a, b) = s.coefficients(Form::Plain);
-                    let scaled = |x: Vec<f64>| x.into_iter().map(|x| scale * x).collect::<Vec<f64>>();
-                    Fourier::plain(s.base(), *home, scaled(a), scaled(b))
-                        .map_err(|e| Error::setting("harmonics", "a trajectory", e))
-                })
-                .collect();
-        }
-        scale *= 0.85;
+        reached.is_ok() && measure >= self.least
     }
-    Err(Error::Unsupported("no random motion about the home position stays within reach".to_owned()))
 }

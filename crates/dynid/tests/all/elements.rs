@@ -8,15 +8,20 @@ use dynid::io::toml_robot;
 use dynid::model::{EffortModel, Mechanism, ParameterTable, RobotModel};
 
 /// A joint with a speed limit of 4 rad/s, and what is said about its elements.
-fn plan(elements: &str) -> (Mechanism, ElementPlan) {
+fn planned(elements: &str) -> (Mechanism, Result<ElementPlan, Error>) {
     let text = format!(
         "schema = 1\nname = \"one\"\ndh = \"modified\"\n[[joint]]\nname = \"j1\"\nd = 0.3\n\
          limits = {{ velocity = 4.0 }}\nmass = 1.0\n[element.j1]\n{elements}\n"
     );
     let robot = toml_robot::parse(&text, "one.toml").unwrap();
     let mechanism = robot.description.build().unwrap();
-    let plan = ElementPlan::new(&mechanism, &robot.elements, None, |_| true).unwrap();
+    let plan = ElementPlan::new(&mechanism, &robot.elements, None, |_| true);
     (mechanism, plan)
+}
+
+fn plan(elements: &str) -> (Mechanism, ElementPlan) {
+    let (mechanism, plan) = planned(elements);
+    (mechanism, plan.unwrap())
 }
 
 fn table(elements: &str) -> ParameterTable {
@@ -25,8 +30,8 @@ fn table(elements: &str) -> ParameterTable {
 }
 
 fn fault(elements: &str) -> String {
-    let (mechanism, plan) = plan(elements);
-    plan.build(&mechanism).unwrap_err().to_string()
+    let (mechanism, plan) = planned(elements);
+    plan.and_then(|plan| plan.build(&mechanism)).map(|_| ()).unwrap_err().to_string()
 }
 
 #[test]

@@ -160,7 +160,10 @@ fn welded_links_keep_the_file_and_every_other_byte_stays() {
         "{:?}",
         urdf_file.notes
     );
-    for note in ["offset of shoulder, elbow", "rotor inertia (armature in MJCF) of shoulder, elbow"] {
+    for note in [
+        "constant load): shoulder -0.3000 N m, elbow 0.1000 N m",
+        "armature: shoulder 0.0500 kg m², elbow 0.0200 kg m²",
+    ] {
         assert!(urdf_file.notes.iter().any(|n| n.contains(note)), "{:?}", urdf_file.notes);
     }
     assert!(!mjcf_file.notes.iter().any(|n| n.contains("rotor")), "{:?}", mjcf_file.notes);

@@ -276,6 +276,20 @@ fn bad_priors_are_repaired_and_missing_ones_invented() {
 }
 
 #[test]
+fn a_carrier_that_states_zeros_gets_no_invented_body() {
+    let found = prior_of(&model_of(
+        &planar([Some(body(3.0, [0.1, 0.0, 0.0])), Some(Inertia::default())]),
+        Vec::new(),
+    ));
+    assert_eq!(found.bodies.iter().map(|b| b.origin).collect::<Vec<_>>(), [Origin::Stated, Origin::Massless]);
+    assert!(
+        (found.bodies[1].inertia.mass() - 3e-3).abs() < 1e-15
+            && found.bodies[1].inertia.physical_fault().is_none()
+    );
+    assert!(found.warnings.is_empty(), "{:?}", found.warnings);
+}
+
+#[test]
 fn a_negative_mass_is_refused_by_name_even_behind_a_weld() {
     let mut d = good_planar();
     d.links.push(LinkDescription { name: "tool".into(), inertia: Some(body(-0.5, [0.0; 3])) });

@@ -128,7 +128,9 @@ fn example(rule: ForgettingRule) -> Config {
     }];
     config.online.forgetting = rule;
     config.online.learn_s = 12.0;
-    config.online.memory_s = 8.0;
+    if !matches!(rule, ForgettingRule::None | ForgettingRule::ErrorDriven | ForgettingRule::NoiseNormalised) {
+        config.online.memory_s = 8.0;
+    }
     config
 }
 

@@ -3,7 +3,7 @@
 
 #![expect(clippy::print_stdout, reason = "a test may stop, and says what it measured")]
 
-use crate::support::{PANDA, TX40, UR10, data, emps_robot, geometric_mean, on_validation, rms, run};
+use crate::support::{PANDA, TX40, UR10, UR10E, data, emps_robot, geometric_mean, on_validation, rms, run};
 use dynid::model::EffortModel;
 
 /// Runs a set and requires the geometric mean over joints of the RMS ratio to the baseline to stay below `limit`.
@@ -44,27 +44,7 @@ fn panda() {
 
 #[test]
 fn ur10e() {
-    check(
-        "ur10e-innopolis",
-        r#"
-robot = "{data}/ur10e-innopolis/ur10e.urdf"
-[columns]
-effort = { columns = "i{}", unit = "A", scale = [14.87, 13.26, 11.13, 10.62, 11.03, 11.47] }
-[[log]]
-path = "{data}/ur10e-innopolis/20_02_10-30sec_12harm.csv.gz"
-rows = [635, 3510]
-[[log]]
-path = "{data}/ur10e-innopolis/20_02_12-50sec_12harm.csv.gz"
-rows = [355, 5090]
-[[validation]]
-path = "{data}/ur10e-innopolis/20_02_12-40sec_12harm.csv.gz"
-rows = [500, 4460]
-"#,
-        58,
-        8.0,
-        &[2.74, 4.22, 1.87, 0.376, 0.471, 0.407],
-        0.75,
-    );
+    check("ur10e-innopolis", UR10E, 58, 8.0, &[2.74, 4.22, 1.87, 0.376, 0.471, 0.407], 0.75);
 }
 
 #[test]

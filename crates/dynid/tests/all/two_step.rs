@@ -383,13 +383,14 @@ fn an_estimate_predicts_with_the_known_friction() {
     let export = RobotExport::new(robot.identified(), &source).unwrap();
     for exported in [export.urdf(&states).unwrap(), export.mjcf(&states).unwrap()] {
         let notes = exported.notes.join("\n");
-        assert!(notes.contains("left out of the known friction of `j1`"), "{notes}");
+        assert!(notes.contains("friction of `j1` has a form that"), "{notes}");
     }
     let urdf = export.urdf(&states).unwrap().text;
     let dynamics = dynid::io::urdf::dynamics(&urdf, "urdf").unwrap();
     let j1 = dynamics.iter().find(|d| d.joint == "j1").unwrap();
-    let expected = 2.0 + value(&read, "j1.fc");
-    assert!((j1.friction - expected).abs() < 1e-9 && j1.damping == 0.0, "{j1:?} {expected}");
+    // Coulomb friction is held as it is; what saturates adds to it and to damping.
+    let coulomb = 2.0 + value(&read, "j1.fc");
+    assert!(j1.friction > coulomb && j1.damping > 0.0, "{j1:?} {coulomb}");
 }
 
 #[test]

@@ -227,9 +227,12 @@ fn contradictions_are_refused() {
         ),
         case(
             "bad.toml",
-            bound("parameter = \"elbow.fc\"\nrange = [-inf, -0.1]"),
+            bounds(&[
+                "parameter = \"elbow.fc\"\nrange = [-inf, -0.1]",
+                "parameter = \"elbow.fv\"\nrange = [-inf, 0]",
+            ]),
             RUN,
-            &["`elbow.fc` ≤ -0.1"],
+            &["`elbow.fc` ≤ -0.1", "`elbow.fv` ≤ 0", "power of the friction of elbow ≥ 0"],
             contradiction,
         ),
     ]);

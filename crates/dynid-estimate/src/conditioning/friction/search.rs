@@ -243,9 +243,8 @@ impl<'a> Search<'a> {
             let rest = 1.0 - (0..unknowns).map(|i| cross[(i, k)] * solved[(i, k)]).sum::<f64>();
             let slope =
                 scale[c] * normal.rhs[(c, 0)] - (0..unknowns).map(|i| cross[(i, k)] * x[(i, 0)]).sum::<f64>();
-            // A falling tanh would be friction that drives; what falls from rest is for Stribeck.
-            let allowed =
-                !matches!(library[candidates[k]].kind, ShapeKind::Tanh | ShapeKind::Load) || slope > 0.0;
+            // A falling tanh would be friction that drives; what falls from rest is for Stribeck, what rises for tanh.
+            let allowed = library[candidates[k]].kind == ShapeKind::ViscousMagnitude || slope > 0.0;
             (allowed && scale[c] > 0.0 && rest > COLLINEAR).then(|| slope * slope / rest)
         };
         candidates.iter().enumerate().filter_map(|(k, c)| Some((*c, gain(k)?))).collect()

@@ -46,6 +46,9 @@ impl JointElement for LoadFriction {
     fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
         self.rates.iter().map(|rate| joints[*rate].parameter("mu", NUMBER, Some(0.0))).collect()
     }
+    fn opposes_motion(&self) -> bool {
+        true
+    }
     fn entries(&self) -> Vec<(usize, usize)> {
         self.rates.iter().copied().enumerate().map(|(k, rate)| (rate, k)).collect()
     }

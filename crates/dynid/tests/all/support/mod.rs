@@ -48,6 +48,22 @@ path = "{data}/staubli-tx40/motor_log.csv.gz"
 part = [0.6, 1.0]
 "#;
 
+/// UR10e of Innopolis: currents with published gains, two runs, a third kept back.
+pub(crate) const UR10E: &str = r#"
+robot = "{data}/ur10e-innopolis/ur10e.urdf"
+[columns]
+effort = { columns = "i{}", unit = "A", scale = [14.87, 13.26, 11.13, 10.62, 11.03, 11.47] }
+[[log]]
+path = "{data}/ur10e-innopolis/20_02_10-30sec_12harm.csv.gz"
+rows = [635, 3510]
+[[log]]
+path = "{data}/ur10e-innopolis/20_02_12-50sec_12harm.csv.gz"
+rows = [355, 5090]
+[[validation]]
+path = "{data}/ur10e-innopolis/20_02_12-40sec_12harm.csv.gz"
+rows = [500, 4460]
+"#;
+
 /// UR10 of the University of Salerno, later 30 % kept back.
 pub(crate) const UR10: &str = r#"
 robot = "{data}/ur10-unisa/ur10_kinematics.urdf"

@@ -1,0 +1,511 @@
+//! Every flag of every command takes effect or is refused with a reason.
+//!
+//! Commands and flags are read off the program's own help, so that a new flag without a case fails. A case is a command line
+//! without and with the flag; what the program prints and writes must differ, or the flag must be refused.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use crate::support::{TWO_LINKS, dynid, run};
+
+/// Flags of all commands, as `command --flag`.
+fn flags() -> BTreeSet<String> {
+    let help = |args: &[&str]| {
+        let text = String::from_utf8(dynid().args(args).output().unwrap().stdout).unwrap();
+        text.lines().map(str::to_owned).collect::<Vec<String>>()
+    };
+    let commands: Vec<String> = help(&["--help"])
+        .into_iter()
+        .skip_while(|line| line != "Commands:")
+        .skip(1)
+        .take_while(|line| !line.is_empty())
+        .filter_map(|line| line.strip_prefix("  ")?.split(' ').next().map(str::to_owned))
+        .filter(|command| !command.is_empty() && command != "help")
+        .collect();
+    assert!(commands.len() >= 15, "{commands:?}");
+    let of = |command: &String| {
+        let lines = help(&[command, "--help"]);
+        let flags = lines.iter().filter_map(|line| {
+            let flag = line
+                .trim_start()
+                .trim_start_matches("-q, ")
+                .trim_start_matches("-h, ")
+                .trim_start_matches("-V, ");
+            let name = flag.strip_prefix("--")?.split([' ', '.']).next()?;
+            Some(format!("{command} --{name}"))
+        });
+        flags.collect::<Vec<String>>()
+    };
+    commands.iter().flat_map(of).filter(|f| !f.ends_with("--help") && !f.ends_with("--version")).collect()
+}
+
+/// Flags of which another test, or nothing, can show the effect.
+const ELSEWHERE: [(&str, &str); 8] = [
+    ("study ", "studies run for a minute and more: `study`"),
+    ("clearance ", "needs a robot with clearance: `clearance`"),
+    ("friction ", "needs constant speeds: `friction`"),
+    ("check --quiet", "hides progress, which terminals alone show"),
+    ("gains --quiet", "hides progress, which terminals alone show"),
+    ("online --json", "changes what a terminal shows"),
+    ("online --replay", "needs a stream that begins again: `online`"),
+    ("online --checkpoint", "needs a run that is interrupted: `online`"),
+];
+
+struct Case {
+    flag: &'static str,
+    before: &'static str,
+    after: &'static str,
+    /// Words of a refusal; none: the outcome differs.
+    refused: Option<&'static str>,
+}
+
+/// What a command printed and wrote, times and provenance left out.
+fn outcome(files: &Path, line: &str) -> (Option<i32>, String) {
+    let folder = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(files).unwrap() {
+        let path = entry.unwrap().path();
+        std::fs::copy(&path, folder.path().join(path.file_name().unwrap())).unwrap();
+    }
+    let before: BTreeSet<String> = names(folder.path());
+    let output = dynid().current_dir(folder.path()).args(line.split(' ')).output().unwrap();
+    let mut text = format!(
+        "{}\n{}\n",
+        without_clock(&String::from_utf8_lossy(&output.stdout)),
+        without_clock(&String::from_utf8_lossy(&output.stderr))
+    );
+    for name in names(folder.path()).difference(&before) {
+        let path = folder.path().join(name);
+        text += name;
+        if path.is_dir() {
+            for inner in names(&path) {
+                text += &inner;
+                text += &written(&path.join(inner));
+            }
+        } else {
+            text += &written(&path);
+        }
+    }
+    (output.status.code(), text)
+}
+
+fn names(folder: &Path) -> BTreeSet<String> {
+    std::fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+        .collect()
+}
+
+fn written(path: &Path) -> String {
+    let bytes = std::fs::read(path).unwrap();
+    let Ok(serde_json::Value::Object(mut map)) = serde_json::from_slice(&bytes) else {
+        // A page says which command made it.
+        let page = path.extension().is_some_and(|e| e == "html");
+        return if page { String::new() } else { String::from_utf8_lossy(&bytes).into_owned() };
+    };
+    // What was asked for is no effect.
+    for echo in ["provenance", "config", "conditioning", "preflight"] {
+        map.remove(echo);
+    }
+    without_clock(&serde_json::to_string_pretty(&map).unwrap())
+}
+
+/// Lines without times of a clock.
+fn without_clock(text: &str) -> String {
+    let clock = |line: &&str| !["seconds", "_s\":", " s)", "time"].iter().any(|word| line.contains(word));
+    text.lines().filter(clock).collect::<Vec<_>>().join("\n")
+}
+
+/// Robots, logs, an estimate and configurations.
+fn prepared() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let write = |name: &str, text: &str| std::fs::write(at.join(name), text).unwrap();
+    write("arm.urdf", TWO_LINKS);
+    let mimic = TWO_LINKS.replacen(
+        "<limit lower=\"-2\" upper=\"2\" velocity=\"3\" effort=\"100\"/>\n  </joint>\n</robot>",
+        "<limit lower=\"-2\" upper=\"2\" velocity=\"3\" effort=\"100\"/>\n    <mimic joint=\"shoulder\"/>\n  </joint>\n</robot>",
+        1,
+    );
+    assert!(mimic.contains("<mimic"));
+    write("mimic.urdf", &mimic);
+    let simulate = |out: &str, seed: &str, more: &[&str]| {
+        let args =
+            ["simulate", "arm.urdf", "--duration", "8", "--rate-hz", "100", "--seed", seed, "--out", out];
+        run(at, &[&args[..], more].concat(), 0);
+    };
+    simulate("log.csv", "1", &["--clean", "clean.csv"]);
+    simulate("other.csv", "2", &[]);
+    let log = std::fs::read_to_string(at.join("log.csv")).unwrap();
+    let columns = |keep: &dyn Fn(&str) -> bool, rename: &dyn Fn(&str) -> String| {
+        let header: Vec<&str> = log.lines().next().unwrap().split(',').collect();
+        let rows = log.lines().enumerate().map(|(row, line)| {
+            let cells = line.split(',').zip(&header).filter(|(_, name)| keep(name));
+            let cell = |(x, _): (&str, &&str)| if row == 0 { rename(x) } else { x.to_owned() };
+            cells.map(cell).collect::<Vec<String>>().join(",")
+        });
+        rows.collect::<Vec<String>>().join("\n") + "\n"
+    };
+    let same = |name: &str| name.to_owned();
+    write("currents.csv", &columns(&|_| true, &|name| name.replace("tau_", "current_")));
+    write("no-elbow.csv", &columns(&|name| !name.ends_with("elbow"), &same));
+    write("no-time.csv", &columns(&|name| name != "t", &same));
+    run(at, &["identify", "arm.urdf", "--log", "log.csv", "--out", "out", "--quiet"], 0);
+    std::fs::copy(at.join("out/estimate.json"), at.join("estimate.json")).unwrap();
+    write(
+        "bounded.toml",
+        "robot = \"arm.urdf\"\nout = \"out\"\n[[bound]]\nparameter = \"shoulder.fc\"\nrange = [8, 9]\n[[log]]\npath = \"log.csv\"\n",
+    );
+    dynid().current_dir(at).args(["identify", "bounded.toml", "--quiet"]).output().unwrap();
+    std::fs::copy(at.join("out/estimate.json"), at.join("bounded.json")).unwrap();
+    std::fs::remove_dir_all(at.join("out")).unwrap();
+    write("longer.urdf", &TWO_LINKS.replace("0 0 0.35", "0 0 0.6"));
+    let law = "[element.shoulder]\nstribeck = { coulomb = 2, static = 5, vs = 0.3 }\n[element.elbow]\nstribeck = { coulomb = 1, static = 2, vs = 0.3 }\n";
+    write(
+        "stribeck.toml",
+        &format!(
+            "urdf = \"arm.urdf\"\n[defaults]\nelements = [\"stribeck\", \"viscous\", \"offset\"]\n{law}"
+        ),
+    );
+    run(
+        at,
+        &["simulate", "stribeck.toml", "--duration", "8", "--rate-hz", "100", "--out", "stribeck.csv"],
+        0,
+    );
+    let logs = "[[log]]\npath = \"log.csv\"\n[[log]]\npath = \"other.csv\"\npayload = \"tool\"\n";
+    let tool = "[[payload]]\nname = \"tool\"\nmass = 1.0\n";
+    write("payload.toml", &format!("robot = \"arm.urdf\"\npreflight = \"off\"\n{tool}{logs}"));
+    write(
+        "turned.toml",
+        "robot = \"arm.urdf\"\n[columns]\nposition = { columns = \"q_{joint}\", scale = 1.5 }\n[[log]]\npath = \"log.csv\"\n",
+    );
+    write("run.toml", "robot = \"arm.urdf\"\n[online]\nlearn_s = 4\n[[log]]\npath = \"log.csv\"\n");
+    write(
+        "scaled.toml",
+        "robot = \"arm.urdf\"\n[columns]\neffort = { columns = \"tau_{joint}\", scale = 1.5 }\n[[log]]\npath = \"log.csv\"\n",
+    );
+    write(
+        "small.toml",
+        "robot = \"arm.urdf\"\n[trajectory]\nperiod_s = 4\nharmonics = 3\nsample_rate_hz = 50\n[search]\nstarts = 1\n",
+    );
+    write("sim.toml", "harmonics = 2\n");
+    folder
+}
+
+fn cases() -> Vec<Case> {
+    let case = |flag, before, after| Case { flag, before, after, refused: None };
+    let refused = |flag, after, words| Case { flag, before: "inspect arm.urdf", after, refused: Some(words) };
+    let mut out = Vec::new();
+    let plain: &[(&str, &str, &[&str])] = &[
+        (
+            "inspect",
+            "inspect arm.urdf",
+            &["--floating-base", "--lock elbow=0.3", "--gravity 0,0,-3", "--elements viscous", "--json"],
+        ),
+        (
+            "regressor",
+            "regressor arm.urdf --states clean.csv",
+            &["--lock elbow=0.3", "--gravity 0,0,-3", "--json"],
+        ),
+        (
+            "check",
+            "check log.csv --robot arm.urdf",
+            &["--fix f.toml", "--report r.html", "--lock elbow=0.3", "--gravity 0,0,9.81", "--json"],
+        ),
+        ("compare", "compare arm.urdf --log log.csv", &["--report r.html", "--json", "--quiet"]),
+        (
+            "identify",
+            "identify arm.urdf --log log.csv",
+            &[
+                "--validate other.csv",
+                "--out elsewhere",
+                "--elements viscous",
+                "--friction stribeck",
+                "--lock elbow=0.3",
+                "--gravity 0,0,-9.5",
+                "--route textbook",
+                "--estimator huber",
+                "--consistency none",
+                "--kernel-hz 5",
+                "--state-hz 25",
+                "--delay-samples 2",
+                "--reversal-mask 0.3",
+                "--prefer upper_arm.m,forearm.m",
+                "--json",
+                "--quiet",
+            ],
+        ),
+        ("predict", "predict estimate.json --states clean.csv", &["--out p.csv"]),
+        (
+            "design",
+            "design small.toml",
+            &[
+                "--out elsewhere",
+                "--period 5",
+                "--harmonics 4",
+                "--periods 2",
+                "--rate-hz 60",
+                "--no-rest",
+                "--park",
+                "--acceleration 2",
+                "--share 0.5",
+                "--criterion condition",
+                "--columns inertial",
+                "--noise 5",
+                "--elements viscous",
+                "--lock elbow=0.3",
+                "--starts 2",
+                "--seed 5",
+                "--checkpoint c.json",
+                "--json",
+                "--quiet",
+            ],
+        ),
+        (
+            "simulate",
+            "simulate arm.urdf --out s.csv",
+            &[
+                "--lock elbow=0.3",
+                "--gravity 0,0,-3",
+                "--config sim.toml",
+                "--closed-loop",
+                "--duration 5",
+                "--rate-hz 90",
+                "--effort-noise 0.2",
+                "--encoder-bits 9",
+                "--seed 5",
+                "--clean c.csv",
+                "--truth t.json",
+            ],
+        ),
+        (
+            "validate",
+            "validate estimate.json --log other.csv",
+            &["--rows 1:400", "--config scaled.toml", "--filter-hz 3", "--json"],
+        ),
+        (
+            "backlash",
+            "backlash estimate.json --log other.csv",
+            &["--rows 1:700", "--config scaled.toml", "--json"],
+        ),
+        (
+            "export",
+            "export estimate.json --urdf e.urdf",
+            &["--mjcf e.xml", "--json e.json", "--log other.csv", "--robot mimic.urdf"],
+        ),
+        ("payload", "payload payload.toml", &["--out elsewhere", "--json", "--quiet"]),
+        ("gains", "gains payload.toml", &["--json"]),
+        ("online", "online run.toml", &["--log other.csv", "--quiet"]),
+    ];
+    for (command, base, flags) in plain {
+        for flag in *flags {
+            let name = flag.split(' ').next().unwrap();
+            out.push(case(leak(format!("{command} {name}")), base, leak(format!("{base} {flag}"))));
+        }
+    }
+    // Flags that say how logs are read.
+    for (command, base) in [
+        ("check", "check {log} --robot arm.urdf"),
+        ("compare", "compare arm.urdf --log {log}"),
+        ("identify", "identify arm.urdf --log {log}"),
+        ("validate", "validate estimate.json --log {log}"),
+        ("backlash", "backlash estimate.json --log {log}"),
+        ("export", "export estimate.json --urdf e.urdf --log {log}"),
+    ] {
+        for (flag, log) in [
+            ("--rate-hz 100", "no-time.csv"),
+            ("--gains 1,1", "currents.csv"),
+            ("--allow-unlogged", "no-elbow.csv"),
+        ] {
+            let name = flag.split(' ').next().unwrap();
+            let before = base.replace("{log}", log);
+            let after = format!("{before} {flag}");
+            out.push(case(leak(format!("{command} {name}")), leak(before), leak(after)));
+        }
+        let after = leak(format!("{} --gains 1,1", base.replace("{log}", "log.csv")));
+        out.push(refused(leak(format!("{command} --gains")), after, "current_gains"));
+    }
+    for (command, base) in [
+        ("inspect", "inspect mimic.urdf"),
+        ("regressor", "regressor mimic.urdf --states clean.csv"),
+        ("simulate", "simulate mimic.urdf --out s.csv"),
+        ("identify", "identify mimic.urdf --log log.csv"),
+    ] {
+        out.push(case(
+            leak(format!("{command} --couple-mimics")),
+            base,
+            leak(format!("{base} --couple-mimics")),
+        ));
+    }
+    out.extend([
+        case(
+            "regressor --base",
+            "regressor arm.urdf --states clean.csv --json",
+            "regressor arm.urdf --states clean.csv --json --base",
+        ),
+        refused("regressor --base", "regressor arm.urdf --states clean.csv --base", "--json"),
+        case(
+            "regressor --states",
+            "regressor arm.urdf --states clean.csv",
+            "regressor arm.urdf --states log.csv",
+        ),
+        case(
+            "regressor --floating-base",
+            "regressor arm.urdf --states clean.csv",
+            "regressor arm.urdf --states clean.csv --floating-base",
+        ),
+        refused("simulate --floating-base", "simulate arm.urdf --out s.csv --floating-base", "floating"),
+        case("check --robot", "check log.csv --robot arm.urdf", "check log.csv --robot longer.urdf"),
+        case(
+            "validate --unconstrained",
+            "validate bounded.json --log other.csv",
+            "validate bounded.json --log other.csv --unconstrained",
+        ),
+        case(
+            "predict --unconstrained",
+            "predict bounded.json --states clean.csv",
+            "predict bounded.json --states clean.csv --unconstrained",
+        ),
+        case("compare --log", "compare arm.urdf --log log.csv", "compare arm.urdf --log other.csv"),
+        case("identify --log", "identify arm.urdf --log log.csv", "identify arm.urdf --log other.csv"),
+        refused(
+            "identify --known-friction",
+            "identify arm.urdf --log log.csv --known-friction none.json",
+            "none.json",
+        ),
+        refused(
+            "identify --search",
+            "identify arm.urdf --log log.csv --friction given --search ics",
+            "shape parameter",
+        ),
+        case(
+            "identify --search",
+            "identify arm.urdf --log stribeck.csv --friction stribeck",
+            "identify arm.urdf --log stribeck.csv --friction stribeck --search de",
+        ),
+        refused(
+            "identify --decimation",
+            "identify arm.urdf --log log.csv --decimation 4",
+            "route = \"textbook\"",
+        ),
+        case(
+            "identify --decimation",
+            "identify arm.urdf --log log.csv --route textbook",
+            "identify arm.urdf --log log.csv --route textbook --decimation 7",
+        ),
+        case(
+            "identify --seed",
+            "identify arm.urdf --log stribeck.csv --friction stribeck --search de",
+            "identify arm.urdf --log stribeck.csv --friction stribeck --search de --seed 9",
+        ),
+        case(
+            "predict --states",
+            "predict estimate.json --states clean.csv",
+            "predict estimate.json --states none.csv",
+        ),
+        refused("design --earlier", "design small.toml --earlier none.json", "none.json"),
+        case(
+            "design --time-budget",
+            "design small.toml --starts 3",
+            "design small.toml --starts 3 --time-budget 0",
+        ),
+        refused("simulate --follow", "simulate arm.urdf --out s.csv --follow none.json", "none.json"),
+        refused(
+            "simulate --journal-noise",
+            "simulate arm.urdf --out s.csv --journal-noise 1e-6",
+            "clearance",
+        ),
+        case("simulate --out", "simulate arm.urdf --out s.csv", "simulate arm.urdf --out z.csv"),
+        case(
+            "validate --log",
+            "validate estimate.json --log other.csv",
+            "validate estimate.json --log log.csv",
+        ),
+        case(
+            "backlash --log",
+            "backlash estimate.json --log other.csv",
+            "backlash estimate.json --log log.csv",
+        ),
+        case(
+            "export --urdf",
+            "export estimate.json --json e.json",
+            "export estimate.json --json e.json --urdf e.urdf",
+        ),
+        case(
+            "export --config",
+            "export estimate.json --urdf e.urdf --log other.csv",
+            "export estimate.json --urdf e.urdf --log other.csv --config turned.toml",
+        ),
+        refused("export --config", "export estimate.json --urdf e.urdf --config scaled.toml", "--log"),
+        refused("export --rate-hz", "export estimate.json --urdf e.urdf --rate-hz 100", "--log"),
+        refused(
+            "validate --config",
+            "validate estimate.json --log other.csv --config none.toml",
+            "none.toml",
+        ),
+        case(
+            "export --allow-unphysical",
+            "export flat.json --robot arm.urdf --urdf e.urdf",
+            "export flat.json --robot arm.urdf --urdf e.urdf --allow-unphysical",
+        ),
+        refused("online --stream", "online run.toml --stream csv --log log.csv", "--log"),
+    ]);
+    out
+}
+
+/// Arguments live as long as the test.
+fn leak(text: String) -> &'static str {
+    Box::leak(text.into_boxed_str())
+}
+
+#[test]
+fn every_flag_takes_effect_or_is_refused() {
+    let files = prepared();
+    // An estimate with a link that no body could be.
+    let estimate = std::fs::read_to_string(files.path().join("estimate.json")).unwrap();
+    let mut flat: serde_json::Value = serde_json::from_str(&estimate).unwrap();
+    for parameter in flat["parameters"].as_array_mut().unwrap() {
+        if parameter["name"] == "forearm.m" {
+            parameter["value"] = (-1.0).into();
+        }
+    }
+    std::fs::write(files.path().join("flat.json"), flat.to_string()).unwrap();
+
+    let mut faults: Vec<String> = Vec::new();
+    let cases = cases();
+    let flags = flags();
+    for flag in &flags {
+        let elsewhere = ELSEWHERE.iter().any(|(start, _)| flag.starts_with(start));
+        if !elsewhere && !cases.iter().any(|case| case.flag == flag) {
+            faults.push(format!("{flag}: no case"));
+        }
+    }
+    let mut known: BTreeMap<&str, (Option<i32>, String)> = BTreeMap::new();
+    for case in &cases {
+        if !flags.contains(case.flag) {
+            faults.push(format!("{}: a case, but no such flag", case.flag));
+        }
+        let after = outcome(files.path(), case.after);
+        match case.refused {
+            Some(words) if after.0 == Some(2) && after.1.contains(words) => {}
+            Some(_) => faults.push(format!("{}: not refused: {:?} {}", case.after, after.0, start(&after.1))),
+            None => {
+                let before = known.entry(case.before).or_insert_with(|| outcome(files.path(), case.before));
+                if *before == after {
+                    faults.push(format!(
+                        "{}: changes nothing: {:?} {}",
+                        case.after,
+                        after.0,
+                        start(&after.1)
+                    ));
+                }
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+fn start(text: &str) -> String {
+    text.trim().chars().take(200).collect()
+}

@@ -1,0 +1,54 @@
+//! In which samples a joint moves, and in which it stands.
+
+use dynid_motion::mask::reversal_threshold;
+
+use super::states::States;
+use super::{ConditioningError, ConditioningSettings, PreparedLog};
+
+/// Least speed of a joint that moves, as a share of its rms speed: the first rung of the usual ladder of reversal masks.
+const LEAST_SHARE: f64 = 0.03;
+
+/// Where the joints of a log move.
+///
+/// A joint moves where `|v| ≥ max(4 σ_v, 3 % of its rms speed)`, `σ_v` the noise of the speed at the state cut-off: below that the
+/// sign of a speed, and with it friction, is a matter of chance. A joint that the log does not move at all stands throughout.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Moving {
+    /// Per output: least speed of a joint that moves, rad/s or m/s.
+    pub least_speed: Vec<f64>,
+    /// Per output and sample: whether it moves.
+    pub samples: Vec<Vec<bool>>,
+}
+
+impl Moving {
+    /// Of a log with its states.
+    pub fn new(log: &PreparedLog, states: &States, settings: &ConditioningSettings) -> Moving {
+        let outputs = 0..log.position.len();
+        let least_speed: Vec<f64> = outputs
+            .map(|j| {
+                let v = states.velocity(j);
+                reversal_threshold(v, states.velocity_sigma[j], settings.stick_sigma, LEAST_SHARE)
+            })
+            .collect();
+        let samples = least_speed
+            .iter()
+            .enumerate()
+            .map(|(j, least)| {
+                states.velocity(j).iter().map(|v| log.moves[j] && *v != 0.0 && v.abs() >= *least).collect()
+            })
+            .collect();
+        Moving { least_speed, samples }
+    }
+
+    /// Of a log at a state cut-off, Hz, which counts up to what the sample rate allows.
+    ///
+    /// # Errors
+    /// [`ConditioningError::Signal`] for a signal that cannot be filtered.
+    pub fn of(
+        log: &PreparedLog,
+        state_hz: f64,
+        settings: &ConditioningSettings,
+    ) -> Result<Moving, ConditioningError> {
+        Ok(Moving::new(log, &States::of(log, state_hz, settings)?, settings))
+    }
+}

@@ -1,0 +1,69 @@
+//! What robot files hold of an identified model, and what that costs.
+
+use serde::{Deserialize, Serialize};
+
+use crate::export::FrictionProjection;
+
+/// Loss of effort, in per cent of the joint's effort, above which an exported file is not the model that was judged.
+pub const EXPORT_LOSS_LIMIT: f64 = 5.0;
+
+/// Robot files beside the identified model.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ExportedRecord {
+    /// What files state of the joints.
+    pub joints: Vec<ExportedJoint>,
+    /// Friction of other forms, and what stands for it.
+    pub projections: Vec<FrictionProjection>,
+    /// Figures on the training logs.
+    pub training: Vec<ExportedLog>,
+    /// Figures on the validation logs.
+    pub validation: Vec<ExportedLog>,
+}
+
+/// What files state of a joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExportedJoint {
+    /// Joint.
+    pub joint: String,
+    /// URDF `friction`, MJCF `frictionloss`, N m or N.
+    pub friction_loss: f64,
+    /// `damping`, N m s/rad or N s/m.
+    pub damping: f64,
+    /// MJCF `armature`, kg m² or kg; URDF has no place for it.
+    pub rotor_inertia: f64,
+}
+
+/// What files predict on a log.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExportedLog {
+    /// Log file.
+    pub log: String,
+    /// Cut-off of the filter that prediction and measurement pass, Hz.
+    pub filter_hz: f64,
+    /// The MJCF; also the URDF with the rotor inertias of [`ExportedJoint`] added.
+    pub mjcf: FileFit,
+    /// The URDF alone.
+    pub urdf: FileFit,
+}
+
+/// Figures of a file on a log, per joint in joint order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FileFit {
+    /// RMS of measured minus predicted effort.
+    pub rms: Vec<Option<f64>>,
+    /// `100 ‖measured - predicted‖/‖measured‖` per joint, percent.
+    pub relative_error_per_joint: Vec<Option<f64>>,
+    /// The same over all joints, percent.
+    pub relative_error: Option<f64>,
+    /// RMS of the identified model's effort minus the file's, in the effort's unit.
+    pub loss: Vec<f64>,
+    /// The same in per cent of the RMS of the measured effort.
+    pub loss_percent: Vec<Option<f64>>,
+}
+
+impl ExportedRecord {
+    /// The log that files are judged on: the first validation log, else the first training log.
+    pub fn judged(&self) -> Option<&ExportedLog> {
+        self.validation.first().or(self.training.first())
+    }
+}

@@ -1,0 +1,106 @@
+//! What robot files predict on the logs of an identification, beside the identified model.
+
+use dynid_estimate::conditioning::{PreparedLog, predict};
+use dynid_io::mjcf::JointParameters;
+use dynid_model::{EffortModel, RobotModel};
+
+use super::joints::{self, Format};
+use super::{CheckStates, FrictionProjection, projection, read_back};
+use crate::Error;
+use crate::agreement::Agreement;
+use crate::estimate::{ExportedJoint, ExportedLog, ExportedRecord, FileFit};
+use crate::identify::Identification;
+
+/// Models of the files that an identification leaves.
+#[derive(Debug)]
+pub(crate) struct FileModels {
+    joints: Vec<JointParameters>,
+    /// With rotors: MJCF, or URDF with the printed rotor inertias added. `None` where files do not hold the mechanism's efforts (motors
+    /// behind springs, loads that sensors measure).
+    with_rotor: Option<(RobotModel, Vec<f64>)>,
+    /// Without: URDF alone.
+    without_rotor: Option<(RobotModel, Vec<f64>)>,
+}
+
+impl FileModels {
+    /// Projects friction over the training logs and lays out what files state.
+    ///
+    /// # Errors
+    /// [`Error::Conditioning`]: a log is too short for the state filter.
+    pub(crate) fn of(
+        id: &Identification,
+        logs: &[PreparedLog],
+    ) -> Result<(Self, Vec<FrictionProjection>), Error> {
+        let identified = id.identified();
+        let (model, values) = (identified.model, identified.values);
+        let bodies = model.mechanism().bodies().len();
+        if bodies == 0 || !model.coordinates().is_empty() {
+            let nothing = FileModels { joints: Vec::new(), with_rotor: None, without_rotor: None };
+            return Ok((nothing, Vec::new()));
+        }
+        let states = CheckStates::logs(logs, id.state_hz, &id.settings)?;
+        let known = |joint: &str| identified.known_friction.iter().any(|law| law.joint == joint);
+        let projected = projection::project(model, values, known, &states);
+        let joints = joints::split(&identified, Format::Mjcf, &projected).joints;
+        let still: Vec<JointParameters> =
+            joints.iter().map(|p| JointParameters { armature: 0.0, ..p.clone() }).collect();
+        let file = |joints: &[JointParameters]| {
+            read_back::with_joints(model.mechanism().clone(), values[..10 * bodies].to_vec(), joints, model)
+                .unwrap_or_else(|fault| unreachable!("loops that closed before: {fault}"))
+        };
+        let (with_rotor, without_rotor) = (Some(file(&joints)), Some(file(&still)));
+        Ok((FileModels { joints, with_rotor, without_rotor }, projected))
+    }
+
+    /// Figures on a log; `agreement` is that of the identified model.
+    ///
+    /// # Errors
+    /// As [`crate::agreement::compare`].
+    pub(crate) fn judge(
+        &self,
+        id: &Identification,
+        log: &PreparedLog,
+        agreement: &Agreement,
+    ) -> Result<Option<ExportedLog>, Error> {
+        let (Some(with_rotor), Some(without_rotor)) = (&self.with_rotor, &self.without_rotor) else {
+            return Ok(None);
+        };
+        let delay = id.delay_on(log);
+        let run = |model: &RobotModel, values: &[f64]| {
+            let shape = model.parameters().shape_start();
+            predict(model, &shape, values, log, id.state_hz, delay, &id.settings)
+        };
+        let (alone, values) = id.robot_alone();
+        let alone = run(alone, values)?;
+        let file = |(model, values): &(RobotModel, Vec<f64>)| -> Result<FileFit, Error> {
+            let file = run(model, values)?;
+            // What the file loses of the robot; terms of single logs stay.
+            let pairs = alone.iter().zip(&file);
+            let lost: Vec<Vec<f64>> =
+                pairs.map(|(a, f)| a.iter().zip(f).map(|(a, f)| a - f).collect()).collect();
+            agreement.without(&lost)
+        };
+        Ok(Some(ExportedLog {
+            log: log.name.clone(),
+            filter_hz: agreement.filter_hz,
+            mjcf: file(with_rotor)?,
+            urdf: file(without_rotor)?,
+        }))
+    }
+
+    /// The record, once all logs are judged.
+    pub(crate) fn record(
+        &self,
+        projections: Vec<FrictionProjection>,
+        training: Vec<ExportedLog>,
+        validation: Vec<ExportedLog>,
+    ) -> ExportedRecord {
+        let joint = |p: &JointParameters| ExportedJoint {
+            joint: p.joint.clone(),
+            friction_loss: p.friction_loss,
+            damping: p.damping,
+            rotor_inertia: p.armature,
+        };
+        ExportedRecord { joints: self.joints.iter().map(joint).collect(), projections, training, validation }
+    }
+}

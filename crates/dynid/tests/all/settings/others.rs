@@ -1,0 +1,580 @@
+//! Keys of virtual logs, designs, friction experiments and on-line identification.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use dynid::design::{DesignConfig, design};
+use dynid::io::csv::{ReadOptions, read};
+use dynid::online::Session;
+use dynid::simulate::{SimulateSettings, simulate};
+use dynid::{Config, FrictionConfig, Robot, RobotOptions, identify_friction};
+
+use super::identification::{ARM, folder};
+use super::{Case, Changes, Expect, Refused, Text, beside, keys, table, top, walk};
+
+/// Lines of defaults for keys that a case does not state itself.
+fn defaults(given: &str, lines: &[(&str, &str)]) -> String {
+    let stated =
+        |key: &str| given.lines().any(|line| line.split('=').next().is_some_and(|k| k.trim() == key));
+    lines.iter().filter(|(key, _)| !stated(key)).fold(String::new(), |mut out, (key, value)| {
+        writeln!(out, "{key} = {value}").unwrap();
+        out
+    })
+}
+
+fn simulated(text: &Text) -> Result<String, String> {
+    let head = defaults(text.top, &[("duration_s", "1.0"), ("rate_hz", "100")]);
+    let head = if text.top.contains("follow") { String::new() } else { head };
+    let settings = SimulateSettings::parse(&format!("{head}{}\n{}\n", text.top, text.tables), "sim.toml");
+    let thermal =
+        ARM.replace("elements = [", "elements = [\"exponential_viscous\", ").replace("\"viscous\", ", "");
+    let weak = ARM.replace("effort = 100", "effort = 12");
+    let arm = match text.top {
+        top if top.contains("temperature") => &thermal,
+        top if top.contains("weak") => &weak,
+        _ => ARM,
+    };
+    let robot = Robot::parse(arm, Path::new("arm.toml"), &RobotOptions::default()).unwrap();
+    let log = settings.and_then(|settings| simulate(&robot, &settings));
+    log.map(|log| format!("{log:?}")).map_err(|e| e.to_string())
+}
+
+const CLOSED: &str = "mode = \"closed_loop\"";
+/// On a robot with weak drives.
+const WEAK: &str = "mode = \"closed_loop\" # weak drives";
+
+#[test]
+fn every_key_of_a_virtual_log_takes_effect_or_is_refused() {
+    let both = |key, before: [&'static str; 2], after: [&'static str; 2], expect| {
+        let text = |[top, tables]: [&'static str; 2]| Text { top, tables, ..Text::default() };
+        Case { key, before: text(before), after: text(after), expect }
+    };
+    // A table of the controlled robot: refused without it, in effect with it.
+    let closed = |key, tables: &'static str| both(key, [CLOSED, ""], [CLOSED, tables], Changes);
+    let idle = |key, tables: &'static str, words| both(key, [CLOSED, ""], [CLOSED, tables], Refused(words));
+    let open = |key, tables: &'static str| table(key, tables, Refused("closed_loop"));
+    let stated =
+        "[trajectory.j1]\nsine = [0.5]\ncosine = [0.0]\n[trajectory.j2]\nsine = [0.4]\ncosine = [0.0]\n";
+    let cases = vec![
+        top("duration_s", "duration_s = 1.2", Changes),
+        top("rate_hz", "rate_hz = 120", Changes),
+        top("harmonics", "harmonics = 2", Changes),
+        both("harmonics", ["", stated], ["harmonics = 2", stated], Refused("at random")),
+        top("period_s", "period_s = 0.5", Changes),
+        top("share", "share = 0.3", Changes),
+        both("share", ["", stated], ["share = 0.3", stated], Refused("at random")),
+        top("mode", CLOSED, Changes),
+        top("effort_noise", "effort_noise = 0.1", Changes),
+        top("effort_noise", "mode = \"closed_loop\"\nperfect = true\neffort_noise = 0.1", Refused("perfect")),
+        top("encoder_bits", "encoder_bits = 8", Changes),
+        top("encoder_bits", "mode = \"closed_loop\"\nperfect = true\nencoder_bits = 8", Refused("perfect")),
+        top("delay_samples", "delay_samples = 2", Changes),
+        top("delay_samples", "mode = \"closed_loop\"\nperfect = true\ndelay_samples = 2", Refused("perfect")),
+        top("acceleration", "acceleration = 2", Changes),
+        both("acceleration", ["", stated], ["acceleration = 2", stated], Refused("at random")),
+        top("values", "values = { \"j1.fc\" = 3.0 }", Changes),
+        top("values", "values = { \"j9.fc\" = 3.0 }", Refused("names of parameters")),
+        top("seed", "seed = 2", Changes),
+        table("trajectory.offset", "[trajectory.j1]\noffset = 0.3", Changes),
+        table("trajectory.sine", "[trajectory.j1]\nsine = [0.3]\ncosine = [0.0]", Changes),
+        table("trajectory.cosine", "[trajectory.j1]\nsine = [0.0]\ncosine = [0.3]", Changes),
+        top("follow", "follow = \"none.json\"", Refused("none.json")),
+        top("follow", "follow = \"none.json\"\nshare = 0.3", Refused("follow")),
+        top("settle_s", "settle_s = 0.2", Refused("clearance")),
+        top("journal_noise", "journal_noise = 1e-6", Refused("clearance")),
+        top("perfect", "perfect = true", Refused("closed_loop")),
+        top("perfect", "mode = \"closed_loop\"\nperfect = true", Changes),
+        both(
+            "perfect",
+            ["", ""],
+            ["mode = \"closed_loop\"\nperfect = true", "[imperfections]\noutlier_share = 0.1"],
+            Refused("perfect"),
+        ),
+        top("log_velocity", "log_velocity = true", Refused("closed_loop")),
+        both("log_velocity", [CLOSED, ""], ["mode = \"closed_loop\"\nlog_velocity = true", ""], Changes),
+        both(
+            "channels",
+            ["channels = { temperature = [[0, 20]] }", ""],
+            ["channels = { temperature = [[0, 40]] }", ""],
+            Changes,
+        ),
+        both(
+            "channels",
+            ["channels = { temperature = [[0, 20]] }", ""],
+            ["channels = { temperature = [[0, 20]], temperature_j2 = [[0, 40]] }", ""],
+            Changes,
+        ),
+        top("channels", "channels = { wind = [[0, 1]] }", Refused("no element of this robot reads one")),
+        open("control.rate_hz", "[control]\nrate_hz = 2000"),
+        closed("control.rate_hz", "[control]\nrate_hz = 2000"),
+        closed("control.bandwidth_hz", "[control]\nbandwidth_hz = 9"),
+        idle(
+            "control.bandwidth_hz",
+            "[control]\nbandwidth_hz = 9\nposition_gain = [90, 30]\nvelocity_gain = [9, 3]",
+            "gains",
+        ),
+        closed("control.damping", "[control]\ndamping = 0.6"),
+        idle("control.damping", "[control]\ndamping = 0.6\nvelocity_gain = [9, 3]", "gains"),
+        closed("control.position_gain", "[control]\nposition_gain = [90, 30]"),
+        closed("control.velocity_gain", "[control]\nvelocity_gain = [9, 3]"),
+        closed("control.feed_forward", "[control]\nfeed_forward = false"),
+        closed("control.model_error", "[control]\nmodel_error = 0.3"),
+        idle(
+            "control.model_error",
+            "[control]\nmodel_error = 0.3\nfeed_forward = false\nposition_gain = [90, 30]\nvelocity_gain = [9, 3]",
+            "gains",
+        ),
+        closed("control.velocity_cutoff_hz", "[control]\nvelocity_cutoff_hz = 30"),
+        closed("control.delay_ticks", "[control]\ndelay_ticks = 2"),
+        both("control.effort_limits", [WEAK, ""], [WEAK, "[control]\neffort_limits = false"], Changes),
+        closed("control.passive", "[control]\npassive = [\"j2\"]"),
+        open("imperfections.encoder_noise", "[imperfections]\nencoder_noise = 1e-3"),
+        closed("imperfections.encoder_noise", "[imperfections]\nencoder_noise = 1e-3"),
+        idle("imperfections.velocity_noise", "[imperfections]\nvelocity_noise = 0.1", "log_velocity"),
+        both(
+            "imperfections.velocity_noise",
+            ["mode = \"closed_loop\"\nlog_velocity = true", ""],
+            ["mode = \"closed_loop\"\nlog_velocity = true", "[imperfections]\nvelocity_noise = 0.1"],
+            Changes,
+        ),
+        closed("imperfections.effort_noise_absolute", "[imperfections]\neffort_noise_absolute = 1.0"),
+        closed("imperfections.ripple_share", "[imperfections]\nripple_share = 0.1"),
+        closed("imperfections.ripple_cycles", "[imperfections]\nripple_cycles = 7"),
+        idle(
+            "imperfections.ripple_cycles",
+            "[imperfections]\nripple_share = 0\nripple_cycles = 7",
+            "a share above 0",
+        ),
+        closed("imperfections.outlier_share", "[imperfections]\noutlier_share = 0.2"),
+        both(
+            "imperfections.outlier_size",
+            [CLOSED, "[imperfections]\noutlier_share = 0.2"],
+            [CLOSED, "[imperfections]\noutlier_share = 0.2\noutlier_size = 9"],
+            Changes,
+        ),
+        idle(
+            "imperfections.outlier_size",
+            "[imperfections]\noutlier_share = 0\noutlier_size = 9",
+            "a share above 0",
+        ),
+        closed("imperfections.dropped_share", "[imperfections]\ndropped_share = 0.2"),
+        closed("imperfections.clock_jitter_s", "[imperfections]\nclock_jitter_s = 1e-3"),
+        open("plant.sign_width", "[plant]\nsign_width = 0.01"),
+        closed("plant.sign_width", "[plant]\nsign_width = 0.01"),
+        closed("plant.tolerance", "[plant]\ntolerance = 1e-5"),
+    ];
+    let parse = |text: &str| SimulateSettings::parse(text, "sim.toml").err().map(|e| e.to_string());
+    walk("simulate", &keys(&parse), &cases, &simulated);
+}
+
+/// Two capsules, which must not touch.
+const CAPSULES: &str = "[[capsule]]\nframe = \"base\"\nfrom = [0, 0, 0]\nto = [0.25, 0, 0]\nradius = 0.15\n[[capsule]]\nframe = \"link2\"\nfrom = [0.3, 0, 0]\nto = [0.5, 0, 0]\nradius = 0.15";
+
+fn designed(text: &Text) -> Result<String, String> {
+    let head = defaults(text.top, &[("robot", "\"arm.toml\"")]);
+    let of = |table: &str| {
+        let start = text.tables.find(&format!("[{table}]\n"));
+        start.map_or("", |at| text.tables[at..].split("\n[").next().unwrap_or_default())
+    };
+    let small = [
+        (
+            "trajectory",
+            defaults(of("trajectory"), &[("period_s", "4"), ("harmonics", "3"), ("sample_rate_hz", "50")]),
+        ),
+        ("search", defaults(of("search"), &[("starts", "1")])),
+    ];
+    let mut tables = text.tables.to_owned();
+    for (name, lines) in small {
+        let header = format!("[{name}]\n");
+        match tables.contains(&header) {
+            true => tables = tables.replacen(&header, &format!("{header}{lines}"), 1),
+            false => write!(tables, "\n{header}{lines}").unwrap(),
+        }
+    }
+    let path = folder().path().join("design.toml");
+    std::fs::write(&path, format!("{head}{}\n{tables}\n", text.top)).unwrap();
+    let run = || {
+        let config = DesignConfig::read(&path)?;
+        design(&config, |_| {})?.record(&config)
+    };
+    let record = run().map_err(|e: dynid::Error| e.to_string())?;
+    let mut json = serde_json::to_value(&record).unwrap();
+    let echoes: Vec<String> = json
+        .as_object()
+        .unwrap()
+        .keys()
+        .filter(|key| ["config", "provenance"].contains(&key.as_str()))
+        .cloned()
+        .collect();
+    echoes.iter().for_each(|key| drop(json.as_object_mut().unwrap().remove(key)));
+    // Times of a clock are no outcome.
+    let mut text = String::new();
+    without_clock(&json, &mut text);
+    Ok(text)
+}
+
+/// All numbers and words but those of clocks.
+fn without_clock(json: &serde_json::Value, out: &mut String) {
+    match json {
+        serde_json::Value::Object(map) => {
+            for (key, value) in
+                map.iter().filter(|(key, _)| *key != "seconds" && *key != "time_s" && *key != "elapsed_s")
+            {
+                write!(out, "{key}:").unwrap();
+                without_clock(value, out);
+            }
+        }
+        serde_json::Value::Array(list) => list.iter().for_each(|value| without_clock(value, out)),
+        other => writeln!(out, "{other}").unwrap(),
+    }
+}
+
+#[test]
+fn every_key_of_a_design_takes_effect_or_is_refused() {
+    let criterion = |text| table("criterion.name", text, Changes);
+    let region = |key, text| table(key, text, Changes);
+    let cases = vec![
+        top("robot", "robot = \"longer.toml\"", Changes),
+        top("gravity", "gravity = [0, -5, 0]", Changes),
+        Case {
+            key: "couple_mimics",
+            before: Text { top: "robot = \"mimic.urdf\"", ..Text::default() },
+            after: Text { top: "robot = \"mimic.urdf\"\ncouple_mimics = true", ..Text::default() },
+            expect: Changes,
+        },
+        table("locked", "[locked]\nj2 = 0.1", Changes),
+        table("elements.default", "[elements]\ndefault = [\"viscous\"]", Changes),
+        table("elements.joint", "[elements.joint]\nj1 = [\"viscous\"]", Changes),
+        table("elements.friction", "[elements]\nfriction = \"stribeck\"", Refused("a design has no logs")),
+        table(
+            "elements.known_friction",
+            "[elements]\nknown_friction = \"none.json\"",
+            Refused("known_friction"),
+        ),
+        table(
+            "elements.friction_errors",
+            "[elements]\nfriction_errors = \"nonnegative\"",
+            Refused("a design has no logs"),
+        ),
+        table("elements.temperature", "[elements]\ntemperature = 30.0", Refused("a design has no logs")),
+        top("values", "values = { \"j1.fc\" = 30.0 }", Changes),
+        table("trajectory.period_s", "[trajectory]\nperiod_s = 5", Changes),
+        table("trajectory.harmonics", "[trajectory]\nharmonics = 2", Changes),
+        table("trajectory.periods", "[trajectory]\nperiods = 3", Changes),
+        table("trajectory.rest", "[trajectory]\nrest = false", Changes),
+        table("trajectory.zero_jerk", "[trajectory]\nharmonics = 4\nzero_jerk = true", Changes),
+        table("trajectory.zero_jerk", "[trajectory]\nrest = false\nzero_jerk = true", Refused("rest")),
+        table("trajectory.start_pose", "[trajectory]\nstart_pose = { j1 = 0.1, j2 = 0.2 }", Changes),
+        table("trajectory.parking", "[trajectory]\nparking = { j1 = 0.5 }", Changes),
+        table("trajectory.sample_rate_hz", "[trajectory]\nsample_rate_hz = 60", Changes),
+        table("trajectory.frames", "[trajectory]\nframes = [\"link9\"]", Refused("link9")),
+        table("limits.position", "[limits]\nposition = { j1 = [-1, 1] }", Changes),
+        table("limits.velocity", "[limits]\nvelocity = 1.0", Changes),
+        table("limits.acceleration", "[limits]\nacceleration = 2.0", Changes),
+        table("limits.jerk", "[limits]\njerk = 20.0", Changes),
+        table("limits.effort", "[limits]\neffort = 30.0", Changes),
+        table("limits.effort", "[limits]\neffort = 30.0\nefforts = false", Refused("efforts")),
+        table("limits.share", "[limits]\nshare = 0.5", Changes),
+        table("limits.efforts", "[limits]\nefforts = false", Changes),
+        table("keep.frames", "[[keep]]\nframes = [\"link9\"]\nabove = -1", Refused("link9")),
+        beside(
+            "keep.point",
+            "[[keep]]
+frames = [\"link2\"]
+half_space = { normal = [1, 0, 0], offset = 0.1 }",
+            "[[keep]]
+frames = [\"link2\"]
+point = [0.2, 0, 0]
+half_space = { normal = [1, 0, 0], offset = 0.1 }",
+            Changes,
+        ),
+        region("keep.above", "[[keep]]\nframes = [\"link2\"]\nabove = -0.5"),
+        region(
+            "keep.half_space.normal",
+            "[[keep]]\nframes = [\"link2\"]\nhalf_space = { normal = [1, 0, 0], offset = 0.1 }",
+        ),
+        region(
+            "keep.half_space.offset",
+            "[[keep]]\nframes = [\"link2\"]\nhalf_space = { normal = [1, 0, 0], offset = 0.2 }",
+        ),
+        region(
+            "keep.inside.lower",
+            "[[keep]]\nframes = [\"link2\"]\ninside = { lower = [0, -1, -1], upper = [1, 1, 1] }",
+        ),
+        region(
+            "keep.inside.upper",
+            "[[keep]]\nframes = [\"link2\"]\ninside = { lower = [-1, -1, -1], upper = [1, 0.2, 1] }",
+        ),
+        region(
+            "keep.outside_cylinder.center",
+            "[[keep]]\nframes = [\"link2\"]\noutside_cylinder = { center = [0.4, 0.3], radius = 0.1 }",
+        ),
+        region(
+            "keep.outside_cylinder.radius",
+            "[[keep]]\nframes = [\"link2\"]\noutside_cylinder = { radius = 0.2 }",
+        ),
+        region(
+            "keep.outside_column.center",
+            "[[keep]]\nframes = [\"link2\"]\noutside_column = { center = [0.4, 0.3], radius = 0.1, height = 1 }",
+        ),
+        region(
+            "keep.outside_column.radius",
+            "[[keep]]\nframes = [\"link2\"]\noutside_column = { radius = 0.2, height = 1 }",
+        ),
+        region(
+            "keep.outside_column.height",
+            "[[keep]]\nframes = [\"link2\"]\noutside_column = { radius = 0.2, height = 2 }",
+        ),
+        table(
+            "capsule.frame",
+            "[[capsule]]\nframe = \"base\"\nfrom = [0, 0, 0]\nto = [0, 0, 0]\nradius = 0.1",
+            Refused("two or more"),
+        ),
+        beside(
+            "capsule.from",
+            CAPSULES,
+            "[[capsule]]\nframe = \"base\"\nfrom = [0, 0, 0]\nto = [0.25, 0, 0]\nradius = 0.15\n[[capsule]]\nframe = \"link2\"\nfrom = [0.2, 0, 0]\nto = [0.5, 0, 0]\nradius = 0.15",
+            Changes,
+        ),
+        beside(
+            "capsule.to",
+            CAPSULES,
+            "[[capsule]]\nframe = \"base\"\nfrom = [0, 0, 0]\nto = [0.3, 0, 0]\nradius = 0.15\n[[capsule]]\nframe = \"link2\"\nfrom = [0.3, 0, 0]\nto = [0.5, 0, 0]\nradius = 0.15",
+            Changes,
+        ),
+        beside(
+            "capsule.radius",
+            CAPSULES,
+            "[[capsule]]\nframe = \"base\"\nfrom = [0, 0, 0]\nto = [0.25, 0, 0]\nradius = 0.15\n[[capsule]]\nframe = \"link2\"\nfrom = [0.3, 0, 0]\nto = [0.5, 0, 0]\nradius = 0.12",
+            Changes,
+        ),
+        criterion("[criterion]\nname = \"condition\""),
+        table("criterion.columns", "[criterion]\ncolumns = \"inertial\"", Changes),
+        table("criterion.noise", "[criterion]\nnoise = 3.0", Changes),
+        table("criterion.correlation_time_s", "[criterion]\ncorrelation_time_s = 0.1", Changes),
+        table("criterion.mix", "[criterion]\nmix = [1, 5]", Refused("name = \"mix\"")),
+        beside(
+            "criterion.mix",
+            "[criterion]\nname = \"mix\"",
+            "[criterion]\nname = \"mix\"\nmix = [1, 500]",
+            Changes,
+        ),
+        top("earlier", "earlier = [\"none.json\"]", Refused("none.json")),
+        table("search.starts", "[search]\nstarts = 2", Changes),
+        table("search.seed", "[search]\nseed = 3", Changes),
+        beside(
+            "search.time_budget_s",
+            "[search]\nstarts = 3",
+            "[search]\nstarts = 3\ntime_budget_s = 0",
+            Changes,
+        ),
+        table("search.checkpoint", "[search]\ncheckpoint = \"arm.toml\"", Refused("arm.toml")),
+    ];
+    let parse = |text: &str| DesignConfig::parse(text, "design.toml").err().map(|e| e.to_string());
+    let mut found = keys(&parse);
+    found.remove("out");
+    walk("design", &found, &cases, &designed);
+}
+
+/// A motor that runs at constant speeds forth and back, and one that rests.
+fn sweep(rows: usize) -> String {
+    let mut text = String::from("t,q_j1,q_j2,v_j1,v_j2,tau_j1,tau_j2,temp_j1,temp_j2\n");
+    let mut q = 0.0;
+    for row in 0..rows {
+        // A second each way, ten speeds one after the other, at two temperatures.
+        let (second, half) = (row / 100, (row / 2000) % 2);
+        let speed = 0.15 * (1 + (second / 2) % 10) as f64 * if second % 2 == 0 { 1.0 } else { -1.0 };
+        let noise = f64::from(u32::try_from(row * 7919 % 101).unwrap()) / 50.0 - 1.0;
+        let warm = 20.0 + 20.0 * half as f64;
+        let stribeck = 3.0 * (-(speed / 0.2_f64).powi(2)).exp();
+        let viscous = (6.0 - 0.08 * warm) * speed.abs().powf(0.8);
+        let tau = speed.signum() * (4.0 + stribeck + viscous) + 0.1 * noise;
+        let other = 0.1 + 0.0005 * (row as f64 / 300.0).sin();
+        writeln!(text, "{},{q},{other},{},0,{tau},0.5,{warm},24", row as f64 / 100.0, speed + 0.002 * noise)
+            .unwrap();
+        q += speed / 100.0;
+    }
+    text
+}
+
+fn of_friction(text: &Text) -> Result<String, String> {
+    let dir = folder().path();
+    for (name, rows) in [("sweep.csv", 4000), ("short.csv", 2000)] {
+        if !dir.join(name).is_file() {
+            std::fs::write(dir.join(name), sweep(rows)).unwrap();
+        }
+    }
+    let path = dir.join("friction.toml");
+    let head = defaults(text.top, &[("robot", "\"arm.toml\"")]);
+    let log = defaults(
+        text.log,
+        &[
+            ("path", "\"sweep.csv\""),
+            ("columns", "{ velocity = \"v_{joint}\", temperature = \"temp_{joint}\" }"),
+        ],
+    );
+    let whole = format!("{head}{}\n{}\n[[log]]\n{log}{}\n", text.top, text.tables, text.log);
+    std::fs::write(&path, whole).unwrap();
+    let run = || {
+        let config = FrictionConfig::read(&path)?;
+        let found = identify_friction(&config, |_| {})?;
+        let joints: String = found.joints.iter().fold(String::new(), |mut out, j| {
+            write!(out, "{:?} {:?} {:?}", j.experiment.pairing, j.law, j.presliding).unwrap();
+            out
+        });
+        let mut json = serde_json::to_value(found.model(&config)?).unwrap();
+        json.as_object_mut().unwrap().remove("provenance");
+        Ok(format!("{joints}{json}{:?}", found.warnings))
+    };
+    run().map_err(|e: dynid::Error| e.to_string())
+}
+
+fn friction_keys() -> Vec<(&'static str, &'static str, &'static str, Expect)> {
+    vec![
+        ("robot", "robot = \"none.toml\"", "", Refused("none.toml")),
+        ("reference_temperature", "reference_temperature = 35", "", Changes),
+        ("temperature_range", "temperature_range = [10, 60]", "", Changes),
+        ("thermal_lines", "thermal_lines = \"none\"", "", Changes),
+        ("law", "law = \"coulomb_viscous\"", "", Changes),
+        ("confidence", "confidence = 0.5", "", Changes),
+        (
+            "constant_speed.least_duration_s",
+            "",
+            "[constant_speed]\nleast_duration_s = 5",
+            Refused("5 s or more"),
+        ),
+        (
+            "constant_speed.speed_tolerance",
+            "",
+            "[constant_speed]\nspeed_tolerance = 1e-6\nnoise_tolerance = 0.01",
+            Changes,
+        ),
+        (
+            "constant_speed.noise_tolerance",
+            "",
+            "[constant_speed]\nspeed_tolerance = 1e-6\nnoise_tolerance = 0.02",
+            Changes,
+        ),
+        ("constant_speed.trim_s", "", "[constant_speed]\ntrim_s = 0.2", Changes),
+        ("constant_speed.window_s", "", "[constant_speed]\nwindow_s = 0.2", Changes),
+        ("constant_speed.least_speed", "", "[constant_speed]\nleast_speed = 0.4", Changes),
+        ("constant_speed.use_velocity", "", "[constant_speed]\nuse_velocity = true", Changes),
+        ("constant_speed.rest_tolerance", "", "[constant_speed]\nrest_tolerance = 0.0001", Changes),
+        ("pairs.speed_tolerance", "", "[pairs]\nspeed_tolerance = 0.6", Changes),
+        ("pairs.temperature_tolerance", "", "[pairs]\ntemperature_tolerance = 50", Changes),
+        ("pairs.bins", "", "[pairs]\nbins = 6", Changes),
+        ("pairs.level_tolerance", "", "[pairs]\nlevel_tolerance = 50", Changes),
+        ("prior.sigma0", "", "[prior.j9]\nsigma0 = 1e4\nsigma1 = 10", Refused("j9")),
+        ("prior.sigma1", "", "[prior.j1]\nsigma0 = 1e4\nsigma1 = 10", Changes),
+    ]
+}
+
+#[test]
+fn every_key_of_a_friction_experiment_takes_effect_or_is_refused() {
+    let mut cases: Vec<Case> = friction_keys()
+        .into_iter()
+        .map(|(key, top, tables, expect)| Case {
+            key,
+            before: Text::default(),
+            after: Text { top, tables, ..Text::default() },
+            expect,
+        })
+        .collect();
+    let log = |key, log, expect| Case {
+        key,
+        before: Text::default(),
+        after: Text { log, ..Text::default() },
+        expect,
+    };
+    cases.extend([
+        log("log.path", "path = \"short.csv\"", Changes),
+        log("log.joint", "joint = \"j9\"", Refused("j9")),
+        log("log.signal", "joint = \"j1\"\nsignal = \"friction\"", Changes),
+        log("log.rows", "rows = [1, 2500]", Changes),
+        log("log.part", "part = [0.0, 0.6]", Changes),
+        log(
+            "log.columns.effort",
+            "columns = { velocity = \"v_{joint}\", effort = { columns = \"tau_{joint}\", scale = 2.0 } }",
+            Changes,
+        ),
+    ]);
+    let presliding = |key, text, expect| table(key, text, expect);
+    cases.extend([
+        presliding(
+            "presliding.path",
+            "[[presliding]]\npath = \"none.csv\"\njoint = \"j1\"\ninertia = 1",
+            Refused("none.csv"),
+        ),
+        presliding(
+            "presliding.joint",
+            "[[presliding]]\npath = \"short.csv\"\njoint = \"j9\"\ninertia = 1",
+            Refused("j9"),
+        ),
+    ]);
+    let parse = |text: &str| FrictionConfig::parse(text, "friction.toml").err().map(|e| e.to_string());
+    let mut found = keys(&parse);
+    // Logs of pre-sliding motion and their keys are those of `bristles`; columns as in an identification.
+    found.retain(|key| {
+        !key.starts_with("columns.")
+            && (!key.starts_with("log.columns.") || key == "log.columns.effort")
+            && (!key.starts_with("presliding.")
+                || ["presliding.path", "presliding.joint"].contains(&key.as_str()))
+    });
+    found.remove("out");
+    walk("friction", &found, &cases, &of_friction);
+}
+
+/// Events of a stream.
+fn streamed(text: &Text) -> Result<String, String> {
+    let stated = text.tables.strip_prefix("[online]\n").unwrap_or("");
+    let head = defaults(stated, &[("learn_s", "2.0"), ("report_s", "0.5")]);
+    let path = folder().path().join("stream.toml");
+    let whole = format!(
+        "robot = \"arm.toml\"\n[elements]\nfriction = \"given\"\n[online]\n{head}{stated}\n[[log]]\npath = \"a.csv\"\n"
+    );
+    std::fs::write(&path, whole).unwrap();
+    let run = || {
+        let config = Config::read(&path)?;
+        let table = read(&config.log[0].path, &ReadOptions::default()).unwrap();
+        let mut session = Session::new(&config, "a.csv", &table.header, None)?;
+        let mut events = String::new();
+        for k in 0..table.rows {
+            let row: Vec<f64> = table.columns.iter().map(|c| c[k]).collect();
+            session.row(&row, &mut |e| writeln!(events, "{e:?}").unwrap())?;
+        }
+        session.finish(&mut |e| writeln!(events, "{e:?}").unwrap())?;
+        Ok(events)
+    };
+    run().map_err(|e: dynid::Error| e.to_string())
+}
+
+#[test]
+fn every_key_of_on_line_identification_takes_effect_or_is_refused() {
+    let forgets = "[online]\nforgetting = \"constant\"";
+    let cases = vec![
+        table("online.learn_s", "[online]\nlearn_s = 3.0", Changes),
+        table("online.forgetting", forgets, Changes),
+        table("online.memory_s", "[online]\nmemory_s = 5", Refused("forgetting")),
+        beside("online.memory_s", forgets, "[online]\nforgetting = \"constant\"\nmemory_s = 5", Changes),
+        table("online.alarms", "[online]\nalarms = false", Changes),
+        table(
+            "online.false_alarm_rate",
+            "[online]\nalarms = false\nfalse_alarm_rate = 0.5",
+            Refused("alarms"),
+        ),
+        table(
+            "online.false_alarm_hours",
+            "[online]\nalarms = false\nfalse_alarm_hours = 5",
+            Refused("alarms"),
+        ),
+        table("online.reaction_s", "[online]\nalarms = false\nreaction_s = 1", Refused("alarms")),
+        table("online.report_s", "[online]\nreport_s = 1.0", Changes),
+        table("online.consistent", "[online]\nconsistent = false", Changes),
+        table("online.checkpoint_s", "[online]\ncheckpoint_s = 3", Refused("checkpoint")),
+    ];
+    let parse = |text: &str| Config::parse(text, "run.toml").err().map(|e| e.to_string());
+    let mut found = keys(&parse);
+    // The file of the state is written by the program, and tested there.
+    found.retain(|key| key.starts_with("online.") && key != "online.checkpoint");
+    walk("online", &found, &cases, &streamed);
+}
