@@ -18,15 +18,46 @@ pub struct Row {
     /// The same in words.
     #[serde(skip)]
     pub words: String,
-    /// Whether the claim holds.
-    pub pass: bool,
+    /// Whether the claim holds; `None` for a row that stands beside another one and is not graded.
+    pub pass: Option<bool>,
+    /// Noise, starts or searches of the seed enter what is measured.
+    pub depends_on_seed: bool,
+    /// Why the row fails, where it does and the cause is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cause: Option<String>,
 }
 
 impl Row {
-    /// A row; `words` say in the report what `measured` says to programs.
+    /// A graded row; `words` say in the report what `measured` says to programs.
     pub fn new(id: &str, claim: &str, required: &str, measured: Json, words: String, pass: bool) -> Self {
-        Row { id: id.into(), claim: claim.into(), required: required.into(), measured, words, pass }
+        let row = Row::beside(id, claim, required, measured, words);
+        Row { pass: Some(pass), ..row }
     }
+
+    /// A row that is shown and not graded; `beside` says beside what it stands.
+    pub fn beside(id: &str, claim: &str, beside: &str, measured: Json, words: String) -> Self {
+        let (id, claim, required) = (id.into(), claim.into(), beside.into());
+        Row { id, claim, required, measured, words, pass: None, depends_on_seed: false, cause: None }
+    }
+
+    /// Whether the row is graded and its claim does not hold.
+    pub fn fails(&self) -> bool {
+        self.pass == Some(false)
+    }
+}
+
+/// A row that the seed enters.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Drawn {
+    /// Identity of the row.
+    pub(crate) id: &'static str,
+    /// Why it fails with the seeds with which it does; empty if none is known.
+    pub(crate) cause: &'static str,
+}
+
+/// A row that the seed enters and that holds with every seed tried.
+pub(crate) const fn drawn(id: &'static str) -> Drawn {
+    Drawn { id, cause: "" }
 }
 
 /// What `dynid study NAME --json` prints; keys are added, never renamed.
@@ -47,14 +78,24 @@ pub struct StudyRecord {
 }
 
 impl StudyRecord {
-    /// A record of rows.
-    pub fn new(study: &str, settings: &crate::RunSettings, rows: Vec<Row>) -> Self {
+    /// A record of rows; `drawn` are those that the seed enters.
+    pub(crate) fn new(
+        study: &str,
+        settings: &crate::RunSettings,
+        mut rows: Vec<Row>,
+        drawn: &[Drawn],
+    ) -> Self {
+        for row in &mut rows {
+            let Some(known) = drawn.iter().find(|d| d.id == row.id) else { continue };
+            row.depends_on_seed = true;
+            row.cause = (row.fails() && !known.cause.is_empty()).then(|| known.cause.to_owned());
+        }
         StudyRecord {
             study: study.to_owned(),
             version: dynid::VERSION.to_owned(),
             seed: settings.seed,
             quick: settings.quick,
-            pass: rows.iter().all(|r| r.pass),
+            pass: !rows.iter().any(Row::fails),
             rows,
         }
     }
@@ -77,22 +118,34 @@ impl StudyRecord {
                 required: r.required.clone(),
                 measured: r.words.clone(),
                 pass: r.pass,
+                depends_on_seed: r.depends_on_seed,
+                cause: r.cause.clone(),
             })
             .collect()
     }
 
     /// How many rows hold, in words.
     pub fn verdict(&self) -> Verdict {
-        let failed: Vec<&str> = self.rows.iter().filter(|r| !r.pass).map(|r| r.id.as_str()).collect();
+        let failed: Vec<&str> = self.rows.iter().filter(|r| r.fails()).map(|r| r.id.as_str()).collect();
+        let graded = self.rows.iter().filter(|r| r.pass.is_some()).count();
         let (status, headline) = match failed[..] {
-            [] => (Status::Ok, format!("All {} claims hold", self.rows.len())),
-            [one] => (Status::Fail, format!("Row {one} of {} does not hold", self.rows.len())),
-            _ => (Status::Fail, format!("Rows {} of {} do not hold", failed.join(", "), self.rows.len())),
+            [] => (Status::Ok, format!("All {graded} claims hold")),
+            [one] => (Status::Fail, format!("Row {one} of {graded} does not hold")),
+            _ => (Status::Fail, format!("Rows {} of {graded} do not hold", failed.join(", "))),
         };
-        let sentences = match self.quick {
-            true => vec!["Statistics are shrunk: a quick run.".to_owned()],
-            false => Vec::new(),
-        };
+        let drawn: Vec<&str> =
+            self.rows.iter().filter(|r| r.depends_on_seed).map(|r| r.id.as_str()).collect();
+        let mut sentences = Vec::new();
+        if !drawn.is_empty() {
+            sentences.push(format!(
+                "What is measured in rows {} depends on the seed, here {}; the other rows are the same with every seed.",
+                drawn.join(", "),
+                self.seed
+            ));
+        }
+        if self.quick {
+            sentences.push("Statistics are shrunk: a quick run.".to_owned());
+        }
         Verdict { status, headline, sentences, ..Verdict::default() }
     }
 }

@@ -69,10 +69,18 @@ fn failure(error: StudyError) -> Failure {
 
 fn summary(record: &StudyRecord) {
     for row in &record.rows {
-        let verdict = if row.pass { "ok" } else { "FAIL" };
-        note(&format!("[{verdict:>4}] {:>2}  {}", row.id, row.claim));
+        let verdict = match row.pass {
+            Some(true) => "ok",
+            Some(false) => "FAIL",
+            None => "-",
+        };
+        let seed = if row.depends_on_seed { " (depends on the seed)" } else { "" };
+        note(&format!("[{verdict:>4}] {:>2}  {}{seed}", row.id, row.claim));
         note(&format!("           required: {}", row.required));
         note(&format!("           measured: {}", row.words));
+        if let Some(cause) = &row.cause {
+            note(&format!("           cause: {cause}"));
+        }
     }
     note(&format!("\n{}", record.verdict().headline));
 }

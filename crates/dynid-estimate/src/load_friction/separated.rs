@@ -18,6 +18,14 @@ const SAME: f64 = 1e-9;
 pub enum SignStatus {
     /// The signs of all reactions are those of the solution.
     Settled,
+    /// The signs of a solution are those of an earlier round: there is no solution with its own signs on this path, mostly
+    /// since some reactions are zero at the minimum.
+    Cycling {
+        /// Rounds until the signs come back.
+        period: usize,
+        /// Samples of reactions whose sign differs between the last two rounds.
+        differing: usize,
+    },
     /// The limit of rounds is reached; so many signs still differ.
     RoundLimit {
         /// Samples of reactions whose sign differs.
@@ -39,15 +47,16 @@ pub struct SeparatedFit {
     pub dependent: Vec<usize>,
     /// Rounds made.
     pub rounds: usize,
-    /// How the rounds ended.
+    /// How the rounds ended. Unless they settled, `theta` is that of the round with the least `J`, which need not be the minimum.
     pub signs: SignStatus,
-    /// How the search of the last round ended.
+    /// How the search of that round ended.
     pub status: SearchStatus,
 }
 
 /// Minimises `J(θ)` by separable least squares: with the signs of the reactions given, efforts are linear in `(φ, f_v)` for
 /// given `(μ_c, μ_s, v_s)`, which alone are searched, within their bounds. Signs are those at the start, then those of the
-/// solution, until they agree or [`FitSettings::max_rounds`] is reached.
+/// solution, until they agree, come back to those of an earlier round, or [`FitSettings::max_rounds`] is reached; which of
+/// these is [`SeparatedFit::signs`], never an error.
 ///
 /// Bounds of `φ` and `f_v` are not used. The start's inertial parameters decide the first signs only.
 ///
@@ -78,34 +87,44 @@ fn rounds(
 ) -> Result<SeparatedFit, LoadFrictionError> {
     let p = problem.inertial();
     let mut theta = start.to_vec();
-    let mut signs = signs_at(problem, &theta[..p]);
+    let mut tried = vec![signs_at(problem, &theta[..p])];
     let limit = settings.max_rounds.max(1);
-    let mut rounds = 0;
-    let (found, status) = loop {
-        let signed = Signed::new(problem, bounds, &theta, &signs);
+    let mut best: Option<SeparatedFit> = None;
+    loop {
+        let rounds = tried.len();
+        let signs = &tried[rounds - 1];
+        let signed = Signed::new(problem, bounds, &theta, signs);
         let found = fit(&signed, &separable_settings(settings))?;
         signed.put(&found, &mut theta);
-        rounds += 1;
         let next = signs_at(problem, &theta[..p]);
         let differing = signs.iter().zip(&next).filter(|(a, b)| a != b).count();
-        if differing == 0 {
-            break (found, SignStatus::Settled);
+        let ended = match tried.iter().rposition(|earlier| *earlier == next) {
+            Some(at) if at + 1 == rounds => Some(SignStatus::Settled),
+            Some(at) => Some(SignStatus::Cycling { period: rounds - at, differing }),
+            None if rounds == limit => Some(SignStatus::RoundLimit { differing }),
+            None => None,
+        };
+        let sum_of_squares = problem.sum_of_squares(&theta)?;
+        let this = SeparatedFit {
+            theta: theta.clone(),
+            rms: (sum_of_squares / problem.rows() as f64).sqrt(),
+            sum_of_squares,
+            dependent: found.dependent,
+            rounds,
+            signs: SignStatus::Settled,
+            status: found.status,
+        };
+        let settled = ended == Some(SignStatus::Settled);
+        let kept = match best.take() {
+            Some(earlier) if !settled && earlier.sum_of_squares <= sum_of_squares => earlier,
+            _ => this,
+        };
+        if let Some(signs) = ended {
+            return Ok(SeparatedFit { rounds, signs, ..kept });
         }
-        if rounds == limit {
-            break (found, SignStatus::RoundLimit { differing });
-        }
-        signs = next;
-    };
-    let sum_of_squares = problem.sum_of_squares(&theta)?;
-    Ok(SeparatedFit {
-        theta,
-        rms: (sum_of_squares / problem.rows() as f64).sqrt(),
-        sum_of_squares,
-        dependent: found.dependent,
-        rounds,
-        signs: status,
-        status: found.status,
-    })
+        best = Some(kept);
+        tried.push(next);
+    }
 }
 
 /// Signs of all reactions that the law uses, in the order of [`Signed::new`].

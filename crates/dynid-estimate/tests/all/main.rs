@@ -47,6 +47,7 @@ mod search_rank_sum;
 mod second_opinions;
 mod separable;
 mod separable_arm;
+mod sign_rounds;
 mod simulated;
 mod steady_friction;
 mod steady_rows;

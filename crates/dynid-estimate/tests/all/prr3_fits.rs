@@ -13,9 +13,9 @@ use std::ops::ControlFlow;
 
 const MODELS: [Model; 3] = [Model::Stribeck, Model::CoulombViscous, Model::Constant];
 
-/// Pattern search as the reference numbers have it: the mesh never above the first one.
-fn pattern_search(problem: &Problem) -> SearchResult {
-    let algorithm = Algorithm::PatternSearch(PatternSearch { largest_mesh: 1.0, ..PatternSearch::default() });
+/// Pattern search as published, the mesh doubled after every success; or never wider than a given one.
+fn pattern_search(problem: &Problem, largest_mesh: f64) -> SearchResult {
+    let algorithm = Algorithm::PatternSearch(PatternSearch { largest_mesh, ..PatternSearch::default() });
     let settings = search::Settings { start: Some(start()), history: 40_000, ..search::Settings::default() };
     let objective = SquaredResiduals::new(problem);
     search::run(&algorithm, &objective, &bounds(), &settings, &mut |_| ControlFlow::Continue(())).unwrap()
@@ -44,7 +44,8 @@ fn clean_efforts_give_back_what_is_identifiable() {
     for model in MODELS {
         let problem = experiment(model, 0.0, 0);
         let fit = fit_bounded(&problem, &bounds(), &start(), &FitSettings::default()).unwrap();
-        let found = pattern_search(&problem);
+        // As published it does not get that far in 34 000 evaluations.
+        let found = pattern_search(&problem, 1.0);
         println!(
             "{model:?}: bounded LS {:.6} N (J {:.6e}, {} of {} starts), pattern search {:.4} N",
             fit.rms,
@@ -89,7 +90,7 @@ fn noisy_efforts_keep_the_order_of_the_models() {
         assert!(fits[0].2 <= 0.3 * fits[2].2);
 
         let problem = experiment(Model::Stribeck, 2.0, seed);
-        let found = pattern_search(&problem);
+        let found = pattern_search(&problem, f64::INFINITY);
         let excess = found.value / fits[0].0;
         println!(
             "  pattern search J {excess:.4} of LS, {} evaluations, {:?}, circle {:.4} N",
@@ -98,9 +99,11 @@ fn noisy_efforts_keep_the_order_of_the_models() {
             circle_error(&problem, &found.point)
         );
         assert!(bounds().contain(&found.point));
-        assert!(excess <= 1.05, "seed {seed}: {excess}");
+        assert!(excess <= 1.06, "seed {seed}: {excess}");
         assert!(found.evaluations <= 34_000);
         assert!(found.history.windows(2).all(|h| h[1].value <= h[0].value));
+        let capped = pattern_search(&problem, 1.0).value / fits[0].0;
+        assert!(capped <= 1.05, "seed {seed}, mesh kept at 1: {capped}");
     }
 }
 

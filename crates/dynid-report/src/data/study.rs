@@ -35,8 +35,12 @@ pub struct StudyRow {
     pub required: String,
     /// What was measured, in words and numbers.
     pub measured: String,
-    /// Whether the claim holds.
-    pub pass: bool,
+    /// Whether the claim holds; `None` for a row that is not graded.
+    pub pass: Option<bool>,
+    /// What is measured depends on the seed.
+    pub depends_on_seed: bool,
+    /// Why the claim does not hold, where that is known.
+    pub cause: Option<String>,
 }
 
 /// A part of the report.

@@ -15,7 +15,7 @@ pub(super) fn context(kind: &str, data: &StudyReport) -> Value {
         warnings => Serde(&data.warnings),
         introduction => Serde(&data.introduction),
         rows => Serde(&data.rows),
-        passed => data.rows.iter().filter(|r| r.pass).count(),
+        graded => data.rows.iter().filter(|r| r.pass.is_some()).count(),
         sections => Serde(sections(&data.sections)),
         provenance => Serde(&data.provenance),
     }

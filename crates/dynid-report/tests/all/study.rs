@@ -15,9 +15,18 @@ fn study() -> StudyReport {
                 claim: "Two is more than one".into(),
                 required: "2 > 1".into(),
                 measured: "2 & 1".into(),
-                pass: true,
+                pass: Some(true),
+                ..StudyRow::default()
             },
-            StudyRow { id: "2".into(), claim: "One is more than two".into(), ..StudyRow::default() },
+            StudyRow {
+                id: "2".into(),
+                claim: "One is more than two".into(),
+                pass: Some(false),
+                depends_on_seed: true,
+                cause: Some("Two was drawn too large.".into()),
+                ..StudyRow::default()
+            },
+            StudyRow { id: "3".into(), claim: "Three is odd".into(), ..StudyRow::default() },
         ],
         sections: vec![StudySection {
             title: "Numbers".into(),
@@ -65,6 +74,15 @@ fn claims_tables_and_charts_are_on_the_page() {
     let picture = page.split("<svg class=\"chart\"").nth(1).unwrap().split("</svg>").next().unwrap();
     assert!(picture.contains("c1 dashed") && !picture.contains("NaN"), "{picture}");
     assert_eq!(page, render_study(&study()).unwrap());
+}
+
+#[test]
+fn a_row_shows_what_the_seed_enters_why_it_fails_and_that_it_is_not_graded() {
+    let page = render_study(&study()).unwrap();
+    assert_eq!(page.matches("title=\"depends on the seed\"").count(), 1);
+    assert!(page.contains("Two was drawn too large."));
+    assert_eq!(page.matches("not graded").count(), 1);
+    assert!(page.contains("2 claims"), "a row that is not graded is no claim");
 }
 
 #[test]

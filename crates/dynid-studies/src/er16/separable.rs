@@ -3,7 +3,7 @@
 use dynid::estimators::separable::{
     EffortBlock, EffortProblem, SeparableEstimate, SeparableLoss, SeparableSettings, Weighting, fit,
 };
-use dynid::model::{BaseParameters, BaseSettings, EffortModel, RobotModel, ShapeParameter};
+use dynid::model::{BaseParameters, BaseSettings, EffortModel, Passivity, RobotModel, ShapeParameter};
 use rayon::prelude::*;
 use serde_json::json;
 
@@ -303,28 +303,31 @@ fn polished(
     ))
 }
 
-/// By squares with a variance per joint.
-pub(super) fn identify_weighted(arm: &Arm, data: &Measurement) -> Result<Identified, StudyError> {
-    identify(arm, data, &SeparableSettings::default())
-}
-
-/// Row e: where the true friction of joint 2 takes energy out of the motion.
-pub(super) fn passivity_row(arm: &Arm) -> Row {
-    use dynid::model::Passivity;
+/// Row e: where the friction of joint 2 takes energy out of the motion, by the truth and by the paper's unknowns from data.
+pub(super) fn passivity_row(arm: &Arm, unknowns: &[f64]) -> Row {
     /// Beyond the excited speeds of the reference, rad/s.
     const MOST: f64 = 1.8;
-    let found = arm.model.friction_passivity(1, &arm.shape, &arm.linear, (0.0, MOST), &[]);
-    let interval = match &found.passivity {
-        Passivity::PassiveOn(intervals) => intervals.first().copied(),
-        _ => None,
+    let interval = |shape: &[f64], linear: &[f64]| {
+        let found = arm.model.friction_passivity(1, shape, linear, (0.0, MOST), &[]);
+        match found.passivity {
+            Passivity::PassiveOn(intervals) => intervals.first().copied(),
+            _ => None,
+        }
     };
-    let near = |found: f64, wanted: f64| (found / wanted - 1.0).abs() <= 0.01;
+    let truth = interval(&arm.shape, &arm.linear);
+    let (base, shape) = arm.split(unknowns);
+    let found = interval(&shape, &arm.base.expanded(&base));
+    let near = |found: f64, wanted: f64, within: f64| (found / wanted - 1.0).abs() <= within;
+    let told = |i: Option<(f64, f64)>| {
+        i.map_or_else(|| "no interval".to_owned(), |(a, b)| format!("{a:.4} to {b:.4} rad/s"))
+    };
     Row::new(
         "e",
-        "The friction of joint 2 is reported as passive on an interval of speeds only",
-        "0.0022 to 1.496 rad/s within 1 %",
-        json!({ "interval": interval }),
-        interval.map_or_else(|| "no interval".to_owned(), |(a, b)| format!("{a:.5} to {b:.4} rad/s")),
-        interval.is_some_and(|(a, b)| near(a, 0.0022) && near(b, 1.496)),
+        "The friction of joint 2, identified at 50 Hz, is reported as passive on an interval of speeds only",
+        "of the truth 0.0022 to 1.496 rad/s within 1 %; of the estimate the same upper end within 5 %, the lower one below 0.06 rad/s",
+        json!({ "truth": truth, "estimate": found }),
+        format!("{}; identified {}", told(truth), told(found)),
+        truth.is_some_and(|(a, b)| near(a, 0.0022, 0.01) && near(b, 1.496, 0.01))
+            && found.is_some_and(|(a, b)| a < SLOW && near(b, 1.496, 0.05)),
     )
 }

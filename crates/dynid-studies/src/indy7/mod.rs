@@ -18,6 +18,7 @@ mod validation;
 use dynid::estimators::conditioning::PreparedLog;
 use dynid::sim::Profile;
 
+use crate::record::{Drawn, drawn};
 use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
 use experiment::Experiment;
 use identification::{Identified, OURS, PAPER, regression};
@@ -40,6 +41,20 @@ const JOINTS: usize = 6;
 fn fault(error: impl std::fmt::Display) -> StudyError {
     StudyError::Data { file: "indy7", message: error.to_string() }
 }
+
+/// Rows that the seed enters.
+const DRAWN: [Drawn; 10] = [
+    drawn("7"),
+    drawn("8"),
+    drawn("9"),
+    drawn("10"),
+    drawn("11"),
+    drawn("a"),
+    drawn("b"),
+    drawn("c"),
+    drawn("d"),
+    drawn("e"),
+];
 
 /// Runs the study.
 ///
@@ -92,7 +107,7 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     rows.push(drift(&arm, &settings, excitation, first, run.seed)?);
 
     rows.sort_by_key(|r| (r.id.parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
-    let record = StudyRecord::new(NAME, run, rows);
+    let record = StudyRecord::new(NAME, run, rows, &DRAWN);
     let report = report::Contents {
         arm: &arm,
         settings: &settings,

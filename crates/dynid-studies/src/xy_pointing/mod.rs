@@ -27,6 +27,7 @@ mod table;
 mod trajectory;
 mod tree;
 
+use crate::record::{Drawn, drawn};
 use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
 use data::Data;
 use excitation::Designs;
@@ -51,6 +52,26 @@ pub const SOURCE: &str = "Sun, Han, Li & Li, Robotics 2021, 10(1), 36";
 fn fault(error: impl std::fmt::Display) -> StudyError {
     StudyError::Data { file: "xy_pointing", message: error.to_string() }
 }
+
+/// Rows that the seed enters.
+const DRAWN: [Drawn; 11] = [
+    drawn("5"),
+    drawn("7"),
+    drawn("8"),
+    Drawn {
+        id: "9",
+        cause: "The count is decided by parameters that torques do not show: both models leave them anywhere within the search range, and \
+                whose happens to end nearer counts. One search in ten has 6 of 11. What torques show, π1, π7 and π8, is closer on \
+                every seed.",
+    },
+    drawn("10"),
+    drawn("c"),
+    drawn("f"),
+    drawn("g"),
+    drawn("j"),
+    drawn("x"),
+    drawn("y"),
+];
 
 /// Runs the study.
 ///
@@ -108,7 +129,7 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     rows.sort_by_key(|r| (r.id.parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
 
     step("report");
-    let record = StudyRecord::new(NAME, run, rows);
+    let record = StudyRecord::new(NAME, run, rows, &DRAWN);
     let report = report::Contents {
         pointing: &pointing,
         settings: &settings,
