@@ -19,6 +19,7 @@ use serde::Serialize;
 
 use crate::Error;
 use crate::config::Config;
+use crate::estimate::InputRecord;
 use crate::logs::{self, LoadedLog};
 use crate::robot::{Robot, RobotOptions};
 use bench::{Bench, Examined};
@@ -64,6 +65,8 @@ pub struct Check {
     /// Per log: its columns and the joints that are logged.
     #[serde(skip)]
     mapped: Vec<fix::Mapped>,
+    #[serde(skip)]
+    inputs: Vec<InputRecord>,
 }
 
 impl Check {
@@ -104,6 +107,7 @@ pub fn check(config: &Config, mut progress: impl FnMut(&str)) -> Result<Check, E
         logs: Vec::new(),
         traces: Vec::new(),
         mapped: Vec::new(),
+        inputs: InputRecord::of_robot(&robot),
     };
     let mut bench: Option<(Vec<String>, Bench)> = None;
     let training = config.training_logs();
@@ -119,6 +123,7 @@ pub fn check(config: &Config, mut progress: impl FnMut(&str)) -> Result<Check, E
         let Some((_, bench)) = &bench else { continue };
         let mut findings = Findings { log: &file, number: out.logs.len(), list: Vec::new() };
         let (checked, trace) = examine(config, &loaded, bench, &mut findings)?;
+        out.inputs.extend(InputRecord::of_logs(std::slice::from_ref(&loaded)));
         out.findings.extend(findings.list);
         out.logs.push(checked);
         out.traces.push(trace);
