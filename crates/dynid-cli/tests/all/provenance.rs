@@ -88,8 +88,8 @@ fn logs_with_columns_of_their_own_names_are_read_as_the_estimate_records() {
     let names = [
         ("q_shoulder", "first angle", 1.0 / degree),
         ("q_elbow", "second angle", 1.0 / degree),
-        ("effort_shoulder", "first amps", 0.5),
-        ("effort_elbow", "second amps", -0.25),
+        ("tau_shoulder", "first amps", 0.5),
+        ("tau_elbow", "second amps", -0.25),
     ];
     renamed(folder, "train.csv", "train_own.csv", &names);
     renamed(folder, "valid.csv", "valid_own.csv", &names);
@@ -110,9 +110,8 @@ fn logs_with_columns_of_their_own_names_are_read_as_the_estimate_records() {
     let validate = ["validate", "out/estimate.json", "--log", "valid_own.csv", "--json"];
     let recorded = stdout(folder, &validate);
     assert_eq!(recorded, stdout(folder, &[&validate[..], &["--config", "run.toml"]].concat()));
-    let error = |text: &str| {
-        serde_json::from_str::<Json>(text).unwrap()[0]["raw"]["relative_error"].as_f64().unwrap()
-    };
+    let error =
+        |text: &str| serde_json::from_str::<Json>(text).unwrap()[0]["relative_error"].as_f64().unwrap();
     assert!(error(&recorded) < 5.0, "{recorded}");
     let given = stdout(folder, &[&validate[..], &["--gains", "4,-8"]].concat());
     assert!(error(&given) > 40.0, "gains that are given win: {given}");
@@ -143,7 +142,7 @@ fn logs_with_columns_of_their_own_names_are_read_as_the_estimate_records() {
 fn gains_of_currents_are_those_of_the_estimate_unless_given() {
     let folder = logs();
     let folder = folder.path();
-    let names = [("effort_shoulder", "current_shoulder", 0.5), ("effort_elbow", "current_elbow", 0.25)];
+    let names = [("tau_shoulder", "current_shoulder", 0.5), ("tau_elbow", "current_elbow", 0.25)];
     renamed(folder, "train.csv", "train_own.csv", &names);
     renamed(folder, "valid.csv", "valid_own.csv", &names);
     run(folder, &["identify", "arm.urdf", "--log", "train_own.csv", "--gains", "2,4", "--out", "out"], 0);
