@@ -221,7 +221,7 @@ pub(crate) struct ReadingArgs {
     pub(crate) rows: Option<(usize, usize)>,
     #[command(flatten)]
     pub(crate) columns: LogArgs,
-    /// Configuration whose [columns] and [motor_side] the logs follow.
+    /// Configuration whose [columns] and [motor_side] the logs follow (default: as the estimate records).
     #[arg(long, value_name = "FILE.toml")]
     pub(crate) config: Option<PathBuf>,
 }

@@ -7,6 +7,7 @@
 
 pub mod columns;
 pub mod csv;
+pub mod digest;
 mod excerpt;
 pub mod mjcf;
 pub mod output;
@@ -20,6 +21,7 @@ pub mod urdf;
 
 pub use columns::{ColumnMapping, GuessOptions, MappingError, MappingSpec, Signals};
 pub use csv::{LogFileError, ReadOptions, Table};
+pub use digest::SourceFile;
 pub use excerpt::closest;
 pub use output::OutputError;
 pub use robot::{Place, RobotFileError};

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use crate::digest::{SourceFile, sha256};
 use crate::robot::RobotFileError;
 
 /// Largest robot file that is read, bytes (64 MiB).
@@ -27,8 +28,8 @@ pub(crate) enum TextFault {
     },
 }
 
-/// The text of a robot file without a byte order mark.
-pub(crate) fn read_text(path: &Path, limit: u64) -> Result<String, RobotFileError> {
+/// The text of a robot file without a byte order mark, and what was read.
+pub(crate) fn read_text(path: &Path, limit: u64) -> Result<(String, SourceFile), RobotFileError> {
     text(path, limit).map_err(|fault| {
         let file = path.display().to_string();
         match fault {
@@ -39,8 +40,8 @@ pub(crate) fn read_text(path: &Path, limit: u64) -> Result<String, RobotFileErro
     })
 }
 
-/// The file's text without a byte order mark.
-pub(crate) fn text(path: &Path, limit: u64) -> Result<String, TextFault> {
+/// The file's text without a byte order mark, and what was read.
+pub(crate) fn text(path: &Path, limit: u64) -> Result<(String, SourceFile), TextFault> {
     let handle = File::open(path).map_err(TextFault::Unreadable)?;
     let metadata = handle.metadata().map_err(TextFault::Unreadable)?;
     if metadata.is_dir() {
@@ -54,12 +55,14 @@ pub(crate) fn text(path: &Path, limit: u64) -> Result<String, TextFault> {
     if bytes.len() as u64 > limit {
         return Err(TextFault::TooLarge { limit });
     }
+    let source = SourceFile { path: path.display().to_string(), sha256: sha256(&bytes) };
     let text = String::from_utf8(bytes).map_err(|e| {
         let offset = e.utf8_error().valid_up_to();
         TextFault::NotText { offset, byte: e.as_bytes().get(offset).copied().unwrap_or_default() }
     })?;
-    Ok(match text.strip_prefix('\u{feff}') {
+    let text = match text.strip_prefix('\u{feff}') {
         Some(rest) => rest.to_owned(),
         None => text,
-    })
+    };
+    Ok((text, source))
 }

@@ -151,12 +151,23 @@ pub fn read_with_channels(
     channels: &[String],
     options: &ReadOptions,
 ) -> Result<States, StatesError> {
-    let table = csv::read(path, options)?;
-    let mut states = from_table(&table, joints)?;
+    from_table_with_channels(&csv::read(path, options)?, joints, channels)
+}
+
+/// Picks the states out of a table, and channels by their names; see [`read_with_channels`].
+///
+/// # Errors
+/// [`StatesError`].
+pub fn from_table_with_channels(
+    table: &Table,
+    joints: &[StateJoint],
+    channels: &[String],
+) -> Result<States, StatesError> {
+    let mut states = from_table(table, joints)?;
     for channel in channels {
         let Some(values) = table.column(channel) else {
-            let (file, channel) = (table.source.clone(), channel.clone());
-            return Err(StatesError::MissingChannel { file, channel, header: table.header });
+            let (file, channel, header) = (table.source.clone(), channel.clone(), table.header.clone());
+            return Err(StatesError::MissingChannel { file, channel, header });
         };
         states.channels.push((channel.clone(), values.to_vec()));
     }

@@ -125,7 +125,7 @@ pub struct CouplingConfig {
 
 /// Transmission between the motors that a log records and the joints: `q_motor = matrix · (q - offset)`,
 /// `effort_joint = matrixᵀ · effort_motor`.
-#[derive(Debug, Clone, Default, Deserialize, PartialEq)]
+#[derive(Debug, Clone, Default, Deserialize, PartialEq, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MotorSide {
     /// Transmission matrix, one row per motor, one column per joint.

@@ -14,7 +14,9 @@ pub use pairs::AlikeElements;
 use std::sync::Arc;
 
 use dynid_estimate::conditioning::{FrictionShape, ShapeKind};
-use dynid_io::{CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, SettingValue};
+use dynid_io::{
+    CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, SettingValue, SourceFile,
+};
 use dynid_model::closed::ClosedMechanism;
 use dynid_model::element::{
     AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, ExternalLoad, JointElement,
@@ -78,6 +80,8 @@ pub struct ElementPlan {
     /// Friction whose effort is known, at most one law per joint. Coefficients of friction among the elements of these
     /// joints are errors of the laws.
     pub known: Vec<KnownFriction>,
+    /// The file that they come from.
+    pub known_source: Option<SourceFile>,
     /// Whether these errors may have any sign.
     pub free_errors: bool,
     /// The mechanism with its loops closed, if it has some.
@@ -111,6 +115,7 @@ impl ElementPlan {
             spec: spec.clone(),
             load_reference: None,
             known: Vec::new(),
+            known_source: None,
             free_errors: true,
             closed: None,
             log_terms: LogTerms::default(),

@@ -51,6 +51,16 @@ pub enum Error {
         /// The fault.
         source: dynid_io::MappingError,
     },
+    /// Columns of a log do not fit the reading that an estimate records.
+    #[error("{file}: {source}; columns are those by which the logs of {estimate} were read")]
+    RecordedColumns {
+        /// Log file.
+        file: String,
+        /// Estimate file.
+        estimate: String,
+        /// The fault.
+        source: dynid_io::MappingError,
+    },
     /// Signals of a log contradict each other.
     #[error(transparent)]
     Log(#[from] dynid_motion::LogError),
@@ -365,6 +375,11 @@ impl Error {
             Error::EqualElements { first, .. } => Some(format!("leave out one `{first}`")),
             Error::Checkpoint { .. } => Some("delete the file, or name another one".to_owned()),
             Error::Columns { source, .. } => source.hint(),
+            Error::RecordedColumns { .. } => Some(
+                "give a configuration whose [columns] name those of this log (--config FILE.toml), or name the log's columns as the \
+                 training logs had them"
+                    .to_owned(),
+            ),
             Error::States(e) => e.hint(),
             Error::StatesChannel { .. } => {
                 Some("read the states with it: a column of this name, temperatures in degrees Celsius".to_owned())

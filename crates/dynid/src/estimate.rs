@@ -25,6 +25,7 @@ use serde_json::Value as Json;
 use crate::Error;
 use crate::identify::OwnDelay;
 use crate::log_agreement::LogAgreement;
+pub use crate::provenance::ReadingRecord;
 
 /// Version of the file's layout.
 pub const SCHEMA: u32 = 1;
@@ -436,22 +437,46 @@ pub struct ConditioningRecord {
 pub struct Provenance {
     /// Version of the program.
     pub version: String,
+    /// Revision of its source; absent if it was not built from a repository, or the program that calls the library does not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub revision: Option<String>,
+    /// Arguments of the command line as given, the program's name first; empty if a program called the library.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub command_line: Vec<String>,
     /// Input files.
     pub inputs: Vec<InputRecord>,
+    /// How the training logs were read, which `validate` and others follow; absent from files of earlier versions and of other
+    /// commands.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reading: Option<ReadingRecord>,
     /// Settings of the run.
     pub settings: Json,
     /// Seed.
     pub seed: u64,
 }
 
+impl Default for Provenance {
+    fn default() -> Self {
+        Provenance {
+            version: crate::VERSION.to_owned(),
+            revision: None,
+            command_line: Vec::new(),
+            inputs: Vec::new(),
+            reading: None,
+            settings: Json::Null,
+            seed: 0,
+        }
+    }
+}
+
 /// An input file.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputRecord {
     /// Path as given.
     pub path: String,
-    /// `robot`, `log`, `validation`, `trajectory` or `friction`.
+    /// `robot`, `urdf` (the one that a robot file refers to), `log`, `validation`, `trajectory` or `friction`.
     pub kind: String,
-    /// SHA-256 of its bytes.
+    /// SHA-256 of its bytes as they were read, of a log also of those behind the last row used.
     pub sha256: String,
 }
 

@@ -16,6 +16,7 @@ use dynid_model::{
 use crate::Error;
 use crate::config::{Config, Own, PayloadConfig, Route};
 use crate::elements::ElementPlan;
+use crate::estimate::InputRecord;
 use crate::fitting::{self, Fitted};
 use crate::identify::{Step, plan_elements, read_logs};
 use crate::log_terms::{LogTerms, known_inertia};
@@ -35,6 +36,7 @@ pub struct GainIdentification {
     /// Warnings, in words.
     pub warnings: Vec<String>,
     robot: String,
+    inputs: Vec<InputRecord>,
 }
 
 /// Finds the drive gains from logs with and without a payload of known mass.
@@ -105,8 +107,11 @@ pub fn identify_gains(config: &Config, mut progress: impl FnMut(Step)) -> Result
     if !shape.is_empty() {
         warnings.push("shape parameters of friction are held where they start".to_owned());
     }
-    let robot = model.mechanism().name().to_owned();
-    Ok(GainIdentification { fitted, joints, payload: payload.clone(), warnings, robot })
+    let name = model.mechanism().name().to_owned();
+    let mut inputs = InputRecord::of_robot(&robot);
+    inputs.extend(InputRecord::of_logs(&loaded));
+    inputs.extend(plan.known_source.iter().map(|source| InputRecord::of("friction", source)));
+    Ok(GainIdentification { fitted, joints, payload: payload.clone(), warnings, robot: name, inputs })
 }
 
 fn known_payload(config: &Config) -> Result<&PayloadConfig, Error> {

@@ -21,6 +21,7 @@ use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::linear::LinearEstimate;
 use dynid_estimate::rank::numerical_rank;
 use dynid_estimate::whiteness::InBandWhiteness;
+use dynid_io::TrajectoryFile;
 use dynid_model::element::scale_name;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
 use dynid_motion::Log;
@@ -31,7 +32,7 @@ use crate::check::{self, Finding, Severity};
 use crate::config::{Config, LogConfig, Preflight, Route};
 use crate::consistency::Consistent;
 use crate::elements::ElementPlan;
-use crate::estimate::{ExportedRecord, LogFit};
+use crate::estimate::{ExportedRecord, InputRecord, LogFit};
 use crate::export::FileModels;
 use crate::fitting::Fitted;
 use crate::friction_power::FrictionPower;
@@ -96,6 +97,8 @@ pub struct Identification {
     pub logs: Vec<PreparedLog>,
     /// How their columns were understood.
     pub columns: Vec<Vec<(String, String)>>,
+    /// Files as they were read.
+    pub inputs: Vec<InputRecord>,
     /// Choices of the compact route; `None` on the textbook route.
     pub conditioning: Option<Conditioning>,
     /// Per output: friction shapes chosen beside the elements asked for, and candidates that were not; empty where none
@@ -169,6 +172,9 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     config.demand_inputs()?;
     config.check_effect()?;
     let settings = config.conditioning_settings();
+    let reference_trajectory = config.instruments.as_ref().and_then(|table| table.trajectory.as_ref());
+    let reference_trajectory = reference_trajectory.map(TrajectoryFile::read_source).transpose()?;
+    let reference_trajectory = reference_trajectory.map(|(_, source)| InputRecord::of("trajectory", &source));
     let Opened { robot, loaded, mut plan, model, logs: prepared, structure, own_delays, findings } =
         open(config, &mut progress)?;
     let (model, conditioning) = match config.conditioning.route {
@@ -233,7 +239,10 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     let log_agreement = log_agreement::test(config, &model, &base, &fitted, &plan.log_terms, scale);
     warnings.extend(log_agreement.iter().flat_map(LogAgreement::warnings));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
+    let mut inputs = InputRecord::of_robot(&robot);
+    inputs.extend(InputRecord::of_logs(&loaded));
     let mut out = Identification {
+        inputs,
         plan,
         base,
         columns: loaded.into_iter().map(|l| l.columns).collect(),
@@ -303,6 +312,10 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     for log in &config.validation {
         progress(Step::Validate(log.path.display().to_string()));
         let mut loaded = logs::load(log, &out.robot.axes, &config.columns, config.motor_side.as_ref())?;
+        out.inputs.extend(loaded.inputs.drain(..).map(|input| match input.kind.as_str() {
+            "log" => InputRecord { kind: "validation".to_owned(), ..input },
+            _ => input,
+        }));
         loaded.log = out.plan.log_terms.of_validation(loaded.log, log);
         let mut prepared = loaded.prepare(&out.model, &out.settings)?;
         if let Some(own) = out.own_delays.iter().find(|d| Some(&d.log) == log.like.as_ref()) {
@@ -317,6 +330,8 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
             out.validation_unconstrained.push(crate::result::log_fit(&free));
         }
     }
+    out.inputs.extend(out.plan.known_source.iter().map(|source| InputRecord::of("friction", source)));
+    out.inputs.extend(reference_trajectory);
     out.exported = files.record(projections, files_training, files_validation);
     progress(Step::Trust);
     out.explained = figures::explained(out.training.iter().chain(&out.validation), &out.consistent);

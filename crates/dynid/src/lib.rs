@@ -33,6 +33,7 @@ mod passivity;
 pub mod payload;
 pub mod predict;
 pub mod prior;
+mod provenance;
 mod report_data;
 mod result;
 pub mod robot;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, prepare};
 use dynid_io::columns::EffortColumn;
-use dynid_io::{ColumnMapping, MappingError, MappingSpec, ReadOptions, Signals};
+use dynid_io::{ColumnMapping, MappingError, MappingSpec, ReadOptions, Signals, SourceFile};
 use dynid_model::element::{is_temperature, temperature_channel};
 use dynid_model::{EffortModel, Limits, RobotModel};
 use dynid_motion::temperature::{self, TemperatureDoubt};
@@ -19,6 +19,7 @@ pub use axes::{LogAxis, as_logged, axes, names};
 
 use crate::Error;
 use crate::config::{LogConfig, MotorSide, PerJoint};
+use crate::estimate::InputRecord;
 
 /// A log that was read, with what was read besides signals.
 #[derive(Debug, Clone)]
@@ -35,6 +36,8 @@ pub struct LoadedLog {
     pub mapping: ColumnMapping,
     /// Per row of the log: its data row in the file, from 1.
     pub rows: Vec<usize>,
+    /// Files that were read: the log, and its trajectory.
+    pub inputs: Vec<InputRecord>,
 }
 
 impl LoadedLog {
@@ -70,12 +73,12 @@ pub fn load(
     run_columns: &MappingSpec,
     motor_side: Option<&MotorSide>,
 ) -> Result<LoadedLog, Error> {
-    let (signals, mapping) = read(config, axes, run_columns, motor_side)?;
+    let (signals, mapping, source) = read(config, axes, run_columns, motor_side)?;
     let file = config.path.display().to_string();
     check_degrees(&signals, axes, &file)?;
     check_reach(&signals, &file)?;
     check_temperatures(&signals, &file)?;
-    finish(config, &file, &signals, mapping)
+    finish(config, &file, &signals, mapping, &source)
 }
 
 /// The same without refusing numbers for what they seem to be: units of angles, counts, temperatures.
@@ -88,8 +91,8 @@ pub(crate) fn load_as_it_is(
     run_columns: &MappingSpec,
     motor_side: Option<&MotorSide>,
 ) -> Result<LoadedLog, Error> {
-    let (signals, mapping) = read(config, axes, run_columns, motor_side)?;
-    finish(config, &config.path.display().to_string(), &signals, mapping)
+    let (signals, mapping, source) = read(config, axes, run_columns, motor_side)?;
+    finish(config, &config.path.display().to_string(), &signals, mapping, &source)
 }
 
 fn read(
@@ -97,7 +100,7 @@ fn read(
     axes: &[LogAxis],
     run_columns: &MappingSpec,
     motor_side: Option<&MotorSide>,
-) -> Result<(Signals, ColumnMapping), Error> {
+) -> Result<(Signals, ColumnMapping, SourceFile), Error> {
     let file = config.path.display().to_string();
     let options = ReadOptions { rows: config.rows, ..ReadOptions::default() };
     let table = dynid_io::csv::read(&config.path, &options)?;
@@ -114,7 +117,7 @@ fn read(
         to_joint_side(&mut signals, transmission)?;
     }
     state_temperatures(&mut signals, config, &joints)?;
-    Ok((signals, mapping))
+    Ok((signals, mapping, SourceFile { path: file, sha256: table.sha256 }))
 }
 
 /// Puts the temperatures that a configuration states in place of the logged ones.
@@ -143,11 +146,13 @@ fn finish(
     file: &str,
     signals: &Signals,
     mapping: ColumnMapping,
+    source: &SourceFile,
 ) -> Result<LoadedLog, Error> {
     let joints: Vec<String> = mapping.joints.clone();
     let whole = assemble(file, signals)?;
     let times = whole.time().to_vec();
     let log = left_out(whole, config)?;
+    let mut inputs = vec![InputRecord::of("log", source)];
     let log = match config.part {
         None => log,
         Some((from, to)) => {
@@ -158,14 +163,15 @@ fn finish(
     let (log, period_s) = match &config.trajectory {
         Some(path) => {
             let cut = config.part.is_none() && config.rows.is_none();
-            let (log, period_s) = known_motion::record(log, path, &joints, cut)?;
+            let (log, period_s, source) = known_motion::record(log, path, &joints, cut)?;
+            inputs.push(InputRecord::of("trajectory", &source));
             (log, Some(period_s))
         }
         None => (log, config.period_s),
     };
     let (not_logged, columns) = (signals.not_logged.clone(), describe(&mapping));
     let rows = data_rows(&times, log.time(), config.rows.map_or(1, |(first, _)| first));
-    Ok(LoadedLog { period_s, log, not_logged, columns, mapping, rows })
+    Ok(LoadedLog { period_s, log, not_logged, columns, mapping, rows, inputs })
 }
 
 /// Data rows of the rows that are left of a log, which keep their times and their order. `first`: data row of the first time.

@@ -1,9 +1,73 @@
 //! Efforts and regressors at given states.
 
-use dynid_io::States;
+use std::path::Path;
+
+use dynid_io::{MappingSpec, ReadOptions, States, StatesError, Table, states};
+use dynid_model::element::temperature_channel;
 use dynid_model::{BaseParameters, EffortModel, MotionBlock, RegressorBlock, RobotModel};
 
 use crate::Error;
+use crate::estimate::ReadingRecord;
+use crate::logs;
+use crate::robot::model_state_joints;
+
+/// Reads states of a model: columns named as in a table of states ([`dynid_io::states::read`]), else those by which the training
+/// logs were read, with their units.
+///
+/// # Errors
+/// [`Error::States`]; [`Error::Columns`] for a table that has neither.
+pub fn read_states(
+    path: &Path,
+    model: &RobotModel,
+    reading: Option<&ReadingRecord>,
+) -> Result<States, Error> {
+    let table = dynid_io::csv::read(path, &ReadOptions::default()).map_err(StatesError::File)?;
+    let (joints, channels) = (model_state_joints(model), model.channels());
+    let named = states::from_table_with_channels(&table, &joints, channels);
+    let recorded = reading.filter(|r| r.columns.position.is_some() && r.motor_side.is_none());
+    match (named, recorded) {
+        (Err(StatesError::Missing { .. } | StatesError::MissingChannel { .. }), Some(reading)) => {
+            let table = with_recorded_columns(table, model, &reading.columns)?;
+            Ok(states::from_table_with_channels(&table, &joints, channels)?)
+        }
+        (named, _) => Ok(named?),
+    }
+}
+
+/// The table with columns of states beside those that a mapping takes for the same.
+fn with_recorded_columns(
+    mut table: Table,
+    model: &RobotModel,
+    columns: &MappingSpec,
+) -> Result<Table, Error> {
+    let spec = MappingSpec {
+        // A table of states needs neither time nor effort.
+        time: None,
+        rate_hz: Some(1.0),
+        effort: None,
+        current_gains: None,
+        allow_no_effort: true,
+        ..columns.clone()
+    };
+    let named = |source| Error::Columns { file: table.source.clone(), source };
+    let mapping = logs::map_columns(&table.header, &logs::axes(model), &spec).map_err(named)?;
+    let signals = mapping.extract(&table).map_err(named)?;
+    let mut columns = signals.channels;
+    let quantities = [("q", Some(signals.position)), ("dq", signals.velocity), ("ddq", signals.acceleration)];
+    for (prefix, values) in quantities {
+        let joints = signals.joints.iter().zip(values.into_iter().flatten());
+        columns.extend(joints.map(|(joint, values)| (format!("{prefix}_{joint}"), values)));
+    }
+    let temperatures = signals.joints.iter().zip(signals.temperature.into_iter().flatten());
+    columns.extend(temperatures.filter_map(|(joint, values)| Some((temperature_channel(joint), values?))));
+    for (name, values) in columns {
+        if table.column(&name).is_none() {
+            table.header.push(name);
+            table.columns.push(values);
+        }
+    }
+    Ok(table)
+}
 
 /// Channel-after-channel copy of a states table.
 struct Flat {

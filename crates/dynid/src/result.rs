@@ -12,11 +12,11 @@ use crate::Error;
 use crate::agreement::Agreement;
 use crate::config::{Config, Route};
 use crate::estimate::{
-    BaseValue, ByMotion, Choice, ConditioningRecord, Estimate, FitSummary, FitValues, InputRecord, LogFit,
-    LogScale, ModelRecord, ParameterValue, Provenance, RankStatus, SCHEMA, ShapeValue,
+    BaseValue, ByMotion, Choice, ConditioningRecord, Estimate, FitSummary, FitValues, LogFit, LogScale,
+    ModelRecord, ParameterValue, Provenance, RankStatus, SCHEMA, ShapeValue,
 };
 use crate::identify::Identification;
-use crate::logs::sha256;
+use crate::provenance::{ReadingRecord, provenance};
 use crate::shape;
 use crate::trust::ParameterTrust;
 use crate::verdict;
@@ -25,7 +25,7 @@ impl Identification {
     /// The result file of this identification.
     ///
     /// # Errors
-    /// [`Error::Read`] if an input file cannot be hashed any more.
+    /// [`Error`] of the records that the file is made of.
     pub fn estimate(&self, config: &Config) -> Result<Estimate, Error> {
         let solution = &self.fit().solution;
         let finite = |x: f64| x.is_finite().then_some(x);
@@ -77,7 +77,10 @@ impl Identification {
             verdict,
             conditioning: self.conditioning_record(config),
             model,
-            provenance: provenance(config)?,
+            provenance: Provenance {
+                reading: Some(ReadingRecord::of(config, &self.columns)),
+                ..provenance(config, self.inputs.clone())
+            },
         })
     }
 
@@ -517,76 +520,4 @@ fn without_interval(trust: &ParameterTrust) -> String {
 fn relative(value: Option<f64>, std: Option<f64>) -> Option<f64> {
     let (value, std) = (value?, std?);
     (value.abs() >= 2.0 * std && value != 0.0).then(|| 100.0 * std / value.abs())
-}
-
-pub(crate) fn provenance(config: &Config) -> Result<Provenance, Error> {
-    let mut inputs = vec![InputRecord {
-        path: config.robot.display().to_string(),
-        kind: "robot".to_owned(),
-        sha256: sha256(&config.robot)?,
-    }];
-    let training = config.training_logs();
-    for (kind, logs) in [("log", &training), ("validation", &config.validation)] {
-        for log in logs {
-            let trajectory = log.trajectory.as_ref().map(|path| ("trajectory", path));
-            for (kind, path) in std::iter::once((kind, &log.path)).chain(trajectory) {
-                inputs.push(InputRecord {
-                    path: path.display().to_string(),
-                    kind: kind.to_owned(),
-                    sha256: sha256(path)?,
-                });
-            }
-        }
-    }
-    let rows = |l: &crate::config::LogConfig| {
-        let mut value = json!({ "path": l.path, "rows": l.rows, "part": l.part });
-        if l.trajectory.is_some() || l.period_s.is_some() {
-            value["trajectory"] = json!(l.trajectory);
-            value["period_s"] = json!(l.period_s);
-        }
-        for (key, own) in [("name", &l.name), ("payload", &l.payload), ("like", &l.like)] {
-            if let Some(own) = own {
-                value[key] = json!(own);
-            }
-        }
-        if !l.own.is_empty() {
-            value["own"] = json!(l.own);
-        }
-        value
-    };
-    let elements = &config.elements;
-    if let Some(path) = &elements.known_friction {
-        inputs.push(InputRecord {
-            path: path.display().to_string(),
-            kind: "friction".to_owned(),
-            sha256: sha256(path)?,
-        });
-    }
-    if let Some(path) = config.instruments.as_ref().and_then(|t| t.trajectory.as_ref()) {
-        inputs.push(InputRecord {
-            path: path.display().to_string(),
-            kind: "trajectory".to_owned(),
-            sha256: sha256(path)?,
-        });
-    }
-    let mut settings = json!({
-        "gravity": config.gravity,
-        "couple_mimics": config.couple_mimics.unwrap_or(false),
-        "locked": config.locked,
-        "elements": elements,
-        "conditioning": config.conditioning,
-        "estimator": config.estimator,
-        "bound": config.bound,
-        "preferred": config.preferred,
-        "preflight": config.preflight,
-        "log": training.iter().map(rows).collect::<Vec<_>>(),
-        "validation": config.validation.iter().map(rows).collect::<Vec<_>>(),
-    });
-    if let Some(table) = &config.instruments {
-        settings["instruments"] = json!(table);
-    }
-    if !config.payload.is_empty() {
-        settings["payload"] = json!(config.payload);
-    }
-    Ok(Provenance { version: crate::VERSION.to_owned(), inputs, settings, seed: config.seed.unwrap_or(1) })
 }

@@ -9,13 +9,14 @@ use crate::message::{Failure, data, json};
 
 pub(crate) fn run(args: &BacklashArgs) -> Result<u8, Failure> {
     let estimate = Estimate::read(&args.estimate)?;
-    let reading = Reading::of(&args.reading)?;
+    let reading = Reading::of(&args.reading, &estimate, &args.estimate)?;
     let logs = match args.log.is_empty() {
         true => reading.stated.clone(),
         false => args.log.iter().map(|path| reading.log(path)).collect(),
     };
     let motor_side = reading.motor_side.as_ref();
-    let found = backlash((&estimate, &args.estimate), &logs, &reading.columns, motor_side)?;
+    let found = backlash((&estimate, &args.estimate), &logs, &reading.columns, motor_side)
+        .map_err(|e| reading.named(e))?;
     if args.json {
         json(&found)?;
         return Ok(0);

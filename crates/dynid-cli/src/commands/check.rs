@@ -28,7 +28,7 @@ pub(crate) fn run(args: &CheckArgs) -> Result<u8, Failure> {
     let progress = Progress::new(args.quiet);
     let found = check(&config, |log| progress.examining(log))?;
     drop(progress);
-    let page = if args.report.is_some() { Some(found.report(&config)?) } else { None };
+    let page = if args.report.is_some() { Some(found.report()?) } else { None };
     let fixed = if args.fix.is_some() { Some(found.corrected(&config, source)?) } else { None };
     for (path, text) in [(&args.report, page), (&args.fix, fixed)] {
         if let (Some(path), Some(text)) = (path, text) {

@@ -11,10 +11,11 @@ use crate::message::{Failure, data, json};
 pub(crate) fn run(args: &ClearanceArgs) -> Result<u8, Failure> {
     let robot = Robot::load(&args.robot, &RobotOptions::default())?;
     let estimate = Estimate::read(&args.estimate)?;
-    let reading = Reading::of(&args.reading)?;
+    let reading = Reading::of(&args.reading, &estimate, &args.estimate)?;
     let log = reading.log(&args.log);
     let motor_side = reading.motor_side.as_ref();
-    let found = clearance(&robot, (&estimate, &args.estimate), &log, &reading.columns, motor_side)?;
+    let found = clearance(&robot, (&estimate, &args.estimate), &log, &reading.columns, motor_side)
+        .map_err(|e| reading.named(e))?;
     if args.json {
         json(&found)?;
         return Ok(0);

@@ -30,7 +30,7 @@ pub(crate) fn run(args: &CompareArgs) -> Result<u8, Failure> {
     let found = compare(&config, |done, of, what| progress.fit(done, of, what))?;
     drop(progress);
     if let Some(path) = &args.report {
-        write_atomically(path, found.report(&config)?.as_bytes())?;
+        write_atomically(path, found.report()?.as_bytes())?;
     }
     match args.json {
         true => data(&(found.to_json() + "\n"))?,

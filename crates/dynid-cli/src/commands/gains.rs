@@ -12,7 +12,7 @@ pub(crate) fn run(args: &GainsArgs) -> Result<u8, Failure> {
     let config = Config::read(&args.input)?;
     let progress = Progress::new(args.quiet);
     let found = identify_gains(&config, |step| progress.step(step))?;
-    let file = found.file(&config)?;
+    let file = found.file(&config);
     drop(progress);
     if !args.quiet {
         file.warnings.iter().for_each(|w| note(&format!("warning: {w}")));

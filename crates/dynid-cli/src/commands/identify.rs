@@ -29,7 +29,10 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     outputs::check_folder(&out, &files, &inputs)?;
     let progress = Progress::new(args.quiet);
     let identification = identify(&config, |step| progress.step(step))?;
-    let estimate = identification.estimate(&config)?;
+    let mut estimate = identification.estimate(&config)?;
+    estimate.provenance.command_line =
+        std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
+    estimate.provenance.revision = option_env!("DYNID_REVISION").map(str::to_owned);
     let report = identification.report(&config, &estimate)?;
     let urdf = match identification.urdf() {
         Ok(exported) => Ok(exported),

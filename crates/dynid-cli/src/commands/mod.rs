@@ -19,10 +19,12 @@ pub(crate) mod study;
 mod table;
 pub(crate) mod validate;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use dynid::config::{Config, LogConfig};
-use dynid::{Robot, RobotOptions};
+use dynid::estimate::{Estimate, ReadingRecord};
+use dynid::io::columns::{FullSignal, PerJoint, SignalSpec};
+use dynid::{Error, Robot, RobotOptions};
 
 use crate::args::{LogArgs, ReadingArgs, RobotArgs};
 use crate::message::Failure;
@@ -59,22 +61,62 @@ fn apply_log_args(spec: &mut dynid::io::MappingSpec, args: &LogArgs) {
     spec.allow_unlogged |= args.allow_unlogged;
 }
 
-/// How logs are to be read: columns, side of the gear, and the configuration that said so.
+/// How logs are to be read: columns and side of the gear by a configuration, else as the estimate records; flags over both.
 struct Reading {
     columns: dynid::io::MappingSpec,
     motor_side: Option<dynid::config::MotorSide>,
     /// Training logs of the configuration.
     stated: Vec<LogConfig>,
     rows: Option<(usize, usize)>,
+    /// The estimate that stated the columns.
+    recorded: Option<PathBuf>,
 }
 
 impl Reading {
-    fn of(args: &ReadingArgs) -> Result<Self, Failure> {
-        let config = args.config.as_deref().map(Config::read).transpose()?.unwrap_or_default();
-        let stated = config.training_logs();
-        let mut columns = config.columns;
-        apply_log_args(&mut columns, &args.columns);
-        Ok(Self { columns, motor_side: config.motor_side, stated, rows: args.rows })
+    fn of(args: &ReadingArgs, estimate: &Estimate, file: &Path) -> Result<Self, Failure> {
+        let rows = args.rows;
+        let mut reading =
+            match (args.config.as_deref().map(Config::read).transpose()?, &estimate.provenance.reading) {
+                (Some(config), _) => {
+                    let stated = config.training_logs();
+                    Self {
+                        columns: config.columns,
+                        motor_side: config.motor_side,
+                        stated,
+                        rows,
+                        recorded: None,
+                    }
+                }
+                (None, recorded) => {
+                    let ReadingRecord { columns, motor_side, .. } = recorded.clone().unwrap_or_default();
+                    let stated = recorded.as_ref().is_some_and(ReadingRecord::states_columns);
+                    let recorded = stated.then(|| file.to_owned());
+                    Self { columns, motor_side, stated: Vec::new(), rows, recorded }
+                }
+            };
+        apply_log_args(&mut reading.columns, &args.columns);
+        // Recorded effort columns keep their names, and take the gains that are given for their scale.
+        if reading.recorded.is_some()
+            && let Some(effort) = &mut reading.columns.effort
+            && let Some(gains) = reading.columns.current_gains.take()
+        {
+            let scale = Some(PerJoint::List(gains));
+            *effort = SignalSpec::Full(match effort.clone() {
+                SignalSpec::Full(full) => FullSignal { scale, ..full },
+                SignalSpec::Names(columns) => FullSignal { columns, unit: None, scale, offset: None },
+            });
+        }
+        Ok(reading)
+    }
+
+    /// Says where columns that do not fit come from.
+    fn named(&self, error: Error) -> Error {
+        match (error, &self.recorded) {
+            (Error::Columns { file, source }, Some(estimate)) => {
+                Error::RecordedColumns { file, estimate: estimate.display().to_string(), source }
+            }
+            (other, _) => other,
+        }
     }
 
     fn log(&self, path: &Path) -> LogConfig {

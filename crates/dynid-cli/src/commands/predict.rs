@@ -2,12 +2,9 @@
 
 use std::fmt::Write;
 
-use dynid::Estimate;
-use dynid::io::{ReadOptions, states};
 use dynid::logs::as_logged;
-use dynid::model::EffortModel;
-use dynid::predict::efforts;
-use dynid::robot::model_state_joints;
+use dynid::predict::{efforts, read_states};
+use dynid::{Error, Estimate};
 
 use crate::args::PredictArgs;
 use crate::message::{Failure, data, note};
@@ -20,9 +17,14 @@ pub(crate) fn run(args: &PredictArgs) -> Result<u8, Failure> {
     let estimate = Estimate::read(&args.estimate)?;
     let split = args.split.of();
     let model = estimate.effort_model(&args.estimate, split)?;
-    let joints = model_state_joints(&model);
-    let states =
-        states::read_with_channels(&args.states, &joints, model.channels(), &ReadOptions::default())?;
+    let states = read_states(&args.states, &model, estimate.provenance.reading.as_ref()).map_err(
+        |error| match error {
+            Error::Columns { file, source } => {
+                Error::RecordedColumns { file, estimate: args.estimate.display().to_string(), source }
+            }
+            other => other,
+        },
+    )?;
     let effort = as_logged(&model, efforts(&model, &estimate.values(split), &states)?);
     match &args.out {
         None => data(&csv_text(&estimate.joints, &effort))?,

@@ -9,7 +9,7 @@ use crate::message::{Failure, data, json, note};
 
 pub(crate) fn run(args: &ValidateArgs) -> Result<u8, Failure> {
     let estimate = Estimate::read(&args.estimate)?;
-    let reading = Reading::of(&args.reading)?;
+    let reading = Reading::of(&args.reading, &estimate, &args.estimate)?;
     if let Some(hz) = args.filter_hz
         && !(hz.is_finite() && hz > 0.0)
     {
@@ -22,7 +22,8 @@ pub(crate) fn run(args: &ValidateArgs) -> Result<u8, Failure> {
     let split = args.split.of();
     let motor_side = reading.motor_side.as_ref();
     let validation =
-        validate(&estimate, split, &args.estimate, &logs, &reading.columns, motor_side, args.filter_hz)?;
+        validate(&estimate, split, &args.estimate, &logs, &reading.columns, motor_side, args.filter_hz)
+            .map_err(|e| reading.named(e))?;
     for warning in &validation.warnings {
         note(&format!("warning: {warning}"));
     }

@@ -12,6 +12,7 @@ mod friction;
 mod online;
 mod other_libraries;
 mod payload;
+mod provenance;
 mod round_trip;
 mod study;
 mod support;

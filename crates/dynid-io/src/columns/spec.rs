@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::error::MappingError;
 use super::guess::{Finder, GuessOptions, PerJointColumns, of_logged};
@@ -12,35 +12,46 @@ use super::{ColumnMapping, ColumnUse, EffortColumn, TimeSource};
 use crate::excerpt::closest;
 
 /// An explicit mapping; signals that it does not mention are found by name as in [`ColumnMapping::guess`].
-#[derive(Clone, Debug, Default, Deserialize, PartialEq)]
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MappingSpec {
     /// Time column.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<SignalSpec>,
     /// Sampling rate, Hz, in place of a time column.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
     /// Positions.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub position: Option<SignalSpec>,
     /// Velocities.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub velocity: Option<SignalSpec>,
     /// Accelerations.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub acceleration: Option<SignalSpec>,
     /// Efforts, or currents with `scale` = drive gain in N m/A.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub effort: Option<SignalSpec>,
     /// Temperatures.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature: Option<SignalSpec>,
     /// Other columns, by the names to give them.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub channels: BTreeMap<String, ChannelSpec>,
     /// Drive gains for current columns found by name, N m/A or N/A, one per joint.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub current_gains: Option<Vec<f64>>,
     /// Allow joints without columns. Default: off.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub allow_unlogged: bool,
     /// Accept a log without effort. Default: off.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub allow_no_effort: bool,
 }
 
 /// Columns of one signal: their names alone, or with unit, scale and offset.
-#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 #[serde(
     untagged,
     expecting = "a pattern such as \"q{}\", a list of columns, a table joint -> column, or { columns, unit, scale, offset }"
@@ -53,21 +64,24 @@ pub enum SignalSpec {
 }
 
 /// Columns with unit, scale and offset.
-#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct FullSignal {
     /// Columns.
     pub columns: ColumnNames,
     /// Unit of the columns. Default: the one in the column's name, else SI.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Units>,
     /// Factor per joint, such as a drive gain in N m/A, a gear ratio or -1. Default: 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<PerJoint>,
     /// Offset per joint, added last, SI. Default: 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub offset: Option<PerJoint>,
 }
 
 /// Names of a signal's columns.
-#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum ColumnNames {
     /// A pattern: `{}` is the number of the joint (from 1; from 0 if that column exists), `{joint}` its name.
@@ -79,7 +93,7 @@ pub enum ColumnNames {
 }
 
 /// One unit for all columns or one per joint.
-#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Units {
     /// The same for all.
@@ -89,7 +103,7 @@ pub enum Units {
 }
 
 /// One number for all joints or one per joint.
-#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum PerJoint {
     /// The same for all.
@@ -101,7 +115,7 @@ pub enum PerJoint {
 }
 
 /// A column besides the joints' signals: `value = scale · raw + offset`.
-#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelSpec {
     /// Column.

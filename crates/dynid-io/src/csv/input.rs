@@ -6,6 +6,8 @@ use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 
+use crate::digest::Hashed;
+
 /// Buffer between the file and the decoder, bytes.
 const BUFFER_BYTES: usize = 1 << 16;
 
@@ -38,13 +40,13 @@ pub(super) struct Input {
 }
 
 enum Stream {
-    Plain(File),
+    Plain(Hashed<File>),
     Gzip(Box<MultiGzDecoder<Counted>>),
 }
 
 /// Counts the compressed bytes.
 struct Counted {
-    inner: BufReader<File>,
+    inner: BufReader<Hashed<File>>,
     bytes: u64,
 }
 
@@ -67,12 +69,20 @@ impl Input {
         (&mut file).take(2).read_to_end(&mut magic)?;
         file.rewind()?;
         let stream = if magic == [0x1f, 0x8b] {
-            let inner = BufReader::with_capacity(BUFFER_BYTES, file);
+            let inner = BufReader::with_capacity(BUFFER_BYTES, Hashed::new(file));
             Stream::Gzip(Box::new(MultiGzDecoder::new(Counted { inner, bytes: 0 })))
         } else {
-            Stream::Plain(file)
+            Stream::Plain(Hashed::new(file))
         };
         Ok(Input { stream, bounds, text_bytes: 0 })
+    }
+
+    /// Digest of all bytes of the file, those read so far and those behind them.
+    pub(super) fn digest(self) -> io::Result<String> {
+        match self.stream {
+            Stream::Plain(file) => file.finish(),
+            Stream::Gzip(decoder) => decoder.into_inner().inner.into_inner().finish(),
+        }
     }
 
     /// Reads text into the buffer; 0 at the end.

@@ -33,6 +33,12 @@ impl<'f> Lines<'f> {
         self.line
     }
 
+    /// Digest of the whole file; what follows the line last returned is not looked at.
+    pub(super) fn digest(self) -> Result<String, LogFileError> {
+        let file = self.file;
+        self.input.digest().map_err(|error| LogFileError::Unreadable { file: file.to_owned(), error })
+    }
+
     /// The next line that is neither blank nor a comment.
     pub(super) fn next(&mut self) -> Result<Option<&[u8]>, LogFileError> {
         loop {

@@ -72,6 +72,9 @@ pub struct Table {
     pub rows: usize,
     /// Number in the file of the first row of the table, from 1.
     pub first_row: usize,
+    /// SHA-256 of the file's bytes as they were read, rows that were not asked for included; hexadecimal.
+    /// Empty for a table that no file was read for.
+    pub sha256: String,
 }
 
 impl Table {
@@ -84,7 +87,8 @@ impl Table {
 /// Reads a CSV log, gzip-compressed or not (told by its first bytes), streaming.
 ///
 /// The first line that is neither blank nor a comment (`#`) names the columns; every further one is a row of numbers.
-/// Fields may be quoted. Reading stops at the last row asked for; what follows is not looked at.
+/// Fields may be quoted. What follows the last row asked for is hashed and not looked
+/// at.
 ///
 /// # Errors
 /// [`LogFileError`], the first fault met.
@@ -124,7 +128,8 @@ pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Table, LogF
     if row < first || (options.rows.is_some() && row < last) {
         return Err(bad_range(format!("{row} rows")));
     }
-    Ok(rows.into_table(first, row + 1 - first))
+    let table = rows.into_table(first, row + 1 - first);
+    Ok(Table { sha256: lines.digest()?, ..table })
 }
 
 /// What is wrong with a row.
@@ -334,6 +339,7 @@ impl<'a> Rows<'a> {
             columns: self.columns.into_iter().enumerate().filter(|(k, _)| kept(*k)).map(|(_, c)| c).collect(),
             rows,
             first_row,
+            sha256: String::new(),
         }
     }
 }

@@ -18,7 +18,7 @@ use crate::urdf;
 /// [`RobotFileError`]: the file cannot be read, is too large, or is not a robot.
 pub fn read(path: impl AsRef<Path>) -> Result<RobotFile, RobotFileError> {
     let path = path.as_ref();
-    let text = read_text(path, MAX_ROBOT_FILE_BYTES)?;
+    let (text, source) = read_text(path, MAX_ROBOT_FILE_BYTES)?;
     let name = path.display().to_string();
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let is_xml = match extension.as_str() {
@@ -29,8 +29,8 @@ pub fn read(path: impl AsRef<Path>) -> Result<RobotFile, RobotFileError> {
     };
     if is_xml {
         let plain = RobotFile::plain(urdf::parse(&text, &name)?, ElementSpec::default());
-        Ok(RobotFile { urdf: Some(name), ..plain })
+        Ok(RobotFile { urdf: Some(name), sources: vec![source], ..plain })
     } else {
-        toml_robot::parse(&text, &name)
+        toml_robot::parse_source(&text, &name, Some(source))
     }
 }

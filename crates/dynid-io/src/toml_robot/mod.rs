@@ -25,6 +25,7 @@ use toml::Spanned;
 
 pub use write::Loops;
 
+use crate::digest::SourceFile;
 use crate::excerpt::{closest, excerpt};
 use crate::robot::{Place, RobotFileError};
 use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
@@ -46,6 +47,8 @@ pub struct RobotFile {
     pub closures: Vec<ClosureDescription>,
     /// Path of the URDF that holds the tree, if the file is a URDF or refers to one.
     pub urdf: Option<String>,
+    /// Files that were read, this one first; a text alone has none but those that it refers to.
+    pub sources: Vec<SourceFile>,
 }
 
 impl RobotFile {
@@ -58,6 +61,7 @@ impl RobotFile {
             home: Vec::new(),
             closures: Vec::new(),
             urdf: None,
+            sources: Vec::new(),
         }
     }
 }
@@ -68,7 +72,8 @@ impl RobotFile {
 /// [`RobotFileError`].
 pub fn read(path: impl AsRef<Path>) -> Result<RobotFile, RobotFileError> {
     let path = path.as_ref();
-    parse(&read_text(path, MAX_ROBOT_FILE_BYTES)?, &path.display().to_string())
+    let (text, source) = read_text(path, MAX_ROBOT_FILE_BYTES)?;
+    parse_source(&text, &path.display().to_string(), Some(source))
 }
 
 /// Reads a robot in TOML; `source_name` stands in messages, and its folder is where `urdf = "..."` is looked for.
@@ -111,6 +116,16 @@ pub fn read(path: impl AsRef<Path>) -> Result<RobotFile, RobotFileError> {
 /// # Errors
 /// [`RobotFileError`] with line and column.
 pub fn parse(text: &str, source_name: &str) -> Result<RobotFile, RobotFileError> {
+    parse_source(text, source_name, None)
+}
+
+/// The same, of a text that was read from a file.
+pub(crate) fn parse_source(
+    text: &str,
+    source_name: &str,
+    own: Option<SourceFile>,
+) -> Result<RobotFile, RobotFileError> {
+    let mut sources: Vec<SourceFile> = own.into_iter().collect();
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let robot: RobotToml = toml::from_str(text).map_err(|e| syntax(text, source_name, &e))?;
     let source = Source { text, file: source_name };
@@ -122,7 +137,9 @@ pub fn parse(text: &str, source_name: &str) -> Result<RobotFile, RobotFileError>
             let folder = Path::new(source_name).parent().unwrap_or(Path::new(""));
             let path = folder.join(file.get_ref());
             urdf_path = Some(path.display().to_string());
-            urdf::read(path)?
+            let (description, source) = urdf::read_source(&path)?;
+            sources.push(source);
+            description
         }
         (None, None, None) => {
             let expected = "one of the keys `joint`, `body`, `urdf`".to_owned();
@@ -152,7 +169,7 @@ pub fn parse(text: &str, source_name: &str) -> Result<RobotFile, RobotFileError>
     let home = home::build(&source, &robot.home, &description)?;
     let closures = loops::build(&source, &robot.loops, &description)?;
     let actuated = robot.actuated.map(|names| names.into_iter().map(Spanned::into_inner).collect());
-    Ok(RobotFile { elements, actuated, home, closures, urdf: urdf_path, description })
+    Ok(RobotFile { elements, actuated, home, closures, urdf: urdf_path, sources, description })
 }
 
 /// `dh` and `tool` belong to DH tables.

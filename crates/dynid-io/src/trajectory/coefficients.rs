@@ -6,6 +6,7 @@ use dynid_motion::trajectory::{Form, Fourier, FourierTrajectory, RowOrder, Seque
 
 use super::TrajectoryFileError;
 use super::schema::{ApproachKeys, FileKeys, FormKey, JointKeys, ReturnKeys, SCHEMA, TableKeys, UnitKey};
+use crate::digest::SourceFile;
 use crate::excerpt::excerpt;
 use crate::output::{OutputError, write_atomically};
 use crate::source;
@@ -62,10 +63,18 @@ impl TrajectoryFile {
     /// # Errors
     /// [`TrajectoryFileError`] with the file, and the line or field.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, TrajectoryFileError> {
+        Ok(Self::read_source(path)?.0)
+    }
+
+    /// The same, and what was read.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_source(path: impl AsRef<Path>) -> Result<(Self, SourceFile), TrajectoryFileError> {
         let path = path.as_ref();
         let file = path.display().to_string();
         match source::text(path, LIMIT) {
-            Ok(text) => Self::parse(&text, &file),
+            Ok((text, source)) => Ok((Self::parse(&text, &file)?, source)),
             Err(fault) => Err(TrajectoryFileError::of_text(file, fault)),
         }
     }

@@ -9,5 +9,6 @@ pub(crate) mod xml;
 
 pub use dynamics::dynamics;
 pub use edit::{JointDynamics, edit};
+pub(crate) use read::read_source;
 pub use read::{parse, read};
 pub use write::from_description;

@@ -8,6 +8,7 @@ use dynid_model::{
 };
 
 use super::xml::{Attribute, Tag, Tags};
+use crate::digest::SourceFile;
 use crate::excerpt::excerpt;
 use crate::robot::{Place, RobotFileError};
 use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
@@ -17,8 +18,13 @@ use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
 /// # Errors
 /// [`RobotFileError`].
 pub fn read(path: impl AsRef<Path>) -> Result<Description, RobotFileError> {
-    let path = path.as_ref();
-    parse(&read_text(path, MAX_ROBOT_FILE_BYTES)?, &path.display().to_string())
+    Ok(read_source(path.as_ref())?.0)
+}
+
+/// The same, and what was read.
+pub(crate) fn read_source(path: &Path) -> Result<(Description, SourceFile), RobotFileError> {
+    let (text, source) = read_text(path, MAX_ROBOT_FILE_BYTES)?;
+    Ok((parse(&text, &path.display().to_string())?, source))
 }
 
 /// Reads URDF text; `source_name` stands in messages.

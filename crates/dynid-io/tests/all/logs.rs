@@ -53,6 +53,25 @@ fn delimiters_quotes_comments_and_line_ends() {
 }
 
 #[test]
+fn the_digest_is_of_the_whole_file_however_much_of_it_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let mut text = "t,q1\n".to_owned();
+    for row in 0..100_000 {
+        text += &format!("{row},{}\n", f64::from(row).sin());
+    }
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    std::io::Write::write_all(&mut packed, text.as_bytes()).unwrap();
+    for bytes in [text.into_bytes(), packed.finish().unwrap()] {
+        fs::write(&path, &bytes).unwrap();
+        for rows in [None, Some((1, 3))] {
+            let table = csv::read(&path, &ReadOptions { rows, ..ReadOptions::default() }).unwrap();
+            assert_eq!(table.sha256, dynid_io::digest::sha256(&bytes), "{rows:?}");
+        }
+    }
+}
+
+#[test]
 fn ranges_ignored_columns_and_large_stamps() {
     let text =
         "stamp,mode,q1\n1700000000000000000,on,1\n1700000000010000000,off,2\n1700000000020000000,on,3\n";

@@ -21,6 +21,7 @@ use serde::Serialize;
 
 use crate::Error;
 use crate::config::Config;
+use crate::estimate::InputRecord;
 use crate::logs::{self, LoadedLog};
 use crate::robot::{Robot, RobotOptions};
 use bench::{Bench, Examined};
@@ -66,6 +67,8 @@ pub struct Check {
     /// Per log: its columns and the joints that are logged.
     #[serde(skip)]
     mapped: Vec<fix::Mapped>,
+    #[serde(skip)]
+    inputs: Vec<InputRecord>,
 }
 
 impl Check {
@@ -106,6 +109,7 @@ pub fn check(config: &Config, mut progress: impl FnMut(&str)) -> Result<Check, E
         logs: Vec::new(),
         traces: Vec::new(),
         mapped: Vec::new(),
+        inputs: InputRecord::of_robot(&robot),
     };
     let mut bench: Option<(Vec<String>, Bench)> = None;
     let training = config.training_logs();
@@ -124,6 +128,7 @@ pub fn check(config: &Config, mut progress: impl FnMut(&str)) -> Result<Check, E
         if let Some(found) = late(config, &loaded, bench, &checked, &mut findings)? {
             checked.delay_samples = Some([found.samples, found.error]);
         }
+        out.inputs.extend(InputRecord::of_logs(std::slice::from_ref(&loaded)));
         out.findings.extend(findings.list);
         out.logs.push(checked);
         out.traces.push(trace);

@@ -5,8 +5,8 @@ use dynid_report as report;
 use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, Fact, StudySection, StudyTable, Value};
 
 use super::{Check, CheckedLog, Severity, short};
-use crate::config::Config;
-use crate::{Error, VERSION, logs};
+use crate::estimate::InputRecord;
+use crate::{Error, VERSION};
 
 /// Points per drawn curve.
 const POINTS: usize = 400;
@@ -65,8 +65,8 @@ impl Check {
     /// The page as HTML.
     ///
     /// # Errors
-    /// [`Error::Report`]; [`Error::Read`] where an input has gone.
-    pub fn report(&self, config: &Config) -> Result<String, Error> {
+    /// [`Error::Report`].
+    pub fn report(&self) -> Result<String, Error> {
         let status = match self.worst() {
             Some(Severity::Error) => report::Status::Fail,
             Some(Severity::Warning) => report::Status::Warn,
@@ -90,18 +90,7 @@ impl Check {
             ..StudySection::default()
         }];
         sections.extend(self.logs.iter().zip(&self.traces).map(|(log, trace)| section(log, trace)));
-        let training = config.training_logs();
-        let files = std::iter::once(("robot", config.robot.clone()))
-            .chain(training.iter().chain(&config.validation).map(|l| ("log", l.path.clone())));
-        let inputs = files
-            .map(|(kind, path)| {
-                Ok(report::InputFile {
-                    sha256: Some(logs::sha256(&path)?),
-                    path: path.display().to_string(),
-                    kind: kind.to_owned(),
-                })
-            })
-            .collect::<Result<Vec<_>, Error>>()?;
+        let inputs = self.inputs.iter().map(InputRecord::shown).collect();
         Ok(report::render_log_page(&report::LogPage {
             kind: "Pre-flight".to_owned(),
             title: format!(

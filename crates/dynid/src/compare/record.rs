@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::estimators::Contestant;
 use super::{FOLDS, FoldScore};
 use crate::config::Config;
+use crate::estimate::InputRecord;
 use crate::identify::Opened;
 
 /// Error of an estimator on one joint.
@@ -64,6 +65,9 @@ pub struct Comparison {
     pub filter_hz: f64,
     /// Estimators, best first, failed ones last.
     pub estimators: Vec<ComparedEstimator>,
+    /// Files as they were read.
+    #[serde(skip)]
+    pub inputs: Vec<InputRecord>,
 }
 
 impl Comparison {
@@ -136,7 +140,10 @@ pub(super) fn ranked(
         estimator.behind = Some([mean, spread]);
         estimator.level_with_best = mean <= 2.0 * spread;
     }
+    let mut inputs = InputRecord::of_robot(&opened.robot);
+    inputs.extend(InputRecord::of_logs(&opened.loaded));
     Comparison {
+        inputs,
         robot: config.robot.display().to_string(),
         logs: opened.logs.iter().map(|l| l.name.clone()).collect(),
         joints: opened.model.outputs().iter().map(|o| o.name.clone()).collect(),

@@ -4,26 +4,16 @@ use dynid_report as report;
 use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, StudySection, StudyTable, Value};
 
 use super::{ComparedEstimator, Comparison, JointError};
-use crate::config::Config;
-use crate::{Error, VERSION, logs};
+use crate::estimate::InputRecord;
+use crate::{Error, VERSION};
 
 impl Comparison {
     /// The page as HTML.
     ///
     /// # Errors
-    /// [`Error::Report`]; [`Error::Read`] where an input has gone.
-    pub fn report(&self, config: &Config) -> Result<String, Error> {
-        let files =
-            std::iter::once(("robot", &config.robot)).chain(config.log.iter().map(|l| ("log", &l.path)));
-        let inputs = files
-            .map(|(kind, path)| {
-                Ok(report::InputFile {
-                    sha256: Some(logs::sha256(path)?),
-                    path: path.display().to_string(),
-                    kind: kind.to_owned(),
-                })
-            })
-            .collect::<Result<Vec<_>, Error>>()?;
+    /// [`Error::Report`].
+    pub fn report(&self) -> Result<String, Error> {
+        let inputs = self.inputs.iter().map(InputRecord::shown).collect();
         let sections = vec![
             StudySection {
                 title: "Errors on unseen time".to_owned(),

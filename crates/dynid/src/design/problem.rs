@@ -7,7 +7,7 @@ use dynid_excitation::{
     DEFAULT_SAMPLES_PER_HARMONIC, DEFAULT_SIGN_WIDTH, ExcitationModel, Information, MotionLimits, Problem,
     RobotExcitation, StartConditions, information,
 };
-use dynid_io::TrajectoryFile;
+use dynid_io::{SourceFile, TrajectoryFile};
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
 use dynid_motion::trajectory::{Form, RowOrder};
 
@@ -38,6 +38,8 @@ pub(super) struct RobotProblem {
     pub(super) effort_limits: Vec<Option<f64>>,
     /// What was taken for granted, in words.
     pub(super) assumptions: Vec<String>,
+    /// Trajectory files of earlier experiments, as they were read.
+    pub(super) earlier: Vec<SourceFile>,
 }
 
 pub(super) fn pose(problem: &RobotProblem, config: &DesignConfig) -> Result<Option<Vec<f64>>, Error> {
@@ -142,8 +144,18 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
         samples: DEFAULT_SAMPLES_PER_HARMONIC * t.harmonics,
         model: Box::new(excitation.clone()),
     };
-    problem.prior = earlier(config, &problem, &excitation, spacing)?;
-    Ok(RobotProblem { problem, model, nominal, criterion: name, noise, effort_limits, assumptions })
+    let mut files = Vec::new();
+    problem.prior = earlier(config, &problem, &excitation, spacing, &mut files)?;
+    Ok(RobotProblem {
+        problem,
+        model,
+        nominal,
+        criterion: name,
+        noise,
+        effort_limits,
+        assumptions,
+        earlier: files,
+    })
 }
 
 fn start_conditions(config: &DesignConfig, joints: &[String]) -> Result<StartConditions, Error> {
@@ -237,10 +249,12 @@ fn earlier(
     problem: &Problem,
     model: &RobotExcitation,
     spacing: f64,
+    files: &mut Vec<SourceFile>,
 ) -> Result<Option<Information>, Error> {
     let mut stacked: Option<Information> = None;
     for path in &config.earlier {
-        let file = TrajectoryFile::read(path)?;
+        let (file, source) = TrajectoryFile::read_source(path)?;
+        files.push(source);
         let order = file.order_of(&problem.coordinates).map_err(|joint| Error::InFile {
             file: path.display().to_string(),
             source: Box::new(Error::setting("joints", &format!("a trajectory of joint `{joint}`"), "none")),

@@ -8,7 +8,6 @@ use super::config::{CriterionName, DesignConfig};
 use super::{DesignRun, DesignedTrajectory};
 use crate::Error;
 use crate::estimate::{InputRecord, Provenance};
-use crate::logs::sha256;
 
 /// Schema of `design.json`.
 pub(super) const SCHEMA: &str = "dynid-design/1";
@@ -224,10 +223,16 @@ impl From<&LimitPoint> for LimitRecord {
 }
 
 impl DesignRun {
+    fn inputs(&self) -> Vec<InputRecord> {
+        let mut inputs = InputRecord::of_robot(&self.robot);
+        inputs.extend(self.set.earlier.iter().map(|source| InputRecord::of("trajectory", source)));
+        inputs
+    }
+
     /// Everything as JSON keys.
     ///
     /// # Errors
-    /// [`Error::Read`] if an input has gone.
+    /// [`Error`] of the figures that the record is made of.
     pub fn record(&self, config: &DesignConfig) -> Result<DesignRecord, Error> {
         let set = &self.set;
         let designed = self.outcome.as_ref().ok();
@@ -295,7 +300,7 @@ impl DesignRun {
             starts: self.starts.iter().map(|s| start_record(s, set.criterion, columns)).collect(),
             infeasible: self.outcome.as_ref().err().map(infeasible_record),
             noise: set.noise.clone(),
-            provenance: provenance(config)?,
+            provenance: provenance(config, self.inputs()),
         })
     }
 
@@ -409,19 +414,7 @@ fn infeasible_headline(infeasible: &Infeasible) -> String {
     }
 }
 
-fn provenance(config: &DesignConfig) -> Result<Provenance, Error> {
-    let mut inputs = vec![InputRecord {
-        path: config.robot.display().to_string(),
-        kind: "robot".to_owned(),
-        sha256: sha256(&config.robot)?,
-    }];
-    for path in &config.earlier {
-        inputs.push(InputRecord {
-            path: path.display().to_string(),
-            kind: "trajectory".to_owned(),
-            sha256: sha256(path)?,
-        });
-    }
+fn provenance(config: &DesignConfig, inputs: Vec<InputRecord>) -> Provenance {
     let settings = serde_json::to_value(config).unwrap_or_default();
-    Ok(Provenance { version: crate::VERSION.to_owned(), inputs, settings, seed: config.search.seed })
+    Provenance { inputs, settings, seed: config.search.seed, ..Provenance::default() }
 }

@@ -49,7 +49,9 @@ impl ElementPlan {
         }
         if let Some(file) = &config.elements.known_friction {
             let temperatures = config.elements.temperature.finite("elements.temperature", &names)?;
-            plan.known = KnownFriction::load(file, &names, &temperatures)?;
+            let (known, source) = KnownFriction::load(file, &names, &temperatures)?;
+            plan.known = known;
+            plan.known_source = Some(source);
             check_temperature(&config.elements.temperature, &plan.known)?;
             plan.free_errors = config.elements.friction_errors == FrictionErrors::Free;
         }

@@ -8,6 +8,7 @@ use dynid_motion::constant_speed::{Pairing, Pass, Segment, at_rest, pair, segmen
 use super::config::{FrictionConfig, FrictionLog, LoggedSignal, ThermalLines};
 use super::error::FrictionError;
 use crate::Error;
+use crate::estimate::InputRecord;
 use crate::logs::{self, LoadedLog};
 use crate::robot::Robot;
 
@@ -70,7 +71,7 @@ impl JointExperiment {
 pub(super) fn read(
     config: &FrictionConfig,
     robot: &Robot,
-    warnings: &mut Vec<String>,
+    (warnings, inputs): (&mut Vec<String>, &mut Vec<InputRecord>),
     mut progress: impl FnMut(String),
 ) -> Result<Vec<JointExperiment>, Error> {
     let names = robot.mechanism.rate_names();
@@ -84,6 +85,7 @@ pub(super) fn read(
             return Err(Error::UnknownJoint { name: name.clone(), known: names.clone() });
         }
         let loaded = logs::load(&log.plain(), &robot.axes, &config.columns, None)?;
+        inputs.extend(loaded.inputs.iter().cloned());
         warnings.extend(logs::temperature_warnings(&loaded.log));
         match log.signal {
             LoggedSignal::Effort => passes(config, log, &loaded, &mut joints, warnings)?,

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use dynid_estimate::steady_friction::FrictionLaw;
+use dynid_io::SourceFile;
 use dynid_model::KnownElement;
 use dynid_model::element::{Coulomb, ExponentialViscous, LuGre, ShapeSetting, Stribeck, Viscous};
 use dynid_motion::temperature::PLAUSIBLE;
@@ -88,8 +89,8 @@ impl KnownFriction {
         path: &Path,
         joints: &[String],
         temperatures: &[Option<f64>],
-    ) -> Result<Vec<KnownFriction>, Error> {
-        let model = FrictionModel::load(path)?;
+    ) -> Result<(Vec<KnownFriction>, SourceFile), Error> {
+        let (model, source) = FrictionModel::load_source(path)?;
         let file = || path.display().to_string();
         let mut out = Vec::new();
         for (joint, temperature) in joints.iter().zip(temperatures) {
@@ -109,7 +110,7 @@ impl KnownFriction {
             let stated = model.joints.iter().map(|j| j.joint.clone()).collect();
             return Err(FrictionError::NoLaw { file: file(), stated, joints: joints.to_vec() }.into());
         }
-        Ok(out)
+        Ok((out, source))
     }
 
     /// Says what is wrong with the coefficients.

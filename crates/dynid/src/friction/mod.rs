@@ -33,6 +33,7 @@ pub use presliding::{PreslidingFit, PreslidingTest, fit_presliding};
 use dynid_estimate::steady_friction::{SteadyError, SteadyFriction, analyse};
 
 use crate::Error;
+use crate::estimate::InputRecord;
 use crate::robot::{Robot, RobotOptions, refuse_elastic, refuse_loops};
 
 /// What is being worked on.
@@ -66,6 +67,8 @@ pub struct FrictionIdentification {
     pub joints: Vec<IdentifiedJoint>,
     /// Warnings, in words.
     pub warnings: Vec<String>,
+    /// Files as they were read.
+    pub inputs: Vec<InputRecord>,
 }
 
 /// Reads robot and logs, finds points, laws and bristles.
@@ -83,12 +86,14 @@ pub fn identify_friction(
     refuse_loops(&robot, "evaluated by friction experiments")?;
     // What a robot file leaves open about bodies is no matter for friction.
     let mut warnings = Vec::new();
+    let mut inputs = InputRecord::of_robot(&robot);
     let known = robot.mechanism.rate_names();
     if let Some(name) = config.prior.keys().find(|j| !known.contains(j)) {
         return Err(Error::UnknownJoint { name: name.clone(), known });
     }
-    let experiments =
-        experiment::read(config, &robot, &mut warnings, |file| progress(FrictionStep::Read(file)))?;
+    let experiments = experiment::read(config, &robot, (&mut warnings, &mut inputs), |file| {
+        progress(FrictionStep::Read(file))
+    })?;
     let mut joints = Vec::with_capacity(experiments.len());
     for experiment in experiments {
         progress(FrictionStep::Law(experiment.joint.clone()));
@@ -99,12 +104,12 @@ pub fn identify_friction(
         progress(FrictionStep::Presliding(log.joint.clone()));
         let joint = joints.iter_mut().find(|j| j.experiment.joint == log.joint);
         let law = joint.as_ref().and_then(|j| j.law.as_ref().ok()).map(|l| &l.law);
-        let fit = presliding::find(config, log, &robot, law, &mut warnings)?;
+        let fit = presliding::find(config, log, &robot, law, (&mut warnings, &mut inputs))?;
         if let Some(joint) = joint {
             joint.presliding.push(fit);
         }
     }
-    Ok(FrictionIdentification { robot, joints, warnings })
+    Ok(FrictionIdentification { robot, joints, warnings, inputs })
 }
 
 /// The law of one joint; `Err` inside: there is none, and why.

@@ -1,5 +1,6 @@
 //! The friction model of a robot as a file, `friction.json`: keys are added, never renamed.
 
+use dynid_io::SourceFile;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -279,13 +280,19 @@ impl FrictionModel {
     /// # Errors
     /// [`Error::Read`], [`Error::Friction`] with [`FrictionError::File`] for other files and schemas.
     pub fn load(path: &Path) -> Result<Self, Error> {
+        Ok(Self::load_source(path)?.0)
+    }
+
+    /// The same, and what was read.
+    pub(crate) fn load_source(path: &Path) -> Result<(Self, SourceFile), Error> {
         let text = std::fs::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
+        let source = SourceFile { path: path.display().to_string(), sha256: dynid_io::digest::sha256(&text) };
         let fault = |message: String| FrictionError::File { file: path.display().to_string(), message };
         let model: FrictionModel = serde_json::from_slice(&text).map_err(|e| fault(e.to_string()))?;
         if model.schema != SCHEMA {
             return Err(fault(format!("expected schema {SCHEMA}, found {}", model.schema)).into());
         }
-        Ok(model)
+        Ok((model, source))
     }
 
     /// The file's text.

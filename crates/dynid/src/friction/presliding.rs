@@ -13,6 +13,7 @@ use super::config::{FrictionConfig, HoldName, PreslidingLog};
 use super::error::FrictionError;
 use super::experiment::{on_grid, temperature};
 use crate::Error;
+use crate::estimate::InputRecord;
 use crate::logs;
 use crate::robot::Robot;
 
@@ -79,7 +80,7 @@ pub(super) fn find(
     log: &PreslidingLog,
     robot: &Robot,
     law: Option<&FrictionLaw>,
-    warnings: &mut Vec<String>,
+    (warnings, inputs): (&mut Vec<String>, &mut Vec<InputRecord>),
 ) -> Result<PreslidingFit, Error> {
     let file = log.path.display().to_string();
     let known = robot.mechanism.rate_names();
@@ -93,6 +94,8 @@ pub(super) fn find(
         ..crate::config::LogConfig::default()
     };
     let loaded = logs::load(&plain, &robot.axes, &config.columns, None)?;
+    let presliding = |input: &InputRecord| InputRecord { kind: "presliding".to_owned(), ..input.clone() };
+    inputs.extend(loaded.inputs.iter().map(presliding));
     warnings.extend(logs::temperature_warnings(&loaded.log));
     let grid = on_grid(&loaded)?;
     let unknown = || FrictionError::NoSteadyLaw { file: file.clone(), joint: log.joint.clone() };

@@ -13,7 +13,6 @@ use super::model::{
 use super::{FrictionIdentification, IdentifiedJoint, PreslidingFit};
 use crate::Error;
 use crate::estimate::{InputRecord, Provenance};
-use crate::logs::sha256;
 
 /// Names of coefficients in the file, by symbol.
 const NAMES: [(&str, &str); 10] = [
@@ -42,7 +41,7 @@ impl FrictionIdentification {
             robot: self.robot.file.description.name.clone(),
             verdict,
             joints,
-            provenance: provenance(config)?,
+            provenance: provenance(config, self.inputs.clone()),
             warnings: self.warnings.clone(),
         })
     }
@@ -354,16 +353,7 @@ fn verdict(joints: &[JointFrictionModel], warnings: &[String]) -> FrictionVerdic
     FrictionVerdict { status: status.to_owned(), headline: parts.join("; ") }
 }
 
-fn provenance(config: &FrictionConfig) -> Result<Provenance, Error> {
-    let logs = config.log.iter().map(|l| (&l.path, "log"));
-    let slow = config.presliding.iter().map(|l| (&l.path, "presliding"));
-    let inputs = std::iter::once((&config.robot, "robot"))
-        .chain(logs)
-        .chain(slow)
-        .map(|(path, kind)| {
-            Ok(InputRecord { path: path.display().to_string(), kind: kind.to_owned(), sha256: sha256(path)? })
-        })
-        .collect::<Result<Vec<_>, Error>>()?;
+fn provenance(config: &FrictionConfig, inputs: Vec<InputRecord>) -> Provenance {
     let settings = serde_json::to_value(config).unwrap_or_default();
-    Ok(Provenance { version: crate::VERSION.to_owned(), inputs, settings, seed: 0 })
+    Provenance { inputs, settings, ..Provenance::default() }
 }

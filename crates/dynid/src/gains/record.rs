@@ -3,10 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::GainIdentification;
-use crate::Error;
 use crate::config::Config;
 use crate::estimate::{Provenance, SCHEMA};
-use crate::result::provenance;
+use crate::provenance::provenance;
 
 /// t-value of `1/g` above which a gain is determined.
 pub(super) const LEAST_T: f64 = 5.0;
@@ -106,10 +105,7 @@ pub struct GainsFile {
 
 impl GainIdentification {
     /// The result in full.
-    ///
-    /// # Errors
-    /// [`Error::Read`] if an input file cannot be hashed any more.
-    pub fn file(&self, config: &Config) -> Result<GainsFile, Error> {
+    pub fn file(&self, config: &Config) -> GainsFile {
         let p = &self.payload;
         let known = match (p.com, p.inertia) {
             (Some(_), Some(_)) => "mass, centre of mass and inertia",
@@ -117,7 +113,7 @@ impl GainIdentification {
             _ => "mass alone; its centre of mass and inertia have columns of their own",
         };
         let determined = self.joints.iter().any(|j| j.gain.is_some());
-        Ok(GainsFile {
+        GainsFile {
             schema: SCHEMA,
             robot: self.robot.clone(),
             payload: p.name.clone(),
@@ -128,7 +124,7 @@ impl GainIdentification {
             variance_inflation: self.fitted.inflation,
             status: if determined { "ok" } else { "fail" }.to_owned(),
             warnings: self.warnings.clone(),
-            provenance: provenance(config)?,
-        })
+            provenance: provenance(config, self.inputs.clone()),
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynid_io::TrajectoryFile;
+use dynid_io::{SourceFile, TrajectoryFile};
 use dynid_motion::Log;
 
 use crate::Error;
@@ -10,24 +10,29 @@ use crate::Error;
 /// Channel that tells approach (0), record (1) and return (2) apart.
 const PHASE: &str = "phase";
 
-/// The record without approach and return, and its period, s.
+/// The record without approach and return, its period, s, and the trajectory file as it was read.
 ///
 /// With a channel `phase`, rows of phase 1 are kept. Without one the log is taken to start with the approach if it is long
 /// enough for approach and record, else to be the record alone. Nothing is cut unless `cut`.
 ///
 /// `joints`: joints of the robot, which those of the file must be among.
-pub(super) fn record(log: Log, path: &Path, joints: &[String], cut: bool) -> Result<(Log, f64), Error> {
-    let file = TrajectoryFile::read(path)?;
+pub(super) fn record(
+    log: Log,
+    path: &Path,
+    joints: &[String],
+    cut: bool,
+) -> Result<(Log, f64, SourceFile), Error> {
+    let (file, source) = TrajectoryFile::read_source(path)?;
     check_joints(&file, path, joints)?;
     let period_s = file.motion.period();
     if !cut {
-        return Ok((log, period_s));
+        return Ok((log, period_s, source));
     }
     let rows = match log.channels().iter().find(|c| c.name == PHASE) {
         Some(phase) => rows_of_record(&phase.values),
         None => rows_by_time(log.time(), &file),
     };
-    Ok((log.slice(rows)?, period_s))
+    Ok((log.slice(rows)?, period_s, source))
 }
 
 /// From the first to the last row of phase 1.

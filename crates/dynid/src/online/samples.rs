@@ -53,6 +53,7 @@ impl Samples {
                 columns: vec![Vec::with_capacity(BATCH); header.len()],
                 rows: 0,
                 first_row: 1,
+                sha256: String::new(),
             },
             name: name.to_owned(),
             mapping,

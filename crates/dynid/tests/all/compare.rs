@@ -32,5 +32,5 @@ fn estimators_are_ranked_on_time_they_did_not_see() {
         a.name == b.name && a.error == b.error && a.joints == b.joints
     };
     assert!(found.estimators.iter().zip(&again.estimators).all(|(a, b)| same(a, b)));
-    assert!(found.report(&config).unwrap().contains("Comparison of estimators"));
+    assert!(found.report().unwrap().contains("Comparison of estimators"));
 }
