@@ -13,6 +13,7 @@
 //! | rows spoilt by noise that a control loop feeds back | [`instruments`] |
 //! | shape parameters beside linear ones | [`separable`] |
 //! | clearance of a joint from its journal, or from the effort alone | [`clearance`] |
+//! | compliance of joints from encoders on both sides of their gears | [`deformation`] |
 //! | friction laws from constant-speed tests | [`steady_friction`] |
 //! | friction that follows reaction forces | [`load_friction`] |
 //! | covariance that survives filtering | [`covariance`] |
@@ -33,6 +34,7 @@ pub mod conditioning;
 pub mod consistent;
 pub mod covariance;
 pub mod cyclic;
+pub mod deformation;
 pub mod distribution;
 pub mod drive_gain;
 pub mod elimination;

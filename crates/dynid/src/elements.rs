@@ -8,7 +8,7 @@ mod pairs;
 mod settings;
 
 pub use elastic::ElasticFault;
-pub(crate) use elastic::stated_springs;
+pub(crate) use elastic::{ELASTIC, stated_springs};
 pub use pairs::AlikeElements;
 
 use std::sync::Arc;

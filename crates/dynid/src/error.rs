@@ -49,7 +49,7 @@ pub enum Error {
         /// Log file.
         file: String,
         /// The fault.
-        source: dynid_io::MappingError,
+        source: Box<dynid_io::MappingError>,
     },
     /// Columns of a log do not fit the reading that an estimate records.
     #[error("{file}: {source}; columns are those by which the logs of {estimate} were read")]
@@ -59,7 +59,7 @@ pub enum Error {
         /// Estimate file.
         estimate: String,
         /// The fault.
-        source: dynid_io::MappingError,
+        source: Box<dynid_io::MappingError>,
     },
     /// Signals of a log contradict each other.
     #[error(transparent)]

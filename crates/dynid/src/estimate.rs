@@ -26,6 +26,7 @@ use crate::Error;
 use crate::identify::OwnDelay;
 use crate::log_agreement::LogAgreement;
 pub use crate::provenance::ReadingRecord;
+use crate::stiffness::JointStiffness;
 
 /// Version of the file's layout.
 pub const SCHEMA: u32 = 1;
@@ -67,6 +68,9 @@ pub struct Estimate {
     /// Factors on the friction of single logs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub log_scales: Vec<LogScale>,
+    /// Stiffness of elastic joints as the deformation between their encoders tells it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stiffness: Vec<JointStiffness>,
     /// Base parameters.
     pub base_parameters: Vec<BaseValue>,
     /// Parameters that enter the effort nonlinearly.

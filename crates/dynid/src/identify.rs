@@ -32,7 +32,7 @@ use crate::check::{self, Finding, Severity};
 use crate::config::{Config, LogConfig, Preflight, Route};
 use crate::consistency::Consistent;
 use crate::elements::ElementPlan;
-use crate::estimate::{ExportedRecord, InputRecord, LogFit};
+use crate::estimate::{ExportedRecord, InputRecord, LogFit, ReadingRecord};
 use crate::export::FileModels;
 use crate::fitting::Fitted;
 use crate::friction_power::FrictionPower;
@@ -44,6 +44,7 @@ use crate::passivity::SPEED_SPAN_S;
 use crate::prior::Prior;
 use crate::robot::{Robot, RobotOptions, refuse_internal_load};
 use crate::shape::{self, ShapeFit};
+use crate::stiffness::{self, JointStiffness};
 use crate::trust::{Evidence, Trust};
 pub(crate) use model_fit::{ModelFit, fit as fit_model};
 pub use own_delay::OwnDelay;
@@ -99,6 +100,11 @@ pub struct Identification {
     pub columns: Vec<Vec<(String, String)>>,
     /// Files as they were read.
     pub inputs: Vec<InputRecord>,
+    /// How logs were read.
+    pub(crate) reading: ReadingRecord,
+    /// Stiffness of elastic joints by their deformation; empty without encoders on both sides of gears, and where sensors
+    /// measure the load.
+    pub stiffness: Vec<JointStiffness>,
     /// Choices of the compact route; `None` on the textbook route.
     pub conditioning: Option<Conditioning>,
     /// Per output: friction shapes chosen beside the elements asked for, and candidates that were not; empty where none
@@ -166,17 +172,43 @@ pub struct Identification {
 
 /// Reads robot and logs, conditions, fits, validates.
 ///
+/// Elastic joints without sensors of their load, whose stiffness in the fit is not borne out by the deformation that their encoders show,
+/// are taken as stiff ones: the result is that of [`Identification::stiffness`] beside a model of stiff joints.
+///
 /// # Errors
 /// [`Error`]: bad input. A rank-deficient log is a status of the result, not an error.
 pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Identification, Error> {
     config.demand_inputs()?;
     config.check_effect()?;
+    config.check()?;
+    progress(Step::Read(config.robot.display().to_string()));
+    let robot = load_robot(config)?;
+    let mut found = run(config, robot, &mut progress)?;
+    let stiffness = stiffness::of(&found)?;
+    if stiffness.iter().all(JointStiffness::is_borne_out) {
+        found.stiffness = stiffness;
+        return Ok(found);
+    }
+    let elastic = load_robot(config)?;
+    let stiff = stiffness::stiff_config(config, &elastic)?;
+    let mut found = run(&stiff, stiffness::stiff_robot(&elastic)?, &mut progress)?;
+    found.warnings.push(format!(
+        "the deformation does not bear out the stiffness that rows of links and motors give: joints are taken as stiff, read at their \
+         motors, and their stiffness is that of the deformation: {}",
+        stiffness.iter().map(JointStiffness::words).collect::<Vec<_>>().join("; ")
+    ));
+    found.stiffness = stiffness;
+    Ok(found)
+}
+
+/// One run with a robot as it was read.
+fn run(config: &Config, robot: Robot, mut progress: &mut impl FnMut(Step)) -> Result<Identification, Error> {
     let settings = config.conditioning_settings();
     let reference_trajectory = config.instruments.as_ref().and_then(|table| table.trajectory.as_ref());
     let reference_trajectory = reference_trajectory.map(TrajectoryFile::read_source).transpose()?;
     let reference_trajectory = reference_trajectory.map(|(_, source)| InputRecord::of("trajectory", &source));
     let Opened { robot, loaded, mut plan, model, logs: prepared, structure, own_delays, findings } =
-        open(config, &mut progress)?;
+        open_robot(config, robot, progress)?;
     let (model, conditioning) = match config.conditioning.route {
         Route::Compact => {
             let stages = |stage| progress(Step::Conditioning(stage));
@@ -239,13 +271,16 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     let log_agreement = log_agreement::test(config, &model, &base, &fitted, &plan.log_terms, scale);
     warnings.extend(log_agreement.iter().flat_map(LogAgreement::warnings));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
+    let understood: Vec<_> = loaded.iter().map(|l| l.columns.clone()).collect();
     let mut inputs = InputRecord::of_robot(&robot);
     inputs.extend(InputRecord::of_logs(&loaded));
     let mut out = Identification {
         inputs,
+        reading: ReadingRecord::of(config, &understood),
+        stiffness: Vec::new(),
         plan,
         base,
-        columns: loaded.into_iter().map(|l| l.columns).collect(),
+        columns: understood,
         conditioning,
         friction,
         prior,
@@ -503,15 +538,22 @@ pub(crate) struct Opened {
 pub(crate) fn open(config: &Config, progress: &mut impl FnMut(Step)) -> Result<Opened, Error> {
     config.check()?;
     config.demand_inputs()?;
-    let settings = config.conditioning_settings();
     progress(Step::Read(config.robot.display().to_string()));
+    open_robot(config, load_robot(config)?, progress)
+}
+
+fn load_robot(config: &Config) -> Result<Robot, Error> {
     let options = RobotOptions {
         gravity: config.gravity,
         couple_mimics: config.couple_mimics.unwrap_or(false),
         floating_base: false,
         locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
     };
-    let robot = Robot::load(&config.robot, &options)?;
+    Robot::load(&config.robot, &options)
+}
+
+fn open_robot(config: &Config, robot: Robot, progress: &mut impl FnMut(Step)) -> Result<Opened, Error> {
+    let settings = config.conditioning_settings();
     if robot.closed.is_none() && robot.mechanism.positions() != robot.mechanism.rates() {
         return Err(Error::Unsupported(
             "a floating base cannot be identified from joint logs: lock the base or leave it out".to_owned(),

@@ -39,6 +39,7 @@ mod result;
 pub mod robot;
 pub mod shape;
 pub mod simulate;
+pub mod stiffness;
 pub mod trust;
 pub mod validate;
 pub mod verdict;

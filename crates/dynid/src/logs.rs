@@ -106,7 +106,7 @@ fn read(
     let table = dynid_io::csv::read(&config.path, &options)?;
     let spec = config.columns.as_ref().unwrap_or(run_columns);
     let joints = names(axes);
-    let named = |source| Error::Columns { file: file.clone(), source };
+    let named = |source| Error::Columns { file: file.clone(), source: Box::new(source) };
     let mapping = map_columns(&table.header, axes, spec).map_err(named)?;
     if spec.position.is_none() {
         check_surplus(&mapping, &joints, &table.header, &file)?;

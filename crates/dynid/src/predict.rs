@@ -49,7 +49,7 @@ fn with_recorded_columns(
         allow_no_effort: true,
         ..columns.clone()
     };
-    let named = |source| Error::Columns { file: table.source.clone(), source };
+    let named = |source| Error::Columns { file: table.source.clone(), source: Box::new(source) };
     let mapping = logs::map_columns(&table.header, &logs::axes(model), &spec).map_err(named)?;
     let signals = mapping.extract(&table).map_err(named)?;
     let mut columns = signals.channels;

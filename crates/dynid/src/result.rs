@@ -16,7 +16,7 @@ use crate::estimate::{
     ModelRecord, ParameterValue, Provenance, RankStatus, SCHEMA, ShapeValue,
 };
 use crate::identify::Identification;
-use crate::provenance::{ReadingRecord, provenance};
+use crate::provenance::provenance;
 use crate::shape;
 use crate::trust::ParameterTrust;
 use crate::verdict;
@@ -62,6 +62,7 @@ impl Identification {
             base_parameters: self.base_values(),
             shape_parameters: self.robot_shapes(),
             log_scales: self.log_scales(),
+            stiffness: self.stiffness.clone(),
             friction_passivity: self.friction_passivity(),
             feasible: self.unphysical_bodies().is_empty(),
             consistency: self.consistency_record(config),
@@ -78,7 +79,7 @@ impl Identification {
             conditioning: self.conditioning_record(config),
             model,
             provenance: Provenance {
-                reading: Some(ReadingRecord::of(config, &self.columns)),
+                reading: Some(self.reading.clone()),
                 ..provenance(config, self.inputs.clone())
             },
         })

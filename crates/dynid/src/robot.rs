@@ -122,6 +122,16 @@ impl Robot {
         Ok(robot)
     }
 
+    /// The same robot with another file.
+    ///
+    /// # Errors
+    /// As [`Robot::load`].
+    pub(crate) fn changed(&self, change: impl FnOnce(&mut RobotFile)) -> Result<Robot, Error> {
+        let mut file = self.file.clone();
+        change(&mut file);
+        Self::compile(&self.path, file, &[])
+    }
+
     /// The robot with its springs and without any other element; no bodies act where sensors measure the load.
     ///
     /// # Errors

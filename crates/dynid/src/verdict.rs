@@ -13,6 +13,7 @@ pub(crate) use instruments::in_words as closed_loop_bias_in_words;
 use crate::consistency::UNCONSTRAINED;
 use crate::estimate::{CheckResult, Verdict};
 use crate::identify::Identification;
+use crate::stiffness::JointStiffness;
 
 /// How bad a check came out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -78,6 +79,7 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
     checks.extend(mask(id));
     checks.push(blocks(id));
     checks.extend(consistency(id));
+    checks.extend(stiffness(id));
     checks.extend(whiteness(id));
     checks.extend(instruments::instruments(id));
     checks.extend(instruments::closed_loop_bias(id));
@@ -123,6 +125,28 @@ fn unphysical(id: &Identification) -> impl Iterator<Item = String> {
             "the identified body `{body}` {fault}: the split of what is seen into its ten parameters is not physical; \
              predictions are not affected, but a simulator may refuse the robot file"
         )
+    })
+}
+
+/// Stiffness that no log tells is no fault of the model, whose joints are stiff ones then.
+fn stiffness(id: &Identification) -> Option<(Status, CheckResult)> {
+    let told = id.stiffness.iter().filter(|s| s.stiffness.is_some()).count();
+    let all = id.stiffness.len();
+    let words: Vec<String> = id.stiffness.iter().map(JointStiffness::words).collect();
+    let status = Status::of(id.stiffness.iter().all(JointStiffness::is_borne_out), true);
+    let meaning = match status {
+        Status::Ok => {
+            format!("the deformation of the joints bears the stiffness of the fit out: {}", words.join("; "))
+        }
+        _ => format!(
+            "rows of links behind springs tell no stiffness here, so joints are taken as stiff ones; by their deformation: {}; a stiffness \
+             has the scale of the efforts: 5 % in a torque constant are 5 % in it",
+            words.join("; ")
+        ),
+    };
+    (all > 0).then(|| {
+        let limit = format!("all {all} joints");
+        check(status, "stiffness told by deformation", Some(told as f64), "", &limit, meaning)
     })
 }
 

@@ -9,6 +9,7 @@ mod clearance;
 mod conditioned_rows;
 mod consistent_golden;
 mod consistent_random;
+mod deformation;
 mod determinism;
 mod double_double;
 mod er16;

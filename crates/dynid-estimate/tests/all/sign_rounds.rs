@@ -1,5 +1,4 @@
 //! Signs of reactions that no solution keeps.
-#![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use dynid_estimate::Mat;
 use dynid_estimate::load_friction::{

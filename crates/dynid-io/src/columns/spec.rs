@@ -132,6 +132,49 @@ fn one() -> f64 {
     1.0
 }
 
+/// All columns in full: what was found by name is stated, in SI units.
+impl From<&ColumnMapping> for MappingSpec {
+    fn from(mapping: &ColumnMapping) -> Self {
+        let (time, rate_hz) = match &mapping.time {
+            TimeSource::Column(time) => (Some(in_full(&[Some(time.clone())], "s")), None),
+            TimeSource::Rate(hz) => (None, Some(*hz)),
+        };
+        let signal = |list: &Option<Vec<Option<ColumnUse>>>, unit: &str| Some(in_full(list.as_ref()?, unit));
+        let channel = |(name, column): &(String, ColumnUse)| {
+            let ColumnUse { name: of, factor, offset, .. } = column.clone();
+            (name.clone(), ChannelSpec { column: of, scale: factor, offset })
+        };
+        MappingSpec {
+            time,
+            rate_hz,
+            position: Some(in_full(&mapping.position, "SI")),
+            velocity: signal(&mapping.velocity, "SI"),
+            acceleration: signal(&mapping.acceleration, "SI"),
+            effort: signal(&mapping.effort, "SI"),
+            temperature: signal(&mapping.temperature, "degC"),
+            channels: mapping.channels.iter().map(channel).collect(),
+            current_gains: None,
+            allow_unlogged: mapping.position.iter().any(Option::is_none),
+            allow_no_effort: mapping.effort.is_none(),
+        }
+    }
+}
+
+/// `{ columns, unit, scale, offset }`.
+fn in_full(list: &[Option<ColumnUse>], unit: &str) -> SignalSpec {
+    let number = |of: fn(&ColumnUse) -> f64, without: f64| -> Vec<f64> {
+        list.iter().map(|c| c.as_ref().map_or(without, of)).collect()
+    };
+    let name = |c: &Option<ColumnUse>| c.as_ref().map_or_else(String::new, |c| c.name.clone());
+    let moved = list.iter().flatten().any(|c| c.offset != 0.0);
+    SignalSpec::Full(FullSignal {
+        columns: ColumnNames::List(list.iter().map(name).collect()),
+        unit: Some(Units::One(unit.to_owned())),
+        scale: Some(PerJoint::List(number(|c| c.factor, 1.0))),
+        offset: moved.then(|| PerJoint::List(number(|c| c.offset, 0.0))),
+    })
+}
+
 impl ColumnMapping {
     /// Assigns columns as a configuration says, and the rest by name.
     ///

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use dynid_estimate::preflight::Wiring;
-use dynid_io::ColumnMapping;
 use dynid_io::columns::{ColumnUse, TimeSource};
+use dynid_io::{ColumnMapping, MappingSpec};
 use toml::{Table, Value};
 
 use super::finding::Fix;
@@ -177,42 +177,11 @@ impl Mapped {
                 _ => {}
             }
         }
-        let mut out = Table::new();
-        match (rate, &mapping.time) {
-            (Some(hz), _) => drop(out.insert("rate_hz".to_owned(), Value::Float(hz))),
-            (None, TimeSource::Rate(hz)) => drop(out.insert("rate_hz".to_owned(), Value::Float(*hz))),
-            (None, TimeSource::Column(time)) => {
-                out.insert("time".to_owned(), Value::Table(signal(&[Some(time.clone())], Some("s"))));
-            }
+        if let Some(hz) = rate {
+            mapping.time = TimeSource::Rate(hz);
         }
-        let lists = [
-            ("position", Some(&mapping.position)),
-            ("velocity", mapping.velocity.as_ref()),
-            ("acceleration", mapping.acceleration.as_ref()),
-            ("effort", mapping.effort.as_ref()),
-            ("temperature", mapping.temperature.as_ref()),
-        ];
-        for (name, list) in lists {
-            if let Some(list) = list {
-                let unit = if name == "temperature" { Some("degC") } else { None };
-                out.insert(name.to_owned(), Value::Table(signal(list, unit)));
-            }
-        }
-        if !mapping.channels.is_empty() {
-            let channels = mapping.channels.iter().map(|(name, column)| {
-                let entry = Table::from_iter([
-                    ("column".to_owned(), Value::String(column.name.clone())),
-                    ("scale".to_owned(), Value::Float(column.factor)),
-                    ("offset".to_owned(), Value::Float(column.offset)),
-                ]);
-                (name.clone(), Value::Table(entry))
-            });
-            out.insert("channels".to_owned(), Value::Table(channels.collect()));
-        }
-        if mapping.position.iter().any(Option::is_none) {
-            out.insert("allow_unlogged".to_owned(), Value::Boolean(true));
-        }
-        out
+        let spec = MappingSpec { allow_no_effort: false, ..MappingSpec::from(&mapping) };
+        Table::try_from(spec).unwrap_or_else(|e| unreachable!("columns are plain values: {e}"))
     }
 }
 
@@ -245,19 +214,6 @@ fn rewire(
             list[*place] = scaled(&of[source], effort.factor, 0.0);
         }
     }
-}
-
-/// `{ columns, unit, scale, offset }`; SI if no unit is given.
-fn signal(list: &[Option<ColumnUse>], unit: Option<&str>) -> Table {
-    let name = |c: &Option<ColumnUse>| Value::String(c.as_ref().map_or_else(String::new, |c| c.name.clone()));
-    let mut out = Table::new();
-    out.insert("columns".to_owned(), Value::Array(list.iter().map(name).collect()));
-    out.insert("unit".to_owned(), Value::String(unit.unwrap_or("SI").to_owned()));
-    out.insert("scale".to_owned(), numbers(list.iter().map(|c| c.as_ref().map_or(1.0, |c| c.factor))));
-    if list.iter().flatten().any(|c| c.offset != 0.0) {
-        out.insert("offset".to_owned(), numbers(list.iter().map(|c| c.as_ref().map_or(0.0, |c| c.offset))));
-    }
-    out
 }
 
 fn read(path: &Path) -> Result<Table, Error> {

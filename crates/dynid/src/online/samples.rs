@@ -37,7 +37,7 @@ impl Samples {
         axes: &[LogAxis],
         columns: &MappingSpec,
     ) -> Result<Samples, Error> {
-        let named = |source| Error::Columns { file: name.to_owned(), source };
+        let named = |source| Error::Columns { file: name.to_owned(), source: Box::new(source) };
         let mapping = logs::map_columns(header, axes, columns).map_err(named)?;
         if columns.position.is_none() {
             logs::check_surplus(&mapping, &logs::names(axes), header, name)?;
@@ -92,7 +92,7 @@ impl Samples {
         if rows == 0 {
             return Ok(Vec::new());
         }
-        let named = |source| Error::Columns { file: self.name.clone(), source };
+        let named = |source| Error::Columns { file: self.name.clone(), source: Box::new(source) };
         let mut signals = self.mapping.extract(&self.rows).map_err(named)?;
         self.rows.columns.iter_mut().for_each(Vec::clear);
         self.rows.rows = 0;

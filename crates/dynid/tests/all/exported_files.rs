@@ -1,7 +1,5 @@
 //! The file that leaves against the model that was judged.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
-
 use crate::support::{UR10E, data, run};
 use dynid::agreement::{Alignment, compare};
 use dynid::export::{CheckStates, RobotExport, Source};
