@@ -20,6 +20,8 @@ const STATED: f64 = 0.3;
 /// Mass over the cube of the reach that gravity shows on arms, kg/m³, with room to either side: six arms of 0.9 to 1.4 m, from 18 to 34 kg,
 /// show 3 to 19 on their logs.
 const ARMS: (f64, f64) = (1.5, 40.0);
+/// Least share of the largest effort that gravity must have to tell of the arm.
+const GRAVITY_OF_EFFORT: f64 = 0.05;
 /// Standard gravity, m/s².
 const G: f64 = 9.81;
 /// Fewest joints that carry each other in an arm.
@@ -69,12 +71,19 @@ pub(super) fn examine(
     let limits = from_limits(bench, trial, wiring, applied);
     // What stands still may stand where gravity does not act.
     let least = if trial.moves.iter().all(|m| *m) { ARMS.0 } else { 0.0 };
-    let arm = density(bench, &identified).map(|(found, joint)| Evidence {
-        ratio: if found < least { found / least } else { (found / ARMS.1).max(1.0) },
-        words: format!(
-            "gravity at `{joint}` asks for {found:.3e} kg per cube of the reach in m, arms that exist for {} to {}",
-            ARMS.0, ARMS.1
-        ),
+    let efforts = trial.samples.efforts(wiring);
+    let arm = density(bench, &identified).and_then(|(found, joint)| {
+        // Springs, offsets, or an axis that stands upright may leave gravity nothing to do.
+        let of_gravity = peak(&identified[joint]) * applied.abs() > GRAVITY_OF_EFFORT * peak(&efforts[joint]);
+        of_gravity.then(|| Evidence {
+            ratio: if found < least { found / least } else { (found / ARMS.1).max(1.0) },
+            words: format!(
+                "gravity at `{}` asks for {found:.3e} kg per cube of the reach in m, arms that exist for {} to {}",
+                bench.model.outputs()[joint].name,
+                ARMS.0,
+                ARMS.1
+            ),
+        })
     });
     let judged = match &file {
         Some(file) => Some(file),
@@ -184,7 +193,7 @@ fn from_limits(bench: &Bench, trial: &Trial<'_>, wiring: &Wiring, applied: f64) 
 }
 
 /// Mass over the cube of the reach that the largest effort of gravity asks for if the mass sits half way out, kg/m³, and the joint.
-fn density(bench: &Bench, at_rest: &[Vec<f64>]) -> Option<(f64, String)> {
+fn density(bench: &Bench, at_rest: &[Vec<f64>]) -> Option<(f64, usize)> {
     let tree = bench.tree()?;
     let depth = |mut body: usize| {
         let mut joints = 1;
@@ -196,16 +205,18 @@ fn density(bench: &Bench, at_rest: &[Vec<f64>]) -> Option<(f64, String)> {
     if (0..tree.bodies().len()).map(depth).max().is_none_or(|joints| joints < ARM_JOINTS) {
         return None;
     }
-    let peak = |signal: &Vec<f64>| signal.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     let (joint, effort) = at_rest
         .iter()
-        .map(peak)
+        .map(|signal| peak(signal))
         .enumerate()
         .filter(|(j, _)| !bench.slides[*j])
         .max_by(|a, b| a.1.total_cmp(&b.1))?;
     let reach = reach(tree, *tree.rate_bodies().get(joint)?);
-    let name = bench.model.outputs()[joint].name.clone();
-    (reach > 0.0 && effort > 0.0).then(|| (effort / (G * 0.5 * reach) / reach.powi(3), name))
+    (reach > 0.0 && effort > 0.0).then(|| (effort / (G * 0.5 * reach) / reach.powi(3), joint))
+}
+
+fn peak(signal: &[f64]) -> f64 {
+    signal.iter().fold(0.0, |m, x| m.max(x.abs()))
 }
 
 /// Way from a body's joint to the end of what it carries, m: to the farthest joint, and once more the last part of that way, since no robot

@@ -3,10 +3,12 @@
 use dynid_estimate::conditioning::PreparedLog;
 use dynid_estimate::deformation::{DeformationRows, Rows, Settings, SumRows};
 use dynid_model::{EffortModel, MotionBlock, RegressorBlock, RobotModel};
+use dynid_motion::SignalError;
 use dynid_motion::difference::central;
 use dynid_motion::filter::{butterworth, forward_backward};
+use dynid_motion::mask::{self, dilate, near_reversal};
 use dynid_motion::shift::shift;
-use dynid_motion::{SignalError, mask};
+use dynid_motion::signal::rms;
 
 use super::Spring;
 use crate::Error;
@@ -18,6 +20,11 @@ const CUTOFF_HZ: f64 = 10.0;
 const PER_PERIOD: f64 = 5.0;
 /// Correlation of residuals that spreads bear, s.
 const CORRELATED_S: f64 = 0.4;
+/// Standard deviations of a prior that nobody stated are widened so: it decides only what the logs leave open.
+const PRIOR: f64 = 10.0;
+/// Share of the rms speed below which a joint counts as reversing, with so much to either side, s.
+const REVERSAL: f64 = 0.1;
+const ROUND_S: f64 = 0.1;
 
 /// One log through its filter, away from edges and gaps.
 struct Filtered {
@@ -28,6 +35,8 @@ struct Filtered {
     deformed: Vec<[Vec<f64>; 4]>,
     /// Per output: columns of friction.
     friction: Vec<Vec<usize>>,
+    /// Per output and sample: 1 where the joint moves, 0 where it stands or reverses, since friction has any value there.
+    sliding: Vec<Vec<f64>>,
     samples: usize,
 }
 
@@ -66,10 +75,19 @@ pub(super) fn rows(id: &Identification, springs: &[Spring], lag_s: f64) -> Resul
     let joined = |of: &dyn Fn(&Filtered) -> Vec<f64>| logs.iter().flat_map(of).collect::<Vec<f64>>();
     let column = |output: usize, column: usize| joined(&|l: &Filtered| l.column(output, column));
     let effort = |output: usize| joined(&|l: &Filtered| l.effort[output].clone());
+    // Rows of efforts count where the joint moves.
+    let sliding = |output: usize, mut x: Vec<f64>| {
+        let counts = logs.iter().flat_map(|l| &l.sliding[output]);
+        x.iter_mut().zip(counts).for_each(|(x, counts)| *x *= counts);
+        x
+    };
     let is_elastic = |output: &usize| springs.iter().any(|s| s.link == *output || s.motor == *output);
     let mut sums: Vec<SumRows> = (0..model.outputs().len())
         .filter(|o| !is_elastic(o) && !model.is_undriven(*o))
-        .map(|o| SumRows { regressor: columns.iter().map(|c| column(o, *c)).collect(), effort: effort(o) })
+        .map(|o| {
+            let regressor = columns.iter().map(|c| sliding(o, column(o, *c))).collect();
+            SumRows { regressor, effort: sliding(o, effort(o)) }
+        })
         .collect();
     let added = |a: Vec<f64>, b: Vec<f64>, times: f64| -> Vec<f64> {
         a.iter().zip(&b).map(|(a, b)| a + times * b).collect()
@@ -78,8 +96,8 @@ pub(super) fn rows(id: &Identification, springs: &[Spring], lag_s: f64) -> Resul
     for (j, spring) in springs.iter().enumerate() {
         let both = |c: &usize| added(column(spring.link, *c), column(spring.motor, *c), spring.ratio);
         sums.push(SumRows {
-            regressor: columns.iter().map(both).collect(),
-            effort: added(effort(spring.link), effort(spring.motor), spring.ratio),
+            regressor: columns.iter().map(|c| sliding(spring.motor, both(c))).collect(),
+            effort: sliding(spring.motor, added(effort(spring.link), effort(spring.motor), spring.ratio)),
         });
         // Friction behind the spring is a column of the hysteresis and of the lag.
         let load = |c: &usize| match logs.iter().any(|l| l.friction[spring.link].contains(c)) {
@@ -102,7 +120,8 @@ pub(super) fn rows(id: &Identification, springs: &[Spring], lag_s: f64) -> Resul
             deformation: signal(0),
         });
     }
-    let prior = columns.iter().map(|c| (id.prior.values[*c], id.prior.std[*c])).collect();
+    let width = |c: usize| if id.stated[c].is_some() { 1.0 } else { PRIOR };
+    let prior = columns.iter().map(|c| (id.prior.values[*c], width(*c) * id.prior.std[*c])).collect();
     let lag = (CORRELATED_S * PER_PERIOD * cutoff).ceil() as usize;
     let torque = |spring: &Spring| {
         let mut out = vec![0.0; total];
@@ -134,7 +153,7 @@ fn filtered(
     let filter = butterworth(4, cutoff, rate)?;
     let margin = (2.0 * rate / cutoff).ceil() as usize;
     let mut bad: Vec<bool> = log.usable.iter().map(|u| !u).collect();
-    bad = mask::dilate(&bad, margin);
+    bad = dilate(&bad, margin);
     mask::merge(&mut bad, &mask::edges(n, margin));
     let thin = ((rate / (PER_PERIOD * cutoff)) as usize).max(1);
     let kept: Vec<usize> = (0..n).step_by(thin).filter(|k| !bad[*k]).collect();
@@ -153,6 +172,12 @@ fn filtered(
         ddq.extend(pick(&central(&speed, rate)?));
         speeds.push(speed);
     }
+    let sliding = |speed: &Vec<f64>| {
+        let reversing =
+            dilate(&near_reversal(speed, REVERSAL * rms(speed)), (ROUND_S * rate).ceil() as usize);
+        kept.iter().map(|k| if reversing[*k] { 0.0 } else { 1.0 }).collect()
+    };
+    let sliding: Vec<Vec<f64>> = speeds.iter().map(sliding).collect();
     let deformed = springs
         .iter()
         .map(|spring| {
@@ -184,5 +209,5 @@ fn filtered(
     let friction = (0..model.outputs().len())
         .map(|output| model.friction_columns(output, &shape, &motion).into_iter().map(|(c, _)| c).collect())
         .collect();
-    Ok(Filtered { block, effort, deformed, friction, samples })
+    Ok(Filtered { block, effort, deformed, friction, sliding, samples })
 }
