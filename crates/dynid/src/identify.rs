@@ -189,9 +189,11 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
         found.stiffness = stiffness;
         return Ok(found);
     }
+    let doubts = elastic::warnings(&found.model, &found.logs);
     let elastic = load_robot(config)?;
     let stiff = stiffness::stiff_config(config, &elastic)?;
     let mut found = run(&stiff, stiffness::stiff_robot(&elastic)?, &mut progress)?;
+    found.warnings.extend(doubts);
     found.warnings.push(format!(
         "the deformation does not bear out the stiffness that rows of links and motors give: joints are taken as stiff, read at their \
          motors, and their stiffness is that of the deformation: {}",

@@ -3,7 +3,9 @@
 //! Rows, all at the same instants: *sum rows* `e = S β + ε` (effort of the motors, spring torque eliminated) and per elastic
 //! joint a *deformation row*
 //!
-//!     δ = c T + N b + ν,   T = L β
+//! ```text
+//! δ = c T + N b + ν,   T = L β
+//! ```
 //!
 //! with the compliance `c = 1/k` (rad/(N m)), the load `T` behind the spring and nuisances `N`: zeros of the logs, the lag
 //! between the encoders (column `q̇`), hysteresis (`sign q̇`). Noise sits on the left of both, so each row may be weighted by its own

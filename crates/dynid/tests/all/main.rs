@@ -27,6 +27,7 @@ mod preflight;
 mod preflight_causes;
 mod recorded_logs;
 mod settings;
+mod stiffness;
 mod support;
 mod trust;
 mod two_step;

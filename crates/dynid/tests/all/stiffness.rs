@@ -1,0 +1,213 @@
+//! Stiffness of joints with encoders on both sides of their gears: what the deformation tells takes the place of what the rows of links run to.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use dynid::config::{Config, LogConfig};
+use dynid::estimate::{Estimate, Split};
+use dynid::identify::identify;
+use dynid::robot::{Robot, RobotOptions};
+use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
+use dynid::stiffness::{JointStiffness, StiffnessVerdict};
+use dynid::validate::validate;
+
+use crate::support::data;
+
+/// Geometry, gears and rotors of the data's README; no body is stated.
+const KR300: &str = r#"
+schema = 1
+name = "kr300"
+gravity = [0, 0, 9.81]
+dh = "standard"
+[[joint]]
+name = "a1"
+d = -0.675
+a = 0.35
+alpha = "90deg"
+[[joint]]
+name = "a2"
+d = -0.189
+a = 1.15
+offset = "-90deg"
+[[joint]]
+name = "a3"
+d = 0.189
+a = 0.041
+alpha = "-90deg"
+offset = "180deg"
+[[joint]]
+name = "a4"
+d = -1.0
+alpha = "90deg"
+[[joint]]
+name = "a5"
+alpha = "-90deg"
+[[joint]]
+name = "a6"
+d = -0.24
+alpha = "180deg"
+[element.a1]
+elements = ["coulomb", "viscous"]
+elastic = { ratio = 256.857142857, cubic = false }
+[element.a2]
+elements = ["coulomb", "viscous", "spring"]
+elastic = { ratio = 267.428571429, cubic = false }
+[element.a3]
+elements = ["coulomb", "viscous"]
+elastic = { ratio = 252.333333333, cubic = false }
+[element.a1_motor]
+elements = ["coulomb", "viscous", "offset", "rotor"]
+[element.a2_motor]
+elements = ["coulomb", "viscous", "offset", "rotor"]
+[element.a3_motor]
+elements = ["coulomb", "viscous", "offset", "rotor"]
+"#;
+
+const KR300_RUN: &str = r#"
+robot = "robot.toml"
+[columns.position]
+columns = { a1 = "ql1", a2 = "ql2", a3 = "ql3", a4 = "qm4", a5 = "qm5", a6 = "qm6", a1_motor = "qm1", a2_motor = "qm2", a3_motor = "qm3" }
+scale = { a1_motor = 256.857142857, a2_motor = 267.428571429, a3_motor = 252.333333333 }
+[columns.effort]
+columns = { a1_motor = "tau_motor1", a2_motor = "tau_motor2", a3_motor = "tau_motor3", a4 = "tau_motor4", a5 = "tau_motor5", a6 = "tau_motor6" }
+scale = { a4 = 221.0, a5 = 239.619047619, a6 = 154.323134328 }
+"#;
+
+fn of<'a>(all: &'a [JointStiffness], joint: &str) -> &'a JointStiffness {
+    all.iter().find(|s| s.joint == joint).unwrap()
+}
+
+#[test]
+fn link_rows_of_a_kr300_do_not_make_a_stiffness_of_five() {
+    let Some(data) = data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("robot.toml"), KR300).unwrap();
+    let log = data.join("kuka-kr300/run_a.csv.gz");
+    let text = format!("{KR300_RUN}[[log]]\npath = {log:?}\n");
+    let path = folder.path().join("run.toml");
+    std::fs::write(&path, text).unwrap();
+    let config = Config::read(&path).unwrap();
+    let found = identify(&config, |_| {}).unwrap();
+    let estimate = found.estimate(&config).unwrap();
+    for s in &estimate.stiffness {
+        println!("{} (rows: {:.2e}), {s:?}", s.words(), s.of_rows);
+        // The encoders are 3 ms apart, and what is left is no hysteresis.
+        assert!((2.8e-3..3.2e-3).contains(&s.lag_s.0), "{s:?}");
+        assert!(s.hysteresis.0.abs() < 3.0 * s.hysteresis.1, "{s:?}");
+        // What rows of links run to has left the load of the efforts.
+        assert!(s.slope_of_rows < 0.1 && !s.is_borne_out(), "{s:?}");
+    }
+    let [a1, a2, a3] = ["a1", "a2", "a3"].map(|joint| of(&estimate.stiffness, joint));
+    assert_eq!((a1.stiffness, a1.interval), (None, None));
+    // The intervals hold the values of the machine's owners.
+    for (joint, owners, range) in [(a2, 7.5e6, 5.5e6..1.0e7), (a3, 4.1e6, 4.0e6..6.0e6)] {
+        let (low, high) = joint.interval.unwrap();
+        assert!(range.contains(&joint.stiffness.unwrap()), "{joint:?}");
+        assert!(low < owners && owners < high && low > 2.5e6, "{joint:?}");
+    }
+    // The model that is left is one of stiff joints, which says so and is read without the configuration.
+    assert_eq!(estimate.joints, ["a1", "a2", "a3", "a4", "a5", "a6"]);
+    assert!(
+        estimate.model.elastic.is_empty() && !estimate.parameters.iter().any(|p| p.name.ends_with(".k1"))
+    );
+    let check = estimate.verdict.checks.iter().find(|c| c.name.contains("stiffness")).unwrap();
+    assert_eq!((check.status.as_str(), check.value), ("warn", Some(2.0)));
+    let file = folder.path().join("estimate.json");
+    std::fs::write(&file, estimate.to_json()).unwrap();
+    let read = Estimate::read(&file).unwrap();
+    assert_eq!(read.stiffness, estimate.stiffness);
+    let reading = read.provenance.reading.clone().unwrap();
+    let entry = LogConfig { path: log, ..Default::default() };
+    let again = validate(&read, Split::Consistent, &file, &[entry], &reading.columns, None, None).unwrap();
+    let (own, again) = (&found.training[0].filtered, &again.agreements[0].filtered);
+    assert!((own.relative_error.unwrap() - again.relative_error.unwrap()).abs() < 0.5, "{again:?}");
+}
+
+const ARM: &str = r#"
+schema = 1
+name = "elastic-arm"
+gravity = [0, -9.81, 0]
+dh = "modified"
+[[joint]]
+name = "j1"
+limits = { position = ["-150deg", "150deg"], velocity = 2.0, effort = 200.0 }
+phi = [8.0, 2.0, 0.1, 0, 0.15, 0, 0, 0.85, 0, 0.9]
+[[joint]]
+name = "j2"
+a = 0.5
+limits = { position = ["-150deg", "150deg"], velocity = 2.5, effort = 80.0 }
+phi = [4.0, 0.8, -0.05, 0, 0.05, 0, 0, 0.28, 0, 0.3]
+[element.j1]
+elements = ["coulomb", "viscous"]
+coulomb = { effort = 1.0 }
+viscous = { coefficient = 1.0 }
+elastic = { ratio = 100, k1 = 40000.0, cubic = false }
+[element.j1_motor]
+elements = ["coulomb", "viscous", "rotor"]
+coulomb = { effort = 0.08 }
+viscous = { coefficient = 4e-4 }
+rotor = { inertia = 1.2e-4 }
+[element.j2]
+elements = ["coulomb", "viscous", "elastic"]
+coulomb = { effort = 0.5 }
+viscous = { coefficient = 0.5 }
+elastic = { ratio = -80, motor = "m2", k1 = 20000.0, cubic = false }
+[element.m2]
+elements = ["coulomb", "viscous", "rotor"]
+coulomb = { effort = 0.04 }
+viscous = { coefficient = 2e-4 }
+rotor = { inertia = 6e-5 }
+"#;
+
+/// The simulated log with the links' encoders read late by whole rows.
+fn table(log: &SimulatedLog, late: usize) -> String {
+    let mut text = "t,q_j1,q_j2,q_j1_motor,q_m2,tau_j1_motor,tau_m2\n".to_owned();
+    for row in late..log.time.len() {
+        let q = |k: usize| if k < 2 { log.position[k][row - late] } else { log.position[k][row] };
+        let cells = [log.time[row], q(0), q(1), q(2), q(3), log.effort[2][row], log.effort[3][row]];
+        writeln!(text, "{}", cells.map(|x| x.to_string()).join(",")).unwrap();
+    }
+    text
+}
+
+fn told(late: usize, seed: u64, folder: &Path) -> (Vec<JointStiffness>, Vec<String>) {
+    std::fs::write(folder.join("robot.toml"), ARM).unwrap();
+    let robot = Robot::parse(ARM, Path::new("robot.toml"), &RobotOptions::default()).unwrap();
+    let settings =
+        SimulateSettings { duration_s: 20.0, rate_hz: 1000.0, seed, ..SimulateSettings::default() };
+    let log = simulate(&robot, &settings).unwrap();
+    std::fs::write(folder.join("log.csv"), table(&log, late)).unwrap();
+    let config = folder.join("run.toml");
+    std::fs::write(&config, "robot = \"robot.toml\"\npreflight = \"warn\"\n[[log]]\npath = \"log.csv\"\n")
+        .unwrap();
+    let config = Config::read(&config).unwrap();
+    let found = identify(&config, |_| {}).unwrap();
+    let estimate = found.estimate(&config).unwrap();
+    for s in &estimate.stiffness {
+        println!("late {late}: {} (rows: {:.4e}, slope {:.3})", s.words(), s.of_rows, s.slope_of_rows);
+    }
+    (estimate.stiffness, estimate.joints)
+}
+
+#[test]
+fn encoders_read_at_different_times_do_not_make_a_stiffness() {
+    let folder = tempfile::tempdir().unwrap();
+    let truth = [("j1", 40000.0), ("j2", 20000.0)];
+    let (stiffness, joints) = told(0, 1, folder.path());
+    assert_eq!(joints, ["j1", "j2", "j1_motor", "m2"], "what the deformation bears out stays");
+    for (joint, k) in truth {
+        let s = of(&stiffness, joint);
+        assert!((s.compliance - 1.0 / k).abs() < 3.0 * s.compliance_std, "{s:?}");
+        assert!(s.is_borne_out() && (s.of_rows / k - 1.0).abs() < 0.05, "{s:?}");
+    }
+    let (stiffness, joints) = told(3, 1, folder.path());
+    assert_eq!(joints, ["j1", "j2"], "what it does not is gone");
+    for (joint, k) in truth {
+        let s = of(&stiffness, joint);
+        assert!((s.compliance - 1.0 / k).abs() < 3.0 * s.compliance_std, "{s:?}");
+        assert!(matches!(s.verdict, StiffnessVerdict::Told | StiffnessVerdict::Coarse), "{s:?}");
+        assert!((s.lag_s.0 - 3e-3).abs() < 2e-4, "{s:?}");
+    }
+}
