@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) use stiff::{stiff_config, stiff_robot};
 
 use crate::Error;
+use crate::elements::ElementPlan;
 use crate::identify::Identification;
 use rows::{LogRows, rows};
 
@@ -168,6 +169,18 @@ pub(crate) fn of(id: &Identification) -> Result<Vec<JointStiffness>, Error> {
     let Some((all, found, here)) = last else { return Ok(Vec::new()) };
     let one = |(j, spring)| told(id, spring, j, (&all, &found), here);
     Ok(springs.iter().enumerate().map(one).collect())
+}
+
+/// What to know about a stiffness where the deformation is not asked, in words.
+pub(crate) fn of_rows_alone(plan: &ElementPlan) -> Option<String> {
+    let joints: Vec<&str> = plan.elastic.iter().filter(|e| !e.sensor).map(|e| e.joint.as_str()).collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "stiffness of `{}` is that of the rows of links, whose effort is zero: it falls to nothing where encoders are read at different \
+             times or gears have errors of their own; `dynid identify` compares it with the deformation",
+            joints.join("`, `")
+        )
+    })
 }
 
 fn told(

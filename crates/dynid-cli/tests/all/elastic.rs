@@ -86,7 +86,8 @@ fn motors_behind_springs_pass_through_all_commands() {
         .output()
         .unwrap();
     assert!(matches!(stream.status.code(), Some(0 | 1)), "{}", String::from_utf8_lossy(&stream.stderr));
-    assert!(String::from_utf8(stream.stdout).unwrap().contains("j1.k1"));
+    let events = String::from_utf8(stream.stdout).unwrap();
+    assert!(events.contains("j1.k1") && events.contains("is that of the rows of links"), "{events}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Every robot of the repository through simulate, identify, predict, validate and export, each from what the one before wrote.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
 
 use std::path::{Path, PathBuf};
 

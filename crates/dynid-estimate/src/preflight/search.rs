@@ -137,11 +137,12 @@ impl Trial<'_> {
         }
     }
 
-    /// Standard parameters of bodies that can exist, as they explain a wiring best; `None` where there are none.
-    pub fn parameters(&self, wiring: &Wiring) -> Option<Vec<f64>> {
+    /// Standard parameters of bodies that can exist, as they explain a wiring best, with their misfit; `None` where there are none.
+    pub fn parameters(&self, wiring: &Wiring) -> Option<(Vec<f64>, f64)> {
         let samples = self.samples_at(wiring.delay_s)?;
         let factor = self.rows(&samples, wiring).ok()?.weighted(wiring);
-        estimate(&(self.problem)(&factor), &self.settings()).ok().map(|found| found.x)
+        let found = estimate(&(self.problem)(&factor), &self.settings()).ok()?;
+        Some((found.x, found.objective + factor.rho().powi(2)))
     }
 
     fn settings(&self) -> Settings {

@@ -260,7 +260,7 @@ fn tally(arms: impl Iterator<Item = (Made, u64)>) -> Tally {
 fn total_deviations_of_simulated_arms_cover() {
     for (size, stiffness, hysteresis) in [(0.01, 1e4, 0.0), (0.01, 1e5, 1e-4), (1.0, 5e6, 5e-4)] {
         let arm = Made { size, stiffness, hysteresis, once_per_turn: 0.0, amplitude: 0.8 };
-        let found = tally((0..30).map(|seed| (arm, seed)));
+        let found = tally((0..40).map(|seed| (arm, seed)));
         println!(
             "k {stiffness:.0e}: within three {:.3}, told {:.2}, of these within two {:.3}, median {:.4}, worst told {:.3}",
             found.held, found.told, found.told_held, found.middle, found.worst_told
@@ -275,7 +275,7 @@ fn total_deviations_of_simulated_arms_cover() {
 fn errors_of_encoders_once_per_turn_are_in_the_deviation() {
     for amplitude in [0.8, 0.4, 0.2] {
         let arm = Made { size: 1.0, stiffness: 5e6, hysteresis: 1e-4, once_per_turn: 1e-4, amplitude };
-        let found = tally((0..50).map(|seed| (arm, seed)));
+        let found = tally((0..100).map(|seed| (arm, seed)));
         println!(
             "amplitude {amplitude}: within three {:.3}, told {:.2}, of these within two {:.3}, worst told {:.3}",
             found.held, found.told, found.told_held, found.worst_told

@@ -20,6 +20,8 @@ const STATED: f64 = 0.3;
 /// Mass over the cube of the reach that gravity shows on arms, kg/m³, with room to either side: six arms of 0.9 to 1.4 m, from 18 to 34 kg,
 /// show 3 to 19 on their logs.
 const ARMS: (f64, f64) = (1.5, 40.0);
+/// Factors of all efforts at which bodies are looked for.
+const SIZES: [f64; 7] = [1.0, 0.1, 10.0, 1e-2, 1e2, 1e-3, 1e3];
 /// Least share of the largest effort that gravity must have to tell of the arm.
 const GRAVITY_OF_EFFORT: f64 = 0.05;
 /// Standard gravity, m/s².
@@ -56,7 +58,7 @@ pub(super) fn examine(
     (velocities, known, applied): (bool, bool, f64),
     out: &mut Findings<'_>,
 ) -> Result<(), Error> {
-    let Some(mut identified) = trial.parameters(wiring) else { return Ok(()) };
+    let Some(mut identified) = at_any_size(trial, wiring) else { return Ok(()) };
     identified.iter_mut().for_each(|x| *x /= applied);
     let bodies = 10 * prior.bodies.len();
     identified[bodies..].fill(0.0);
@@ -110,6 +112,19 @@ pub(super) fn examine(
         finding.fixes = vec![Fix::Wiring { wiring: wiring.clone(), velocities }];
     }
     Ok(())
+}
+
+/// Parameters that explain a wiring best, its efforts of any size: a prior of bodies would keep those of another unit small.
+fn at_any_size(trial: &Trial<'_>, wiring: &Wiring) -> Option<Vec<f64>> {
+    let sized = |factor: f64| {
+        let mut sized = wiring.clone();
+        sized.effort.iter_mut().for_each(|e| e.factor *= factor);
+        let (mut x, misfit) = trial.parameters(&sized)?;
+        x.iter_mut().for_each(|x| *x /= factor);
+        Some((x, misfit))
+    };
+    let found = SIZES.into_iter().filter_map(sized);
+    found.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(x, _)| x)
 }
 
 /// Whether the robot file states bodies of its own: not none, and not the same for all.

@@ -22,6 +22,7 @@ use crate::identify::stated_values;
 use crate::logs::{self, LogAxis};
 use crate::prior::{self, Prior};
 use crate::robot::{Robot, RobotOptions, refuse_loops};
+use crate::stiffness;
 use crate::{Error, advice, bounds};
 
 /// Rows per base parameter that a stretch must give.
@@ -73,6 +74,7 @@ impl Structure {
         let mut warnings = robot.warnings.clone();
         warnings.extend(robot.clearance_warnings());
         warnings.extend(plan.alike(&robot.mechanism).iter().map(ToString::to_string));
+        warnings.extend(stiffness::of_rows_alone(&plan));
         Ok(Structure {
             regrouping: advice::regrouping(&base),
             bounds: bounds::rows(&config.bound, &model)?,

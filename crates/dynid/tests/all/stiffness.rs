@@ -1,6 +1,6 @@
 //! Stiffness of joints with encoders on both sides of their gears: what the deformation tells takes the place of what the rows of links run to.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
 
 use std::fmt::Write as _;
 use std::path::Path;
