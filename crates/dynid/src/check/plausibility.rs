@@ -21,7 +21,9 @@ const STATED: f64 = 0.3;
 /// show 3 to 19 on their logs.
 const ARMS: (f64, f64) = (1.5, 40.0);
 /// Factors of all efforts at which bodies are looked for.
-const SIZES: [f64; 7] = [1.0, 0.1, 10.0, 1e-2, 1e2, 1e-3, 1e3];
+const SIZES: [f64; 6] = [0.1, 10.0, 1e-2, 1e2, 1e-3, 1e3];
+/// A misfit is clearly less if it falls to this share, and by so much.
+const CLEARLY: (f64, f64) = (0.6, 40.0);
 /// Least share of the largest effort that gravity must have to tell of the arm.
 const GRAVITY_OF_EFFORT: f64 = 0.05;
 /// Standard gravity, m/s².
@@ -123,8 +125,11 @@ fn at_any_size(trial: &Trial<'_>, wiring: &Wiring) -> Option<Vec<f64>> {
         x.iter_mut().for_each(|x| *x /= factor);
         Some((x, misfit))
     };
-    let found = SIZES.into_iter().filter_map(sized);
-    found.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(x, _)| x)
+    let (x, misfit) = sized(1.0)?;
+    let other = SIZES.into_iter().filter_map(sized).min_by(|a, b| a.1.total_cmp(&b.1));
+    // As large a gain as a difference of columns must have: friction alone is of any size.
+    let better = other.filter(|(_, other)| *other < CLEARLY.0 * misfit && misfit - other > CLEARLY.1);
+    Some(better.map_or(x, |(x, _)| x))
 }
 
 /// Whether the robot file states bodies of its own: not none, and not the same for all.
