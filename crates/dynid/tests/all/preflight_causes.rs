@@ -169,12 +169,12 @@ fn reads_as(clean: &Record, config: &Config, spoilt_rows: usize) -> Result<(), S
     Ok(())
 }
 
-/// Spoils a robot's log in every way; how many were named first, of how many. No remedy written is wrong, no clean log is refused.
-fn spoil(name: &str, clean: &Record) -> (usize, usize) {
+/// Spoils a robot's log in every way; the causes that were not named first. No remedy written is wrong, no clean log is refused.
+fn spoil(name: &str, clean: &Record) -> Vec<&'static str> {
     let folder = tempfile::tempdir().unwrap();
     let found = check(&clean.write(folder.path(), "clean"), |_| {}).unwrap();
     assert!(errors(&found).is_empty(), "{name}, clean: {:#?}", errors(&found));
-    let (mut named, mut tried) = (0, 0);
+    let mut missed = Vec::new();
     for (cause, id, corrupt) in causes() {
         let mut record = clean.clone();
         corrupt(&mut record);
@@ -184,9 +184,8 @@ fn spoil(name: &str, clean: &Record) -> (usize, usize) {
         let worse = |f: &&dynid::check::Finding| f.severity != Severity::Info && !of_record.contains(&f.id);
         let first = found.findings.iter().find(worse);
         let right = first.is_some_and(|f| f.id == id);
-        tried += 1;
-        named += usize::from(right);
         if !right {
+            missed.push(cause);
             println!("{name}, {cause}: {:?}", first.map(|f| (f.id, &f.joint, &f.evidence)));
         }
         let faults: Vec<_> = found.mended().filter(|f| f.severity == Severity::Error).collect();
@@ -204,7 +203,7 @@ fn spoil(name: &str, clean: &Record) -> (usize, usize) {
         let again = check(&corrected, |_| {}).unwrap();
         assert!(errors(&again).is_empty(), "{name}, {cause}, put right: {:#?}", errors(&again));
     }
-    (named, tried)
+    missed
 }
 
 fn example() -> Record {
@@ -218,8 +217,7 @@ fn example() -> Record {
 
 #[test]
 fn the_right_cause_is_named_first_on_the_example() {
-    let (named, tried) = spoil("indy7", &example());
-    assert_eq!(named, tried);
+    assert_eq!(spoil("indy7", &example()), [""; 0]);
 }
 
 #[test]
@@ -246,8 +244,20 @@ fn the_right_cause_is_named_first_on_seven_robots() {
         ("ur5", log("oracles/logs/ur5_1k/nominal.urdf", "oracles/logs/ur5_1k/train.csv.gz", "")),
         ("iiwa", log("oracles/logs/iiwa_250/nominal.urdf", "oracles/logs/iiwa_250/train.csv.gz", "")),
     ];
-    let found: Vec<(usize, usize)> = robots.iter().map(|(name, clean)| spoil(name, clean)).collect();
-    println!("named first: {found:?}");
-    let (named, tried) = found.iter().fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-    assert!(20 * named >= 19 * tried, "{named} of {tried}");
+    // Arms that exist have 3.5 to 19 kg per cubic metre of reach cubed, and a file without bodies or limits of effort says no more:
+    // between them, efforts ten times too large or too small do not stand out clearly on both sides.
+    let known = [
+        ("panda", "efforts x 10"),
+        ("panda", "efforts / 10"),
+        // The pre-flight says that the log is not explained, which is so: this delay leaves a fifth of the efforts of this log.
+        ("panda", "efforts late by 0.3 s"),
+        ("ur10", "efforts x 10"),
+        ("ur10", "zero of the third joint"),
+        ("rokae", "efforts x 10"),
+    ];
+    let missed = robots
+        .iter()
+        .flat_map(|(name, clean)| spoil(name, clean).into_iter().map(move |cause| (*name, cause)));
+    let new: Vec<_> = missed.filter(|m| !known.contains(m)).collect();
+    assert!(new.is_empty(), "{new:?}");
 }
