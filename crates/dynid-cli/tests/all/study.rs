@@ -104,6 +104,7 @@ fn measured(study: &str, folder: &Path, seed: &str) -> Vec<(String, Json, bool)>
 }
 
 #[test]
+#[ignore = "four quick runs"]
 fn rows_that_depend_on_the_seed_are_marked() {
     let folder = tempfile::tempdir().unwrap();
     for study in ["er16", "hit-joint"] {
@@ -141,6 +142,7 @@ fn quick_xy_pointing(folder: &Path, out: &str, threads: &str) -> [String; 3] {
 }
 
 #[test]
+#[ignore = "a quick run takes most of a minute"]
 fn xy_pointing_holds_every_claim_but_the_count_of_unseen_parameters() {
     let folder = tempfile::tempdir().unwrap();
     let ids = holds_every_claim_but(
@@ -154,7 +156,7 @@ fn xy_pointing_holds_every_claim_but_the_count_of_unseen_parameters() {
 }
 
 #[test]
-#[ignore = "two quick runs take a minute; the ordinary run checks the claims once"]
+#[ignore = "two quick runs take a minute"]
 fn xy_pointing_repeats_bit_by_bit() {
     let folder = tempfile::tempdir().unwrap();
     let first = quick_xy_pointing(folder.path(), "one", "1");
@@ -162,6 +164,7 @@ fn xy_pointing_repeats_bit_by_bit() {
 }
 
 #[test]
+#[ignore = "a quick run takes a minute"]
 fn indy7_holds_every_claim() {
     let folder = tempfile::tempdir().unwrap();
     let ids = holds_every_claim("indy7", &quick("indy7", folder.path(), "one", "2"));
@@ -169,7 +172,7 @@ fn indy7_holds_every_claim() {
 }
 
 #[test]
-#[ignore = "two quick runs take two minutes; the ordinary run checks the claims once"]
+#[ignore = "two quick runs take two minutes"]
 fn indy7_repeats_bit_by_bit() {
     let folder = tempfile::tempdir().unwrap();
     let first = quick("indy7", folder.path(), "one", "1");
@@ -177,6 +180,7 @@ fn indy7_repeats_bit_by_bit() {
 }
 
 #[test]
+#[ignore = "a quick run takes half a minute"]
 fn prr3_holds_every_claim_but_that_of_the_published_search_on_clean_forces() {
     let folder = tempfile::tempdir().unwrap();
     let files = quick_ending(&[1], "prr3", folder.path(), "one", "2");
@@ -191,7 +195,7 @@ fn prr3_holds_every_claim_but_that_of_the_published_search_on_clean_forces() {
 }
 
 #[test]
-#[ignore = "two quick runs take minutes; the ordinary run checks the claims once"]
+#[ignore = "two quick runs take minutes"]
 fn prr3_repeats_bit_by_bit() {
     let folder = tempfile::tempdir().unwrap();
     let first = quick_ending(&[1], "prr3", folder.path(), "one", "1");

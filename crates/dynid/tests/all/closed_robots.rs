@@ -97,6 +97,7 @@ fn a_delta_gives_its_base_parameters_back_within_their_deviations() {
 }
 
 #[test]
+#[ignore = "half a minute; the ordinary run takes the delta"]
 fn a_stewart_platform_gives_its_base_parameters_back_within_their_deviations() {
     let (id, truth) = identified("stewart", "stewart", r#"["coulomb", "viscous"]"#, &[1, 2, 3, 4]);
     assert_eq!(id.base.len(), 88 + 12);
