@@ -82,7 +82,7 @@ pub struct DesignedTrajectory {
 ///
 /// # Errors
 /// [`Error`] for bad input. A problem without a solution is an [`Infeasible`] outcome.
-pub fn design(config: &DesignConfig, mut progress: impl FnMut(DesignStep)) -> Result<DesignRun, Error> {
+pub fn design(config: &DesignConfig, progress: &mut dyn FnMut(DesignStep)) -> Result<DesignRun, Error> {
     config.check()?;
     progress(DesignStep::Structure);
     let options = RobotOptions {

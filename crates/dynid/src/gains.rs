@@ -50,7 +50,7 @@ pub struct GainIdentification {
 /// [`Error::Setting`] unless there is one payload, with its mass, carried by a log and missing in another;
 /// [`Error::Unsupported`] for motor-side logs, the textbook route, and logs with a delay or a factor on friction of their own;
 /// as [`crate::identify()`] for logs and robot.
-pub fn identify_gains(config: &Config, mut progress: impl FnMut(Step)) -> Result<GainIdentification, Error> {
+pub fn identify_gains(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<GainIdentification, Error> {
     config.check()?;
     config.demand_inputs()?;
     let payload = known_payload(config)?;
@@ -76,7 +76,7 @@ pub fn identify_gains(config: &Config, mut progress: impl FnMut(Step)) -> Result
     };
     let robot = Robot::load(&config.robot, &options)?;
     refuse_internal_load(&robot, "identified")?;
-    let (robot, mut loaded) = read_logs(config, &config.training_logs(), robot, &mut progress)?;
+    let (robot, mut loaded) = read_logs(config, &config.training_logs(), robot, progress)?;
     let scale = common_scale(&loaded)?;
     let mut plan = plan_elements(config, &robot, &loaded)?;
     let terms = LogTerms::of(config, &robot)?;
@@ -92,7 +92,7 @@ pub fn identify_gains(config: &Config, mut progress: impl FnMut(Step)) -> Result
     let apart = PerOutput::new(&model);
     let base_settings = BaseSettings { seed: config.seed.unwrap_or(1), ..BaseSettings::default() };
     let base = BaseParameters::of_model(&apart, &shape, &base_settings);
-    let choices = condition(&apart, &shape, &base.kept, &prepared, &settings, |stage| {
+    let choices = condition(&apart, &shape, &base.kept, &prepared, &settings, &mut |stage| {
         progress(Step::Conditioning(stage));
     })?;
     progress(Step::Fit);

@@ -177,13 +177,13 @@ pub struct Identification {
 ///
 /// # Errors
 /// [`Error`]: bad input. A rank-deficient log is a status of the result, not an error.
-pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Identification, Error> {
+pub fn identify(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Identification, Error> {
     config.demand_inputs()?;
     config.check_effect()?;
     config.check()?;
     progress(Step::Read(config.robot.display().to_string()));
     let robot = load_robot(config)?;
-    let mut found = run(config, robot, &mut progress)?;
+    let mut found = run(config, robot, progress)?;
     let stiffness = stiffness::of(&found)?;
     if stiffness.iter().all(JointStiffness::is_borne_out) {
         found.stiffness = stiffness;
@@ -192,7 +192,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
     let doubts = elastic::warnings(&found.model, &found.logs);
     let elastic = load_robot(config)?;
     let stiff = stiffness::stiff_config(config, &elastic)?;
-    let mut found = run(&stiff, stiffness::stiff_robot(&elastic)?, &mut progress)?;
+    let mut found = run(&stiff, stiffness::stiff_robot(&elastic)?, progress)?;
     found.warnings.extend(doubts);
     found.warnings.push(format!(
         "the deformation does not bear out the stiffness that rows of links and motors give: joints are taken as stiff, read at their \
@@ -204,7 +204,7 @@ pub fn identify(config: &Config, mut progress: impl FnMut(Step)) -> Result<Ident
 }
 
 /// One run with a robot as it was read.
-fn run(config: &Config, robot: Robot, mut progress: &mut impl FnMut(Step)) -> Result<Identification, Error> {
+fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<Identification, Error> {
     let settings = config.conditioning_settings();
     let reference_trajectory = config.instruments.as_ref().and_then(|table| table.trajectory.as_ref());
     let reference_trajectory = reference_trajectory.map(TrajectoryFile::read_source).transpose()?;
@@ -213,8 +213,9 @@ fn run(config: &Config, robot: Robot, mut progress: &mut impl FnMut(Step)) -> Re
         open_robot(config, robot, progress)?;
     let (model, conditioning) = match config.conditioning.route {
         Route::Compact => {
-            let stages = |stage| progress(Step::Conditioning(stage));
-            let (model, found) = conditioned(model, &structure, &mut plan, &prepared, &settings, stages)?;
+            let mut stages = |stage| progress(Step::Conditioning(stage));
+            let (model, found) =
+                conditioned(model, &structure, &mut plan, &prepared, &settings, &mut stages)?;
             (model, Some(found))
         }
         Route::Textbook => (model, None),
@@ -247,7 +248,7 @@ fn run(config: &Config, robot: Robot, mut progress: &mut impl FnMut(Step)) -> Re
         &prepared,
         conditioning,
         &settings,
-        &mut progress,
+        progress,
     )?;
     warnings.extend(effect::warnings(config, shapes.is_some()));
     let Structure { base, stated, prior, regrouping, space, .. } = structure;
@@ -497,7 +498,7 @@ pub(crate) fn read_logs(
     config: &Config,
     files: &[LogConfig],
     robot: Robot,
-    progress: &mut impl FnMut(Step),
+    progress: &mut dyn FnMut(Step),
 ) -> Result<(Robot, Vec<LoadedLog>), Error> {
     let mut loaded = Vec::with_capacity(files.len());
     for file in files {
@@ -537,7 +538,7 @@ pub(crate) struct Opened {
 ///
 /// # Errors
 /// As [`identify`].
-pub(crate) fn open(config: &Config, progress: &mut impl FnMut(Step)) -> Result<Opened, Error> {
+pub(crate) fn open(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Opened, Error> {
     config.check()?;
     config.demand_inputs()?;
     progress(Step::Read(config.robot.display().to_string()));
@@ -554,7 +555,7 @@ fn load_robot(config: &Config) -> Result<Robot, Error> {
     Robot::load(&config.robot, &options)
 }
 
-fn open_robot(config: &Config, robot: Robot, progress: &mut impl FnMut(Step)) -> Result<Opened, Error> {
+fn open_robot(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<Opened, Error> {
     let settings = config.conditioning_settings();
     if robot.closed.is_none() && robot.mechanism.positions() != robot.mechanism.rates() {
         return Err(Error::Unsupported(
@@ -597,7 +598,7 @@ fn preflight(
     config: &Config,
     robot: &Robot,
     loaded: &[LoadedLog],
-    progress: &mut impl FnMut(Step),
+    progress: &mut dyn FnMut(Step),
 ) -> Result<Vec<Finding>, Error> {
     if config.preflight == Preflight::Off {
         return Ok(Vec::new());

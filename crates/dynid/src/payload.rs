@@ -32,7 +32,7 @@ pub struct PayloadIdentification {
 /// [`Error::Setting`] without a payload, or without a log that carries it and one that does not; those of [`identify`].
 pub fn identify_payloads(
     config: &Config,
-    progress: impl FnMut(Step),
+    progress: &mut dyn FnMut(Step),
 ) -> Result<PayloadIdentification, Error> {
     config.check()?;
     config.demand_inputs()?;

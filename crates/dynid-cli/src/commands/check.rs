@@ -26,7 +26,7 @@ pub(crate) fn run(args: &CheckArgs) -> Result<u8, Failure> {
     let inputs: Vec<&Path> = logs.chain(source).chain([config.robot.as_path()]).collect();
     outputs::check_files(&outputs, &inputs)?;
     let progress = Progress::new(args.quiet);
-    let found = check(&config, |log| progress.examining(log))?;
+    let found = check(&config, &mut |log| progress.examining(log))?;
     drop(progress);
     let page = if args.report.is_some() { Some(found.report()?) } else { None };
     let fixed = if args.fix.is_some() { Some(found.corrected(&config, source)?) } else { None };

@@ -27,7 +27,7 @@ pub(crate) fn run(args: &CompareArgs) -> Result<u8, Failure> {
     let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).collect();
     outputs::check_files(&outputs, &inputs)?;
     let progress = DesignProgress::new(args.quiet);
-    let found = compare(&config, |done, of, what| progress.fit(done, of, what))?;
+    let found = compare(&config, &mut |done, of, what| progress.fit(done, of, what))?;
     drop(progress);
     if let Some(path) = &args.report {
         write_atomically(path, found.report()?.as_bytes())?;

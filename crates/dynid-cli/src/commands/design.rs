@@ -43,7 +43,7 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
         }
     }
     let progress = DesignProgress::new(args.quiet);
-    let run = design(&config, |step| progress.step(step))?;
+    let run = design(&config, &mut |step| progress.step(step))?;
     let record = run.record(&config)?;
     let report = run.report(&config, &record)?;
     drop(progress);

@@ -27,7 +27,7 @@ pub(crate) fn run(args: &FrictionTestArgs) -> Result<u8, Failure> {
     let inputs: Vec<&Path> = logs.chain(slow).chain([args.input.as_path(), &config.robot]).collect();
     outputs::check_folder(&out, &files, &inputs)?;
     let progress = Progress::new(args.quiet);
-    let found = identify_friction(&config, |step| progress.friction(step))?;
+    let found = identify_friction(&config, &mut |step| progress.friction(step))?;
     let model = found.model(&config)?;
     let report = found.report(&model)?;
     drop(progress);

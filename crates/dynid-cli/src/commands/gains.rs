@@ -11,7 +11,7 @@ use crate::progress::Progress;
 pub(crate) fn run(args: &GainsArgs) -> Result<u8, Failure> {
     let config = Config::read(&args.input)?;
     let progress = Progress::new(args.quiet);
-    let found = identify_gains(&config, |step| progress.step(step))?;
+    let found = identify_gains(&config, &mut |step| progress.step(step))?;
     let file = found.file(&config);
     drop(progress);
     if !args.quiet {

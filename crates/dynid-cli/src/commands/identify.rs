@@ -28,7 +28,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).chain(friction).collect();
     outputs::check_folder(&out, &files, &inputs)?;
     let progress = Progress::new(args.quiet);
-    let identification = identify(&config, |step| progress.step(step))?;
+    let identification = identify(&config, &mut |step| progress.step(step))?;
     let mut estimate = identification.estimate(&config)?;
     estimate.provenance.command_line =
         std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();

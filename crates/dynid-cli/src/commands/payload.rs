@@ -27,7 +27,7 @@ pub(crate) fn run(args: &PayloadArgs) -> Result<u8, Failure> {
     let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).collect();
     outputs::check_folder(&out, &files, &inputs)?;
     let progress = Progress::new(args.quiet);
-    let found = identify_payloads(&config, |step| progress.step(step))?;
+    let found = identify_payloads(&config, &mut |step| progress.step(step))?;
     let file = found.file(&config)?;
     let report = file.report()?;
     drop(progress);

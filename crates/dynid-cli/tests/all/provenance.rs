@@ -69,7 +69,7 @@ fn files_that_change_after_they_were_read_keep_the_hash_of_what_was_read() {
     };
     let files = ["arm.toml", "arm.urdf", "train.csv", "valid.csv"];
     let before = files.map(|name| sha256(&fs::read(at(name)).unwrap()));
-    let found = dynid::identify(&config, |_| {}).unwrap();
+    let found = dynid::identify(&config, &mut |_| {}).unwrap();
     for name in files {
         fs::write(at(name), "something else").unwrap();
     }

@@ -184,7 +184,7 @@ pub fn condition(
     kept: &[usize],
     logs: &[PreparedLog],
     settings: &ConditioningSettings,
-    mut progress: impl FnMut(Stage),
+    progress: &mut dyn FnMut(Stage),
 ) -> Result<Conditioning, ConditioningError> {
     let settings = &with_given_mask(settings);
     assert!(settings.ladder.len() <= 7, "rungs are bits of a byte, and one stands for no mask");

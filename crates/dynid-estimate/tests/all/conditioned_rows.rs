@@ -59,7 +59,7 @@ fn case(logs: usize, share: f64) -> Case {
             prepare(&log, &model, &settings()).unwrap()
         })
         .collect::<Vec<_>>();
-    let choices = condition(&model, &[], &base.kept, &prepared, &settings(), |_| {}).unwrap();
+    let choices = condition(&model, &[], &base.kept, &prepared, &settings(), &mut |_| {}).unwrap();
     Case { model, base, truth, logs: prepared, choices }
 }
 

@@ -72,14 +72,14 @@ impl Case {
         let time = (0..samples).map(|k| k as f64 / RATE_HZ).collect();
         let log = Log::new(format!("log {seed}"), time, joints, vec![]).unwrap();
         let logs = vec![prepare(&log, &model, &settings).unwrap()];
-        let choices = condition(&model, &[], &base.kept, &logs, &settings, |_| {}).unwrap();
+        let choices = condition(&model, &[], &base.kept, &logs, &settings, &mut |_| {}).unwrap();
         Case { model, base, settings, logs, choices }
     }
 
     fn choose(&self, kinds: &[ShapeKind]) -> FrictionChoice {
         let kinds = vec![kinds.to_vec(); JOINTS];
         let Case { model, base, settings, logs, choices } = self;
-        choose_friction(model, &[], &base.kept, logs, &kinds, None, choices, settings, |_| {}).unwrap()
+        choose_friction(model, &[], &base.kept, logs, &kinds, None, choices, settings, &mut |_| {}).unwrap()
     }
 }
 

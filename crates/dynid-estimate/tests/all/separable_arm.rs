@@ -254,7 +254,7 @@ fn shapes_are_found_from_the_rows_of_a_log() {
     let settings = ConditioningSettings { delay_samples: Some(0.0), ..ConditioningSettings::default() };
     let logs = [prepare(&log, &model, &settings).unwrap()];
     let start = model.parameters().shape_start();
-    let mut choices = condition(&model, &start, &base.kept, &logs, &settings, |_| {}).unwrap();
+    let mut choices = condition(&model, &start, &base.kept, &logs, &settings, &mut |_| {}).unwrap();
     // A joint with a shape keeps its low speeds.
     (choices.rung[0], choices.rung[2]) = (0, 0);
     let started = std::time::Instant::now();

@@ -55,7 +55,7 @@ pub(super) fn one_shot(
     let base = BaseParameters::of(&free, &arm.mechanism, &shape, &BaseSettings::default());
     let settings = ConditioningSettings { reversal_mask: Some(-1.0), ..ConditioningSettings::default() };
     let logs = std::slice::from_ref(log);
-    let choices = condition(&free, &shape, &base.kept, logs, &settings, |_| {}).map_err(fault)?;
+    let choices = condition(&free, &shape, &base.kept, logs, &settings, &mut |_| {}).map_err(fault)?;
     let rows = ShapedRows::new(&free, &shape, &base.kept, logs, &choices, &settings).map_err(fault)?;
     let steady = SteadyRows::new(&free, &base.kept, points, logs.len()).map_err(fault)?;
     let search = SeparableSettings { starts: 1, profile_points: 0, ..SeparableSettings::default() };

@@ -48,7 +48,7 @@ pub(super) fn find(
     let mut samples = start;
     for _ in 0..SEARCHES {
         let log = moved(&prepared, samples)?;
-        let Ok(found) = condition(&bench.model, &bench.shape, &kept, &[log], &settings, |_| {}) else {
+        let Ok(found) = condition(&bench.model, &bench.shape, &kept, &[log], &settings, &mut |_| {}) else {
             return Ok(None);
         };
         samples += found.delay.samples;

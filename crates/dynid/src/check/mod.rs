@@ -93,7 +93,7 @@ impl Check {
 ///
 /// # Errors
 /// Bad input: files that cannot be read, columns that cannot be assigned. What is wrong with the numbers is a finding.
-pub fn check(config: &Config, mut progress: impl FnMut(&str)) -> Result<Check, Error> {
+pub fn check(config: &Config, progress: &mut dyn FnMut(&str)) -> Result<Check, Error> {
     config.check()?;
     config.demand_inputs()?;
     let options = RobotOptions {

@@ -41,7 +41,7 @@ struct FoldScore {
 ///
 /// # Errors
 /// As [`crate::identify()`]. An estimator that fails is in the table with its reason, and no error.
-pub fn compare(config: &Config, mut progress: impl FnMut(usize, usize, &str)) -> Result<Comparison, Error> {
+pub fn compare(config: &Config, progress: &mut dyn FnMut(usize, usize, &str)) -> Result<Comparison, Error> {
     let settings = config.conditioning_settings();
     progress(0, 1, "reading");
     let mut opened = open(
@@ -56,7 +56,7 @@ pub fn compare(config: &Config, mut progress: impl FnMut(usize, usize, &str)) ->
     )?;
     progress(0, 1, "conditioning");
     let (model, conditioning) =
-        conditioned(opened.model, &opened.structure, &mut opened.plan, &opened.logs, &settings, |_| {})?;
+        conditioned(opened.model, &opened.structure, &mut opened.plan, &opened.logs, &settings, &mut |_| {})?;
     opened.model = model;
     let bench = Bench { opened: &opened, conditioning: &conditioning, settings: &settings };
     let list = contestants(config, &opened);
@@ -154,7 +154,7 @@ impl Bench<'_> {
             training,
             conditioning,
             self.settings,
-            |_| {},
+            &mut |_| {},
         )?;
         Ok((fit, plan))
     }

@@ -72,7 +72,7 @@ pub(super) fn read(
     config: &FrictionConfig,
     robot: &Robot,
     (warnings, inputs): (&mut Vec<String>, &mut Vec<InputRecord>),
-    mut progress: impl FnMut(String),
+    progress: &mut dyn FnMut(String),
 ) -> Result<Vec<JointExperiment>, Error> {
     let names = robot.mechanism.rate_names();
     let mut joints: Vec<JointExperiment> = names

@@ -78,7 +78,7 @@ pub struct FrictionIdentification {
 /// impossible. One direction only, too few speeds and coarse encoders are results that say so.
 pub fn identify_friction(
     config: &FrictionConfig,
-    mut progress: impl FnMut(FrictionStep),
+    progress: &mut dyn FnMut(FrictionStep),
 ) -> Result<FrictionIdentification, Error> {
     config.check()?;
     let robot = Robot::load(&config.robot, &RobotOptions::default())?;
@@ -91,7 +91,7 @@ pub fn identify_friction(
     if let Some(name) = config.prior.keys().find(|j| !known.contains(j)) {
         return Err(Error::UnknownJoint { name: name.clone(), known });
     }
-    let experiments = experiment::read(config, &robot, (&mut warnings, &mut inputs), |file| {
+    let experiments = experiment::read(config, &robot, (&mut warnings, &mut inputs), &mut |file| {
         progress(FrictionStep::Read(file))
     })?;
     let mut joints = Vec::with_capacity(experiments.len());

@@ -24,7 +24,7 @@ pub(super) fn choose(
     logs: &[PreparedLog],
     choices: &Conditioning,
     settings: &ConditioningSettings,
-    progress: impl FnMut(Stage),
+    progress: &mut dyn FnMut(Stage),
 ) -> Result<FrictionChoice, Error> {
     let unloaded = model.mechanism().follows().is_some() || model.closed().is_some();
     let rates = model.mechanism().rates();

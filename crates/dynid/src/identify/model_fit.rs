@@ -52,10 +52,10 @@ pub(crate) fn fit(
     logs: &[PreparedLog],
     conditioning: Option<Conditioning>,
     settings: &ConditioningSettings,
-    mut progress: impl FnMut(Step),
+    progress: &mut dyn FnMut(Step),
 ) -> Result<ModelFit, Error> {
     let Shaped { model, mut structure, conditioning, friction, found: shapes } =
-        shapes::search(config, model, plan, logs, conditioning, settings, &mut progress)?;
+        shapes::search(config, model, plan, logs, conditioning, settings, progress)?;
     let state_hz = state_hz(config, conditioning.as_ref());
     let power = friction_power::limits(&model, plan, logs, state_hz, settings)?;
     let model = power.free(model);

@@ -73,7 +73,7 @@ pub(super) fn take_off(
     let reference: Vec<PreparedLog> =
         (0..logs.len()).filter(|k| !own.contains(k)).map(|k| logs[k].clone()).collect();
     let delay_of =
-        |logs: &[PreparedLog]| condition(model, shape, &kept, logs, settings, |_| {}).map(|c| c.delay);
+        |logs: &[PreparedLog]| condition(model, shape, &kept, logs, settings, &mut |_| {}).map(|c| c.delay);
     let common = delay_of(&reference)?;
     drop(reference);
     let labels = config.log_labels();

@@ -23,11 +23,11 @@ pub(crate) fn conditioned(
     plan: &mut ElementPlan,
     logs: &[PreparedLog],
     settings: &ConditioningSettings,
-    mut progress: impl FnMut(Stage),
+    progress: &mut dyn FnMut(Stage),
 ) -> Result<(RobotModel, Conditioning), Error> {
     let kept = &structure.base.kept;
     let start = model.parameters().shape_start();
-    let choices = condition(&model, &start, kept, logs, settings, &mut progress)?;
+    let choices = condition(&model, &start, kept, logs, settings, progress)?;
     let scaled = plan.log_terms.scaled();
     if scaled.is_empty() {
         return Ok((model, choices));

@@ -35,7 +35,7 @@ pub(super) fn search(
     logs: &[PreparedLog],
     conditioning: Option<Conditioning>,
     settings: &ConditioningSettings,
-    mut progress: impl FnMut(Step),
+    progress: &mut dyn FnMut(Step),
 ) -> Result<Shaped, Error> {
     let mut out = Shaped { model, structure, conditioning, friction: Vec::new(), found: None };
     let Some(choices) = &mut out.conditioning else { return Ok(out) };
@@ -47,9 +47,10 @@ pub(super) fn search(
     };
     let all_known = plan.known.len() == plan.per_rate.len();
     if config.elements.friction == Friction::Auto && !all_known {
-        let chosen = friction::choose(&out.model, &out.structure, plan, logs, choices, settings, |stage| {
-            progress(Step::Conditioning(stage));
-        })?;
+        let chosen =
+            friction::choose(&out.model, &out.structure, plan, logs, choices, settings, &mut |stage| {
+                progress(Step::Conditioning(stage));
+            })?;
         (out.model, out.structure) = rebuilt(plan)?;
         out.friction = chosen.per_output;
         *choices = chosen.conditioning;

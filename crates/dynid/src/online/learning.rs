@@ -128,7 +128,7 @@ impl Learned {
         };
         config.check_cutoffs(name, prepared.rate_hz)?;
         let logs = [prepared];
-        let found = condition(model, &structure.shape, &structure.base.kept, &logs, &settings, |_| {});
+        let found = condition(model, &structure.shape, &structure.base.kept, &logs, &settings, &mut |_| {});
         let choices = match found {
             Ok(choices) => choices,
             Err(reason) => return insufficient(reason),

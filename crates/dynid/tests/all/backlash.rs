@@ -55,7 +55,7 @@ fn write_log(path: &std::path::Path, gap: f64) {
 }
 
 fn look(config: &Config) -> Vec<LogBacklash> {
-    let estimate = identify(config, |_| {}).unwrap().estimate(config).unwrap();
+    let estimate = identify(config, &mut |_| {}).unwrap().estimate(config).unwrap();
     let logs: Vec<LogConfig> = config.training_logs();
     let found =
         backlash((&estimate, "estimate.json".as_ref()), &logs, &config.columns, config.motor_side.as_ref());

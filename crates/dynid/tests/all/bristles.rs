@@ -76,7 +76,7 @@ fn a_log_of_a_warming_arm_tells_its_friction() {
     // Starts off the truth; the stiffness of the bristles is held where it is.
     std::fs::write(folder.join("robot.toml"), robot(1.5, 0.1, 1.0, 1.0)).unwrap();
     let config = run(folder, "[[log]]\npath = \"log.csv\"\n");
-    let found = identify(&config, |_| {}).unwrap();
+    let found = identify(&config, &mut |_| {}).unwrap();
     let estimate = found.estimate(&config).unwrap();
     let shape = |name: &str| estimate.shape_parameters.iter().find(|p| p.name == name).unwrap().value;
     let linear = |name: &str| estimate.parameters.iter().find(|p| p.name == name).unwrap().value;
@@ -95,10 +95,10 @@ fn a_log_of_a_warming_arm_tells_its_friction() {
     assert!(error < 3.0, "{error} %");
 
     // Without temperatures: the joint's channel is named, and what to do.
-    let missing = identify(&run(folder, "[[log]]\npath = \"cold.csv\"\n"), |_| {}).unwrap_err();
+    let missing = identify(&run(folder, "[[log]]\npath = \"cold.csv\"\n"), &mut |_| {}).unwrap_err();
     assert!(missing.to_string().contains("temperature_j1"), "{missing}");
     assert!(missing.hint().unwrap().contains("temperature = 30"), "{:?}", missing.hint());
-    let kelvin = identify(&run(folder, "[[log]]\npath = \"kelvin.csv\"\n"), |_| {}).unwrap_err();
+    let kelvin = identify(&run(folder, "[[log]]\npath = \"kelvin.csv\"\n"), &mut |_| {}).unwrap_err();
     assert!(matches!(kelvin, Error::Temperature { row: 1, .. }), "{kelvin}");
     assert!(kelvin.hint().unwrap().contains("unit"), "{:?}", kelvin.hint());
 }

@@ -64,7 +64,7 @@ fn identified(name: &str, test: &str, elements: &str, seeds: &[u64]) -> (Identif
         truth = log.truth;
     }
     let config = Config::parse(&text, &folder.join("run.toml").display().to_string()).unwrap();
-    let id = identify(&config, |_| ()).unwrap();
+    let id = identify(&config, &mut |_| ()).unwrap();
     let value = |name: &String| truth.iter().find(|(n, _)| n == name).map_or(0.0, |(_, v)| *v);
     let values = id.model.parameters().linear.iter().map(|p| value(&p.name)).collect();
     std::fs::remove_dir_all(folder).unwrap();
@@ -135,7 +135,7 @@ fn rows_that_the_mechanism_cannot_follow_are_named() {
     write(&made, &log);
     let text = format!("robot = {:?}\n[[log]]\npath = {log:?}\n", robot_file("fivebar"));
     let config = Config::parse(&text, "run.toml").unwrap();
-    let error = identify(&config, |_| ()).unwrap_err();
+    let error = identify(&config, &mut |_| ()).unwrap_err();
     let message = error.to_string();
     assert!(message.contains("row 701") && message.contains("`tool_pin`"), "{message}");
     assert!(error.hint().is_some());
@@ -155,7 +155,7 @@ fn a_controlled_delta_is_identified_and_comes_back_as_urdf_and_loops() {
     let path = folder.join("log.csv");
     write(&simulate(&robot, &settings).unwrap(), &path);
     let text = format!("robot = {:?}\n[[log]]\npath = {path:?}\n", robot_file("delta"));
-    let id = identify(&Config::parse(&text, "run.toml").unwrap(), |_| ()).unwrap();
+    let id = identify(&Config::parse(&text, "run.toml").unwrap(), &mut |_| ()).unwrap();
     let urdf = id.urdf().unwrap();
     assert!(urdf.difference < 1e-6, "{}", urdf.difference);
     std::fs::write(folder.join("delta.urdf"), &urdf.text).unwrap();

@@ -53,7 +53,7 @@ fn checked(arms: &[&str], joints: &[&str], columns: &str) -> Check {
     write_log(folder.path(), &joints.iter().map(|j| (*j).to_owned()).collect::<Vec<_>>());
     let at = folder.path().display();
     let text = format!("robot = \"{at}/robot.toml\"\n[[log]]\npath = \"{at}/log.csv\"\n{columns}");
-    check(&Config::parse(&text, "test").unwrap(), |_| {}).unwrap()
+    check(&Config::parse(&text, "test").unwrap(), &mut |_| {}).unwrap()
 }
 
 const NUMBERS: [&str; 4] = ["1", "2", "3", "4"];

@@ -10,7 +10,7 @@ fn estimators_are_ranked_on_time_they_did_not_see() {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../examples/indy7/identify.toml");
     let config = Config::read(&path).unwrap();
     let mut fits = 0;
-    let found = compare(&config, |_, _, _| fits += 1).unwrap();
+    let found = compare(&config, &mut |_, _, _| fits += 1).unwrap();
     assert!(fits >= FOLDS * found.estimators.len());
     let names: Vec<&str> = found.estimators.iter().map(|e| e.name.as_str()).collect();
     for name in ["textbook", "ols", "wls", "huber", "tukey", "ridge", "consistent", "separable", "search: de"]
@@ -27,7 +27,7 @@ fn estimators_are_ranked_on_time_they_did_not_see() {
     let [behind, spread] = found.estimators[0].behind.unwrap();
     assert!(behind == 0.0 && spread == 0.0);
     assert!(found.estimators.iter().all(|e| e.joints.len() == 6 && e.failure.is_none()));
-    let again = compare(&config, |_, _, _| {}).unwrap();
+    let again = compare(&config, &mut |_, _, _| {}).unwrap();
     let same = |a: &dynid::compare::ComparedEstimator, b: &dynid::compare::ComparedEstimator| {
         a.name == b.name && a.error == b.error && a.joints == b.joints
     };

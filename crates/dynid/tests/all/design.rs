@@ -52,7 +52,7 @@ fn identified(folder: &Path, trajectory: &Path, seed: u64) -> Estimate {
     dynid::io::csv::write(&path, &header, &columns).unwrap();
     let text = format!("robot = '{}'\n[[log]]\npath = '{}'\n", robot_path().display(), path.display());
     let config = Config::parse(&text, "run").unwrap();
-    identify(&config, |_| {}).unwrap().estimate(&config).unwrap()
+    identify(&config, &mut |_| {}).unwrap().estimate(&config).unwrap()
 }
 
 /// Mean over base parameters of std(random) / std(designed), and the ratio of the mean relative standard deviations.
@@ -78,7 +78,7 @@ fn a_designed_log_tells_three_times_more_than_a_random_one() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("trajectory.json");
     let config = config();
-    let run = design(&config, |_| {}).unwrap();
+    let run = design(&config, &mut |_| {}).unwrap();
     let designed = run.outcome.as_ref().unwrap();
     designed.motion.file.write(&path).unwrap();
     let from_design = identified(folder.path(), &path, 1);
@@ -115,7 +115,7 @@ fn table_of_criteria() {
     ] {
         let mut config = config();
         config.criterion.name = Some(name);
-        let run = design(&config, |_| {}).unwrap();
+        let run = design(&config, &mut |_| {}).unwrap();
         let designed = run.outcome.as_ref().unwrap();
         designed.motion.file.write(&path).unwrap();
         let from_design = identified(folder.path(), &path, 1);

@@ -89,7 +89,7 @@ fn identified(
     let path = folder.path().join("run.toml");
     std::fs::write(&path, config).unwrap();
     let config = Config::read(&path).unwrap();
-    let found = identify(&config, |_| {}).unwrap();
+    let found = identify(&config, &mut |_| {}).unwrap();
     (folder, found, config)
 }
 

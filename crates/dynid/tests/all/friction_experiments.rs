@@ -160,11 +160,11 @@ fn config(folder: &Path, text: &str) -> FrictionConfig {
 }
 
 fn model(config: &FrictionConfig) -> FrictionModel {
-    identify_friction(config, |_| {}).unwrap().model(config).unwrap()
+    identify_friction(config, &mut |_| {}).unwrap().model(config).unwrap()
 }
 
 fn message(folder: &Path, text: &str) -> String {
-    let error = identify_friction(&config(folder, text), |_| {}).unwrap_err();
+    let error = identify_friction(&config(folder, text), &mut |_| {}).unwrap_err();
     format!("{error} / {}", error.hint().unwrap_or_default())
 }
 
@@ -190,7 +190,7 @@ fn sweeps_over_temperatures_give_the_law_and_presliding_the_bristles() {
     }
     let config = config(folder.path(), &text);
     let start = std::time::Instant::now();
-    let found = identify_friction(&config, |_| {}).unwrap();
+    let found = identify_friction(&config, &mut |_| {}).unwrap();
     println!("identified in {:.2} s", start.elapsed().as_secs_f64());
     let model = found.model(&config).unwrap();
     println!("{:?} {:?}", model.verdict, model.warnings);
@@ -245,7 +245,7 @@ fn sweeps_over_temperatures_give_the_law_and_presliding_the_bristles() {
     let path = folder.path().join("friction.json");
     std::fs::write(&path, model.to_json()).unwrap();
     assert_eq!(FrictionModel::load(&path).unwrap().to_json(), model.to_json());
-    let again = identify_friction(&config, |_| {}).unwrap();
+    let again = identify_friction(&config, &mut |_| {}).unwrap();
     assert_eq!(again.model(&config).unwrap().to_json(), model.to_json());
 }
 

@@ -115,7 +115,7 @@ impl Bench {
         let path = self.path("run.toml");
         std::fs::write(&path, text).unwrap();
         let config = Config::read(&path).unwrap();
-        let found = identify(&config, |_| {}).unwrap();
+        let found = identify(&config, &mut |_| {}).unwrap();
         let estimate = found.estimate(&config).unwrap();
         std::fs::write(self.path("estimate.json"), estimate.to_json()).unwrap();
         let read = Estimate::read(&self.path("estimate.json")).unwrap();

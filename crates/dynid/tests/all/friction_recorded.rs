@@ -17,7 +17,7 @@ fn data(set: &str) -> Option<PathBuf> {
 
 fn model(text: &str) -> FrictionModel {
     let config = FrictionConfig::parse(text, "test").unwrap();
-    identify_friction(&config, |_| {}).unwrap().model(&config).unwrap()
+    identify_friction(&config, &mut |_| {}).unwrap().model(&config).unwrap()
 }
 
 /// Single joints of a Gen3 run in one direction at one speed: effort is all that can be stated.

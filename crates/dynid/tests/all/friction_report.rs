@@ -39,7 +39,7 @@ fn identified(friction: impl Fn(f64) -> f64, elements: &str, settings: &str) -> 
         path("log.csv")
     );
     let config = Config::parse(&text, "test").unwrap();
-    let identification = identify(&config, |_| {}).unwrap();
+    let identification = identify(&config, &mut |_| {}).unwrap();
     let estimate = identification.estimate(&config).unwrap();
     let page = identification.report(&config, &estimate).unwrap();
     let file = folder.path().join("estimate.json");

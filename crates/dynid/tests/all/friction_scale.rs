@@ -80,7 +80,7 @@ impl Bench {
 
     fn identify(&self, text: &str) -> (Identification, Estimate) {
         let config = self.config(text);
-        let found = identify(&config, |_| {}).unwrap();
+        let found = identify(&config, &mut |_| {}).unwrap();
         let estimate = found.estimate(&config).unwrap();
         std::fs::write(self.path("estimate.json"), estimate.to_json()).unwrap();
         (found, Estimate::read(&self.path("estimate.json")).unwrap())
@@ -197,7 +197,7 @@ fn a_factor_without_a_meaning_is_refused() {
         ("[elements]\ndefault = [\"rotor\", \"offset\"]\nfriction = \"given\"\n", "no joint has friction"),
         ("[elements]\ndefault = [\"lugre\"]\nfriction = \"given\"\n", "`lugre`"),
     ] {
-        let fault = identify(&bench.config(&format!("{more}{logs}")), |_| {}).unwrap_err().to_string();
+        let fault = identify(&bench.config(&format!("{more}{logs}")), &mut |_| {}).unwrap_err().to_string();
         assert!(fault.contains("friction_scale") && fault.contains(expected), "{fault}");
     }
     let text = format!("robot = \"arm.toml\"\n{}", logs.replace("[\"fr", "[\"friction\", \"fr"));
@@ -222,7 +222,7 @@ path = "{data}/rokae-xmate/run_b.csv.gz"
 own = ["offset", "friction_scale"]
 "#;
     let config = Config::parse(&text.replace("{data}", &data.display().to_string()), "test").unwrap();
-    let found = identify(&config, |_| {}).unwrap().estimate(&config).unwrap();
+    let found = identify(&config, &mut |_| {}).unwrap().estimate(&config).unwrap();
     println!("{:?}", found.log_scales);
     assert!((found.log_scales[0].value - 1.0).abs() < 0.1, "{:?}", found.log_scales);
 }

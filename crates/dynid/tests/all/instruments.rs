@@ -123,7 +123,7 @@ fn bias_of_an_arm_in_closed_loop_falls_to_a_fifth() {
         let log = log_of(folder.path(), seed, 3e-4);
         write(&log, &folder.path().join("log.csv"));
         let config = config(folder.path(), "iv", &instruments(folder.path()));
-        let id = identify(&config, |_| {}).unwrap();
+        let id = identify(&config, &mut |_| {}).unwrap();
         let truth = truth_of(&id, &log);
         let comparison = id.comparison.as_ref().unwrap();
         let found = comparison.exogeneity.as_ref().unwrap();
@@ -268,7 +268,7 @@ phi = [2.0, 0.3, 0.02, 0.0, 0.01, 0.0, 0.0, 0.06, 0.0, 0.06]
 
     fn identify(&self, more: &str) -> (Config, Identification) {
         let config = self.config(more).unwrap();
-        let id = identify(&config, |_| {}).unwrap();
+        let id = identify(&config, &mut |_| {}).unwrap();
         (config, id)
     }
 }
@@ -294,7 +294,7 @@ fn columns_of_the_reference_serve_as_its_trajectory_file_does() {
         assert!((a - b).abs() < 1e-4 * a.abs(), "{a} {b}");
     }
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    let again = alone.install(|| identify(&config, |_| {}).unwrap());
+    let again = alone.install(|| identify(&config, &mut |_| {}).unwrap());
     assert_eq!(
         (&again.fit().x, &again.comparison),
         (&by_columns.fit().x, &by_columns.comparison),
@@ -317,7 +317,7 @@ fn periodic_logs_and_friction_with_shapes_are_simulated_too() {
     };
     let file = format!("trajectory = {:?}", pendulum.folder.path().join("motion.json"));
     let config = pendulum.config_of_log(&iv("given", ""), &file).unwrap();
-    let periodic = identify(&config, |_| {}).unwrap();
+    let periodic = identify(&config, &mut |_| {}).unwrap();
     assert!(periodic.logs[0].periodic.is_some());
     let columns = "reference = [\"goal1\"]\nreference_scale = 0.01\n";
     let fed = format!("{columns}feed_forward = true\nnominal = \"identified\"\n");
@@ -396,7 +396,7 @@ fn what_is_missing_or_contradictory_is_named() {
     let pendulum = Pendulum::new(1e-4);
     let refused = |more: &str, words: &[&str]| {
         let message = match pendulum.config(more) {
-            Ok(config) => identify(&config, |_| {}).unwrap_err().to_string(),
+            Ok(config) => identify(&config, &mut |_| {}).unwrap_err().to_string(),
             Err(message) => message,
         };
         assert!(words.iter().all(|w| message.contains(w)), "{message}");
@@ -438,7 +438,7 @@ fn emps(robot: &Path, method: &str, route: &str) -> Option<Identification> {
          [[log]]\npath = {:?}\n",
         data.join("emps/emps_identification.csv.gz")
     );
-    Some(identify(&Config::parse(&text, "emps").unwrap(), |_| {}).unwrap())
+    Some(identify(&Config::parse(&text, "emps").unwrap(), &mut |_| {}).unwrap())
 }
 
 /// Published IDIM-LS values and their standard deviations.

@@ -65,7 +65,7 @@ path = "{data}/emps/emps_identification.csv.gz"
     let Some(config) = parsed(&text.replace("{robot}", &robot.path().display().to_string())) else { return };
     let events = follow(&config);
     assert!(!events.iter().any(|(_, e)| matches!(e, Event::Alarm { .. })), "nothing changed");
-    let off_line = identify(&config, |_| {}).unwrap();
+    let off_line = identify(&config, &mut |_| {}).unwrap();
     let Event::Estimate { parameters, .. } = last_estimate(&events) else { unreachable!() };
     for ((p, x), (std, _)) in parameters.iter().zip(&off_line.fit().x).zip(off_line.standard_deviations()) {
         let std = std.unwrap();

@@ -165,7 +165,7 @@ fn a_simulated_payload_is_found_to_a_thousandth() {
         bench.log("bare.csv", &Record { seed: 2 * seed, ..LONG }, &[1.0; 6]);
         bench.log("loaded.csv", &Record { seed: 2 * seed + 1, loaded: true, ..LONG }, &[1.0; 6]);
         let config = bench.config(TWO_LOGS);
-        let found = identify_payloads(&config, |_| {}).unwrap();
+        let found = identify_payloads(&config, &mut |_| {}).unwrap();
         let record = &found.payloads[0];
         let [mass, com, inertia] = errors(record);
         let inside = |q: &dynid::payload::Quantity, truth: f64| {
@@ -213,7 +213,7 @@ fn simulated_gains_are_found_where_plain_least_squares_are_off() {
         "name = \"tool\"\nmass = 2.6\ncom = [0.04, -0.03, 0.11]\ninertia = [0.031, 0.002, -0.003, 0.042, 0.004, 0.036]\n",
     );
     let config = bench.config(&format!("[conditioning]\nkernel_hz = 50\n{known}"));
-    let found = identify_gains(&config, |_| {}).unwrap();
+    let found = identify_gains(&config, &mut |_| {}).unwrap();
     for (joint, truth) in found.joints.iter().zip(GAINS) {
         let share = |g: Option<f64>| g.map(|g| 100.0 * (g / truth - 1.0));
         println!(
@@ -249,13 +249,13 @@ fn what_a_log_has_of_its_own_is_told_and_found() {
         format!("[[log]]\npath = \"{}.csv\"\n[[log]]\npath = \"{}.csv\"\n{own}\n", names[0], names[1])
     };
     // Logs alike.
-    let alike = identify(&bench.config(&logs(["a", "b"], "")), |_| {}).unwrap();
+    let alike = identify(&bench.config(&logs(["a", "b"], "")), &mut |_| {}).unwrap();
     let agreement = alike.log_agreement.as_ref().unwrap();
     println!("alike: {:?}", agreement.one_robot);
     assert!(!agreement.contradicts(), "{:?}", agreement.warnings());
     // Told without being asked.
     let config = bench.config(&logs(["a", "c"], ""));
-    let told = identify(&config, |_| {}).unwrap();
+    let told = identify(&config, &mut |_| {}).unwrap();
     let agreement = told.log_agreement.as_ref().unwrap();
     let warnings = agreement.warnings();
     println!("{warnings:#?}");
@@ -269,7 +269,7 @@ fn what_a_log_has_of_its_own_is_told_and_found() {
     assert!(about.contains("c and a contradict") && about.contains("`j2`"), "{about}");
     // Found when asked for.
     let config = bench.config(&logs(["a", "c"], "own = [\"offset\", \"delay\"]"));
-    let own = identify(&config, |_| {}).unwrap();
+    let own = identify(&config, &mut |_| {}).unwrap();
     let delay = &own.own_delays[0];
     println!("{delay:?}");
     assert!((delay.samples - delay.reference - 2.0).abs() < 0.3, "{delay:?}");
@@ -291,7 +291,7 @@ fn the_same_bits_come_out_of_any_number_of_threads() {
     );
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| identify_payloads(&config, |_| {}).unwrap().file(&config).unwrap().to_json())
+        pool.install(|| identify_payloads(&config, &mut |_| {}).unwrap().file(&config).unwrap().to_json())
     };
     assert_eq!(run(1), run(3));
 }
@@ -323,7 +323,10 @@ fn configurations_that_contradict_themselves_are_refused() {
     bench.log("bare.csv", &Record { seconds: 5, ..PLAIN }, &[1.0; 6]);
     let run = |rest: &str| {
         let config = bench.config(rest);
-        (identify_payloads(&config, |_| {}).map(|_| ()), identify_gains(&config, |_| {}).map(|_| ()))
+        (
+            identify_payloads(&config, &mut |_| {}).map(|_| ()),
+            identify_gains(&config, &mut |_| {}).map(|_| ()),
+        )
     };
     let bare = "[[log]]\npath = \"bare.csv\"\n";
     let (payload, gains) = run(bare);
@@ -365,7 +368,7 @@ fn recorded(text: &str) -> Option<Config> {
 #[test]
 fn ur10e_payload_and_gains() {
     let Some(config) = recorded(UR10E) else { return };
-    let found = identify_payloads(&config, |_| {}).unwrap();
+    let found = identify_payloads(&config, &mut |_| {}).unwrap();
     let p = &found.payloads[0];
     println!("{}\n{:?}\n{:?}", p.sentence, p.mass, p.difference);
     p.com.iter().chain(&p.inertia).for_each(|q| println!("  {q:?}"));
@@ -373,7 +376,7 @@ fn ur10e_payload_and_gains() {
     assert!((p.mass.value / 2.805 - 1.0).abs() < 0.15, "{:?}", p.mass);
     assert!(p.mass.interval.unwrap().0 > 2.805, "{:?}", p.mass);
     assert_eq!(found.file(&config).unwrap().status, "warn", "the stated mass is outside");
-    let gains = identify_gains(&config, |_| {}).unwrap();
+    let gains = identify_gains(&config, &mut |_| {}).unwrap();
     for j in &gains.joints {
         println!("{j:?}");
     }
@@ -392,7 +395,7 @@ path = "{data}/rokae-xmate/run_a.csv.gz"
 path = "{data}/rokae-xmate/run_b.csv.gz"
 "#;
     let Some(config) = recorded(text) else { return };
-    let found = identify(&config, |_| {}).unwrap();
+    let found = identify(&config, &mut |_| {}).unwrap();
     let agreement = found.log_agreement.as_ref().unwrap();
     agreement.warnings().iter().for_each(|w| println!("{w}"));
     println!("{:?}", agreement.one_robot);

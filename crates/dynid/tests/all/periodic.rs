@@ -38,7 +38,7 @@ fn errors_of(log: &SimulatedLog, held_out: &SimulatedLog, path: &Path, more: &st
         "robot = {:?}\n{more}\n[estimator]\nconsistency = \"none\"\n[[log]]\npath = {path:?}\n",
         robot_file()
     );
-    let id = identify(&Config::parse(&text, "test").unwrap(), |_| {}).unwrap();
+    let id = identify(&Config::parse(&text, "test").unwrap(), &mut |_| {}).unwrap();
     assert!(!id.warnings.iter().any(|w| w.contains("repeat")), "{:?}", id.warnings);
     let table = id.model.parameters();
     let mut truth = vec![0.0; table.linear.len()];

@@ -119,7 +119,7 @@ fn case(
 }
 
 fn examine(config: &Config) -> Check {
-    check(config, |_| {}).unwrap()
+    check(config, &mut |_| {}).unwrap()
 }
 
 /// Runs all cases; gives the corrected configuration of each.
@@ -427,7 +427,7 @@ fn identification_refuses_nonsense_and_accepts_what_was_put_right() {
     let folder = tempfile::tempdir().unwrap();
     let clean = folder.path().join("clean.csv");
     Record::clean().write(&clean);
-    let truth = identify(&config(&clean), |_| {}).unwrap();
+    let truth = identify(&config(&clean), &mut |_| {}).unwrap();
     assert!(truth.findings.is_empty());
     let mut record = Record::clean();
     record.swap(2, 3);
@@ -436,15 +436,15 @@ fn identification_refuses_nonsense_and_accepts_what_was_put_right() {
     let path = folder.path().join("wrong.csv");
     record.write(&path);
     let wrong = config(&path);
-    let error = identify(&wrong, |_| {}).unwrap_err();
+    let error = identify(&wrong, &mut |_| {}).unwrap_err();
     assert!(matches!(&error, dynid::Error::PreflightFault(_)), "{error}");
     assert!(error.hint().unwrap().contains("--fix"), "{error}");
     let warned = Config { preflight: dynid::config::Preflight::Warn, ..wrong.clone() };
-    let warned = identify(&warned, |_| {}).unwrap();
+    let warned = identify(&warned, &mut |_| {}).unwrap();
     assert!(warned.warnings.iter().any(|w| w.contains("joint permutation")), "{:?}", warned.warnings);
     let corrected = folder.path().join("right.toml");
     std::fs::write(&corrected, examine(&wrong).corrected(&wrong, None).unwrap()).unwrap();
-    let right = identify(&Config::read(&corrected).unwrap(), |_| {}).unwrap();
+    let right = identify(&Config::read(&corrected).unwrap(), &mut |_| {}).unwrap();
     for (a, b) in right.fit().x.iter().zip(&truth.fit().x) {
         assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{a} against {b}");
     }

@@ -172,14 +172,14 @@ fn reads_as(clean: &Record, config: &Config, spoilt_rows: usize) -> Result<(), S
 /// Spoils a robot's log in every way; the causes that were not named first. No remedy written is wrong, no clean log is refused.
 fn spoil(name: &str, clean: &Record) -> Vec<&'static str> {
     let folder = tempfile::tempdir().unwrap();
-    let found = check(&clean.write(folder.path(), "clean"), |_| {}).unwrap();
+    let found = check(&clean.write(folder.path(), "clean"), &mut |_| {}).unwrap();
     assert!(errors(&found).is_empty(), "{name}, clean: {:#?}", errors(&found));
     let mut missed = Vec::new();
     for (cause, id, corrupt) in causes() {
         let mut record = clean.clone();
         corrupt(&mut record);
         let config = record.write(folder.path(), "spoilt");
-        let found = check(&config, |_| {}).unwrap();
+        let found = check(&config, &mut |_| {}).unwrap();
         let of_record = ["clock_gap", "weak_excitation"];
         let worse = |f: &&dynid::check::Finding| f.severity != Severity::Info && !of_record.contains(&f.id);
         let first = found.findings.iter().find(worse);
@@ -200,7 +200,7 @@ fn spoil(name: &str, clean: &Record) -> Vec<&'static str> {
         let corrected = Config::read(&corrected).unwrap();
         let wrong = reads_as(clean, &corrected, record.time.len());
         assert_eq!(wrong, Ok(()), "{name}, {cause}: {:#?}", errors(&found));
-        let again = check(&corrected, |_| {}).unwrap();
+        let again = check(&corrected, &mut |_| {}).unwrap();
         assert!(errors(&again).is_empty(), "{name}, {cause}, put right: {:#?}", errors(&again));
     }
     missed

@@ -89,7 +89,7 @@ fn link_rows_of_a_kr300_do_not_make_a_stiffness_of_five() {
     let path = folder.path().join("run.toml");
     std::fs::write(&path, text).unwrap();
     let config = Config::read(&path).unwrap();
-    let found = identify(&config, |_| {}).unwrap();
+    let found = identify(&config, &mut |_| {}).unwrap();
     let estimate = found.estimate(&config).unwrap();
     for s in &estimate.stiffness {
         println!("{} (rows: {:.2e}), {s:?}", s.words(), s.of_rows);
@@ -183,7 +183,7 @@ fn told(late: usize, seed: u64, folder: &Path) -> (Vec<JointStiffness>, Vec<Stri
     std::fs::write(&config, "robot = \"robot.toml\"\npreflight = \"warn\"\n[[log]]\npath = \"log.csv\"\n")
         .unwrap();
     let config = Config::read(&config).unwrap();
-    let found = identify(&config, |_| {}).unwrap();
+    let found = identify(&config, &mut |_| {}).unwrap();
     let estimate = found.estimate(&config).unwrap();
     for s in &estimate.stiffness {
         println!("late {late}: {} (rows: {:.4e}, slope {:.3})", s.words(), s.of_rows, s.slope_of_rows);

@@ -113,7 +113,7 @@ elements = ["stribeck", "exponential_viscous", "offset"]
 
     fn identify(&self, elements: &str, logs: &str) -> (Identification, Estimate) {
         let config = self.config(elements, logs);
-        let found = identify(&config, |_| {}).unwrap();
+        let found = identify(&config, &mut |_| {}).unwrap();
         let estimate = found.estimate(&config).unwrap();
         std::fs::write(self.path("estimate.json"), estimate.to_json()).unwrap();
         let read = Estimate::read(&self.path("estimate.json")).unwrap();
@@ -254,7 +254,7 @@ fn a_log_without_temperature_is_named_and_a_constant_one_helps() {
     let bench = Bench::new(2.0);
     bench.log("log.csv", [31.0, 31.0], 1);
     let bare = "[[log]]\npath = \"bare_log.csv\"\n";
-    let error = identify(&bench.config(KNOWN, bare), |_| {}).unwrap_err();
+    let error = identify(&bench.config(KNOWN, bare), &mut |_| {}).unwrap_err();
     let hint = error.hint().unwrap();
     match error {
         Error::Conditioning(ConditioningError::MissingChannel { log, channel }) => {
@@ -279,7 +279,7 @@ fn a_log_without_temperature_is_named_and_a_constant_one_helps() {
     let model = held.effort_model(&bench.path("estimate.json"), Split::Consistent).unwrap();
     assert!(model.channels().is_empty());
     let senseless = bench.config(&format!("{KNOWN}\ntemperature = {{ j2 = 304.0 }}"), bare);
-    assert!(identify(&senseless, |_| {}).unwrap_err().to_string().contains("elements.temperature"));
+    assert!(identify(&senseless, &mut |_| {}).unwrap_err().to_string().contains("elements.temperature"));
 }
 
 #[test]
@@ -304,7 +304,7 @@ fn every_log_may_state_its_temperature() {
     assert!(error(&hot) > 2.0 * error(&logged), "{} {}", error(&hot), error(&logged));
     let refused = |known: &str, stated: &str| {
         let config = bench.config(known, &logs(["bare_cold", "bare_warm"], [stated, "temperature = 43.0"]));
-        identify(&config, |_| {}).unwrap_err().to_string()
+        identify(&config, &mut |_| {}).unwrap_err().to_string()
     };
     for (known, stated, found) in [
         (KNOWN.to_owned(), "temperature = 294.0", "found 294"),
@@ -326,7 +326,7 @@ fn a_temperature_that_no_law_reads_is_refused() {
     let refused = |laws: &[Value], stated: &str| {
         std::fs::write(bench.path("friction.json"), friction_file(laws)).unwrap();
         let config = bench.config(&format!("{KNOWN}\ntemperature = {stated}"), bare);
-        identify(&config, |_| {}).err().map(|e| e.to_string())
+        identify(&config, &mut |_| {}).err().map(|e| e.to_string())
     };
     let both = [law("j1", 2.0), constant.clone()];
     // One number for all joints serves those that read it.
@@ -418,16 +418,16 @@ fn what_the_law_does_not_know_is_said() {
     );
 
     std::fs::write(bench.path("friction.json"), friction_file(&[law("wrist", 2.0)])).unwrap();
-    let error = identify(&bench.config(KNOWN, LOG), |_| {}).unwrap_err();
+    let error = identify(&bench.config(KNOWN, LOG), &mut |_| {}).unwrap_err();
     assert!(error.to_string().contains("wrist") && error.hint().is_some(), "{error}");
     std::fs::write(bench.path("friction.json"), friction_file(&[law("j1", -2.0)])).unwrap();
-    let error = identify(&bench.config(KNOWN, LOG), |_| {}).unwrap_err();
+    let error = identify(&bench.config(KNOWN, LOG), &mut |_| {}).unwrap_err();
     assert!(error.to_string().contains("joint `j1`: `coulomb`: expected at least 0"), "{error}");
     let lugre = format!("{KNOWN}\njoint = {{ j1 = [\"lugre\"] }}");
     let mut bristled = law("j1", 2.0);
     bristled["bristle"] = json!({ "sigma0": 2000.0, "sigma1": 1.0 });
     std::fs::write(bench.path("friction.json"), friction_file(&[bristled])).unwrap();
-    let error = identify(&bench.config(&lugre, LOG), |_| {}).unwrap_err();
+    let error = identify(&bench.config(&lugre, LOG), &mut |_| {}).unwrap_err();
     assert!(error.to_string().contains("has bristles already"), "{error}");
     let alone = Config::parse("robot = \"a\"\n[elements]\ntemperature = 30\n[[log]]\npath = \"b\"\n", "c");
     assert!(alone.unwrap_err().to_string().contains("known_friction"));

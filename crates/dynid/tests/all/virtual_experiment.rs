@@ -227,7 +227,7 @@ fn identified(path: &Path, text: &str) -> Vec<(f64, f64)> {
         path.display().to_string(),
         file.display().to_string()
     );
-    let id = identify(&Config::parse(&run, "test").unwrap(), |_| {}).unwrap();
+    let id = identify(&Config::parse(&run, "test").unwrap(), &mut |_| {}).unwrap();
     let beta = id.base.values(&values(&log));
     let std = id.standard_deviations();
     (0..beta.len()).filter_map(|k| std[k].0.map(|s| (id.fit().x[k] - beta[k], s))).collect()

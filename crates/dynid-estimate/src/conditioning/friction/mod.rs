@@ -138,7 +138,7 @@ pub fn choose_friction(
     prior: Option<&BasePrior>,
     choices: &Conditioning,
     settings: &ConditioningSettings,
-    mut progress: impl FnMut(Stage),
+    progress: &mut dyn FnMut(Stage),
 ) -> Result<FrictionChoice, ConditioningError> {
     assert_eq!(kinds.len(), model.outputs().len(), "kinds of shapes per output");
     let settings = &super::with_given_mask(settings);

@@ -126,7 +126,7 @@ fn outcome(file: &str, text: &str) -> Result<String, String> {
     std::fs::write(&path, text).unwrap();
     let run = || {
         let config = Config::read(&path)?;
-        identify(&config, |_| {})?.estimate(&config)
+        identify(&config, &mut |_| {})?.estimate(&config)
     };
     let estimate: dynid::Estimate = run().map_err(|e: dynid::Error| e.to_string())?;
     let mut json: serde_json::Value = serde_json::from_str(&estimate.to_json()).unwrap();
@@ -628,10 +628,10 @@ fn every_key_of_an_identification_takes_effect_or_is_refused() {
 #[test]
 fn an_identification_without_logs_is_refused_by_the_library() {
     let robot = folder().path().join("arm.toml");
-    let error = identify(&Config { robot, ..Config::default() }, |_| {}).unwrap_err();
+    let error = identify(&Config { robot, ..Config::default() }, &mut |_| {}).unwrap_err();
     assert!(matches!(&error, dynid::Error::Setting { name, .. } if name == "log"), "{error}");
     assert!(error.hint().unwrap().contains("[[log]]"));
-    let error = identify(&Config::default(), |_| {}).unwrap_err();
+    let error = identify(&Config::default(), &mut |_| {}).unwrap_err();
     assert!(matches!(&error, dynid::Error::Setting { name, .. } if name == "robot"), "{error}");
 }
 

@@ -195,7 +195,7 @@ fn designed(text: &Text) -> Result<String, String> {
     std::fs::write(&path, format!("{head}{}\n{tables}\n", text.top)).unwrap();
     let run = || {
         let config = DesignConfig::read(&path)?;
-        design(&config, |_| {})?.record(&config)
+        design(&config, &mut |_| {})?.record(&config)
     };
     let record = run().map_err(|e: dynid::Error| e.to_string())?;
     let mut json = serde_json::to_value(&record).unwrap();
@@ -417,7 +417,7 @@ fn of_friction(text: &Text) -> Result<String, String> {
     std::fs::write(&path, whole).unwrap();
     let run = || {
         let config = FrictionConfig::read(&path)?;
-        let found = identify_friction(&config, |_| {})?;
+        let found = identify_friction(&config, &mut |_| {})?;
         let joints: String = found.joints.iter().fold(String::new(), |mut out, j| {
             write!(out, "{:?} {:?} {:?}", j.experiment.pairing, j.law, j.presliding).unwrap();
             out

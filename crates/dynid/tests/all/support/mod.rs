@@ -89,7 +89,7 @@ pub(crate) fn data() -> Option<PathBuf> {
 pub(crate) fn run(text: &str) -> Option<(Config, Identification)> {
     let data = data()?;
     let config = Config::parse(&text.replace("{data}", &data.display().to_string()), "test").unwrap();
-    let identification = identify(&config, |_| {}).unwrap();
+    let identification = identify(&config, &mut |_| {}).unwrap();
     Some((config, identification))
 }
 
