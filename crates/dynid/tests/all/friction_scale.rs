@@ -135,6 +135,7 @@ fn the_factor_of_a_cold_log_is_found_and_the_robot_alone_is_that_of_the_warm_one
 
 /// Intervals hold the true factor as often as they say, and coefficients lie off by what their standard deviations say.
 #[test]
+#[ignore = "32 identifications"]
 fn intervals_of_the_factor_hold_it() {
     const RUNS: u32 = 16;
     let bench = Bench::new();
