@@ -1,6 +1,6 @@
 //! Friction that follows reactions: `cargo bench -p dynid-estimate --bench load_friction`.
 //!
-//! Three drives of 1000 samples with 17 parameters, the machine of spec/prr3.md.
+//! Three drives of 1000 samples with 17 parameters, the planar machine of Rosyid & El-Khasawneh 2020.
 #![expect(clippy::unwrap_used, reason = "a benchmark that fails should stop")]
 
 #[path = "../tests/all/prr3_machine/mod.rs"]

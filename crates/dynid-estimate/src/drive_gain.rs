@@ -2,7 +2,7 @@
 //!
 //! Where currents `i = (W x + w_L)/g` were logged with and without a known load `w_L`, the current is regressed on
 //! exact columns, `i = W (x/g) + w_L (1/g)`. Moving it to the regressor, `w_L = g i - W x`, brings its noise there and pulls
-//! `g` towards zero (spec/estimation.md section 10).
+//! `g` towards zero.
 
 use crate::factor::Factor;
 use crate::linear::{TlsNoise, ols, tls};

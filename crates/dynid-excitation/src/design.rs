@@ -122,7 +122,7 @@ struct Stage {
 }
 
 /// Warm start with the determinant, which is smooth and pulls up all small values; then smooth stand-ins for measures of
-/// extremes, ever closer (spec/excitation.md sections 4.4 and 6.2, with more and smaller steps).
+/// extremes, ever closer (with more and smaller steps).
 fn schedule(criterion: &Criterion) -> Vec<Stage> {
     let stage = |smoothing, iterations, radius, fine| Stage {
         criterion: criterion.clone(),

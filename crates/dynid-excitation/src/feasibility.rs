@@ -1,4 +1,4 @@
-//! When no motion keeps all limits: which one is in the way (spec/excitation.md section 6.6).
+//! When no motion keeps all limits: which one is in the way.
 
 use crate::constraint::ConstraintKind;
 use crate::grid::{Grid, LimitId, LimitValues, SidedRow};

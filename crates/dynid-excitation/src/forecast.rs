@@ -45,7 +45,7 @@ pub struct RandomComparison {
     pub condition: f64,
 }
 
-/// What a trajectory promises (spec/excitation.md section 7).
+/// What a trajectory promises.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Forecast {
     /// Condition number of the weighted columns in SI units.

@@ -116,7 +116,7 @@ pub(crate) struct Grid<'a> {
 
 impl<'a> Grid<'a> {
     /// Grid of the search: `samples` in one period, coordinate limits tightened so that peaks between samples stay
-    /// within them (spec/excitation.md section 5.2).
+    /// within them.
     pub(crate) fn search(problem: &'a Problem, map: &'a Parametrisation, samples: usize) -> Self {
         let basis = FourierBasis::on_period(problem.base, problem.harmonics, samples);
         let bound = FourierBasis::grid_factor(problem.harmonics, samples).map_or(1.0, |f| 1.0 / f);

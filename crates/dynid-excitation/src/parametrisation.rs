@@ -22,7 +22,7 @@ pub struct StartConditions {
 /// Unknowns of a coordinate: amplitudes in an orthonormal basis of the conditions' null space, harmonic `k` in units of
 /// `½ min(r, v/(kω), a/(kω)²)`; then, without a start pose, the offset in units of half the half range from the middle.
 ///
-/// Source: spec/excitation.md sections 3.2 and 3.3.
+/// Source: Swevers et al. 1997.
 #[derive(Debug, Clone)]
 pub struct Parametrisation {
     harmonics: usize,

@@ -40,7 +40,7 @@ pub struct Problem {
     pub samples: usize,
 }
 
-/// Width of the smoothed sign of velocities, unless chosen otherwise (spec/excitation.md section 3.5).
+/// Width of the smoothed sign of velocities, unless chosen otherwise.
 pub const DEFAULT_SIGN_WIDTH: f64 = 0.02;
 
 /// Samples per harmonic of a period during the search, unless chosen otherwise.

@@ -1,4 +1,4 @@
-//! Closes the gap between the grid of the search and every instant (spec/excitation.md section 6.4).
+//! Closes the gap between the grid of the search and every instant.
 
 use crate::grid::{Grid, LimitId, LimitValues};
 use crate::optimiser::{Elastic, QuadraticProgram, Row};

@@ -101,8 +101,7 @@ impl BaseParameters {
 
     /// Analyses a closed mechanism of which reactions are known beside the efforts: measured, or felt through friction.
     ///
-    /// Efforts alone tell combinations that belong to the mechanism; what reactions add belongs to the place of the cuts
-    /// (spec/mechanisms.md section 12).
+    /// Efforts alone tell combinations that belong to the mechanism; what reactions add belongs to the place of the cuts.
     pub fn with_reactions(
         model: &ClosedModel,
         reactions: &[Reaction],

@@ -26,7 +26,7 @@ pub struct Inertia(pub [f64; PARAMETERS_PER_BODY]);
 impl Inertia {
     /// From mass (kg), centre of mass (m) and the inertia tensor about the centre of mass (kg m²), all in frame axes.
     ///
-    /// `I = I_c + m ((c·c) 1 - c cᵀ)`, `h = m c` (spec/mechanisms.md section 3).
+    /// `I = I_c + m ((c·c) 1 - c cᵀ)`, `h = m c`.
     pub fn from_com(mass: f64, com: Vec3<f64>, about_com: &Mat3<f64>) -> Self {
         let tensor = *about_com + (Mat3::identity() * com.dot(com) + Mat3::outer(com, com) * -1.0) * mass;
         Inertia::from_parts(mass, com.scale(mass), &tensor)
@@ -92,7 +92,7 @@ impl Inertia {
     /// Pseudo-inertia `P = [[Σ, h], [hᵀ, m]]` with `Σ = ½ tr(I) 1 - I` (the second moments of mass), kg m², kg m, kg.
     ///
     /// Positive semidefinite exactly if some mass distribution has these parameters; a bijection between ten parameters
-    /// and symmetric 4 × 4 matrices (Wensing, Kim & Slotine 2018, eq. 19; spec/estimation.md section 5.1).
+    /// and symmetric 4 × 4 matrices (Wensing, Kim & Slotine 2018, eq. 19).
     pub fn pseudo_inertia(&self) -> Square<4> {
         let [m, x, y, z, xx, xy, xz, yy, yz, zz] = self.0;
         [

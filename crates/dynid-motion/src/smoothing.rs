@@ -14,7 +14,7 @@ const FIRST: [f64; 5] = [69.0, 4.0, -6.0, 4.0, -1.0];
 ///
 /// `passes`: how often, each time from the samples of the pass before; 0 changes nothing. Cubics pass unchanged. White
 /// noise falls to `√(17/35)` = 0.70 of its RMS with one pass; many passes round off steps, such as Coulomb friction at a
-/// reversal. The study of the ER-16 uses 3 passes at 100 Hz on torques (spec/er16.md section 6).
+/// reversal. The study of the ER-16 uses 3 passes at 100 Hz on torques.
 ///
 /// # Errors
 /// [`SignalError`] with fewer than five samples, or if one is not finite.

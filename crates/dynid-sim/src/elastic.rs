@@ -3,7 +3,7 @@
 //! The link's row of the equation of motion gives the torque of its transmission, `T_k = rigid_j + e_out + load`. The spring
 //! inverted, `Δ` follows, and the motor's motion `θ = N (q + Δ)`, then the drive's effort from the motor's row. No stiff
 //! equation is integrated. For the motor's acceleration the torque is needed with two time derivatives, hence the motion of
-//! the links with four (Spong 1987; spec/hit-joint.md section 4):
+//! the links with four (Spong 1987):
 //!
 //! ```text
 //! S = k1 + 3 k2 Δ²        Δ̇ = Ṫ/S        Δ̈ = (T̈ - 6 k2 Δ Δ̇²)/S

@@ -1,8 +1,7 @@
 //! Which motion would help: what the next log should hold, for parameters that this one leaves to the prior.
 //!
 //! A library of short motions is run through the model's regressor, reduced to rows as the fit reduces a log, and added to
-//! the present information `J`. What a motion `c` is worth to parameter `j` is `s_j(J + J_c) - s_j(J)`
-//! (spec/estimation.md section 6).
+//! the present information `J`. What a motion `c` is worth to parameter `j` is `s_j(J + J_c) - s_j(J)`.
 
 mod motions;
 mod rows;

@@ -1,4 +1,4 @@
-//! Drive gains from a known payload (spec/estimation.md section 10).
+//! Drive gains from a known payload.
 
 mod record;
 

@@ -24,7 +24,7 @@ pub struct PayloadIdentification {
 /// Identifies the payloads of a configuration. All ten parameters of every payload are unknown; what the configuration
 /// states of them stands beside the result.
 ///
-/// Robot and payloads are identified together (spec/estimation.md section 10): the columns of the link that carries a
+/// Robot and payloads are identified together: the columns of the link that carries a
 /// payload count once more in the logs that carry it, robot parameters are shared by all logs, and the pseudo-inertia of
 /// the payload is one more body that must be able to exist. That a log deviates in offset or friction is said by `own`.
 ///

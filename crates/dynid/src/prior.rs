@@ -30,7 +30,7 @@ pub enum PriorError {
 
 /// Prior values and standard deviations of all linear parameters of a model.
 ///
-/// Deviations (spec/estimation.md section 6) with `m0` and `ℓ` of [`BodyPrior`]: mass `0.5 m0`, first moments `0.5 m0 ℓ`,
+/// Deviations with `m0` and `ℓ` of [`BodyPrior`]: mass `0.5 m0`, first moments `0.5 m0 ℓ`,
 /// moments of inertia `0.5 m0 ℓ²`. Parameters of elements, by what their columns do (so couplings and new elements need
 /// no rule of their own), with the largest entry `c_j` of the column in the row of joint `j`:
 ///

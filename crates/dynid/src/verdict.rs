@@ -64,7 +64,7 @@ fn check(
     (status, result)
 }
 
-/// Judges an identification (spec/conditioning.md section 11).
+/// Judges an identification.
 ///
 /// A failure is: rank doubtful, most parameters not excited, or a prediction that explains less than half of the effort
 /// on some joint that moves. A warning is anything that should make a user look.

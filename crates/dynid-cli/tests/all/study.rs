@@ -104,7 +104,7 @@ fn measured(study: &str, folder: &Path, seed: &str) -> Vec<(String, Json, bool)>
 }
 
 #[test]
-#[ignore = "four quick runs"]
+#[ignore = "four quick runs of studies take half a minute"]
 fn rows_that_depend_on_the_seed_are_marked() {
     let folder = tempfile::tempdir().unwrap();
     for study in ["er16", "hit-joint"] {

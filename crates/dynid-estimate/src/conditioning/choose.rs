@@ -1,4 +1,4 @@
-//! Kernel, reversal mask and delay, chosen on held-out time blocks (spec/conditioning.md sections 6 to 8).
+//! Kernel, reversal mask and delay, chosen on held-out time blocks.
 
 use dynid_motion::cutoff::{KernelLimit, kernel_candidates, kernel_limit};
 use dynid_motion::median::median;

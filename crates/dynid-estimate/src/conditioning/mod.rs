@@ -1,4 +1,4 @@
-//! From logs to regression rows: every setting found from the logs themselves (spec/conditioning.md).
+//! From logs to regression rows: every setting found from the logs themselves.
 //!
 //! Nonlinear columns are computed from states at a high cut-off; then columns and effort pass through one compact kernel,
 //! and a row counts only if nothing unusable lies under it. Kernel, reversal mask and delay are chosen on held-out

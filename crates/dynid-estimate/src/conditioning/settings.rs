@@ -1,4 +1,4 @@
-//! Settings of the conditioning; every threshold of spec/conditioning.md with its default.
+//! Settings of the conditioning; every threshold with its default.
 
 use dynid_motion::clock::ClockSettings;
 use dynid_motion::cutoff::CutoffSettings;

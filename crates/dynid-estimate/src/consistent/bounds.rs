@@ -1,4 +1,4 @@
-//! A start that meets the bounds, or the bounds that exclude each other (spec/estimation.md section 5.7).
+//! A start that meets the bounds, or the bounds that exclude each other.
 
 use dynid_model::symmetric::trace;
 use faer::Mat;

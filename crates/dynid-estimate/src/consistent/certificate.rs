@@ -1,4 +1,4 @@
-//! A proven bound on the excess of a consistent point over the optimum (spec/estimation.md section 5.6).
+//! A proven bound on the excess of a consistent point over the optimum.
 //!
 //! `F` is convex: `F(y) ≥ F(ξ) + ∇F(ξ)·(y - ξ)`, and the right side is least over
 //! `{X_i ⪰ M_i, tr X_i ≤ β_i, scalars in a box}` in closed form. Any multipliers `≥ 0` of the bounds may be used; no

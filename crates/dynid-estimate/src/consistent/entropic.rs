@@ -1,7 +1,7 @@
 //! Entropic distance of bodies (Lee, Wensing & Park 2020).
 //!
 //! `D(P | P0) = ln(det P0 / det P) + tr(P0⁻¹ P) - 4`, the Bregman divergence of `-ln det`: zero for equal bodies,
-//! convex in `P`, and the same in every frame and in all units (spec/estimation.md section 5.2).
+//! convex in `P`, and the same in every frame and in all units.
 
 use dynid_model::Inertia;
 use dynid_model::symmetric::{Square, cholesky, congruence, inner, lower_inverse, product, trace, transpose};

@@ -1,6 +1,6 @@
 //! Primal-dual interior-point method with Nesterov-Todd directions, predictor and corrector.
 //!
-//! Sources: Nesterov & Todd 1997; Mehrotra 1992; Todd, Toh & Tütüncü 1998. spec/estimation.md section 5.5.
+//! Sources: Nesterov & Todd 1997; Mehrotra 1992; Todd, Toh & Tütüncü 1998.
 
 mod direction;
 mod newton;

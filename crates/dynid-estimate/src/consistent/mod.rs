@@ -9,7 +9,7 @@
 //! `R`, `z` are weighted by `1/σ`, so that everything counts in units of the residual variance.
 //!
 //! Sources: Wensing, Kim & Slotine 2018 (pseudo-inertia); Sousa & Cortesão 2014 (6 × 6 form); Lee, Wensing & Park 2020
-//! (entropic distance); Nesterov & Todd 1997, Mehrotra 1992 (method). spec/estimation.md section 5.
+//! (entropic distance); Nesterov & Todd 1997, Mehrotra 1992 (method).
 
 mod active;
 mod bounds;
@@ -144,7 +144,7 @@ fn report<const N: usize>(
 /// Proven bound on the excess of an estimate, from whatever method, over the consistent optimum.
 ///
 /// For any consistent `x` whose whitened parts are below ten times those of `estimate`,
-/// `objective(x) ≥ objective(estimate) - gap` (spec/estimation.md section 5.6). Bounds of the problem are given their
+/// `objective(x) ≥ objective(estimate) - gap`. Bounds of the problem are given their
 /// best multipliers zero, which is safe and loose where a bound is active. `None` for the 6 × 6 form, which needs
 /// multipliers, and if the estimate is not consistent.
 ///

@@ -8,7 +8,7 @@
 //!   longer logs of the same motion would remove;
 //! - structural limit `p_j`: the same for the row space of the regrouping `K`, what any motion could remove;
 //!
-//! and `s_j ≤ l_j ≤ p_j`. [`Assessment::verdict`] sums them up (spec/estimation.md section 6).
+//! and `s_j ≤ l_j ≤ p_j`. [`Assessment::verdict`] sums them up.
 //!
 //! A log enters in base columns, `R = R_β K`. All work is orthogonal: a QR of `C0^½ Kᵀ = Q T` gives the visible space,
 //! and the singular values of `R_β Tᵀ` what was seen of it. Directions at rounding level count as not seen however large

@@ -25,8 +25,7 @@
 //! | what each value rests on | [`verdicts`] |
 //!
 //! In the inverse model nothing is implicit: reactions come from rows without friction. Signs of reactions make `J` piecewise
-//! smooth. Masses and moments that move no effort and no reaction stay undetermined whatever the method
-//! (spec/prr3.md section 7).
+//! smooth. Masses and moments that move no effort and no reaction stay undetermined whatever the method.
 
 mod barrier;
 mod bounded;

@@ -11,8 +11,8 @@ const ROWS: usize = 256;
 /// Residuals of all candidates above which groups are worth several threads.
 const PARALLEL: usize = 30_000;
 
-/// `J(θ) = Σ_j Σ_t (τ_meas - τ(θ))²` over the used samples: the objective of Rosyid & El-Khasawneh 2020 (section 9 of
-/// spec/prr3.md), `θ = [φ, μ_c, f_v, μ_s, v_s]`.
+/// `J(θ) = Σ_j Σ_t (τ_meas - τ(θ))²` over the used samples: the objective of Rosyid & El-Khasawneh 2020,
+/// `θ = [φ, μ_c, f_v, μ_s, v_s]`.
 ///
 /// Exponentials are kept for the last Stribeck speed, which most candidates of a pattern search share; they are used for
 /// a candidate with exactly that speed only, so a value depends on its candidate alone, whatever the group and the number

@@ -11,8 +11,8 @@
 //! Candidates of a phase are formed from the sources at its beginning and evaluated as one group. The best point ever is
 //! remembered outside the population. Two named presets:
 //!
-//! - [`BeeColony::published`] (the default): all coordinates change, `a = 0.5`, `L = 600`, `f = exp(-J/mean J)`
-//!   (spec/xy-pointing.md section 11). Sources without a finite value have `f = 0` and do not enter the mean. If there are
+//! - [`BeeColony::published`] (the default): all coordinates change, `a = 0.5`, `L = 600`, `f = exp(-J/mean J)`.
+//!   Sources without a finite value have `f = 0` and do not enter the mean. If there are
 //!   negative values, all are counted from the least.
 //! - [`BeeColony::general`]: about one coordinate in ten changes (one for certain), `a = 1`, `L = n d/2`, and every step
 //!   has a pull `ψ_d (best_d - x_id)`, `ψ_d` uniform on `[0, 1.5]`, towards the best point (Zhu & Kwong 2010).

@@ -1,6 +1,6 @@
 //! Cuckoo search, plain and improved.
 //!
-//! `n` nests hold a point each. Every iteration proposes two candidates per nest (spec/er16.md section 7):
+//! `n` nests hold a point each. Every iteration proposes two candidates per nest:
 //!
 //! 1. a Lévy flight away from or towards the best nest, `x' = x + α L ∘ (x - x_best) ∘ ν`, `ν ~ N(0, 1)`, with
 //!    `L = u/|v|^{1/λ}`, `v ~ N(0, 1)`, `u ~ N(0, σ²)`,
@@ -15,7 +15,7 @@
 //!
 //! Evaluations: `n + 2 n` per iteration; 10 025 with the defaults.
 //!
-//! Sources: Yang & Deb 2009 (plain); Ding, Li, Li & Chao 2018, as read by spec/er16.md (improved).
+//! Sources: Yang & Deb 2009 (plain); Ding, Li, Li & Chao 2018 (improved).
 
 use super::algorithm::{inside, positive};
 use super::error::SearchError;

@@ -35,7 +35,7 @@ pub enum EffortLoss {
 /// one matrix product with them, and each candidate the columns that its shape changes ([`EffortModel::shaped`]).
 /// Candidates are always multiplied by eights, so a value does not depend on its group.
 ///
-/// Source: equation 11 of the paper on the ER-16 (spec/er16.md section 7) for the absolute loss.
+/// Source: equation 11 of the paper on the ER-16 for the absolute loss.
 pub struct EffortObjective<'a> {
     model: &'a dyn EffortModel,
     chunks: Vec<Chunk<'a>>,

@@ -9,8 +9,8 @@
 //!
 //! and positions are clipped to the bounds. Two named presets:
 //!
-//! - [`ParticleSwarm::published`] (the default): `w = 0.5`, `c₁ = c₂ = 0.2`, share 0.2, everyone hears of everyone
-//!   (spec/er16.md section 7.4). It contracts within some 50 iterations and stalls: right for repeating the published
+//! - [`ParticleSwarm::published`] (the default): `w = 0.5`, `c₁ = c₂ = 0.2`, share 0.2, everyone hears of everyone.
+//!   It contracts within some 50 iterations and stalls: right for repeating the published
 //!   ranking, wrong for anything else.
 //! - [`ParticleSwarm::general`]: `w = 0.65`, `c₁ = c₂ = 1.5`, each particle informs six random others until an iteration
 //!   brings no progress, then others are drawn; a velocity that led out of the bounds is reversed and halved. Topology and

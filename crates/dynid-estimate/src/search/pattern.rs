@@ -12,7 +12,7 @@
 //! logarithmic coordinates: 1, a factor e. Points that clipping leaves at `x` are not evaluated again. One-sided bounds
 //! and none are allowed if there is a start.
 //!
-//! Deterministic: the seed has no effect. Sources: Torczon 1997; spec/prr3.md section 10 for scales, factors and limits.
+//! Deterministic: the seed has no effect. Sources: Torczon 1997; Rosyid & El-Khasawneh 2020 (scales, factors and limits).
 
 use super::algorithm::positive;
 use super::error::SearchError;

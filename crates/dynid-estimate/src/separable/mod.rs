@@ -1,4 +1,4 @@
-//! Separable least squares: models linear in most of their parameters, `y ≈ Φ(α) c` (spec/estimation.md section 7).
+//! Separable least squares: models linear in most of their parameters, `y ≈ Φ(α) c`.
 //!
 //! For given shape parameters `α` the linear ones follow from `Φ = QR`, so that only `α` is searched, on the residual
 //! `r(α) = (1 - QQᵀ) y` with Kaufman's Jacobian `J_k = -(1 - QQᵀ) ∂Φ/∂α_k c`: bounded Levenberg-Marquardt from several

@@ -12,7 +12,7 @@
 //! Rows are weighted by `1/max(std, floor)`. `σ3` and `σ4` stand in for each other within some 10 %: judge a law by its
 //! curve ([`CurveError`]), not by its coefficients.
 //!
-//! Equations: spec/indy7.md section 6, spec/elements.md section 2. Source: Tadese, Pico, Seo & Moon 2022; Hurvich & Tsai
+//! Source: Tadese, Pico, Seo & Moon 2022; Hurvich & Tsai
 //! 1989 for AICc.
 
 mod analyse;

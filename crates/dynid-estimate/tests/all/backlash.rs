@@ -233,7 +233,7 @@ fn what_would_show_does_show() {
 }
 
 #[test]
-#[ignore = "the ordinary run takes one drive"]
+#[ignore = "twelve seconds; the ordinary run takes one drive"]
 fn what_would_show_does_show_on_other_drives() {
     shows_what_would_show(&Drive { load_friction: 0.1, ..DRIVE });
     shows_what_would_show(&Drive { loop_hz: 8.0, noise: 1.0, ..DRIVE });

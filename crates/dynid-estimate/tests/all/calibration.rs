@@ -1,7 +1,7 @@
 //! Do 95 % intervals hold the truth in 95 % of the logs of a filtered six-joint arm?
 //!
-//! By default a few logs are simulated, enough to notice a wrong interval. The full count of spec/estimation.md section
-//! 12 takes some minutes:
+//! By default a few logs are simulated, enough to notice a wrong interval. The full count
+//! takes some minutes:
 //!
 //! `cargo test --release -p dynid-estimate --test all calibration:: -- --ignored --nocapture`
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "in tests a panic is the report")]

@@ -116,7 +116,7 @@ fn effort_and_column_change_places() {
     assert!((found.rss - expected.rss).abs() < 1e-12);
 }
 
-/// Currents `i = (W x + w_L)/g` with noise: what the least singular value of spec/estimation.md section 10 is about.
+/// Currents `i = (W x + w_L)/g` with noise: what the least singular value is about.
 fn currents(sigma: f64, overlap: f64) -> Factor {
     let mut noise = Noise::new(11);
     let mut builder = FactorBuilder::new(3);

@@ -1,5 +1,5 @@
 //! The closed form of the three-slider mechanism, held to golden numbers, and its friction: rows B1, B3, B4, B6, B12 of
-//! spec/prr3.md section 13.
+//! the acceptance table.
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use crate::golden::{load, number, vector};

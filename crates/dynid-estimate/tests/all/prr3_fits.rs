@@ -1,4 +1,4 @@
-//! Fits of the three-slider mechanism: rows B7 to B11 of spec/prr3.md section 13, and what goes beyond the source.
+//! Fits of the three-slider mechanism: rows B7 to B11 of the acceptance table, and what goes beyond the source.
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use crate::prr3_machine::{

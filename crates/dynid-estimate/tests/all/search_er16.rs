@@ -1,4 +1,4 @@
-//! Searches on the ER-16 problem (spec/er16.md sections 7 and 10).
+//! Searches on the ER-16 problem.
 
 use crate::er16::{Er16, Motion, median, numbers, reference, value};
 use dynid_estimate::search::{

@@ -1,7 +1,7 @@
 //! Path constraints: functions of the motion at one instant that must stay within bounds along a whole trajectory.
 //!
 //! Limits of position, rate, acceleration and jerk are linear in the trajectory's unknowns and are not kept here. Efforts
-//! and distances are, each normalised to the order of one (spec/excitation.md section 5.1). None of them is band-limited:
+//! and distances are, each normalised to the order of one. None of them is band-limited:
 //! bounds that hold on a grid may break between its samples.
 
 mod capsule;

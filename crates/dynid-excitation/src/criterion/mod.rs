@@ -4,7 +4,7 @@
 //! already stacked under it), so `M_f = RᵀR` is the Fisher information. The sensitivity of every criterion is
 //! `∂c/∂W = W H` with a symmetric `H` of the size of `R`.
 //!
-//! Source: spec/excitation.md section 4.1; Gautier & Khalil 1992 (condition number), Swevers et al. 1997.
+//! Source: Gautier & Khalil 1992 (condition number), Swevers et al. 1997.
 
 mod triangle;
 

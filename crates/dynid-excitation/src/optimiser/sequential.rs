@@ -1,6 +1,6 @@
 //! Sequential quadratic programming with damped BFGS and an elastic quadratic program on near-active rows.
 //!
-//! Source: spec/excitation.md section 6.1; Powell 1978 (damping), Shanno & Phua 1978 (first scale of the curvature),
+//! Source: Powell 1978 (damping), Shanno & Phua 1978 (first scale of the curvature),
 //! Nocedal & Wright 2006 section 3.5 (step lengths by interpolation).
 
 use super::quadratic::{Elastic, Failure, Minimum, QuadraticProgram, Row};

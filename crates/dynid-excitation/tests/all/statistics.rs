@@ -47,7 +47,7 @@ fn run(name: &str, problem: &Problem, starts: usize) -> Vec<f64> {
     values
 }
 
-/// The bounds of spec/excitation.md section 9: best of all starts, every start.
+/// The bounds of the acceptance table: best of all starts, every start.
 fn require(values: &[f64], best: f64, worst: f64) {
     let found = values.iter().fold((f64::INFINITY, 0.0_f64), |(b, w), x| (b.min(*x), w.max(*x)));
     assert!(found.0 <= best && found.1 <= worst, "{found:?}, required {best} and {worst}");

@@ -1,4 +1,4 @@
-//! A design in coordinates that are no joints: the pose of a planar 3-PRR platform (spec/prr3.md).
+//! A design in coordinates that are no joints: the pose of a planar 3-PRR platform.
 
 use std::sync::Arc;
 

@@ -67,7 +67,7 @@ pub struct CouplingSpec {
     pub joints: Vec<String>,
     /// Rows of the matrix.
     pub matrix: Vec<Vec<f64>>,
-    /// Which parameters stand for the motors' side (spec/elements.md section 5).
+    /// Which parameters stand for the motors' side.
     pub form: CouplingForm,
 }
 

@@ -150,7 +150,7 @@ fn every_robot_with_loops_is_a_tree_beside_them() {
     }
 }
 
-/// Inverse kinematics of spec/prr3.md section 3 at the home pose (0, 0.32 m, 0).
+/// Inverse kinematics of the planar machine of Rosyid & El-Khasawneh 2020 at the home pose (0, 0.32 m, 0).
 #[test]
 fn home_of_the_planar_mechanism_lies_in_its_assembly_mode() {
     let robot = committed("../../robots/prr3.toml");

@@ -1,4 +1,4 @@
-//! From a tree and closures to a checked closed mechanism (spec/mechanisms.md section 10).
+//! From a tree and closures to a checked closed mechanism.
 
 use faer::Mat;
 use rand::{RngExt, SeedableRng};

@@ -12,8 +12,7 @@ pub struct LinkFrame {
 }
 
 /// Kind of a cut joint between frame `a` (axes `x_a y_a z_a`, origin `P`) and frame `b` (`x_b y_b z_b`, `Q`), with
-/// `d = Q - P`. Every kind is a list of residuals that are zero while the joint is closed, its *rows*
-/// (spec/mechanisms.md section 9).
+/// `d = Q - P`. Every kind is a list of residuals that are zero while the joint is closed, its *rows*.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CutKind {
     /// Both origins are one point: `x_a·d, y_a·d, z_a·d`.

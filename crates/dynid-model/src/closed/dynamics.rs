@@ -1,4 +1,4 @@
-//! Inverse dynamics of closed mechanisms, multipliers, and their regressors (spec/mechanisms.md section 12).
+//! Inverse dynamics of closed mechanisms, multipliers, and their regressors.
 
 use std::sync::Arc;
 

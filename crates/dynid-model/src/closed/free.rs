@@ -1,4 +1,4 @@
-//! Conditions at any positions, and the motions that they leave free (spec/mechanisms.md section 14).
+//! Conditions at any positions, and the motions that they leave free.
 
 use super::factor::Factor;
 use super::mechanism::ClosedMechanism;

@@ -1,4 +1,4 @@
-//! Closed mechanisms: trees with cut joints that close their loops (spec/mechanisms.md sections 9 to 14).
+//! Closed mechanisms: trees with cut joints that close their loops.
 //!
 //! A [`ClosedMechanism`] is a [`Mechanism`](crate::Mechanism) whose coordinates obey closures `Γ(q) = 0`. Some of them are
 //! *independent*; the others depend on them, which coordinates the poses of a motion solve for. Some are *driven*: efforts act

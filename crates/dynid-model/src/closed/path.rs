@@ -1,5 +1,4 @@
-//! The way from pose to pose: prediction, Newton's method, and steps that are halved until they are plainly a continuation
-//! (spec/mechanisms.md section 11).
+//! The way from pose to pose: prediction, Newton's method, and steps that are halved until they are plainly a continuation.
 
 use super::bend::float;
 use super::error::PoseError;

@@ -1,4 +1,4 @@
-//! Closed poses, and how all coordinates move there with the independent ones (spec/mechanisms.md sections 10 and 11).
+//! Closed poses, and how all coordinates move there with the independent ones.
 
 use super::bend::Bend;
 use super::error::PoseError;

@@ -1,4 +1,4 @@
-//! Wrenches in the joints of the tree, linear in the inertias (spec/mechanisms.md sections 6 and 12).
+//! Wrenches in the joints of the tree, linear in the inertias.
 
 use super::dynamics::ClosedDynamics;
 use super::mechanism::ClosedMechanism;

@@ -1,4 +1,4 @@
-//! Residuals of closures, their Jacobian and bias (spec/mechanisms.md section 9).
+//! Residuals of closures, their Jacobian and bias.
 
 use super::closure::{ClosureDescription, Condition, CutKind, LinkFrame};
 use super::error::ClosedError;

@@ -1,4 +1,4 @@
-//! How near a pose is to a singular one (spec/mechanisms.md section 13).
+//! How near a pose is to a singular one.
 
 use faer::Mat;
 

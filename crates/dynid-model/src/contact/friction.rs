@@ -9,8 +9,7 @@ use super::error::{ContactError, checked};
 ///
 /// Default: `μ = 0.1`, `v_0 = 1e-5` m/s, `v_m = 1e-4` m/s.
 ///
-/// Source: Ambrósio, *Impact of rigid and flexible multibody systems: deformation description and contact models* (2003);
-/// spec/xy-pointing.md, section 5.
+/// Source: Ambrósio, *Impact of rigid and flexible multibody systems: deformation description and contact models* (2003).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SlidingFriction {
     /// Coefficient `μ`, at least 0.

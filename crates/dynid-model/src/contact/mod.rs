@@ -3,7 +3,7 @@
 //! A [`ContactLaw`] turns penetration, its rate and the speed of impact into a normal force; [`SlidingFriction`] gives the
 //! direction of the tangential one. Neither knows a mechanism. The rough contact starts from a [`FractalSurface`].
 //!
-//! Source: Sun, Han, Li & Li, *Robotics* 2021, 10(1), 36; symbols and decisions in spec/xy-pointing.md, sections 4 and 5.
+//! Source: Sun, Han, Li & Li, *Robotics* 2021, 10(1), 36.
 
 mod bearing;
 mod error;

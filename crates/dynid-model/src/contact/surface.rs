@@ -98,7 +98,7 @@ pub struct SurfaceConstants {
 /// An asperity on the truncated area `a` has the interference
 /// `ω(a) = 2^(4-D) G^(D-2) √(ln γ) π^((D-3)/2) a^((3-D)/2)` and the radius `R(a) = a/(2πω)`; small ones are the plastic ones.
 ///
-/// Source: Sun et al. 2021 with Majumdar & Bhushan and Kogut & Etsion; spec/xy-pointing.md, 4.1 to 4.3.
+/// Source: Sun et al. 2021 with Majumdar & Bhushan and Kogut & Etsion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FractalSurface {
     settings: SurfaceSettings,

@@ -1,5 +1,5 @@
 //! Adjoints of inverse dynamics and regressor: derivatives of a scalar with respect to the motion, in one sweep outward
-//! and one back (spec/excitation.md section 4.2).
+//! and one back.
 //!
 //! Both scalars are sums over bodies of virtual powers. With the unit motion `(Ω, V)` of a coordinate carried to a body,
 //! its acceleration field `a + B r`, mass `m`, first moment `h` and second moment `Σ = ½ tr(I) 1 - I`,

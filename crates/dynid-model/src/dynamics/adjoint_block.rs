@@ -145,7 +145,7 @@ impl Dynamics {
     /// Adds to `out` the derivatives of `Σ_k Σ_s weights[k * stride + s] · effort_k(s)`, with the efforts of
     /// [`Dynamics::inverse_dynamics_block`]; joint level, mimic coupling is left to the caller.
     ///
-    /// Source: spec/excitation.md section 4.2 (reverse accumulation over the recursion of Featherstone 2008).
+    /// Source: Featherstone 2008 (the recursion, here accumulated in reverse).
     pub(crate) fn effort_adjoint_block(
         &self,
         motion: &MotionBlock<'_>,

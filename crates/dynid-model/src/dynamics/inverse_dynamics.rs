@@ -1,4 +1,4 @@
-//! Inverse dynamics: efforts from motion (recursive Newton-Euler, spec/mechanisms.md section 5).
+//! Inverse dynamics: efforts from motion (recursive Newton-Euler).
 
 use super::motion::{BodyMotion, Turns, placement, step};
 use super::tree::{Motion, Tree};

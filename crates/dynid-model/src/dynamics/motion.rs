@@ -1,4 +1,4 @@
-//! The outward recursion: rotations, velocities and accelerations of all bodies (spec/mechanisms.md section 4).
+//! The outward recursion: rotations, velocities and accelerations of all bodies.
 
 use super::tree::{Motion, Node, Tree};
 use crate::scalar::Scalar;

@@ -1,4 +1,4 @@
-//! Joint torque regressor in standard parameters (spec/mechanisms.md section 5).
+//! Joint torque regressor in standard parameters.
 //!
 //! The axis of every coordinate is carried outward into the axes of every body that it moves; an entry is then one
 //! inner product with the body's own motion, and nothing is carried back to the base.

@@ -1,4 +1,4 @@
-//! What acts at a joint besides rigid bodies (spec/elements.md).
+//! What acts at a joint besides rigid bodies.
 //!
 //! Efforts count on the drive's side of the balance: `effort of the drive = rigid bodies + Σ elements`, so friction is
 //! positive for positive speed. `s(v)` is the sign with `s(0) = 0`.

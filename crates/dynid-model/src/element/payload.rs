@@ -163,8 +163,8 @@ impl Payload {
 /// A known body fixed to a link wherever the channel [`payload_channel`] is 1, seen by efforts of unknown scale: per joint
 /// one column, the effort `w_L` that the body asks for (N m or N), times `<joint>.h`.
 ///
-/// Where efforts are logged as currents `i = (W x + w_L)/g`, `h = 1/g` is the inverse of the drive gain
-/// (spec/estimation.md section 10): the noisy current stays on the left-hand side.
+/// Where efforts are logged as currents `i = (W x + w_L)/g`, `h = 1/g` is the inverse of the drive gain:
+/// the noisy current stays on the left-hand side.
 #[derive(Debug)]
 pub struct KnownLoad {
     name: String,

@@ -286,7 +286,7 @@ fn er16_has_the_fifteen_base_parameters_of_the_paper() {
 #[test]
 fn er16_efforts_friction_regressor_and_poses() {
     let Some(g) = golden("er16_dynamics.json") else { return };
-    // f0, fc, fv, fa and fb of every joint: spec/er16.md section 4.
+    // f0, fc, fv, fa and fb of every joint of the ER-16.
     let friction = [
         [0.7044, 3.9877, 8.0, 32.3929, 6.9975],
         [53.2922, -2.8909, -70.0174, 70.0243, 19.7363],

@@ -44,7 +44,7 @@ fn four() -> Vec<Box<dyn JointElement>> {
     ]
 }
 
-/// Joints of Table 3 of the ER-16 (spec/er16.md section 4): `f0, fc, fv, fa, fb`.
+/// Joints of Table 3 of the ER-16: `f0, fc, fv, fa, fb`.
 const ER16: [[f64; 5]; 3] = [
     [0.7044, 3.9877, 8.0, 32.3929, 6.9975],
     [53.2922, -2.8909, -70.0174, 70.0243, 19.7363],

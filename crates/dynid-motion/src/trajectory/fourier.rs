@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::error::check;
 use super::{Point, RowOrder, TrajectoryError};
 
-/// Which coefficients describe a series (spec/excitation.md section 3.1).
+/// Which coefficients describe a series.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Form {
     /// `q = q0 + sum_l [a_l sin(l w t) + b_l cos(l w t)]`.

@@ -3,7 +3,7 @@
 /// Rows of `q = B0 x`, `q̇ = B1 x`, `q̈ = B2 x`, `q⃛ = B3 x` at given times, for coefficients
 /// `x = [q0, a_1..a_L, b_1..b_L]` of `q = q0 + Σ a_k sin kωt + b_k cos kωt`.
 ///
-/// Source: spec/excitation.md section 3.1 (Swevers et al. 1997).
+/// Source: Swevers et al. 1997.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FourierBasis {
     harmonics: usize,

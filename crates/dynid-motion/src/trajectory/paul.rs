@@ -3,7 +3,7 @@
 use super::error::check;
 use super::{Point, Profile, TrajectoryError};
 
-/// Paul's blend (spec/hit-joint.md section 4): speed `v h^2 (3 - 2 h)` with `h = t / blend` during the first blend, then a
+/// Paul's blend: speed `v h^2 (3 - 2 h)` with `h = t / blend` during the first blend, then a
 /// cruise at speed `v`, then the first blend mirrored. Position, speed and acceleration are continuous; the jerk jumps.
 ///
 /// Speed and acceleration peak at `v` and `1.5 v / blend`.

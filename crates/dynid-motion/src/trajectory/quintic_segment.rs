@@ -6,7 +6,7 @@ use super::polynomial::Polynomial;
 use super::{MotionLimits, Point, Trajectory, held};
 
 /// One polynomial of degree 5 per coordinate with given position, velocity and acceleration at both ends: the way from
-/// a parking pose into a trajectory and back (spec/excitation.md section 3.4).
+/// a parking pose into a trajectory and back.
 #[derive(Debug, Clone, PartialEq)]
 pub struct QuinticSegment {
     duration: f64,

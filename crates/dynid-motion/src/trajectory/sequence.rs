@@ -88,7 +88,7 @@ impl Sequence {
     }
 
     /// A record with the shortest quintic approach from rest at `parking` and back that keep the limits of each
-    /// coordinate (spec/excitation.md section 3.4). The record's own limits are not checked here.
+    /// coordinate. The record's own limits are not checked here.
     ///
     /// # Errors
     /// As [`QuinticSegment::shortest`].

@@ -108,7 +108,7 @@ fn indy7() {
     }
 }
 
-/// Limits of spec/er16.md section 5, degrees.
+/// Limits of the ER-16, degrees.
 const ER16_RANGE: [(f64, f64); 3] = [(-180.0, 180.0), (-60.0, 60.0), (-170.0, 80.0)];
 const ER16_SPEED: [f64; 3] = [145.0, 105.0, 170.0];
 const ER16_ACCELERATION: [f64; 3] = [50.0, 40.0, 65.0];
@@ -215,14 +215,14 @@ fn planar_machine_starts_at_rest_and_keeps_its_pose_limits() {
             close(p.position, sample["pose"][j].as_f64().unwrap(), tolerance, "pose");
         }
     }
-    // spec/prr3.md section 10: theta in [-0.3502, 0.3515], allowed 0.36.
+    // Rosyid & El-Khasawneh 2020: theta in [-0.3502, 0.3515], allowed 0.36.
     let theta = exact(&motion)[2];
     close(theta[0], -0.3502, 5e-5, "least angle");
     close(theta[1], 0.3515, 5e-5, "greatest angle");
     assert!(theta[0] > -0.36 && theta[1] < 0.36);
 }
 
-/// Table 1 of Sun et al. 2021 (spec/xy-pointing.md section 9).
+/// Table 1 of Sun et al. 2021.
 fn xy(base: f64) -> FourierTrajectory {
     let rows = [
         vec![0.111, 0.243, -6.5e-10, -0.028, -0.033, -0.005, -0.113, -0.01, 0.001, 0.013, -0.003],

@@ -1,4 +1,4 @@
-//! Closed mechanisms in motion: parallel robots, linkages (spec/mechanisms.md section 14).
+//! Closed mechanisms in motion: parallel robots, linkages.
 //!
 //! A [`ClosedPlant`] gives accelerations in the coordinates of its whole tree, by a basis of the motions that the loops leave
 //! free. Neither drives nor inverses of mass matrices are needed for that, so that it runs through poses where the drives lose

@@ -14,7 +14,7 @@ use dynid_sim::*;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-// The joint of spec/hit-joint.md: link 0, motor 1, neither with a body.
+// The HIT joint: link 0, motor 1, neither with a body.
 const RATIO: f64 = 290.0;
 const SPRING: CubicSpring = CubicSpring { k1: 396_500.0, k2: 1.336e11 };
 const J_IN: f64 = 1.2e-3;

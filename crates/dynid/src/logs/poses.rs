@@ -8,7 +8,7 @@ use crate::Error;
 
 /// Poses per log whose nearness to a singular one is measured.
 const MEASURED: usize = 500;
-/// Measure of singularity below which a log deserves a warning (spec/mechanisms.md section 13).
+/// Measure of singularity below which a log deserves a warning.
 const NEAR: f64 = 1e-2;
 
 fn visit(model: &ClosedModel, log: &Log, see: impl FnMut(usize, &PoseWorkspace)) -> Result<(), PathError> {

@@ -14,7 +14,7 @@ use crate::identify::Identification;
 use crate::prior::PAYLOAD_SIZE;
 use crate::{Error, advice};
 
-/// Share of the prior variance that the logs must remove for a value to count as seen (spec/estimation.md section 6).
+/// Share of the prior variance that the logs must remove for a value to count as seen.
 const SEEN: f64 = 0.9;
 
 /// A value with its uncertainty.

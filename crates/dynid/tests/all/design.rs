@@ -10,7 +10,7 @@ use dynid::robot::{Robot, RobotOptions};
 use dynid::simulate::{SimulateSettings, simulate};
 use dynid::{Config, Estimate, identify};
 
-/// Noise of the efforts, N m (spec/indy7.md section 8).
+/// Noise of the efforts, N m.
 const NOISE: [f64; 6] = [0.6, 0.8, 0.4, 0.2, 0.2, 0.2];
 
 fn robot_path() -> PathBuf {

@@ -60,7 +60,7 @@ fn about_friction(estimate: &Estimate) -> Vec<&String> {
     estimate.verdict.warnings.iter().filter(|w| w.contains("friction of `j1`")).collect()
 }
 
-/// The law of the second joint of the ER-16 (spec/er16.md section 4) acts against the motion up to 1.496 rad/s.
+/// The law of the second joint of the ER-16 acts against the motion up to 1.496 rad/s.
 #[test]
 fn a_law_that_drives_the_motion_is_told_with_a_remedy() {
     let law = |v: f64| -2.8909 * v.signum() - 70.0174 * v + 70.0243 * (19.7363 * v).atan();

@@ -325,7 +325,7 @@ fn indy7() -> Study {
     Study::new(RobotModel::new(robot.mechanism, elements))
 }
 
-/// Rows of the table of base parameters in spec/indy7.md section 4.
+/// Rows of the table of base parameters of the Indy7 (Tadese et al. 2022).
 #[test]
 fn the_combinations_of_an_industrial_arm_read_as_in_its_table() {
     let study = indy7();

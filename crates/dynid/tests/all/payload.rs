@@ -200,7 +200,7 @@ fn a_simulated_payload_is_found_to_a_thousandth() {
 
 const GAINS: [f64; 6] = [14.0, 13.0, 11.0, 8.0, 9.0, 10.0];
 
-/// Row 15 of spec/estimation.md: the inverse form within 1 % where plain least squares are 15 % off.
+/// Drive gains: the inverse form within 1 % where plain least squares are 15 % off.
 #[test]
 fn simulated_gains_are_found_where_plain_least_squares_are_off() {
     let bench = Bench::new();

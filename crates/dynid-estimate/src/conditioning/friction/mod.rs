@@ -1,4 +1,4 @@
-//! Friction shapes, chosen per joint on held-out time blocks (spec/conditioning.md section 10).
+//! Friction shapes, chosen per joint on held-out time blocks.
 
 mod library;
 mod losses;

@@ -1,4 +1,4 @@
-//! The ER-16 problem of spec/er16.md section 7: joints 1 to 3, 15 base parameters, five of friction per joint.
+//! The ER-16 problem : joints 1 to 3, 15 base parameters, five of friction per joint.
 #![allow(dead_code, reason = "an example uses a part of it")]
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
 

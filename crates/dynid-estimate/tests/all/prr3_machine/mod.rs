@@ -1,4 +1,4 @@
-//! The planar three-slider mechanism of spec/prr3.md in closed form: kinematics, dynamics with multipliers, trajectories.
+//! The planar three-slider mechanism (Rosyid & El-Khasawneh 2020) in closed form: kinematics, dynamics with multipliers, trajectories.
 #![allow(
     dead_code,
     clippy::unwrap_used,

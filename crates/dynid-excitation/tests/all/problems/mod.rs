@@ -1,4 +1,4 @@
-//! Design problems of the acceptance table (spec/excitation.md section 9).
+//! Design problems of the acceptance table.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 #![allow(dead_code, unreachable_pub, reason = "a benchmark uses a part of it")]
@@ -90,7 +90,7 @@ pub fn indy7_robot(data: &Value) -> Robot {
     Robot::new(&mechanism(data), &rotors, &friction)
 }
 
-/// Indy7, 58 columns, with effort limits and the distances of spec/indy7.md section 8.
+/// Indy7, 58 columns, with effort limits and distances.
 pub fn indy7(rest: bool) -> Option<Problem> {
     let data = reference("robots/indy7.json")?;
     let robot = indy7_robot(&data);

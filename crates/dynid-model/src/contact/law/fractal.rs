@@ -64,7 +64,7 @@ impl FractalSettings {
 /// in a bearing of 10 mm with 50 µm of clearance this is at 5 fm with `Ra = 0.8` µm and at 60 nm with 10 µm; with 25 µm it
 /// is never, and such a contact is refused.
 ///
-/// Source: Sun, Han, Li & Li, *Robotics* 2021, 10(1), 36; spec/xy-pointing.md, 4.3 and 4.4.
+/// Source: Sun, Han, Li & Li, *Robotics* 2021, 10(1), 36.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FractalLankaraniNikravesh {
     surface: FractalSurface,

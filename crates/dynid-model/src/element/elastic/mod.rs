@@ -1,4 +1,4 @@
-//! Joints with an elastic transmission: harmonic drives (spec/elements.md section 7).
+//! Joints with an elastic transmission: harmonic drives.
 
 mod cubic_spring;
 mod piecewise;

@@ -11,7 +11,7 @@ use crate::scalar::elementary::{Curve, atan};
 /// Friction `F_a atan(f_b v)`: one column `atan(f_b v)` for `fa`, one shape parameter `fb` (s/rad, s/m).
 ///
 /// `∂/∂v = f_b / (1 + f_b² v²)`, `∂/∂f_b = v / (1 + f_b² v²)`. Beside Coulomb and viscous friction it forms the law of
-/// spec/er16.md section 3; `fa` may then be negative (friction that falls from rest). With `f_b v_max < 1` the column
+/// the ER-16; `fa` may then be negative (friction that falls from rest). With `f_b v_max < 1` the column
 /// equals viscous friction, with `f_b |v| > 100` Coulomb friction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arctangent {

@@ -9,7 +9,7 @@ use crate::mechanism::Mechanism;
 use crate::parameter::Parameter;
 
 /// Friction of loaded gears, `μ |τ_j| s(v)` beside Coulomb friction: one column `|τ_j| s(v)` for `mu` per rate
-/// (spec/elements.md section 4, the form of gears).
+/// in the form of gears.
 ///
 /// `τ_j` is the effort of rigid bodies with given *reference* inertias, held fixed: measured efforts would bring their
 /// noise into the column, and the inertias being estimated would make it nonlinear. Any parameters with the right base

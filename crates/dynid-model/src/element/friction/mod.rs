@@ -1,4 +1,4 @@
-//! Friction of velocity, and the constant offset (spec/elements.md section 2).
+//! Friction of velocity, and the constant offset.
 
 mod arctangent;
 mod exponential_viscous;

@@ -28,7 +28,7 @@ pub fn weight_channel(joint: &str) -> String {
 /// Columns `F s (1 - E) + F_w s` and `F s E` for `mu_c`, `mu_s` (numbers without unit); without the Stribeck effect (`E = 0`)
 /// one column `(F + F_w) s` for `mu_c`. `F`, `F_w` come from channels ([`reaction_channel`], [`weight_channel`]), which a
 /// [`ClosedModel`](crate::ClosedModel) computes itself. Source: Rosyid & El-Khasawneh 2020, equations 23 and 39;
-/// spec/prr3.md section 5, where the steady force has no Stribeck effect.
+/// the steady force has no Stribeck effect there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReactionFriction {
     /// Rate, and shape parameters `vs` (m/s or rad/s) and `delta`.

@@ -47,7 +47,7 @@ fn shift_setting() -> ShapeSetting {
 }
 
 impl Sigmoid {
-    /// Default settings. They are those of spec/elements.md section 2 and do not scale with the speeds in use: the
+    /// Default settings. They do not scale with the speeds in use: the
     /// steepness of the passage through rest says nothing of the largest speed.
     pub fn new(rate: usize) -> Self {
         Sigmoid { rate, phi2: slope_setting(), phi3: shift_setting() }

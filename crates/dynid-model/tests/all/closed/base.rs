@@ -1,4 +1,4 @@
-//! Base parameters of closed mechanisms: counts of spec/mechanisms.md section 16, null directions, spec/prr3.md section 7.
+//! Base parameters of closed mechanisms: counts and null directions.
 
 use dynid_model::closed::ClosedMechanism;
 use dynid_model::*;

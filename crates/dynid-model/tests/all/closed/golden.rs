@@ -1,4 +1,4 @@
-//! Golden numbers of the specification: spec/mechanisms.md, section 18.
+//! Golden numbers of closed mechanisms.
 
 use dynid_model::closed::ClosedDynamics;
 use dynid_model::{Dynamics, State};

@@ -1,4 +1,4 @@
-//! Friction that follows reactions: spec/elements.md section 4, spec/mechanisms.md section 14.
+//! Friction that follows reactions.
 
 use dynid_model::closed::ClosedMechanism;
 use dynid_model::element::{JointElement, ReactionFriction, Stribeck};
