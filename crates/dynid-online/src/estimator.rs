@@ -180,6 +180,24 @@ impl Estimator {
         effort: &[f64],
         noise: RowNoise<'_>,
     ) -> Result<Step, SampleError> {
+        self.step_where(regressor, effort, noise, |_| true)
+    }
+
+    /// As [`Self::step`], with change detection only where `watched` says so of the sample's innovations: a sample that is not watched
+    /// updates the estimate, and the sum of change detection starts again from zero.
+    ///
+    /// What rows ask of the estimate that those before did not tell ([`Innovation::leverage`]) shows in the errors of a model that is not
+    /// quite right, though nothing has changed.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_where(
+        &mut self,
+        regressor: &[f64],
+        effort: &[f64],
+        noise: RowNoise<'_>,
+        watched: impl FnOnce(&Innovation) -> bool,
+    ) -> Result<Step, SampleError> {
         let m = effort.len();
         self.rows.load(regressor, effort, noise)?;
         let frozen = self.monitor.as_ref().map_or(self.never_frozen.as_slice(), |m| m.frozen());
@@ -203,8 +221,12 @@ impl Estimator {
             lambda = self.forget(effort);
             self.memory.push(self.rows.get_mut());
             self.solve();
+            let watched = watched(&self.innovation);
             if let Some(detection) = &mut self.detection {
-                alarm = detection.push(self.innovation.whitened());
+                match watched {
+                    true => alarm = detection.push(self.innovation.whitened()),
+                    false => detection.restart(),
+                }
             }
             if let (true, Some(reaction)) = (alarm, &mut self.reaction) {
                 reaction.start();

@@ -89,6 +89,14 @@ impl Innovation {
     }
 }
 
+impl Innovation {
+    /// Largest leverage of the rows against what is known, `φ P φᵀ` over the variance of the row's noise: how much of the error comes from
+    /// what the samples before have not told.
+    pub fn leverage(&self) -> f64 {
+        (0..self.rows).map(|row| self.variance(row) - 1.0).fold(0.0, f64::max)
+    }
+}
+
 /// Cholesky factor `L` in the lower triangle of a symmetric `m × m` matrix; the first row without a positive
 /// pivot on failure.
 pub(crate) fn cholesky(a: &mut [f64], m: usize) -> Result<(), usize> {

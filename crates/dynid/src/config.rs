@@ -61,6 +61,9 @@ pub struct Config {
     /// The size of the efforts is right, whatever the robot file, its effort limits and other arms say of it: the pre-flight then
     /// tells the difference without a warning. Default false.
     pub known_effort_scale: bool,
+    /// Masses that were weighed, kg, by the name of the payload or link: the identified ones against them tell the scale of the efforts. They
+    /// are no prior. Default: none.
+    pub known_mass: BTreeMap<String, f64>,
     /// What the pre-flight of the training logs may do. Default `refuse`.
     pub preflight: Preflight,
     /// Estimator.

@@ -23,8 +23,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
 use crate::Error;
+use crate::effort_scale::EffortScale;
 use crate::identify::OwnDelay;
 use crate::log_agreement::LogAgreement;
+use crate::overlap::Overlaps;
 pub use crate::provenance::ReadingRecord;
 use crate::stiffness::JointStiffness;
 
@@ -109,6 +111,12 @@ pub struct Estimate {
     /// What the pre-flight of the training logs found, the remedies it took for granted included.
     #[serde(default)]
     pub preflight: Vec<FindingRecord>,
+    /// Rows that logs share although each should be a recording of its own.
+    #[serde(default, skip_serializing_if = "Overlaps::is_empty")]
+    pub overlaps: Overlaps,
+    /// What speaks for the scale of the efforts.
+    #[serde(default)]
+    pub effort_scale: EffortScale,
     /// Verdict in words and checks.
     pub verdict: Verdict,
     /// Choices of the conditioning, with reasons.
@@ -370,6 +378,9 @@ pub struct Verdict {
     pub status: String,
     /// One sentence.
     pub headline: String,
+    /// What it takes for granted, since no log tells it, a sentence each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub assumptions: Vec<String>,
     /// Checks behind it.
     pub checks: Vec<CheckResult>,
     /// Warnings.

@@ -31,6 +31,7 @@ use crate::agreement::{self, Agreement};
 use crate::check::{self, Finding, Severity};
 use crate::config::{Config, LogConfig, Preflight, Route};
 use crate::consistency::Consistent;
+use crate::effort_scale::{self, EffortScale, WeighedMass};
 use crate::elements::ElementPlan;
 use crate::estimate::{ExportedRecord, InputRecord, LogFit, ReadingRecord};
 use crate::export::FileModels;
@@ -40,6 +41,7 @@ use crate::instruments::{self, Comparison, InstrumentRun};
 use crate::log_agreement::{self, LogAgreement};
 use crate::log_terms::LogTerms;
 use crate::logs::{self, LoadedLog};
+use crate::overlap::Overlaps;
 use crate::passivity::SPEED_SPAN_S;
 use crate::prior::Prior;
 use crate::robot::{Robot, RobotOptions, refuse_internal_load};
@@ -157,8 +159,14 @@ pub struct Identification {
     pub exported: ExportedRecord,
     /// Warnings, in words.
     pub warnings: Vec<String>,
+    /// Whether the training logs were examined before.
+    pub preflight: bool,
     /// What the pre-flight of the training logs found.
     pub findings: Vec<Finding>,
+    /// Rows that logs share.
+    pub overlaps: Overlaps,
+    /// What speaks for the scale of the efforts.
+    pub effort_scale: EffortScale,
     /// What friction had to obey.
     pub(crate) power: FrictionPower,
     /// Settings of the conditioning.
@@ -209,8 +217,18 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
     let reference_trajectory = config.instruments.as_ref().and_then(|table| table.trajectory.as_ref());
     let reference_trajectory = reference_trajectory.map(TrajectoryFile::read_source).transpose()?;
     let reference_trajectory = reference_trajectory.map(|(_, source)| InputRecord::of("trajectory", &source));
-    let Opened { robot, loaded, mut plan, model, logs: prepared, structure, own_delays, findings } =
-        open_robot(config, robot, progress)?;
+    let Opened {
+        robot,
+        loaded,
+        validation,
+        mut plan,
+        model,
+        logs: prepared,
+        structure,
+        own_delays,
+        findings,
+        overlaps,
+    } = open_robot(config, robot, progress)?;
     let (model, conditioning) = match config.conditioning.route {
         Route::Compact => {
             let mut stages = |stage| progress(Step::Conditioning(stage));
@@ -261,7 +279,7 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
     let residual_ratio = figures::residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
     warnings.extend(findings.iter().filter_map(Finding::warning));
     warnings.extend(prior.warnings.iter().cloned());
-    warnings.extend(loaded.iter().flat_map(|l| logs::temperature_warnings(&l.log)));
+    warnings.extend(loaded.iter().chain(&validation).flat_map(LoadedLog::warnings));
     warnings.extend(log_warnings(&model, &prepared));
     warnings.extend(elastic::warnings(&model, &prepared));
     warnings.extend(known::warnings(&plan, &robot.mechanism, &prepared));
@@ -308,7 +326,10 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
         log_agreement,
         own_delays,
         warnings,
+        preflight: config.preflight != Preflight::Off,
         findings,
+        overlaps,
+        effort_scale: EffortScale::default(),
         settings,
         power,
         logs: Vec::new(),
@@ -347,9 +368,8 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
             Err(other) => return Err(other),
         }
     }
-    for log in &config.validation {
+    for (log, mut loaded) in config.validation.iter().zip(validation) {
         progress(Step::Validate(log.path.display().to_string()));
-        let mut loaded = logs::load(log, &out.robot.axes, &config.columns, config.motor_side.as_ref())?;
         out.inputs.extend(loaded.inputs.drain(..).map(|input| match input.kind.as_str() {
             "log" => InputRecord { kind: "validation".to_owned(), ..input },
             _ => input,
@@ -387,6 +407,7 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
         power: &out.power,
     }
     .trust();
+    out.effort_scale = out.scale_of_efforts(config)?;
     Ok(out)
 }
 
@@ -477,6 +498,25 @@ impl Identification {
         Ok(predict(model, &shape, values, log, self.state_hz, self.delay_samples, &self.settings)?)
     }
 
+    /// What speaks for the scale of the efforts.
+    fn scale_of_efforts(&self, config: &Config) -> Result<EffortScale, Error> {
+        let weighed = effort_scale::mass_columns(&config.known_mass, &self.model)?;
+        let of = |(name, column, known): (String, usize, f64)| {
+            let trust = &self.trust.parameters[column];
+            WeighedMass { name, known, identified: trust.unconstrained, interval: trust.interval }
+        };
+        let masses = weighed.into_iter().map(of).collect();
+        let by_file = effort_scale::by_robot_file(
+            &self.model,
+            self.values(),
+            &self.prior,
+            &self.logs,
+            self.state_hz,
+            &self.settings,
+        )?;
+        Ok(EffortScale::of(masses, config.known_effort_scale, by_file))
+    }
+
     /// Standard deviations of all base parameters: reported and white; `None` where a column was dropped.
     pub fn standard_deviations(&self) -> Vec<(Option<f64>, Option<f64>)> {
         let mut out = vec![(None, None); self.base.len()];
@@ -526,12 +566,14 @@ pub(crate) fn read_logs(
 pub(crate) struct Opened {
     pub(crate) robot: Robot,
     pub(crate) loaded: Vec<LoadedLog>,
+    pub(crate) validation: Vec<LoadedLog>,
     pub(crate) plan: ElementPlan,
     pub(crate) model: RobotModel,
     pub(crate) logs: Vec<PreparedLog>,
     pub(crate) structure: Structure,
     pub(crate) own_delays: Vec<OwnDelay>,
     pub(crate) findings: Vec<Finding>,
+    pub(crate) overlaps: Overlaps,
 }
 
 /// Reads robot and logs, examines them, prepares them for a model with the elements asked for.
@@ -568,6 +610,16 @@ fn open_robot(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> 
         table.read_reference(&mut files, &config.columns, &logs::names(&robot.axes))?;
     }
     let (robot, mut loaded) = read_logs(config, &files, robot, progress)?;
+    // What cannot be read is told before the long work.
+    let validation = config
+        .validation
+        .iter()
+        .map(|log| {
+            progress(Step::Read(log.path.display().to_string()));
+            logs::load(log, &robot.axes, &config.columns, config.motor_side.as_ref())
+        })
+        .collect::<Result<Vec<_>, Error>>()?;
+    let overlaps = Overlaps::of(&loaded, &validation);
     let mut plan = plan_elements(config, &robot, &loaded)?;
     plan.log_terms = LogTerms::of(config, &robot)?;
     for ((loaded, log), label) in loaded.iter_mut().zip(&config.log).zip(config.log_labels()) {
@@ -575,6 +627,7 @@ fn open_robot(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> 
     }
     let model = plan.model(&robot.mechanism)?;
     effect::check(config, &plan, &model)?;
+    effort_scale::mass_columns(&config.known_mass, &model)?;
     logs::check_stated_temperatures(config.log.iter().chain(&config.validation), &model)?;
     let mut prepared =
         loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
@@ -583,14 +636,25 @@ fn open_robot(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> 
         config.check_cutoffs(&log.name, log.rate_hz)?;
     }
     // What cannot be prepared says so in its own words.
-    let findings = preflight(config, &robot, &loaded, progress)?;
+    let findings = preflight(config, &robot, &loaded, &overlaps, progress)?;
 
     progress(Step::Structure);
     // Names that do not exist are told before the long work.
     let structure = Structure::of(config, &model, &plan, &prepared)?;
     let start = model.parameters().shape_start();
     let own_delays = own_delay::take_off(config, &model, &start, &structure.base, &mut prepared, &settings)?;
-    Ok(Opened { robot, loaded, plan, model, logs: prepared, structure, own_delays, findings })
+    Ok(Opened {
+        robot,
+        loaded,
+        validation,
+        plan,
+        model,
+        logs: prepared,
+        structure,
+        own_delays,
+        findings,
+        overlaps,
+    })
 }
 
 /// Examines the training logs before anything is made of them.
@@ -598,13 +662,14 @@ fn preflight(
     config: &Config,
     robot: &Robot,
     loaded: &[LoadedLog],
+    overlaps: &Overlaps,
     progress: &mut dyn FnMut(Step),
 ) -> Result<Vec<Finding>, Error> {
     if config.preflight == Preflight::Off {
         return Ok(Vec::new());
     }
     progress(Step::Preflight);
-    let findings = check::of_loaded(config, robot, loaded)?;
+    let findings = check::of_loaded(config, robot, loaded, overlaps)?;
     match findings.iter().find(|f| f.severity == Severity::Error) {
         Some(fault) if config.preflight == Preflight::Refuse => {
             Err(Error::PreflightFault(Box::new(fault.clone())))

@@ -143,21 +143,18 @@ fn deviations<'a>(
     let limit = found.limit(found.deviations.len());
     let parameter = |column: usize| name_of(column).rsplit('.').next().unwrap_or_default().to_owned();
     let is_offset = |column: usize| parameter(column) == "fo";
-    let alike = |a: usize, b: usize| is_offset(a) == is_offset(b);
-    found
-        .deviations
-        .iter()
-        .map(|d| {
+    let mut out = Vec::with_capacity(found.deviations.len());
+    // Those of one log and joint stand together.
+    for of_joint in found.deviations.chunk_by(|a, b| (a.of.log, a.of.output) == (b.of.log, b.of.output)) {
+        for d in of_joint {
             let of = d.of;
-            let same = |other: &&dynid_estimate::log_deviations::Deviation| {
-                (other.of.log, other.of.output) == (of.log, of.output) && alike(other.of.column, of.column)
-            };
-            let together: Vec<_> = found.deviations.iter().filter(same).collect();
-            let columns: Vec<usize> = together.iter().map(|o| o.of.column).collect();
+            let together =
+                || of_joint.iter().filter(|other| is_offset(other.of.column) == is_offset(of.column));
+            let columns: Vec<usize> = together().map(|o| o.of.column).collect();
             let effect = found.effect(of.log, of.output, &columns);
             let residual = found.residual(of.log, of.output).unwrap_or(0.0);
-            let certain = together.iter().any(|o| o.value.abs() > limit * o.std);
-            LogDeviation {
+            let certain = together().any(|o| o.value.abs() > limit * o.std);
+            out.push(LogDeviation {
                 log: labels[of.log].clone(),
                 than: labels[0].clone(),
                 joint: model.outputs()[of.output].name.clone(),
@@ -168,9 +165,10 @@ fn deviations<'a>(
                 effect,
                 residual,
                 disagrees: certain && effect > RELEVANT * residual,
-            }
-        })
-        .collect()
+            });
+        }
+    }
+    out
 }
 
 impl LogAgreement {

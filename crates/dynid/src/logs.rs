@@ -14,6 +14,7 @@ use sha2::{Digest, Sha256};
 mod axes;
 mod known_motion;
 pub(crate) mod poses;
+pub mod turns;
 
 pub use axes::{LogAxis, as_logged, axes, names};
 
@@ -38,12 +39,20 @@ pub struct LoadedLog {
     pub rows: Vec<usize>,
     /// Files that were read: the log, and its trajectory.
     pub inputs: Vec<InputRecord>,
+    /// Positions that jumped by full turns and were unwrapped.
+    pub unwrapped: Vec<turns::Unwrapped>,
 }
 
 impl LoadedLog {
     /// Factors from effort columns to efforts, drive gains with currents, in the order of the log's joints; empty without.
     pub fn effort_factors(&self) -> Vec<f64> {
         self.mapping.effort.iter().flatten().flatten().map(|c| c.factor).collect()
+    }
+
+    /// Doubts about the signals and what was done to them, in words.
+    pub(crate) fn warnings(&self) -> Vec<String> {
+        let turns = self.unwrapped.iter().map(|u| format!("{}: {}", file_name(self.log.name()), u.words()));
+        turns.chain(temperature_warnings(&self.log)).collect()
     }
 
     /// Conditions the log's signals; states of a motion with a stated period come from its Fourier series.
@@ -73,12 +82,12 @@ pub fn load(
     run_columns: &MappingSpec,
     motor_side: Option<&MotorSide>,
 ) -> Result<LoadedLog, Error> {
-    let (signals, mapping, source) = read(config, axes, run_columns, motor_side)?;
-    let file = config.path.display().to_string();
-    check_degrees(&signals, axes, &file)?;
-    check_reach(&signals, &file)?;
-    check_temperatures(&signals, &file)?;
-    finish(config, &file, &signals, mapping, &source)
+    let read = read(config, axes, run_columns, motor_side)?;
+    let (file, signals) = (config.path.display().to_string(), &read.signals);
+    check_degrees(signals, axes, &file)?;
+    check_reach(signals, &file)?;
+    check_temperatures(signals, &file)?;
+    finish(config, &file, read, axes)
 }
 
 /// The same without refusing numbers for what they seem to be: units of angles, counts, temperatures.
@@ -91,8 +100,16 @@ pub(crate) fn load_as_it_is(
     run_columns: &MappingSpec,
     motor_side: Option<&MotorSide>,
 ) -> Result<LoadedLog, Error> {
-    let (signals, mapping, source) = read(config, axes, run_columns, motor_side)?;
-    finish(config, &config.path.display().to_string(), &signals, mapping, &source)
+    let read = read(config, axes, run_columns, motor_side)?;
+    finish(config, &config.path.display().to_string(), read, axes)
+}
+
+/// A file as it was read.
+struct Read {
+    signals: Signals,
+    mapping: ColumnMapping,
+    source: SourceFile,
+    unwrapped: Vec<turns::Unwrapped>,
 }
 
 fn read(
@@ -100,7 +117,7 @@ fn read(
     axes: &[LogAxis],
     run_columns: &MappingSpec,
     motor_side: Option<&MotorSide>,
-) -> Result<(Signals, ColumnMapping, SourceFile), Error> {
+) -> Result<Read, Error> {
     let file = config.path.display().to_string();
     let options = ReadOptions { rows: config.rows, ..ReadOptions::default() };
     let table = dynid_io::csv::read(&config.path, &options)?;
@@ -113,11 +130,15 @@ fn read(
     }
     check_gains(spec, joints.len())?;
     let mut signals = mapping.extract(&table).map_err(named)?;
+    let source = SourceFile { path: file, sha256: table.sha256 };
+    let mut unwrapped = Vec::new();
     if let Some(transmission) = motor_side {
+        // Behind a transmission a turn of a motor is no turn of a joint.
+        unwrapped = turns::unwrap(&mut signals, axes);
         to_joint_side(&mut signals, transmission)?;
     }
     state_temperatures(&mut signals, config, &joints)?;
-    Ok((signals, mapping, SourceFile { path: file, sha256: table.sha256 }))
+    Ok(Read { signals, mapping, source, unwrapped })
 }
 
 /// Puts the temperatures that a configuration states in place of the logged ones.
@@ -141,18 +162,16 @@ fn state_temperatures(signals: &mut Signals, config: &LogConfig, joints: &[Strin
     Ok(())
 }
 
-fn finish(
-    config: &LogConfig,
-    file: &str,
-    signals: &Signals,
-    mapping: ColumnMapping,
-    source: &SourceFile,
-) -> Result<LoadedLog, Error> {
+fn finish(config: &LogConfig, file: &str, read: Read, axes: &[LogAxis]) -> Result<LoadedLog, Error> {
+    let Read { mut signals, mapping, source, mut unwrapped } = read;
+    // Many turns look like degrees: units were judged before.
+    unwrapped.extend(turns::unwrap(&mut signals, axes));
     let joints: Vec<String> = mapping.joints.clone();
+    let not_logged = signals.not_logged.clone();
     let whole = assemble(file, signals)?;
     let times = whole.time().to_vec();
     let log = left_out(whole, config)?;
-    let mut inputs = vec![InputRecord::of("log", source)];
+    let mut inputs = vec![InputRecord::of("log", &source)];
     let log = match config.part {
         None => log,
         Some((from, to)) => {
@@ -169,9 +188,9 @@ fn finish(
         }
         None => (log, config.period_s),
     };
-    let (not_logged, columns) = (signals.not_logged.clone(), describe(&mapping));
+    let columns = describe(&mapping);
     let rows = data_rows(&times, log.time(), config.rows.map_or(1, |(first, _)| first));
-    Ok(LoadedLog { period_s, log, not_logged, columns, mapping, rows, inputs })
+    Ok(LoadedLog { period_s, log, not_logged, columns, mapping, rows, inputs, unwrapped })
 }
 
 /// Data rows of the rows that are left of a log, which keep their times and their order. `first`: data row of the first time.
@@ -248,25 +267,21 @@ fn combine(signals: &[Vec<f64>], matrix: &[Vec<f64>], offset: impl Fn(usize) -> 
         .collect()
 }
 
-fn assemble(file: &str, signals: &Signals) -> Result<Log, Error> {
-    let take = |list: &Option<Vec<Vec<f64>>>, k: usize| list.as_ref().map(|l| l[k].clone());
-    let joints = signals
-        .joints
-        .iter()
-        .enumerate()
-        .map(|(k, name)| JointSignals {
-            name: name.clone(),
-            position: signals.position[k].clone(),
-            velocity: take(&signals.velocity, k),
-            effort: take(&signals.effort, k).unwrap_or_default(),
-        })
-        .collect();
-    let stated = signals.channels.iter().map(|(name, values)| (name.clone(), values));
-    let temperatures = signals.temperature.iter().flat_map(|list| signals.joints.iter().zip(list));
-    let measured =
-        temperatures.filter_map(|(joint, values)| Some((temperature_channel(joint), values.as_ref()?)));
-    let channels = stated.chain(measured).map(|(name, values)| Channel { name, values: values.clone() });
-    Ok(Log::new(file, signals.time.clone(), joints, channels.collect())?)
+fn assemble(file: &str, signals: Signals) -> Result<Log, Error> {
+    let Signals { time, joints: names, position, mut velocity, mut effort, temperature, channels, .. } =
+        signals;
+    let take = |list: &mut Option<Vec<Vec<f64>>>, k: usize| list.as_mut().map(|l| std::mem::take(&mut l[k]));
+    let joints = names.iter().zip(position).enumerate().map(|(k, (name, position))| JointSignals {
+        name: name.clone(),
+        position,
+        velocity: take(&mut velocity, k),
+        effort: take(&mut effort, k).unwrap_or_default(),
+    });
+    let joints = joints.collect();
+    let temperatures = temperature.into_iter().flat_map(|list| names.iter().zip(list));
+    let measured = temperatures.filter_map(|(joint, values)| Some((temperature_channel(joint), values?)));
+    let channels = channels.into_iter().chain(measured).map(|(name, values)| Channel { name, values });
+    Ok(Log::new(file, time, joints, channels.collect())?)
 }
 
 /// Refuses temperatures that no joint has.
@@ -302,9 +317,14 @@ pub(crate) fn check_stated_temperatures<'a>(
     Ok(())
 }
 
+/// Name of a file without its folders.
+fn file_name(path: &str) -> String {
+    Path::new(path).file_name().map_or_else(|| path.to_owned(), |n| n.to_string_lossy().into_owned())
+}
+
 /// Doubts about the temperatures of a log, in words.
 pub(crate) fn temperature_warnings(log: &Log) -> Vec<String> {
-    let file = Path::new(log.name()).file_name().map_or_else(|| log.name().into(), |n| n.to_string_lossy());
+    let file = file_name(log.name());
     let doubtful = log.channels().iter().filter(|c| is_temperature(&c.name));
     doubtful
         .filter_map(|c| match temperature::doubt(&c.values)? {

@@ -75,6 +75,8 @@ impl Identification {
             validation: self.validation.iter().map(log_fit).collect(),
             exported: self.exported.clone(),
             preflight: self.findings.iter().map(Into::into).collect(),
+            overlaps: self.overlaps.clone(),
+            effort_scale: self.effort_scale.clone(),
             verdict,
             conditioning: self.conditioning_record(config),
             model,

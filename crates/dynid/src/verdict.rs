@@ -1,5 +1,6 @@
 //! What an identification is worth, in plain words.
 
+mod inputs;
 mod logs;
 
 use dynid_estimate::consistent::Status as ConsistentStatus;
@@ -8,8 +9,10 @@ mod instruments;
 
 use dynid_estimate::whiteness::InBandWhiteness;
 
+pub(crate) use inputs::{OWN_LOGS, PREFLIGHT};
 pub(crate) use instruments::in_words as closed_loop_bias_in_words;
 
+use crate::agreement::Agreement;
 use crate::consistency::UNCONSTRAINED;
 use crate::estimate::{CheckResult, Verdict};
 use crate::identify::Identification;
@@ -70,7 +73,7 @@ fn check(
 /// on some joint that moves. A warning is anything that should make a user look.
 pub fn judge(id: &Identification) -> (Status, Verdict) {
     let mut checks = vec![excitation(id), rank_gap(id), condition(id), training_fit(id)];
-    if !id.validation.is_empty() {
+    if !id.unseen().is_empty() {
         checks.push(validation_fit(id));
     }
     checks.extend(explained(id));
@@ -84,21 +87,26 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
     checks.extend(instruments::instruments(id));
     checks.extend(instruments::closed_loop_bias(id));
     checks.extend(logs::checks(id));
+    checks.extend(inputs::checks(id));
     let status = checks.iter().map(|(s, _)| *s).max().unwrap_or(Status::Ok);
-    let relative = |a: &[crate::agreement::Agreement]| {
-        a.iter().filter_map(|v| v.filtered.relative_error).fold(f64::NAN, f64::max)
-    };
-    let (error, agrees) = if id.validation.is_empty() {
-        (relative(&id.training), "reproduces the training logs")
+    let relative =
+        |a: &[&Agreement]| a.iter().filter_map(|v| v.filtered.relative_error).fold(f64::NAN, f64::max);
+    let unseen = id.unseen();
+    let (error, agrees) = if unseen.is_empty() {
+        (relative(&id.training.iter().collect::<Vec<_>>()), "reproduces the training logs")
     } else {
-        (relative(&id.validation), "predicts logs it has not seen")
+        (relative(&unseen), "predicts logs it has not seen")
     };
     let named = |level: Status| {
         let names = checks.iter().filter(|(s, _)| *s == level).map(|(_, c)| c.name.as_str());
         names.collect::<Vec<_>>().join(", ")
     };
+    let assumptions: Vec<String> = id.effort_scale.assumption().into_iter().collect();
     let reservation = match status {
-        Status::Ok => "All checks passed.".to_owned(),
+        Status::Ok => match &assumptions[..] {
+            [] => "All checks passed.".to_owned(),
+            assumed => format!("All checks passed; {}.", assumed.join("; ")),
+        },
         Status::Warn => format!("These checks call for a look: {}.", named(Status::Warn)),
         Status::Fail => {
             format!("It should not be used without a look at the failed checks: {}.", named(Status::Fail))
@@ -112,10 +120,19 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
     let verdict = Verdict {
         status: status.word().to_owned(),
         headline,
+        assumptions,
         checks: checks.into_iter().map(|(_, c)| c).collect(),
         warnings: id.warnings.iter().cloned().chain(unphysical(id)).chain(id.friction_warnings()).collect(),
     };
     (status, verdict)
+}
+
+impl Identification {
+    /// Validation logs that hold nothing of the training logs to speak of.
+    fn unseen(&self) -> Vec<&Agreement> {
+        let is_new = |(k, _): &(usize, &Agreement)| !self.overlaps.repeats(self.training.len() + k);
+        self.validation.iter().enumerate().filter(is_new).map(|(_, log)| log).collect()
+    }
 }
 
 /// Bodies whose split of base values into standard parameters no body could have.
@@ -197,7 +214,7 @@ fn condition(id: &Identification) -> (Status, CheckResult) {
 }
 
 /// Of samples in which the joint moves; of a joint that never does, of all.
-fn worst_r2(agreements: &[crate::agreement::Agreement]) -> Option<f64> {
+fn worst_r2(agreements: &[&Agreement]) -> Option<f64> {
     agreements
         .iter()
         .flat_map(|a| {
@@ -206,7 +223,7 @@ fn worst_r2(agreements: &[crate::agreement::Agreement]) -> Option<f64> {
         .fold(None, |m: Option<f64>, x| Some(m.map_or(x, |m| m.min(x))))
 }
 
-fn fit_check(name: &str, agreements: &[crate::agreement::Agreement], where_: &str) -> (Status, CheckResult) {
+fn fit_check(name: &str, agreements: &[&Agreement], where_: &str) -> (Status, CheckResult) {
     let worst = worst_r2(agreements);
     let r2 = worst.unwrap_or(f64::NAN);
     check(
@@ -226,7 +243,7 @@ fn fit_check(name: &str, agreements: &[crate::agreement::Agreement], where_: &st
 const STANDS: f64 = 0.05;
 
 /// What the error is where joints stand, of the joint that stands longest.
-fn standing_apart(agreements: &[crate::agreement::Agreement]) -> String {
+fn standing_apart(agreements: &[&Agreement]) -> String {
     let joints = agreements.iter().flat_map(|a| a.standing_share.iter().copied().zip(&a.standing.channels));
     let longest = joints.filter(|(share, _)| *share > STANDS).max_by(|a, b| a.0.total_cmp(&b.0));
     longest.map_or_else(String::new, |(share, standing)| {
@@ -239,11 +256,12 @@ fn standing_apart(agreements: &[crate::agreement::Agreement]) -> String {
 }
 
 fn training_fit(id: &Identification) -> (Status, CheckResult) {
-    fit_check("fit on training logs", &id.training, "the logs it was fitted to")
+    let training: Vec<&Agreement> = id.training.iter().collect();
+    fit_check("fit on training logs", &training, "the logs it was fitted to")
 }
 
 fn validation_fit(id: &Identification) -> (Status, CheckResult) {
-    fit_check("prediction of validation logs", &id.validation, "logs it has not seen")
+    fit_check("prediction of validation logs", &id.unseen(), "logs it has not seen")
 }
 
 fn explained(id: &Identification) -> Option<(Status, CheckResult)> {

@@ -62,7 +62,7 @@ fn summary(file: &PayloadFile) -> String {
         let std = p.std.map_or_else(String::new, |s| format!(" ± {}", table::number(Some(s))));
         out.push_str(&format!("{} = {}{std} {}\n", p.name, table::number(Some(p.value)), p.unit));
     }
-    out + &format!("{}: {}\n", file.status, file.verdict.headline)
+    out + &format!("{}: {}\n", file.status, file.headline)
 }
 
 fn payload(p: &PayloadRecord) -> String {

@@ -100,7 +100,7 @@ fn leave_out(
 }
 
 /// Merges of the factors before each one: entry `b` holds the fixed rows and factors `0..b`.
-fn running_merges<'a>(
+pub(crate) fn running_merges<'a>(
     fixed: Option<&Factor>,
     factors: impl ExactSizeIterator<Item = &'a Factor>,
 ) -> Vec<Factor> {
@@ -114,7 +114,7 @@ fn running_merges<'a>(
     merges
 }
 
-fn change_without(rest: &Factor, norms: &[f64]) -> (Vec<f64>, bool) {
+pub(crate) fn change_without(rest: &Factor, norms: &[f64]) -> (Vec<f64>, bool) {
     if certainly_full_rank(rest) {
         return (solve(rest), false);
     }

@@ -1,5 +1,7 @@
 //! Which linear estimator, and its settings.
 
+use std::collections::HashMap;
+
 use super::tls::{TlsNoise, TlsRefusal};
 use super::wls::WlsSettings;
 use crate::groups::ReducedGroup;
@@ -54,12 +56,13 @@ pub enum VarianceSharing {
 impl VarianceSharing {
     /// Per group, the index of the first group it shares its variance with.
     pub(crate) fn classes(self, groups: &[ReducedGroup]) -> Vec<usize> {
-        let same = |a: &ReducedGroup, b: &ReducedGroup| match self {
-            VarianceSharing::Group => (a.log, a.output, a.scale) == (b.log, b.output, b.scale),
-            VarianceSharing::JointAndLog => (a.log, a.output) == (b.log, b.output),
-            VarianceSharing::Joint => a.output == b.output,
+        let key = |g: &ReducedGroup| match self {
+            VarianceSharing::Group => (g.log, g.output, g.scale),
+            VarianceSharing::JointAndLog => (g.log, g.output, 0),
+            VarianceSharing::Joint => (0, g.output, 0),
         };
-        groups.iter().enumerate().map(|(k, g)| groups.iter().position(|o| same(o, g)).unwrap_or(k)).collect()
+        let mut first = HashMap::new();
+        groups.iter().enumerate().map(|(k, group)| *first.entry(key(group)).or_insert(k)).collect()
     }
 }
 

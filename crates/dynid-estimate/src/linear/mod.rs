@@ -22,4 +22,4 @@ pub use ols::{LinearSolution, ols};
 pub use ridge::{RidgeSolution, ridge};
 pub use tls::{TlsNoise, TlsRefusal, TlsSolution, tls};
 pub use wls::{GroupVariance, WlsEstimate, WlsSettings, wls};
-pub(crate) use wls::{floors, merge_weighted};
+pub(crate) use wls::{floors, group_floors, merge_weighted};

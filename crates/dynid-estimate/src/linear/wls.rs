@@ -157,11 +157,14 @@ fn group_variances(
         })
         .collect();
     let least = floors(groups, classes, floor);
+    let mut sums = vec![(0.0, 0.0); groups.len()];
+    for ((group, (leverage, rss)), class) in groups.iter().zip(&found).zip(classes) {
+        sums[*class].0 += rss;
+        sums[*class].1 += group.rows() as f64 - leverage;
+    }
     (0..groups.len())
         .map(|g| {
-            let of_class = || (0..groups.len()).filter(|k| classes[*k] == classes[g]);
-            let rss: f64 = of_class().map(|k| found[k].1).sum();
-            let freedom: f64 = of_class().map(|k| groups[k].rows() as f64 - found[k].0).sum();
+            let (rss, freedom) = sums[classes[g]];
             let estimate = if freedom >= 0.5 { rss / freedom } else { variances[g] };
             GroupVariance {
                 variance: estimate.max(least[g]),
@@ -177,22 +180,35 @@ fn group_variances(
 /// Least variance of each group's class, `(floor · rms effort)²`; a class of zero effort takes that of the group of
 /// largest effort.
 pub(crate) fn floors(groups: &[Factor], classes: &[usize], floor: f64) -> Vec<f64> {
-    let fallback =
-        match groups.iter().map(|g| mean_square(g.effort_norm().powi(2), g.rows())).fold(0.0, f64::max) {
-            0.0 => 1.0,
-            largest => largest,
-        };
-    (0..groups.len())
-        .map(|g| {
-            let of_class = || groups.iter().zip(classes).filter(|(_, c)| **c == classes[g]).map(|(f, _)| f);
-            let energy: f64 = of_class().map(|f| f.effort_norm().powi(2)).sum();
-            let mean_square = match mean_square(energy, of_class().map(Factor::rows).sum()) {
-                0.0 => fallback,
-                positive => positive,
-            };
-            floor * floor * mean_square
-        })
-        .collect()
+    let mut sums = vec![(0.0, 0); groups.len()];
+    for (group, class) in groups.iter().zip(classes) {
+        sums[*class].0 += group.effort_norm().powi(2);
+        sums[*class].1 += group.rows();
+    }
+    let fallback = largest_effort(groups.iter());
+    classes.iter().map(|class| least(sums[*class], fallback, floor)).collect()
+}
+
+/// The same where every group is a class of its own.
+pub(crate) fn group_floors(groups: &[&Factor], floor: f64) -> Vec<f64> {
+    let fallback = largest_effort(groups.iter().copied());
+    groups.iter().map(|g| least((g.effort_norm().powi(2), g.rows()), fallback, floor)).collect()
+}
+
+/// Mean square effort of the group of largest effort; 1 if there is none.
+fn largest_effort<'a>(groups: impl Iterator<Item = &'a Factor>) -> f64 {
+    match groups.map(|g| mean_square(g.effort_norm().powi(2), g.rows())).fold(0.0, f64::max) {
+        0.0 => 1.0,
+        largest => largest,
+    }
+}
+
+fn least((energy, rows): (f64, usize), fallback: f64, floor: f64) -> f64 {
+    let mean_square = match mean_square(energy, rows) {
+        0.0 => fallback,
+        positive => positive,
+    };
+    floor * floor * mean_square
 }
 
 fn mean_square(energy: f64, rows: usize) -> f64 {

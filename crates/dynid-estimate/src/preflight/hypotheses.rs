@@ -17,6 +17,9 @@ use crate::conditioning::KeptColumns;
 const WORTH: f64 = 0.7;
 /// Least angle of gravity from where it was that is worth a word, rad.
 const LEAST_TURN: f64 = 0.035;
+/// Standard gravity, m/s², and the relative deviation from it at which its size is in question.
+const STANDARD_GRAVITY: f64 = 9.80665;
+const OTHER_SIZE: f64 = 0.02;
 /// Least zero of a joint that is worth a word, rad.
 const LEAST_ZERO: f64 = 0.035;
 /// An angle this close to a quarter turn, or a clock this close (relative) to a unit in use, is one.
@@ -74,7 +77,7 @@ impl Look<'_> {
         Ok(found.map(|f| f.wiring))
     }
 
-    /// Gravity along the axes of the base, then wherever it fits best.
+    /// Gravity along the axes of the base, then wherever it fits best; of the standard size where another one is stated.
     fn gravity(&self) -> Result<Vec<Rewiring>, PreflightError> {
         let stated = self.wiring.gravity.unwrap_or(self.trial.gravity);
         let size = norm(stated);
@@ -94,7 +97,11 @@ impl Look<'_> {
             let refined = self.refined(&start, Unknown::Gravity)?;
             directions.extend(refined.into_iter().chain([start]).filter_map(|w| w.gravity));
         }
-        Ok(directions.into_iter().filter(far).map(Rewiring::Gravity).collect())
+        let mut out: Vec<Rewiring> = directions.into_iter().filter(far).map(Rewiring::Gravity).collect();
+        if (size / STANDARD_GRAVITY - 1.0).abs() > OTHER_SIZE {
+            out.push(Rewiring::Gravity(stated.map(|x| x * STANDARD_GRAVITY / size)));
+        }
+        Ok(out)
     }
 
     /// Zeros of joints that turn, from none and from eighths of a turn.

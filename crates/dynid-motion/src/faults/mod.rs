@@ -1,4 +1,4 @@
-//! Faults of a record that it shows by itself: rows that repeat, signals that freeze, efforts that are cut off.
+//! Faults of a record that it shows by itself: rows that repeat, rows that logs share, signals that freeze, efforts that are cut off.
 //!
 //! Every test asks what a sound record would hardly show, given how often its values repeat anyway: encoders at rest and
 //! coarse currents repeat for long and are no fault.
@@ -7,11 +7,13 @@ mod clipped;
 mod frozen;
 mod outliers;
 mod repeated;
+mod shared;
 
 pub use clipped::{Clipping, clipped};
 pub use frozen::{frozen_effort, frozen_position};
 pub use outliers::outliers;
 pub use repeated::{Repeats, repeated};
+pub use shared::{SharedRows, shared_rows};
 
 /// A run of samples, counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -12,7 +12,7 @@ use dynid_motion::{JointSignals, Log, UniformLog};
 
 use super::columns::Velocities;
 use super::finding::{Findings, Fix, Severity};
-use super::plausibility;
+use super::plausibility::{self, Taken};
 use crate::config::Config;
 use crate::elements::ElementPlan;
 use crate::identify::stated_values;
@@ -43,7 +43,7 @@ pub(super) struct Bench {
     regrouping: dynid_estimate::Mat<f64>,
     pub(super) slides: Vec<bool>,
     stated: Vec<Option<f64>>,
-    gravity: [f64; 3],
+    pub(super) gravity: [f64; 3],
     /// Delay as stated, samples.
     stated_delay: f64,
     robot: String,
@@ -82,6 +82,12 @@ impl Bench {
     /// Names of the outputs.
     pub(super) fn names(&self) -> Vec<String> {
         self.model.outputs().iter().map(|o| o.name.clone()).collect()
+    }
+
+    /// Whether a drive acts on a joint; on one that the model does not know, it may.
+    pub(super) fn drives(&self, joint: &str) -> bool {
+        let output = self.model.outputs().iter().position(|o| o.name == joint);
+        output.is_none_or(|o| !self.model.is_undriven(o))
     }
 
     /// The tree of joints; `None` where loops tie its branches together.
@@ -227,8 +233,14 @@ impl Bench {
         found.excitation = Some(excitation(&self.model, &self.shape, &self.base.kept, &samples, &wiring)?);
         self.weak_excitation(found.excitation.as_ref(), out);
         if explained && told {
-            let known = (follow, self.known_effort_scale, applied);
-            plausibility::examine(self, &trial, &mut wiring, &prior, known, out)?;
+            let taken = Taken {
+                velocities: follow,
+                known: self.known_effort_scale,
+                applied,
+                unexplained: (misfit / nothing).sqrt(),
+            };
+            plausibility::gravity_size(self, &trial, &wiring, misfit, out);
+            plausibility::examine(self, &trial, &mut wiring, &prior, &taken, out)?;
         }
         if wiring.delay_s == self.stated_delay / log.rate_hz {
             found.tilt = tilt(&trial, &wiring)?;

@@ -25,6 +25,8 @@ const EXPLAINED: f64 = 0.2;
 const BEARABLE: f64 = 0.1;
 /// Gravity this close to the direction stated is a base that is not level, rad; what is farther off is mounted another way.
 const SLIGHT: f64 = 0.18;
+/// Gravity this close to the direction stated differs in its size alone, rad.
+const SAME_DIRECTION: f64 = 1e-6;
 
 /// Findings of the search for what the log is to be read by; `false` if nothing tried explains the log. `velocities`: whether
 /// velocities go with positions; `rate_hz`: of the log; `shown`: the clock that velocities show;
@@ -60,6 +62,10 @@ pub(super) fn wiring(
     let clear = clock_told && !sized && search.found.iter().all(|f| f.alternatives.is_empty());
     for (k, found) in search.found.iter().enumerate() {
         let (id, joint, what) = describe(&found.change, names);
+        let id = match &found.change {
+            Rewiring::Gravity(g) if angle(*g, gravity) < SAME_DIRECTION => "gravity_size",
+            _ => id,
+        };
         let evidence = format!(
             "bodies that can exist leave {:.3} % of the efforts unexplained as the log is, {:.3} % {what}{}",
             share(found.before),
@@ -77,6 +83,7 @@ pub(super) fn wiring(
             "base_tilt" => {
                 "state gravity in base axes (`gravity`): the robot is mounted another way than the file says"
             }
+            "gravity_size" => "state gravity in base axes (`gravity`), m/s²: on Earth it is 9.81 long",
             "clock_rate" => "state the unit of the time",
             "delay" => {
                 "state the delay (`conditioning.delay_samples`), or log motion and effort by one clock"
@@ -92,7 +99,7 @@ pub(super) fn wiring(
             }
         };
         let slight = match &found.change {
-            Rewiring::Gravity(g) => angle(*g, gravity) < SLIGHT,
+            Rewiring::Gravity(g) => id == "base_tilt" && angle(*g, gravity) < SLIGHT,
             Rewiring::Clock(_) | Rewiring::Zero(..) | Rewiring::Delay(_) | Rewiring::EffortScale(..) => {
                 found.before < BEARABLE * BEARABLE * search.nothing
             }

@@ -52,9 +52,14 @@ pub struct Finding {
 const SAID_ANYWAY: [&str; 4] = ["clock_gap", "idle_joint", "spikes", "weak_excitation"];
 
 impl Finding {
-    /// The finding as a warning of an identification; `None` for what it says anyway or takes care of.
+    /// Whether an identification has to tell of it: not what it says anyway or takes care of.
+    pub(crate) fn counts(&self) -> bool {
+        self.severity != Severity::Info && !SAID_ANYWAY.contains(&self.id)
+    }
+
+    /// The finding as a warning of an identification; `None` unless it counts.
     pub(crate) fn warning(&self) -> Option<String> {
-        if self.severity == Severity::Info || SAID_ANYWAY.contains(&self.id) {
+        if !self.counts() {
             return None;
         }
         let joint = self.joint.as_ref().map_or_else(String::new, |j| format!(" of {j}"));
@@ -63,7 +68,7 @@ impl Finding {
 }
 
 /// Faults that are looked for.
-pub const IDS: [&str; 24] = [
+pub const IDS: [&str; 27] = [
     "base_tilt",
     "clock_backwards",
     "clock_gap",
@@ -77,12 +82,15 @@ pub const IDS: [&str; 24] = [
     "duplicate_samples",
     "effort_sign",
     "frozen_signal",
+    "gravity_size",
     "idle_joint",
     "joint_permutation",
     "not_examined",
     "position_range",
     "position_sign",
+    "position_wrap",
     "position_zero",
+    "repeated_log",
     "saturation",
     "spikes",
     "unexplained_effort",
@@ -114,6 +122,8 @@ pub(super) enum Fix {
     Rate(f64),
     /// Times are to be multiplied by a factor.
     Clock(f64),
+    /// The log is to be left out.
+    Drop,
 }
 
 /// A finding of a log.

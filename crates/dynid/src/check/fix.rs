@@ -45,9 +45,12 @@ impl Check {
             let entries: Vec<Value> = logs
                 .iter()
                 .enumerate()
+                .filter(|(k, _)| !self.is_dropped(first + k))
                 .map(|(k, log)| self.log_entry(first + k, log, config, as_read(&table, key, k)))
                 .collect();
-            if !entries.is_empty() {
+            if entries.is_empty() {
+                table.remove(key);
+            } else {
                 table.insert(key.to_owned(), Value::Array(entries));
             }
         }
@@ -79,6 +82,10 @@ impl Check {
         }
         out += &toml::to_string(&table).unwrap_or_default();
         Ok(out)
+    }
+
+    fn is_dropped(&self, number: usize) -> bool {
+        self.findings.iter().any(|f| f.number == number && f.fixes.contains(&Fix::Drop))
     }
 
     fn log_entry(&self, number: usize, log: &LogConfig, config: &Config, mut entry: Table) -> Value {
@@ -114,7 +121,7 @@ impl Check {
         }
         let columns = own
             .iter()
-            .any(|f| !matches!(f, Fix::LeaveOut(_) | Fix::DropRepeated | Fix::Delay(_) | Fix::Gravity(_)));
+            .any(|f| matches!(f, Fix::Wiring { .. } | Fix::VelocityScale(..) | Fix::Rate(_) | Fix::Clock(_)));
         if let (true, None, Some(mapped)) = (columns, &config.motor_side, self.mapped.get(number)) {
             entry.insert("columns".to_owned(), Value::Table(mapped.stated(&own)));
         }

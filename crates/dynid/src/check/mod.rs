@@ -23,6 +23,7 @@ use crate::Error;
 use crate::config::Config;
 use crate::estimate::InputRecord;
 use crate::logs::{self, LoadedLog};
+use crate::overlap::{Overlap, Overlaps};
 use crate::robot::{Robot, RobotOptions};
 use bench::{Bench, Examined};
 pub use finding::{Finding, IDS, Severity};
@@ -113,6 +114,7 @@ pub fn check(config: &Config, progress: &mut dyn FnMut(&str)) -> Result<Check, E
     };
     let mut bench: Option<(Vec<String>, Bench)> = None;
     let training = config.training_logs();
+    let mut read: Vec<LoadedLog> = Vec::new();
     for log in training.iter().chain(&config.validation) {
         let file = log.path.display().to_string();
         progress(&file);
@@ -132,14 +134,22 @@ pub fn check(config: &Config, progress: &mut dyn FnMut(&str)) -> Result<Check, E
         out.findings.extend(findings.list);
         out.logs.push(checked);
         out.traces.push(trace);
-        out.mapped.push(fix::Mapped { columns: loaded.mapping, joints: bench.names() });
+        out.mapped.push(fix::Mapped { columns: loaded.mapping.clone(), joints: bench.names() });
+        read.push(loaded);
     }
+    let overlaps = Overlaps::of(&read[..training.len()], &read[training.len()..]);
+    out.findings.extend(repeated(&overlaps));
     out.findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
     Ok(out)
 }
 
 /// Examines logs that were read already. `robot`: joints that are not logged are locked.
-pub(crate) fn of_loaded(config: &Config, robot: &Robot, loaded: &[LoadedLog]) -> Result<Vec<Finding>, Error> {
+pub(crate) fn of_loaded(
+    config: &Config,
+    robot: &Robot,
+    loaded: &[LoadedLog],
+    overlaps: &Overlaps,
+) -> Result<Vec<Finding>, Error> {
     let bench = Bench::new(config, robot)?;
     let training = config.training_logs();
     let mut out = Vec::new();
@@ -149,7 +159,29 @@ pub(crate) fn of_loaded(config: &Config, robot: &Robot, loaded: &[LoadedLog]) ->
         examine(config, log, &bench, &mut findings)?;
         out.extend(findings.list);
     }
+    out.extend(repeated(overlaps).into_iter().filter(|f| f.number < loaded.len()));
     Ok(out)
+}
+
+/// Logs that are no recordings of their own.
+fn repeated(overlaps: &Overlaps) -> Vec<Finding> {
+    let finding = |overlap: &Overlap, severity, remedy: &str, fixes| {
+        let mut findings = Findings { log: &overlap.log, number: overlap.number, list: Vec::new() };
+        findings.add("repeated_log", severity, None, overlap.words(), remedy).fixes = fixes;
+        findings.list
+    };
+    let training = overlaps.training.iter().flat_map(|o| {
+        let remedy = "leave out one of the two: rows that count twice make intervals too narrow";
+        match o.repeats() {
+            true => finding(o, Severity::Error, remedy, vec![Fix::Drop]),
+            false => finding(o, Severity::Warning, remedy, Vec::new()),
+        }
+    });
+    let validation = overlaps.validation.iter().flat_map(|o| {
+        let remedy = "validate on a recording of its own: the model was fitted to these rows";
+        finding(o, Severity::Warning, remedy, Vec::new())
+    });
+    training.chain(validation).collect()
 }
 
 /// The delay of a log that is read as it should be. Identification, which finds it itself, does not ask for it twice.
@@ -188,7 +220,11 @@ fn examine(
     if let Some(tree) = bench.tree() {
         assignment::examine(config, tree, &loaded.mapping, out);
     }
-    let mut on_grid = record::examine(&loaded.log, &loaded.rows, out)?;
+    for turns in &loaded.unwrapped {
+        let remedy = "nothing: the position was unwrapped; see that the logger keeps turns apart where a joint has limits";
+        out.add("position_wrap", Severity::Info, Some(&turns.joint), turns.words(), remedy);
+    }
+    let mut on_grid = record::examine(&loaded.log, &loaded.rows, |joint| bench.drives(joint), out)?;
     bench.order(&mut on_grid);
     let idle = bench.idle(&loaded.log, out);
     let Examined { wiring, tilt, excitation } = bench.examine(&on_grid, &idle, out)?;

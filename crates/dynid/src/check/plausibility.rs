@@ -1,20 +1,21 @@
 //! Whether efforts have the size that a robot like this one asks for. No log tells the unit of all efforts together: bodies of any
 //! mass move alike. The robot file, effort limits and the arms that exist do.
 
-use dynid_estimate::preflight::{AgainstStated, Trial, Wiring, against_stated, efforts_at_rest};
+use dynid_estimate::preflight::{
+    AgainstStated, GaussianPrior, Trial, Wiring, against_stated, efforts_at_rest,
+};
 use dynid_model::{EffortModel, Mechanism};
 
 use super::bench::Bench;
 use super::finding::{Findings, Fix, Severity};
 use crate::Error;
-use crate::prior::{Origin, Prior};
+use crate::effort_scale::{G, GRAVITY_SHARE, states_bodies};
+use crate::prior::Prior;
 
 /// Efforts this many times larger or smaller than expected are worth a word ...
 const WARN: f64 = 2.5;
 /// ... and from here on in another unit.
 const OTHER_UNIT: f64 = 8.0;
-/// Gravity counts from this share of what stated bodies weigh at their size on (root mean square over the joints).
-const GRAVITY_SHARE: f64 = 0.02;
 /// Stated inertias that leave more of the efforts' variance unexplained say nothing where gravity does not act.
 const STATED: f64 = 0.3;
 /// Mass over the cube of the reach that gravity shows on arms, kg/m³, with room to either side: six arms of 0.9 to 1.4 m, from 18 to 34 kg,
@@ -26,12 +27,30 @@ const SIZES: [f64; 6] = [0.1, 10.0, 1e-2, 1e2, 1e-3, 1e3];
 const CLEARLY: (f64, f64) = (0.6, 40.0);
 /// Least share of the largest effort that gravity must have to tell of the arm.
 const GRAVITY_OF_EFFORT: f64 = 0.05;
-/// Standard gravity, m/s².
-const G: f64 = 9.81;
+/// Gravity is upside down if its efforts correlate like this with those that are expected.
+const OPPOSITE: f64 = -0.5;
+/// Bodies tell of gravity where they leave at most this share of the efforts (root mean square) unexplained.
+const EXPLAINED: f64 = 0.1;
+/// Gravity whose size deviates from that on Earth by more than this is in question.
+const OTHER_SIZE: f64 = 0.02;
+/// Bodies as they are known speak for another gravity from this difference of misfits on: natural logarithms of odds, twice.
+const BETTER: f64 = 8.0;
 /// Fewest joints that carry each other in an arm.
 const ARM_JOINTS: usize = 3;
 /// A ratio this close to a power of ten (its decimal logarithm) is a unit.
 const A_UNIT: f64 = 0.15;
+
+/// How the search took a log, and what it left open.
+pub(super) struct Taken {
+    /// Velocities go with positions.
+    pub(super) velocities: bool,
+    /// The configuration states that the efforts are right.
+    pub(super) known: bool,
+    /// The factor of all efforts that the wiring has already.
+    pub(super) applied: f64,
+    /// Share of the efforts (root mean square) that is left unexplained.
+    pub(super) unexplained: f64,
+}
 
 /// Efforts against what one source expects of them.
 struct Evidence {
@@ -48,8 +67,6 @@ impl Evidence {
 
 /// Compares efforts with the bodies of the robot file; where it has none that count, with effort limits and with arms that exist.
 ///
-/// `known`: whether the configuration states that the efforts are right; `applied`: the factor of all efforts that the wiring has already.
-///
 /// # Errors
 /// [`Error`] if a regressor is not finite.
 pub(super) fn examine(
@@ -57,9 +74,10 @@ pub(super) fn examine(
     trial: &Trial<'_>,
     wiring: &mut Wiring,
     prior: &Prior,
-    (velocities, known, applied): (bool, bool, f64),
+    taken: &Taken,
     out: &mut Findings<'_>,
 ) -> Result<(), Error> {
+    let Taken { velocities, known, applied, unexplained } = *taken;
     let Some(mut identified) = at_any_size(trial, wiring) else { return Ok(()) };
     identified.iter_mut().for_each(|x| *x /= applied);
     let bodies = 10 * prior.bodies.len();
@@ -68,7 +86,15 @@ pub(super) fn examine(
     stated[bodies..].fill(0.0);
     let at_rest = |values: &[f64]| efforts_at_rest(trial, wiring, values);
     let (identified, stated) = (at_rest(&identified), at_rest(&stated));
-    let file = match is_told(prior) {
+    // A model that leaves much may have its bodies anywhere; other efforts were taken already for another size.
+    let tells_gravity = unexplained < EXPLAINED && applied == 1.0;
+    if tells_gravity
+        && is_opposite(prior, &identified, &stated)
+        && upside_down(bench, trial, wiring, prior, out)
+    {
+        return Ok(());
+    }
+    let file = match states_bodies(prior) {
         true => from_file(bench, trial, (wiring, applied), prior, (&identified, &stated))?,
         false => None,
     };
@@ -95,6 +121,9 @@ pub(super) fn examine(
     };
     let Some(judged) = judged.filter(|e| e.off() >= WARN) else { return Ok(()) };
     let (ratio, off) = (judged.ratio, judged.off());
+    if tells_gravity && file.is_some() && other_gravity(bench, trial, wiring, prior, out) {
+        return Ok(());
+    }
     let words: Vec<&str> = [&file, &limits, &arm].into_iter().flatten().map(|e| e.words.as_str()).collect();
     let evidence = words.join("; ");
     if known {
@@ -116,6 +145,118 @@ pub(super) fn examine(
     Ok(())
 }
 
+/// Whether bodies pull the other way than those of the robot file do: bodies mirrored at their joints explain gravity that is upside down.
+fn is_opposite(prior: &Prior, identified: &[Vec<f64>], stated: &[Vec<f64>]) -> bool {
+    let weight: f64 = prior.bodies.iter().map(|b| G * b.inertia.mass() * b.size).sum();
+    let (found, expected) = (rms(identified), rms(stated));
+    let count = stated.iter().map(Vec::len).sum::<usize>() as f64;
+    let product: f64 = identified.iter().flatten().zip(stated.iter().flatten()).map(|(a, b)| a * b).sum();
+    expected > GRAVITY_SHARE * weight && product < OPPOSITE * count * found * expected
+}
+
+/// Whether the log is a better one of the bodies that are known under another gravity. Offsets may stand for gravity where little moves: then bodies
+/// may as well be those of the file.
+fn is_clearly_better(trial: &Trial<'_>, wiring: &Wiring, gravity: [f64; 3]) -> bool {
+    let believing = Trial { prior: GaussianPrior { weight: 1.0, ..trial.prior }, ..*trial };
+    let misfit = |wiring: &Wiring| believing.parameters(wiring).map(|(_, misfit)| misfit);
+    let other = Wiring { gravity: Some(gravity), ..wiring.clone() };
+    misfit(wiring).zip(misfit(&other)).is_some_and(|(stated, other)| other < stated - BETTER)
+}
+
+fn upside_down(
+    bench: &Bench,
+    trial: &Trial<'_>,
+    wiring: &Wiring,
+    prior: &Prior,
+    out: &mut Findings<'_>,
+) -> bool {
+    let gravity = wiring.gravity.unwrap_or(bench.gravity).map(|g| -g);
+    if !is_clearly_better(trial, wiring, gravity) {
+        return false;
+    }
+    let told = states_bodies(prior);
+    let bodies = if told { "that the robot file states" } else { "half way along its links" };
+    let evidence = format!(
+        "gravity pulls the other way than on bodies {bodies}: gravity points the other way, or all efforts and positions count the other way"
+    );
+    let remedy =
+        "state gravity in base axes (`gravity`): the robot is mounted another way than the file says";
+    let severity = if told { Severity::Error } else { Severity::Warning };
+    let finding = out.add("base_tilt", severity, None, evidence, remedy);
+    if told {
+        finding.fixes = vec![Fix::Gravity(gravity)];
+    }
+    true
+}
+
+/// Whether efforts have the size that the robot file asks for under gravity that points the other way, or is as strong as on Earth.
+fn other_gravity(
+    bench: &Bench,
+    trial: &Trial<'_>,
+    wiring: &Wiring,
+    prior: &Prior,
+    out: &mut Findings<'_>,
+) -> bool {
+    let stated = wiring.gravity.unwrap_or(bench.gravity);
+    let size = stated.iter().map(|g| g * g).sum::<f64>().sqrt();
+    if size == 0.0 {
+        return false;
+    }
+    let mut others = vec![("base_tilt", stated.map(|g| -g))];
+    if (size / G - 1.0).abs() > OTHER_SIZE {
+        others.push(("gravity_size", stated.map(|g| g * G / size)));
+    }
+    let bodies = 10 * prior.bodies.len();
+    let told = others.into_iter().find_map(|(id, gravity)| {
+        let changed = Wiring { gravity: Some(gravity), ..wiring.clone() };
+        let of_bodies = |values: &[f64]| {
+            let mut values = values.to_vec();
+            values[bodies..].fill(0.0);
+            efforts_at_rest(trial, &changed, &values)
+        };
+        let (found, expected) = (of_bodies(&at_any_size(trial, &changed)?), of_bodies(&prior.values));
+        let ratio = rms(&found) / rms(&expected);
+        let told = ratio.max(1.0 / ratio) < WARN && is_clearly_better(trial, wiring, gravity);
+        told.then_some((id, gravity, ratio))
+    });
+    let Some((id, gravity, ratio)) = told else { return false };
+    let evidence = format!(
+        "under gravity ({:.2}, {:.2}, {:.2}) m/s² efforts are {ratio:.2} times those of the bodies that the robot file states; as stated, they are not",
+        gravity[0], gravity[1], gravity[2]
+    );
+    out.add(id, Severity::Error, None, evidence, "state gravity in base axes (`gravity`), m/s²").fixes =
+        vec![Fix::Gravity(gravity)];
+    true
+}
+
+/// Doubts gravity of another size than on Earth, unless the log bears it out against that of the Earth.
+pub(super) fn gravity_size(
+    bench: &Bench,
+    trial: &Trial<'_>,
+    wiring: &Wiring,
+    misfit: f64,
+    out: &mut Findings<'_>,
+) {
+    let size = bench.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+    if size == 0.0 || (size / G - 1.0).abs() <= OTHER_SIZE || wiring.gravity.is_some() {
+        return;
+    }
+    let on_earth = Wiring { gravity: Some(bench.gravity.map(|g| g * G / size)), ..wiring.clone() };
+    let borne_out = trial.parameters(&on_earth).is_some_and(|(_, other)| other > misfit + CLEARLY.1);
+    if !borne_out {
+        let evidence = format!(
+            "gravity is stated as {size:.3} m/s²; the log explains as well by the {G} m/s² of the Earth"
+        );
+        out.add(
+            "gravity_size",
+            Severity::Warning,
+            None,
+            evidence,
+            "state gravity in base axes (`gravity`), m/s²",
+        );
+    }
+}
+
 /// Parameters that explain a wiring best, its efforts of any size: a prior of bodies would keep those of another unit small.
 fn at_any_size(trial: &Trial<'_>, wiring: &Wiring) -> Option<Vec<f64>> {
     let sized = |factor: f64| {
@@ -130,13 +271,6 @@ fn at_any_size(trial: &Trial<'_>, wiring: &Wiring) -> Option<Vec<f64>> {
     // As large a gain as a difference of columns must have: friction alone is of any size.
     let better = other.filter(|(_, other)| *other < CLEARLY.0 * misfit && misfit - other > CLEARLY.1);
     Some(better.map_or(x, |(x, _)| x))
-}
-
-/// Whether the robot file states bodies of its own: not none, and not the same for all.
-fn is_told(prior: &Prior) -> bool {
-    let first = prior.bodies.first().map(|b| b.inertia);
-    let alike = prior.bodies.len() > 1 && prior.bodies.iter().all(|b| Some(b.inertia) == first);
-    !alike && prior.bodies.iter().all(|b| b.origin != Origin::Invented)
 }
 
 fn rms(signals: &[Vec<f64>]) -> f64 {

@@ -27,8 +27,14 @@ const MOVED: f64 = 10.0;
 /// Most ranges that a configuration is to leave out.
 const MOST_RANGES: usize = 200;
 
-/// Looks at clock, repetitions, frozen and cut-off signals; gives the log on its grid without spikes. `rows`: data row of every row.
-pub(super) fn examine(log: &Log, rows: &[usize], out: &mut Findings<'_>) -> Result<UniformLog, Error> {
+/// Looks at clock, repetitions, frozen and cut-off signals; gives the log on its grid without spikes. `rows`: data row of every row; `driven`:
+/// whether a drive acts on a joint.
+pub(super) fn examine(
+    log: &Log,
+    rows: &[usize],
+    driven: impl Fn(&str) -> bool,
+    out: &mut Findings<'_>,
+) -> Result<UniformLog, Error> {
     repetitions(log, rows, out);
     let rate_hz = median_rate(log);
     for joint in log.joints() {
@@ -42,12 +48,15 @@ pub(super) fn examine(log: &Log, rows: &[usize], out: &mut Findings<'_>) -> Resu
             out.add("frozen_signal", Severity::Warning, name, evidence, LEAVE_OUT).fixes =
                 leave_out(&frozen, rows);
         }
-        if joint.effort.is_empty() || joint.effort.iter().all(|e| *e == 0.0) {
+        if joint.effort.is_empty() {
             continue;
         }
         if joint.effort_is_constant() {
-            let evidence = format!("the effort is {} in every row", joint.effort[0]);
-            out.add("frozen_signal", Severity::Error, name, evidence, "log the effort of this joint");
+            // Where no drive acts there is no effort.
+            if driven(&joint.name) {
+                let evidence = format!("the effort is {} in every row", joint.effort[0]);
+                out.add("frozen_signal", Severity::Error, name, evidence, "log the effort of this joint");
+            }
             continue;
         }
         let mut frozen = frozen_effort(&joint.effort, rate_hz);

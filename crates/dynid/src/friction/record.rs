@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use dynid_estimate::distribution::f_quantile;
 use dynid_estimate::steady_friction::{LevelFit, SteadyFriction};
 use dynid_sim::presliding::EffortHold;
 
@@ -27,6 +28,11 @@ const NAMES: [(&str, &str); 10] = [
     ("sigma4", "sigma4"),
     ("sigma4_slope", "sigma4_slope"),
 ];
+
+/// Chance with which points without any friction pass for a law.
+const BY_CHANCE: f64 = 0.999;
+/// Most of the friction's power that a law may leave.
+const MOST_LEFT: f64 = 0.5;
 
 impl FrictionIdentification {
     /// What the identification leaves behind.
@@ -215,6 +221,20 @@ fn law(
     out.notes.extend(found.notes.iter().cloned());
     let simple = law.value("fs").is_none() || law.value("sigma2").is_none() || !law.form.thermal;
     out.status = if simple { "simplified" } else { "identified" }.to_owned();
+    if let Some(share) = unexplained(found, speeds.iter().map(|p| p.friction)) {
+        out.status = "not_identified".to_owned();
+        (out.coulomb, out.static_, out.stribeck_speed, out.stribeck_exponent) = (None, None, None, None);
+        (out.offset, out.viscous) = (None, None);
+        out.std.clear();
+        out.levels.clear();
+        out.lines.clear();
+        out.notes.push(format!(
+            "no law of friction: the best one leaves {:.0} % of the friction of the points unexplained (root mean square), no less than noise would \
+             by chance; see whether effort and speed are of this joint",
+            100.0 * share
+        ));
+        return;
+    }
     if law.value("fv").is_some_and(|fv| fv < 0.0) {
         out.notes.push(
             "the viscous coefficient is negative: friction falls with speed within the speeds of the test, the law is not to be \
@@ -223,6 +243,17 @@ fn law(
         );
     }
     check_range(out, found, experiment);
+}
+
+/// Share of the friction (root mean square) that a law leaves, if that is more than half of its power, or no less than chance leaves.
+fn unexplained(found: &SteadyFriction, friction: impl Iterator<Item = f64>) -> Option<f64> {
+    let all: f64 = friction.map(|f| f * f).sum();
+    let left: f64 = found.residuals.iter().map(|r| r * r).sum();
+    let freedom = found.error.freedom as f64;
+    let terms = found.residuals.len() as f64 - freedom;
+    let f = (all - left) / terms / (left / freedom);
+    let chance = f_quantile(BY_CHANCE, terms, freedom).is_some_and(|limit| f < limit);
+    (chance || left > MOST_LEFT * all).then(|| (left / all).sqrt())
 }
 
 /// Refuses a law whose `σ2` vanishes where it was measured, shortens a wider range that was asked for.

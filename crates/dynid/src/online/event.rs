@@ -126,10 +126,24 @@ pub enum Event {
         statistic: f64,
         /// Its alarm threshold.
         threshold: Option<f64>,
+        /// Whether alarms are given: not while the motion goes where nothing was learned.
+        watching: bool,
         /// Samples of rows so far.
         rows: u64,
         /// Alarms so far.
         alarms: u64,
+    },
+    /// The motion leaves the region that was learned: alarms are withheld until it has been learned too.
+    Withheld {
+        /// Time of the newest row, s.
+        time: f64,
+        /// Variance of the prediction by what is not known of the parameters, in parts of that of the noise.
+        leverage: f64,
+    },
+    /// The motion stays where it was learned: alarms are given again.
+    Watching {
+        /// Time of the newest row, s.
+        time: f64,
     },
     /// Prediction errors are larger than they should be.
     Alarm {

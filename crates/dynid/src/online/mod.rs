@@ -8,6 +8,7 @@
 
 mod checkpoint;
 mod event;
+mod ground;
 mod learning;
 mod moved;
 mod rules;

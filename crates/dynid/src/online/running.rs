@@ -11,6 +11,7 @@ use dynid_motion::live::LiveGrid;
 use dynid_motion::words::Transfer;
 
 use super::event::{Counts, Event, ParameterValue, PlainValue};
+use super::ground::Ground;
 use super::learning::{Learned, Structure};
 use super::moved::Hypotheses;
 use super::rules::settings;
@@ -26,6 +27,8 @@ use crate::prior::Prior;
 const PRIOR_SHARE: f64 = 0.01;
 /// Prior of a stretch on its own, in prior deviations of the run.
 const NO_PRIOR: f64 = 1e9;
+/// After the last row outside the region that was learned alarms are withheld for this part of the stretch that is learned from.
+const SETTLING: f64 = 0.5;
 /// A parameter is determined if its deviation is below this share of that before any sample.
 const DETERMINED: f64 = 0.1;
 
@@ -51,6 +54,8 @@ pub(super) struct Running {
     since: Estimator,
     empty: SquareRoot,
     hold: Option<Hold>,
+    /// Where the motion has been.
+    ground: Ground,
     /// Time of the newest row.
     newest: f64,
     next_report: Option<f64>,
@@ -67,6 +72,9 @@ impl Running {
     pub(super) fn new(config: &Config, structure: &Structure, learned: Learned) -> Result<Running, Error> {
         let outputs = structure.model.outputs().len();
         let rows = learned.live_rows(structure)?;
+        let in_rows = |seconds: f64| (seconds / rows.spacing_s()).ceil().max(1.0) as u64;
+        let (settling, block) =
+            (in_rows(SETTLING * config.online.learn_s), in_rows(config.online.reaction_s));
         let settings = settings(config, &learned, outputs, rows.spacing_s(), true);
         let window = Settings {
             prior_std: learned.prior_std.iter().map(|s| NO_PRIOR * s).collect(),
@@ -90,6 +98,7 @@ impl Running {
             newest: f64::NEG_INFINITY,
             next_report: None,
             hold: None,
+            ground: Ground::new(outputs, settling, block),
             counts: Counts::default(),
             waiting: Vec::new(),
             estimator,
@@ -257,7 +266,22 @@ impl Running {
             }
             return Ok(());
         }
-        let step = self.estimator.step(&self.regressor, effort, RowNoise::Covariance(noise))?;
+        let (ground, inflation) = (&mut self.ground, self.learned.innovations.inflation);
+        let was_known = ground.is_known();
+        let step = self.estimator.step_where(
+            &self.regressor,
+            effort,
+            RowNoise::Covariance(noise),
+            |innovation| ground.watches(innovation, inflation),
+        )?;
+        ground.learn(used, self.estimator.innovation().whitened(), &mut self.learned.innovations);
+        if config.online.alarms && was_known != self.ground.is_known() {
+            let leverage = inflation * self.estimator.innovation().leverage();
+            emit(match was_known {
+                true => Event::Withheld { time: self.newest, leverage },
+                false => Event::Watching { time: self.newest },
+            });
+        }
         for (o, e) in used.iter().zip(self.estimator.prediction_error()) {
             self.errors[*o] = (self.errors[*o].0 + e * e, self.errors[*o].1 + 1);
         }
@@ -323,6 +347,7 @@ impl Running {
             residual_rms,
             statistic: self.statistic(),
             threshold: self.estimator.detection().map(|d| d.threshold()),
+            watching: self.estimator.detection().is_some() && self.ground.is_known(),
             rows: self.counts.rows,
             alarms: self.counts.alarms,
         })
@@ -374,6 +399,7 @@ impl Running {
         transfer_estimator(&mut self.estimator, transfer);
         transfer_estimator(&mut self.since, transfer);
         transfer_root(&mut self.unchanged, transfer);
+        self.ground.transfer(transfer);
         let mut held = self.hold.is_some();
         transfer.flag(&mut held);
         let hold = self.hold.get_or_insert(Hold { alarm: 0.0, left: 1 });

@@ -44,10 +44,9 @@ pub(super) fn difference(
     let found = explain_difference([&with, &without], [id.fitted.inflation; 2], &map)?;
     let phi = Inertia(std::array::from_fn(|j| found.x[j]));
     let about = about_com(&phi);
-    Some(Difference {
-        mass: phi.mass(),
-        mass_std: found.covariance[(0, 0)].sqrt(),
-        com: [about[1], about[2], about[3]],
-        feasible: phi.physical_fault().is_none(),
-    })
+    let (mass, mass_std) = (phi.mass(), found.covariance[(0, 0)].sqrt());
+    let com = [about[1], about[2], about[3]];
+    // Two fits to the same rows differ by nothing, of which there is no centre.
+    let told = [mass, mass_std].into_iter().chain(com).all(f64::is_finite);
+    told.then(|| Difference { mass, mass_std, com, feasible: phi.physical_fault().is_none() })
 }

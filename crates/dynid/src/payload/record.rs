@@ -9,10 +9,15 @@ use super::body::{Body, NAMES, about_com};
 use super::difference::{Difference, difference};
 use super::{PayloadIdentification, quantile};
 use crate::config::{Config, PayloadConfig};
-use crate::estimate::{ConsistencyRecord, LogScale, ParameterValue, Provenance, SCHEMA, Verdict};
+use crate::estimate::{
+    CheckResult, ConsistencyRecord, LogScale, ParameterValue, Provenance, SCHEMA, Verdict,
+};
 use crate::identify::Identification;
 use crate::prior::PAYLOAD_SIZE;
-use crate::{Error, advice};
+use crate::{Error, advice, verdict};
+
+/// Checks of an identification that say what its logs are worth. The scale of the efforts is told by the stated mass.
+const INPUTS: [&str; 2] = [verdict::PREFLIGHT, verdict::OWN_LOGS];
 
 /// Share of the prior variance that the logs must remove for a value to count as seen.
 const SEEN: f64 = 0.9;
@@ -75,8 +80,11 @@ pub struct PayloadFile {
     /// Robot.
     pub robot: String,
     /// `ok`: mass and centre of mass of every payload are seen in the data, stated masses within their intervals; `warn`: masses
-    /// are seen; `fail`: not even these, or the model behind them is not to be trusted.
+    /// are seen; `fail`: not even these, or not told from none, or the model behind them is not to be trusted.
     pub status: String,
+    /// What it comes down to, in words.
+    #[serde(default)]
+    pub headline: String,
     /// Payloads.
     pub payloads: Vec<PayloadRecord>,
     /// Deviations of single logs that were identified beside.
@@ -108,11 +116,13 @@ pub(super) fn of(id: &Identification, run: &Config, stated: &PayloadConfig) -> P
     let about = free.map(|inertia| about_com(&inertia));
     let half_mass = 0.5 * stated.rated();
     let t = quantile(id);
+    // Of what may weigh nothing there is no centre.
+    let weighs = about.is_some_and(|a| a[0] > t * body.std[0]);
     let quantities: Vec<Quantity> = (0..10)
         .map(|k| {
             let prior = half_mass.powi(i32::from(!(1..4).contains(&k))) * PAYLOAD_SIZE.powi(degree(k));
             let share = (1.0 - (body.std[k] / prior).powi(2)).clamp(0.0, 1.0);
-            let seen = share >= SEEN;
+            let seen = share >= SEEN && (k == 0 || weighs);
             let unconstrained = about.map(|a| a[k]);
             let moved = unconstrained.map_or(f64::INFINITY, |u| (body.values[k] - u).abs());
             Quantity {
@@ -197,6 +207,12 @@ fn sentence(name: &str, found: &[Quantity], stated: &PayloadConfig) -> String {
             100.0 * mass.share
         );
     };
+    if low <= 0.0 {
+        return format!(
+            "the logs show no payload `{name}`: its mass is not told from none (95 % interval {low:.2e} to {high:.2e} kg); are logs with and \
+             without it exchanged or the same, or is it too light?"
+        );
+    }
     let centre: Vec<String> = found[1..4].iter().map(|c| format!("{:.1}", 1e3 * c.value)).collect();
     let beside = stated.mass.map_or_else(String::new, |m| {
         let within = if (low..=high).contains(&m) { "within" } else { "outside of" };
@@ -217,23 +233,38 @@ impl PayloadIdentification {
     pub fn file(&self, config: &Config) -> Result<PayloadFile, Error> {
         let estimate = self.identification.estimate(config)?;
         let all = |of: &dyn Fn(&PayloadRecord) -> bool| self.payloads.iter().all(of);
-        let mass = all(&|p| p.mass.interval.is_some());
+        let mass = all(&|p| p.mass.interval.is_some_and(|(low, _)| low > 0.0));
         let centre = all(&|p| p.com.iter().all(|c| c.interval.is_some()));
         // A stated mass that the interval excludes says that the scale of the efforts is wrong, or the statement.
         let agrees = |p: &PayloadRecord| match (p.stated_mass, p.mass.interval) {
             (Some(stated), Some((low, high))) => (low..=high).contains(&stated),
             _ => true,
         };
-        let status = match (estimate.verdict.status.as_str(), mass, centre && all(&agrees)) {
+        // What makes the logs doubtful makes their difference doubtful too.
+        let doubted = |c: &CheckResult| c.status == "warn" && INPUTS.contains(&c.name.as_str());
+        let doubtful = estimate.verdict.checks.iter().any(doubted);
+        let status = match (estimate.verdict.status.as_str(), mass, centre && all(&agrees) && !doubtful) {
             ("fail", _, _) | (_, false, _) => "fail",
             (_, true, true) => "ok",
             (_, true, false) => "warn",
         };
         let of_payload = |p: &ParameterValue| p.link.is_some();
+        let sentences: Vec<&str> = self.payloads.iter().map(|p| p.sentence.as_str()).collect();
+        let headline = match (estimate.verdict.status.as_str(), status) {
+            ("fail", _) => {
+                format!("what stands behind it is not to be trusted: {}", estimate.verdict.headline)
+            }
+            (of_robot, _) => format!(
+                "{}. Robot and payloads together ({of_robot}): {}",
+                sentences.join("; "),
+                estimate.verdict.headline
+            ),
+        };
         Ok(PayloadFile {
             schema: SCHEMA,
             robot: estimate.robot,
             status: status.to_owned(),
+            headline,
             payloads: self.payloads.clone(),
             log_parameters: estimate.log_parameters.into_iter().filter(|p| !of_payload(p)).collect(),
             log_scales: estimate.log_scales,

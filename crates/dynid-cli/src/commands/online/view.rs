@@ -79,6 +79,12 @@ impl View {
                 ));
             }
             Event::Learning { time, reason } => self.note(&format!("{time:.2} s: still learning: {reason}")),
+            Event::Withheld { time, .. } => self.note(&format!(
+                "{time:.2} s: the motion leaves the region that was learned: alarms are withheld, learning goes on"
+            )),
+            Event::Watching { time } => {
+                self.note(&format!("{time:.2} s: the region is learned: alarms are given again"));
+            }
             Event::Alarm { time, .. } => self.note(&format!("{time:.2} s: alarm")),
             Event::Change { time, confirmed: false, .. } => {
                 self.note(&format!("{time:.2} s: the alarm was false: nothing changed"));

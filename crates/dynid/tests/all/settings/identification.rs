@@ -180,6 +180,9 @@ fn cases() -> Vec<Case> {
             text("robot = \"heavy.toml\"\nknown_effort_scale = true", "", "", ""),
             Changes,
         ),
+        carried("known_mass", TOOL, "[[payload]]\nname = \"tool\"\n[known_mass]\ntool = 1.2", Changes),
+        table("known_mass", "[known_mass]\nlink2 = -1", Refused("known_mass.link2")),
+        table("known_mass", "[known_mass]\nlink9 = 1", Refused("a link: link1, link2")),
         with(
             "couple_mimics",
             text("robot = \"mimic.urdf\"", "", "", ""),
