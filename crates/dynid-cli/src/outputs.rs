@@ -1,24 +1,43 @@
-//! Refuses outputs that cannot be written before anything is computed, so that a run writes all of its files or none.
+//! Output files of commands: whether they can be written is found out before anything is computed, and they appear together.
 
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 
-use dynid::io::OutputError;
+use dynid::io::output::{OutputError, OutputSet};
 
-use crate::message::Failure;
+use crate::message::{Failure, note};
 
-/// Checks the files that a command is about to write.
+/// Readies the files that a command is about to write, the most telling first; their folders must exist.
 ///
 /// `outputs`: argument that names the file, and the file. `inputs`: files that must not be overwritten.
 ///
 /// # Errors
-/// A missing folder, a folder in the place of a file, one file named twice, an input.
-pub(crate) fn check_files(outputs: &[(&str, &Path)], inputs: &[&Path]) -> Result<(), Failure> {
-    for (k, (argument, path)) in outputs.iter().enumerate() {
+/// A missing folder, a folder in the place of a file, one file named twice, an input, what cannot be written.
+pub(crate) fn prepare_files(outputs: &[(&str, &Path)], inputs: &[&Path]) -> Result<OutputSet, Failure> {
+    for (_, path) in outputs {
         let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if !folder.is_dir() {
             return Err(unwritable(path, ErrorKind::NotFound));
         }
+    }
+    prepare(outputs, inputs)
+}
+
+/// Readies files of a folder that is made, with its parents, if it does not exist.
+///
+/// # Errors
+/// As [`prepare_files`]; something that is no folder in the place of the folder or of a parent.
+pub(crate) fn prepare_folder(files: &[PathBuf], inputs: &[&Path]) -> Result<OutputSet, Failure> {
+    let outputs: Vec<(&str, &Path)> = files.iter().map(|f| ("--out", f.as_path())).collect();
+    prepare(&outputs, inputs)
+}
+
+/// Refuses outputs that are folders, inputs, or each other.
+///
+/// # Errors
+/// The first such output.
+pub(crate) fn check(outputs: &[(&str, &Path)], inputs: &[&Path]) -> Result<(), Failure> {
+    for (k, (argument, path)) in outputs.iter().enumerate() {
         if path.is_dir() {
             return Err(unwritable(path, ErrorKind::IsADirectory));
         }
@@ -39,22 +58,18 @@ pub(crate) fn check_files(outputs: &[(&str, &Path)], inputs: &[&Path]) -> Result
     Ok(())
 }
 
-/// Checks a folder that is to be made, with its parents, if it does not exist, and files in it.
-///
-/// # Errors
-/// Something that is no folder in its place or in that of a parent; as [`check_files`] if it exists.
-pub(crate) fn check_folder(folder: &Path, files: &[PathBuf], inputs: &[&Path]) -> Result<(), Failure> {
-    let here = Path::new(".");
-    let existing =
-        folder.ancestors().find(|f| f.exists()).filter(|f| !f.as_os_str().is_empty()).unwrap_or(here);
-    if !existing.is_dir() {
-        return Err(unwritable(folder, ErrorKind::NotADirectory));
+fn prepare(outputs: &[(&str, &Path)], inputs: &[&Path]) -> Result<OutputSet, Failure> {
+    check(outputs, inputs)?;
+    let set = OutputSet::prepare(&outputs.iter().map(|(_, path)| *path).collect::<Vec<_>>())?;
+    for other in set.others() {
+        note(&format!(
+            "another run (process {}, begun {} s ago) is going to write into {} too: the one that ends later stays",
+            other.process,
+            other.age.as_secs(),
+            other.folder.display()
+        ));
     }
-    if !folder.is_dir() {
-        return Ok(());
-    }
-    let outputs: Vec<(&str, &Path)> = files.iter().map(|f| ("--out", f.as_path())).collect();
-    check_files(&outputs, inputs)
+    Ok(set)
 }
 
 fn unwritable(path: &Path, kind: ErrorKind) -> Failure {

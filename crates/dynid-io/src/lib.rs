@@ -9,6 +9,7 @@ pub mod columns;
 pub mod csv;
 pub mod digest;
 mod excerpt;
+pub mod input;
 pub mod mjcf;
 pub mod output;
 pub mod robot;

@@ -501,7 +501,8 @@ impl Estimate {
     /// # Errors
     /// [`Error::Read`], [`Error::EstimateFile`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
+        let text =
+            dynid_io::input::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
         let fault = |message: String| Error::EstimateFile { file: path.display().to_string(), message };
         let estimate: Estimate = serde_json::from_slice(&text).map_err(|e| fault(e.to_string()))?;
         if estimate.schema != SCHEMA {

@@ -39,6 +39,7 @@ mod provenance;
 mod report_data;
 mod result;
 pub mod robot;
+mod sealed;
 pub mod shape;
 pub mod simulate;
 pub mod stiffness;

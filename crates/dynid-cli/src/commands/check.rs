@@ -4,7 +4,6 @@ use std::path::Path;
 
 use dynid::check::{Check, Finding, Severity, check};
 use dynid::config::{Config, LogConfig};
-use dynid::io::output::write_atomically;
 
 use super::apply_log_args_to;
 use crate::args::CheckArgs;
@@ -24,17 +23,18 @@ pub(crate) fn run(args: &CheckArgs) -> Result<u8, Failure> {
         .collect();
     let logs = config.log.iter().chain(&config.validation).map(|log| log.path.as_path());
     let inputs: Vec<&Path> = logs.chain(source).chain([config.robot.as_path()]).collect();
-    outputs::check_files(&outputs, &inputs)?;
+    let set = outputs::prepare_files(&outputs, &inputs)?;
     let progress = Progress::new(args.quiet);
     let found = check(&config, &mut |log| progress.examining(log))?;
     drop(progress);
-    let page = if args.report.is_some() { Some(found.report()?) } else { None };
-    let fixed = if args.fix.is_some() { Some(found.corrected(&config, source)?) } else { None };
-    for (path, text) in [(&args.report, page), (&args.fix, fixed)] {
-        if let (Some(path), Some(text)) = (path, text) {
-            write_atomically(path, text.as_bytes())?;
-        }
+    for (number, (argument, _)) in outputs.iter().enumerate() {
+        let text = match *argument {
+            "--fix" => found.corrected(&config, source)?,
+            _ => found.report()?,
+        };
+        set.write(number, text.as_bytes())?;
     }
+    set.publish()?;
     if args.json {
         data(&(found.to_json() + "\n"))?;
     } else {

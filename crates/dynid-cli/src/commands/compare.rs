@@ -4,7 +4,6 @@ use std::path::Path;
 
 use dynid::compare::{ComparedEstimator, Comparison, compare};
 use dynid::config::{Config, LogConfig};
-use dynid::io::output::write_atomically;
 
 use super::{apply_log_args_to, table};
 use crate::args::CompareArgs;
@@ -25,13 +24,14 @@ pub(crate) fn run(args: &CompareArgs) -> Result<u8, Failure> {
     let outputs: Vec<(&str, &Path)> = args.report.iter().map(|p| ("--report", p.as_path())).collect();
     let logs = config.log.iter().map(|log| log.path.as_path());
     let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).collect();
-    outputs::check_files(&outputs, &inputs)?;
+    let set = outputs::prepare_files(&outputs, &inputs)?;
     let progress = DesignProgress::new(args.quiet);
     let found = compare(&config, &mut |done, of, what| progress.fit(done, of, what))?;
     drop(progress);
-    if let Some(path) = &args.report {
-        write_atomically(path, found.report()?.as_bytes())?;
+    if args.report.is_some() {
+        set.write(0, found.report()?.as_bytes())?;
     }
+    set.publish()?;
     match args.json {
         true => data(&(found.to_json() + "\n"))?,
         false => data(&text(&found))?,

@@ -4,8 +4,6 @@ use std::path::{Path, PathBuf};
 
 use dynid::config::PerJoint;
 use dynid::design::{ColumnsName, CriterionName, DesignConfig, DesignRecord, MotionPaths, design};
-use dynid::io::OutputError;
-use dynid::io::output::write_atomically;
 
 use super::{element_names, table};
 use crate::args::{ColumnsArg, CriterionArg, DesignArgs};
@@ -32,33 +30,34 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
             .map(Clone::clone);
     let earlier = config.earlier.iter().map(PathBuf::as_path);
     let inputs: Vec<&Path> = earlier.chain([args.input.as_path(), &config.robot]).collect();
-    outputs::check_folder(&out, &files, &inputs)?;
     if let Some(checkpoint) = &config.search.checkpoint {
-        let results = files.iter().map(|file| ("--out", file.as_path())).filter(|_| out.is_dir());
-        let all: Vec<(&str, &Path)> = results.chain([("--checkpoint", checkpoint.as_path())]).collect();
-        outputs::check_files(&all, &inputs)?;
+        let results = files.iter().map(|file| ("--out", file.as_path()));
+        outputs::check(
+            &results.chain([("--checkpoint", checkpoint.as_path())]).collect::<Vec<_>>(),
+            &inputs,
+        )?;
+        drop(outputs::prepare_files(&[("--checkpoint", checkpoint)], &[])?);
         if std::path::absolute(checkpoint).ok() == std::path::absolute(&out).ok() {
             let text = format!("--checkpoint: {} is the output folder", checkpoint.display());
             return Err(Failure::Usage(text, "give the checkpoint a file of its own"));
         }
     }
+    let set = outputs::prepare_folder(&files, &inputs)?;
     let progress = DesignProgress::new(args.quiet);
     let run = design(&config, &mut |step| progress.step(step))?;
     let record = run.record(&config)?;
     let report = run.report(&config, &record)?;
     drop(progress);
 
-    std::fs::create_dir_all(&out)
-        .map_err(|error| OutputError::Unwritable { file: out.display().to_string(), error })?;
-    let mut written = Vec::new();
     if let Ok(designed) = &run.outcome {
-        designed.motion.write(&paths)?;
-        written.extend([&paths.coefficients, &paths.samples, &paths.ros_yaml, &paths.ros_json]);
+        let staged = |number: usize| set.staged(number).to_owned();
+        let [coefficients, samples, ros_yaml, ros_json] = [0, 1, 2, 3].map(staged);
+        designed.motion.write(&MotionPaths { coefficients, samples, ros_yaml, ros_json })?;
     }
     let text = serde_json::to_string_pretty(&record).map_err(|e| Failure::Output(e.into()))? + "\n";
-    write_atomically(&record_path, text.as_bytes())?;
-    write_atomically(&report_path, report.as_bytes())?;
-    written.extend([&record_path, &report_path]);
+    set.write(4, text.as_bytes())?;
+    set.write(5, report.as_bytes())?;
+    let written = set.publish()?;
     if args.quiet {
         if record.verdict.status == "fail" {
             note(&verdict(&record));
@@ -140,13 +139,13 @@ fn configuration(args: &DesignArgs) -> Result<DesignConfig, Failure> {
 /// Whether a TOML file, sound or not, means to be a robot: no configuration of a design has such a table.
 fn is_robot(path: &Path) -> bool {
     let table = |line: &str| matches!(line.trim(), "[[joint]]" | "[[body]]");
-    std::fs::read_to_string(path).is_ok_and(|text| text.lines().any(table))
+    dynid::io::input::read_text(path).is_ok_and(|text| text.lines().any(table))
 }
 
 /// Parameters that the summary shows, worst first.
 const SHOWN: usize = 8;
 
-fn summary(record: &DesignRecord, written: &[&PathBuf]) {
+fn summary(record: &DesignRecord, written: &[PathBuf]) {
     for warning in &record.verdict.warnings {
         note(&format!("warning: {warning}"));
     }

@@ -6,7 +6,6 @@ use dynid::config::{Config, LogConfig};
 use dynid::estimate::{EXPORT_LOSS_LIMIT, Estimate, FileFit};
 use dynid::export::{CheckStates, Exported, IdentifiedRobot, RobotExport, Source, json};
 use dynid::io::MappingSpec;
-use dynid::io::output::write_atomically;
 use dynid::logs::sha256;
 
 use super::{apply_log_args, table};
@@ -15,7 +14,7 @@ use crate::message::{Failure, note};
 use crate::outputs;
 
 pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
-    let outputs: Vec<(&str, &Path)> =
+    let mut outputs: Vec<(&str, &Path)> =
         [("--urdf", &args.urdf), ("--mjcf", &args.mjcf), ("--json", &args.json)]
             .into_iter()
             .filter_map(|(argument, path)| Some((argument, path.as_deref()?)))
@@ -40,7 +39,11 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
         .chain(&args.config)
         .map(PathBuf::as_path)
         .collect();
-    outputs::check_files(&outputs, &inputs)?;
+    // Loops stand beside the URDF, which has no place for them.
+    let beside = args.urdf.as_ref().map(|urdf| urdf.with_extension("loops.toml"));
+    let models = outputs.len();
+    outputs.extend(beside.iter().map(|path| ("--urdf", path.as_path())));
+    let set = outputs::prepare_files(&outputs, &inputs)?;
 
     let identified = estimate.identified_robot(&args.estimate)?;
     let states = states(args, &estimate, &identified)?;
@@ -60,7 +63,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
     for fault in export.faults() {
         note(&format!("warning: link `{}` {}: simulators refuse such a robot", fault.link, fault.fault));
     }
-    let exported = outputs
+    let exported = outputs[..models]
         .iter()
         .map(|(argument, path)| {
             let exported = match *argument {
@@ -71,16 +74,17 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
             Ok((*argument, *path, exported?))
         })
         .collect::<Result<Vec<_>, Failure>>()?;
-    for (_, path, exported) in &exported {
-        write_atomically(path, exported.text.as_bytes())?;
+    for (number, (_, _, exported)) in exported.iter().enumerate() {
+        set.write(number, exported.text.as_bytes())?;
     }
-    if let Some(urdf) = &args.urdf {
-        let name = urdf.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        if let Some(loops) = export.loops(&name) {
-            let path = urdf.with_extension("loops.toml");
-            write_atomically(&path, loops.as_bytes())?;
-            note(&format!("written: {} (its loops)", path.display()));
-        }
+    let name = args.urdf.as_ref().and_then(|urdf| urdf.file_name());
+    let loops = name.and_then(|name| export.loops(&name.to_string_lossy()));
+    if let Some(loops) = &loops {
+        set.write(models, loops.as_bytes())?;
+    }
+    set.publish()?;
+    if let (Some(path), Some(_)) = (&beside, &loops) {
+        note(&format!("written: {} (its loops)", path.display()));
     }
     for (argument, path, exported) in &exported {
         note(&format!(

@@ -4,8 +4,6 @@ use std::path::{Path, PathBuf};
 
 use dynid::friction::model::{FrictionModel, JointFrictionModel, ViscousModel};
 use dynid::friction::{FrictionConfig, identify_friction};
-use dynid::io::OutputError;
-use dynid::io::output::write_atomically;
 
 use super::table;
 use crate::args::FrictionTestArgs;
@@ -25,18 +23,17 @@ pub(crate) fn run(args: &FrictionTestArgs) -> Result<u8, Failure> {
     let logs = config.log.iter().map(|l| l.path.as_path());
     let slow = config.presliding.iter().map(|l| l.path.as_path());
     let inputs: Vec<&Path> = logs.chain(slow).chain([args.input.as_path(), &config.robot]).collect();
-    outputs::check_folder(&out, &files, &inputs)?;
+    let set = outputs::prepare_folder(&files, &inputs)?;
     let progress = Progress::new(args.quiet);
     let found = identify_friction(&config, &mut |step| progress.friction(step))?;
     let model = found.model(&config)?;
     let report = found.report(&model)?;
     drop(progress);
 
-    std::fs::create_dir_all(&out)
-        .map_err(|error| OutputError::Unwritable { file: out.display().to_string(), error })?;
     let text = model.to_json();
-    write_atomically(&files[0], text.as_bytes())?;
-    write_atomically(&files[1], report.as_bytes())?;
+    set.write(0, text.as_bytes())?;
+    set.write(1, report.as_bytes())?;
+    set.publish()?;
     let failed = model.verdict.status == "fail";
     if !args.quiet {
         summary(&model);

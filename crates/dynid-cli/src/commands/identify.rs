@@ -4,8 +4,6 @@ use std::path::{Path, PathBuf};
 
 use dynid::config::{Config, Consistency, Friction, LogConfig, Method, Route};
 use dynid::estimate::{Estimate, LogScale, ShapeValue};
-use dynid::io::OutputError;
-use dynid::io::output::write_atomically;
 use dynid::{Error, identify};
 
 use super::{apply_log_args_to, element_names, export, table};
@@ -26,7 +24,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     let logs = config.log.iter().chain(&config.validation).map(|log| log.path.as_path());
     let friction = config.elements.known_friction.as_deref();
     let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).chain(friction).collect();
-    outputs::check_folder(&out, &files, &inputs)?;
+    let set = outputs::prepare_folder(&files, &inputs)?;
     let progress = Progress::new(args.quiet);
     let identification = identify(&config, &mut |step| progress.step(step))?;
     let mut estimate = identification.estimate(&config)?;
@@ -42,19 +40,16 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     };
     drop(progress);
 
-    std::fs::create_dir_all(&out)
-        .map_err(|error| OutputError::Unwritable { file: out.display().to_string(), error })?;
     let loops = if urdf.is_ok() { identification.loops(&urdf_name)? } else { None };
     let texts =
         [Some(&estimate.to_json()), Some(&report), urdf.as_ref().ok().map(|u| &u.text), loops.as_ref()];
-    let written: Vec<(&PathBuf, &String)> =
-        files.iter().zip(texts).filter_map(|(path, text)| Some((path, text?))).collect();
-    for (path, text) in &written {
-        write_atomically(path, text.as_bytes())?;
+    for (number, text) in texts.into_iter().enumerate() {
+        text.map(|text| set.write(number, text.as_bytes())).transpose()?;
     }
+    let written = set.publish()?;
     let failed = estimate.verdict.status == "fail";
     if !args.quiet {
-        summary(&estimate, written.iter().map(|(path, _)| path.as_path()));
+        summary(&estimate, written.iter().map(PathBuf::as_path));
     } else if failed {
         note(&verdict(&estimate));
     }

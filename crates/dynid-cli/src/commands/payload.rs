@@ -3,8 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use dynid::Config;
-use dynid::io::OutputError;
-use dynid::io::output::write_atomically;
 use dynid::payload::{PayloadFile, PayloadRecord, Quantity, identify_payloads};
 
 use super::table;
@@ -25,20 +23,19 @@ pub(crate) fn run(args: &PayloadArgs) -> Result<u8, Failure> {
     files.extend(config.payload.iter().map(|p| out.join(format!("{}.urdf.part", file_name(&p.name)))));
     let logs = config.log.iter().chain(&config.validation).map(|log| log.path.as_path());
     let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).collect();
-    outputs::check_folder(&out, &files, &inputs)?;
+    let set = outputs::prepare_folder(&files, &inputs)?;
     let progress = Progress::new(args.quiet);
     let found = identify_payloads(&config, &mut |step| progress.step(step))?;
     let file = found.file(&config)?;
     let report = file.report()?;
     drop(progress);
 
-    std::fs::create_dir_all(&out)
-        .map_err(|error| OutputError::Unwritable { file: out.display().to_string(), error })?;
     let text = file.to_json();
     let parts = file.payloads.iter().map(|p| &p.urdf);
-    for (path, text) in files.iter().zip([&text, &report].into_iter().chain(parts)) {
-        write_atomically(path, text.as_bytes())?;
+    for (number, text) in [&text, &report].into_iter().chain(parts).enumerate() {
+        set.write(number, text.as_bytes())?;
     }
+    set.publish()?;
     if !args.quiet {
         file.verdict.warnings.iter().for_each(|w| note(&format!("warning: {w}")));
         files.iter().for_each(|path| note(&format!("written: {}", path.display())));

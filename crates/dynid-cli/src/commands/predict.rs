@@ -1,6 +1,7 @@
 //! `dynid predict`.
 
 use std::fmt::Write;
+use std::path::Path;
 
 use dynid::logs::as_logged;
 use dynid::predict::{efforts, read_states};
@@ -11,9 +12,8 @@ use crate::message::{Failure, data, note};
 use crate::outputs;
 
 pub(crate) fn run(args: &PredictArgs) -> Result<u8, Failure> {
-    if let Some(out) = &args.out {
-        outputs::check_files(&[("--out", out)], &[&args.estimate, &args.states])?;
-    }
+    let out: Vec<(&str, &Path)> = args.out.iter().map(|out| ("--out", out.as_path())).collect();
+    let set = outputs::prepare_files(&out, &[&args.estimate, &args.states])?;
     let estimate = Estimate::read(&args.estimate)?;
     let split = args.split.of();
     let model = estimate.effort_model(&args.estimate, split)?;
@@ -29,7 +29,8 @@ pub(crate) fn run(args: &PredictArgs) -> Result<u8, Failure> {
     match &args.out {
         None => data(&csv_text(&estimate.joints, &effort))?,
         Some(path) => {
-            dynid::io::csv::write(path, &header(&estimate.joints), &effort)?;
+            dynid::io::csv::write(set.staged(0), &header(&estimate.joints), &effort)?;
+            set.publish()?;
             note(&format!("{} rows written to {}", states.rows, path.display()));
         }
     }

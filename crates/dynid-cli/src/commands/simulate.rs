@@ -27,7 +27,7 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
         .chain(&args.follow)
         .map(PathBuf::as_path)
         .collect();
-    outputs::check_files(&files, &inputs)?;
+    let set = outputs::prepare_files(&files, &inputs)?;
     let robot = load_robot(&args.robot)?;
     let mut settings = match &args.config {
         None => SimulateSettings::default(),
@@ -50,7 +50,16 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
     if let Some(velocity) = &log.velocity {
         signals.insert(1, ("dq", velocity));
     }
-    write(&args.out, &log, &signals, &log.channels)?;
+    write(set.staged(0), &log, &signals, &log.channels)?;
+    if args.clean.is_some() {
+        let [q, dq, ddq, tau] = &log.clean;
+        let signals = [("q", q), ("dq", dq), ("ddq", ddq), (EFFORT, tau)];
+        write(set.staged(1), &log, &signals, &log.clean_channels)?;
+    }
+    if args.truth.is_some() {
+        set.write(files.len() - 1, truth(&log)?.as_bytes())?;
+    }
+    set.publish()?;
     note(&format!(
         "{} samples of {} joints written to {}",
         log.time.len(),
@@ -71,27 +80,25 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
             note(&line);
         }
     }
-    if let Some(path) = &args.clean {
-        let [q, dq, ddq, tau] = &log.clean;
-        write(path, &log, &[("q", q), ("dq", dq), ("ddq", ddq), (EFFORT, tau)], &log.clean_channels)?;
-    }
-    if let Some(path) = &args.truth {
-        let mut truth: serde_json::Map<String, serde_json::Value> =
-            log.truth.iter().map(|(n, v)| (n.clone(), (*v).into())).collect();
-        if let Some(experiment) = &log.experiment {
-            truth.insert("experiment".to_owned(), in_json(experiment));
-        }
-        if let Some(clearance) = &log.clearance {
-            truth.insert("clearance".to_owned(), clearance_in_json(clearance));
-        }
-        let text = serde_json::to_string_pretty(&truth).map_err(|e| Failure::Output(e.into()))?;
-        dynid::io::output::write_atomically(path, (text + "\n").as_bytes())?;
-    }
     Ok(0)
 }
 
+/// True parameters as JSON.
+fn truth(log: &SimulatedLog) -> Result<String, Failure> {
+    let mut truth: serde_json::Map<String, serde_json::Value> =
+        log.truth.iter().map(|(n, v)| (n.clone(), (*v).into())).collect();
+    if let Some(experiment) = &log.experiment {
+        truth.insert("experiment".to_owned(), in_json(experiment));
+    }
+    if let Some(clearance) = &log.clearance {
+        truth.insert("clearance".to_owned(), clearance_in_json(clearance));
+    }
+    let text = serde_json::to_string_pretty(&truth).map_err(|e| Failure::Output(e.into()))?;
+    Ok(text + "\n")
+}
+
 fn read_settings(path: &Path) -> Result<SimulateSettings, Failure> {
-    let text = std::fs::read_to_string(path)
+    let text = dynid::io::input::read_text(path)
         .map_err(|source| dynid::Error::Read { file: path.to_owned(), source })?;
     let mut settings = SimulateSettings::parse(&text, &path.display().to_string())?;
     let folder = path.parent().unwrap_or(Path::new(""));

@@ -2,8 +2,6 @@
 
 use std::path::PathBuf;
 
-use dynid::io::OutputError;
-use dynid::io::output::write_atomically;
 use dynid_studies::{RunSettings, StudyError, StudyRecord, list, run as run_study};
 
 use crate::args::StudyArgs;
@@ -24,17 +22,16 @@ pub(crate) fn run(args: &StudyArgs) -> Result<u8, Failure> {
     }
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("dynid-study-{}", args.name)));
     let files = ["study.json", "report.html"].map(|name| out.join(name));
-    outputs::check_folder(&out, &files, &[])?;
+    let set = outputs::prepare_folder(&files, &[])?;
     let progress = StudyProgress::new(args.quiet);
     let settings = RunSettings { quick: args.quick, seed: args.seed };
     let study = run_study(&args.name, &settings, &mut |step| progress.step(&step)).map_err(failure)?;
     drop(progress);
     let page = dynid::report::render_study(&study.report).map_err(dynid::Error::from)?;
-    std::fs::create_dir_all(&out)
-        .map_err(|error| OutputError::Unwritable { file: out.display().to_string(), error })?;
     let text = study.record.to_json();
-    write_atomically(&files[0], text.as_bytes())?;
-    write_atomically(&files[1], page.as_bytes())?;
+    set.write(0, text.as_bytes())?;
+    set.write(1, page.as_bytes())?;
+    set.publish()?;
     if !args.quiet {
         summary(&study.record);
         files.iter().for_each(|file| note(&format!("written: {}", file.display())));

@@ -45,7 +45,7 @@ pub struct ConditioningSettings {
     pub remove_spikes: bool,
     /// Order of the state filter (Butterworth, run forward and backward). Default 4.
     pub state_order: usize,
-    /// Length of the time blocks behind standard deviations, s; at most 64 blocks per log. Default 1.
+    /// Length of the time blocks behind standard deviations, s; at most 64 blocks per log, and 256 (or one per log) of all logs together. Default 1.
     pub block_s: f64,
     /// Clock.
     pub clock: ClockSettings,

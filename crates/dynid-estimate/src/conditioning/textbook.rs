@@ -3,6 +3,7 @@
 use dynid_model::{EffortModel, RegressorBlock};
 use dynid_motion::filter::{anti_alias, butterworth, forward_backward, pick};
 
+use super::log_rows::most_blocks;
 use super::reduce::unusable_row;
 use super::rows::KeptColumns;
 use super::states::States;
@@ -103,13 +104,14 @@ fn rows_of<'a>(
     model: &dyn EffortModel,
     shape: &[f64],
     kept: &[usize],
-    logs: impl Iterator<Item = (usize, &'a PreparedLog, Option<&'a [Vec<f64>]>)>,
+    logs: impl ExactSizeIterator<Item = (usize, &'a PreparedLog, Option<&'a [Vec<f64>]>)>,
     route: &TextbookRoute,
     settings: &ConditioningSettings,
 ) -> Result<MemoryRows, ConditioningError> {
     let columns = KeptColumns::new(model, kept);
     let settings = ConditioningSettings { state_order: route.order, ..settings.clone() };
     let mut out = MemoryRows::new();
+    let most = most_blocks(logs.len());
     for (l, log, motion) in logs {
         let cutoff = route.cutoff_hz.min(settings.cutoff.state_rate * log.rate_hz);
         let states = States::new(log, cutoff, &settings)?;
@@ -153,7 +155,7 @@ fn rows_of<'a>(
                 .collect::<Result<Vec<_>, _>>()?;
             let positions = &columns.global[output];
             let per_block = ((settings.block_s * log.rate_hz / factor as f64).ceil() as usize)
-                .max(effort.len().div_ceil(64))
+                .max(effort.len().div_ceil(most))
                 .max(1);
             let group = out.add_group(GroupShape {
                 log: l,

@@ -103,7 +103,7 @@ impl Problem<'_> {
     /// # Errors
     /// [`PreflightError`] if a regressor is not finite.
     pub(crate) fn misfit(&self, wiring: &Wiring) -> Result<f64, PreflightError> {
-        let parts = self.parts(&self.block(wiring), &self.all(), wiring, &[])?;
+        let parts = self.parts(&self.block(wiring), &self.all(), wiring, &[], 1)?;
         Ok(solve(&parts, None, &self.prior, 0).misfit)
     }
 
@@ -126,7 +126,7 @@ impl Problem<'_> {
             let block = self.block(&wiring);
             let x = match values.take() {
                 Some(x) => x,
-                None => solve(&self.parts(&block, &columns, &wiring, &[])?, None, &self.prior, 0).x,
+                None => solve(&self.parts(&block, &columns, &wiring, &[], 1)?, None, &self.prior, 0).x,
             };
             // What the unknown does to every effort, per unit.
             let changes: Vec<Vec<Vec<f64>>> = (0..unknown.count())
@@ -141,7 +141,7 @@ impl Problem<'_> {
                     (0..self.samples.joints.len()).map(change).collect()
                 })
                 .collect();
-            let parts = self.parts(&block, &columns, &wiring, &changes)?;
+            let parts = self.parts(&block, &columns, &wiring, &changes, BLOCKS)?;
             if !is_seen(&parts, self.kept, columns.total) {
                 return Ok(None);
             }
@@ -173,17 +173,18 @@ impl Problem<'_> {
         Ok(None)
     }
 
-    /// Weighted factors of the parts of the record, in all columns and one more per component of an unknown.
+    /// Weighted factors of so many parts of the record, 1 or [`BLOCKS`], in all columns and one more per component of an unknown.
     fn parts(
         &self,
         block: &RegressorBlock,
         columns: &KeptColumns,
         wiring: &Wiring,
         changes: &[Vec<Vec<f64>>],
+        blocks: usize,
     ) -> Result<Vec<Factor>, PreflightError> {
         let samples = self.samples;
         let total = columns.total + changes.len();
-        let mut out: Vec<Vec<Factor>> = vec![Vec::new(); BLOCKS];
+        let mut out: Vec<Vec<Factor>> = vec![Vec::new(); blocks];
         for output in 0..samples.joints.len() {
             let source = wiring.effort[output];
             let effort: Vec<f64> =
@@ -193,7 +194,7 @@ impl Problem<'_> {
             let own = columns.local[output].len();
             let mut positions = columns.global[output].clone();
             positions.extend(columns.total..total);
-            let parts = reduce(block, columns, samples, &wiring.position, output, &beside, BLOCKS)?;
+            let parts = reduce(block, columns, samples, &wiring.position, output, &beside, blocks)?;
             let rows: usize = parts.iter().map(Factor::rows).sum();
             let Some(weight) = row_weight(rows.max(1), deviation(&effort), samples.duration_s, samples.len())
             else {

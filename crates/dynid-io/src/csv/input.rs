@@ -1,7 +1,7 @@
 //! Bytes of a log, decompressed if need be, within bounds.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek};
+use std::io::{self, BufReader, Chain, Cursor, Read};
 use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
@@ -39,14 +39,17 @@ pub(super) struct Input {
     text_bytes: u64,
 }
 
+/// A file with the bytes in front that were looked at: a pipe cannot be wound back.
+type Whole = Chain<Cursor<Vec<u8>>, File>;
+
 enum Stream {
-    Plain(Hashed<File>),
+    Plain(Hashed<Whole>),
     Gzip(Box<MultiGzDecoder<Counted>>),
 }
 
 /// Counts the compressed bytes.
 struct Counted {
-    inner: BufReader<Hashed<File>>,
+    inner: BufReader<Hashed<Whole>>,
     bytes: u64,
 }
 
@@ -67,8 +70,9 @@ impl Input {
         }
         let mut magic = Vec::with_capacity(2);
         (&mut file).take(2).read_to_end(&mut magic)?;
-        file.rewind()?;
-        let stream = if magic == [0x1f, 0x8b] {
+        let is_gzip = magic == [0x1f, 0x8b];
+        let file = Cursor::new(magic).chain(file);
+        let stream = if is_gzip {
             let inner = BufReader::with_capacity(BUFFER_BYTES, Hashed::new(file));
             Stream::Gzip(Box::new(MultiGzDecoder::new(Counted { inner, bytes: 0 })))
         } else {

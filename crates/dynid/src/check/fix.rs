@@ -225,7 +225,7 @@ fn rewire(
 
 fn read(path: &Path) -> Result<Table, Error> {
     let text =
-        std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
+        dynid_io::input::read_text(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
     crate::config::toml_file::parse(&text, &path.display().to_string())
 }
 

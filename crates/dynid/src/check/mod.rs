@@ -17,10 +17,11 @@ mod report;
 
 use std::path::Path;
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::Error;
-use crate::config::Config;
+use crate::config::{Config, LogConfig};
 use crate::estimate::InputRecord;
 use crate::logs::{self, LoadedLog};
 use crate::overlap::{Overlap, Overlaps};
@@ -152,13 +153,14 @@ pub(crate) fn of_loaded(
 ) -> Result<Vec<Finding>, Error> {
     let bench = Bench::new(config, robot)?;
     let training = config.training_logs();
-    let mut out = Vec::new();
-    for (number, (log, entry)) in loaded.iter().zip(&training).enumerate() {
+    let logs: Vec<_> = loaded.iter().zip(&training).enumerate().collect();
+    let of_log = |(number, (log, entry)): &(usize, (&LoadedLog, &LogConfig))| {
         let file = entry.path.display().to_string();
-        let mut findings = Findings { log: &file, number, list: Vec::new() };
+        let mut findings = Findings { log: &file, number: *number, list: Vec::new() };
         examine(config, log, &bench, &mut findings)?;
-        out.extend(findings.list);
-    }
+        Ok(findings.list)
+    };
+    let mut out = logs.par_iter().map(of_log).collect::<Result<Vec<_>, Error>>()?.concat();
     out.extend(repeated(overlaps).into_iter().filter(|f| f.number < loaded.len()));
     Ok(out)
 }

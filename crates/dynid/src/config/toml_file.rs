@@ -15,7 +15,7 @@ pub(crate) fn read<T>(
     parse: impl FnOnce(&str, &str) -> Result<T, Error>,
 ) -> Result<(T, PathBuf), Error> {
     let text =
-        std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
+        dynid_io::input::read_text(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
     let config = parse(&text, &path.display().to_string())?;
     Ok((config, path.parent().unwrap_or(Path::new("")).to_owned()))
 }

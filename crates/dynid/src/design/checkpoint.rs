@@ -3,11 +3,10 @@
 use std::path::Path;
 
 use dynid_excitation::StartOutcome;
-use dynid_io::output::write_atomically;
 use serde::{Deserialize, Serialize};
 
 use super::DesignConfig;
-use crate::Error;
+use crate::{Error, sealed};
 
 const SCHEMA: &str = "dynid-design-checkpoint/1";
 
@@ -51,11 +50,7 @@ pub(super) fn fingerprint(config: &DesignConfig) -> Result<String, Error> {
 
 /// Starts of an earlier run of the same problem; none if the file does not exist yet.
 pub(super) fn read(path: &Path, fingerprint: &str) -> Result<Vec<StartOutcome>, Error> {
-    let text = match std::fs::read_to_string(path) {
-        Ok(text) => text,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(source) => return Err(Error::Read { file: path.to_owned(), source }),
-    };
+    let Some(text) = sealed::read(path)? else { return Ok(Vec::new()) };
     let fault = |message: String| Error::Checkpoint { file: path.display().to_string(), message };
     let checkpoint: Checkpoint = serde_json::from_str(&text).map_err(|e| fault(e.to_string()))?;
     if checkpoint.schema != SCHEMA {
@@ -92,6 +87,5 @@ pub(super) fn write(path: &Path, fingerprint: &str, starts: &[StartOutcome]) -> 
     };
     let text = serde_json::to_string_pretty(&checkpoint)
         .map_err(|e| Error::Checkpoint { file: path.display().to_string(), message: e.to_string() })?;
-    write_atomically(path, (text + "\n").as_bytes())?;
-    Ok(())
+    sealed::write(path, &(text + "\n"))
 }

@@ -285,7 +285,8 @@ impl FrictionModel {
 
     /// The same, and what was read.
     pub(crate) fn load_source(path: &Path) -> Result<(Self, SourceFile), Error> {
-        let text = std::fs::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
+        let text =
+            dynid_io::input::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
         let source = SourceFile { path: path.display().to_string(), sha256: dynid_io::digest::sha256(&text) };
         let fault = |message: String| FrictionError::File { file: path.display().to_string(), message };
         let model: FrictionModel = serde_json::from_slice(&text).map_err(|e| fault(e.to_string()))?;

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use dynid_io::output::write_atomically;
 use dynid_model::EffortModel;
 use dynid_motion::live::LiveSettings;
 use dynid_motion::words::Transfer;
@@ -13,11 +12,11 @@ use super::learning::{Learned, Structure};
 use super::running::Running;
 use super::samples::Samples;
 use super::usual::Innovations;
-use crate::Error;
 use crate::config::Config;
+use crate::{Error, sealed};
 use dynid_estimate::conditioning::LiveRowSettings;
 
-const SCHEMA: &str = "dynid-online-checkpoint/1";
+const SCHEMA: &str = "dynid-online-checkpoint/2";
 
 /// State of a session after whole rows. Goes on with the same bits as a session that was never interrupted.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -123,11 +122,7 @@ impl Checkpoint {
     /// # Errors
     /// [`Error::Read`], [`Error::Checkpoint`].
     pub fn read(path: &Path) -> Result<Option<Checkpoint>, Error> {
-        let text = match std::fs::read_to_string(path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(source) => return Err(Error::Read { file: path.to_owned(), source }),
-        };
+        let Some(text) = sealed::read(path)? else { return Ok(None) };
         let fault = |e: serde_json::Error| Error::Checkpoint {
             file: path.display().to_string(),
             message: e.to_string(),
@@ -145,7 +140,7 @@ impl Checkpoint {
             message: e.to_string(),
         };
         let text = serde_json::to_string(self).map_err(fault)?;
-        Ok(write_atomically(path, text.as_bytes())?)
+        sealed::write(path, &text)
     }
 }
 

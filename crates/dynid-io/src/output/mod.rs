@@ -1,9 +1,14 @@
-//! Files that appear whole or not at all.
+//! Files that appear whole or not at all, and sets of files that appear together or not at all.
+
+mod set;
+
+pub use set::{OtherRun, OutputSet};
 
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use thiserror::Error;
 
@@ -18,6 +23,14 @@ pub enum OutputError {
         file: String,
         /// Reason.
         error: io::Error,
+    },
+    /// Another run has been publishing into the folder for too long.
+    #[error("{folder}: another run has been writing its files there for more than {seconds} s")]
+    Busy {
+        /// Folder.
+        folder: String,
+        /// Time that was waited, s.
+        seconds: u64,
     },
     /// A value is NaN or infinite.
     #[error("{file}: row {row}, column `{column}`: expected a finite number, found {found}")]
@@ -52,6 +65,9 @@ impl OutputError {
             OutputError::Unwritable { .. } => {
                 Some("check that the folder exists and may be written".to_owned())
             }
+            OutputError::Busy { .. } => {
+                Some("let it end, or give a folder of its own to each run".to_owned())
+            }
             OutputError::NotFinite { .. } | OutputError::Shape { .. } => None,
         }
     }
@@ -85,7 +101,6 @@ impl AtomicFile {
     }
 
     fn open(path: &Path) -> io::Result<Self> {
-        static COUNTER: AtomicU64 = AtomicU64::new(0);
         let target = match fs::metadata(path) {
             Ok(metadata) if metadata.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
             Ok(metadata) if !metadata.is_file() => {
@@ -95,11 +110,15 @@ impl AtomicFile {
             Ok(_) => fs::canonicalize(path)?,
             Err(_) => path.to_owned(),
         };
-        let name = target.file_name().ok_or(io::ErrorKind::InvalidInput)?;
-        let unique = (std::process::id(), COUNTER.fetch_add(1, Ordering::Relaxed));
-        let name = format!(".{}.{}-{}.tmp", name.to_string_lossy(), unique.0, unique.1);
-        let temporary = target.with_file_name(name);
-        let file = File::create_new(&temporary)?;
+        if target.file_name().is_none() {
+            return Err(io::ErrorKind::InvalidInput.into());
+        }
+        let folder = folder_of(&target);
+        remove_abandoned(&folder, false);
+        // What a run that was killed left behind, of the same process number in a container too, must not stand in the way.
+        let (file, temporary) = fresh(&folder, |path| File::create_new(path))?;
+        // Held until the file is closed: it tells that somebody still writes. Where locks do not exist nothing is removed.
+        let _ = file.try_lock();
         Ok(AtomicFile { file, target, temporary: Some(temporary) })
     }
 
@@ -140,6 +159,73 @@ impl Drop for AtomicFile {
     }
 }
 
+/// Beginning and end of names of temporary files and folders.
+const TEMPORARY: (&str, &str) = (".dynid-", ".tmp");
+
+/// Folder of a file.
+fn folder_of(path: &Path) -> PathBuf {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+        _ => PathBuf::from("."),
+    }
+}
+
+/// Makes something under a temporary name that nothing has; the name tells process and time, s since 1970.
+fn fresh<T>(folder: &Path, make: impl Fn(&Path) -> io::Result<T>) -> io::Result<(T, PathBuf)> {
+    static COUNTER: AtomicU64 = AtomicU64::new(0);
+    let process = std::process::id();
+    loop {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let count = COUNTER.fetch_add(1, Ordering::Relaxed);
+        let name = format!(
+            "{}{process}-{}-{}-{count}{}",
+            TEMPORARY.0,
+            now.as_secs(),
+            now.subsec_nanos(),
+            TEMPORARY.1
+        );
+        let path = folder.join(name);
+        match make(&path) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            made => return made.map(|made| (made, path)),
+        }
+    }
+}
+
+/// Younger temporary files are left alone, s: their owner may not have locked them yet.
+const YOUNG_S: u64 = 10;
+
+/// Removes temporary files, or folders of sets, whose owner has gone: those that can be locked. Failures leave them to a later run.
+fn remove_abandoned(folder: &Path, folders: bool) {
+    for path in temporary(folder) {
+        let is_folder = path.is_dir();
+        let is_young = owner(&path).is_none_or(|(_, age)| age.as_secs() < YOUNG_S);
+        if is_folder != folders || is_young {
+            continue;
+        }
+        // A lock that is free tells that nobody holds the file open any more.
+        let free = File::open(&path).and_then(|file| Ok(file.try_lock()?)).is_ok();
+        if free {
+            let _ = if is_folder { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
+        }
+    }
+}
+
+/// Process and age of the run that made a temporary file or folder, by its name.
+fn owner(temporary: &Path) -> Option<(u32, Duration)> {
+    let mut parts = temporary.file_name()?.to_str()?.strip_prefix(TEMPORARY.0)?.split('-');
+    let process = parts.next()?.parse().ok()?;
+    let since = UNIX_EPOCH + Duration::from_secs(parts.next()?.parse().ok()?);
+    Some((process, SystemTime::now().duration_since(since).unwrap_or_default()))
+}
+
+/// Temporary files and folders of this program in a folder.
+fn temporary(folder: &Path) -> Vec<PathBuf> {
+    let is_ours = |name: &str| name.starts_with(TEMPORARY.0) && name.ends_with(TEMPORARY.1);
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.filter(|e| e.file_name().to_str().is_some_and(is_ours)).map(|e| e.path()).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -168,6 +254,18 @@ mod tests {
         file.write_all(b"half").unwrap();
         drop(file);
         assert!(names(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn what_a_killed_run_left_is_removed_and_what_is_being_written_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let left = format!(".dynid-{}-1-2-0.tmp", std::process::id());
+        fs::write(folder.path().join(&left), b"half").unwrap();
+        let other = AtomicFile::create(&folder.path().join("other.txt")).unwrap();
+        write_atomically(folder.path().join("out.txt"), b"x").unwrap();
+        assert_eq!(names(folder.path()).len(), 2, "{:?}", names(folder.path()));
+        other.finish().unwrap();
+        assert_eq!(names(folder.path()), ["other.txt", "out.txt"]);
     }
 
     #[test]
