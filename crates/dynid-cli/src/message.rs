@@ -1,5 +1,6 @@
 //! Messages for people, and how a run ends.
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
@@ -33,9 +34,9 @@ impl Failure {
         };
         let mut err = io::stderr().lock();
         // Nothing is left to be done if stderr itself is gone.
-        let _ = writeln!(err, "error: {text}");
+        let _ = writeln!(err, "error: {}", printable(&text));
         if let Some(hint) = hint {
-            let _ = writeln!(err, "hint: {hint}");
+            let _ = writeln!(err, "hint: {}", printable(&hint));
         }
         ExitCode::from(2)
     }
@@ -52,7 +53,17 @@ pub(crate) fn data(text: &str) -> Result<(), Failure> {
 /// Writes a line for people to stderr.
 pub(crate) fn note(text: &str) {
     // A closed stderr is the user's choice.
-    let _ = writeln!(io::stderr().lock(), "{text}");
+    let _ = writeln!(io::stderr().lock(), "{}", printable(text));
+}
+
+/// A text whose control characters, but for ends of lines and tabs, are written out: names of files may hold codes that terminals obey.
+fn printable(text: &str) -> Cow<'_, str> {
+    let is_code = |c: char| c.is_control() && c != '\n' && c != '\t';
+    if !text.contains(is_code) {
+        return Cow::Borrowed(text);
+    }
+    let shown = |c: char| if is_code(c) { c.escape_default().to_string() } else { c.to_string() };
+    Cow::Owned(text.chars().map(shown).collect())
 }
 
 /// JSON text with a newline.

@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, Read};
+use std::ops::Range;
 use std::path::Path;
 
 /// Largest file that is read whole, bytes (256 MiB).
@@ -35,6 +36,16 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
 /// As [`read`]; [`io::ErrorKind::InvalidData`] unless it is UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
     String::from_utf8(read(path)?).map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e.utf8_error()))
+}
+
+/// The message of a fault in a TOML text, with the key that is given twice.
+pub fn toml_message(message: &str, text: &str, span: Option<Range<usize>>) -> String {
+    match span.and_then(|span| text.get(span)).map(str::trim).filter(|key| !key.is_empty()) {
+        Some(key) if message == "duplicate key" => {
+            format!("duplicate key `{}`", key.lines().next().unwrap_or_default())
+        }
+        _ => message.to_owned(),
+    }
 }
 
 #[cfg(test)]

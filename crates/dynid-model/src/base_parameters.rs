@@ -13,6 +13,13 @@ use crate::mechanism::Mechanism;
 use crate::parameter::ParameterTable;
 use crate::random_motion::RandomMotion;
 
+/// Robots with more outputs than this have rows enough by few states.
+const MANY_OUTPUTS: usize = 30;
+/// Up to so many columns the gap is that of singular values; beyond, of bounds of them.
+const FEW_COLUMNS: usize = 600;
+/// Columns that are projected on the kept ones together, of few columns and of many.
+const BLOCKS: [usize; 2] = [256, 64];
+
 /// Settings of the structural analysis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BaseSettings {
@@ -21,7 +28,7 @@ pub struct BaseSettings {
     /// Rotations that a file gives with 5 to 12 digits leave shares of up to 1e-9; true parameters of robots start at
     /// about 1e-3. Default 1e-7.
     pub tolerance: f64,
-    /// Random states; 0: enough for a stack three times as tall as wide, at least 100. Default 0.
+    /// Random states; 0: enough for a stack three times as tall as wide, at least 100 (30 of more than 30 outputs). Default 0.
     pub states: usize,
     /// Seed of the random states.
     pub seed: u64,
@@ -39,13 +46,20 @@ impl Default for BaseSettings {
 impl BaseSettings {
     fn states_for(&self, model: &dyn EffortModel) -> usize {
         match self.states {
-            0 => 100.max((3 * model.layout().parameters()).div_ceil(model.outputs().len())),
+            0 => {
+                let outputs = model.outputs().len();
+                let least = if outputs > MANY_OUTPUTS { 30 } else { 100 };
+                least.max((3 * model.layout().parameters()).div_ceil(outputs))
+            }
             n => n,
         }
     }
 }
 
 /// Gap in the singular values at the rank decision (columns scaled to unit length).
+///
+/// Of more than 600 columns bounds stand for them: the root of the rank, the least remainder of a column that was kept, the largest of one that was
+/// not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RankGap {
     /// Largest singular value.
@@ -163,26 +177,37 @@ impl BaseParameters {
         let zero: Vec<usize> = (0..stacked.len()).filter(|c| silent(*c)).collect();
         let order = preference(table, &settings.preferred).into_iter().filter(|c| !silent(*c));
         let active: Vec<usize> = (0..stacked.len()).filter(|c| !silent(*c)).collect();
-        let singular = singular_values(rows, &active, &stacked);
-
-        let mut projection = Projection::default();
+        let mut projection = Projection::new(rows, active.len());
         let mut kept = Vec::new();
         let mut folded = Vec::new();
-        for column in order {
-            let (coefficients, residual) = projection.project(&stacked[column]);
-            let left = dot(&residual, &residual).sqrt();
-            if left > settings.tolerance {
-                projection.keep(coefficients, residual, left);
-                kept.push(column);
-            } else {
-                folded.push((column, coefficients));
+        let (mut least, mut most_left) = (f64::INFINITY, None::<f64>);
+        let order: Vec<usize> = order.collect();
+        let many = active.len() > FEW_COLUMNS;
+        for block in order.chunks(BLOCKS[usize::from(many)]) {
+            let mut remainders = projection.block(block.iter().map(|c| stacked[*c].as_slice()));
+            for (k, &column) in block.iter().enumerate() {
+                let left = projection.project(&mut remainders, k);
+                if left > settings.tolerance {
+                    projection.keep(&mut remainders, k, left);
+                    kept.push(column);
+                    least = least.min(left);
+                } else {
+                    folded.push((column, remainders.coefficients(k)));
+                    most_left = Some(most_left.map_or(left, |m| m.max(left)));
+                }
             }
         }
         let rank = kept.len();
-        let gap = RankGap {
-            largest: singular.first().copied().unwrap_or(0.0),
-            kept: if rank > 0 { singular[rank - 1] } else { 0.0 },
-            dropped: singular.get(rank).copied(),
+        let gap = match many {
+            false => {
+                let singular = singular_values(rows, &active, &stacked);
+                RankGap {
+                    largest: singular.first().copied().unwrap_or(0.0),
+                    kept: if rank > 0 { singular[rank - 1] } else { 0.0 },
+                    dropped: singular.get(rank).copied(),
+                }
+            }
+            true => RankGap { largest: (rank as f64).sqrt(), kept: least, dropped: most_left },
         };
 
         // Kept columns ascending from here on.
@@ -328,34 +353,78 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums[0] + sums[1] + (sums[2] + sums[3]) + rest
 }
 
-/// Gram-Schmidt with every projection done twice, which keeps the directions orthogonal to rounding.
-#[derive(Default)]
+/// Gram-Schmidt with every projection done twice, which keeps the directions orthogonal to rounding; blocks of columns are projected together.
 struct Projection {
-    directions: Vec<Vec<f64>>,
+    /// Orthonormal directions, the first [`Projection::count`] columns.
+    directions: Mat<f64>,
+    count: usize,
     /// Column `k` of the triangular factor: coefficients on directions `0..k`, then the length left.
     triangle: Vec<Vec<f64>>,
 }
 
+/// Columns of a block, projected on the directions that there were when it began.
+struct Remainders {
+    columns: Mat<f64>,
+    /// Coefficients on the directions, one list per column.
+    coefficients: Vec<Vec<f64>>,
+}
+
+impl Remainders {
+    fn coefficients(&mut self, k: usize) -> Vec<f64> {
+        std::mem::take(&mut self.coefficients[k])
+    }
+}
+
 impl Projection {
-    fn project(&self, column: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let mut residual = column.to_vec();
-        let mut coefficients = vec![0.0; self.directions.len()];
+    fn new(rows: usize, most: usize) -> Self {
+        Projection { directions: Mat::zeros(rows, most.min(rows)), count: 0, triangle: Vec::new() }
+    }
+
+    fn block<'a>(&self, columns: impl ExactSizeIterator<Item = &'a [f64]>) -> Remainders {
+        let (rows, width) = (self.directions.nrows(), columns.len());
+        let mut block = Mat::zeros(rows, width);
+        for (k, column) in columns.enumerate() {
+            block.col_as_slice_mut(k).copy_from_slice(column);
+        }
+        let mut coefficients = vec![vec![0.0; self.count]; width];
+        if self.count > 0 {
+            let directions = self.directions.as_ref().subcols(0, self.count);
+            for _ in 0..2 {
+                let along = directions.transpose() * &block;
+                block -= directions * &along;
+                for (k, own) in coefficients.iter_mut().enumerate() {
+                    own.iter_mut().zip(along.col_as_slice(k)).for_each(|(sum, x)| *sum += x);
+                }
+            }
+        }
+        Remainders { columns: block, coefficients }
+    }
+
+    /// Projects a column of a block on the directions that came since; the length that is left.
+    fn project(&self, block: &mut Remainders, k: usize) -> f64 {
+        let Remainders { columns, coefficients } = block;
+        let (own, residual) = (&mut coefficients[k], columns.col_as_slice_mut(k));
+        let before = own.len();
+        own.resize(self.count, 0.0);
         for _ in 0..2 {
-            for (coefficient, direction) in coefficients.iter_mut().zip(&self.directions) {
-                let along = dot(direction, &residual);
+            for (place, coefficient) in own.iter_mut().enumerate().skip(before) {
+                let direction = self.directions.col_as_slice(place);
+                let along = dot(direction, residual);
                 *coefficient += along;
                 for (r, d) in residual.iter_mut().zip(direction) {
                     *r -= along * d;
                 }
             }
         }
-        (coefficients, residual)
+        dot(residual, residual).sqrt()
     }
 
-    fn keep(&mut self, mut coefficients: Vec<f64>, mut residual: Vec<f64>, length: f64) {
-        residual.iter_mut().for_each(|x| *x /= length);
+    fn keep(&mut self, block: &mut Remainders, k: usize, length: f64) {
+        let direction = self.directions.col_as_slice_mut(self.count);
+        direction.iter_mut().zip(block.columns.col_as_slice(k)).for_each(|(d, x)| *d = x / length);
+        self.count += 1;
+        let mut coefficients = block.coefficients(k);
         coefficients.push(length);
-        self.directions.push(residual);
         self.triangle.push(coefficients);
     }
 

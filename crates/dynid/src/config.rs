@@ -16,6 +16,7 @@ pub use estimator::{
 pub use friction::{Friction, FrictionErrors};
 pub(crate) use instruments::reference_channel;
 pub use instruments::{InstrumentsConfig, NominalModel, ReferenceColumns};
+pub(crate) use log_terms::MASSES;
 pub use log_terms::{Own, PayloadConfig, RATED_MASS};
 pub use online::{ForgettingRule, OnlineConfig};
 pub use per_joint::PerJoint;

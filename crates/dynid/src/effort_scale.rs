@@ -10,6 +10,7 @@ use dynid_model::{EffortModel, MotionBlock, RegressorBlock, RobotModel};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
+use crate::config::MASSES;
 use crate::prior::{Origin, Prior};
 
 /// Gravity counts from this share of what stated bodies weigh at their size on (root mean square over the joints).
@@ -130,8 +131,8 @@ pub(crate) fn mass_columns(
         .iter()
         .map(|(name, mass)| {
             let key = format!("known_mass.{name}");
-            if !(mass.is_normal() && *mass > 0.0) {
-                return Err(Error::setting(&key, "a positive mass, kg", mass));
+            if !MASSES.contains(mass) {
+                return Err(Error::setting(&key, "a positive number, 1e-6 to 1e6 kg", mass));
             }
             let payload = model.payloads().find(|(p, _)| p.name() == name).map(|(_, first)| first);
             let link = || model.mechanism().bodies().iter().position(|b| b.name == *name).map(|b| 10 * b);

@@ -7,6 +7,7 @@ mod design;
 mod elastic;
 mod estimator_settings;
 mod export;
+mod faults;
 mod flags;
 mod friction;
 mod online;

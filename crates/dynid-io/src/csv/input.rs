@@ -1,7 +1,7 @@
 //! Bytes of a log, decompressed if need be, within bounds.
 
 use std::fs::File;
-use std::io::{self, BufReader, Chain, Cursor, Read};
+use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
@@ -40,7 +40,22 @@ pub(super) struct Input {
 }
 
 /// A file with the bytes in front that were looked at: a pipe cannot be wound back.
-type Whole = Chain<Cursor<Vec<u8>>, File>;
+struct Whole {
+    front: Vec<u8>,
+    file: File,
+}
+
+impl Read for Whole {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.front.len().min(buffer.len());
+        let (own, rest) = buffer.split_at_mut(count);
+        own.copy_from_slice(&self.front[..count]);
+        // Both in one, so that whoever looks at the beginning of a text sees enough of it.
+        let more = self.file.read(rest)?;
+        self.front.drain(..count);
+        Ok(count + more)
+    }
+}
 
 enum Stream {
     Plain(Hashed<Whole>),
@@ -71,7 +86,7 @@ impl Input {
         let mut magic = Vec::with_capacity(2);
         (&mut file).take(2).read_to_end(&mut magic)?;
         let is_gzip = magic == [0x1f, 0x8b];
-        let file = Cursor::new(magic).chain(file);
+        let file = Whole { front: magic, file };
         let stream = if is_gzip {
             let inner = BufReader::with_capacity(BUFFER_BYTES, Hashed::new(file));
             Stream::Gzip(Box::new(MultiGzDecoder::new(Counted { inner, bytes: 0 })))

@@ -43,6 +43,9 @@ pub struct OutputSet {
 
 #[derive(Debug)]
 struct Output {
+    /// As it was given.
+    path: PathBuf,
+    /// Links followed.
     target: PathBuf,
     staged: PathBuf,
 }
@@ -85,7 +88,8 @@ impl OutputSet {
         let target = match fs::metadata(path) {
             Ok(metadata) if metadata.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
             Ok(metadata) if !metadata.is_file() => {
-                self.outputs.push(Output { target: path.to_owned(), staged: path.to_owned() });
+                let [path, target, staged] = [(); 3].map(|()| path.to_owned());
+                self.outputs.push(Output { path, target, staged });
                 return Ok(());
             }
             Ok(_) => fs::canonicalize(path)?,
@@ -97,12 +101,15 @@ impl OutputSet {
         // What cannot be made now could not be made later.
         fs::write(&staged, b"?")?;
         fs::remove_file(&staged)?;
-        self.outputs.push(Output { target, staged });
+        self.outputs.push(Output { path: path.to_owned(), target, staged });
         Ok(())
     }
 
     /// The stage of a folder.
     fn stage(&mut self, folder: &Path) -> io::Result<usize> {
+        if folder.ancestors().any(|f| f.exists() && !f.is_dir()) {
+            return Err(io::ErrorKind::NotADirectory.into());
+        }
         let missing: Vec<PathBuf> = folder
             .ancestors()
             .take_while(|f| !f.as_os_str().is_empty() && !f.exists())
@@ -151,7 +158,7 @@ impl OutputSet {
     /// # Panics
     /// If there is none.
     pub fn write(&self, number: usize, bytes: &[u8]) -> Result<(), OutputError> {
-        let Output { target, staged } = &self.outputs[number];
+        let Output { target, staged, .. } = &self.outputs[number];
         let written = match staged == target {
             true => {
                 File::options().write(true).open(staged).and_then(|mut f| io::Write::write_all(&mut f, bytes))
@@ -196,7 +203,7 @@ impl OutputSet {
             let _ = File::open(folder).and_then(|f| f.sync_all());
         }
         drop(locks);
-        let written = direct.into_iter().chain(new).map(|o| o.target.clone()).collect();
+        let written = direct.into_iter().chain(new).map(|o| o.path.clone()).collect();
         self.published = true;
         Ok(written)
     }

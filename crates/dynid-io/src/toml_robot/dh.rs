@@ -6,7 +6,7 @@ use toml::Spanned;
 use super::Source;
 use super::schema::{Dh, Frame, LimitsToml, RobotToml, Row, RowKind};
 use crate::excerpt::excerpt;
-use crate::robot::RobotFileError;
+use crate::robot::{LEAST_LIMIT, RobotFileError};
 
 const X: [f64; 3] = [1.0, 0.0, 0.0];
 const Z: [f64; 3] = [0.0, 0.0, 1.0];
@@ -167,8 +167,9 @@ pub(super) fn limits(
         return Err(source.value(offset, owner, "limits.position", "lower <= upper", &found));
     }
     for (field, value) in [("limits.velocity", velocity), ("limits.effort", effort)] {
-        if let Some(x) = value.filter(|x| *x <= 0.0) {
-            return Err(source.value(offset, owner, field, "a positive number", &x.to_string()));
+        if let Some(x) = value.filter(|x| *x < LEAST_LIMIT) {
+            let expected = format!("a positive number, at least {LEAST_LIMIT:e}");
+            return Err(source.value(offset, owner, field, &expected, &x.to_string()));
         }
     }
     Ok(Limits { position, velocity, effort })

@@ -191,6 +191,7 @@ fn check_dh_keys(source: &Source<'_>, robot: &RobotToml) -> Result<(), RobotFile
 fn syntax(text: &str, file: &str, error: &toml::de::Error) -> RobotFileError {
     let at = Place::of(file, text, error.span().map_or(0, |s| s.start));
     let message = error.message().lines().collect::<Vec<_>>().join("; ");
+    let message = crate::input::toml_message(&message, text, error.span());
     RobotFileError::Syntax { at, message }
 }
 

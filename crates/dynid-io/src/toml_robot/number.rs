@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Unexpected, Visitor};
 
+use crate::robot::is_in_range;
+
 /// A finite number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Number(pub(super) f64);
@@ -22,14 +24,14 @@ impl Visitor<'_> for NumberVisitor {
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(if self.angles {
-            "a finite number (rad, m) or an angle like \"90deg\""
+            "a finite number (rad, m) up to 1e30 or an angle like \"90deg\""
         } else {
-            "a finite number"
+            "a finite number up to 1e30"
         })
     }
 
     fn visit_f64<E: Error>(self, x: f64) -> Result<f64, E> {
-        if x.is_finite() { Ok(x) } else { Err(E::invalid_value(Unexpected::Float(x), &self)) }
+        if is_in_range(x) { Ok(x) } else { Err(E::invalid_value(Unexpected::Float(x), &self)) }
     }
 
     fn visit_i64<E: Error>(self, x: i64) -> Result<f64, E> {
@@ -56,7 +58,7 @@ impl<'de> Visitor<'de> for PositionVisitor {
     type Value = Position;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a finite number (rad, m), an angle like \"90deg\", or a list of them")
+        f.write_str("a finite number (rad, m) up to 1e30, an angle like \"90deg\", or a list of them")
     }
 
     fn visit_f64<E: Error>(self, x: f64) -> Result<Position, E> {
@@ -94,7 +96,7 @@ fn angle(text: &str) -> Option<f64> {
     };
     let x: f64 = number.trim().parse().ok()?;
     let x = if degrees { x.to_radians() } else { x };
-    x.is_finite().then_some(x)
+    is_in_range(x).then_some(x)
 }
 
 impl<'de> Deserialize<'de> for Number {

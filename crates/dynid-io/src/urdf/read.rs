@@ -10,7 +10,7 @@ use dynid_model::{
 use super::xml::{Attribute, Tag, Tags};
 use crate::digest::SourceFile;
 use crate::excerpt::excerpt;
-use crate::robot::{Place, RobotFileError};
+use crate::robot::{LEAST_LIMIT, Place, RobotFileError, is_in_range};
 use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
 
 /// Reads a URDF file of at most 64 MiB. See [`parse`].
@@ -206,7 +206,7 @@ impl Reader<'_> {
     }
 
     fn number(&self, element: &Element, owner: &str, a: &Attribute) -> Result<f64, RobotFileError> {
-        finite(&a.value).ok_or_else(|| self.value(element, owner, a, "a finite number"))
+        finite(&a.value).ok_or_else(|| self.value(element, owner, a, "a finite number up to 1e30"))
     }
 
     fn optional_number(
@@ -226,10 +226,10 @@ impl Reader<'_> {
             *x = words
                 .next()
                 .and_then(finite)
-                .ok_or_else(|| self.value(element, owner, a, "three finite numbers"))?;
+                .ok_or_else(|| self.value(element, owner, a, "three finite numbers up to 1e30"))?;
         }
         if words.next().is_some() {
-            return Err(self.value(element, owner, a, "three finite numbers"));
+            return Err(self.value(element, owner, a, "three finite numbers up to 1e30"));
         }
         Ok(Some(out))
     }
@@ -321,12 +321,16 @@ impl Reader<'_> {
         {
             return Err(self.value(limit, owner, a, &format!("lower <= upper, with upper {high}")));
         }
-        let positive = |x: Option<f64>| x.filter(|x| *x > 0.0);
-        Ok(Limits {
-            position,
-            velocity: positive(self.optional_number(limit, owner, "velocity")?),
-            effort: positive(self.optional_number(limit, owner, "effort")?),
-        })
+        let positive = |name: &str| -> Result<Option<f64>, RobotFileError> {
+            let found = self.optional_number(limit, owner, name)?.filter(|x| *x > 0.0);
+            match (found.filter(|x| *x < LEAST_LIMIT), limit.text(name)) {
+                (Some(_), Some(a)) => {
+                    Err(self.value(limit, owner, a, &format!("0 (no limit) or at least {LEAST_LIMIT:e}")))
+                }
+                _ => Ok(found),
+            }
+        };
+        Ok(Limits { position, velocity: positive("velocity")?, effort: positive("effort")? })
     }
 
     fn mimic(&self, joint: &Element, owner: &str) -> Result<Option<Mimic>, RobotFileError> {
@@ -347,5 +351,5 @@ fn attach(kept: &mut [Element], root: &mut Option<Element>, element: Element) {
 }
 
 fn finite(text: &str) -> Option<f64> {
-    text.trim().parse::<f64>().ok().filter(|x| x.is_finite())
+    text.trim().parse::<f64>().ok().filter(|x| is_in_range(*x))
 }

@@ -62,7 +62,8 @@ pub(super) fn unit_axis(joint: &JointDescription) -> Result<Vec3<f64>, Mechanism
         return Err(MechanismError::NotFinite { what: "axis", name: joint.name.clone() });
     }
     let largest = axis.0.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    if largest == 0.0 {
+    // Of the least numbers there is no quotient.
+    if !largest.is_normal() {
         return Err(MechanismError::ZeroAxis { joint: joint.name.clone() });
     }
     let scaled = axis.scale(1.0 / largest);
@@ -72,6 +73,12 @@ pub(super) fn unit_axis(joint: &JointDescription) -> Result<Vec3<f64>, Mechanism
 fn check_names_and_numbers(d: &Description) -> Result<HashMap<&str, usize>, MechanismError> {
     if d.links.is_empty() {
         return Err(MechanismError::Empty { robot: d.name.clone() });
+    }
+    let links = d.links.iter().map(|l| ("link", &l.name));
+    let joints = d.joints.iter().map(|j| ("joint", &j.name));
+    let mut names = std::iter::once(("robot", &d.name)).chain(links).chain(joints);
+    if let Some((what, name)) = names.find(|(_, name)| name.chars().any(char::is_control)) {
+        return Err(MechanismError::ControlCharacter { what, name: name.clone() });
     }
     if !d.gravity.iter().all(|g| g.is_finite()) {
         return Err(MechanismError::NotFinite { what: "gravity", name: d.name.clone() });

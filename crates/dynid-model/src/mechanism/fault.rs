@@ -28,6 +28,14 @@ pub enum MechanismError {
         /// The name.
         name: String,
     },
+    /// A name holds a control character: files that other programs read, and terminals, do not bear it.
+    #[error("{what} name {name:?}: expected no control characters")]
+    ControlCharacter {
+        /// "robot", "link" or "joint".
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
     /// A joint names a link that does not exist.
     #[error("joint `{joint}`: {role} link `{link}` does not exist")]
     MissingLink {

@@ -31,6 +31,9 @@ pub struct PayloadConfig {
     pub inertia: Option<[f64; 6]>,
 }
 
+/// Masses that a payload may have, kg.
+pub(crate) const MASSES: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
+
 /// Largest mass of a payload about which nothing is said, kg.
 pub const RATED_MASS: f64 = 5.0;
 
@@ -75,12 +78,12 @@ impl PayloadConfig {
         let key = |key: &str| format!("payload.{}.{key}", self.name);
         let positive = [("rated_mass", self.rated_mass), ("mass", self.mass)];
         for (name, value) in positive.into_iter().filter_map(|(n, v)| Some((n, v?))) {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(Error::setting(&key(name), "a positive number", value));
+            if !MASSES.contains(&value) {
+                return Err(Error::setting(&key(name), "a positive number, 1e-6 to 1e6 kg", value));
             }
         }
-        if let Some(std) = self.mass_std.filter(|s| !(s.is_finite() && *s >= 0.0)) {
-            return Err(Error::setting(&key("mass_std"), "a number that is not negative", std));
+        if let Some(std) = self.mass_std.filter(|s| *s != 0.0 && !MASSES.contains(s)) {
+            return Err(Error::setting(&key("mass_std"), "0, or 1e-6 to 1e6 kg", std));
         }
         let beside =
             |name: &str, with: &str| Error::setting(&key(name), &format!("`{with}` beside it"), "none");
@@ -94,8 +97,8 @@ impl PayloadConfig {
             return Err(beside("inertia", "com"));
         }
         let numbers = self.com.iter().flatten().chain(self.inertia.iter().flatten());
-        match numbers.copied().find(|x| !x.is_finite()) {
-            Some(x) => Err(Error::setting(&key("com, inertia"), "finite numbers", x)),
+        match numbers.copied().find(|x| !(x.abs() <= *MASSES.end())) {
+            Some(x) => Err(Error::setting(&key("com, inertia"), "numbers up to 1e6", x)),
             None => Ok(()),
         }
     }
@@ -110,6 +113,11 @@ impl Config {
         for log in self.log.iter().chain(&self.validation) {
             let known: Vec<String> = self.payload.iter().map(|p| p.name.clone()).collect();
             one_of("payload", log.payload.as_ref(), &known, "[[payload]]")?;
+        }
+        let payloads = self.payload.iter().map(|p| ("payload.name", &p.name));
+        let logs = self.log.iter().filter_map(|log| Some(("log.name", log.name.as_ref()?)));
+        if let Some((key, name)) = payloads.chain(logs).find(|(_, name)| name.chars().any(char::is_control)) {
+            return Err(Error::setting(key, "a name without control characters", format!("{name:?}")));
         }
         for (k, payload) in self.payload.iter().enumerate() {
             if payload.name.trim().is_empty() {

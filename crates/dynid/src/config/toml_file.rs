@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use dynid_io::input::toml_message;
 use serde::de::DeserializeOwned;
 
 use crate::Error;
@@ -28,7 +29,7 @@ pub(crate) fn parse<T: DeserializeOwned>(text: &str, file: &str) -> Result<T, Er
     toml::from_str(text).map_err(|e| Error::Config {
         file: file.to_owned(),
         line: e.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count()),
-        message: e.message().lines().next().unwrap_or_default().to_owned(),
+        message: toml_message(e.message().lines().next().unwrap_or_default(), text, e.span()),
     })
 }
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::DesignConfig;
 use crate::{Error, sealed};
 
-const SCHEMA: &str = "dynid-design-checkpoint/1";
+const SCHEMA: &str = "dynid-design-checkpoint/2";
 
 #[derive(Debug, Serialize, Deserialize)]
 struct Checkpoint {
@@ -50,7 +50,7 @@ pub(super) fn fingerprint(config: &DesignConfig) -> Result<String, Error> {
 
 /// Starts of an earlier run of the same problem; none if the file does not exist yet.
 pub(super) fn read(path: &Path, fingerprint: &str) -> Result<Vec<StartOutcome>, Error> {
-    let Some(text) = sealed::read(path)? else { return Ok(Vec::new()) };
+    let Some(text) = sealed::read(path, SCHEMA)? else { return Ok(Vec::new()) };
     let fault = |message: String| Error::Checkpoint { file: path.display().to_string(), message };
     let checkpoint: Checkpoint = serde_json::from_str(&text).map_err(|e| fault(e.to_string()))?;
     if checkpoint.schema != SCHEMA {

@@ -92,7 +92,8 @@ impl Source {
     pub fn read(path: &Path) -> Result<Self, Error> {
         let file = dynid_io::robot::read(path)?;
         let text = |path: &String| {
-            dynid_io::input::read_text(path).map_err(|source| Error::Read { file: path.into(), source })
+            dynid_io::input::read_text(path.as_ref())
+                .map_err(|source| Error::Read { file: path.into(), source })
         };
         let urdf = file.urdf.as_ref().map(text).transpose()?;
         Ok(Source { path: path.to_owned(), file, urdf })

@@ -13,6 +13,9 @@ use super::FrictionError;
 use super::model::{BristleModel, ExponentialModel, FrictionModel, JointFrictionModel, ViscousModel};
 use crate::Error;
 
+/// Largest coefficient.
+const LARGEST: f64 = 1e30;
+
 /// Friction of one joint whose coefficients are known: the law of [`JointFrictionModel`] without its offset. SI, °C.
 ///
 /// With bristles it is LuGre friction, else Stribeck friction where the static friction is known, else Coulomb friction;
@@ -118,9 +121,9 @@ impl KnownFriction {
     /// # Errors
     /// The fault, in words.
     pub fn check(&self) -> Result<(), String> {
-        let finite = |name: &str, x: f64| match x.is_finite() {
+        let finite = |name: &str, x: f64| match x.abs() <= LARGEST {
             true => Ok(()),
-            false => Err(format!("`{name}`: expected a finite number, found {x}")),
+            false => Err(format!("`{name}`: expected a number up to {LARGEST:e}, found {x}")),
         };
         let sign = |name: &str, x: f64, zero: bool| {
             finite(name, x)?;
@@ -137,7 +140,12 @@ impl KnownFriction {
         match self.viscous {
             Some(ViscousModel::Linear { coefficient }) => finite("coefficient", coefficient)?,
             Some(ViscousModel::Exponential(e)) => {
-                finite("reference_temperature", e.reference_temperature)?;
+                if !PLAUSIBLE.contains(&e.reference_temperature) {
+                    let found = e.reference_temperature;
+                    return Err(format!(
+                        "`reference_temperature`: expected degrees Celsius, -40 to 120, found {found}"
+                    ));
+                }
                 finite("sigma2", e.sigma2)?;
                 sign("sigma3", e.sigma3, false)?;
                 sign("sigma4", e.sigma4, false)?;

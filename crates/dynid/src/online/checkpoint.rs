@@ -122,7 +122,7 @@ impl Checkpoint {
     /// # Errors
     /// [`Error::Read`], [`Error::Checkpoint`].
     pub fn read(path: &Path) -> Result<Option<Checkpoint>, Error> {
-        let Some(text) = sealed::read(path)? else { return Ok(None) };
+        let Some(text) = sealed::read(path, SCHEMA)? else { return Ok(None) };
         let fault = |e: serde_json::Error| Error::Checkpoint {
             file: path.display().to_string(),
             message: e.to_string(),

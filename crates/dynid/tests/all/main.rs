@@ -1,5 +1,6 @@
 //! All tests of the crate from outside, in one program: each program would be linked against everything again.
 
+mod abuses;
 mod accuracy;
 mod backlash;
 mod bristles;
@@ -20,6 +21,7 @@ mod friction_scale;
 mod identifiability;
 mod instruments;
 mod least_squares;
+mod mutations;
 mod online;
 mod payload;
 mod periodic;

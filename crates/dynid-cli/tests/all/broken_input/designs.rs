@@ -176,7 +176,7 @@ fn with_unusable_files_are_refused() {
             "c.json",
             r#"{"schema": "dynid-design-checkpoint/9", "problem": "", "starts": []}"#,
             checkpoint,
-            &["c.json", "dynid-design-checkpoint/1", "checkpoint/9"],
+            &["c.json", "dynid-design-checkpoint/2", "checkpoint/9"],
             "delete",
         ),
         design("[search]\ncheckpoint = \"gone/c.json\"", &["gone/c.json", "cannot be written"], "folder"),
