@@ -219,7 +219,7 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
     let reference_trajectory = reference_trajectory.map(|(_, source)| InputRecord::of("trajectory", &source));
     let Opened {
         robot,
-        loaded,
+        read,
         validation,
         mut plan,
         model,
@@ -240,11 +240,6 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
     };
     let mut warnings = robot.warnings.clone();
     warnings.extend(robot.clearance_warnings());
-    warnings.extend(
-        model.closed().iter().flat_map(|closed| {
-            loaded.iter().filter_map(|l| logs::poses::nearest_singularity(closed, &l.log))
-        }),
-    );
     warnings.extend(plan.alike(&robot.mechanism).iter().map(ToString::to_string));
     let ModelFit {
         model,
@@ -279,7 +274,8 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
     let residual_ratio = figures::residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
     warnings.extend(findings.iter().filter_map(Finding::warning));
     warnings.extend(prior.warnings.iter().cloned());
-    warnings.extend(loaded.iter().chain(&validation).flat_map(LoadedLog::warnings));
+    warnings.extend(read.iter().flat_map(|log| log.warnings.iter().cloned()));
+    warnings.extend(validation.iter().flat_map(LoadedLog::warnings));
     warnings.extend(log_warnings(&model, &prepared));
     warnings.extend(elastic::warnings(&model, &prepared));
     warnings.extend(known::warnings(&plan, &robot.mechanism, &prepared));
@@ -292,9 +288,10 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
     let log_agreement = log_agreement::test(config, &model, &base, &fitted, &plan.log_terms, scale);
     warnings.extend(log_agreement.iter().flat_map(LogAgreement::warnings));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
-    let understood: Vec<_> = loaded.iter().map(|l| l.columns.clone()).collect();
+    let (understood, sources): (Vec<_>, Vec<_>) =
+        read.into_iter().map(|log| (log.columns, log.inputs)).unzip();
     let mut inputs = InputRecord::of_robot(&robot);
-    inputs.extend(InputRecord::of_logs(&loaded));
+    inputs.extend(sources.into_iter().flatten());
     let mut out = Identification {
         inputs,
         reading: ReadingRecord::of(config, &understood),
@@ -562,10 +559,20 @@ pub(crate) fn read_logs(
     Ok((robot, loaded))
 }
 
+/// What stays of a log's file once its signals are prepared.
+pub(crate) struct ReadLog {
+    /// Doubts, and what was done about them, in words.
+    pub(crate) warnings: Vec<String>,
+    /// How columns were understood.
+    pub(crate) columns: Vec<(String, String)>,
+    /// Files that were read.
+    pub(crate) inputs: Vec<InputRecord>,
+}
+
 /// Robot, logs and model of a run, before anything is fitted.
 pub(crate) struct Opened {
     pub(crate) robot: Robot,
-    pub(crate) loaded: Vec<LoadedLog>,
+    pub(crate) read: Vec<ReadLog>,
     pub(crate) validation: Vec<LoadedLog>,
     pub(crate) plan: ElementPlan,
     pub(crate) model: RobotModel,
@@ -623,20 +630,29 @@ fn open_robot(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> 
     let mut plan = plan_elements(config, &robot, &loaded)?;
     plan.log_terms = LogTerms::of(config, &robot)?;
     for ((loaded, log), label) in loaded.iter_mut().zip(&config.log).zip(config.log_labels()) {
-        loaded.log = plan.log_terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
+        if !plan.log_terms.is_empty() {
+            loaded.log = plan.log_terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
+        }
     }
     let model = plan.model(&robot.mechanism)?;
     effect::check(config, &plan, &model)?;
     effort_scale::mass_columns(&config.known_mass, &model)?;
     logs::check_stated_temperatures(config.log.iter().chain(&config.validation), &model)?;
-    let mut prepared =
-        loaded.iter().map(|l| l.prepare(&model, &settings)).collect::<Result<Vec<_>, Error>>()?;
-
+    let findings = preflight(config, &robot, &loaded, &overlaps, progress);
+    // Signals as they were read go as soon as they are prepared: a log may be most of the memory.
+    let mut read = Vec::with_capacity(loaded.len());
+    let mut prepared = Vec::with_capacity(loaded.len());
+    for log in loaded {
+        prepared.push(log.prepare(&model, &settings)?);
+        let nearest = model.closed().and_then(|closed| logs::poses::nearest_singularity(closed, &log.log));
+        let warnings = nearest.into_iter().chain(log.warnings()).collect();
+        read.push(ReadLog { warnings, columns: log.columns, inputs: log.inputs });
+    }
     for log in &prepared {
         config.check_cutoffs(&log.name, log.rate_hz)?;
     }
     // What cannot be prepared says so in its own words.
-    let findings = preflight(config, &robot, &loaded, &overlaps, progress)?;
+    let findings = findings?;
 
     progress(Step::Structure);
     // Names that do not exist are told before the long work.
@@ -645,7 +661,7 @@ fn open_robot(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> 
     let own_delays = own_delay::take_off(config, &model, &start, &structure.base, &mut prepared, &settings)?;
     Ok(Opened {
         robot,
-        loaded,
+        read,
         validation,
         plan,
         model,

@@ -432,7 +432,7 @@ fn a_checkpoint_takes_up_finished_starts_and_is_refused_for_another_problem() {
     let at = |args: &[&str], code: i32| run(folder.path(), args, code);
     at(&["design", "design.toml", "--starts", "1"], 0);
     let first = json(read(folder.path(), "starts.json"));
-    assert_eq!(first["schema"], "dynid-design-checkpoint/1");
+    assert_eq!(first["schema"], "dynid-design-checkpoint/2");
     assert_eq!(first["starts"].as_array().unwrap().len(), 1);
     at(&["design", "design.toml"], 0);
     let both = json(read(folder.path(), "starts.json"));

@@ -146,7 +146,7 @@ fn texts(list: &[Value]) -> Option<Vec<String>> {
 
 pub(super) fn number(value: &Value) -> Option<f64> {
     let x = value.as_float().or_else(|| value.as_integer().map(|i| i as f64))?;
-    x.is_finite().then_some(x)
+    crate::robot::is_in_range(x).then_some(x)
 }
 
 /// Flattens nested tables of settings.

@@ -110,11 +110,22 @@ pub fn uniform(log: &Log, settings: &ClockSettings) -> Result<UniformLog, ClockE
     let kept = increasing_rows(log, settings)?;
     let time: Vec<f64> = kept.iter().map(|&row| log.time()[row]).collect();
     let clock = judge(log, &kept, &time, settings)?;
-    let places =
-        if clock.resampled { lay_grid(log, &kept, &time, &clock, settings)? } else { as_recorded(&time) };
-    let usable: Vec<bool> = places.iter().map(|place| place.usable).collect();
+    // Without a grid, rows are taken as they are.
+    let grid = match clock.resampled {
+        true => Some(lay_grid(log, &kept, &time, &clock, settings)?),
+        false => None,
+    };
+    let usable: Vec<bool> = match &grid {
+        Some(places) => places.iter().map(|place| place.usable).collect(),
+        None => vec![true; kept.len()],
+    };
     let unusable = usable.iter().filter(|u| !**u).count();
-    let take = |values: &[f64]| -> Vec<f64> { places.iter().map(|place| place.of(values, &kept)).collect() };
+    let take = |values: &[f64]| -> Vec<f64> {
+        match &grid {
+            Some(places) => places.iter().map(|place| place.of(values, &kept)).collect(),
+            None => kept.iter().map(|row| values[*row]).collect(),
+        }
+    };
     Ok(UniformLog {
         name: log.name().to_owned(),
         start: time[0],
@@ -260,10 +271,6 @@ impl Place {
         // Weighted sum, not `here + f (next - here)`: the difference of two finite values may overflow.
         (1.0 - self.fraction) * here + self.fraction * next
     }
-}
-
-fn as_recorded(time: &[f64]) -> Vec<Place> {
-    (0..time.len()).map(|row| Place { row, fraction: 0.0, usable: true }).collect()
 }
 
 fn lay_grid(

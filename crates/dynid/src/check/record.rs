@@ -169,6 +169,10 @@ fn outlying(log: &Log, rows: &[usize], out: &mut Findings<'_>) {
 
 /// Positions that no joint reaches; gives the log with the neighbours' in their place where they are few.
 fn far(log: &Log, rows: &[usize], out: &mut Findings<'_>) -> Option<Log> {
+    let reach = |x: &f64| x.abs() <= LARGEST_POSITION;
+    if log.joints().iter().all(|joint| joint.position.iter().all(reach)) {
+        return None;
+    }
     let mut joints = log.joints().to_vec();
     let mut replaced = false;
     for joint in &mut joints {

@@ -141,7 +141,7 @@ pub(super) fn ranked(
         estimator.level_with_best = mean <= 2.0 * spread;
     }
     let mut inputs = InputRecord::of_robot(&opened.robot);
-    inputs.extend(InputRecord::of_logs(&opened.loaded));
+    inputs.extend(opened.read.iter().flat_map(|log| log.inputs.clone()));
     Comparison {
         inputs,
         robot: config.robot.display().to_string(),

@@ -7,7 +7,7 @@ use super::usual::Innovations;
 
 /// Variance of a prediction by what is not known of the parameters, in parts of that of the noise, from which on a row leaves the region that was
 /// learned.
-const OUTSIDE: f64 = 0.25;
+const OUTSIDE: f64 = 0.1;
 /// Fewest innovations of a block that say anything of their size.
 const FEWEST: u64 = 8;
 

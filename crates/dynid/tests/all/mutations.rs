@@ -417,10 +417,11 @@ fn very_many_damaged_inputs_are_refused_or_read() {
 }
 
 /// Inputs that once ended in a panic or in a number that is none.
-const FOUND: [(Reader, &str, &str, &str); 5] = [
+const FOUND: [(Reader, &str, &str, &str); 6] = [
     (Reader::Robot, URDF, "effort=\"100\"", "effort=\"1e-320\""),
     (Reader::Robot, URDF, "xyz=\"0 0 1\"", "xyz=\"1e-320 0 0\""),
     (Reader::Robot, URDF, "name=\"upper\"", "name=\"up&#7;per\""),
+    (Reader::Robot, ARM, "coulomb = 2", "coulomb = -1e308"),
     (Reader::Config, CONFIG, "rated_mass = 2", "rated_mass = 5e-324"),
     (Reader::Friction, FRICTION, "reference_temperature = 25", "reference_temperature = 1e308"),
 ];
@@ -431,7 +432,10 @@ fn what_was_found_is_refused() {
         assert!(text.contains(from), "{from}");
         let text = text.replace(from, to);
         let refused = match reader {
-            Reader::Robot => Robot::parse(&text, Path::new("robot.urdf"), &RobotOptions::default()).is_err(),
+            Reader::Robot => {
+                let name = if text.starts_with('<') { "robot.urdf" } else { "robot.toml" };
+                Robot::parse(&text, Path::new(name), &RobotOptions::default()).is_err()
+            }
             Reader::Config => Config::parse(&text, "run.toml").is_err(),
             _ => FrictionConfig::parse(&text, "friction.toml").is_err(),
         };
