@@ -28,7 +28,7 @@ const PRIOR_SHARE: f64 = 0.01;
 /// Prior of a stretch on its own, in prior deviations of the run.
 const NO_PRIOR: f64 = 1e9;
 /// After the last row outside the region that was learned alarms are withheld for this part of the stretch that is learned from.
-const SETTLING: f64 = 0.5;
+const SETTLING: f64 = 0.25;
 /// A parameter is determined if its deviation is below this share of that before any sample.
 const DETERMINED: f64 = 0.1;
 
