@@ -8,6 +8,8 @@ use super::usual::Innovations;
 /// Variance of a prediction by what is not known of the parameters, in parts of that of the noise, from which on a row leaves the region that was
 /// learned.
 const OUTSIDE: f64 = 0.1;
+/// Alarms are first given after so many times the rows for which they are withheld otherwise.
+const FIRST: u64 = 2;
 /// Fewest innovations of a block that say anything of their size.
 const FEWEST: u64 = 8;
 
@@ -32,7 +34,14 @@ pub(super) struct Ground {
 impl Ground {
     /// `settling` and `length` in samples of rows.
     pub(super) fn new(outputs: usize, settling: u64, length: u64) -> Ground {
-        Ground { left: 0, settling, length: length.max(1), block: vec![(0.0, 0); outputs], taken: 0 }
+        // What was learned is first judged by rows that it has not seen.
+        Ground {
+            left: FIRST * settling,
+            settling,
+            length: length.max(1),
+            block: vec![(0.0, 0); outputs],
+            taken: 0,
+        }
     }
 
     /// Whether alarms are given.
