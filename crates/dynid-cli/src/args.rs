@@ -467,7 +467,7 @@ pub(crate) struct DesignArgs {
     /// Seed of the first start (default: 1).
     #[arg(long)]
     pub(crate) seed: Option<u64>,
-    /// Begin no start after this time, s (default: all run).
+    /// Begin no start after this time, and end those that began, s (default: all run).
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) time_budget: Option<f64>,
     /// File that keeps finished starts, so that a run can be taken up again.

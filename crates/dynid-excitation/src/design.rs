@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use faer::Mat;
 
@@ -23,8 +23,8 @@ pub struct Settings {
     pub starts: usize,
     /// Seed of the first start; start `k` has seed `seed + k`. Default 1.
     pub seed: u64,
-    /// No start begins after this time, s; starts that began are finished. `None` (default): all starts run, so that the
-    /// result does not depend on the speed of the machine.
+    /// No start begins after this time, and those that began end at their next iteration, s; the first one gets a trajectory in any case.
+    /// `None` (default): all starts run, so that the result does not depend on the speed of the machine.
     pub time_budget_s: Option<f64>,
     /// Samples of a period on which the reported criterion is taken, with exact signs. Default 1000.
     pub report_samples: usize,
@@ -75,6 +75,8 @@ pub struct StartOutcome {
     pub evaluations: usize,
     /// Share of the amplitudes left after the last resort of scaling them down; 1 as a rule.
     pub share: f64,
+    /// Whether the time budget ended it before its last iteration.
+    pub cut: bool,
 }
 
 impl StartOutcome {
@@ -157,8 +159,8 @@ const TRIAL_ITERATIONS: usize = 10;
 /// Optimises from several starts and keeps the best.
 ///
 /// `done`: starts of an earlier run with the same problem and settings, which are not repeated. `observe` hears of every
-/// start as it ends. Results do not depend on the number of threads; with a time budget the
-/// number of starts depends on the machine, each start does not.
+/// start as it ends. Results do not depend on the number of threads; with a time budget the number of starts, and those that it cuts, depend on
+/// the machine.
 ///
 /// # Errors
 /// [`ProblemError`] if the problem is not well posed.
@@ -172,7 +174,9 @@ pub fn design(
     problem.check()?;
     settings.check(problem)?;
     let map = Parametrisation::new(&problem.limits, problem.base, problem.harmonics, &problem.start);
-    let optimiser = StartOptimiser::new(problem, &map, settings);
+    let deadline =
+        settings.time_budget_s.map(|budget| begun + Duration::from_secs_f64(budget.clamp(0.0, 1e9)));
+    let optimiser = StartOptimiser::new(problem, &map, settings, deadline);
     refuse_rank_deficient(problem, &optimiser.search)?;
     let at_start = violated_at_start(problem, &map);
     if !at_start.is_empty() {
@@ -188,8 +192,7 @@ pub fn design(
     let had_some = !starts.is_empty();
     let take = || {
         let k = next.fetch_add(1, Ordering::Relaxed);
-        let over = settings.time_budget_s.is_some_and(|budget| begun.elapsed().as_secs_f64() > budget);
-        missing.get(k).filter(|_| !over || (k == 0 && !had_some))
+        missing.get(k).filter(|_| !optimiser.is_over() || (k == 0 && !had_some))
     };
     let threads = rayon::current_num_threads().clamp(1, missing.len().max(1));
     let (send, ended) = mpsc::channel();
@@ -233,10 +236,16 @@ struct StartOptimiser<'a> {
     finer: Grid<'a>,
     restoration: Restoration<'a>,
     report: Grid<'a>,
+    deadline: Option<Instant>,
 }
 
 impl<'a> StartOptimiser<'a> {
-    fn new(problem: &'a Problem, map: &'a Parametrisation, settings: &Settings) -> Self {
+    fn new(
+        problem: &'a Problem,
+        map: &'a Parametrisation,
+        settings: &Settings,
+        deadline: Option<Instant>,
+    ) -> Self {
         StartOptimiser {
             problem,
             given: settings.from.as_ref().map(|from| (settings.seed, map.nearest(from))),
@@ -244,7 +253,12 @@ impl<'a> StartOptimiser<'a> {
             finer: Grid::exact(problem, map, 2 * problem.samples),
             restoration: Restoration::new(problem, map),
             report: Grid::exact(problem, map, settings.report_samples.max(4 * problem.harmonics)),
+            deadline,
         }
+    }
+
+    fn is_over(&self) -> bool {
+        self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 
     /// `None` if no start point within the limits was found or the criterion is not defined there.
@@ -257,6 +271,9 @@ impl<'a> StartOptimiser<'a> {
         let given = self.given.as_ref().filter(|(first, _)| *first == seed);
         // Some start points lead to far worse optima than others, which a few iterations tell.
         for _ in 0..if given.is_some() { 1 } else { CANDIDATES } {
+            if best.is_some() && self.is_over() {
+                break;
+            }
             let start = match given {
                 Some((_, z)) => feasible_share(&self.search, z).map(|share| shrunk(&self.search, z, share)),
                 None => feasible_start(&self.search, &mut rng),
@@ -276,9 +293,10 @@ impl<'a> StartOptimiser<'a> {
             }
         }
         let mut candidate = best?;
-        for stage in rest {
+        for stage in rest.iter().take_while(|_| !self.is_over()) {
             self.advance(&mut candidate, stage, stage.iterations)?;
         }
+        let cut = self.is_over();
         let restored = self.restoration.restore(candidate.z);
         Some(StartOutcome {
             seed,
@@ -287,13 +305,14 @@ impl<'a> StartOptimiser<'a> {
             share: restored.share,
             unknowns: restored.z,
             evaluations: evaluations + candidate.evaluations,
+            cut,
         })
     }
 
     fn advance(&self, candidate: &mut Candidate, stage: &Stage, iterations: usize) -> Option<()> {
         let grid = if stage.fine { &self.finer } else { &self.search };
         let mut search = Search::new(grid, stage.criterion.clone(), stage.smoothing);
-        let steps = Steps { iterations, radius: stage.radius, stall: 1e-4 };
+        let steps = Steps { iterations, radius: stage.radius, stall: 1e-4, deadline: self.deadline };
         let z = std::mem::take(&mut candidate.z);
         let outcome = minimise(&mut search, z, candidate.curvature.take(), steps)?;
         candidate.evaluations += search.evaluations;

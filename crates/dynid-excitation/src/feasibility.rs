@@ -193,7 +193,7 @@ fn closest(grid: &Grid<'_>, seed: u64, without: Option<&Blame>) -> (Vec<f64>, f6
 /// Minimises half the sum of squared excesses, which spans many orders of magnitude on its way: in rounds, each in units of
 /// what the last one left.
 fn approach(grid: &Grid<'_>, mut z: Vec<f64>, without: Option<&Blame>) -> Option<(Vec<f64>, f64)> {
-    let settings = Settings { iterations: 60, radius: 0.5, stall: 1e-3 };
+    let settings = Settings { iterations: 60, radius: 0.5, stall: 1e-3, deadline: None };
     let mut excess = Excess { grid, without, unit: 1.0 };
     let mut sum = excess.evaluate(&z)?.objective;
     for _ in 0..ROUNDS {

@@ -179,6 +179,10 @@ impl<'a> Checkpointing<'a> {
     }
 
     fn push(&mut self, start: &StartOutcome) -> Result<(), Error> {
+        // What a time budget cut short is done again by the next run.
+        if start.cut {
+            return Ok(());
+        }
         self.starts.push(start.clone());
         self.starts.sort_by_key(|s| s.seed);
         match self.path {

@@ -3,6 +3,8 @@
 //! Source: Powell 1978 (damping), Shanno & Phua 1978 (first scale of the curvature),
 //! Nocedal & Wright 2006 section 3.5 (step lengths by interpolation).
 
+use std::time::Instant;
+
 use super::quadratic::{Elastic, Failure, Minimum, QuadraticProgram, Row};
 
 /// A problem `min c(z)` subject to rows, evaluated where asked.
@@ -46,6 +48,8 @@ pub(crate) struct Settings {
     pub(crate) radius: f64,
     /// Progress below this counts as none; four such iterations in a row end the run.
     pub(crate) stall: f64,
+    /// No iteration begins after this.
+    pub(crate) deadline: Option<Instant>,
 }
 
 /// How a run ended.
@@ -95,7 +99,8 @@ pub(crate) fn minimise<P: Program>(
     let mut stalled = 0;
     let mut failures = 0;
     let mut iterations = 0;
-    while iterations < settings.iterations && stalled < STALLED_ITERATIONS && failures < 4 {
+    let is_over = || settings.deadline.is_some_and(|deadline| Instant::now() >= deadline);
+    while iterations < settings.iterations && stalled < STALLED_ITERATIONS && failures < 4 && !is_over() {
         iterations += 1;
         let near = program.near_rows(&z, (NEAR * (1.0 + radius)).min(FARTHEST));
         let (mut rows, curved): (Vec<Row>, Vec<Option<P::Id>>) =
@@ -368,7 +373,7 @@ mod tests {
 
     #[test]
     fn a_curved_constraint_is_met_at_the_optimum() {
-        let settings = Settings { iterations: 100, radius: 0.5, stall: 2e-4 };
+        let settings = Settings { iterations: 100, radius: 0.5, stall: 2e-4, deadline: None };
         let outcome = minimise(&mut Valley, vec![-1.0, 0.5], None, settings).unwrap();
         // From the stationarity conditions of the same problem, solved by bisection on the circle.
         let on_circle = |angle: f64| {

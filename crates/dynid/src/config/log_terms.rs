@@ -97,7 +97,7 @@ impl PayloadConfig {
             return Err(beside("inertia", "com"));
         }
         let numbers = self.com.iter().flatten().chain(self.inertia.iter().flatten());
-        match numbers.copied().find(|x| !(x.abs() <= *MASSES.end())) {
+        match numbers.copied().find(|x| x.is_nan() || x.abs() > *MASSES.end()) {
             Some(x) => Err(Error::setting(&key("com, inertia"), "numbers up to 1e6", x)),
             None => Ok(()),
         }

@@ -66,6 +66,7 @@ pub(super) fn read(path: &Path, fingerprint: &str) -> Result<Vec<StartOutcome>, 
         excess: s.excess,
         evaluations: s.evaluations,
         share: s.share,
+        cut: false,
     };
     Ok(checkpoint.starts.into_iter().map(outcome).collect())
 }

@@ -54,8 +54,9 @@ fn unwrap_signal(position: &mut [f64]) -> usize {
     let jumps = |w: &&[f64]| (w[1] - w[0]).abs() > PI;
     let is_turn = |w: &[f64]| ((w[1] - w[0]).abs() - TURN).abs() < BESIDE;
     let found = position.windows(2).filter(jumps).count();
-    // Comparing so keeps what is not finite as it is.
-    if found == 0 || !(high - low <= WITHIN) || !position.windows(2).filter(jumps).all(is_turn) {
+    // What is not finite stays as it is.
+    let range = high - low;
+    if found == 0 || range.is_nan() || range > WITHIN || !position.windows(2).filter(jumps).all(is_turn) {
         return 0;
     }
     let (mut turns, mut before) = (0.0, position[0]);
