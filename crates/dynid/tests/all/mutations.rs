@@ -6,8 +6,6 @@
 
 #![expect(
     clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stdout,
     reason = "helpers of tests outside of test functions; the fault is the outcome"
 )]
 
@@ -335,7 +333,7 @@ fn run(reader: Reader, bytes: &[u8], folder: &Path, number: usize) {
             let Ok(table) = csv::read(&file, &ReadOptions::default()) else { return };
             drop(table);
             // Every hundredth case goes the whole way.
-            if number % 100 == 0 {
+            if number.is_multiple_of(100) {
                 let robot = folder.join("arm.toml");
                 let text = format!("robot = {robot:?}\n[[log]]\npath = {file:?}\n");
                 if let Ok(config) = Config::parse(&text, "case")
