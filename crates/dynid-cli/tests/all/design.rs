@@ -447,6 +447,14 @@ fn a_checkpoint_takes_up_finished_starts_and_is_refused_for_another_problem() {
     let mut marked = both.clone();
     marked["starts"][1]["evaluations"] = json!(123_456);
     std::fs::write(folder.path().join("starts.json"), marked.to_string()).unwrap();
+    // Its checksum tells that it is not what was written; with a new one it is taken.
+    assert!(stderr(&at(&["design", "design.toml"], 2)).contains("damaged"));
+    marked.as_object_mut().unwrap().remove("sha256");
+    let members = marked.to_string()[1..].to_owned();
+    std::fs::write(folder.path().join("members"), &members).unwrap();
+    let digest = dynid::logs::sha256(&folder.path().join("members")).unwrap();
+    let sealed = format!("{{\"sha256\":\"{digest}\",{members}");
+    std::fs::write(folder.path().join("starts.json"), sealed).unwrap();
     at(&["design", "design.toml"], 0);
     let d = json(read(folder.path(), "out/design.json"));
     assert_eq!(d["starts"][1]["evaluations"], 123_456);
