@@ -25,6 +25,17 @@ const LEAST_PIVOT: f64 = 1e-50;
 /// First word of a saved state.
 const STATE_VERSION: u64 = 1;
 
+/// What change detection makes of a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Watch {
+    /// It counts.
+    Count,
+    /// It is passed over.
+    Pass,
+    /// The sum starts again from zero.
+    Restart,
+}
+
 /// What a sample did.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
@@ -180,11 +191,10 @@ impl Estimator {
         effort: &[f64],
         noise: RowNoise<'_>,
     ) -> Result<Step, SampleError> {
-        self.step_where(regressor, effort, noise, |_| true)
+        self.step_where(regressor, effort, noise, |_| Watch::Count)
     }
 
-    /// As [`Self::step`], with change detection only where `watched` says so of the sample's innovations: a sample that is not watched
-    /// updates the estimate, and the sum of change detection starts again from zero.
+    /// As [`Self::step`], with change detection as `watched` says of the sample's innovations; the estimate is updated by every sample.
     ///
     /// What rows ask of the estimate that those before did not tell ([`Innovation::leverage`]) shows in the errors of a model that is not
     /// quite right, though nothing has changed.
@@ -196,7 +206,7 @@ impl Estimator {
         regressor: &[f64],
         effort: &[f64],
         noise: RowNoise<'_>,
-        watched: impl FnOnce(&Innovation) -> bool,
+        watched: impl FnOnce(&Innovation) -> Watch,
     ) -> Result<Step, SampleError> {
         let m = effort.len();
         self.rows.load(regressor, effort, noise)?;
@@ -224,8 +234,9 @@ impl Estimator {
             let watched = watched(&self.innovation);
             if let Some(detection) = &mut self.detection {
                 match watched {
-                    true => alarm = detection.push(self.innovation.whitened()),
-                    false => detection.restart(),
+                    Watch::Count => alarm = detection.push(self.innovation.whitened()),
+                    Watch::Pass => {}
+                    Watch::Restart => detection.restart(),
                 }
             }
             if let (true, Some(reaction)) = (alarm, &mut self.reaction) {

@@ -46,7 +46,7 @@ pub use correlation::InnovationCorrelation;
 pub use downdating::{RowWindow, downdate};
 pub use drift::Drift;
 pub use error::{SampleError, SettingsError, StateError};
-pub use estimator::{Estimator, Step};
+pub use estimator::{Estimator, Step, Watch};
 pub use excitation_monitor::ExcitationMonitor;
 pub use forgetting::{
     BoundedCovariance, DirectionalForgetting, Forgetting, error_driven_factor, excess_error, relative_error,

@@ -1,6 +1,6 @@
 //! Whether rows lie where something was learned.
 
-use dynid_estimate::online::Innovation;
+use dynid_estimate::online::{Innovation, Watch};
 use dynid_motion::words::Transfer;
 
 use super::usual::Innovations;
@@ -29,11 +29,16 @@ pub(super) struct Ground {
     /// Per output: sum of squares of a block's whitened innovations, and their number.
     block: Vec<(f64, u64)>,
     taken: u64,
+    /// Per output: column of the regressor that holds its joint's speed, if one does.
+    speeds: Vec<Option<usize>>,
+    /// Per output: samples of rows at speeds of every bin.
+    visits: Vec<Vec<u64>>,
 }
 
 impl Ground {
     /// `settling` and `length` in samples of rows.
-    pub(super) fn new(outputs: usize, settling: u64, length: u64) -> Ground {
+    pub(super) fn new(speeds: Vec<Option<usize>>, settling: u64, length: u64) -> Ground {
+        let outputs = speeds.len();
         // What was learned is first judged by rows that it has not seen.
         Ground {
             left: FIRST * settling,
@@ -41,6 +46,8 @@ impl Ground {
             length: length.max(1),
             block: vec![(0.0, 0); outputs],
             taken: 0,
+            visits: vec![vec![0; 2 * BINS]; outputs],
+            speeds,
         }
     }
 
@@ -49,14 +56,33 @@ impl Ground {
         self.left == 0
     }
 
-    /// Takes what a row asks of the estimate; whether it may raise an alarm. `inflation`: by how much information is overstated.
-    pub(super) fn watches(&mut self, innovation: &Innovation, inflation: f64) -> bool {
+    /// Counts the speeds of a sample; whether one of them is new: friction that is not quite what the model says shows at speeds that were never
+    /// fitted, however well its parameters are known.
+    pub(super) fn visit(&mut self, used: &[usize], regressor: &[f64]) -> bool {
+        let width = regressor.len() / used.len().max(1);
+        let mut is_new = false;
+        for (row, output) in used.iter().enumerate() {
+            let Some(column) = self.speeds[*output] else { continue };
+            let visits = &mut self.visits[*output][bin(regressor[row * width + column])];
+            is_new |= *visits < self.length;
+            *visits += 1;
+        }
+        is_new
+    }
+
+    /// Takes what a row asks of the estimate; whether it may raise an alarm. `inflation`: by how much information is overstated;
+    /// `is_new`: its speeds are.
+    pub(super) fn watches(&mut self, innovation: &Innovation, inflation: f64, is_new: bool) -> Watch {
         if innovation.leverage() * inflation > OUTSIDE {
             self.left = self.settling.max(1);
         } else {
             self.left = self.left.saturating_sub(1);
         }
-        self.left == 0
+        match self.left {
+            0 if is_new => Watch::Pass,
+            0 => Watch::Count,
+            _ => Watch::Restart,
+        }
     }
 
     /// Learns the size of innovations while alarms are withheld: that of the worst block.
@@ -94,5 +120,18 @@ impl Ground {
             transfer.real(sum);
             transfer.integer(count);
         }
+        self.visits.iter_mut().flatten().for_each(|count| transfer.integer(count));
     }
+}
+
+/// Bins of speeds per direction, half an octave each.
+const BINS: usize = 32;
+/// Speeds below this are one, rad/s or m/s.
+const SLOWEST: f64 = 1e-3;
+
+/// Bin of a speed; those next to rest are one.
+fn bin(speed: f64) -> usize {
+    let octaves = 2.0 * (speed.abs() / SLOWEST).max(1.0).log2();
+    let size = (octaves as usize).min(BINS - 1);
+    if speed < 0.0 { BINS + size } else { size }
 }

@@ -75,6 +75,12 @@ impl Running {
         let in_rows = |seconds: f64| (seconds / rows.spacing_s()).ceil().max(1.0) as u64;
         let (settling, block) =
             (in_rows(SETTLING * config.online.learn_s), in_rows(config.online.reaction_s));
+        let names = &structure.model.parameters().linear;
+        let speed_of = |joint: &str| {
+            let name = format!("{joint}.fv");
+            structure.base.kept.iter().position(|column| names[*column].name == name)
+        };
+        let speeds = structure.model.outputs().iter().map(|output| speed_of(&output.name)).collect();
         let settings = settings(config, &learned, outputs, rows.spacing_s(), true);
         let window = Settings {
             prior_std: learned.prior_std.iter().map(|s| NO_PRIOR * s).collect(),
@@ -98,7 +104,7 @@ impl Running {
             newest: f64::NEG_INFINITY,
             next_report: None,
             hold: None,
-            ground: Ground::new(outputs, settling, block),
+            ground: Ground::new(speeds, settling, block),
             counts: Counts::default(),
             waiting: Vec::new(),
             estimator,
@@ -153,6 +159,7 @@ impl Running {
         for row in std::mem::take(&mut self.waiting) {
             let Some((used, effort)) = self.load(&row) else { continue };
             let noise = self.noise(&used);
+            self.ground.visit(&used, &self.regressor);
             self.estimator.step(&self.regressor, &effort, RowNoise::Covariance(&noise))?;
             usual.push(&used, self.estimator.innovation().whitened());
             taken.push((used, effort, self.regressor.clone()));
@@ -268,11 +275,12 @@ impl Running {
         }
         let (ground, inflation) = (&mut self.ground, self.learned.innovations.inflation);
         let was_known = ground.is_known();
+        let is_new = ground.visit(used, &self.regressor);
         let step = self.estimator.step_where(
             &self.regressor,
             effort,
             RowNoise::Covariance(noise),
-            |innovation| ground.watches(innovation, inflation),
+            |innovation| ground.watches(innovation, inflation, is_new),
         )?;
         ground.learn(used, self.estimator.innovation().whitened(), &mut self.learned.innovations);
         if config.online.alarms && was_known != self.ground.is_known() {
