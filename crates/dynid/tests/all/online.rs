@@ -120,7 +120,7 @@ rows = [308, 5071]
     assert!((mass.jump - 2.805).abs() < 2.0 * mass.std && mass.std < 1.0, "{mass:?}");
 }
 
-/// The first stretch is slow, what follows is not, and no motion comes twice.
+/// A robot with a friction that the session does not know of; its first stretch is slow, what follows is not, and no motion comes twice.
 #[test]
 fn motion_beyond_what_was_learned_raises_no_alarm() {
     let folder = tempfile::tempdir().unwrap();
@@ -142,7 +142,10 @@ elements = ["coulomb", "viscous", "offset"]
 "#;
     let plain = folder.path().join("arm.toml");
     std::fs::write(&plain, arm).unwrap();
-    let robot = Robot::parse(arm, Path::new("arm.toml"), &RobotOptions::default()).unwrap();
+    let law = "[element.j1]\nstribeck = { coulomb = 2, static = 2.6, vs = 0.15 }\n\
+               [element.j2]\nstribeck = { coulomb = 1, static = 1.3, vs = 0.15 }\n";
+    let text = arm.replace("\"coulomb\"", "\"stribeck\"") + law;
+    let robot = Robot::parse(&text, Path::new("arm.toml"), &RobotOptions::default()).unwrap();
     let (mut alarms, mut withheld, mut seconds) = (0, 0, 0.0);
     for run in 0..6_u64 {
         let mut config = format!("robot = {plain:?}\n");
