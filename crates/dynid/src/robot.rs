@@ -52,13 +52,12 @@ impl Robot {
         Self::of_file(path, dynid_io::robot::read(path)?, options)
     }
 
-    /// The same from the text of a TOML robot file; `path` stands in messages and provenance.
+    /// Reads a robot from the text of a URDF or TOML file; `path` says which by its ending, and stands in messages and provenance.
     ///
     /// # Errors
     /// As [`Robot::load`].
     pub fn parse(text: &str, path: &Path, options: &RobotOptions) -> Result<Robot, Error> {
-        let file = dynid_io::toml_robot::parse(text, &path.display().to_string())?;
-        Self::of_file(path, file, options)
+        Self::of_file(path, dynid_io::robot::parse(text, path)?, options)
     }
 
     fn of_file(path: &Path, mut file: RobotFile, options: &RobotOptions) -> Result<Robot, Error> {

@@ -2,6 +2,8 @@
 
 use dynid_model::Inertia;
 
+use crate::robot::is_in_range;
+
 /// Centre of mass (m) and tensor about it (kg m²) in link axes, as URDF and MJCF state a body.
 pub(crate) struct Inertial {
     pub(crate) mass: f64,
@@ -22,8 +24,21 @@ impl Inertial {
             }
             None => return Err("it has a first moment but no mass, so no centre of mass".to_owned()),
         };
-        let finite = split.com.iter().chain(split.tensor.iter().flatten()).all(|x| x.is_finite());
-        finite.then_some(split).ok_or_else(|| "its centre of mass is too far away for a number".to_owned())
+        split.within_range()
+    }
+
+    /// What readers take: numbers of moderate size, a denormal one as zero.
+    fn within_range(mut self) -> Result<Self, String> {
+        let numbers = self.com.iter_mut().chain(self.tensor.iter_mut().flatten()).chain([&mut self.mass]);
+        for x in numbers {
+            if x.is_subnormal() {
+                *x = 0.0;
+            }
+            if !is_in_range(*x) {
+                return Err(format!("its mass, centre of mass or tensor holds {x:e}, beyond what readers take"));
+            }
+        }
+        Ok(self)
     }
 
     /// The element over several lines; the first line is not indented, the others by `indent` and two spaces a level.

@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use dynid::design::DesignConfig;
 use dynid::inspect::inspect;
+use dynid::online::Session;
 use dynid::io::TrajectoryFile;
 use dynid::io::csv::{self, ReadOptions};
 use dynid::predict::{efforts, read_states};
@@ -208,13 +209,12 @@ fn corpus(folder: &Path) -> Vec<Entry> {
     std::fs::write(folder.join("estimate.json"), estimate.to_json()).unwrap();
     let states = "q_j1,q_j2,dq_j1,dq_j2,ddq_j1,ddq_j2\n0.1,0.2,0.3,0.4,0.5,0.6\n-1,2,-3,1,0,1e-3\n";
     let friction = r#"{"schema":1,"robot":"arm","verdict":{"status":"pass","headline":""},"joints":[],"warnings":[],"provenance":{"version":"","seed":1,"inputs":[],"settings":{}}}"#;
-    let trajectory =
-        r#"{"schema":1,"joints":["j1","j2"],"series":[{"offset":0.1,"sin":[0.1],"cos":[0.2]}],"period_s":5}"#;
-    let mjcf = r#"<mujoco model="arm"><compiler angle="radian"/><worldbody><body name="a"><joint name="j1" axis="0 0 1" range="-1 1"/><inertial pos="0.1 0 0" mass="2" diaginertia="0.1 0.1 0.1"/><body name="b" pos="0.3 0 0"><joint name="j2" axis="0 1 0"/><inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body></body></worldbody></mujoco>"#;
+    let trajectory = r#"{"schema":"dynid-trajectory/1","form":"plain","base_frequency_rad_s":1.2,"joints":[{"name":"j1","q0":0.1,"a":[0.1,0.2],"b":[0.2,0]},{"name":"j2","unit":"deg","q0":3,"a":[1,2],"b":[2,0]}],"approach":{"from":[0,0],"duration_s":2},"sample_rate_hz":100}"#;
+    let mjcf = dynid::io::mjcf::from_description(&robot.file.description, &[]).unwrap();
     [
         (Reader::Robot, URDF),
         (Reader::Robot, ARM),
-        (Reader::Mjcf, mjcf),
+        (Reader::Mjcf, &mjcf),
         (Reader::Config, CONFIG),
         (Reader::Design, DESIGN),
         (Reader::Friction, FRICTION),
@@ -297,6 +297,10 @@ fn run(reader: Reader, bytes: &[u8], folder: &Path, number: usize) {
                 if let Ok(log) = simulate(&robot, &settings) {
                     assert!(log.effort.iter().flatten().all(|x| x.is_finite()), "efforts of a virtual log");
                 }
+                // What is written is read again.
+                if let Ok(written) = dynid::io::urdf::from_description(&robot.file.description) {
+                    dynid::io::urdf::parse(&written, "written.urdf").unwrap();
+                }
             }
         }
         Reader::Mjcf => drop(dynid::io::mjcf::parse(&text, "robot.xml")),
@@ -331,17 +335,9 @@ fn run(reader: Reader, bytes: &[u8], folder: &Path, number: usize) {
         Reader::Log => {
             std::fs::write(&file, bytes).unwrap();
             let Ok(table) = csv::read(&file, &ReadOptions::default()) else { return };
-            drop(table);
-            // Every hundredth case goes the whole way.
-            if number.is_multiple_of(100) {
-                let robot = folder.join("arm.toml");
-                let text = format!("robot = {robot:?}\n[[log]]\npath = {file:?}\n");
-                if let Ok(config) = Config::parse(&text, "case")
-                    && let Ok(found) = dynid::identify(&config, &mut |_| {})
-                {
-                    assert!(found.values().iter().all(|x| x.is_finite()), "identified values");
-                    found.estimate(&config).unwrap();
-                }
+            // Every fiftieth case goes through one of the commands.
+            if number.is_multiple_of(50) {
+                commands(number / 50, &folder.join("arm.toml"), &file, table);
             }
         }
         Reader::States => {
@@ -356,6 +352,31 @@ fn run(reader: Reader, bytes: &[u8], folder: &Path, number: usize) {
         }
     }
     drop(std::fs::remove_file(&file));
+}
+
+/// What commands make of a log.
+fn commands(number: usize, robot: &Path, file: &Path, table: csv::Table) {
+    let text = format!("robot = {robot:?}\n[[log]]\npath = {file:?}\n[online]\nlearn_s = 3\n");
+    let config = Config::parse(&text, "case").unwrap();
+    match number % 4 {
+        0 | 1 => {
+            if let Ok(found) = dynid::identify(&config, &mut |_| {}) {
+                assert!(found.values().iter().all(|x| x.is_finite()), "identified values");
+                found.estimate(&config).unwrap();
+            }
+        }
+        2 => drop(dynid::check::check(&config, &mut |_| {})),
+        _ => {
+            let Ok(mut session) = Session::new(&config, "case", &table.header, None) else { return };
+            let rows = (0..table.rows).map(|k| table.columns.iter().map(|c| c[k]).collect::<Vec<f64>>());
+            for row in rows {
+                if session.row(&row, &mut |_| {}).is_err() {
+                    return;
+                }
+            }
+            drop(session.finish(&mut |_| {}));
+        }
+    }
 }
 
 /// Runs so many cases; faults with the seed and number that make them again.
@@ -396,6 +417,43 @@ fn walk(seed: u64, cases: usize) -> Vec<String> {
 
 fn number(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
+}
+
+/// What is not read as it is shows nothing once it is damaged.
+#[test]
+fn the_corpus_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("entry");
+    let options = RobotOptions::default();
+    let mut faults = Vec::new();
+    for Entry { reader, text } in corpus(folder.path()) {
+        std::fs::write(&file, &text).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        let error = match reader {
+            Reader::Robot => {
+                let name = if text.starts_with('<') { "robot.urdf" } else { "robot.toml" };
+                Robot::parse(&text, Path::new(name), &options).err().map(|e| e.to_string())
+            }
+            Reader::Mjcf => dynid::io::mjcf::parse(&text, "robot.xml").err().map(|e| e.to_string()),
+            Reader::Config => Config::parse(&text, "run.toml").err().map(|e| e.to_string()),
+            Reader::Design => DesignConfig::parse(&text, "design.toml").err().map(|e| e.to_string()),
+            Reader::Friction => FrictionConfig::parse(&text, "friction.toml").err().map(|e| e.to_string()),
+            Reader::Simulate => SimulateSettings::parse(&text, "simulate.toml").err().map(|e| e.to_string()),
+            Reader::Estimate => Estimate::read(&file).err().map(|e| e.to_string()),
+            Reader::FrictionModel => FrictionModel::load(&file).err().map(|e| e.to_string()),
+            Reader::Trajectory => TrajectoryFile::parse(&text, "t.json").err().map(|e| e.to_string()),
+            Reader::Log => csv::read(&file, &ReadOptions::default()).err().map(|e| e.to_string()),
+            Reader::States => {
+                let estimate_file = folder.path().join("estimate.json");
+                let estimate = Estimate::read(&estimate_file).unwrap();
+                let model =
+                    estimate.effort_model(&estimate_file, dynid::estimate::Split::Consistent).unwrap();
+                read_states(&file, &model, None).err().map(|e| e.to_string())
+            }
+        };
+        faults.extend(error.map(|error| format!("{reader:?}: {error}")));
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
 #[test]

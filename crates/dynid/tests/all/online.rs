@@ -120,11 +120,7 @@ rows = [308, 5071]
     assert!((mass.jump - 2.805).abs() < 2.0 * mass.std && mass.std < 1.0, "{mass:?}");
 }
 
-/// A robot with a friction that the session does not know of; its first stretch is slow, what follows is not, and no motion comes twice.
-#[test]
-fn motion_beyond_what_was_learned_raises_no_alarm() {
-    let folder = tempfile::tempdir().unwrap();
-    let arm = r#"schema = 1
+const ARM: &str = r#"schema = 1
 name = "arm"
 gravity = [0, -9.81, 0]
 dh = "modified"
@@ -140,41 +136,105 @@ phi = [1.5, 0.25, 0.02, 0.01, 0.02, 0, 0, 0.06, 0, 0.07]
 [defaults]
 elements = ["coulomb", "viscous", "offset"]
 "#;
+/// The last body of [`ARM`] with half a kilogram more, 0.2 m out.
+const LOADED: &str = "phi = [2.0, 0.35, 0.02, 0.01, 0.02, 0, 0, 0.08, 0, 0.09]";
+/// Shares of the limits that the parts of a session use: the stretch that is learned from is slow, what follows is not.
+const SHARES: [f64; 6] = [0.15, 0.5, 0.9, 0.3, 0.7, 0.95];
+const PART_S: f64 = 25.0;
+
+/// What sessions said while nothing changed, and how soon a load was named that came after it.
+#[derive(Debug, Default)]
+struct Stationary {
+    hours: f64,
+    alarms: usize,
+    confirmed: usize,
+    withheld: usize,
+    reports: usize,
+    watching: usize,
+    /// Times from the load to the first confirmed change, s, of the sessions that named one.
+    found_after_s: Vec<f64>,
+}
+
+/// Sessions of motions that do not repeat, of an arm whose friction the session does not know of. The last part carries a load.
+fn stationary(seeds: std::ops::Range<u64>) -> Stationary {
+    let folder = tempfile::tempdir().unwrap();
     let plain = folder.path().join("arm.toml");
-    std::fs::write(&plain, arm).unwrap();
+    std::fs::write(&plain, ARM).unwrap();
     let law = "[element.j1]\nstribeck = { coulomb = 2, static = 2.6, vs = 0.15 }\n\
                [element.j2]\nstribeck = { coulomb = 1, static = 1.3, vs = 0.15 }\n";
-    let text = arm.replace("\"coulomb\"", "\"stribeck\"") + law;
-    let robot = Robot::parse(&text, Path::new("arm.toml"), &RobotOptions::default()).unwrap();
-    let (mut alarms, mut withheld, mut seconds) = (0, 0, 0.0);
-    for run in 0..6_u64 {
+    let text = ARM.replace("\"coulomb\"", "\"stribeck\"") + law;
+    let own = "phi = [1.5, 0.25, 0.02, 0.01, 0.02, 0, 0, 0.06, 0, 0.07]";
+    let [robot, loaded] = [text.clone(), text.replace(own, LOADED)]
+        .map(|text| Robot::parse(&text, Path::new("arm.toml"), &RobotOptions::default()).unwrap());
+    let mut out = Stationary::default();
+    for seed in seeds {
         let mut config = format!("robot = {plain:?}\n");
-        for (part, share) in [0.15, 0.5, 0.9, 0.3, 0.7, 0.95].into_iter().enumerate() {
+        for (part, share) in SHARES.into_iter().chain([0.7]).enumerate() {
             let settings = SimulateSettings {
-                duration_s: 25.0,
+                duration_s: PART_S,
                 rate_hz: 100.0,
                 effort_noise: 0.01,
                 share,
-                seed: 100 * run + part as u64,
+                seed: 100 * seed + part as u64,
                 ..SimulateSettings::default()
             };
-            let log = simulate(&robot, &settings).unwrap();
-            let file = folder.path().join(format!("{run}-{part}.csv"));
+            let carried = if part < SHARES.len() { &robot } else { &loaded };
+            let log = simulate(carried, &settings).unwrap();
+            let file = folder.path().join(format!("{seed}-{part}.csv"));
             let header = ["t", "q_j1", "q_j2", "tau_j1", "tau_j2"].map(str::to_owned);
             let signals = log.position.iter().chain(&log.effort).map(Vec::as_slice);
             let columns: Vec<&[f64]> = std::iter::once(log.time.as_slice()).chain(signals).collect();
             dynid::io::csv::write(&file, &header, &columns).unwrap();
             config += &format!("[[log]]\npath = {file:?}\n");
-            seconds += settings.duration_s;
         }
-        for (_, event) in follow(&Config::parse(&config, "test").unwrap()) {
-            alarms += usize::from(matches!(event, Event::Alarm { .. }));
-            withheld += usize::from(matches!(event, Event::Withheld { .. }));
+        let mut load_from = None;
+        let mut found = None;
+        for (part, event) in follow(&Config::parse(&config, "test").unwrap()) {
+            let carries = part == SHARES.len();
+            match event {
+                Event::Estimate { time, .. } if carries => {
+                    load_from.get_or_insert(time);
+                }
+                Event::Change { time, confirmed: true, .. } if carries => {
+                    found.get_or_insert(time);
+                }
+                _ if carries => {}
+                Event::Estimate { watching, .. } => {
+                    out.reports += 1;
+                    out.watching += usize::from(watching);
+                }
+                Event::Alarm { .. } => out.alarms += 1,
+                Event::Change { confirmed, .. } => out.confirmed += usize::from(confirmed),
+                Event::Withheld { .. } => out.withheld += 1,
+                _ => {}
+            }
         }
+        out.hours += PART_S * SHARES.len() as f64 / 3600.0;
+        out.found_after_s.extend(found.zip(load_from).map(|(found, from)| found - from));
     }
-    println!("{seconds} s: {alarms} alarms, withheld {withheld} times");
-    assert_eq!(alarms, 0);
-    assert!(withheld > 0);
+    out
+}
+
+/// A stretch that was learned from does not cover the motion to come, yet nothing has changed; what does change is still found.
+#[test]
+fn motion_beyond_what_was_learned_raises_no_alarm() {
+    let found = stationary(0..6);
+    println!("{found:?}");
+    assert_eq!(found.alarms, 0);
+    assert!(found.withheld > 0);
+    assert!(2 * found.watching > found.reports, "alarms are withheld most of the time");
+    assert_eq!(found.found_after_s.len(), 6, "a load is not found");
+}
+
+#[test]
+#[ignore = "minutes"]
+fn two_hundred_stationary_logs_raise_alarms_at_the_stated_rate() {
+    let found = stationary(1000..1200);
+    println!("{found:?}");
+    // 0.01 an hour over eight hours: two or more come by chance once in 300 times.
+    assert!(found.alarms <= 1, "{} alarms in {} h", found.alarms, found.hours);
+    assert_eq!(found.confirmed, 0);
+    assert!(found.found_after_s.len() >= 190, "{} of 200 loads found", found.found_after_s.len());
 }
 
 fn example(rule: ForgettingRule) -> Config {
