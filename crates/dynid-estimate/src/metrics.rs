@@ -65,15 +65,40 @@ pub fn fit<M: AsRef<[f64]>, P: AsRef<[f64]>>(measured: &[M], predicted: &[P]) ->
     if measured.len() != predicted.len() {
         return Err(MetricsError::Channels { expected: measured.len(), found: predicted.len() });
     }
-    let (mut error_energy, mut energy) = (0.0, 0.0);
-    let mut channels = Vec::with_capacity(measured.len());
-    for (channel, (m, p)) in measured.iter().zip(predicted).enumerate() {
-        let sums = Sums::of(channel, m.as_ref(), p.as_ref())?;
-        error_energy += sums.error_energy;
-        energy += sums.energy;
-        channels.push(sums.fit());
+    let mut sums = FitSums::default();
+    for (m, p) in measured.iter().zip(predicted) {
+        sums.push(m.as_ref(), p.as_ref(), true)?;
     }
-    Ok(Fit { channels, relative_error: percent(error_energy, energy) })
+    Ok(sums.fit())
+}
+
+/// Agreement of channels that come one after the other, so that signals need not be held together.
+#[derive(Debug, Default)]
+pub struct FitSums {
+    channels: Vec<ChannelFit>,
+    error_energy: f64,
+    energy: f64,
+}
+
+impl FitSums {
+    /// Takes the next channel. `counts`: whether it counts in the figure over all channels.
+    ///
+    /// # Errors
+    /// [`MetricsError::Samples`], [`MetricsError::NotFinite`].
+    pub fn push(&mut self, measured: &[f64], predicted: &[f64], counts: bool) -> Result<(), MetricsError> {
+        let sums = Sums::of(self.channels.len(), measured, predicted)?;
+        if counts {
+            self.error_energy += sums.error_energy;
+            self.energy += sums.energy;
+        }
+        self.channels.push(sums.fit());
+        Ok(())
+    }
+
+    /// Agreement of all channels taken.
+    pub fn fit(self) -> Fit {
+        Fit { channels: self.channels, relative_error: percent(self.error_energy, self.energy) }
+    }
 }
 
 struct Sums {

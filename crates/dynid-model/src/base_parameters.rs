@@ -4,7 +4,8 @@ mod expression;
 
 pub use expression::{linear_combination, significant};
 
-use faer::Mat;
+use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
+use faer::{Mat, Par};
 
 use crate::closed_model::{ClosedModel, Reaction};
 use crate::dynamics::MotionBlock;
@@ -28,7 +29,7 @@ pub struct BaseSettings {
     /// Rotations that a file gives with 5 to 12 digits leave shares of up to 1e-9; true parameters of robots start at
     /// about 1e-3. Default 1e-7.
     pub tolerance: f64,
-    /// Random states; 0: enough for a stack three times as tall as wide, at least 100 (30 of more than 30 outputs). Default 0.
+    /// Random states; 0: enough for a stack three times as tall as wide, at least 100; of more than 30 outputs 1.5 times, at least 20. Default 0.
     pub states: usize,
     /// Seed of the random states.
     pub seed: u64,
@@ -48,8 +49,12 @@ impl BaseSettings {
         match self.states {
             0 => {
                 let outputs = model.outputs().len();
-                let least = if outputs > MANY_OUTPUTS { 30 } else { 100 };
-                least.max((3 * model.layout().parameters()).div_ceil(outputs))
+                let parameters = model.layout().parameters();
+                match outputs > MANY_OUTPUTS {
+                    // The states of a joint's rows are to be more than the parameters of its body and elements.
+                    true => 20.max((3 * parameters).div_ceil(2 * outputs)),
+                    false => 100.max((3 * parameters).div_ceil(outputs)),
+                }
             }
             n => n,
         }
@@ -179,7 +184,7 @@ impl BaseParameters {
         let active: Vec<usize> = (0..stacked.len()).filter(|c| !silent(*c)).collect();
         let mut projection = Projection::new(rows, active.len());
         let mut kept = Vec::new();
-        let mut folded = Vec::new();
+        let mut folded: Vec<(usize, Vec<f64>)> = Vec::new();
         let (mut least, mut most_left) = (f64::INFINITY, None::<f64>);
         let order: Vec<usize> = order.collect();
         let many = active.len() > FEW_COLUMNS;
@@ -213,18 +218,15 @@ impl BaseParameters {
         // Kept columns ascending from here on.
         let mut position: Vec<usize> = (0..rank).collect();
         position.sort_by_key(|k| kept[*k]);
-        let mut folded: Vec<(usize, Vec<f64>)> = folded
-            .into_iter()
-            .map(|(column, coefficients)| {
-                let scaled = projection.solve(coefficients);
-                let factor = |k: &usize| {
-                    let value = scaled.get(*k).copied().unwrap_or(0.0);
-                    // Undo the scaling; drop what is rounding.
-                    if value.abs() < 1e-10 { 0.0 } else { value * norms[column] / norms[kept[*k]] }
-                };
-                (column, position.iter().map(factor).collect())
-            })
-            .collect();
+        projection.solve(&mut folded);
+        for (column, factors) in &mut folded {
+            let factor = |k: &usize| {
+                let value = factors.get(*k).copied().unwrap_or(0.0);
+                // Undo the scaling; drop what is rounding.
+                if value.abs() < 1e-10 { 0.0 } else { value * norms[*column] / norms[kept[*k]] }
+            };
+            *factors = position.iter().map(factor).collect();
+        }
         folded.sort_by_key(|(column, _)| *column);
         kept.sort_unstable();
         let (folded, factors) = folded.into_iter().unzip();
@@ -428,15 +430,30 @@ impl Projection {
         self.triangle.push(coefficients);
     }
 
-    /// Factors on the kept columns from coefficients on the directions: back substitution.
-    fn solve(&self, mut coefficients: Vec<f64>) -> Vec<f64> {
-        for k in (0..coefficients.len()).rev() {
-            coefficients[k] /= self.triangle[k][k];
-            let x = coefficients[k];
-            for (c, t) in coefficients[..k].iter_mut().zip(&self.triangle[k]) {
-                *c -= t * x;
+    /// Turns coefficients on the directions into factors on the kept columns: back substitution.
+    fn solve(&self, folded: &mut [(usize, Vec<f64>)]) {
+        if self.count > FEW_COLUMNS {
+            return self.solve_together(folded);
+        }
+        for (_, x) in folded {
+            for k in (0..x.len()).rev() {
+                x[k] /= self.triangle[k][k];
+                let (earlier, from) = x.split_at_mut(k);
+                for (c, t) in earlier.iter_mut().zip(&self.triangle[k]) {
+                    *c -= t * from[0];
+                }
             }
         }
-        coefficients
+    }
+
+    /// Solves for all columns together, which sums in another order.
+    fn solve_together(&self, folded: &mut [(usize, Vec<f64>)]) {
+        let n = self.count;
+        let triangle = Mat::from_fn(n, n, |i, k| if i <= k { self.triangle[k][i] } else { 0.0 });
+        let mut x = Mat::from_fn(n, folded.len(), |i, c| folded[c].1.get(i).copied().unwrap_or(0.0));
+        solve_upper_triangular_in_place(triangle.as_ref(), x.as_mut(), Par::Seq);
+        for (c, (_, out)) in folded.iter_mut().enumerate() {
+            *out = x.col_as_slice(c).to_vec();
+        }
     }
 }

@@ -109,6 +109,25 @@ impl Kernel {
         }
     }
 
+    /// Adds to weighted means what a block holds of their windows.
+    ///
+    /// `block` holds the samples from index `first` on; `centres` are ascending indices of the same count. `out`: one value per centre. A window that
+    /// lies in the block as a whole adds the value of [`Self::apply_block`]; the parts of a window that lies in several blocks add up to it but for
+    /// rounding.
+    pub fn add_block(&self, block: &[f64], first: usize, centres: &[usize], out: &mut [f64]) {
+        assert_eq!(centres.len(), out.len(), "one output per centre");
+        let (half, end) = (self.half_width(), first + block.len());
+        let touched =
+            centres.partition_point(|c| c + half < first)..centres.partition_point(|c| *c < end + half);
+        for (y, centre) in out[touched.clone()].iter_mut().zip(&centres[touched]) {
+            // Index of the window's first sample is `centre - half`, which may lie before the block.
+            let from = (first + half).saturating_sub(*centre);
+            let to = self.weights.len().min(end + half - centre);
+            let start = centre + from - half - first;
+            *y += dot(&self.weights[from..to], &block[start..start + to - from]);
+        }
+    }
+
     /// Weighted means of several columns of a block.
     ///
     /// `columns`: column `c` in `columns[c * stride..(c + 1) * stride]`, beginning at sample `first` and of at most
@@ -212,5 +231,26 @@ mod tests {
         assert!(Kernel::new(0.0, 1000.0).is_err());
         assert!(Kernel::new(f64::MIN_POSITIVE, f64::MAX).is_err());
         assert!(Kernel::new(10.0, 100.0).unwrap().centres(3).is_empty());
+    }
+
+    #[test]
+    fn parts_of_windows_add_up() {
+        let kernel = Kernel::new(5.0, 200.0).unwrap();
+        let signal: Vec<f64> = (0..1000).map(|k| (0.37 * f64::from(k)).sin() + 0.01 * f64::from(k)).collect();
+        let centres = kernel.centres(signal.len());
+        let mut whole = vec![0.0; centres.len()];
+        kernel.apply_block(&signal, 0, &centres, &mut whole);
+        let mut once = vec![0.0; centres.len()];
+        kernel.add_block(&signal, 0, &centres, &mut once);
+        assert_eq!(once, whole);
+        for length in [1, 17, 64, 333, 999] {
+            let mut parts = vec![0.0; centres.len()];
+            for (k, block) in signal.chunks(length).enumerate() {
+                kernel.add_block(block, k * length, &centres, &mut parts);
+            }
+            // Weights sum to one: each of at most 1000 additions rounds a value of at most 11.
+            let bound = 1000.0 * f64::EPSILON * 11.0;
+            assert!(parts.iter().zip(&whole).all(|(a, b)| (a - b).abs() < bound), "{length}");
+        }
     }
 }

@@ -31,6 +31,9 @@ impl PowerSpectrum {
     }
 }
 
+/// Longest window that stands for a whole record, samples: the transform of a longer one takes more room than the log.
+const LONGEST: usize = 1 << 18;
+
 /// Welch's estimate: Hann windows of `segment` samples overlapping by half, each freed of its mean, averaged.
 ///
 /// A segment longer than the signal is cut to it. Equals SciPy's `welch(x, fs, nperseg=segment)`. Fails if the signal
@@ -260,10 +263,10 @@ fn crossing(spectrum: &PowerSpectrum, floor_psd: f64, rate_hz: f64, settings: &N
 
 /// Frequency below which `share` of the power of the signal about its mean lies, Hz; 0 for a constant.
 ///
-/// Uses one Hann window over the whole record, so that slow motion is resolved.
+/// Uses one Hann window over the whole record, so that slow motion is resolved; of more than 262,144 samples windows of so many.
 /// Fails if the signal has fewer than two samples or is not finite.
 pub fn excited_band(signal: &[f64], rate_hz: f64, share: f64) -> Result<f64, SignalError> {
-    let spectrum = welch(signal, rate_hz, signal.len().max(2))?;
+    let spectrum = welch(signal, rate_hz, signal.len().clamp(2, LONGEST))?;
     // The mean of a constant is rounded, so its spectrum is not quite zero.
     if signal.iter().all(|x| *x == signal[0]) {
         return Ok(0.0);
@@ -299,7 +302,7 @@ fn limit_from_bend(
     crossing_hz: f64,
     noise_power: f64,
 ) -> Result<(f64, f64), SignalError> {
-    let spectrum = welch(bend, rate_hz, bend.len())?;
+    let spectrum = welch(bend, rate_hz, bend.len().clamp(2, LONGEST))?;
     let bin = spectrum.resolution();
     let mut total = 0.0;
     let below: Vec<f64> = spectrum

@@ -1,9 +1,10 @@
 //! Predicted against measured effort on a log.
 
-use dynid_estimate::conditioning::{ConditioningSettings, Moving, PreparedLog, predict};
-use dynid_estimate::metrics::{Fit, MetricsError, fit};
+use dynid_estimate::conditioning::{ConditioningSettings, Moving, PreparedLog, States, predict_along};
+use dynid_estimate::metrics::{Fit, FitSums};
 use dynid_model::EffortModel;
 use dynid_motion::filter::{butterworth, forward_backward};
+use dynid_motion::shift::shift;
 
 use crate::Error;
 use crate::estimate::{FileFit, FitValues};
@@ -84,51 +85,57 @@ pub fn compare(
 ) -> Result<Agreement, Error> {
     let state_hz = alignment.state_hz;
     let filter_hz = alignment.filter_hz.min(0.4 * log.rate_hz);
-    let shape = model.parameters().shape_start();
-    let run = |delay: f64| predict(model, &shape, values, log, state_hz, delay, settings);
-    let predicted = run(lead(log.rate_hz, alignment.delay_samples, alignment.delay_rate_hz))?;
-    let unaligned = run(0.0)?;
     let margin = (EDGE_PERIODS * log.rate_hz / filter_hz.min(state_hz)).ceil() as usize;
     let mut bad: Vec<bool> = log.usable.iter().map(|u| !u).collect();
     bad = dynid_motion::mask::dilate(&bad, margin);
     dynid_motion::mask::merge(&mut bad, &dynid_motion::mask::edges(log.samples(), margin));
     let counted: Vec<bool> = bad.iter().map(|b| !b).collect();
+    let too_short = |message: String| Error::TooShort { file: log.name.clone(), message };
     if !counted.contains(&true) {
-        return Err(Error::TooShort {
-            file: log.name.clone(),
-            message: format!("{:.2} s leave no sample between the filter's edges", log.duration()),
-        });
+        let lasts = format!("{:.2} s leave no sample between the filter's edges", log.duration());
+        return Err(too_short(lasts));
     }
+    let states = States::of_motion(log, state_hz, settings)?;
+    let motion = Moving::new(log, &states, settings);
+    let mut predicted = predict_along(model, &model.parameters().shape_start(), values, log, &states);
+    drop(states);
+    let lead = lead(log.rate_hz, alignment.delay_samples, alignment.delay_rate_hz);
     let filter = butterworth(4, filter_hz, log.rate_hz).map_err(conditioning)?;
-    let filtered = |signals: &[Vec<f64>]| {
-        signals
-            .iter()
-            .map(|s| forward_backward(&filter, s).map_err(conditioning))
-            .collect::<Result<Vec<_>, _>>()
-    };
-    let motion = Moving::of(log, state_hz, settings)?;
+    let filtered = |signal: &[f64]| forward_backward(&filter, signal).map_err(conditioning);
     let driven: Vec<bool> = (0..log.effort.len()).map(|output| !model.is_undriven(output)).collect();
-    let agree_on = |measured: &[Vec<f64>], predicted: &[Vec<f64>], part: Part| {
-        let is_of = |output: usize, k: usize| counted[k] && part.holds(motion.samples[output][k]);
-        fit_driven(&pick(measured, is_of), &pick(predicted, is_of), &driven)
-            .map_err(|e| Error::TooShort { file: log.name.clone(), message: e.to_string() })
-    };
-    let agree = |measured: &[Vec<f64>], predicted: &[Vec<f64>]| agree_on(measured, predicted, Part::All);
-    let (measured_filtered, predicted_filtered) = (filtered(&log.effort)?, filtered(&predicted)?);
+    let [mut raw, mut all, mut unaligned, mut moving, mut standing] = [(); 5].map(|()| FitSums::default());
+    // One output at a time: long logs leave no room for filtered copies of all.
+    for (output, (measured, predicted)) in log.effort.iter().zip(&mut predicted).enumerate() {
+        let agree = |sums: &mut FitSums, measured: &[f64], predicted: &[f64], part: Part| {
+            let is_of = |k: usize| counted[k] && part.holds(motion.samples[output][k]);
+            sums.push(&pick(measured, is_of), &pick(predicted, is_of), driven[output])
+                .map_err(|e| too_short(e.to_string()))
+        };
+        let measured_filtered = filtered(measured)?;
+        agree(&mut unaligned, &measured_filtered, &filtered(predicted)?, Part::All)?;
+        if lead != 0.0 {
+            *predicted = shift(predicted, lead).map_err(conditioning)?.values;
+        }
+        agree(&mut raw, measured, predicted, Part::All)?;
+        let predicted_filtered = filtered(predicted)?;
+        agree(&mut all, &measured_filtered, &predicted_filtered, Part::All)?;
+        agree(&mut moving, &measured_filtered, &predicted_filtered, Part::Moving)?;
+        agree(&mut standing, &measured_filtered, &predicted_filtered, Part::Standing)?;
+    }
     let samples = counted.iter().filter(|c| **c).count() as f64;
     let stands = |moves: &Vec<bool>| moves.iter().zip(&counted).filter(|(m, c)| !**m && **c).count() as f64;
     Ok(Agreement {
-        moving: agree_on(&measured_filtered, &predicted_filtered, Part::Moving)?,
-        standing: agree_on(&measured_filtered, &predicted_filtered, Part::Standing)?,
+        moving: moving.fit(),
+        standing: standing.fit(),
         standing_share: motion.samples.iter().map(|moves| stands(moves) / samples).collect(),
         name: log.name.clone(),
         start: log.start,
         rate_hz: log.rate_hz,
-        raw: agree(&log.effort, &predicted)?,
-        filtered: agree(&measured_filtered, &predicted_filtered)?,
-        filtered_unaligned: agree(&measured_filtered, &filtered(&unaligned)?)?,
+        raw: raw.fit(),
+        filtered: all.fit(),
+        filtered_unaligned: unaligned.fit(),
         measured: log.effort.clone(),
-        driven: driven.clone(),
+        driven,
         predicted,
         moves: log.moves.clone(),
         motion,
@@ -155,25 +162,9 @@ impl Part {
     }
 }
 
-/// The samples of each signal that are asked for, by output and sample.
-fn pick(signals: &[Vec<f64>], is_kept: impl Fn(usize, usize) -> bool) -> Vec<Vec<f64>> {
-    let kept = |(output, s): (usize, &Vec<f64>)| {
-        s.iter().enumerate().filter(|(k, _)| is_kept(output, *k)).map(|(_, x)| *x).collect()
-    };
-    signals.iter().enumerate().map(kept).collect()
-}
-
-/// Figures per joint; those over all joints leave out where nothing drives: what is left over there is no share of any effort.
-fn fit_driven(measured: &[Vec<f64>], predicted: &[Vec<f64>], driven: &[bool]) -> Result<Fit, MetricsError> {
-    let whole = fit(measured, predicted)?;
-    if driven.iter().all(|d| *d) {
-        return Ok(whole);
-    }
-    let of = |signals: &[Vec<f64>]| -> Vec<Vec<f64>> {
-        signals.iter().zip(driven).filter(|(_, d)| **d).map(|(s, _)| s.clone()).collect()
-    };
-    let relative_error = fit(&of(measured), &of(predicted))?.relative_error;
-    Ok(Fit { relative_error, ..whole })
+/// The samples of a signal that are asked for.
+fn pick(signal: &[f64], is_kept: impl Fn(usize) -> bool) -> Vec<f64> {
+    signal.iter().enumerate().filter(|(k, _)| is_kept(*k)).map(|(_, x)| *x).collect()
 }
 
 impl Agreement {
@@ -183,27 +174,28 @@ impl Agreement {
     /// [`Error::Conditioning`], [`Error::TooShort`].
     pub(crate) fn without(&self, lost: &[Vec<f64>]) -> Result<FileFit, Error> {
         let filter = butterworth(4, self.filter_hz, self.rate_hz).map_err(conditioning)?;
-        let through = |signals: &[Vec<f64>]| {
-            let filtered = signals.iter().map(|s| forward_backward(&filter, s).map_err(conditioning));
-            Ok::<_, Error>(pick(&filtered.collect::<Result<Vec<_>, _>>()?, |_, k| self.counted[k]))
+        let through = |signal: &[f64]| {
+            let filtered = forward_backward(&filter, signal).map_err(conditioning)?;
+            Ok::<_, Error>(pick(&filtered, |k| self.counted[k]))
         };
-        let (measured, whole, lost) = (through(&self.measured)?, through(&self.predicted)?, through(lost)?);
-        let pairs = whole.iter().zip(&lost);
-        let predicted: Vec<Vec<f64>> =
-            pairs.map(|(w, l)| w.iter().zip(l).map(|(w, l)| w - l).collect()).collect();
-        let found = fit_driven(&measured, &predicted, &self.driven)
-            .map_err(|e| Error::TooShort { file: self.name.clone(), message: e.to_string() })?;
         let rms = |s: &[f64]| (s.iter().map(|x| x * x).sum::<f64>() / s.len() as f64).sqrt();
-        let loss: Vec<f64> = lost.iter().map(|l| rms(l)).collect();
-        let percent = |(loss, measured): (&f64, &Vec<f64>)| {
-            let whole = rms(measured);
-            (whole > 0.0).then(|| 100.0 * loss / whole)
-        };
+        let (mut sums, mut loss, mut loss_percent) = (FitSums::default(), Vec::new(), Vec::new());
+        for (output, lost) in lost.iter().enumerate() {
+            let (measured, lost) = (through(&self.measured[output])?, through(lost)?);
+            let whole = through(&self.predicted[output])?;
+            let predicted: Vec<f64> = whole.iter().zip(&lost).map(|(w, l)| w - l).collect();
+            sums.push(&measured, &predicted, self.driven[output])
+                .map_err(|e| Error::TooShort { file: self.name.clone(), message: e.to_string() })?;
+            let (own, of) = (rms(&lost), rms(&measured));
+            loss.push(own);
+            loss_percent.push((of > 0.0).then(|| 100.0 * own / of));
+        }
+        let found = sums.fit();
         Ok(FileFit {
             rms: found.channels.iter().map(|c| c.rms).collect(),
             relative_error_per_joint: found.channels.iter().map(|c| c.relative_error).collect(),
             relative_error: found.relative_error,
-            loss_percent: loss.iter().zip(&measured).map(percent).collect(),
+            loss_percent,
             loss,
         })
     }

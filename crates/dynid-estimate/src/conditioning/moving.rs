@@ -49,6 +49,6 @@ impl Moving {
         state_hz: f64,
         settings: &ConditioningSettings,
     ) -> Result<Moving, ConditioningError> {
-        Ok(Moving::new(log, &States::of(log, state_hz, settings)?, settings))
+        Ok(Moving::new(log, &States::of_motion(log, state_hz, settings)?, settings))
     }
 }

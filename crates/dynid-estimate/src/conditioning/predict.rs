@@ -19,8 +19,28 @@ pub fn predict(
     delay_samples: f64,
     settings: &ConditioningSettings,
 ) -> Result<Vec<Vec<f64>>, ConditioningError> {
+    let states = States::of_motion(log, state_hz, settings)?;
+    let mut predicted = predict_along(model, shape, linear, log, &states);
+    drop(states);
+    if delay_samples != 0.0 {
+        for p in &mut predicted {
+            *p = shift::shift(p, delay_samples)?.values;
+        }
+    }
+    Ok(predicted)
+}
+
+/// Effort of every output at every sample of a log, along states of it ([`States::of_motion`]).
+///
+/// `linear`: all linear parameters of the model.
+pub fn predict_along(
+    model: &dyn EffortModel,
+    shape: &[f64],
+    linear: &[f64],
+    log: &PreparedLog,
+    states: &States,
+) -> Vec<Vec<f64>> {
     const BLOCK: usize = 2048;
-    let states = States::of(log, state_hz, settings)?;
     let outputs = model.outputs().len();
     let mut predicted = vec![Vec::with_capacity(log.samples()); outputs];
     let mut block = RegressorBlock::new(model.layout().clone(), BLOCK);
@@ -34,10 +54,5 @@ pub fn predict(
             out.extend(block.effort(output, linear));
         }
     }
-    if delay_samples != 0.0 {
-        for p in &mut predicted {
-            *p = shift::shift(p, delay_samples)?.values;
-        }
-    }
-    Ok(predicted)
+    predicted
 }

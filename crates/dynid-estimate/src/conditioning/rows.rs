@@ -118,8 +118,18 @@ pub(crate) struct Pass<'a> {
     pub(crate) load: &'a [f64],
 }
 
-/// Samples whose regressor is held at a time, beyond the kernels' reach.
+/// Samples whose rows are formed at a time, at least; a multiple of the kernels' reach otherwise.
 const BLOCK: usize = 2048;
+/// Entries of the regressor that are held at a time, 64 MB of them: the windows of wide kernels over fast logs are longer.
+const ENTRIES: usize = 1 << 23;
+
+/// Rows of one output at one scale while their columns are summed.
+struct Rows {
+    scale: usize,
+    centres: Vec<usize>,
+    rungs: Vec<u8>,
+    columns: Vec<f64>,
+}
 
 impl Pass<'_> {
     /// Runs through the log once and hands every row to the consumer of its output, in time order for each scale.
@@ -127,25 +137,39 @@ impl Pass<'_> {
         let samples = self.states.samples;
         let reach = self.kernels.kernels[0].half_width();
         let block = BLOCK.max(6 * reach);
-        let mut regressor = RegressorBlock::new(self.model.layout().clone(), block + 2 * reach);
+        let layout = self.model.layout();
+        let slots = (0..layout.outputs()).map(|output| layout.columns(output).len() + 1).sum::<usize>();
+        let piece = (block + 2 * reach).min((ENTRIES / slots).max(BLOCK)).min(samples);
+        let mut regressor = RegressorBlock::new(layout.clone(), piece);
         let mut instruments = self.instruments.map(|_| regressor.clone());
         let remembered = self.remembered(self.states);
         let simulated = self.instruments.map(|states| self.remembered(states));
         let mut start = 0;
         while start < samples {
             let end = (start + block).min(samples);
-            let range = start.saturating_sub(reach)..(end + reach).min(samples);
-            self.fill(self.states, range.clone(), &remembered, &mut regressor);
-            if let (Some(states), Some(signals), Some(block)) =
-                (self.instruments, &simulated, &mut instruments)
-            {
-                self.fill(states, range.clone(), signals, block);
+            let mut rows: Vec<Vec<Rows>> =
+                (0..consumers.len()).into_par_iter().map(|output| self.rows(output, start..end)).collect();
+            let mut first = start.saturating_sub(reach);
+            let last = (end + reach).min(samples);
+            while first < last {
+                let range = first..(first + piece).min(last);
+                self.fill(self.states, range.clone(), &remembered, &mut regressor);
+                if let (Some(states), Some(signals), Some(block)) =
+                    (self.instruments, &simulated, &mut instruments)
+                {
+                    self.fill(states, range.clone(), signals, block);
+                }
+                let blocks = (&regressor, instruments.as_ref());
+                rows.par_iter_mut().enumerate().for_each(|(output, rows)| {
+                    self.add_columns(output, range.start, blocks, rows);
+                });
+                first = range.end;
             }
-            let blocks = (&regressor, instruments.as_ref());
             consumers
                 .par_iter_mut()
+                .zip(rows)
                 .enumerate()
-                .map(|(output, consumer)| self.output_rows(output, start..end, range.start, blocks, consumer))
+                .map(|(output, (consumer, rows))| self.hand_over(output, &rows, consumer))
                 .collect::<Result<Vec<()>, _>>()?;
             start = end;
         }
@@ -168,26 +192,13 @@ impl Pass<'_> {
         });
     }
 
-    fn output_rows<C: RowConsumer>(
-        &self,
-        output: usize,
-        centres_in: std::ops::Range<usize>,
-        first: usize,
-        (regressor, instruments): (&RegressorBlock, Option<&RegressorBlock>),
-        consumer: &mut C,
-    ) -> Result<(), RowsError> {
-        let speed = &self.states.velocity(output)[first..first + regressor.samples()];
-        let loads = match self.shapes[output].iter().any(|s| s.kind == ShapeKind::Load) {
-            true => regressor.effort(output, self.load),
-            false => Vec::new(),
-        };
-        let shaped: Vec<Vec<f64>> = self.shapes[output].iter().map(|s| s.column(speed, &loads)).collect();
-        let mut centres = Vec::new();
-        let mut rungs = Vec::new();
-        let mut columns = Vec::new();
+    /// Rows of an output whose centres lie in a range, their columns still empty.
+    fn rows(&self, output: usize, centres_in: std::ops::Range<usize>) -> Vec<Rows> {
+        let own = self.columns.local[output].len() * (1 + usize::from(self.instruments.is_some()));
+        let width = own + self.shapes[output].len() + 1;
+        let mut out = Vec::new();
         for (scale, kernel) in self.kernels.kernels.iter().enumerate() {
-            centres.clear();
-            rungs.clear();
+            let (mut centres, mut rungs) = (Vec::new(), Vec::new());
             let spacing = kernel.spacing();
             let from = centres_in.start.div_ceil(spacing) * spacing;
             for centre in (from..centres_in.end).step_by(spacing) {
@@ -197,13 +208,30 @@ impl Pass<'_> {
                     rungs.push(used);
                 }
             }
-            if centres.is_empty() {
-                continue;
+            if !centres.is_empty() {
+                let columns = vec![0.0; width * centres.len()];
+                out.push(Rows { scale, centres, rungs, columns });
             }
-            let local = &self.columns.local[output];
-            columns.clear();
-            let own = local.len() * (1 + usize::from(instruments.is_some()));
-            columns.resize((own + shaped.len() + 1) * centres.len(), 0.0);
+        }
+        out
+    }
+
+    /// Adds what a piece of the regressor, from sample `first` on, holds of the rows' windows.
+    fn add_columns(
+        &self,
+        output: usize,
+        first: usize,
+        (regressor, instruments): (&RegressorBlock, Option<&RegressorBlock>),
+        rows: &mut [Rows],
+    ) {
+        let speed = &self.states.velocity(output)[first..first + regressor.samples()];
+        let loads = match self.shapes[output].iter().any(|s| s.kind == ShapeKind::Load) {
+            true => regressor.effort(output, self.load),
+            false => Vec::new(),
+        };
+        let shaped: Vec<Vec<f64>> = self.shapes[output].iter().map(|s| s.column(speed, &loads)).collect();
+        let local = &self.columns.local[output];
+        for Rows { scale, centres, columns, .. } in rows {
             let sources = instruments
                 .iter()
                 .flat_map(|block| local.iter().map(|k| block.column(output, *k)))
@@ -211,18 +239,20 @@ impl Pass<'_> {
                 .chain(shaped.iter().map(Vec::as_slice))
                 .chain([regressor.offset(output)]);
             for (source, out) in sources.zip(columns.chunks_exact_mut(centres.len())) {
-                kernel.apply_block(source, first, &centres, out);
+                self.kernels.kernels[*scale].add_block(source, first, centres, out);
             }
-            consumer.take(
-                output,
-                &RowBatch {
-                    scale,
-                    centres: &centres,
-                    rungs: &rungs,
-                    columns: &columns,
-                    half_width: kernel.half_width(),
-                },
-            )?;
+        }
+    }
+
+    fn hand_over<C: RowConsumer>(
+        &self,
+        output: usize,
+        rows: &[Rows],
+        consumer: &mut C,
+    ) -> Result<(), RowsError> {
+        for Rows { scale, centres, rungs, columns } in rows {
+            let half_width = self.kernels.kernels[*scale].half_width();
+            consumer.take(output, &RowBatch { scale: *scale, centres, rungs, columns, half_width })?;
         }
         Ok(())
     }

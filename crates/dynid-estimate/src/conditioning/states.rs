@@ -25,7 +25,7 @@ pub struct States {
     pub dq: Vec<f64>,
     /// Accelerations.
     pub ddq: Vec<f64>,
-    /// Per output: effort through the state filter.
+    /// Per output: effort through the state filter; empty where no effort was asked for.
     pub effort: Vec<Vec<f64>>,
     /// Per output: standard deviation of the velocity that comes from position noise.
     pub velocity_sigma: Vec<f64>,
@@ -39,39 +39,48 @@ impl States {
         cutoff_hz: f64,
         settings: &ConditioningSettings,
     ) -> Result<States, ConditioningError> {
+        States::build(log, cutoff_hz, settings, true)
+    }
+
+    fn build(
+        log: &PreparedLog,
+        cutoff_hz: f64,
+        settings: &ConditioningSettings,
+        with_effort: bool,
+    ) -> Result<States, ConditioningError> {
         let filter = butterworth(settings.state_order, cutoff_hz, log.rate_hz)?;
-        let per_joint = (0..log.position.len())
-            .into_par_iter()
-            .map(|j| {
-                let effort = forward_backward(&filter, &log.effort[j])?;
+        let samples = log.samples();
+        let [mut q, mut dq, mut ddq] = [(); 3].map(|()| vec![0.0; samples * log.position.len()]);
+        // Every joint writes to its place: long logs leave no room for a second copy.
+        let places = q
+            .par_chunks_exact_mut(samples.max(1))
+            .zip(dq.par_chunks_exact_mut(samples.max(1)))
+            .zip(ddq.par_chunks_exact_mut(samples.max(1)));
+        let per_joint = places
+            .enumerate()
+            .map(|(j, ((q, dq), ddq))| {
+                let effort = match with_effort {
+                    true => forward_backward(&filter, &log.effort[j])?,
+                    false => Vec::new(),
+                };
                 if let Some(motion) = &log.periodic {
-                    let (q, dq, ddq) = (motion.q[j].clone(), motion.dq[j].clone(), motion.ddq[j].clone());
-                    return Ok((q, dq, ddq, effort, motion.velocity_sigma[j]));
+                    q.copy_from_slice(&motion.q[j]);
+                    dq.copy_from_slice(&motion.dq[j]);
+                    ddq.copy_from_slice(&motion.ddq[j]);
+                    return Ok((effort, motion.velocity_sigma[j]));
                 }
-                let [q, dq, ddq] = motion(&filter, &log.position[j], log.rate_hz)?;
+                for (place, signal) in
+                    [q, dq, ddq].into_iter().zip(motion(&filter, &log.position[j], log.rate_hz)?)
+                {
+                    place.copy_from_slice(&signal);
+                }
                 let floor = log.position_noise[j].floor_psd;
                 let sigma = velocity_noise(floor, settings.state_order, cutoff_hz, log.rate_hz)?;
-                Ok((q, dq, ddq, effort, sigma))
+                Ok((effort, sigma))
             })
             .collect::<Result<Vec<_>, ConditioningError>>()?;
-        let mut states = States {
-            samples: log.samples(),
-            rate_hz: log.rate_hz,
-            cutoff_hz,
-            q: Vec::new(),
-            dq: Vec::new(),
-            ddq: Vec::new(),
-            effort: Vec::new(),
-            velocity_sigma: Vec::new(),
-        };
-        for (q, dq, ddq, effort, sigma) in per_joint {
-            states.q.extend(q);
-            states.dq.extend(dq);
-            states.ddq.extend(ddq);
-            states.effort.push(effort);
-            states.velocity_sigma.push(sigma);
-        }
-        Ok(states)
+        let (effort, velocity_sigma) = per_joint.into_iter().unzip();
+        Ok(States { samples, rate_hz: log.rate_hz, cutoff_hz, q, dq, ddq, effort, velocity_sigma })
     }
 
     /// States at a cut-off that counts up to what the sample rate of the log allows.
@@ -84,6 +93,18 @@ impl States {
         settings: &ConditioningSettings,
     ) -> Result<States, ConditioningError> {
         States::new(log, state_hz.min(settings.cutoff.state_rate * log.rate_hz), settings)
+    }
+
+    /// States at a cut-off that counts up to what the sample rate of the log allows, without efforts.
+    ///
+    /// # Errors
+    /// As [`States::new`].
+    pub fn of_motion(
+        log: &PreparedLog,
+        state_hz: f64,
+        settings: &ConditioningSettings,
+    ) -> Result<States, ConditioningError> {
+        States::build(log, state_hz.min(settings.cutoff.state_rate * log.rate_hz), settings, false)
     }
 
     /// States of another motion on the same grid: through the same filter, differentiated alike. They have no effort and no
@@ -200,31 +221,49 @@ fn motion(filter: &Sections, position: &[f64], rate_hz: f64) -> Result<[Vec<f64>
     Ok([q, dq, ddq])
 }
 
-/// Running counts of bad samples, so that any window is judged by two look-ups.
+/// Bad samples and their running counts, so that any window is judged by two look-ups. A count stands per word of 64 samples: one per sample
+/// would take more room than the log.
 #[derive(Debug, Clone)]
-pub(crate) struct BadSamples(Vec<u32>);
+pub(crate) struct BadSamples {
+    samples: usize,
+    /// Bit `k % 64` of word `k / 64`: sample `k` is bad.
+    words: Vec<u64>,
+    /// Bad samples before every word.
+    before: Vec<u32>,
+}
 
 impl BadSamples {
     pub(crate) fn new(bad: impl Iterator<Item = bool>) -> Self {
-        let mut count = 0;
-        let mut counts = vec![0];
-        counts.extend(bad.map(|b| {
-            count += u32::from(b);
-            count
-        }));
-        BadSamples(counts)
+        let mut out = BadSamples { samples: 0, words: vec![0], before: vec![0] };
+        for bad in bad {
+            let last = out.words.len() - 1;
+            out.words[last] |= u64::from(bad) << (out.samples % 64);
+            out.samples += 1;
+            if out.samples.is_multiple_of(64) {
+                out.before.push(out.before[last] + out.words[last].count_ones());
+                out.words.push(0);
+            }
+        }
+        out
+    }
+
+    /// Bad samples before one.
+    fn count(&self, sample: usize) -> u32 {
+        let earlier = (1u64 << (sample % 64)) - 1;
+        self.before[sample / 64] + (self.words[sample / 64] & earlier).count_ones()
     }
 
     /// True if no bad sample and no end of the record lies within `reach` of `centre`.
     pub(crate) fn clean(&self, centre: usize, reach: usize) -> bool {
-        let samples = self.0.len() - 1;
-        centre >= reach && centre + reach < samples && self.0[centre - reach] == self.0[centre + reach + 1]
+        centre >= reach
+            && centre + reach < self.samples
+            && self.count(centre - reach) == self.count(centre + reach + 1)
     }
 
     /// True if no bad sample lies within `reach` of `centre`; the record's ends do not count.
     fn quiet(&self, centre: usize, reach: usize) -> bool {
-        let end = (centre + reach + 1).min(self.0.len() - 1);
-        self.0[centre.saturating_sub(reach)] == self.0[end]
+        let end = (centre + reach + 1).min(self.samples);
+        self.count(centre.saturating_sub(reach)) == self.count(end)
     }
 }
 

@@ -35,7 +35,9 @@ impl Inertial {
                 *x = 0.0;
             }
             if !is_in_range(*x) {
-                return Err(format!("its mass, centre of mass or tensor holds {x:e}, beyond what readers take"));
+                return Err(format!(
+                    "its mass, centre of mass or tensor holds {x:e}, beyond what readers take"
+                ));
             }
         }
         Ok(self)

@@ -15,9 +15,9 @@ use std::time::{Duration, Instant};
 
 use dynid::design::DesignConfig;
 use dynid::inspect::inspect;
-use dynid::online::Session;
 use dynid::io::TrajectoryFile;
 use dynid::io::csv::{self, ReadOptions};
+use dynid::online::Session;
 use dynid::predict::{efforts, read_states};
 use dynid::simulate::{SimulateSettings, simulate};
 use dynid::{Config, Estimate, FrictionConfig, FrictionModel, Robot, RobotOptions};
