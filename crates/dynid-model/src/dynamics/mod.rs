@@ -1,6 +1,6 @@
 //! Dynamics of a mechanism: inverse and forward dynamics, regressor, kinematics, mass matrix, energies.
 //!
-//! Notation and equations: *Own derivation* in the guide (`docs/guide.md`), after Featherstone 2008 and
+//! Notation and equations: the chapter *Equations on one page* of the book (`docs/book/src/theory/equations.md`), after Featherstone 2008 and
 //! Atkeson, An & Hollerbach 1986. Frames: body quantities in axes of the body's joint frame, gravity in base axes.
 
 mod adjoint;
