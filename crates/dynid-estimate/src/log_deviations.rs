@@ -65,9 +65,9 @@ pub struct LogDeviations {
 /// Rows of a log, without those of other logs.
 #[derive(Debug, Clone)]
 struct OneLog {
-    /// Its own columns that its rows tell from each other.
+    /// Columns of this log alone that its rows tell from each other.
     own: Vec<OwnColumn>,
-    /// Their values.
+    /// Values of the parameters of these columns.
     values: Vec<f64>,
     groups: Vec<OneGroup>,
 }

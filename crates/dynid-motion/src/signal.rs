@@ -17,7 +17,7 @@ pub enum SignalError {
     NotFinite {
         /// Index of the first offending sample, from 0.
         sample: usize,
-        /// Its value.
+        /// Value of that sample.
         found: f64,
     },
     /// Two signals that belong together have different lengths.

@@ -19,7 +19,7 @@ pub enum SettingsError {
     Number {
         /// Which number.
         what: &'static str,
-        /// Its place in a list, 0 for single numbers.
+        /// Place of the number in a list, 0 for single numbers.
         index: usize,
         /// What it should be.
         expected: &'static str,
@@ -73,7 +73,7 @@ pub enum SampleError {
     NotFinite {
         /// Which number.
         what: &'static str,
-        /// Its place in the slice.
+        /// Place of the number in the slice.
         index: usize,
     },
     /// A deviation of a row's noise is not positive, or a covariance not positive definite.

@@ -194,13 +194,13 @@ impl Estimator {
         self.step_where(regressor, effort, noise, |_| Watch::Count)
     }
 
-    /// As [`Self::step`], with change detection as `watched` says of the sample's innovations; the estimate is updated by every sample.
+    /// Takes a sample as [`Self::step`] does, with change detection as `watched` says of the sample's innovations; the estimate is updated by every sample.
     ///
     /// What rows ask of the estimate that those before did not tell ([`Innovation::leverage`]) shows in the errors of a model that is not
     /// quite right, though nothing has changed.
     ///
     /// # Errors
-    /// As [`Self::step`].
+    /// Fails as [`Self::step`] does.
     pub fn step_where(
         &mut self,
         regressor: &[f64],

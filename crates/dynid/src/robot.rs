@@ -52,10 +52,10 @@ impl Robot {
         Self::of_file(path, dynid_io::robot::read(path)?, options)
     }
 
-    /// The same from the text of a TOML robot file; `path` stands in messages and provenance.
+    /// Loads a robot from the text of a TOML robot file; `path` stands in messages and provenance.
     ///
     /// # Errors
-    /// As [`Robot::load`].
+    /// Fails as [`Robot::load`] does.
     pub fn parse(text: &str, path: &Path, options: &RobotOptions) -> Result<Robot, Error> {
         let file = dynid_io::toml_robot::parse(text, &path.display().to_string())?;
         Self::of_file(path, file, options)
@@ -99,10 +99,10 @@ impl Robot {
         Ok(Robot { path: path.to_owned(), mechanism, closed, axes, elements, file, warnings })
     }
 
-    /// The same robot with more joints held still; a motor stands still with its joint.
+    /// Returns the robot with more joints held still; a motor stands still with its joint.
     ///
     /// # Errors
-    /// As [`Robot::load`].
+    /// Fails as [`Robot::load`] does.
     pub fn locked(&self, joints: &[(String, f64)]) -> Result<Robot, Error> {
         let is_motor = |name: &String| self.axes.iter().any(|a| a.motor && a.name == *name);
         let (motors, joints): (Vec<_>, Vec<_>) = joints.iter().cloned().partition(|(name, _)| is_motor(name));
@@ -122,10 +122,10 @@ impl Robot {
         Ok(robot)
     }
 
-    /// The same robot with another file.
+    /// Returns the robot with another file.
     ///
     /// # Errors
-    /// As [`Robot::load`].
+    /// Fails as [`Robot::load`] does.
     pub(crate) fn changed(&self, change: impl FnOnce(&mut RobotFile)) -> Result<Robot, Error> {
         let mut file = self.file.clone();
         change(&mut file);

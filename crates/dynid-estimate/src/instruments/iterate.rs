@@ -59,7 +59,7 @@ pub struct Iteration {
 /// after `max_rounds` (10) simulations.
 ///
 /// # Errors
-/// Those of `simulate`; [`LinearError`] as [`instrumental`].
+/// Passes on errors of `simulate`; [`LinearError`] as [`instrumental`] returns it.
 pub fn iterate<E: From<LinearError>>(
     start: &[f64],
     sizes: &[f64],

@@ -112,7 +112,7 @@ impl Rewiring {
 }
 
 impl Wiring {
-    /// As the log says.
+    /// The wiring that the log states.
     pub fn identity(joints: usize) -> Self {
         let plain: Vec<Source> =
             (0..joints).map(|joint| Source { joint, factor: 1.0, offset: 0.0 }).collect();

@@ -35,7 +35,7 @@ const SLOWEST: (usize, f64) = (60, 0.1);
 struct Noise {
     /// Into the readings of the controller, rad.
     loop_: f64,
-    /// The same noise into the log.
+    /// Whether the log has the noise that the controller reads.
     logged: bool,
     /// Into the logged effort.
     effort: f64,

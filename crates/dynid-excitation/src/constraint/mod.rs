@@ -187,6 +187,6 @@ pub trait PathConstraint: Send + Sync {
     /// `3 n` numbers each, `n` the number of rates; `out` has room for exactly these.
     ///
     /// # Panics
-    /// As [`PathConstraint::values`]; if a row or sample does not exist, or a joint floats.
+    /// Panics as [`PathConstraint::values`] does; if a row or sample does not exist, or a joint floats.
     fn gradients(&self, motion: &MotionBlock<'_>, wanted: &[(usize, usize)], out: &mut [f64]);
 }

@@ -57,7 +57,7 @@ struct NodeFrame {
     origin: Vec3<f64>,
 }
 
-/// The same frame in base axes.
+/// A frame of a closure in base axes.
 struct WorldFrame<S> {
     axes: Mat3<S>,
     origin: Vec3<S>,

@@ -180,7 +180,7 @@ impl ClosedModel {
         self.loads = Some(loads);
     }
 
-    /// The same loads at other parameters.
+    /// Returns the model with its loads at other parameters.
     ///
     /// # Errors
     /// [`LoadError::Value`] for a wrong length.

@@ -81,7 +81,7 @@ impl DynamicsWorkspace<f64> {
     }
 }
 
-/// The same memory for the fused twin of a scalar.
+/// Memory of the recursions for the fused twin of a scalar.
 #[derive(Clone, Debug)]
 struct FusedWorkspace<F> {
     inverse: InverseDynamicsWorkspace<F>,
@@ -126,7 +126,7 @@ impl Dynamics {
         }
     }
 
-    /// The same recursions with every joint a coordinate of its own.
+    /// Returns the recursions with every joint a coordinate for itself.
     pub(crate) fn uncoupled(mut self) -> Self {
         self.follows = None;
         self.rates = self.tree.rates;

@@ -52,7 +52,7 @@ pub struct ClearanceContact {
 pub struct JournalMotion {
     /// Centre in bearing axes, m.
     pub position: [f64; 2],
-    /// Its rate, m/s.
+    /// Rate of the centre, m/s.
     pub rate: [f64; 2],
     /// Rate of the rotation, rad/s.
     pub spin: f64,
@@ -67,7 +67,7 @@ pub struct JournalContact {
     pub normal: [f64; 2],
     /// Penetration `δ`, m; negative without contact.
     pub penetration: f64,
-    /// Its rate, m/s.
+    /// Rate of the penetration, m/s.
     pub penetration_rate: f64,
     /// Sliding speed `v_t`, m/s.
     pub sliding: f64,

@@ -11,7 +11,7 @@ pub fn translation_names(joint: &str) -> [String; 2] {
 }
 
 impl Description {
-    /// The same robot with clearance in some revolute joints.
+    /// Returns the robot with clearance in some revolute joints.
     ///
     /// Each of them becomes three: translations `<joint>.x` and `<joint>.y` of the journal's centre along two axes of the
     /// bearing at right angles to the joint's axis (m), then the rotation under its old name. For an axis along z, `x` and

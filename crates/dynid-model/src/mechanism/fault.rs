@@ -155,7 +155,7 @@ pub enum MechanismWarning {
     MimicIndependent {
         /// The mimic joint.
         joint: String,
-        /// Its leader.
+        /// Leader of the mimic joint.
         of: String,
     },
     /// A joint was locked because nothing moves it.

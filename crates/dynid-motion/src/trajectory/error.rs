@@ -89,7 +89,7 @@ pub enum TrajectoryError {
         coordinate: usize,
         /// Base frequency of the first series, rad/s.
         expected: f64,
-        /// Its base frequency, rad/s.
+        /// Base frequency of the other series, rad/s.
         found: f64,
     },
     /// A state through which the motion must go breaks a limit.

@@ -70,7 +70,7 @@ pub struct HeldOut {
     pub joints: Vec<HeldOutJoint>,
     /// `100 |residual| / |effort|` over all joints without constraints, %.
     pub free_percent: Option<f64>,
-    /// The same of the consistent parameters, %.
+    /// `100 |residual| / |effort|` of the consistent parameters, %.
     pub consistent_percent: Option<f64>,
 }
 

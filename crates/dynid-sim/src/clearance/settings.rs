@@ -15,7 +15,7 @@ pub enum Method {
         /// Longest step, s. Default: none.
         longest_step: f64,
     },
-    /// The same with equal steps, to see its order.
+    /// Collocation with equal steps, to see its order.
     CollocationSteps {
         /// Step between located instants, s.
         step: f64,

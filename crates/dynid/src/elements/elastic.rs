@@ -23,13 +23,13 @@ pub enum ElasticFault {
     Fixed,
     /// It follows another joint, or others follow it.
     Follows,
-    /// Its motor is one of a coupling of joints.
+    /// The motor is one of a coupling of joints.
     Coupled,
     /// It has a sensor, but bodies act on other joints, which have none.
     OthersWithoutSensor(Vec<String>),
     /// `elastic` is among its elements, but nothing states the ratio.
     NoRatio,
-    /// Its position is logged, that of its motor is not.
+    /// The position of the joint is logged, that of its motor is not.
     MotorNotLogged(String),
 }
 

@@ -9,7 +9,7 @@ pub struct FrictionTrial {
     pub joint: String,
     /// Element that stands for the shape.
     pub element: String,
-    /// Its speed (`vs`, `w`) in the grid of the search, rad/s or m/s; absent where the shape has none.
+    /// Speed of the shape (`vs`, `w`) in the grid of the search, rad/s or m/s; absent where the shape has none.
     pub speed: Option<f64>,
     /// Share by which the joint's held-out mean square falls: of an accepted shape against the choice without it, of
     /// another one beside the choice.

@@ -54,7 +54,7 @@ pub struct ModelRecord {
 pub struct ElasticRecord {
     /// Joint.
     pub joint: String,
-    /// Its motor, an effort of its own.
+    /// Motor of the joint, an effort of its own.
     pub motor: String,
     /// Travel of the motor over that of the joint with a stiff spring.
     pub ratio: f64,

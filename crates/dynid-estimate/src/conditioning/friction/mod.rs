@@ -22,7 +22,7 @@ pub struct FrictionSettings {
     /// First shape of a joint: standard errors of the gain over time blocks, share of the joint's held-out loss.
     /// Default 1.4, 0.01.
     pub first: (f64, f64),
-    /// The same for a second shape. Default 2.5, 0.03.
+    /// What a second shape must gain: standard errors over blocks, and share of the mean square. Default 2.5, 0.03.
     pub second: (f64, f64),
     /// Candidates tried on held-out blocks, after all were ranked by the loss on all rows. Default 4.
     pub tried: usize,
