@@ -45,12 +45,13 @@ fn section(text: &mut String, types: &BTreeMap<String, Type>, name: &str, places
     if !of.doc.is_empty() && !places[0].is_empty() {
         let _ = write!(text, "{}\n\n", plain(&of.doc));
     }
-    text.push_str("| key | value | default | meaning |\n|---|---|---|---|\n");
-    if let Kind::Table(keys) = &of.kind {
-        for key in keys {
-            let default = key.default.as_ref().map(|d| format!("`{}`", d.replace('_', ""))).unwrap_or_default();
-            let _ = writeln!(text, "| `{}` | {} | {default} | {} |", key.name, value(&key.of, types), plain(&meaning(key, types)));
-        }
+    let Kind::Table(keys) = &of.kind else { return };
+    let with_defaults = keys.iter().any(|k| k.default.is_some());
+    text.push_str(if with_defaults { "| key | value | default | meaning |\n|---|---|---|---|\n" } else { "| key | value | meaning |\n|---|---|---|\n" });
+    for key in keys {
+        let default = key.default.as_ref().map(|d| format!("`{}`", d.replace('_', ""))).unwrap_or_default();
+        let default = if with_defaults { format!(" {default} |") } else { String::new() };
+        let _ = writeln!(text, "| `{}` | {} |{default} {} |", key.name, value(&key.of, types), plain(&meaning(key, types)));
     }
     text.push('\n');
 }
