@@ -39,8 +39,16 @@ impl Panel {
     fn grid(&self, svg: &mut String, marks: &[f64]) {
         for mark in marks {
             let y = self.y(*mark);
-            let _ = writeln!(svg, r##"<line x1="{LEFT}" x2="{RIGHT}" y1="{y:.1}" y2="{y:.1}" stroke="#d8dde3"/>"##);
-            let _ = writeln!(svg, r#"<text x="{}" y="{:.1}" text-anchor="end">{mark}</text>"#, LEFT - 8.0, y + 4.0);
+            let _ = writeln!(
+                svg,
+                r##"<line x1="{LEFT}" x2="{RIGHT}" y1="{y:.1}" y2="{y:.1}" stroke="#d8dde3"/>"##
+            );
+            let _ = writeln!(
+                svg,
+                r#"<text x="{}" y="{:.1}" text-anchor="end">{mark}</text>"#,
+                LEFT - 8.0,
+                y + 4.0
+            );
         }
     }
 
@@ -77,9 +85,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let x = LEFT + second as f64 / SECONDS * (RIGHT - LEFT);
         let _ = writeln!(svg, r#"<text x="{x:.1}" y="317" text-anchor="middle">{second}</text>"#);
     }
-    let _ = writeln!(svg, r#"<text x="{LEFT}" y="20">effort of joint 2, N m, on a log that the model has not seen</text>"#);
-    let _ = writeln!(svg, r##"<text x="{RIGHT}" y="20" text-anchor="end"><tspan fill="#c9711d">measured</tspan>, <tspan fill="#17375e">predicted</tspan></text>"##);
-    let _ = writeln!(svg, r#"<text x="{LEFT}" y="226">difference, N m</text><text x="{RIGHT}" y="333" text-anchor="end">time, s</text>"#);
+    let _ = writeln!(
+        svg,
+        r#"<text x="{LEFT}" y="20">effort of joint 2, N m, on a log that the model has not seen</text>"#
+    );
+    let _ = writeln!(
+        svg,
+        r##"<text x="{RIGHT}" y="20" text-anchor="end"><tspan fill="#c9711d">measured</tspan>, <tspan fill="#17375e">predicted</tspan></text>"##
+    );
+    let _ = writeln!(
+        svg,
+        r#"<text x="{LEFT}" y="226">difference, N m</text><text x="{RIGHT}" y="333" text-anchor="end">time, s</text>"#
+    );
     svg.push_str("</svg>\n");
     std::fs::create_dir_all(Path::new(OUT).parent().ok_or("a folder")?)?;
     std::fs::write(OUT, svg)?;

@@ -68,7 +68,9 @@ impl Run<'_> {
         for (index, (command, expected)) in commands.into_iter().enumerate() {
             let (code, printed) = run(&command, folder);
             let demanded = if index + 1 == count { exit } else { 0 };
-            let differs = (!expected.trim().is_empty()).then(|| shown::difference(&expected, &printed, digits)).flatten();
+            let differs = (!expected.trim().is_empty())
+                .then(|| shown::difference(&expected, &printed, digits))
+                .flatten();
             let why = match differs {
                 _ if code != Some(demanded) => format!("exit code {code:?}, demanded {demanded}"),
                 Some(difference) => difference,
@@ -104,7 +106,8 @@ fn commands(text: &str) -> Vec<(String, String)> {
 /// Exit code and both streams, as they come.
 fn run(command: &str, folder: &Path) -> (Option<i32>, String) {
     let program = Path::new(env!("CARGO_BIN_EXE_dynid"));
-    let path = format!("{}:{}", program.parent().unwrap().display(), std::env::var("PATH").unwrap_or_default());
+    let path =
+        format!("{}:{}", program.parent().unwrap().display(), std::env::var("PATH").unwrap_or_default());
     let output = Command::new("sh")
         .args(["-c", &format!("{{ {command}\n}} 2>&1")])
         .current_dir(folder)

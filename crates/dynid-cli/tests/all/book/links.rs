@@ -7,7 +7,8 @@ use super::markdown_below;
 
 /// Links of all documents that lead to no file or to no heading of it.
 pub(super) fn broken(root: &Path) -> Vec<String> {
-    let mut documents = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"].map(|f| root.join(f)).to_vec();
+    let mut documents =
+        ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"].map(|f| root.join(f)).to_vec();
     for folder in ["docs", "bench", "crates"] {
         documents.extend(markdown_below(&root.join(folder)));
     }

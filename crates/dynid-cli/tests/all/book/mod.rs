@@ -75,8 +75,10 @@ fn long_commands_print_what_the_pages_show() {
 
 #[test]
 fn files_on_the_pages_are_what_they_claim() {
-    let faults: Vec<String> =
-        pages().iter().flat_map(|(name, page)| page.blocks.iter().filter_map(|b| files::fault(name, b))).collect();
+    let faults: Vec<String> = pages()
+        .iter()
+        .flat_map(|(name, page)| page.blocks.iter().filter_map(|b| files::fault(name, b)))
+        .collect();
     demand_none(&faults);
 }
 
@@ -88,4 +90,27 @@ fn links_lead_somewhere() {
 #[test]
 fn the_summary_lists_every_page_once() {
     demand_none(&links::summary_faults(&root().join("docs/book/src")));
+}
+
+/// Numbers of a text, as they are written.
+fn numbers(text: &str) -> Vec<&str> {
+    let parts = text.split(|c: char| !(c.is_ascii_digit() || c == '.')).map(|word| word.trim_matches('.'));
+    parts.filter(|word| word.contains(|c: char| c.is_ascii_digit())).collect()
+}
+
+#[test]
+fn numbers_of_the_readme_are_those_of_the_results() {
+    let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
+    let results = std::fs::read_to_string(root().join("docs/results.md")).unwrap();
+    let (_, rest) = readme.split_once("## What it does better").expect("the section with claims");
+    let (claims, _) = rest.split_once("\n## ").unwrap();
+    let measured = numbers(&results);
+    let claimed = numbers(claims);
+    assert!(claimed.len() > 4, "{claimed:?}");
+    let faults: Vec<String> = claimed
+        .into_iter()
+        .filter(|number| !measured.contains(number))
+        .map(|number| format!("README.md claims {number}, which docs/results.md does not have"))
+        .collect();
+    demand_none(&faults);
 }

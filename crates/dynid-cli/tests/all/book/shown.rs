@@ -47,7 +47,9 @@ fn tokens_agree(shown: &[Token<'_>], printed: &[Token<'_>], digits: i32) -> bool
         ([Token::Anything, rest @ ..], _) => {
             (0..=printed.len()).any(|skipped| tokens_agree(rest, &printed[skipped..], digits))
         }
-        ([s, shown @ ..], [p, printed @ ..]) => token_agrees(s, p, digits) && tokens_agree(shown, printed, digits),
+        ([s, shown @ ..], [p, printed @ ..]) => {
+            token_agrees(s, p, digits) && tokens_agree(shown, printed, digits)
+        }
         _ => false,
     }
 }

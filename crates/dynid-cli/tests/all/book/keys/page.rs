@@ -16,8 +16,16 @@ pub(super) fn tables(types: &BTreeMap<String, Type>, top: &str) -> String {
         if let Kind::Table(keys) = &types[&name].kind {
             for key in keys {
                 for (below, many) in tables_in(&key.of, types) {
-                    let path = [places[0].as_str(), &key.name].iter().filter(|p| !p.is_empty()).copied().collect::<Vec<_>>();
-                    let path = if many == Many::ByName { format!("{}.NAME", path.join(".")) } else { path.join(".") };
+                    let path = [places[0].as_str(), &key.name]
+                        .iter()
+                        .filter(|p| !p.is_empty())
+                        .copied()
+                        .collect::<Vec<_>>();
+                    let path = if many == Many::ByName {
+                        format!("{}.NAME", path.join("."))
+                    } else {
+                        path.join(".")
+                    };
                     match sections.iter_mut().find(|(name, _)| *name == below) {
                         Some((_, places)) if !places.contains(&path) => places.push(path),
                         Some(_) => {}
@@ -47,11 +55,21 @@ fn section(text: &mut String, types: &BTreeMap<String, Type>, name: &str, places
     }
     let Kind::Table(keys) = &of.kind else { return };
     let with_defaults = keys.iter().any(|k| k.default.is_some());
-    text.push_str(if with_defaults { "| key | value | default | meaning |\n|---|---|---|---|\n" } else { "| key | value | meaning |\n|---|---|---|\n" });
+    text.push_str(if with_defaults {
+        "| key | value | default | meaning |\n|---|---|---|---|\n"
+    } else {
+        "| key | value | meaning |\n|---|---|---|\n"
+    });
     for key in keys {
         let default = key.default.as_ref().map(|d| format!("`{}`", d.replace('_', ""))).unwrap_or_default();
         let default = if with_defaults { format!(" {default} |") } else { String::new() };
-        let _ = writeln!(text, "| `{}` | {} |{default} {} |", key.name, value(&key.of, types), plain(&meaning(key, types)));
+        let _ = writeln!(
+            text,
+            "| `{}` | {} |{default} {} |",
+            key.name,
+            value(&key.of, types),
+            plain(&meaning(key, types))
+        );
     }
     text.push('\n');
 }
@@ -62,7 +80,8 @@ fn meaning(key: &Key, types: &BTreeMap<String, Type>) -> String {
         return key.doc.clone();
     };
     let told = names.iter().filter(|(_, doc)| !doc.is_empty());
-    let told: Vec<String> = told.map(|(name, doc)| format!("`{name}`: {}", doc.trim_end_matches('.'))).collect();
+    let told: Vec<String> =
+        told.map(|(name, doc)| format!("`{name}`: {}", doc.trim_end_matches('.'))).collect();
     if told.is_empty() { key.doc.clone() } else { format!("{} {}.", key.doc, told.join("; ")) }
 }
 
@@ -71,7 +90,11 @@ fn value(of: &syn::Type, types: &BTreeMap<String, Type>) -> String {
     match of {
         syn::Type::Array(array) => {
             let syn::Expr::Lit(length) = &array.len else { return "list".to_owned() };
-            format!("list of {} {}", quote::ToTokens::to_token_stream(length), plural(&value(&array.elem, types)))
+            format!(
+                "list of {} {}",
+                quote::ToTokens::to_token_stream(length),
+                plural(&value(&array.elem, types))
+            )
         }
         syn::Type::Tuple(tuple) => {
             format!("[{}]", tuple.elems.iter().map(|t| value(t, types)).collect::<Vec<_>>().join(", "))

@@ -117,11 +117,16 @@ fn stated(item: &ImplItem) -> Vec<(String, String)> {
         },
         Expr::Array(list) => {
             let text = list.to_token_stream().to_string();
-            text.chars().all(|c| "[]0123456789.,-e_ ".contains(c)).then(|| text.replace(" ,", ",").replace("[ ", "["))
+            text.chars()
+                .all(|c| "[]0123456789.,-e_ ".contains(c))
+                .then(|| text.replace(" ,", ",").replace("[ ", "["))
         }
         _ => None,
     };
-    made.fields.iter().filter_map(|f| Some((f.member.to_token_stream().to_string(), value(&f.expr)?))).collect()
+    made.fields
+        .iter()
+        .filter_map(|f| Some((f.member.to_token_stream().to_string(), value(&f.expr)?)))
+        .collect()
 }
 
 /// Text of doc comments, in one line.
