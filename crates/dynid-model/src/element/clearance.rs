@@ -32,7 +32,7 @@ pub fn impact_speed_signal(joint: &str) -> String {
 /// unit. The speed `v0` at the start of a contact is a signal; where it is missing, the law's floor stands in.
 ///
 /// Degenerate: where the load does not change, nor the penetration, `K` cannot be told from the clearance. Stiff: forces
-/// grow by 1e7 N/m. Sources: Sun, Han, Li & Li 2021, Eqs. 1 to 30, as restored in the guide; Ambrósio 2003 for `c_d`.
+/// grow by 1e7 N/m. Sources: Sun, Han, Li & Li 2021, Eqs. 1 to 30, as written in the chapter *Joints with clearance* of the book; Ambrósio 2003 for `c_d`.
 #[derive(Debug, Clone)]
 pub struct ClearanceContact {
     /// Rate of the rotation.
