@@ -30,7 +30,7 @@ pub struct OwnColumn {
 /// What one log has more than the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
-    /// Which parameter.
+    /// Name of the parameter.
     pub of: OwnColumn,
     /// Deviation, in the parameter's unit.
     pub value: f64,

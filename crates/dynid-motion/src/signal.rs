@@ -23,7 +23,7 @@ pub enum SignalError {
     /// Two signals that belong together have different lengths.
     #[error("{what}: expected {expected} samples, found {found}")]
     Length {
-        /// Which signal.
+        /// Name of the signal.
         what: &'static str,
         /// Samples expected.
         expected: usize,

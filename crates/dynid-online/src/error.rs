@@ -8,7 +8,7 @@ use core::fmt;
 pub enum SettingsError {
     /// A list has the wrong length.
     Length {
-        /// Which list.
+        /// Name of the list.
         what: &'static str,
         /// What it should have.
         expected: usize,
@@ -17,7 +17,7 @@ pub enum SettingsError {
     },
     /// A number is out of range.
     Number {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
         /// Place of the number in a list, 0 for single numbers.
         index: usize,
@@ -55,7 +55,7 @@ impl core::error::Error for SettingsError {}
 pub enum SampleError {
     /// A slice has the wrong length.
     Length {
-        /// Which slice.
+        /// Name of the slice.
         what: &'static str,
         /// What it should have.
         expected: usize,
@@ -71,7 +71,7 @@ pub enum SampleError {
     },
     /// A number is not finite, or so large in units of its deviation that squares would overflow.
     NotFinite {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
         /// Place of the number in the slice.
         index: usize,

@@ -28,9 +28,9 @@ const STATE_VERSION: u64 = 1;
 /// What change detection makes of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Watch {
-    /// It counts.
+    /// The row counts for change detection.
     Count,
-    /// It is passed over.
+    /// Change detection passes the row over.
     Pass,
     /// The sum starts again from zero.
     Restart,

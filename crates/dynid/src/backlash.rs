@@ -23,7 +23,7 @@ use crate::logs;
 pub enum BacklashVerdict {
     /// The residual holds the trace of a gap, beyond what else looks like one.
     Found,
-    /// It does not.
+    /// The log does not show a gap.
     NotFound,
     /// The load changes its sign too seldom away from reversals.
     NoCrossings,

@@ -130,7 +130,7 @@ pub struct Estimate {
 /// A finding of the pre-flight ([`crate::check`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FindingRecord {
-    /// Which fault.
+    /// Name of the fault.
     pub id: String,
     /// `info`, `warning` or `error`.
     pub severity: String,

@@ -9,7 +9,7 @@ use crate::linear::LinearError;
 pub enum Simulated {
     /// Rows paired with its regressor.
     Rows(Vec<ReducedGroup>),
-    /// It left the reference, or could not go on.
+    /// The simulation left the reference, or could not go on.
     Diverged {
         /// Largest distance from the reference, rad or m; infinite where it could not go on.
         distance: f64,

@@ -54,7 +54,7 @@ pub enum Rewiring {
     EffortOrder(Vec<usize>),
     /// Positions belong to other joints.
     PositionOrder(Vec<usize>),
-    /// Both belong to other joints, alike.
+    /// Positions and efforts both belong to other joints, alike.
     JointOrder(Vec<usize>),
     /// The position of a joint has another unit: it is to be multiplied by this.
     PositionUnit(usize, f64),

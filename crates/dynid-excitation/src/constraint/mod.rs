@@ -33,7 +33,7 @@ pub enum ConstraintError {
     /// A number that must be finite, or positive, is not.
     #[error("{what} of `{subject}` is {found}, expected {expected}")]
     Number {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
         /// Output, frame or region.
         subject: String,

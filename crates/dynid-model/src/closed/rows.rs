@@ -97,7 +97,7 @@ impl NodeFrame {
 #[derive(Clone, Copy, Debug)]
 struct Mover {
     rate: usize,
-    /// It moves `b`; otherwise `a`.
+    /// Whether the rate moves `b`; otherwise it moves `a`.
     moves_b: bool,
 }
 

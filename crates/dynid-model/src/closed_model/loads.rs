@@ -59,7 +59,7 @@ pub enum LoadError {
     /// A length that does not fit, or a number that is not finite.
     #[error("{what}: expected {expected}, found {found}")]
     Value {
-        /// Which value.
+        /// Name of the value.
         what: &'static str,
         /// What it should be.
         expected: String,

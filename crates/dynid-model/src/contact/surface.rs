@@ -27,7 +27,7 @@ pub struct SurfaceSettings {
     pub friction: f64,
     /// The body that yields first.
     pub softer: Material,
-    /// The other body.
+    /// The harder body.
     pub harder: Material,
     /// Yield strength `σ_y` of the softer body, Pa, above 0.
     pub yield_strength: f64,

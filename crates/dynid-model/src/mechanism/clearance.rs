@@ -115,7 +115,7 @@ impl JournalPath {
         }
     }
 
-    /// The other way round.
+    /// The path of a journal in axes that turn with the link, from the path in bearing axes.
     pub fn in_journal(&self, joint: [f64; 3]) -> JournalPath {
         self.in_bearing(joint.map(|x| -x))
     }

@@ -47,7 +47,7 @@ pub enum TrajectoryError {
     /// A number is not finite or not in the range where it must be.
     #[error("{name}: expected {expected}, found {found}")]
     Value {
-        /// Which number.
+        /// Name of the number.
         name: &'static str,
         /// The range it must lie in.
         expected: &'static str,

@@ -25,7 +25,7 @@ pub struct Consistency {
     pub status: Option<ConsistencyStatus>,
     /// Increase of the weighted sum of squares over the unconstrained fit, in residual variances.
     pub price: Option<f64>,
-    /// That increase over what the same number of parameters would take up by chance.
+    /// Increase of the weighted sum of squares over what the same number of parameters would take up by chance.
     pub price_over_chance: Option<f64>,
     /// Weight of the distance from the prior.
     pub prior_weight: Option<f64>,

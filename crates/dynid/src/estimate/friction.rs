@@ -35,7 +35,7 @@ pub struct PassivityRecord {
     /// Velocity at which friction feeds most power into the motion; absent where it is passive.
     #[serde(default)]
     pub worst_velocity: Option<f64>,
-    /// That power, W.
+    /// Power that friction feeds into the motion at that velocity, W.
     #[serde(default)]
     pub worst_power: Option<f64>,
     /// Static friction is identified below Coulomb friction.

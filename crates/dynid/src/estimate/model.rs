@@ -60,7 +60,7 @@ pub struct ElasticRecord {
     pub ratio: f64,
     /// The spring has a cubic part, `<joint>.k2`.
     pub cubic: bool,
-    /// It is damped, `<joint>.d`.
+    /// Whether the spring is damped, `<joint>.d`.
     pub damping: bool,
     /// A sensor behind the spring measures its torque; efforts of the joint are the negative readings.
     pub sensor: bool,

@@ -13,7 +13,7 @@ pub struct ConsistencyRecord {
     pub status: String,
     /// What consistency costs in fit: increase of the weighted sum of squares, in residual variances.
     pub price: f64,
-    /// That increase over what the same number of parameters would take up by chance, `price / (variance inflation ·
+    /// Increase of the weighted sum of squares over what the same number of parameters would take up by chance, `price / (variance inflation ·
     /// base parameters)`; around 1 is no more than noise.
     pub price_over_chance: Option<f64>,
     /// Weight of the distance from the robot file, as given or as large as held-out folds allow.

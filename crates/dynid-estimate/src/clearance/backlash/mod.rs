@@ -126,7 +126,7 @@ pub enum BacklashError {
 pub enum BacklashVerdict {
     /// The residual holds the trace of a gap, beyond what else looks like one.
     Found,
-    /// It does not.
+    /// The log does not show a gap.
     NotFound,
     /// The load changes its sign too seldom away from reversals: flanks stay where they are, whatever the gap.
     NoCrossings,

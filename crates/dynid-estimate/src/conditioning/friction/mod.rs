@@ -28,7 +28,7 @@ pub struct FrictionSettings {
     pub tried: usize,
     /// Fewest time blocks with rows of a joint; with fewer nothing is chosen for it. Default 4.
     pub least_blocks: usize,
-    /// Another rung of the mask ladder after the choice: standard errors of the gain, share of the loss.
+    /// Least gain for another rung of the mask ladder after the choice: standard errors of the gain, share of the loss.
     /// Default 1.4, 0.005.
     pub mask_again: (f64, f64),
 }
