@@ -34,7 +34,7 @@ const PAGES: [Keys; 5] = [
         opening: "Read by `design`. An example with comments: [The design file](../files/design.md).",
         top: "DesignConfig",
         sources: &[
-            "crates/dynid/src/design/config.rs",
+            "crates/dynid/src/design",
             "crates/dynid/src/config.rs",
             "crates/dynid/src/config",
             "crates/dynid-excitation/src/criterion/mod.rs",
@@ -46,14 +46,14 @@ const PAGES: [Keys; 5] = [
         title: "Keys of a friction experiment",
         opening: "Read by `friction`. An example with comments: [The file of a friction experiment](../files/friction.md).",
         top: "FrictionConfig",
-        sources: &["crates/dynid/src/friction/config.rs", "crates/dynid/src/config.rs", COLUMNS],
+        sources: &["crates/dynid/src/friction", "crates/dynid/src/config.rs", COLUMNS],
     },
     Keys {
         page: "simulate",
         title: "Keys of a virtual experiment",
         opening: "Read by `simulate --config`. An example with comments: [simulate](../commands/simulate.md).",
         top: "SimulateSettings",
-        sources: &["crates/dynid/src/simulate/settings.rs"],
+        sources: &["crates/dynid/src/simulate"],
     },
     Keys {
         page: "robot",
@@ -66,7 +66,7 @@ const PAGES: [Keys; 5] = [
     },
 ];
 
-const COLUMNS: &str = "crates/dynid-io/src/columns/spec.rs";
+const COLUMNS: &str = "crates/dynid-io/src/columns";
 const COUPLING: &str = "crates/dynid-io/src/toml_robot/elements.rs";
 
 /// `DYNID_WRITE_KEYS=1 cargo test -p dynid-cli --test all keys_of_files` writes the pages anew.

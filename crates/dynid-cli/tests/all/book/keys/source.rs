@@ -38,14 +38,14 @@ pub(super) fn read(root: &Path, sources: &[&str]) -> BTreeMap<String, Type> {
             let parsed = syn::parse_file(&std::fs::read_to_string(&file).unwrap()).unwrap();
             for item in parsed.items {
                 match item {
-                    Item::Struct(s) => {
+                    Item::Struct(s) if is_read(&s.attrs) => {
                         let Fields::Named(fields) = s.fields else { continue };
                         let case = serde(&s.attrs, "rename_all");
                         let keys = fields.named.into_iter().filter_map(|f| key(f, case.as_deref())).collect();
                         let doc = doc(&s.attrs);
                         types.entry(s.ident.to_string()).or_insert(Type { doc, kind: Kind::Table(keys) });
                     }
-                    Item::Enum(e) => {
+                    Item::Enum(e) if is_read(&e.attrs) => {
                         types.entry(e.ident.to_string()).or_insert(enumeration(e));
                     }
                     Item::Impl(i) if i.trait_.as_ref().is_some_and(|(path, _)| path.is_ident("Default")) => {
@@ -74,6 +74,12 @@ fn rust_files(path: &Path) -> Vec<std::path::PathBuf> {
     files.retain(|file| file.extension().is_some_and(|e| e == "rs"));
     files.sort();
     files
+}
+
+/// Whether a file is read into the type.
+fn is_read(attributes: &[Attribute]) -> bool {
+    let mut derived = attributes.iter().filter(|a| a.path().is_ident("derive"));
+    derived.any(|a| a.meta.to_token_stream().to_string().contains("Deserialize"))
 }
 
 fn key(field: syn::Field, case: Option<&str>) -> Option<Key> {
