@@ -83,7 +83,7 @@ fn feasible(problem: &Problem, settings: &Settings, x: &[f64], inside: &[f64]) -
 struct Pair {
     ours: ConsistentEstimate,
     theirs: Answer,
-    /// Theirs, made feasible.
+    /// Estimate of the conic solver, made feasible.
     x: Vec<f64>,
     /// Objectives from the definition: ours, theirs made feasible, theirs as it came.
     objectives: [f64; 3],

@@ -26,7 +26,7 @@ pub(crate) fn prepare_files(outputs: &[(&str, &Path)], inputs: &[&Path]) -> Resu
 /// Readies files of a folder that is made, with its parents, if it does not exist.
 ///
 /// # Errors
-/// As [`prepare_files`]; something that is no folder in the place of the folder or of a parent.
+/// Fails as [`prepare_files`] does, and for something that is no folder in the place of the folder or of a parent.
 pub(crate) fn prepare_folder(files: &[PathBuf], inputs: &[&Path]) -> Result<OutputSet, Failure> {
     let outputs: Vec<(&str, &Path)> = files.iter().map(|f| ("--out", f.as_path())).collect();
     prepare(&outputs, inputs)

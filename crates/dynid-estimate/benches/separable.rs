@@ -142,7 +142,7 @@ impl SeparableProblem for Arctangents {
     }
 }
 
-/// The same rows with all parameters searched.
+/// The rows of the problem with all parameters searched.
 struct General {
     fixed: Vec<RowGroup>,
     groups: Vec<RowGroup>,

@@ -21,7 +21,7 @@ pub struct PathStep {
     pub bic: f64,
     /// Column with the least statistic, the next to go.
     pub weakest: usize,
-    /// Its statistic `F`; infinite for an exact fit.
+    /// Statistic `F` of that column; infinite for an exact fit.
     pub statistic: f64,
 }
 
@@ -53,7 +53,7 @@ pub fn backward_elimination(factor: &Factor, effective_rows: f64) -> Vec<PathSte
     })
 }
 
-/// As [`backward_elimination`] with another statistic, such as the Wald form `F_i = x_i²/V_ii` with a robust `V`.
+/// Elimination as by [`backward_elimination`] with another statistic, such as the Wald form `F_i = x_i²/V_ii` with a robust `V`.
 ///
 /// `statistics(columns, solution)` is given the columns of the model (in the numbering of `factor`) and its
 /// solution (numbered within the model), and returns one value per column.

@@ -23,7 +23,7 @@ impl ReducedGroup {
         Factor::merge(&self.blocks.iter().collect::<Vec<_>>()).embed(total, &self.columns)
     }
 
-    /// The same rows without base columns that are not among `columns`: their parameters are held at zero.
+    /// Returns the rows without base columns that are not among `columns`: their parameters are held at zero.
     pub fn within(&self, columns: &[usize]) -> ReducedGroup {
         let places: Vec<usize> =
             (0..self.columns.len()).filter(|k| columns.contains(&self.columns[*k])).collect();
@@ -39,7 +39,7 @@ impl ReducedGroup {
         self.blocks.iter().map(Factor::rows).sum()
     }
 
-    /// The same rows in blocks `factor` times as long, the last one taking the rest: what
+    /// Returns the rows in blocks `factor` times as long, the last one taking the rest: what
     /// [`crate::covariance::block_length`] asks for when residuals stay correlated beyond a block.
     ///
     /// A rest of less than half a block joins the one before. Panics if `factor` is zero.

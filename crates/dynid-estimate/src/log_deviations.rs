@@ -30,7 +30,7 @@ pub struct OwnColumn {
 /// What one log has more than the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
-    /// Which parameter.
+    /// Name of the parameter.
     pub of: OwnColumn,
     /// Deviation, in the parameter's unit.
     pub value: f64,
@@ -65,9 +65,9 @@ pub struct LogDeviations {
 /// Rows of a log, without those of other logs.
 #[derive(Debug, Clone)]
 struct OneLog {
-    /// Its own columns that its rows tell from each other.
+    /// Columns of this log alone that its rows tell from each other.
     own: Vec<OwnColumn>,
-    /// Their values.
+    /// Values of the parameters of these columns.
     values: Vec<f64>,
     groups: Vec<OneGroup>,
 }

@@ -63,7 +63,7 @@ impl Settings {
 /// One start's end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StartOutcome {
-    /// Its seed.
+    /// Seed of the start.
     pub seed: u64,
     /// Unknowns at the end; see [`Parametrisation`].
     pub unknowns: Vec<f64>,

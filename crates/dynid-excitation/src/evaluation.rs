@@ -26,7 +26,7 @@ pub fn information(problem: &Problem, coefficients: &[Vec<f64>], samples: usize)
 /// Criterion with smoothed signs, and its gradient with respect to the coefficients; `None` where it is not defined.
 ///
 /// # Panics
-/// As [`information`].
+/// Panics as [`information`] does.
 pub fn criterion_gradient(
     problem: &Problem,
     coefficients: &[Vec<f64>],
@@ -57,7 +57,7 @@ pub fn criterion_gradient(
 /// first. `least = 0`: broken limits; `-1e-3`: limits that act.
 ///
 /// # Panics
-/// As [`information`].
+/// Panics as [`information`] does.
 pub fn limit_points(
     problem: &Problem,
     coefficients: &[Vec<f64>],

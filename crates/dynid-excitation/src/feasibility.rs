@@ -12,11 +12,11 @@ use crate::start::{draw, generator, shrunk};
 pub enum LimitKind {
     /// Position of a coordinate.
     Position,
-    /// Its velocity.
+    /// Velocity of a coordinate.
     Velocity,
-    /// Its acceleration.
+    /// Acceleration of a coordinate.
     Acceleration,
-    /// Its jerk.
+    /// Jerk of a coordinate.
     Jerk,
     /// A path constraint.
     Path(ConstraintKind),

@@ -56,7 +56,7 @@ pub enum ProblemError {
     /// A list has the wrong length.
     #[error("{what}: expected {expected} entries, found {found}")]
     Count {
-        /// Which list.
+        /// Name of the list.
         what: &'static str,
         /// Entries needed.
         expected: usize,
@@ -66,7 +66,7 @@ pub enum ProblemError {
     /// A number is out of range.
     #[error("{what}: expected {expected}, found {found}")]
     Value {
-        /// Which number.
+        /// Name of the number.
         what: String,
         /// The range it must lie in.
         expected: &'static str,

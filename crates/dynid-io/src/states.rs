@@ -98,7 +98,7 @@ pub enum StatesError {
         row: usize,
         /// Joint.
         joint: String,
-        /// Its length.
+        /// Length of the quaternion.
         found: f64,
     },
 }

@@ -146,7 +146,7 @@ fn bristles_of_six_joints_over_20_s_at_4_khz(bencher: Bencher<'_, '_>) {
     });
 }
 
-/// The same sample by sample with the standard library's functions.
+/// Bristles sample by sample with the standard library's functions.
 #[divan::bench]
 fn bristles_sample_by_sample_with_the_standard_library(bencher: Bencher<'_, '_>) {
     let dq: Vec<f64> = (0..JOINTS).flat_map(|_| speeds_of_record()).collect();

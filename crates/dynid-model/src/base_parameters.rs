@@ -112,7 +112,7 @@ impl BaseParameters {
         motion.with_block(|block| Self::on_motion(model, block, shape, settings))
     }
 
-    /// The same for any effort model, on [its own random states](EffortModel::random_motion).
+    /// Base parameters of any effort model, on [its own random states](EffortModel::random_motion).
     pub fn of_model(model: &dyn EffortModel, shape: &[f64], settings: &BaseSettings) -> Self {
         let motion = model.random_motion(settings.states_for(model), settings.seed);
         motion.with_block(|block| Self::on_motion(model, block, shape, settings))

@@ -11,7 +11,7 @@ use crate::description::Limits;
 pub struct Coordinate {
     /// Name, other than those of all joints and coordinates.
     pub name: String,
-    /// It slides (m, N) instead of turning (rad, N m).
+    /// Whether the coordinate slides (m, N) instead of turning (rad, N m).
     pub slides: bool,
     /// Limits.
     pub limits: Limits,

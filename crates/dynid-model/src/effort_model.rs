@@ -128,7 +128,7 @@ impl RegressorBlock {
         effort
     }
 
-    /// The same entries, to be written: weights for [`EffortModel::regressor_adjoint`].
+    /// Entries of a column, to be written: weights for [`EffortModel::regressor_adjoint`].
     pub fn column_mut(&mut self, output: usize, k: usize) -> &mut [f64] {
         let slot = self.layout.first_slot[output] + k;
         &mut self.data[slot * self.capacity..][..self.samples]
@@ -295,7 +295,7 @@ pub trait EffortModel: Send + Sync {
     /// [`MotionBlock::sign_width`].
     ///
     /// # Panics
-    /// As [`EffortModel::efforts`]; if `out` has other dimensions than motion and model; if a joint floats.
+    /// Panics as [`EffortModel::efforts`] does; if `out` has other dimensions than motion and model; if a joint floats.
     fn effort_adjoint(
         &self,
         motion: &MotionBlock<'_>,

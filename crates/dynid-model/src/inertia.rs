@@ -66,7 +66,7 @@ impl Inertia {
         Some((c, self.tensor() + shift * -1.0))
     }
 
-    /// The same body described in an outer frame in which this one sits at `placement`.
+    /// Returns the inertia of the body described in an outer frame in which this one sits at `placement`.
     ///
     /// `m' = m`, `h' = R h + m p`, `I' = R I Rᵀ + 2 (h_R·p) 1 - h_R pᵀ - p h_Rᵀ + m ((p·p) 1 - p pᵀ)`, `h_R = R h`.
     pub fn in_frame(&self, placement: &Placement) -> Self {

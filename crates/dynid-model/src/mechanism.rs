@@ -24,7 +24,7 @@ pub const ROOT_JOINT: &str = "root_joint";
 pub struct FixedLink {
     /// Link name.
     pub name: String,
-    /// Its frame in the frame of the body.
+    /// Frame of the link in the frame of the body.
     pub placement: Placement,
     /// Inertia in its own frame as stated by the file.
     pub inertia: Option<Inertia>,
@@ -148,13 +148,13 @@ impl Mechanism {
         self.gravity
     }
 
-    /// The same mechanism under another gravity (m/s², base axes).
+    /// Returns the mechanism under another gravity (m/s², base axes).
     pub fn with_gravity(mut self, gravity: [f64; 3]) -> Self {
         self.gravity = Vec3(gravity);
         self
     }
 
-    /// The same mechanism with other body inertias, in body order.
+    /// Returns the mechanism with other body inertias, in body order.
     ///
     /// # Panics
     /// If there is not one inertia per body.

@@ -68,7 +68,7 @@ impl RandomMotion {
         Self::new(mechanism, channels, samples, seed).with_coordinates(model, seed)
     }
 
-    /// The same motion with that of a model's coordinates without bodies, as [`RandomMotion::of`] says.
+    /// Returns the motion with that of a model's coordinates without bodies, as [`RandomMotion::of`] says.
     pub fn with_coordinates(mut self, model: &dyn EffortModel, seed: u64) -> Self {
         let samples = self.samples;
         let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(0x636f_6f72_6469));

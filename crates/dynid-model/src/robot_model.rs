@@ -42,7 +42,7 @@ impl RobotModel {
     /// A tree; see [`TreeModel::new`].
     ///
     /// # Panics
-    /// As [`TreeModel::new`].
+    /// Panics as [`TreeModel::new`] does.
     pub fn new(mechanism: Mechanism, elements: Vec<Box<dyn JointElement>>) -> Self {
         TreeModel::new(mechanism, elements).into()
     }
@@ -50,7 +50,7 @@ impl RobotModel {
     /// A tree with coordinates that no body moves with; see [`TreeModel::with_coordinates`].
     ///
     /// # Panics
-    /// As [`TreeModel::with_coordinates`].
+    /// Panics as [`TreeModel::with_coordinates`] does.
     pub fn with_coordinates(
         mechanism: Mechanism,
         coordinates: Vec<Coordinate>,
@@ -111,7 +111,7 @@ impl RobotModel {
         self.tree().limits(self.tree_rate(rate))
     }
 
-    /// The same model with other values of its shape parameters; see [`TreeModel::with_shape`]. Loads of a closed model stay
+    /// Returns the model with other values of its shape parameters; see [`TreeModel::with_shape`]. Loads of a closed model stay
     /// at their reference.
     ///
     /// # Panics
@@ -120,15 +120,15 @@ impl RobotModel {
         self.map_tree(|tree| tree.with_shape(values))
     }
 
-    /// The same model with known elements; see [`TreeModel::with_known`].
+    /// Returns the model with known elements; see [`TreeModel::with_known`].
     ///
     /// # Panics
-    /// As [`TreeModel::with_known`].
+    /// Panics as [`TreeModel::with_known`] does.
     pub fn with_known(self, known: Vec<KnownElement>) -> Self {
         self.map_tree(|tree| tree.with_known(known))
     }
 
-    /// The same model with linear parameters of any sign where `is_free` says so; see [`TreeModel::with_free_sign`].
+    /// Returns the model with linear parameters of any sign where `is_free` says so; see [`TreeModel::with_free_sign`].
     pub fn with_free_sign(self, is_free: impl Fn(&Parameter) -> bool) -> Self {
         self.map_tree(|tree| tree.with_free_sign(is_free))
     }
@@ -154,7 +154,7 @@ impl RobotModel {
     /// See [`TreeModel::clearance_contacts`].
     ///
     /// # Panics
-    /// As there.
+    /// Panics as the function of [`TreeModel`] does.
     pub fn clearance_contacts(&self, linear: &[f64]) -> Vec<(&ClearanceContact, [f64; 3])> {
         self.tree().clearance_contacts(linear)
     }
@@ -182,7 +182,7 @@ impl RobotModel {
     /// See [`TreeModel::elastic_transmissions`].
     ///
     /// # Panics
-    /// As there.
+    /// Panics as the function of [`TreeModel`] does.
     pub fn elastic_transmissions(&self, linear: &[f64]) -> Vec<(&ElasticTransmission, Vec<f64>)> {
         self.tree().elastic_transmissions(linear)
     }
@@ -190,10 +190,10 @@ impl RobotModel {
     /// See [`TreeModel::element_jets`].
     ///
     /// # Errors
-    /// As there.
+    /// Fails as the function of [`TreeModel`] does.
     ///
     /// # Panics
-    /// As there.
+    /// Panics as the function of [`TreeModel`] does.
     pub fn element_jets(
         &self,
         motion: &JetMotion<'_>,
@@ -208,7 +208,7 @@ impl RobotModel {
     /// Passivity of the friction of an output's joint; see [`TreeModel::friction_passivity`].
     ///
     /// # Panics
-    /// As there.
+    /// Panics as the function of [`TreeModel`] does.
     pub fn friction_passivity(
         &self,
         rate: usize,
@@ -223,7 +223,7 @@ impl RobotModel {
     /// Columns of the friction of an output's joint over a motion of the tree; see [`TreeModel::friction_columns`].
     ///
     /// # Panics
-    /// As there.
+    /// Panics as the function of [`TreeModel`] does.
     pub fn friction_columns(
         &self,
         rate: usize,
@@ -236,7 +236,7 @@ impl RobotModel {
     /// Friction of an output's joint over velocities; see [`TreeModel::friction_effort`].
     ///
     /// # Panics
-    /// As there.
+    /// Panics as the function of [`TreeModel`] does.
     pub fn friction_effort(
         &self,
         rate: usize,

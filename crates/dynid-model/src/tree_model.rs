@@ -211,7 +211,7 @@ impl TreeModel {
         }
     }
 
-    /// The same model with other values of its shape parameters: those that hold wherever nothing else is said
+    /// Returns the model with other values of its shape parameters: those that hold wherever nothing else is said
     /// ([`ParameterTable::shape_start`]).
     ///
     /// # Panics
@@ -277,7 +277,7 @@ impl EffortModel for TreeModel {
         self.form_signals(motion, step_s, shape, history, stride, out);
     }
 
-    /// As [`RandomMotion::of`].
+    /// Random motion as [`RandomMotion::of`] makes it.
     fn random_motion(&self, samples: usize, seed: u64) -> RandomMotion {
         RandomMotion::of(self, &self.mechanism, samples, seed)
     }

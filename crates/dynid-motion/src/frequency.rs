@@ -13,7 +13,7 @@ use crate::signal::{SignalError, check_positive, check_signal};
 pub enum HarmonicPath {
     /// The record holds whole periods: bins of its discrete Fourier transform.
     Transform,
-    /// It does not: least squares.
+    /// The samples do not: least squares.
     LeastSquares,
 }
 

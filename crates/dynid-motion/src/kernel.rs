@@ -83,7 +83,7 @@ impl Kernel {
         (half..samples.saturating_sub(half)).step_by(self.spacing()).collect()
     }
 
-    /// Those of the ascending `centres` whose whole window lies in the block of `samples` that begins at `first`.
+    /// Places of those of the ascending `centres` whose whole window lies in the block of `samples` that begins at `first`.
     pub fn covered(&self, centres: &[usize], first: usize, samples: usize) -> Range<usize> {
         let half = self.half_width();
         let start = centres.partition_point(|c| *c < first + half);

@@ -46,7 +46,7 @@ pub enum LogError {
         signal: String,
         /// Index of the first offending sample.
         sample: usize,
-        /// Its value.
+        /// Value of that sample.
         found: f64,
     },
     /// Two joints, or two channels, share a name.
@@ -187,7 +187,7 @@ impl Log {
         &self.channels
     }
 
-    /// The same log with a further channel that never changes.
+    /// Returns the log with a further channel that never changes.
     pub fn with_constant(mut self, channel: String, value: f64) -> Self {
         self.channels.push(Channel { name: channel, values: vec![value; self.time.len()] });
         self

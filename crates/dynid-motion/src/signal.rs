@@ -17,13 +17,13 @@ pub enum SignalError {
     NotFinite {
         /// Index of the first offending sample, from 0.
         sample: usize,
-        /// Its value.
+        /// Value of that sample.
         found: f64,
     },
     /// Two signals that belong together have different lengths.
     #[error("{what}: expected {expected} samples, found {found}")]
     Length {
-        /// Which signal.
+        /// Name of the signal.
         what: &'static str,
         /// Samples expected.
         expected: usize,

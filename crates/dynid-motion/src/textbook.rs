@@ -56,7 +56,7 @@ pub fn states(position: &[f64], rate_hz: f64, settings: &TextbookSettings) -> Re
     Ok(States { position, velocity, acceleration })
 }
 
-/// As [`states`], with the velocity taken from a measurement that passes the same filter.
+/// States of the textbook route as [`states`] forms them, with the velocity taken from a measurement that passes the same filter.
 pub fn states_with_velocity(
     position: &[f64],
     velocity: &[f64],

@@ -8,7 +8,7 @@ use core::fmt;
 pub enum SettingsError {
     /// A list has the wrong length.
     Length {
-        /// Which list.
+        /// Name of the list.
         what: &'static str,
         /// What it should have.
         expected: usize,
@@ -17,9 +17,9 @@ pub enum SettingsError {
     },
     /// A number is out of range.
     Number {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
-        /// Its place in a list, 0 for single numbers.
+        /// Place of the number in a list, 0 for single numbers.
         index: usize,
         /// What it should be.
         expected: &'static str,
@@ -55,7 +55,7 @@ impl core::error::Error for SettingsError {}
 pub enum SampleError {
     /// A slice has the wrong length.
     Length {
-        /// Which slice.
+        /// Name of the slice.
         what: &'static str,
         /// What it should have.
         expected: usize,
@@ -71,9 +71,9 @@ pub enum SampleError {
     },
     /// A number is not finite, or so large in units of its deviation that squares would overflow.
     NotFinite {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
-        /// Its place in the slice.
+        /// Place of the number in the slice.
         index: usize,
     },
     /// A deviation of a row's noise is not positive, or a covariance not positive definite.

@@ -28,9 +28,9 @@ const STATE_VERSION: u64 = 1;
 /// What change detection makes of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Watch {
-    /// It counts.
+    /// The row counts for change detection.
     Count,
-    /// It is passed over.
+    /// Change detection passes the row over.
     Pass,
     /// The sum starts again from zero.
     Restart,
@@ -194,13 +194,13 @@ impl Estimator {
         self.step_where(regressor, effort, noise, |_| Watch::Count)
     }
 
-    /// As [`Self::step`], with change detection as `watched` says of the sample's innovations; the estimate is updated by every sample.
+    /// Takes a sample as [`Self::step`] does, with change detection as `watched` says of the sample's innovations; the estimate is updated by every sample.
     ///
     /// What rows ask of the estimate that those before did not tell ([`Innovation::leverage`]) shows in the errors of a model that is not
     /// quite right, though nothing has changed.
     ///
     /// # Errors
-    /// As [`Self::step`].
+    /// Fails as [`Self::step`] does.
     pub fn step_where(
         &mut self,
         regressor: &[f64],

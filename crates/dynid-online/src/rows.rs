@@ -44,7 +44,7 @@ impl WeightedRows {
         &self.rows[..self.count * (self.scale.len() + 1)]
     }
 
-    /// The same, for those who use them up.
+    /// The rows, for those who use them up.
     pub(crate) fn get_mut(&mut self) -> &mut [f64] {
         &mut self.rows[..self.count * (self.scale.len() + 1)]
     }

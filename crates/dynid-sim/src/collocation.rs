@@ -129,7 +129,7 @@ pub(crate) struct Collocation {
     converged: f64,
     /// Accelerations of the stages of the last attempt, stage after stage.
     stages: Vec<f64>,
-    /// Those of the last step that was kept, with its size, to predict from.
+    /// Accelerations of the stages of the last step that was kept, with its size, to predict from.
     kept: Vec<f64>,
     kept_step: Option<f64>,
     lu: Lu,

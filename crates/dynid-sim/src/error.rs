@@ -12,7 +12,7 @@ pub enum SimError {
     /// A setting is out of range.
     #[error("{name}: expected {expected}, found {found}")]
     Setting {
-        /// Which setting.
+        /// Name of the setting.
         name: &'static str,
         /// What it must be.
         expected: &'static str,
@@ -22,7 +22,7 @@ pub enum SimError {
     /// A list has not one entry per joint, parameter or channel.
     #[error("{name}: expected {expected} entries, found {found}")]
     Length {
-        /// Which list.
+        /// Name of the list.
         name: &'static str,
         /// Entries needed.
         expected: usize,

@@ -205,7 +205,7 @@ pub fn run(
 /// reference of all drives must be of one motion.
 ///
 /// # Errors
-/// As [`run`]; [`SimError::Pose`] where the reference leaves the workspace or comes next to a singular pose,
+/// Fails as [`run`] does; [`SimError::Pose`] where the reference leaves the workspace or comes next to a singular pose,
 /// [`SimError::Reference`], [`SimError::Forward`].
 pub fn run_closed(
     plant: &mut ClosedPlant,

@@ -56,7 +56,7 @@ pub struct Plant {
     added: Vec<f64>,
     /// What joints feel of it: the same where all rates are joints.
     at_joints: Vec<f64>,
-    /// Its diagonal, if there is nothing else.
+    /// Diagonal of the inertia, if there is nothing else.
     diagonal: Option<Vec<f64>>,
     bodiless: Option<Bodiless>,
     /// Contacts of journals in their bearings are left out: somebody else adds them.
@@ -128,15 +128,15 @@ impl Plant {
         Ok(plant)
     }
 
-    /// The same plant with other linear parameters.
+    /// Returns the plant with other linear parameters.
     ///
     /// # Errors
-    /// As [`Plant::new`].
+    /// Fails as [`Plant::new`] does.
     pub fn with_linear(self, linear: Vec<f64>) -> Result<Plant, SimError> {
         Plant::new(self.model, linear, self.shape, self.sign_width)
     }
 
-    /// The same plant without contacts of journals in their bearings, for those who add them.
+    /// Returns the plant without contacts of journals in their bearings, for those who add them.
     pub(crate) fn without_contacts(mut self) -> Self {
         self.without_contacts = true;
         self
@@ -163,12 +163,12 @@ impl Plant {
         &self.model
     }
 
-    /// Its linear parameters.
+    /// Linear parameters of the plant.
     pub fn linear(&self) -> &[f64] {
         &self.linear
     }
 
-    /// Its shape parameters.
+    /// Shape parameters of the plant.
     pub fn shape(&self) -> &[f64] {
         &self.shape
     }

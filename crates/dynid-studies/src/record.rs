@@ -15,7 +15,7 @@ pub struct Row {
     pub required: String,
     /// Numbers measured, by name.
     pub measured: Json,
-    /// The same in words.
+    /// What is measured, in words.
     #[serde(skip)]
     pub words: String,
     /// Whether the claim holds; `None` for a row that stands beside another one and is not graded.

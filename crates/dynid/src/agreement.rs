@@ -46,15 +46,15 @@ pub struct Agreement {
     pub raw: Fit,
     /// Through the same zero-phase Butterworth filter of order 4.
     pub filtered: Fit,
-    /// The same without aligning by the delay.
+    /// Agreement after filtering, without aligning by the delay.
     pub filtered_unaligned: Fit,
     /// Cut-off of that filter, Hz.
     pub filter_hz: f64,
     /// Where the joints move, over all samples.
     pub motion: Moving,
-    /// As [`Agreement::filtered`], per output on the samples in which its joint moves.
+    /// Agreement as in [`Agreement::filtered`], per output on the samples in which its joint moves.
     pub moving: Fit,
-    /// The same on those in which it stands: friction may then have any value up to static friction, which no model of the speed
+    /// Agreement per output on the samples in which its joint stands: friction may then have any value up to static friction, which no model of the speed
     /// tells.
     pub standing: Fit,
     /// Per output: share of the counted samples in which its joint stands.

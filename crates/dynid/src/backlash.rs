@@ -23,7 +23,7 @@ use crate::logs;
 pub enum BacklashVerdict {
     /// The residual holds the trace of a gap, beyond what else looks like one.
     Found,
-    /// It does not.
+    /// The log does not show a gap.
     NotFound,
     /// The load changes its sign too seldom away from reversals.
     NoCrossings,
@@ -59,7 +59,7 @@ pub struct JointBacklash {
     pub interval: Option<(f64, f64)>,
     /// Root of twice the log-likelihood ratio of the most likely gap against none.
     pub evidence: f64,
-    /// The same for flanks that part at loads where they have no reason to: what else looks like a gap; `None` if the load is
+    /// Evidence for flanks that part at loads where they have no reason to: what else looks like a gap; `None` if the load is
     /// too uncertain for a comparison.
     pub elsewhere: Option<f64>,
     /// Share of the joint's friction behind the transmission, as the most likely gap has it.

@@ -68,7 +68,7 @@ fn both(
     }
 }
 
-/// As the user may have written it, but never with hundreds of digits.
+/// The number as the user may have written it, but never with hundreds of digits.
 fn number(x: f64) -> String {
     if x == 0.0 || (1e-4..1e6).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
 }

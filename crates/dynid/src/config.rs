@@ -242,10 +242,10 @@ impl Config {
         Ok(config)
     }
 
-    /// The same, for a run that need not have a log.
+    /// Reads a configuration for a run that need not have a log.
     ///
     /// # Errors
-    /// As [`Config::read`].
+    /// Fails as [`Config::read`] does.
     pub fn read_for_stream(path: &Path) -> Result<Self, Error> {
         let (mut config, folder) = toml_file::read(path, Self::parse_any)?;
         config.robot = folder.join(&config.robot);
@@ -485,7 +485,7 @@ pub(crate) fn exactly<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: u
     just(deserializer).map(Some)
 }
 
-/// The same where it must be given.
+/// A list of so many numbers that must be given.
 pub(crate) fn just<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
     deserializer: D,
 ) -> Result<[T; N], D::Error> {

@@ -43,7 +43,7 @@ pub struct WeighedMass {
     pub known: f64,
     /// Mass as identified, kg.
     pub identified: f64,
-    /// Its 95 % interval, kg; absent unless the logs see it.
+    /// 95 % interval of the identified mass, kg; absent unless the logs see it.
     pub interval: Option<(f64, f64)>,
 }
 

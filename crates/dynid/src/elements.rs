@@ -176,7 +176,7 @@ impl ElementPlan {
         ElementPlan::new(mechanism, &spec, Some(&[]), |_| false)
     }
 
-    /// The same plan for a mechanism whose loops are closed.
+    /// Returns the plan for a mechanism whose loops are closed.
     pub fn with_loops(self, closed: Option<Arc<ClosedMechanism>>) -> Self {
         ElementPlan { closed, ..self }
     }
@@ -191,7 +191,7 @@ impl ElementPlan {
         &self.spec.settings
     }
 
-    /// The same with bounds of shape parameters for the speeds that a log reaches, per rate; `None`: not known. Settings that
+    /// Returns the plan with bounds of shape parameters for the speeds that a log reaches, per rate; `None`: not known. Settings that
     /// state a speed stand.
     pub fn with_speeds(mut self, mechanism: &Mechanism, speeds: &[Option<f64>]) -> Self {
         let names = self.names(mechanism);

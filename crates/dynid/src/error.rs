@@ -176,7 +176,7 @@ pub enum Error {
         joint: String,
         /// The element to leave out.
         first: String,
-        /// The other.
+        /// The second of the two.
         second: String,
         /// Why.
         reason: String,

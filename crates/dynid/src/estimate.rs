@@ -48,9 +48,9 @@ pub struct Estimate {
     pub rows: usize,
     /// Condition number of the weighted base regressor in its own units.
     pub condition_number: Option<f64>,
-    /// The same with columns scaled to unit length.
+    /// Condition number of the weighted base regressor with columns scaled to unit length.
     pub condition_number_scaled: Option<f64>,
-    /// The same without columns of shape parameters, which the check judges.
+    /// Condition number with scaled columns and without columns of shape parameters, which the check judges.
     #[serde(default)]
     pub condition_number_without_shapes: Option<f64>,
     /// Rank found in the logs against the structural rank.
@@ -130,7 +130,7 @@ pub struct Estimate {
 /// A finding of the pre-flight ([`crate::check`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FindingRecord {
-    /// Which fault.
+    /// Name of the fault.
     pub id: String,
     /// `info`, `warning` or `error`.
     pub severity: String,
@@ -161,9 +161,9 @@ pub struct LogScale {
     pub log: String,
     /// Friction in this log over that in the logs without such a factor.
     pub value: f64,
-    /// Its standard deviation, where the logs show it.
+    /// Standard deviation of the factor, where the logs show it.
     pub std: Option<f64>,
-    /// Its 95 % interval, where the logs show it.
+    /// 95 % interval of the factor, where the logs show it.
     pub interval: Option<(f64, f64)>,
     /// What the logs say of it.
     pub verdict: String,
@@ -318,7 +318,7 @@ pub struct FitValues {
     pub r2: Vec<Option<f64>>,
     /// `100 ‖residual‖ / ‖effort‖` per joint, percent.
     pub relative_error_per_joint: Vec<Option<f64>>,
-    /// The same over all joints, percent.
+    /// `100 ‖residual‖ / ‖effort‖` over all joints, percent.
     pub relative_error: Option<f64>,
 }
 
@@ -364,7 +364,7 @@ pub struct LogFit {
     pub filtered: FitValues,
     /// Cut-off of that filter, Hz.
     pub filter_hz: f64,
-    /// The same on filtered effort without aligning prediction and effort by the identified delay.
+    /// Figures on filtered effort without aligning prediction and effort by the identified delay.
     pub filtered_unaligned: FitValues,
     /// In motion and at rest apart.
     #[serde(default)]

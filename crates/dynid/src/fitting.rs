@@ -39,7 +39,7 @@ pub struct Fitted {
     pub jackknife: Option<Mat<f64>>,
     /// Variance inflation `κ`: by how much coloured residuals inflate the variances that white ones would give.
     pub inflation: f64,
-    /// The same joint by joint, where it can be told.
+    /// Variance inflation joint by joint, where it can be told.
     pub inflation_per_output: Vec<Option<f64>>,
     /// Length of time blocks that the residuals ask for.
     pub block_length: BlockLength,

@@ -141,11 +141,11 @@ pub struct Identification {
     pub delay_rate_hz: f64,
     /// Agreement on the training logs.
     pub training: Vec<Agreement>,
-    /// The same on the validation logs.
+    /// Agreement on the validation logs.
     pub validation: Vec<Agreement>,
     /// Figures of the unconstrained parameters on the training logs, where they predict differently.
     pub training_unconstrained: Vec<LogFit>,
-    /// The same on the validation logs.
+    /// Figures of the unconstrained parameters on the validation logs.
     pub validation_unconstrained: Vec<LogFit>,
     /// Per training log and output: whether the raw residuals are white inside the kernel's band.
     pub whiteness: Vec<Vec<Option<InBandWhiteness>>>,
@@ -586,7 +586,7 @@ pub(crate) struct Opened {
 /// Reads robot and logs, examines them, prepares them for a model with the elements asked for.
 ///
 /// # Errors
-/// As [`identify`].
+/// Fails as [`identify`] does.
 pub(crate) fn open(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Opened, Error> {
     config.check()?;
     config.demand_inputs()?;

@@ -76,7 +76,7 @@ pub struct MotorRow {
     pub number: usize,
     /// Motor.
     pub name: String,
-    /// Its joint.
+    /// Joint of the motor.
     pub joint: String,
     /// Travel of the motor over that of the joint with a stiff spring.
     pub ratio: f64,

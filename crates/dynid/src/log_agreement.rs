@@ -26,7 +26,7 @@ pub struct LogDeviation {
     pub parameter: String,
     /// Deviation, in the parameter's unit.
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the deviation.
     pub std: f64,
     /// Unit.
     pub unit: String,

@@ -32,7 +32,7 @@ pub struct PayloadTerm {
     pub config: PayloadConfig,
     /// Body that carries it, in body order.
     pub body: usize,
-    /// Its inertia is known and its effort taken off; otherwise it is estimated.
+    /// Known inertia, whose effort is taken off; without it the payload is estimated.
     pub known: Option<Inertia>,
 }
 

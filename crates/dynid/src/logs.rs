@@ -90,10 +90,10 @@ pub fn load(
     finish(config, &file, read, axes)
 }
 
-/// The same without refusing numbers for what they seem to be: units of angles, counts, temperatures.
+/// Loads a log without refusing numbers for what they seem to be: units of angles, counts, temperatures.
 ///
 /// # Errors
-/// As [`load`], without [`Error::Degrees`], [`Error::FarPosition`] and [`Error::Temperature`].
+/// Fails as [`load`] does, without [`Error::Degrees`], [`Error::FarPosition`] and [`Error::Temperature`].
 pub(crate) fn load_as_it_is(
     config: &LogConfig,
     axes: &[LogAxis],

@@ -136,7 +136,7 @@ pub fn efforts(model: &RobotModel, values: &[f64], states: &States) -> Result<Ve
 /// Regressor at every state: `rows[state][output][column]`, in standard columns or, with `base`, in base columns.
 ///
 /// # Errors
-/// As [`efforts`].
+/// Fails as [`efforts`] does.
 pub fn regressors(
     model: &RobotModel,
     base: Option<&BaseParameters>,

@@ -23,7 +23,7 @@ pub enum PriorError {
         file: String,
         /// The link.
         link: String,
-        /// Its mass, kg.
+        /// Mass of the link, kg.
         mass: f64,
     },
 }

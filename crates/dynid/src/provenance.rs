@@ -56,7 +56,7 @@ impl InputRecord {
         robot.file.sources.iter().zip(kinds).map(|(source, kind)| InputRecord::of(kind, source)).collect()
     }
 
-    /// As pages show it.
+    /// The input as pages show it.
     pub(crate) fn shown(&self) -> dynid_report::InputFile {
         let InputRecord { path, kind, sha256 } = self.clone();
         dynid_report::InputFile { path, kind, sha256: Some(sha256) }

@@ -55,7 +55,7 @@ impl Robot {
     /// Reads a robot from the text of a URDF or TOML file; `path` says which by its ending, and stands in messages and provenance.
     ///
     /// # Errors
-    /// As [`Robot::load`].
+    /// Fails as [`Robot::load`] does.
     pub fn parse(text: &str, path: &Path, options: &RobotOptions) -> Result<Robot, Error> {
         Self::of_file(path, dynid_io::robot::parse(text, path)?, options)
     }
@@ -98,10 +98,10 @@ impl Robot {
         Ok(Robot { path: path.to_owned(), mechanism, closed, axes, elements, file, warnings })
     }
 
-    /// The same robot with more joints held still; a motor stands still with its joint.
+    /// Returns the robot with more joints held still; a motor stands still with its joint.
     ///
     /// # Errors
-    /// As [`Robot::load`].
+    /// Fails as [`Robot::load`] does.
     pub fn locked(&self, joints: &[(String, f64)]) -> Result<Robot, Error> {
         let is_motor = |name: &String| self.axes.iter().any(|a| a.motor && a.name == *name);
         let (motors, joints): (Vec<_>, Vec<_>) = joints.iter().cloned().partition(|(name, _)| is_motor(name));
@@ -121,10 +121,10 @@ impl Robot {
         Ok(robot)
     }
 
-    /// The same robot with another file.
+    /// Returns the robot with another file.
     ///
     /// # Errors
-    /// As [`Robot::load`].
+    /// Fails as [`Robot::load`] does.
     pub(crate) fn changed(&self, change: impl FnOnce(&mut RobotFile)) -> Result<Robot, Error> {
         let mut file = self.file.clone();
         change(&mut file);

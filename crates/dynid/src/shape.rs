@@ -56,7 +56,7 @@ pub(crate) fn is_free(finding: &ShapeFinding) -> bool {
 /// that is `free` becomes a linear one, the change from its value; the others stay.
 ///
 /// # Errors
-/// As [`ElementPlan::build`].
+/// Fails as [`ElementPlan::build`] does.
 ///
 /// # Panics
 /// If `linear` is not one value per linear parameter of `model`, `free` not one per shape parameter, or `model` is not of
@@ -103,7 +103,7 @@ fn take<'a, T>(rest: &mut &'a [T], count: usize) -> &'a [T] {
 pub struct Unfolded {
     /// Linear parameters of the nonlinear model.
     pub linear: Vec<f64>,
-    /// Its shape parameters: where the model was linearised, plus the changes, within their bounds.
+    /// Shape parameters of the nonlinear model: where the model was linearised, plus the changes, within their bounds.
     pub shape: Vec<f64>,
 }
 

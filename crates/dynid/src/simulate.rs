@@ -44,7 +44,7 @@ pub struct SimulatedLog {
     pub effort: Vec<Vec<f64>>,
     /// Extra channels by name, with noise.
     pub channels: Vec<(String, Vec<f64>)>,
-    /// The same without.
+    /// Extra channels by name, without noise.
     pub clean_channels: Vec<(String, Vec<f64>)>,
     /// Per joint: true position, velocity, acceleration, effort at the same times.
     pub clean: [Vec<Vec<f64>>; 4],

@@ -71,7 +71,7 @@ pub struct JointStiffness {
     pub verdict: StiffnessVerdict,
     /// Compliance `c = 1/k`, rad/(N m).
     pub compliance: f64,
-    /// Its standard deviation with correlated residuals, blocks of time left out, and errors of the encoders once per turn.
+    /// Standard deviation with correlated residuals, blocks of time left out, and errors of the encoders once per turn.
     pub compliance_std: f64,
     /// Stiffness, N m/rad; absent unless told.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -21,7 +21,7 @@ use crate::stiffness::JointStiffness;
 /// How bad a check came out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Status {
-    /// As it should be.
+    /// All is as it should be.
     Ok,
     /// Usable, with a reservation.
     Warn,

@@ -51,7 +51,7 @@ unsafe fn view<'a, T>(a: *const T, trans: bool, rows: usize, columns: usize, str
 /// Write access to a matrix of `rows × columns`.
 ///
 /// # Safety
-/// As for [`view`], and nothing else may read it meanwhile.
+/// The memory is as [`view`] asks for, and nothing else may read it meanwhile.
 unsafe fn columns<'a, T>(a: *mut T, rows: usize, columns: usize, stride: &c_int) -> Columns<'a, T> {
     let length = span(rows, columns, stride);
     let data = if length == 0 { &mut [] } else { unsafe { from_raw_parts_mut(a, length) } };

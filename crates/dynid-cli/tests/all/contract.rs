@@ -37,7 +37,7 @@ fn logs() -> TempDir {
     folder
 }
 
-/// The same with an identification in `out`.
+/// The folder of the example with an identification in `out`.
 fn identified() -> &'static Path {
     static FOLDER: OnceLock<TempDir> = OnceLock::new();
     FOLDER

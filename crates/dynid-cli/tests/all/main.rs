@@ -1,5 +1,6 @@
 //! All tests of the crate from outside, in one program: each program would be linked against everything again.
 
+mod book;
 mod broken_input;
 mod clearance;
 mod contract;

@@ -17,7 +17,7 @@ fn quick(study: &str, folder: &Path, out: &str, threads: &str) -> [String; 3] {
     quick_ending(&[0], study, folder, out, threads)
 }
 
-/// The same with one of some exit codes.
+/// Runs a study that may end with one of some exit codes.
 fn quick_ending(codes: &[i32], study: &str, folder: &Path, out: &str, threads: &str) -> [String; 3] {
     let args = ["study", study, "--quick", "--json", "--out", out];
     let output = dynid().current_dir(folder).env("RAYON_NUM_THREADS", threads).args(args).output().unwrap();
@@ -53,7 +53,7 @@ fn holds_every_claim(name: &str, files: &[String; 3]) -> Vec<String> {
     holds_every_claim_but(&[], name, files)
 }
 
-/// The same but for some that may miss.
+/// Demands that every claim holds, but for some that may miss.
 fn holds_every_claim_but(may_miss: &[&str], name: &str, [stdout, json, report]: &[String; 3]) -> Vec<String> {
     assert_eq!(stdout, json);
     let study: Json = serde_json::from_str(json).unwrap();

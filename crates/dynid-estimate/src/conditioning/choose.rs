@@ -13,7 +13,7 @@ pub struct KernelTrial {
     pub kernel_hz: f64,
     /// Held-out loss relative to the best, with linear friction.
     pub loss: f64,
-    /// The same with a rich friction model.
+    /// Held-out loss relative to the best, with a rich friction model.
     pub loss_rich: f64,
 }
 

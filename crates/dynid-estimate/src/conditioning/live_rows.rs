@@ -43,7 +43,7 @@ const MOST_ELEMENTS: usize = 100_000;
 
 /// Forms rows of an effort model from grid samples: positions, efforts, then channels in the order of the model's.
 ///
-/// As the rows of a log ([`super::LogRows`]), but with a state filter that looks a few samples ahead only
+/// Rows are formed like those of a log ([`super::LogRows`]), but with a state filter that looks a few samples ahead only
 /// ([`dynid_motion::live::LocalPolynomial`]) and without narrower kernels between masked samples. Rows are a quarter of
 /// `1 / kernel_hz` apart and appear [`LiveRows::lag_s`] after their time. They depend on the samples alone, never on how these
 /// were handed over.

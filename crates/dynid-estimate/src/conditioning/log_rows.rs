@@ -42,7 +42,7 @@ impl std::fmt::Debug for LogRows<'_> {
 pub(super) struct ConditionedLog<'a> {
     pub(super) log: &'a PreparedLog,
     pub(super) states: States,
-    /// Those of a simulated motion, where rows are paired with instruments.
+    /// States of a simulated motion, where rows are paired with instruments.
     instruments: Option<States>,
     masks: Vec<Masks>,
     pub(super) kernels: Kernels,
@@ -95,7 +95,7 @@ impl<'a> LogRows<'a> {
         Self::of(model, shape, kept, logs.iter().enumerate(), choices, settings)
     }
 
-    /// The same rows paired with instruments, `[Z | W | y]`: `Z` is the regressor of another motion on the logs' grids, through the
+    /// Rows of logs paired with instruments, `[Z | W | y]`: `Z` is the regressor of another motion on the logs' grids, through the
     /// state filter, kernels, masks and centres of the measured one (see [`crate::instruments`]).
     ///
     /// `motions`: one per log, per output its positions at the log's samples, rad or m. Columns of the groups are those of

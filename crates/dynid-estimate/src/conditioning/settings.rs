@@ -34,7 +34,7 @@ pub struct ConditioningSettings {
     pub least_usable: f64,
     /// A stricter mask must gain this share of the loss. Default 0.002.
     pub mask_gain: f64,
-    /// And this many standard errors of the gain over time blocks: for all joints together, for one joint. The second is
+    /// Least gain of a stricter mask in standard errors of the gain over time blocks: for all joints together, for one joint. The second is
     /// larger because many joints and rungs are tried. Default 1, 2.
     pub mask_sigma: (f64, f64),
     /// Mean and standard deviation of the prior on the delay, samples. Default 0.5, 1.

@@ -86,7 +86,7 @@ impl States {
     /// States at a cut-off that counts up to what the sample rate of the log allows.
     ///
     /// # Errors
-    /// As [`States::new`].
+    /// Fails as [`States::new`] does.
     pub fn of(
         log: &PreparedLog,
         state_hz: f64,

@@ -80,7 +80,7 @@ pub fn textbook_rows(
     rows_of(model, shape, kept, logs, route, settings)
 }
 
-/// The same rows paired with instruments, `[Z | W | y]`: see [`super::LogRows::with_instruments`].
+/// Rows of the textbook route paired with instruments, `[Z | W | y]`: see [`super::LogRows::with_instruments`].
 ///
 /// `motions`: one per log, per output its positions at the log's samples, rad or m.
 ///

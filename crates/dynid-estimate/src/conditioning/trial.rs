@@ -212,7 +212,7 @@ impl Trial {
         (columns, unknowns)
     }
 
-    /// The same trial with the columns of some of its friction shapes, per output.
+    /// Returns the trial with the columns of some of its friction shapes, per output.
     pub(crate) fn with_shapes(&self, shapes: &[Vec<usize>]) -> Trial {
         let classes = self
             .classes

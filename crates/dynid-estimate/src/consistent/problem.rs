@@ -114,7 +114,7 @@ pub enum ProblemError {
     /// A number is not finite, or a weight is out of range.
     #[error("{what}: expected {expected}, found {found}")]
     Number {
-        /// Which number.
+        /// Name of the number.
         what: String,
         /// What it should be.
         expected: &'static str,
@@ -124,7 +124,7 @@ pub enum ProblemError {
     /// Sizes do not fit.
     #[error("{what}: expected {expected}, found {found}")]
     Shape {
-        /// Which size.
+        /// Name of the size.
         what: String,
         /// What it should be.
         expected: usize,
@@ -157,7 +157,7 @@ pub enum ProblemError {
     Contradiction {
         /// One of them.
         first: String,
-        /// The other.
+        /// The second of the two.
         second: String,
     },
     /// No consistent parameters meet all bounds.

@@ -19,7 +19,7 @@ pub fn hac_bartlett(scores: &Mat<f64>, unit_covariance: &Mat<f64>, lag: usize) -
     hac_bartlett_logs(std::slice::from_ref(scores), unit_covariance, &[lag])
 }
 
-/// As [`hac_bartlett`], over several logs that are independent of each other: `Ω = Σ_l Ω_l`, `T = Σ_l T_l`.
+/// Covariance as by [`hac_bartlett`], over several logs that are independent of each other: `Ω = Σ_l Ω_l`, `T = Σ_l T_l`.
 ///
 /// `lags`: one per log. `None` unless `T > p`. Panics unless there is one lag per log and all have `p` columns.
 pub fn hac_bartlett_logs(logs: &[Mat<f64>], unit_covariance: &Mat<f64>, lags: &[usize]) -> Option<Mat<f64>> {

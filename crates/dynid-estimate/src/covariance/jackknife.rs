@@ -50,7 +50,7 @@ pub fn jackknife(blocks: &[Factor], x: &[f64]) -> Option<Jackknife> {
     jackknife_with(blocks, None, x)
 }
 
-/// As [`jackknife`], with rows that are never left out, such as those of a prior.
+/// Jackknife as by [`jackknife`], with rows that are never left out, such as those of a prior.
 ///
 /// `x`: joint solution of the blocks and the fixed rows.
 pub fn jackknife_with(blocks: &[Factor], fixed: Option<&Factor>, x: &[f64]) -> Option<Jackknife> {

@@ -15,7 +15,7 @@ pub fn block_sandwich(blocks: &[Factor], x: &[f64]) -> Option<Mat<f64>> {
     block_sandwich_with(blocks, None, x)
 }
 
-/// As [`block_sandwich`], with rows that belong to no block, such as those of a prior: they add to `C` but have no
+/// Covariance as by [`block_sandwich`], with rows that belong to no block, such as those of a prior: they add to `C` but have no
 /// score of their own, being fixed numbers.
 pub fn block_sandwich_with(blocks: &[Factor], fixed: Option<&Factor>, x: &[f64]) -> Option<Mat<f64>> {
     let count = blocks.len();

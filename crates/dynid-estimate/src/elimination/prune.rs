@@ -41,7 +41,7 @@ pub struct PruneStep {
     pub bic: f64,
     /// Column of least `F`, the next to go.
     pub weakest: usize,
-    /// Its `F_i = x_i²/V_ii`.
+    /// Statistic `F_i = x_i²/V_ii` of that column.
     pub statistic: f64,
     /// Held-out mean squared error per row, in units of the variances; `None` with too few blocks to hold any out.
     pub held_out: Option<HeldOutError>,

@@ -21,10 +21,10 @@ pub enum Verdict {
 /// Why a value is carried by the prior.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Carried {
-    /// It acts only together with others (structural limit below 0.9): no motion separates them. The log may miss
+    /// The parameter acts only together with others (structural limit below 0.9): no motion separates them. The log may miss
     /// excitation besides; see [`Carried::lacks_excitation`].
     OnlyInCombination,
-    /// Another motion would reveal it, the logged one does not.
+    /// Another motion would reveal the parameter, the logged one does not.
     NotExcited,
     /// The logged motion would reveal it if there were less noise or more of it.
     TooNoisy,

@@ -9,7 +9,7 @@ use crate::linear::LinearError;
 pub enum Simulated {
     /// Rows paired with its regressor.
     Rows(Vec<ReducedGroup>),
-    /// It left the reference, or could not go on.
+    /// The simulation left the reference, or could not go on.
     Diverged {
         /// Largest distance from the reference, rad or m; infinite where it could not go on.
         distance: f64,
@@ -59,7 +59,7 @@ pub struct Iteration {
 /// after `max_rounds` (10) simulations.
 ///
 /// # Errors
-/// Those of `simulate`; [`LinearError`] as [`instrumental`].
+/// Passes on errors of `simulate`; [`LinearError`] as [`instrumental`] returns it.
 pub fn iterate<E: From<LinearError>>(
     start: &[f64],
     sizes: &[f64],

@@ -14,7 +14,7 @@ const LEAST_SINGULAR: f64 = 1e-9;
 pub struct DifferenceFit {
     /// The unknowns `x`.
     pub x: Vec<f64>,
-    /// Their covariance.
+    /// Covariance of `x`.
     pub covariance: Mat<f64>,
 }
 

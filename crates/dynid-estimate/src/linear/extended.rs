@@ -7,7 +7,7 @@ use faer::Mat;
 
 /// Least squares on the merged rows of one extended factor.
 ///
-/// As [`ols`], the rank being decided on the rounded factor by the same rule; but parameters, residual sum of
+/// The rules are those of [`ols`], the rank being decided on the rounded factor by the same rule; but parameters, residual sum of
 /// squares and `C` of [`LinearSolution::unit_covariance`] come from the double-double triangle and are rounded
 /// once, at the end. [`LinearSolution::factor`] is rounded: what is computed from it has double precision.
 pub fn ols_extended(factor: &ExtendedFactor) -> LinearSolution {

@@ -77,7 +77,7 @@ pub struct LinearEstimate {
 }
 
 impl LinearEstimate {
-    /// The same estimate with time blocks `factor` times as long, for residuals that stay correlated beyond a block.
+    /// Returns the estimate with time blocks `factor` times as long, for residuals that stay correlated beyond a block.
     ///
     /// Panics if `factor` is zero.
     pub fn with_longer_blocks(mut self, factor: usize) -> LinearEstimate {

@@ -82,7 +82,7 @@ pub(super) struct PriorRows {
     pub(super) x0: Vec<f64>,
 }
 
-/// As [`wls`], groups of the same class sharing one variance, and with prior rows.
+/// Weighted least squares as by [`wls`], groups of the same class sharing one variance, and with prior rows.
 ///
 /// `classes`: one index below the number of groups per group.
 pub(super) fn wls_with(
@@ -189,7 +189,7 @@ pub(crate) fn floors(groups: &[Factor], classes: &[usize], floor: f64) -> Vec<f6
     classes.iter().map(|class| least(sums[*class], fallback, floor)).collect()
 }
 
-/// The same where every group is a class of its own.
+/// Least variances, where every group is a class for itself.
 pub(crate) fn group_floors(groups: &[&Factor], floor: f64) -> Vec<f64> {
     let fallback = largest_effort(groups.iter().copied());
     groups.iter().map(|g| least((g.effort_norm().powi(2), g.rows()), fallback, floor)).collect()

@@ -63,7 +63,7 @@ impl Constraint {
         }
     }
 
-    /// The same with a slack as last variable.
+    /// The constraint with a slack as last variable.
     fn relaxed(&self) -> Constraint {
         let with = |a: &Affine, unit: f64| {
             let mut factors = a.factors.clone();

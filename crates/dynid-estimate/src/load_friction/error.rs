@@ -22,9 +22,9 @@ pub enum LoadFrictionError {
     Size {
         /// What was counted.
         what: String,
-        /// As it should be.
+        /// Number that is expected.
         expected: usize,
-        /// As it is.
+        /// Number that is found.
         found: usize,
     },
     /// A number that is not finite.
@@ -44,7 +44,7 @@ pub enum LoadFrictionError {
     Value {
         /// What it is.
         what: String,
-        /// Its range.
+        /// Range that is allowed.
         expected: &'static str,
         /// The value.
         found: f64,

@@ -43,11 +43,11 @@ pub struct Identifiability {
 /// A linear combination of the parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CombinationValue {
-    /// Its value.
+    /// Value of the combination.
     pub value: f64,
     /// Whether no null direction changes it.
     pub determined: bool,
-    /// Its standard deviation; `None` if it is not determined or no row is to spare.
+    /// Standard deviation; `None` if it is not determined or no row is to spare.
     pub std: Option<f64>,
 }
 
@@ -57,7 +57,7 @@ impl Problem {
     /// `scales`: what counts as one unit of every parameter, positive; `None`: `|θ_k|`, and 1 where that is 0.
     ///
     /// # Errors
-    /// As [`Problem::residuals`]; scales of a wrong number or not positive.
+    /// Fails as [`Problem::residuals`] does; scales of a wrong number or not positive.
     pub fn identifiability(
         &self,
         theta: &[f64],

@@ -11,7 +11,7 @@ pub enum Model {
     Stribeck,
     /// `μ_c (F + G) sign v + f_v v`: `μ_s` and `v_s` have no effect.
     CoulombViscous,
-    /// As [`Model::Stribeck`] with `F` replaced by its mean over all samples of the record that is fitted; on another
+    /// The law of [`Model::Stribeck`] with `F` replaced by its mean over all samples of the record that is fitted; on another
     /// record the mean is carried over.
     Constant,
 }

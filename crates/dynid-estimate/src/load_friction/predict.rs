@@ -54,7 +54,7 @@ impl Problem {
     /// Efforts at `θ` on the record of the problem, all samples.
     ///
     /// # Errors
-    /// As [`Problem::residuals`].
+    /// Fails as [`Problem::residuals`] does.
     pub fn predict(&self, theta: &[f64]) -> Result<Prediction, LoadFrictionError> {
         self.predict_on(&self.record, theta)
     }
@@ -63,7 +63,7 @@ impl Problem {
     /// problem's own record.
     ///
     /// # Errors
-    /// As [`Problem::residuals`], and for a record with other numbers of drives or inertial parameters.
+    /// Fails as [`Problem::residuals`] does, and for a record with other numbers of drives or inertial parameters.
     pub fn predict_on(&self, record: &Record, theta: &[f64]) -> Result<Prediction, LoadFrictionError> {
         check_theta(self.settings.model, self.inertial(), theta)?;
         same_size("drives of the record", self.record.drives().len(), record.drives().len())?;

@@ -107,7 +107,7 @@ impl Problem {
         Ok(problem)
     }
 
-    /// The same without samples of a drive in which one of its reactions `N_k φ` is below `share` of that reaction's RMS
+    /// Returns the problem without samples of a drive in which one of its reactions `N_k φ` is below `share` of that reaction's RMS
     /// over the used samples: there its size has a kink. Decided once, at the given `φ` (p values), so that the misfit
     /// stays a continuous function of `θ`.
     ///
@@ -209,7 +209,7 @@ impl Problem {
     /// `J(θ) = Σ residual²` (Rosyid 2020).
     ///
     /// # Errors
-    /// As [`Problem::residuals`].
+    /// Fails as [`Problem::residuals`] does.
     pub fn sum_of_squares(&self, theta: &[f64]) -> Result<f64, LoadFrictionError> {
         Ok(self.residuals(theta)?.iter().map(|r| r * r).sum())
     }
@@ -218,7 +218,7 @@ impl Problem {
     /// samples where a reaction vanishes.
     ///
     /// # Errors
-    /// As [`Problem::residuals`].
+    /// Fails as [`Problem::residuals`] does.
     pub fn jacobian(&self, theta: &[f64]) -> Result<Mat<f64>, LoadFrictionError> {
         check_theta(self.settings.model, self.inertial(), theta)?;
         let mut out = Mat::zeros(self.rows(), self.parameters());

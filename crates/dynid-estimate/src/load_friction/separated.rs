@@ -61,7 +61,7 @@ pub struct SeparatedFit {
 /// Bounds of `φ` and `f_v` are not used. The start's inertial parameters decide the first signs only.
 ///
 /// # Errors
-/// As [`super::fit_bounded`].
+/// Fails as [`super::fit_bounded`] does.
 pub fn fit_separated(
     problem: &Problem,
     bounds: &Bounds,

@@ -29,7 +29,7 @@ pub enum Verdict {
         /// Value of that sum and its standard deviation.
         sum: CombinationValue,
     },
-    /// It has no effect on the efforts in this model: the value is the start.
+    /// The parameter has no effect on the efforts in this model: the value is the start.
     NotEstimated,
     /// The value lies at a bound: the data ask for more than the bound allows, or leave it free. No standard deviation.
     AtBound {

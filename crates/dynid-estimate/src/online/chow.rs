@@ -17,7 +17,7 @@ pub struct MovedParameter {
     pub statistic: f64,
     /// Probability of as large a change by chance, two-sided.
     pub p_value: f64,
-    /// The same, adjusted for looking at all parameters (Holm 1979): below a level for no parameter in all
+    /// The probability of as large a change by chance, adjusted for looking at all parameters (Holm 1979): below a level for no parameter in all
     /// but that share of cases without change.
     pub adjusted: f64,
 }

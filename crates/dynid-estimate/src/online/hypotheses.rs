@@ -139,7 +139,7 @@ fn jumps(joint: &SquareRoot, count: usize) -> Vec<(f64, f64)> {
     }
 }
 
-/// Both hypotheses.
+/// Two hypotheses together.
 fn combined(first: &ChangeHypothesis, second: &ChangeHypothesis) -> ChangeHypothesis {
     ChangeHypothesis {
         name: format!("{}, {}", first.name, second.name),

@@ -38,15 +38,15 @@ const SIMPLER: (f64, f64) = (1.3, 5.0);
 pub struct Trial<'a> {
     /// The model, with friction at its joints.
     pub model: &'a dyn EffortModel,
-    /// Its shape parameters.
+    /// Shape parameters of the model.
     pub shape: &'a [f64],
-    /// Its base columns, ascending.
+    /// Base columns of the model, ascending.
     pub kept: &'a [usize],
     /// The log, joints in the order of the outputs.
     pub log: &'a UniformLog,
     /// Per joint, whether it moves.
     pub moves: &'a [bool],
-    /// Its samples.
+    /// Samples of the log.
     pub samples: &'a Samples,
     /// Per joint, whether it slides.
     pub slides: &'a [bool],

@@ -17,7 +17,7 @@ pub struct AgainstStated {
     pub ratio: f64,
     /// Share of the effort's variance that stated inertias so scaled leave unexplained.
     pub unexplained: f64,
-    /// The same with elements alone.
+    /// Share of the effort's variance that elements alone leave unexplained.
     pub elements_alone: f64,
 }
 

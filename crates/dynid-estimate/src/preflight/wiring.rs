@@ -54,7 +54,7 @@ pub enum Rewiring {
     EffortOrder(Vec<usize>),
     /// Positions belong to other joints.
     PositionOrder(Vec<usize>),
-    /// Both belong to other joints, alike.
+    /// Positions and efforts both belong to other joints, alike.
     JointOrder(Vec<usize>),
     /// The position of a joint has another unit: it is to be multiplied by this.
     PositionUnit(usize, f64),
@@ -112,7 +112,7 @@ impl Rewiring {
 }
 
 impl Wiring {
-    /// As the log says.
+    /// The wiring that the log states.
     pub fn identity(joints: usize) -> Self {
         let plain: Vec<Source> =
             (0..joints).map(|joint| Source { joint, factor: 1.0, offset: 0.0 }).collect();

@@ -43,7 +43,7 @@ pub struct BeeColony {
 }
 
 impl BeeColony {
-    /// As published for the X-Y pointing mechanism: 100 sources, 200 iterations.
+    /// Settings published for the X-Y pointing mechanism: 100 sources, 200 iterations.
     pub fn published() -> Self {
         BeeColony {
             acceleration: 0.5,

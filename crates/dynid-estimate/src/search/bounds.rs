@@ -22,9 +22,9 @@ pub enum BoundsError {
     NotFinite {
         /// The coordinate, from 0.
         index: usize,
-        /// Its lower bound.
+        /// Lower bound of the coordinate.
         lower: f64,
-        /// Its upper bound.
+        /// Upper bound of the coordinate.
         upper: f64,
     },
     /// A lower bound above its upper bound.
@@ -32,9 +32,9 @@ pub enum BoundsError {
     Reversed {
         /// The coordinate, from 0.
         index: usize,
-        /// Its lower bound.
+        /// Lower bound of the coordinate.
         lower: f64,
-        /// Its upper bound.
+        /// Upper bound of the coordinate.
         upper: f64,
     },
     /// A logarithmic coordinate whose lower bound is not positive.
@@ -42,7 +42,7 @@ pub enum BoundsError {
     NotPositive {
         /// The coordinate, from 0.
         index: usize,
-        /// Its lower bound.
+        /// Lower bound of the coordinate.
         lower: f64,
     },
     /// A coordinate that does not exist was to be logarithmic.
@@ -94,7 +94,7 @@ impl Bounds {
         Ok(Bounds { search_lower: lower.clone(), search_upper: upper.clone(), lower, upper, logarithmic })
     }
 
-    /// The same bounds with the given coordinates searched by their logarithm: steps and spreads are then factors.
+    /// Returns the bounds with the given coordinates searched by their logarithm: steps and spreads are then factors.
     ///
     /// # Errors
     /// A coordinate that does not exist or whose lower bound is not positive.

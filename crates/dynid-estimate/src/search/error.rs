@@ -57,9 +57,9 @@ pub enum SearchError {
         algorithm: &'static str,
         /// The parameter.
         parameter: &'static str,
-        /// Its range.
+        /// Range that is allowed.
         expected: &'static str,
-        /// Its value.
+        /// Value that is found.
         found: f64,
     },
     /// The start point has another number of coordinates.
@@ -75,11 +75,11 @@ pub enum SearchError {
     StartOutside {
         /// The coordinate, from 0.
         index: usize,
-        /// Its value.
+        /// Value of the coordinate.
         value: f64,
-        /// Its lower bound.
+        /// Lower bound of the coordinate.
         lower: f64,
-        /// Its upper bound.
+        /// Upper bound of the coordinate.
         upper: f64,
     },
     /// No algorithm of this name.

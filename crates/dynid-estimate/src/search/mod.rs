@@ -96,7 +96,7 @@ pub fn run(
 /// observer may differ from those of the run that was saved; counters go on.
 ///
 /// # Errors
-/// As [`run`], and for a checkpoint of another algorithm, population, seed or bounds, or a damaged one.
+/// Fails as [`run`] does, and for a checkpoint of another algorithm, population, seed or bounds, or a damaged one.
 pub fn resume(
     algorithm: &Algorithm,
     objective: &dyn Objective,
@@ -111,7 +111,7 @@ pub fn resume(
 /// Runs with several seeds in parallel, results in the order of the seeds. The seed of the settings is not used.
 ///
 /// # Errors
-/// As [`run`]; of several, that of the first seed.
+/// Fails as [`run`] does; of several, that of the first seed.
 pub fn many(
     algorithm: &Algorithm,
     objective: &dyn Objective,

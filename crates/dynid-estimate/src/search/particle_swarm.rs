@@ -35,7 +35,7 @@ use dynid_motion::words::Transfer;
 pub enum Neighbours {
     /// All.
     All,
-    /// Its own and those of the particles that drew it, each drawing so many; drawn anew after an iteration without
+    /// Best points of the particle itself and of the particles that drew it, each drawing so many; drawn anew after an iteration without
     /// progress.
     Random(usize),
 }
@@ -60,7 +60,7 @@ pub struct ParticleSwarm {
 }
 
 impl ParticleSwarm {
-    /// As published for the ER-16: 25 particles, 200 iterations.
+    /// Settings published for the ER-16: 25 particles, 200 iterations.
     pub fn published() -> Self {
         ParticleSwarm {
             inertia: 0.5,

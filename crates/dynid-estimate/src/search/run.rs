@@ -43,7 +43,7 @@ pub enum Status {
 pub struct SearchResult {
     /// The best point, within the bounds.
     pub point: Vec<f64>,
-    /// Its value.
+    /// Value at the best point.
     pub value: f64,
     /// Iterations made (without the initial population).
     pub iterations: u64,
@@ -67,7 +67,7 @@ pub struct Progress<'a> {
     pub not_finite: u64,
     /// The best point so far; `None` as long as no value was finite.
     pub point: Option<&'a [f64]>,
-    /// Its value, `+∞` without one.
+    /// Value at the best point, `+∞` without one.
     pub value: f64,
     pub(super) save: &'a dyn Fn() -> Checkpoint,
 }

@@ -109,7 +109,7 @@ impl<'a> EffortProblem<'a> {
         })
     }
 
-    /// The same with other starts and bounds of the shape parameters.
+    /// Returns the problem with other starts and bounds of the shape parameters.
     ///
     /// # Panics
     /// Unless there is one entry per shape parameter of the model.

@@ -61,7 +61,7 @@ impl SeparableEstimate {
         Some(self.spread(fit, &covariance, self.residual_variance(fit)))
     }
 
-    /// The same from the delete-a-block jackknife, which survives filtered residuals; `None` below two time blocks.
+    /// Standard deviations from the delete-a-block jackknife, which survives filtered residuals; `None` below two time blocks.
     pub fn jackknife_deviations(&self) -> Option<Deviations> {
         let fit = self.linearised.as_ref()?;
         let covariance = fit.jackknife()?.covariance;

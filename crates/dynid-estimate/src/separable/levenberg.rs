@@ -33,7 +33,7 @@ pub(super) struct Stops {
     pub(super) gradient: f64,
     /// Predicted fall of the rss that is not worth a step.
     pub(super) fall: f64,
-    /// The same as a share of the rss.
+    /// Predicted fall, as a share of the rss, that is not worth a step.
     pub(super) relative_fall: f64,
 }
 

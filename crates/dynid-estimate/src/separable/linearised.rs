@@ -1,6 +1,6 @@
 //! The problem linearised in all parameters: regressor `J_f = [Φ, D_1 c, D_2 c, ..]`, target `y - known columns`.
 //!
-//! Its least-squares solution is `(c + Δc, Δα)`, so at a minimum the last entries vanish and everything that works on
+//! The least-squares solution is `(c + Δc, Δα)`, so at a minimum the last entries vanish and everything that works on
 //! rows and factors (variances, jackknife, sandwich, HAC, robust losses) gives the figures of `(c, α)` together.
 
 use super::problem::{RowGroup, SeparableProblem, ShapedColumns};

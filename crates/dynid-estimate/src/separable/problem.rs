@@ -16,7 +16,7 @@ pub struct RowGroup {
     pub block_rows: Vec<usize>,
     /// Linear parameters with a column here that no shape parameter changes.
     pub fixed: Vec<usize>,
-    /// Their columns: `fixed_values[k * rows + i]`, effort per unit of the parameter.
+    /// Columns of the fixed parameters: `fixed_values[k * rows + i]`, effort per unit of the parameter.
     pub fixed_values: Vec<f64>,
     /// Measured effort less what is known of it.
     pub effort: Vec<f64>,
@@ -63,7 +63,7 @@ impl ShapedColumns {
         &self.values[k * self.rows..][..self.rows]
     }
 
-    /// The same, to be written.
+    /// Values of a shaped column, to be written.
     pub fn value_mut(&mut self, k: usize) -> &mut [f64] {
         &mut self.values[k * self.rows..][..self.rows]
     }
@@ -73,7 +73,7 @@ impl ShapedColumns {
         &self.derivatives[d * self.rows..][..self.rows]
     }
 
-    /// The same, to be written.
+    /// A derivative of a shaped column, to be written.
     pub fn derivative_mut(&mut self, d: usize) -> &mut [f64] {
         &mut self.derivatives[d * self.rows..][..self.rows]
     }

@@ -41,7 +41,7 @@ impl Default for Weighting {
 pub struct ShapeSearch {
     /// Algorithm.
     pub algorithm: Algorithm,
-    /// Its budget and seed; a start is taken from the problem where none is given.
+    /// Budget and seed; a start is taken from the problem where none is given.
     pub settings: search::Settings,
 }
 

@@ -17,7 +17,7 @@ pub struct SteadyFrictionRow {
     pub temperature: f64,
     /// Friction, N m or N.
     pub friction: f64,
-    /// Its standard deviation, positive.
+    /// Standard deviation of the friction, positive.
     pub std: f64,
 }
 

@@ -22,7 +22,7 @@ const COMMON: [&str; 4] = ["fc", "fs", "vs", "fo"];
 /// A law that was tried.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rung {
-    /// Its terms.
+    /// Terms of the law.
     pub form: LawForm,
     /// Fit, if there was one.
     pub error: Option<CurveError>,
@@ -45,7 +45,7 @@ pub struct LevelFit {
     pub own: Option<FrictionLaw>,
     /// How far that is from its points.
     pub own_error: Option<CurveError>,
-    /// Its law of the common fit, in which all temperatures share `F_c, F_s, v_s`.
+    /// Law of this temperature in the common fit, in which all temperatures share `F_c, F_s, v_s`.
     pub common: Option<FrictionLaw>,
 }
 

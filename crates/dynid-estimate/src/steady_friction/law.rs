@@ -184,7 +184,7 @@ pub(super) fn build(form: &LawForm, scale: &ShapeScale, reference: f64, range: (
 pub struct LawParts {
     /// The model of one joint without inertia.
     pub model: RobotModel,
-    /// Its shape parameters.
+    /// Shape parameters of the model.
     pub shape: Vec<f64>,
     /// Linear parameters of Coulomb or Stribeck friction alone.
     pub bristles: Vec<f64>,

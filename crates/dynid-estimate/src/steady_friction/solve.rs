@@ -233,7 +233,7 @@ fn covariance(found: &SeparableEstimate) -> Mat<f64> {
     }
 }
 
-/// The same from the delete-a-block jackknife.
+/// Covariance from the delete-a-block jackknife.
 fn jackknifed(found: &SeparableEstimate) -> Mat<f64> {
     let jackknife = found.linearised.as_ref().and_then(LinearEstimate::jackknife);
     match (&found.linearised, jackknife, found.jackknife_deviations()) {

@@ -104,7 +104,7 @@ fn raw_residuals_of_a_fit_are_judged_fairly() {
     assert!(null <= 0.07 && power >= 0.90, "null {null}, power {power}");
 }
 
-/// The full count, at both lengths of the specification.
+/// The full count of logs, at both lengths.
 #[test]
 #[ignore = "takes some minutes; the ordinary run does fewer logs"]
 fn intervals_of_a_thousand_logs_hold_the_truth() {

@@ -1,4 +1,4 @@
-//! The same rows give the same bits, however they are portioned and whatever the thread count.
+//! Equal rows give the same bits, however they are portioned and whatever the thread count.
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use dynid_estimate::covariance::jackknife;

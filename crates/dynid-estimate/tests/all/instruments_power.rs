@@ -20,7 +20,7 @@ const SECONDS: usize = 40;
 /// Inertia, viscous friction, Coulomb friction, offset.
 const TRUTH: [f64; 4] = [0.06, 0.3, 0.6, 0.2];
 const SIZES: [f64; 4] = [0.03, 0.3, 0.6, 0.6];
-/// Position noise that the spec states for its power, rad.
+/// Position noise at which the power of the test is asked for, rad.
 const NOISE: f64 = 3e-4;
 const EFFORT_NOISE: f64 = 0.05;
 /// Cut-off in Hz and decimation of rows that let noise through, and of rows that do not.
@@ -35,7 +35,7 @@ const SLOWEST: (usize, f64) = (60, 0.1);
 struct Noise {
     /// Into the readings of the controller, rad.
     loop_: f64,
-    /// The same noise into the log.
+    /// Whether the log has the noise that the controller reads.
     logged: bool,
     /// Into the logged effort.
     effort: f64,

@@ -75,7 +75,7 @@ fn the_reference_trajectory_is_the_golden_one() {
             near("effort", effort, vector(&sample["tau"])[i], tolerance);
         }
     }
-    // B12: friction is more than half of the force of every slider.
+    // Friction is more than half of the force of every slider.
     let problem = Problem::new(record, &clean, Settings::default()).unwrap();
     for (i, drive) in problem.predict(&TRUTH).unwrap().drives.iter().enumerate() {
         let rms = |v: &[f64]| (v.iter().map(|x| x * x).sum::<f64>() / v.len() as f64).sqrt();

@@ -36,7 +36,7 @@ fn base(phi: &[f64]) -> Vec<f64> {
     (0..9).map(|i| (0..13).map(|k| b[(i, k)] * phi[k]).sum()).collect()
 }
 
-/// B7, B8, B10 without noise.
+/// Fits and searches of the three laws without noise.
 #[test]
 fn clean_efforts_give_back_what_is_identifiable() {
     let mut searched = Vec::new();
@@ -69,11 +69,11 @@ fn clean_efforts_give_back_what_is_identifiable() {
     }
     assert!(fitted[0] <= 0.01 * fitted[1]);
     assert!(searched[0] <= 0.6 * searched[1], "{searched:?}");
-    // Section 10: 0, 0.429 and 1.855 N.
+    // By an independent program: 0, 0.429 and 1.855 N.
     assert!((fitted[1] - 0.429).abs() < 5e-4 && (fitted[2] - 1.855).abs() < 5e-4, "{fitted:?}");
 }
 
-/// B7, B8, B9, B11 with noise of 2 N.
+/// Fits, identifiability and prediction with noise of 2 N.
 #[test]
 fn noisy_efforts_keep_the_order_of_the_models() {
     for seed in 1..=3 {

@@ -33,7 +33,7 @@ pub enum ConstraintError {
     /// A number that must be finite, or positive, is not.
     #[error("{what} of `{subject}` is {found}, expected {expected}")]
     Number {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
         /// Output, frame or region.
         subject: String,
@@ -187,6 +187,6 @@ pub trait PathConstraint: Send + Sync {
     /// `3 n` numbers each, `n` the number of rates; `out` has room for exactly these.
     ///
     /// # Panics
-    /// As [`PathConstraint::values`]; if a row or sample does not exist, or a joint floats.
+    /// Panics as [`PathConstraint::values`] does; if a row or sample does not exist, or a joint floats.
     fn gradients(&self, motion: &MotionBlock<'_>, wanted: &[(usize, usize)], out: &mut [f64]);
 }

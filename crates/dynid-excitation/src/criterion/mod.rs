@@ -38,7 +38,7 @@ pub enum Measure {
 pub enum ColumnScaling {
     /// Nothing: columns in SI units.
     Raw,
-    /// Their own lengths.
+    /// Lengths of the columns themselves.
     UnitNorm,
     /// Given numbers, one per column.
     Given(Vec<f64>),

@@ -16,7 +16,7 @@ const SLACK: f64 = 1.05;
 pub struct DegreesEvidence {
     /// Index of the joint with the strongest sign.
     pub joint: usize,
-    /// Its largest position, in the unit of the log.
+    /// Largest position of the joint, in the unit of the log.
     pub largest: f64,
     /// The limit that it exceeds, rad; `None`: no limits are known, and it exceeds two turns.
     pub limit: Option<f64>,

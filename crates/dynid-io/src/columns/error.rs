@@ -122,7 +122,7 @@ pub enum MappingError {
     Number {
         /// Signal or table.
         owner: String,
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
         /// What is required.
         expected: &'static str,

@@ -11,7 +11,7 @@ const EPOCH_CLOCK: f64 = 1e6;
 pub struct Signals {
     /// Logged joints in joint order.
     pub joints: Vec<String>,
-    /// Their indices among the robot's joints.
+    /// Indices of the logged joints among the robot's joints.
     pub indices: Vec<usize>,
     /// Joints of the robot without a log.
     pub not_logged: Vec<String>,

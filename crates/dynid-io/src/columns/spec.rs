@@ -96,7 +96,7 @@ pub enum ColumnNames {
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Units {
-    /// The same for all.
+    /// One unit for all joints.
     One(String),
     /// One per joint.
     List(Vec<String>),
@@ -106,7 +106,7 @@ pub enum Units {
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum PerJoint {
-    /// The same for all.
+    /// One number for all joints.
     One(f64),
     /// One per joint.
     List(Vec<f64>),
@@ -184,7 +184,7 @@ impl ColumnMapping {
         Self::with_efforts(header, joints, &vec![EffortColumn::Drive; joints.len()], spec)
     }
 
-    /// The same for joints whose effort is not always that of their drive.
+    /// Maps the columns of a log for joints whose effort is not always that of their drive.
     ///
     /// # Errors
     /// [`MappingError`]; [`MappingError::Undriven`] for a column of an effort that is known to be zero.

@@ -15,7 +15,7 @@ const PATIENCE_S: u64 = 30;
 pub struct OtherRun {
     /// Folder.
     pub folder: PathBuf,
-    /// Its process.
+    /// Process of the other run.
     pub process: u32,
     /// Time since it began.
     pub age: Duration,
@@ -43,7 +43,7 @@ pub struct OutputSet {
 
 #[derive(Debug)]
 struct Output {
-    /// As it was given.
+    /// Path as it was given.
     path: PathBuf,
     /// Links followed.
     target: PathBuf,

@@ -202,7 +202,7 @@ pub enum RobotFileError {
         format: &'static str,
         /// `link` or `joint`.
         what: &'static str,
-        /// Its name.
+        /// Name of the link or joint.
         name: String,
         /// Why.
         reason: String,

@@ -119,7 +119,7 @@ pub fn parse(text: &str, source_name: &str) -> Result<RobotFile, RobotFileError>
     parse_source(text, source_name, None)
 }
 
-/// The same, of a text that was read from a file.
+/// Parses a robot from text that was read from a file.
 pub(crate) fn parse_source(
     text: &str,
     source_name: &str,

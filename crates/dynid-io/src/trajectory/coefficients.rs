@@ -66,10 +66,10 @@ impl TrajectoryFile {
         Ok(Self::read_source(path)?.0)
     }
 
-    /// The same, and what was read.
+    /// Reads a trajectory file, and returns what was read beside it.
     ///
     /// # Errors
-    /// As [`Self::read`].
+    /// Fails as [`Self::read`] does.
     pub fn read_source(path: impl AsRef<Path>) -> Result<(Self, SourceFile), TrajectoryFileError> {
         let path = path.as_ref();
         let file = path.display().to_string();
@@ -82,7 +82,7 @@ impl TrajectoryFile {
     /// Reads a text; `file` names it in errors.
     ///
     /// # Errors
-    /// As [`Self::read`].
+    /// Fails as [`Self::read`] does.
     pub fn parse(text: &str, file: &str) -> Result<Self, TrajectoryFileError> {
         // The schema first, so that a foreign file is told as such and not by its first unknown key.
         let value: serde_json::Value = serde_json::from_str(text).map_err(|e| syntax(file, &e))?;

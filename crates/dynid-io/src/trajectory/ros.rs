@@ -124,7 +124,7 @@ impl JointTrajectory {
 /// Writes the message as YAML, whole or not at all.
 ///
 /// # Errors
-/// As [`JointTrajectory::new`], and [`OutputError::Unwritable`].
+/// Fails as [`JointTrajectory::new`] does, and [`OutputError::Unwritable`].
 pub fn write_ros_yaml(
     path: impl AsRef<Path>,
     joints: &[String],
@@ -137,7 +137,7 @@ pub fn write_ros_yaml(
 /// Writes the message as JSON, whole or not at all.
 ///
 /// # Errors
-/// As [`write_ros_yaml`].
+/// Fails as [`write_ros_yaml`] does.
 pub fn write_ros_json(
     path: impl AsRef<Path>,
     joints: &[String],

@@ -69,7 +69,7 @@ struct Open<'a> {
     edit: Edit<'a>,
     /// Name as the file writes it.
     name: String,
-    /// Its opening tag.
+    /// Opening tag of the element.
     tag: Range<usize>,
     /// Start and attributes of the child element that is being replaced.
     child: Option<(usize, Vec<Attribute>)>,

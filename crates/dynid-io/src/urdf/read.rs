@@ -21,7 +21,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Description, RobotFileError> {
     Ok(read_source(path.as_ref())?.0)
 }
 
-/// The same, and what was read.
+/// Reads a URDF, and returns what was read beside it.
 pub(crate) fn read_source(path: &Path) -> Result<(Description, SourceFile), RobotFileError> {
     let (text, source) = read_text(path, MAX_ROBOT_FILE_BYTES)?;
     Ok((parse(&text, &path.display().to_string())?, source))

@@ -23,7 +23,7 @@ const SPREAD: f64 = 0.2;
 /// Change of a coordinate at home that is worth a word.
 const MOVED: f64 = 1e-3;
 const CLOSED: f64 = 1e-12;
-/// The same where steps along all of them do not close the loops further.
+/// Largest gap where steps along all coordinates do not close the loops further.
 const STRETCHED: f64 = 0.1;
 /// Smallest part of a step towards a closed pose that is tried.
 const SHORTEST: f64 = 1.0 / 1024.0;
@@ -228,7 +228,7 @@ impl ClosedMechanism {
         self.warnings.push(ClosedWarning::Redundant { rows: m, rank, closures });
     }
 
-    /// As many of the candidates as there are free motions, so that they determine the motion as well as may be.
+    /// Returns as many of the candidates as there are free motions, so that they determine the motion as well as may be.
     fn chosen(&self, poses: &[Vec<f64>], candidates: &[usize], mobility: usize) -> Vec<usize> {
         // Dependent coordinates are taken first, from what is no candidate; candidates left over are independent.
         let jacobian = poses.last().map(|q| self.jacobian_at(q)).unwrap_or_default();

@@ -17,7 +17,7 @@ pub struct LinkFrame {
 pub enum CutKind {
     /// Both origins are one point: `x_a·d, y_a·d, z_a·d`.
     Spherical,
-    /// The same in a plane: `x_a·d, y_a·d`.
+    /// Both origins are one point in the plane x y of `a`: `x_a·d, y_a·d`.
     PlanarRevolute,
     /// One point and one axis z: point; `x_a·z_b, y_a·z_b`.
     Revolute,
@@ -33,7 +33,7 @@ pub enum CutKind {
     Fixed,
     /// A rod without mass between two ball joints: `(d·d - L²) / (2 L)`.
     Distance {
-        /// Its length `L`, m; positive.
+        /// Length `L` of the rod, m; positive.
         length: f64,
     },
 }

@@ -162,7 +162,7 @@ impl ClosedDynamics {
     /// Goes to a closed pose, given by the positions of all joints.
     ///
     /// # Errors
-    /// As [`ClosedMechanism::take`].
+    /// Fails as [`ClosedMechanism::take`] does.
     pub fn take(&mut self, q: &[f64]) -> Result<(), PoseError> {
         self.machine.take(&mut self.pose, q)?;
         self.take_map();
@@ -172,7 +172,7 @@ impl ClosedDynamics {
     /// Goes to other positions of the independent coordinates.
     ///
     /// # Errors
-    /// As [`ClosedMechanism::reach`].
+    /// Fails as [`ClosedMechanism::reach`] does.
     pub fn reach(&mut self, independent: &[f64]) -> Result<(), PoseError> {
         self.machine.reach(&mut self.pose, independent)?;
         self.take_map();

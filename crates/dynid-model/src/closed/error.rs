@@ -187,7 +187,7 @@ pub enum ClosedWarning {
     Redundant {
         /// Number of rows.
         rows: usize,
-        /// Their rank.
+        /// Rank of the rows.
         rank: usize,
         /// Closures with a multiplier that is not determined.
         closures: Vec<String>,

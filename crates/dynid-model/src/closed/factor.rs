@@ -166,7 +166,7 @@ impl Factor {
         }
     }
 
-    /// The same for `count` right-hand sides, which lie row after row, as do the solutions.
+    /// Solves for `count` right-hand sides, which lie row after row, as do the solutions.
     pub(super) fn solve_many(&self, count: usize, b: &[f64], x: &mut [f64]) {
         if self.square {
             return self.lu.solve_many(count, b, x);

@@ -60,7 +60,7 @@ impl ClosedMechanism {
         build::build(mechanism, closures, driven, home, LEAST_MEASURE)
     }
 
-    /// The same mechanism with other independent coordinates: a pose of the platform, say, in place of the drives.
+    /// Returns the mechanism with other independent coordinates: a pose of the platform, say, in place of the drives.
     ///
     /// # Errors
     /// [`ClosedError::IndependentCount`], [`ClosedError::Dependent`], [`ClosedError::SingularHome`], and those of names.
@@ -84,7 +84,7 @@ impl ClosedMechanism {
         &self.mechanism
     }
 
-    /// The same closures on another tree with the same joints: other inertias or another gravity.
+    /// Returns the closures on another tree with the same joints: other inertias or another gravity.
     ///
     /// # Panics
     /// If the joints differ.

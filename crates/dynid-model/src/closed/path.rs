@@ -7,7 +7,7 @@ use super::pose::PoseWorkspace;
 
 /// Residual at which a pose counts as closed, m.
 const CLOSED: f64 = 1e-14;
-/// The same where rounding keeps it from falling further.
+/// Largest gap where rounding keeps it from falling further.
 const STALLED: f64 = 1e-11;
 const ITERATIONS: usize = 12;
 /// Longest step of a coordinate between two poses, m (or rad times `L_c`).

@@ -116,7 +116,7 @@ impl ClosedMechanism {
     /// Takes a workspace to a closed pose: positions of all joints, as a motion or a file states them.
     ///
     /// # Errors
-    /// As [`ClosedMechanism::reach`]; `q` may be off by rounding only, and dependent joints are corrected.
+    /// Fails as [`ClosedMechanism::reach`] does; `q` may be off by rounding only, and dependent joints are corrected.
     ///
     /// # Panics
     /// If `q` has the wrong length.

@@ -57,7 +57,7 @@ struct NodeFrame {
     origin: Vec3<f64>,
 }
 
-/// The same frame in base axes.
+/// A frame of a closure in base axes.
 struct WorldFrame<S> {
     axes: Mat3<S>,
     origin: Vec3<S>,
@@ -97,7 +97,7 @@ impl NodeFrame {
 #[derive(Clone, Copy, Debug)]
 struct Mover {
     rate: usize,
-    /// It moves `b`; otherwise `a`.
+    /// Whether the rate moves `b`; otherwise it moves `a`.
     moves_b: bool,
 }
 

@@ -60,7 +60,7 @@ impl ClosedModel {
         self.expand_with(motion, |_, _, _, _| ())
     }
 
-    /// The same; `visit(sample, motion so far, pose, fault)` sees every pose, with its velocity map.
+    /// Expands a motion of the drives; `visit(sample, motion so far, pose, fault)` sees every pose, with its velocity map.
     pub(super) fn expand_with(
         &self,
         motion: &MotionBlock<'_>,

@@ -59,7 +59,7 @@ pub enum LoadError {
     /// A length that does not fit, or a number that is not finite.
     #[error("{what}: expected {expected}, found {found}")]
     Value {
-        /// Which value.
+        /// Name of the value.
         what: &'static str,
         /// What it should be.
         expected: String,
@@ -180,7 +180,7 @@ impl ClosedModel {
         self.loads = Some(loads);
     }
 
-    /// The same loads at other parameters.
+    /// Returns the model with its loads at other parameters.
     ///
     /// # Errors
     /// [`LoadError::Value`] for a wrong length.

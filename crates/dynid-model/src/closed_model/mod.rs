@@ -104,7 +104,7 @@ impl ClosedModel {
         &self.machine
     }
 
-    /// The same closures and loads around a changed model of the tree, whose elements keep their columns.
+    /// Returns the closures and loads around a changed model of the tree, whose elements keep their columns.
     pub(crate) fn map_tree(self, change: impl FnOnce(TreeModel) -> TreeModel) -> Self {
         let loads = self.loads;
         let mut out = ClosedModel::new(change(self.tree), self.machine);

@@ -33,7 +33,7 @@ pub struct Reactions {
     list: Vec<Reaction>,
     /// Nodes that hang on each reaction's joint.
     hanging: Vec<Vec<usize>>,
-    /// Their bodies.
+    /// Bodies of these nodes.
     bodies: Vec<Vec<usize>>,
     layout: Arc<RegressorLayout>,
 }
@@ -107,7 +107,7 @@ impl ClosedModel {
     /// [not determined](crate::closed::ClosedMechanism::is_determined) are those of least norm.
     ///
     /// # Panics
-    /// As [`EffortModel::regressor`].
+    /// Panics as [`EffortModel::regressor`] does.
     pub fn reaction_regressor(
         &self,
         motion: &MotionBlock<'_>,

@@ -31,7 +31,7 @@ impl JournalBearing {
         Ok(JournalBearing { journal_radius, clearance, width })
     }
 
-    /// The same journal in a bearing of another clearance.
+    /// Returns the journal in a bearing of another clearance.
     ///
     /// Fails unless it is above 0.
     pub fn with_clearance(&self, clearance: f64) -> Result<Self, ContactError> {

@@ -83,7 +83,7 @@ impl ContactLaw {
         }
     }
 
-    /// The same law, surfaces and journal with another clearance, m.
+    /// Returns the law, surfaces and journal with another clearance, m.
     ///
     /// Fails unless it is above 0, and as [`FractalLankaraniNikravesh::new`] does if it leaves only plastic spots.
     pub fn with_clearance(&self, clearance: f64) -> Result<ContactLaw, ContactError> {

@@ -27,7 +27,7 @@ pub struct SurfaceSettings {
     pub friction: f64,
     /// The body that yields first.
     pub softer: Material,
-    /// The other body.
+    /// The harder body.
     pub harder: Material,
     /// Yield strength `σ_y` of the softer body, Pa, above 0.
     pub yield_strength: f64,
@@ -121,7 +121,7 @@ pub enum AsperityStage {
 /// One asperity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Asperity {
-    /// Its stage.
+    /// Stage of the asperity.
     pub stage: AsperityStage,
     /// Interference `ω`, m.
     pub interference: f64,
@@ -241,7 +241,7 @@ impl FractalSurface {
         &self.settings
     }
 
-    /// Its constants.
+    /// Constants of the surface.
     pub fn constants(&self) -> &SurfaceConstants {
         &self.constants
     }

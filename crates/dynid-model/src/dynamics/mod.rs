@@ -1,6 +1,6 @@
 //! Dynamics of a mechanism: inverse and forward dynamics, regressor, kinematics, mass matrix, energies.
 //!
-//! Notation and equations: *Own derivation* in the guide (`docs/guide.md`), after Featherstone 2008 and
+//! Notation and equations: the chapter *Equations on one page* of the book (`docs/book/src/theory/equations.md`), after Featherstone 2008 and
 //! Atkeson, An & Hollerbach 1986. Frames: body quantities in axes of the body's joint frame, gravity in base axes.
 
 mod adjoint;
@@ -81,7 +81,7 @@ impl DynamicsWorkspace<f64> {
     }
 }
 
-/// The same memory for the fused twin of a scalar.
+/// Memory of the recursions for the fused twin of a scalar.
 #[derive(Clone, Debug)]
 struct FusedWorkspace<F> {
     inverse: InverseDynamicsWorkspace<F>,
@@ -126,7 +126,7 @@ impl Dynamics {
         }
     }
 
-    /// The same recursions with every joint a coordinate of its own.
+    /// Returns the recursions with every joint a coordinate for itself.
     pub(crate) fn uncoupled(mut self) -> Self {
         self.follows = None;
         self.rates = self.tree.rates;

@@ -32,7 +32,7 @@ pub fn impact_speed_signal(joint: &str) -> String {
 /// unit. The speed `v0` at the start of a contact is a signal; where it is missing, the law's floor stands in.
 ///
 /// Degenerate: where the load does not change, nor the penetration, `K` cannot be told from the clearance. Stiff: forces
-/// grow by 1e7 N/m. Sources: Sun, Han, Li & Li 2021, Eqs. 1 to 30, as restored in the guide; Ambrósio 2003 for `c_d`.
+/// grow by 1e7 N/m. Sources: Sun, Han, Li & Li 2021, Eqs. 1 to 30, as written in the chapter *Joints with clearance* of the book; Ambrósio 2003 for `c_d`.
 #[derive(Debug, Clone)]
 pub struct ClearanceContact {
     /// Rate of the rotation.
@@ -52,7 +52,7 @@ pub struct ClearanceContact {
 pub struct JournalMotion {
     /// Centre in bearing axes, m.
     pub position: [f64; 2],
-    /// Its rate, m/s.
+    /// Rate of the centre, m/s.
     pub rate: [f64; 2],
     /// Rate of the rotation, rad/s.
     pub spin: f64,
@@ -67,7 +67,7 @@ pub struct JournalContact {
     pub normal: [f64; 2],
     /// Penetration `δ`, m; negative without contact.
     pub penetration: f64,
-    /// Its rate, m/s.
+    /// Rate of the penetration, m/s.
     pub penetration_rate: f64,
     /// Sliding speed `v_t`, m/s.
     pub sliding: f64,

@@ -14,7 +14,7 @@ pub struct JetMotion<'a> {
     pub ddq: &'a [Jet],
     /// Extra channels by name.
     pub channels: &'a [(&'a str, Jet)],
-    /// As [`MotionBlock::sign_width`](crate::MotionBlock::sign_width).
+    /// Speed over which signs are smooth, see [`MotionBlock::sign_width`](crate::MotionBlock::sign_width).
     pub sign_width: f64,
 }
 

@@ -96,12 +96,12 @@ impl LogScaled {
 }
 
 impl ScaledPart {
-    /// Its shape parameters among those of all parts.
+    /// Shape parameters of this part among those of all parts.
     pub fn shape<'a>(&self, all: &'a [f64]) -> &'a [f64] {
         &all[self.first_shape..self.first_shape + self.shapes]
     }
 
-    /// Its entries among those of all parts.
+    /// Entries of this part among those of all parts.
     pub fn entries(&self) -> std::ops::Range<usize> {
         self.first_entry..self.first_entry + self.element.entries().len()
     }

@@ -193,7 +193,7 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     }
     /// Which of its linear parameters act on which rate: `(rate, parameter)`.
     fn entries(&self) -> Vec<(usize, usize)>;
-    /// Its effort is friction: of a single rate, whose velocity alone it depends on. False by default.
+    /// Whether the effort is friction: of a single rate, whose velocity alone it depends on. False by default.
     fn is_friction(&self) -> bool {
         false
     }
@@ -248,7 +248,7 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
     fn scaled(&self) -> Option<&LogScaled> {
         None
     }
-    /// Its linear parameters are of single logs: without [gate](is_gate) it has no effort. False by default.
+    /// Whether the linear parameters are of single logs: without [gate](is_gate) it has no effort. False by default.
     fn is_of_logs(&self) -> bool {
         false
     }

@@ -37,10 +37,10 @@ impl Payload {
         Self::with_unknown(mechanism, body, name, (0..10).collect())
     }
 
-    /// The same where some parameters are zero or [known](KnownLoad). `unknown`: places of the others, ascending.
+    /// A payload of which some parameters are zero or [known](KnownLoad). `unknown`: places of the others, ascending.
     ///
     /// # Panics
-    /// As [`Payload::new`]; if a place is above 9.
+    /// Panics as [`Payload::new`] does; if a place is above 9.
     pub fn with_unknown(mechanism: &Mechanism, body: usize, name: &str, unknown: Vec<usize>) -> Self {
         check(mechanism, body);
         assert!(unknown.iter().all(|k| *k < 10), "places of a payload {unknown:?}");
@@ -52,7 +52,7 @@ impl Payload {
         Payload { name: name.to_owned(), body, unknown, rated_mass: RATED_MASS, rates, dynamics, slots }
     }
 
-    /// The same with another largest mass thought possible, kg (5 by default): for priors, it bounds nothing.
+    /// Returns the payload with another largest mass thought possible, kg (5 by default): for priors, it bounds nothing.
     pub fn with_rated_mass(self, rated_mass: f64) -> Self {
         Payload { rated_mass, ..self }
     }
@@ -177,7 +177,7 @@ impl KnownLoad {
     /// A known body on a body of a mechanism. `load`: its inertia about the joint frame of the link.
     ///
     /// # Panics
-    /// As [`Payload::new`].
+    /// Panics as [`Payload::new`] does.
     pub fn new(mechanism: &Mechanism, body: usize, name: &str, load: &Inertia) -> Self {
         check(mechanism, body);
         let mut inertias = vec![0.0; mechanism.inertial_parameters()];

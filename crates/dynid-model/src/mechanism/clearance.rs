@@ -11,7 +11,7 @@ pub fn translation_names(joint: &str) -> [String; 2] {
 }
 
 impl Description {
-    /// The same robot with clearance in some revolute joints.
+    /// Returns the robot with clearance in some revolute joints.
     ///
     /// Each of them becomes three: translations `<joint>.x` and `<joint>.y` of the journal's centre along two axes of the
     /// bearing at right angles to the joint's axis (m), then the rotation under its old name. For an axis along z, `x` and
@@ -115,7 +115,7 @@ impl JournalPath {
         }
     }
 
-    /// The other way round.
+    /// The path of a journal in axes that turn with the link, from the path in bearing axes.
     pub fn in_journal(&self, joint: [f64; 3]) -> JournalPath {
         self.in_bearing(joint.map(|x| -x))
     }

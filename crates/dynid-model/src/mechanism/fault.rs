@@ -81,7 +81,7 @@ pub enum MechanismError {
     /// A number is NaN or infinite.
     #[error("{what} of `{name}` is not finite")]
     NotFinite {
-        /// Which quantity.
+        /// Name of the quantity.
         what: &'static str,
         /// Of which link or joint.
         name: String,
@@ -155,7 +155,7 @@ pub enum MechanismWarning {
     MimicIndependent {
         /// The mimic joint.
         joint: String,
-        /// Its leader.
+        /// Leader of the mimic joint.
         of: String,
     },
     /// A joint was locked because nothing moves it.

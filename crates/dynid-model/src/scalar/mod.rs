@@ -20,9 +20,9 @@ use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 pub trait Scalar:
     Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self> + AddAssign
 {
-    /// The same kind of number with fused multiply-add, for code that runs where the processor has it.
+    /// Twin of this kind of number with fused multiply-add, for code that runs where the processor has it.
     type Fused: Scalar;
-    /// As its fused twin.
+    /// Returns the number as its fused twin.
     fn fuse(self) -> Self::Fused;
     /// Back from the fused twin.
     fn unfuse(fused: Self::Fused) -> Self;

@@ -9,7 +9,7 @@ impl TreeModel {
         self.elements.iter().filter_map(|placed| placed.element.clearance())
     }
 
-    /// The same with values of their parameters `[K, D, mu]`; `linear`: all linear parameters of the model.
+    /// Contacts of journals with values of their parameters `[K, D, mu]`; `linear`: all linear parameters of the model.
     ///
     /// # Panics
     /// If `linear` is too short.

@@ -16,7 +16,7 @@ impl TreeModel {
     /// `linear`: all linear parameters of the model. `memory`: scratch, of any length.
     ///
     /// # Panics
-    /// As [`EffortModel::efforts`](crate::EffortModel::efforts).
+    /// Panics as [`EffortModel::efforts`](crate::EffortModel::efforts) does.
     pub fn element_efforts(
         &self,
         motion: &MotionBlock<'_>,
@@ -29,10 +29,10 @@ impl TreeModel {
         self.efforts_of(|_| true, motion, (shape, linear), stride, effort, memory);
     }
 
-    /// The same of some elements; known ones all count.
+    /// Efforts of some elements; known ones all count.
     ///
     /// # Panics
-    /// As [`EffortModel::efforts`](crate::EffortModel::efforts).
+    /// Panics as [`EffortModel::efforts`](crate::EffortModel::efforts) does.
     pub fn efforts_of(
         &self,
         counts: impl Fn(&dyn JointElement) -> bool,
@@ -68,7 +68,7 @@ impl TreeModel {
     /// the motion; compare [`EffortModel::effort_adjoint`](crate::EffortModel::effort_adjoint).
     ///
     /// # Panics
-    /// As [`EffortModel::effort_adjoint`](crate::EffortModel::effort_adjoint).
+    /// Panics as [`EffortModel::effort_adjoint`](crate::EffortModel::effort_adjoint) does.
     pub fn element_adjoint(
         &self,
         motion: &MotionBlock<'_>,
@@ -81,10 +81,10 @@ impl TreeModel {
         self.adjoint_of(|_| true, motion, (shape, linear), (stride, weights), out, memory);
     }
 
-    /// The same of some elements; known ones all count.
+    /// Adjoint of the efforts of some elements; known ones all count.
     ///
     /// # Panics
-    /// As [`EffortModel::effort_adjoint`](crate::EffortModel::effort_adjoint).
+    /// Panics as [`EffortModel::effort_adjoint`](crate::EffortModel::effort_adjoint) does.
     pub fn adjoint_of(
         &self,
         counts: impl Fn(&dyn JointElement) -> bool,

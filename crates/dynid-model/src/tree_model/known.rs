@@ -17,7 +17,7 @@ pub struct KnownElement {
     pub shape: Vec<f64>,
 }
 
-/// The same in its place; entries are `(rate, own linear parameter)`.
+/// A known element in its place; entries are `(rate, own linear parameter)`.
 #[derive(Debug)]
 pub(super) struct PlacedKnown {
     pub(super) placed: PlacedElement,
@@ -26,7 +26,7 @@ pub(super) struct PlacedKnown {
 }
 
 impl TreeModel {
-    /// The same model with elements whose efforts are known: they go into the offset of the effort
+    /// Returns the model with elements whose efforts are known: they go into the offset of the effort
     /// (`effort = W linear + offset`) and into predictions, not into the parameters.
     ///
     /// # Panics
@@ -58,7 +58,7 @@ impl TreeModel {
         self
     }
 
-    /// The same model with linear parameters of any sign where `is_free` says so: errors of known elements, say, have no
+    /// Returns the model with linear parameters of any sign where `is_free` says so: errors of known elements, say, have no
     /// reason to be positive.
     pub fn with_free_sign(mut self, is_free: impl Fn(&Parameter) -> bool) -> Self {
         for parameter in self.parameters.linear.iter_mut().filter(|p| is_free(p)) {

@@ -10,7 +10,7 @@ pub(crate) struct PlacedReactionFriction<'a> {
     pub(crate) element: &'a ReactionFriction,
     /// Columns of its coefficients.
     pub(crate) columns: Vec<usize>,
-    /// Its shape parameters.
+    /// Shape parameters of the element.
     pub(crate) shape: Range<usize>,
 }
 

@@ -21,7 +21,7 @@ struct ShapedElement {
     element: usize,
     /// For every entry: its shaped column, if it is one.
     columns: Vec<Option<usize>>,
-    /// The same without gaps, where every entry is shaped: the element then fills its columns in place.
+    /// Shaped columns without gaps, where every entry is shaped: the element then fills its columns in place.
     in_place: Option<Vec<usize>>,
     /// For every pair of the element: its place among the dependences.
     derivatives: Vec<usize>,

@@ -237,7 +237,7 @@ fn wrench_along_the_axis_is_the_effort() {
     }
 }
 
-/// The same tree with the frame of every link turned by a rotation.
+/// The tree with the frame of every link turned by a rotation.
 fn turned(d: &Description, rotations: &[Placement]) -> Description {
     let mut out = d.clone();
     let of = |name: &str| rotations[d.links.iter().position(|l| l.name == name).unwrap()];

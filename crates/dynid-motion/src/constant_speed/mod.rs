@@ -29,7 +29,7 @@ pub enum ConstantSpeedError {
         sample: usize,
         /// Time before it, s.
         before: f64,
-        /// Its time, s.
+        /// Time of the sample, s.
         found: f64,
     },
 }

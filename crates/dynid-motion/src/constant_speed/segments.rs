@@ -15,7 +15,7 @@ pub struct SegmentSettings {
     pub least_duration_s: f64,
     /// Largest departure from the mean speed, as a share of it. Default 0.03.
     pub speed_tolerance: f64,
-    /// The same in standard deviations of the noise of the speed; both add up. Default 4.
+    /// Largest departure from the mean speed in standard deviations of the noise of the speed; it adds to `speed_tolerance`. Default 4.
     pub noise_tolerance: f64,
     /// Cut from both ends, where the joint still speeds up or swings in, s. Default 0.1.
     pub trim_s: f64,

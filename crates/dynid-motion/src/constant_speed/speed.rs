@@ -16,7 +16,7 @@ pub(super) struct Smoothed {
 /// `window` seconds, or the mean of its logged velocity there.
 ///
 /// # Errors
-/// As [`segments()`](super::segments()).
+/// Fails as [`segments()`](super::segments()) does.
 pub fn speed(
     time: &[f64],
     joint: &JointSignals,

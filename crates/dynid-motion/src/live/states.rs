@@ -24,7 +24,7 @@ struct Taps {
 }
 
 impl Taps {
-    /// Those of smoothing a signal that is taken `samples` later, by 6-point Lagrange interpolation.
+    /// Taps of smoothing a signal that is taken `samples` later, by 6-point Lagrange interpolation.
     fn shifted(weights: &[f64], samples: f64) -> Taps {
         let half = (weights.len() / 2) as isize;
         let whole = samples.floor();

@@ -51,7 +51,7 @@ impl BSpline {
         Ok(BSpline { duration, degree, spans, control: curves })
     }
 
-    /// The same from rest to rest: the first and the last control point count three times, so that velocity and acceleration
+    /// A spline from rest to rest: the first and the last control point count three times, so that velocity and acceleration
     /// vanish at both ends. `control`: per coordinate at least two points.
     ///
     /// Fails as [`Self::new`].

@@ -47,7 +47,7 @@ pub enum TrajectoryError {
     /// A number is not finite or not in the range where it must be.
     #[error("{name}: expected {expected}, found {found}")]
     Value {
-        /// Which number.
+        /// Name of the number.
         name: &'static str,
         /// The range it must lie in.
         expected: &'static str,
@@ -89,7 +89,7 @@ pub enum TrajectoryError {
         coordinate: usize,
         /// Base frequency of the first series, rad/s.
         expected: f64,
-        /// Its base frequency, rad/s.
+        /// Base frequency of the other series, rad/s.
         found: f64,
     },
     /// A state through which the motion must go breaks a limit.

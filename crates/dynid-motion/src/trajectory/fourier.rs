@@ -145,7 +145,7 @@ impl Fourier {
         (&self.sine, &self.cosine)
     }
 
-    /// The same motion with its amplitudes (not its offset) multiplied by `factor`.
+    /// Returns the motion with its amplitudes (not its offset) multiplied by `factor`.
     pub fn scaled(&self, factor: f64) -> Result<Self, TrajectoryError> {
         let times = |v: &[f64]| v.iter().map(|x| factor * x).collect();
         Self::plain(self.base, self.offset, times(&self.sine), times(&self.cosine))

@@ -91,7 +91,7 @@ impl Sequence {
     /// coordinate. The record's own limits are not checked here.
     ///
     /// # Errors
-    /// As [`QuinticSegment::shortest`].
+    /// Fails as [`QuinticSegment::shortest`] does.
     pub fn parked(
         parking: &[f64],
         record: Box<dyn Trajectory>,
@@ -108,10 +108,10 @@ impl Sequence {
         ])
     }
 
-    /// The same with given durations, s; `None`: no approach, no return.
+    /// A sequence with given durations, s; `None`: no approach, no return.
     ///
     /// # Errors
-    /// As [`QuinticSegment::new`].
+    /// Fails as [`QuinticSegment::new`] does.
     pub fn timed(
         approach: Option<(&[f64], f64)>,
         record: Box<dyn Trajectory>,

@@ -54,7 +54,7 @@ fn on_grid(motion: &FourierTrajectory, samples: usize) -> Vec<[f64; 4]> {
     motion.series().iter().map(of).collect()
 }
 
-/// The same, exactly.
+/// Positions and derivatives of the series, exactly.
 fn exact(motion: &FourierTrajectory) -> Vec<[f64; 4]> {
     let of = |series: &Fourier| {
         let (position, velocity) = (series.extremes(), series.derivative().extremes());

@@ -36,7 +36,7 @@ fn white_innovations_raise_as_many_as_asked_for() {
     }
 }
 
-/// The same with an estimator in front, from its first sample on: innovations are white while it still
+/// False alarms with an estimator in front, from its first sample on: innovations are white while it still
 /// converges.
 #[test]
 fn an_estimator_raises_as_many_as_asked_for() {

@@ -56,7 +56,7 @@ pub struct Ladder {
 pub struct Rung {
     /// The candidate.
     pub value: Value,
-    /// Its loss.
+    /// Loss of the candidate.
     pub loss: Option<f64>,
     /// Standard error of the loss, same unit.
     pub loss_std_error: Option<f64>,

@@ -25,7 +25,7 @@ pub struct Consistency {
     pub status: Option<ConsistencyStatus>,
     /// Increase of the weighted sum of squares over the unconstrained fit, in residual variances.
     pub price: Option<f64>,
-    /// That increase over what the same number of parameters would take up by chance.
+    /// Increase of the weighted sum of squares over what the same number of parameters would take up by chance.
     pub price_over_chance: Option<f64>,
     /// Weight of the distance from the prior.
     pub prior_weight: Option<f64>,
@@ -70,7 +70,7 @@ pub struct HeldOut {
     pub joints: Vec<HeldOutJoint>,
     /// `100 |residual| / |effort|` over all joints without constraints, %.
     pub free_percent: Option<f64>,
-    /// The same of the consistent parameters, %.
+    /// `100 |residual| / |effort|` of the consistent parameters, %.
     pub consistent_percent: Option<f64>,
 }
 

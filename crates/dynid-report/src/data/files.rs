@@ -49,6 +49,6 @@ pub struct FileLoss {
     pub error_percent: Option<f64>,
     /// RMS of the model's effort minus the file's.
     pub loss: Option<f64>,
-    /// The same in % of the effort.
+    /// RMS of the model's effort minus the file's, in % of the effort.
     pub loss_percent: Option<f64>,
 }

@@ -36,7 +36,7 @@ pub struct LogReport {
     pub quality: Vec<JointQuality>,
     /// Euclidean norm of the residual over that of the measured effort, all joints together, raw effort, %.
     pub relative_error_raw_percent: Option<f64>,
-    /// The same, with the same filter over measured and predicted effort, %.
+    /// Euclidean norm of the residual over that of the measured effort, with one filter over measured and predicted effort, %.
     pub relative_error_filtered_percent: Option<f64>,
     /// The effort to draw; `None` leaves the log out of the plots and of the residual statistics.
     pub series: Option<LogSeries>,
@@ -49,9 +49,9 @@ pub struct JointQuality {
     pub raw: Quality,
     /// Against the filtered effort, the prediction passed through the same filter.
     pub filtered: Quality,
-    /// As `filtered`, on samples in which the joint moves.
+    /// Quality as in `filtered`, on samples in which the joint moves.
     pub moving: Quality,
-    /// As `filtered`, on samples in which it stands.
+    /// Quality as in `filtered`, on samples in which the joint stands.
     pub standing: Quality,
     /// Share of the samples in which it stands, %.
     pub standing_percent: Option<f64>,

@@ -129,9 +129,9 @@ pub struct Joint {
 pub struct Fact {
     /// What it is.
     pub name: String,
-    /// Its value.
+    /// Value of the fact.
     pub value: Value,
-    /// Its unit; empty if dimensionless or text.
+    /// Unit of the value; empty if dimensionless or text.
     pub unit: String,
 }
 

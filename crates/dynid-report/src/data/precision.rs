@@ -7,11 +7,11 @@ use serde::Serialize;
 pub struct Precision {
     /// By how much coloured residuals inflate the variances that white ones would give.
     pub variance_inflation: Option<f64>,
-    /// The same per joint, where it can be told.
+    /// Variance inflation per joint, where it can be told.
     pub variance_inflation_per_joint: Vec<Option<f64>>,
     /// Number of time blocks behind the standard deviations.
     pub blocks: Option<u64>,
-    /// Their length, s.
+    /// Length of the time blocks, s.
     pub block_s: Option<f64>,
     /// Length that the correlation of the residuals asks for, s.
     pub wanted_block_s: Option<f64>,

@@ -26,12 +26,12 @@ pub struct PruningStep {
     pub parameters: u64,
     /// Parameter that goes next.
     pub next: String,
-    /// Its `value^2 / variance`.
+    /// Statistic `value^2 / variance` of that parameter.
     pub statistic: Option<f64>,
     /// Bayesian information criterion.
     pub bic: Option<f64>,
     /// Mean squared held-out error in residual variances.
     pub held_out: Option<f64>,
-    /// Its standard error.
+    /// Standard error of the held-out error.
     pub held_out_standard_error: Option<f64>,
 }

@@ -81,11 +81,11 @@ pub fn render_study(data: &StudyReport) -> Result<String, ReportError> {
     render_kind("Study", data)
 }
 
-/// The same page for a result that is no study, under the name of its kind; without claims it has no part for them.
+/// The page for a result that is no study, under the name of its kind; without claims it has no part for them.
 ///
 /// # Errors
 ///
-/// As [`render_study`].
+/// Fails as [`render_study`] does.
 pub fn render_kind(kind: &str, data: &StudyReport) -> Result<String, ReportError> {
     check_tables(data.sections.iter().flat_map(|s| &s.tables))?;
     let environment = environment::environment()?;

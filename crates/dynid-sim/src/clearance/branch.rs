@@ -45,7 +45,7 @@ impl Sliding {
         Self::ALL[next.min(4)]
     }
 
-    /// Its line, continued beyond its range.
+    /// Line of the branch, continued beyond its range.
     pub(super) fn line(self, friction: &SlidingFriction) -> FrictionLine {
         let slope = 1.0 / (friction.v_m - friction.v_0);
         match self {

@@ -7,7 +7,7 @@ use super::system::{Contact, System, power};
 pub struct ClearanceEnergy {
     /// Work of the drives.
     pub drives: f64,
-    /// The same with every exchange counted as positive, `∫ Σ|τ q̇| dt`: what errors are held against.
+    /// Energy with every exchange counted as positive, `∫ Σ|τ q̇| dt`: what errors are held against.
     pub exchanged: f64,
     /// Gain of kinetic and potential energy of the bodies.
     pub bodies: f64,
@@ -27,7 +27,7 @@ impl ClearanceEnergy {
         self.drives - self.bodies - self.contacts - self.damping - self.friction - self.elements
     }
 
-    /// The same as a share of all that was exchanged; `None` where nothing was.
+    /// Error of the balance as a share of all that was exchanged; `None` where nothing was.
     pub fn relative_error(&self) -> Option<f64> {
         let exchanged = self.exchanged + self.damping.abs() + self.friction + self.bodies.abs();
         (exchanged > 0.0).then(|| self.unbalanced().abs() / exchanged)

@@ -9,9 +9,9 @@ pub struct JournalRecord {
     pub joint: String,
     /// Offset `e` of the journal's centre in axes that turn with the journal's link, m.
     pub offset: Vec<[f64; 2]>,
-    /// Its first time derivative, m/s.
+    /// First time derivative of the offset, m/s.
     pub offset_rate: Vec<[f64; 2]>,
-    /// Its second time derivative, m/s².
+    /// Second time derivative of the offset, m/s².
     pub offset_acceleration: Vec<[f64; 2]>,
     /// Penetration, m; negative without contact.
     pub penetration: Vec<f64>,

@@ -15,7 +15,7 @@ pub enum Method {
         /// Longest step, s. Default: none.
         longest_step: f64,
     },
-    /// The same with equal steps, to see its order.
+    /// Collocation with equal steps, to see its order.
     CollocationSteps {
         /// Step between located instants, s.
         step: f64,
@@ -60,7 +60,7 @@ pub type Controller<'a> = &'a mut dyn FnMut(f64, &[f64], &[f64], &mut [f64]);
 
 /// What drives the driven joints, in the order of their rates.
 pub enum Driving<'a> {
-    /// They follow a motion exactly.
+    /// Joints follow a motion exactly.
     Prescribed(PrescribedMotion<'a>),
     /// Efforts are formed every `period` from the start on, and held.
     Controlled {

@@ -21,7 +21,7 @@ use crate::plant::{PlantEnergy, Ripple};
 #[derive(Debug)]
 pub struct ClosedPlant {
     model: Arc<RobotModel>,
-    /// Its poses are followed by drives.
+    /// Mechanism whose poses are followed by drives.
     pub(super) machine: Arc<ClosedMechanism>,
     pub(super) dynamics: Dynamics,
     pub(super) linear: Vec<f64>,
@@ -95,10 +95,10 @@ impl ClosedPlant {
         Ok(plant)
     }
 
-    /// The same plant with other linear parameters.
+    /// Returns the plant with other linear parameters.
     ///
     /// # Errors
-    /// As [`ClosedPlant::new`].
+    /// Fails as [`ClosedPlant::new`] does.
     pub fn with_linear(self, linear: Vec<f64>) -> Result<ClosedPlant, SimError> {
         ClosedPlant::new(self.model, linear, self.shape, self.sign_width)
     }
@@ -127,17 +127,17 @@ impl ClosedPlant {
         }
     }
 
-    /// Its mechanism, whose independent coordinates are drives.
+    /// Mechanism of the plant, whose independent coordinates are drives.
     pub fn machine(&self) -> &Arc<ClosedMechanism> {
         &self.machine
     }
 
-    /// Its linear parameters.
+    /// Linear parameters of the plant.
     pub fn linear(&self) -> &[f64] {
         &self.linear
     }
 
-    /// Its shape parameters.
+    /// Shape parameters of the plant.
     pub fn shape(&self) -> &[f64] {
         &self.shape
     }

@@ -5,7 +5,7 @@ use super::plant::{ClosedPlant, ClosedWorkspace};
 
 /// Gap at which a pose counts as closed, m.
 const CLOSED: f64 = 1e-13;
-/// The same where rounding keeps it from falling further.
+/// Largest gap where rounding keeps it from falling further.
 const STALLED: f64 = 1e-12;
 const ITERATIONS: usize = 6;
 

@@ -34,7 +34,7 @@ pub(super) struct Arm {
     pub(super) model: Arc<RobotModel>,
     /// All linear parameters of the model.
     pub(super) linear: Vec<f64>,
-    /// Its shape parameters.
+    /// Shape parameters of the model.
     pub(super) shape: Vec<f64>,
     pub(super) base: BaseParameters,
     /// The paper's unknowns, in its order.
@@ -76,7 +76,7 @@ impl Arm {
         Ok(Arm { model: Arc::new(model), linear, shape, base, places, mechanism })
     }
 
-    /// The same arm with linear friction: Coulomb and viscous, with an offset or without.
+    /// Returns the arm with linear friction: Coulomb and viscous, with an offset or without.
     pub(super) fn with_linear_friction(&self, offset: bool) -> RobotModel {
         let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
         for rate in 0..JOINTS {

@@ -65,7 +65,7 @@ impl Measurement {
         }
     }
 
-    /// The same motion with another realisation of the noise.
+    /// Returns the motion with another realisation of the noise.
     pub(super) fn with_noise(&self, settings: &Settings, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let noisy = |(k, clean): (usize, &f64)| {

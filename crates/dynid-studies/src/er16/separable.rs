@@ -23,7 +23,7 @@ pub(super) struct Identified {
     pub(super) estimate: SeparableEstimate,
     /// The paper's unknowns.
     pub(super) unknowns: Vec<f64>,
-    /// Their standard deviations.
+    /// Standard deviations of the parameters.
     pub(super) deviations: Vec<Option<f64>>,
 }
 
@@ -85,7 +85,7 @@ pub(super) fn identify_plain(arm: &Arm, data: &Measurement) -> Result<Identified
     identify(arm, data, &plain(SeparableLoss::Squares))
 }
 
-/// The same by the paper's objective, the sum of absolute errors.
+/// Identifies by the paper's objective, the sum of absolute errors.
 pub(super) fn identify_absolute(arm: &Arm, data: &Measurement) -> Result<Identified, StudyError> {
     identify(arm, data, &plain(SeparableLoss::Absolute))
 }

@@ -27,7 +27,7 @@ pub(super) fn per_cent(list: &[f64]) -> String {
     format!("{} %", words.join(", "))
 }
 
-/// The same with the names of the parameters.
+/// The values with the names of the parameters.
 pub(super) fn by_name(list: &Values) -> String {
     let words: Vec<String> = NAMES.iter().zip(list).map(|(n, e)| format!("{n} {:+.2}", 100.0 * e)).collect();
     format!("{} %", words.join(", "))

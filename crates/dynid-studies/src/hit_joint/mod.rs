@@ -31,7 +31,7 @@ pub const SOURCE: &str =
 
 /// `k1, k2, b_in, b_inD, b_out, b_outC`.
 const PARAMETERS: usize = 6;
-/// Their names.
+/// Names of the parameters.
 const NAMES: [&str; PARAMETERS] = ["k1", "k2", "b_in", "b_inD", "b_out", "b_outC"];
 /// A value per parameter.
 type Values = [f64; PARAMETERS];

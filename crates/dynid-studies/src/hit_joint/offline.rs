@@ -126,7 +126,7 @@ pub(super) fn fit(
     fit_model(settings, &identified(settings, damping, false), cruises, which, method)
 }
 
-/// The same for any model of the joint.
+/// Fits any model of the joint.
 pub(super) fn fit_model(
     settings: &Settings,
     model: &RobotModel,

@@ -151,7 +151,7 @@ pub(super) const DROP: f64 = 0.85;
 pub(super) struct Machine<'a> {
     settings: &'a Settings,
     pub(super) model: RobotModel,
-    /// As built, and after the stiffness has dropped.
+    /// Signals of the joint as built, and after the stiffness has dropped.
     states: [Vec<Signals>; 2],
     pub(super) truth: [Values; 2],
 }

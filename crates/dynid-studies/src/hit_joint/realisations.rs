@@ -23,7 +23,7 @@ pub(super) fn clean(settings: &Settings, extras: Extras) -> Result<Vec<Signals>,
     Signals::programme(settings, &settings.truth.values(), extras, settings.programme.rate_hz)
 }
 
-/// The same with noise, that of the deformation as given.
+/// The signals with noise, that of the deformation as given.
 pub(super) fn noisy(settings: &Settings, clean: &[Signals], deformation: f64, seed: u64) -> Vec<Signals> {
     let mut random = random(seed);
     let noise = super::settings::Noise { deformation, ..settings.noise };

@@ -22,7 +22,7 @@ pub(super) fn trajectory(rows: &[Vec<f64>]) -> Result<FourierTrajectory, StudyEr
     repeated(rows, 1)
 }
 
-/// The same several times.
+/// A motion several times over.
 pub(super) fn repeated(rows: &[Vec<f64>], periods: usize) -> Result<FourierTrajectory, StudyError> {
     Ok(FourierTrajectory::from_rows(BASE, Form::VelocityAmplitudes, &RowOrder::default(), rows, periods)?)
 }
@@ -38,7 +38,7 @@ pub(super) struct Experiment<'a> {
     pub(super) seed: u64,
 }
 
-/// The same temperature throughout.
+/// One temperature throughout.
 pub(super) fn constant(temperature: f64) -> Result<Profile, StudyError> {
     Ok(Profile::new(vec![(0.0, temperature)])?)
 }
@@ -88,7 +88,7 @@ impl Experiment<'_> {
         Ok(Log::new(name, result.time, joints.collect(), channels.collect()).map_err(dynid::Error::from)?)
     }
 
-    /// The same, made ready for rows.
+    /// The log, made ready for rows.
     pub(super) fn prepared(
         &self,
         name: &str,

@@ -171,7 +171,7 @@ pub(super) fn regression(
     regression_of(arm, arm.regression().with_known(known), log, settings, constraints)
 }
 
-/// The same for any model with friction columns.
+/// The regression for any model with friction columns.
 pub(super) fn regression_of(
     arm: &Indy7,
     model: RobotModel,

@@ -147,7 +147,7 @@ impl Indy7 {
         self.regression_with(&Cycles::default())
     }
 
-    /// The same with torque ripple of given orders.
+    /// The regression model with torque ripple of given orders.
     pub(super) fn regression_with(&self, cycles: &Cycles) -> RobotModel {
         let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
         for (rate, orders) in cycles.iter().enumerate() {

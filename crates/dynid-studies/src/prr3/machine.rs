@@ -21,7 +21,7 @@ pub(super) const SLIDERS: usize = 3;
 /// Which way the plane of the mechanism lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Plane {
-    /// As published: weight rests on the guideway, out of the plane.
+    /// The machine as published: weight rests on the guideway, out of the plane.
     Horizontal,
     /// Gravity against the axis y: the weight is part of the reactions.
     Vertical,
@@ -134,7 +134,7 @@ impl Machine {
         self.record_of(motion, Coordinates::Platform, plane)
     }
 
-    /// The same of a motion in given coordinates.
+    /// The record of a motion in given coordinates.
     pub(super) fn record_of(
         &self,
         motion: &Sampled,

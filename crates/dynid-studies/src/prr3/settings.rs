@@ -40,7 +40,7 @@ pub(super) struct Inertial {
     pub(super) estimate: f64,
 }
 
-/// The same of friction.
+/// Settings of friction.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Friction {

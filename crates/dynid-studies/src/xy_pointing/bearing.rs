@@ -111,7 +111,7 @@ impl Bearing {
         Self::plant_of(self.contacts()?)
     }
 
-    /// The same with contacts that may differ.
+    /// The plant with contacts that may differ.
     pub(super) fn plant_of(contacts: Vec<ClearanceContact>) -> Result<Plant, StudyError> {
         let mechanism = description()?.with_clearance(&NAMES).map_err(fault)?.build().map_err(fault)?;
         let boxed = |contact| Box::new(contact) as Box<dyn JointElement>;

@@ -16,7 +16,7 @@ use crate::{Row, StudyError};
 
 /// Parameters of a contact, relative: clearance, stiffness, damping, friction.
 pub(super) const PARAMETERS: usize = 4;
-/// Their names.
+/// Names of the parameters.
 pub(super) const NAMES: [&str; PARAMETERS] = ["clearance", "stiffness", "damping", "friction"];
 /// Changes by which their effects are found.
 const CHANGES: [f64; PARAMETERS] = [2e-4, 1e-3, 1e-2, 1e-3];

@@ -9,12 +9,12 @@ use crate::StudyError;
 
 /// Parameters of the paper.
 pub(super) const PARAMETERS: usize = 11;
-/// Their names.
+/// Names of the parameters.
 pub(super) const NAMES: [&str; PARAMETERS] =
     ["Ixx2", "Ixy2", "Ixz2", "Iyy2", "Iyz2", "Izz2", "m2", "Ls2", "Izz1", "Ls1", "m1"];
 /// Combinations of them that ideal joints show.
 pub(super) const BASE: usize = 8;
-/// Their standard parameters as [`dynid::model::BaseParameters`] keeps them, with the rest folded in.
+/// Standard parameters of the base ones as [`dynid::model::BaseParameters`] keeps them, with the rest folded in.
 pub(super) const KEPT: [&str; BASE] = ["Izz1", "Ixx2", "Ixy2", "Ixz2", "Iyz2", "Izz2", "mx2", "mx1"];
 /// Standard parameters of both links, those of link 1 first.
 pub(super) const STANDARD: usize = JOINTS * PARAMETERS_PER_BODY;
@@ -37,7 +37,7 @@ pub(super) const MOMENT_1: usize = 10;
 pub(super) struct Parameters(pub(super) [f64; PARAMETERS]);
 
 impl Parameters {
-    /// Those of a mechanism.
+    /// Parameters of a mechanism.
     pub(super) fn of(mechanism: &Mechanism) -> Result<Self, StudyError> {
         let link = |k: usize| {
             let body =

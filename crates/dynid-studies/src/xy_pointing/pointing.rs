@@ -69,7 +69,7 @@ impl Pointing {
         linear
     }
 
-    /// The same from the paper's parameters.
+    /// Linear parameters of the model from the paper's parameters.
     pub(super) fn linear_of(&self, parameters: &Parameters) -> Vec<f64> {
         let mut links = [0.0; STANDARD];
         for (own, Inertia(values)) in links.chunks_exact_mut(PARAMETERS_PER_BODY).zip(parameters.standard()) {
@@ -90,7 +90,7 @@ impl Pointing {
         self.columns(motion, &THETA)
     }
 
-    /// Likewise of all standard parameters of both links.
+    /// Columns of all standard parameters of both links.
     pub(super) fn standard_columns(&self, motion: &MotionBlock<'_>) -> Vec<Vec<f64>> {
         let each: [[usize; 1]; STANDARD] = std::array::from_fn(|k| [k]);
         self.columns(motion, &each.each_ref().map(|k| &k[..]))

@@ -18,7 +18,7 @@ use crate::{Row, RunSettings, StudyError};
 
 /// Local error of the study's simulations, in units of the clearance.
 pub(super) const TOLERANCE: f64 = 1e-10;
-/// That of the reference.
+/// Tolerance of the reference.
 const TIGHT: f64 = 1e-12;
 /// Change of torque by finer steps that is asked for, N m rms.
 const REQUIRED: f64 = 1e-5;

@@ -69,7 +69,7 @@ fn variant(
 pub(super) struct Sweeps {
     pub(super) clearance: Vec<Variant>,
     pub(super) roughness: Vec<Variant>,
-    /// As published, exponent 1, and the unmodified law of smooth bodies.
+    /// The law as published, exponent 1, and the unmodified law of smooth bodies.
     pub(super) laws: Vec<Variant>,
     gravity: f64,
 }

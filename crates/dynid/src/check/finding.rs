@@ -28,7 +28,7 @@ impl Severity {
 /// One fault of a log.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// Which fault: one of [`IDS`].
+    /// Name of the fault: one of [`IDS`].
     pub id: &'static str,
     /// How much it matters.
     pub severity: Severity,

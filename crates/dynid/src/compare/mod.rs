@@ -40,7 +40,7 @@ struct FoldScore {
 /// Compares all estimators that a configuration allows. `progress`: fits done, of how many, and what is being fitted.
 ///
 /// # Errors
-/// As [`crate::identify()`]. An estimator that fails is in the table with its reason, and no error.
+/// Fails as [`crate::identify()`] does. An estimator that fails is in the table with its reason, and no error.
 pub fn compare(config: &Config, progress: &mut dyn FnMut(usize, usize, &str)) -> Result<Comparison, Error> {
     let settings = config.conditioning_settings();
     progress(0, 1, "reading");

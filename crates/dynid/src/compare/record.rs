@@ -15,7 +15,7 @@ use crate::identify::Opened;
 pub struct JointError {
     /// Root mean square of the held-out error, N m or N.
     pub rms: f64,
-    /// The same relative to the root mean square of the effort, %.
+    /// Error relative to the root mean square of the effort, %.
     pub relative: f64,
     /// The root mean square of samples in which the joint moves, N m or N.
     pub rms_moving: Option<f64>,

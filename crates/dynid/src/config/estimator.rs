@@ -149,15 +149,15 @@ pub struct BoundConfig {
     /// Centre of mass of a single link along x of its frame, m.
     #[serde(deserialize_with = "pair")]
     pub com_x: Option<(f64, f64)>,
-    /// The same along y, m.
+    /// Centre of mass of a single link along y, m.
     #[serde(deserialize_with = "pair")]
     pub com_y: Option<(f64, f64)>,
-    /// The same along z, m.
+    /// Centre of mass of a single link along z, m.
     #[serde(deserialize_with = "pair")]
     pub com_z: Option<(f64, f64)>,
     /// A parameter, by name such as `joint1.fc`.
     pub parameter: Option<String>,
-    /// Its range, in its unit.
+    /// Range of the parameter, in its unit.
     #[serde(deserialize_with = "pair")]
     pub range: Option<(f64, f64)>,
 }

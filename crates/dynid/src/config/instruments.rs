@@ -50,7 +50,7 @@ pub struct InstrumentsConfig {
     pub rate_hz: Option<f64>,
     /// Natural frequency of the position loop, Hz, where gains are not stated. Default 5.
     pub bandwidth_hz: f64,
-    /// Its damping ratio. Default 1.
+    /// Damping ratio of the position loop. Default 1.
     pub damping: f64,
     /// Position gains in joint order, N m/rad or N/m. Default: from `bandwidth_hz` and the nominal inertia.
     pub position_gain: Option<Vec<f64>>,

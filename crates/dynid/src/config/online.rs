@@ -10,7 +10,7 @@ use crate::Error;
 #[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 pub enum ForgettingRule {
-    /// They do not: the estimate is that of all samples, until change detection finds that something changed.
+    /// Old samples keep their weight: the estimate is that of all samples, until change detection finds that something changed.
     #[default]
     None,
     /// By age alone, with a time constant of `memory_s`.

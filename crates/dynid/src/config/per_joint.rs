@@ -10,7 +10,7 @@ use crate::Error;
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(untagged, expecting = "expected a number, or numbers by joint such as `{ j1 = 2.0 }`")]
 pub enum PerJoint {
-    /// The same for all.
+    /// One value for all joints.
     All(f64),
     /// By joint.
     Each(BTreeMap<String, f64>),

@@ -200,7 +200,7 @@ pub struct CapsuleConfig {
     /// One end of the segment in the link's axes, m.
     #[serde(deserialize_with = "just")]
     pub from: [f64; 3],
-    /// The other end; the same for a sphere.
+    /// The other end of the segment; equal to `from` for a sphere.
     #[serde(deserialize_with = "just")]
     pub to: [f64; 3],
     /// Radius, m.

@@ -36,7 +36,7 @@ pub struct LegFault {
 pub struct DesignedMotion {
     /// Joints.
     pub joints: Vec<String>,
-    /// As written to files.
+    /// The motion as written to files.
     pub file: TrajectoryFile,
     /// All of it.
     pub sequence: Sequence,
@@ -149,7 +149,7 @@ pub struct MotionPaths {
     pub samples: std::path::PathBuf,
     /// `trajectory_msgs/JointTrajectory` as YAML.
     pub ros_yaml: std::path::PathBuf,
-    /// The same as JSON.
+    /// The message `JointTrajectory` as JSON.
     pub ros_json: std::path::PathBuf,
 }
 

@@ -17,19 +17,19 @@ pub(super) const ROTOR: &str = "rotor";
 /// Why a joint cannot be elastic as it is stated.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ElasticFault {
-    /// It floats.
+    /// The joint floats.
     Floats,
-    /// It does not move.
+    /// The joint does not move.
     Fixed,
-    /// It follows another joint, or others follow it.
+    /// The joint follows another joint, or others follow it.
     Follows,
-    /// Its motor is one of a coupling of joints.
+    /// The motor is one of a coupling of joints.
     Coupled,
-    /// It has a sensor, but bodies act on other joints, which have none.
+    /// The joint has a sensor, but bodies act on other joints, which have none.
     OthersWithoutSensor(Vec<String>),
     /// `elastic` is among its elements, but nothing states the ratio.
     NoRatio,
-    /// Its position is logged, that of its motor is not.
+    /// The position of the joint is logged, that of its motor is not.
     MotorNotLogged(String),
 }
 

@@ -15,7 +15,7 @@ impl ElementPlan {
     /// `moves`: whether the joint of a rate moves.
     ///
     /// # Errors
-    /// As [`ElementPlan::new`] and [`KnownFriction::load`].
+    /// Fails as [`ElementPlan::new`] and [`KnownFriction::load`] do.
     pub(crate) fn of_run(
         config: &Config,
         robot: &Robot,
@@ -62,7 +62,7 @@ impl ElementPlan {
     /// bodies.
     ///
     /// # Errors
-    /// As [`ElementPlan::build`].
+    /// Fails as [`ElementPlan::build`] does.
     pub fn model(&self, mechanism: &Mechanism) -> Result<RobotModel, Error> {
         let bodies = self.bodies(mechanism);
         self.complete(&bodies, self.build(&bodies)?)

@@ -49,7 +49,7 @@ pub struct AlikeElements {
     pub joint: String,
     /// One element.
     pub first: &'static str,
-    /// The other.
+    /// The second of the two.
     pub second: &'static str,
     /// What motion they need.
     pub needs: &'static str,

@@ -53,11 +53,11 @@ pub struct FileFit {
     pub rms: Vec<Option<f64>>,
     /// `100 ‖measured - predicted‖/‖measured‖` per joint, percent.
     pub relative_error_per_joint: Vec<Option<f64>>,
-    /// The same over all joints, percent.
+    /// `100 ‖measured - predicted‖/‖measured‖` over all joints, percent.
     pub relative_error: Option<f64>,
     /// RMS of the identified model's effort minus the file's, in the effort's unit.
     pub loss: Vec<f64>,
-    /// The same in per cent of the RMS of the measured effort.
+    /// Loss in per cent of the RMS of the measured effort.
     pub loss_percent: Vec<Option<f64>>,
 }
 

@@ -9,7 +9,7 @@ pub struct FrictionTrial {
     pub joint: String,
     /// Element that stands for the shape.
     pub element: String,
-    /// Its speed (`vs`, `w`) in the grid of the search, rad/s or m/s; absent where the shape has none.
+    /// Speed of the shape (`vs`, `w`) in the grid of the search, rad/s or m/s; absent where the shape has none.
     pub speed: Option<f64>,
     /// Share by which the joint's held-out mean square falls: of an accepted shape against the choice without it, of
     /// another one beside the choice.
@@ -35,7 +35,7 @@ pub struct PassivityRecord {
     /// Velocity at which friction feeds most power into the motion; absent where it is passive.
     #[serde(default)]
     pub worst_velocity: Option<f64>,
-    /// That power, W.
+    /// Power that friction feeds into the motion at that velocity, W.
     #[serde(default)]
     pub worst_power: Option<f64>,
     /// Static friction is identified below Coulomb friction.

@@ -8,11 +8,11 @@ pub struct ExogeneityRecord {
     /// By the size of the differences: `exogenous` (regressors equal instruments), `harmless`, `material`; or `weak` instruments, `diverged`
     /// simulation, `undetermined` (nothing to compare).
     pub verdict: String,
-    /// The same in words.
+    /// The verdict in words.
     pub summary: String,
     /// Probability of differences as large by chance, by the jackknife over time blocks; absent without a test.
     pub p_value: Option<f64>,
-    /// The same as if residuals were independent, which filtered ones are not: it rejects too often.
+    /// Probability of differences as large by chance if residuals were independent, which filtered ones are not: it rejects too often.
     pub p_value_independent: Option<f64>,
     /// Time blocks of the test.
     pub blocks: Option<usize>,
@@ -44,7 +44,7 @@ pub struct EffectRecord {
     pub instruments: f64,
     /// Standard deviation of least squares, jackknife over time blocks.
     pub std_least_squares: f64,
-    /// The same of the instruments' value.
+    /// Standard deviation of the instruments' value.
     pub std_instruments: f64,
     /// Least squares less instruments.
     pub difference: f64,

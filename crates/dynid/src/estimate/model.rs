@@ -54,13 +54,13 @@ pub struct ModelRecord {
 pub struct ElasticRecord {
     /// Joint.
     pub joint: String,
-    /// Its motor, an effort of its own.
+    /// Motor of the joint, an effort of its own.
     pub motor: String,
     /// Travel of the motor over that of the joint with a stiff spring.
     pub ratio: f64,
     /// The spring has a cubic part, `<joint>.k2`.
     pub cubic: bool,
-    /// It is damped, `<joint>.d`.
+    /// Whether the spring is damped, `<joint>.d`.
     pub damping: bool,
     /// A sensor behind the spring measures its torque; efforts of the joint are the negative readings.
     pub sensor: bool,

@@ -13,7 +13,7 @@ pub struct ConsistencyRecord {
     pub status: String,
     /// What consistency costs in fit: increase of the weighted sum of squares, in residual variances.
     pub price: f64,
-    /// That increase over what the same number of parameters would take up by chance, `price / (variance inflation ·
+    /// Increase of the weighted sum of squares over what the same number of parameters would take up by chance, `price / (variance inflation ·
     /// base parameters)`; around 1 is no more than noise.
     pub price_over_chance: Option<f64>,
     /// Weight of the distance from the robot file, as given or as large as held-out folds allow.
@@ -30,7 +30,7 @@ pub struct ConsistencyRecord {
     pub active: Vec<String>,
     /// Figures of the parameters without constraints on the training logs; empty where they predict the same.
     pub training_unconstrained: Vec<LogFit>,
-    /// The same on the validation logs.
+    /// Figures of the parameters without constraints on the validation logs.
     pub validation_unconstrained: Vec<LogFit>,
 }
 
@@ -41,13 +41,13 @@ pub struct HeldOutRecord {
     pub folds: usize,
     /// RMS per joint, in the effort's unit, without constraints.
     pub rms: Vec<Option<f64>>,
-    /// Its standard error over the folds.
+    /// Standard error of the RMS over the folds.
     pub rms_standard_error: Vec<Option<f64>>,
     /// RMS per joint of the physically consistent estimate.
     pub rms_consistent: Vec<Option<f64>>,
     /// `100 ‖residual‖ / ‖effort‖` over all joints without constraints, percent.
     pub relative_error: Option<f64>,
-    /// The same of the physically consistent estimate, percent.
+    /// `100 ‖residual‖ / ‖effort‖` of the physically consistent estimate, percent.
     pub relative_error_consistent: Option<f64>,
 }
 
@@ -56,11 +56,11 @@ pub struct HeldOutRecord {
 pub struct PrecisionRecord {
     /// By how much coloured residuals inflate the variances that white ones would give (median over base parameters).
     pub variance_inflation: f64,
-    /// The same per joint.
+    /// Variance inflation per joint.
     pub variance_inflation_per_joint: Vec<Option<f64>>,
     /// Number of time blocks behind the standard deviations.
     pub blocks: usize,
-    /// Their length, s.
+    /// Length of the time blocks, s.
     pub block_s: f64,
     /// Length that the correlation of the residuals asks for, s.
     pub wanted_block_s: f64,
@@ -108,7 +108,7 @@ pub struct PruningStep {
     pub parameters: usize,
     /// Parameter that goes next.
     pub next: String,
-    /// Its test statistic, `value² / variance`.
+    /// Test statistic of that parameter, `value² / variance`.
     pub statistic: Option<f64>,
     /// Weighted residual sum of squares.
     pub rss: f64,
@@ -116,6 +116,6 @@ pub struct PruningStep {
     pub bic: Option<f64>,
     /// Mean held-out squared error in residual variances.
     pub held_out: Option<f64>,
-    /// Its standard error.
+    /// Standard error of the held-out error.
     pub held_out_standard_error: Option<f64>,
 }

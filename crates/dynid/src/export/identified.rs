@@ -15,7 +15,7 @@ use crate::identify::Identification;
 pub struct Identified<'a> {
     /// The robot as it was identified; joints that were held are fixed.
     pub description: &'a Description,
-    /// Its effort model.
+    /// Effort model of the robot.
     pub model: &'a RobotModel,
     /// Linear parameters of the model.
     pub values: &'a [f64],
@@ -26,7 +26,7 @@ pub struct Identified<'a> {
     pub known_friction: &'a [KnownFriction],
 }
 
-/// The same, as an estimate file holds it.
+/// An identified robot as an estimate file holds it.
 #[derive(Debug)]
 pub struct IdentifiedRobot {
     description: Description,

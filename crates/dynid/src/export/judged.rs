@@ -55,7 +55,7 @@ impl FileModels {
     /// Figures on a log; `agreement` is that of the identified model.
     ///
     /// # Errors
-    /// As [`crate::agreement::compare`].
+    /// Fails as [`crate::agreement::compare`] does.
     pub(crate) fn judge(
         &self,
         id: &Identification,

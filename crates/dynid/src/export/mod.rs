@@ -139,7 +139,7 @@ impl<'a> RobotExport<'a> {
         Ok(RobotExport { identified, source, description, held, links, faults, notes, projected })
     }
 
-    /// The same with projections that were formed when the robot was identified, over the states of its logs. They are used
+    /// Returns the export with projections that were formed when the robot was identified, over the states of its logs. They are used
     /// where they stand for the very parameters of this robot; else friction is projected over the states of the check.
     #[must_use]
     pub fn with_projections(mut self, projected: &[FrictionProjection]) -> Self {
@@ -317,7 +317,7 @@ impl Identification {
     /// be are written as they are and named in the notes.
     ///
     /// # Errors
-    /// As [`Source::read`], [`RobotExport::new`] and [`RobotExport::urdf`].
+    /// Fails as [`Source::read`], [`RobotExport::new`] and [`RobotExport::urdf`] do.
     pub fn urdf(&self) -> Result<Exported, Error> {
         let source = Source::read(&self.robot.path)?;
         let export =
@@ -336,7 +336,7 @@ impl Identification {
     /// The loops beside the URDF of a mechanism that has some, as [`RobotExport::loops`].
     ///
     /// # Errors
-    /// As [`Source::read`] and [`RobotExport::new`].
+    /// Fails as [`Source::read`] and [`RobotExport::new`] do.
     pub fn loops(&self, urdf: &str) -> Result<Option<String>, Error> {
         let source = Source::read(&self.robot.path)?;
         Ok(RobotExport::new(self.identified(), &source)?.loops(urdf))

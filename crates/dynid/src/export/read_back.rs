@@ -17,7 +17,7 @@ use crate::config::{LogConfig, MotorSide};
 
 /// Random states of a check without logs.
 const STATES: usize = 1000;
-/// Their seed: the same robot is always checked at the same states.
+/// Seed of these states: a robot is always checked at the same ones.
 const SEED: u64 = 1;
 /// Samples that are evaluated at once.
 const BLOCK: usize = 256;
@@ -60,7 +60,7 @@ impl CheckStates {
     /// States of log files, at the state cut-off of an estimate.
     ///
     /// # Errors
-    /// As [`validate`](crate::validate::validate()).
+    /// Fails as [`validate`](crate::validate::validate()) does.
     pub fn read(
         model: &RobotModel,
         state_hz: f64,
@@ -206,7 +206,7 @@ pub(super) fn largest_difference(
     difference.iter().zip(&largest).map(|(d, l)| d / l.max(floor)).fold(0.0, f64::max)
 }
 
-/// The same motion for elements that remember, bristles slipping as Coulomb friction does: what files have a place for.
+/// The motion for elements that remember, bristles slipping as Coulomb friction does: what files have a place for.
 pub(super) fn with_slipping_bristles(
     model: &RobotModel,
     motion: &MotionBlock<'_>,

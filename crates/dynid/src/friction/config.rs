@@ -117,7 +117,7 @@ pub struct ConstantSpeedConfig {
     pub least_duration_s: f64,
     /// Largest departure from the mean speed, as a share of it. Default 0.03.
     pub speed_tolerance: f64,
-    /// The same in standard deviations of the speed's noise. Default 4.
+    /// Largest departure from the mean speed in standard deviations of the speed's noise, besides. Default 4.
     pub noise_tolerance: f64,
     /// Cut from both ends, s. Default 0.1.
     pub trim_s: f64,

@@ -86,7 +86,7 @@ impl KnownFriction {
     /// `temperatures`: per joint a constant temperature in place of the logged one, °C.
     ///
     /// # Errors
-    /// As [`FrictionModel::load`]; [`FrictionError::NoLaw`] if no joint has one, [`FrictionError::Known`] if a coefficient
+    /// Fails as [`FrictionModel::load`] does; [`FrictionError::NoLaw`] if no joint has one, [`FrictionError::Known`] if a coefficient
     /// makes no sense, [`Error::Setting`] for a temperature that no joint has.
     pub fn load(
         path: &Path,

@@ -134,15 +134,15 @@ pub struct ExponentialModel {
     pub reference_temperature: f64,
     /// Amplitude at `T_ref`, N m or N.
     pub sigma2: f64,
-    /// Its slope, N m/K or N/K.
+    /// Slope of the amplitude, N m/K or N/K.
     pub sigma2_slope: f64,
     /// Rate at `T_ref`, s/rad or s/m.
     pub sigma3: f64,
-    /// Its slope, per K.
+    /// Slope of the rate, per K.
     pub sigma3_slope: f64,
     /// Exponent at `T_ref`.
     pub sigma4: f64,
-    /// Its slope, per K.
+    /// Slope of the exponent, per K.
     pub sigma4_slope: f64,
 }
 
@@ -167,7 +167,7 @@ pub struct PointRecord {
     pub temperature: Option<f64>,
     /// Half the difference of both directions, N m or N.
     pub friction: f64,
-    /// Its standard error.
+    /// Standard error of the friction.
     pub std: f64,
     /// Half the sum of both directions: gravity and offset, N m or N.
     pub half_sum: f64,
@@ -186,11 +186,11 @@ pub struct LevelRecord {
     pub points: usize,
     /// Of the common fit, in which all temperatures share Coulomb, static friction and Stribeck speed.
     pub sigma2: Option<f64>,
-    /// As `sigma2`.
+    /// Rate of the common fit; absent where `sigma2` is.
     pub sigma3: Option<f64>,
-    /// As `sigma2`.
+    /// Exponent of the common fit; absent where `sigma2` is.
     pub sigma4: Option<f64>,
-    /// Their standard deviations.
+    /// Standard deviations of these coefficients.
     pub std: BTreeMap<String, f64>,
     /// Coefficients of this temperature's points alone, by name.
     pub alone: BTreeMap<String, f64>,
@@ -260,7 +260,7 @@ pub struct PreslidingRecord {
     pub reason: String,
     /// Values found, where identified, with standard deviations.
     pub sigma0: Option<[f64; 2]>,
-    /// As `sigma0`.
+    /// Damping of the bristles and its standard deviation, where identified.
     pub sigma1: Option<[f64; 2]>,
     /// Peak to peak of the motion, rad or m.
     pub motion: f64,
@@ -283,7 +283,7 @@ impl FrictionModel {
         Ok(Self::load_source(path)?.0)
     }
 
-    /// The same, and what was read.
+    /// Reads a friction file, and returns what was read beside it.
     pub(crate) fn load_source(path: &Path) -> Result<(Self, SourceFile), Error> {
         let text =
             dynid_io::input::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;

@@ -23,7 +23,7 @@ pub struct JointGain {
     pub stated: f64,
     /// Drive gain by the inverse form; absent unless it is determined.
     pub gain: Option<f64>,
-    /// Its standard deviation, that of the mass included.
+    /// Standard deviation of the gain, that of the mass included.
     pub std: Option<f64>,
     /// 95 % interval.
     pub interval: Option<(f64, f64)>,
@@ -85,7 +85,7 @@ pub struct GainsFile {
     pub robot: String,
     /// Payload.
     pub payload: String,
-    /// Its mass, kg.
+    /// Mass of the payload, kg.
     pub mass: f64,
     /// What is known of it besides.
     pub known: String,

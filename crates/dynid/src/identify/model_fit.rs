@@ -120,7 +120,7 @@ impl ModelFit {
     /// linearised.
     ///
     /// # Errors
-    /// As the plan of the fit.
+    /// Fails as the plan of the fit does.
     pub(crate) fn unfolded(&self, plan: &ElementPlan) -> Result<Option<(RobotModel, Vec<f64>)>, Error> {
         let Some(found) = &self.shapes else { return Ok(None) };
         let unfolded = shape::unfold(&found.model, &self.model, &self.consistent.values);

@@ -17,7 +17,7 @@ pub struct OwnDelay {
     pub samples: f64,
     /// Half width of its 95 % interval, samples.
     pub half_width: f64,
-    /// That of the logs without a delay of their own, samples; the difference is taken off the log's efforts.
+    /// Delay of the logs without a delay of their own, samples; the difference is taken off the log's efforts.
     pub reference: f64,
     /// The search ran into a limit: a warning, not a value.
     pub at_limit: bool,

@@ -27,7 +27,7 @@ pub(super) struct Shaped {
 /// them. On the textbook route the model stays as it is.
 ///
 /// # Errors
-/// As choice and search: [`Error::Conditioning`], or settings that do not fit the model.
+/// Fails as choice and search do: [`Error::Conditioning`], or settings that do not fit the model.
 pub(super) fn search(
     config: &Config,
     (model, structure): (RobotModel, Structure),

@@ -8,9 +8,9 @@ use dynid_model::{EffortModel, Limits, RobotModel};
 pub struct LogAxis {
     /// Joint or motor.
     pub name: String,
-    /// It slides instead of turning.
+    /// Whether the axis slides instead of turning.
     pub slides: bool,
-    /// It is a motor behind a spring.
+    /// Whether the axis is a motor behind a spring.
     pub motor: bool,
     /// Limits.
     pub limits: Limits,

@@ -124,7 +124,7 @@ pub enum Event {
         determined: f64,
         /// Cumulative sum of change detection.
         statistic: f64,
-        /// Its alarm threshold.
+        /// Alarm threshold of that sum.
         threshold: Option<f64>,
         /// Whether alarms are given: not while the motion goes where nothing was learned.
         watching: bool,

@@ -133,7 +133,7 @@ impl Session {
     /// Works off the rows taken so far.
     ///
     /// # Errors
-    /// As [`Session::row`].
+    /// Fails as [`Session::row`] does.
     pub fn flush(&mut self, emit: &mut dyn FnMut(Event)) -> Result<(), Error> {
         let samples = self.samples.drain(&self.config, self.structure.model.channels())?;
         for mut sample in samples {
@@ -201,7 +201,7 @@ impl Session {
     /// Ends the session: learns from what there is if nothing was learned yet, reports the estimate.
     ///
     /// # Errors
-    /// As [`Session::row`]; [`Error::TooShort`] if nothing could be learned.
+    /// Fails as [`Session::row`] does; [`Error::TooShort`] if nothing could be learned.
     pub fn finish(&mut self, emit: &mut dyn FnMut(Event)) -> Result<(), Error> {
         self.flush(emit)?;
         if let Phase::Learning { samples, .. } = &self.phase {

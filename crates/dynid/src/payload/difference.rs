@@ -16,7 +16,7 @@ use crate::identify::Identification;
 pub struct Difference {
     /// Mass, kg.
     pub mass: f64,
-    /// Its standard deviation, kg.
+    /// Standard deviation of the mass, kg.
     pub mass_std: f64,
     /// Centre of mass in the joint frame of the link, m.
     pub com: [f64; 3],

@@ -251,7 +251,7 @@ fn rigid_bodies(model: &RobotModel, motion: &MotionBlock<'_>, inertias: &[f64]) 
     (mass, rigid)
 }
 
-/// The same for the drives of a mechanism with loops; elements play no part.
+/// Inertias that drives of a mechanism with loops feel; elements play no part.
 fn closed_bodies(model: &RobotModel, motion: &MotionBlock<'_>, inertias: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let (n, samples) = (model.outputs().len(), motion.samples);
     let mut linear = inertias.to_vec();

@@ -60,7 +60,7 @@ pub struct JournalSummary {
 pub(super) struct Journals {
     /// Effort per joint at the samples.
     pub(super) effort: Vec<Vec<f64>>,
-    /// The same at the shifted samples.
+    /// Effort per joint at the shifted samples.
     pub(super) led: Vec<Vec<f64>>,
     /// Offsets of the journals.
     pub(super) offsets: Vec<(String, Vec<f64>)>,

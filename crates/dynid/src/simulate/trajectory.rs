@@ -161,7 +161,7 @@ const LEAST_MEASURE: f64 = 0.25;
 /// Ways from home to the middle of the drives' windows on which the middle of the motion may lie.
 const WAYS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
-/// The same motion, all drives smaller by the same factor until the mechanism can follow it away from singular poses, about
+/// Returns the motion, all drives smaller by the same factor until the mechanism can follow it away from singular poses, about
 /// that place between home and the middle of the drives' windows that leaves most room.
 fn within_reach(
     (model, closed): (&RobotModel, &ClosedModel),
@@ -198,7 +198,7 @@ fn within_reach(
     }
 }
 
-/// The same motion, as many whole times in the log as speeds and accelerations leave room for: what had to be made smaller
+/// Returns the motion, as many whole times in the log as speeds and accelerations leave room for: what had to be made smaller
 /// would be slow.
 fn livelier(
     model: &RobotModel,

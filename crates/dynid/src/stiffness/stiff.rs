@@ -1,4 +1,4 @@
-//! The same robot with stiff joints, and its logs read at the motors.
+//! A robot with stiff joints in place of elastic ones, and its logs read at the motors.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ const CARRIED: [(&str, &str, i32); 3] =
 /// A robot whose joints with springs are stiff: elements of the motors act at the joints.
 ///
 /// # Errors
-/// As [`Robot::load`].
+/// Fails as [`Robot::load`] does.
 pub(crate) fn stiff_robot(robot: &Robot) -> Result<Robot, Error> {
     robot.changed(|file| {
         let elements = &mut file.elements;
@@ -74,7 +74,7 @@ fn carry(settings: &mut Vec<ElementSetting>, spec: &ElasticSpec) {
 /// are those of the motors, on the side of the joints.
 ///
 /// # Errors
-/// As [`logs::load`].
+/// Fails as [`logs::load`] does.
 pub(crate) fn stiff_config(config: &Config, robot: &Robot) -> Result<Config, Error> {
     let mut out = config.clone();
     let read = |log: &mut LogConfig| -> Result<(), Error> {

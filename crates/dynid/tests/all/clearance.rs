@@ -19,7 +19,7 @@ fn robot(text: &str) -> Robot {
     Robot::parse(text, Path::new("xy.toml"), &RobotOptions::default()).unwrap()
 }
 
-/// The same without clearance.
+/// The robot without clearance.
 fn ideal() -> Robot {
     let text: Vec<String> =
         pointing().lines().filter(|line| !line.starts_with("clearance")).map(str::to_owned).collect();

@@ -51,7 +51,7 @@ const PLAIN: Record = Record {
     acceleration: 6.0,
 };
 
-/// As drives log: 1 kHz. With 40 s at 200 Hz noise of 1 % alone gives standard deviations of 0.05 % of the mass and 2 % of the
+/// The rate of drives: 1 kHz. With 40 s at 200 Hz noise of 1 % alone gives standard deviations of 0.05 % of the mass and 2 % of the
 /// inertia.
 const LONG: Record = Record { seconds: 60, rate_hz: 1000, acceleration: 10.0, ..PLAIN };
 

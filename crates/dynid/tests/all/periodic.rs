@@ -137,7 +137,7 @@ fn a_known_period_does_no_harm_where_effort_noise_is_large() {
 }
 
 #[test]
-#[ignore = "measures what docs/guide.md says; two minutes"]
+#[ignore = "measures what the book says (theory/rows.md); two minutes"]
 fn table_of_gains() {
     for (encoder_bits, effort_noise) in
         [(18, 0.0), (18, 0.005), (16, 0.005), (18, 0.02), (16, 0.02), (16, 0.05)]

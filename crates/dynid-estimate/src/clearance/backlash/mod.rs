@@ -126,7 +126,7 @@ pub enum BacklashError {
 pub enum BacklashVerdict {
     /// The residual holds the trace of a gap, beyond what else looks like one.
     Found,
-    /// It does not.
+    /// The log does not show a gap.
     NotFound,
     /// The load changes its sign too seldom away from reversals: flanks stay where they are, whatever the gap.
     NoCrossings,
@@ -146,7 +146,7 @@ pub struct BacklashEstimate {
     /// Root of twice the log-likelihood ratio against no gap: standard deviations, if noise were Gaussian. 0 where no gap
     /// beats none.
     pub evidence: f64,
-    /// The same for flanks that part at other loads; `None` if the load's zero is too uncertain for others to be others.
+    /// Evidence for flanks that part at other loads; `None` if the load's zero is too uncertain for others to be others.
     pub elsewhere: Option<f64>,
     /// Share of the friction that acts behind the transmission, as the most likely gap has it.
     pub share: f64,

@@ -22,13 +22,13 @@ pub struct FrictionSettings {
     /// First shape of a joint: standard errors of the gain over time blocks, share of the joint's held-out loss.
     /// Default 1.4, 0.01.
     pub first: (f64, f64),
-    /// The same for a second shape. Default 2.5, 0.03.
+    /// What a second shape must gain: standard errors over blocks, and share of the mean square. Default 2.5, 0.03.
     pub second: (f64, f64),
     /// Candidates tried on held-out blocks, after all were ranked by the loss on all rows. Default 4.
     pub tried: usize,
     /// Fewest time blocks with rows of a joint; with fewer nothing is chosen for it. Default 4.
     pub least_blocks: usize,
-    /// Another rung of the mask ladder after the choice: standard errors of the gain, share of the loss.
+    /// Least gain for another rung of the mask ladder after the choice: standard errors of the gain, share of the loss.
     /// Default 1.4, 0.005.
     pub mask_again: (f64, f64),
 }

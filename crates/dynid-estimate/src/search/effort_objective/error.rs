@@ -16,9 +16,9 @@ pub enum EffortObjectiveError {
     Length {
         /// What was counted.
         what: &'static str,
-        /// As it should be.
+        /// Number that is expected.
         expected: usize,
-        /// As it is.
+        /// Number that is found.
         found: usize,
     },
     /// A linear column that the model does not have, or that is listed twice.
@@ -36,9 +36,9 @@ pub enum EffortObjectiveError {
         what: &'static str,
         /// Output, from 0.
         output: usize,
-        /// Its range.
+        /// Range that is allowed.
         expected: &'static str,
-        /// Its value.
+        /// Value that is found.
         found: f64,
     },
     /// A measured effort or an entry of the regressor that is not finite.

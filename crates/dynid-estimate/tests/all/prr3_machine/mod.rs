@@ -1,4 +1,5 @@
 //! The planar three-slider mechanism (Rosyid & El-Khasawneh 2020) in closed form: kinematics, dynamics with multipliers, trajectories.
+//! The equations are in the chapter *Three sliders and a platform* of the book.
 #![allow(
     dead_code,
     clippy::unwrap_used,
@@ -42,12 +43,12 @@ pub(crate) fn bounds() -> Bounds {
     Bounds::new(LOWER.to_vec(), upper).unwrap()
 }
 
-/// Section 9: design values and friction start.
+/// Design values and the start of friction.
 pub(crate) fn start() -> Vec<f64> {
     DESIGN.into_iter().chain([0.1, 50.0, 0.2, 0.05]).collect()
 }
 
-/// Base parameters of section 7 as rows.
+/// Base parameters as rows.
 pub(crate) fn base_matrix() -> Mat<f64> {
     let [l1, l2, l3] = LEGS;
     let rows: [&[(usize, f64)]; 9] = [
@@ -68,7 +69,7 @@ pub(crate) fn base_matrix() -> Mat<f64> {
     out
 }
 
-/// The four null directions of section 7.
+/// The four directions that change no effort without friction.
 pub(crate) fn null_directions() -> [[f64; 13]; 4] {
     let [l1, l2, l3] = LEGS;
     let (a, b, c) = (l1 * l1, l2 * l2, l3 * l3);
@@ -88,7 +89,7 @@ pub(crate) struct Pose {
     pub(crate) ddq: [f64; 3],
 }
 
-/// All twelve coordinates `(x_i, y_i, α_i, x, y, θ)` with derivatives: section 3.
+/// All twelve coordinates `(x_i, y_i, α_i, x, y, θ)` with derivatives.
 pub(crate) struct State {
     pub(crate) q: [f64; 12],
     pub(crate) dq: [f64; 12],
@@ -117,7 +118,7 @@ pub(crate) fn inverse_kinematics(pose: &Pose) -> State {
     out
 }
 
-/// `M q'' + N` of section 4.
+/// Inertial forces `M q'' + N`.
 fn inertial_forces(state: &State, phi: &[f64; 13], g: f64) -> [f64; 12] {
     let (q, dq, ddq) = (&state.q, &state.dq, &state.ddq);
     let mut out = [0.0; 12];
@@ -138,7 +139,7 @@ fn inertial_forces(state: &State, phi: &[f64; 13], g: f64) -> [f64; 12] {
     out
 }
 
-/// `B = ∂Γ/∂q` of section 4, with `-y_i` in the loops.
+/// `B = ∂Γ/∂q` of the constraints.
 fn constraint_rows(q: &[f64; 12]) -> [[f64; 12]; 9] {
     let mut b = [[0.0; 12]; 9];
     let (s, c) = q[11].sin_cos();
@@ -213,7 +214,7 @@ fn eliminate(system: &mut [[f64; 22]; 9]) {
     }
 }
 
-/// Section 8: `q0, a1..a5, b1..b5` of x, y, θ.
+/// Coefficients `q0, a1..a5, b1..b5` of x, y, θ of the identification.
 pub(crate) const TRAJECTORY: [[f64; 11]; 3] = [
     [-0.0832, -0.0478, -0.0250, -0.0325, 0.0031, 0.1022, -0.0227, -0.0814, -0.0023, 0.0097, 0.03072],
     [0.3330, 0.0844, -0.0192, -0.0704, -0.0467, 0.0519, -0.0219, 0.0453, -0.0316, -0.0602, 0.05338],
@@ -236,7 +237,7 @@ pub(crate) fn reference(t: f64) -> Pose {
     pose
 }
 
-/// Section 11: a full circle in 4 s.
+/// A full circle in 4 s.
 pub(crate) fn circle(t: f64) -> Pose {
     let u = t / 4.0;
     let angle = TAU * u.powi(3) * (10.0 - 15.0 * u + 6.0 * u * u);
@@ -288,7 +289,7 @@ pub(crate) fn efforts(record: &Record, noise: f64, seed: u64) -> Vec<Vec<f64>> {
     clean.drives.iter().map(|d| d.effort.iter().map(&mut noisy).collect()).collect()
 }
 
-/// The experiment of section 11: 250 Hz over 4 s.
+/// The experiment: 250 Hz over 4 s.
 pub(crate) fn experiment(model: Model, noise: f64, seed: u64) -> Problem {
     let record = record(&sampled(reference, 1000), 0.0);
     let efforts = efforts(&record, noise, seed);

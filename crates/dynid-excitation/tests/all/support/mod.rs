@@ -77,7 +77,7 @@ pub fn model(mechanism: &Mechanism, rotors: std::ops::Range<usize>, friction: bo
     RobotModel::new(mechanism.clone(), elements)
 }
 
-/// Its base columns.
+/// The model with its base columns, for a design.
 pub fn excitation(model: RobotModel) -> RobotExcitation {
     let model = Arc::new(model);
     let base = BaseParameters::of(model.as_ref(), model.mechanism(), &[], &BaseSettings::default());

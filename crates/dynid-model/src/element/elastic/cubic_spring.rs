@@ -98,7 +98,7 @@ impl CubicSpring {
         -k1 / (3.0 * deformation * deformation)
     }
 
-    /// The same spring as the motor sees it through a ratio `N`: `k1/N²`, `k2/N⁴` (torque on the motor over motor angle).
+    /// Returns the spring as the motor sees it through a ratio `N`: `k1/N²`, `k2/N⁴` (torque on the motor over motor angle).
     pub fn motor_side(&self, ratio: f64) -> CubicSpring {
         let square = ratio * ratio;
         CubicSpring { k1: self.k1 / square, k2: self.k2 / (square * square) }

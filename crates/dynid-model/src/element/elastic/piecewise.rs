@@ -17,7 +17,7 @@ pub struct PiecewiseSpring {
 pub struct PiecewiseFit {
     /// The spring.
     pub spring: PiecewiseSpring,
-    /// Its deformations at `T1`, `T2`, rad or m.
+    /// Deformations of the spring at `T1`, `T2`, rad or m.
     pub knots: [f64; 2],
     /// Largest difference of deformation at the same torque up to `T3`, rad or m.
     pub worst: f64,

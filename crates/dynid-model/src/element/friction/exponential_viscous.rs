@@ -45,7 +45,7 @@ pub struct ExponentialViscous {
 }
 
 impl ExponentialViscous {
-    /// Both slopes of the shape held at 0.
+    /// Friction of a rate with both slopes of the shape held at 0.
     pub fn new(rate: usize) -> Self {
         let slope = ShapeSetting { start: 0.0, lower: -0.03, upper: 0.03, held: true };
         ExponentialViscous {

@@ -17,7 +17,7 @@ use crate::scalar::elementary::{decay, map_decay};
 /// Two columns `[w, ẇ/κ]` for `fc`, `sigma1`; shape parameters `kappa`, `rho`, `vs`, `delta`. It takes the place of
 /// [`Coulomb`](super::Coulomb) and [`Stribeck`](super::Stribeck); viscous friction stands beside it.
 ///
-/// Its columns depend on the motion before: they are signals that [`JointElement::remember`] forms sample after sample, with
+/// The columns depend on the motion before: they are signals that [`JointElement::remember`] forms sample after sample, with
 /// the velocity held over each step, `w⁺ = s γ + (w - s γ) exp(-κ |v| Δt / γ)`, exact and stable for any step. A record
 /// starts at `w = s(v) γ(v)`, the steady state, which is 0 at rest; signs are exact there, whatever a block smooths. Where a motion block comes without these signals, the
 /// steady state `[s γ, 0]` stands in for them: away from reversals, after a travel of some `5 γ / κ`, there is no difference.

@@ -57,7 +57,7 @@ pub(crate) fn closures(list: &Value) -> Vec<ClosureDescription> {
     list.as_array().unwrap().iter().map(closure).collect()
 }
 
-/// Tree, closures, driven joints and home of a robot of the specification.
+/// Tree, closures, driven joints and home of a robot of the reference data.
 pub(crate) struct Parts {
     pub(crate) mechanism: Mechanism,
     pub(crate) closures: Vec<ClosureDescription>,

@@ -126,7 +126,7 @@ pub struct DesignReport {
     pub facts: Vec<Fact>,
     /// Criterion and condition of the designed trajectory.
     pub quality: DesignQuality,
-    /// The same of random motion within the same limits; `None` if none was found or tried.
+    /// Criterion and condition of random motion within the same limits; `None` if none was found or tried.
     pub random: Option<RandomMotion>,
     /// Parameters and how well the log will show them, in the order of the table.
     pub parameters: Vec<DesignParameter>,

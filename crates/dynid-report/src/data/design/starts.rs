@@ -16,7 +16,7 @@ pub struct Starts {
 /// End of one start.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct DesignStart {
-    /// Its seed.
+    /// Seed of the start.
     pub seed: u64,
     /// Criterion with exact signs, on the scale of [`super::DesignQuality::criterion_exact`]; `None` if undefined.
     pub criterion: Option<f64>,

@@ -11,7 +11,7 @@ pub(super) struct StartsView {
     ran: usize,
     /// Starts that ended within all limits with a criterion.
     ended: usize,
-    /// Of these, those within 5 % of the best; `None` if it is not known what that is.
+    /// Starts that ended within 5 % of the best; `None` if it is not known what that is.
     near: Option<usize>,
     best_seed: Option<u64>,
     best: Option<f64>,

@@ -68,7 +68,7 @@ fn described(bodies: &[Value], gravity: [f64; 3]) -> Mechanism {
     d.build().unwrap()
 }
 
-/// A robot of the specification; `driven` in place of its own.
+/// A robot of the reference data; `driven` in place of its own.
 pub(crate) fn robot(name: &str, variant: Option<&str>, driven: Option<&[&str]>) -> Option<ClosedMechanism> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/robots");
     let Ok(text) = std::fs::read_to_string(path.join(format!("{name}.json"))) else {

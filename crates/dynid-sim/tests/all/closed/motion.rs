@@ -42,7 +42,7 @@ fn openness(plant: &ClosedPlant, free: &mut FreeMotions, state: &PlantState) -> 
     [free.gap(), speed.fold(0.0, f64::max)]
 }
 
-/// Spec M8: 10 s of a swinging four-bar.
+/// The energy of 10 s of a swinging four-bar.
 #[test]
 fn a_swinging_fourbar_keeps_its_energy_and_its_loop() {
     let Some(machine) = robot("fourbar", None, None) else { return };

@@ -34,7 +34,7 @@ elements = ["coulomb", "viscous", "offset"]
 const STRIBECK_LAW: &str = "[element.j1]\nstribeck = { coulomb = 2, static = 5, vs = 0.3 }\n\
                             [element.j2]\nstribeck = { coulomb = 1, static = 2, vs = 0.3 }\n";
 
-/// The same as a URDF in which the second joint follows the first where it is coupled.
+/// The two-joint arm as a URDF in which the second joint follows the first where it is coupled.
 const MIMIC: &str = r#"<robot name="arm"><link name="base"/>
 <link name="link1"><inertial><origin xyz="0.2 0 0"/><mass value="3"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
 <link name="link2"><inertial><origin xyz="0.2 0 0"/><mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
