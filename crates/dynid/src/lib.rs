@@ -17,6 +17,7 @@ pub mod effort_scale;
 pub mod elements;
 mod error;
 pub mod estimate;
+pub mod explain;
 pub mod export;
 pub mod fitting;
 pub mod friction;

@@ -18,10 +18,11 @@ use crate::robot::model_state_joints;
 /// [`Error::States`]; [`Error::Columns`] for a table that has neither.
 pub fn read_states(
     path: &Path,
+    options: &ReadOptions,
     model: &RobotModel,
     reading: Option<&ReadingRecord>,
 ) -> Result<States, Error> {
-    let table = dynid_io::csv::read(path, &ReadOptions::default()).map_err(StatesError::File)?;
+    let table = dynid_io::csv::read(path, options).map_err(StatesError::File)?;
     let (joints, channels) = (model_state_joints(model), model.channels());
     let named = states::from_table_with_channels(&table, &joints, channels);
     let recorded = reading.filter(|r| r.columns.position.is_some() && r.motor_side.is_none());
