@@ -39,7 +39,7 @@ fn run(command: &Command) -> Result<u8, Failure> {
         Command::Compare(args) => commands::compare::run(args),
         Command::Completions(args) => commands::completions::run(args),
         Command::Design(args) => commands::design::run(args),
-        Command::Diff(_) => Ok(0),
+        Command::Diff(args) => commands::diff::run(args),
         Command::Explain(args) => commands::explain::run(args),
         Command::Export(args) => commands::export::run(args),
         Command::Friction(args) => commands::friction::run(args),

@@ -13,6 +13,7 @@ pub mod compare;
 pub mod config;
 pub mod consistency;
 pub mod design;
+pub mod diff;
 pub mod effort_scale;
 pub mod elements;
 mod error;

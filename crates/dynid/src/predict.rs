@@ -134,6 +134,15 @@ pub fn efforts(model: &RobotModel, values: &[f64], states: &States) -> Result<Ve
     Ok((0..model.outputs().len()).map(|output| block.effort(output, values)).collect())
 }
 
+/// Effort of known elements alone, of every output at every state; zero where none are known.
+///
+/// # Errors
+/// As [`efforts`].
+pub(crate) fn known_efforts(model: &RobotModel, states: &States) -> Result<Vec<Vec<f64>>, Error> {
+    let block = Flat::new(states).regressor(model)?;
+    Ok((0..model.outputs().len()).map(|output| block.offset(output).to_vec()).collect())
+}
+
 /// Regressor at every state: `rows[state][output][column]`, in standard columns or, with `base`, in base columns.
 ///
 /// # Errors

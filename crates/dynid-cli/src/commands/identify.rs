@@ -5,7 +5,6 @@ mod summary;
 use std::path::{Path, PathBuf};
 
 use dynid::config::{Config, Consistency, Friction, Method, Route};
-
 use dynid::{Error, identify};
 
 use super::run::{GivenLogs, configuration as run_configuration, plain};

@@ -6,6 +6,7 @@ pub(crate) mod clearance;
 pub(crate) mod compare;
 pub(crate) mod completions;
 pub(crate) mod design;
+pub(crate) mod diff;
 pub(crate) mod explain;
 pub(crate) mod export;
 pub(crate) mod friction;

@@ -114,7 +114,7 @@ fn used_again(meant: impl Fn(&Path) -> bool) {
             estimate
         };
         let estimate = identified(&[&name], "out");
-        run(at, &["export", "out/estimate.json", "--urdf", "again.urdf", "--json", "again.json"], 0);
+        run(at, &["export", "out/estimate.json", "--urdf", "again.urdf", "--model", "again.json"], 0);
 
         // Once more, from what was exported.
         if estimate["model"]["elastic"].as_array().is_some_and(|springs| !springs.is_empty()) {
