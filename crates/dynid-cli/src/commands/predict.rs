@@ -37,8 +37,8 @@ pub(crate) fn run(args: &PredictArgs) -> Result<u8, Failure> {
         Some(path) => {
             set.write_table(0, &header(&estimate.joints), &effort)?;
             if !set.publish()?.is_empty() {
-                let rows = states.rows;
-                Notes::new(args.quiet).tell(&format!("written: {} ({rows} rows)", path.display()));
+                let notes = Notes::new(args.quiet);
+                notes.tell(&format!("{} rows written to {}", states.rows, path.display()));
             }
         }
     }

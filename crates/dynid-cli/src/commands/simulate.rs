@@ -10,7 +10,7 @@ use dynid::simulate::{
 use super::{demand_stdout, load_robot};
 use crate::args::SimulateArgs;
 use crate::message::{Failure, Notes, json};
-use crate::outputs::{self, Outputs};
+use crate::outputs::{self, Outputs, is_stdout};
 use crate::progress::Progress;
 
 /// Columns of efforts; joints without a drive have none.
@@ -63,11 +63,11 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
     if args.truth.is_some() {
         set.write(files.len() - 1, truth(&log)?.as_bytes())?;
     }
-    let written = set.publish()?;
+    set.publish()?;
     if args.print.json {
         json(&summary(&log, args))?;
     }
-    tell(&log, &written, Notes::new(args.print.quiet));
+    tell(&log, &args.out, Notes::new(args.print.quiet));
     Ok(0)
 }
 
@@ -84,9 +84,9 @@ fn summary(log: &SimulatedLog, args: &SimulateArgs) -> serde_json::Value {
 }
 
 /// Tells what was simulated, and what is not as one would expect.
-fn tell(log: &SimulatedLog, written: &[PathBuf], notes: Notes) {
-    notes.tell(&format!("{} samples of {} joints", log.time.len(), log.joints.len()));
-    notes.written(written);
+fn tell(log: &SimulatedLog, out: &Path, notes: Notes) {
+    let place = if is_stdout(out) { "standard output".into() } else { out.to_string_lossy() };
+    notes.tell(&format!("{} samples of {} joints written to {place}", log.time.len(), log.joints.len()));
     if let Some(e) = log.experiment.as_ref().filter(|e| e.saturated_ticks > 0) {
         notes.tell(&format!(
             "efforts were cut off at their limits at {} of {} control ticks",
