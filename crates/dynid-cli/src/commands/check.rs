@@ -44,6 +44,9 @@ pub(crate) fn run(args: &CheckArgs) -> Result<u8, Failure> {
         false => result(&text(&found), taken, notes)?,
     }
     notes.written(&written);
+    if !found.findings.is_empty() && !args.print.json {
+        notes.tell("`dynid explain NAME` says what a finding means and what to do");
+    }
     Ok(u8::from(found.worst() == Some(Severity::Error)))
 }
 

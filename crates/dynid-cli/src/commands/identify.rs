@@ -58,6 +58,9 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     data(&if args.print.json { json } else { summary(&estimate) })?;
     notes.written(&written);
     export::tell(&files[2], &urdf, &estimate, notes);
+    if estimate.verdict.status != "ok" {
+        notes.tell("`dynid explain NAME` says what a check means and what to do");
+    }
     Ok(u8::from(estimate.verdict.status == "fail"))
 }
 

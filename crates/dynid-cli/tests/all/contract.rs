@@ -322,7 +322,7 @@ fn json_goes_to_stdout_alone_and_is_what_the_file_holds() {
     assert_eq!(text(&output.stdout), read(folder.path(), "out/estimate.json"));
     let output = run(folder.path(), &IDENTIFY, 0);
     let (result, said) = (text(&output.stdout), text(&output.stderr));
-    for part in ["settings:", "training fit", "validation on valid.csv", "checks ", "parameters: "] {
+    for part in ["settings:", "training fit", "validation on valid.csv", "checks:", "parameters: "] {
         assert!(result.contains(part), "{part}: {result}");
         assert!(!said.contains(part), "{part}: {said}");
     }

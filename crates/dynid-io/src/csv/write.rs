@@ -3,10 +3,13 @@
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use flate2::Compression;
 use flate2::write::GzEncoder;
+use flate2::{Compression, GzBuilder};
 
 use crate::output::{AtomicFile, OutputError};
+
+/// Comment in the head of compressed files: it tells who wrote them.
+pub const GZIP_COMMENT: &str = "written by dynid";
 
 /// Writes columns under a header; see [`RowWriter`].
 ///
@@ -66,7 +69,8 @@ impl RowWriter {
         let buffered = BufWriter::with_capacity(1 << 16, AtomicFile::create(path)?);
         let gzip = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
         let sink = if gzip {
-            Sink::Gzip(Box::new(GzEncoder::new(buffered, Compression::default())))
+            let encoder = GzBuilder::new().comment(GZIP_COMMENT).write(buffered, Compression::default());
+            Sink::Gzip(Box::new(encoder))
         } else {
             Sink::Plain(buffered)
         };

@@ -31,7 +31,7 @@ pub(super) fn summary(estimate: &Estimate) -> String {
         );
         out += &table::agreement(&estimate.joints, &fit.raw, &fit.filtered, &fit.by_motion);
     }
-    out += "\nchecks (`dynid explain NAME` says more):\n";
+    out += "\nchecks:\n";
     for check in &estimate.verdict.checks {
         let value =
             check.value.map_or_else(String::new, |v| format!("{} {}", table::number(Some(v)), check.unit));
