@@ -1,7 +1,8 @@
 //! Who wrote a file that is about to be replaced.
 //!
 //! Every file that dynid writes says so, where its format has a place for it: JSON by its schema or provenance, pages by their generator,
-//! XML and TOML by a comment. Tables (CSV) and messages for robots (YAML) have no such place.
+//! XML, TOML and compressed tables by a comment. Plain tables (CSV) and messages for robots (YAML) have no such place; efforts alone, as
+//! `predict` writes them, are nobody's log.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -10,7 +11,7 @@ use std::path::Path;
 use serde_json::Value;
 
 /// What comments say.
-const MARK: &str = "written by dynid";
+const MARK: &str = dynid::io::csv::GZIP_COMMENT;
 /// What pages say.
 const GENERATOR: &str = "name=\"generator\" content=\"dynid";
 /// Bytes at both ends of a file in which a mark is looked for.
@@ -37,14 +38,19 @@ impl Origin {
         let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
         let is = |ending: &str| name.ends_with(ending);
         let marked = match () {
-            () if [".csv", ".csv.gz", ".yaml", ".ros2.json"].iter().any(|e| is(e)) => {
-                return Origin::Unmarked;
-            }
+            () if is(".csv") && has_efforts_alone(path) => true,
+            () if [".csv", ".yaml", ".ros2.json"].iter().any(|e| is(e)) => return Origin::Unmarked,
             () if is(".json") => is_result(path),
             () => ends(path).is_ok_and(|text| text.contains(MARK) || text.contains(GENERATOR)),
         };
         if marked { Origin::Dynid } else { Origin::Foreign }
     }
+}
+
+/// Whether a table is of predicted efforts, which no robot logs.
+fn has_efforts_alone(path: &Path) -> bool {
+    let Ok(text) = ends(path) else { return false };
+    text.lines().next().is_some_and(|header| header.split(',').all(|name| name.starts_with("effort_")))
 }
 
 /// Whether a JSON file is a result of this program.

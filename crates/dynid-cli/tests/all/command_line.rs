@@ -193,6 +193,10 @@ fn files_of_others_stay_unless_forced() {
     run(at, &["simulate", "arm.urdf", "--out", "log.csv", "--force"], 0);
     run(at, &["export", "estimate.json", "--urdf", "mine.urdf", "--force"], 0);
     // What dynid wrote it replaces.
+    for _ in 0..2 {
+        run(at, &["simulate", "arm.urdf", "--duration", "2", "--out", "again.csv.gz"], 0);
+        run(at, &["predict", "estimate.json", "--states", "states.csv", "--out", "efforts.csv"], 0);
+    }
     run(at, &["identify", "run.toml", "--out", "out"], 0);
     run(
         at,
