@@ -35,6 +35,25 @@ fn words_are_explained_as_they_are_printed() {
 }
 
 #[test]
+fn lines_to_write_are_lines_that_are_read() {
+    for e in dynid::explain::all().iter().filter(|e| !e.line.is_empty()) {
+        match e.line.strip_prefix("dynid ") {
+            Some(line) => {
+                let output = crate::support::dynid().args(line.split(' ')).output().unwrap();
+                let said = String::from_utf8(output.stderr).unwrap();
+                assert!(!said.contains("For more information, try"), "{}: {said}", e.id);
+            }
+            None => {
+                let log = if e.line.contains("[[log]]") { "" } else { "\n[[log]]\npath = \"log.csv\"\n" };
+                let text = format!("robot = \"arm.urdf\"\n{}{log}", e.line);
+                let parsed = dynid::Config::parse(&text, "run.toml");
+                assert!(parsed.is_ok(), "{}: {}", e.id, parsed.unwrap_err());
+            }
+        }
+    }
+}
+
+#[test]
 fn an_unknown_word_is_told_with_the_nearest_one() {
     let folder = tempfile::tempdir().unwrap();
     let said = String::from_utf8(run(folder.path(), &["explain", "colum_order"], 2).stderr).unwrap();

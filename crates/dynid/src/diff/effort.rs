@@ -40,7 +40,7 @@ pub(super) fn at_random(a: &Valued, b: &Valued) -> Vec<JointEffort> {
             with_slipping_bristles(&of.model, motion, |motion| {
                 of.model.regressor(motion, &shape, &mut block)
             });
-            let effort = |output: usize| {
+            let effort = |output: usize| -> Vec<f64> {
                 let known = block.offset(output).iter().map(|known| if of.with_known { 0.0 } else { *known });
                 block.effort(output, &of.values).iter().zip(known).map(|(e, known)| e - known).collect()
             };

@@ -15,13 +15,14 @@ mod structure;
 use std::path::Path;
 
 use dynid_io::{ReadOptions, States};
-use dynid_model::{EffortModel, RobotModel};
+use dynid_model::{EffortModel, Parameter, RobotModel};
 
 use crate::Error;
 use crate::estimate::{Estimate, Split};
 use crate::predict::read_states;
 pub use effort::JointEffort;
-pub use parameters::{Compared, ParameterDiff};
+pub use file::StatedRobot;
+pub use parameters::ParameterDiff;
 pub use record::{EffortDiff, ModelDiff, NotCompared};
 
 /// One of the two models, as a file holds it.
@@ -30,7 +31,7 @@ pub enum Side {
     /// An identified model.
     Estimate(Box<Estimate>),
     /// A robot file.
-    Robot(file::StatedRobot),
+    Robot(StatedRobot),
 }
 
 impl Side {
@@ -43,7 +44,7 @@ impl Side {
             dynid_io::input::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
         match text.iter().find(|byte| !byte.is_ascii_whitespace()) {
             Some(b'{') => Ok(Side::Estimate(Box::new(Estimate::read(path)?))),
-            _ => Ok(Side::Robot(file::StatedRobot::read(path)?)),
+            _ => Ok(Side::Robot(StatedRobot::read(path)?)),
         }
     }
 
@@ -79,33 +80,37 @@ struct Valued {
 pub fn diff(a: (&Path, &Side), b: (&Path, &Side), split: Split, at: At<'_>) -> Result<ModelDiff, Error> {
     let name = |path: &Path| path.display().to_string();
     let refuse = |fault: String| Error::NotComparable { a: name(a.0), b: name(b.0), fault };
-    let Some((path, reference)) = [a, b].into_iter().find_map(|(path, side)| Some((path, side.estimate()?)))
+    let Some((identified, reference)) =
+        [a, b].into_iter().find_map(|(path, side)| Some((path, side.estimate()?)))
     else {
         return Err(refuse("both are robot files: one of the two has to be an estimate".to_owned()));
     };
-    let model = reference.effort_model(path, split)?;
-    let valued = |(path, side): (&Path, &Side)| match side {
-        Side::Estimate(estimate) => {
-            structure::same(reference, estimate).map_err(&refuse)?;
-            let model = estimate.effort_model(path, split)?;
-            Ok(Valued { model, values: estimate.values(split), with_known: true })
-        }
-        Side::Robot(robot) => {
-            let stated = robot.values(reference, path)?.map_err(&refuse)?;
-            let values = model.parameters().linear.iter();
-            let values = values.map(|p| stated.get(&p.name).copied().unwrap_or(0.0)).collect();
-            Ok(Valued { model: reference.effort_model(path, split)?, values, with_known: false })
+    let model = reference.effort_model(identified, split)?;
+    let stated = |robot: &StatedRobot| robot.values(reference, identified)?.map_err(&refuse);
+    let valued = |(path, side): (&Path, &Side)| -> Result<Valued, Error> {
+        match side {
+            Side::Estimate(estimate) => {
+                structure::same(reference, estimate).map_err(&refuse)?;
+                let model = estimate.effort_model(path, split)?;
+                Ok(Valued { model, values: estimate.values(split), with_known: true })
+            }
+            Side::Robot(robot) => {
+                let stated = stated(robot)?;
+                let value = |p: &Parameter| stated.get(&p.name).copied().unwrap_or(0.0);
+                let values = model.parameters().linear.iter().map(value).collect();
+                let model = reference.effort_model(identified, split)?;
+                Ok(Valued { model, values, with_known: false })
+            }
         }
     };
     let models = (valued(a)?, valued(b)?);
-    let told = |(path, side): (&Path, &Side)| match side {
-        Side::Estimate(estimate) => Ok(parameters::Told::of_estimate(estimate)),
-        Side::Robot(robot) => {
-            let stated = robot.values(reference, path)?.map_err(&refuse)?;
-            Ok::<_, Error>(parameters::Told::of_file(stated, reference, &model))
-        }
+    let told = |side: &Side| -> Result<parameters::Told, Error> {
+        Ok(match side {
+            Side::Estimate(estimate) => parameters::Told::of_estimate(estimate),
+            Side::Robot(robot) => parameters::Told::of_file(&stated(robot)?, reference, &model),
+        })
     };
-    let found = parameters::compare(&told(a)?, &told(b)?);
+    let found = parameters::compare(&told(a.1)?, &told(b.1)?);
     let (states, joints) = match at {
         At::Random => ("1000 random states".to_owned(), effort::at_random(&models.0, &models.1)),
         At::Table(file, options) => {

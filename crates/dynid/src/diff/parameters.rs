@@ -64,7 +64,7 @@ impl Told {
     }
 
     /// What a robot file states, its values combined as those of an estimate are. `model`: of the estimate.
-    pub(super) fn of_file(stated: BTreeMap<String, f64>, like: &Estimate, model: &RobotModel) -> Self {
+    pub(super) fn of_file(stated: &BTreeMap<String, f64>, like: &Estimate, model: &RobotModel) -> Self {
         let exact = |value: f64| Value { value, half_width: 0.0 };
         let table = model.parameters();
         let entry = |name: &String, unit: &str| {
@@ -74,7 +74,7 @@ impl Told {
         let linear = table.linear.iter().map(|p| entry(&p.name, p.unit));
         let shapes = table.shape.iter().map(|s| entry(&s.name, s.unit));
         let single = linear.chain(shapes).collect();
-        Told { single, combined: combinations(&stated, like, model), is_file: true }
+        Told { single, combined: combinations(stated, like, model), is_file: true }
     }
 }
 
@@ -138,15 +138,15 @@ pub struct ParameterDiff {
 
 /// Outcome of a comparison of parameters.
 #[derive(Debug, Clone, Default)]
-pub struct Compared {
+pub(super) struct Compared {
     /// Parameters and combinations that both tell, in the order of the first model.
-    pub parameters: Vec<ParameterDiff>,
+    pub(super) parameters: Vec<ParameterDiff>,
     /// Parameters that cannot be compared, with the reason.
-    pub not_compared: Vec<(String, String)>,
+    pub(super) not_compared: Vec<(String, String)>,
     /// Parameters that only the first model has.
-    pub only_in_a: Vec<String>,
+    pub(super) only_in_a: Vec<String>,
     /// Parameters that only the second model has.
-    pub only_in_b: Vec<String>,
+    pub(super) only_in_b: Vec<String>,
 }
 
 pub(super) fn compare(a: &Told, b: &Told) -> Compared {

@@ -15,7 +15,7 @@ pub(super) fn text(name: Name) -> Text {
             "A controller feeds noise of the positions back into the efforts, which biases least squares. The check compares least squares with \
              instrumental variables, which are free of this bias.",
             "Lower the cut-off of the kernel, or take the values of the instruments.",
-            "[estimator]\nmethod = \"iv\"",
+            "[estimator]\nmethod = \"iv\"\n\n[instruments]\nreference = \"q_ref_{joint}\"",
         ),
         Name::Condition => Text(
             "The condition number says how strongly errors of the effort are amplified in the parameters, with all columns at unit length. \
@@ -51,7 +51,7 @@ pub(super) fn text(name: Name) -> Text {
             "Instrumental variables come from a simulation of the closed loop. The check says whether the simulation settled and resembles the \
              measured motion.",
             "Put right the reference, the controller or the model in the configuration.",
-            "[instruments]",
+            "[instruments]\nreference = \"q_ref_{joint}\"\nbandwidth_hz = 5.0",
         ),
         Name::OwnLogs => Text(
             "Training logs share rows. These rows count more than once, so that all intervals are too narrow.",
