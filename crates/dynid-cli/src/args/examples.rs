@@ -156,7 +156,7 @@ const ENDINGS: &[Ending] = &[
         negative: "",
         examples: &[
             ("Write all manual pages", "man --out ~/.local/share/man/man1"),
-            ("Read the page of the program", "man"),
+            ("Read the page of the program", "man | man -l -"),
         ],
     },
     Ending {

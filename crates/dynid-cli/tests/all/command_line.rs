@@ -60,9 +60,9 @@ fn commands(folder: &Path) -> Vec<String> {
     names.filter(|name| !name.is_empty() && name != "help").collect()
 }
 
-/// Words of a line as a shell splits it, up to a redirection.
+/// Words of a line as a shell splits it, up to a redirection or a pipe.
 fn words(line: &str) -> Vec<String> {
-    let command = line.split(" > ").next().unwrap();
+    let command = line.split(['>', '|']).next().unwrap().trim_end();
     let mut words = vec![String::new()];
     let mut quoted = false;
     for c in command.chars() {

@@ -34,10 +34,11 @@ pub fn page() -> String {
         out += &format!("\n## {title}\n\n{text}\n");
         for e in all().iter().filter(|e| e.kind == kind) {
             out += &format!("\n### `{}`\n\n{}\n\n**What to do.** {}\n", e.id, e.meaning, e.remedy);
-            let language = if e.line.starts_with("dynid ") { "sh" } else { "toml" };
-            if !e.line.is_empty() {
-                out += &format!("\n```{language}\n{}\n```\n", e.line);
-            }
+            out += &match e.line {
+                "" => String::new(),
+                line if line.starts_with("dynid ") => format!("\n    {line}\n"),
+                lines => format!("\n```toml run part\n{lines}\n```\n"),
+            };
         }
     }
     out
