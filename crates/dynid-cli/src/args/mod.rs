@@ -39,7 +39,7 @@ pub(crate) const VERSION: &str = match option_env!("DYNID_VERSION") {
 
 /// Identifies the dynamic parameters of robots and mechanisms from logs of motion and effort.
 #[derive(Debug, Parser)]
-#[command(name = "dynid", version = VERSION, about, propagate_version = true)]
+#[command(name = "dynid", version = VERSION, propagate_version = true)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,

@@ -69,7 +69,7 @@ fn configuration(args: &CheckArgs, notes: Notes) -> Result<(Config, Option<&Path
         (None, [input]) if is_configuration(input) => {
             Ok((run_configuration(input, &logs(&args.log), notes)?, Some(input)))
         }
-        (None, [input]) if !args.log.is_empty() => {
+        (None, [input]) if !args.log.is_empty() || !is_table(input) => {
             Ok((run_configuration(input, &logs(&args.log), notes)?, None))
         }
         (None, [config, ..]) if is_configuration(config) => Err(Failure::Usage(
@@ -81,6 +81,12 @@ fn configuration(args: &CheckArgs, notes: Notes) -> Result<(Config, Option<&Path
             "add --robot ROBOT, or give a configuration (TOML)",
         )),
     }
+}
+
+/// Whether a file is called as logs are.
+fn is_table(path: &Path) -> bool {
+    let name = path.to_string_lossy().to_lowercase();
+    [".csv", ".gz", ".txt", ".tsv", ".dat"].iter().any(|ending| name.ends_with(ending))
 }
 
 fn text(found: &Check) -> String {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use dynid_estimate::distribution::t_quantile;
+use dynid_estimate::distribution::chi_squared_quantile;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
 use serde::Serialize;
 
@@ -10,8 +10,6 @@ use crate::estimate::{BaseValue, Estimate};
 
 /// Chance at which parameters that are the same are told to differ.
 const LEVEL: f64 = 0.05;
-/// Degrees of freedom of a normal distribution.
-const MANY: f64 = 1e9;
 /// Verdict of values that the data tell.
 const SEEN: &str = "seen in the data";
 
@@ -107,7 +105,7 @@ fn combinations(
 fn quantile(estimate: &Estimate) -> f64 {
     let ratio = |b: &BaseValue| b.half_width.zip(b.std).filter(|(_, s)| *s > 0.0).map(|(h, s)| h / s);
     let known = estimate.base_parameters.iter().find_map(ratio);
-    known.or_else(|| t_quantile(1.0 - LEVEL / 2.0, MANY)).unwrap_or(f64::INFINITY)
+    known.or_else(|| deviations(LEVEL)).unwrap_or(f64::INFINITY)
 }
 
 /// A parameter, or a combination of some, that both models tell.
@@ -200,7 +198,11 @@ fn pair(name: &str, expression: Option<&String>, unit: &str, a: Value, b: Value)
 
 /// Half widths of a 95 % interval that chance keeps within for all of so many comparisons, in 95 of 100 cases (Bonferroni).
 fn limit_of_all(count: usize) -> f64 {
-    let quantile = |level: f64| t_quantile(1.0 - 0.5 * level, MANY);
-    let of_all = quantile(LEVEL / count.max(1) as f64);
-    of_all.zip(quantile(LEVEL)).map_or(f64::INFINITY, |(all, one)| all / one)
+    let of_all = deviations(LEVEL / count.max(1) as f64);
+    of_all.zip(deviations(LEVEL)).map_or(f64::INFINITY, |(all, one)| all / one)
+}
+
+/// Standard deviations beyond which a normal variable lies, on either side, at a level.
+fn deviations(level: f64) -> Option<f64> {
+    chi_squared_quantile(1.0 - level, 1.0).map(f64::sqrt)
 }
