@@ -95,7 +95,7 @@ fn every_command_has_examples_that_parse_and_says_its_exit_codes() {
         for line in lines {
             let mut words = words(line);
             assert_eq!(words[0], *command, "{line}");
-            if words[..2] == ["study", "indy7"] {
+            if line.starts_with("study indy7") {
                 // Refused before a minute of work.
                 words.extend(["--out".to_owned(), "taken/deeper".to_owned()]);
             }
