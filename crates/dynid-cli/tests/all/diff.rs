@@ -79,7 +79,8 @@ fn two_logs_of_one_robot_do_not_differ_and_a_heavier_forearm_does() {
     assert!(differing.contains(&"forearm.mz".to_owned()), "{differing:?}");
     let off = moment["difference"].as_f64().unwrap() - 0.5 * 0.15;
     assert!(off.abs() < moment["half_width"].as_f64().unwrap(), "{moment}");
-    assert!(differing.iter().all(|name| !name.ends_with(".fv") && !name.ends_with(".Ia")), "{differing:?}");
+    // Typical friction of a simulated robot grows with its load; offsets and rotors do not.
+    assert!(differing.iter().all(|name| !name.ends_with(".fo") && !name.ends_with(".Ia")), "{differing:?}");
     let said = run(prepared(), &["diff", "a/estimate.json", "c/estimate.json"], 1).stdout;
     let said = String::from_utf8(said).unwrap();
     assert!(said.contains("forearm.mz") && said.contains("**") && said.contains("they differ: "), "{said}");
