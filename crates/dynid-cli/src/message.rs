@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::io::{self, Write};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Why a command ended early.
@@ -42,12 +43,57 @@ impl Failure {
     }
 }
 
-/// Writes data to stdout.
+/// Writes text to stdout; a reader that has gone is no error.
 pub(crate) fn data(text: &str) -> Result<(), Failure> {
+    bytes(text.as_bytes())
+}
+
+/// Writes bytes to stdout; a reader that has gone is no error.
+pub(crate) fn bytes(bytes: &[u8]) -> Result<(), Failure> {
+    match while_read(bytes) {
+        Err(Failure::Closed) => Ok(()),
+        written => written,
+    }
+}
+
+/// Writes bytes to stdout.
+///
+/// # Errors
+/// [`Failure::Closed`] once nobody reads any more.
+fn while_read(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    let written = out.write_all(bytes).and_then(|()| out.flush());
     written
         .map_err(|e| if e.kind() == io::ErrorKind::BrokenPipe { Failure::Closed } else { Failure::Output(e) })
+}
+
+/// What a command tells beside its result, on stderr; nothing if it was asked to be quiet.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Notes {
+    quiet: bool,
+}
+
+impl Notes {
+    pub(crate) fn new(quiet: bool) -> Self {
+        Notes { quiet }
+    }
+
+    /// Tells a line.
+    pub(crate) fn tell(self, text: &str) {
+        if !self.quiet {
+            note(text);
+        }
+    }
+
+    /// Tells what a user should know of the result.
+    pub(crate) fn warnings<'a>(self, warnings: impl IntoIterator<Item = &'a String>) {
+        warnings.into_iter().for_each(|warning| self.tell(&format!("warning: {warning}")));
+    }
+
+    /// Tells which files appeared.
+    pub(crate) fn written(self, files: &[PathBuf]) {
+        files.iter().for_each(|file| self.tell(&format!("written: {}", file.display())));
+    }
 }
 
 /// Writes a line for people to stderr.
@@ -66,8 +112,20 @@ fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(text.chars().map(shown).collect())
 }
 
-/// JSON text with a newline.
+/// Prints a value as a line of JSON.
 pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    data(&line(value)?)
+}
+
+/// Prints a value as a line of JSON to somebody who may go at any time.
+///
+/// # Errors
+/// [`Failure::Closed`] once nobody reads any more.
+pub(crate) fn json_while_read(value: &impl serde::Serialize) -> Result<(), Failure> {
+    while_read(line(value)?.as_bytes())
+}
+
+fn line(value: &impl serde::Serialize) -> Result<String, Failure> {
     let text = serde_json::to_string(value).map_err(|e| Failure::Output(e.into()))?;
-    data(&(text + "\n"))
+    Ok(text + "\n")
 }

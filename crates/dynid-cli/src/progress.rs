@@ -1,4 +1,4 @@
-//! A progress line for long work, on terminals only.
+//! The progress of long work: what is being done, for how long, and how far it is where that is known. On terminals only.
 
 use std::io::IsTerminal;
 use std::time::Duration;
@@ -9,7 +9,12 @@ use dynid::estimators::conditioning::Stage;
 use dynid::friction::FrictionStep;
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Shows what is being worked on; silent unless stderr is a terminal.
+/// Work of which the end is not known.
+const OPEN: &str = "{spinner} [{elapsed}] {msg}";
+/// Work of so many steps.
+const COUNTED: &str = "{spinner} [{elapsed}] {bar:30} {pos}/{len} {msg}";
+
+/// Shows what is being worked on, in a line that goes with it; silent unless stderr is a terminal.
 pub(crate) struct Progress(ProgressBar);
 
 impl Progress {
@@ -18,15 +23,29 @@ impl Progress {
             return Progress(ProgressBar::hidden());
         }
         let bar = ProgressBar::new_spinner();
-        if let Ok(style) = ProgressStyle::with_template("{spinner} [{elapsed}] {msg}") {
-            bar.set_style(style);
-        }
+        restyle(&bar, OPEN);
         bar.enable_steady_tick(Duration::from_millis(120));
         Progress(bar)
     }
 
+    /// The work in words.
+    pub(crate) fn doing(&self, what: impl Into<String>) {
+        self.0.set_message(what.into());
+    }
+
+    /// Steps done, of how many, and the work in words.
+    pub(crate) fn counted(&self, done: usize, of: usize, what: impl Into<String>) {
+        if self.0.length() != Some(of as u64) {
+            self.0.set_length(of as u64);
+            restyle(&self.0, COUNTED);
+        }
+        self.0.set_position(done as u64);
+        self.doing(what);
+    }
+
+    /// A step of an identification.
     pub(crate) fn step(&self, step: Step) {
-        self.0.set_message(match step {
+        self.doing(match step {
             Step::Read(file) => format!("reading {file}"),
             Step::Preflight => "examining logs".to_owned(),
             Step::Structure => "finding base parameters".to_owned(),
@@ -43,77 +62,33 @@ impl Progress {
             Step::Validate(log) => format!("predicting {log}"),
         });
     }
-}
 
-impl Progress {
-    pub(crate) fn examining(&self, log: &str) {
-        self.0.set_message(format!("examining {log}"));
-    }
-
+    /// A step of a friction experiment.
     pub(crate) fn friction(&self, step: FrictionStep) {
-        self.0.set_message(match step {
+        self.doing(match step {
             FrictionStep::Read(file) => format!("reading {file}"),
             FrictionStep::Law(joint) => format!("fitting friction of {joint}"),
             FrictionStep::Presliding(joint) => format!("searching bristles of {joint}"),
         });
     }
-}
 
-/// Shows how far a design is; silent unless stderr is a terminal.
-pub(crate) struct DesignProgress(ProgressBar);
-
-impl DesignProgress {
-    pub(crate) fn new(quiet: bool) -> Self {
-        if quiet || !std::io::stderr().is_terminal() {
-            return DesignProgress(ProgressBar::hidden());
-        }
-        let bar = ProgressBar::new(0);
-        if let Ok(style) = ProgressStyle::with_template("{spinner} [{elapsed}] {bar:30} {pos}/{len} {msg}") {
-            bar.set_style(style);
-        }
-        bar.enable_steady_tick(Duration::from_millis(120));
-        DesignProgress(bar)
-    }
-
-    pub(crate) fn fit(&self, done: usize, of: usize, what: &str) {
-        self.0.set_length(of as u64);
-        self.0.set_position(done as u64);
-        self.0.set_message(what.to_owned());
-    }
-
-    pub(crate) fn step(&self, step: DesignStep) {
+    /// A step of a design.
+    pub(crate) fn design(&self, step: DesignStep) {
         match step {
             DesignStep::Starts { ended, of, best } => {
-                self.0.set_length(of as u64);
-                self.0.set_position(ended as u64);
                 let best =
                     best.map_or_else(|| "none within all limits yet".to_owned(), |b| format!("best {b:.4}"));
-                self.0.set_message(format!("starts, {best}"));
+                self.counted(ended, of, format!("starts, {best}"));
             }
-            DesignStep::Forecast => self.0.set_message("predicting what the log will tell"),
-            _ => self.0.set_message("finding base parameters"),
+            DesignStep::Forecast => self.doing("predicting what the log will tell"),
+            _ => self.doing("finding base parameters"),
         }
     }
 }
 
-/// Shows how far a study is; silent unless stderr is a terminal.
-pub(crate) struct StudyProgress(DesignProgress);
-
-impl StudyProgress {
-    pub(crate) fn new(quiet: bool) -> Self {
-        StudyProgress(DesignProgress::new(quiet))
-    }
-
-    pub(crate) fn step(&self, step: &dynid_studies::Progress) {
-        self.0.0.set_length(step.steps as u64);
-        self.0.0.set_position(step.done as u64);
-        self.0.0.set_message(step.step.clone());
-    }
-}
-
-impl Drop for DesignProgress {
-    fn drop(&mut self) {
-        self.0.finish_and_clear();
+fn restyle(bar: &ProgressBar, template: &str) {
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
     }
 }
 

@@ -1,10 +1,10 @@
 //! Reading whole text files of bounded size.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
 use crate::digest::{SourceFile, sha256};
+use crate::input;
 use crate::robot::RobotFileError;
 
 /// Largest robot file that is read, bytes (64 MiB).
@@ -42,12 +42,8 @@ pub(crate) fn read_text(path: &Path, limit: u64) -> Result<(String, SourceFile),
 
 /// The file's text without a byte order mark, and what was read.
 pub(crate) fn text(path: &Path, limit: u64) -> Result<(String, SourceFile), TextFault> {
-    let handle = File::open(path).map_err(TextFault::Unreadable)?;
-    let metadata = handle.metadata().map_err(TextFault::Unreadable)?;
-    if metadata.is_dir() {
-        return Err(TextFault::Unreadable(std::io::ErrorKind::IsADirectory.into()));
-    }
-    if metadata.len() > limit {
+    let handle = input::open(path).map_err(TextFault::Unreadable)?;
+    if handle.length().map_err(TextFault::Unreadable)? > limit {
         return Err(TextFault::TooLarge { limit });
     }
     let mut bytes = Vec::new();

@@ -4,6 +4,7 @@ mod effect;
 mod estimator;
 mod friction;
 mod instruments;
+mod kind;
 mod log_terms;
 mod online;
 mod per_joint;
@@ -16,6 +17,7 @@ pub use estimator::{
 pub use friction::{Friction, FrictionErrors};
 pub(crate) use instruments::reference_channel;
 pub use instruments::{InstrumentsConfig, NominalModel, ReferenceColumns};
+pub use kind::is_configuration;
 pub(crate) use log_terms::MASSES;
 pub use log_terms::{Own, PayloadConfig, RATED_MASS};
 pub use online::{ForgettingRule, OnlineConfig};

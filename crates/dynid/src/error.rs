@@ -148,6 +148,16 @@ pub enum Error {
         .0.evidence
     )]
     PreflightFault(Box<crate::check::Finding>),
+    /// Two models that say nothing about each other.
+    #[error("{a} and {b} cannot be compared: {fault}")]
+    NotComparable {
+        /// First file.
+        a: String,
+        /// Second file.
+        b: String,
+        /// Why.
+        fault: String,
+    },
     /// A log cannot be examined.
     #[error(transparent)]
     Preflight(#[from] dynid_estimate::preflight::PreflightError),
@@ -364,9 +374,13 @@ impl Error {
             Error::LogFile(e) => e.hint(),
             Error::Export(e) => e.hint(),
             Error::PreflightFault(found) => Some(format!(
-                "{}: `dynid check` with `--fix FILE.toml` writes the configuration; `preflight = \"warn\"` goes on regardless",
-                found.remedy
+                "{}: `dynid check` with `--fix FILE.toml` writes the configuration; `preflight = \"warn\"` goes on regardless; `dynid explain {}` says \
+                 more",
+                found.remedy, found.id
             )),
+            Error::NotComparable { .. } => Some(
+                "compare an estimate with one of the same robot, identified with the same joints held, or with its robot file".to_owned(),
+            ),
             Error::Elastic { fault, .. } => Some(fault.hint().to_owned()),
             Error::Friction(e) => e.hint(),
             Error::Design(dynid_excitation::ProblemError::RankDeficient { .. }) => Some(

@@ -437,7 +437,7 @@ fn describe(mapping: &ColumnMapping) -> Vec<(String, String)> {
 /// [`Error::Read`].
 pub fn sha256(path: &Path) -> Result<String, Error> {
     let read_error = |source| Error::Read { file: path.to_owned(), source };
-    let mut file = std::fs::File::open(path).map_err(read_error)?;
+    let mut file = dynid_io::input::open(path).map_err(read_error)?;
     let mut hasher = Sha256::new();
     std::io::copy(&mut file, &mut hasher).map_err(read_error)?;
     Ok(hasher.finalize().iter().map(|b| format!("{b:02x}")).collect())

@@ -18,10 +18,11 @@ use crate::robot::model_state_joints;
 /// [`Error::States`]; [`Error::Columns`] for a table that has neither.
 pub fn read_states(
     path: &Path,
+    options: &ReadOptions,
     model: &RobotModel,
     reading: Option<&ReadingRecord>,
 ) -> Result<States, Error> {
-    let table = dynid_io::csv::read(path, &ReadOptions::default()).map_err(StatesError::File)?;
+    let table = dynid_io::csv::read(path, options).map_err(StatesError::File)?;
     let (joints, channels) = (model_state_joints(model), model.channels());
     let named = states::from_table_with_channels(&table, &joints, channels);
     let recorded = reading.filter(|r| r.columns.position.is_some() && r.motor_side.is_none());
@@ -131,6 +132,15 @@ impl Flat {
 pub fn efforts(model: &RobotModel, values: &[f64], states: &States) -> Result<Vec<Vec<f64>>, Error> {
     let block = Flat::new(states).regressor(model)?;
     Ok((0..model.outputs().len()).map(|output| block.effort(output, values)).collect())
+}
+
+/// Effort of known elements alone, of every output at every state; zero where none are known.
+///
+/// # Errors
+/// As [`efforts`].
+pub(crate) fn known_efforts(model: &RobotModel, states: &States) -> Result<Vec<Vec<f64>>, Error> {
+    let block = Flat::new(states).regressor(model)?;
+    Ok((0..model.outputs().len()).map(|output| block.offset(output).to_vec()).collect())
 }
 
 /// Regressor at every state: `rows[state][output][column]`, in standard columns or, with `base`, in base columns.

@@ -1,16 +1,16 @@
 //! What an identification is worth, in plain words.
 
 mod inputs;
+mod instruments;
 mod logs;
+mod names;
 
 use dynid_estimate::consistent::Status as ConsistentStatus;
 use dynid_estimate::identifiability::Verdict as ParameterVerdict;
-mod instruments;
-
 use dynid_estimate::whiteness::InBandWhiteness;
 
-pub(crate) use inputs::{OWN_LOGS, PREFLIGHT};
 pub(crate) use instruments::in_words as closed_loop_bias_in_words;
+pub use names::CheckName;
 
 use crate::agreement::Agreement;
 use crate::consistency::UNCONSTRAINED;
@@ -50,7 +50,7 @@ impl Status {
 
 fn check(
     status: Status,
-    name: &str,
+    name: CheckName,
     value: Option<f64>,
     unit: &str,
     limit: &str,
@@ -58,7 +58,7 @@ fn check(
 ) -> (Status, CheckResult) {
     let result = CheckResult {
         status: status.word().to_owned(),
-        name: name.to_owned(),
+        name: name.name().to_owned(),
         value,
         unit: unit.to_owned(),
         limit: limit.to_owned(),
@@ -163,7 +163,7 @@ fn stiffness(id: &Identification) -> Option<(Status, CheckResult)> {
     };
     (all > 0).then(|| {
         let limit = format!("all {all} joints");
-        check(status, "stiffness told by deformation", Some(told as f64), "", &limit, meaning)
+        check(status, CheckName::Stiffness, Some(told as f64), "", &limit, meaning)
     })
 }
 
@@ -171,7 +171,7 @@ fn excitation(id: &Identification) -> (Status, CheckResult) {
     let (kept, all) = (id.fit().solution.kept.len(), id.base.len());
     check(
         Status::of(kept == all, 2 * kept > all),
-        "excitation",
+        CheckName::Excitation,
         Some(kept as f64),
         "",
         &format!("all {all} base parameters"),
@@ -191,7 +191,7 @@ fn rank_gap(id: &Identification) -> (Status, CheckResult) {
     let gap = id.base.gap.ratio().min(1.0 / f64::EPSILON);
     check(
         Status::of(gap >= 1e4, gap >= 1e2),
-        "structural rank gap",
+        CheckName::RankGap,
         gap.is_finite().then_some(gap),
         "",
         "at least 1e4",
@@ -204,7 +204,7 @@ fn condition(id: &Identification) -> (Status, CheckResult) {
     // It amplifies errors, and standard deviations know of it: no reason to throw a model away.
     check(
         Status::of(condition < 100.0, true),
-        "condition number (scaled columns)",
+        CheckName::Condition,
         condition.is_finite().then_some(condition),
         "",
         "below 100",
@@ -223,7 +223,7 @@ fn worst_r2(agreements: &[&Agreement]) -> Option<f64> {
         .fold(None, |m: Option<f64>, x| Some(m.map_or(x, |m| m.min(x))))
 }
 
-fn fit_check(name: &str, agreements: &[&Agreement], where_: &str) -> (Status, CheckResult) {
+fn fit_check(name: CheckName, agreements: &[&Agreement], where_: &str) -> (Status, CheckResult) {
     let worst = worst_r2(agreements);
     let r2 = worst.unwrap_or(f64::NAN);
     check(
@@ -257,11 +257,11 @@ fn standing_apart(agreements: &[&Agreement]) -> String {
 
 fn training_fit(id: &Identification) -> (Status, CheckResult) {
     let training: Vec<&Agreement> = id.training.iter().collect();
-    fit_check("fit on training logs", &training, "the logs it was fitted to")
+    fit_check(CheckName::TrainingFit, &training, "the logs it was fitted to")
 }
 
 fn validation_fit(id: &Identification) -> (Status, CheckResult) {
-    fit_check("prediction of validation logs", &id.unseen(), "logs it has not seen")
+    fit_check(CheckName::ValidationFit, &id.unseen(), "logs it has not seen")
 }
 
 fn explained(id: &Identification) -> Option<(Status, CheckResult)> {
@@ -271,7 +271,7 @@ fn explained(id: &Identification) -> Option<(Status, CheckResult)> {
     (!poor.is_empty()).then(|| {
         check(
             Status::Warn,
-            "joints that the model does not explain",
+            CheckName::Explained,
             Some(poor.len() as f64),
             "",
             "none: at least half of the effort of every joint explained, on logs that move it and on held-out folds",
@@ -293,7 +293,7 @@ fn residual(id: &Identification) -> Option<(Status, CheckResult)> {
         .fold(None, |m: Option<f64>, x| Some(m.map_or(x, |m| m.max(x))))?;
     Some(check(
         Status::of(worst < 2.0, true),
-        "residual against sensor noise",
+        CheckName::Residual,
         Some(worst),
         "",
         "below 2 on every joint",
@@ -314,7 +314,7 @@ fn delay(id: &Identification) -> Option<(Status, CheckResult)> {
     let chi = delay.chi_squared.unwrap_or(0.0);
     Some(check(
         Status::of(!delay.at_limit && chi < 3.0, true),
-        "delay of the effort",
+        CheckName::Delay,
         Some(delay.samples),
         "samples",
         "off the limits of the search, joints in agreement (χ²/dof below 3)",
@@ -345,7 +345,7 @@ fn mask(id: &Identification) -> Option<(Status, CheckResult)> {
     let good = spread <= 50.0 && most - least <= (0.05 * least).max(chance);
     Some(check(
         Status::of(good, true),
-        "sensitivity to the reversal mask",
+        CheckName::ReversalMask,
         Some(spread),
         "%",
         "below 5 %, or below 50 % and two standard errors",
@@ -368,7 +368,7 @@ fn blocks(id: &Identification) -> (Status, CheckResult) {
     let short = wanted > 1.01 * fitted.block_s;
     check(
         Status::of(id.blocks() >= 20 && !short, true),
-        "time blocks behind the standard deviations",
+        CheckName::TimeBlocks,
         Some(id.blocks() as f64),
         "",
         "at least 20, each five correlation times of the residual long",
@@ -422,7 +422,7 @@ fn consistency(id: &Identification) -> Option<(Status, CheckResult)> {
     };
     Some(check(
         Status::of(cost <= CHEAP && found.status != ConsistentStatus::Stalled, cost <= DEAR),
-        "price of physical consistency",
+        CheckName::PriceOfConsistency,
         rise,
         "%",
         "error on held-out folds and on validation logs rises by at most 2 %",
@@ -459,7 +459,7 @@ fn whiteness(id: &Identification) -> Option<(Status, CheckResult)> {
     let robust = id.fitted.jackknife.is_some();
     Some(check(
         Status::of(!worst.rejected() || robust, true),
-        "whiteness of the residuals",
+        CheckName::Whiteness,
         Some(ratio(worst)),
         "",
         "largest distance of the cumulative periodogram below its 5 % threshold (1), or robust intervals",

@@ -6,6 +6,7 @@ use dynid::estimate::Estimate;
 use super::Reading;
 use crate::args::BacklashArgs;
 use crate::message::{Failure, data, json};
+use crate::progress::Progress;
 
 pub(crate) fn run(args: &BacklashArgs) -> Result<u8, Failure> {
     let estimate = Estimate::read(&args.estimate)?;
@@ -15,9 +16,12 @@ pub(crate) fn run(args: &BacklashArgs) -> Result<u8, Failure> {
         false => args.log.iter().map(|path| reading.log(path)).collect(),
     };
     let motor_side = reading.motor_side.as_ref();
+    let progress = Progress::new(args.print.quiet);
+    progress.doing("weighing gaps against none");
     let found = backlash((&estimate, &args.estimate), &logs, &reading.columns, motor_side)
         .map_err(|e| reading.named(e))?;
-    if args.json {
+    drop(progress);
+    if args.print.json {
         json(&found)?;
         return Ok(0);
     }

@@ -3,16 +3,18 @@
 use std::path::Path;
 
 use dynid::check::{Check, Finding, Severity, check};
-use dynid::config::{Config, LogConfig};
+use dynid::config::{Config, is_configuration};
 
-use super::apply_log_args_to;
+use super::run::{GivenLogs, configuration as run_configuration};
+use super::{apply_log_args_to, demand_stdout, result};
 use crate::args::CheckArgs;
-use crate::message::{Failure, data, note};
-use crate::outputs;
+use crate::message::{Failure, Notes, data};
+use crate::outputs::{self, marked_toml};
 use crate::progress::Progress;
 
 pub(crate) fn run(args: &CheckArgs) -> Result<u8, Failure> {
-    let (mut config, source) = configuration(args)?;
+    let notes = Notes::new(args.print.quiet);
+    let (mut config, source) = configuration(args, notes)?;
     apply_log_args_to(&mut config, &args.columns);
     config.locked.extend(args.lock.iter().cloned());
     config.gravity = args.gravity.or(config.gravity);
@@ -23,47 +25,68 @@ pub(crate) fn run(args: &CheckArgs) -> Result<u8, Failure> {
         .collect();
     let logs = config.log.iter().chain(&config.validation).map(|log| log.path.as_path());
     let inputs: Vec<&Path> = logs.chain(source).chain([config.robot.as_path()]).collect();
-    let set = outputs::prepare_files(&outputs, &inputs)?;
-    let progress = Progress::new(args.quiet);
-    let found = check(&config, &mut |log| progress.examining(log))?;
+    let set = outputs::prepare_files(&outputs, &inputs, args.force)?;
+    demand_stdout(args.print, &set)?;
+    let progress = Progress::new(args.print.quiet);
+    let found = check(&config, &mut |log| progress.doing(format!("examining {log}")))?;
     drop(progress);
     for (number, (argument, _)) in outputs.iter().enumerate() {
         let text = match *argument {
-            "--fix" => found.corrected(&config, source)?,
+            "--fix" => marked_toml(&found.corrected(&config, source)?),
             _ => found.report()?,
         };
         set.write(number, text.as_bytes())?;
     }
-    set.publish()?;
-    if args.json {
-        data(&(found.to_json() + "\n"))?;
-    } else {
-        data(&text(&found))?;
+    let taken = set.take_stdout();
+    let written = set.publish()?;
+    match args.print.json {
+        true => data(&(found.to_json() + "\n"))?,
+        false => result(&text(&found), taken, notes)?,
     }
-    if !args.quiet {
-        for path in [&args.report, &args.fix].into_iter().flatten() {
-            note(&format!("written: {}", path.display()));
-        }
+    notes.written(&written);
+    if !found.findings.is_empty() && !args.print.json {
+        notes.tell("`dynid explain NAME` says what a finding means and what to do");
     }
     Ok(u8::from(found.worst() == Some(Severity::Error)))
 }
 
 /// The configuration to examine, and the file that it comes from.
-fn configuration(args: &CheckArgs) -> Result<(Config, Option<&Path>), Failure> {
-    let plain = |path: &std::path::PathBuf| LogConfig { path: path.clone(), ..LogConfig::default() };
+fn configuration(args: &CheckArgs, notes: Notes) -> Result<(Config, Option<&Path>), Failure> {
+    let logs = |paths| GivenLogs { paths, rows: args.rows };
     match (&args.robot, args.input.as_slice()) {
-        (Some(robot), logs) => {
-            let log = logs.iter().map(plain).collect();
-            Ok((Config { robot: robot.clone(), log, ..Config::default() }, None))
+        (Some(_), _) if !args.log.is_empty() => Err(Failure::Usage(
+            "--log: logs are named before --robot already".to_owned(),
+            "`dynid check ROBOT --log LOG`, or `dynid check LOG --robot ROBOT`",
+        )),
+        (Some(robot), paths) if is_configuration(robot) => Err(Failure::Usage(
+            format!("--robot: expected a robot file, found the configuration {}", robot.display()),
+            match paths.len() {
+                1 => "`dynid check CONFIG --log LOG`",
+                _ => "`dynid check CONFIG --log LOG --log LOG`",
+            },
+        )),
+        (Some(robot), paths) => Ok((run_configuration(robot, &logs(paths), notes)?, None)),
+        (None, [input]) if is_configuration(input) => {
+            Ok((run_configuration(input, &logs(&args.log), notes)?, Some(input)))
         }
-        (None, [config]) if config.extension().is_some_and(|e| e == "toml") => {
-            Ok((Config::read(config)?, Some(config)))
+        (None, [input]) if !args.log.is_empty() || !is_table(input) => {
+            Ok((run_configuration(input, &logs(&args.log), notes)?, None))
         }
+        (None, [config, ..]) if is_configuration(config) => Err(Failure::Usage(
+            format!("expected one configuration, found {} files", args.input.len()),
+            "name logs with --log: `dynid check CONFIG --log LOG`",
+        )),
         (None, _) => Err(Failure::Usage(
             "expected a robot file for these logs, found none".to_owned(),
             "add --robot ROBOT, or give a configuration (TOML)",
         )),
     }
+}
+
+/// Whether a file is called as logs are.
+fn is_table(path: &Path) -> bool {
+    let name = path.to_string_lossy().to_lowercase();
+    [".csv", ".gz", ".txt", ".tsv", ".dat"].iter().any(|ending| name.ends_with(ending))
 }
 
 fn text(found: &Check) -> String {

@@ -7,6 +7,7 @@ use dynid::{Robot, RobotOptions};
 use super::Reading;
 use crate::args::ClearanceArgs;
 use crate::message::{Failure, data, json};
+use crate::progress::Progress;
 
 pub(crate) fn run(args: &ClearanceArgs) -> Result<u8, Failure> {
     let robot = Robot::load(&args.robot, &RobotOptions::default())?;
@@ -14,9 +15,12 @@ pub(crate) fn run(args: &ClearanceArgs) -> Result<u8, Failure> {
     let reading = Reading::of(&args.reading, &estimate, &args.estimate)?;
     let log = reading.log(&args.log);
     let motor_side = reading.motor_side.as_ref();
+    let progress = Progress::new(args.print.quiet);
+    progress.doing("searching clearances");
     let found = clearance(&robot, (&estimate, &args.estimate), &log, &reading.columns, motor_side)
         .map_err(|e| reading.named(e))?;
-    if args.json {
+    drop(progress);
+    if args.print.json {
         json(&found)?;
         return Ok(0);
     }

@@ -2,43 +2,36 @@
 
 use std::path::Path;
 
-use dynid::compare::{ComparedEstimator, Comparison, compare};
-use dynid::config::{Config, LogConfig};
-
-use super::{apply_log_args_to, table};
+use super::run::{GivenLogs, configuration};
+use super::{apply_log_args_to, demand_stdout, result, table};
 use crate::args::CompareArgs;
-use crate::message::{Failure, data, note};
+use crate::message::{Failure, Notes, data};
 use crate::outputs;
-use crate::progress::DesignProgress;
+use crate::progress::Progress;
+use dynid::compare::{ComparedEstimator, Comparison, compare};
 
 pub(crate) fn run(args: &CompareArgs) -> Result<u8, Failure> {
-    let mut config = match args.log.is_empty() {
-        true => Config::read(&args.input)?,
-        false => Config {
-            robot: args.input.clone(),
-            log: args.log.iter().map(|p| LogConfig { path: p.clone(), ..LogConfig::default() }).collect(),
-            ..Config::default()
-        },
-    };
+    let notes = Notes::new(args.print.quiet);
+    let mut config = configuration(&args.input, &GivenLogs { paths: &args.log, rows: args.rows }, notes)?;
     apply_log_args_to(&mut config, &args.columns);
     let outputs: Vec<(&str, &Path)> = args.report.iter().map(|p| ("--report", p.as_path())).collect();
     let logs = config.log.iter().map(|log| log.path.as_path());
     let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).collect();
-    let set = outputs::prepare_files(&outputs, &inputs)?;
-    let progress = DesignProgress::new(args.quiet);
-    let found = compare(&config, &mut |done, of, what| progress.fit(done, of, what))?;
+    let set = outputs::prepare_files(&outputs, &inputs, args.force)?;
+    demand_stdout(args.print, &set)?;
+    let progress = Progress::new(args.print.quiet);
+    let found = compare(&config, &mut |done, of, what| progress.counted(done, of, what))?;
     drop(progress);
     if args.report.is_some() {
         set.write(0, found.report()?.as_bytes())?;
     }
-    set.publish()?;
-    match args.json {
+    let taken = set.take_stdout();
+    let written = set.publish()?;
+    match args.print.json {
         true => data(&(found.to_json() + "\n"))?,
-        false => data(&text(&found))?,
+        false => result(&text(&found), taken, notes)?,
     }
-    if let (Some(path), false) = (&args.report, args.quiet) {
-        note(&format!("written: {}", path.display()));
-    }
+    notes.written(&written);
     Ok(u8::from(found.estimators.iter().all(|e| e.rank.is_none())))
 }
 

@@ -6,10 +6,10 @@ use dynid::config::PerJoint;
 use dynid::design::{ColumnsName, CriterionName, DesignConfig, DesignRecord, MotionPaths, design};
 
 use super::{element_names, table};
-use crate::args::{ColumnsArg, CriterionArg, DesignArgs};
+use crate::args::{ColumnsArg, CriterionArg, DesignArgs, ForceArgs};
 use crate::message::{Failure, data, note};
 use crate::outputs;
-use crate::progress::DesignProgress;
+use crate::progress::Progress;
 
 const DEFAULT_OUT: &str = "dynid-design";
 
@@ -36,15 +36,15 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
             &results.chain([("--checkpoint", checkpoint.as_path())]).collect::<Vec<_>>(),
             &inputs,
         )?;
-        drop(outputs::prepare_files(&[("--checkpoint", checkpoint)], &[])?);
+        drop(outputs::prepare_files(&[("--checkpoint", checkpoint)], &[], ForceArgs { force: true })?);
         if std::path::absolute(checkpoint).ok() == std::path::absolute(&out).ok() {
             let text = format!("--checkpoint: {} is the output folder", checkpoint.display());
             return Err(Failure::Usage(text, "give the checkpoint a file of its own"));
         }
     }
-    let set = outputs::prepare_folder(&files, &inputs)?;
-    let progress = DesignProgress::new(args.quiet);
-    let run = design(&config, &mut |step| progress.step(step))?;
+    let set = outputs::prepare_folder(&files, &inputs, args.force)?;
+    let progress = Progress::new(args.quiet);
+    let run = design(&config, &mut |step| progress.design(step))?;
     let record = run.record(&config)?;
     let report = run.report(&config, &record)?;
     drop(progress);

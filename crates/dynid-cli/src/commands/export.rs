@@ -8,20 +8,23 @@ use dynid::export::{CheckStates, Exported, IdentifiedRobot, RobotExport, Source,
 use dynid::io::MappingSpec;
 use dynid::logs::sha256;
 
-use super::{apply_log_args, table};
+use super::run::plain;
+use super::{apply_log_args, demand_stdout, table};
 use crate::args::ExportArgs;
-use crate::message::{Failure, note};
-use crate::outputs;
+use crate::message::{Failure, Notes, json as print_json, note};
+use crate::outputs::{self, is_stdout, marked_toml, marked_xml};
+use crate::progress::Progress;
 
 pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
+    let notes = Notes::new(args.print.quiet);
     let mut outputs: Vec<(&str, &Path)> =
-        [("--urdf", &args.urdf), ("--mjcf", &args.mjcf), ("--json", &args.json)]
+        [("--urdf", &args.urdf), ("--mjcf", &args.mjcf), ("--model", &args.model)]
             .into_iter()
             .filter_map(|(argument, path)| Some((argument, path.as_deref()?)))
             .collect();
     if outputs.is_empty() {
         return Err(Failure::Usage(
-            "nothing to write: expected at least one of --urdf, --mjcf, --json".to_owned(),
+            "nothing to write: expected at least one of --urdf, --mjcf, --model".to_owned(),
             "for example `dynid export dynid-out/estimate.json --urdf robot.urdf`",
         ));
     }
@@ -40,19 +43,21 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
         .map(PathBuf::as_path)
         .collect();
     // Loops stand beside the URDF, which has no place for them.
-    let beside = args.urdf.as_ref().map(|urdf| urdf.with_extension("loops.toml"));
+    let beside = args.urdf.as_ref().filter(|urdf| !is_stdout(urdf)).map(|u| u.with_extension("loops.toml"));
     let models = outputs.len();
     outputs.extend(beside.iter().map(|path| ("--urdf", path.as_path())));
-    let set = outputs::prepare_files(&outputs, &inputs)?;
+    let set = outputs::prepare_files(&outputs, &inputs, args.force)?;
+    demand_stdout(args.print, &set)?;
 
+    let progress = Progress::new(args.print.quiet);
+    progress.doing("reading");
     let identified = estimate.identified_robot(&args.estimate)?;
     let states = states(args, &estimate, &identified)?;
     let source = Source::read(&robot)?;
-    if let Some(record) = estimate.robot_file()
-        && sha256(&robot)? != record.sha256
-    {
-        note(&format!("warning: {} has changed since it was identified", robot.display()));
-    }
+    let changed = match estimate.robot_file() {
+        Some(record) => sha256(&robot)? != record.sha256,
+        None => false,
+    };
     let mut export = RobotExport::new(identified.identified(), &source)?;
     if args.log.is_empty() {
         export = export.with_projections(&estimate.exported.projections);
@@ -60,9 +65,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
     if !args.allow_unphysical {
         export.require_physical()?;
     }
-    for fault in export.faults() {
-        note(&format!("warning: link `{}` {}: simulators refuse such a robot", fault.link, fault.fault));
-    }
+    progress.doing("writing and reading back");
     let exported = outputs[..models]
         .iter()
         .map(|(argument, path)| {
@@ -71,53 +74,107 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
                 "--mjcf" => export.mjcf(&states),
                 _ => json(&identified.identified(), &states),
             };
-            Ok((*argument, *path, exported?))
+            Ok(Made { argument, path, exported: exported? })
         })
         .collect::<Result<Vec<_>, Failure>>()?;
-    for (number, (_, _, exported)) in exported.iter().enumerate() {
-        set.write(number, exported.text.as_bytes())?;
+    for (number, made) in exported.iter().enumerate() {
+        let text = match made.argument {
+            "--model" => made.exported.text.clone(),
+            _ => marked_xml(&made.exported.text),
+        };
+        set.write(number, text.as_bytes())?;
     }
     let name = args.urdf.as_ref().and_then(|urdf| urdf.file_name());
     let loops = name.and_then(|name| export.loops(&name.to_string_lossy()));
-    if let Some(loops) = &loops {
-        set.write(models, loops.as_bytes())?;
+    match (&loops, &beside) {
+        (Some(loops), Some(_)) => set.write(models, marked_toml(loops).as_bytes())?,
+        (Some(_), None) => {
+            return Err(Failure::Usage(
+                "--urdf: loops need a file beside the URDF, found `-`".to_owned(),
+                "name a file: --urdf robot.urdf",
+            ));
+        }
+        (None, _) => {}
     }
+    drop(progress);
     set.publish()?;
-    if let (Some(path), Some(_)) = (&beside, &loops) {
-        note(&format!("written: {} (its loops)", path.display()));
+    if changed {
+        notes.tell(&format!("warning: {} has changed since it was identified", robot.display()));
     }
-    for (argument, path, exported) in &exported {
-        note(&format!(
-            "written: {} (read back: effort within {:.1e} over {})",
-            path.display(),
-            exported.difference,
-            states.describe()
-        ));
-        notes(exported);
-        loss(&estimate, argument);
+    for fault in export.faults() {
+        notes
+            .tell(&format!("warning: link `{}` {}: simulators refuse such a robot", fault.link, fault.fault));
+    }
+    if let (Some(path), Some(_)) = (&beside, &loops) {
+        notes.tell(&format!("written: {} (its loops)", path.display()));
+    }
+    for made in &exported {
+        made.tell(&states, notes);
+        loss(&estimate, made.argument, notes);
+    }
+    if args.print.json {
+        let files: Vec<_> = exported.iter().map(Made::record).collect();
+        print_json(&serde_json::json!({
+            "files": files,
+            "read_back_over": states.describe(),
+            "judged": estimate.exported.judged(),
+        }))?;
     }
     Ok(0)
 }
 
+/// A file that was made.
+struct Made<'a> {
+    argument: &'a str,
+    path: &'a Path,
+    exported: Exported,
+}
+
+impl Made<'_> {
+    fn tell(&self, states: &CheckStates, notes: Notes) {
+        let place =
+            if is_stdout(self.path) { "standard output".to_owned() } else { self.path.display().to_string() };
+        notes.tell(&format!(
+            "written: {place} (read back: effort within {:.1e} over {})",
+            self.exported.difference,
+            states.describe()
+        ));
+        tell_notes(&self.exported, notes);
+    }
+
+    fn record(&self) -> serde_json::Value {
+        serde_json::json!({
+            "file": self.path.display().to_string(),
+            "format": self.argument.trim_start_matches('-'),
+            "read_back_difference": self.exported.difference,
+            "notes": self.exported.notes,
+        })
+    }
+}
+
 /// Tells what `identify` did with its URDF.
-pub(super) fn tell(path: &Path, exported: &Result<Exported, dynid::Error>, estimate: &Estimate) {
+pub(super) fn tell(
+    path: &Path,
+    exported: &Result<Exported, dynid::Error>,
+    estimate: &Estimate,
+    notes: Notes,
+) {
     match exported {
         Ok(exported) => {
-            notes(exported);
-            loss(estimate, "--urdf");
+            tell_notes(exported, notes);
+            loss(estimate, "--urdf", notes);
         }
+        // A file that is missing is told in any case.
         Err(reason) => note(&format!("not written: {}: {reason}", path.display())),
     }
 }
 
-fn notes(exported: &Exported) {
-    for line in &exported.notes {
-        note(&format!("  {line}"));
-    }
+fn tell_notes(exported: &Exported, notes: Notes) {
+    exported.notes.iter().for_each(|line| notes.tell(&format!("  {line}")));
 }
 
 /// Tells what a file (`--urdf`, `--mjcf`) loses of the identified model, on the log that files were judged on.
-fn loss(estimate: &Estimate, argument: &str) {
+fn loss(estimate: &Estimate, argument: &str, notes: Notes) {
     let Some(log) = estimate.exported.judged() else { return };
     let (format, alone, with_rotor): (_, _, Option<&FileFit>) = match argument {
         "--mjcf" => ("MJCF", &log.mjcf, None),
@@ -131,13 +188,13 @@ fn loss(estimate: &Estimate, argument: &str) {
     let rotor = with_rotor.map_or_else(String::new, |fit| {
         format!(", {} % with the rotor inertias added", percent(fit.relative_error))
     });
-    note(&format!(
+    notes.tell(&format!(
         "  the {format} predicts {} with an error of {} % of the effort{rotor}, the identified model with {} %",
         log.log,
         percent(alone.relative_error),
         percent(model)
     ));
-    note(&table::loss(&estimate.joints, alone, with_rotor));
+    notes.tell(&table::loss(&estimate.joints, alone, with_rotor));
     for (fit, what) in [(Some(alone), ""), (with_rotor, " with the rotor inertias added")] {
         let Some(fit) = fit else { continue };
         let pairs = estimate.joints.iter().zip(&fit.loss_percent);
@@ -146,8 +203,8 @@ fn loss(estimate: &Estimate, argument: &str) {
             .map(|(joint, lost)| format!("{joint} ({lost:.1} %)"))
             .collect();
         if !above.is_empty() {
-            note(&format!(
-                "  warning: the {format}{what} loses more than {EXPORT_LOSS_LIMIT} % of the effort of {}: it is not the model that was judged; the JSON of `dynid export --json` is",
+            notes.tell(&format!(
+                "  warning: the {format}{what} loses more than {EXPORT_LOSS_LIMIT} % of the effort of {}: it is not the model that was judged; the JSON of `dynid export --model` is",
                 above.join(", ")
             ));
         }
@@ -189,6 +246,6 @@ fn states(
     };
     apply_log_args(&mut columns, &args.columns);
     let logs: Vec<LogConfig> =
-        args.log.iter().map(|path| LogConfig { path: path.clone(), ..LogConfig::default() }).collect();
+        args.log.iter().map(|path| LogConfig { rows: args.rows, ..plain(path) }).collect();
     Ok(CheckStates::read(model, estimate.model.state_hz, &logs, &columns, motor_side.as_ref())?)
 }

@@ -7,7 +7,7 @@ use dynid::friction::{FrictionConfig, identify_friction};
 
 use super::table;
 use crate::args::FrictionTestArgs;
-use crate::message::{Failure, data, note};
+use crate::message::{Failure, Notes, data};
 use crate::outputs;
 use crate::progress::Progress;
 
@@ -23,8 +23,8 @@ pub(crate) fn run(args: &FrictionTestArgs) -> Result<u8, Failure> {
     let logs = config.log.iter().map(|l| l.path.as_path());
     let slow = config.presliding.iter().map(|l| l.path.as_path());
     let inputs: Vec<&Path> = logs.chain(slow).chain([args.input.as_path(), &config.robot]).collect();
-    let set = outputs::prepare_folder(&files, &inputs)?;
-    let progress = Progress::new(args.quiet);
+    let set = outputs::prepare_folder(&files, &inputs, args.force)?;
+    let progress = Progress::new(args.print.quiet);
     let found = identify_friction(&config, &mut |step| progress.friction(step))?;
     let model = found.model(&config)?;
     let report = found.report(&model)?;
@@ -33,34 +33,25 @@ pub(crate) fn run(args: &FrictionTestArgs) -> Result<u8, Failure> {
     let text = model.to_json();
     set.write(0, text.as_bytes())?;
     set.write(1, report.as_bytes())?;
-    set.publish()?;
-    let failed = model.verdict.status == "fail";
-    if !args.quiet {
-        summary(&model);
-        files.iter().for_each(|file| note(&format!("written: {}", file.display())));
-    } else if failed {
-        note(&verdict(&model));
-    }
-    if args.json {
-        data(&text)?;
-    }
-    Ok(u8::from(failed))
+    let written = set.publish()?;
+    let notes = Notes::new(args.print.quiet);
+    notes.warnings(&model.warnings);
+    data(&if args.print.json { text } else { summary(&model) })?;
+    notes.written(&written);
+    Ok(u8::from(model.verdict.status == "fail"))
 }
 
-fn summary(model: &FrictionModel) {
-    for warning in &model.warnings {
-        note(&format!("warning: {warning}"));
-    }
+fn summary(model: &FrictionModel) -> String {
     let rows: Vec<Vec<String>> = model.joints.iter().map(row).collect();
     let head =
         ["joint", "status", "points", "F_c", "F_s", "v_s", "viscous", "RMS", "error, %", "sigma0", "sigma1"];
-    note(table::aligned(&head, &rows).trim_end());
+    let mut out = table::aligned(&head, &rows);
     for joint in &model.joints {
         for text in &joint.notes {
-            note(&format!("{}: {text}", joint.joint));
+            out += &format!("{}: {text}\n", joint.joint);
         }
     }
-    note(&format!("\n{}", verdict(model)));
+    out + &format!("\n{}: {}\n", model.verdict.status, model.verdict.headline)
 }
 
 fn row(joint: &JointFrictionModel) -> Vec<String> {
@@ -85,8 +76,4 @@ fn row(joint: &JointFrictionModel) -> Vec<String> {
         table::number(joint.bristle.map(|b| b.sigma0)),
         table::number(joint.bristle.map(|b| b.sigma1)),
     ]
-}
-
-fn verdict(model: &FrictionModel) -> String {
-    format!("{}: {}", model.verdict.status, model.verdict.headline)
 }

@@ -5,19 +5,17 @@ use dynid::gains::{GainsFile, JointGain, identify_gains};
 
 use super::table;
 use crate::args::GainsArgs;
-use crate::message::{Failure, data, json, note};
+use crate::message::{Failure, Notes, data, json};
 use crate::progress::Progress;
 
 pub(crate) fn run(args: &GainsArgs) -> Result<u8, Failure> {
     let config = Config::read(&args.input)?;
-    let progress = Progress::new(args.quiet);
+    let progress = Progress::new(args.print.quiet);
     let found = identify_gains(&config, &mut |step| progress.step(step))?;
     let file = found.file(&config);
     drop(progress);
-    if !args.quiet {
-        file.warnings.iter().for_each(|w| note(&format!("warning: {w}")));
-    }
-    match args.json {
+    Notes::new(args.print.quiet).warnings(&file.warnings);
+    match args.print.json {
         true => json(&file)?,
         false => data(&summary(&file))?,
     }

@@ -1,31 +1,36 @@
 //! `dynid identify`.
 
+mod summary;
+
 use std::path::{Path, PathBuf};
 
-use dynid::config::{Config, Consistency, Friction, LogConfig, Method, Route};
-use dynid::estimate::{Estimate, LogScale, ShapeValue};
+use dynid::config::{Config, Consistency, Friction, Method, Route};
 use dynid::{Error, identify};
 
-use super::{apply_log_args_to, element_names, export, table};
+use super::run::{GivenLogs, configuration as run_configuration, plain};
+use super::{apply_log_args_to, element_names, export};
 use crate::args::{ConsistencyArg, FrictionArg, IdentifyArgs, MethodArg, RouteArg};
-use crate::message::{Failure, data, note};
-use crate::outputs;
+use crate::message::{Failure, Notes, data};
+use crate::outputs::{self, marked_toml, marked_xml};
 use crate::progress::Progress;
+use summary::summary;
 
 const DEFAULT_OUT: &str = "dynid-out";
 
 pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
-    let config = configuration(args)?;
+    let notes = Notes::new(args.print.quiet);
+    let config = configuration(args, notes)?;
     let out = config.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
-    let robot = config.robot.file_stem().map_or_else(|| "robot".into(), |s| s.to_string_lossy().into_owned());
+    let stem = config.robot.file_stem().filter(|stem| *stem != "-");
+    let robot = stem.map_or_else(|| "robot".into(), |s| s.to_string_lossy().into_owned());
     let urdf_name = format!("{robot}.urdf");
     let names = ["estimate.json", "report.html", &urdf_name, &format!("{robot}.loops.toml")];
     let files = names.map(|name| out.join(name));
     let logs = config.log.iter().chain(&config.validation).map(|log| log.path.as_path());
     let friction = config.elements.known_friction.as_deref();
     let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).chain(friction).collect();
-    let set = outputs::prepare_folder(&files, &inputs)?;
-    let progress = Progress::new(args.quiet);
+    let set = outputs::prepare_folder(&files, &inputs, args.force)?;
+    let progress = Progress::new(args.print.quiet);
     let identification = identify(&config, &mut |step| progress.step(step))?;
     let mut estimate = identification.estimate(&config)?;
     estimate.provenance.command_line =
@@ -41,48 +46,28 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     drop(progress);
 
     let loops = if urdf.is_ok() { identification.loops(&urdf_name)? } else { None };
-    let texts =
-        [Some(&estimate.to_json()), Some(&report), urdf.as_ref().ok().map(|u| &u.text), loops.as_ref()];
+    let urdf_text = urdf.as_ref().ok().map(|u| marked_xml(&u.text));
+    let loops = loops.map(|text| marked_toml(&text));
+    let json = estimate.to_json();
+    let texts = [Some(&json), Some(&report), urdf_text.as_ref(), loops.as_ref()];
     for (number, text) in texts.into_iter().enumerate() {
         text.map(|text| set.write(number, text.as_bytes())).transpose()?;
     }
     let written = set.publish()?;
-    let failed = estimate.verdict.status == "fail";
-    if !args.quiet {
-        summary(&estimate, written.iter().map(PathBuf::as_path));
-    } else if failed {
-        note(&verdict(&estimate));
+    notes.warnings(&estimate.verdict.warnings);
+    data(&if args.print.json { json } else { summary(&estimate) })?;
+    notes.written(&written);
+    export::tell(&files[2], &urdf, &estimate, notes);
+    if estimate.verdict.status != "ok" {
+        notes.tell("`dynid explain NAME` says what a check means and what to do");
     }
-    if !args.quiet || urdf.is_err() {
-        export::tell(&files[2], &urdf, &estimate);
-    }
-    if args.json {
-        data(&estimate.to_json())?;
-    }
-    Ok(u8::from(failed))
+    Ok(u8::from(estimate.verdict.status == "fail"))
 }
 
 /// The configuration file with flags over it, or one made of flags alone.
-fn configuration(args: &IdentifyArgs) -> Result<Config, Failure> {
-    let plain = |path: &Path| LogConfig { path: path.to_owned(), ..LogConfig::default() };
-    let mut config = if args.log.is_empty() {
-        Config::read(&args.input).map_err(|error| match dynid::io::robot::read(&args.input) {
-            Ok(_) => Failure::Usage(
-                format!(
-                    "{}: expected a configuration, found a robot file without --log",
-                    args.input.display()
-                ),
-                "add --log LOG, or give a configuration",
-            ),
-            Err(_) => error.into(),
-        })?
-    } else {
-        Config {
-            robot: args.input.clone(),
-            log: args.log.iter().map(|p| plain(p)).collect(),
-            ..Config::default()
-        }
-    };
+fn configuration(args: &IdentifyArgs, notes: Notes) -> Result<Config, Failure> {
+    let logs = GivenLogs { paths: &args.log, rows: args.rows };
+    let mut config = run_configuration(&args.input, &logs, notes)?;
     config.validation.extend(args.validate.iter().map(|p| plain(p)));
     if args.out.is_some() {
         config.out.clone_from(&args.out);
@@ -145,97 +130,4 @@ fn configuration(args: &IdentifyArgs) -> Result<Config, Failure> {
     c.reversal_mask = args.reversal_mask.or(c.reversal_mask);
     c.decimation = args.decimation.or(c.decimation);
     Ok(config)
-}
-
-fn summary<'a>(estimate: &Estimate, files: impl Iterator<Item = &'a Path>) {
-    for warning in &estimate.verdict.warnings {
-        note(&format!("warning: {warning}"));
-    }
-    note("settings:");
-    for choice in &estimate.conditioning.choices {
-        let value = match &choice.value {
-            serde_json::Value::Number(n) => table::number(n.as_f64()),
-            serde_json::Value::Null => {
-                note(&format!("  {} = none ({}: {})", choice.name, choice.origin, choice.reason));
-                continue;
-            }
-            serde_json::Value::Array(list) if list.is_empty() => "none".to_owned(),
-            serde_json::Value::Array(list) => {
-                let word = |x: &serde_json::Value| x.as_str().map(str::to_owned);
-                let words = list.iter().map(|x| word(x).unwrap_or_else(|| table::number(x.as_f64())));
-                words.collect::<Vec<_>>().join(" ")
-            }
-            other => other.to_string(),
-        };
-        note(&format!("  {} = {value} {} ({}: {})", choice.name, choice.unit, choice.origin, choice.reason));
-    }
-    note(&format!(
-        "\ntraining fit (filtered at {:.1} Hz, relative error {} %):",
-        estimate.fit.filter_hz,
-        table::number(estimate.fit.filtered.relative_error)
-    ));
-    let fit = &estimate.fit;
-    note(table::agreement(&estimate.joints, &fit.raw, &fit.filtered, &fit.by_motion).trim_end());
-    for fit in &estimate.validation {
-        note(&format!(
-            "\nvalidation on {} (filtered at {:.1} Hz, relative error {} %):",
-            fit.log,
-            fit.filter_hz,
-            table::number(fit.filtered.relative_error)
-        ));
-        note(table::agreement(&estimate.joints, &fit.raw, &fit.filtered, &fit.by_motion).trim_end());
-    }
-    note("\nchecks:");
-    for check in &estimate.verdict.checks {
-        let value =
-            check.value.map_or_else(String::new, |v| format!("{} {}", table::number(Some(v)), check.unit));
-        let value = value.trim_end();
-        note(&format!("  [{}] {}: {value} ({}): {}", check.status, check.name, check.limit, check.meaning));
-    }
-    let count = |verdict: &str| estimate.parameters.iter().filter(|p| p.verdict == verdict).count();
-    note(&format!(
-        "\nparameters: {} of {} seen in the data, {} carried by the prior, {} not identifiable (one by one in the report)",
-        count("seen in the data"),
-        estimate.parameters.len(),
-        count("carried by the prior"),
-        count("not identifiable"),
-    ));
-    for shape in &estimate.shape_parameters {
-        note(&format!("  {}", shape_parameter(shape)));
-    }
-    for scale in &estimate.log_scales {
-        note(&format!("  {}", log_scale(scale)));
-    }
-    for motion in &estimate.motions_that_would_help {
-        note(&format!("  {motion}"));
-    }
-    note(&format!("\n{}", verdict(estimate)));
-    for file in files {
-        note(&format!("written: {}", file.display()));
-    }
-}
-
-/// A parameter that enters nonlinearly: value, interval, verdict with its reason.
-fn shape_parameter(shape: &ShapeValue) -> String {
-    let of = format!("{} = {} {}", shape.name, table::number(Some(shape.value)), shape.unit);
-    judged(&of, shape.interval, &shape.verdict, shape.reason.as_deref())
-}
-
-/// Friction of a log over that of the others.
-fn log_scale(scale: &LogScale) -> String {
-    let of =
-        format!("friction in {} = {} of that in the others", scale.log, table::number(Some(scale.value)));
-    judged(&of, scale.interval, &scale.verdict, scale.reason.as_deref())
-}
-
-fn judged(of: &str, interval: Option<(f64, f64)>, verdict: &str, reason: Option<&str>) -> String {
-    let number = |x: f64| table::number(Some(x));
-    let interval = interval
-        .map_or_else(String::new, |(low, high)| format!(" (95 %: {} to {})", number(low), number(high)));
-    let reason = reason.map_or_else(String::new, |r| format!(", {r}"));
-    format!("{of}{interval}: {verdict}{reason}")
-}
-
-fn verdict(estimate: &Estimate) -> String {
-    format!("{}: {}", estimate.verdict.status, estimate.verdict.headline)
 }

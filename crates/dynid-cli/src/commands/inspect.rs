@@ -6,18 +6,21 @@ use dynid::inspect::{ClearanceRow, Inspection, LoopsInspection, MotorRow, inspec
 
 use super::{element_names, load_robot, table};
 use crate::args::InspectArgs;
-use crate::message::{Failure, data, json, note};
+use crate::message::{Failure, Notes, data, json};
+use crate::progress::Progress;
 
 pub(crate) fn run(args: &InspectArgs) -> Result<u8, Failure> {
     let robot = load_robot(&args.robot)?;
+    let progress = Progress::new(args.print.quiet);
+    progress.doing("finding base parameters");
     let inspection = inspect(&robot, element_names(args.elements.as_deref()).as_deref())?;
-    if args.json {
-        json(&inspection)?;
-    } else {
-        for warning in &inspection.warnings {
-            note(&format!("warning: {warning}"));
+    drop(progress);
+    match args.print.json {
+        true => json(&inspection)?,
+        false => {
+            Notes::new(args.print.quiet).warnings(&inspection.warnings);
+            data(&text(&inspection))?;
         }
-        data(&text(&inspection))?;
     }
     Ok(0)
 }

@@ -4,16 +4,21 @@ pub(crate) mod backlash;
 pub(crate) mod check;
 pub(crate) mod clearance;
 pub(crate) mod compare;
+pub(crate) mod completions;
 pub(crate) mod design;
+pub(crate) mod diff;
+pub(crate) mod explain;
 pub(crate) mod export;
 pub(crate) mod friction;
 pub(crate) mod gains;
 pub(crate) mod identify;
 pub(crate) mod inspect;
+pub(crate) mod man;
 pub(crate) mod online;
 pub(crate) mod payload;
 pub(crate) mod predict;
 pub(crate) mod regressor;
+mod run;
 pub(crate) mod simulate;
 pub(crate) mod study;
 mod table;
@@ -26,8 +31,9 @@ use dynid::estimate::{Estimate, ReadingRecord};
 use dynid::io::columns::{FullSignal, PerJoint, SignalSpec};
 use dynid::{Error, Robot, RobotOptions};
 
-use crate::args::{LogArgs, ReadingArgs, RobotArgs};
-use crate::message::Failure;
+use crate::args::{LogArgs, PrintArgs, ReadingArgs, RobotArgs};
+use crate::message::{Failure, Notes, data};
+use crate::outputs::Outputs;
 
 fn load_robot(args: &RobotArgs) -> Result<Robot, Failure> {
     let options = RobotOptions {
@@ -37,6 +43,26 @@ fn load_robot(args: &RobotArgs) -> Result<Robot, Failure> {
         locked: args.lock.clone(),
     };
     Ok(Robot::load(&args.robot, &options)?)
+}
+
+/// Refuses JSON on a standard output that a file takes.
+fn demand_stdout(print: PrintArgs, set: &Outputs) -> Result<(), Failure> {
+    match print.json && set.take_stdout() {
+        true => Err(Failure::Usage(
+            "--json: standard output is taken by a file (`-`)".to_owned(),
+            "give the file a name, or leave --json out",
+        )),
+        false => Ok(()),
+    }
+}
+
+/// Prints a result; beside a file that takes standard output it is a note.
+fn result(text: &str, taken: bool, notes: Notes) -> Result<(), Failure> {
+    match taken {
+        true => notes.tell(text.trim_end()),
+        false => data(text)?,
+    }
+    Ok(())
 }
 
 /// Names of elements from the command line; `none` stands for an empty list.

@@ -10,8 +10,9 @@ use dynid::io::stream::{BadLine, LineFormat, LineSource, LinesEnd, StreamRows};
 use dynid::online::{Checkpoint, Event, Session};
 use serde::Serialize;
 
+use super::run;
 use crate::args::{OnlineArgs, StreamArg};
-use crate::message::{Failure, json, note};
+use crate::message::{Failure, Notes, json_while_read, note};
 use view::View;
 
 /// Bad lines that are told one by one.
@@ -29,8 +30,10 @@ struct Skipped {
 pub(crate) fn run(args: &OnlineArgs) -> Result<u8, Failure> {
     let mut config = Config::read_for_stream(&args.config)?;
     if !args.log.is_empty() {
-        config.log =
-            args.log.iter().map(|path| LogConfig { path: path.clone(), ..LogConfig::default() }).collect();
+        run::replace(&mut config, &args.log, Notes::new(args.quiet));
+    }
+    if args.rows.is_some() {
+        config.log.iter_mut().for_each(|log| log.rows = args.rows);
     }
     if args.checkpoint.is_some() {
         config.online.checkpoint.clone_from(&args.checkpoint);
@@ -260,7 +263,7 @@ impl Output {
         let done = work(&mut |event| {
             self.view.show(&event);
             if self.lines && written.is_ok() {
-                written = json(&event);
+                written = json_while_read(&event);
             }
         });
         written?;
@@ -268,6 +271,6 @@ impl Output {
     }
 
     fn plain(&self, value: &impl Serialize) -> Result<(), Failure> {
-        if self.lines { json(value) } else { Ok(()) }
+        if self.lines { json_while_read(value) } else { Ok(()) }
     }
 }

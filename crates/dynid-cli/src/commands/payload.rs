@@ -7,8 +7,8 @@ use dynid::payload::{PayloadFile, PayloadRecord, Quantity, identify_payloads};
 
 use super::table;
 use crate::args::PayloadArgs;
-use crate::message::{Failure, data, note};
-use crate::outputs;
+use crate::message::{Failure, Notes, data};
+use crate::outputs::{self, marked_xml};
 use crate::progress::Progress;
 
 const DEFAULT_OUT: &str = "dynid-payload";
@@ -23,24 +23,23 @@ pub(crate) fn run(args: &PayloadArgs) -> Result<u8, Failure> {
     files.extend(config.payload.iter().map(|p| out.join(format!("{}.urdf.part", file_name(&p.name)))));
     let logs = config.log.iter().chain(&config.validation).map(|log| log.path.as_path());
     let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).collect();
-    let set = outputs::prepare_folder(&files, &inputs)?;
-    let progress = Progress::new(args.quiet);
+    let set = outputs::prepare_folder(&files, &inputs, args.force)?;
+    let progress = Progress::new(args.print.quiet);
     let found = identify_payloads(&config, &mut |step| progress.step(step))?;
     let file = found.file(&config)?;
     let report = file.report()?;
     drop(progress);
 
     let text = file.to_json();
-    let parts = file.payloads.iter().map(|p| &p.urdf);
-    for (number, text) in [&text, &report].into_iter().chain(parts).enumerate() {
+    let parts: Vec<String> = file.payloads.iter().map(|p| marked_xml(&p.urdf)).collect();
+    for (number, text) in [&text, &report].into_iter().chain(&parts).enumerate() {
         set.write(number, text.as_bytes())?;
     }
-    set.publish()?;
-    if !args.quiet {
-        file.verdict.warnings.iter().for_each(|w| note(&format!("warning: {w}")));
-        files.iter().for_each(|path| note(&format!("written: {}", path.display())));
-    }
-    data(&if args.json { text } else { summary(&file) })?;
+    let written = set.publish()?;
+    let notes = Notes::new(args.print.quiet);
+    notes.warnings(&file.verdict.warnings);
+    data(&if args.print.json { text } else { summary(&file) })?;
+    notes.written(&written);
     Ok(u8::from(file.status == "fail"))
 }
 

@@ -9,6 +9,7 @@ use super::load_robot;
 use super::predict::csv_text;
 use crate::args::RegressorArgs;
 use crate::message::{Failure, data, json};
+use crate::progress::Progress;
 
 #[derive(Serialize)]
 struct Output {
@@ -20,13 +21,17 @@ struct Output {
 
 pub(crate) fn run(args: &RegressorArgs) -> Result<u8, Failure> {
     let robot = load_robot(&args.robot)?;
-    let states = states::read(&args.states, &robot.state_joints(), &ReadOptions::default())?;
+    let options = ReadOptions { rows: args.rows, ..ReadOptions::default() };
+    let states = states::read(&args.states, &robot.state_joints(), &options)?;
     let model = robot.skeleton()?;
     let values = robot.skeleton_values(&model);
+    let progress = Progress::new(args.quiet);
+    progress.doing("computing efforts");
     let effort = efforts(&model, &values, &states)?;
     let joints: Vec<String> = model.outputs().iter().map(|o| o.name.clone()).collect();
     if !args.json {
-        data(&csv_text(&joints, &effort))?;
+        drop(progress);
+        data(&csv_text(&joints, &effort)?)?;
         return Ok(0);
     }
     let base = args.base.then(|| {
@@ -37,11 +42,13 @@ pub(crate) fn run(args: &RegressorArgs) -> Result<u8, Failure> {
         None => table.iter().map(|p| p.name.clone()).collect(),
         Some(base) => base.kept.iter().map(|c| table[*c].name.clone()).collect(),
     };
-    json(&Output {
+    let output = Output {
         columns,
         effort: (0..states.rows).map(|s| effort.iter().map(|e| e[s]).collect()).collect(),
         regressor: regressors(&model, base.as_ref(), &states)?,
         joints,
-    })?;
+    };
+    drop(progress);
+    json(&output)?;
     Ok(0)
 }

@@ -2,16 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use dynid::io::csv;
 use dynid::sim::clearance::ContactEventKind;
 use dynid::simulate::{
     ClearanceSummary, ExperimentSummary, SimulateMode, SimulateSettings, SimulatedLog, simulate,
 };
 
-use super::load_robot;
+use super::{demand_stdout, load_robot};
 use crate::args::SimulateArgs;
-use crate::message::{Failure, note};
-use crate::outputs;
+use crate::message::{Failure, Notes, json};
+use crate::outputs::{self, Outputs, is_stdout};
+use crate::progress::Progress;
 
 /// Columns of efforts; joints without a drive have none.
 const EFFORT: &str = "tau";
@@ -27,7 +27,8 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
         .chain(&args.follow)
         .map(PathBuf::as_path)
         .collect();
-    let set = outputs::prepare_files(&files, &inputs)?;
+    let set = outputs::prepare_files(&files, &inputs, args.force)?;
+    demand_stdout(args.print, &set)?;
     let robot = load_robot(&args.robot)?;
     let mut settings = match &args.config {
         None => SimulateSettings::default(),
@@ -45,48 +46,64 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
     settings.encoder_bits = args.encoder_bits.unwrap_or(settings.encoder_bits);
     settings.seed = args.seed.unwrap_or(settings.seed);
     settings.journal_noise = args.journal_noise.unwrap_or(settings.journal_noise);
+    let progress = Progress::new(args.print.quiet);
+    progress.doing("simulating");
     let log = simulate(&robot, &settings)?;
+    drop(progress);
     let mut signals = vec![("q", &log.position), (EFFORT, &log.effort)];
     if let Some(velocity) = &log.velocity {
         signals.insert(1, ("dq", velocity));
     }
-    write(set.staged(0), &log, &signals, &log.channels)?;
+    write(&set, 0, &log, &signals, &log.channels)?;
     if args.clean.is_some() {
         let [q, dq, ddq, tau] = &log.clean;
         let signals = [("q", q), ("dq", dq), ("ddq", ddq), (EFFORT, tau)];
-        write(set.staged(1), &log, &signals, &log.clean_channels)?;
+        write(&set, 1, &log, &signals, &log.clean_channels)?;
     }
     if args.truth.is_some() {
         set.write(files.len() - 1, truth(&log)?.as_bytes())?;
     }
     set.publish()?;
-    note(&format!(
-        "{} samples of {} joints written to {}",
-        log.time.len(),
-        log.joints.len(),
-        args.out.display()
-    ));
+    if args.print.json {
+        json(&summary(&log, args))?;
+    }
+    tell(&log, &args.out, Notes::new(args.print.quiet));
+    Ok(0)
+}
+
+/// What was simulated, for programs.
+fn summary(log: &SimulatedLog, args: &SimulateArgs) -> serde_json::Value {
+    serde_json::json!({
+        "log": args.out.display().to_string(),
+        "samples": log.time.len(),
+        "joints": log.joints,
+        "warnings": log.warnings,
+        "experiment": log.experiment.as_ref().map(in_json),
+        "clearance": log.clearance.as_ref().map(clearance_in_json),
+    })
+}
+
+/// Tells what was simulated, and what is not as one would expect.
+fn tell(log: &SimulatedLog, out: &Path, notes: Notes) {
+    let place = if is_stdout(out) { "standard output".into() } else { out.to_string_lossy() };
+    notes.tell(&format!("{} samples of {} joints written to {place}", log.time.len(), log.joints.len()));
     if let Some(e) = log.experiment.as_ref().filter(|e| e.saturated_ticks > 0) {
-        note(&format!(
+        notes.tell(&format!(
             "efforts were cut off at their limits at {} of {} control ticks",
             e.saturated_ticks, e.ticks
         ));
     }
-    for warning in &log.warnings {
-        note(&format!("warning: {warning}"));
-    }
+    notes.warnings(&log.warnings);
     if let Some(clearance) = &log.clearance {
-        for line in in_words(clearance) {
-            note(&line);
-        }
+        in_words(clearance).iter().for_each(|line| notes.tell(line));
     }
-    Ok(0)
 }
 
 /// True parameters as JSON.
 fn truth(log: &SimulatedLog) -> Result<String, Failure> {
     let mut truth: serde_json::Map<String, serde_json::Value> =
         log.truth.iter().map(|(n, v)| (n.clone(), (*v).into())).collect();
+    truth.insert("schema".to_owned(), "dynid-truth/1".into());
     if let Some(experiment) = &log.experiment {
         truth.insert("experiment".to_owned(), in_json(experiment));
     }
@@ -190,7 +207,8 @@ fn clearance_in_json(c: &ClearanceSummary) -> serde_json::Value {
 }
 
 fn write(
-    path: &Path,
+    set: &Outputs,
+    number: usize,
     log: &SimulatedLog,
     signals: &[(&str, &Vec<Vec<f64>>)],
     channels: &[(String, Vec<f64>)],
@@ -210,6 +228,5 @@ fn write(
         header.push(name.clone());
         columns.push(values);
     }
-    csv::write(path, &header, &columns)?;
-    Ok(())
+    set.write_table(number, &header, &columns)
 }

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use dynid_studies::{RunSettings, StudyError, StudyRecord, list, run as run_study};
 
 use crate::args::StudyArgs;
-use crate::message::{Failure, data, json, note};
+use crate::message::{Failure, Notes, data, json};
 use crate::outputs;
-use crate::progress::StudyProgress;
+use crate::progress::Progress;
 
 pub(crate) fn run(args: &StudyArgs) -> Result<u8, Failure> {
     if args.name == "list" {
@@ -22,28 +22,25 @@ pub(crate) fn run(args: &StudyArgs) -> Result<u8, Failure> {
     }
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("dynid-study-{}", args.name)));
     let files = ["study.json", "report.html"].map(|name| out.join(name));
-    let set = outputs::prepare_folder(&files, &[])?;
-    let progress = StudyProgress::new(args.quiet);
+    let set = outputs::prepare_folder(&files, &[], args.force)?;
+    let progress = Progress::new(args.print.quiet);
     let settings = RunSettings { quick: args.quick, seed: args.seed };
-    let study = run_study(&args.name, &settings, &mut |step| progress.step(&step)).map_err(failure)?;
+    let study =
+        run_study(&args.name, &settings, &mut |step| progress.counted(step.done, step.steps, step.step))
+            .map_err(failure)?;
     drop(progress);
     let page = dynid::report::render_study(&study.report).map_err(dynid::Error::from)?;
     let text = study.record.to_json();
     set.write(0, text.as_bytes())?;
     set.write(1, page.as_bytes())?;
-    set.publish()?;
-    if !args.quiet {
-        summary(&study.record);
-        files.iter().for_each(|file| note(&format!("written: {}", file.display())));
-    }
-    if args.json {
-        data(&text)?;
-    }
+    let written = set.publish()?;
+    data(&if args.print.json { text } else { summary(&study.record) })?;
+    Notes::new(args.print.quiet).written(&written);
     Ok(u8::from(!study.record.pass))
 }
 
 fn list_studies(args: &StudyArgs) -> Result<u8, Failure> {
-    if args.json {
+    if args.print.json {
         let studies: Vec<_> = list()
             .iter()
             .map(|s| serde_json::json!({ "study": s.name, "title": s.title, "source": s.source }))
@@ -64,7 +61,8 @@ fn failure(error: StudyError) -> Failure {
     }
 }
 
-fn summary(record: &StudyRecord) {
+fn summary(record: &StudyRecord) -> String {
+    let mut out = String::new();
     for row in &record.rows {
         let verdict = match row.pass {
             Some(true) => "ok",
@@ -72,12 +70,12 @@ fn summary(record: &StudyRecord) {
             None => "-",
         };
         let seed = if row.depends_on_seed { " (depends on the seed)" } else { "" };
-        note(&format!("[{verdict:>4}] {:>2}  {}{seed}", row.id, row.claim));
-        note(&format!("           required: {}", row.required));
-        note(&format!("           measured: {}", row.words));
+        out += &format!("[{verdict:>4}] {:>2}  {}{seed}\n", row.id, row.claim);
+        out += &format!("           required: {}\n", row.required);
+        out += &format!("           measured: {}\n", row.words);
         if let Some(cause) = &row.cause {
-            note(&format!("           cause: {cause}"));
+            out += &format!("           cause: {cause}\n");
         }
     }
-    note(&format!("\n{}", record.verdict().headline));
+    out + &format!("\n{}\n", record.verdict().headline)
 }

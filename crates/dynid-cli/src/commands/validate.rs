@@ -1,11 +1,12 @@
 //! `dynid validate`.
 
-use dynid::estimate::{Estimate, FitValues};
+use dynid::estimate::{Estimate, FitValues, LogFit};
 use dynid::validate::{log_fit, validate};
 
 use super::{Reading, table};
 use crate::args::ValidateArgs;
-use crate::message::{Failure, data, json, note};
+use crate::message::{Failure, Notes, data, json};
+use crate::progress::Progress;
 
 pub(crate) fn run(args: &ValidateArgs) -> Result<u8, Failure> {
     let estimate = Estimate::read(&args.estimate)?;
@@ -21,16 +22,19 @@ pub(crate) fn run(args: &ValidateArgs) -> Result<u8, Failure> {
     let logs: Vec<_> = args.log.iter().map(|path| reading.log(path)).collect();
     let split = args.split.of();
     let motor_side = reading.motor_side.as_ref();
+    let progress = Progress::new(args.print.quiet);
+    progress.doing("predicting logs");
     let validation =
         validate(&estimate, split, &args.estimate, &logs, &reading.columns, motor_side, args.filter_hz)
             .map_err(|e| reading.named(e))?;
-    for warning in &validation.warnings {
-        note(&format!("warning: {warning}"));
-    }
+    drop(progress);
+    Notes::new(args.print.quiet).warnings(&validation.warnings);
     let fits: Vec<_> = validation.agreements.iter().map(log_fit).collect();
-    if args.json {
+    let beyond: Vec<&LogFit> = fits.iter().filter(|fit| is_beyond(fit, args.max_error)).collect();
+    let code = u8::from(!beyond.is_empty());
+    if args.print.json {
         json(&fits)?;
-        return Ok(0);
+        return Ok(code);
     }
     let mut out = String::new();
     for fit in &fits {
@@ -44,6 +48,20 @@ pub(crate) fn run(args: &ValidateArgs) -> Result<u8, Failure> {
         let (raw, filtered): (&FitValues, &FitValues) = (&fit.raw, &fit.filtered);
         out.push_str(&table::agreement(&estimate.joints, raw, filtered, &fit.by_motion));
     }
+    if let Some(limit) = args.max_error {
+        out.push_str(&match beyond.as_slice() {
+            [] => format!("ok: no filtered error above {limit} %\n"),
+            beyond => {
+                let logs: Vec<&str> = beyond.iter().map(|fit| fit.log.as_str()).collect();
+                format!("fail: filtered error above {limit} % on {}\n", logs.join(", "))
+            }
+        });
+    }
     data(&out)?;
-    Ok(0)
+    Ok(code)
+}
+
+/// Whether the error on a log does not keep within the limit; one that cannot be told does not.
+fn is_beyond(fit: &LogFit, limit: Option<f64>) -> bool {
+    limit.is_some_and(|limit| fit.filtered.relative_error.is_none_or(|error| error > limit))
 }

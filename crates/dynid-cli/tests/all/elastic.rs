@@ -73,7 +73,7 @@ fn motors_behind_springs_pass_through_all_commands() {
     // Signs of velocities are smooth in the simulation, sharp in the prediction.
     assert!(off < 0.05, "predicted efforts are {off} off");
     run(at, &["validate", "out/estimate.json", "--log", "log.csv"], 0);
-    run(at, &["export", "out/estimate.json", "--json", "robot.json"], 0);
+    run(at, &["export", "out/estimate.json", "--model", "robot.json"], 0);
     assert!(text(at, "robot.json").contains("\"motor\": \"j1_motor\""));
     let rows = run(at, &["regressor", "arm.toml", "--states", "clean.csv", "--json"], 0).stdout;
     let rows: Value = serde_json::from_slice(&rows).unwrap();

@@ -87,7 +87,7 @@ fn refused(folder: &TempDir, args: &[&str], parts: &[&str]) {
 #[test]
 fn three_files_are_written_and_every_difference_is_told() {
     let folder = identified();
-    let all = ["--urdf", "new.urdf", "--mjcf", "new.xml", "--json", "new.json"];
+    let all = ["--urdf", "new.urdf", "--mjcf", "new.xml", "--model", "new.json"];
     let said = export(&folder, &all, 0);
     for file in ["new.urdf", "new.xml", "new.json"] {
         let line = said.lines().find(|l| l.starts_with(&format!("written: {file} "))).unwrap();
@@ -100,7 +100,7 @@ fn three_files_are_written_and_every_difference_is_told() {
     assert!(read(&folder, "new.xml").contains("<mujoco model=\"arm\">"));
     // The file is the robot that was simulated, so only the text of <inertial> and <dynamics> is new.
     let kept = |text: &str| -> Vec<String> {
-        let edited = ["<origin xyz=\"0", "<mass", "<inertia", "<dynamics"];
+        let edited = ["<origin xyz=\"0", "<mass", "<inertia", "<dynamics", "<!-- written by dynid -->"];
         text.lines().filter(|l| !edited.iter().any(|e| l.contains(e))).map(str::to_owned).collect()
     };
     assert_eq!(kept(&read(&folder, "new.urdf")), kept(TWO_LINKS));
@@ -121,18 +121,18 @@ fn efforts_are_compared_on_a_log_if_one_is_given() {
 #[test]
 fn bad_usage_and_missing_files_are_refused() {
     let folder = identified();
-    refused(&folder, &[], &["--urdf, --mjcf, --json"]);
+    refused(&folder, &[], &["--urdf, --mjcf, --model"]);
     refused(&folder, &["--urdf", "no/such/new.urdf"], &["no/such/new.urdf", "folder exists"]);
     refused(&folder, &["--urdf", "arm.urdf"], &["arm.urdf would be overwritten"]);
     refused(&folder, &["--mjcf", "estimate.json"], &["would be overwritten"]);
-    refused(&folder, &["--urdf", "a", "--json", "a"], &["is written by --urdf already"]);
+    refused(&folder, &["--urdf", "a", "--model", "a"], &["is written by --urdf already"]);
     refused(&folder, &["--urdf", "new.urdf", "--robot", "none.urdf"], &["none.urdf", "check the path"]);
     refused(&folder, &["--urdf", "new.urdf", "--robot", "log.csv"], &["log.csv"]);
     std::fs::rename(folder.path().join("arm.urdf"), folder.path().join("moved.urdf")).unwrap();
     refused(&folder, &["--urdf", "new.urdf"], &["robot file `arm.urdf` is not there", "--robot FILE"]);
     let said = export(&folder, &["--urdf", "new.urdf", "--robot", "moved.urdf"], 0);
     assert!(!said.contains("has changed"), "{said}");
-    let output = run(folder.path(), &["export", "log.csv", "--json", "x.json"], 2);
+    let output = run(folder.path(), &["export", "log.csv", "--model", "x.json"], 2);
     assert!(String::from_utf8(output.stderr).unwrap().contains("log.csv: not an estimate"));
     run(folder.path(), &["export", "estimate.json", "--sdf", "x.sdf"], 2);
 }
@@ -160,7 +160,7 @@ fn impossible_links_need_a_flag_and_negative_friction_is_told() {
     assert!(said.contains("viscous friction of `elbow` is negative (-5.0000e-1 N m s/rad)"), "{said}");
     assert!(!read(&folder, "new.urdf").contains("damping=\"-"));
     set(&folder, "forearm.m", -1.0);
-    for output in ["--urdf", "--mjcf", "--json"] {
+    for output in ["--urdf", "--mjcf", "--model"] {
         refused(&folder, &[output, "refused"], &["link `forearm` has a negative mass", "--allow-unphysical"]);
     }
     let said = export(&folder, &["--urdf", "new.urdf", "--allow-unphysical"], 0);

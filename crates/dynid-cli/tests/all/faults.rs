@@ -59,6 +59,7 @@ fn start(folder: &Path, name: &str) -> Child {
     Command::new(env!("CARGO_BIN_EXE_dynid"))
         .current_dir(folder)
         .args(["identify", name, "-q"])
+        .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
         .unwrap()

@@ -42,12 +42,16 @@ fn flags() -> BTreeSet<String> {
 }
 
 /// Flags of which another test, or nothing, can show the effect.
-const ELSEWHERE: [(&str, &str); 8] = [
+const ELSEWHERE: [(&str, &str); 12] = [
     ("study ", "studies run for a minute and more: `study`"),
     ("clearance ", "needs a robot with clearance: `clearance`"),
     ("friction ", "needs constant speeds: `friction`"),
-    ("check --quiet", "hides progress, which terminals alone show"),
+    ("backlash --quiet", "hides progress, which terminals alone show"),
+    ("diff --quiet", "hides progress, which terminals alone show"),
+    ("explain --quiet", "is there for all commands alike"),
     ("gains --quiet", "hides progress, which terminals alone show"),
+    ("regressor --quiet", "hides progress, which terminals alone show"),
+    ("validate --quiet", "hides progress, and warnings of temperatures: `friction`"),
     ("online --json", "changes what a terminal shows"),
     ("online --replay", "needs a stream that begins again: `online`"),
     ("online --checkpoint", "needs a run that is interrupted: `online`"),
@@ -191,6 +195,9 @@ fn prepared() -> tempfile::TempDir {
         "robot = \"arm.urdf\"\n[trajectory]\nperiod_s = 4\nharmonics = 3\nsample_rate_hz = 50\n[search]\nstarts = 1\n",
     );
     write("sim.toml", "harmonics = 2\n");
+    for mine in ["report.html", "payload.html", "dynid.1"] {
+        write(mine, "not of this program\n");
+    }
     folder
 }
 
@@ -204,22 +211,37 @@ fn cases() -> Vec<Case> {
             "inspect arm.urdf",
             &["--floating-base", "--lock elbow=0.3", "--gravity 0,0,-3", "--elements viscous", "--json"],
         ),
+        ("inspect", "inspect arm.urdf --lock elbow=0.3", &["--quiet"]),
+        ("explain", "explain", &["--json", "--markdown"]),
+        ("man", "man", &["--out pages"]),
+        ("man", "man --out pages", &["--quiet"]),
+        ("diff", "diff arm.urdf estimate.json", &["--states clean.csv", "--all", "--json"]),
         (
             "regressor",
             "regressor arm.urdf --states clean.csv",
-            &["--lock elbow=0.3", "--gravity 0,0,-3", "--json"],
+            &["--lock elbow=0.3", "--gravity 0,0,-3", "--rows 3:5", "--json"],
         ),
         (
             "check",
             "check log.csv --robot arm.urdf",
-            &["--fix f.toml", "--report r.html", "--lock elbow=0.3", "--gravity 0,0,9.81", "--json"],
+            &[
+                "--fix f.toml",
+                "--report r.html",
+                "--lock elbow=0.3",
+                "--gravity 0,0,9.81",
+                "--rows 1:500",
+                "--json",
+            ],
         ),
-        ("compare", "compare arm.urdf --log log.csv", &["--report r.html", "--json", "--quiet"]),
+        ("check", "check log.csv --robot arm.urdf --report r.html", &["--quiet"]),
+        ("compare", "compare arm.urdf --log log.csv", &["--report r.html", "--rows 1:500", "--json"]),
+        ("compare", "compare arm.urdf --log log.csv --report r.html", &["--quiet"]),
         (
             "identify",
             "identify arm.urdf --log log.csv",
             &[
                 "--validate other.csv",
+                "--rows 1:600",
                 "--out elsewhere",
                 "--elements viscous",
                 "--friction stribeck",
@@ -237,7 +259,8 @@ fn cases() -> Vec<Case> {
                 "--quiet",
             ],
         ),
-        ("predict", "predict estimate.json --states clean.csv", &["--out p.csv"]),
+        ("predict", "predict estimate.json --states clean.csv", &["--out p.csv", "--rows 3:5", "--json"]),
+        ("predict", "predict estimate.json --states clean.csv --out p.csv", &["--quiet"]),
         (
             "design",
             "design small.toml",
@@ -278,12 +301,14 @@ fn cases() -> Vec<Case> {
                 "--seed 5",
                 "--clean c.csv",
                 "--truth t.json",
+                "--json",
+                "--quiet",
             ],
         ),
         (
             "validate",
             "validate estimate.json --log other.csv",
-            &["--rows 1:400", "--config scaled.toml", "--filter-hz 3", "--json"],
+            &["--rows 1:400", "--config scaled.toml", "--filter-hz 3", "--max-error 0.001", "--json"],
         ),
         (
             "backlash",
@@ -293,11 +318,12 @@ fn cases() -> Vec<Case> {
         (
             "export",
             "export estimate.json --urdf e.urdf",
-            &["--mjcf e.xml", "--json e.json", "--log other.csv", "--robot mimic.urdf"],
+            &["--mjcf e.xml", "--model e.json", "--log other.csv", "--robot mimic.urdf", "--json", "--quiet"],
         ),
+        ("export", "export estimate.json --urdf e.urdf --log other.csv", &["--rows 1:400"]),
         ("payload", "payload payload.toml", &["--out elsewhere", "--json", "--quiet"]),
         ("gains", "gains payload.toml", &["--json"]),
-        ("online", "online run.toml", &["--log other.csv", "--quiet"]),
+        ("online", "online run.toml", &["--log other.csv", "--rows 1:700", "--quiet"]),
     ];
     for (command, base, flags) in plain {
         for flag in *flags {
@@ -346,6 +372,50 @@ fn cases() -> Vec<Case> {
             "regressor arm.urdf --states clean.csv --json --base",
         ),
         refused("regressor --base", "regressor arm.urdf --states clean.csv --base", "--json"),
+        case("check --log", "check arm.urdf --log log.csv", "check arm.urdf --log other.csv"),
+        case(
+            "diff --unconstrained",
+            "diff arm.urdf bounded.json",
+            "diff arm.urdf bounded.json --unconstrained",
+        ),
+        case(
+            "diff --rows",
+            "diff arm.urdf estimate.json --states clean.csv",
+            "diff arm.urdf estimate.json --states clean.csv --rows 3:50",
+        ),
+        case(
+            "predict --force",
+            "predict estimate.json --states clean.csv --out log.csv",
+            "predict estimate.json --states clean.csv --out log.csv --force",
+        ),
+        case(
+            "simulate --force",
+            "simulate arm.urdf --out log.csv",
+            "simulate arm.urdf --out log.csv --force",
+        ),
+        case(
+            "export --force",
+            "export estimate.json --urdf heavy.urdf",
+            "export estimate.json --urdf heavy.urdf --force",
+        ),
+        case(
+            "check --force",
+            "check log.csv --robot arm.urdf --fix run.toml",
+            "check log.csv --robot arm.urdf --fix run.toml --force",
+        ),
+        case(
+            "compare --force",
+            "compare arm.urdf --log log.csv --report run.toml",
+            "compare arm.urdf --log log.csv --report run.toml --force",
+        ),
+        case(
+            "identify --force",
+            "identify stribeck.toml --log stribeck.csv --out .",
+            "identify stribeck.toml --log stribeck.csv --out . --force",
+        ),
+        case("design --force", "design small.toml --out .", "design small.toml --out . --force"),
+        case("payload --force", "payload payload.toml --out .", "payload payload.toml --out . --force"),
+        case("man --force", "man --out .", "man --out . --force"),
         case(
             "regressor --states",
             "regressor arm.urdf --states clean.csv",
@@ -440,8 +510,8 @@ fn cases() -> Vec<Case> {
         ),
         case(
             "export --urdf",
-            "export estimate.json --json e.json",
-            "export estimate.json --json e.json --urdf e.urdf",
+            "export estimate.json --model e.json",
+            "export estimate.json --model e.json --urdf e.urdf",
         ),
         case(
             "export --config",

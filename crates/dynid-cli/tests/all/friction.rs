@@ -62,8 +62,9 @@ fn one_direction_ends_with_exit_code_1() {
     let folder = tempfile::tempdir().unwrap();
     put(folder.path(), CONFIG, &[1.0]);
     let output = run(folder.path(), &["friction", "friction.toml", "--quiet"], 1);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(said.contains("Coulomb friction and offset cannot be told apart"), "{said}");
+    assert!(output.stderr.is_empty());
 }
 
 #[test]
@@ -140,11 +141,12 @@ fn a_flag_names_the_friction_file_and_predictions_ask_for_temperatures() {
     let args =
         ["identify", "robot.urdf", "--log", "log.csv", "--known-friction", "friction.json", "--out", "out"];
     let output = run(folder.path(), &args, 0);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let result = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(
-        said.contains("known friction of shoulder = \"Coulomb and exponential viscous friction"),
-        "{said}"
+        result.contains("known friction of shoulder = \"Coulomb and exponential viscous friction"),
+        "{result}"
     );
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(said.contains("friction of `shoulder` has a form that URDF has no place for"), "{said}");
     let text = std::fs::read_to_string(folder.path().join("out/estimate.json")).unwrap();
     let estimate: serde_json::Value = serde_json::from_str(&text).unwrap();

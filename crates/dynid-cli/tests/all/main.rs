@@ -3,10 +3,13 @@
 mod book;
 mod broken_input;
 mod clearance;
+mod command_line;
 mod contract;
 mod design;
+mod diff;
 mod elastic;
 mod estimator_settings;
+mod explain;
 mod export;
 mod faults;
 mod flags;

@@ -91,7 +91,7 @@ fn used_again(meant: impl Fn(&Path) -> bool) {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         let simulated = |robot: &str, seed: &str, out: &str, clean: &str| {
-            let args = ["simulate", robot, "--seed", seed, "--out", out, "--clean", clean];
+            let args = ["simulate", robot, "--seed", seed, "--out", out, "--clean", clean, "--force"];
             String::from_utf8(run(at, &args, 0).stderr).unwrap()
         };
         let told = simulated(&name, "1", "log.csv", "clean.csv");
@@ -114,7 +114,7 @@ fn used_again(meant: impl Fn(&Path) -> bool) {
             estimate
         };
         let estimate = identified(&[&name], "out");
-        run(at, &["export", "out/estimate.json", "--urdf", "again.urdf", "--json", "again.json"], 0);
+        run(at, &["export", "out/estimate.json", "--urdf", "again.urdf", "--model", "again.json"], 0);
 
         // Once more, from what was exported.
         if estimate["model"]["elastic"].as_array().is_some_and(|springs| !springs.is_empty()) {

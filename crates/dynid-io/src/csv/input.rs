@@ -1,12 +1,12 @@
 //! Bytes of a log, decompressed if need be, within bounds.
 
-use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 
 use crate::digest::Hashed;
+use crate::input::{self, Opened};
 
 /// Buffer between the file and the decoder, bytes.
 const BUFFER_BYTES: usize = 1 << 16;
@@ -42,7 +42,7 @@ pub(super) struct Input {
 /// A file with the bytes in front that were looked at: a pipe cannot be wound back.
 struct Whole {
     front: Vec<u8>,
-    file: File,
+    file: Opened,
 }
 
 impl Read for Whole {
@@ -79,10 +79,7 @@ impl Read for Counted {
 impl Input {
     /// Opens a file; gzip is told by its first two bytes.
     pub(super) fn open(path: &Path, bounds: Bounds) -> io::Result<Self> {
-        let mut file = File::open(path)?;
-        if file.metadata()?.is_dir() {
-            return Err(io::ErrorKind::IsADirectory.into());
-        }
+        let mut file = input::open(path)?;
         let mut magic = Vec::with_capacity(2);
         (&mut file).take(2).read_to_end(&mut magic)?;
         let is_gzip = magic == [0x1f, 0x8b];

@@ -10,4 +10,4 @@ mod write;
 pub use error::LogFileError;
 pub use read::{Delimiter, ReadOptions, Table, read};
 pub(crate) use read::{RowFault, RowParser};
-pub use write::{RowWriter, write};
+pub use write::{GZIP_COMMENT, RowWriter, text, write};

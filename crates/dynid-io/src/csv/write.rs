@@ -3,10 +3,13 @@
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use flate2::Compression;
 use flate2::write::GzEncoder;
+use flate2::{Compression, GzBuilder};
 
 use crate::output::{AtomicFile, OutputError};
+
+/// Comment in the head of compressed files: it tells who wrote them.
+pub const GZIP_COMMENT: &str = "written by dynid";
 
 /// Writes columns under a header; see [`RowWriter`].
 ///
@@ -17,25 +20,26 @@ pub fn write<H: AsRef<str>, C: AsRef<[f64]>>(
     header: &[H],
     columns: &[C],
 ) -> Result<(), OutputError> {
-    let file = path.as_ref().display().to_string();
-    if header.len() != columns.len() {
-        let (expected, found) = (header.len(), columns.len());
-        return Err(OutputError::Shape { file, what: "columns".to_owned(), expected, found });
-    }
-    let rows = columns.first().map_or(0, |c| c.as_ref().len());
-    if let Some((name, column)) = header.iter().zip(columns).find(|(_, c)| c.as_ref().len() != rows) {
-        let what = format!("rows of column `{}`", name.as_ref());
-        return Err(OutputError::Shape { file, what, expected: rows, found: column.as_ref().len() });
-    }
     let mut writer = RowWriter::create(path, header)?;
-    let mut row = vec![0.0; columns.len()];
-    for k in 0..rows {
-        for (x, column) in row.iter_mut().zip(columns) {
-            *x = column.as_ref()[k];
-        }
-        writer.row(&row)?;
-    }
+    writer.rows_of(header, columns)?;
     writer.finish()
+}
+
+/// Columns under a header as text, as [`write`] writes them uncompressed. `name` stands for the file in messages.
+///
+/// # Errors
+/// [`OutputError`]: values that are not finite, columns that do not fit the header.
+pub fn text<H: AsRef<str>, C: AsRef<[f64]>>(
+    name: &str,
+    header: &[H],
+    columns: &[C],
+) -> Result<String, OutputError> {
+    let mut writer = RowWriter::begin(Sink::Text(Vec::new()), name.to_owned(), header)?;
+    writer.rows_of(header, columns)?;
+    match writer.sink {
+        Sink::Text(bytes) => Ok(String::from_utf8_lossy(&bytes).into_owned()),
+        Sink::Plain(_) | Sink::Gzip(_) => unreachable!("it was begun as text"),
+    }
 }
 
 /// Writes rows one by one into a temporary file that [`RowWriter::finish`] renames to its name.
@@ -52,6 +56,7 @@ pub struct RowWriter {
 enum Sink {
     Plain(BufWriter<AtomicFile>),
     Gzip(Box<GzEncoder<BufWriter<AtomicFile>>>),
+    Text(Vec<u8>),
 }
 
 impl RowWriter {
@@ -64,15 +69,46 @@ impl RowWriter {
         let buffered = BufWriter::with_capacity(1 << 16, AtomicFile::create(path)?);
         let gzip = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
         let sink = if gzip {
-            Sink::Gzip(Box::new(GzEncoder::new(buffered, Compression::default())))
+            let encoder = GzBuilder::new().comment(GZIP_COMMENT).write(buffered, Compression::default());
+            Sink::Gzip(Box::new(encoder))
         } else {
             Sink::Plain(buffered)
         };
+        Self::begin(sink, path.display().to_string(), header)
+    }
+
+    fn begin<H: AsRef<str>>(sink: Sink, file: String, header: &[H]) -> Result<Self, OutputError> {
         let header: Vec<String> = header.iter().map(|h| h.as_ref().to_owned()).collect();
-        let mut writer = RowWriter { sink, file: path.display().to_string(), header, rows: 0 };
+        let mut writer = RowWriter { sink, file, header, rows: 0 };
         let line = writer.header.iter().map(|h| quoted(h)).collect::<Vec<_>>().join(",") + "\n";
         writer.put(line.as_bytes())?;
         Ok(writer)
+    }
+
+    /// Writes the rows of columns.
+    fn rows_of<H: AsRef<str>, C: AsRef<[f64]>>(
+        &mut self,
+        header: &[H],
+        columns: &[C],
+    ) -> Result<(), OutputError> {
+        let shape =
+            |what, expected, found| OutputError::Shape { file: self.file.clone(), what, expected, found };
+        if header.len() != columns.len() {
+            return Err(shape("columns".to_owned(), header.len(), columns.len()));
+        }
+        let rows = columns.first().map_or(0, |c| c.as_ref().len());
+        if let Some((name, column)) = header.iter().zip(columns).find(|(_, c)| c.as_ref().len() != rows) {
+            let what = format!("rows of column `{}`", name.as_ref());
+            return Err(shape(what, rows, column.as_ref().len()));
+        }
+        let mut row = vec![0.0; columns.len()];
+        for k in 0..rows {
+            for (x, column) in row.iter_mut().zip(columns) {
+                *x = column.as_ref()[k];
+            }
+            self.row(&row)?;
+        }
+        Ok(())
     }
 
     /// Writes a row.
@@ -109,6 +145,7 @@ impl RowWriter {
         let buffered = match self.sink {
             Sink::Plain(buffered) => buffered,
             Sink::Gzip(encoder) => encoder.finish().map_err(fault)?,
+            Sink::Text(_) => unreachable!("text is not finished"),
         };
         buffered.into_inner().map_err(|e| fault(e.into_error()))?.finish()
     }
@@ -117,6 +154,7 @@ impl RowWriter {
         let written = match &mut self.sink {
             Sink::Plain(sink) => sink.write_all(bytes),
             Sink::Gzip(sink) => sink.write_all(bytes),
+            Sink::Text(sink) => sink.write_all(bytes),
         };
         written.map_err(|error| OutputError::Unwritable { file: self.file.clone(), error })
     }

@@ -3,7 +3,7 @@
 use dynid_io::columns::{ColumnMapping, ColumnNames, FullSignal, SignalSpec};
 use dynid_model::{JointKind, Mechanism};
 
-use super::finding::{Findings, Severity};
+use super::finding::{FindingId, Findings, Severity};
 use crate::config::Config;
 
 /// Warns where columns go to joints by number alone and a log cannot tell another order: branches that are alike fit each other's columns,
@@ -38,7 +38,7 @@ pub(super) fn examine(
         "compare the list with the program that wrote the log, then state it by names: `[columns] position = {{ {} }}`, velocity and effort alike",
         list(&|joint, column| format!("\"{joint}\" = \"{column}\""))
     );
-    out.add("column_order", Severity::Warning, None, evidence, &remedy);
+    out.add(FindingId::ColumnOrder, Severity::Warning, None, evidence, &remedy);
 }
 
 /// Why the order of a robot's joints is open, in words; `None` for one chain.

@@ -11,7 +11,7 @@ use dynid_model::{BaseParameters, BaseSettings, EffortModel, Mechanism, RobotMod
 use dynid_motion::{JointSignals, Log, UniformLog};
 
 use super::columns::Velocities;
-use super::finding::{Findings, Fix, Severity};
+use super::finding::{FindingId, Findings, Fix, Severity};
 use super::plausibility::{self, Taken};
 use crate::config::Config;
 use crate::elements::ElementPlan;
@@ -134,7 +134,7 @@ impl Bench {
             idle.push(joint.name.clone());
             if !joint.effort_is_constant() {
                 let remedy = "friction, drive and most inertias of this joint cannot be seen in this log; add one in which it moves";
-                out.add("idle_joint", Severity::Warning, Some(&joint.name), evidence, remedy);
+                out.add(FindingId::IdleJoint, Severity::Warning, Some(&joint.name), evidence, remedy);
             }
         }
         idle
@@ -178,7 +178,7 @@ impl Bench {
         let mut found = Examined::default();
         let not_examined = |out: &mut Findings<'_>, reason: String| {
             let remedy = "nothing: order, signs and units of its columns were not examined";
-            out.add("not_examined", Severity::Info, None, reason, remedy);
+            out.add(FindingId::NotExamined, Severity::Info, None, reason, remedy);
         };
         if let Some(reason) = self.refusal(log) {
             not_examined(out, reason);
@@ -188,7 +188,7 @@ impl Bench {
         let Some(samples) = Samples::new(log, &moves).map_err(PreflightError::from)? else {
             let evidence = "too little motion, or too short a log, for a model to be tried".to_owned();
             let remedy = "record for longer: order, signs and units of the columns were not examined";
-            out.add("not_examined", Severity::Warning, None, evidence, remedy);
+            out.add(FindingId::NotExamined, Severity::Warning, None, evidence, remedy);
             return Ok(found);
         };
         let prior = self.prior(log)?;
@@ -252,7 +252,7 @@ impl Bench {
             );
             let remedy =
                 "see whether robot file and log are of the same robot, and whether something else acts on it";
-            out.add("unexplained_effort", Severity::Warning, None, evidence, remedy);
+            out.add(FindingId::UnexplainedEffort, Severity::Warning, None, evidence, remedy);
             return Ok(found);
         }
         if wiring.gravity.is_none() {
@@ -279,7 +279,7 @@ impl Bench {
             );
             wiring.position[j].factor *= 1f64.to_radians();
             let remedy = "state the unit of the position";
-            out.add("degrees", Severity::Error, Some(&joint.name), evidence, remedy).fixes =
+            out.add(FindingId::Degrees, Severity::Error, Some(&joint.name), evidence, remedy).fixes =
                 vec![Fix::Wiring { wiring: wiring.clone(), velocities }];
         }
     }
@@ -302,7 +302,7 @@ impl Bench {
             evidence += &format!("; not excited: {}", first_of(&unseen));
         }
         let remedy = "record a trajectory made for identification (`dynid design`); verdicts say which parameters this log still tells";
-        out.add("weak_excitation", Severity::Warning, None, evidence, remedy);
+        out.add(FindingId::WeakExcitation, Severity::Warning, None, evidence, remedy);
     }
 }
 
@@ -323,5 +323,5 @@ fn tilted(tilt: Option<Tilt>, out: &mut Findings<'_>) {
         g[2]
     );
     let remedy = "state gravity in base axes, or level the base";
-    out.add("base_tilt", Severity::Warning, None, evidence, remedy).fixes = vec![Fix::Gravity(g)];
+    out.add(FindingId::BaseTilt, Severity::Warning, None, evidence, remedy).fixes = vec![Fix::Gravity(g)];
 }

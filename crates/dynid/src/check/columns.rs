@@ -4,7 +4,7 @@ use dynid_estimate::preflight::{Found, Rewiring, Wiring, WiringSearch};
 use dynid_motion::UniformLog;
 use dynid_motion::velocity::compare;
 
-use super::finding::{Findings, Fix, Severity};
+use super::finding::{FindingId, Findings, Fix, Severity};
 
 /// Deviation of a measured velocity's scale from 1 that is a fault of its own.
 const SCALE: f64 = 0.1;
@@ -52,7 +52,7 @@ pub(super) fn wiring(
         );
         let remedy = "see whether robot file and log are of the same robot and configuration, and whether something else acts on it; several \
                       columns may be wrong at once";
-        out.add("unexplained_effort", Severity::Error, None, evidence, remedy);
+        out.add(FindingId::UnexplainedEffort, Severity::Error, None, evidence, remedy);
         return false;
     }
     // Efforts alone tell a clock to some per cent.
@@ -63,7 +63,7 @@ pub(super) fn wiring(
     for (k, found) in search.found.iter().enumerate() {
         let (id, joint, what) = describe(&found.change, names);
         let id = match &found.change {
-            Rewiring::Gravity(g) if angle(*g, gravity) < SAME_DIRECTION => "gravity_size",
+            Rewiring::Gravity(g) if angle(*g, gravity) < SAME_DIRECTION => FindingId::GravitySize,
             _ => id,
         };
         let evidence = format!(
@@ -73,19 +73,23 @@ pub(super) fn wiring(
             alternatives(found, names)
         );
         let remedy = match id {
-            "joint_permutation" => "assign the columns in this order",
-            "effort_sign" => "reverse the sign of the effort",
-            "position_sign" => {
+            FindingId::JointPermutation => "assign the columns in this order",
+            FindingId::EffortSign => "reverse the sign of the effort",
+            FindingId::PositionSign => {
                 "reverse the sign, or turn the joint's axis in the robot file if the log is right"
             }
-            "degrees" => "state the unit of the position",
-            "position_zero" => "state the offset of the position, or the zero of the joint in the robot file",
-            "base_tilt" => {
+            FindingId::Degrees => "state the unit of the position",
+            FindingId::PositionZero => {
+                "state the offset of the position, or the zero of the joint in the robot file"
+            }
+            FindingId::BaseTilt => {
                 "state gravity in base axes (`gravity`): the robot is mounted another way than the file says"
             }
-            "gravity_size" => "state gravity in base axes (`gravity`), m/s²: on Earth it is 9.81 long",
-            "clock_rate" => "state the unit of the time",
-            "delay" => {
+            FindingId::GravitySize => {
+                "state gravity in base axes (`gravity`), m/s²: on Earth it is 9.81 long"
+            }
+            FindingId::ClockRate => "state the unit of the time",
+            FindingId::Delay => {
                 "state the delay (`conditioning.delay_samples`), or log motion and effort by one clock"
             }
             _ => "state the unit or the drive gain of the effort",
@@ -99,7 +103,7 @@ pub(super) fn wiring(
             }
         };
         let slight = match &found.change {
-            Rewiring::Gravity(g) => id == "base_tilt" && angle(*g, gravity) < SLIGHT,
+            Rewiring::Gravity(g) => id == FindingId::BaseTilt && angle(*g, gravity) < SLIGHT,
             Rewiring::Clock(_) | Rewiring::Zero(..) | Rewiring::Delay(_) | Rewiring::EffortScale(..) => {
                 found.before < BEARABLE * BEARABLE * search.nothing
             }
@@ -133,7 +137,7 @@ fn fixes(search: &WiringSearch, velocities: bool, rate_hz: f64) -> Vec<Fix> {
 }
 
 /// A difference in words that stand alone.
-fn in_full((_, joint, what): (&'static str, Option<String>, String)) -> String {
+fn in_full((_, joint, what): (FindingId, Option<String>, String)) -> String {
     match joint.filter(|_| what.contains("its ")) {
         Some(joint) => format!("{what} (`{joint}`)"),
         None => what,
@@ -151,7 +155,7 @@ fn list(joints: &[usize], names: &[String]) -> String {
 }
 
 /// Identity of the finding, its joints, what is done.
-fn describe(change: &Rewiring, names: &[String]) -> (&'static str, Option<String>, String) {
+fn describe(change: &Rewiring, names: &[String]) -> (FindingId, Option<String>, String) {
     let one = |j: &usize| Some(names[*j].clone());
     let pair = |a: &usize, b: &usize| Some(list(&[*a, *b], names));
     let swap = |what: &str, a: &usize, b: &usize| {
@@ -161,42 +165,48 @@ fn describe(change: &Rewiring, names: &[String]) -> (&'static str, Option<String
         format!("with the {what} taken from the columns of {} in this order", list(order, names))
     };
     match change {
-        Rewiring::EffortSign(j) => ("effort_sign", one(j), "with its effort reversed".to_owned()),
-        Rewiring::AllEffortSigns => ("effort_sign", None, "with all efforts reversed".to_owned()),
-        Rewiring::PositionSign(j) => ("position_sign", one(j), "with its position reversed".to_owned()),
-        Rewiring::BothSigns(j) => {
-            ("position_sign", one(j), "with its position and its effort reversed".to_owned())
+        Rewiring::EffortSign(j) => (FindingId::EffortSign, one(j), "with its effort reversed".to_owned()),
+        Rewiring::AllEffortSigns => (FindingId::EffortSign, None, "with all efforts reversed".to_owned()),
+        Rewiring::PositionSign(j) => {
+            (FindingId::PositionSign, one(j), "with its position reversed".to_owned())
         }
-        Rewiring::EffortSwap(a, b) => ("joint_permutation", pair(a, b), swap("efforts", a, b)),
-        Rewiring::PositionSwap(a, b) => ("joint_permutation", pair(a, b), swap("positions", a, b)),
-        Rewiring::JointSwap(a, b) => ("joint_permutation", pair(a, b), swap("positions and efforts", a, b)),
-        Rewiring::EffortOrder(o) => ("joint_permutation", None, order("efforts", o)),
-        Rewiring::PositionOrder(o) => ("joint_permutation", None, order("positions", o)),
-        Rewiring::JointOrder(o) => ("joint_permutation", None, order("positions and efforts", o)),
-        Rewiring::PositionUnit(j, factor) => ("degrees", one(j), unit(*factor, "its position")),
-        Rewiring::AllPositionUnits(factor) => ("degrees", None, unit(*factor, "all positions")),
+        Rewiring::BothSigns(j) => {
+            (FindingId::PositionSign, one(j), "with its position and its effort reversed".to_owned())
+        }
+        Rewiring::EffortSwap(a, b) => (FindingId::JointPermutation, pair(a, b), swap("efforts", a, b)),
+        Rewiring::PositionSwap(a, b) => (FindingId::JointPermutation, pair(a, b), swap("positions", a, b)),
+        Rewiring::JointSwap(a, b) => {
+            (FindingId::JointPermutation, pair(a, b), swap("positions and efforts", a, b))
+        }
+        Rewiring::EffortOrder(o) => (FindingId::JointPermutation, None, order("efforts", o)),
+        Rewiring::PositionOrder(o) => (FindingId::JointPermutation, None, order("positions", o)),
+        Rewiring::JointOrder(o) => (FindingId::JointPermutation, None, order("positions and efforts", o)),
+        Rewiring::PositionUnit(j, factor) => (FindingId::Degrees, one(j), unit(*factor, "its position")),
+        Rewiring::AllPositionUnits(factor) => (FindingId::Degrees, None, unit(*factor, "all positions")),
         Rewiring::EffortScale(j, factor) => {
-            ("drive_gain", one(j), format!("with its effort multiplied by {factor}"))
+            (FindingId::DriveGain, one(j), format!("with its effort multiplied by {factor}"))
         }
         Rewiring::AllEffortScales(factor) => {
-            ("drive_gain", None, format!("with all efforts multiplied by {factor}"))
+            (FindingId::DriveGain, None, format!("with all efforts multiplied by {factor}"))
         }
-        Rewiring::Zero(j, angle) => {
-            ("position_zero", one(j), format!("with {:.1} degrees added to its position", angle.to_degrees()))
-        }
+        Rewiring::Zero(j, angle) => (
+            FindingId::PositionZero,
+            one(j),
+            format!("with {:.1} degrees added to its position", angle.to_degrees()),
+        ),
         Rewiring::Gravity(g) => (
-            "base_tilt",
+            FindingId::BaseTilt,
             None,
             format!("with gravity ({:.2}, {:.2}, {:.2}) m/s² in base axes", g[0], g[1], g[2]),
         ),
         Rewiring::Clock(factor) => {
-            ("clock_rate", None, format!("with times multiplied by {factor:.4e}{}", clock(*factor)))
+            (FindingId::ClockRate, None, format!("with times multiplied by {factor:.4e}{}", clock(*factor)))
         }
         Rewiring::Delay(s) if *s > 0.0 => {
-            ("delay", None, format!("with efforts {s:.3} s before the motion of the same row"))
+            (FindingId::Delay, None, format!("with efforts {s:.3} s before the motion of the same row"))
         }
         Rewiring::Delay(s) => {
-            ("delay", None, format!("with efforts {:.3} s after the motion of the same row", -s))
+            (FindingId::Delay, None, format!("with efforts {:.3} s after the motion of the same row", -s))
         }
     }
 }
@@ -319,7 +329,8 @@ impl Velocities {
                 }
             }
             let remedy = "identification differentiates positions and does not use this column; do not use it elsewhere before it is put right";
-            out.add("velocity_mismatch", Severity::Warning, Some(&name), evidence, remedy).fixes = fixes;
+            out.add(FindingId::VelocityMismatch, Severity::Warning, Some(&name), evidence, remedy).fixes =
+                fixes;
         }
     }
 }
@@ -356,7 +367,7 @@ fn other_clock(shown: f64, out: &mut Findings<'_>) {
         clock(shown)
     );
     let remedy = "see whether the time counts seconds, and state the unit of the one that is wrong";
-    out.add("clock_rate", Severity::Warning, None, evidence, remedy);
+    out.add(FindingId::ClockRate, Severity::Warning, None, evidence, remedy);
 }
 
 /// Velocities that are all off by the same small factor tell of the clock.
@@ -373,5 +384,6 @@ fn clock_rate(own: &[Option<(f64, f64)>], rate_hz: f64, out: &mut Findings<'_>) 
         100.0 * AGREE
     );
     let remedy = "the clock, not the velocities: state the rate that rows really come at";
-    out.add("clock_rate", Severity::Warning, None, evidence, remedy).fixes = vec![Fix::Rate(mean * rate_hz)];
+    out.add(FindingId::ClockRate, Severity::Warning, None, evidence, remedy).fixes =
+        vec![Fix::Rate(mean * rate_hz)];
 }

@@ -4,7 +4,7 @@ use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, condition}
 use dynid_motion::shift::shift;
 
 use super::bench::Bench;
-use super::finding::{Findings, Fix, Severity};
+use super::finding::{FindingId, Findings, Fix, Severity};
 use crate::Error;
 use crate::config::{Config, Route};
 use crate::logs::LoadedLog;
@@ -87,9 +87,9 @@ pub(super) fn judge(found: Delay, stated: Option<f64>, rate_hz: f64, out: &mut F
     let fix = vec![Fix::Delay(found.samples)];
     if stated.is_none() && found.samples > -2.0 && found.samples < by_itself {
         let remedy = "nothing: identification finds and removes a delay of this size";
-        out.add("delay", Severity::Info, None, evidence, remedy).fixes = fix;
+        out.add(FindingId::Delay, Severity::Info, None, evidence, remedy).fixes = fix;
     } else {
         let remedy = "state the delay (`conditioning.delay_samples`), or log motion and effort by one clock";
-        out.add("delay", Severity::Warning, None, evidence, remedy).fixes = fix;
+        out.add(FindingId::Delay, Severity::Warning, None, evidence, remedy).fixes = fix;
     }
 }

@@ -28,7 +28,7 @@ impl Severity {
 /// One fault of a log.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// Name of the fault: one of [`IDS`].
+    /// Which fault: the name of a [`FindingId`].
     pub id: &'static str,
     /// How much it matters.
     pub severity: Severity,
@@ -49,12 +49,13 @@ pub struct Finding {
 }
 
 /// What an identification says by itself, in figures of its own.
-const SAID_ANYWAY: [&str; 4] = ["clock_gap", "idle_joint", "spikes", "weak_excitation"];
+const SAID_ANYWAY: [FindingId; 4] =
+    [FindingId::ClockGap, FindingId::IdleJoint, FindingId::Spikes, FindingId::WeakExcitation];
 
 impl Finding {
     /// Whether an identification has to tell of it: not what it says anyway or takes care of.
     pub(crate) fn counts(&self) -> bool {
-        self.severity != Severity::Info && !SAID_ANYWAY.contains(&self.id)
+        self.severity != Severity::Info && SAID_ANYWAY.iter().all(|id| id.name() != self.id)
     }
 
     /// The finding as a warning of an identification; `None` unless it counts.
@@ -67,36 +68,65 @@ impl Finding {
     }
 }
 
-/// Faults that are looked for.
-pub const IDS: [&str; 27] = [
-    "base_tilt",
-    "clock_backwards",
-    "clock_gap",
-    "clock_jitter",
-    "clock_rate",
-    "coarse_signal",
-    "column_order",
-    "degrees",
-    "delay",
-    "drive_gain",
-    "duplicate_samples",
-    "effort_sign",
-    "frozen_signal",
-    "gravity_size",
-    "idle_joint",
-    "joint_permutation",
-    "not_examined",
-    "position_range",
-    "position_sign",
-    "position_wrap",
-    "position_zero",
-    "repeated_log",
-    "saturation",
-    "spikes",
-    "unexplained_effort",
-    "velocity_mismatch",
-    "weak_excitation",
-];
+crate::explain::names! {
+    /// Faults that are looked for.
+    FindingId {
+        /// Gravity does not point where it is stated to.
+        BaseTilt = "base_tilt",
+        /// Rows whose time is not after every earlier one.
+        ClockBackwards = "clock_backwards",
+        /// Rows are missing.
+        ClockGap = "clock_gap",
+        /// Steps of the clock vary.
+        ClockJitter = "clock_jitter",
+        /// The time does not count seconds, or not well.
+        ClockRate = "clock_rate",
+        /// An effort of few values.
+        CoarseSignal = "coarse_signal",
+        /// Numbered columns whose joints no log can tell.
+        ColumnOrder = "column_order",
+        /// Positions in degrees that are taken for radians, or the other way round.
+        Degrees = "degrees",
+        /// Motion and effort of a row belong to different times.
+        Delay = "delay",
+        /// Efforts of another size than the robot asks for.
+        DriveGain = "drive_gain",
+        /// Rows that repeat the row before.
+        DuplicateSamples = "duplicate_samples",
+        /// Efforts that count the other way.
+        EffortSign = "effort_sign",
+        /// A signal that stays exactly the same.
+        FrozenSignal = "frozen_signal",
+        /// Gravity of another size than on Earth.
+        GravitySize = "gravity_size",
+        /// A joint that stands still.
+        IdleJoint = "idle_joint",
+        /// Columns of other joints.
+        JointPermutation = "joint_permutation",
+        /// Columns that were not tried in other ways.
+        NotExamined = "not_examined",
+        /// Positions that no joint reaches.
+        PositionRange = "position_range",
+        /// Positions that count the other way.
+        PositionSign = "position_sign",
+        /// Positions that jump by whole turns.
+        PositionWrap = "position_wrap",
+        /// Positions that count from another zero.
+        PositionZero = "position_zero",
+        /// Rows that two logs share.
+        RepeatedLog = "repeated_log",
+        /// Efforts cut off at a limit.
+        Saturation = "saturation",
+        /// Single samples off their neighbours.
+        Spikes = "spikes",
+        /// Efforts that no reading of the log explains.
+        UnexplainedEffort = "unexplained_effort",
+        /// Velocities that are no derivatives of the positions.
+        VelocityMismatch = "velocity_mismatch",
+        /// Motion that does not show all parameters.
+        WeakExcitation = "weak_excitation",
+    }
+}
 
 /// A change of the configuration.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,15 +166,14 @@ pub(super) struct Findings<'a> {
 impl Findings<'_> {
     pub(super) fn add(
         &mut self,
-        id: &'static str,
+        id: FindingId,
         severity: Severity,
         joint: Option<&str>,
         evidence: String,
         remedy: &str,
     ) -> &mut Finding {
-        debug_assert!(IDS.contains(&id), "{id}");
         self.list.push(Finding {
-            id,
+            id: id.name(),
             severity,
             joint: joint.map(str::to_owned),
             log: self.log.to_owned(),

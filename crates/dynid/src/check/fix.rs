@@ -41,12 +41,15 @@ impl Check {
         table.insert("robot".to_owned(), absolute(&config.robot));
         let training = config.training_logs();
         let count = training.len();
+        let folder = source.and_then(Path::parent).unwrap_or(Path::new(""));
         for (key, logs, first) in [("log", &training, 0), ("validation", &config.validation, count)] {
             let entries: Vec<Value> = logs
                 .iter()
                 .enumerate()
                 .filter(|(k, _)| !self.is_dropped(first + k))
-                .map(|(k, log)| self.log_entry(first + k, log, config, as_read(&table, key, k)))
+                .map(|(k, log)| {
+                    self.log_entry(first + k, log, config, as_read(&table, (key, k), folder, &log.path))
+                })
                 .collect();
             if entries.is_empty() {
                 table.remove(key);
@@ -96,7 +99,7 @@ impl Check {
         if let Some(period) = log.period_s {
             entry.insert("period_s".to_owned(), Value::Float(period));
         }
-        if let (Some((first, last)), false) = (log.rows, entry.contains_key("rows")) {
+        if let Some((first, last)) = log.rows {
             entry.insert("rows".to_owned(), Value::Array(vec![whole(first), whole(last)]));
         }
         if let (Some((from, to)), false) = (log.part, entry.contains_key("part")) {
@@ -230,9 +233,12 @@ fn read(path: &Path) -> Result<Table, Error> {
 }
 
 /// Entry of a log as the configuration file states it.
-fn as_read(table: &Table, key: &str, number: usize) -> Table {
+fn as_read(table: &Table, (key, number): (&str, usize), folder: &Path, log: &Path) -> Table {
     let entry = table.get(key).and_then(|list| list.get(number)).and_then(Value::as_table);
-    entry.cloned().unwrap_or_default()
+    let is_of_log = |entry: &&Table| {
+        entry.get("path").and_then(Value::as_str).is_some_and(|path| folder.join(path) == log)
+    };
+    entry.filter(is_of_log).cloned().unwrap_or_default()
 }
 
 fn make_absolute(table: &mut Table, config: &Config) {

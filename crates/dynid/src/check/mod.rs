@@ -27,7 +27,7 @@ use crate::logs::{self, LoadedLog};
 use crate::overlap::{Overlap, Overlaps};
 use crate::robot::{Robot, RobotOptions};
 use bench::{Bench, Examined};
-pub use finding::{Finding, IDS, Severity};
+pub use finding::{Finding, FindingId, Severity};
 use finding::{Findings, Fix};
 
 /// What was measured of one log, whether or not it is a fault.
@@ -169,7 +169,7 @@ pub(crate) fn of_loaded(
 fn repeated(overlaps: &Overlaps) -> Vec<Finding> {
     let finding = |overlap: &Overlap, severity, remedy: &str, fixes| {
         let mut findings = Findings { log: &overlap.log, number: overlap.number, list: Vec::new() };
-        findings.add("repeated_log", severity, None, overlap.words(), remedy).fixes = fixes;
+        findings.add(FindingId::RepeatedLog, severity, None, overlap.words(), remedy).fixes = fixes;
         findings.list
     };
     let training = overlaps.training.iter().flat_map(|o| {
@@ -194,7 +194,7 @@ fn late(
     checked: &CheckedLog,
     out: &mut Findings<'_>,
 ) -> Result<Option<delay::Delay>, Error> {
-    let spoilt = out.list.iter().any(|f| f.severity == Severity::Error && f.id != "delay");
+    let spoilt = out.list.iter().any(|f| f.severity == Severity::Error && f.id != FindingId::Delay.name());
     if spoilt || checked.unexplained.is_none_or(|share| share > bench::UNEXPLAINED) {
         return Ok(None);
     }
@@ -224,7 +224,7 @@ fn examine(
     }
     for turns in &loaded.unwrapped {
         let remedy = "nothing: the position was unwrapped; see that the logger keeps turns apart where a joint has limits";
-        out.add("position_wrap", Severity::Info, Some(&turns.joint), turns.words(), remedy);
+        out.add(FindingId::PositionWrap, Severity::Info, Some(&turns.joint), turns.words(), remedy);
     }
     let mut on_grid = record::examine(&loaded.log, &loaded.rows, |joint| bench.drives(joint), out)?;
     bench.order(&mut on_grid);

@@ -7,7 +7,7 @@ use dynid_estimate::preflight::{
 use dynid_model::{EffortModel, Mechanism};
 
 use super::bench::Bench;
-use super::finding::{Findings, Fix, Severity};
+use super::finding::{FindingId, Findings, Fix, Severity};
 use crate::Error;
 use crate::effort_scale::{G, GRAVITY_SHARE, states_bodies};
 use crate::prior::Prior;
@@ -129,13 +129,13 @@ pub(super) fn examine(
     if known {
         let remedy =
             "nothing: the configuration states that the size of the efforts is right (`known_effort_scale`)";
-        out.add("drive_gain", Severity::Info, None, evidence, remedy);
+        out.add(FindingId::DriveGain, Severity::Info, None, evidence, remedy);
         return Ok(());
     }
     let severity = if off >= OTHER_UNIT { Severity::Error } else { Severity::Warning };
     let remedy = "state the unit or the drive gains of the efforts, or put right the masses of the robot file (efforts without gravity are \
                   no efforts of the joints either); if the efforts are right, say so: `known_effort_scale = true` (`--known-effort-scale`)";
-    let finding = out.add("drive_gain", severity, None, evidence, remedy);
+    let finding = out.add(FindingId::DriveGain, severity, None, evidence, remedy);
     let order = ratio.log10().round();
     if severity == Severity::Error && file.is_some() && order != 0.0 && (ratio.log10() - order).abs() < A_UNIT
     {
@@ -182,7 +182,7 @@ fn upside_down(
     let remedy =
         "state gravity in base axes (`gravity`): the robot is mounted another way than the file says";
     let severity = if told { Severity::Error } else { Severity::Warning };
-    let finding = out.add("base_tilt", severity, None, evidence, remedy);
+    let finding = out.add(FindingId::BaseTilt, severity, None, evidence, remedy);
     if told {
         finding.fixes = vec![Fix::Gravity(gravity)];
     }
@@ -202,9 +202,9 @@ fn other_gravity(
     if size == 0.0 {
         return false;
     }
-    let mut others = vec![("base_tilt", stated.map(|g| -g))];
+    let mut others = vec![(FindingId::BaseTilt, stated.map(|g| -g))];
     if (size / G - 1.0).abs() > OTHER_SIZE {
-        others.push(("gravity_size", stated.map(|g| g * G / size)));
+        others.push((FindingId::GravitySize, stated.map(|g| g * G / size)));
     }
     let bodies = 10 * prior.bodies.len();
     let told = others.into_iter().find_map(|(id, gravity)| {
@@ -248,7 +248,7 @@ pub(super) fn gravity_size(
             "gravity is stated as {size:.3} m/s²; the log explains as well by the {G} m/s² of the Earth"
         );
         out.add(
-            "gravity_size",
+            FindingId::GravitySize,
             Severity::Warning,
             None,
             evidence,

@@ -6,7 +6,7 @@ use dynid_motion::signal::{quantum, rms};
 use dynid_motion::spikes::{self, SpikeSettings};
 use dynid_motion::{ClockReport, Log, UniformLog};
 
-use super::finding::{Findings, Fix, Severity};
+use super::finding::{FindingId, Findings, Fix, Severity};
 use crate::Error;
 use crate::logs::LARGEST_POSITION;
 
@@ -45,7 +45,7 @@ pub(super) fn examine(
                 "the position stops changing within one sample, at speed: {}",
                 runs(&frozen, rows, rate_hz)
             );
-            out.add("frozen_signal", Severity::Warning, name, evidence, LEAVE_OUT).fixes =
+            out.add(FindingId::FrozenSignal, Severity::Warning, name, evidence, LEAVE_OUT).fixes =
                 leave_out(&frozen, rows);
         }
         if joint.effort.is_empty() {
@@ -55,7 +55,13 @@ pub(super) fn examine(
             // Where no drive acts there is no effort.
             if driven(&joint.name) {
                 let evidence = format!("the effort is {} in every row", joint.effort[0]);
-                out.add("frozen_signal", Severity::Error, name, evidence, "log the effort of this joint");
+                out.add(
+                    FindingId::FrozenSignal,
+                    Severity::Error,
+                    name,
+                    evidence,
+                    "log the effort of this joint",
+                );
             }
             continue;
         }
@@ -73,13 +79,13 @@ pub(super) fn examine(
                 frozen.iter().map(|r| r.length).max().unwrap_or(0)
             );
             let remedy = "little is to be learned about this joint: its effort hardly exceeds the resolution of its sensor";
-            out.add("coarse_signal", Severity::Warning, name, evidence, remedy);
+            out.add(FindingId::CoarseSignal, Severity::Warning, name, evidence, remedy);
         } else if !frozen.is_empty() {
             let evidence = format!(
                 "the effort stays exactly the same for longer than its other samples let one expect: {}",
                 runs(&frozen, rows, rate_hz)
             );
-            out.add("frozen_signal", Severity::Warning, name, evidence, LEAVE_OUT).fixes =
+            out.add(FindingId::FrozenSignal, Severity::Warning, name, evidence, LEAVE_OUT).fixes =
                 leave_out(&frozen, rows);
         }
         for flat in clipped(&joint.effort) {
@@ -91,7 +97,7 @@ pub(super) fn examine(
                 flat.runs.len()
             );
             let remedy = "leave these rows out: the true effort is larger than the log says; a slower trajectory keeps within the drive's limit";
-            out.add("saturation", Severity::Warning, name, evidence, remedy).fixes =
+            out.add(FindingId::Saturation, Severity::Warning, name, evidence, remedy).fixes =
                 leave_out(&flat.runs, rows);
         }
     }
@@ -118,14 +124,14 @@ pub(super) fn examine(
             );
             match found.removed {
                 true => out.add(
-                    "spikes",
+                    FindingId::Spikes,
                     Severity::Info,
                     Some(&name),
                     evidence,
                     "nothing: they are replaced by the running median",
                 ),
                 false => out.add(
-                    "spikes",
+                    FindingId::Spikes,
                     Severity::Warning,
                     Some(&name),
                     evidence + ", too many to be replaced",
@@ -162,7 +168,7 @@ fn outlying(log: &Log, rows: &[usize], out: &mut Findings<'_>) {
             wrong.len(),
             rows[first.first]
         );
-        out.add("spikes", Severity::Warning, Some(&joint.name), evidence, LEAVE_OUT).fixes =
+        out.add(FindingId::Spikes, Severity::Warning, Some(&joint.name), evidence, LEAVE_OUT).fixes =
             leave_out(&wrong, rows);
     }
 }
@@ -191,7 +197,7 @@ fn far(log: &Log, rows: &[usize], out: &mut Findings<'_>) -> Option<Log> {
         let few = wrong.len() < log.rows() / 100 && wrong.len() <= MOST_RANGES;
         let remedy =
             if few { LEAVE_OUT } else { "state the scale of the position: encoder counts are no angles" };
-        out.add("position_range", Severity::Error, Some(&joint.name), evidence, remedy).fixes =
+        out.add(FindingId::PositionRange, Severity::Error, Some(&joint.name), evidence, remedy).fixes =
             if few { leave_out(&wrong, rows) } else { Vec::new() };
         if few {
             replaced = true;
@@ -229,7 +235,7 @@ fn repetitions(log: &Log, rows: &[usize], out: &mut Findings<'_>) {
     );
     let severity = if found.share() > HELD { Severity::Warning } else { Severity::Info };
     let remedy = "drop these rows; if the log was written faster than the drives answer, log at their rate";
-    out.add("duplicate_samples", severity, None, evidence, remedy).fixes = vec![Fix::DropRepeated];
+    out.add(FindingId::DuplicateSamples, severity, None, evidence, remedy).fixes = vec![Fix::DropRepeated];
 }
 
 fn clock(report: &ClockReport, rows: &[usize], out: &mut Findings<'_>) {
@@ -241,7 +247,7 @@ fn clock(report: &ClockReport, rows: &[usize], out: &mut Findings<'_>) {
             rows[report.first_dropped.unwrap_or(0)]
         );
         let remedy = "nothing: such rows are dropped; see why the logger writes them";
-        out.add("clock_backwards", Severity::Info, None, evidence, remedy);
+        out.add(FindingId::ClockBackwards, Severity::Info, None, evidence, remedy);
     }
     if report.jitter > JITTER {
         let severity = if report.jitter > ROUGH { Severity::Warning } else { Severity::Info };
@@ -255,7 +261,7 @@ fn clock(report: &ClockReport, rows: &[usize], out: &mut Findings<'_>) {
         } else {
             "nothing: the log is resampled on a uniform grid"
         };
-        out.add("clock_jitter", severity, None, evidence, remedy);
+        out.add(FindingId::ClockJitter, severity, None, evidence, remedy);
     }
     if let Some(longest) = report.gaps.iter().max_by(|a, b| a.duration.total_cmp(&b.duration)) {
         let total: f64 = report.gaps.iter().map(|g| g.duration).sum();
@@ -268,7 +274,7 @@ fn clock(report: &ClockReport, rows: &[usize], out: &mut Findings<'_>) {
             longest.start
         );
         let remedy = "nothing: samples in gaps and what borders on them are not used; avoid gaps where the motion matters";
-        out.add("clock_gap", Severity::Warning, None, evidence, remedy);
+        out.add(FindingId::ClockGap, Severity::Warning, None, evidence, remedy);
     }
 }
 

@@ -51,6 +51,7 @@ use joints::{Format, JointValues};
 pub use json::{ElasticJson, JointJson, LinkJson, OtherJson, ROBOT_JSON_SCHEMA, RobotJson, json};
 pub(crate) use judged::FileModels;
 pub use projection::FrictionProjection;
+pub(crate) use read_back::with_slipping_bristles;
 pub use read_back::{CheckStates, READ_BACK_LIMIT};
 
 /// Text that is ready to be written.
@@ -298,7 +299,7 @@ impl<'a> RobotExport<'a> {
 }
 
 /// Joints of a robot file that were held for the identification, and where; `Err` names a joint that is not the same.
-fn held_joints(file: &Description, recorded: &Description) -> Result<Vec<(String, f64)>, String> {
+pub(crate) fn held_joints(file: &Description, recorded: &Description) -> Result<Vec<(String, f64)>, String> {
     let mut held = Vec::new();
     for joint in file.joints.iter().filter(|j| j.kind != JointKind::Fixed) {
         match recorded.joints.iter().find(|j| j.name == joint.name) {

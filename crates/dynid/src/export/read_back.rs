@@ -45,6 +45,16 @@ impl CheckStates {
         }))
     }
 
+    /// Random states as those of [`CheckStates::random`] for two models of one robot, with what either of them reads beside the motion.
+    pub(crate) fn random_of_both(a: &RobotModel, b: &RobotModel) -> Self {
+        let others = b.channels().iter().filter(|name| !a.channels().contains(name));
+        let channels: Vec<String> = a.channels().iter().chain(others).cloned().collect();
+        CheckStates(Kind::Random(match a.closed() {
+            None => RandomMotion::new(a.mechanism(), &channels, STATES, SEED).with_coordinates(a, SEED),
+            Some(closed) => closed.random_motion(STATES, SEED),
+        }))
+    }
+
     /// States of logs, positions filtered at `state_hz`: up to 64 runs of 256 samples from each, evenly spread.
     ///
     /// # Errors
@@ -93,7 +103,7 @@ impl CheckStates {
         if matches!(self.0, Kind::Random(_)) { STATES } else { BLOCK }
     }
 
-    pub(super) fn for_each_block(&self, mut work: impl FnMut(&MotionBlock<'_>)) {
+    pub(crate) fn for_each_block(&self, mut work: impl FnMut(&MotionBlock<'_>)) {
         match &self.0 {
             Kind::Random(motion) => motion.with_block(work),
             Kind::Logs(logs) => {
@@ -207,7 +217,7 @@ pub(super) fn largest_difference(
 }
 
 /// The motion for elements that remember, bristles slipping as Coulomb friction does: what files have a place for.
-pub(super) fn with_slipping_bristles(
+pub(crate) fn with_slipping_bristles(
     model: &RobotModel,
     motion: &MotionBlock<'_>,
     work: impl FnOnce(&MotionBlock<'_>),

@@ -14,10 +14,11 @@ use crate::estimate::{
 };
 use crate::identify::Identification;
 use crate::prior::PAYLOAD_SIZE;
-use crate::{Error, advice, verdict};
+use crate::verdict::CheckName;
+use crate::{Error, advice};
 
 /// Checks of an identification that say what its logs are worth. The scale of the efforts is told by the stated mass.
-const INPUTS: [&str; 2] = [verdict::PREFLIGHT, verdict::OWN_LOGS];
+const INPUTS: [&str; 2] = [CheckName::Preflight.name(), CheckName::OwnLogs.name()];
 
 /// Share of the prior variance that the logs must remove for a value to count as seen.
 const SEEN: f64 = 0.9;

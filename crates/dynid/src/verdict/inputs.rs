@@ -1,15 +1,11 @@
 //! What the logs themselves leave open: their pre-flight, rows that they share, the scale of their efforts.
 
-use super::{Status, check};
+use super::{CheckName, Status, check};
 use crate::check::Severity;
 use crate::effort_scale::{EffortScale, ScaleSource};
 use crate::estimate::CheckResult;
 use crate::identify::Identification;
 
-/// Name of the check of the pre-flight.
-pub(crate) const PREFLIGHT: &str = "pre-flight of the logs";
-/// Name of the check of training logs that repeat each other.
-pub(crate) const OWN_LOGS: &str = "training logs of their own";
 /// Masses of the robot file speak for the scale of the efforts within this factor.
 const FILE_AGREES: f64 = 1.25;
 /// A ratio to a weighed mass this close to one is right, whatever its interval ...
@@ -49,14 +45,7 @@ fn preflight(id: &Identification) -> (Status, CheckResult) {
     } else {
         (Status::Ok, "columns, signs, units, clock and gravity are what the logs say".to_owned())
     };
-    check(
-        status,
-        "pre-flight of the logs",
-        id.preflight.then_some(count),
-        "",
-        "no error, no warning",
-        meaning,
-    )
+    check(status, CheckName::Preflight, id.preflight.then_some(count), "", "no error, no warning", meaning)
 }
 
 fn repeated(id: &Identification) -> Option<(Status, CheckResult)> {
@@ -65,7 +54,7 @@ fn repeated(id: &Identification) -> Option<(Status, CheckResult)> {
     let words: Vec<String> = found.iter().map(|o| o.words()).collect();
     Some(check(
         Status::of(false, !found.iter().any(|o| o.repeats())),
-        OWN_LOGS,
+        CheckName::OwnLogs,
         Some(100.0 * most),
         "%",
         "no rows in common",
@@ -79,7 +68,7 @@ fn seen_before(id: &Identification) -> Option<(Status, CheckResult)> {
     let words: Vec<String> = found.iter().map(|o| o.words()).collect();
     Some(check(
         Status::Warn,
-        "validation logs of their own",
+        CheckName::OwnValidation,
         Some(100.0 * most),
         "%",
         "no rows in common with training logs",
@@ -88,7 +77,7 @@ fn seen_before(id: &Identification) -> Option<(Status, CheckResult)> {
 }
 
 fn scale(found: &EffortScale) -> (Status, CheckResult) {
-    let name = "scale of the efforts";
+    let name = CheckName::EffortScale;
     let assumption = found.assumption().unwrap_or_default();
     match found.source {
         ScaleSource::KnownMass => weighed(found),
@@ -124,7 +113,7 @@ fn scale(found: &EffortScale) -> (Status, CheckResult) {
 
 /// Against masses that were weighed.
 fn weighed(found: &EffortScale) -> (Status, CheckResult) {
-    let (name, limit) = ("scale of the efforts", "1 within the interval");
+    let (name, limit) = (CheckName::EffortScale, "1 within the interval");
     let each: Vec<String> = found
         .masses
         .iter()

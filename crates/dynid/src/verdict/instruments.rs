@@ -4,7 +4,7 @@ use dynid_estimate::instruments::{Exogeneity, ExogeneityVerdict, IterationEnd, S
 use dynid_estimate::linear::LinearMethod;
 use dynid_model::EffortModel;
 
-use super::{Status, check};
+use super::{CheckName, Status, check};
 use crate::estimate::CheckResult;
 use crate::identify::Identification;
 use crate::instruments::InstrumentRun;
@@ -45,7 +45,7 @@ pub(super) fn instruments(id: &Identification) -> Option<(Status, CheckResult)> 
         ),
     };
     let limit = "settled, smallest cosine between instruments and regressors at least 0.1";
-    Some(check(status, "instruments", cosine, "", limit, meaning))
+    Some(check(status, CheckName::Instruments, cosine, "", limit, meaning))
 }
 
 /// Size of the difference between least squares and instruments.
@@ -61,7 +61,7 @@ pub(super) fn closed_loop_bias(id: &Identification) -> Option<(Status, CheckResu
     let worst = found.and_then(Exogeneity::worst).map(|e| e.ratio()).filter(|r| r.is_finite());
     let limit = "no base parameter of least squares further from that of instruments than its limit (1): two standard deviations, or \
                  1 % of the prior deviation";
-    Some(check(status, "closed-loop bias", worst, "", limit, in_words(id)?))
+    Some(check(status, CheckName::ClosedLoopBias, worst, "", limit, in_words(id)?))
 }
 
 /// What the comparison comes to, in a sentence or two.

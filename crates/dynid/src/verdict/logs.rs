@@ -2,7 +2,7 @@
 
 use dynid_model::element::scale_name;
 
-use super::{Status, check};
+use super::{CheckName, Status, check};
 use crate::estimate::CheckResult;
 use crate::identify::Identification;
 
@@ -21,7 +21,7 @@ fn agreement(id: &Identification) -> Option<(Status, CheckResult)> {
     let contradicts = found.contradicts();
     Some(check(
         Status::of(!contradicts, true),
-        "agreement of the training logs",
+        CheckName::AgreementOfLogs,
         most.or(found.one_robot.as_ref().map(|r| r.f).filter(|_| contradicts)),
         "",
         "no deviation of a log above a quarter of the residual",
@@ -83,7 +83,7 @@ fn own(id: &Identification) -> Option<(Status, CheckResult)> {
     };
     Some(check(
         Status::Ok,
-        "terms of single logs",
+        CheckName::TermsOfLogs,
         Some(clear.len() as f64),
         &format!("of {}", values.len()),
         "beyond three standard deviations; for information",

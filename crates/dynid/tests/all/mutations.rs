@@ -346,7 +346,7 @@ fn run(reader: Reader, bytes: &[u8], folder: &Path, number: usize) {
             let estimate = Estimate::read(&estimate_file).unwrap();
             let split = dynid::estimate::Split::Consistent;
             let model = estimate.effort_model(&estimate_file, split).unwrap();
-            if let Ok(states) = read_states(&file, &model, None) {
+            if let Ok(states) = read_states(&file, &ReadOptions::default(), &model, None) {
                 drop(efforts(&model, &estimate.values(split), &states));
             }
         }

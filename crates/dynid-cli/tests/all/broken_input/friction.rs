@@ -134,7 +134,7 @@ fn estimates_with_broken_shape_parameters_are_refused() {
     };
     let predict = "predict bad.json --states states.csv --out effort.csv";
     let validate = "validate bad.json --log log.csv";
-    let export = "export bad.json --robot robot.urdf --json robot.json";
+    let export = "export bad.json --robot robot.urdf --model robot.json";
     let missing = changed(&|list| drop(list.pop()));
     let none = changed(&Vec::clear);
     let extra = changed(&|list| list.push(list[0].clone()));

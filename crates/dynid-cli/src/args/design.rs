@@ -1,0 +1,106 @@
+//! Arguments of `dynid design`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum, ValueHint};
+
+use super::ForceArgs;
+use super::robot::joint_value;
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum CriterionArg {
+    /// Mean square of the relative standard deviations of the base parameters.
+    RelativeStd,
+    /// Condition number of the columns at unit length.
+    UnitCondition,
+    /// Condition number of the columns in SI units.
+    Condition,
+    /// w1 condition + w2 / smallest singular value.
+    Mix,
+    /// Mean variance.
+    A,
+    /// Determinant of the information.
+    D,
+    /// Smallest singular value.
+    E,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum ColumnsArg {
+    /// All base parameters: bodies, rotors, friction, offsets.
+    All,
+    /// Base parameters of the rigid bodies alone.
+    Inertial,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DesignArgs {
+    /// Configuration (TOML), or a robot file; `-`: standard input.
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub(crate) input: PathBuf,
+    /// Output folder (default: dynid-design).
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub(crate) out: Option<PathBuf>,
+    /// Period, s (default: 20).
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub(crate) period: Option<f64>,
+    /// Harmonics (default: 5).
+    #[arg(long, value_name = "N")]
+    pub(crate) harmonics: Option<usize>,
+    /// Recorded periods (default: 1).
+    #[arg(long, value_name = "N")]
+    pub(crate) periods: Option<usize>,
+    /// Rate of commanded and recorded samples, Hz (default: 500).
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    pub(crate) rate_hz: Option<f64>,
+    /// Let the motion start and end at speed instead of at rest.
+    #[arg(long)]
+    pub(crate) no_rest: bool,
+    /// Come from the zero pose (or the nearest within the limits) and go back to it; `[trajectory] parking` names others.
+    #[arg(long)]
+    pub(crate) park: bool,
+    /// Largest acceleration of all joints, rad/s² or m/s² (default: full speed in half a second).
+    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    pub(crate) acceleration: Option<f64>,
+    /// Share of the robot file's limits that may be used (default: 1).
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    pub(crate) share: Option<f64>,
+    /// What is minimised (default: relative-std, without inertias in the robot file unit-condition).
+    #[arg(long, value_enum)]
+    pub(crate) criterion: Option<CriterionArg>,
+    /// Parameters that count (default: all).
+    #[arg(long, value_enum)]
+    pub(crate) columns: Option<ColumnsArg>,
+    /// Standard deviation of the effort's noise at all joints, N m or N.
+    #[arg(long, value_name = "STD", allow_negative_numbers = true)]
+    pub(crate) noise: Option<f64>,
+    /// Trajectory that is recorded as well, so that its information counts; repeat for several.
+    #[arg(long, value_name = "TRAJECTORY.json", value_hint = ValueHint::FilePath)]
+    pub(crate) earlier: Vec<PathBuf>,
+    /// Elements at every joint, comma separated; `none`: rigid bodies alone.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub(crate) elements: Option<Vec<String>>,
+    /// Hold a joint at a position, rad or m.
+    #[arg(long, value_name = "JOINT=POSITION", value_parser = joint_value)]
+    pub(crate) lock: Vec<(String, f64)>,
+    /// Random starts (default: 16).
+    #[arg(long, value_name = "N")]
+    pub(crate) starts: Option<usize>,
+    /// Seed of the first start (default: 1).
+    #[arg(long)]
+    pub(crate) seed: Option<u64>,
+    /// Begin no start after this time, and end those that began, s (default: all run).
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub(crate) time_budget: Option<f64>,
+    /// File that keeps finished starts, so that a run can be taken up again.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) checkpoint: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) force: ForceArgs,
+    /// Print design.json to stdout as well.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Say only what went wrong.
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
+}

@@ -1,0 +1,132 @@
+//! Arguments: the program and its commands; a file per group of commands.
+
+mod about;
+mod design;
+mod examples;
+mod experiments;
+mod identify;
+mod logs;
+mod model;
+mod online;
+mod output;
+mod robot;
+mod simulate;
+mod study;
+
+pub(crate) use about::{CompletionsArgs, ExplainArgs, ManArgs};
+pub(crate) use design::{ColumnsArg, CriterionArg, DesignArgs};
+pub(crate) use experiments::{BacklashArgs, ClearanceArgs, FrictionTestArgs, GainsArgs, PayloadArgs};
+pub(crate) use identify::{
+    CheckArgs, CompareArgs, ConsistencyArg, FrictionArg, IdentifyArgs, MethodArg, RouteArg,
+};
+pub(crate) use logs::{LogArgs, ReadingArgs};
+pub(crate) use model::{DiffArgs, ExportArgs, InspectArgs, PredictArgs, RegressorArgs, ValidateArgs};
+pub(crate) use online::{OnlineArgs, StreamArg};
+pub(crate) use output::{ForceArgs, PrintArgs};
+pub(crate) use robot::RobotArgs;
+pub(crate) use simulate::SimulateArgs;
+pub(crate) use study::StudyArgs;
+
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueHint};
+
+use crate::message::Failure;
+
+/// Version with the revision that the program was built from, where that is known.
+pub(crate) const VERSION: &str = match option_env!("DYNID_VERSION") {
+    Some(version) => version,
+    None => env!("CARGO_PKG_VERSION"),
+};
+
+/// Identifies the dynamic parameters of robots and mechanisms from logs of motion and effort.
+#[derive(Debug, Parser)]
+#[command(name = "dynid", version = VERSION, propagate_version = true)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// Commands, in the order of their names.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Backlash of an identified robot's drives from ordinary logs: what gaps would have done to the effort.
+    Backlash(BacklashArgs),
+    /// Pre-flight of logs: clock, joint order, signs, units, delay, saturation, excitation.
+    Check(CheckArgs),
+    /// Clearances of an identified robot's joints from a log: by probes at the journals, by their swing in the effort.
+    Clearance(ClearanceArgs),
+    /// Every applicable estimator on the same logs, ranked on held-out time.
+    Compare(CompareArgs),
+    /// Print what a shell needs to complete commands, flags and files.
+    Completions(CompletionsArgs),
+    /// Design an excitation trajectory within all limits: writes trajectory files, design.json and report.html.
+    Design(Box<DesignArgs>),
+    /// Compare two models of a robot: parameters that differ beyond their intervals, difference of the effort.
+    Diff(DiffArgs),
+    /// Say what a finding, a check or a verdict means and what to do.
+    Explain(ExplainArgs),
+    /// Put identified parameters into a robot file: URDF, MJCF or JSON, read back and checked before it is written.
+    Export(ExportArgs),
+    /// Friction from constant-speed tests and pre-sliding motion: writes friction.json and report.html.
+    Friction(FrictionTestArgs),
+    /// Drive gains from logs with and without a payload of known mass.
+    Gains(GainsArgs),
+    /// Identify a robot from logs: writes estimate.json, report.html and an updated robot file.
+    Identify(Box<IdentifyArgs>),
+    /// Show a robot's tree, its parameters and which combinations of them can be identified.
+    Inspect(InspectArgs),
+    /// Write manual pages, one per command.
+    Man(ManArgs),
+    /// Follow a stream or logs: estimates as JSON lines, alarms when something changes.
+    Online(OnlineArgs),
+    /// Payloads from logs with and without them: mass, centre of mass, inertia; writes payload.json, payload.html and a URDF
+    /// link.
+    Payload(PayloadArgs),
+    /// Effort of an identified model at given states.
+    Predict(PredictArgs),
+    /// Effort and regressor rows of a robot file at given states.
+    Regressor(RegressorArgs),
+    /// Make a virtual log: by inverse dynamics, or of a controlled robot.
+    Simulate(SimulateArgs),
+    /// Published systems, every claim of their papers beside what is measured here.
+    Study(StudyArgs),
+    /// Compare an identified model with other logs.
+    Validate(ValidateArgs),
+}
+
+/// The command line as the parser, help, completions and manual pages know it.
+pub(crate) fn definition() -> clap::Command {
+    examples::with_examples(Cli::command())
+}
+
+impl Cli {
+    /// Parses the arguments of the program.
+    ///
+    /// # Errors
+    /// What clap says of them; help and version too.
+    pub(crate) fn of_program() -> Result<Result<Self, Failure>, clap::Error> {
+        let definition = definition();
+        let matches = definition.clone().try_get_matches()?;
+        let cli = Self::from_arg_matches(&matches)?;
+        Ok(one_standard_input(&definition, &matches).map(|()| cli))
+    }
+}
+
+/// Refuses `-` for more than one input, or for more than one output.
+fn one_standard_input(definition: &clap::Command, matches: &clap::ArgMatches) -> Result<(), Failure> {
+    let Some((name, given)) = matches.subcommand() else { return Ok(()) };
+    let Some(command) = definition.find_subcommand(name) else { return Ok(()) };
+    for (hint, what, cure) in [
+        (ValueHint::FilePath, "standard input", "give all inputs but one as files"),
+        (ValueHint::AnyPath, "standard output", "give all outputs but one as files"),
+    ] {
+        let dashes = |arg: &clap::Arg| {
+            let values = given.try_get_raw(arg.get_id().as_str()).ok().flatten();
+            values.map_or(0, |values| values.filter(|value| *value == "-").count())
+        };
+        let of_kind = command.get_arguments().filter(|arg| arg.get_value_hint() == hint);
+        if of_kind.map(dashes).sum::<usize>() > 1 {
+            return Err(Failure::Usage(format!("{what}: `-` is given more than once"), cure));
+        }
+    }
+    Ok(())
+}

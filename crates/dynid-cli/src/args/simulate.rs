@@ -1,0 +1,53 @@
+//! Arguments of `dynid simulate`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueHint};
+
+use super::{ForceArgs, PrintArgs, RobotArgs};
+
+#[derive(Debug, Args)]
+pub(crate) struct SimulateArgs {
+    #[command(flatten)]
+    pub(crate) robot: RobotArgs,
+    /// Settings of the virtual log, TOML.
+    #[arg(long, value_name = "FILE.toml", value_hint = ValueHint::FilePath)]
+    pub(crate) config: Option<PathBuf>,
+    /// Let a controller move the robot, with all imperfections (default: inverse dynamics of the trajectory).
+    #[arg(long)]
+    pub(crate) closed_loop: bool,
+    /// Follow a trajectory file, approach and return included (`dynid design` writes them).
+    #[arg(long, value_name = "TRAJECTORY.json", value_hint = ValueHint::FilePath)]
+    pub(crate) follow: Option<PathBuf>,
+    /// Length, s.
+    #[arg(long, value_name = "S", allow_negative_numbers = true, conflicts_with = "follow")]
+    pub(crate) duration: Option<f64>,
+    /// Sample rate, Hz.
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    pub(crate) rate_hz: Option<f64>,
+    /// Noise of the effort, share of its rms.
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    pub(crate) effort_noise: Option<f64>,
+    /// Encoder resolution, bits per turn; 0: exact.
+    #[arg(long, value_name = "BITS")]
+    pub(crate) encoder_bits: Option<u32>,
+    /// Noise of the logged offsets of journals in their bearings (joints with clearance), m.
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub(crate) journal_noise: Option<f64>,
+    /// Seed of trajectory and noise.
+    #[arg(long)]
+    pub(crate) seed: Option<u64>,
+    /// Output log, CSV or CSV.gz; `-`: standard output.
+    #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::AnyPath)]
+    pub(crate) out: PathBuf,
+    /// Also write the true states and efforts.
+    #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::AnyPath)]
+    pub(crate) clean: Option<PathBuf>,
+    /// Also write the true parameters, JSON.
+    #[arg(long, value_name = "FILE.json", value_hint = ValueHint::AnyPath)]
+    pub(crate) truth: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) force: ForceArgs,
+    #[command(flatten)]
+    pub(crate) print: PrintArgs,
+}

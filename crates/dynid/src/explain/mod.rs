@@ -1,0 +1,152 @@
+//! What the words of results mean and what to do: one table for the command line, the book and programs.
+//!
+//! Names that code can print are variants of [`FindingId`], [`CheckName`] and [`Word`]; their texts are exhaustive matches, so that a new
+//! name without a text does not compile.
+
+mod checks;
+mod findings;
+mod page;
+mod words;
+
+pub use page::page;
+use serde::Serialize;
+pub use words::Word;
+
+use crate::check::FindingId;
+use crate::verdict::CheckName;
+
+/// An enumeration of names as they are printed.
+macro_rules! names {
+    ($(#[$doc:meta])* $kind:ident { $($(#[$text:meta])* $variant:ident = $name:literal,)* }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum $kind {
+            $($(#[$text])* $variant,)*
+        }
+
+        impl $kind {
+            /// Every variant once.
+            pub const ALL: &'static [$kind] = &[$($kind::$variant,)*];
+
+            /// Name as printed.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $($kind::$variant => $name,)*
+                }
+            }
+        }
+    };
+}
+pub(crate) use names;
+
+/// What sort of word is explained.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// What the pre-flight of a log may find.
+    Finding,
+    /// A check behind the verdict of an identification.
+    Check,
+    /// A verdict of a parameter, a status, a severity.
+    Word,
+}
+
+/// What a word of a result means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Explanation {
+    /// The word as printed.
+    pub id: &'static str,
+    /// What sort of word it is.
+    pub kind: Kind,
+    /// What it means.
+    pub meaning: &'static str,
+    /// What to do.
+    pub remedy: &'static str,
+    /// The command, or the line of the configuration, that does it; empty if there is none.
+    pub line: &'static str,
+}
+
+/// Meaning, remedy and line of a word.
+struct Text(&'static str, &'static str, &'static str);
+
+impl Text {
+    fn of(self, id: &'static str, kind: Kind) -> Explanation {
+        Explanation { id, kind, meaning: self.0, remedy: self.1, line: self.2 }
+    }
+}
+
+/// Every explanation: findings, checks, words, each sort in the order of its names.
+pub fn all() -> Vec<Explanation> {
+    let findings = FindingId::ALL.iter().map(|id| findings::text(*id).of(id.name(), Kind::Finding));
+    let checks = CheckName::ALL.iter().map(|name| checks::text(*name).of(name.name(), Kind::Check));
+    let words = Word::ALL.iter().map(|word| words::text(*word).of(word.name(), Kind::Word));
+    let mut all: Vec<Explanation> = findings.chain(checks).chain(words).collect();
+    all.sort_by_key(|e| (e.kind as u8, e.id));
+    all
+}
+
+/// The explanation of a word; capitals, underscores, hyphens and quotes do not matter.
+pub fn find(id: &str) -> Option<Explanation> {
+    all().into_iter().find(|e| plain(e.id) == plain(id))
+}
+
+/// The word that is most like an unknown one.
+pub fn nearest(id: &str) -> &'static str {
+    let likeness = |e: &Explanation| {
+        let (name, asked) = (plain(e.id), plain(id));
+        let whole = strsim::jaro_winkler(&name, &asked);
+        // One word of a name says more than letters alike.
+        if asked.len() > 2 && name.contains(&asked) { 1.0 + whole } else { whole }
+    };
+    let all = all();
+    let best = all.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+    best.map_or("", |e| e.id)
+}
+
+fn plain(id: &str) -> String {
+    let letters = id.trim().trim_matches(['`', '"', '\'', '[', ']']).chars();
+    letters.map(|c| if c == '_' || c == '-' { ' ' } else { c.to_ascii_lowercase() }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use dynid_estimate::identifiability::{Carried, Verdict};
+
+    use super::*;
+
+    #[test]
+    fn ids_are_unique_and_texts_are_whole() {
+        let all = all();
+        for (k, e) in all.iter().enumerate() {
+            assert!(!all[..k].iter().any(|other| plain(other.id) == plain(e.id)), "{} twice", e.id);
+            for text in [e.meaning, e.remedy] {
+                assert!(text.ends_with('.') && text.len() > 20, "{}: {text}", e.id);
+            }
+        }
+    }
+
+    #[test]
+    fn words_of_parameters_are_those_of_the_estimator() {
+        let carried = [Carried::OnlyInCombination, Carried::NotExcited, Carried::TooNoisy];
+        let verdicts =
+            carried.map(Verdict::CarriedByPrior).into_iter().chain([Verdict::Seen, Verdict::NotIdentifiable]);
+        for verdict in verdicts {
+            for word in [Some(verdict.words()), verdict.reason()].into_iter().flatten() {
+                assert!(find(word).is_some(), "{word}");
+            }
+        }
+        for word in [crate::shape::ONE_SIDED, crate::shape::NOT_SEEN] {
+            assert!(find(word).is_some(), "{word}");
+        }
+    }
+
+    #[test]
+    fn words_are_found_as_people_type_them() {
+        for typed in ["column_order", "Column order", "`column-order`", "[warn]"] {
+            assert!(find(typed).is_some(), "{typed}");
+        }
+        assert_eq!(find("colum_order"), None);
+        assert_eq!(nearest("colum_order"), "column_order");
+        assert_eq!(nearest("whiteness"), "whiteness of the residuals");
+    }
+}
