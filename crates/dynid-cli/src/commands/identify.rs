@@ -165,6 +165,7 @@ fn summary<'a>(estimate: &Estimate, files: impl Iterator<Item = &'a Path>) {
                 let words = list.iter().map(|x| word(x).unwrap_or_else(|| table::number(x.as_f64())));
                 words.collect::<Vec<_>>().join(" ")
             }
+            serde_json::Value::String(text) => text.clone(),
             other => other.to_string(),
         };
         note(&format!("  {} = {value} {} ({}: {})", choice.name, choice.unit, choice.origin, choice.reason));
