@@ -59,7 +59,9 @@ impl LoadedLog {
         let turns = self.unwrapped.iter().map(|u| format!("{file}: {}", u.words()));
         // A header that is missing leaves room for doubt.
         let guessed = self.reading.iter().filter(|note| note.setting == "columns");
-        let guessed = guessed.map(|note| format!("{file}: columns without names are taken for {}: {}", note.value, note.reason));
+        let guessed = guessed.map(|note| {
+            format!("{file}: columns without names are taken for {}: {}", note.value, note.reason)
+        });
         turns.chain(guessed).chain(temperature_warnings(&self.log)).collect()
     }
 

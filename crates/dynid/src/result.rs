@@ -325,7 +325,13 @@ impl Identification {
         for (log, notes) in self.logs.iter().zip(&self.found_out) {
             let name = short_name(&log.name);
             for note in notes {
-                add(&format!("{} of {name}", note.setting), json!(note.value), "", "found", note.reason.clone());
+                add(
+                    &format!("{} of {name}", note.setting),
+                    json!(note.value),
+                    "",
+                    "found",
+                    note.reason.clone(),
+                );
             }
         }
         for (log, columns) in self.logs.iter().zip(&self.columns) {

@@ -55,7 +55,9 @@ fn asked(question: &Question) -> Option<String> {
     }
     let mut err = io::stderr().lock();
     // A terminal that cannot be written to cannot ask.
-    write!(err, "{}\n  {} [Enter: leave open]: ", question.text, question.line).and_then(|()| err.flush()).ok()?;
+    write!(err, "{}\n  {} [Enter: leave open]: ", question.text, question.line)
+        .and_then(|()| err.flush())
+        .ok()?;
     let mut answer = String::new();
     stdin.read_line(&mut answer).ok()?;
     Some(answer)

@@ -99,7 +99,8 @@ impl ColumnMapping {
 
 /// Median of the steps that go forward; `None` unless most do.
 fn median_step(time: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).filter(|s| *s > 0.0 && s.is_finite()).collect();
+    let mut steps: Vec<f64> =
+        time.windows(2).map(|w| w[1] - w[0]).filter(|s| *s > 0.0 && s.is_finite()).collect();
     if steps.is_empty() || 2 * steps.len() < time.len() - 1 {
         return None;
     }
@@ -140,7 +141,8 @@ impl Motion {
             let Some(column) = column else { continue };
             let (q, _) = super::extract::raw_column(table, "position", column)?;
             let velocity = mapping.velocity.as_ref().and_then(|v| v[k].as_ref());
-            let velocity = velocity.map(|v| Ok((super::extract::raw_column(table, "velocity", v)?.0, v.factor)));
+            let velocity =
+                velocity.map(|v| Ok((super::extract::raw_column(table, "velocity", v)?.0, v.factor)));
             let velocity = velocity.transpose()?;
             let mut speeds = Vec::with_capacity(time.len());
             for row in (lag..time.len()).step_by(lag) {
@@ -186,21 +188,24 @@ fn choose(step: f64, start: f64, motion: &Motion, motors: bool) -> Choice {
         return Choice::Unit(name, *unit, reason);
     }
     // Velocities are per second, speeds per raw unit of time.
-    let agreeing = motion.ratio.and_then(|ratio| {
-        UNITS.into_iter().find(|(_, unit)| within(ratio * unit, [1.0 / AGREES, AGREES]))
-    });
+    let agreeing = motion
+        .ratio
+        .and_then(|ratio| UNITS.into_iter().find(|(_, unit)| within(ratio * unit, [1.0 / AGREES, AGREES])));
     if let Some((name, unit)) = agreeing.filter(|found| possible.contains(found)) {
         return Choice::Unit(name, unit, "logged velocities agree with those of the positions".to_owned());
     }
     let fastest = if motors { FASTEST_MOTOR } else { FASTEST };
     let sensible: Vec<(&'static str, f64)> =
         possible.iter().copied().filter(|(_, unit)| motion.speed / unit <= fastest).collect();
-    let reason = |unit: f64| format!("steps of {step:.6} give {:.6} Hz and speeds that joints have", rate(unit));
+    let reason =
+        |unit: f64| format!("steps of {step:.6} give {:.6} Hz and speeds that joints have", rate(unit));
     match sensible.as_slice() {
         [(name, unit)] => Choice::Unit(name, *unit, reason(*unit)),
         [] => match possible.as_slice() {
             // Speeds that no joint has: something else is wrong, which is told where it is known.
-            [(name, unit)] => Choice::Unit(name, *unit, format!("steps of {step:.6} give {:.6} Hz", rate(*unit))),
+            [(name, unit)] => {
+                Choice::Unit(name, *unit, format!("steps of {step:.6} give {:.6} Hz", rate(*unit)))
+            }
             [] => Choice::None,
             several => Choice::Several(several.iter().map(|(name, unit)| (*name, rate(*unit))).collect()),
         },
@@ -209,9 +214,8 @@ fn choose(step: f64, start: f64, motion: &Motion, motors: bool) -> Choice {
             let usual_rate = |unit: f64| within(rate(unit), USUAL_RATES);
             let usual_speed = |unit: f64| within(motion.speed / unit, USUAL_SPEEDS);
             let still = motion.speed == 0.0;
-            let (usual, rest): (Vec<_>, Vec<_>) = several
-                .iter()
-                .partition(|(_, unit)| usual_rate(*unit) && (still || usual_speed(*unit)));
+            let (usual, rest): (Vec<_>, Vec<_>) =
+                several.iter().partition(|(_, unit)| usual_rate(*unit) && (still || usual_speed(*unit)));
             let unusual = |unit: f64| !usual_rate(unit) && (still || !usual_speed(unit));
             match usual.as_slice() {
                 [(name, unit)] if rest.iter().all(|(_, unit)| unusual(*unit)) => {

@@ -166,7 +166,9 @@ pub enum MappingError {
         row: usize,
     },
     /// Hardly any row has all signals.
-    #[error("column `{column}`: expected a value in most of the {positioned} rows with positions, found all signals in {rows} of them")]
+    #[error(
+        "column `{column}`: expected a value in most of the {positioned} rows with positions, found all signals in {rows} of them"
+    )]
     Sparse {
         /// The column that lacks most.
         column: String,

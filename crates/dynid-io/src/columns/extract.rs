@@ -114,7 +114,8 @@ impl ColumnMapping {
                 let mut start = 0.0;
                 for part in &time.parts {
                     let (raw, origin) = raw_column(table, "time", part)?;
-                    start += part.factor * (raw.first().copied().unwrap_or(0.0) + origin as f64) + part.offset;
+                    start +=
+                        part.factor * (raw.first().copied().unwrap_or(0.0) + origin as f64) + part.offset;
                 }
                 if let ([column], true) = (time.parts.as_slice(), start.abs() <= EPOCH_CLOCK) {
                     return Ok((convert(table, "time", column)?, 0.0));
@@ -132,7 +133,8 @@ impl ColumnMapping {
 
     fn has_gaps(&self, table: &Table) -> bool {
         let used = self.signal_columns().chain(self.time_columns());
-        used.filter_map(|c| raw_column(table, "", c).ok()).any(|(values, _)| values.iter().any(|x| x.is_nan()))
+        used.filter_map(|c| raw_column(table, "", c).ok())
+            .any(|(values, _)| values.iter().any(|x| x.is_nan()))
     }
 }
 

@@ -51,12 +51,8 @@ impl ColumnMapping {
             let row = table.columns[place].iter().position(|x| x.is_nan()).unwrap_or_default();
             return Err(MappingError::NoValue { column: column.clone(), row: table.first_row + row });
         }
-        let needed: Vec<usize> = self
-            .time_columns()
-            .iter()
-            .chain(self.position.iter().flatten())
-            .filter_map(place)
-            .collect();
+        let needed: Vec<usize> =
+            self.time_columns().iter().chain(self.position.iter().flatten()).filter_map(place).collect();
         let whole = |table: &Table, columns: &[usize], row: usize| {
             columns.iter().all(|k| !table.columns[*k][row].is_nan())
         };
@@ -69,7 +65,9 @@ impl ColumnMapping {
         }
         let rows: Vec<usize> = positioned.iter().copied().filter(|row| whole(table, &used, *row)).collect();
         if (rows.len() as f64) < LEAST_SHARE * positioned.len() as f64 || rows.is_empty() {
-            let emptiest = used.iter().max_by_key(|k| positioned.iter().filter(|r| table.columns[**k][**r].is_nan()).count());
+            let emptiest = used
+                .iter()
+                .max_by_key(|k| positioned.iter().filter(|r| table.columns[**k][**r].is_nan()).count());
             return Err(MappingError::Sparse {
                 column: emptiest.map_or_else(String::new, |k| table.header[*k].clone()),
                 rows: rows.len(),
@@ -100,8 +98,10 @@ impl ColumnMapping {
 
 /// Fills gaps of a column at some rows; how many were filled.
 fn interpolate(time: &[f64], values: &mut [f64], at: &[usize]) -> usize {
-    let known: Vec<usize> = (0..values.len()).filter(|k| !values[*k].is_nan() && !time[*k].is_nan()).collect();
-    let mut steps: Vec<f64> = known.windows(2).map(|w| time[w[1]] - time[w[0]]).filter(|s| *s > 0.0).collect();
+    let known: Vec<usize> =
+        (0..values.len()).filter(|k| !values[*k].is_nan() && !time[*k].is_nan()).collect();
+    let mut steps: Vec<f64> =
+        known.windows(2).map(|w| time[w[1]] - time[w[0]]).filter(|s| *s > 0.0).collect();
     if steps.is_empty() {
         return 0;
     }
@@ -113,7 +113,8 @@ fn interpolate(time: &[f64], values: &mut [f64], at: &[usize]) -> usize {
             continue;
         }
         let next = known.partition_point(|k| k < row);
-        let (Some(before), Some(after)) = (next.checked_sub(1).map(|k| known[k]), known.get(next).copied()) else {
+        let (Some(before), Some(after)) = (next.checked_sub(1).map(|k| known[k]), known.get(next).copied())
+        else {
             continue;
         };
         let span = time[after] - time[before];

@@ -39,10 +39,30 @@ pub(super) const TIME_NAMES: [&str; 5] = ["t", "time", "timestamp", "stamp", "he
 pub(super) fn names(signal: Signal) -> &'static [&'static [&'static str]] {
     match signal {
         Signal::Time => &[&TIME_NAMES],
-        Signal::Position => &[&["q", "pos", "position", "joint_position", "positions", "joint_positions"], &["qm", "motor_position"]],
-        Signal::Velocity => &[&["dq", "qd", "v", "vel", "velocity", "joint_velocity", "velocities", "joint_velocities"]],
-        Signal::Acceleration => &[&["ddq", "qdd", "a", "acc", "acceleration", "joint_acceleration", "accelerations"]],
-        Signal::Effort => &[&["tau", "effort", "torque", "joint_torque", "joint_effort", "efforts", "torques", "joint_torques", "joint_efforts"], &["u"]],
+        Signal::Position => &[
+            &["q", "pos", "position", "joint_position", "positions", "joint_positions"],
+            &["qm", "motor_position"],
+        ],
+        Signal::Velocity => {
+            &[&["dq", "qd", "v", "vel", "velocity", "joint_velocity", "velocities", "joint_velocities"]]
+        }
+        Signal::Acceleration => {
+            &[&["ddq", "qdd", "a", "acc", "acceleration", "joint_acceleration", "accelerations"]]
+        }
+        Signal::Effort => &[
+            &[
+                "tau",
+                "effort",
+                "torque",
+                "joint_torque",
+                "joint_effort",
+                "efforts",
+                "torques",
+                "joint_torques",
+                "joint_efforts",
+            ],
+            &["u"],
+        ],
         Signal::Temperature => &[&["temp", "temperature", "t", "temperatures"]],
     }
 }

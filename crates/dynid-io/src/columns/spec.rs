@@ -400,7 +400,8 @@ impl Resolver<'_> {
         let said = |full: &FullSignal| full.unit.is_some() || full.scale.is_some();
         let mut unit_stated = matches!(stated, SignalSpec::Full(full) if said(full));
         if !unit_stated {
-            let in_name = |part: &ColumnUse| ColumnName::new(&part.name).reading(|_| true).flatten().is_some();
+            let in_name =
+                |part: &ColumnUse| ColumnName::new(&part.name).reading(|_| true).flatten().is_some();
             unit_stated = parts.iter().all(in_name);
         }
         if !unit_stated && parts.len() > 1 {

@@ -22,7 +22,10 @@ pub fn columns_of_unnamed(table: &Table, joints: usize) -> Result<MappingSpec, M
     let columns = table.columns.len();
     let refused = |reason: String| Err(MappingError::Unnamed { columns, joints, reason });
     if columns != 1 + 3 * joints {
-        return refused(format!("time, positions, velocities and efforts of {joints} joints are {} columns", 1 + 3 * joints));
+        return refused(format!(
+            "time, positions, velocities and efforts of {joints} joints are {} columns",
+            1 + 3 * joints
+        ));
     }
     let time = &table.columns[0];
     if time.len() < 20 || time.windows(2).any(|w| w[1].is_nan() || w[1] <= w[0]) {

@@ -231,7 +231,9 @@ pub enum LogFileError {
         found: String,
     },
     /// Numbers with commas beside numbers with points.
-    #[error("{file}: expected one decimal mark, found `{comma}` in column `{of_comma}` and `{point}` in column `{of_point}`")]
+    #[error(
+        "{file}: expected one decimal mark, found `{comma}` in column `{of_comma}` and `{point}` in column `{of_point}`"
+    )]
     MixedMarks {
         /// File.
         file: String,
@@ -255,7 +257,9 @@ pub enum LogFileError {
         found: String,
     },
     /// A list of another length than that of the first row.
-    #[error("{file}: row {row} (line {line}), column `{column}`: expected a list of {expected} numbers as in the first row, found {found}")]
+    #[error(
+        "{file}: row {row} (line {line}), column `{column}`: expected a list of {expected} numbers as in the first row, found {found}"
+    )]
     ListLength {
         /// File.
         file: String,
@@ -271,7 +275,9 @@ pub enum LogFileError {
         found: usize,
     },
     /// A message of other joints than the first one.
-    #[error("{file}: row {row} (line {line}), column `{column}`: expected the joint `{expected}` as in the first row, found `{found}`")]
+    #[error(
+        "{file}: row {row} (line {line}), column `{column}`: expected the joint `{expected}` as in the first row, found `{found}`"
+    )]
     OtherJoint {
         /// File.
         file: String,
@@ -287,7 +293,9 @@ pub enum LogFileError {
         found: String,
     },
     /// A message of joints that none of the first ones had.
-    #[error("{file}: row {row} (line {line}): expected a message of the joints that the first ones have, found `{found}`")]
+    #[error(
+        "{file}: row {row} (line {line}): expected a message of the joints that the first ones have, found `{found}`"
+    )]
     OtherJoints {
         /// File.
         file: String,
@@ -352,7 +360,9 @@ impl LogFileError {
             }
             E::Thousands { .. } => "write the log without marks of thousands",
             E::ListLength { .. } => "leave the row out: `leave_out = [[first, last]]` in its [[log]]",
-            E::OtherJoint { .. } | E::OtherJoints { .. } => "record the joint states of one publisher alone, all joints in every message",
+            E::OtherJoint { .. } | E::OtherJoints { .. } => {
+                "record the joint states of one publisher alone, all joints in every message"
+            }
             E::NoMessage { .. } => "remove the line: it is no message",
             E::TooManyColumns { .. } => "check the delimiter",
             E::DuplicateColumn { .. } => "rename one of them",

@@ -177,7 +177,8 @@ impl RowParser {
         times: &[String],
     ) -> Result<Self, LogFileError> {
         let delimiter = detect(header);
-        let mut parser = Self::new(file, line, delimiter, &split(header, delimiter), &ReadOptions::default())?;
+        let mut parser =
+            Self::new(file, line, delimiter, &split(header, delimiter), &ReadOptions::default())?;
         for (name, largest) in parser.names.iter().zip(&mut parser.largest) {
             if times.contains(name) {
                 *largest = f64::MAX;

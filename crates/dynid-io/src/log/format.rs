@@ -55,7 +55,9 @@ impl LogFormat {
         match self {
             LogFormat::PlotJuggler => "its first column is `__time`",
             LogFormat::RostopicEcho => "its first column is `%time`",
-            LogFormat::Ros2TopicEcho => "no header; seconds, nanoseconds, a frame, names of joints, then numbers",
+            LogFormat::Ros2TopicEcho => {
+                "no header; seconds, nanoseconds, a frame, names of joints, then numbers"
+            }
             LogFormat::Rtde => "it has columns such as `actual_q_0`",
             LogFormat::Libfranka => "it has a success rate beside `q[0]` and `tau_J[0]`",
         }

@@ -56,7 +56,12 @@ impl Layout {
         if let Some(echo) = Echo::of_lines(lines) {
             if let Some(names) = &options.names {
                 let (expected, found) = (echo.names().len(), names.len());
-                return Err(LogFileError::NameCount { file: file.to_owned(), line: first.0, expected, found });
+                return Err(LogFileError::NameCount {
+                    file: file.to_owned(),
+                    line: first.0,
+                    expected,
+                    found,
+                });
             }
             return Ok(Self::of_echo(echo));
         }
@@ -111,14 +116,18 @@ impl Sniffer<'_> {
             let (limit, found) = (MAX_COLUMNS, fields.len());
             return Err(LogFileError::TooManyColumns { file: self.file.to_owned(), line, limit, found });
         }
-        let mut rows: Vec<Vec<Vec<u8>>> = self.sample.iter().map(|(_, text)| split(text, delimiter)).collect();
+        let mut rows: Vec<Vec<Vec<u8>>> =
+            self.sample.iter().map(|(_, text)| split(text, delimiter)).collect();
         if first_is_row {
             rows.insert(0, fields.clone());
         }
         let mut notes = Vec::new();
         let mut names = self.names(fields, first_is_row, &mut notes)?;
         // A delimiter behind the last field makes one more.
-        if rows.first().is_some_and(|row| row.len() == names.len() + 1 && row.last().is_some_and(Vec::is_empty)) {
+        if rows
+            .first()
+            .is_some_and(|row| row.len() == names.len() + 1 && row.last().is_some_and(Vec::is_empty))
+        {
             names.push(format!("column{}", names.len() + 1));
         }
         rows.retain(|row| row.len() == names.len());
@@ -128,7 +137,8 @@ impl Sniffer<'_> {
             (0..names.len()).map(|k| rows.iter().map(|row| classify(&row[k])).collect()).collect();
         let comma = self.decimal(&names, &rows, &cells, &mut notes)?;
         let mut holds: Vec<Holds> = cells.iter().map(|column| held(column)).collect();
-        let mut header = LogHeader { unnamed: first_is_row && self.options.names.is_none(), ..of_columns(names, &holds) };
+        let mut header =
+            LogHeader { unnamed: first_is_row && self.options.names.is_none(), ..of_columns(names, &holds) };
         if let Some(format) = header.format {
             notes.insert(0, format_note(format));
         }
@@ -205,7 +215,11 @@ impl Sniffer<'_> {
             return Ok(mark == DecimalMark::Comma);
         }
         if let Some((k, row)) = find(&|c| *c == Cell::BothMarks) {
-            return Err(LogFileError::Thousands { file: file(), column: names[k].clone(), found: shown(k, row) });
+            return Err(LogFileError::Thousands {
+                file: file(),
+                column: names[k].clone(),
+                found: shown(k, row),
+            });
         }
         let Some((k, row)) = find(&|c| matches!(c, Cell::Comma { .. })) else { return Ok(false) };
         let point = rows.iter().enumerate().find_map(|(row, fields)| {
@@ -222,7 +236,11 @@ impl Sniffer<'_> {
             });
         }
         let Some((k, row)) = find(&|c| *c == Cell::Comma { grouped: false }) else {
-            return Err(LogFileError::AmbiguousComma { file: file(), column: names[k].clone(), found: shown(k, row) });
+            return Err(LogFileError::AmbiguousComma {
+                file: file(),
+                column: names[k].clone(),
+                found: shown(k, row),
+            });
         };
         let reason = format!("`{}` in column `{}`", shown(k, row), names[k]);
         notes.push(ReadingNote::new("decimal mark", "comma", reason));
@@ -257,7 +275,11 @@ impl Sniffer<'_> {
             .map(|(_, (_, name))| name.trim_end_matches("[0]"))
             .collect();
         if !lists.is_empty() {
-            notes.push(ReadingNote::new("list cells", listed(&lists, LISTED), "one column per entry, numbered from 0"));
+            notes.push(ReadingNote::new(
+                "list cells",
+                listed(&lists, LISTED),
+                "one column per entry, numbered from 0",
+            ));
         }
         let texts: Vec<&String> =
             header.names.iter().zip(&header.text).filter(|(_, text)| **text).map(|(name, _)| name).collect();
@@ -269,7 +291,8 @@ impl Sniffer<'_> {
 
 /// True if most of the fields of a line are values.
 fn is_data(fields: &[Vec<u8>]) -> bool {
-    let is_value = |field: &&Vec<u8>| matches!(classify(field), Cell::Number | Cell::Comma { .. } | Cell::List(_));
+    let is_value =
+        |field: &&Vec<u8>| matches!(classify(field), Cell::Number | Cell::Comma { .. } | Cell::List(_));
     2 * fields.iter().filter(is_value).count() > fields.len()
 }
 

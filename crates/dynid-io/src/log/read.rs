@@ -60,8 +60,8 @@ impl LogText {
         }
         let bounds =
             Bounds { max_bytes: read.max_bytes, max_ratio: read.max_ratio, ratio_grace: read.ratio_grace };
-        let input =
-            Input::open(path, bounds).map_err(|error| LogFileError::Unreadable { file: file.clone(), error })?;
+        let input = Input::open(path, bounds)
+            .map_err(|error| LogFileError::Unreadable { file: file.clone(), error })?;
         let mut lines = Lines::new(input, &file, read.max_bytes, read.max_ratio);
         let Some(mut first) = next(&mut lines)? else { return Err(LogFileError::Empty { file }) };
         let mut delimiter = read.delimiter;
@@ -105,8 +105,7 @@ impl LogText {
         let shown = self.header();
         let place = |k: &usize| self.layout.header.column(&shown.names[*k]);
         let all: Vec<usize> = (0..shown.names.len()).filter(|k| !shown.text[*k]).collect();
-        let columns: Vec<usize> =
-            wanted.columns.as_ref().unwrap_or(&all).iter().filter_map(place).collect();
+        let columns: Vec<usize> = wanted.columns.as_ref().unwrap_or(&all).iter().filter_map(place).collect();
         let time: Vec<usize> = wanted.time.iter().filter_map(place).collect();
         let mut rows = self.rows(columns, &time, wanted.missing != Missing::Error);
         let (first, last) = self.options.read.rows.unwrap_or((1, usize::MAX));
@@ -166,7 +165,8 @@ impl LogText {
                 let mut slot = 0;
                 let mut takes = Vec::with_capacity(holds.len());
                 for (cell, holds) in holds.iter().enumerate() {
-                    let largest = if time.contains(&slot) { f64::MAX } else { self.options.read.max_magnitude };
+                    let largest =
+                        if time.contains(&slot) { f64::MAX } else { self.options.read.max_magnitude };
                     let width = if let Holds::Lists(length) = holds { *length } else { 1 };
                     let used = (slot..slot + width).any(|k| columns.contains(&k));
                     takes.push(match holds {
@@ -191,10 +191,13 @@ impl LogText {
                 LineParser::Cells(Cells::new(*delimiter, *comma, takes, keep_missing))
             }
         };
-        let values = vec![0.0; match &parser {
-            LineParser::Cells(cells) => cells.width(),
-            LineParser::Echo(_) => width,
-        }];
+        let values = vec![
+            0.0;
+            match &parser {
+                LineParser::Cells(cells) => cells.width(),
+                LineParser::Echo(_) => width,
+            }
+        ];
         Rows { parser, values, origin, values_of: vec![Vec::new(); columns.len()], columns }
     }
 

@@ -45,7 +45,12 @@ impl<'a> EchoRow<'a> {
             *array = (at..at + names.len()).map(number).collect::<Option<_>>()?;
             at += names.len();
         }
-        (at == fields.len() && !arrays[0].is_empty()).then_some(EchoRow { seconds, nanoseconds, names, arrays })
+        (at == fields.len() && !arrays[0].is_empty()).then_some(EchoRow {
+            seconds,
+            nanoseconds,
+            names,
+            arrays,
+        })
     }
 }
 
@@ -83,12 +88,14 @@ impl Echo {
             remarks: 0,
         };
         for row in lines.filter_map(EchoRow::of) {
-            let names: Vec<String> = row.names.iter().map(|n| String::from_utf8_lossy(n).into_owned()).collect();
+            let names: Vec<String> =
+                row.names.iter().map(|n| String::from_utf8_lossy(n).into_owned()).collect();
             let own = (0..3).filter(|k| !row.arrays[*k].is_empty());
             let new: Vec<usize> = own.filter(|k| !echo.arrays.contains(k)).collect();
             echo.arrays.extend(new);
             if !echo.kinds.contains(&names) {
-                let unknown: Vec<String> = names.iter().filter(|n| !echo.joints.contains(n)).cloned().collect();
+                let unknown: Vec<String> =
+                    names.iter().filter(|n| !echo.joints.contains(n)).cloned().collect();
                 echo.joints.extend(unknown);
                 echo.kinds.push(names);
             }
@@ -154,8 +161,12 @@ impl Echo {
 pub(super) fn name_after_joints(header: &mut LogHeader, first_row: &[Vec<u8>]) -> Vec<usize> {
     let mut named = Vec::new();
     for number in 0.. {
-        let Some(column) = header.names.iter().position(|n| *n == format!("field.name{number}")) else { break };
-        let Some(joint) = first_row.get(column).map(|f| String::from_utf8_lossy(f).into_owned()) else { break };
+        let Some(column) = header.names.iter().position(|n| *n == format!("field.name{number}")) else {
+            break;
+        };
+        let Some(joint) = first_row.get(column).map(|f| String::from_utf8_lossy(f).into_owned()) else {
+            break;
+        };
         named.push(column);
         for array in ARRAYS {
             let place = header.names.iter().position(|n| *n == format!("field.{array}{number}"));

@@ -127,7 +127,10 @@ impl Cells {
                         length
                     }
                     Some(_) => return false,
-                    None if self.keep_missing && separator.is_some() && rest.first().is_none_or(|b| ends(*b)) => {
+                    None if self.keep_missing
+                        && separator.is_some()
+                        && rest.first().is_none_or(|b| ends(*b)) =>
+                    {
                         *value = f64::NAN;
                         0
                     }

@@ -237,7 +237,11 @@ mod tests {
     fn stamps_may_be_of_any_size_under_any_name_that_is_said_to_be_a_time() {
         for (format, header, row) in [
             (LineFormat::Csv, "clock,q1", "1700000000000000000,1"),
-            (LineFormat::Json, r#"{"clock": 1700000000000000000, "q1": 1}"#, r#"{"clock": 1700000000000000001, "q1": 1}"#),
+            (
+                LineFormat::Json,
+                r#"{"clock": 1700000000000000000, "q1": 1}"#,
+                r#"{"clock": 1700000000000000001, "q1": 1}"#,
+            ),
         ] {
             for (times, good) in [(vec![], false), (vec!["clock".to_owned()], true)] {
                 let mut stream = StreamRows::new("stdin", format).with_times(times);

@@ -36,7 +36,13 @@ impl JsonFields {
         }
         let places = names.iter().enumerate().map(|(k, n)| (n.clone(), k)).collect();
         let times = names.iter().map(|n| is_time_name(n) || times.contains(n)).collect();
-        Ok(JsonFields { places, times, values: vec![0.0; names.len()], filled: vec![false; names.len()], names })
+        Ok(JsonFields {
+            places,
+            times,
+            values: vec![0.0; names.len()],
+            filled: vec![false; names.len()],
+            names,
+        })
     }
 
     pub(super) fn names(&self) -> &[String] {

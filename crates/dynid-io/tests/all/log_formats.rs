@@ -60,7 +60,10 @@ fn formats_are_recognised_by_their_columns() {
         ("1700000000,5,,a,1,2,3\n1700000000,6,,a,1,2,3\n", Some(LogFormat::Ros2TopicEcho)),
         ("timestamp actual_q_0 actual_qd_0\n0.1 1 2\n", Some(LogFormat::Rtde)),
         ("time,success_rate,state.q[0],state.tau_J[0]\n1,1,1,1\n", Some(LogFormat::Libfranka)),
-        ("duration, success rate, q[0],q_d[0],tau_J[0],sent commands,q_d[0]\n1,1,1,1,1,,1\n", Some(LogFormat::Libfranka)),
+        (
+            "duration, success rate, q[0],q_d[0],tau_J[0],sent commands,q_d[0]\n1,1,1,1,1,,1\n",
+            Some(LogFormat::Libfranka),
+        ),
         ("t,q1,tau1\n0,1,2\n", None),
     ] {
         assert_eq!(header(text).format, format, "{text}");
@@ -101,7 +104,8 @@ fn a_row_reads_alike_on_both_ways() {
         let cells = [x * 0.1, (x * 0.37).sin() * 1e3, -(x * 1.7).cos() / 7.0];
         let row = cells.map(|c| c.to_string());
         plain += &format!("{},x,{}\n", row.join(","), 1_700_000_000_000_000_001_i64 + i64::from(k));
-        quoted += &format!("\"{}\",x,\"{}\"\n", row.join("\",\""), 1_700_000_000_000_000_001_i64 + i64::from(k));
+        quoted +=
+            &format!("\"{}\",x,\"{}\"\n", row.join("\",\""), 1_700_000_000_000_000_001_i64 + i64::from(k));
     }
     let read = |text: &str| {
         let wanted = Wanted { columns: Some(vec![0, 1, 2, 4]), time: vec![4], missing: Missing::Error };
@@ -155,10 +159,13 @@ fn the_mapping_goes_before_names() {
 
 #[test]
 fn joints_of_messages_decide_the_order() {
-    let echo = rows("%time,field.header.stamp,field.name0,field.name1,field.position0,field.position1,field.effort0,field.effort1", |k| {
-        let stamp = 10_000_000 * (k as i64 + 1);
-        format!("{},{stamp},b,a,{},2,3,4", stamp + 1, 0.01 * k as f64)
-    });
+    let echo = rows(
+        "%time,field.header.stamp,field.name0,field.name1,field.position0,field.position1,field.effort0,field.effort1",
+        |k| {
+            let stamp = 10_000_000 * (k as i64 + 1);
+            format!("{},{stamp},b,a,{},2,3,4", stamp + 1, 0.01 * k as f64)
+        },
+    );
     let (signals, time) = understood(&echo, "a,b", "").unwrap();
     assert_eq!((signals.position[0][9], signals.position[1][9]), (2.0, 0.09));
     assert_eq!(signals.effort.unwrap()[0][0], 4.0);
@@ -175,7 +182,9 @@ fn joints_of_messages_decide_the_order() {
 
 #[test]
 fn patterns_and_lists_name_columns() {
-    let text = rows("t,/js/a/pos,/js/b/pos,tau", |k| format!("{},{},2,\"[5, 6]\"", 0.01 * k as f64, 0.01 * k as f64));
+    let text = rows("t,/js/a/pos,/js/b/pos,tau", |k| {
+        format!("{},{},2,\"[5, 6]\"", 0.01 * k as f64, 0.01 * k as f64)
+    });
     let spec = "position = \"/js/{joint}/pos\"\neffort = \"tau\"";
     let (signals, _) = understood(&text, "b,a", spec).unwrap();
     assert_eq!((signals.position[0][5], signals.position[1][5]), (2.0, 0.05));

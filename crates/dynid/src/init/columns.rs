@@ -12,12 +12,15 @@ const SAME_UNIT: f64 = 0.5;
 /// Positions in degrees, and velocities in degrees per second where these agree with positions as they stand in the file.
 pub(super) fn in_degrees(loaded: &LoadedLog) -> (SignalSpec, Option<SignalSpec>) {
     let names = |columns: &[Option<ColumnUse>]| {
-        ColumnNames::List(columns.iter().map(|c| c.as_ref().map_or_else(String::new, |c| c.name.clone())).collect())
+        ColumnNames::List(
+            columns.iter().map(|c| c.as_ref().map_or_else(String::new, |c| c.name.clone())).collect(),
+        )
     };
     let position = in_unit(names(&loaded.mapping.position), "deg");
-    let velocity = loaded.mapping.velocity.as_ref().map(|columns| {
-        in_unit(names(columns), if velocities_follow(loaded) { "deg/s" } else { "rad/s" })
-    });
+    let velocity =
+        loaded.mapping.velocity.as_ref().map(|columns| {
+            in_unit(names(columns), if velocities_follow(loaded) { "deg/s" } else { "rad/s" })
+        });
     (position, velocity)
 }
 
@@ -46,8 +49,10 @@ pub(super) fn names(columns: &[Option<ColumnUse>], mapping: &ColumnMapping) -> S
     match pattern {
         Some(pattern) => super::text::quoted(&pattern),
         None => {
-            let list: Vec<String> =
-                columns.iter().map(|c| super::text::quoted(c.as_ref().map_or("", |c| c.name.as_str()))).collect();
+            let list: Vec<String> = columns
+                .iter()
+                .map(|c| super::text::quoted(c.as_ref().map_or("", |c| c.name.as_str())))
+                .collect();
             format!("[{}]", list.join(", "))
         }
     }
@@ -67,7 +72,8 @@ fn by_number(names: &[&str]) -> Option<String> {
     let name = names.first().filter(|n| !n.contains(['{', '}']))?;
     let at = name.find('1')?;
     let pattern = format!("{}{{}}{}", &name[..at], &name[at + 1..]);
-    let fits = names.iter().enumerate().all(|(k, name)| pattern.replace("{}", &(k + 1).to_string()) == **name);
+    let fits =
+        names.iter().enumerate().all(|(k, name)| pattern.replace("{}", &(k + 1).to_string()) == **name);
     (fits && names.len() > 1).then_some(pattern)
 }
 

@@ -61,7 +61,12 @@ pub fn draft(
     let Some(first) = settings.logs.first() else {
         return Err(Error::setting("log", "at least one log", "none"));
     };
-    let mut reading = Reading { spec: settings.columns.clone(), trial: settings.columns.clone(), open: Vec::new(), degrees: None };
+    let mut reading = Reading {
+        spec: settings.columns.clone(),
+        trial: settings.columns.clone(),
+        open: Vec::new(),
+        degrees: None,
+    };
     let loaded = reading.of_log(first, &robot, ask)?;
     let mut found = Vec::new();
     if let Some(loaded) = &loaded {

@@ -1,8 +1,8 @@
 //! What logs do not tell.
 
+use dynid_io::LogFileError;
 use dynid_io::columns::{ColumnNames, FullSignal, MappingError, MappingSpec, Signal, SignalSpec, Units};
 use dynid_io::log::{DecimalMark, Missing};
-use dynid_io::LogFileError;
 
 use crate::Error;
 use crate::robot::Robot;
@@ -55,7 +55,12 @@ pub(super) fn settle(error: &Error, spec: &mut MappingSpec) -> bool {
 
 /// Columns in a unit.
 pub(super) fn in_unit(columns: ColumnNames, unit: &str) -> SignalSpec {
-    SignalSpec::Full(FullSignal { columns, unit: Some(Units::One(unit.to_owned())), scale: None, offset: None })
+    SignalSpec::Full(FullSignal {
+        columns,
+        unit: Some(Units::One(unit.to_owned())),
+        scale: None,
+        offset: None,
+    })
 }
 
 impl Question {
@@ -91,7 +96,9 @@ impl Question {
                 ),
                 MappingError::Unnamed { columns, reason, .. } => question(
                     "names",
-                    format!("The log has no header ({reason}). Names of its {columns} columns, with commas between (such as t,q1,q2,tau1,tau2)?"),
+                    format!(
+                        "The log has no header ({reason}). Names of its {columns} columns, with commas between (such as t,q1,q2,tau1,tau2)?"
+                    ),
                     "one name per column",
                     format!("names = [\"t\", ..]  # {columns} names; joints: {all}"),
                     Kind::Names,
@@ -105,10 +112,14 @@ impl Question {
                 MappingError::Missing { signal: Signal::Position, joints: without, .. }
                     if without.len() < joints.len() =>
                 {
-                    let without: Vec<String> = without.iter().map(|j| j.trim_matches('`').to_owned()).collect();
+                    let without: Vec<String> =
+                        without.iter().map(|j| j.trim_matches('`').to_owned()).collect();
                     question(
                         "allow_unlogged",
-                        format!("There is no position of {}. Is it held at zero throughout the log? (yes or no)", without.join(", ")),
+                        format!(
+                            "There is no position of {}. Is it held at zero throughout the log? (yes or no)",
+                            without.join(", ")
+                        ),
                         "yes or no",
                         format!("allow_unlogged = true  # {} held at zero", without.join(", ")),
                         Kind::Unlogged,
@@ -120,9 +131,12 @@ impl Question {
                 MappingError::Ambiguous { signal: Signal::Time, candidates, .. } => {
                     columns_question(Signal::Time, "Several columns may be the time", candidates, "")
                 }
-                MappingError::Ambiguous { signal, owner, candidates } => {
-                    columns_question(*signal, &format!("Several columns may be the {signal} of {owner}"), candidates, &all)
-                }
+                MappingError::Ambiguous { signal, owner, candidates } => columns_question(
+                    *signal,
+                    &format!("Several columns may be the {signal} of {owner}"),
+                    candidates,
+                    &all,
+                ),
                 _ => None,
             },
             _ => None,
@@ -162,7 +176,9 @@ impl Question {
             Kind::Gains(count) => {
                 let gains: Result<Vec<f64>, _> = list().iter().map(|x| x.parse::<f64>()).collect();
                 match gains {
-                    Ok(gains) if gains.len() == *count && gains.iter().all(|g| g.is_finite() && *g != 0.0) => {
+                    Ok(gains)
+                        if gains.len() == *count && gains.iter().all(|g| g.is_finite() && *g != 0.0) =>
+                    {
                         spec.current_gains = Some(gains);
                         true
                     }

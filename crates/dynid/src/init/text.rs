@@ -31,7 +31,11 @@ impl Page {
     /// `key = value  # why`.
     fn entry(&mut self, key: &str, value: &str, why: &str) {
         let why = why.replace(['\n', '\r'], " ");
-        self.line(if why.is_empty() { format!("{key} = {value}") } else { format!("{key} = {value}  # {why}") });
+        self.line(if why.is_empty() {
+            format!("{key} = {value}")
+        } else {
+            format!("{key} = {value}  # {why}")
+        });
     }
 }
 
@@ -43,7 +47,9 @@ pub(super) fn write(
     loaded: Option<&LoadedLog>,
 ) -> String {
     let mut page = Page(String::new());
-    page.line("# Configuration of a dynid run. What was found out has its reason beside it; change what is wrong.");
+    page.line(
+        "# Configuration of a dynid run. What was found out has its reason beside it; change what is wrong.",
+    );
     if !reading.open.is_empty() {
         page.line("# Lines with `..` wait for what the logs do not tell: fill them in and take the `#` in front away.");
     }
@@ -106,16 +112,23 @@ fn signals(page: &mut Page, reading: &Reading, loaded: &LoadedLog) {
     let (spec, mapping) = (&reading.spec, &loaded.mapping);
     let is_open = |key: &str| reading.open.iter().any(|q| q.key == key);
     match &mapping.time {
-        TimeSource::Rate(hz) if spec.rate_hz.is_some() => page.entry("rate_hz", &hz.to_string(), "no time column"),
+        TimeSource::Rate(hz) if spec.rate_hz.is_some() => {
+            page.entry("rate_hz", &hz.to_string(), "no time column")
+        }
         TimeSource::Columns(time) if !is_open("time") => {
             let list: Vec<String> = time.parts.iter().map(|p| quoted(&p.name)).collect();
             let why = loaded.reading.iter().find(|n| n.setting == "time").map_or("", |n| n.reason.as_str());
             match time.parts.as_slice() {
-                [one] => page.entry("time", &format!("{{ columns = {}, {} }}", list[0], unit_of(one, TIME)), why),
+                [one] => {
+                    page.entry("time", &format!("{{ columns = {}, {} }}", list[0], unit_of(one, TIME)), why)
+                }
                 parts => {
                     let scale: Vec<String> = parts.iter().map(|p| format!("{:?}", p.factor)).collect();
-                    let value =
-                        format!("{{ columns = [{}], unit = \"s\", scale = [{}] }}", list.join(", "), scale.join(", "));
+                    let value = format!(
+                        "{{ columns = [{}], unit = \"s\", scale = [{}] }}",
+                        list.join(", "),
+                        scale.join(", ")
+                    );
                     page.entry("time", &value, why);
                 }
             }
@@ -130,12 +143,27 @@ fn signals(page: &mut Page, reading: &Reading, loaded: &LoadedLog) {
     let why = reading.degrees.clone().unwrap_or(order);
     page.entry("position", &signal(&mapping.position, loaded, POSITION), &why);
     if let Some(velocity) = &mapping.velocity {
-        page.entry("velocity", &signal(velocity, loaded, VELOCITY), "a second source beside the positions; used by the pre-flight");
+        page.entry(
+            "velocity",
+            &signal(velocity, loaded, VELOCITY),
+            "a second source beside the positions; used by the pre-flight",
+        );
     }
     if let Some(gains) = &spec.current_gains {
         let list: Vec<String> = gains.iter().map(|g| format!("{g:?}")).collect();
-        let of = mapping.effort.iter().flatten().flatten().map(|c| c.name.as_str()).take(SHOWN).collect::<Vec<_>>();
-        page.entry("current_gains", &format!("[{}]", list.join(", ")), &format!("N m/A, of {}", of.join(" ")));
+        let of = mapping
+            .effort
+            .iter()
+            .flatten()
+            .flatten()
+            .map(|c| c.name.as_str())
+            .take(SHOWN)
+            .collect::<Vec<_>>();
+        page.entry(
+            "current_gains",
+            &format!("[{}]", list.join(", ")),
+            &format!("N m/A, of {}", of.join(" ")),
+        );
     } else if let Some(effort) = &mapping.effort {
         let why = "no unit is said: N m (N of sliding joints); the pre-flight judges the size";
         let stated = effort.iter().flatten().any(|c| c.factor != 1.0);
@@ -161,8 +189,12 @@ type KnownUnits = &'static [(&'static str, f64)];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 const TIME: KnownUnits = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
 const POSITION: KnownUnits = &[("SI", 1.0), ("deg", DEGREE), ("rev", std::f64::consts::TAU), ("mm", 1e-3)];
-const VELOCITY: KnownUnits =
-    &[("SI", 1.0), ("deg/s", DEGREE), ("rev/s", std::f64::consts::TAU), ("rpm", std::f64::consts::TAU / 60.0)];
+const VELOCITY: KnownUnits = &[
+    ("SI", 1.0),
+    ("deg/s", DEGREE),
+    ("rev/s", std::f64::consts::TAU),
+    ("rpm", std::f64::consts::TAU / 60.0),
+];
 const EFFORT: KnownUnits = &[("SI", 1.0), ("mN m", 1e-3), ("kN m", 1e3)];
 
 /// `unit = ".."`, or `unit = "s", scale = ..`.
@@ -181,7 +213,8 @@ fn signal(columns: &[Option<ColumnUse>], loaded: &LoadedLog, known: KnownUnits) 
         // A unit in the brackets of a name is said already.
         return value;
     }
-    let shared = uses.first().filter(|first| uses.iter().all(|c| c.factor == first.factor && c.offset == 0.0));
+    let shared =
+        uses.first().filter(|first| uses.iter().all(|c| c.factor == first.factor && c.offset == 0.0));
     if let Some((unit, _)) = shared.and_then(|c| known.iter().find(|(_, factor)| *factor == c.factor)) {
         return format!("{{ columns = {value}, unit = \"{unit}\" }}");
     }
@@ -237,4 +270,3 @@ fn logs(page: &mut Page, settings: &DraftSettings, loaded: Option<&LoadedLog>) {
     entry(page, "log", 0, Some((0.0, TRAINING_SHARE, "the first part is identified from")));
     entry(page, "validation", 0, Some((TRAINING_SHARE, 1.0, "the rest is predicted; another log is better")));
 }
-

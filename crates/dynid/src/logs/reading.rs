@@ -132,7 +132,9 @@ pub fn table(log: &LogConfig, spec: &MappingSpec) -> Result<(Table, LogHeader), 
     let missing = spec.missing.unwrap_or(if drops { Missing::Drop } else { Missing::Error });
     let columns: Vec<usize> = (0..header.names.len()).filter(|k| !header.text[*k]).collect();
     let stated = spec.time_names();
-    let is_time = |k: &usize| header.time.contains(k) || stated.contains(&header.names[*k]) || is_time_name(&header.names[*k]);
+    let is_time = |k: &usize| {
+        header.time.contains(k) || stated.contains(&header.names[*k]) || is_time_name(&header.names[*k])
+    };
     let time = columns.iter().copied().filter(is_time).collect();
     let (table, _) = text.read(&Wanted { columns: Some(columns.clone()), time, missing })?;
     let texts: Vec<String> =

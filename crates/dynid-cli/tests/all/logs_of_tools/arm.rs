@@ -61,7 +61,8 @@ impl Arm {
     /// Positions, velocities and efforts of a row, between separators.
     pub(super) fn signals(&self, k: usize, separator: &str) -> String {
         let lists = [&self.q, &self.dq, &self.tau];
-        let cells: Vec<String> = lists.iter().flat_map(|l| l.iter()).map(|list| list[k].to_string()).collect();
+        let cells: Vec<String> =
+            lists.iter().flat_map(|l| l.iter()).map(|list| list[k].to_string()).collect();
         cells.join(separator)
     }
 }

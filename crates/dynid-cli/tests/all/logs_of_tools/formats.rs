@@ -14,9 +14,8 @@ fn says(said: &str, parts: &[&str]) {
 fn plot_juggler() -> String {
     let Arm { q, dq, tau, .. } = arm();
     let series = [("effort", tau), ("position", q), ("velocity", dq)];
-    let names = ["elbow", "shoulder"].map(|joint| {
-        series.map(|(signal, _)| format!("/joint_states/{joint}/{signal}")).join(",")
-    });
+    let names = ["elbow", "shoulder"]
+        .map(|joint| series.map(|(signal, _)| format!("/joint_states/{joint}/{signal}")).join(","));
     let header = format!("__time,/camera/fps,/joint_states/header/stamp,{}", names.join(","));
     arm().rows(&header, |k, t| {
         let cells = [1, 0].map(|joint| series.map(|(_, list)| format!("{:.9}", list[joint][k])).join(","));
@@ -78,14 +77,18 @@ fn ros2_topic_echo() -> String {
 #[test]
 fn ros2_topic_echo_csv() {
     let said = two_commands(&ros2_topic_echo(), &[]);
-    says(&said, &["ros2 topic echo --csv", "joint order: elbow, shoulder, finger", "position = \"position.{joint}\""]);
+    says(
+        &said,
+        &["ros2 topic echo --csv", "joint order: elbow, shoulder, finger", "position = \"position.{joint}\""],
+    );
     one_command(&ros2_topic_echo(), &[]);
 }
 
 #[test]
 fn rostopic_echo_p() {
     let Arm { q, dq, tau, .. } = arm();
-    let fields = ["name", "position", "velocity", "effort"].map(|f| format!("field.{f}0,field.{f}1")).join(",");
+    let fields =
+        ["name", "position", "velocity", "effort"].map(|f| format!("field.{f}0,field.{f}1")).join(",");
     let header = format!("%time,field.header.seq,field.header.stamp,field.header.frame_id,{fields}");
     let log = arm().rows(&header, |k, t| {
         let stamp = nanoseconds(t);
@@ -135,7 +138,14 @@ fn libfranka_log() {
     let Arm { q, dq, tau, .. } = arm();
     let group = |name: &str| format!("{name}[0],{name}[1]");
     let header = [
-        "state.q", "state.q_d", "state.dq", "state.dq_d", "state.tau_J", "state.tau_ext_hat_filtered", "cmd.q_d", "cmd.tau_J_d",
+        "state.q",
+        "state.q_d",
+        "state.dq",
+        "state.dq_d",
+        "state.tau_J",
+        "state.tau_ext_hat_filtered",
+        "cmd.q_d",
+        "cmd.tau_J_d",
     ]
     .map(group)
     .join(",");
@@ -212,7 +222,12 @@ fn numbers_without_a_header() {
     let Arm { q, tau, .. } = arm();
     let log = arm().rows("", |k, t| format!("{t},{},{},{},{}", q[0][k], q[1][k], tau[0][k], tau[1][k]));
     let identify = ["identify", "robot.urdf", "--log", "log.csv", "--out", "out"];
-    super::refused(&log, &identify, &["column names", "5 columns"], "names = [\"t\", \"q1\", \"q2\", .., \"tau1\", \"tau2\", ..]");
+    super::refused(
+        &log,
+        &identify,
+        &["column names", "5 columns"],
+        "names = [\"t\", \"q1\", \"q2\", .., \"tau1\", \"tau2\", ..]",
+    );
     one_command(&log, &["--names", "t,q1,q2,tau1,tau2"]);
 }
 

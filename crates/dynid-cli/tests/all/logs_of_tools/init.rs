@@ -56,7 +56,8 @@ fn of_several_logs_the_last_one_is_kept_and_paths_lead_there() {
 fn degrees_are_written_with_their_reason() {
     let Arm { q, dq, tau, .. } = arm();
     let log = arm().rows("t,q1,q2,dq1,dq2,tau1,tau2", |k, t| {
-        let degrees = |list: &[Vec<f64>; 2]| format!("{},{}", list[0][k].to_degrees(), list[1][k].to_degrees());
+        let degrees =
+            |list: &[Vec<f64>; 2]| format!("{},{}", list[0][k].to_degrees(), list[1][k].to_degrees());
         format!("{t},{},{},{},{}", degrees(q), degrees(dq), tau[0][k], tau[1][k])
     });
     let said = super::two_commands(&log, &[]);

@@ -23,10 +23,13 @@ fn commas_that_may_set_thousands_apart() {
 #[test]
 fn times_whose_unit_is_open_or_absurd() {
     // A slow joint, ten rows in a unit of time: 10 Hz in s or 10 kHz in ms.
-    let slow = |scale: f64| {
-        log(HEADER, |t, q| format!("{},{},{},1,2", scale * 10.0 * t, 1e-3 * q, 2e-3 * q))
-    };
-    refused(&slow(1.0), &CHECK, &["steps of 0.1", "10.0000 Hz in s"], "time = { columns = \"t\", unit = \"s\" }");
+    let slow = |scale: f64| log(HEADER, |t, q| format!("{},{},{},1,2", scale * 10.0 * t, 1e-3 * q, 2e-3 * q));
+    refused(
+        &slow(1.0),
+        &CHECK,
+        &["steps of 0.1", "10.0000 Hz in s"],
+        "time = { columns = \"t\", unit = \"s\" }",
+    );
     // Nanoseconds that are said to be seconds.
     let named = log("t[s],q1,q2,tau1,tau2", |t, q| format!("{:.0},{q},{q},1,2", 1e9 * t));
     refused(&named, &CHECK, &["expected steps of a sampled log", "10000000 s"], "unit = \"ns\"");
@@ -36,7 +39,12 @@ fn times_whose_unit_is_open_or_absurd() {
 fn columns_that_may_be_either() {
     let header = "__time,/a/shoulder/position,/b/shoulder/position,/a/elbow/position,/a/shoulder/effort,/a/elbow/effort";
     let text = log(header, |t, q| format!("{t},{q},{q},{q},1,2"));
-    refused(&text, &CHECK, &["position of `shoulder`", "/b/shoulder/position"], "\"shoulder\" = \"/a/shoulder/position\"");
+    refused(
+        &text,
+        &CHECK,
+        &["position of `shoulder`", "/b/shoulder/position"],
+        "\"shoulder\" = \"/a/shoulder/position\"",
+    );
     let text = log("t,q0,q1,q2,tau0,tau1", |t, q| format!("{t},{q},{q},{q},1,2"));
     refused(&text, &CHECK, &["expected 2", "`q2`"], "[columns]");
     let text = log("t,positions,torques", |t, q| format!("{t},\"[{q}, {q}, {q}]\",\"[1, 2, 3]\""));
@@ -48,7 +56,11 @@ fn lists_and_messages_that_change() {
     let mut row = 0;
     let text = log("t,positions,torques", |t, q| {
         row += 1;
-        if row == 100 { format!("{t},\"[{q}]\",\"[1, 2]\"") } else { format!("{t},\"[{q}, {q}]\",\"[1, 2]\"") }
+        if row == 100 {
+            format!("{t},\"[{q}]\",\"[1, 2]\"")
+        } else {
+            format!("{t},\"[{q}, {q}]\",\"[1, 2]\"")
+        }
     });
     refused(&text, &CHECK, &["row 100", "`positions`", "2 numbers", "found 1"], "leave_out");
     let header = "%time,field.header.stamp,field.name0,field.name1,field.position0,field.position1,field.effort0,field.effort1";
