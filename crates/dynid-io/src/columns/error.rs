@@ -136,7 +136,7 @@ pub enum MappingError {
         column: String,
     },
     /// A time whose unit its numbers leave open.
-    #[error("time, column `{column}`: expected a unit, found steps of {step}: {}", rates(units))]
+    #[error("time, column `{column}`: expected a unit, found steps of {}: {}", short(*step), rates(units))]
     TimeUnit {
         /// Column.
         column: String,
@@ -146,7 +146,7 @@ pub enum MappingError {
         units: Vec<(&'static str, f64)>,
     },
     /// A time in whose unit no log is sampled.
-    #[error("time, column `{column}`: expected steps of a sampled log, found steps of {step} {unit}")]
+    #[error("time, column `{column}`: expected steps of a sampled log, found steps of {} {unit}", short(*step))]
     TimeStep {
         /// Column.
         column: String,
@@ -203,6 +203,11 @@ pub enum MappingError {
         /// The value.
         found: f64,
     },
+}
+
+/// A number with six digits.
+fn short(x: f64) -> f64 {
+    format!("{x:.5e}").parse().unwrap_or(x)
 }
 
 /// `5 Hz in s, 5000 Hz in ms`.

@@ -211,8 +211,8 @@ impl Question {
                 spec.allow_unlogged = true;
                 true
             }
-            Kind::Gains(_) | Kind::Columns(Signal::Effort) if !spec.allow_no_effort => {
-                spec.allow_no_effort = true;
+            Kind::Gains(count) if spec.current_gains.is_none() => {
+                spec.current_gains = Some(vec![1.0; *count]);
                 true
             }
             _ => false,

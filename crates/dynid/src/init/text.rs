@@ -164,7 +164,7 @@ fn signals(page: &mut Page, reading: &Reading, loaded: &LoadedLog) {
             &format!("[{}]", list.join(", ")),
             &format!("N m/A, of {}", of.join(" ")),
         );
-    } else if let Some(effort) = &mapping.effort {
+    } else if let (Some(effort), false) = (&mapping.effort, is_open("current_gains")) {
         let why = "no unit is said: N m (N of sliding joints); the pre-flight judges the size";
         let stated = effort.iter().flatten().any(|c| c.factor != 1.0);
         page.entry("effort", &signal(effort, loaded, EFFORT), if stated { "" } else { why });

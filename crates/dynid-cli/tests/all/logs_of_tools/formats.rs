@@ -241,6 +241,6 @@ fn empty_cells_and_nan_are_left_out_where_that_is_said() {
     });
     let identify = ["identify", "robot.urdf", "--log", "log.csv", "--out", "out"];
     super::refused(&log, &identify, &["row 78", "column `q2`", "NaN"], "missing = \"drop\"");
-    says(&one_command(&log, &["--missing", "drop"]), &["drop, 20 of 2000 rows left out"]);
+    says(&one_command(&log, &["--missing", "drop"]), &["drop, 20 of 2001 rows left out"]);
     says(&two_commands(&log, &[]), &["missing = \"drop\""]);
 }

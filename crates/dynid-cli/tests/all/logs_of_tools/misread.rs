@@ -80,7 +80,7 @@ fn keys_of_columns_that_do_not_fit() {
     let cases: [(&str, &[&str], &str); 9] = [
         ("ignore = [\"mode\"]", &["`mode`", "ignored"], "header"),
         ("names = [\"a\", \"b\"]", &["names", "without a header"], "leave `names` out"),
-        ("decimal = \";\"", &["decimal"], ""),
+        ("decimal = \";\"", &["`;`", "`,`"], ""),
         ("missing = \"guess\"", &["missing", "guess"], ""),
         ("time = \"stamp\"", &["time", "`stamp`"], "header"),
         ("time = \"q\"", &["time", "`q`"], "`q1`, `q2`"),
