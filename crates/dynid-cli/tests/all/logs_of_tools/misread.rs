@@ -81,7 +81,7 @@ fn keys_of_columns_that_do_not_fit() {
         ("ignore = [\"mode\"]", &["`mode`", "ignored"], "header"),
         ("names = [\"a\", \"b\"]", &["names", "without a header"], "leave `names` out"),
         ("decimal = \";\"", &["`;`", "`,`"], ""),
-        ("missing = \"guess\"", &["missing", "guess"], ""),
+        ("missing = \"guess\"", &["`guess`", "`drop`"], ""),
         ("time = \"stamp\"", &["time", "`stamp`"], "header"),
         ("time = \"q\"", &["time", "`q`"], "`q1`, `q2`"),
         ("position = \"joint{}\"", &["position", "`joint1`"], ""),
