@@ -45,6 +45,7 @@ fn run(command: &Command) -> Result<u8, Failure> {
         Command::Friction(args) => commands::friction::run(args),
         Command::Gains(args) => commands::gains::run(args),
         Command::Identify(args) => commands::identify::run(args),
+        Command::Init(args) => commands::init::run(args),
         Command::Inspect(args) => commands::inspect::run(args),
         Command::Man(args) => commands::man::run(args),
         Command::Online(args) => commands::online::run(args),

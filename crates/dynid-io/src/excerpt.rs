@@ -49,6 +49,24 @@ pub fn closest<'a, S: AsRef<str>>(name: &str, known: &'a [S]) -> Option<&'a str>
         .map(|(_, k)| k)
 }
 
+/// The entries of `known` that look most like `name`, at most three, the most alike first: slips of the pen, then names that
+/// hold it or are held by it.
+pub(crate) fn nearest(name: &str, known: &[String]) -> Vec<String> {
+    let most = (name.chars().count() / 3).clamp(1, 3);
+    let wanted = name.to_lowercase();
+    let mut found: Vec<(usize, &String)> = known
+        .iter()
+        .filter_map(|k| {
+            let other = k.to_lowercase();
+            let distance = edit_distance(&wanted, &other);
+            let holds = other.contains(&wanted) || (other.len() > 2 && wanted.contains(&other));
+            (distance <= most || holds).then_some((distance, k))
+        })
+        .collect();
+    found.sort_by_key(|(distance, _)| *distance);
+    found.into_iter().take(3).map(|(_, k)| k.clone()).collect()
+}
+
 /// Levenshtein distance of two names, capped by their first 64 characters.
 fn edit_distance(a: &str, b: &str) -> usize {
     let a: Vec<char> = a.chars().take(64).collect();

@@ -10,6 +10,7 @@ pub mod csv;
 pub mod digest;
 mod excerpt;
 pub mod input;
+pub mod log;
 pub mod mjcf;
 pub mod output;
 pub mod robot;
@@ -24,6 +25,7 @@ pub use columns::{ColumnMapping, GuessOptions, MappingError, MappingSpec, Signal
 pub use csv::{LogFileError, ReadOptions, Table};
 pub use digest::SourceFile;
 pub use excerpt::closest;
+pub use log::{LogHeader, LogOptions, LogText, ReadingNote};
 pub use output::OutputError;
 pub use robot::{Place, RobotFileError};
 pub use states::{StateJoint, States, StatesError};

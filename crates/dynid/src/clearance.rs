@@ -6,7 +6,6 @@ use dynid_estimate::clearance::orbit::{self, OrbitSample, OrbitSettings};
 use dynid_estimate::clearance::swing::{self, SwingSettings};
 use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, States};
 use dynid_io::columns::ChannelSpec;
-use dynid_io::csv::ReadOptions;
 use dynid_io::{ClearanceSpec, MappingSpec};
 use dynid_model::{EffortModel, JournalPath, MotionBlock, RobotModel};
 use serde::Serialize;
@@ -122,9 +121,8 @@ pub fn clearance(
             model.mechanism().rate_names().join(", ")
         )));
     }
-    let header =
-        dynid_io::csv::read(&log.path, &ReadOptions { rows: Some((1, 1)), ..ReadOptions::default() })?.header;
     let mut columns = log.columns.as_ref().unwrap_or(columns).clone();
+    let header = logs::header(log, &columns)?.names;
     for name in robot.elements.clearance.iter().flat_map(|c| journal_channels(&c.joint)) {
         if header.contains(&name) && !columns.channels.contains_key(&name) {
             let spec = ChannelSpec { column: name.clone(), scale: 1.0, offset: 0.0 };

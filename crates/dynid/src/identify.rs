@@ -21,7 +21,7 @@ use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::linear::LinearEstimate;
 use dynid_estimate::rank::numerical_rank;
 use dynid_estimate::whiteness::InBandWhiteness;
-use dynid_io::TrajectoryFile;
+use dynid_io::{ReadingNote, TrajectoryFile};
 use dynid_model::element::scale_name;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
 use dynid_motion::Log;
@@ -100,6 +100,8 @@ pub struct Identification {
     pub logs: Vec<PreparedLog>,
     /// How their columns were understood.
     pub columns: Vec<Vec<(String, String)>>,
+    /// Per training log, how the file was read where that was found out.
+    pub found_out: Vec<Vec<ReadingNote>>,
     /// Files as they were read.
     pub inputs: Vec<InputRecord>,
     /// How logs were read.
@@ -288,6 +290,7 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
     let log_agreement = log_agreement::test(config, &model, &base, &fitted, &plan.log_terms, scale);
     warnings.extend(log_agreement.iter().flat_map(LogAgreement::warnings));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
+    let found_out: Vec<Vec<ReadingNote>> = read.iter().map(|log| log.reading.clone()).collect();
     let (understood, sources): (Vec<_>, Vec<_>) =
         read.into_iter().map(|log| (log.columns, log.inputs)).unzip();
     let mut inputs = InputRecord::of_robot(&robot);
@@ -299,6 +302,7 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
         plan,
         base,
         columns: understood,
+        found_out,
         conditioning,
         friction,
         prior,
@@ -565,6 +569,8 @@ pub(crate) struct ReadLog {
     pub(crate) warnings: Vec<String>,
     /// How columns were understood.
     pub(crate) columns: Vec<(String, String)>,
+    /// How the file was read where that was found out.
+    pub(crate) reading: Vec<ReadingNote>,
     /// Files that were read.
     pub(crate) inputs: Vec<InputRecord>,
 }
@@ -646,7 +652,7 @@ fn open_robot(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> 
         prepared.push(log.prepare(&model, &settings)?);
         let nearest = model.closed().and_then(|closed| logs::poses::nearest_singularity(closed, &log.log));
         let warnings = nearest.into_iter().chain(log.warnings()).collect();
-        read.push(ReadLog { warnings, columns: log.columns, inputs: log.inputs });
+        read.push(ReadLog { warnings, columns: log.columns, reading: log.reading, inputs: log.inputs });
     }
     for log in &prepared {
         config.check_cutoffs(&log.name, log.rate_hz)?;

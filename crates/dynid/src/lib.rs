@@ -25,6 +25,7 @@ pub mod friction;
 mod friction_power;
 pub mod gains;
 pub mod identify;
+pub mod init;
 pub mod inspect;
 pub mod instruments;
 pub mod log_agreement;

@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, prepare};
-use dynid_io::columns::EffortColumn;
-use dynid_io::{ColumnMapping, MappingError, MappingSpec, ReadOptions, Signals, SourceFile};
+use dynid_io::{ColumnMapping, MappingSpec, ReadingNote, Signals, SourceFile};
 use dynid_model::element::{is_temperature, temperature_channel};
 use dynid_model::{EffortModel, Limits, RobotModel};
 use dynid_motion::temperature::{self, TemperatureDoubt};
@@ -14,9 +13,12 @@ use sha2::{Digest, Sha256};
 mod axes;
 mod known_motion;
 pub(crate) mod poses;
+mod reading;
 pub mod turns;
 
 pub use axes::{LogAxis, as_logged, axes, names};
+pub use reading::table;
+pub(crate) use reading::{header, map_columns};
 
 use crate::Error;
 use crate::config::{LogConfig, MotorSide, PerJoint};
@@ -41,6 +43,8 @@ pub struct LoadedLog {
     pub inputs: Vec<InputRecord>,
     /// Positions that jumped by full turns and were unwrapped.
     pub unwrapped: Vec<turns::Unwrapped>,
+    /// How the file was read where that was found out: format, decimal mark, unit of the time, rows without a value.
+    pub reading: Vec<ReadingNote>,
 }
 
 impl LoadedLog {
@@ -51,8 +55,14 @@ impl LoadedLog {
 
     /// Doubts about the signals and what was done to them, in words.
     pub(crate) fn warnings(&self) -> Vec<String> {
-        let turns = self.unwrapped.iter().map(|u| format!("{}: {}", file_name(self.log.name()), u.words()));
-        turns.chain(temperature_warnings(&self.log)).collect()
+        let file = file_name(self.log.name());
+        let turns = self.unwrapped.iter().map(|u| format!("{file}: {}", u.words()));
+        // A header that is missing leaves room for doubt.
+        let guessed = self.reading.iter().filter(|note| note.setting == "columns");
+        let guessed = guessed.map(|note| {
+            format!("{file}: columns without names are taken for {}: {}", note.value, note.reason)
+        });
+        turns.chain(guessed).chain(temperature_warnings(&self.log)).collect()
     }
 
     /// Conditions the log's signals; states of a motion with a stated period come from its Fourier series.
@@ -110,6 +120,7 @@ struct Read {
     mapping: ColumnMapping,
     source: SourceFile,
     unwrapped: Vec<turns::Unwrapped>,
+    notes: Vec<ReadingNote>,
 }
 
 fn read(
@@ -119,17 +130,12 @@ fn read(
     motor_side: Option<&MotorSide>,
 ) -> Result<Read, Error> {
     let file = config.path.display().to_string();
-    let options = ReadOptions { rows: config.rows, ..ReadOptions::default() };
-    let table = dynid_io::csv::read(&config.path, &options)?;
     let spec = config.columns.as_ref().unwrap_or(run_columns);
     let joints = names(axes);
+    let mut understood = reading::understand(config, axes, spec, motor_side.is_some())?;
     let named = |source| Error::Columns { file: file.clone(), source: Box::new(source) };
-    let mapping = map_columns(&table.header, axes, spec).map_err(named)?;
-    if spec.position.is_none() {
-        check_surplus(&mapping, &joints, &table.header, &file)?;
-    }
-    check_gains(spec, joints.len())?;
-    let mut signals = mapping.extract(&table).map_err(named)?;
+    let mut signals = understood.signals().map_err(named)?;
+    let reading::Understood { table, mapping, notes } = understood;
     let source = SourceFile { path: file, sha256: table.sha256 };
     let mut unwrapped = Vec::new();
     if let Some(transmission) = motor_side {
@@ -138,7 +144,7 @@ fn read(
         to_joint_side(&mut signals, transmission)?;
     }
     state_temperatures(&mut signals, config, &joints)?;
-    Ok(Read { signals, mapping, source, unwrapped })
+    Ok(Read { signals, mapping, source, unwrapped, notes })
 }
 
 /// Puts the temperatures that a configuration states in place of the logged ones.
@@ -163,14 +169,15 @@ fn state_temperatures(signals: &mut Signals, config: &LogConfig, joints: &[Strin
 }
 
 fn finish(config: &LogConfig, file: &str, read: Read, axes: &[LogAxis]) -> Result<LoadedLog, Error> {
-    let Read { mut signals, mapping, source, mut unwrapped } = read;
+    let Read { mut signals, mapping, source, mut unwrapped, notes } = read;
     // Many turns look like degrees: units were judged before.
     unwrapped.extend(turns::unwrap(&mut signals, axes));
     let joints: Vec<String> = mapping.joints.clone();
     let not_logged = signals.not_logged.clone();
+    let numbers = numbers(&signals, config.rows.map_or(1, |(first, _)| first));
     let whole = assemble(file, signals)?;
     let times = whole.time().to_vec();
-    let log = left_out(whole, config)?;
+    let log = left_out(whole, config, &numbers)?;
     let mut inputs = vec![InputRecord::of("log", &source)];
     let log = match config.part {
         None => log,
@@ -189,12 +196,20 @@ fn finish(config: &LogConfig, file: &str, read: Read, axes: &[LogAxis]) -> Resul
         None => (log, config.period_s),
     };
     let columns = describe(&mapping);
-    let rows = data_rows(&times, log.time(), config.rows.map_or(1, |(first, _)| first));
-    Ok(LoadedLog { period_s, log, not_logged, columns, mapping, rows, inputs, unwrapped })
+    let rows = data_rows(&times, log.time(), &numbers);
+    Ok(LoadedLog { period_s, log, not_logged, columns, mapping, rows, inputs, unwrapped, reading: notes })
 }
 
-/// Data rows of the rows that are left of a log, which keep their times and their order. `first`: data row of the first time.
-fn data_rows(times: &[f64], left: &[f64], first: usize) -> Vec<usize> {
+/// Data rows of the samples of a log. `first`: data row that its table begins with.
+fn numbers(signals: &Signals, first: usize) -> Vec<usize> {
+    match &signals.rows {
+        Some(rows) => rows.iter().map(|row| first + row).collect(),
+        None => (first..first + signals.time.len()).collect(),
+    }
+}
+
+/// Data rows of the rows that are left of a log, which keep their times and their order. `numbers`: data row of every time.
+fn data_rows(times: &[f64], left: &[f64], numbers: &[usize]) -> Vec<usize> {
     let mut at = 0;
     left.iter()
         .map(|time| {
@@ -202,18 +217,16 @@ fn data_rows(times: &[f64], left: &[f64], first: usize) -> Vec<usize> {
                 at += 1;
             }
             at += 1;
-            first + at - 1
+            numbers[at - 1]
         })
         .collect()
 }
 
 /// The log without the rows that its configuration leaves out; the clock takes what is missing for a gap.
-fn left_out(log: Log, config: &LogConfig) -> Result<Log, Error> {
+fn left_out(log: Log, config: &LogConfig, numbers: &[usize]) -> Result<Log, Error> {
     let mut keep = vec![true; log.rows()];
-    let first_row = config.rows.map_or(1, |(first, _)| first);
     for (from, to) in &config.leave_out {
-        let from = from.saturating_sub(first_row).min(keep.len());
-        let to = (to + 1).saturating_sub(first_row).min(keep.len());
+        let (from, to) = (numbers.partition_point(|n| n < from), numbers.partition_point(|n| n <= to));
         keep[from..to.max(from)].fill(false);
     }
     if config.drop_repeated {
@@ -337,6 +350,19 @@ pub(crate) fn temperature_warnings(log: &Log) -> Vec<String> {
         .collect()
 }
 
+/// Whether the positions of a log look like degrees although radians are said.
+pub(crate) fn degrees(loaded: &LoadedLog, axes: &[LogAxis]) -> Option<Error> {
+    let of_joint = |joint: &JointSignals| axes.iter().position(|a| a.name == joint.name);
+    let joints = loaded.log.joints();
+    let signals = Signals {
+        joints: joints.iter().map(|j| j.name.clone()).collect(),
+        indices: joints.iter().filter_map(of_joint).collect(),
+        position: joints.iter().map(|j| j.position.clone()).collect(),
+        ..Signals::default()
+    };
+    check_degrees(&signals, axes, loaded.log.name()).err()
+}
+
 fn check_degrees(signals: &Signals, axes: &[LogAxis], file: &str) -> Result<(), Error> {
     // Motors turn as often as their gears say.
     let turning: Vec<usize> = (0..signals.joints.len())
@@ -353,16 +379,6 @@ fn check_degrees(signals: &Signals, axes: &[LogAxis], file: &str) -> Result<(), 
             limit: evidence.limit,
         }),
     }
-}
-
-/// Columns of a robot's signals. The sign of torque sensors is that of efforts from here on.
-pub(crate) fn map_columns(
-    header: &[String],
-    axes: &[LogAxis],
-    spec: &MappingSpec,
-) -> Result<ColumnMapping, MappingError> {
-    let efforts: Vec<EffortColumn> = axes.iter().map(|a| a.effort).collect();
-    ColumnMapping::with_efforts(header, &names(axes), &efforts, spec)
 }
 
 /// Largest position that is taken for one, rad or m: beyond any cable drum or track, below encoder counts.
@@ -387,9 +403,10 @@ pub(crate) fn check_surplus(
     file: &str,
 ) -> Result<(), Error> {
     let (Some(Some(last)), Some(joint)) = (mapping.position.last(), joints.last()) else { return Ok(()) };
-    let stem = last.name.trim_end_matches(|c: char| c.is_ascii_digit());
-    let Ok(number) = last.name[stem.len()..].parse::<u32>() else { return Ok(()) };
-    let column = format!("{stem}{}", u64::from(number) + 1);
+    let bare = last.name.trim_end_matches([']', ')']);
+    let stem = bare.trim_end_matches(|c: char| c.is_ascii_digit());
+    let Ok(number) = bare[stem.len()..].parse::<u32>() else { return Ok(()) };
+    let column = format!("{stem}{}{}", u64::from(number) + 1, &last.name[bare.len()..]);
     if last.name.contains(joint.as_str()) || !header.contains(&column) {
         return Ok(());
     }
@@ -414,7 +431,9 @@ fn describe(mapping: &ColumnMapping) -> Vec<(String, String)> {
     let mut out = vec![(
         "time".to_owned(),
         match &mapping.time {
-            dynid_io::columns::TimeSource::Column(c) => c.name.clone(),
+            dynid_io::columns::TimeSource::Columns(time) => {
+                time.parts.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(" ")
+            }
             dynid_io::columns::TimeSource::Rate(r) => format!("{r} Hz"),
         },
     )];

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynid_io::{MappingSpec, ReadOptions, States, StatesError, Table, states};
+use dynid_io::{LogHeader, MappingSpec, ReadOptions, States, StatesError, Table, states};
 use dynid_model::element::temperature_channel;
 use dynid_model::{BaseParameters, EffortModel, MotionBlock, RegressorBlock, RobotModel};
 
@@ -51,7 +51,8 @@ fn with_recorded_columns(
         ..columns.clone()
     };
     let named = |source| Error::Columns { file: table.source.clone(), source: Box::new(source) };
-    let mapping = logs::map_columns(&table.header, &logs::axes(model), &spec).map_err(named)?;
+    let mapping =
+        logs::map_columns(&LogHeader::of_names(&table.header), &logs::axes(model), &spec).map_err(named)?;
     let signals = mapping.extract(&table).map_err(named)?;
     let mut columns = signals.channels;
     let quantities = [("q", Some(signals.position)), ("dq", signals.velocity), ("ddq", signals.acceleration)];

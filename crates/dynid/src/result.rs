@@ -322,6 +322,18 @@ impl Identification {
                 "isolated runs far outside the running median; chatter and steps at reversal stay".to_owned(),
             );
         }
+        for (log, notes) in self.logs.iter().zip(&self.found_out) {
+            let name = short_name(&log.name);
+            for note in notes {
+                add(
+                    &format!("{} of {name}", note.setting),
+                    json!(note.value),
+                    "",
+                    "found",
+                    note.reason.clone(),
+                );
+            }
+        }
         for (log, columns) in self.logs.iter().zip(&self.columns) {
             let name = short_name(&log.name);
             for (signal, used) in columns {

@@ -141,6 +141,14 @@ const ENDINGS: &[Ending] = &[
         ],
     },
     Ending {
+        command: "init",
+        negative: "the configuration has lines to fill in",
+        examples: &[
+            ("A configuration for one log, part of which is kept for validation", "init arm.urdf log.csv"),
+            ("Of several logs the last one is kept; to standard output", "init arm.urdf a.csv b.csv --out -"),
+        ],
+    },
+    Ending {
         command: "inspect",
         negative: "",
         examples: &[

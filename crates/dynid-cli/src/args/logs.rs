@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueHint};
+use clap::{Args, ValueEnum, ValueHint};
+
+use super::ForceArgs;
 
 /// How log columns are understood.
 #[derive(Debug, Args)]
@@ -16,18 +18,57 @@ pub(crate) struct LogArgs {
     /// Hold joints without columns still at zero instead of refusing the log.
     #[arg(long)]
     pub(crate) allow_unlogged: bool,
+    /// Names of the columns of a file without a header, in their order.
+    #[arg(long, value_name = "T,Q1,..", value_delimiter = ',')]
+    pub(crate) names: Option<Vec<String>>,
+    /// What becomes of rows in which a signal has no value (default: drop for formats that leave cells empty, else error).
+    #[arg(long, value_enum, value_name = "POLICY")]
+    pub(crate) missing: Option<MissingArg>,
+}
+
+/// What becomes of rows in which a signal has no value.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum MissingArg {
+    /// The log is refused.
+    Error,
+    /// They are left out.
+    Drop,
+    /// Signals are interpolated at the rows that have all positions.
+    Interpolate,
 }
 
 impl LogArgs {
     /// The first flag that is given.
     pub(crate) fn given(&self) -> Option<&'static str> {
-        match (self.rate_hz, &self.gains, self.allow_unlogged) {
-            (Some(_), _, _) => Some("--rate-hz"),
-            (_, Some(_), _) => Some("--gains"),
-            (_, _, true) => Some("--allow-unlogged"),
-            (None, None, false) => None,
-        }
+        let flags = [
+            ("--rate-hz", self.rate_hz.is_some()),
+            ("--gains", self.gains.is_some()),
+            ("--allow-unlogged", self.allow_unlogged),
+            ("--names", self.names.is_some()),
+            ("--missing", self.missing.is_some()),
+        ];
+        flags.into_iter().find(|(_, given)| *given).map(|(flag, _)| flag)
     }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct InitArgs {
+    /// Robot file: URDF or TOML.
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub(crate) robot: PathBuf,
+    /// Logs, CSV or CSV.gz: of several the last one is kept for validation.
+    #[arg(required = true, value_name = "LOG", value_hint = ValueHint::FilePath)]
+    pub(crate) log: Vec<PathBuf>,
+    /// Configuration to write.
+    #[arg(long, value_name = "FILE.toml", default_value = "dynid.toml", value_hint = ValueHint::AnyPath)]
+    pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) force: ForceArgs,
+    #[command(flatten)]
+    pub(crate) columns: LogArgs,
+    /// Print nothing but results and errors.
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
 }
 
 /// How the logs of a command that works with an estimate are read.

@@ -19,7 +19,7 @@ pub(crate) use experiments::{BacklashArgs, ClearanceArgs, FrictionTestArgs, Gain
 pub(crate) use identify::{
     CheckArgs, CompareArgs, ConsistencyArg, FrictionArg, IdentifyArgs, MethodArg, RouteArg,
 };
-pub(crate) use logs::{LogArgs, ReadingArgs};
+pub(crate) use logs::{InitArgs, LogArgs, MissingArg, ReadingArgs};
 pub(crate) use model::{DiffArgs, ExportArgs, InspectArgs, PredictArgs, RegressorArgs, ValidateArgs};
 pub(crate) use online::{OnlineArgs, StreamArg};
 pub(crate) use output::{ForceArgs, PrintArgs};
@@ -72,6 +72,8 @@ pub(crate) enum Command {
     Gains(GainsArgs),
     /// Identify a robot from logs: writes estimate.json, report.html and an updated robot file.
     Identify(Box<IdentifyArgs>),
+    /// Write a commented configuration for a robot and its logs: what their columns are, units, time, validation.
+    Init(InitArgs),
     /// Show a robot's tree, its parameters and which combinations of them can be identified.
     Inspect(InspectArgs),
     /// Write manual pages, one per command.

@@ -105,6 +105,9 @@ fn text(found: &Check) -> String {
             log.excited.map(|[seen, of]| format!("{seen} of {of} base parameters excited")),
         ];
         line(format!("{}: {}", log.log, facts.into_iter().flatten().collect::<Vec<_>>().join(", ")));
+        for note in &log.reading {
+            line(format!("  {}: {} ({})", note.setting, note.value, note.reason));
+        }
         let mut own: Vec<&Finding> = found.findings.iter().filter(|f| f.log == log.log).collect();
         own.dedup();
         for finding in own {

@@ -12,6 +12,7 @@ pub(crate) mod export;
 pub(crate) mod friction;
 pub(crate) mod gains;
 pub(crate) mod identify;
+pub(crate) mod init;
 pub(crate) mod inspect;
 pub(crate) mod man;
 pub(crate) mod online;
@@ -29,9 +30,10 @@ use std::path::{Path, PathBuf};
 use dynid::config::{Config, LogConfig};
 use dynid::estimate::{Estimate, ReadingRecord};
 use dynid::io::columns::{FullSignal, PerJoint, SignalSpec};
+use dynid::io::log::Missing;
 use dynid::{Error, Robot, RobotOptions};
 
-use crate::args::{LogArgs, PrintArgs, ReadingArgs, RobotArgs};
+use crate::args::{LogArgs, MissingArg, PrintArgs, ReadingArgs, RobotArgs};
 use crate::message::{Failure, Notes, data};
 use crate::outputs::Outputs;
 
@@ -85,6 +87,15 @@ fn apply_log_args(spec: &mut dynid::io::MappingSpec, args: &LogArgs) {
         spec.current_gains.clone_from(&args.gains);
     }
     spec.allow_unlogged |= args.allow_unlogged;
+    if args.names.is_some() {
+        spec.names.clone_from(&args.names);
+    }
+    spec.missing = match args.missing {
+        Some(MissingArg::Error) => Some(Missing::Error),
+        Some(MissingArg::Drop) => Some(Missing::Drop),
+        Some(MissingArg::Interpolate) => Some(Missing::Interpolate),
+        None => spec.missing,
+    };
 }
 
 /// How logs are to be read: columns and side of the gear by a configuration, else as the estimate records; flags over both.

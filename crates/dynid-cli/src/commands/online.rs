@@ -5,7 +5,8 @@ mod view;
 use std::io::{self, IsTerminal, Read};
 
 use dynid::config::{Config, LogConfig};
-use dynid::io::csv::{ReadOptions, Table};
+use dynid::io::LogHeader;
+use dynid::io::csv::Table;
 use dynid::io::stream::{BadLine, LineFormat, LineSource, LinesEnd, StreamRows};
 use dynid::online::{Checkpoint, Event, Session};
 use serde::Serialize;
@@ -79,12 +80,13 @@ impl Run {
         }
         for log in self.config.log.clone() {
             let name = log.path.display().to_string();
-            let options = ReadOptions { rows: log.rows, ..ReadOptions::default() };
-            let table = dynid::io::csv::read(&log.path, &options)?;
-            self.source(&name, &table.header, Some(&log))?;
+            let columns = log.columns.as_ref().unwrap_or(&self.config.columns);
+            let (table, header) = dynid::logs::table(&log, columns)?;
+            self.source(&name, &header, Some(&log))?;
             let mut row = vec![0.0; table.columns.len()];
             for k in part(&log, &table) {
-                row.iter_mut().zip(&table.columns).for_each(|(x, column)| *x = column[k]);
+                let cells = table.columns.iter().zip(&table.origin);
+                row.iter_mut().zip(cells).for_each(|(x, (column, origin))| *x = column[k] + *origin as f64);
                 self.row(&row)?;
             }
             self.flush()?;
@@ -115,7 +117,7 @@ impl Run {
         quiet: bool,
         skipped: &mut Skipped,
     ) -> Result<(), Failure> {
-        let mut rows = StreamRows::new("stdin", format);
+        let mut rows = StreamRows::new("stdin", format).with_times(self.config.columns.time_names());
         loop {
             let mut outcome = Ok(());
             let before = lines.overlong_lines();
@@ -156,7 +158,7 @@ impl Run {
             Some(Ok(row)) => {
                 let row = row.to_vec();
                 if self.session.is_none() {
-                    let header = rows.header().unwrap_or_default().to_vec();
+                    let header = LogHeader::of_names(rows.header().unwrap_or_default());
                     self.source("stdin", &header, None)?;
                 }
                 self.row(&row)?;
@@ -166,14 +168,14 @@ impl Run {
     }
 
     /// Begins a session, or another source of the one there is.
-    fn source(&mut self, name: &str, header: &[String], log: Option<&LogConfig>) -> Result<(), Failure> {
+    fn source(&mut self, name: &str, header: &LogHeader, log: Option<&LogConfig>) -> Result<(), Failure> {
         let columns = log.and_then(|l| l.columns.as_ref());
         let Run { session, output, .. } = self;
         if let Some(session) = session {
-            output.passing(|emit| Ok(session.source(name, header, columns, emit)?))?;
+            output.passing(|emit| Ok(session.source(name, header.clone(), columns, emit)?))?;
             return Ok(());
         }
-        let mut session = Session::new(&self.config, name, header, columns)?;
+        let mut session = Session::new(&self.config, name, header.clone(), columns)?;
         self.output.view.begin(&session.joints());
         if let Some(path) = &self.config.online.checkpoint
             && let Some(found) = Checkpoint::read(path)?

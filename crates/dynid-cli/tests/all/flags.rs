@@ -42,7 +42,20 @@ fn flags() -> BTreeSet<String> {
 }
 
 /// Flags of which another test, or nothing, can show the effect.
-const ELSEWHERE: [(&str, &str); 12] = [
+const ELSEWHERE: [(&str, &str); 21] = [
+    ("init ", "writes a configuration: `logs_of_tools`"),
+    ("backlash --missing", "columns are read alike by all commands: `logs_of_tools`"),
+    ("backlash --names", "columns are read alike by all commands: `logs_of_tools`"),
+    ("check --missing", "columns are read alike by all commands: `logs_of_tools`"),
+    ("check --names", "columns are read alike by all commands: `logs_of_tools`"),
+    ("compare --missing", "columns are read alike by all commands: `logs_of_tools`"),
+    ("compare --names", "columns are read alike by all commands: `logs_of_tools`"),
+    ("export --missing", "columns are read alike by all commands: `logs_of_tools`"),
+    ("export --names", "columns are read alike by all commands: `logs_of_tools`"),
+    ("identify --missing", "`logs_of_tools`"),
+    ("identify --names", "`logs_of_tools`"),
+    ("validate --names", "columns are read alike by all commands: `logs_of_tools`"),
+    ("validate --missing", "columns are read alike by all commands: `logs_of_tools`"),
     ("study ", "studies run for a minute and more: `study`"),
     ("clearance ", "needs a robot with clearance: `clearance`"),
     ("friction ", "needs constant speeds: `friction`"),

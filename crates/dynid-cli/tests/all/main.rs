@@ -14,6 +14,7 @@ mod export;
 mod faults;
 mod flags;
 mod friction;
+mod logs_of_tools;
 mod online;
 mod other_libraries;
 mod payload;

@@ -58,8 +58,8 @@ pub enum MappingError {
         column: String,
         /// Names there are.
         header: Vec<String>,
-        /// A close name.
-        meant: Option<String>,
+        /// The names that look most like it.
+        nearest: Vec<String>,
     },
     /// The mapping names a joint that the robot does not have.
     #[error("{signal}: expected a joint of the robot, found `{joint}`")]
@@ -129,6 +129,66 @@ pub enum MappingError {
         /// The number.
         found: f64,
     },
+    /// Columns that are added up to a time, one of which does not say what it counts.
+    #[error("time, column `{column}`: expected a unit, since columns of the time are added up, found none")]
+    PartOfTime {
+        /// Column.
+        column: String,
+    },
+    /// A time whose unit its numbers leave open.
+    #[error("time, column `{column}`: expected a unit, found steps of {}: {}", short(*step), rates(units))]
+    TimeUnit {
+        /// Column.
+        column: String,
+        /// Usual step, as in the file.
+        step: f64,
+        /// Units that make sense with the sample rates that follow, Hz.
+        units: Vec<(&'static str, f64)>,
+    },
+    /// A time in whose unit no log is sampled.
+    #[error("time, column `{column}`: expected steps of a sampled log, found steps of {} {unit}", short(*step))]
+    TimeStep {
+        /// Column.
+        column: String,
+        /// Usual step, as in the file.
+        step: f64,
+        /// Unit that was said or assumed.
+        unit: String,
+        /// The unit that makes sense of it.
+        meant: Option<&'static str>,
+    },
+    /// A signal without a value in a row.
+    #[error("column `{column}`, row {row}: expected a value, found none")]
+    NoValue {
+        /// Column.
+        column: String,
+        /// Data row, from 1.
+        row: usize,
+    },
+    /// Hardly any row has all signals.
+    #[error(
+        "column `{column}`: expected a value in most of the {positioned} rows with positions, found all signals in {rows} of them"
+    )]
+    Sparse {
+        /// The column that lacks most.
+        column: String,
+        /// Rows with all signals.
+        rows: usize,
+        /// Rows with positions.
+        positioned: usize,
+        /// Gaps were interpolated already.
+        interpolated: bool,
+    },
+    /// A log without a header whose numbers do not tell what its columns are.
+    #[error("expected column names, found numbers in the first line and {columns} columns: {reason}")]
+    Unnamed {
+        /// Columns.
+        columns: usize,
+        /// Joints of the robot.
+        joints: usize,
+        /// Why they are not told.
+        reason: String,
+    },
     /// A converted value overflows.
     #[error(
         "{signal}, column `{column}`, row {row}: expected a finite number after conversion, found {found}"
@@ -145,8 +205,32 @@ pub enum MappingError {
     },
 }
 
+/// A number with six digits.
+fn short(x: f64) -> f64 {
+    format!("{x:.5e}").parse().unwrap_or(x)
+}
+
+/// `5 Hz in s, 5000 Hz in ms`.
+fn rates(units: &[(&'static str, f64)]) -> String {
+    units.iter().map(|(unit, rate)| format!("{rate:.4} Hz in {unit}")).collect::<Vec<_>>().join(", ")
+}
+
+/// A line of a configuration that names the columns of a signal: for few joints one by one, for many as a pattern.
+fn line(signal: Signal, joints: &[String]) -> String {
+    // Messages put names between backticks.
+    let bare: Vec<&str> = joints.iter().map(|j| j.trim_matches('`')).collect();
+    match bare.as_slice() {
+        [] => format!("{signal} = \"..\""),
+        few if few.len() <= 3 => {
+            let entries: Vec<String> = few.iter().map(|joint| format!("\"{joint}\" = \"..\"")).collect();
+            format!("{signal} = {{ {} }}", entries.join(", "))
+        }
+        _ => format!("{signal} = \"..{{}}\" ({{}} counts the joints, {{joint}} is the name of one)"),
+    }
+}
+
 impl MappingError {
-    /// What to do about it.
+    /// What to do about it, with the line to write.
     pub fn hint(&self) -> Option<String> {
         use MappingError as E;
         Some(match self {
@@ -157,34 +241,86 @@ impl MappingError {
             }
             E::Idle { .. } => "leave out one of the two".to_owned(),
             E::Missing { signal: Signal::Time, .. } => {
-                "name the time column in the mapping, or give the sampling rate (`rate_hz`)".to_owned()
-            }
-            E::Missing { signal: Signal::Position, .. } => {
-                "name the columns in the mapping; joints without a log (such as grippers) need `allow_unlogged`"
+                "name the time column under [columns], `time = { columns = \"..\", unit = \"s\" }`, or give the sample rate, \
+                 `rate_hz = 500` (`--rate-hz 500`)"
                     .to_owned()
             }
-            E::Missing { signal: Signal::Effort, header, .. }
-                if header.iter().any(|h| h.starts_with(['i', 'I'])) =>
-            {
-                "name the effort columns in the mapping; motor currents need drive gains, N m/A".to_owned()
+            E::Missing { signal: Signal::Position, joints, .. } => format!(
+                "name the columns under [columns]: `{}`; joints without a log (such as grippers) need `allow_unlogged = true` \
+                 (`--allow-unlogged`)",
+                line(Signal::Position, joints)
+            ),
+            E::Missing { signal: Signal::Effort, header, .. } if holds_currents(header) => {
+                "motor currents need drive gains, N m/A, one per joint: `current_gains = [..]` under [columns] (`--gains K1,K2,..`), \
+                 or name the effort columns, `effort = \"..{}\"`"
+                    .to_owned()
             }
-            E::Missing { .. } => "name the columns in the mapping".to_owned(),
-            E::Ambiguous { .. } | E::Shared { .. } => "say which one in the mapping".to_owned(),
-            E::UnknownColumn { meant: Some(name), .. } | E::UnknownJoint { meant: Some(name), .. } => {
-                format!("did you mean `{name}`?")
+            E::Missing { signal, joints, .. } => {
+                format!("name the columns under [columns]: `{}`", line(*signal, joints))
             }
+            E::Ambiguous { signal: Signal::Time, candidates, .. } => format!(
+                "say which one under [columns]: `time = \"{}\"`, or leave the others alone: `ignore = [\"..\"]`",
+                candidates.first().map_or("..", String::as_str)
+            ),
+            E::Ambiguous { signal, owner, candidates } => format!(
+                "say which one under [columns]: `{signal} = {{ \"{}\" = \"{}\", .. }}` or a pattern such as `\"..{{joint}}..\"`, or leave \
+                 the others alone: `ignore = [\"..\"]`",
+                owner.trim_matches('`'),
+                candidates.first().map_or("..", String::as_str)
+            ),
+            E::Shared { .. } => "say which one under [columns], such as `effort = \"tau{}\"`".to_owned(),
+            E::UnknownColumn { nearest, .. } if !nearest.is_empty() => {
+                format!("did you mean `{}`?", nearest.join("`, `"))
+            }
+            E::UnknownJoint { meant: Some(name), .. } => format!("did you mean `{name}`?"),
             E::UnknownColumn { .. } => "use the names of the log's header".to_owned(),
             E::UnknownJoint { .. } => "use the joint names of the robot file".to_owned(),
-            E::Unit { .. } => "correct the unit in the mapping or in the header's brackets".to_owned(),
-            E::NoGain { .. } => "give `scale` in N m/A (or `current_gains`), one number per joint".to_owned(),
+            E::Unit { signal, column, .. } => format!(
+                "correct the unit: `{signal} = {{ columns = \"{column}\", unit = \"..\" }}` under [columns], or in the header's brackets"
+            ),
+            E::NoGain { .. } => "give `scale` in N m/A (or `current_gains = [..]`, `--gains`), one number per joint".to_owned(),
             E::Undriven { .. } => {
                 "the drive of an elastic joint acts on its motor: name the column as the motor's, `effort = { <motor> = \"..\" }`; \
                  a torque sensor behind the transmission is said by `sensor = true` in the robot file"
                     .to_owned()
             }
             E::Count { .. } => "one entry per joint in joint order; an empty name stands for `not logged`".to_owned(),
-            E::Number { .. } => "correct the number in the mapping".to_owned(),
+            E::Number { .. } => "correct the number under [columns]".to_owned(),
+            E::PartOfTime { .. } => {
+                "state them: `time = { columns = [\"sec\", \"nanosec\"], unit = \"s\", scale = [1.0, 1e-9] }` under [columns]".to_owned()
+            }
+            E::TimeUnit { column, units, .. } => {
+                let unit = units.first().map_or("s", |(unit, _)| unit);
+                format!("state it under [columns]: `time = {{ columns = \"{column}\", unit = \"{unit}\" }}`")
+            }
+            E::TimeStep { column, meant: Some(unit), .. } => {
+                format!("state the unit under [columns]: `time = {{ columns = \"{column}\", unit = \"{unit}\" }}`")
+            }
+            E::TimeStep { column, .. } => format!(
+                "state the unit under [columns], `time = {{ columns = \"{column}\", unit = \"..\" }}`, or the sample rate, `rate_hz = 500`"
+            ),
+            E::NoValue { .. } => "`missing = \"drop\"` under [columns] (or `--missing drop`) leaves such rows out".to_owned(),
+            E::Sparse { interpolated: false, .. } => {
+                "topics with stamps of their own have no rows in common: `missing = \"interpolate\"` under [columns] (`--missing interpolate`)"
+                    .to_owned()
+            }
+            E::Sparse { column, .. } => {
+                format!("the signal is silent most of the time: leave it out, `ignore = [\"{column}\"]`, or record it faster")
+            }
+            E::Unnamed { joints, .. } => {
+                let numbered = |name: &str| (1..=(*joints).min(2)).map(|k| format!("\"{name}{k}\"")).collect::<Vec<_>>().join(", ");
+                format!(
+                    "name all columns in their order under [columns]: `names = [\"t\", {}, .., {}, ..]` (`--names t,q1,..`), or add a first line",
+                    numbered("q"),
+                    numbered("tau")
+                )
+            }
             E::Overflow { .. } => "check unit, scale and offset of the column".to_owned(),
         })
     }
+}
+
+/// Whether a header has columns that look like motor currents.
+fn holds_currents(header: &[String]) -> bool {
+    header.iter().any(|h| h.starts_with(['i', 'I']) || h.contains("current"))
 }

@@ -1,6 +1,6 @@
 //! Signals in SI out of a table.
 
-use super::{ColumnMapping, ColumnUse, MappingError, Signal, TimeSource};
+use super::{ColumnMapping, ColumnUse, MappingError, Signal, Sparse, TimeSource};
 use crate::csv::Table;
 
 /// Clocks beyond this magnitude count from an epoch and are shifted to start at zero, s.
@@ -18,7 +18,8 @@ pub struct Signals {
     /// Time, s, minus `time_origin`.
     pub time: Vec<f64>,
     /// Time that was subtracted, s: the first stamp of a clock beyond 1e6 s, else 0. The difference is taken before the
-    /// conversion; what an `f64` of the raw stamp resolves (256 ns for nanoseconds since 1970) is all there is.
+    /// conversion. Of tables read by [`LogText`](crate::LogText) it is exact; of others, what an `f64` of the raw stamp resolves
+    /// (256 ns for nanoseconds since 1970) is all there is.
     pub time_origin: f64,
     /// Position, rad or m.
     pub position: Vec<Vec<f64>>,
@@ -32,6 +33,10 @@ pub struct Signals {
     pub temperature: Option<Vec<Option<Vec<f64>>>>,
     /// Other columns.
     pub channels: Vec<(String, Vec<f64>)>,
+    /// Places of the samples among the rows of the table; `None`: all rows in their order.
+    pub rows: Option<Vec<usize>>,
+    /// What became of rows without a value.
+    pub sparse: Sparse,
 }
 
 impl ColumnMapping {
@@ -39,8 +44,26 @@ impl ColumnMapping {
     ///
     /// # Errors
     /// [`MappingError::UnknownColumn`] if the mapping was made for another header, [`MappingError::Overflow`] if a
-    /// conversion leaves the range of numbers.
+    /// conversion leaves the range of numbers, [`MappingError::Sparse`] if hardly any row has all signals.
     pub fn extract(&self, table: &Table) -> Result<Signals, MappingError> {
+        let mut filled;
+        let whole = if self.has_gaps(table) {
+            filled = table.clone();
+            let kept = self.fill(&mut filled)?;
+            if let Some(rows) = &kept.rows {
+                for column in &mut filled.columns {
+                    *column = rows.iter().map(|row| column[*row]).collect();
+                }
+                filled.rows = rows.len();
+            }
+            Some((filled, kept))
+        } else {
+            None
+        };
+        let (table, kept) = match &whole {
+            Some((table, kept)) => (table, Some(kept)),
+            None => (table, None),
+        };
         let (time, time_origin) = self.time(table)?;
         let indices: Vec<usize> =
             self.position.iter().enumerate().filter(|(_, p)| p.is_some()).map(|(k, _)| k).collect();
@@ -65,6 +88,8 @@ impl ColumnMapping {
             effort: self.efforts(table, &indices)?,
             temperature: temperature.transpose()?,
             channels: channels.collect::<Result<_, _>>()?,
+            rows: kept.and_then(|k| k.rows.clone()),
+            sparse: kept.map(|k| k.sparse.clone()).unwrap_or_default(),
             indices,
             time,
             time_origin,
@@ -85,16 +110,31 @@ impl ColumnMapping {
     fn time(&self, table: &Table) -> Result<(Vec<f64>, f64), MappingError> {
         match &self.time {
             TimeSource::Rate(rate) => Ok(((0..table.rows).map(|k| k as f64 / rate).collect(), 0.0)),
-            TimeSource::Column(column) => {
-                let raw = raw_column(table, "time", column)?;
-                let first = raw.first().copied().unwrap_or(0.0);
-                let start = column.factor * first + column.offset;
-                if start.abs() <= EPOCH_CLOCK {
+            TimeSource::Columns(time) => {
+                let mut start = 0.0;
+                for part in &time.parts {
+                    let (raw, origin) = raw_column(table, "time", part)?;
+                    start +=
+                        part.factor * (raw.first().copied().unwrap_or(0.0) + origin as f64) + part.offset;
+                }
+                if let ([column], true) = (time.parts.as_slice(), start.abs() <= EPOCH_CLOCK) {
                     return Ok((convert(table, "time", column)?, 0.0));
                 }
-                Ok((raw.iter().map(|t| (t - first) * column.factor).collect(), start))
+                let mut out = vec![0.0; table.rows];
+                for part in &time.parts {
+                    let (raw, _) = raw_column(table, "time", part)?;
+                    let first = raw.first().copied().unwrap_or(0.0);
+                    out.iter_mut().zip(raw).for_each(|(t, x)| *t += (x - first) * part.factor);
+                }
+                Ok((out, start))
             }
         }
+    }
+
+    fn has_gaps(&self, table: &Table) -> bool {
+        let used = self.signal_columns().chain(self.time_columns());
+        used.filter_map(|c| raw_column(table, "", c).ok())
+            .any(|(values, _)| values.iter().any(|x| x.is_nan()))
     }
 }
 
@@ -106,24 +146,36 @@ fn per_joint(
     columns.iter().flatten().map(|c| convert(table, &signal.to_string(), c)).collect()
 }
 
-fn raw_column<'t>(table: &'t Table, signal: &str, column: &ColumnUse) -> Result<&'t [f64], MappingError> {
-    match table.header.get(column.column) {
-        Some(name) if *name == column.name => Ok(&table.columns[column.column]),
-        _ => Err(MappingError::UnknownColumn {
+/// A column as it was read, and what was taken off its values. The table may hold some of the header's columns alone.
+pub(super) fn raw_column<'t>(
+    table: &'t Table,
+    signal: &str,
+    column: &ColumnUse,
+) -> Result<(&'t [f64], i64), MappingError> {
+    let in_place = table.header.get(column.column).is_some_and(|name| *name == column.name);
+    let place = if in_place { Some(column.column) } else { place_of(table, column) };
+    match place {
+        Some(k) => Ok((&table.columns[k], table.origin[k])),
+        None => Err(MappingError::UnknownColumn {
             signal: signal.to_owned(),
             column: column.name.clone(),
             header: table.header.clone(),
-            meant: None,
+            nearest: Vec::new(),
         }),
     }
 }
 
+/// Place of a column in a table.
+pub(super) fn place_of(table: &Table, column: &ColumnUse) -> Option<usize> {
+    table.header.iter().position(|name| *name == column.name)
+}
+
 fn convert(table: &Table, signal: &str, column: &ColumnUse) -> Result<Vec<f64>, MappingError> {
-    let raw = raw_column(table, signal, column)?;
-    let values: Vec<f64> = if column.factor == 1.0 && column.offset == 0.0 {
+    let (raw, origin) = raw_column(table, signal, column)?;
+    let values: Vec<f64> = if column.factor == 1.0 && column.offset == 0.0 && origin == 0 {
         raw.to_vec()
     } else {
-        raw.iter().map(|x| column.factor * x + column.offset).collect()
+        raw.iter().map(|x| column.factor * (x + origin as f64) + column.offset).collect()
     };
     match values.iter().position(|x| !x.is_finite()) {
         None => Ok(values),

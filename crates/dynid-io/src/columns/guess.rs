@@ -1,9 +1,12 @@
 //! Finding signals by the names of columns.
 
 use super::error::MappingError;
-use super::names::{CURRENT_NAMES, ColumnName, Signal, TIME_NAMES, names, names_joint, number_of};
+use super::names::{
+    CURRENT_NAMES, ColumnName, Signal, TIME_NAMES, names, names_joint, number_of, part_of_time,
+};
 use super::units::{Conversion, conversion};
-use super::{ColumnMapping, ColumnUse, TimeSource};
+use super::{ColumnMapping, ColumnUse, TimeColumns, TimeSource};
+use crate::log::{LogHeader, Missing};
 
 /// Settings of [`ColumnMapping::guess`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,7 +32,8 @@ impl ColumnMapping {
     /// # Errors
     /// [`MappingError`]: a signal is missing, ambiguous, or covers only some of the logged joints.
     pub fn guess(header: &[String], joints: &[String], options: &GuessOptions) -> Result<Self, MappingError> {
-        let finder = Finder::new(header, joints);
+        let header = LogHeader::of_names(header);
+        let finder = Finder::new(&header, joints);
         let time = finder.time(options.rate_hz)?;
         let position = finder.position(options.allow_unlogged)?;
         let logged: Vec<bool> = position.iter().map(Option::is_some).collect();
@@ -42,6 +46,7 @@ impl ColumnMapping {
             effort: finder.effort(options, &logged)?,
             undriven: vec![false; joints.len()],
             channels: Vec::new(),
+            missing: Missing::Error,
             time,
             position,
         };
@@ -52,10 +57,7 @@ impl ColumnMapping {
     /// No column may have two meanings.
     pub(super) fn check_shared(&self) -> Result<(), MappingError> {
         let mut seen: Vec<(usize, String)> = Vec::new();
-        let time = match &self.time {
-            TimeSource::Column(use_) => vec![Some(use_.clone())],
-            TimeSource::Rate(_) => Vec::new(),
-        };
+        let time: PerJointColumns = self.time_columns().iter().cloned().map(Some).collect();
         let lists = [
             (Signal::Time, Some(&time)),
             (Signal::Position, Some(&self.position)),
@@ -87,14 +89,16 @@ pub(super) type PerJointColumns = Vec<Option<ColumnUse>>;
 
 /// Looks for signals in a header.
 pub(super) struct Finder<'a> {
+    log: &'a LogHeader,
     header: &'a [String],
     columns: Vec<ColumnName<'a>>,
     joints: &'a [String],
 }
 
 impl<'a> Finder<'a> {
-    pub(super) fn new(header: &'a [String], joints: &'a [String]) -> Self {
-        Finder { header, columns: header.iter().map(|h| ColumnName::new(h)).collect(), joints }
+    pub(super) fn new(log: &'a LogHeader, joints: &'a [String]) -> Self {
+        let header = log.names.as_slice();
+        Finder { log, header, columns: header.iter().map(|h| ColumnName::new(h)).collect(), joints }
     }
 
     pub(super) fn time(&self, rate_hz: Option<f64>) -> Result<TimeSource, MappingError> {
@@ -105,13 +109,31 @@ impl<'a> Finder<'a> {
             let (what, expected) = ("rate_hz", "a positive number of Hz");
             return Err(MappingError::Number { owner: "time".to_owned(), what, expected, found: rate });
         }
+        if let [_, ..] = self.log.time.as_slice() {
+            let part = |k: &usize| {
+                let unit = part_of_time(&self.header[*k]).map(|(_, unit)| unit);
+                self.column_use(Signal::Time, *k, unit)
+            };
+            let parts = self.log.time.iter().map(part).collect::<Result<Vec<_>, _>>()?;
+            // Nanoseconds are said by the names of a pair alone.
+            return Ok(TimeSource::Columns(TimeColumns { unit_stated: parts.len() > 1, parts }));
+        }
         let mut found = self.time_columns();
+        // Whole seconds alone (`stamp_sec` of `stamp_sec`, `stamp_nanosec`) are no time.
+        if let Some(pair) = self.pair()?
+            && found.iter().all(|(k, _)| pair.parts.iter().any(|part| part.column == *k))
+        {
+            return Ok(TimeSource::Columns(pair));
+        }
         // `T` beside a time column is a temperature.
         if found.len() > 1 {
             found.retain(|(k, _)| self.columns[*k].raw.trim() != "T");
         }
         match found.as_slice() {
-            [(column, unit)] => Ok(TimeSource::Column(self.column_use(Signal::Time, *column, *unit)?)),
+            [(column, unit)] => {
+                let parts = vec![self.column_use(Signal::Time, *column, *unit)?];
+                Ok(TimeSource::Columns(TimeColumns { parts, unit_stated: unit.is_some() }))
+            }
             [] => Err(MappingError::Missing {
                 signal: Signal::Time,
                 joints: vec!["the log".to_owned()],
@@ -126,9 +148,27 @@ impl<'a> Finder<'a> {
         }
     }
 
+    /// Columns of whole seconds and nanoseconds, if there is one such pair.
+    fn pair(&self) -> Result<Option<TimeColumns>, MappingError> {
+        let parts: Vec<(usize, &str, &str)> = self
+            .header
+            .iter()
+            .enumerate()
+            .filter_map(|(k, name)| part_of_time(name).map(|(before, unit)| (k, before, unit)))
+            .collect();
+        let [(seconds, before, "s"), (nanoseconds, other, "ns")] = parts.as_slice() else { return Ok(None) };
+        if before != other {
+            return Ok(None);
+        }
+        let part = |k: &usize, unit| self.column_use(Signal::Time, *k, Some(unit));
+        let parts = vec![part(seconds, "s")?, part(nanoseconds, "ns")?];
+        Ok(Some(TimeColumns { parts, unit_stated: true }))
+    }
+
     fn time_columns(&self) -> Vec<(usize, Option<&'a str>)> {
         let is_time = |(k, c): (usize, &ColumnName<'a>)| {
-            c.reading(|stem| TIME_NAMES.contains(&stem)).map(|unit| (k, unit))
+            let unit = c.reading(|stem| TIME_NAMES.contains(&stem));
+            unit.filter(|_| !self.log.text[k]).map(|unit| (k, unit))
         };
         self.columns.iter().enumerate().filter_map(is_time).collect()
     }
@@ -183,7 +223,11 @@ impl<'a> Finder<'a> {
             let (what, expected) = ("current_gains", "finite numbers that are not zero");
             return Err(MappingError::Number { owner: signal.to_string(), what, expected, found: *found });
         }
-        let mut found = self.find_group(signal, &CURRENT_NAMES, Some("A"))?;
+        let of_format = self.log.format.and_then(|f| f.currents()).and_then(|p| self.numbered(p));
+        let mut found = match of_format {
+            Some(columns) => Some(self.uses(signal, columns, Some("A"))?),
+            None => self.find_group(signal, &CURRENT_NAMES, Some("A"))?,
+        };
         for (column, gain) in found.iter_mut().flatten().zip(gains) {
             if let Some(column) = column {
                 column.factor *= gain;
@@ -194,12 +238,33 @@ impl<'a> Finder<'a> {
 
     /// Columns of the first group of names that matches anything.
     pub(super) fn find(&self, signal: Signal) -> Result<Option<PerJointColumns>, MappingError> {
+        let patterns = self.log.format.map_or(&[][..], |format| format.patterns(signal));
+        if let Some(columns) = patterns.iter().find_map(|pattern| self.numbered(pattern)) {
+            return self.uses(signal, columns, None).map(Some);
+        }
         for group in names(signal) {
             if let Some(found) = self.find_group(signal, group, None)? {
                 return Ok(Some(found));
             }
         }
         Ok(None)
+    }
+
+    /// Columns of a pattern whose `{}` counts joints from 0; `None` if there is no such column.
+    fn numbered(&self, pattern: &str) -> Option<Vec<Option<usize>>> {
+        let column = |k: usize| self.log.column(&pattern.replace("{}", &k.to_string()));
+        let columns: Vec<Option<usize>> = (0..self.joints.len()).map(column).collect();
+        columns.iter().any(Option::is_some).then_some(columns)
+    }
+
+    fn uses(
+        &self,
+        signal: Signal,
+        columns: Vec<Option<usize>>,
+        current: Option<&str>,
+    ) -> Result<PerJointColumns, MappingError> {
+        let use_of = |k: usize| self.column_use_of(signal, k, current, current.is_some());
+        columns.into_iter().map(|column| column.map(use_of).transpose()).collect()
     }
 
     /// `current`: the unit of columns that state none, and the sign that gains are known.
@@ -213,8 +278,8 @@ impl<'a> Finder<'a> {
         let times = self.time_columns();
         for name in group {
             let zero_based =
-                self.columns.iter().any(|c| c.reading(|s| number_of(s, name) == Some(0)).is_some());
-            for (k, column) in self.columns.iter().enumerate() {
+                self.columns.iter().any(|c| c.reading_of_path(|s| number_of(s, name) == Some(0)).is_some());
+            for (k, column) in self.columns.iter().enumerate().filter(|(k, _)| !self.log.text[*k]) {
                 if let Some((joint, unit)) = self.meant(column, name, zero_based) {
                     // A lone `t` or `T` is the time.
                     if signal == Signal::Temperature && times.len() < 2 && times.iter().any(|(t, _)| *t == k)
@@ -256,12 +321,12 @@ impl<'a> Finder<'a> {
         zero_based: bool,
     ) -> Option<(usize, Option<&'a str>)> {
         for (k, joint) in self.joints.iter().enumerate() {
-            if let Some(unit) = column.reading(|stem| names_joint(stem, name, joint)) {
+            if let Some(unit) = column.reading_of_path(|stem| names_joint(stem, name, joint)) {
                 return Some((k, unit));
             }
         }
         for number in usize::from(!zero_based)..self.joints.len() + usize::from(!zero_based) {
-            if let Some(unit) = column.reading(|stem| number_of(stem, name) == Some(number)) {
+            if let Some(unit) = column.reading_of_path(|stem| number_of(stem, name) == Some(number)) {
                 return Some((number - usize::from(!zero_based), unit));
             }
         }

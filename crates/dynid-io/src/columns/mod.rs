@@ -1,19 +1,27 @@
 //! Which column of a log is which signal, in which unit.
 
+mod clock;
 mod degrees;
 mod error;
 mod extract;
 mod guess;
+mod missing;
 mod names;
 mod spec;
 mod units;
+mod unnamed;
 
+pub use clock::TimeReading;
 pub use degrees::{DegreesEvidence, degrees_suspected};
 pub use error::MappingError;
 pub use extract::Signals;
 pub use guess::GuessOptions;
+pub use missing::Sparse;
 pub use names::{Signal, is_time_name};
 pub use spec::{ChannelSpec, ColumnNames, FullSignal, MappingSpec, PerJoint, SignalSpec, Units};
+pub use unnamed::columns_of_unnamed;
+
+use crate::log::Missing;
 
 /// A column and its conversion to SI: `value = factor · raw + offset`.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,11 +48,21 @@ pub enum EffortColumn {
     Absent,
 }
 
+/// Columns of the time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimeColumns {
+    /// Columns that are added up: one, or whole seconds and nanoseconds.
+    pub parts: Vec<ColumnUse>,
+    /// The unit is said by the mapping or by the columns' names; else seconds are assumed until the numbers were looked at
+    /// ([`ColumnMapping::settle_time`]).
+    pub unit_stated: bool,
+}
+
 /// Where the time comes from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TimeSource {
-    /// A column.
-    Column(ColumnUse),
+    /// Columns.
+    Columns(TimeColumns),
     /// Equal steps at a rate, Hz.
     Rate(f64),
 }
@@ -70,9 +88,35 @@ pub struct ColumnMapping {
     pub undriven: Vec<bool>,
     /// Other columns by the names the mapping gives them.
     pub channels: Vec<(String, ColumnUse)>,
+    /// What becomes of rows in which one of these columns has no value.
+    pub missing: Missing,
 }
 
 impl ColumnMapping {
+    /// Columns of the time.
+    pub fn time_columns(&self) -> &[ColumnUse] {
+        match &self.time {
+            TimeSource::Columns(time) => &time.parts,
+            TimeSource::Rate(_) => &[],
+        }
+    }
+
+    /// All columns but those of the time.
+    fn signal_columns(&self) -> impl Iterator<Item = &ColumnUse> {
+        let lists = [&self.velocity, &self.acceleration, &self.effort, &self.temperature];
+        let signals = lists.into_iter().flatten().chain([&self.position]).flatten().flatten();
+        signals.chain(self.channels.iter().map(|(_, column)| column))
+    }
+
+    /// What is to be read of a log for this mapping.
+    pub fn wanted(&self) -> crate::log::Wanted {
+        let time: Vec<usize> = self.time_columns().iter().map(|c| c.column).collect();
+        let mut columns: Vec<usize> = self.signal_columns().map(|c| c.column).chain(time.clone()).collect();
+        columns.sort_unstable();
+        columns.dedup();
+        crate::log::Wanted { columns: Some(columns), time, missing: self.missing }
+    }
+
     /// Joints without a position column.
     pub fn not_logged(&self) -> Vec<&str> {
         self.joints.iter().zip(&self.position).filter(|(_, p)| p.is_none()).map(|(j, _)| j.as_str()).collect()

@@ -33,17 +33,37 @@ impl fmt::Display for Signal {
 }
 
 /// Names of time columns.
-pub(super) const TIME_NAMES: [&str; 4] = ["t", "time", "timestamp", "stamp"];
+pub(super) const TIME_NAMES: [&str; 5] = ["t", "time", "timestamp", "stamp", "header.stamp"];
 
 /// Names of a signal in groups; a group is looked at only if the ones before it matched nothing.
 pub(super) fn names(signal: Signal) -> &'static [&'static [&'static str]] {
     match signal {
         Signal::Time => &[&TIME_NAMES],
-        Signal::Position => &[&["q", "pos", "position", "joint_position"], &["qm", "motor_position"]],
-        Signal::Velocity => &[&["dq", "qd", "v", "vel", "velocity", "joint_velocity"]],
-        Signal::Acceleration => &[&["ddq", "qdd", "a", "acc", "acceleration", "joint_acceleration"]],
-        Signal::Effort => &[&["tau", "effort", "torque", "joint_torque", "joint_effort"], &["u"]],
-        Signal::Temperature => &[&["temp", "temperature", "t"]],
+        Signal::Position => &[
+            &["q", "pos", "position", "joint_position", "positions", "joint_positions"],
+            &["qm", "motor_position"],
+        ],
+        Signal::Velocity => {
+            &[&["dq", "qd", "v", "vel", "velocity", "joint_velocity", "velocities", "joint_velocities"]]
+        }
+        Signal::Acceleration => {
+            &[&["ddq", "qdd", "a", "acc", "acceleration", "joint_acceleration", "accelerations"]]
+        }
+        Signal::Effort => &[
+            &[
+                "tau",
+                "effort",
+                "torque",
+                "joint_torque",
+                "joint_effort",
+                "efforts",
+                "torques",
+                "joint_torques",
+                "joint_efforts",
+            ],
+            &["u"],
+        ],
+        Signal::Temperature => &[&["temp", "temperature", "t", "temperatures"]],
     }
 }
 
@@ -55,6 +75,8 @@ pub(super) struct ColumnName<'a> {
     pub(super) raw: &'a str,
     /// Possible readings: the whole name, and for `time_ms` also without the unit.
     readings: Vec<(String, Option<&'a str>)>,
+    /// Ends of a path such as `/joint_states/j1/position`: `joint_states/j1/position`, `j1/position`, `position`.
+    ends: Vec<String>,
 }
 
 /// Units that may follow a name after `_`.
@@ -83,13 +105,33 @@ impl<'a> ColumnName<'a> {
                 readings
             }
         };
-        ColumnName { raw, readings }
+        let lower = name.to_lowercase();
+        let ends = lower.match_indices('/').map(|(k, _)| lower[k + 1..].to_owned()).collect();
+        ColumnName { raw, readings, ends }
     }
 
     /// The unit of the first reading that `accept` takes; `Some(None)`: taken, no unit.
     pub(super) fn reading(&self, accept: impl Fn(&str) -> bool) -> Option<Option<&'a str>> {
         self.readings.iter().find(|(stem, _)| accept(stem)).map(|(_, unit)| *unit)
     }
+
+    /// As [`ColumnName::reading`], also for the end of a path.
+    pub(super) fn reading_of_path(&self, accept: impl Fn(&str) -> bool) -> Option<Option<&'a str>> {
+        self.reading(&accept).or_else(|| self.ends.iter().any(|end| accept(end)).then_some(None))
+    }
+}
+
+/// The unit of a part of a time, by names such as `header.stamp.sec` and `stamp_nanosec`, and what stands before it.
+pub(super) fn part_of_time(column: &str) -> Option<(&str, &'static str)> {
+    let column = column.trim();
+    let at = column.rfind(['.', '/', '_']).map_or(0, |k| k + 1);
+    let (before, part) = column.split_at(at);
+    let unit = match part.to_lowercase().as_str() {
+        "sec" | "secs" | "seconds" => "s",
+        "nanosec" | "nanosecs" | "nsec" | "nsecs" | "nanoseconds" => "ns",
+        _ => return None,
+    };
+    Some((before, unit))
 }
 
 /// True if a log's column of this name holds times: `t`, `Time`, `timestamp [ns]`, `time_ms`, ...

@@ -6,16 +6,18 @@ use serde::{Deserialize, Serialize};
 
 use super::error::MappingError;
 use super::guess::{Finder, GuessOptions, PerJointColumns, of_logged};
-use super::names::{ColumnName, Signal};
+use super::names::{ColumnName, Signal, part_of_time};
 use super::units::{Conversion, conversion};
-use super::{ColumnMapping, ColumnUse, EffortColumn, TimeSource};
-use crate::excerpt::closest;
+use super::{ColumnMapping, ColumnUse, EffortColumn, TimeColumns, TimeSource};
+use crate::excerpt::nearest;
+use crate::log::{DecimalMark, LogHeader, LogOptions, Missing};
 
 /// An explicit mapping; signals that it does not mention are found by name as in [`ColumnMapping::guess`].
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MappingSpec {
-    /// Time column.
+    /// Time column, or columns that are added up, such as whole seconds and nanoseconds. Without a unit, seconds, ms, us
+    /// and ns are told from the size and the steps of the numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<SignalSpec>,
     /// Sampling rate, Hz, in place of a time column.
@@ -48,6 +50,54 @@ pub struct MappingSpec {
     /// Accept a log without effort. Default: off.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub allow_no_effort: bool,
+    /// Columns that are left alone, as if the log did not have them. Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub ignore: Vec<String>,
+    /// Names of the columns of a file without a header, in their order. Default: `column1`, `column2`, ...
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub names: Option<Vec<String>>,
+    /// Decimal mark, `"."` or `","`. Default: found from the numbers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub decimal: Option<DecimalMark>,
+    /// What becomes of rows in which a signal has no value: `error`, `drop` or `interpolate`. Default: `drop` for formats
+    /// that leave cells empty by design (PlotJuggler, `ros2 topic echo`), else `error`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub missing: Option<Missing>,
+}
+
+impl MappingSpec {
+    /// How a log with these columns is to be opened.
+    pub fn options(&self, rows: Option<(usize, usize)>) -> LogOptions {
+        let read = crate::ReadOptions { rows, ignore: self.ignore.clone(), ..crate::ReadOptions::default() };
+        LogOptions { read, names: self.names.clone(), decimal: self.decimal }
+    }
+
+    /// Columns of the time that are stated by name.
+    pub fn time_names(&self) -> Vec<String> {
+        let names = match &self.time {
+            None => return Vec::new(),
+            Some(SignalSpec::Full(full)) => &full.columns,
+            Some(SignalSpec::Names(names)) => names,
+        };
+        match names {
+            ColumnNames::Pattern(name) => vec![name.clone()],
+            ColumnNames::List(list) => list.clone(),
+            ColumnNames::Table(table) => table.values().cloned().collect(),
+        }
+    }
+
+    /// The columns of this mapping in files that are read as another says: ignored columns, names of files without a header,
+    /// decimal mark, missing values.
+    #[must_use]
+    pub fn read_as(self, other: &MappingSpec) -> Self {
+        MappingSpec {
+            ignore: other.ignore.clone(),
+            names: other.names.clone(),
+            decimal: other.decimal,
+            missing: self.missing.or(other.missing),
+            ..self
+        }
+    }
 }
 
 /// Columns of one signal: their names alone, or with unit, scale and offset.
@@ -136,7 +186,10 @@ fn one() -> f64 {
 impl From<&ColumnMapping> for MappingSpec {
     fn from(mapping: &ColumnMapping) -> Self {
         let (time, rate_hz) = match &mapping.time {
-            TimeSource::Column(time) => (Some(in_full(&[Some(time.clone())], "s")), None),
+            TimeSource::Columns(time) => {
+                let parts: PerJointColumns = time.parts.iter().cloned().map(Some).collect();
+                (Some(in_full(&parts, "s")), None)
+            }
             TimeSource::Rate(hz) => (None, Some(*hz)),
         };
         let signal = |list: &Option<Vec<Option<ColumnUse>>>, unit: &str| Some(in_full(list.as_ref()?, unit));
@@ -156,6 +209,8 @@ impl From<&ColumnMapping> for MappingSpec {
             current_gains: None,
             allow_unlogged: mapping.position.iter().any(Option::is_none),
             allow_no_effort: mapping.effort.is_none(),
+            missing: (mapping.missing != Missing::Error).then_some(mapping.missing),
+            ..MappingSpec::default()
         }
     }
 }
@@ -193,6 +248,22 @@ impl ColumnMapping {
     /// If there is not one entry of `efforts` per joint.
     pub fn with_efforts(
         header: &[String],
+        joints: &[String],
+        efforts: &[EffortColumn],
+        spec: &MappingSpec,
+    ) -> Result<Self, MappingError> {
+        Self::of_log(&LogHeader::of_names(header), joints, efforts, spec)
+    }
+
+    /// Assigns columns of a log that was opened: as a configuration says, the rest by format and name.
+    ///
+    /// # Errors
+    /// [`MappingError`].
+    ///
+    /// # Panics
+    /// If there is not one entry of `efforts` per joint.
+    pub fn of_log(
+        header: &LogHeader,
         joints: &[String],
         efforts: &[EffortColumn],
         spec: &MappingSpec,
@@ -260,6 +331,10 @@ impl ColumnMapping {
             effort,
             undriven: undriven.clone(),
             channels: channels.collect::<Result<_, _>>()?,
+            missing: spec.missing.unwrap_or(match header.format {
+                Some(format) if format.leaves_cells_empty() => Missing::Drop,
+                _ => Missing::Error,
+            }),
             time,
             position,
         };
@@ -269,7 +344,7 @@ impl ColumnMapping {
 }
 
 struct Resolver<'a> {
-    header: &'a [String],
+    header: &'a LogHeader,
     joints: &'a [String],
     /// Joints whose effort a pattern does not mean; empty: none.
     undriven: &'a [bool],
@@ -277,11 +352,11 @@ struct Resolver<'a> {
 
 impl Resolver<'_> {
     fn column(&self, signal: &str, name: &str) -> Result<usize, MappingError> {
-        self.header.iter().position(|h| h == name).ok_or_else(|| MappingError::UnknownColumn {
+        self.header.column(name).ok_or_else(|| MappingError::UnknownColumn {
             signal: signal.to_owned(),
             column: name.to_owned(),
-            header: self.header.to_vec(),
-            meant: closest(name, self.header).map(str::to_owned),
+            header: self.header.names.clone(),
+            nearest: nearest(name, &self.header.names),
         })
     }
 
@@ -305,18 +380,41 @@ impl Resolver<'_> {
         let column = self.column(&owner, &stated.column)?;
         check_scale(&owner, stated.scale)?;
         check_offset(&owner, stated.offset)?;
-        let use_ =
-            ColumnUse { column, name: stated.column.clone(), factor: stated.scale, offset: stated.offset };
+        let own = self.header.names[column].clone();
+        let use_ = ColumnUse { column, name: own, factor: stated.scale, offset: stated.offset };
         Ok((name.to_owned(), use_))
     }
 
     fn time(&self, stated: &SignalSpec) -> Result<TimeSource, MappingError> {
-        let alone = Resolver { header: self.header, joints: &["time".to_owned()], undriven: &[] };
-        let mut columns = alone.signal(Signal::Time, stated)?;
-        match columns.pop().flatten() {
-            Some(column) => Ok(TimeSource::Column(column)),
-            None => Err(MappingError::Count { signal: Signal::Time, what: "columns", expected: 1, found: 0 }),
+        let names = match stated {
+            SignalSpec::Full(full) => &full.columns,
+            SignalSpec::Names(names) => names,
+        };
+        let count = if let ColumnNames::List(list) = names { list.len() } else { 1 };
+        let parts = vec!["time".to_owned(); count];
+        let alone = Resolver { header: self.header, joints: &parts, undriven: &[] };
+        let mut parts: Vec<ColumnUse> = alone.signal(Signal::Time, stated)?.into_iter().flatten().collect();
+        if parts.is_empty() {
+            return Err(MappingError::Count { signal: Signal::Time, what: "columns", expected: 1, found: 0 });
         }
+        let said = |full: &FullSignal| full.unit.is_some() || full.scale.is_some();
+        let mut unit_stated = matches!(stated, SignalSpec::Full(full) if said(full));
+        if !unit_stated {
+            let in_name =
+                |part: &ColumnUse| ColumnName::new(&part.name).reading(|_| true).flatten().is_some();
+            unit_stated = parts.iter().all(in_name);
+        }
+        if !unit_stated && parts.len() > 1 {
+            // Columns are added up: each must say what it counts.
+            for part in &mut parts {
+                let Some((_, unit)) = part_of_time(&part.name) else {
+                    return Err(MappingError::PartOfTime { column: part.name.clone() });
+                };
+                part.factor = conversion(Signal::Time, unit, &part.name)?.factor;
+            }
+            unit_stated = true;
+        }
+        Ok(TimeSource::Columns(TimeColumns { parts, unit_stated }))
     }
 
     fn signal(&self, signal: Signal, stated: &SignalSpec) -> Result<PerJointColumns, MappingError> {
@@ -354,7 +452,7 @@ impl Resolver<'_> {
                 column,
                 factor: conversion.factor * scales[k],
                 offset: conversion.offset * scales[k] + offsets[k],
-                name,
+                name: self.header.names[column].clone(),
             }));
         }
         Ok(columns)
@@ -364,12 +462,25 @@ impl Resolver<'_> {
         let n = self.joints.len();
         match stated {
             ColumnNames::Pattern(pattern) => {
+                let entry = |k: usize| format!("{pattern}[{k}]");
+                if self.header.column(pattern).is_none()
+                    && self.header.column(&entry(0)).is_some()
+                    && !pattern.contains(['{', '}'])
+                {
+                    // Cells with lists: one entry per joint.
+                    if self.header.column(&entry(n)).is_some() {
+                        let found = (0..).take_while(|k| self.header.column(&entry(*k)).is_some()).count();
+                        let what = "entries of the list";
+                        return Err(MappingError::Count { signal, what, expected: n, found });
+                    }
+                    return Ok((0..n).map(|k| Some(entry(k))).collect());
+                }
                 if n > 1 && !pattern.contains("{}") && !pattern.contains("{joint}") {
                     let what = "columns (a pattern needs `{}` or `{joint}`)";
                     return Err(MappingError::Count { signal, what, expected: n, found: 1 });
                 }
                 let numbered = |k: usize| pattern.replace("{}", &k.to_string());
-                let has = |k: usize| self.header.contains(&numbered(k));
+                let has = |k: usize| self.header.column(&numbered(k)).is_some();
                 let from = usize::from(!(pattern.contains("{}") && has(0) && !has(n)));
                 let named = self.joints.iter().enumerate();
                 let meant = |k: usize| signal != Signal::Effort || !self.is_undriven(k);
@@ -437,7 +548,7 @@ impl Resolver<'_> {
         match names.find(|n| !self.joints.contains(n)) {
             None => Ok(()),
             Some(joint) => {
-                let meant = closest(joint, self.joints).map(str::to_owned);
+                let meant = crate::excerpt::closest(joint, self.joints).map(str::to_owned);
                 Err(MappingError::UnknownJoint { signal, joint: joint.clone(), meant })
             }
         }

@@ -196,6 +196,128 @@ pub enum LogFileError {
         /// What is wrong.
         found: String,
     },
+    /// Names for the columns of a file that has names of its own.
+    #[error("{file}: line {line}: `names`: expected a file without a header, found `{found}`")]
+    NamesBesideHeader {
+        /// File.
+        file: String,
+        /// Line of the header.
+        line: usize,
+        /// The header.
+        found: String,
+    },
+    /// Another number of names than there are columns.
+    #[error("{file}: line {line}: `names`: expected {expected} names, one per column, found {found}")]
+    NameCount {
+        /// File.
+        file: String,
+        /// Line of the first row.
+        line: usize,
+        /// Columns.
+        expected: usize,
+        /// Names.
+        found: usize,
+    },
+    /// Commas in numbers that may be decimal marks or set thousands apart.
+    #[error(
+        "{file}: column `{column}`: expected one decimal mark, found `{found}`: the comma may be a decimal mark or set thousands apart"
+    )]
+    AmbiguousComma {
+        /// File.
+        file: String,
+        /// Column name.
+        column: String,
+        /// A cell.
+        found: String,
+    },
+    /// Numbers with commas beside numbers with points.
+    #[error(
+        "{file}: expected one decimal mark, found `{comma}` in column `{of_comma}` and `{point}` in column `{of_point}`"
+    )]
+    MixedMarks {
+        /// File.
+        file: String,
+        /// A cell with a comma.
+        comma: String,
+        /// Its column.
+        of_comma: String,
+        /// A cell with a point.
+        point: String,
+        /// Its column.
+        of_point: String,
+    },
+    /// A number with both marks.
+    #[error("{file}: column `{column}`: expected numbers without marks of thousands, found `{found}`")]
+    Thousands {
+        /// File.
+        file: String,
+        /// Column name.
+        column: String,
+        /// The cell.
+        found: String,
+    },
+    /// A list of another length than that of the first row.
+    #[error(
+        "{file}: row {row} (line {line}), column `{column}`: expected a list of {expected} numbers as in the first row, found {found}"
+    )]
+    ListLength {
+        /// File.
+        file: String,
+        /// Data row.
+        row: usize,
+        /// Line.
+        line: usize,
+        /// Column name.
+        column: String,
+        /// Entries of the first row.
+        expected: usize,
+        /// Entries.
+        found: usize,
+    },
+    /// A message of other joints than the first one.
+    #[error(
+        "{file}: row {row} (line {line}), column `{column}`: expected the joint `{expected}` as in the first row, found `{found}`"
+    )]
+    OtherJoint {
+        /// File.
+        file: String,
+        /// Data row.
+        row: usize,
+        /// Line.
+        line: usize,
+        /// Column name.
+        column: String,
+        /// Joint of the first row.
+        expected: String,
+        /// Joint of this row.
+        found: String,
+    },
+    /// A message of joints that none of the first ones had.
+    #[error(
+        "{file}: row {row} (line {line}): expected a message of the joints that the first ones have, found `{found}`"
+    )]
+    OtherJoints {
+        /// File.
+        file: String,
+        /// Data row.
+        row: usize,
+        /// Line.
+        line: usize,
+        /// Joints of this row.
+        found: String,
+    },
+    /// A line that is no joint state.
+    #[error("{file}: row {row} (line {line}): expected a joint state as in the first row, found `{found}`")]
+    NoMessage {
+        /// File.
+        file: String,
+        /// Data row.
+        row: usize,
+        /// Line.
+        line: usize,
+        /// The line.
+        found: String,
+    },
     /// A column that shall be ignored does not exist.
     #[error("{file}: column `{column}` to be ignored: expected a column of the header, found none")]
     UnknownIgnored {
@@ -224,6 +346,24 @@ impl LogFileError {
             E::Empty { .. } => "the first line names the columns, such as `t,q1,q2,tau1,tau2`",
             E::NoRows { .. } => "the recording may have failed",
             E::MissingHeader { .. } => "add a first line with names, such as `t,q1,q2,tau1,tau2`",
+            E::NamesBesideHeader { .. } => {
+                "leave `names` out; `position = \"..\"` and so on under [columns] say which column is which signal"
+            }
+            E::NameCount { .. } => {
+                "one name per column in their order under [columns], such as `names = [\"t\", \"q1\", \"q2\", \"tau1\", \"tau2\"]`"
+            }
+            E::AmbiguousComma { .. } => {
+                "say what the comma is under [columns]: `decimal = \",\"` if it is the decimal mark; numbers with marks of thousands are not read"
+            }
+            E::MixedMarks { .. } => {
+                "write the log with one decimal mark, or leave the column with the other one out: `ignore = [\"..\"]` under [columns]"
+            }
+            E::Thousands { .. } => "write the log without marks of thousands",
+            E::ListLength { .. } => "leave the row out: `leave_out = [[first, last]]` in its [[log]]",
+            E::OtherJoint { .. } | E::OtherJoints { .. } => {
+                "record the joint states of one publisher alone, all joints in every message"
+            }
+            E::NoMessage { .. } => "remove the line: it is no message",
             E::TooManyColumns { .. } => "check the delimiter",
             E::DuplicateColumn { .. } => "rename one of them",
             E::FieldCount { found, expected, .. } if found < expected => {
@@ -231,10 +371,15 @@ impl LogFileError {
             }
             E::FieldCount { .. } => "a decimal comma or a comma inside a field splits it",
             E::NotANumber { found, .. } if found.is_empty() => {
-                "a value is missing: fill it or remove the row, or ignore the column"
+                "a value is missing: `missing = \"drop\"` under [columns] (or `--missing drop`) leaves such rows out"
             }
-            E::NotANumber { found, .. } if is_decimal_comma(found) => "use a point as decimal mark",
+            E::NotANumber { found, .. } if is_decimal_comma(found) => {
+                "use a point as decimal mark; of logs, `decimal = \",\"` under [columns] says that it is a comma"
+            }
             E::NotANumber { .. } => "correct the field, or ignore the column if it is not a signal",
+            E::NotFinite { found, .. } if found.to_lowercase().contains("nan") => {
+                "remove the row, or `missing = \"drop\"` under [columns] (or `--missing drop`) to leave out rows without a value"
+            }
             E::NotFinite { .. } => "remove the row or limit the range of rows, or ignore the column",
             E::TooBig { .. } => "a sentinel or a damaged value: remove the row, or ignore the column",
             E::RowRange { .. } => "rows are counted from 1 after the header, the last one included",

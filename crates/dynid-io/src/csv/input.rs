@@ -12,7 +12,7 @@ use crate::input::{self, Opened};
 const BUFFER_BYTES: usize = 1 << 16;
 
 /// What stops the reading of bytes.
-pub(super) enum InputFault {
+pub(crate) enum InputFault {
     /// The operating system.
     Unreadable(io::Error),
     /// The gzip stream ends early.
@@ -27,13 +27,13 @@ pub(super) enum InputFault {
 
 /// Bounds of the text.
 #[derive(Clone, Copy)]
-pub(super) struct Bounds {
-    pub(super) max_bytes: u64,
-    pub(super) max_ratio: u64,
-    pub(super) ratio_grace: u64,
+pub(crate) struct Bounds {
+    pub(crate) max_bytes: u64,
+    pub(crate) max_ratio: u64,
+    pub(crate) ratio_grace: u64,
 }
 
-pub(super) struct Input {
+pub(crate) struct Input {
     stream: Stream,
     bounds: Bounds,
     text_bytes: u64,
@@ -78,7 +78,7 @@ impl Read for Counted {
 
 impl Input {
     /// Opens a file; gzip is told by its first two bytes.
-    pub(super) fn open(path: &Path, bounds: Bounds) -> io::Result<Self> {
+    pub(crate) fn open(path: &Path, bounds: Bounds) -> io::Result<Self> {
         let mut file = input::open(path)?;
         let mut magic = Vec::with_capacity(2);
         (&mut file).take(2).read_to_end(&mut magic)?;
@@ -94,7 +94,7 @@ impl Input {
     }
 
     /// Digest of all bytes of the file, those read so far and those behind them.
-    pub(super) fn digest(self) -> io::Result<String> {
+    pub(crate) fn digest(self) -> io::Result<String> {
         match self.stream {
             Stream::Plain(file) => file.finish(),
             Stream::Gzip(decoder) => decoder.into_inner().inner.into_inner().finish(),
@@ -102,7 +102,7 @@ impl Input {
     }
 
     /// Reads text into the buffer; 0 at the end.
-    pub(super) fn read(&mut self, buffer: &mut [u8]) -> Result<usize, InputFault> {
+    pub(crate) fn read(&mut self, buffer: &mut [u8]) -> Result<usize, InputFault> {
         let n = loop {
             let result = match &mut self.stream {
                 Stream::Plain(file) => file.read(buffer),

@@ -10,9 +10,9 @@ const CHUNK_BYTES: usize = 1 << 18;
 const MAX_LINE_BYTES: usize = 1 << 20;
 
 /// Lines without their ends, skipping blank lines and comments (`#`).
-pub(super) struct Lines<'f> {
+pub(crate) struct Lines {
     input: Input,
-    file: &'f str,
+    file: String,
     buffer: Vec<u8>,
     /// Unread part of the buffer.
     from: usize,
@@ -22,25 +22,26 @@ pub(super) struct Lines<'f> {
     limits: (u64, u64),
 }
 
-impl<'f> Lines<'f> {
-    pub(super) fn new(input: Input, file: &'f str, max_bytes: u64, max_ratio: u64) -> Self {
+impl Lines {
+    pub(crate) fn new(input: Input, file: &str, max_bytes: u64, max_ratio: u64) -> Self {
         let buffer = vec![0; CHUNK_BYTES];
+        let file = file.to_owned();
         Lines { input, file, buffer, from: 0, to: 0, ended: false, line: 0, limits: (max_bytes, max_ratio) }
     }
 
     /// Number of the line last returned.
-    pub(super) fn number(&self) -> usize {
+    pub(crate) fn number(&self) -> usize {
         self.line
     }
 
     /// Digest of the whole file; what follows the line last returned is not looked at.
-    pub(super) fn digest(self) -> Result<String, LogFileError> {
+    pub(crate) fn digest(self) -> Result<String, LogFileError> {
         let file = self.file;
-        self.input.digest().map_err(|error| LogFileError::Unreadable { file: file.to_owned(), error })
+        self.input.digest().map_err(|error| LogFileError::Unreadable { file, error })
     }
 
     /// The next line that is neither blank nor a comment.
-    pub(super) fn next(&mut self) -> Result<Option<&[u8]>, LogFileError> {
+    pub(crate) fn next(&mut self) -> Result<Option<&[u8]>, LogFileError> {
         loop {
             let Some((from, to)) = self.next_range()? else { return Ok(None) };
             let first = self.buffer[from..to].iter().find(|b| !b.is_ascii_whitespace());
@@ -79,7 +80,7 @@ impl<'f> Lines<'f> {
         self.to -= self.from;
         self.from = 0;
         if self.to > MAX_LINE_BYTES {
-            let (file, line) = (self.file.to_owned(), self.line + 1);
+            let (file, line) = (self.file.clone(), self.line + 1);
             return Err(LogFileError::LongLine { file, line, limit: MAX_LINE_BYTES });
         }
         if self.to == self.buffer.len() {
@@ -93,7 +94,7 @@ impl<'f> Lines<'f> {
             self.check_start()?;
         }
         if self.line == 0 && self.buffer[..self.to].contains(&0) {
-            return Err(LogFileError::NotText { file: self.file.to_owned(), found: "binary data" });
+            return Err(LogFileError::NotText { file: self.file.clone(), found: "binary data" });
         }
         Ok(())
     }
@@ -112,11 +113,11 @@ impl<'f> Lines<'f> {
             [0xFD, b'7', b'z', b'X', b'Z', ..] => "xz-compressed data",
             _ => return Ok(()),
         };
-        Err(LogFileError::NotText { file: self.file.to_owned(), found })
+        Err(LogFileError::NotText { file: self.file.clone(), found })
     }
 
     fn fault(&self, fault: InputFault) -> LogFileError {
-        let (file, line) = (self.file.to_owned(), self.line);
+        let (file, line) = (self.file.clone(), self.line);
         match fault {
             InputFault::Unreadable(error) => LogFileError::Unreadable { file, error },
             InputFault::Truncated => LogFileError::TruncatedGzip { file, line },

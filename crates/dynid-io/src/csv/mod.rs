@@ -1,13 +1,13 @@
 //! Logs as CSV, plain or gzip-compressed.
 
 mod error;
-mod input;
-mod lines;
-mod number;
+pub(crate) mod input;
+pub(crate) mod lines;
+pub(crate) mod number;
 mod read;
 mod write;
 
 pub use error::LogFileError;
 pub use read::{Delimiter, ReadOptions, Table, read};
-pub(crate) use read::{RowFault, RowParser};
+pub(crate) use read::{MAX_COLUMNS, RowFault, RowParser, detect, split};
 pub use write::{GZIP_COMMENT, RowWriter, text, write};

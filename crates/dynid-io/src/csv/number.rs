@@ -11,7 +11,7 @@ const EXACT_POWERS: [f64; 23] = [
 /// The value is the one that `str::parse` gives. Short numbers, which logs are full of, take the exact path of Clinger
 /// (1990): an integer below 2^53 times or over a power of ten up to 10^22 rounds once.
 #[inline]
-pub(super) fn prefix(text: &[u8]) -> Option<(f64, usize)> {
+pub(crate) fn prefix(text: &[u8]) -> Option<(f64, usize)> {
     let mut at = 0;
     let negative = text.first() == Some(&b'-');
     if negative || text.first() == Some(&b'+') {
@@ -62,6 +62,59 @@ pub(super) fn prefix(text: &[u8]) -> Option<(f64, usize)> {
     let power = EXACT_POWERS[exponent.unsigned_abs() as usize];
     let magnitude = if exponent < 0 { mantissa as f64 / power } else { mantissa as f64 * power };
     Some((if negative { -magnitude } else { magnitude }, at))
+}
+
+/// The numbers of a row that holds nothing else, as many as `values`, none beyond `largest`; `false`: look closer.
+#[inline]
+pub(crate) fn row(line: &[u8], separator: u8, values: &mut [f64], largest: &[f64]) -> bool {
+    let mut at = 0;
+    let last = values.len() - 1;
+    for (k, (x, largest)) in values.iter_mut().zip(largest).enumerate() {
+        while line.get(at) == Some(&b' ') {
+            at += 1;
+        }
+        let Some((value, length)) = prefix(&line[at..]) else { return false };
+        if value.abs() > *largest {
+            return false;
+        }
+        *x = value;
+        at += length;
+        while line.get(at) == Some(&b' ') {
+            at += 1;
+        }
+        match line.get(at) {
+            Some(b) if *b == separator && k < last => at += 1,
+            None if k == last => {}
+            _ => return false,
+        }
+    }
+    true
+}
+
+/// The whole part of a plain decimal number such as `1700000000123456789` or `1700000000.25`; `None` with an exponent, and
+/// beyond the range.
+pub(crate) fn whole_part(text: &[u8]) -> Option<i64> {
+    let whole = match text.iter().position(|b| *b == b'.') {
+        Some(point) if text[point + 1..].iter().all(u8::is_ascii_digit) => &text[..point],
+        Some(_) => return None,
+        None => text,
+    };
+    std::str::from_utf8(whole).ok()?.parse().ok()
+}
+
+/// A plain decimal number minus a whole number: the difference of the whole parts is exact, so that no digit of a stamp since
+/// 1970 is lost.
+pub(crate) fn beyond(text: &[u8], origin: i64) -> Option<f64> {
+    let whole = whole_part(text)?;
+    let fraction = match text.iter().position(|b| *b == b'.') {
+        Some(point) if point + 1 < text.len() => {
+            let (value, length) = prefix(&text[point..])?;
+            (point + length == text.len()).then_some(value)?
+        }
+        _ => 0.0,
+    };
+    let fraction = if text.first() == Some(&b'-') { -fraction } else { fraction };
+    Some(whole.checked_sub(origin)? as f64 + fraction)
 }
 
 #[inline(always)]

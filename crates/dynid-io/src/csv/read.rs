@@ -11,7 +11,7 @@ use crate::columns::is_time_name;
 use crate::excerpt::excerpt_bytes;
 
 /// Most columns of a log.
-const MAX_COLUMNS: usize = 65_536;
+pub(crate) const MAX_COLUMNS: usize = 65_536;
 
 /// What separates the fields of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +24,18 @@ pub enum Delimiter {
     Tab,
     /// Any run of blanks and tabulators.
     Whitespace,
+}
+
+impl Delimiter {
+    /// The byte that separates fields; `None` for runs of blanks.
+    pub(crate) fn byte(self) -> Option<u8> {
+        match self {
+            Delimiter::Comma => Some(b','),
+            Delimiter::Semicolon => Some(b';'),
+            Delimiter::Tab => Some(b'\t'),
+            Delimiter::Whitespace => None,
+        }
+    }
 }
 
 /// Settings of [`read`].
@@ -72,6 +84,9 @@ pub struct Table {
     pub rows: usize,
     /// Number in the file of the first row of the table, from 1.
     pub first_row: usize,
+    /// Per column, the whole number that was taken off its values where an `f64` could not have held them exactly
+    /// (stamps since 1970); else 0.
+    pub origin: Vec<i64>,
     /// SHA-256 of the file's bytes as they were read, rows that were not asked for included; hexadecimal.
     /// Empty for a table that no file was read for.
     pub sha256: String,
@@ -154,10 +169,22 @@ pub(crate) struct RowParser {
 }
 
 impl RowParser {
-    /// A parser of the rows under a header line.
-    pub(crate) fn of_header(file: &str, line: usize, header: &[u8]) -> Result<Self, LogFileError> {
+    /// A parser of the rows under a header line. `times`: columns that hold times besides those whose names say so.
+    pub(crate) fn of_header(
+        file: &str,
+        line: usize,
+        header: &[u8],
+        times: &[String],
+    ) -> Result<Self, LogFileError> {
         let delimiter = detect(header);
-        Self::new(file, line, delimiter, &split(header, delimiter), &ReadOptions::default())
+        let mut parser =
+            Self::new(file, line, delimiter, &split(header, delimiter), &ReadOptions::default())?;
+        for (name, largest) in parser.names.iter().zip(&mut parser.largest) {
+            if times.contains(name) {
+                *largest = f64::MAX;
+            }
+        }
+        Ok(parser)
     }
 
     fn new(
@@ -203,12 +230,7 @@ impl RowParser {
             names.iter().map(|n| if is_time_name(n) { f64::MAX } else { options.max_magnitude }).collect();
         Ok(RowParser {
             delimiter,
-            separator: match delimiter {
-                Delimiter::Comma => Some(b','),
-                Delimiter::Semicolon => Some(b';'),
-                Delimiter::Tab => Some(b'\t'),
-                Delimiter::Whitespace => None,
-            },
+            separator: delimiter.byte(),
             any_ignored: ignored.contains(&true),
             ignored,
             largest,
@@ -239,28 +261,7 @@ impl RowParser {
     /// The common row: unquoted numbers, as many as the header has. `false`: look closer.
     fn parse_plain(&mut self, line: &[u8]) -> bool {
         let (Some(separator), false) = (self.separator, self.any_ignored) else { return false };
-        let mut at = 0;
-        let last = self.values.len() - 1;
-        for (k, (x, largest)) in self.values.iter_mut().zip(&self.largest).enumerate() {
-            while line.get(at) == Some(&b' ') {
-                at += 1;
-            }
-            let Some((value, length)) = number::prefix(&line[at..]) else { return false };
-            if value.abs() > *largest {
-                return false;
-            }
-            *x = value;
-            at += length;
-            while line.get(at) == Some(&b' ') {
-                at += 1;
-            }
-            match line.get(at) {
-                Some(b) if *b == separator && k < last => at += 1,
-                None if k == last => {}
-                _ => return false,
-            }
-        }
-        true
+        number::row(line, separator, &mut self.values, &self.largest)
     }
 
     /// Any row, field by field.
@@ -333,9 +334,12 @@ impl<'a> Rows<'a> {
     fn into_table(self, first_row: usize, rows: usize) -> Table {
         let RowParser { names, ignored, .. } = self.parser;
         let kept = |k: usize| !ignored[k];
+        let header: Vec<String> =
+            names.into_iter().enumerate().filter(|(k, _)| kept(*k)).map(|(_, n)| n).collect();
         Table {
             source: self.file.to_owned(),
-            header: names.into_iter().enumerate().filter(|(k, _)| kept(*k)).map(|(_, n)| n).collect(),
+            origin: vec![0; header.len()],
+            header,
             columns: self.columns.into_iter().enumerate().filter(|(k, _)| kept(*k)).map(|(_, c)| c).collect(),
             rows,
             first_row,
@@ -349,7 +353,7 @@ fn is_number(field: &[u8]) -> bool {
 }
 
 /// The delimiter that is most frequent outside quotes; whitespace if there is none.
-fn detect(header: &[u8]) -> Delimiter {
+pub(crate) fn detect(header: &[u8]) -> Delimiter {
     let mut quoted = false;
     let mut counts = [(0, Delimiter::Comma), (0, Delimiter::Semicolon), (0, Delimiter::Tab)];
     for b in header {
@@ -371,7 +375,7 @@ fn detect(header: &[u8]) -> Delimiter {
 }
 
 /// The fields of a line, trimmed and without their quotes (`""` inside quotes is one quote).
-fn split(line: &[u8], delimiter: Delimiter) -> Vec<Vec<u8>> {
+pub(crate) fn split(line: &[u8], delimiter: Delimiter) -> Vec<Vec<u8>> {
     let ends_field = |b: u8| match delimiter {
         Delimiter::Comma => b == b',',
         Delimiter::Semicolon => b == b';',

@@ -3,7 +3,6 @@
 use thiserror::Error;
 
 use super::json::JsonFields;
-use crate::columns::is_time_name;
 use crate::csv::{LogFileError, RowFault, RowParser};
 use crate::excerpt::excerpt_bytes;
 
@@ -71,6 +70,7 @@ pub enum BadLine {
 pub struct StreamRows {
     name: String,
     format: LineFormat,
+    times: Vec<String>,
     header: Option<Header>,
 }
 
@@ -91,7 +91,13 @@ impl std::fmt::Debug for StreamRows {
 impl StreamRows {
     /// Rows of a stream with a name for messages.
     pub fn new(name: &str, format: LineFormat) -> Self {
-        StreamRows { name: name.to_owned(), format, header: None }
+        StreamRows { name: name.to_owned(), format, times: Vec::new(), header: None }
+    }
+
+    /// Names columns that hold times besides those whose names say so: their numbers may be of any size.
+    #[must_use]
+    pub fn with_times(self, times: Vec<String>) -> Self {
+        StreamRows { times, ..self }
     }
 
     /// Column names, once the first line has come.
@@ -120,8 +126,8 @@ impl StreamRows {
         if self.header.is_none() {
             let place = usize::try_from(number).unwrap_or(usize::MAX);
             self.header = Some(match self.format {
-                LineFormat::Csv => Header::Csv(RowParser::of_header(&self.name, place, line)?),
-                LineFormat::Json => match JsonFields::of_line(line) {
+                LineFormat::Csv => Header::Csv(RowParser::of_header(&self.name, place, line, &self.times)?),
+                LineFormat::Json => match JsonFields::of_line(line, &self.times) {
                     Ok(fields) => Header::Json(fields),
                     // The next line may be better.
                     Err(bad) => return Ok(Some(Err(bad))),
@@ -157,12 +163,12 @@ fn csv_row<'a>(parser: &'a mut RowParser, line: &[u8]) -> Result<&'a [f64], BadL
 const MAX_MAGNITUDE: f64 = 1e12;
 
 /// A number that may enter a row of a column.
-pub(super) fn checked(column: &str, x: f64) -> Result<f64, BadLine> {
+pub(super) fn checked(column: &str, x: f64, is_time: bool) -> Result<f64, BadLine> {
     let found = || excerpt_bytes(x.to_string().as_bytes());
     if !x.is_finite() {
         return Err(BadLine::NotFinite { column: column.to_owned(), found: found() });
     }
-    if x.abs() > MAX_MAGNITUDE && !is_time_name(column) {
+    if x.abs() > MAX_MAGNITUDE && !is_time {
         return Err(BadLine::TooBig { column: column.to_owned(), found: found() });
     }
     Ok(x)
@@ -225,6 +231,24 @@ mod tests {
         assert_eq!(found[5], Some(Err("column `q2`: expected a number, found `\"x\"`".into())));
         assert_eq!(found[6], Some(Err("expected a JSON object, found a list".into())));
         assert_eq!(found[7], Some(Ok(vec![5.0, 6.0, 0.5])));
+    }
+
+    #[test]
+    fn stamps_may_be_of_any_size_under_any_name_that_is_said_to_be_a_time() {
+        for (format, header, row) in [
+            (LineFormat::Csv, "clock,q1", "1700000000000000000,1"),
+            (
+                LineFormat::Json,
+                r#"{"clock": 1700000000000000000, "q1": 1}"#,
+                r#"{"clock": 1700000000000000001, "q1": 1}"#,
+            ),
+        ] {
+            for (times, good) in [(vec![], false), (vec!["clock".to_owned()], true)] {
+                let mut stream = StreamRows::new("stdin", format).with_times(times);
+                let _ = stream.read(1, header.as_bytes()).unwrap();
+                assert_eq!(stream.read(2, row.as_bytes()).unwrap().unwrap().is_ok(), good);
+            }
+        }
     }
 
     #[test]

@@ -5,19 +5,22 @@ use std::collections::HashMap;
 use serde_json::{Map, Value};
 
 use super::fields::{BadLine, checked};
+use crate::columns::is_time_name;
 use crate::excerpt::excerpt_bytes;
 
 /// Columns that the first object named.
 pub(super) struct JsonFields {
     names: Vec<String>,
     places: HashMap<String, usize>,
+    /// Columns that hold times.
+    times: Vec<bool>,
     values: Vec<f64>,
     filled: Vec<bool>,
 }
 
 impl JsonFields {
     /// Columns in alphabetical order: the first object's numbers and lists of numbers; other fields are not looked at.
-    pub(super) fn of_line(line: &[u8]) -> Result<Self, BadLine> {
+    pub(super) fn of_line(line: &[u8], times: &[String]) -> Result<Self, BadLine> {
         let mut names: Vec<String> = Vec::new();
         for (key, value) in &object(line)? {
             match value {
@@ -32,7 +35,14 @@ impl JsonFields {
             return Err(BadLine::NotJson { found: "an object without numbers".to_owned() });
         }
         let places = names.iter().enumerate().map(|(k, n)| (n.clone(), k)).collect();
-        Ok(JsonFields { places, values: vec![0.0; names.len()], filled: vec![false; names.len()], names })
+        let times = names.iter().map(|n| is_time_name(n) || times.contains(n)).collect();
+        Ok(JsonFields {
+            places,
+            times,
+            values: vec![0.0; names.len()],
+            filled: vec![false; names.len()],
+            names,
+        })
     }
 
     pub(super) fn names(&self) -> &[String] {
@@ -71,7 +81,7 @@ impl JsonFields {
             let found = excerpt_bytes(value.to_string().as_bytes());
             return Err(BadLine::NotANumber { column: column.to_owned(), found });
         };
-        self.values[*place] = checked(column, x)?;
+        self.values[*place] = checked(column, x, self.times[*place])?;
         self.filled[*place] = true;
         Ok(())
     }

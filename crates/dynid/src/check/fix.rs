@@ -126,24 +126,16 @@ impl Check {
             .iter()
             .any(|f| matches!(f, Fix::Wiring { .. } | Fix::VelocityScale(..) | Fix::Rate(_) | Fix::Clock(_)));
         if let (true, None, Some(mapped)) = (columns, &config.motor_side, self.mapped.get(number)) {
-            entry.insert("columns".to_owned(), Value::Table(mapped.stated(&own)));
+            let spec = log.columns.as_ref().unwrap_or(&config.columns);
+            entry.insert("columns".to_owned(), Value::Table(mapped.stated(&own, spec)));
         }
         Value::Table(entry)
     }
 
     /// What flags said of the columns, for logs whose columns are not stated in full.
     fn run_columns(&self, config: &Config, table: &mut Table) {
-        let mut columns = Table::new();
-        let spec = &config.columns;
-        if let Some(rate) = spec.rate_hz {
-            columns.insert("rate_hz".to_owned(), Value::Float(rate));
-        }
-        if let Some(gains) = &spec.current_gains {
-            columns.insert("current_gains".to_owned(), numbers(gains.iter().copied()));
-        }
-        if spec.allow_unlogged {
-            columns.insert("allow_unlogged".to_owned(), Value::Boolean(true));
-        }
+        let columns = Table::try_from(&config.columns)
+            .unwrap_or_else(|e| unreachable!("columns are plain values: {e}"));
         if !columns.is_empty() {
             table.insert("columns".to_owned(), Value::Table(columns));
         }
@@ -158,8 +150,8 @@ impl Check {
 }
 
 impl Mapped {
-    /// All columns in full, put right.
-    fn stated(&self, fixes: &[&Fix]) -> Table {
+    /// All columns in full, put right; how the file is read stays as it is stated.
+    fn stated(&self, fixes: &[&Fix], spec: &MappingSpec) -> Table {
         let mut mapping = self.columns.clone();
         let place = |joint: usize| mapping.joints.iter().position(|j| *j == self.joints[joint]);
         let places: Vec<Option<usize>> = (0..self.joints.len()).map(place).collect();
@@ -178,10 +170,10 @@ impl Mapped {
                 }
                 Fix::Rate(hz) => rate = Some(*hz),
                 Fix::Clock(factor) => match &mut mapping.time {
-                    TimeSource::Column(time) => {
-                        time.factor *= factor;
-                        time.offset *= factor;
-                    }
+                    TimeSource::Columns(time) => time.parts.iter_mut().for_each(|part| {
+                        part.factor *= factor;
+                        part.offset *= factor;
+                    }),
                     TimeSource::Rate(hz) => *hz /= factor,
                 },
                 _ => {}
@@ -190,7 +182,7 @@ impl Mapped {
         if let Some(hz) = rate {
             mapping.time = TimeSource::Rate(hz);
         }
-        let spec = MappingSpec { allow_no_effort: false, ..MappingSpec::from(&mapping) };
+        let spec = MappingSpec { allow_no_effort: false, ..MappingSpec::from(&mapping) }.read_as(spec);
         Table::try_from(spec).unwrap_or_else(|e| unreachable!("columns are plain values: {e}"))
     }
 }

@@ -17,6 +17,7 @@ mod report;
 
 use std::path::Path;
 
+use dynid_io::ReadingNote;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -35,6 +36,8 @@ use finding::{Findings, Fix};
 pub struct CheckedLog {
     /// Log file.
     pub log: String,
+    /// How the file was read where that was found out: format, decimal mark, unit of the time, rows without a value.
+    pub reading: Vec<ReadingNote>,
     /// Rows.
     pub rows: usize,
     /// Sample rate, Hz.
@@ -232,6 +235,7 @@ fn examine(
     let Examined { wiring, tilt, excitation } = bench.examine(&on_grid, &idle, out)?;
     let checked = CheckedLog {
         log: out.log.to_owned(),
+        reading: loaded.reading.clone(),
         rows: loaded.log.rows(),
         rate_hz: on_grid.rate_hz,
         duration_s: on_grid.samples() as f64 / on_grid.rate_hz,

@@ -1,7 +1,7 @@
 //! From rows of a stream to samples of a model's outputs.
 
 use dynid_io::columns::TimeSource;
-use dynid_io::{ColumnMapping, MappingSpec, Table};
+use dynid_io::{ColumnMapping, LogHeader, MappingError, MappingSpec, Table};
 use dynid_model::element::temperature_channel;
 
 use crate::Error;
@@ -23,6 +23,8 @@ pub(super) struct Sample {
 pub(super) struct Samples {
     name: String,
     mapping: ColumnMapping,
+    /// Positions may be those of motors.
+    motors: bool,
     rows: Table,
     /// Time of the first row of a clock that counts from an epoch.
     origin: Option<f64>,
@@ -33,14 +35,14 @@ impl Samples {
     /// For a stream with these columns. `axes`: of the robot, in their order.
     pub(super) fn new(
         name: &str,
-        header: &[String],
+        header: &LogHeader,
         axes: &[LogAxis],
         columns: &MappingSpec,
     ) -> Result<Samples, Error> {
         let named = |source| Error::Columns { file: name.to_owned(), source: Box::new(source) };
         let mapping = logs::map_columns(header, axes, columns).map_err(named)?;
         if columns.position.is_none() {
-            logs::check_surplus(&mapping, &logs::names(axes), header, name)?;
+            logs::check_surplus(&mapping, &logs::names(axes), &header.names, name)?;
         }
         logs::check_gains(columns, axes.len())?;
         if mapping.effort.is_none() {
@@ -49,13 +51,15 @@ impl Samples {
         Ok(Samples {
             rows: Table {
                 source: name.to_owned(),
-                header: header.to_vec(),
-                columns: vec![Vec::with_capacity(BATCH); header.len()],
+                header: header.names.clone(),
+                origin: vec![0; header.names.len()],
+                columns: vec![Vec::with_capacity(BATCH); header.names.len()],
                 rows: 0,
                 first_row: 1,
                 sha256: String::new(),
             },
             name: name.to_owned(),
+            motors: axes.iter().any(|a| a.motor),
             mapping,
             origin: None,
             taken: 0,
@@ -89,7 +93,7 @@ impl Samples {
     /// Samples of the rows taken, in SI. `channels`: names of the model's.
     pub(super) fn drain(&mut self, config: &Config, channels: &[String]) -> Result<Vec<Sample>, Error> {
         let rows = self.rows.rows;
-        if rows == 0 {
+        if rows == 0 || !self.settled(config)? {
             return Ok(Vec::new());
         }
         let named = |source| Error::Columns { file: self.name.clone(), source: Box::new(source) };
@@ -98,7 +102,7 @@ impl Samples {
         self.rows.rows = 0;
         let before = match &self.mapping.time {
             TimeSource::Rate(rate) => self.taken as f64 / rate,
-            TimeSource::Column(_) => {
+            TimeSource::Columns(_) => {
                 let origin = *self.origin.get_or_insert(signals.time_origin);
                 signals.time_origin - origin
             }
@@ -132,6 +136,23 @@ impl Samples {
             time: before + signals.time[row],
             values: lists.iter().map(|list| list[row]).collect(),
         };
-        Ok((0..rows).map(sample).collect())
+        Ok((0..signals.time.len()).map(sample).collect())
+    }
+
+    /// Finds the unit of the time; false: some more rows are needed for that.
+    fn settled(&mut self, config: &Config) -> Result<bool, Error> {
+        let more = self.rows.rows < BATCH;
+        let stated = |mapping: &ColumnMapping| match &mapping.time {
+            TimeSource::Columns(time) => time.unit_stated,
+            TimeSource::Rate(_) => true,
+        };
+        if stated(&self.mapping) {
+            return Ok(true);
+        }
+        match self.mapping.settle_time(&self.rows, self.motors || config.motor_side.is_some()) {
+            Ok(_) => Ok(stated(&self.mapping) || !more),
+            Err(MappingError::TimeUnit { .. } | MappingError::TimeStep { .. }) if more => Ok(false),
+            Err(source) => Err(Error::Columns { file: self.name.clone(), source: Box::new(source) }),
+        }
     }
 }

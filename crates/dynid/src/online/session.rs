@@ -1,6 +1,6 @@
 //! A stream from its first row to its end.
 
-use dynid_io::MappingSpec;
+use dynid_io::{LogHeader, MappingSpec};
 use dynid_model::EffortModel;
 
 use super::checkpoint::{Checkpoint, Place};
@@ -60,7 +60,7 @@ impl Session {
     pub fn new(
         config: &Config,
         name: &str,
-        header: &[String],
+        header: impl Into<LogHeader>,
         columns: Option<&MappingSpec>,
     ) -> Result<Session, Error> {
         config.check()?;
@@ -71,7 +71,7 @@ impl Session {
             ));
         }
         let axes = Structure::new(config, &[])?.axes();
-        let samples = Samples::new(name, header, &axes, columns.unwrap_or(&config.columns))?;
+        let samples = Samples::new(name, &header.into(), &axes, columns.unwrap_or(&config.columns))?;
         let structure = Structure::new(config, &samples.not_logged())?;
         Ok(Session {
             phase: Phase::Learning { samples: Vec::new(), wanted_s: config.online.learn_s },
@@ -94,14 +94,14 @@ impl Session {
     pub fn source(
         &mut self,
         name: &str,
-        header: &[String],
+        header: impl Into<LogHeader>,
         columns: Option<&MappingSpec>,
         emit: &mut dyn FnMut(Event),
     ) -> Result<(), Error> {
         self.flush(emit)?;
         let still = self.samples.not_logged();
         let axes = Structure::new(&self.config, &[])?.axes();
-        let samples = Samples::new(name, header, &axes, columns.unwrap_or(&self.config.columns))?;
+        let samples = Samples::new(name, &header.into(), &axes, columns.unwrap_or(&self.config.columns))?;
         if samples.not_logged() != still {
             return Err(Error::Unsupported(format!(
                 "{name}: expected columns of the same joints as before, not logged: {still:?}, found {:?}",

@@ -79,7 +79,8 @@ pub(crate) fn stiff_config(config: &Config, robot: &Robot) -> Result<Config, Err
     let mut out = config.clone();
     let read = |log: &mut LogConfig| -> Result<(), Error> {
         let loaded = logs::load(log, &robot.axes, &config.columns, config.motor_side.as_ref())?;
-        log.columns = Some(at_motors(&loaded.mapping, &robot.elements.elastic));
+        let stated = log.columns.as_ref().unwrap_or(&config.columns);
+        log.columns = Some(at_motors(&loaded.mapping, &robot.elements.elastic).read_as(stated));
         Ok(())
     };
     out.log.iter_mut().chain(&mut out.validation).try_for_each(read)?;
@@ -125,6 +126,7 @@ fn at_motors(mapping: &ColumnMapping, elastic: &[ElasticSpec]) -> MappingSpec {
         temperature: mapping.temperature.as_ref().map(|c| list(c, |_| 1.0)),
         undriven: kept.iter().map(|k| mapping.undriven[*k] && source(*k).is_none()).collect(),
         channels: mapping.channels.clone(),
+        missing: mapping.missing,
     };
     MappingSpec::from(&at_joints)
 }

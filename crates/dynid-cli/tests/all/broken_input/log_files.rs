@@ -146,7 +146,13 @@ fn are_refused() {
         case("bad.csv", with_column(log, "t", |_, _| 1.0), IDENTIFY, &["bad.csv", "time"], "time"),
         case("bad.csv", without(log, "t"), IDENTIFY, &["bad.csv", "time"], "rate_hz"),
         case("bad.csv", without(log, "q_elbow"), IDENTIFY, &["bad.csv", "position of", "elbow"], "allow"),
-        case("bad.csv", without(log, "tau_elbow"), IDENTIFY, &["bad.csv", "effort of", "elbow"], "mapping"),
+        case(
+            "bad.csv",
+            without(log, "tau_elbow"),
+            IDENTIFY,
+            &["bad.csv", "effort of", "elbow"],
+            "effort = { \"elbow\" = \"..\" }",
+        ),
         case(
             "bad.csv",
             sines(5),

@@ -1,0 +1,165 @@
+//! From the file of a log to a table and the meaning of its columns.
+
+use std::path::Path;
+
+use dynid_io::columns::{EffortColumn, columns_of_unnamed, is_time_name};
+use dynid_io::log::{Missing, Wanted};
+use dynid_io::{ColumnMapping, LogHeader, LogText, MappingError, MappingSpec, ReadingNote, Signals, Table};
+
+use super::{LogAxis, names};
+use crate::Error;
+use crate::config::LogConfig;
+
+/// A log as a table, with the meaning of its columns.
+#[derive(Debug)]
+pub(crate) struct Understood {
+    pub(crate) table: Table,
+    pub(crate) mapping: ColumnMapping,
+    /// What was found out about how to read it.
+    pub(crate) notes: Vec<ReadingNote>,
+}
+
+/// Reads the columns of a log that its robot needs. `motors`: positions may be those of motors before their gears.
+pub(crate) fn understand(
+    log: &LogConfig,
+    axes: &[LogAxis],
+    spec: &MappingSpec,
+    motors: bool,
+) -> Result<Understood, Error> {
+    let named = |source| columns_error(&log.path, source);
+    let text = LogText::open(&log.path, &spec.options(log.rows))?;
+    let header = text.header();
+    let (spec, text, unnamed) = match of_unnamed(log, &header, axes, spec)? {
+        Some((found, note)) => (found, text, Some(note)),
+        None => (spec.clone(), text, None),
+    };
+    let mapping = map_columns(&header, axes, &spec).map_err(named)?;
+    if spec.position.is_none() {
+        super::check_surplus(&mapping, &names(axes), &header.names, &log.path.display().to_string())?;
+    }
+    super::check_gains(&spec, axes.len())?;
+    let wanted = mapping.wanted();
+    let (table, mut notes) = text.read(&wanted)?;
+    notes.extend(unnamed);
+    let mut understood = Understood { table, mapping, notes };
+    understood.settle(motors || axes.iter().any(|a| a.motor)).map_err(named)?;
+    Ok(understood)
+}
+
+impl Understood {
+    /// Finds the unit of the time.
+    fn settle(&mut self, motors: bool) -> Result<(), MappingError> {
+        if let Some(found) = self.mapping.settle_time(&self.table, motors)? {
+            let column = self.mapping.time_columns().first().map_or("", |c| c.name.as_str());
+            let value = format!("`{column}` in {}, {:.4} Hz", found.unit, found.rate_hz);
+            self.notes.push(ReadingNote::new("time", value, found.reason));
+        } else if let [seconds, rest @ ..] = self.mapping.time_columns()
+            && !rest.is_empty()
+        {
+            let others: Vec<String> = rest.iter().map(|c| format!("`{}`", c.name)).collect();
+            let value = format!("`{}` + {}", seconds.name, others.join(" + "));
+            self.notes.push(ReadingNote::new("time", value, "whole seconds and their fractions are apart"));
+        }
+        Ok(())
+    }
+
+    /// Signals of the log, and what became of rows without a value.
+    pub(crate) fn signals(&mut self) -> Result<Signals, MappingError> {
+        let signals = self.mapping.extract(&self.table)?;
+        let sparse = &signals.sparse;
+        if !sparse.columns.is_empty() {
+            let most = sparse.columns.iter().max_by_key(|(_, count)| *count);
+            let reason = most.map_or_else(String::new, |(name, count)| {
+                format!("`{name}` has no value in {count} of {} rows", self.table.rows)
+            });
+            let value = match self.mapping.missing {
+                Missing::Interpolate => {
+                    format!("interpolate, {} values; {} rows left out", sparse.interpolated, sparse.left_out)
+                }
+                _ => format!("drop, {} of {} rows left out", sparse.left_out, self.table.rows),
+            };
+            self.notes.push(ReadingNote::new("missing values", value, reason));
+        }
+        Ok(signals)
+    }
+}
+
+/// Columns of a file without a header, where its numbers tell them.
+fn of_unnamed(
+    log: &LogConfig,
+    header: &LogHeader,
+    axes: &[LogAxis],
+    spec: &MappingSpec,
+) -> Result<Option<(MappingSpec, ReadingNote)>, Error> {
+    let stated = spec.position.is_some() || spec.effort.is_some() || spec.time.is_some();
+    if !header.unnamed || stated || spec.rate_hz.is_some() {
+        return Ok(None);
+    }
+    let all = Wanted { columns: None, time: vec![0], missing: Missing::Error };
+    let (table, _) = LogText::open(&log.path, &spec.options(log.rows))?.read(&all)?;
+    let found = columns_of_unnamed(&table, axes.len()).map_err(|e| columns_error(&log.path, e))?;
+    let merged = MappingSpec {
+        time: found.time.clone(),
+        position: found.position.clone(),
+        velocity: found.velocity.clone(),
+        effort: found.effort.clone(),
+        ..spec.clone()
+    };
+    let mapping = map_columns(header, axes, &merged).map_err(|e| columns_error(&log.path, e))?;
+    let shown = |list: Option<&Vec<Option<dynid_io::columns::ColumnUse>>>| {
+        let names: Vec<&str> = list.into_iter().flatten().flatten().map(|c| c.name.as_str()).collect();
+        names.join(" ")
+    };
+    let value = format!(
+        "position {}, velocity {}, effort {}",
+        shown(Some(&mapping.position)),
+        shown(mapping.velocity.as_ref()),
+        shown(mapping.effort.as_ref())
+    );
+    let reason = "one block of columns is the rate of another, the third must be the effort; joints in the order of the robot";
+    Ok(Some((merged, ReadingNote::new("columns", value, reason))))
+}
+
+/// A log as a table of all its columns that hold numbers, with their header. Cells without a value are NaN where rows
+/// without one are not refused.
+///
+/// # Errors
+/// [`Error::LogFile`].
+pub fn table(log: &LogConfig, spec: &MappingSpec) -> Result<(Table, LogHeader), Error> {
+    let text = LogText::open(&log.path, &spec.options(log.rows))?;
+    let header = text.header();
+    let drops = header.format.is_some_and(|f| f.leaves_cells_empty());
+    let missing = spec.missing.unwrap_or(if drops { Missing::Drop } else { Missing::Error });
+    let columns: Vec<usize> = (0..header.names.len()).filter(|k| !header.text[*k]).collect();
+    let stated = spec.time_names();
+    let is_time = |k: &usize| {
+        header.time.contains(k) || stated.contains(&header.names[*k]) || is_time_name(&header.names[*k])
+    };
+    let time = columns.iter().copied().filter(is_time).collect();
+    let (table, _) = text.read(&Wanted { columns: Some(columns.clone()), time, missing })?;
+    let texts: Vec<String> =
+        (0..header.names.len()).filter(|k| header.text[*k]).map(|k| header.names[k].clone()).collect();
+    Ok((table, header.without(&texts)))
+}
+
+/// Names of the columns of a log.
+///
+/// # Errors
+/// [`Error::LogFile`].
+pub(crate) fn header(log: &LogConfig, spec: &MappingSpec) -> Result<LogHeader, Error> {
+    Ok(LogText::open(&log.path, &spec.options(log.rows))?.header())
+}
+
+/// Columns of a robot's signals. The sign of torque sensors is that of efforts from here on.
+pub(crate) fn map_columns(
+    header: &LogHeader,
+    axes: &[LogAxis],
+    spec: &MappingSpec,
+) -> Result<ColumnMapping, MappingError> {
+    let efforts: Vec<EffortColumn> = axes.iter().map(|a| a.effort).collect();
+    ColumnMapping::of_log(header, &names(axes), &efforts, spec)
+}
+
+fn columns_error(path: &Path, source: MappingError) -> Error {
+    Error::Columns { file: path.display().to_string(), source: Box::new(source) }
+}
