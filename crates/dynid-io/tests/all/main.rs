@@ -5,6 +5,7 @@ mod clearance;
 mod closed_robots;
 mod logs;
 mod loops;
+mod meshes;
 mod mjcf;
 mod oracles;
 mod robot_files;
