@@ -22,7 +22,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-SLENDERNESS = 0.15
+SLENDERNESS = 0.055
 ROUNDING = 1e-6
 
 
@@ -123,9 +123,12 @@ def extremes(shape, placement):
 
 
 def bodies_of_chain(model):
-    """Bodies as capsules from joint to joint, of a radius that follows from the longest distance."""
-    lengths = [np.linalg.norm(model.jointPlacements[j].translation) for j in range(1, model.njoints) if model.parents[j] != 0]
-    radius = SLENDERNESS * max(lengths)
+    """Bodies as capsules from joint to joint, of a radius that follows from the length of the longest chain."""
+    length = [0.0] * model.njoints
+    for joint in range(1, model.njoints):
+        if model.parents[joint] != 0:
+            length[joint] = length[model.parents[joint]] + np.linalg.norm(model.jointPlacements[joint].translation)
+    radius = SLENDERNESS * max(length)
     bodies = {}
     for joint in range(model.njoints):
         ends = [model.jointPlacements[c].translation for c in range(1, model.njoints) if model.parents[c] == joint]

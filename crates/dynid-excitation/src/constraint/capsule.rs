@@ -64,7 +64,7 @@ pub struct Capsules {
 }
 
 /// Distance beyond which own links count as far from each other, m: no row of a search looks farther.
-const FAR: f64 = 0.9 * DISTANCE_SCALE;
+const FAR: f64 = 0.5 * DISTANCE_SCALE;
 
 impl Capsules {
     /// Keeps capsules apart. `ranges`: lowest and highest position of every coordinate, rad or m (infinite where there is
@@ -104,7 +104,7 @@ impl Capsules {
     }
 
     /// Keeps pairs of capsules on the links of a robot at least `margin` apart, m: rows
-    /// `(distance of segments - radii - margin) / 0.5 m ≥ 0`. Beyond 0.45 m a lower bound stands for the distance.
+    /// `(distance of segments - radii - margin) / 0.5 m ≥ 0`. Beyond 0.25 m a lower bound stands for the distance.
     ///
     /// Fails as [`Capsules::new`].
     pub fn own_links(

@@ -63,11 +63,7 @@ impl<'a> Clearance<'a> {
                 (*low, *high)
             }
         };
-        Clearance {
-            mechanism,
-            dynamics,
-            ranges: ranges.iter().zip(comes_round).map(within).collect(),
-        }
+        Clearance { mechanism, dynamics, ranges: ranges.iter().zip(comes_round).map(within).collect() }
     }
 
     /// True if it is proven that the segments never come closer than `radii`; `ends`: those of the first, then of the

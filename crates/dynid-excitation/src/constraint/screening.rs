@@ -1,8 +1,7 @@
 //! What of a robot's capsules can be kept apart and on one side of planes, and what cannot.
 //!
-//! A limit that every pose breaks can be kept by no motion; one that no pose comes near costs time for nothing. Poses drawn
-//! from the joint ranges tell the first (and so leave a limit alone that hardly ever can be met); that a limit cannot be
-//! broken is proven (see `clearance`).
+//! A limit that (nearly) every pose breaks can be kept by no motion; one that no pose comes near costs time for nothing.
+//! Poses drawn from the joint ranges tell the first; that a limit cannot be broken is proven (see `clearance`).
 
 use dynid_model::{BodyPoint, Dynamics, Mechanism, MotionBlock, Vec3};
 use rand::SeedableRng;
@@ -17,6 +16,8 @@ use super::{Capsule, ConstraintError, ConstraintKind, finite};
 const POSES: usize = 2000;
 /// Distance below which no proof is tried that capsules stay apart: it would hardly succeed, m.
 const WORTH_A_PROOF: f64 = 0.02;
+/// Share of poses that must have two links apart for a motion to be able to keep them so.
+const LEAST_APART: f64 = 0.05;
 /// Distance that rounding may make, m.
 const ROUNDING: f64 = 1e-9;
 /// Poses at which two points that are always at one place are compared.
@@ -38,7 +39,7 @@ pub struct Plane {
 pub struct Screening {
     /// Pairs that are to be kept apart: some poses may bring them within the margin, and not all do.
     pub pairs: Vec<(usize, usize)>,
-    /// Pairs that every pose has within the margin.
+    /// Pairs that are given up, because 95 of 100 poses or more have their links within the margin.
     pub always_near: Vec<(usize, usize)>,
     /// Number of pairs that provably never come within the margin.
     pub never_near: usize,
@@ -74,18 +75,28 @@ pub fn screen(
     let clearance = Clearance::new(mechanism, &dynamics, ranges);
     let poses = Poses::new(&dynamics, &clearance, &points);
     let mut out = Screening::default();
-    for (a, b) in not_neighbours(mechanism, &points) {
-        let radii = capsules[a].radius + capsules[b].radius + margin;
-        let (least, largest) = poses.range(|s| {
-            segment_distance(&poses.segment(a, s), &poses.segment(b, s)).distance - radii
-        });
-        let ends = [2 * a, 2 * a + 1, 2 * b, 2 * b + 1].map(|p| points[p]);
-        if largest <= ROUNDING {
-            out.always_near.push((a, b));
-        } else if least > WORTH_A_PROOF && clearance.never_touch(&ends, radii) {
-            out.never_near += 1;
-        } else {
-            out.pairs.push((a, b));
+    for pairs in by_links(not_neighbours(mechanism, &points), capsules) {
+        let radii = |(a, b): (usize, usize)| capsules[a].radius + capsules[b].radius + margin;
+        let gaps: Vec<Vec<f64>> = pairs
+            .iter()
+            .map(|pair| {
+                let segments = |s| [poses.segment(pair.0, s), poses.segment(pair.1, s)];
+                let gap = |[a, b]: [Segment; 2]| segment_distance(&a, &b).distance - radii(*pair);
+                (0..POSES).map(|s| gap(segments(s))).collect()
+            })
+            .collect();
+        let near = hopeless(&gaps);
+        for (k, pair) in pairs.into_iter().enumerate() {
+            let (a, b) = pair;
+            let least = gaps[k].iter().fold(f64::INFINITY, |m, x| m.min(*x));
+            let ends = [2 * a, 2 * a + 1, 2 * b, 2 * b + 1].map(|p| points[p]);
+            if near.contains(&k) {
+                out.always_near.push(pair);
+            } else if least > WORTH_A_PROOF && clearance.never_touch(&ends, radii(pair)) {
+                out.never_near += 1;
+            } else {
+                out.pairs.push(pair);
+            }
         }
     }
     for plane in planes {
@@ -103,6 +114,33 @@ pub fn screen(
         out.planes.push(own);
     }
     Ok(out)
+}
+
+/// Pairs of capsules, those of the same two links together.
+fn by_links(pairs: Vec<(usize, usize)>, capsules: &[Capsule]) -> Vec<Vec<(usize, usize)>> {
+    let mut out: Vec<Vec<(usize, usize)>> = Vec::new();
+    let links = |(a, b): (usize, usize)| (&capsules[a].frame, &capsules[b].frame);
+    for pair in pairs {
+        match out.iter_mut().find(|group| links(group[0]) == links(pair)) {
+            Some(group) => group.push(pair),
+            None => out.push(vec![pair]),
+        }
+    }
+    out
+}
+
+/// Indices of the capsule pairs of two links that are given up, those near most often first, until enough poses have the
+/// others apart.
+fn hopeless(gaps: &[Vec<f64>]) -> Vec<usize> {
+    let mut left: Vec<usize> = (0..gaps.len()).collect();
+    let near_in = |k: usize| gaps[k].iter().filter(|gap| **gap <= ROUNDING).count();
+    let is_apart = |left: &[usize], s: usize| left.iter().all(|k| gaps[*k][s] > ROUNDING);
+    let apart = |left: &[usize]| (0..POSES).filter(|s| is_apart(left, *s)).count();
+    while apart(&left) < (LEAST_APART * POSES as f64) as usize {
+        let Some(place) = (0..left.len()).max_by_key(|place| near_in(left[*place])) else { break };
+        left.remove(place);
+    }
+    (0..gaps.len()).filter(|k| !left.contains(k)).collect()
 }
 
 /// Ends on moving bodies, without those that are always where an end of at least their radius is.

@@ -95,8 +95,7 @@ fn about(points: &[Vec3<f64>], axis: Vec3<f64>) -> Envelope {
     let [u, v] = across(axis);
     let flat: Vec<[f64; 2]> = points.iter().map(|p| [u.dot(*p), v.dot(*p)]).collect();
     let center = smallest_circle(&flat);
-    let distances: Vec<f64> =
-        flat.iter().map(|p| (p[0] - center[0]).hypot(p[1] - center[1])).collect();
+    let distances: Vec<f64> = flat.iter().map(|p| (p[0] - center[0]).hypot(p[1] - center[1])).collect();
     let least = distances.iter().fold(0.0, |m: f64, d| m.max(*d)) + ROUNDING;
     let heights: Vec<f64> = points.iter().map(|p| axis.dot(*p)).collect();
     let origin = u.scale(center[0]) + v.scale(center[1]);
@@ -111,7 +110,10 @@ fn about(points: &[Vec3<f64>], axis: Vec3<f64>) -> Envelope {
         if low > high {
             (low, high) = (0.5 * (low + high), 0.5 * (low + high));
         }
-        Envelope { ends: [axis.scale_add(low, origin), axis.scale_add(high, origin)], radius: radius + ROUNDING }
+        Envelope {
+            ends: [axis.scale_add(low, origin), axis.scale_add(high, origin)],
+            radius: radius + ROUNDING,
+        }
     };
     let mut best = with(least);
     for k in 1..RADII {

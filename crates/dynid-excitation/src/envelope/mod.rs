@@ -46,7 +46,8 @@ impl Envelope {
 
     /// Capsules about a box with these edge lengths.
     pub fn of_box(size: [f64; 3]) -> Vec<Envelope> {
-        let corner = |k: usize| Vec3(std::array::from_fn(|c| if k >> c & 1 == 1 { 0.5 } else { -0.5 } * size[c]));
+        let corner =
+            |k: usize| Vec3(std::array::from_fn(|c| if k >> c & 1 == 1 { 0.5 } else { -0.5 } * size[c]));
         const FACES: [[usize; 4]; 6] =
             [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
         let halves = FACES.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]);

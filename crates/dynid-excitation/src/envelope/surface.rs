@@ -64,11 +64,8 @@ impl Part {
         }
         let mut best: Option<(f64, Vec<bool>)> = None;
         for normal in normals {
-            let heights: Vec<f64> = self
-                .triangles
-                .iter()
-                .map(|t| t.iter().map(|p| normal.dot(*p)).sum::<f64>() / 3.0)
-                .collect();
+            let heights: Vec<f64> =
+                self.triangles.iter().map(|t| t.iter().map(|p| normal.dot(*p)).sum::<f64>() / 3.0).collect();
             let low = heights.iter().fold(f64::INFINITY, |m, h| m.min(*h));
             let high = heights.iter().fold(f64::NEG_INFINITY, |m, h| m.max(*h));
             for share in CUTS {

@@ -88,7 +88,8 @@ fn capsules_are_slender() {
     let capsules = Envelope::of_surface(&tube(&straight, 0.05));
     assert_eq!(capsules.len(), 1);
     let tight = std::f64::consts::PI * 0.05_f64.powi(2) * (length + 4.0 / 3.0 * 0.05);
-    assert!(capsules[0].volume() <= 1.01 * tight, "{} {tight}", capsules[0].volume());
+    // Axes are found to 2e-3 rad, which at the ends, 0.32 m away, is 1.3 % of the radius.
+    assert!(capsules[0].volume() <= 1.03 * tight, "{} {tight}", capsules[0].volume());
     let bent = tube(&[[0.0, 0.0, 0.0], [0.0, 0.0, 0.6], [0.0, 0.6, 0.6]].map(Vec3), 0.05);
     let several: f64 = Envelope::of_surface(&bent).iter().map(Envelope::volume).sum();
     // One capsule about an elbow is at least a tube about its three corners.
@@ -107,7 +108,8 @@ fn primitives_lie_within_their_capsules() {
                 assert!(least_outside(&e, rim) <= 0.0, "{radius} {length}");
             }
         }
-        let around = Envelope { ends: [Vec3([0.0, 0.0, -0.5 * length]), Vec3([0.0, 0.0, 0.5 * length])], radius };
+        let around =
+            Envelope { ends: [Vec3([0.0, 0.0, -0.5 * length]), Vec3([0.0, 0.0, 0.5 * length])], radius };
         assert!(e[0].volume() <= around.volume() * (1.0 + 1e-12));
     }
     for size in [[0.1, 0.2, 0.3], [1.0, 0.02, 0.02], [0.5, 0.5, 0.01]] {
@@ -121,9 +123,9 @@ fn primitives_lie_within_their_capsules() {
     assert!(Envelope::of_surface(&[]).is_empty());
 }
 
-/// The UR10 along its chain: what is screened away is near, or far, at poses that the screening did not draw.
+/// The UR10 along its chain: what is given up is near at poses that the screening did not draw.
 #[test]
-fn screening_leaves_out_what_is_always_near_or_never() {
+fn screening_gives_up_what_is_nearly_always_near() {
     let Some(mechanism) = plain_urdf::ur10() else { return };
     let radius = chain_radius(&mechanism).unwrap();
     let bodies = std::iter::once(None).chain((0..mechanism.bodies().len()).map(Some));
@@ -142,6 +144,7 @@ fn screening_leaves_out_what_is_always_near_or_never() {
         frame.body.map_or(local, |b| frames[b].rotation.mul_vec(local) + frames[b].translation)
     };
     let total = capsules.len();
+    let mut near = vec![0; screened.always_near.len()];
     for _ in 0..500 {
         let q: Vec<f64> = ranges.iter().map(|(low, high)| rng.random_range(*low..*high)).collect();
         let frames = dynamics.forward_kinematics(&q, &mut work);
@@ -153,12 +156,14 @@ fn screening_leaves_out_what_is_always_near_or_never() {
                 .fold(f64::INFINITY, f64::min);
             nearest - capsules[a].radius - capsules[b].radius
         };
-        for (a, b) in &screened.always_near {
-            assert!(gap(*a, *b) <= margin + 0.01, "{} {}", capsules[*a].frame, capsules[*b].frame);
+        for (count, (a, b)) in near.iter_mut().zip(&screened.always_near) {
+            *count += usize::from(gap(*a, *b) <= margin);
         }
         for (k, end) in &screened.planes[0].always_low {
             assert!(placed(*k, *end, &frames).0[2] <= radius + margin + 1e-9);
         }
     }
+    // 95 of 100 poses of the screening: within three deviations of that on others.
+    assert!(near.iter().all(|count| *count >= 460), "{near:?}");
     assert!(screened.pairs.iter().all(|(a, b)| *a < total && *b < total));
 }

@@ -198,7 +198,13 @@ impl Reader<'_> {
         })
     }
 
-    pub(super) fn value(&self, element: &Element, owner: &str, a: &Attribute, expected: &str) -> RobotFileError {
+    pub(super) fn value(
+        &self,
+        element: &Element,
+        owner: &str,
+        a: &Attribute,
+        expected: &str,
+    ) -> RobotFileError {
         RobotFileError::Value {
             at: self.place(a.offset),
             owner: owner.to_owned(),
@@ -208,7 +214,12 @@ impl Reader<'_> {
         }
     }
 
-    pub(super) fn number(&self, element: &Element, owner: &str, a: &Attribute) -> Result<f64, RobotFileError> {
+    pub(super) fn number(
+        &self,
+        element: &Element,
+        owner: &str,
+        a: &Attribute,
+    ) -> Result<f64, RobotFileError> {
         finite(&a.value).ok_or_else(|| self.value(element, owner, a, "a finite number up to 1e30"))
     }
 
@@ -221,7 +232,12 @@ impl Reader<'_> {
         element.text(name).map(|a| self.number(element, owner, a)).transpose()
     }
 
-    pub(super) fn vector(&self, element: &Element, owner: &str, name: &str) -> Result<Option<[f64; 3]>, RobotFileError> {
+    pub(super) fn vector(
+        &self,
+        element: &Element,
+        owner: &str,
+        name: &str,
+    ) -> Result<Option<[f64; 3]>, RobotFileError> {
         let Some(a) = element.text(name) else { return Ok(None) };
         let mut out = [0.0; 3];
         let mut words = a.value.split_ascii_whitespace();
@@ -237,7 +253,11 @@ impl Reader<'_> {
         Ok(Some(out))
     }
 
-    pub(super) fn origin(&self, element: &Element, owner: &str) -> Result<([f64; 3], [f64; 3]), RobotFileError> {
+    pub(super) fn origin(
+        &self,
+        element: &Element,
+        owner: &str,
+    ) -> Result<([f64; 3], [f64; 3]), RobotFileError> {
         let Some(origin) = self.child(element, owner, "origin")? else { return Ok(([0.0; 3], [0.0; 3])) };
         let xyz = self.vector(origin, owner, "xyz")?.unwrap_or_default();
         let rpy = self.vector(origin, owner, "rpy")?.unwrap_or_default();

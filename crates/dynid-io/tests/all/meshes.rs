@@ -43,7 +43,8 @@ fn expected() -> Vec<[[f64; 3]; 3]> {
 #[test]
 fn binary_and_text_stl_and_obj_give_the_same_triangles() {
     let folder = tempfile::tempdir().unwrap();
-    let files = [("a.stl", binary_stl()), ("b.STL", text_stl().into_bytes()), ("c.obj", OBJ.as_bytes().to_vec())];
+    let files =
+        [("a.stl", binary_stl()), ("b.STL", text_stl().into_bytes()), ("c.obj", OBJ.as_bytes().to_vec())];
     for (name, bytes) in files {
         let path = folder.path().join(name);
         std::fs::write(&path, &bytes).unwrap();
@@ -129,7 +130,11 @@ fn shapes_that_mean_nothing_are_refused_with_their_place() {
         ("0.1 0.2 0.3", "0.1 0 0.3", "r.urdf:3:62: link `a`: <box> size: expected three positive numbers"),
         ("radius=\"0.2\"", "radius=\"-0.2\"", "<cylinder> radius: expected a positive number, found `-0.2`"),
         ("radius=\"0.2\" ", "", "expected an attribute `radius` of <cylinder>"),
-        ("<capsule radius", "<cone radius", "expected <box>, <cylinder>, <sphere>, <capsule> or <mesh>, found `<cone>`"),
+        (
+            "<capsule radius",
+            "<cone radius",
+            "expected <box>, <cylinder>, <sphere>, <capsule> or <mesh>, found `<cone>`",
+        ),
     ] {
         let error = parse_shapes(&URDF.replace(good, bad), "r.urdf").unwrap_err().to_string();
         assert!(error.contains(says), "{error}");

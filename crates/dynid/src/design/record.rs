@@ -48,7 +48,7 @@ pub struct DesignRecord {
     pub limits: Vec<LimitRecord>,
     /// What is kept by default (floor, own links), and what is not checked.
     pub safety: SafetyRecord,
-    /// Least distance between links that are kept apart, m: of 0.45 m and more a lower bound.
+    /// Least distance between links that are kept apart, m: of 0.25 m and more a lower bound.
     pub least_distance_m: Option<f64>,
     /// Least height of links above the floor (or distance from the mounting plane), m.
     pub least_height_m: Option<f64>,
@@ -392,8 +392,12 @@ impl DesignRun {
         let rows = problem.constraints.iter().flat_map(|c| c.rows());
         let kinds: Vec<ConstraintKind> = rows.map(|row| row.kind).collect();
         let is_kept = |kind: &ConstraintKind| kinds.contains(kind);
-        let regions =
-            [ConstraintKind::HalfSpace, ConstraintKind::Box, ConstraintKind::Cylinder, ConstraintKind::Column];
+        let regions = [
+            ConstraintKind::HalfSpace,
+            ConstraintKind::Box,
+            ConstraintKind::Cylinder,
+            ConstraintKind::Column,
+        ];
         let named = [
             (is_kept(&ConstraintKind::Effort), "efforts"),
             (regions.iter().any(is_kept), "regions of [[keep]]"),
@@ -402,7 +406,9 @@ impl DesignRun {
         kept.extend(named.iter().filter(|(is_kept, _)| *is_kept).map(|(_, name)| (*name).to_owned()));
         let safety = &self.set.safety.record;
         let margin = format!("{:.0} mm", 1e3 * safety.margin_m);
-        kept.extend(safety.planes.iter().filter(|p| !p.links.is_empty()).map(|p| format!("{} ({margin})", p.name)));
+        kept.extend(
+            safety.planes.iter().filter(|p| !p.links.is_empty()).map(|p| format!("{} ({margin})", p.name)),
+        );
         if !safety.pairs.is_empty() {
             kept.push(format!("own links ({} pairs, {margin})", safety.pairs.len()));
         }

@@ -284,9 +284,11 @@ impl Safety {
         let is_given = |k: usize| self.capsules[k].source == CapsuleSource::Given;
         let names = |(a, b): &(usize, usize)| [capsules[*a].frame.clone(), capsules[*b].frame.clone()];
         let stated = |pair: &[String; 2]| {
-            config.safety.exempt.iter().any(|[a, b]| {
-                (*a == pair[0] && *b == pair[1]) || (*b == pair[0] && *a == pair[1])
-            })
+            config
+                .safety
+                .exempt
+                .iter()
+                .any(|[a, b]| (*a == pair[0] && *b == pair[1]) || (*b == pair[0] && *a == pair[1]))
         };
         // Given capsules are kept apart among themselves as the configuration says.
         let own = |(a, b): &&(usize, usize)| !(is_given(*a) && is_given(*b));
@@ -298,11 +300,11 @@ impl Safety {
             let text: Vec<String> = near.iter().map(|[a, b]| format!("{a} and {b}")).collect();
             let millimetres = 1e3 * margin;
             self.assumptions.push(format!(
-                "parts of these links are not kept apart, since every pose has their capsules within {millimetres:.0} mm: {}",
+                "parts of these links are not kept apart, since 95 of 100 poses or more have them within {millimetres:.0} mm: {}",
                 text.join(", ")
             ));
             self.record.not_checked.push(format!(
-                "{} pairs of links of which parts are near in every pose ({})",
+                "parts of {} pairs of links that are near in nearly every pose ({})",
                 near.len(),
                 text.join(", ")
             ));
@@ -312,7 +314,7 @@ impl Safety {
             let text: Vec<String> = exempt.iter().map(|[a, b]| format!("{a} and {b}")).collect();
             self.record.not_checked.push(format!("exempt pairs of links ({})", text.join(", ")));
         }
-        let reason = "every pose has parts of them within the margin";
+        let reason = "95 of 100 poses or more have parts of them within the margin";
         self.record.exempt.extend(near.into_iter().map(|links| ExemptRecord { links, reason }));
         let reason = "the configuration says so";
         self.record.exempt.extend(exempt.into_iter().map(|links| ExemptRecord { links, reason }));

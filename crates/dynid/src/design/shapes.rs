@@ -84,8 +84,9 @@ pub(super) fn link_capsules(robot: &Robot, config: &DesignConfig) -> Result<Link
         for body in std::iter::once(None).chain((0..mechanism.bodies().len()).map(Some)) {
             if !known.contains(&body) || unknown.contains(&body) {
                 let chain = chain_capsules(mechanism, body, radius);
-                out.capsules
-                    .extend(chain.into_iter().map(|capsule| LinkCapsule { capsule, source: CapsuleSource::Chain }));
+                out.capsules.extend(
+                    chain.into_iter().map(|capsule| LinkCapsule { capsule, source: CapsuleSource::Chain }),
+                );
             }
         }
     }
@@ -108,9 +109,9 @@ fn shapes_of(robot: &Robot) -> Result<Vec<LinkShape>, Error> {
     let Some(urdf) = &robot.file.urdf else { return Ok(Vec::new()) };
     let (shapes, source) = read_shapes(urdf)?;
     match robot.file.sources.iter().find(|s| s.path == source.path) {
-        Some(first) if first.sha256 != source.sha256 => Err(Error::Unsupported(format!(
-            "{urdf} changed while it was read: run once more"
-        ))),
+        Some(first) if first.sha256 != source.sha256 => {
+            Err(Error::Unsupported(format!("{urdf} changed while it was read: run once more")))
+        }
         _ => Ok(shapes),
     }
 }

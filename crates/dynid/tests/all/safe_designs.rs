@@ -76,9 +76,8 @@ fn measured(record: &DesignRecord, robot: &Path) -> (f64, f64) {
         let pairs = &record.safety.pairs;
         pairs.iter().any(|p| (p[0] == a && p[1] == b) || (p[0] == b && p[1] == a))
     };
-    let is_near = |a: &str, b: &str| {
-        record.safety.exempt.iter().any(|e| e.links == [a, b] || e.links == [b, a])
-    };
+    let is_near =
+        |a: &str, b: &str| record.safety.exempt.iter().any(|e| e.links == [a, b] || e.links == [b, a]);
     let (mut nearest, mut lowest) = (f64::INFINITY, f64::INFINITY);
     for s in 0..INSTANTS {
         let q = positions(record, record.trajectory.period_s * s as f64 / INSTANTS as f64);
@@ -102,7 +101,8 @@ fn measured(record: &DesignRecord, robot: &Path) -> (f64, f64) {
             let Some(plane) = record.safety.planes.first() else { continue };
             let link = &capsules[a].link;
             if plane.links.contains(link) && !plane.always_low.contains(link) {
-                let height = |x: &Vec3<f64>| Vec3(plane.normal).dot(*x) - plane.height_m - capsules[a].radius_m;
+                let height =
+                    |x: &Vec3<f64>| Vec3(plane.normal).dot(*x) - plane.height_m - capsules[a].radius_m;
                 lowest = placed[a].iter().map(height).fold(lowest, f64::min);
             }
         }
@@ -138,7 +138,8 @@ fn check(config: &DesignConfig) -> DesignRecord {
 fn the_indy7_keeps_its_links_apart_and_above_the_floor() {
     let record = check(&quick(&robots().join("indy7.toml")));
     let headline = &record.verdict.headline;
-    for part in ["all limits hold at every instant", "floor (20 mm)", "own links (", "not checked: ", "tools"] {
+    for part in ["all limits hold at every instant", "floor (20 mm)", "own links (", "not checked: ", "tools"]
+    {
         assert!(headline.contains(part), "{headline}");
     }
     assert!(record.safety.capsules.iter().all(|c| c.source == CapsuleSource::Chain));
@@ -164,9 +165,16 @@ fn what_is_turned_off_is_not_kept_and_said() {
     config.safety.floor = false;
     config.safety.self_collision = false;
     let (_, record) = run(&config);
-    assert!(record.verdict.headline.contains("not checked: the floor (turned off), own links against each other (turned off)"));
+    assert!(
+        record
+            .verdict
+            .headline
+            .contains("not checked: the floor (turned off), own links against each other (turned off)")
+    );
     assert!(record.safety.planes.is_empty() && record.safety.pairs.is_empty());
-    assert!(record.limits.iter().all(|l| l.kind != "height above the floor" && l.kind != "distance of own links"));
+    assert!(
+        record.limits.iter().all(|l| l.kind != "height above the floor" && l.kind != "distance of own links")
+    );
     // Nothing else holds the arm above the floor.
     config.safety.floor = true;
     let (_, floor) = run(&config);
@@ -201,7 +209,9 @@ fn a_start_pose_below_the_floor_is_named_with_what_to_write() {
     let (run, record) = run(&config);
     assert!(run.outcome.is_err());
     let headline = &record.verdict.headline;
-    for part in ["the start pose itself is not allowed", "height above the floor", "start_pose", "floor_height_m"] {
+    for part in
+        ["the start pose itself is not allowed", "height above the floor", "start_pose", "floor_height_m"]
+    {
         assert!(headline.contains(part), "{headline}");
     }
 }
@@ -251,7 +261,20 @@ fn slab() -> Vec<u8> {
             .chain([if k >> 2 == 1 { 450.0 } else { 0.0 }])
             .collect::<Vec<f32>>()
     };
-    let faces = [[0, 1, 2], [1, 2, 3], [4, 5, 6], [5, 6, 7], [0, 1, 4], [1, 4, 5], [2, 3, 6], [3, 6, 7], [0, 2, 4], [2, 4, 6], [1, 3, 5], [3, 5, 7]];
+    let faces = [
+        [0, 1, 2],
+        [1, 2, 3],
+        [4, 5, 6],
+        [5, 6, 7],
+        [0, 1, 4],
+        [1, 4, 5],
+        [2, 3, 6],
+        [3, 6, 7],
+        [0, 2, 4],
+        [2, 4, 6],
+        [1, 3, 5],
+        [3, 5, 7],
+    ];
     let mut bytes = vec![0_u8; 80];
     bytes.extend(12_u32.to_le_bytes());
     for face in faces {
@@ -285,9 +308,9 @@ fn meshes_are_found_in_packages_and_their_corners_lie_in_capsules() {
     for x in [-0.04, 0.04] {
         for (y, z) in [(-0.03, 0.0), (-0.03, 0.45), (0.03, 0.0), (0.03, 0.45)] {
             let corner = Vec3([x, y, z]);
-            let is_inside = lower.iter().any(|c| {
-                distance([Vec3(c.from_m), Vec3(c.to_m)], [corner, corner]) <= c.radius_m + 1e-6
-            });
+            let is_inside = lower
+                .iter()
+                .any(|c| distance([Vec3(c.from_m), Vec3(c.to_m)], [corner, corner]) <= c.radius_m + 1e-6);
             assert!(is_inside, "{corner:?}: {lower:?}");
         }
     }
@@ -310,7 +333,11 @@ fn meshes_that_are_missing_or_damaged_are_named_and_replaced_along_the_chain() {
         let sources: Vec<CapsuleSource> =
             record.safety.capsules.iter().filter(|c| c.link == "lower").map(|c| c.source).collect();
         assert_eq!(sources, [CapsuleSource::Chain]);
-        assert!(record.verdict.warnings.iter().any(|w| w.contains(reason) && w.contains("package_dirs")), "{:?}", record.verdict.warnings);
+        assert!(
+            record.verdict.warnings.iter().any(|w| w.contains(reason) && w.contains("package_dirs")),
+            "{:?}",
+            record.verdict.warnings
+        );
         assert!(record.verdict.headline.contains("the true shape of lower"), "{}", record.verdict.headline);
     }
 }

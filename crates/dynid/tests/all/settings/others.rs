@@ -332,7 +332,11 @@ half_space = { normal = [1, 0, 0], offset = 0.1 }",
         ),
         table("safety.floor", "[safety]\nfloor = false", Changes),
         table("safety.floor_height_m", "[safety]\nfloor_height_m = -0.5", Changes),
-        table("safety.floor_height_m", "[safety]\nfloor = false\nfloor_height_m = -0.5", Refused("floor = true")),
+        table(
+            "safety.floor_height_m",
+            "[safety]\nfloor = false\nfloor_height_m = -0.5",
+            Refused("floor = true"),
+        ),
         table("safety.self_collision", "[safety]\nself_collision = false", Changes),
         table("safety.margin_m", "[safety]\nmargin_m = 0.05", Changes),
         table(
