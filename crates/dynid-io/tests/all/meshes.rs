@@ -127,7 +127,7 @@ fn shapes_of_links_are_read_with_their_role_and_place() {
 #[test]
 fn shapes_that_mean_nothing_are_refused_with_their_place() {
     for (good, bad, says) in [
-        ("0.1 0.2 0.3", "0.1 0 0.3", "r.urdf:3:62: link `a`: <box> size: expected three positive numbers"),
+        ("0.1 0.2 0.3", "0.1 0 0.3", "r.urdf:3:52: link `a`: <box> size: expected three positive numbers"),
         ("radius=\"0.2\"", "radius=\"-0.2\"", "<cylinder> radius: expected a positive number, found `-0.2`"),
         ("radius=\"0.2\" ", "", "expected an attribute `radius` of <cylinder>"),
         (
