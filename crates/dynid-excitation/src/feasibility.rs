@@ -35,6 +35,9 @@ impl std::fmt::Display for LimitKind {
             LimitKind::Path(ConstraintKind::Cylinder) => f.write_str("distance from a cylinder"),
             LimitKind::Path(ConstraintKind::Column) => f.write_str("distance from the column"),
             LimitKind::Path(ConstraintKind::Capsule) => f.write_str("distance of bodies"),
+            LimitKind::Path(ConstraintKind::OwnLinks) => f.write_str("distance of own links"),
+            LimitKind::Path(ConstraintKind::Floor) => f.write_str("height above the floor"),
+            LimitKind::Path(ConstraintKind::Mounting) => f.write_str("distance from the mounting plane"),
             LimitKind::Path(ConstraintKind::JointPosition) => f.write_str("position"),
             LimitKind::Path(ConstraintKind::JointRate) => f.write_str("velocity"),
             LimitKind::Path(ConstraintKind::JointAcceleration) => f.write_str("acceleration"),
@@ -111,14 +114,17 @@ pub(crate) fn worst_points(
     for limit in &values.limits {
         let worst = (0..values.motion.samples).max_by(|a, b| limit.excess(*a).total_cmp(&limit.excess(*b)));
         let Some(sample) = worst else { continue };
-        if limit.excess(sample) > least {
-            let (kind, subject) = describe(problem, limit.id);
-            points.push(LimitPoint {
-                kind,
-                subject,
-                time: grid.basis.times()[sample],
-                excess: limit.excess(sample),
-            });
+        let excess = limit.excess(sample);
+        if excess <= least {
+            continue;
+        }
+        let (kind, subject) = describe(problem, limit.id);
+        let point = LimitPoint { kind, subject, time: grid.basis.times()[sample], excess };
+        // Several rows may be of one limit: parts of the same two links.
+        match points.iter_mut().find(|p| p.kind == point.kind && p.subject == point.subject) {
+            Some(known) if known.excess < excess => *known = point,
+            Some(_) => {}
+            None => points.push(point),
         }
     }
     points.sort_by(|a, b| b.excess.total_cmp(&a.excess));

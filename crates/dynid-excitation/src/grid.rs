@@ -3,6 +3,7 @@
 use dynid_model::MotionBlock;
 use dynid_motion::trajectory::FourierBasis;
 
+use crate::constraint::ConstraintKind;
 use crate::optimiser::{NearRow, Row};
 use crate::parametrisation::Parametrisation;
 use crate::problem::Problem;
@@ -70,6 +71,18 @@ pub(crate) struct LimitValue {
     pub(crate) lower: f64,
     pub(crate) upper: f64,
     pub(crate) values: Vec<f64>,
+    /// How near to its bound a sample must be to enter a quadratic program, in shares of what is usual.
+    pub(crate) nearness: f64,
+}
+
+/// Nearness of floor and own links: there are many of them, and none moves by more than some 15 cm in one step.
+const NEARNESS_OF_LINKS: f64 = 0.4;
+
+fn nearness(kind: ConstraintKind) -> f64 {
+    match kind {
+        ConstraintKind::OwnLinks | ConstraintKind::Floor | ConstraintKind::Mounting => NEARNESS_OF_LINKS,
+        _ => 1.0,
+    }
 }
 
 impl LimitValue {
@@ -158,6 +171,7 @@ impl<'a> Grid<'a> {
                     lower: -self.bound,
                     upper: self.bound,
                     values: channel.iter().map(|x| (x - middle) / scale).collect(),
+                    nearness: 1.0,
                 });
             }
         }
@@ -172,6 +186,7 @@ impl<'a> Grid<'a> {
                     lower: info.lower,
                     upper: info.upper,
                     values: values.to_vec(),
+                    nearness: nearness(info.kind),
                 });
             }
         }

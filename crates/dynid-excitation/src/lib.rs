@@ -5,6 +5,7 @@ pub mod constraint;
 pub mod criterion;
 mod design;
 mod duals;
+pub mod envelope;
 mod evaluation;
 mod feasibility;
 mod forecast;

@@ -155,7 +155,9 @@ impl Program for Search<'_> {
     fn near_rows(&mut self, z: &[f64], distance: f64) -> Vec<NearRow<SidedRow>> {
         let grid = self.grid;
         match self.at(z) {
-            Some(e) => grid.linearised(&e.values, 0.0, |limit, sample| limit.excess(sample) > -distance),
+            Some(e) => grid.linearised(&e.values, 0.0, |limit, sample| {
+                limit.excess(sample) > -distance * limit.nearness
+            }),
             None => Vec::new(),
         }
     }

@@ -12,6 +12,8 @@ const BISECTIONS: usize = 40;
 /// Starts that had to be shrunk below this share are drawn again.
 const LEAST_SHARE: f64 = 0.05;
 const DRAWS: usize = 60;
+/// Mean poses that are drawn for one set of amplitudes.
+const MEANS: usize = 200;
 
 /// Unknowns drawn at random, of any size.
 pub(crate) fn draw(grid: &Grid<'_>, rng: &mut ChaCha8Rng) -> Vec<f64> {
@@ -21,12 +23,16 @@ pub(crate) fn draw(grid: &Grid<'_>, rng: &mut ChaCha8Rng) -> Vec<f64> {
             SPREAD * x
         })
         .collect();
+    draw_means(grid, rng, &mut z);
+    z
+}
+
+fn draw_means(grid: &Grid<'_>, rng: &mut ChaCha8Rng, z: &mut [f64]) {
     for coordinate in 0..grid.map.coordinates() {
         if let Some(offset) = grid.map.offset_unknown(coordinate) {
             z[offset] = rng.random_range(-1.0..=1.0);
         }
     }
-    z
 }
 
 /// Generator of one start.
@@ -37,8 +43,16 @@ pub(crate) fn generator(seed: u64) -> ChaCha8Rng {
 /// A random start within all limits of the grid: amplitudes are drawn, then shrunk about the mean pose (or the start
 /// pose) by bisection. `None` if no draw could be shrunk into the limits.
 pub(crate) fn feasible_start(grid: &Grid<'_>, rng: &mut ChaCha8Rng) -> Option<Vec<f64>> {
+    let rest = Grid { bound: grid.bound, ..Grid::at_times(grid.problem, grid.map, vec![0.0]) };
     for _ in 0..DRAWS {
-        let z = draw(grid, rng);
+        let mut z = draw(grid, rng);
+        // Where floor and own links leave few poses, most means are not allowed, which one instant tells.
+        for _ in 0..MEANS {
+            if rest.values(&shrunk(&rest, &z, 0.0)).worst().0 <= 0.0 {
+                break;
+            }
+            draw_means(grid, rng, &mut z);
+        }
         if let Some(share) = feasible_share(grid, &z)
             && share >= LEAST_SHARE
         {

@@ -1,5 +1,5 @@
 //! Robot files and logs: URDF, robots in TOML (DH tables or body trees), MJCF (written), CSV logs and states,
-//! trajectories (JSON; CSV and ROS 2 messages, written).
+//! trajectories (JSON; CSV and ROS 2 messages, written), meshes (STL, OBJ).
 //!
 //! Every door checks what it lets in: numbers are finite, names are unique, sizes are bounded. A fault becomes one
 //! typed error whose `Display` is one line (file, line, column or row, expected, found) and whose `hint()` says what
@@ -11,6 +11,7 @@ pub mod digest;
 mod excerpt;
 pub mod input;
 pub mod log;
+pub mod mesh;
 pub mod mjcf;
 pub mod output;
 pub mod robot;
@@ -26,6 +27,7 @@ pub use csv::{LogFileError, ReadOptions, Table};
 pub use digest::SourceFile;
 pub use excerpt::closest;
 pub use log::{LogHeader, LogOptions, LogText, ReadingNote};
+pub use mesh::{Mesh, MeshError};
 pub use output::OutputError;
 pub use robot::{Place, RobotFileError};
 pub use states::{StateJoint, States, StatesError};

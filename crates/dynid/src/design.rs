@@ -7,6 +7,8 @@ mod motion;
 mod problem;
 mod record;
 mod report;
+mod safety;
+mod shapes;
 
 use std::path::Path;
 
@@ -14,15 +16,19 @@ use dynid_excitation::{
     Forecast, Infeasible, LimitPoint, Outcome, Settings, StartOutcome, forecast, limit_points,
 };
 
+use dynid_io::SourceFile;
+
 use crate::Error;
 use crate::robot::{Robot, RobotOptions};
 pub use config::{
     BoxConfig, CapsuleConfig, ColumnConfig, ColumnsName, CriterionConfig, CriterionName, CylinderConfig,
-    DesignConfig, HalfSpaceConfig, KeepConfig, LimitsConfig, SearchConfig, TrajectoryConfig,
+    DesignConfig, HalfSpaceConfig, KeepConfig, LimitsConfig, SafetyConfig, SearchConfig, TrajectoryConfig,
 };
 pub use motion::{DesignedMotion, LegFault, MotionPaths};
 use problem::RobotProblem;
 pub use record::{DesignRecord, DesignVerdict};
+pub use safety::{CapsuleRecord, ExemptRecord, PlaneRecord, SafetyRecord};
+pub use shapes::{CapsuleSource, LinkCapsule};
 
 /// Samples of a period on which criterion and forecast are taken, with exact signs; at least 20 per harmonic.
 const REPORT_SAMPLES: usize = 1000;
@@ -94,7 +100,7 @@ pub fn design(config: &DesignConfig, progress: &mut dyn FnMut(DesignStep)) -> Re
     let robot = Robot::load(&config.robot, &options)?;
     let set = problem::problem(&robot, config)?;
     let parking = problem::pose(&set, config)?;
-    let mut file = Checkpointing::open(config)?;
+    let mut file = Checkpointing::open(config, &set.safety.meshes)?;
     let settings = Settings {
         starts: config.search.starts,
         seed: config.search.seed,
@@ -147,6 +153,18 @@ pub fn design(config: &DesignConfig, progress: &mut dyn FnMut(DesignStep)) -> Re
 }
 
 impl DesignRun {
+    /// Capsules about the links of the robot, as they are kept apart and above the floor; none if both are turned off.
+    pub fn capsules(&self) -> &[LinkCapsule] {
+        &self.set.safety.capsules
+    }
+
+    /// Ends of all capsules at `count` instants spread evenly over a period of a designed trajectory: `[instant][capsule]`, two
+    /// points in base axes each, m. Empty without a trajectory.
+    pub fn capsule_poses(&self, count: usize) -> Result<Vec<Vec<[[f64; 3]; 2]>>, Error> {
+        let Ok(designed) = &self.outcome else { return Ok(Vec::new()) };
+        motion::capsule_poses(&self.set, &designed.coefficients, count)
+    }
+
     /// A random motion within the same limits, as long as the designed one, without approach and return; `None` if none is
     /// found.
     ///
@@ -168,9 +186,9 @@ struct Checkpointing<'a> {
 }
 
 impl<'a> Checkpointing<'a> {
-    fn open(config: &'a DesignConfig) -> Result<Self, Error> {
+    fn open(config: &'a DesignConfig, meshes: &[SourceFile]) -> Result<Self, Error> {
         let path = config.search.checkpoint.as_deref();
-        let fingerprint = checkpoint::fingerprint(config)?;
+        let fingerprint = checkpoint::fingerprint(config, meshes)?;
         let starts = match path {
             Some(path) => checkpoint::read(path, &fingerprint)?,
             None => Vec::new(),

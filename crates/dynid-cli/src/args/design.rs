@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum, ValueHint};
 
-use super::ForceArgs;
 use super::robot::joint_value;
+use super::{ForceArgs, PrintArgs};
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum CriterionArg {
@@ -83,6 +83,21 @@ pub(crate) struct DesignArgs {
     /// Hold a joint at a position, rad or m.
     #[arg(long, value_name = "JOINT=POSITION", value_parser = joint_value)]
     pub(crate) lock: Vec<(String, f64)>,
+    /// Let links go below the floor (default: the plane through the origin of the base, across gravity).
+    #[arg(long)]
+    pub(crate) no_floor: bool,
+    /// Height of the floor above the origin of the base, m (default: 0).
+    #[arg(long, value_name = "M", allow_negative_numbers = true, conflicts_with = "no_floor")]
+    pub(crate) floor_height: Option<f64>,
+    /// Let links of the robot come near each other.
+    #[arg(long)]
+    pub(crate) no_self_collision: bool,
+    /// Least distance between links, and from the floor, m (default: 0.02).
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub(crate) margin: Option<f64>,
+    /// Folder that holds packages, for `package://NAME/...` of meshes; repeat for several.
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub(crate) package_dir: Vec<PathBuf>,
     /// Random starts (default: 16).
     #[arg(long, value_name = "N")]
     pub(crate) starts: Option<usize>,
@@ -97,10 +112,6 @@ pub(crate) struct DesignArgs {
     pub(crate) checkpoint: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) force: ForceArgs,
-    /// Print design.json to stdout as well.
-    #[arg(long)]
-    pub(crate) json: bool,
-    /// Say only what went wrong.
-    #[arg(long, short)]
-    pub(crate) quiet: bool,
+    #[command(flatten)]
+    pub(crate) print: PrintArgs,
 }

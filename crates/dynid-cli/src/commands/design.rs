@@ -7,7 +7,7 @@ use dynid::design::{ColumnsName, CriterionName, DesignConfig, DesignRecord, Moti
 
 use super::{element_names, table};
 use crate::args::{ColumnsArg, CriterionArg, DesignArgs, ForceArgs};
-use crate::message::{Failure, data, note};
+use crate::message::{Failure, Notes, data};
 use crate::outputs;
 use crate::progress::Progress;
 
@@ -43,7 +43,7 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
         }
     }
     let set = outputs::prepare_folder(&files, &inputs, args.force)?;
-    let progress = Progress::new(args.quiet);
+    let progress = Progress::new(args.print.quiet);
     let run = design(&config, &mut |step| progress.design(step))?;
     let record = run.record(&config)?;
     let report = run.report(&config, &record)?;
@@ -58,16 +58,10 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
     set.write(4, text.as_bytes())?;
     set.write(5, report.as_bytes())?;
     let written = set.publish()?;
-    if args.quiet {
-        if record.verdict.status == "fail" {
-            note(&verdict(&record));
-        }
-    } else {
-        summary(&record, &written);
-    }
-    if args.json {
-        data(&text)?;
-    }
+    let notes = Notes::new(args.print.quiet);
+    notes.warnings(&record.verdict.warnings);
+    data(&if args.print.json { text } else { summary(&record) })?;
+    notes.written(&written);
     Ok(u8::from(record.verdict.status == "fail"))
 }
 
@@ -126,6 +120,12 @@ fn configuration(args: &DesignArgs) -> Result<DesignConfig, Failure> {
         config.elements.default = element_names(args.elements.as_deref());
     }
     config.locked.extend(args.lock.iter().cloned());
+    let safety = &mut config.safety;
+    safety.floor &= !args.no_floor;
+    safety.floor_height_m = args.floor_height.or(safety.floor_height_m);
+    safety.self_collision &= !args.no_self_collision;
+    safety.margin_m = args.margin.unwrap_or(safety.margin_m);
+    config.package_dirs.extend(args.package_dir.iter().cloned());
     let s = &mut config.search;
     s.starts = args.starts.unwrap_or(s.starts);
     s.seed = args.seed.unwrap_or(s.seed);
@@ -145,20 +145,19 @@ fn is_robot(path: &Path) -> bool {
 /// Parameters that the summary shows, worst first.
 const SHOWN: usize = 8;
 
-fn summary(record: &DesignRecord, written: &[PathBuf]) {
-    for warning in &record.verdict.warnings {
-        note(&format!("warning: {warning}"));
-    }
+/// What the design promises, and the verdict last.
+fn summary(record: &DesignRecord) -> String {
+    let mut out: Vec<String> = Vec::new();
     if let Some(value) = record.criterion.value {
-        note(&format!("{}: {}", record.criterion.meaning, table::number(Some(value))));
-        note(&format!(
+        out.push(format!("{}: {}", record.criterion.meaning, table::number(Some(value))));
+        out.push(format!(
             "condition number: {} raw, {} with columns of unit length",
             table::number(record.condition_number),
             table::number(record.condition_number_scaled)
         ));
     }
     if let Some(random) = &record.random {
-        note(&format!(
+        out.push(format!(
             "standard deviations are {} times smaller than on random motion within the same limits (mean; geometric {})",
             table::number(Some(random.mean_ratio)),
             table::number(Some(random.geometric_ratio))
@@ -167,7 +166,7 @@ fn summary(record: &DesignRecord, written: &[PathBuf]) {
     let mut worst: Vec<_> = record.parameters.iter().filter(|p| p.rel_std.is_some()).collect();
     worst.sort_by(|a, b| b.rel_std.unwrap_or(0.0).total_cmp(&a.rel_std.unwrap_or(0.0)));
     if !worst.is_empty() {
-        note("\nparameters that the log will tell least about:");
+        out.push("\nparameters that the log will tell least about:".to_owned());
         let rows: Vec<Vec<String>> = worst
             .iter()
             .take(SHOWN)
@@ -181,28 +180,33 @@ fn summary(record: &DesignRecord, written: &[PathBuf]) {
                 ]
             })
             .collect();
-        note(table::aligned(&["parameter", "nominal", "std", "unit", "std, %"], &rows).trim_end());
+        let header = ["parameter", "nominal", "std", "unit", "std, %"];
+        out.push(table::aligned(&header, &rows).trim_end().to_owned());
     }
     for pair in &record.confounded {
-        note(&format!(
+        out.push(format!(
             "hardly told apart: {} and {} (correlation {:.3})",
             pair.names[0], pair.names[1], pair.correlation
         ));
     }
     let acting = record.limits.iter().filter(|l| l.excess > -1e-3).count();
     if record.infeasible.is_none() {
-        note(&format!("\n{acting} of {} limits act (used to 99.9 % or more)", record.limits.len()));
+        out.push(format!("\n{acting} of {} limits act (used to 99.9 % or more)", record.limits.len()));
     }
     if let Some(infeasible) = record.infeasible.as_ref().filter(|i| !i.violations.is_empty()) {
-        note("\nlimits that stay broken:");
+        out.push("\nlimits that stay broken:".to_owned());
         for v in &infeasible.violations {
-            note(&format!("  {} of {} at {:.2} s", v.kind, v.subject, v.time_s));
+            out.push(format!("  {} of {} at {:.2} s", v.kind, v.subject, v.time_s));
         }
     }
-    note(&format!("\n{}", verdict(record)));
-    for file in written {
-        note(&format!("written: {}", file.display()));
+    for (what, figure) in [
+        ("least distance between links that are kept apart", record.least_distance_m),
+        ("least distance of links from the floor or mounting plane", record.least_height_m),
+    ] {
+        out.extend(figure.map(|x| format!("{what}: {:.1} mm", 1e3 * x)));
     }
+    out.push(format!("\n{}\n", verdict(record)));
+    out.join("\n")
 }
 
 fn verdict(record: &DesignRecord) -> String {

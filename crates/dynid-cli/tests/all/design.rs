@@ -90,16 +90,25 @@ fn largest(values: &[f64]) -> f64 {
 fn a_design_leaves_six_files_and_says_what_they_are_worth() {
     let (folder, output) = designed();
     assert_eq!(listing(&folder.path().join("out")), FILES);
-    assert!(output.stdout.is_empty());
-    let said = stderr(output);
+    let results = String::from_utf8(output.stdout.clone()).unwrap();
     let parts = [
-        "warning: noise of the effort is not stated",
         "relative standard deviation",
         "condition number: ",
         "times smaller than on random motion",
         "parameters that the log will tell least about:",
-        "of 24 limits act",
+        " limits act",
         "pass: all limits hold at every instant",
+        "floor (20 mm), own links (",
+        "not checked: the true shape of ",
+        "least distance between links that are kept apart: ",
+    ];
+    for part in parts {
+        assert!(results.contains(part), "{part}: {results}");
+    }
+    let said = stderr(output);
+    let parts = [
+        "warning: noise of the effort is not stated",
+        "warning: no shapes are stated for ",
         "written: out/trajectory.json",
         "written: out/design.json",
         "written: out/report.html",
@@ -107,6 +116,7 @@ fn a_design_leaves_six_files_and_says_what_they_are_worth() {
     for part in parts {
         assert!(said.contains(part), "{part}: {said}");
     }
+    assert!(!said.contains("pass:") && !results.contains("warning:") && !results.contains("written:"));
 }
 
 #[test]
@@ -144,10 +154,23 @@ fn design_json_has_the_keys_types_and_lengths_of_the_contract() {
     for key in ["confounded", "weakest", "limits", "starts", "noise"] {
         assert!(d[key].is_array(), "{key}");
     }
-    // Position, speed, acceleration and effort of six joints, the most used first, none broken.
+    let safety = &d["safety"];
+    assert_eq!(safety["margin_m"], 0.02);
+    let (plane, pairs) = (&safety["planes"][0], safety["pairs"].as_array().unwrap());
+    assert_eq!((&plane["name"], &plane["normal"]), (&json!("floor"), &json!([0.0, 0.0, 1.0])));
+    let links = plane["links"].as_array().unwrap();
+    assert!(!links.is_empty() && !pairs.is_empty());
+    assert!(safety["exempt"].as_array().unwrap().iter().all(|e| e["reason"].is_string()));
+    assert!(safety["capsules"].as_array().unwrap().iter().all(|c| c["source"] == "chain"));
+    assert!(safety["not_checked"].as_array().unwrap().iter().all(Value::is_string));
+    for key in ["least_distance_m", "least_height_m"] {
+        assert!(d[key].as_f64().unwrap() >= 0.02 - 1e-6, "{key}");
+    }
+    // Position, speed, acceleration and effort of six joints, links above the floor, pairs of links; the most used first,
+    // none broken.
     let excess: Vec<f64> =
         d["limits"].as_array().unwrap().iter().map(|l| l["excess"].as_f64().unwrap()).collect();
-    assert_eq!(excess.len(), 24);
+    assert_eq!(excess.len(), 24 + links.len() + pairs.len());
     assert!(excess.windows(2).all(|w| w[0] >= w[1]) && excess[0] <= 0.0, "{excess:?}");
     let shares: f64 = d["weakest"].as_array().unwrap().iter().map(|w| w["share"].as_f64().unwrap()).sum();
     assert!((0.9..=1.0 + 1e-12).contains(&shares), "{shares}");

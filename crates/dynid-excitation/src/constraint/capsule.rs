@@ -12,8 +12,8 @@ use super::cartesian::{add_along, distance_row, resolve};
 use super::clearance::Clearance;
 use super::segment::{Closest, Segment, end_distance, segment_distance};
 use super::{
-    ConstraintError, ConstraintKind, ConstraintRow, DISTANCE_SCALE, PathConstraint, at_poses, fixed_base,
-    positive,
+    ConstraintError, ConstraintKind, ConstraintRow, DISTANCE_SCALE, PathConstraint, at_poses, finite,
+    fixed_base, positive,
 };
 
 /// All points within `radius` of the segment between two points of a link.
@@ -57,7 +57,14 @@ pub struct Capsules {
     /// Pair and measure of every row.
     measures: Vec<(usize, Measure)>,
     rows: Vec<ConstraintRow>,
+    /// Distance beyond which a lower bound stands for it, m.
+    far: f64,
+    /// Half the length of every segment, m.
+    halves: Vec<f64>,
 }
+
+/// Distance beyond which own links count as far from each other, m: no row of a search looks farther.
+const FAR: f64 = 0.5 * DISTANCE_SCALE;
 
 impl Capsules {
     /// Keeps capsules apart. `ranges`: lowest and highest position of every coordinate, rad or m (infinite where there is
@@ -71,44 +78,17 @@ impl Capsules {
         pairs: &CapsulePairs,
         ranges: &[(f64, f64)],
     ) -> Result<Self, ConstraintError> {
-        fixed_base(mechanism.positions(), mechanism.rates())?;
-        let (found, expected) = (ranges.len(), mechanism.rates());
-        if found != expected {
-            return Err(ConstraintError::Length { what: "position ranges", found, expected });
-        }
-        for ((low, high), name) in ranges.iter().zip(mechanism.rate_names()) {
-            if low > high || low.is_nan() || high.is_nan() {
-                let (what, expected) = ("width of the position range", "not negative");
-                return Err(ConstraintError::Number { what, subject: name, found: high - low, expected });
-            }
-        }
-        let mut points = Vec::with_capacity(2 * capsules.len());
-        for capsule in capsules {
-            positive("radius of a capsule", &capsule.frame, capsule.radius)?;
-            for end in capsule.ends {
-                points.push(resolve(mechanism, &capsule.frame, end)?);
-            }
-        }
+        check_ranges(mechanism, ranges)?;
+        let mut out = Self::empty(mechanism, capsules)?;
         let candidates = match pairs {
-            CapsulePairs::All => not_neighbours(mechanism, &points),
+            CapsulePairs::All => not_neighbours(mechanism, &out.points),
             CapsulePairs::Given(pairs) => {
-                let count = capsules.len();
-                if let Some(pair) = pairs.iter().find(|(a, b)| a == b || *a >= count || *b >= count) {
-                    return Err(ConstraintError::Pair { pair: *pair, capsules: count });
-                }
+                check_pairs(pairs, capsules.len())?;
                 pairs.clone()
             }
         };
-        let dynamics = Dynamics::new(mechanism);
-        let mut clearance = Clearance::new(mechanism, &dynamics, ranges);
-        let mut out = Capsules {
-            dynamics: dynamics.clone(),
-            points,
-            pairs: Vec::new(),
-            radii: Vec::new(),
-            measures: Vec::new(),
-            rows: Vec::new(),
-        };
+        let dynamics = out.dynamics.clone();
+        let clearance = Clearance::new(mechanism, &dynamics, ranges);
         for pair in candidates {
             let (a, b) = pair;
             let radii = capsules[a].radius + capsules[b].radius;
@@ -117,18 +97,60 @@ impl Capsules {
                 continue;
             }
             let names = [&capsules[a].frame, &capsules[b].frame];
-            out.push(pair, radii, names, clearance.nearly_parallel(&ends, radii));
+            out.push(ConstraintKind::Capsule, pair, radii, names);
+            out.add_ends(names, clearance.nearly_parallel(&ends, radii));
         }
         Ok(out)
     }
 
-    fn push(&mut self, pair: (usize, usize), radii: f64, names: [&String; 2], nearly_parallel: bool) {
-        let index = self.pairs.len();
+    /// Keeps pairs of capsules on the links of a robot at least `margin` apart, m: rows
+    /// `(distance of segments - radii - margin) / 0.5 m ≥ 0`. Beyond 0.25 m a lower bound stands for the distance.
+    ///
+    /// Fails as [`Capsules::new`].
+    pub fn own_links(
+        mechanism: &Mechanism,
+        capsules: &[Capsule],
+        pairs: &[(usize, usize)],
+        margin: f64,
+    ) -> Result<Self, ConstraintError> {
+        finite("margin", "own links", &[margin])?;
+        check_pairs(pairs, capsules.len())?;
+        let mut out = Self::empty(mechanism, capsules)?;
+        out.far = FAR;
+        for pair in pairs {
+            let (a, b) = (&capsules[pair.0], &capsules[pair.1]);
+            out.push(ConstraintKind::OwnLinks, *pair, a.radius + b.radius + margin, [&a.frame, &b.frame]);
+        }
+        Ok(out)
+    }
+
+    /// Capsules without pairs.
+    fn empty(mechanism: &Mechanism, capsules: &[Capsule]) -> Result<Self, ConstraintError> {
+        let points = ends(mechanism, capsules)?;
+        let half = |ends: &[BodyPoint]| 0.5 * (ends[1].position - ends[0].position).norm();
+        Ok(Capsules {
+            dynamics: Dynamics::new(mechanism),
+            halves: points.chunks_exact(2).map(half).collect(),
+            points,
+            pairs: Vec::new(),
+            radii: Vec::new(),
+            measures: Vec::new(),
+            rows: Vec::new(),
+            far: f64::INFINITY,
+        })
+    }
+
+    fn push(&mut self, kind: ConstraintKind, pair: (usize, usize), radii: f64, names: [&String; 2]) {
+        self.measures.push((self.pairs.len(), Measure::Segments));
         self.pairs.push(pair);
         self.radii.push(radii);
+        self.rows.push(distance_row(kind, format!("{} and {}", names[0], names[1])));
+    }
+
+    /// Rows of the ends of the pair that was added last, if its segments can be nearly parallel.
+    fn add_ends(&mut self, names: [&String; 2], nearly_parallel: bool) {
+        let index = self.pairs.len() - 1;
         let subject = format!("{} and {}", names[0], names[1]);
-        self.measures.push((index, Measure::Segments));
-        self.rows.push(distance_row(ConstraintKind::Capsule, subject.clone()));
         if nearly_parallel {
             for end in 0..4 {
                 self.measures.push((index, Measure::End(end)));
@@ -143,6 +165,16 @@ impl Capsules {
         &self.pairs
     }
 
+    /// What two capsules are apart at least, by the spheres about their segments, if that is far.
+    fn far_gap(&self, row: usize, ends: &[Vec3<f64>]) -> Option<f64> {
+        let pair = self.measures[row].0;
+        let (a, b) = self.pairs[pair];
+        let between = ends[2 * a] + ends[2 * a + 1] - ends[2 * b] - ends[2 * b + 1];
+        let reach = self.far + self.radii[pair] + self.halves[a] + self.halves[b];
+        let squared = 0.25 * between.dot(between);
+        (squared > reach * reach).then(|| squared.sqrt() - reach + self.far)
+    }
+
     fn measure(&self, row: usize, segment: impl Fn(usize) -> Segment) -> (usize, Closest) {
         let (pair, measure) = self.measures[row];
         let (a, b) = self.pairs[pair];
@@ -155,8 +187,44 @@ impl Capsules {
     }
 }
 
+/// A range per coordinate, none of them turned round.
+pub(super) fn check_ranges(mechanism: &Mechanism, ranges: &[(f64, f64)]) -> Result<(), ConstraintError> {
+    fixed_base(mechanism.positions(), mechanism.rates())?;
+    let (found, expected) = (ranges.len(), mechanism.rates());
+    if found != expected {
+        return Err(ConstraintError::Length { what: "position ranges", found, expected });
+    }
+    for ((low, high), name) in ranges.iter().zip(mechanism.rate_names()) {
+        if low > high || low.is_nan() || high.is_nan() {
+            let (what, expected) = ("width of the position range", "not negative");
+            return Err(ConstraintError::Number { what, subject: name, found: high - low, expected });
+        }
+    }
+    Ok(())
+}
+
+fn check_pairs(pairs: &[(usize, usize)], count: usize) -> Result<(), ConstraintError> {
+    match pairs.iter().find(|(a, b)| a == b || *a >= count || *b >= count) {
+        Some(pair) => Err(ConstraintError::Pair { pair: *pair, capsules: count }),
+        None => Ok(()),
+    }
+}
+
+/// Ends of capsules on the bodies of a mechanism, two each.
+pub(super) fn ends(mechanism: &Mechanism, capsules: &[Capsule]) -> Result<Vec<BodyPoint>, ConstraintError> {
+    fixed_base(mechanism.positions(), mechanism.rates())?;
+    let mut points = Vec::with_capacity(2 * capsules.len());
+    for capsule in capsules {
+        positive("radius of a capsule", &capsule.frame, capsule.radius)?;
+        for end in capsule.ends {
+            points.push(resolve(mechanism, &capsule.frame, end)?);
+        }
+    }
+    Ok(points)
+}
+
 /// Pairs on bodies that are neither one nor joined by one joint.
-fn not_neighbours(mechanism: &Mechanism, points: &[BodyPoint]) -> Vec<(usize, usize)> {
+pub(super) fn not_neighbours(mechanism: &Mechanism, points: &[BodyPoint]) -> Vec<(usize, usize)> {
     let parent = |body: Option<usize>| body.and_then(|b| mechanism.bodies()[b].parent);
     let joined = |a: Option<usize>, b: Option<usize>| {
         a == b || (a.is_some() && parent(a) == b) || (b.is_some() && parent(b) == a)
@@ -183,8 +251,11 @@ impl PathConstraint for Capsules {
                 *end = Vec3([0, 1, 2].map(|c| positions[(3 * p + c) * n + s]));
             }
             for row in 0..self.rows.len() {
-                let (pair, closest) = self.measure(row, |k| [ends[2 * k], ends[2 * k + 1]]);
-                values[row * stride + s] = (closest.distance - self.radii[pair]) / DISTANCE_SCALE;
+                let gap = self.far_gap(row, &ends).unwrap_or_else(|| {
+                    let (pair, closest) = self.measure(row, |k| [ends[2 * k], ends[2 * k + 1]]);
+                    closest.distance - self.radii[pair]
+                });
+                values[row * stride + s] = gap / DISTANCE_SCALE;
             }
         }
     }

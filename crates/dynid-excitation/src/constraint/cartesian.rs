@@ -3,7 +3,7 @@
 use dynid_model::{BodyPoint, Dynamics, Mechanism, MotionBlock, Vec3};
 
 use super::{
-    ConstraintError, ConstraintKind, ConstraintRow, DISTANCE_SCALE, PathConstraint, at_poses, finite,
+    ConstraintError, ConstraintKind, ConstraintRow, DISTANCE_SCALE, PathConstraint, Plane, at_poses, finite,
     fixed_base, positive,
 };
 
@@ -118,6 +118,29 @@ impl CartesianLimits {
         for (point, region) in limits {
             out.points.push(resolve(mechanism, &point.frame, point.position)?);
             out.add(&point.frame, region)?;
+        }
+        Ok(out)
+    }
+
+    /// Keeps points above a plane, each by a clearance of its own, m: rows `(n·x - height - clearance) / 0.5 m ≥ 0`.
+    ///
+    /// Fails as [`CartesianLimits::new`].
+    pub fn above_plane(
+        mechanism: &Mechanism,
+        points: &[(FramePoint, f64)],
+        plane: &Plane,
+    ) -> Result<Self, ConstraintError> {
+        let mut out = Self::new(mechanism, &[])?;
+        finite("height of a plane", "base", &[plane.height])?;
+        finite("normal of a plane", "base", &plane.normal.0)?;
+        let length = plane.normal.norm();
+        positive("length of the normal of a plane", "base", length)?;
+        let normal = plane.normal.scale(1.0 / length);
+        for (point, clearance) in points {
+            finite("clearance", &point.frame, &[*clearance])?;
+            out.points.push(resolve(mechanism, &point.frame, point.position)?);
+            let above = Distance::Plane { normal, offset: plane.height + clearance };
+            out.push(plane.kind, point.frame.clone(), above);
         }
         Ok(out)
     }

@@ -1,6 +1,6 @@
-//! Which capsules can touch within the joint ranges.
+//! Which capsules can touch, and which points can get below a plane, within the joint ranges.
 //!
-//! The distance of two capsules changes at most by `Σ L_k |Δq_k|`, `L_k` the farthest that a unit step of coordinate `k`
+//! A distance changes at most by `Σ L_k |Δq_k|`, `L_k` the farthest that a unit step of coordinate `k`
 //! can move a point of either (relative to the other). A box of positions of half widths `h` is therefore free of contact
 //! if the distance at its middle exceeds `Σ L_k h_k`; else it is cut in two.
 
@@ -23,8 +23,25 @@ pub(super) struct Clearance<'a> {
     mechanism: &'a Mechanism,
     dynamics: &'a Dynamics,
     ranges: Vec<(f64, f64)>,
+}
+
+/// Four points at a pose, as two segments.
+struct Segments<'a> {
+    dynamics: &'a Dynamics,
     work: DynamicsWorkspace<f64>,
     jacobians: Vec<f64>,
+}
+
+impl<'a> Segments<'a> {
+    fn new(dynamics: &'a Dynamics) -> Self {
+        Segments { dynamics, work: dynamics.workspace(), jacobians: vec![0.0; 12 * dynamics.rates()] }
+    }
+
+    fn at(&mut self, ends: &[BodyPoint; 4], q: &[f64]) -> [Segment; 2] {
+        let mut at = [Vec3::zero(); 4];
+        self.dynamics.point_jacobians(q, ends, &mut self.work, &mut at, &mut self.jacobians);
+        [[at[0], at[1]], [at[2], at[3]]]
+    }
 }
 
 impl<'a> Clearance<'a> {
@@ -46,19 +63,30 @@ impl<'a> Clearance<'a> {
                 (*low, *high)
             }
         };
-        Clearance {
-            mechanism,
-            dynamics,
-            ranges: ranges.iter().zip(comes_round).map(within).collect(),
-            work: dynamics.workspace(),
-            jacobians: vec![0.0; 12 * mechanism.rates()],
-        }
+        Clearance { mechanism, dynamics, ranges: ranges.iter().zip(comes_round).map(within).collect() }
     }
 
     /// True if it is proven that the segments never come closer than `radii`; `ends`: those of the first, then of the
     /// second.
-    pub(super) fn never_touch(&mut self, ends: &[BodyPoint; 4], radii: f64) -> bool {
-        let Some(reach) = self.reaches(ends) else { return false };
+    pub(super) fn never_touch(&self, ends: &[BodyPoint; 4], radii: f64) -> bool {
+        let Some(reach) = self.reaches(&ends[..2], &ends[2..]) else { return false };
+        let mut segments = Segments::new(self.dynamics);
+        self.stays_positive(&reach, |q| {
+            let [first, second] = segments.at(ends, q);
+            segment_distance(&first, &second).distance - radii
+        })
+    }
+
+    /// True if it is proven that a point never comes below `normal · x = height`; `normal` has unit length.
+    pub(super) fn never_below(&self, point: BodyPoint, normal: Vec3<f64>, height: f64) -> bool {
+        let ground = BodyPoint { body: None, position: Vec3::zero() };
+        let Some(reach) = self.reaches(&[point], &[ground]) else { return false };
+        let mut segments = Segments::new(self.dynamics);
+        self.stays_positive(&reach, |q| normal.dot(segments.at(&[point; 4], q)[0][0]) - height)
+    }
+
+    /// True if it is proven that a distance stays positive, whose slopes along the coordinates are at most `reach`.
+    fn stays_positive(&self, reach: &[f64], mut gap: impl FnMut(&[f64]) -> f64) -> bool {
         let middle_of = |(low, high): &(f64, f64)| 0.5 * (low + high);
         let mut middle: Vec<f64> = self.ranges.iter().map(middle_of).collect();
         let mut half: Vec<f64> = self.ranges.iter().map(|(low, high)| 0.5 * (high - low)).collect();
@@ -73,8 +101,7 @@ impl<'a> Clearance<'a> {
         let mut boxes = vec![(middle, half)];
         for _ in 0..POSES {
             let Some((middle, half)) = boxes.pop() else { return true };
-            let [first, second] = self.segments(ends, &middle);
-            let gap = segment_distance(&first, &second).distance - radii;
+            let gap = gap(&middle);
             if gap <= 0.0 {
                 return false;
             }
@@ -94,17 +121,13 @@ impl<'a> Clearance<'a> {
     }
 
     /// True if one of many random poses has the segments nearly parallel and not far from each other.
-    pub(super) fn nearly_parallel(&mut self, ends: &[BodyPoint; 4], radii: f64) -> bool {
+    pub(super) fn nearly_parallel(&self, ends: &[BodyPoint; 4], radii: f64) -> bool {
         // A stream of its own for every question: answers do not depend on the order of pairs.
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let mut q = vec![0.0; self.ranges.len()];
+        let mut segments = Segments::new(self.dynamics);
         (0..SAMPLES).any(|_| {
-            for (q, (low, high)) in q.iter_mut().zip(&self.ranges) {
-                let limit = |x: f64, instead: f64| if x.is_finite() { x } else { instead };
-                let (low, high) = (limit(*low, -std::f64::consts::PI), limit(*high, std::f64::consts::PI));
-                *q = if low < high { rng.random_range(low..=high) } else { low };
-            }
-            let [first, second] = self.segments(ends, &q);
+            let q = self.random_pose(&mut rng);
+            let [first, second] = segments.at(ends, &q);
             let (u, v) = (first[1] - first[0], second[1] - second[0]);
             let lengths = u.norm() * v.norm();
             lengths > 0.0
@@ -113,18 +136,23 @@ impl<'a> Clearance<'a> {
         })
     }
 
-    fn segments(&mut self, ends: &[BodyPoint; 4], q: &[f64]) -> [Segment; 2] {
-        let mut at = [Vec3::zero(); 4];
-        self.dynamics.point_jacobians(q, ends, &mut self.work, &mut at, &mut self.jacobians);
-        [[at[0], at[1]], [at[2], at[3]]]
+    /// A pose drawn evenly from the ranges; half a turn to both sides where there is no limit.
+    pub(super) fn random_pose(&self, rng: &mut ChaCha8Rng) -> Vec<f64> {
+        let draw = |(low, high): &(f64, f64)| {
+            let limit = |x: f64, instead: f64| if x.is_finite() { x } else { instead };
+            let (low, high) = (limit(*low, -std::f64::consts::PI), limit(*high, std::f64::consts::PI));
+            if low < high { rng.random_range(low..=high) } else { low }
+        };
+        self.ranges.iter().map(draw).collect()
     }
 
-    /// For every coordinate: how far a unit step of it can move a point of one segment relative to the other, m/rad or
-    /// m/m. `None` if a joint on the way slides without limit.
-    fn reaches(&self, ends: &[BodyPoint; 4]) -> Option<Vec<f64>> {
-        let (first, second) = (self.ancestors(ends[0].body), self.ancestors(ends[2].body));
+    /// For every coordinate: how far a unit step of it can move one of the points of one body relative to those of another,
+    /// m/rad or m/m. `None` if a joint on the way slides without limit.
+    fn reaches(&self, points: &[BodyPoint], others: &[BodyPoint]) -> Option<Vec<f64>> {
+        let body = |points: &[BodyPoint]| self.ancestors(points.first().and_then(|p| p.body));
+        let (first, second) = (body(points), body(others));
         let mut reaches = vec![0.0; self.ranges.len()];
-        for (own, other, ends) in [(&first, &second, &ends[..2]), (&second, &first, &ends[2..])] {
+        for (own, other, ends) in [(&first, &second, points), (&second, &first, others)] {
             let mut arm = ends.iter().map(|p| p.position.norm()).fold(0.0, f64::max);
             // Joints that carry both segments move neither relative to the other.
             for b in own.iter().take_while(|b| !other.contains(b)) {

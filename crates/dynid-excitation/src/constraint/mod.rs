@@ -10,12 +10,14 @@ mod clearance;
 mod effort;
 mod gathered;
 mod joints;
+mod screening;
 mod segment;
 
 pub use capsule::{Capsule, CapsulePairs, Capsules};
 pub use cartesian::{CartesianLimits, FramePoint, Region};
 pub use effort::EffortLimits;
 pub use joints::{JointLimits, JointQuantity, JointRange};
+pub use screening::{Plane, PlaneScreening, Screening, mean_place, screen};
 
 use dynid_model::{BodyPoint, Dynamics, MechanismError, MotionBlock, Vec3};
 use thiserror::Error;
@@ -146,6 +148,12 @@ pub enum ConstraintKind {
     Column,
     /// Distance between two capsules on the robot.
     Capsule,
+    /// Distance between two links of the robot.
+    OwnLinks,
+    /// Height of a link above the floor.
+    Floor,
+    /// Distance of a link from the plane that the robot is mounted on.
+    Mounting,
     /// Position of joints that follow from the coordinates.
     JointPosition,
     /// Rate of such joints.

@@ -3,6 +3,7 @@
 mod closed;
 mod constraints;
 mod designs;
+mod envelopes;
 mod forecasts;
 mod gradients;
 mod infeasible;

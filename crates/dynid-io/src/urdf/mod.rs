@@ -4,6 +4,7 @@ mod dynamics;
 mod edit;
 pub(crate) mod inertial;
 mod read;
+mod shapes;
 mod write;
 pub(crate) mod xml;
 
@@ -11,4 +12,5 @@ pub use dynamics::dynamics;
 pub use edit::{JointDynamics, edit};
 pub(crate) use read::read_source;
 pub use read::{parse, read};
+pub use shapes::{LinkShape, Shape, ShapeRole, parse_shapes, read_shapes};
 pub use write::from_description;

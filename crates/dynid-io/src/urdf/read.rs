@@ -42,7 +42,7 @@ pub(crate) fn read_source(path: &Path) -> Result<(Description, SourceFile), Robo
 /// [`RobotFileError`] with line and column. The graph (parents, cycles, roots) is not checked here.
 pub fn parse(text: &str, source_name: &str) -> Result<Description, RobotFileError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let reader = Reader { text, file: source_name };
+    let reader = Reader { text, file: source_name, wanted: is_read };
     let robot = reader.tree()?;
     let name = robot.attributes.iter().find(|a| a.name == "name").map_or("robot", |a| a.value.as_str());
     let mut description = Description::new(name);
@@ -77,15 +77,15 @@ pub fn parse(text: &str, source_name: &str) -> Result<Description, RobotFileErro
 }
 
 /// An element of the parts of a URDF that are read.
-struct Element {
-    name: String,
-    offset: usize,
+pub(super) struct Element {
+    pub(super) name: String,
+    pub(super) offset: usize,
     attributes: Vec<Attribute>,
-    children: Vec<Element>,
+    pub(super) children: Vec<Element>,
 }
 
 impl Element {
-    fn text(&self, name: &str) -> Option<&Attribute> {
+    pub(super) fn text(&self, name: &str) -> Option<&Attribute> {
         self.attributes.iter().find(|a| a.name == name)
     }
 }
@@ -101,18 +101,21 @@ fn is_read(depth: usize, parent: &str, name: &str) -> bool {
     }
 }
 
-struct Reader<'a> {
-    text: &'a str,
-    file: &'a str,
+/// What reads elements and attributes of a text.
+pub(super) struct Reader<'a> {
+    pub(super) text: &'a str,
+    pub(super) file: &'a str,
+    /// Whether an element of this depth, inside this parent, with this name is read.
+    pub(super) wanted: fn(usize, &str, &str) -> bool,
 }
 
 impl Reader<'_> {
-    fn place(&self, offset: usize) -> Place {
+    pub(super) fn place(&self, offset: usize) -> Place {
         Place::of(self.file, self.text, offset)
     }
 
-    /// The elements that are read, as a tree at most four levels deep.
-    fn tree(&self) -> Result<Element, RobotFileError> {
+    /// The elements that are read, as a tree.
+    pub(super) fn tree(&self) -> Result<Element, RobotFileError> {
         let mut tags = Tags::new(self.text, self.file);
         let mut kept: Vec<Element> = Vec::new();
         let mut root = None;
@@ -131,7 +134,7 @@ impl Reader<'_> {
                         return Err(RobotFileError::NotARobot { at, found });
                     }
                     let parent = kept.last().map_or("", |e| e.name.as_str());
-                    if depth > 0 && !is_read(depth, parent, &name) {
+                    if depth > 0 && !(self.wanted)(depth, parent, &name) {
                         skipped = (!empty).then_some(depth);
                         continue;
                     }
@@ -154,7 +157,7 @@ impl Reader<'_> {
     }
 
     /// The only child with a name, if there is one.
-    fn child<'e>(
+    pub(super) fn child<'e>(
         &self,
         element: &'e Element,
         owner: &str,
@@ -182,7 +185,7 @@ impl Reader<'_> {
         })
     }
 
-    fn required<'e>(
+    pub(super) fn required<'e>(
         &self,
         element: &'e Element,
         owner: &str,
@@ -195,7 +198,13 @@ impl Reader<'_> {
         })
     }
 
-    fn value(&self, element: &Element, owner: &str, a: &Attribute, expected: &str) -> RobotFileError {
+    pub(super) fn value(
+        &self,
+        element: &Element,
+        owner: &str,
+        a: &Attribute,
+        expected: &str,
+    ) -> RobotFileError {
         RobotFileError::Value {
             at: self.place(a.offset),
             owner: owner.to_owned(),
@@ -205,7 +214,12 @@ impl Reader<'_> {
         }
     }
 
-    fn number(&self, element: &Element, owner: &str, a: &Attribute) -> Result<f64, RobotFileError> {
+    pub(super) fn number(
+        &self,
+        element: &Element,
+        owner: &str,
+        a: &Attribute,
+    ) -> Result<f64, RobotFileError> {
         finite(&a.value).ok_or_else(|| self.value(element, owner, a, "a finite number up to 1e30"))
     }
 
@@ -218,7 +232,12 @@ impl Reader<'_> {
         element.text(name).map(|a| self.number(element, owner, a)).transpose()
     }
 
-    fn vector(&self, element: &Element, owner: &str, name: &str) -> Result<Option<[f64; 3]>, RobotFileError> {
+    pub(super) fn vector(
+        &self,
+        element: &Element,
+        owner: &str,
+        name: &str,
+    ) -> Result<Option<[f64; 3]>, RobotFileError> {
         let Some(a) = element.text(name) else { return Ok(None) };
         let mut out = [0.0; 3];
         let mut words = a.value.split_ascii_whitespace();
@@ -234,7 +253,11 @@ impl Reader<'_> {
         Ok(Some(out))
     }
 
-    fn origin(&self, element: &Element, owner: &str) -> Result<([f64; 3], [f64; 3]), RobotFileError> {
+    pub(super) fn origin(
+        &self,
+        element: &Element,
+        owner: &str,
+    ) -> Result<([f64; 3], [f64; 3]), RobotFileError> {
         let Some(origin) = self.child(element, owner, "origin")? else { return Ok(([0.0; 3], [0.0; 3])) };
         let xyz = self.vector(origin, owner, "xyz")?.unwrap_or_default();
         let rpy = self.vector(origin, owner, "rpy")?.unwrap_or_default();

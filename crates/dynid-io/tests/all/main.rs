@@ -6,6 +6,7 @@ mod closed_robots;
 mod log_formats;
 mod logs;
 mod loops;
+mod meshes;
 mod mjcf;
 mod oracles;
 mod robot_files;

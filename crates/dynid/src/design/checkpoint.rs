@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use dynid_excitation::StartOutcome;
+use dynid_io::SourceFile;
 use serde::{Deserialize, Serialize};
 
 use super::DesignConfig;
@@ -30,7 +31,7 @@ struct StartRecord {
 
 /// Text that differs between problems whose starts differ: robot, settings, version. The number of starts and the time
 /// budget do not matter.
-pub(super) fn fingerprint(config: &DesignConfig) -> Result<String, Error> {
+pub(super) fn fingerprint(config: &DesignConfig, meshes: &[SourceFile]) -> Result<String, Error> {
     let mut config = config.clone();
     config.search.starts = 1;
     config.search.time_budget_s = None;
@@ -42,6 +43,11 @@ pub(super) fn fingerprint(config: &DesignConfig) -> Result<String, Error> {
     let mut text = format!("{} {robot}", crate::VERSION);
     for earlier in std::mem::take(&mut config.earlier) {
         text += &crate::logs::sha256(&earlier)?;
+    }
+    // What meshes hold matters, not where they are.
+    config.package_dirs.clear();
+    for mesh in meshes {
+        text += &format!(" {}", mesh.sha256);
     }
     config.robot = std::path::PathBuf::new();
     let settings = serde_json::to_string(&config).unwrap_or_else(|_| format!("{config:?}"));

@@ -39,6 +39,11 @@ pub struct DesignConfig {
     pub keep: Vec<KeepConfig>,
     /// Capsules around links, which must not touch.
     pub capsule: Vec<CapsuleConfig>,
+    /// What is kept without being asked for: the floor, own links apart.
+    pub safety: SafetyConfig,
+    /// Folders that hold packages, for `package://NAME/...` of meshes in a URDF, relative to the configuration. The folders
+    /// above the URDF are looked through too.
+    pub package_dirs: Vec<PathBuf>,
     /// What is minimised.
     pub criterion: CriterionConfig,
     /// Trajectories that will be or were recorded as well: their information counts. Files of earlier designs.
@@ -119,6 +124,35 @@ impl Default for LimitsConfig {
             effort: PerJoint::default(),
             share: 1.0,
             efforts: true,
+        }
+    }
+}
+
+/// Limits that every design keeps unless they are turned off: links stay above the floor and apart from each other.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SafetyConfig {
+    /// Keep moving links above the floor: the plane through the origin of the base, across gravity. Of a base that is not
+    /// upright the plane that it is mounted on takes its place. Default true.
+    pub floor: bool,
+    /// Height of the floor above the origin of the base, m. Default: 0 under an upright base, else not known.
+    pub floor_height_m: Option<f64>,
+    /// Keep links apart that are not joined by one joint. Default true.
+    pub self_collision: bool,
+    /// Least distance between links, and from the floor, m. Default 0.02.
+    pub margin_m: f64,
+    /// Pairs of links that need not be kept apart.
+    pub exempt: Vec<[String; 2]>,
+}
+
+impl Default for SafetyConfig {
+    fn default() -> Self {
+        SafetyConfig {
+            floor: true,
+            floor_height_m: None,
+            self_collision: true,
+            margin_m: 0.02,
+            exempt: Vec::new(),
         }
     }
 }
@@ -276,7 +310,8 @@ pub struct SearchConfig {
     pub starts: usize,
     /// Seed of the first. Default 1.
     pub seed: u64,
-    /// No start begins after this time, s. Default: none.
+    /// No start begins after this time, and those that began end at their next step, s; the first one gives a trajectory in
+    /// any case. Default: none.
     pub time_budget_s: Option<f64>,
     /// File that keeps finished starts, so that a run can be taken up again.
     pub checkpoint: Option<PathBuf>,
@@ -307,8 +342,8 @@ impl DesignConfig {
         config.robot = folder.join(&config.robot);
         config.out = config.out.map(|o| folder.join(o));
         config.search.checkpoint = config.search.checkpoint.map(|c| folder.join(c));
-        for earlier in &mut config.earlier {
-            *earlier = folder.join(&earlier);
+        for path in config.earlier.iter_mut().chain(&mut config.package_dirs) {
+            *path = folder.join(&path);
         }
         Ok(config)
     }
@@ -331,7 +366,29 @@ impl DesignConfig {
         let (usual, e) = (ElementsConfig::default(), &self.elements);
         let logs = "no value: a design has no logs; name laws in the lists of elements";
         let mix = CriterionConfig::default().mix;
+        let (safety, plain) = (&self.safety, SafetyConfig::default());
+        let is_off = !safety.floor && !safety.self_collision;
         let keys = [
+            (
+                "safety.floor_height_m",
+                !safety.floor && safety.floor_height_m.is_some(),
+                "`floor = true` beside it",
+            ),
+            (
+                "safety.margin_m",
+                is_off && safety.margin_m != plain.margin_m,
+                "`floor` or `self_collision` beside it",
+            ),
+            (
+                "safety.exempt",
+                !safety.self_collision && !safety.exempt.is_empty(),
+                "`self_collision = true` beside it",
+            ),
+            (
+                "package_dirs",
+                is_off && !self.package_dirs.is_empty(),
+                "`floor` or `self_collision` under [safety], which meshes are read for",
+            ),
             ("elements.friction", e.friction != usual.friction, logs),
             ("elements.friction_errors", e.friction_errors != usual.friction_errors, logs),
             ("elements.temperature", !e.temperature.is_none(), logs),
@@ -377,6 +434,7 @@ impl DesignConfig {
             ("criterion.mix", self.criterion.mix[1]),
             ("criterion.correlation_time_s", self.criterion.correlation_time_s),
             ("search.time_budget_s", self.search.time_budget_s.unwrap_or(0.0)),
+            ("safety.margin_m", self.safety.margin_m),
         ];
         for (name, x) in other {
             if !(x >= 0.0 && x.is_finite()) {
@@ -414,7 +472,10 @@ impl DesignConfig {
             return Err(Error::setting("trajectory.sample_rate_hz", expected, t.sample_rate_hz));
         }
         self.check_effect()?;
-        if self.capsule.len() == 1 {
+        if let Some(height) = self.safety.floor_height_m.filter(|h| !h.is_finite()) {
+            return Err(Error::setting("safety.floor_height_m", "a finite number", height));
+        }
+        if self.capsule.len() == 1 && !self.safety.floor && !self.safety.self_collision {
             let expected = "two or more: pairs of capsules must not touch";
             return Err(Error::setting("capsule", expected, "one"));
         }

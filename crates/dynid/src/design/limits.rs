@@ -3,12 +3,11 @@
 use std::sync::Arc;
 
 use dynid_excitation::MotionLimits;
-use dynid_excitation::constraint::{
-    Capsule, CapsulePairs, Capsules, CartesianLimits, EffortLimits, FramePoint, PathConstraint, Region,
-};
+use dynid_excitation::constraint::{CartesianLimits, EffortLimits, FramePoint, PathConstraint, Region};
 use dynid_model::{EffortModel, RobotModel, Vec3};
 
 use super::config::DesignConfig;
+use super::safety::{Safety, given_capsules, safety};
 use crate::Error;
 use crate::config::known;
 use crate::robot::Robot;
@@ -104,14 +103,16 @@ pub(super) fn effort_limits(
     Ok(given.into_iter().enumerate().map(|(k, g)| g.or_else(|| stated(k))).collect())
 }
 
+/// Limits along the path, and what of them is kept by default.
 pub(super) fn constraints(
+    robot: &Robot,
     config: &DesignConfig,
     model: &Arc<RobotModel>,
     nominal: Option<&[f64]>,
     limits: &[MotionLimits],
     effort_limits: &[Option<f64>],
     assumptions: &mut Vec<String>,
-) -> Result<Vec<Box<dyn PathConstraint>>, Error> {
+) -> Result<(Vec<Box<dyn PathConstraint>>, Safety), Error> {
     let mechanism = model.mechanism();
     let mut out: Vec<Box<dyn PathConstraint>> = Vec::new();
     if config.limits.efforts && effort_limits.iter().any(Option::is_some) {
@@ -129,24 +130,12 @@ pub(super) fn constraints(
     if !regions.is_empty() {
         out.push(Box::new(CartesianLimits::new(mechanism, &regions)?));
     }
-    if !config.capsule.is_empty() {
-        let capsules: Vec<Capsule> = config
-            .capsule
-            .iter()
-            .map(|c| Capsule { frame: c.frame.clone(), ends: [Vec3(c.from), Vec3(c.to)], radius: c.radius })
-            .collect();
-        let ranges: Vec<(f64, f64)> = limits.iter().map(|l| l.position).collect();
-        let capsules = Capsules::new(mechanism, &capsules, &CapsulePairs::All, &ranges)?;
-        if capsules.pairs().is_empty() {
-            assumptions.push(
-                "no two capsules are kept apart: they cannot touch within the position limits, or stand on one link or on two that \
-                 one joint joins"
-                    .to_owned(),
-            );
-        }
-        out.push(Box::new(capsules));
-    }
-    Ok(out)
+    let ranges: Vec<(f64, f64)> = limits.iter().map(|l| l.position).collect();
+    out.extend(given_capsules(config, mechanism, &ranges, assumptions)?);
+    let mut safety = safety(robot, config, mechanism, &ranges)?;
+    out.append(&mut safety.constraints);
+    assumptions.append(&mut safety.assumptions);
+    Ok((out, safety))
 }
 
 /// Regions that points must stay in.

@@ -1,14 +1,15 @@
 //! The whole motion of a design: approach, recorded periods, return.
 
 use dynid_excitation::LimitKind;
-use dynid_excitation::constraint::PathConstraint;
+use dynid_excitation::constraint::{ConstraintError, PathConstraint};
 use dynid_io::trajectory::{Leg, TrajectoryJoint};
 use dynid_io::{OutputError, TrajectoryFile};
-use dynid_model::MotionBlock;
+use dynid_model::{BodyPoint, Dynamics, MotionBlock};
 use dynid_motion::trajectory::{Form, FourierTrajectory, Phase, RowOrder, Sampled, Sequence};
 
 use super::config::DesignConfig;
 use super::problem::RobotProblem;
+use super::shapes::LinkCapsule;
 use crate::Error;
 
 /// Samples of approach and return at which efforts and distances are checked.
@@ -138,6 +139,34 @@ impl DesignedMotion {
         dynid_io::trajectory::write_ros_yaml(&paths.ros_yaml, &self.joints, &sampled).map_err(output)?;
         dynid_io::trajectory::write_ros_json(&paths.ros_json, &self.joints, &sampled).map_err(output)
     }
+}
+
+/// Ends of all capsules at instants spread evenly over a period, `[instant][capsule]`, base axes, m.
+pub(super) fn capsule_poses(
+    set: &RobotProblem,
+    coefficients: &[Vec<f64>],
+    count: usize,
+) -> Result<Vec<Vec<[[f64; 3]; 2]>>, Error> {
+    let mechanism = set.model.mechanism();
+    let mut points = Vec::new();
+    for LinkCapsule { capsule, .. } in &set.safety.capsules {
+        let frame = mechanism.frame(&capsule.frame).map_err(ConstraintError::from)?;
+        for end in capsule.ends {
+            let position = frame.placement.rotation.mul_vec(end) + frame.placement.translation;
+            points.push(BodyPoint { body: frame.body, position });
+        }
+    }
+    let base = set.problem.base;
+    let record = FourierTrajectory::from_rows(base, Form::Plain, &RowOrder::default(), coefficients, 1)?;
+    let period = record.period();
+    let times = (0..count).map(|k| period * k as f64 / count as f64).collect();
+    let sampled = Sampled::at_times(&record, times);
+    let block = MotionBlock::plain(count, &sampled.q, &sampled.dq, &sampled.ddq);
+    let mut places = vec![0.0; 3 * points.len() * count];
+    Dynamics::new(mechanism).points(&block, &points, count, &mut places);
+    let at = |p: usize, s: usize| [0, 1, 2].map(|c| places[(3 * p + c) * count + s]);
+    let pose = |s| (0..points.len() / 2).map(|k| [at(2 * k, s), at(2 * k + 1, s)]).collect();
+    Ok((0..count).map(pose).collect())
 }
 
 /// Where a motion is written.

@@ -13,6 +13,7 @@ use dynid_motion::trajectory::{Form, RowOrder};
 
 use super::config::{ColumnsName, CriterionName, DesignConfig};
 use super::limits::{constraints, effort_limits, joint_limits};
+use super::safety::Safety;
 use crate::Error;
 use crate::config::known;
 use crate::elements::ElementPlan;
@@ -38,6 +39,8 @@ pub(super) struct RobotProblem {
     pub(super) effort_limits: Vec<Option<f64>>,
     /// What was taken for granted, in words.
     pub(super) assumptions: Vec<String>,
+    /// What is kept by default.
+    pub(super) safety: Safety,
     /// Trajectory files of earlier experiments, as they were read.
     pub(super) earlier: Vec<SourceFile>,
 }
@@ -109,8 +112,8 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
     };
     let limits = joint_limits(robot, config, &joints, &mut assumptions)?;
     let effort_limits = effort_limits(robot, config, &joints)?;
-    let constraints =
-        constraints(config, &model, nominal.as_deref(), &limits, &effort_limits, &mut assumptions)?;
+    let (constraints, safety) =
+        constraints(robot, config, &model, nominal.as_deref(), &limits, &effort_limits, &mut assumptions)?;
     let typical = nominal.as_ref().map(|n| typical_efforts(&model, n));
     let noise = noise(config, &joints, &effort_limits, typical.as_deref(), &mut assumptions)?;
 
@@ -154,6 +157,7 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
         noise,
         effort_limits,
         assumptions,
+        safety,
         earlier: files,
     })
 }

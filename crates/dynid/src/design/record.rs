@@ -5,6 +5,7 @@ use dynid_excitation::{Infeasible, LimitKind, LimitPoint, StartOutcome};
 use serde::Serialize;
 
 use super::config::{CriterionName, DesignConfig};
+use super::safety::SafetyRecord;
 use super::{DesignRun, DesignedTrajectory};
 use crate::Error;
 use crate::estimate::{InputRecord, Provenance};
@@ -45,6 +46,12 @@ pub struct DesignRecord {
     pub weakest: Vec<ShareRecord>,
     /// Every limit at its instant of largest use, most used first.
     pub limits: Vec<LimitRecord>,
+    /// What is kept by default (floor, own links), and what is not checked.
+    pub safety: SafetyRecord,
+    /// Least distance between links that are kept apart, m: of 0.25 m and more a lower bound.
+    pub least_distance_m: Option<f64>,
+    /// Least height of links above the floor (or distance from the mounting plane), m.
+    pub least_height_m: Option<f64>,
     /// Predicted gain over random motion within the same limits.
     pub random: Option<RandomRecord>,
     /// All starts.
@@ -225,6 +232,7 @@ impl From<&LimitPoint> for LimitRecord {
 impl DesignRun {
     fn inputs(&self) -> Vec<InputRecord> {
         let mut inputs = InputRecord::of_robot(&self.robot);
+        inputs.extend(self.set.safety.meshes.iter().map(|source| InputRecord::of("mesh", source)));
         inputs.extend(self.set.earlier.iter().map(|source| InputRecord::of("trajectory", source)));
         inputs
     }
@@ -291,6 +299,9 @@ impl DesignRun {
                     .collect()
             }),
             limits,
+            safety: set.safety.record.clone(),
+            least_distance_m: self.least(designed, &[ConstraintKind::OwnLinks]),
+            least_height_m: self.least(designed, &[ConstraintKind::Floor, ConstraintKind::Mounting]),
             random: forecast.and_then(|f| f.random.as_ref()).map(|r| RandomRecord {
                 trajectories: r.trajectories,
                 mean_ratio: r.mean_ratio,
@@ -318,12 +329,17 @@ impl DesignRun {
     fn found_verdict(&self, designed: &DesignedTrajectory, mut warnings: Vec<String>) -> DesignVerdict {
         for fault in &designed.motion.leg_faults {
             warnings.push(format!(
-                "the {} breaks a limit ({} of {} by {:.1} %): its path is straight in joint space; choose another parking \
-                 or start pose",
+                "the {} breaks a limit ({} of {} by {}): its path is straight in joint space; choose another parking or \
+                 start pose{}",
                 fault.phase,
                 fault.kind,
                 fault.subject,
-                100.0 * fault.excess
+                match fault.kind {
+                    LimitKind::Path(kind) if kind != ConstraintKind::Effort =>
+                        format!("{:.0} mm", (1e3 * fault.excess * DISTANCE_SCALE).max(1.0)),
+                    _ => format!("{:.1} %", 100.0 * fault.excess),
+                },
+                way_out(fault.kind, &fault.subject).map_or_else(String::new, |line| format!("; {line}"))
             ));
         }
         let poorly: Vec<&str> = designed
@@ -355,11 +371,56 @@ impl DesignRun {
         let near = self.near_best(designed);
         let status = if designed.motion.leg_faults.is_empty() { "pass" } else { "warn" };
         let headline = format!(
-            "all limits hold at every instant of the period; {near} of {} starts ended within {:.0} % of the best",
+            "all limits hold at every instant of the period: {}; not checked: {}; {near} of {} starts ended within {:.0} % of \
+             the best",
+            self.kept().join(", "),
+            self.set.safety.record.not_checked.join(", "),
             self.starts.len(),
             100.0 * NEAR_BEST
         );
         DesignVerdict { status, headline, warnings }
+    }
+
+    /// What limits are of, in words.
+    fn kept(&self) -> Vec<String> {
+        let problem = &self.set.problem;
+        let mut kept: Vec<String> =
+            ["positions", "speeds", "accelerations"].iter().map(|x| (*x).to_owned()).collect();
+        if problem.limits.iter().any(|l| l.jerk.is_finite()) {
+            kept.push("jerks".to_owned());
+        }
+        let rows = problem.constraints.iter().flat_map(|c| c.rows());
+        let kinds: Vec<ConstraintKind> = rows.map(|row| row.kind).collect();
+        let is_kept = |kind: &ConstraintKind| kinds.contains(kind);
+        let regions = [
+            ConstraintKind::HalfSpace,
+            ConstraintKind::Box,
+            ConstraintKind::Cylinder,
+            ConstraintKind::Column,
+        ];
+        let named = [
+            (is_kept(&ConstraintKind::Effort), "efforts"),
+            (regions.iter().any(is_kept), "regions of [[keep]]"),
+            (is_kept(&ConstraintKind::Capsule), "capsules of [[capsule]]"),
+        ];
+        kept.extend(named.iter().filter(|(is_kept, _)| *is_kept).map(|(_, name)| (*name).to_owned()));
+        let safety = &self.set.safety.record;
+        let margin = format!("{:.0} mm", 1e3 * safety.margin_m);
+        kept.extend(
+            safety.planes.iter().filter(|p| !p.links.is_empty()).map(|p| format!("{} ({margin})", p.name)),
+        );
+        if !safety.pairs.is_empty() {
+            kept.push(format!("own links ({} pairs, {margin})", safety.pairs.len()));
+        }
+        kept
+    }
+
+    /// Least distance that limits of some kinds have along a designed trajectory, m.
+    fn least(&self, designed: Option<&DesignedTrajectory>, kinds: &[ConstraintKind]) -> Option<f64> {
+        let of_kind = |p: &&LimitPoint| matches!(p.kind, LimitKind::Path(kind) if kinds.contains(&kind));
+        let points = designed?.uses.iter().filter(of_kind);
+        let beyond = points.map(|p| -p.excess * DISTANCE_SCALE).reduce(f64::min)?;
+        Some(self.set.safety.record.margin_m + beyond)
     }
 
     /// Starts whose figure is within a few per cent of the best.
@@ -402,15 +463,40 @@ fn infeasible_headline(infeasible: &Infeasible) -> String {
         | LimitKind::Velocity
         | LimitKind::Acceleration
         | LimitKind::Jerk => format!("{:.0} % over its limit", 100.0 * v.excess),
+        LimitKind::Path(ConstraintKind::OwnLinks | ConstraintKind::Floor | ConstraintKind::Mounting) => {
+            format!("{:.0} mm short of the margin", (1e3 * v.excess * DISTANCE_SCALE).max(1.0))
+        }
         LimitKind::Path(_) => format!("{:.3} m on the wrong side", v.excess * DISTANCE_SCALE),
     };
     let worst = format!("{} of {} stays {size}, at {:.2} s", v.kind, v.subject, v.time);
-    match (infeasible.at_start, &infeasible.blamed) {
-        (true, _) => format!("the start pose itself is not allowed: {worst}"),
+    let said = match (infeasible.at_start, &infeasible.blamed) {
+        (true, _) => format!("the start pose itself is not allowed: {worst}; write another `start_pose`"),
         (false, Some(blamed)) => {
             format!("no motion keeps all limits: {worst}; without the limit of {blamed} there is one")
         }
         (false, None) => format!("no motion keeps all limits: {worst}"),
+    };
+    match way_out(v.kind, &v.subject) {
+        Some(line) => format!("{said}; {line}"),
+        None => said,
+    }
+}
+
+/// What to write where a limit that is kept by default is in the way.
+pub(super) fn way_out(kind: LimitKind, subject: &str) -> Option<String> {
+    match kind {
+        LimitKind::Path(ConstraintKind::Floor) => Some(
+            "`floor_height_m = -0.5` under [safety] states a floor 0.5 m below the origin of the base, `floor = false` none"
+                .to_owned(),
+        ),
+        LimitKind::Path(ConstraintKind::Mounting) => {
+            Some("`floor = false` under [safety] takes the plane away".to_owned())
+        }
+        LimitKind::Path(ConstraintKind::OwnLinks) => {
+            let (a, b) = subject.split_once(" and ")?;
+            Some(format!("`exempt = [[\"{a}\", \"{b}\"]]` under [safety] leaves this pair out"))
+        }
+        _ => None,
     }
 }
 

@@ -109,7 +109,7 @@ impl DesignRun {
             limits: self.limit_uses(),
             joints: self.joints(),
             trajectory: designed.map(|d| self.trajectory(config, d)).transpose()?,
-            obstacles: obstacles(config),
+            obstacles: obstacles(config, record),
             starts: self.starts(config, record),
             provenance: report::Provenance {
                 version: record.provenance.version.clone(),
@@ -316,14 +316,31 @@ fn facts(config: &DesignConfig, record: &DesignRecord) -> Vec<Fact> {
         Fact::new("noise of the effort, standard deviation", noise.join(", "), "N m, N"),
         Fact::new("noise is independent after", config.criterion.correlation_time_s, "s"),
     ];
+    let pairs: Vec<String> = record.safety.pairs.iter().map(|[a, b]| format!("{a} and {b}")).collect();
+    if !pairs.is_empty() {
+        facts.push(Fact::new("links that are kept apart", pairs.join(", "), ""));
+    }
+    let distances = [
+        ("least distance between them", record.least_distance_m),
+        ("least distance from the floor or mounting plane", record.least_height_m),
+    ];
+    for (name, distance) in distances {
+        facts.extend(distance.map(|x| Fact::new(name, format!("{:.1}", 1e3 * x), "mm")));
+    }
+    facts.push(Fact::new("not checked", record.safety.not_checked.join(", "), ""));
     if !config.earlier.is_empty() {
         facts.push(Fact::new("trajectories recorded as well", config.earlier.len(), ""));
     }
     facts
 }
 
-fn obstacles(config: &DesignConfig) -> Vec<report::Obstacle> {
-    let mut out: Vec<report::Obstacle> = Vec::new();
+fn obstacles(config: &DesignConfig, record: &DesignRecord) -> Vec<report::Obstacle> {
+    let plane = |p: &super::PlaneRecord| report::Obstacle {
+        name: p.name.to_owned(),
+        frames: p.links.clone(),
+        shape: report::Shape::HalfSpace { normal: p.normal, offset_m: p.height_m },
+    };
+    let mut out: Vec<report::Obstacle> = record.safety.planes.iter().map(plane).collect();
     for (point, region) in regions(config) {
         let Some(shape) = shape(region) else { continue };
         match out.iter_mut().find(|o| o.shape == shape) {
