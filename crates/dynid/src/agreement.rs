@@ -1,6 +1,6 @@
 //! Predicted against measured effort on a log.
 
-use dynid_estimate::conditioning::{ConditioningSettings, Moving, PreparedLog, predict};
+use dynid_estimate::conditioning::{ConditioningSettings, Moving, PreparedLog, predict, predict_at_rest};
 use dynid_estimate::metrics::{Fit, MetricsError, fit};
 use dynid_model::EffortModel;
 use dynid_motion::filter::{butterworth, forward_backward};
@@ -35,6 +35,9 @@ pub struct Agreement {
     pub measured: Vec<Vec<f64>>,
     /// Per output: predicted effort.
     pub predicted: Vec<Vec<f64>>,
+    /// Per output: prediction as pictures show it. Where a joint stands, friction of velocity is left out of it, since the sign of
+    /// its velocity is that of noise; elsewhere it is [`Agreement::predicted`], which all figures go by.
+    pub drawn: Vec<Vec<f64>>,
     /// Per output: a drive acts there, so that its effort counts in figures over all joints.
     pub driven: Vec<bool>,
     /// Per output: the joint moves in this log.
@@ -86,7 +89,8 @@ pub fn compare(
     let filter_hz = alignment.filter_hz.min(0.4 * log.rate_hz);
     let shape = model.parameters().shape_start();
     let run = |delay: f64| predict(model, &shape, values, log, state_hz, delay, settings);
-    let predicted = run(lead(log.rate_hz, alignment.delay_samples, alignment.delay_rate_hz))?;
+    let aligned = lead(log.rate_hz, alignment.delay_samples, alignment.delay_rate_hz);
+    let predicted = run(aligned)?;
     let unaligned = run(0.0)?;
     let margin = (EDGE_PERIODS * log.rate_hz / filter_hz.min(state_hz)).ceil() as usize;
     let mut bad: Vec<bool> = log.usable.iter().map(|u| !u).collect();
@@ -107,6 +111,10 @@ pub fn compare(
             .collect::<Result<Vec<_>, _>>()
     };
     let motion = Moving::of(log, state_hz, settings)?;
+    let drawn = match motion.samples.iter().flatten().all(|moves| *moves) {
+        true => predicted.clone(),
+        false => predict_at_rest(model, &shape, values, log, &motion, (state_hz, aligned), settings)?,
+    };
     let driven: Vec<bool> = (0..log.effort.len()).map(|output| !model.is_undriven(output)).collect();
     let agree_on = |measured: &[Vec<f64>], predicted: &[Vec<f64>], part: Part| {
         let is_of = |output: usize, k: usize| counted[k] && part.holds(motion.samples[output][k]);
@@ -130,6 +138,7 @@ pub fn compare(
         measured: log.effort.clone(),
         driven: driven.clone(),
         predicted,
+        drawn,
         moves: log.moves.clone(),
         motion,
         counted,
@@ -177,6 +186,21 @@ fn fit_driven(measured: &[Vec<f64>], predicted: &[Vec<f64>], driven: &[bool]) ->
 }
 
 impl Agreement {
+    /// Measured effort of an output and its prediction as pictures show it, through the filter of the filtered figures; not a
+    /// number near the ends and gaps, which do not count.
+    ///
+    /// # Errors
+    /// [`Error::Conditioning`].
+    pub(crate) fn in_band(&self, output: usize) -> Result<[Vec<f64>; 2], Error> {
+        let filter = butterworth(4, self.filter_hz, self.rate_hz).map_err(conditioning)?;
+        let through = |signal: &[f64]| -> Result<Vec<f64>, Error> {
+            let filtered = forward_backward(&filter, signal).map_err(conditioning)?;
+            let counted = filtered.into_iter().zip(&self.counted);
+            Ok(counted.map(|(x, counts)| if *counts { x } else { f64::NAN }).collect())
+        };
+        Ok([through(&self.measured[output])?, through(&self.drawn[output])?])
+    }
+
     /// Figures of a prediction that lacks `lost` of each output's effort, through the same filter.
     ///
     /// # Errors

@@ -2,21 +2,50 @@
 
 mod inputs;
 mod logs;
+mod remedy;
 
 use dynid_estimate::consistent::Status as ConsistentStatus;
-use dynid_estimate::identifiability::Verdict as ParameterVerdict;
 mod instruments;
 
 use dynid_estimate::whiteness::InBandWhiteness;
 
-pub(crate) use inputs::{OWN_LOGS, PREFLIGHT};
-pub(crate) use instruments::in_words as closed_loop_bias_in_words;
+pub(crate) use inputs::{OWN_LOGS, OWN_VALIDATION, PREFLIGHT, SCALE};
+pub(crate) use instruments::{CLOSED_LOOP, INSTRUMENTS, in_words as closed_loop_bias_in_words};
+pub(crate) use logs::AGREEMENT;
 
 use crate::agreement::Agreement;
+use crate::caution::{self, Caution};
 use crate::consistency::UNCONSTRAINED;
-use crate::estimate::{CheckResult, Verdict};
+use crate::estimate::{BaseCounts, CheckResult, Verdict};
 use crate::identify::Identification;
 use crate::stiffness::JointStiffness;
+
+/// Name of the check of what the logs excite.
+pub(crate) const EXCITATION: &str = "excitation";
+/// Name of the check of how clearly geometry separates what can be identified.
+pub(crate) const RANK_GAP: &str = "structural rank gap";
+/// Name of the check of amplification of errors.
+pub(crate) const CONDITION: &str = "condition number (scaled columns)";
+/// Name of the check of the fit to what the model has seen.
+pub(crate) const FIT: &str = "fit on training logs";
+/// Name of the check of the prediction of what it has not seen.
+pub(crate) const PREDICTION: &str = "prediction of validation logs";
+/// Name of the check of joints whose effort is something else.
+pub(crate) const EXPLAINED: &str = "joints that the model does not explain";
+/// Name of the check of what the model leaves over.
+pub(crate) const RESIDUAL: &str = "residual against sensor noise";
+/// Name of the check of the delay.
+pub(crate) const DELAY: &str = "delay of the effort";
+/// Name of the check of the reversal mask.
+pub(crate) const MASK: &str = "sensitivity to the reversal mask";
+/// Name of the check of time blocks.
+pub(crate) const BLOCKS: &str = "time blocks behind the standard deviations";
+/// Name of the check of what bodies that can exist cost.
+pub(crate) const CONSISTENCY: &str = "price of physical consistency";
+/// Name of the check of coloured residuals.
+pub(crate) const WHITENESS: &str = "whiteness of the residuals";
+/// Name of the check of springs.
+pub(crate) const STIFFNESS: &str = "stiffness told by deformation";
 
 /// How bad a check came out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -112,36 +141,53 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
             format!("It should not be used without a look at the failed checks: {}.", named(Status::Fail))
         }
     };
-    let seen = id.trust.base.iter().filter(|a| a.verdict == ParameterVerdict::Seen).count();
-    let headline = format!(
-        "{seen} of {} base parameters seen in the data; the model {agrees} within {error:.1} % of the effort. {reservation}",
-        id.base.len(),
+    let line = format!(
+        "{}; the model {agrees} within {error:.1} % of the effort",
+        id.counts().base_in_words()
     );
+    let warnings: Vec<Caution> =
+        id.warnings.iter().cloned().chain(unphysical(id)).chain(id.friction_warnings()).collect();
     let verdict = Verdict {
         status: status.word().to_owned(),
-        headline,
+        headline: format!("{line}. {reservation}"),
+        line,
         assumptions,
+        cautions: cautions(id, &checks, &warnings),
         checks: checks.into_iter().map(|(_, c)| c).collect(),
-        warnings: id.warnings.iter().cloned().chain(unphysical(id)).chain(id.friction_warnings()).collect(),
+        warnings: warnings.into_iter().map(|w| w.message).collect(),
     };
     (status, verdict)
 }
 
+/// Checks that did not pass and warnings, the worst first. A check that only sums up warnings, which stand for themselves, is
+/// left out.
+fn cautions(id: &Identification, checks: &[(Status, CheckResult)], warnings: &[Caution]) -> Vec<Caution> {
+    let told = |name: &str| match name {
+        PREFLIGHT => id.findings.iter().any(|f| f.warning().is_some()),
+        _ => warnings.iter().any(|w| w.name == name),
+    };
+    let open = checks.iter().filter(|(status, c)| *status != Status::Ok && !told(&c.name));
+    let open = open.map(|(_, c)| Caution::of(c, remedy::of(id, &c.name)));
+    caution::ranked(open.chain(warnings.iter().cloned()).collect())
+}
+
 impl Identification {
     /// Validation logs that hold nothing of the training logs to speak of.
-    fn unseen(&self) -> Vec<&Agreement> {
+    pub(crate) fn unseen(&self) -> Vec<&Agreement> {
         let is_new = |(k, _): &(usize, &Agreement)| !self.overlaps.repeats(self.training.len() + k);
         self.validation.iter().enumerate().filter(is_new).map(|(_, log)| log).collect()
     }
 }
 
 /// Bodies whose split of base values into standard parameters no body could have.
-fn unphysical(id: &Identification) -> impl Iterator<Item = String> {
+fn unphysical(id: &Identification) -> impl Iterator<Item = Caution> {
     id.unphysical_bodies().into_iter().map(|(body, fault)| {
-        format!(
+        let message = format!(
             "the identified body `{body}` {fault}: the split of what is seen into its ten parameters is not physical; \
              predictions are not affected, but a simulator may refuse the robot file"
-        )
+        );
+        let remedy = "ask for bodies that can exist: `consistency = \"pseudo-inertia\"` under `[estimator]`";
+        Caution::warn(caution::BODY, message, remedy)
     })
 }
 
@@ -163,15 +209,15 @@ fn stiffness(id: &Identification) -> Option<(Status, CheckResult)> {
     };
     (all > 0).then(|| {
         let limit = format!("all {all} joints");
-        check(status, "stiffness told by deformation", Some(told as f64), "", &limit, meaning)
+        check(status, STIFFNESS, Some(told as f64), "", &limit, meaning)
     })
 }
 
 fn excitation(id: &Identification) -> (Status, CheckResult) {
-    let (kept, all) = (id.fit().solution.kept.len(), id.base.len());
+    let BaseCounts { all, excited: kept, .. } = id.counts().base;
     check(
         Status::of(kept == all, 2 * kept > all),
-        "excitation",
+        EXCITATION,
         Some(kept as f64),
         "",
         &format!("all {all} base parameters"),
@@ -191,7 +237,7 @@ fn rank_gap(id: &Identification) -> (Status, CheckResult) {
     let gap = id.base.gap.ratio().min(1.0 / f64::EPSILON);
     check(
         Status::of(gap >= 1e4, gap >= 1e2),
-        "structural rank gap",
+        RANK_GAP,
         gap.is_finite().then_some(gap),
         "",
         "at least 1e4",
@@ -204,7 +250,7 @@ fn condition(id: &Identification) -> (Status, CheckResult) {
     // It amplifies errors, and standard deviations know of it: no reason to throw a model away.
     check(
         Status::of(condition < 100.0, true),
-        "condition number (scaled columns)",
+        CONDITION,
         condition.is_finite().then_some(condition),
         "",
         "below 100",
@@ -257,11 +303,11 @@ fn standing_apart(agreements: &[&Agreement]) -> String {
 
 fn training_fit(id: &Identification) -> (Status, CheckResult) {
     let training: Vec<&Agreement> = id.training.iter().collect();
-    fit_check("fit on training logs", &training, "the logs it was fitted to")
+    fit_check(FIT, &training, "the logs it was fitted to")
 }
 
 fn validation_fit(id: &Identification) -> (Status, CheckResult) {
-    fit_check("prediction of validation logs", &id.unseen(), "logs it has not seen")
+    fit_check(PREDICTION, &id.unseen(), "logs it has not seen")
 }
 
 fn explained(id: &Identification) -> Option<(Status, CheckResult)> {
@@ -271,7 +317,7 @@ fn explained(id: &Identification) -> Option<(Status, CheckResult)> {
     (!poor.is_empty()).then(|| {
         check(
             Status::Warn,
-            "joints that the model does not explain",
+            EXPLAINED,
             Some(poor.len() as f64),
             "",
             "none: at least half of the effort of every joint explained, on logs that move it and on held-out folds",
@@ -293,7 +339,7 @@ fn residual(id: &Identification) -> Option<(Status, CheckResult)> {
         .fold(None, |m: Option<f64>, x| Some(m.map_or(x, |m| m.max(x))))?;
     Some(check(
         Status::of(worst < 2.0, true),
-        "residual against sensor noise",
+        RESIDUAL,
         Some(worst),
         "",
         "below 2 on every joint",
@@ -314,7 +360,7 @@ fn delay(id: &Identification) -> Option<(Status, CheckResult)> {
     let chi = delay.chi_squared.unwrap_or(0.0);
     Some(check(
         Status::of(!delay.at_limit && chi < 3.0, true),
-        "delay of the effort",
+        DELAY,
         Some(delay.samples),
         "samples",
         "off the limits of the search, joints in agreement (χ²/dof below 3)",
@@ -345,7 +391,7 @@ fn mask(id: &Identification) -> Option<(Status, CheckResult)> {
     let good = spread <= 50.0 && most - least <= (0.05 * least).max(chance);
     Some(check(
         Status::of(good, true),
-        "sensitivity to the reversal mask",
+        MASK,
         Some(spread),
         "%",
         "below 5 %, or below 50 % and two standard errors",
@@ -368,7 +414,7 @@ fn blocks(id: &Identification) -> (Status, CheckResult) {
     let short = wanted > 1.01 * fitted.block_s;
     check(
         Status::of(id.blocks() >= 20 && !short, true),
-        "time blocks behind the standard deviations",
+        BLOCKS,
         Some(id.blocks() as f64),
         "",
         "at least 20, each five correlation times of the residual long",
@@ -422,7 +468,7 @@ fn consistency(id: &Identification) -> Option<(Status, CheckResult)> {
     };
     Some(check(
         Status::of(cost <= CHEAP && found.status != ConsistentStatus::Stalled, cost <= DEAR),
-        "price of physical consistency",
+        CONSISTENCY,
         rise,
         "%",
         "error on held-out folds and on validation logs rises by at most 2 %",
@@ -459,7 +505,7 @@ fn whiteness(id: &Identification) -> Option<(Status, CheckResult)> {
     let robust = id.fitted.jackknife.is_some();
     Some(check(
         Status::of(!worst.rejected() || robust, true),
-        "whiteness of the residuals",
+        WHITENESS,
         Some(ratio(worst)),
         "",
         "largest distance of the cumulative periodogram below its 5 % threshold (1), or robust intervals",

@@ -31,7 +31,7 @@ pub use live_rows::{LiveRow, LiveRowSettings, LiveRows};
 pub use log_rows::LogRows;
 pub use moving::Moving;
 pub use periodic::PeriodicMotion;
-pub use predict::predict;
+pub use predict::{predict, predict_at_rest};
 pub use prepare::{PreparedLog, prepare};
 pub use reduce::reduce;
 pub(crate) use rows::KeptColumns;

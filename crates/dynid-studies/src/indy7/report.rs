@@ -1,9 +1,7 @@
 //! The study's report: the paper's tables and figures again.
 
 use dynid::motion::trajectory::{Point, Trajectory};
-use dynid::report::{
-    Chart, ChartAxis, ChartCurve, CurveStyle, Fact, Provenance, StudyReport, StudySection, StudyTable, Value,
-};
+use dynid::report::{Chart, ChartAxis, ChartCurve, Chosen, CurveStyle, Provenance, StudyReport, StudySection, StudyTable, Value};
 
 use super::experiment::trajectory;
 use super::friction::JointFriction;
@@ -68,7 +66,7 @@ impl Contents<'_> {
             provenance: Provenance {
                 version: dynid::VERSION.into(),
                 seed: Some(record.seed),
-                settings: vec![Fact::new("Quick run", record.quick, "")],
+                settings: vec![Chosen::given("quick run", record.quick, "")],
                 ..Provenance::default()
             },
         })

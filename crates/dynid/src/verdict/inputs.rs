@@ -10,6 +10,10 @@ use crate::identify::Identification;
 pub(crate) const PREFLIGHT: &str = "pre-flight of the logs";
 /// Name of the check of training logs that repeat each other.
 pub(crate) const OWN_LOGS: &str = "training logs of their own";
+/// Name of the check of validation logs that repeat training logs.
+pub(crate) const OWN_VALIDATION: &str = "validation logs of their own";
+/// Name of the check of the size of the efforts.
+pub(crate) const SCALE: &str = "scale of the efforts";
 /// Masses of the robot file speak for the scale of the efforts within this factor.
 const FILE_AGREES: f64 = 1.25;
 /// A ratio to a weighed mass this close to one is right, whatever its interval ...
@@ -51,7 +55,7 @@ fn preflight(id: &Identification) -> (Status, CheckResult) {
     };
     check(
         status,
-        "pre-flight of the logs",
+        PREFLIGHT,
         id.preflight.then_some(count),
         "",
         "no error, no warning",
@@ -79,7 +83,7 @@ fn seen_before(id: &Identification) -> Option<(Status, CheckResult)> {
     let words: Vec<String> = found.iter().map(|o| o.words()).collect();
     Some(check(
         Status::Warn,
-        "validation logs of their own",
+        OWN_VALIDATION,
         Some(100.0 * most),
         "%",
         "no rows in common with training logs",
@@ -88,7 +92,7 @@ fn seen_before(id: &Identification) -> Option<(Status, CheckResult)> {
 }
 
 fn scale(found: &EffortScale) -> (Status, CheckResult) {
-    let name = "scale of the efforts";
+    let name = SCALE;
     let assumption = found.assumption().unwrap_or_default();
     match found.source {
         ScaleSource::KnownMass => weighed(found),
@@ -124,7 +128,7 @@ fn scale(found: &EffortScale) -> (Status, CheckResult) {
 
 /// Against masses that were weighed.
 fn weighed(found: &EffortScale) -> (Status, CheckResult) {
-    let (name, limit) = ("scale of the efforts", "1 within the interval");
+    let (name, limit) = (SCALE, "1 within the interval");
     let each: Vec<String> = found
         .masses
         .iter()

@@ -9,6 +9,10 @@ use crate::estimate::CheckResult;
 use crate::identify::Identification;
 use crate::instruments::InstrumentRun;
 
+/// Name of the check of instruments.
+pub(crate) const INSTRUMENTS: &str = "instruments";
+/// Name of the check of least squares in closed loop.
+pub(crate) const CLOSED_LOOP: &str = "closed-loop bias";
 /// Level of the test that is spoken of.
 const LEVEL: f64 = 0.05;
 
@@ -45,7 +49,7 @@ pub(super) fn instruments(id: &Identification) -> Option<(Status, CheckResult)> 
         ),
     };
     let limit = "settled, smallest cosine between instruments and regressors at least 0.1";
-    Some(check(status, "instruments", cosine, "", limit, meaning))
+    Some(check(status, INSTRUMENTS, cosine, "", limit, meaning))
 }
 
 /// Size of the difference between least squares and instruments.
@@ -61,7 +65,7 @@ pub(super) fn closed_loop_bias(id: &Identification) -> Option<(Status, CheckResu
     let worst = found.and_then(Exogeneity::worst).map(|e| e.ratio()).filter(|r| r.is_finite());
     let limit = "no base parameter of least squares further from that of instruments than its limit (1): two standard deviations, or \
                  1 % of the prior deviation";
-    Some(check(status, "closed-loop bias", worst, "", limit, in_words(id)?))
+    Some(check(status, CLOSED_LOOP, worst, "", limit, in_words(id)?))
 }
 
 /// What the comparison comes to, in a sentence or two.

@@ -6,6 +6,8 @@ use super::{Status, check};
 use crate::estimate::CheckResult;
 use crate::identify::Identification;
 
+/// Name of the check of logs that contradict each other.
+pub(crate) const AGREEMENT: &str = "agreement of the training logs";
 /// Deviations that are shown at most.
 const SHOWN: usize = 6;
 
@@ -21,7 +23,7 @@ fn agreement(id: &Identification) -> Option<(Status, CheckResult)> {
     let contradicts = found.contradicts();
     Some(check(
         Status::of(!contradicts, true),
-        "agreement of the training logs",
+        AGREEMENT,
         most.or(found.one_robot.as_ref().map(|r| r.f).filter(|_| contradicts)),
         "",
         "no deviation of a log above a quarter of the residual",

@@ -28,6 +28,7 @@ mod periodic;
 mod preflight;
 mod preflight_causes;
 mod recorded_logs;
+mod report_page;
 mod settings;
 mod stiffness;
 mod support;
