@@ -117,7 +117,8 @@ mod tests {
 
     #[test]
     fn failures_come_first_then_what_puts_more_in_doubt() {
-        let of = |status: &str, name: &str| Caution { status: status.to_owned(), ..Caution::warn(name, "", "") };
+        let of =
+            |status: &str, name: &str| Caution { status: status.to_owned(), ..Caution::warn(name, "", "") };
         let sorted = ranked(vec![
             of("warn", ROBOT_FILE),
             of("warn", crate::verdict::CONDITION),
@@ -128,7 +129,13 @@ mod tests {
         let names: Vec<&str> = sorted.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(
             names,
-            [crate::verdict::FIT, "joint permutation", crate::verdict::CONDITION, ROBOT_FILE, "never heard of"]
+            [
+                crate::verdict::FIT,
+                "joint permutation",
+                crate::verdict::CONDITION,
+                ROBOT_FILE,
+                "never heard of"
+            ]
         );
     }
 }

@@ -764,7 +764,8 @@ fn log_warnings(model: &RobotModel, logs: &[PreparedLog]) -> Vec<Caution> {
     let mut out = Vec::new();
     for log in logs {
         let name = short_name(&log.name);
-        let mut add = |message: String, remedy: String| out.push(Caution::warn(caution::LOG, message, remedy));
+        let mut add =
+            |message: String, remedy: String| out.push(Caution::warn(caution::LOG, message, remedy));
         if log.rate_hz < SLOWEST_HZ {
             add(
                 format!(

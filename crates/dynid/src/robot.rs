@@ -224,7 +224,9 @@ fn remedy(warning: Option<&MechanismWarning>) -> &'static str {
         Some(MechanismWarning::NotPhysical { .. } | MechanismWarning::NotStated { .. }) => {
             "state mass, centre of mass and inertia of the body: `<inertial>` in a URDF, `mass`, `com` and `inertia_com` in TOML"
         }
-        Some(MechanismWarning::MimicIndependent { .. }) => "`couple_mimics = true` in the configuration couples it",
+        Some(MechanismWarning::MimicIndependent { .. }) => {
+            "`couple_mimics = true` in the configuration couples it"
+        }
         _ => {
             "nothing, if the robot was recorded like this; else log the joint and take it out of `[locked]`, or state what is driven by \
              `actuated = [..]` in the robot file"

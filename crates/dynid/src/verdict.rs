@@ -141,10 +141,8 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
             format!("It should not be used without a look at the failed checks: {}.", named(Status::Fail))
         }
     };
-    let line = format!(
-        "{}; the model {agrees} within {error:.1} % of the effort",
-        id.counts().base_in_words()
-    );
+    let line =
+        format!("{}; the model {agrees} within {error:.1} % of the effort", id.counts().base_in_words());
     let warnings: Vec<Caution> =
         id.warnings.iter().cloned().chain(unphysical(id)).chain(id.friction_warnings()).collect();
     let verdict = Verdict {

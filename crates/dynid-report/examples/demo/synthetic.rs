@@ -3,9 +3,10 @@
 use std::f64::consts::TAU;
 
 use dynid_report::{
-    BaseParameter, Caution, Check, Chosen, Fact, InputFile, Joint, JointDelay, JointQuality, JointSeries, Judged,
-    Ladder, LineKind, LogReport, LogRole, LogSeries, Observation, Origin, ParameterVerdict, PictureLine, PointKind, Pose,
-    Provenance, Quality, ReportData, Robot, RobotPicture, Rung, Status, UnidentifiableColumn, Verdict,
+    BaseParameter, Caution, Check, Chosen, Fact, InputFile, Joint, JointDelay, JointQuality, JointSeries,
+    Judged, Ladder, LineKind, LogReport, LogRole, LogSeries, Observation, Origin, ParameterVerdict,
+    PictureLine, PointKind, Pose, Provenance, Quality, ReportData, Robot, RobotPicture, Rung, Status,
+    UnidentifiableColumn, Verdict,
 };
 
 #[path = "friction.rs"]

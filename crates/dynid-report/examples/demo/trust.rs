@@ -1,8 +1,8 @@
 //! What the made-up identification says about its parameters.
 
 use dynid_report::{
-    Consistency, ConsistencyStatus, Counts, HeldOut, HeldOutJoint, Limit, LogWhiteness, OwnerKind, ParameterVerdict,
-    Precision, Pruning, PruningStep, StandardParameter, ValidationPrice, Whiteness,
+    Consistency, ConsistencyStatus, Counts, HeldOut, HeldOutJoint, Limit, LogWhiteness, OwnerKind,
+    ParameterVerdict, Precision, Pruning, PruningStep, StandardParameter, ValidationPrice, Whiteness,
 };
 
 /// Of 13 standard parameters per joint nine of the first link are not identifiable, and three of every other link are carried;

@@ -4,9 +4,9 @@
 use std::f64::consts::TAU;
 
 use dynid_report::{
-    Check, Chosen, ConfoundedPair, DesignJoint, DesignParameter, DesignQuality, DesignReport, DesignStart, Fact,
-    FramePath, InputFile, JointMotion, LimitUse, Obstacle, ParameterShare, Provenance, RandomMotion, Robot,
-    Shape, Starts, Status, Trajectory, Value, Verdict, Warning,
+    Check, Chosen, ConfoundedPair, DesignJoint, DesignParameter, DesignQuality, DesignReport, DesignStart,
+    Fact, FramePath, InputFile, JointMotion, LimitUse, Obstacle, ParameterShare, Provenance, RandomMotion,
+    Robot, Shape, Starts, Status, Trajectory, Value, Verdict, Warning,
 };
 
 const PERIOD_S: f64 = 10.0;

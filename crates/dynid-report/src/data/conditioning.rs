@@ -35,7 +35,13 @@ pub struct Chosen {
 impl Chosen {
     /// A setting that the user gave.
     pub fn given(name: impl Into<String>, value: impl Into<Value>, unit: impl Into<String>) -> Self {
-        Self { name: name.into(), value: value.into(), unit: unit.into(), origin: Origin::User, reason: String::new() }
+        Self {
+            name: name.into(),
+            value: value.into(),
+            unit: unit.into(),
+            origin: Origin::User,
+            reason: String::new(),
+        }
     }
 }
 

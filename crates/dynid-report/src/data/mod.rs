@@ -47,7 +47,8 @@ pub use precision::{LogWhiteness, Precision, Whiteness};
 pub use provenance::{InputFile, Provenance};
 pub use pruning::{Pruning, PruningStep};
 pub use study::{
-    Chart, ChartAxis, ChartCurve, CurveStyle, Ranked, Ranking, StudyReport, StudyRow, StudySection, StudyTable,
+    Chart, ChartAxis, ChartCurve, CurveStyle, Ranked, Ranking, StudyReport, StudyRow, StudySection,
+    StudyTable,
 };
 pub use verdict::{Check, Status, Verdict, Warning};
 

@@ -258,7 +258,8 @@ mod tests {
         assert!(svg.contains(">&lt;ols&gt;</text>") && !svg.contains("<ols>"));
         let at = |text: &str| {
             let before = svg.split(&format!(">{text}</text>")).next().unwrap();
-            let attribute = |name: &str| before.rsplit(&format!("{name}=\"")).next().unwrap().split('"').next().unwrap();
+            let attribute =
+                |name: &str| before.rsplit(&format!("{name}=\"")).next().unwrap().split('"').next().unwrap();
             (attribute(" y").parse::<f64>().unwrap(), attribute("text-anchor").to_owned())
         };
         assert!((at("&lt;ols&gt;").0 - at("wls").0).abs() >= 12.0);

@@ -5,7 +5,7 @@ use crate::data::{LineKind, PointKind, RobotPicture};
 /// Size of the picture at full size, pixels.
 pub(crate) const WIDTH: f64 = 320.0;
 pub(crate) const HEIGHT: f64 = 280.0;
-const MARGIN: f64 = 22.0;
+const MARGIN: f64 = 14.0;
 /// Height of the eye over the plane of the base, rad.
 const ELEVATION: f64 = 0.36;
 /// Directions that are tried, rad apart.
@@ -66,15 +66,15 @@ impl View {
         let depth = combine(ahead, -sin, aside, cos);
         let above = combine(up, ELEVATION.cos(), depth, ELEVATION.sin());
         let span = |axis: [f64; 3]| {
-            points.iter().map(|p| dot(axis, *p)).fold([0.0, 0.0], |[low, high]: [f64; 2], x| [low.min(x), high.max(x)])
+            points
+                .iter()
+                .map(|p| dot(axis, *p))
+                .fold([0.0, 0.0], |[low, high]: [f64; 2], x| [low.min(x), high.max(x)])
         };
         let (x, y) = (span(right), span(above));
         let (wide, tall) = (x[1] - x[0], y[1] - y[0]);
         let scale = ((WIDTH - 2.0 * MARGIN) / wide).min((HEIGHT - 2.0 * MARGIN) / tall);
-        let at = [
-            0.5 * WIDTH - 0.5 * scale * (x[0] + x[1]),
-            0.5 * HEIGHT + 0.5 * scale * (y[0] + y[1]),
-        ];
+        let at = [0.5 * WIDTH - 0.5 * scale * (x[0] + x[1]), 0.5 * HEIGHT + 0.5 * scale * (y[0] + y[1])];
         let view = View { right: right.map(|x| x * scale), above: above.map(|x| x * scale), up, at };
         (view, wide * tall)
     }
@@ -97,7 +97,8 @@ pub(crate) fn robot_svg(picture: &RobotPicture, label: &str) -> String {
     let (Some(view), Some(pose)) = (View::of(picture), picture.poses.get(picture.shown)) else {
         return String::new();
     };
-    let mut svg = format!(r#"<svg class="robot" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{label}">"#);
+    let mut svg =
+        format!(r#"<svg class="robot" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{label}">"#);
     svg.push_str(&ground(&view, picture));
     if let Some(trail) = picture.trail {
         let path = picture.poses.iter().filter_map(|pose| pose.points_m.get(trail)).map(|p| view.place(*p));
@@ -109,7 +110,10 @@ pub(crate) fn robot_svg(picture: &RobotPicture, label: &str) -> String {
             let ends = line.ends.map(|k| pose.points_m.get(k).copied().unwrap_or([f64::NAN; 3]));
             let ends = ends.map(|p| view.place(if shadow { view.shadow(p) } else { p }));
             if ends.iter().flatten().all(|x| x.is_finite()) {
-                d.push_str(&format!("M{:.1} {:.1}L{:.1} {:.1}", ends[0][0], ends[0][1], ends[1][0], ends[1][1]));
+                d.push_str(&format!(
+                    "M{:.1} {:.1}L{:.1} {:.1}",
+                    ends[0][0], ends[0][1], ends[1][0], ends[1][1]
+                ));
             }
         }
         d
@@ -151,7 +155,7 @@ fn ground(view: &View, picture: &RobotPicture) -> String {
         .filter(|r| r.is_finite())
         .fold(0.0, f64::max);
     let (ahead, aside) = plane(view.up);
-    let radius = reach.max(1e-9) * 0.7;
+    let radius = reach.max(1e-9) * 0.45;
     let corner = |k: usize| {
         let (sin, cos) = (std::f64::consts::TAU * k as f64 / 48.0).sin_cos();
         view.place(combine(ahead, radius * cos, aside, radius * sin))

@@ -37,7 +37,8 @@ pub(crate) fn versus(time_s: &[f64], curves: &[(&str, &[f64])]) -> Versus {
         ticks(first, last, 6.0).into_iter().map(|t| (100.0 * x(t), tick_label(t))).collect();
     let down: Vec<(f64, String)> =
         ticks(low, high, 4.0).into_iter().map(|v| (100.0 * y(v), tick_label(v))).collect();
-    let mut svg = format!(r#"<svg viewBox="0 0 {WIDTH} {HEIGHT}" preserveAspectRatio="none" aria-hidden="true">"#);
+    let mut svg =
+        format!(r#"<svg viewBox="0 0 {WIDTH} {HEIGHT}" preserveAspectRatio="none" aria-hidden="true">"#);
     let grid = |places: &[(f64, String)], line: &dyn Fn(f64) -> String| -> String {
         places.iter().map(|(at, _)| line(*at)).collect()
     };
@@ -50,7 +51,12 @@ pub(crate) fn versus(time_s: &[f64], curves: &[(&str, &[f64])]) -> Versus {
         let mut pen = false;
         for (t, v) in points {
             if v.is_finite() {
-                d.push_str(&format!("{}{:.0} {:.0}", if pen { "L" } else { "M" }, WIDTH * x(t), HEIGHT * y(v)));
+                d.push_str(&format!(
+                    "{}{:.0} {:.0}",
+                    if pen { "L" } else { "M" },
+                    WIDTH * x(t),
+                    HEIGHT * y(v)
+                ));
             }
             pen = v.is_finite();
         }

@@ -43,7 +43,11 @@ fn counts(data: &ReportData) -> Result<(), ReportError> {
         ("base parameters seen in the data", c.base_seen, data.base_parameters.iter().filter(seen).count()),
         ("standard parameters", c.standard, data.standard_parameters.len()),
         ("standard parameters seen in the data", c.standard_seen, standard(ParameterVerdict::SeenInData)),
-        ("standard parameters carried by the prior", c.standard_carried, standard(ParameterVerdict::CarriedByPrior)),
+        (
+            "standard parameters carried by the prior",
+            c.standard_carried,
+            standard(ParameterVerdict::CarriedByPrior),
+        ),
         (
             "standard parameters that are not identifiable",
             c.standard_not_identifiable,

@@ -63,7 +63,8 @@ pub(super) fn picture(data: &RobotPicture) -> Result<Option<PictureView<'_>>, Re
 
 fn motion(data: &RobotPicture) -> Result<Option<String>, ReportError> {
     let Some(view) = RobotView::of(data) else { return Ok(None) };
-    let largest = data.poses.iter().flat_map(|p| p.points_m.iter().flatten()).copied().filter(|x| x.is_finite());
+    let largest =
+        data.poses.iter().flat_map(|p| p.points_m.iter().flatten()).copied().filter(|x| x.is_finite());
     let largest = largest.fold(0.0, |most: f64, x| most.max(x.abs()));
     // Half a pixel at full size is more than this.
     let unit = largest / 2000.0;
@@ -108,5 +109,9 @@ pub(super) fn check(data: &RobotPicture) -> Result<(), ReportError> {
     if let Some(named) = named {
         among("picture of the robot, points", named, points)?;
     }
-    if data.poses.is_empty() { Ok(()) } else { among("picture of the robot, poses", data.shown, data.poses.len()) }
+    if data.poses.is_empty() {
+        Ok(())
+    } else {
+        among("picture of the robot, poses", data.shown, data.poses.len())
+    }
 }

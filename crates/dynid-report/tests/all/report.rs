@@ -4,10 +4,11 @@
 mod synthetic;
 
 use dynid_report::{
-    BaseParameter, Caution, Chart, ChartAxis, ChartCurve, Check, Chosen, Consistency, Counts, Fact, FileJoint, FileJudgement,
-    FrictionTrial, HeldOut, HeldOutJoint, InputFile, Joint, JointDelay, JointQuality, JointSeries, Judged, Ladder,
-    Limit, LineKind, LogReport, LogSeries, LogWhiteness, PictureLine, PointKind, Pose, Precision, Pruning, PruningStep, ReportData, ReportError,
-    RobotPicture, Rung, ShapeParameter, ShapeVerdict, StandardParameter, UnidentifiableColumn, ValidationPrice, Verdict,
+    BaseParameter, Caution, Chart, ChartAxis, ChartCurve, Check, Chosen, Consistency, Counts, Fact,
+    FileJoint, FileJudgement, FrictionTrial, HeldOut, HeldOutJoint, InputFile, Joint, JointDelay,
+    JointQuality, JointSeries, Judged, Ladder, Limit, LineKind, LogReport, LogSeries, LogWhiteness,
+    PictureLine, PointKind, Pose, Precision, Pruning, PruningStep, ReportData, ReportError, RobotPicture,
+    Rung, ShapeParameter, ShapeVerdict, StandardParameter, UnidentifiableColumn, ValidationPrice, Verdict,
     render,
 };
 
@@ -148,7 +149,13 @@ fn hollow(text: &str) -> ReportData {
             version: text(),
             inputs: vec![InputFile { path: text(), kind: text(), sha256: None }],
             seed: None,
-            settings: vec![Chosen { name: text(), value: text().into(), unit: text(), reason: text(), ..Default::default() }],
+            settings: vec![Chosen {
+                name: text(),
+                value: text().into(),
+                unit: text(),
+                reason: text(),
+                ..Default::default()
+            }],
         },
         ..ReportData::default()
     }

@@ -2,7 +2,10 @@
 
 use dynid::estimators::online::error_driven_factor;
 use dynid::model::element::CubicSpring;
-use dynid::report::{Chart, ChartAxis, ChartCurve, Chosen, CurveStyle, Fact, Provenance, StudyReport, StudySection, StudyTable, Value};
+use dynid::report::{
+    Chart, ChartAxis, ChartCurve, Chosen, CurveStyle, Fact, Provenance, StudyReport, StudySection,
+    StudyTable, Value,
+};
 
 use super::joint::{Damping, identified};
 use super::measurement::Signals;

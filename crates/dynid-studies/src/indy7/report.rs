@@ -1,7 +1,10 @@
 //! The study's report: the paper's tables and figures again.
 
 use dynid::motion::trajectory::{Point, Trajectory};
-use dynid::report::{Chart, ChartAxis, ChartCurve, Chosen, CurveStyle, Provenance, StudyReport, StudySection, StudyTable, Value};
+use dynid::report::{
+    Chart, ChartAxis, ChartCurve, Chosen, CurveStyle, Provenance, StudyReport, StudySection, StudyTable,
+    Value,
+};
 
 use super::experiment::trajectory;
 use super::friction::JointFriction;

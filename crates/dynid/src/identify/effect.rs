@@ -48,7 +48,13 @@ pub(super) fn warnings(config: &Config, found: bool) -> Vec<Caution> {
          did nothing"
             .to_owned()
     });
-    let leave_out = |message: String| Caution::warn(caution::SETTING, message, "leave the setting out, so that nothing seems to depend on it");
+    let leave_out = |message: String| {
+        Caution::warn(
+            caution::SETTING,
+            message,
+            "leave the setting out, so that nothing seems to depend on it",
+        )
+    };
     search.into_iter().chain(config.payload.iter().filter_map(idle)).map(leave_out).collect()
 }
 

@@ -4,12 +4,14 @@ use dynid_model::EffortModel;
 use dynid_report as report;
 use dynid_report::{RobotPicture, Value};
 
-use super::AT_REST;
 use crate::Error;
 use crate::agreement::Agreement;
 use crate::estimate::Estimate;
 use crate::identify::Identification;
 use crate::result::short_name;
+
+/// What the first figure leaves out of a prediction; below the curves of all joints it is told at length.
+const BRIEFLY: &str = " Where the joint stands, friction of velocity is left out of the predicted curve.";
 
 /// Cautions of the result file with the numbers of their checks.
 pub(super) fn cautions(estimate: &Estimate) -> Vec<report::Caution> {
@@ -59,7 +61,7 @@ impl Identification {
         let Some(log) = logs.position(|a| std::ptr::eq(a, worst)) else { return Ok(None) };
         let Some((joint, why)) = self.drawn_joint(worst) else { return Ok(None) };
         let [measured, predicted] = worst.in_band(joint)?;
-        let steady = if worst.drawn[joint] == worst.predicted[joint] { "" } else { AT_REST };
+        let steady = if worst.drawn[joint] == worst.predicted[joint] { "" } else { BRIEFLY };
         Ok(Some(report::Judged {
             log,
             unseen: !unseen.is_empty(),
@@ -69,7 +71,10 @@ impl Identification {
             time_s: (0..measured.len()).map(|s| worst.start + s as f64 / worst.rate_hz).collect(),
             measured,
             predicted,
-            description: format!("Both curves passed a zero-phase filter of {:.1} Hz.{steady}", worst.filter_hz),
+            description: format!(
+                "Both curves passed a zero-phase filter of {:.1} Hz.{steady}",
+                worst.filter_hz
+            ),
         }))
     }
 
@@ -85,7 +90,8 @@ impl Identification {
         if let Some((joint, error)) = worst(fit) {
             return Some((joint, format!("The joint that is predicted worst, {error:.2} % of its effort")));
         }
-        worst(all).map(|(joint, error)| (joint, format!("Predicted with an error of {error:.0} % of its effort")))
+        worst(all)
+            .map(|(joint, error)| (joint, format!("Predicted with an error of {error:.0} % of its effort")))
     }
 
     /// The robot in poses of the first training log.

@@ -11,7 +11,7 @@ const RATE_HZ: f64 = 8.0;
 /// Most poses of a picture.
 const MOST: f64 = 160.0;
 /// Length of the strokes along joint axes, in parts of the distance between joints.
-const AXIS: f64 = 0.22;
+const AXIS: f64 = 0.6;
 /// Ends nearer to a joint than this part of the distance between joints are not drawn.
 const NEAR: f64 = 0.02;
 
@@ -143,7 +143,7 @@ pub(crate) fn picture(
     let poses = skeleton.poses(mechanism, &times, &q);
     Some(RobotPicture {
         caption,
-        shown: poses.len() / 2,
+        shown: stretched(&poses),
         poses,
         points: skeleton.kinds,
         lines: skeleton.lines,
@@ -151,6 +151,15 @@ pub(crate) fn picture(
         trail: None,
         plays: false,
     })
+}
+
+/// The pose in which some point lies farthest from the base.
+fn stretched(poses: &[Pose]) -> usize {
+    let reach = |pose: &Pose| {
+        let squares = pose.points_m.iter().map(|p| p.iter().map(|x| x * x).sum::<f64>());
+        squares.fold(0.0, f64::max)
+    };
+    (0..poses.len()).max_by(|a, b| reach(&poses[*a]).total_cmp(&reach(&poses[*b]))).unwrap_or(0)
 }
 
 /// Samples whose poses are shown.
@@ -171,7 +180,9 @@ fn tree_positions(model: &ClosedModel, samples: usize, q: &[f64]) -> Option<Vec<
     let still = vec![0.0; q.len()];
     let mut all: Vec<Vec<f64>> = Vec::with_capacity(samples);
     model
-        .follow(&MotionBlock::plain(samples, q, &still, &still), |_, pose| all.push(pose.positions().to_vec()))
+        .follow(&MotionBlock::plain(samples, q, &still, &still), |_, pose| {
+            all.push(pose.positions().to_vec())
+        })
         .ok()?;
     let coordinates = all.first()?.len();
     Some((0..coordinates).flat_map(|k| all.iter().map(move |pose| pose[k]).collect::<Vec<_>>()).collect())

@@ -62,16 +62,22 @@ fn words(value: &Json) -> String {
             list.iter().map(inner).collect::<Vec<_>>().join(", ")
         }
         Json::Object(table) if table.is_empty() => "none".to_owned(),
-        Json::Object(table) => {
-            table.iter().map(|(key, value)| format!("{key} = {}", words(value))).collect::<Vec<_>>().join(", ")
-        }
+        Json::Object(table) => table
+            .iter()
+            .map(|(key, value)| format!("{key} = {}", words(value)))
+            .collect::<Vec<_>>()
+            .join(", "),
     }
 }
 
 /// Six digits at most, as few as tell the number.
 fn number(x: f64) -> String {
     let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
-    if rounded == 0.0 || (1e-4..1e6).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
+    if rounded == 0.0 || (1e-4..1e6).contains(&rounded.abs()) {
+        rounded.to_string()
+    } else {
+        format!("{rounded:e}")
+    }
 }
 
 #[cfg(test)]

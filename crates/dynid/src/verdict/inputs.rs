@@ -53,14 +53,7 @@ fn preflight(id: &Identification) -> (Status, CheckResult) {
     } else {
         (Status::Ok, "columns, signs, units, clock and gravity are what the logs say".to_owned())
     };
-    check(
-        status,
-        PREFLIGHT,
-        id.preflight.then_some(count),
-        "",
-        "no error, no warning",
-        meaning,
-    )
+    check(status, PREFLIGHT, id.preflight.then_some(count), "", "no error, no warning", meaning)
 }
 
 fn repeated(id: &Identification) -> Option<(Status, CheckResult)> {

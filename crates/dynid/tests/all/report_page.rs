@@ -61,13 +61,17 @@ fn counts_agree(id: &Identification, estimate: &Estimate, page: &str) {
     assert_eq!(counts.standard.not_identifiable, seen("not identifiable"));
     assert_eq!(counts.base.all, estimate.base_parameters.len());
     assert_eq!(counts.base.excited, estimate.base_parameters.iter().filter(|b| b.value.is_some()).count());
-    let base_seen = estimate.base_parameters.iter().filter(|b| b.verdict.as_deref() == Some("seen in the data"));
+    let base_seen =
+        estimate.base_parameters.iter().filter(|b| b.verdict.as_deref() == Some("seen in the data"));
     assert_eq!(counts.base.seen, base_seen.count());
     assert_eq!(counts.shape.all, estimate.shape_parameters.len());
     // The fit has a column for each of both kinds.
     assert_eq!(estimate.rank.structural, counts.base.all + counts.shape.all);
     let words = counts.base_in_words();
-    assert_eq!(words, format!("{} of {} base parameters seen in the data", counts.base.seen, counts.base.all));
+    assert_eq!(
+        words,
+        format!("{} of {} base parameters seen in the data", counts.base.seen, counts.base.all)
+    );
     assert!(estimate.verdict.headline.starts_with(&estimate.verdict.line), "{}", estimate.verdict.headline);
     assert!(estimate.verdict.line.starts_with(&words), "{}", estimate.verdict.line);
     assert!(page.contains(&words), "{words}");
@@ -86,7 +90,10 @@ fn the_first_screen_shows_unseen_data_and_all_counts_agree() {
     counts_agree(&id, &estimate, &page);
     cautions_have_remedies(&estimate, &page);
     let first = page.split("<section id=\"first\"").nth(1).unwrap().split("</section>").next().unwrap();
-    assert!(first.contains("Error per joint on unseen data") && first.contains("<b>valid.csv.gz</b>"), "{first}");
+    assert!(
+        first.contains("Error per joint on unseen data") && first.contains("<b>valid.csv.gz</b>"),
+        "{first}"
+    );
     // Six joints, each with its error.
     let rows = first.split("<tbody>").nth(1).unwrap().split("</tbody>").next().unwrap();
     assert_eq!(rows.matches("<th scope=\"row\">j").count(), 6);
@@ -130,7 +137,8 @@ fn turntable(folder: &Path) -> Config {
         let sum = |f: &dyn Fn(f64, f64) -> f64| waves.iter().map(|(a, w)| f(*a, *w)).sum::<f64>();
         let q = sum(&|a, w| a * (w * s).sin());
         let dq = sum(&|a, w| a * w * (w * s).cos()) * ds;
-        let ddq = sum(&|a, w| -a * w * w * (w * s).sin()) * ds * ds + sum(&|a, w| a * w * (w * s).cos()) * dds;
+        let ddq =
+            sum(&|a, w| -a * w * w * (w * s).sin()) * ds * ds + sum(&|a, w| a * w * (w * s).cos()) * dds;
         let friction = if dq == 0.0 { 0.0 } else { COULOMB * dq.signum() + 2.0 * dq };
         log.push_str(&format!("{t},{},{}\n", q + 4e-5 * noise(), 3.05 * ddq + friction + 0.2 * noise()));
     }
@@ -164,7 +172,8 @@ fn the_predicted_curve_does_not_chatter_where_a_joint_stands() {
     assert!(jump(drawn) < 0.1 * COULOMB, "{}", jump(drawn));
     // In motion both are the same but for the delay's interpolation near the places where motion ends.
     let moves = 0..3000;
-    let differ = log.predicted[0][moves.clone()].iter().zip(&log.drawn[0][moves]).filter(|(p, d)| p != d).count();
+    let differ =
+        log.predicted[0][moves.clone()].iter().zip(&log.drawn[0][moves]).filter(|(p, d)| p != d).count();
     let standing = log.motion.samples[0][..3000].iter().filter(|moves| !**moves).count();
     assert!(differ <= 200 * standing.max(1), "{differ} of {standing}");
     // Figures are those of the full prediction.
