@@ -16,6 +16,16 @@ pub enum ReportError {
         /// Entries it has.
         found: usize,
     },
+    /// A count contradicts the list that it counts.
+    #[error("{place}: the count says {stated}, the list has {found}")]
+    Count {
+        /// Which count, e.g. `base parameters`.
+        place: String,
+        /// What the count says.
+        stated: u64,
+        /// Entries of the list.
+        found: u64,
+    },
     /// The time of a log is not finite or runs backwards.
     #[error("{place}: time of sample {sample} is {found} s, expected a finite number not below {least} s")]
     Time {

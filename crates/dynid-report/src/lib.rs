@@ -22,21 +22,24 @@
 mod data;
 mod drawing;
 mod error;
+mod markup;
 mod number;
 mod page;
 mod series;
 
 pub use data::{
-    BaseParameter, Chart, ChartAxis, ChartCurve, Check, Chosen, ConfoundedPair, Consistency,
-    ConsistencyStatus, CurveStyle, DesignJoint, DesignParameter, DesignQuality, DesignReport, DesignStart,
-    Fact, FileJoint, FileJudgement, FileLoss, FramePath, FrictionTrial, HeldOut, HeldOutJoint, InputFile,
-    Joint, JointDelay, JointMotion, JointQuality, JointSeries, Ladder, Limit, LimitUse, LogReport, LogRole,
-    LogSeries, LogWhiteness, Observation, Obstacle, Origin, OwnerKind, ParameterShare, ParameterVerdict,
-    Precision, Provenance, Pruning, PruningStep, Quality, RandomMotion, ReportData, Robot, Rung, Shape,
-    ShapeParameter, ShapeVerdict, StandardParameter, Starts, Status, StudyReport, StudyRow, StudySection,
-    StudyTable, Trajectory, UnidentifiableColumn, ValidationPrice, Value, Verdict, Warning, Whiteness,
+    BaseParameter, Caution, Chart, ChartAxis, ChartCurve, Check, Chosen, ConfoundedPair, Consistency,
+    ConsistencyStatus, Counts, CurveStyle, DesignJoint, DesignParameter, DesignQuality, DesignReport,
+    DesignStart, Fact, FileJoint, FileJudgement, FileLoss, FramePath, FrictionTrial, HeldOut, HeldOutJoint,
+    InputFile, Joint, JointDelay, JointMotion, JointQuality, JointSeries, Ladder, Limit, LimitUse, LogReport,
+    LogRole, LogSeries, LogWhiteness, Observation, Obstacle, Origin, OwnerKind, ParameterShare,
+    ParameterVerdict, Precision, Provenance, Pruning, PruningStep, Quality, RandomMotion, ReportData, Robot,
+    Rung, Shape, ShapeParameter, ShapeVerdict, StandardParameter, Starts, Status, StudyReport, StudyRow,
+    StudySection, StudyTable, Trajectory, UnidentifiableColumn, ValidationPrice, Value, Verdict, Warning,
+    Whiteness,
 };
 pub use data::{CurvesByTemperature, FrictionReport, FrictionTest, Surface, TemperatureLevel};
-pub use data::{FindingRow, LogPage};
+pub use data::{FindingRow, LogPage, Ranked, Ranking};
+pub use data::{Judged, LineKind, PictureLine, PointKind, Pose, RobotPicture};
 pub use error::ReportError;
 pub use page::{render, render_design, render_friction, render_kind, render_log_page, render_study};

@@ -36,6 +36,9 @@ pub struct Agreement {
     pub measured: Vec<Vec<f64>>,
     /// Per output: predicted effort.
     pub predicted: Vec<Vec<f64>>,
+    /// Per output: prediction as pictures show it. Where a joint stands, friction of velocity is left out of it, since the sign of
+    /// its velocity is that of noise; elsewhere it is [`Agreement::predicted`], which all figures go by.
+    pub drawn: Vec<Vec<f64>>,
     /// Per output: a drive acts there, so that its effort counts in figures over all joints.
     pub driven: Vec<bool>,
     /// Per output: the joint moves in this log.
@@ -95,11 +98,19 @@ pub fn compare(
         let lasts = format!("{:.2} s leave no sample between the filter's edges", log.duration());
         return Err(too_short(lasts));
     }
-    let states = States::of_motion(log, state_hz, settings)?;
+    let mut states = States::of_motion(log, state_hz, settings)?;
     let motion = Moving::new(log, &states, settings);
-    let mut predicted = predict_along(model, &model.parameters().shape_start(), values, log, &states);
-    drop(states);
+    let shape = model.parameters().shape_start();
     let lead = lead(log.rate_hz, alignment.delay_samples, alignment.delay_rate_hz);
+    let mut predicted = predict_along(model, &shape, values, log, &states);
+    states.rest(&motion);
+    let mut drawn = predict_along(model, &shape, values, log, &states);
+    drop(states);
+    if lead != 0.0 {
+        for signal in &mut drawn {
+            *signal = shift(signal, lead).map_err(conditioning)?.values;
+        }
+    }
     let filter = butterworth(4, filter_hz, log.rate_hz).map_err(conditioning)?;
     let filtered = |signal: &[f64]| forward_backward(&filter, signal).map_err(conditioning);
     let driven: Vec<bool> = (0..log.effort.len()).map(|output| !model.is_undriven(output)).collect();
@@ -137,6 +148,7 @@ pub fn compare(
         measured: log.effort.clone(),
         driven,
         predicted,
+        drawn,
         moves: log.moves.clone(),
         motion,
         counted,
@@ -168,6 +180,21 @@ fn pick(signal: &[f64], is_kept: impl Fn(usize) -> bool) -> Vec<f64> {
 }
 
 impl Agreement {
+    /// Measured effort of an output and its prediction as pictures show it, through the filter of the filtered figures; not a
+    /// number near the ends and gaps, which do not count.
+    ///
+    /// # Errors
+    /// [`Error::Conditioning`].
+    pub(crate) fn in_band(&self, output: usize) -> Result<[Vec<f64>; 2], Error> {
+        let filter = butterworth(4, self.filter_hz, self.rate_hz).map_err(conditioning)?;
+        let through = |signal: &[f64]| -> Result<Vec<f64>, Error> {
+            let filtered = forward_backward(&filter, signal).map_err(conditioning)?;
+            let counted = filtered.into_iter().zip(&self.counted);
+            Ok(counted.map(|(x, counts)| if *counts { x } else { f64::NAN }).collect())
+        };
+        Ok([through(&self.measured[output])?, through(&self.drawn[output])?])
+    }
+
     /// Figures of a prediction that lacks `lost` of each output's effort, through the same filter.
     ///
     /// # Errors

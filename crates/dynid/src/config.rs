@@ -38,6 +38,9 @@ use crate::Error;
 #[derive(Debug, Clone, Default, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
+    /// The file that the configuration was read from; `None` if it was put together.
+    #[serde(skip)]
+    pub file: Option<PathBuf>,
     /// Robot file (URDF or TOML), relative to the configuration.
     pub robot: PathBuf,
     /// Output folder, relative to the configuration. Without it the program writes to `dynid-out` in the current folder.
@@ -250,6 +253,7 @@ impl Config {
     /// Fails as [`Config::read`] does.
     pub fn read_for_stream(path: &Path) -> Result<Self, Error> {
         let (mut config, folder) = toml_file::read(path, Self::parse_any)?;
+        config.file = Some(path.to_owned());
         config.robot = folder.join(&config.robot);
         config.out = config.out.map(|o| folder.join(o));
         config.elements.known_friction = config.elements.known_friction.map(|f| folder.join(f));

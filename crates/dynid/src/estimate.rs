@@ -1,5 +1,6 @@
 //! The result file `estimate.json`: stable keys, added to but never renamed.
 
+mod counts;
 mod exported;
 mod friction;
 mod instruments;
@@ -7,6 +8,7 @@ mod loops;
 mod model;
 mod trust;
 
+pub use counts::{BaseCounts, ParameterCounts, ShapeCounts, StandardCounts};
 pub use exported::{EXPORT_LOSS_LIMIT, ExportedJoint, ExportedLog, ExportedRecord, FileFit};
 pub use friction::{FrictionTrial, PassivityRecord};
 pub use instruments::{EffectRecord, ExogeneityRecord, InstrumentRecord};
@@ -23,6 +25,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
 use crate::Error;
+use crate::caution::Caution;
 use crate::effort_scale::EffortScale;
 use crate::identify::OwnDelay;
 use crate::log_agreement::LogAgreement;
@@ -55,6 +58,9 @@ pub struct Estimate {
     pub condition_number_without_shapes: Option<f64>,
     /// Rank found in the logs against the structural rank.
     pub rank: RankStatus,
+    /// How many parameters there are and how many the logs tell; absent from files of earlier versions.
+    #[serde(default)]
+    pub counts: ParameterCounts,
     /// Standard parameters: links, then elements. Their split follows the robot file where only combinations are seen.
     pub parameters: Vec<ParameterValue>,
     /// What belongs to single logs: payloads, and deviations of offset and friction named after their log. Predictions of
@@ -185,9 +191,9 @@ pub enum Split {
 /// Rank of the log.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct RankStatus {
-    /// Base parameters that some motion of this robot can reveal.
+    /// Columns that some motion of this robot can tell apart: base parameters, and one column per shape parameter.
     pub structural: usize,
-    /// Base parameters that these logs excite.
+    /// Columns of these that the logs excite.
     pub excited: usize,
     /// Gap of the structural singular values.
     pub structural_gap: Option<f64>,
@@ -376,8 +382,14 @@ pub struct LogFit {
 pub struct Verdict {
     /// `ok`, `warn` or `fail`.
     pub status: String,
-    /// One sentence.
+    /// One sentence on the result, one on what it is worth.
     pub headline: String,
+    /// The first of them alone: what the logs show, and how well the model predicts.
+    #[serde(default)]
+    pub line: String,
+    /// What to look at before the result is used, the worst first, each with what mends it: checks that did not pass, and warnings.
+    #[serde(default)]
+    pub cautions: Vec<Caution>,
     /// What it takes for granted, since no log tells it, a sentence each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub assumptions: Vec<String>,

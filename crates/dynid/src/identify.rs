@@ -12,8 +12,6 @@ mod own_scale;
 mod shapes;
 mod structure;
 
-use std::path::Path;
-
 use dynid_estimate::conditioning::{
     Conditioning, ConditioningSettings, JointFriction, PreparedLog, ReducedGroup, Stage, predict,
 };
@@ -28,7 +26,9 @@ use dynid_motion::Log;
 
 use crate::Error;
 use crate::agreement::{self, Agreement};
+use crate::caution::{self, Caution};
 use crate::check::{self, Finding, Severity};
+use crate::commands::RunFiles;
 use crate::config::{Config, LogConfig, Preflight, Route};
 use crate::consistency::Consistent;
 use crate::effort_scale::{self, EffortScale, WeighedMass};
@@ -44,10 +44,13 @@ use crate::logs::{self, LoadedLog};
 use crate::overlap::Overlaps;
 use crate::passivity::SPEED_SPAN_S;
 use crate::prior::Prior;
+use crate::result::short_name;
 use crate::robot::{Robot, RobotOptions, refuse_internal_load};
 use crate::shape::{self, ShapeFit};
 use crate::stiffness::{self, JointStiffness};
 use crate::trust::{Evidence, Trust};
+use crate::verdict::CheckName;
+pub(crate) use elastic::REMEDY as SPRING_REMEDY;
 pub(crate) use model_fit::{ModelFit, fit as fit_model};
 pub use own_delay::OwnDelay;
 pub(crate) use own_scale::conditioned;
@@ -104,6 +107,8 @@ pub struct Identification {
     pub found_out: Vec<Vec<ReadingNote>>,
     /// Files as they were read.
     pub inputs: Vec<InputRecord>,
+    /// Files as commands name them.
+    pub files: RunFiles,
     /// How logs were read.
     pub(crate) reading: ReadingRecord,
     /// Stiffness of elastic joints by their deformation; empty without encoders on both sides of gears, and where sensors
@@ -159,8 +164,8 @@ pub struct Identification {
     pub own_delays: Vec<OwnDelay>,
     /// Robot files beside the identified model.
     pub exported: ExportedRecord,
-    /// Warnings, in words.
-    pub warnings: Vec<String>,
+    /// What was noticed on the way and is no check of its own.
+    pub warnings: Vec<Caution>,
     /// Whether the training logs were examined before.
     pub preflight: bool,
     /// What the pre-flight of the training logs found.
@@ -204,11 +209,12 @@ pub fn identify(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Ident
     let stiff = stiffness::stiff_config(config, &elastic)?;
     let mut found = run(&stiff, stiffness::stiff_robot(&elastic)?, progress)?;
     found.warnings.extend(doubts);
-    found.warnings.push(format!(
+    let message = format!(
         "the deformation does not bear out the stiffness that rows of links and motors give: joints are taken as stiff, read at their \
          motors, and their stiffness is that of the deformation: {}",
         stiffness.iter().map(JointStiffness::words).collect::<Vec<_>>().join("; ")
-    ));
+    );
+    found.warnings.push(Caution::warn(caution::SPRING, message, elastic::REMEDY));
     found.stiffness = stiffness;
     Ok(found)
 }
@@ -240,9 +246,18 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
         }
         Route::Textbook => (model, None),
     };
-    let mut warnings = robot.warnings.clone();
-    warnings.extend(robot.clearance_warnings());
-    warnings.extend(plan.alike(&robot.mechanism).iter().map(ToString::to_string));
+    let mut warnings = robot.cautions();
+    warnings.extend(robot.clearance_warnings().map(|message| {
+        let remedy = "`dynid clearance ROBOT dynid-out/estimate.json --log LOG`, with your files, tells the gap and its friction from the effort";
+        Caution::warn(caution::CLEARANCE, message, remedy)
+    }));
+    warnings.extend(plan.alike(&robot.mechanism).iter().map(|pair| {
+        let remedy = format!(
+            "leave one of them out: `{} = [..]` under `[elements.joint]` lists those to keep",
+            pair.joint
+        );
+        Caution::warn(caution::ELEMENTS, pair.to_string(), remedy)
+    }));
     let ModelFit {
         model,
         structure,
@@ -274,10 +289,21 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
     };
     let row_rms = figures::row_rms(&groups, &fitted.estimate.x, base.len());
     let residual_ratio = figures::residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
-    warnings.extend(findings.iter().filter_map(Finding::warning));
-    warnings.extend(prior.warnings.iter().cloned());
-    warnings.extend(read.iter().flat_map(|log| log.warnings.iter().cloned()));
-    warnings.extend(validation.iter().flat_map(LoadedLog::warnings));
+    warnings.extend(findings.iter().filter_map(Finding::caution));
+    warnings.extend(prior.warnings.iter().map(|message| {
+        let remedy = "state mass, centre of mass and inertia of the link in the robot file: `<inertial>` in a URDF, `mass`, `com` and \
+                      `inertia_com` in TOML";
+        Caution::warn(caution::ROBOT_FILE, message, remedy)
+    }));
+    let of_reading = read.iter().flat_map(|log| log.warnings.iter().cloned());
+    let of_reading = of_reading.chain(validation.iter().flat_map(LoadedLog::warnings));
+    warnings.extend(of_reading.map(|message| {
+        let remedy = format!(
+            "`{} --report check.html` draws the signals as they were read; columns and units are stated under `[columns]`",
+            RunFiles::of(config).check()
+        );
+        Caution::warn(caution::LOG, message, remedy)
+    }));
     warnings.extend(log_warnings(&model, &prepared));
     warnings.extend(elastic::warnings(&model, &prepared));
     warnings.extend(known::warnings(&plan, &robot.mechanism, &prepared));
@@ -288,7 +314,11 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
             .unwrap_or(1.0)
     };
     let log_agreement = log_agreement::test(config, &model, &base, &fitted, &plan.log_terms, scale);
-    warnings.extend(log_agreement.iter().flat_map(LogAgreement::warnings));
+    warnings.extend(log_agreement.iter().flat_map(LogAgreement::warnings).map(|message| {
+        let remedy = "give the log terms of its own in its `[[log]]`: `own = [\"offset\"]`, `own = [\"friction\"]`, \
+                      `own = [\"friction_scale\"]` or `own = [\"delay\"]`; what it carries: `payload = \"tool\"`";
+        Caution::warn(CheckName::AgreementOfLogs.name(), message, remedy)
+    }));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
     let found_out: Vec<Vec<ReadingNote>> = read.iter().map(|log| log.reading.clone()).collect();
     let (understood, sources): (Vec<_>, Vec<_>) =
@@ -297,6 +327,7 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
     inputs.extend(sources.into_iter().flatten());
     let mut out = Identification {
         inputs,
+        files: RunFiles::of(config),
         reading: ReadingRecord::of(config, &understood),
         stiffness: Vec::new(),
         plan,
@@ -364,7 +395,12 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
         match instruments::compare(&out, config) {
             Ok(found) => out.comparison = Some(found),
             Err(Error::Unsupported(why)) => {
-                out.warnings.push(format!("least squares was not compared with instruments: {why}"));
+                let message = format!("least squares was not compared with instruments: {why}");
+                out.warnings.push(Caution::warn(
+                    CheckName::Instruments.name(),
+                    message,
+                    "leave out `[instruments]`",
+                ));
             }
             Err(other) => return Err(other),
         }
@@ -380,7 +416,7 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
         if let Some(own) = out.own_delays.iter().find(|d| Some(&d.log) == log.like.as_ref()) {
             own.take_off(&mut prepared)?;
         }
-        out.warnings.extend(known::logged_beyond(&out.plan.known, &prepared));
+        out.warnings.extend(known::cautions(known::logged_beyond(&out.plan.known, &prepared)));
         let agreement = out.agreement(out.values(), &prepared)?;
         files_validation.extend(files.judge(&out, &prepared, &agreement)?);
         out.validation.push(agreement);
@@ -733,43 +769,64 @@ const SLOWEST_HZ: f64 = 10.0;
 /// Deviation from a Fourier series, in parts of the position noise, above which a motion does not repeat.
 const REPEATS: f64 = 2.0;
 
-fn log_warnings(model: &RobotModel, logs: &[PreparedLog]) -> Vec<String> {
+/// What is wrong with the clock and the motion of logs.
+fn log_warnings(model: &RobotModel, logs: &[PreparedLog]) -> Vec<Caution> {
     let mut out = Vec::new();
     for log in logs {
-        let name =
-            Path::new(&log.name).file_name().map_or_else(|| log.name.clone(), |n| n.to_string_lossy().into());
+        let name = short_name(&log.name);
+        let mut add =
+            |message: String, remedy: String| out.push(Caution::warn(caution::LOG, message, remedy));
         if log.rate_hz < SLOWEST_HZ {
-            out.push(format!(
-                "{name}: a sample rate of {} Hz: if the time column is in milliseconds, say so (unit \"ms\"), or state `rate_hz`",
-                log.rate_hz
-            ));
+            add(
+                format!(
+                    "{name}: a sample rate of {} Hz: if the time column is in milliseconds, say so (unit \"ms\"), or state `rate_hz`",
+                    log.rate_hz
+                ),
+                "`time = { column = \"t\", unit = \"ms\" }` or `rate_hz = 500` under `[columns]`".to_owned(),
+            );
         }
         if log.clock.dropped > 0 {
-            out.push(format!(
-                "{name}: {} rows dropped because their time does not advance (first: row {})",
-                log.clock.dropped,
-                log.clock.first_dropped.unwrap_or(0) + 1
-            ));
+            add(
+                format!(
+                    "{name}: {} rows dropped because their time does not advance (first: row {})",
+                    log.clock.dropped,
+                    log.clock.first_dropped.unwrap_or(0) + 1
+                ),
+                "nothing if rows were written twice; else state the rate in place of the clock: `rate_hz = 500` under `[columns]`"
+                    .to_owned(),
+            );
         }
         if !log.clock.gaps.is_empty() {
-            out.push(format!(
-                "{name}: {} gaps in the clock, {} grid samples unusable",
-                log.clock.gaps.len(),
-                log.clock.unusable
-            ));
+            add(
+                format!(
+                    "{name}: {} gaps in the clock, {} grid samples unusable",
+                    log.clock.gaps.len(),
+                    log.clock.unusable
+                ),
+                "record without losing rows, or take a stretch without gaps: `part = [0.0, 0.5]` in the `[[log]]`"
+                    .to_owned(),
+            );
         }
         for (output, ratio) in log.periodic.iter().flat_map(|m| m.residual_ratio.iter().enumerate()) {
             if let Some(ratio) = ratio.filter(|r| *r > REPEATS) {
-                out.push(format!(
-                    "{name}: joint `{}` does not repeat after the stated period: positions lie {ratio:.1} times their noise off the mean period; leave out `trajectory` and `period_s` for this log",
-                    model.outputs()[output].name
-                ));
+                add(
+                    format!(
+                        "{name}: joint `{}` does not repeat after the stated period: positions lie {ratio:.1} times their noise off the mean period; leave out `trajectory` and `period_s` for this log",
+                        model.outputs()[output].name
+                    ),
+                    "leave out `trajectory` and `period_s` of the `[[log]]`".to_owned(),
+                );
             }
         }
-        for (output, moves) in log.moves.iter().enumerate() {
-            if !moves {
-                out.push(format!("{name}: joint `{}` does not move", model.outputs()[output].name));
-            }
+        for (output, _) in log.moves.iter().enumerate().filter(|(_, moves)| !**moves) {
+            let joint = &model.outputs()[output].name;
+            add(
+                format!("{name}: joint `{joint}` does not move"),
+                format!(
+                    "record a motion of it (`dynid design` gives one), or hold it: `{joint} = 0.0` under `[locked]`, at the position that \
+                     it has"
+                ),
+            );
         }
     }
     out

@@ -3,6 +3,7 @@
 use dynid_estimate::conditioning::PreparedLog;
 use dynid_model::{EffortModel, FrictionPassivity, Passivity};
 
+use crate::caution::{self, Caution};
 use crate::elements::friction;
 use crate::estimate::PassivityRecord;
 use crate::identify::Identification;
@@ -100,9 +101,9 @@ impl Identification {
     }
 
     /// Warnings about friction that drives the motion, and about static friction below Coulomb friction.
-    pub(crate) fn friction_warnings(&self) -> Vec<String> {
+    pub(crate) fn friction_warnings(&self) -> Vec<Caution> {
         let records = self.friction_passivity();
-        let mut out: Vec<String> = records
+        let mut out: Vec<Caution> = records
             .iter()
             .filter(|r| r.passivity != PASSIVE)
             .map(|r| {
@@ -115,23 +116,26 @@ impl Identification {
                         self.bound_on_friction(&r.joint)
                     ),
                 };
-                format!(
+                let message = format!(
                     "the identified friction of `{}` is {}; a simulator with it may not come to rest. {remedy}",
                     r.joint,
                     in_words(r, self.speed_unit(&r.joint)),
-                )
+                );
+                Caution::warn(caution::FRICTION, message, remedy)
             })
             .collect();
         let rising: Vec<&str> =
             records.iter().filter(|r| r.static_below_coulomb).map(|r| r.joint.as_str()).collect();
         if !rising.is_empty() {
-            out.push(format!(
+            let message = format!(
                 "static friction of `{}` is identified below Coulomb friction (`fs` < `fc`): friction rises from rest, which is \
                  no Stribeck effect, and `fs` and `vs` tell the shape of the law alone. Take a law that rises from rest \
                  (`--friction tanh`) or a simpler one (`--friction linear`), or bound `{}.fs` from below (`[[bound]]`)",
                 rising.join("`, `"),
                 rising[0]
-            ));
+            );
+            let remedy = "a law that rises from rest, `friction = \"tanh\"`, or a simpler one, `friction = \"linear\"`, under `[elements]`";
+            out.push(Caution::warn(caution::FRICTION, message, remedy));
         }
         out
     }

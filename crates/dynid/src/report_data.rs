@@ -1,7 +1,10 @@
 //! The report's content from an identification and its result file.
 
 mod files;
+mod first;
 mod friction;
+mod picture;
+mod settings;
 mod trust;
 
 use dynid_estimate::linear::LinearMethod;
@@ -11,9 +14,17 @@ use dynid_report::{Fact, Status, Value};
 use crate::Error;
 use crate::agreement::Agreement;
 use crate::config::{Config, Method};
-use crate::estimate::{Choice, Estimate};
+use crate::estimate::{Choice, Estimate, Provenance};
 use crate::identify::Identification;
 use crate::result::short_name;
+
+pub(crate) use picture::picture;
+pub(crate) use settings::settings_table;
+
+/// What pictures leave out of a prediction.
+const AT_REST: &str = " Where a joint stands, friction of velocity is left out of the predicted curve: it may have any value up to \
+                       static friction there, and the sign of a speed that is noise would make the curve jump. Errors and residual \
+                       statistics count the full prediction there too.";
 
 impl Identification {
     /// The report as one HTML page.
@@ -21,7 +32,7 @@ impl Identification {
     /// # Errors
     /// [`Error::Report`].
     pub fn report(&self, config: &Config, estimate: &Estimate) -> Result<String, Error> {
-        Ok(report::render(&self.report_data(config, estimate))?)
+        Ok(report::render(&self.report_data(config, estimate)?)?)
     }
 
     /// Kind of the joint behind an output, in words.
@@ -42,25 +53,26 @@ impl Identification {
     }
 
     /// The report's content.
-    pub fn report_data(&self, config: &Config, estimate: &Estimate) -> report::ReportData {
+    ///
+    /// # Errors
+    /// [`Error::Conditioning`] for an effort that cannot be filtered for the first figure.
+    pub fn report_data(&self, config: &Config, estimate: &Estimate) -> Result<report::ReportData, Error> {
         use dynid_model::EffortModel;
         let mechanism = self.model.mechanism();
-        report::ReportData {
+        Ok(report::ReportData {
             title: format!("Identification of {}", estimate.robot),
             verdict: verdict(estimate),
-            warnings: estimate
-                .verdict
-                .warnings
-                .iter()
-                .map(|w| report::Warning { message: w.clone(), ..Default::default() })
-                .collect(),
+            cautions: first::cautions(estimate),
+            counts: first::counts(estimate),
+            judged: self.judged()?,
+            picture: self.picture(),
             robot: report::Robot {
                 name: estimate.robot.clone(),
                 file: Some(config.robot.display().to_string()),
                 facts: vec![
                     Fact::new("moving joints", mechanism.bodies().len(), ""),
-                    Fact::new("standard parameters, elements included", estimate.parameters.len(), ""),
-                    Fact::new("base parameters", estimate.base_parameters.len(), ""),
+                    Fact::new("standard parameters, elements included", estimate.counts.standard.all, ""),
+                    Fact::new("base parameters", estimate.counts.base.all, ""),
                     Fact::new("gravity", format!("{:?}", mechanism.gravity().0), "m/s^2"),
                 ],
             },
@@ -126,7 +138,7 @@ impl Identification {
             pruning: trust::pruning(estimate),
             observation: report::Observation {
                 rows: Some(estimate.rows as u64),
-                columns: Some(estimate.base_parameters.len() as u64),
+                columns: Some(estimate.rank.structural as u64),
                 rank: Some(estimate.rank.excited as u64),
                 structural_rank: Some(estimate.rank.structural as u64),
                 rank_tolerance: Some(self.fit().solution.rank.tolerance),
@@ -161,9 +173,9 @@ impl Identification {
                     })
                     .collect(),
                 seed: Some(estimate.provenance.seed),
-                settings: settings_facts(&estimate.provenance.settings),
+                settings: run_settings(&estimate.provenance),
             },
-        }
+        })
     }
 
     fn log_report(&self, a: &Agreement, role: report::LogRole, training: Option<usize>) -> report::LogReport {
@@ -206,16 +218,20 @@ impl Identification {
                 time_s: (0..samples).map(|s| a.start + s as f64 / a.rate_hz).collect(),
                 description: format!(
                     "Measured effort as logged; predicted effort from states filtered at {:.1} Hz, aligned by the \
-                     identified delay of {:.2} samples. Filtered figures: both through a zero-phase filter of {:.1} Hz.",
-                    self.state_hz, self.delay_samples, a.filter_hz
+                     identified delay of {:.2} samples. Filtered figures: both through a zero-phase filter of {:.1} Hz.{}",
+                    self.state_hz,
+                    self.delay_samples,
+                    a.filter_hz,
+                    if a.drawn == a.predicted { "" } else { AT_REST }
                 ),
                 joints: a
                     .measured
                     .iter()
-                    .zip(&a.predicted)
-                    .map(|(m, p)| report::JointSeries {
+                    .zip(a.predicted.iter().zip(&a.drawn))
+                    .map(|(m, (p, d))| report::JointSeries {
                         measured: m.clone(),
                         predicted: Some(p.clone()),
+                        drawn: (p != d).then(|| d.clone()),
                         used: Some(a.counted.clone()),
                     })
                     .collect(),
@@ -324,28 +340,17 @@ fn status(word: &str) -> Status {
     }
 }
 
+/// Settings of an identification beside those of a configuration that says nothing.
+pub(crate) fn run_settings(of: &Provenance) -> Vec<report::Chosen> {
+    settings_table(&of.settings, &crate::provenance::provenance(&Config::default(), Vec::new()).settings)
+}
+
 fn verdict(estimate: &Estimate) -> report::Verdict {
     let v = &estimate.verdict;
-    let best = estimate.validation.first().map_or(&estimate.fit.filtered, |f| &f.filtered);
-    let mut sentences = Vec::new();
-    if let Some(error) = best.relative_error {
-        let on = estimate.validation.first().map_or_else(
-            || "the training logs (there was no validation log: this is not a test)".to_owned(),
-            |f| short_name(&f.log),
-        );
-        sentences.push(format!(
-            "On {on}, filtered alike, prediction and measurement differ by {error:.2} % of the effort."
-        ));
-    }
-    if estimate.rank.excited < estimate.rank.structural {
-        sentences.push(format!(
-            "{} parameter combinations are not excited by these logs and keep the robot file's values.",
-            estimate.rank.structural - estimate.rank.excited
-        ));
-    }
+    let sentences = v.assumptions.iter().map(|a| format!("Taken for granted: {a}.")).collect();
     report::Verdict {
         status: status(&v.status),
-        headline: v.headline.clone(),
+        headline: v.line.clone(),
         sentences,
         checks: v
             .checks
@@ -365,7 +370,7 @@ fn verdict(estimate: &Estimate) -> report::Verdict {
 fn chosen(choice: &Choice) -> report::Chosen {
     report::Chosen {
         name: choice.name.clone(),
-        value: json_value(&choice.value),
+        value: settings::plain(&choice.value),
         unit: choice.unit.clone(),
         origin: match choice.origin.as_str() {
             "given" => report::Origin::User,
@@ -374,35 +379,4 @@ fn chosen(choice: &Choice) -> report::Chosen {
         },
         reason: choice.reason.clone(),
     }
-}
-
-fn json_value(value: &serde_json::Value) -> Value {
-    match value {
-        serde_json::Value::Null => Value::Text("none".to_owned()),
-        serde_json::Value::Bool(b) => Value::Flag(*b),
-        serde_json::Value::Number(n) => match n.as_u64() {
-            Some(count) => Value::Count(count),
-            None => n.as_f64().map_or(Value::Undefined, Value::Number),
-        },
-        serde_json::Value::String(s) => Value::Text(s.clone()),
-        serde_json::Value::Array(list) if list.is_empty() => Value::Text("none".to_owned()),
-        serde_json::Value::Array(list) => {
-            let word = |x: &serde_json::Value| match (x.as_str(), x.as_f64()) {
-                (Some(word), _) => word.to_owned(),
-                (None, Some(x)) => format!("{x:.2}"),
-                (None, None) => x.to_string(),
-            };
-            Value::Text(list.iter().map(word).collect::<Vec<_>>().join(", "))
-        }
-        other => Value::Text(other.to_string()),
-    }
-}
-
-/// Settings that differ from "not given", as lines.
-pub(crate) fn settings_facts(settings: &serde_json::Value) -> Vec<Fact> {
-    let Some(map) = settings.as_object() else { return Vec::new() };
-    map.iter()
-        .filter(|(_, v)| !v.is_null())
-        .map(|(name, v)| Fact::new(name.clone(), v.to_string(), ""))
-        .collect()
 }

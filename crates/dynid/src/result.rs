@@ -1,5 +1,6 @@
 //! From an identification to its result file.
 
+mod counts;
 mod friction;
 mod instruments;
 mod trust;
@@ -55,6 +56,7 @@ impl Identification {
                 not_excited: names(&not_excited),
                 never_seen: names(&self.base.zero),
             },
+            counts: self.counts(),
             parameters: self.robot_parameters(),
             log_agreement: self.log_agreement.clone(),
             log_delays: self.own_delays.clone(),

@@ -8,6 +8,7 @@ use dynid_model::closed::ClosedMechanism;
 use dynid_model::{Description, EffortModel, JointKind, Mechanism, MechanismWarning, RobotModel};
 
 use crate::Error;
+use crate::caution::{self, Caution};
 use crate::elements::{ElasticFault, ElementPlan};
 use crate::logs::{self, LogAxis};
 
@@ -96,6 +97,15 @@ impl Robot {
         let is_joint = |joint: &String| axes.iter().any(|a| a.name == *joint) || inside.contains(joint);
         elements.per_joint.retain(|(joint, _)| is_joint(joint));
         Ok(Robot { path: path.to_owned(), mechanism, closed, axes, elements, file, warnings })
+    }
+
+    /// Oddities of the file, each with what mends it.
+    pub(crate) fn cautions(&self) -> Vec<Caution> {
+        let of = |message: &String| {
+            let known = self.mechanism.warnings().iter().find(|w| w.to_string() == *message);
+            Caution::warn(caution::ROBOT_FILE, message, remedy(known))
+        };
+        self.warnings.iter().map(of).collect()
     }
 
     /// Returns the robot with more joints held still; a motor stands still with its joint.
@@ -207,6 +217,22 @@ fn is_fixed(description: &Description, joint: &str) -> bool {
 }
 
 /// Locked joints in words, those at one position together: a mobile robot may have dozens.
+/// What mends an oddity; `None`: joints that are held, or how loops share their forces.
+fn remedy(warning: Option<&MechanismWarning>) -> &'static str {
+    match warning {
+        Some(MechanismWarning::NotPhysical { .. } | MechanismWarning::NotStated { .. }) => {
+            "state mass, centre of mass and inertia of the body: `<inertial>` in a URDF, `mass`, `com` and `inertia_com` in TOML"
+        }
+        Some(MechanismWarning::MimicIndependent { .. }) => {
+            "`couple_mimics = true` in the configuration couples it"
+        }
+        _ => {
+            "nothing, if the robot was recorded like this; else log the joint and take it out of `[locked]`, or state what is driven by \
+             `actuated = [..]` in the robot file"
+        }
+    }
+}
+
 fn held(locked: &[(String, f64)]) -> Vec<String> {
     let mut at: Vec<(f64, Vec<&str>)> = Vec::new();
     for (joint, position) in locked {

@@ -4,17 +4,18 @@ mod inputs;
 mod instruments;
 mod logs;
 mod names;
+mod remedy;
 
 use dynid_estimate::consistent::Status as ConsistentStatus;
-use dynid_estimate::identifiability::Verdict as ParameterVerdict;
 use dynid_estimate::whiteness::InBandWhiteness;
 
 pub(crate) use instruments::in_words as closed_loop_bias_in_words;
 pub use names::CheckName;
 
 use crate::agreement::Agreement;
+use crate::caution::{self, Caution};
 use crate::consistency::UNCONSTRAINED;
-use crate::estimate::{CheckResult, Verdict};
+use crate::estimate::{BaseCounts, CheckResult, Verdict};
 use crate::identify::Identification;
 use crate::stiffness::JointStiffness;
 
@@ -112,36 +113,53 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
             format!("It should not be used without a look at the failed checks: {}.", named(Status::Fail))
         }
     };
-    let seen = id.trust.base.iter().filter(|a| a.verdict == ParameterVerdict::Seen).count();
-    let headline = format!(
-        "{seen} of {} base parameters seen in the data; the model {agrees} within {error:.1} % of the effort. {reservation}",
-        id.base.len(),
-    );
+    let line =
+        format!("{}; the model {agrees} within {error:.1} % of the effort", id.counts().base_in_words());
+    let warnings: Vec<Caution> =
+        id.warnings.iter().cloned().chain(unphysical(id)).chain(id.friction_warnings()).collect();
     let verdict = Verdict {
         status: status.word().to_owned(),
-        headline,
+        headline: format!("{line}. {reservation}"),
+        line,
         assumptions,
+        cautions: cautions(id, &checks, &warnings),
         checks: checks.into_iter().map(|(_, c)| c).collect(),
-        warnings: id.warnings.iter().cloned().chain(unphysical(id)).chain(id.friction_warnings()).collect(),
+        warnings: warnings.into_iter().map(|w| w.message).collect(),
     };
     (status, verdict)
 }
 
+/// Checks that did not pass and warnings, the worst first. A check that only sums up warnings, which stand for themselves, is
+/// left out.
+fn cautions(id: &Identification, checks: &[(Status, CheckResult)], warnings: &[Caution]) -> Vec<Caution> {
+    let told = |name: CheckName| match name {
+        CheckName::Preflight => id.findings.iter().any(|f| f.warning().is_some()),
+        _ => warnings.iter().any(|w| w.name == name.name()),
+    };
+    let open = checks.iter().filter(|(status, _)| *status != Status::Ok).filter_map(|(_, c)| {
+        let name = CheckName::of_name(&c.name).filter(|name| !told(*name))?;
+        Some(Caution::of(c, remedy::of(id, name)))
+    });
+    caution::ranked(open.chain(warnings.iter().cloned()).collect())
+}
+
 impl Identification {
     /// Validation logs that hold nothing of the training logs to speak of.
-    fn unseen(&self) -> Vec<&Agreement> {
+    pub(crate) fn unseen(&self) -> Vec<&Agreement> {
         let is_new = |(k, _): &(usize, &Agreement)| !self.overlaps.repeats(self.training.len() + k);
         self.validation.iter().enumerate().filter(is_new).map(|(_, log)| log).collect()
     }
 }
 
 /// Bodies whose split of base values into standard parameters no body could have.
-fn unphysical(id: &Identification) -> impl Iterator<Item = String> {
+fn unphysical(id: &Identification) -> impl Iterator<Item = Caution> {
     id.unphysical_bodies().into_iter().map(|(body, fault)| {
-        format!(
+        let message = format!(
             "the identified body `{body}` {fault}: the split of what is seen into its ten parameters is not physical; \
              predictions are not affected, but a simulator may refuse the robot file"
-        )
+        );
+        let remedy = "ask for bodies that can exist: `consistency = \"pseudo-inertia\"` under `[estimator]`";
+        Caution::warn(caution::BODY, message, remedy)
     })
 }
 
@@ -168,7 +186,7 @@ fn stiffness(id: &Identification) -> Option<(Status, CheckResult)> {
 }
 
 fn excitation(id: &Identification) -> (Status, CheckResult) {
-    let (kept, all) = (id.fit().solution.kept.len(), id.base.len());
+    let BaseCounts { all, excited: kept, .. } = id.counts().base;
     check(
         Status::of(kept == all, 2 * kept > all),
         CheckName::Excitation,

@@ -42,7 +42,7 @@ fn flags() -> BTreeSet<String> {
 }
 
 /// Flags of which another test, or nothing, can show the effect.
-const ELSEWHERE: [(&str, &str); 21] = [
+const ELSEWHERE: [(&str, &str); 25] = [
     ("init ", "writes a configuration: `logs_of_tools`"),
     ("backlash --missing", "columns are read alike by all commands: `logs_of_tools`"),
     ("backlash --names", "columns are read alike by all commands: `logs_of_tools`"),

@@ -8,7 +8,7 @@ use dynid_motion::mask::{near_reversal, reversal_threshold};
 use dynid_motion::spectrum::velocity_noise;
 use rayon::prelude::*;
 
-use super::{ConditioningError, ConditioningSettings, PreparedLog};
+use super::{ConditioningError, ConditioningSettings, Moving, PreparedLog};
 
 /// Filtered positions, their derivatives, and efforts through the same filter.
 #[derive(Debug, Clone)]
@@ -138,6 +138,16 @@ impl States {
             velocity_sigma: vec![0.0; position.len()],
             ..*self
         })
+    }
+
+    /// Sets velocities of joints that stand to zero: their sign there is that of noise, and friction may have any value up to static friction. A
+    /// prediction along such states is the middle of what it may be, and does not jump.
+    pub fn rest(&mut self, moving: &Moving) {
+        for (velocity, moves) in self.dq.chunks_exact_mut(self.samples.max(1)).zip(&moving.samples) {
+            for (v, _) in velocity.iter_mut().zip(moves).filter(|(_, moves)| !**moves) {
+                *v = 0.0;
+            }
+        }
     }
 
     /// Velocity of an output.

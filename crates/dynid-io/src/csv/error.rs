@@ -238,13 +238,13 @@ pub enum LogFileError {
         /// File.
         file: String,
         /// A cell with a comma.
-        comma: String,
+        comma: Box<str>,
         /// Its column.
-        of_comma: String,
+        of_comma: Box<str>,
         /// A cell with a point.
-        point: String,
+        point: Box<str>,
         /// Its column.
-        of_point: String,
+        of_point: Box<str>,
     },
     /// A number with both marks.
     #[error("{file}: column `{column}`: expected numbers without marks of thousands, found `{found}`")]
@@ -288,9 +288,9 @@ pub enum LogFileError {
         /// Column name.
         column: String,
         /// Joint of the first row.
-        expected: String,
+        expected: Box<str>,
         /// Joint of this row.
-        found: String,
+        found: Box<str>,
     },
     /// A message of joints that none of the first ones had.
     #[error(

@@ -229,10 +229,10 @@ impl Sniffer<'_> {
         if let Some((other, other_row)) = point {
             return Err(LogFileError::MixedMarks {
                 file: file(),
-                comma: shown(k, row),
-                of_comma: names[k].clone(),
-                point: shown(other, other_row),
-                of_point: names[other].clone(),
+                comma: shown(k, row).into(),
+                of_comma: names[k].as_str().into(),
+                point: shown(other, other_row).into(),
+                of_point: names[other].as_str().into(),
             });
         }
         let Some((k, row)) = find(&|c| *c == Cell::Comma { grouped: false }) else {

@@ -243,6 +243,7 @@ impl LogText {
                     },
                     Form::Echo(_) => String::new(),
                 };
+                let (expected, found) = (expected.into(), found.into());
                 LogFileError::OtherJoint { file, row, line, column: column(cell), expected, found }
             }
             Fault::OtherJoints(found) => LogFileError::OtherJoints { file, row, line, found },

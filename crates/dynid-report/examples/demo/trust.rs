@@ -1,9 +1,26 @@
 //! What the made-up identification says about its parameters.
 
 use dynid_report::{
-    Consistency, ConsistencyStatus, HeldOut, HeldOutJoint, Limit, LogWhiteness, OwnerKind, ParameterVerdict,
-    Precision, Pruning, PruningStep, StandardParameter, ValidationPrice, Whiteness,
+    Consistency, ConsistencyStatus, Counts, HeldOut, HeldOutJoint, Limit, LogWhiteness, OwnerKind,
+    ParameterVerdict, Precision, Pruning, PruningStep, StandardParameter, ValidationPrice, Whiteness,
 };
+
+/// Of 13 standard parameters per joint nine of the first link are not identifiable, and three of every other link are carried;
+/// of nine base parameters per joint the offset is carried.
+pub(super) fn counts(joints: usize) -> Counts {
+    let n = joints as u64;
+    Counts {
+        base: 9 * n,
+        base_excited: 9 * n,
+        base_seen: 8 * n,
+        standard: 13 * n,
+        standard_seen: 13 * n - 9 - 3 * (n - 1),
+        standard_carried: 3 * (n - 1),
+        standard_not_identifiable: 9,
+        shape: 2,
+        shape_seen: 1,
+    }
+}
 
 pub(super) fn standard_parameters(joints: usize) -> Vec<StandardParameter> {
     let rows = [

@@ -4,9 +4,9 @@
 use std::f64::consts::TAU;
 
 use dynid_report::{
-    Check, ConfoundedPair, DesignJoint, DesignParameter, DesignQuality, DesignReport, DesignStart, Fact,
-    FramePath, InputFile, JointMotion, LimitUse, Obstacle, ParameterShare, Provenance, RandomMotion, Robot,
-    Shape, Starts, Status, Trajectory, Value, Verdict, Warning,
+    Check, Chosen, ConfoundedPair, DesignJoint, DesignParameter, DesignQuality, DesignReport, DesignStart,
+    Fact, FramePath, InputFile, JointMotion, LimitUse, Obstacle, ParameterShare, Provenance, RandomMotion,
+    Robot, Shape, Starts, Status, Trajectory, Value, Verdict, Warning,
 };
 
 const PERIOD_S: f64 = 10.0;
@@ -69,6 +69,7 @@ pub(crate) fn design(joints: usize) -> DesignReport {
         limits: limits(&joints, &trajectory),
         joints,
         trajectory: Some(trajectory),
+        picture: None,
         obstacles: obstacles(),
         starts: starts(),
         provenance: Provenance {
@@ -79,7 +80,7 @@ pub(crate) fn design(joints: usize) -> DesignReport {
                 sha256: Some("5b41362bc82b7f3d56edc5a306db22105707d01ff4819e26faef9724a2d406c9".into()),
             }],
             seed: Some(1),
-            settings: vec![Fact::new("starts", 16usize, ""), Fact::new("samples", 100usize, "")],
+            settings: vec![Chosen::given("starts", 16usize, ""), Chosen::given("samples", 100usize, "")],
         },
     }
 }

@@ -32,6 +32,19 @@ pub struct Chosen {
     pub reason: String,
 }
 
+impl Chosen {
+    /// A setting that the user gave.
+    pub fn given(name: impl Into<String>, value: impl Into<Value>, unit: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            value: value.into(),
+            unit: unit.into(),
+            origin: Origin::User,
+            reason: String::new(),
+        }
+    }
+}
+
 /// Candidate values of one setting and their losses.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Ladder {

@@ -93,6 +93,9 @@ pub struct JointSeries {
     pub measured: Vec<f64>,
     /// Effort predicted by the identified model; without it neither prediction nor residual is drawn.
     pub predicted: Option<Vec<f64>>,
+    /// Prediction to draw in place of [`JointSeries::predicted`], such as one that is steady while the joint stands. Residual
+    /// statistics are those of `predicted`, the curves those of this. `None`: what is predicted is drawn.
+    pub drawn: Option<Vec<f64>>,
     /// Whether the sample took part in the estimate; stretches that did not are shaded. `None`: all did.
     pub used: Option<Vec<bool>>,
 }

@@ -10,21 +10,25 @@
 //!   when nothing is known; any other length is a [`crate::ReportError::Length`];
 //! - every text may hold any character: the page escapes it.
 
+mod caution;
 mod conditioning;
 mod consistency;
 mod design;
 mod files;
+mod first;
 mod friction;
 mod friction_test;
 mod log;
 mod log_page;
 mod parameters;
+mod picture;
 mod precision;
 mod provenance;
 mod pruning;
 mod study;
 mod verdict;
 
+pub use caution::{Caution, Counts};
 pub use conditioning::{Chosen, JointDelay, Ladder, Observation, Origin, Rung, UnidentifiableColumn};
 pub use consistency::{Consistency, ConsistencyStatus, HeldOut, HeldOutJoint, Limit, ValidationPrice};
 pub use design::{
@@ -32,15 +36,20 @@ pub use design::{
     JointMotion, LimitUse, Obstacle, ParameterShare, RandomMotion, Shape, Starts, Trajectory,
 };
 pub use files::{FileJoint, FileJudgement, FileLoss};
+pub use first::Judged;
 pub use friction::{FrictionTrial, ShapeParameter, ShapeVerdict};
 pub use friction_test::{CurvesByTemperature, FrictionReport, FrictionTest, Surface, TemperatureLevel};
 pub use log::{JointQuality, JointSeries, LogReport, LogRole, LogSeries, Quality};
 pub use log_page::{FindingRow, LogPage};
 pub use parameters::{BaseParameter, OwnerKind, ParameterVerdict, StandardParameter};
+pub use picture::{LineKind, PictureLine, PointKind, Pose, RobotPicture};
 pub use precision::{LogWhiteness, Precision, Whiteness};
 pub use provenance::{InputFile, Provenance};
 pub use pruning::{Pruning, PruningStep};
-pub use study::{Chart, ChartAxis, ChartCurve, CurveStyle, StudyReport, StudyRow, StudySection, StudyTable};
+pub use study::{
+    Chart, ChartAxis, ChartCurve, CurveStyle, Ranked, Ranking, StudyReport, StudyRow, StudySection,
+    StudyTable,
+};
 pub use verdict::{Check, Status, Verdict, Warning};
 
 use serde::Serialize;
@@ -54,8 +63,14 @@ pub struct ReportData {
     pub title: String,
     /// The result in plain words.
     pub verdict: Verdict,
-    /// What the reader should know before using the result.
-    pub warnings: Vec<Warning>,
+    /// What the reader should look at before using the result, the worst first, each with what mends it.
+    pub cautions: Vec<Caution>,
+    /// How many parameters there are; the lists of parameters have as many entries.
+    pub counts: Counts,
+    /// The log that the result is judged by; `None` leaves the errors out of the first screen.
+    pub judged: Option<Judged>,
+    /// The robot in the poses of a log; `None` leaves the picture out.
+    pub picture: Option<RobotPicture>,
     /// The mechanism that was identified.
     pub robot: Robot,
     /// The actuated joints; their order is the order of every "per joint" list.

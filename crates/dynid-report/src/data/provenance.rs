@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::Fact;
+use super::Chosen;
 
 /// Version, inputs, settings and seed. No time of day: the same run gives the same page, byte for byte.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -13,8 +13,8 @@ pub struct Provenance {
     pub inputs: Vec<InputFile>,
     /// Seed of every random draw.
     pub seed: Option<u64>,
-    /// Settings of the run that are not under conditioning.
-    pub settings: Vec<Fact>,
+    /// Settings of the run.
+    pub settings: Vec<Chosen>,
 }
 
 /// A file that was read.

@@ -56,6 +56,32 @@ pub struct StudySection {
     pub tables: Vec<StudyTable>,
     /// Figures.
     pub charts: Vec<Chart>,
+    /// Values of named things, drawn in the order given.
+    pub rankings: Vec<Ranking>,
+}
+
+/// Values of named things, a line each with its error.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Ranking {
+    /// What it shows.
+    pub title: String,
+    /// A sentence below it; may be empty.
+    pub note: String,
+    /// Unit of the values.
+    pub unit: String,
+    /// Lines from top to bottom.
+    pub rows: Vec<Ranked>,
+}
+
+/// A line of a [`Ranking`].
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Ranked {
+    /// What the value belongs to.
+    pub name: String,
+    /// Value, at least 0.
+    pub value: f64,
+    /// Its standard error.
+    pub error: f64,
 }
 
 /// A table: every row has one cell per heading, missing ones are left empty.
@@ -119,4 +145,6 @@ pub enum CurveStyle {
     Dashed,
     /// A dot per point: measurements.
     Dots,
+    /// A dot per point with the name of the curve beside it, in place of the legend.
+    Named,
 }

@@ -59,6 +59,22 @@ pub(crate) fn pair_svg(upper: f64, lower: f64) -> String {
     )
 }
 
+/// A value with its error on an axis from 0 to `most`, stretched to the width it is given. Empty unless value and `most` are
+/// finite and `most > 0`.
+pub(crate) fn ranked_svg(value: f64, error: f64, most: f64) -> String {
+    if !(value.is_finite() && most.is_finite() && most > 0.0) {
+        return String::new();
+    }
+    let x = |v: f64| WIDTH * (v / most).clamp(0.0, 1.0);
+    let error = if error.is_finite() { error.max(0.0) } else { 0.0 };
+    format!(
+        r#"<svg class="ranked" viewBox="0 0 {WIDTH} {HEIGHT}" preserveAspectRatio="none" aria-hidden="true"><rect class="track" y="5.5" width="{WIDTH}" height="1"/><rect class="fill" y="2.5" width="{:.1}" height="7"/><path class="error" d="M{:.1} 6H{:.1}"/></svg>"#,
+        x(value),
+        x(value - error),
+        x(value + error)
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -78,6 +94,14 @@ mod tests {
         assert!(meter_svg(7.0, 5.0, Some(1.0)).contains(r#"width="100.0" height="6""#));
         assert!(meter_svg(7.0, 5.0, Some(1.0)).contains("M20.0 0"));
         assert_eq!(meter_svg(f64::NAN, 1.0, None), "");
+    }
+
+    #[test]
+    fn a_ranked_value_shows_its_error_and_stays_inside() {
+        let svg = ranked_svg(2.0, 1.0, 4.0);
+        assert!(svg.contains(r#"width="50.0" height="7""#) && svg.contains("M25.0 6H75.0"), "{svg}");
+        assert!(ranked_svg(9.0, 1.0, 4.0).contains("H100.0"));
+        assert!(ranked_svg(f64::NAN, 0.0, 1.0).is_empty() && ranked_svg(1.0, 0.0, 0.0).is_empty());
     }
 
     #[test]

@@ -4,6 +4,7 @@ use super::chart::Scale;
 use super::ramp::colour;
 use super::sheet::Sheet;
 use crate::data::CurvesByTemperature;
+use crate::markup::escape;
 use crate::number::significant;
 
 const WIDTH: f64 = 520.0;
@@ -38,7 +39,10 @@ pub(crate) fn by_temperature_svg(data: &CurvesByTemperature) -> String {
         top: 8.0,
         floor: HEIGHT - 24.0,
     };
-    let mut svg = format!(r#"<svg class="chart heat" viewBox="0 0 {WIDTH} {HEIGHT}" role="img">"#);
+    let mut svg = format!(
+        r#"<svg class="chart heat" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{}">"#,
+        escape(&data.title)
+    );
     sheet.axes(&mut svg, true);
     let warm = || data.levels.iter().filter_map(|l| l.temperature);
     let (cold, hot) = warm().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(t), b.max(t)));

@@ -2,6 +2,7 @@
 
 use super::axis::{tick_label, ticks};
 use crate::data::{Chart, ChartAxis, ChartCurve, CurveStyle};
+use crate::markup::escape;
 
 const WIDTH: f64 = 520.0;
 const HEIGHT: f64 = 270.0;
@@ -15,6 +16,8 @@ const MOST_POINTS: usize = 1600;
 const FEW_DOTS: usize = 40;
 /// Classes of lines, in order, then again from the first.
 const COLOURS: usize = 6;
+/// Class of dots that have their names beside them.
+const NAMED: usize = 0;
 
 /// Picture of a chart; empty if no point can be drawn.
 pub(crate) fn chart_svg(chart: &Chart) -> String {
@@ -35,7 +38,10 @@ pub(crate) fn chart_svg(chart: &Chart) -> String {
     }
     let px = |v: f64| LEFT + (v - x.low) / (x.high - x.low) * width;
     let py = |v: f64| TOP + (y.high - v) / (y.high - y.low) * height;
-    let mut svg = format!(r#"<svg class="chart" viewBox="0 0 {WIDTH} {HEIGHT}" role="img">"#);
+    let mut svg = format!(
+        r#"<svg class="chart" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{}">"#,
+        escape(&chart.title)
+    );
     let floor = HEIGHT - BOTTOM;
     for (value, text) in y.ticks(5.0) {
         let at = py(value);
@@ -56,10 +62,10 @@ pub(crate) fn chart_svg(chart: &Chart) -> String {
     }
     svg.push_str(&format!(r#"<path class="axis" d="M{LEFT} {TOP}V{floor}H{:.1}"/>"#, WIDTH - RIGHT));
     for (k, (curve, points)) in chart.curves.iter().zip(&curves).enumerate() {
-        let class = k % COLOURS;
+        let class = if curve.style == CurveStyle::Named { NAMED } else { k % COLOURS };
         let points: Vec<[f64; 2]> = thinned(points).iter().map(|p| [px(p[0]), py(p[1])]).collect();
         match curve.style {
-            CurveStyle::Dots => {
+            CurveStyle::Dots | CurveStyle::Named => {
                 let radius = if points.len() <= FEW_DOTS { 3.0 } else { 1.6 };
                 for p in points.iter().filter(|p| p[0].is_finite() && p[1].is_finite()) {
                     svg.push_str(&format!(
@@ -74,17 +80,53 @@ pub(crate) fn chart_svg(chart: &Chart) -> String {
             }
         }
     }
+    svg.push_str(&labels(chart, &px, &py));
     svg.push_str("</svg>");
     svg
 }
 
+/// Names beside their points, on the left of those near the right end, moved down where they would lie on each other.
+fn labels(chart: &Chart, px: &dyn Fn(f64) -> f64, py: &dyn Fn(f64) -> f64) -> String {
+    let named = chart.curves.iter().filter(|curve| curve.style == CurveStyle::Named);
+    let points = named.flat_map(|curve| curve.points.iter().map(|p| (place(chart, *p), curve.name.as_str())));
+    let mut placed: Vec<([f64; 2], &str)> = points
+        .map(|([x, y], text)| ([px(x), py(y)], text))
+        .filter(|([x, y], _)| x.is_finite() && y.is_finite())
+        .collect();
+    placed.sort_by(|a, b| a.0[1].total_cmp(&b.0[1]));
+    let mut taken: Vec<[f64; 3]> = Vec::new();
+    let mut svg = String::new();
+    for ([x, y], text) in placed {
+        let width = 6.2 * text.chars().count() as f64;
+        let left = x + 8.0 + width > WIDTH - RIGHT;
+        let from = if left { x - 8.0 - width } else { x + 8.0 };
+        let mut at = y + 4.0;
+        let lies_on = |at: f64, t: &[f64; 3]| (t[2] - at).abs() < 12.0 && t[0] < from + width && from < t[1];
+        while let Some(other) = taken.iter().find(|t| lies_on(at, t)) {
+            at = other[2] + 12.0;
+        }
+        taken.push([from, from + width, at]);
+        let (place, anchor) = if left { (x - 8.0, "end") } else { (x + 8.0, "start") };
+        svg.push_str(&format!(
+            r#"<text class="label" x="{place:.1}" y="{at:.1}" text-anchor="{anchor}">{}</text>"#,
+            escape(text)
+        ));
+    }
+    svg
+}
+
 fn scaled(chart: &Chart, curve: &ChartCurve) -> Vec<[f64; 2]> {
+    curve.points.iter().map(|p| place(chart, *p)).collect()
+}
+
+/// A point on the scales of a chart.
+fn place(chart: &Chart, p: [f64; 2]) -> [f64; 2] {
     let scale = |axis: &ChartAxis, v: f64| match axis.logarithmic {
         true if v > 0.0 => v.log10(),
         true => f64::NAN,
         false => v,
     };
-    curve.points.iter().map(|p| [scale(&chart.x, p[0]), scale(&chart.y, p[1])]).collect()
+    [scale(&chart.x, p[0]), scale(&chart.y, p[1])]
 }
 
 /// A drawn axis: its ends, as logarithms on a logarithmic one.
@@ -201,6 +243,27 @@ mod tests {
         let d = svg.split("class=\"curve").nth(1).unwrap();
         assert_eq!(d.matches('M').count(), 2, "{d}");
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+    }
+
+    #[test]
+    fn names_stand_beside_their_points_and_not_on_each_other() {
+        let mut named = chart(Vec::new(), false);
+        let label = |x: f64, name: &str| ChartCurve {
+            name: name.to_owned(),
+            points: vec![[x, 1.0]],
+            style: CurveStyle::Named,
+        };
+        named.curves = vec![label(0.0, "<ols>"), label(0.1, "wls"), label(10.0, "huber")];
+        let svg = chart_svg(&named);
+        assert!(svg.contains(">&lt;ols&gt;</text>") && !svg.contains("<ols>"));
+        let at = |text: &str| {
+            let before = svg.split(&format!(">{text}</text>")).next().unwrap();
+            let attribute =
+                |name: &str| before.rsplit(&format!("{name}=\"")).next().unwrap().split('"').next().unwrap();
+            (attribute(" y").parse::<f64>().unwrap(), attribute("text-anchor").to_owned())
+        };
+        assert!((at("&lt;ols&gt;").0 - at("wls").0).abs() >= 12.0);
+        assert_eq!(at("huber").1, "end");
     }
 
     #[test]

@@ -9,20 +9,24 @@ mod histogram;
 mod interval;
 mod path;
 mod ramp;
+mod robot;
 mod sheet;
 mod strip;
 mod surface;
+mod versus;
 mod views;
 
 pub(crate) use autocorrelation::autocorrelation_svg;
-pub(crate) use bars::{counts_svg, meter_svg, pair_svg};
+pub(crate) use bars::{counts_svg, meter_svg, pair_svg, ranked_svg};
 pub(crate) use by_temperature::by_temperature_svg;
 pub(crate) use chart::chart_svg;
 pub(crate) use histogram::histogram_svg;
 pub(crate) use interval::interval_svg;
 pub(crate) use path::{PathMarks, PathPoint, ceiling, fewest, path_svg};
+pub(crate) use robot::{View as RobotView, mark as robot_mark, robot_svg};
 pub(crate) use strip::{StripDot, strip_svg};
 pub(crate) use surface::surface_svg;
+pub(crate) use versus::versus;
 pub(crate) use views::{PathParts, View, view_pictures};
 
 /// Size and margins of the two residual pictures, in pixels at full size.

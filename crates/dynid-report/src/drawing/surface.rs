@@ -5,6 +5,7 @@ use super::chart::Scale;
 use super::ramp::colour;
 use super::sheet::Sheet;
 use crate::data::Surface;
+use crate::markup::escape;
 
 const WIDTH: f64 = 520.0;
 const HEIGHT: f64 = 300.0;
@@ -28,7 +29,10 @@ pub(crate) fn surface_svg(data: &Surface) -> String {
     let x = Scale::new(&data.x, (scaled(&data.x, data.xs[0]), scaled(&data.x, data.xs[nx - 1])), 0.0);
     let y = Scale::new(&data.y, (scaled(&data.y, data.ys[0]), scaled(&data.y, data.ys[ny - 1])), 0.0);
     let sheet = Sheet { x, y, left: 48.0, right: WIDTH - 74.0, top: 8.0, floor: HEIGHT - 24.0 };
-    let mut svg = format!(r#"<svg class="chart heat" viewBox="0 0 {WIDTH} {HEIGHT}" role="img">"#);
+    let mut svg = format!(
+        r#"<svg class="chart heat" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{}">"#,
+        escape(&data.title)
+    );
     cells(&mut svg, data, &sheet, &share);
     let wished = if high > low { ticks(low, high, 7.0) } else { Vec::new() };
     for level in &wished {

@@ -27,7 +27,12 @@ pub(super) fn chart(chart: &Chart) -> ChartView<'_> {
         note: &chart.note,
         x: &chart.x,
         y: &chart.y,
-        curves: chart.curves.iter().map(|c| Legend { name: &c.name, style: c.style }).collect(),
+        curves: chart
+            .curves
+            .iter()
+            .filter(|c| c.style != CurveStyle::Named)
+            .map(|c| Legend { name: &c.name, style: c.style })
+            .collect(),
         picture: chart_svg(chart),
     }
 }

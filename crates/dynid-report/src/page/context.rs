@@ -5,6 +5,8 @@ use minijinja::value::{Serde, Value};
 use serde::Serialize;
 
 use super::chart::chart;
+use super::first::first;
+use super::picture::picture;
 use super::pruning::pruning;
 use super::script_data::script_json;
 use super::trust::{limits_by_owner, trust};
@@ -20,7 +22,10 @@ pub(super) fn context(data: &ReportData) -> Result<Value, ReportError> {
     Ok(context! {
         title => data.title.as_str(),
         verdict => Serde(&data.verdict),
-        warnings => Serde(&data.warnings),
+        cautions => Serde(&data.cautions),
+        counts => Serde(&data.counts),
+        first => Serde(first(data)),
+        picture => Serde(data.picture.as_ref().map(picture).transpose()?.flatten()),
         robot => Serde(&data.robot),
         joints => Serde(&data.joints),
         any_elements => data.joints.iter().any(|joint| !joint.elements.is_empty()),

@@ -15,12 +15,15 @@ pub(super) const LOG_PAGE: &str = "log/page.html";
 pub(super) const STUDY_PAGE: &str = "study/page.html";
 
 /// Every name ends in `.html`, which switches automatic escaping on.
-const TEMPLATES: [(&str, &str); 29] = [
+const TEMPLATES: [(&str, &str); 32] = [
     ("shell.html", include_str!("../../template/shell.html")),
     (PAGE, include_str!("../../template/page.html")),
     ("macros.html", include_str!("../../template/macros.html")),
     ("verdict.html", include_str!("../../template/verdict.html")),
     ("warnings.html", include_str!("../../template/warnings.html")),
+    ("cautions.html", include_str!("../../template/cautions.html")),
+    ("first.html", include_str!("../../template/first.html")),
+    ("picture.html", include_str!("../../template/picture.html")),
     ("trust.html", include_str!("../../template/trust.html")),
     ("files.html", include_str!("../../template/files.html")),
     ("consistency.html", include_str!("../../template/consistency.html")),
@@ -57,6 +60,7 @@ pub(super) fn environment() -> Result<Environment<'static>, minijinja::Error> {
     for (name, asset) in [
         ("style", include_str!("../../template/style.css")),
         ("plot_script", include_str!("../../template/plot.js")),
+        ("robot_script", include_str!("../../template/robot.js")),
         ("table_script", include_str!("../../template/table.js")),
     ] {
         environment.add_global(name, Value::from_safe_string(asset.to_owned()));

@@ -5,8 +5,10 @@ mod checks;
 mod context;
 mod design;
 mod environment;
+mod first;
 mod friction_test;
 mod log_page;
+mod picture;
 mod prose;
 mod pruning;
 mod script_data;
@@ -24,7 +26,7 @@ use crate::error::ReportError;
 /// # Errors
 ///
 /// [`ReportError::Length`] if a "per joint" list is neither empty nor as long as [`ReportData::joints`], or a series
-/// is not as long as its time; [`ReportError::Time`] if the time of a log is not finite or runs backwards.
+/// is not as long as its time; [`ReportError::Count`] if a count contradicts the list that it counts; [`ReportError::Time`] if the time of a log is not finite or runs backwards.
 /// The other variants would be faults of this crate.
 pub fn render(data: &ReportData) -> Result<String, ReportError> {
     checks::check(data)?;

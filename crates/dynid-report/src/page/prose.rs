@@ -1,5 +1,7 @@
 //! Sentences from outside as markup.
 
+use crate::markup::escape;
+
 /// `text` escaped, from a capital letter to a full stop, with what stands between back-ticks as code.
 pub(super) fn sentence(text: &str) -> String {
     let text = text.trim();
@@ -27,24 +29,11 @@ pub(super) fn prose(text: &str) -> String {
             out.push('`');
         }
         out.push_str(if code { "<code>" } else { "" });
-        escape(part, &mut out);
+        // A number stays on the line of its percent sign.
+        out.push_str(&escape(&part.replace(" %", "\u{a0}%")));
         out.push_str(if code { "</code>" } else { "" });
     }
     out
-}
-
-fn escape(text: &str, out: &mut String) {
-    // A number stays on the line of its percent sign.
-    for c in text.replace(" %", "\u{a0}%").chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            other => out.push(other),
-        }
-    }
 }
 
 #[cfg(test)]

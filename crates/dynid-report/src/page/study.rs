@@ -5,7 +5,8 @@ use minijinja::value::{Serde, Value};
 use serde::Serialize;
 
 use super::chart::{ChartView, chart};
-use crate::data::{Fact, StudyReport, StudySection, StudyTable};
+use crate::data::{Fact, Ranking, StudyReport, StudySection, StudyTable};
+use crate::drawing::ranked_svg;
 
 pub(super) fn context(kind: &str, data: &StudyReport) -> Value {
     context! {
@@ -33,6 +34,45 @@ pub(super) struct SectionView<'a> {
     facts: &'a [Fact],
     tables: &'a [StudyTable],
     charts: Vec<ChartView<'a>>,
+    rankings: Vec<RankingView<'a>>,
+}
+
+/// A ranking on a scale of its own.
+#[derive(Debug, Serialize)]
+struct RankingView<'a> {
+    title: &'a str,
+    note: &'a str,
+    unit: &'a str,
+    rows: Vec<RankedView<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct RankedView<'a> {
+    name: &'a str,
+    value: f64,
+    error: f64,
+    /// The value with its error as a picture.
+    picture: String,
+}
+
+fn ranking(data: &Ranking) -> RankingView<'_> {
+    let ends = data.rows.iter().map(|row| row.value + row.error).filter(|x| x.is_finite());
+    let most = ends.fold(0.0, f64::max);
+    RankingView {
+        title: &data.title,
+        note: &data.note,
+        unit: &data.unit,
+        rows: data
+            .rows
+            .iter()
+            .map(|row| RankedView {
+                name: &row.name,
+                value: row.value,
+                error: row.error,
+                picture: ranked_svg(row.value, row.error, most),
+            })
+            .collect(),
+    }
 }
 
 fn section(section: &StudySection) -> SectionView<'_> {
@@ -42,5 +82,6 @@ fn section(section: &StudySection) -> SectionView<'_> {
         facts: &section.facts,
         tables: &section.tables,
         charts: section.charts.iter().map(chart).collect(),
+        rankings: section.rankings.iter().map(ranking).collect(),
     }
 }

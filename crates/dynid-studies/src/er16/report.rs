@@ -1,6 +1,6 @@
 //! The study's report.
 
-use dynid::report::{Fact, Provenance, StudyReport, StudySection, StudyTable, Value};
+use dynid::report::{Chosen, Fact, Provenance, StudyReport, StudySection, StudyTable, Value};
 
 use super::arm::{Arm, JOINTS};
 use super::chain::ChainRow;
@@ -63,7 +63,7 @@ impl Contents<'_> {
             provenance: Provenance {
                 version: dynid::VERSION.into(),
                 seed: Some(record.seed),
-                settings: vec![Fact::new("Quick run", record.quick, "")],
+                settings: vec![Chosen::given("quick run", record.quick, "")],
                 ..Provenance::default()
             },
         })

@@ -3,7 +3,8 @@
 use dynid::estimators::online::error_driven_factor;
 use dynid::model::element::CubicSpring;
 use dynid::report::{
-    Chart, ChartAxis, ChartCurve, CurveStyle, Fact, Provenance, StudyReport, StudySection, StudyTable, Value,
+    Chart, ChartAxis, ChartCurve, Chosen, CurveStyle, Fact, Provenance, StudyReport, StudySection,
+    StudyTable, Value,
 };
 
 use super::joint::{Damping, identified};
@@ -81,7 +82,7 @@ impl Contents<'_> {
             provenance: Provenance {
                 version: dynid::VERSION.into(),
                 seed: Some(record.seed),
-                settings: vec![Fact::new("Quick run", record.quick, "")],
+                settings: vec![Chosen::given("quick run", record.quick, "")],
                 ..Provenance::default()
             },
         })

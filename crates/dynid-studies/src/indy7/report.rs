@@ -2,7 +2,8 @@
 
 use dynid::motion::trajectory::{Point, Trajectory};
 use dynid::report::{
-    Chart, ChartAxis, ChartCurve, CurveStyle, Fact, Provenance, StudyReport, StudySection, StudyTable, Value,
+    Chart, ChartAxis, ChartCurve, Chosen, CurveStyle, Provenance, StudyReport, StudySection, StudyTable,
+    Value,
 };
 
 use super::experiment::trajectory;
@@ -68,7 +69,7 @@ impl Contents<'_> {
             provenance: Provenance {
                 version: dynid::VERSION.into(),
                 seed: Some(record.seed),
-                settings: vec![Fact::new("Quick run", record.quick, "")],
+                settings: vec![Chosen::given("quick run", record.quick, "")],
                 ..Provenance::default()
             },
         })

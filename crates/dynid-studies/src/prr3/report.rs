@@ -2,7 +2,7 @@
 
 use dynid::estimators::load_friction::Prediction;
 use dynid::motion::trajectory::Sampled;
-use dynid::report::{Fact, Provenance, StudyReport, StudySection, StudyTable, Value};
+use dynid::report::{Chosen, Provenance, StudyReport, StudySection, StudyTable, Value};
 
 use super::beyond::{Shares, Upright};
 use super::encoders::Encoders;
@@ -71,7 +71,7 @@ impl Contents<'_> {
             provenance: Provenance {
                 version: dynid::VERSION.into(),
                 seed: Some(record.seed),
-                settings: vec![Fact::new("Quick run", record.quick, "")],
+                settings: vec![Chosen::given("quick run", record.quick, "")],
                 ..Provenance::default()
             },
         })

@@ -1,7 +1,9 @@
 //! The page of a comparison.
 
 use dynid_report as report;
-use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, StudySection, StudyTable, Value};
+use dynid_report::{
+    Chart, ChartAxis, ChartCurve, CurveStyle, Ranked, Ranking, StudySection, StudyTable, Value,
+};
 
 use super::{ComparedEstimator, Comparison, JointError};
 use crate::estimate::InputRecord;
@@ -18,7 +20,8 @@ impl Comparison {
             StudySection {
                 title: "Errors on unseen time".to_owned(),
                 tables: vec![self.table()],
-                charts: vec![self.by_rank(), self.by_time()],
+                charts: vec![self.by_time()],
+                rankings: vec![self.ranking()],
                 ..StudySection::default()
             },
             StudySection {
@@ -112,25 +115,28 @@ impl Comparison {
         }
     }
 
-    fn by_rank(&self) -> Chart {
-        self.chart(
-            "errors in the order of the table",
-            &ChartAxis { label: "rank".to_owned(), ..ChartAxis::default() },
-            |e| e.rank.map(|rank| rank as f64),
-        )
+    /// Held-out errors of all estimators that came to an end, the best first.
+    fn ranking(&self) -> Ranking {
+        let rows = self.estimators.iter().filter_map(|e| {
+            Some(Ranked { name: e.name.clone(), value: e.error?, error: e.standard_error.unwrap_or(0.0) })
+        });
+        Ranking {
+            title: "Held-out error of every estimator".to_owned(),
+            note: "Strokes: one standard error over the folds to either side.".to_owned(),
+            unit: "% of the effort".to_owned(),
+            rows: rows.collect(),
+        }
     }
 
+    /// Held-out errors over the time that a fit takes, each with a standard error up and down.
     fn by_time(&self) -> Chart {
-        let axis = ChartAxis { label: "time of a fit".to_owned(), unit: "s".to_owned(), logarithmic: true };
-        self.chart("errors over time of a fit", &axis, |e| e.seconds.map(|s| s.max(1e-4)))
-    }
-
-    /// Held-out errors of all estimators that came to an end, each with a standard error up and down.
-    fn chart(&self, title: &str, x: &ChartAxis, place: impl Fn(&ComparedEstimator) -> Option<f64>) -> Chart {
-        let placed: Vec<(f64, f64, f64)> = (self.estimators.iter())
-            .filter_map(|e| Some((place(e)?, e.error?, e.standard_error.unwrap_or(0.0))))
+        let placed: Vec<(&str, [f64; 2], f64)> = (self.estimators.iter())
+            .filter_map(|e| {
+                let at = [e.seconds?.max(1e-4), e.error?];
+                Some((e.name.as_str(), at, e.standard_error.unwrap_or(0.0)))
+            })
             .collect();
-        let bar = |(at, error, spread): &(f64, f64, f64)| {
+        let bar = |(_, [at, error], spread): &(&str, [f64; 2], f64)| {
             [[*at, error - spread], [*at, error + spread], [f64::NAN, f64::NAN]]
         };
         let bars = ChartCurve {
@@ -138,20 +144,21 @@ impl Comparison {
             points: placed.iter().flat_map(bar).collect(),
             style: CurveStyle::Line,
         };
-        let means = ChartCurve {
-            name: "mean over folds".to_owned(),
-            points: placed.iter().map(|(at, error, _)| [*at, *error]).collect(),
-            style: CurveStyle::Dots,
-        };
+        let named = placed.iter().map(|(name, at, _)| ChartCurve {
+            name: (*name).to_owned(),
+            points: vec![*at],
+            style: CurveStyle::Named,
+        });
         Chart {
-            title: title.to_owned(),
-            x: x.clone(),
+            title: "Held-out error over the time of a fit".to_owned(),
+            x: ChartAxis { label: "time of a fit".to_owned(), unit: "s".to_owned(), logarithmic: true },
             y: ChartAxis {
                 label: "held-out error".to_owned(),
                 unit: "% of the effort".to_owned(),
                 logarithmic: false,
             },
-            curves: vec![bars, means],
+            note: "Strokes: one standard error up and down.".to_owned(),
+            curves: std::iter::once(bars).chain(named).collect(),
             ..Chart::default()
         }
     }

@@ -500,6 +500,11 @@ pub(super) fn way_out(kind: LimitKind, subject: &str) -> Option<String> {
     }
 }
 
+/// Settings of a design that states nothing.
+pub(super) fn default_settings() -> serde_json::Value {
+    serde_json::to_value(DesignConfig::default()).unwrap_or_default()
+}
+
 fn provenance(config: &DesignConfig, inputs: Vec<InputRecord>) -> Provenance {
     let settings = serde_json::to_value(config).unwrap_or_default();
     Provenance { inputs, settings, seed: config.search.seed, ..Provenance::default() }

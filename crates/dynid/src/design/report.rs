@@ -12,7 +12,7 @@ use super::limits::regions;
 use super::record::NEAR_BEST;
 use super::{DesignRecord, DesignRun, DesignedTrajectory};
 use crate::Error;
-use crate::report_data::settings_facts;
+use crate::report_data::{picture, settings_table};
 
 /// A limit acts if it is used to this share.
 const ACTS: f64 = 0.999;
@@ -109,6 +109,7 @@ impl DesignRun {
             limits: self.limit_uses(),
             joints: self.joints(),
             trajectory: designed.map(|d| self.trajectory(config, d)).transpose()?,
+            picture: designed.map(|d| self.picture(d)).transpose()?.flatten(),
             obstacles: obstacles(config, record),
             starts: self.starts(config, record),
             provenance: report::Provenance {
@@ -124,7 +125,7 @@ impl DesignRun {
                     })
                     .collect(),
                 seed: Some(record.provenance.seed),
-                settings: settings_facts(&record.provenance.settings),
+                settings: settings_table(&record.provenance.settings, &super::record::default_settings()),
             },
         })
     }
@@ -170,6 +171,20 @@ impl DesignRun {
                 }
             })
             .collect()
+    }
+
+    /// The robot on its way through the trajectory, with the path of the point farthest out.
+    fn picture(&self, designed: &DesignedTrajectory) -> Result<Option<report::RobotPicture>, Error> {
+        let sampled = designed.motion.sampled()?;
+        let n = sampled.samples();
+        let position: Vec<&[f64]> = sampled.q.chunks_exact(n.max(1)).collect();
+        let caption = "The motion as it is commanded".to_owned();
+        let drawn = picture(self.set.model.mechanism(), None, &sampled.time, &position, caption);
+        Ok(drawn.map(|drawn| report::RobotPicture {
+            trail: drawn.points.iter().rposition(|kind| *kind != report::PointKind::Base),
+            plays: true,
+            ..drawn
+        }))
     }
 
     fn trajectory(

@@ -294,7 +294,7 @@ impl Safety {
         let own = |(a, b): &&(usize, usize)| !(is_given(*a) && is_given(*b));
         let wanted: Vec<(usize, usize)> = pairs.iter().filter(own).copied().collect();
         let (exempt, kept): (Vec<_>, Vec<_>) = wanted.iter().partition(|pair| stated(&names(pair)));
-        check_exempt(&config.safety.exempt, mechanism, &exempt.iter().map(|p| names(p)).collect::<Vec<_>>())?;
+        check_exempt(&config.safety.exempt, mechanism, &exempt.iter().map(names).collect::<Vec<_>>())?;
         let near = distinct(always_near.iter().filter(own).map(names));
         if !near.is_empty() {
             let text: Vec<String> = near.iter().map(|[a, b]| format!("{a} and {b}")).collect();
@@ -309,7 +309,7 @@ impl Safety {
                 text.join(", ")
             ));
         }
-        let exempt = distinct(exempt.iter().map(|p| names(p)));
+        let exempt = distinct(exempt.iter().map(names));
         if !exempt.is_empty() {
             let text: Vec<String> = exempt.iter().map(|[a, b]| format!("{a} and {b}")).collect();
             self.record.not_checked.push(format!("exempt pairs of links ({})", text.join(", ")));

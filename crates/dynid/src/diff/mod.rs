@@ -31,7 +31,7 @@ pub enum Side {
     /// An identified model.
     Estimate(Box<Estimate>),
     /// A robot file.
-    Robot(StatedRobot),
+    Robot(Box<StatedRobot>),
 }
 
 impl Side {
@@ -44,7 +44,7 @@ impl Side {
             dynid_io::input::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
         match text.iter().find(|byte| !byte.is_ascii_whitespace()) {
             Some(b'{') => Ok(Side::Estimate(Box::new(Estimate::read(path)?))),
-            _ => Ok(Side::Robot(StatedRobot::read(path)?)),
+            _ => Ok(Side::Robot(Box::new(StatedRobot::read(path)?))),
         }
     }
 

@@ -28,6 +28,11 @@ macro_rules! names {
             /// Every variant once.
             pub const ALL: &'static [$kind] = &[$($kind::$variant,)*];
 
+            /// The variant of a printed name.
+            pub fn of_name(name: &str) -> Option<Self> {
+                Self::ALL.iter().copied().find(|known| known.name() == name)
+            }
+
             /// Name as printed.
             pub const fn name(self) -> &'static str {
                 match self {

@@ -384,6 +384,11 @@ fn verdict(joints: &[JointFrictionModel], warnings: &[String]) -> FrictionVerdic
     FrictionVerdict { status: status.to_owned(), headline: parts.join("; ") }
 }
 
+/// Settings of an identification of friction that states nothing.
+pub(super) fn default_settings() -> serde_json::Value {
+    serde_json::to_value(FrictionConfig::default()).unwrap_or_default()
+}
+
 fn provenance(config: &FrictionConfig, inputs: Vec<InputRecord>) -> Provenance {
     let settings = serde_json::to_value(config).unwrap_or_default();
     Provenance { inputs, settings, ..Provenance::default() }

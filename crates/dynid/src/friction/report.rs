@@ -7,7 +7,7 @@ use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, Fact, StudyTable, V
 use super::model::{FrictionModel, JointFrictionModel, ViscousModel};
 use super::{FrictionIdentification, IdentifiedJoint, PreslidingFit};
 use crate::Error;
-use crate::report_data::settings_facts;
+use crate::report_data::settings_table;
 
 /// Points along a drawn curve.
 const CURVE: usize = 120;
@@ -58,7 +58,7 @@ impl FrictionIdentification {
                     })
                     .collect(),
                 seed: None,
-                settings: settings_facts(&p.settings),
+                settings: settings_table(&p.settings, &super::record::default_settings()),
             },
         })?)
     }

@@ -3,6 +3,7 @@
 use dynid_model::{EffortModel, RobotModel};
 
 use crate::Error;
+use crate::caution::{self, Caution};
 use crate::config::{Config, Friction, Own, PayloadConfig, ShapeConfig};
 use crate::elements::ElementPlan;
 use crate::log_terms;
@@ -40,14 +41,21 @@ pub(super) fn check(config: &Config, plan: &ElementPlan, model: &RobotModel) -> 
 }
 
 /// Settings that turned out to do nothing here, in words. `found`: there were shape parameters to search.
-pub(super) fn warnings(config: &Config, found: bool) -> Vec<String> {
+pub(super) fn warnings(config: &Config, found: bool) -> Vec<Caution> {
     let unsearched = !found && config.estimator.shape != ShapeConfig::default();
     let search = unsearched.then(|| {
         "held-out blocks asked for no friction with a shape parameter, so there was nothing to search: `shape` (`--search`) \
          did nothing"
             .to_owned()
     });
-    search.into_iter().chain(config.payload.iter().filter_map(idle)).collect()
+    let leave_out = |message: String| {
+        Caution::warn(
+            caution::SETTING,
+            message,
+            "leave the setting out, so that nothing seems to depend on it",
+        )
+    };
+    search.into_iter().chain(config.payload.iter().filter_map(idle)).map(leave_out).collect()
 }
 
 /// What is stated of a payload and not used by an identification.

@@ -3,10 +3,15 @@
 use dynid_estimate::conditioning::PreparedLog;
 use dynid_model::{EffortModel, MotionBlock, RobotModel};
 
+use crate::caution::{self, Caution};
 use crate::result::short_name;
 
-/// Springs whose parameters a log tells little of, in words.
-pub(super) fn warnings(model: &RobotModel, logs: &[PreparedLog]) -> Vec<String> {
+/// What helps where a log tells little of a spring.
+pub(crate) const REMEDY: &str = "read encoders on both sides of the gear at the same times, or take the joint as stiff: leave `elastic` out of its \
+                                 `[element.<joint>]` in the robot file";
+
+/// Springs whose parameters a log tells little of.
+pub(super) fn warnings(model: &RobotModel, logs: &[PreparedLog]) -> Vec<Caution> {
     let nothing = vec![0.0; model.parameters().linear.len()];
     let springs: Vec<_> =
         model.elastic_transmissions(&nothing).into_iter().map(|(spring, _)| spring).collect();
@@ -18,7 +23,8 @@ pub(super) fn warnings(model: &RobotModel, logs: &[PreparedLog]) -> Vec<String> 
         for spring in springs.iter().filter(|spring| log.moves[spring.link]) {
             if let Some(doubt) = spring.doubt(model.joints(), &motion) {
                 let joint = &model.joints()[spring.link].name;
-                out.push(format!("{}: joint `{joint}`: {doubt}", short_name(&log.name)));
+                let message = format!("{}: joint `{joint}`: {doubt}", short_name(&log.name));
+                out.push(Caution::warn(caution::SPRING, message, REMEDY));
             }
         }
     }

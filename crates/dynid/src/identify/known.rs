@@ -4,13 +4,18 @@ use dynid_estimate::conditioning::PreparedLog;
 use dynid_model::Mechanism;
 use dynid_model::element::temperature_channel;
 
+use crate::caution::{self, Caution};
 use crate::elements::ElementPlan;
 use crate::friction::KnownFriction;
 use crate::result::short_name;
 
-/// What to know about the known friction of a run, in words: joints that move without a law, and temperatures beyond the
+/// What helps where known friction does not reach.
+const REMEDY: &str = "measure the friction of these joints over the temperatures of the logs: `dynid friction friction.toml`, then \
+                      `known_friction = \"dynid-friction/friction.json\"` under `[elements]`";
+
+/// What to know about the known friction of a run: joints that move without a law, and temperatures beyond the
 /// range of one.
-pub(super) fn warnings(plan: &ElementPlan, mechanism: &Mechanism, logs: &[PreparedLog]) -> Vec<String> {
+pub(super) fn warnings(plan: &ElementPlan, mechanism: &Mechanism, logs: &[PreparedLog]) -> Vec<Caution> {
     if plan.known.is_empty() {
         return Vec::new();
     }
@@ -30,7 +35,12 @@ pub(super) fn warnings(plan: &ElementPlan, mechanism: &Mechanism, logs: &[Prepar
     }
     out.extend(plan.known.iter().filter_map(stated_beyond));
     out.extend(logs.iter().flat_map(|log| logged_beyond(&plan.known, log)));
-    out
+    cautions(out)
+}
+
+/// Doubts in words as cautions.
+pub(super) fn cautions(doubts: Vec<String>) -> Vec<Caution> {
+    doubts.into_iter().map(|message| Caution::warn(caution::KNOWN_FRICTION, message, REMEDY)).collect()
 }
 
 /// Temperatures of a log beyond the range of known friction that changes with them.

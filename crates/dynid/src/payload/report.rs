@@ -6,7 +6,7 @@ use dynid_report::{Fact, StudySection, StudyTable, Value};
 
 use super::record::{PayloadFile, PayloadRecord, Quantity};
 use crate::Error;
-use crate::report_data::settings_facts;
+use crate::report_data::run_settings;
 
 impl PayloadFile {
     /// The report as one HTML page.
@@ -30,9 +30,9 @@ impl PayloadFile {
             },
             warnings: self
                 .verdict
-                .warnings
+                .cautions
                 .iter()
-                .map(|w| report::Warning { message: w.clone(), hint: String::new() })
+                .map(|c| report::Warning { message: format!("{}: {}", c.name, c.message), hint: c.remedy.clone() })
                 .collect(),
             introduction: vec![
                 "Robot and payload are identified together: the columns of the link that carries the payload count once \
@@ -53,7 +53,7 @@ impl PayloadFile {
                     })
                     .collect(),
                 seed: Some(p.seed),
-                settings: settings_facts(&p.settings),
+                settings: run_settings(p),
             },
         };
         Ok(report::render_kind("Payload", &page)?)
@@ -122,7 +122,7 @@ fn section(p: &PayloadRecord) -> StudySection {
                 .to_vec(),
             rows,
         }],
-        charts: Vec::new(),
+        ..StudySection::default()
     }
 }
 

@@ -312,7 +312,7 @@ fn a_motor_position_formed_from_the_joint_is_told() {
     let (_folder, found, _) = identified(ARM, &[("train.csv", table(&log))], config);
     let told = |joint: &str| {
         let about = format!("joint `{joint}`: the spring is never deformed");
-        found.warnings.iter().any(|w| w.contains(&about))
+        found.warnings.iter().any(|w| w.message.contains(&about))
     };
     assert!(told("j1") && !told("j2"), "{:?}", found.warnings);
 }

@@ -28,6 +28,7 @@ mod periodic;
 mod preflight;
 mod preflight_causes;
 mod recorded_logs;
+mod report_page;
 mod safe_designs;
 mod settings;
 mod stiffness;

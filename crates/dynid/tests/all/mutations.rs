@@ -448,7 +448,7 @@ fn the_corpus_is_read() {
                 let estimate = Estimate::read(&estimate_file).unwrap();
                 let model =
                     estimate.effort_model(&estimate_file, dynid::estimate::Split::Consistent).unwrap();
-                read_states(&file, &model, None).err().map(|e| e.to_string())
+                read_states(&file, &ReadOptions::default(), &model, None).err().map(|e| e.to_string())
             }
         };
         faults.extend(error.map(|error| format!("{reader:?}: {error}")));

@@ -39,7 +39,7 @@ fn errors_of(log: &SimulatedLog, held_out: &SimulatedLog, path: &Path, more: &st
         robot_file()
     );
     let id = identify(&Config::parse(&text, "test").unwrap(), &mut |_| {}).unwrap();
-    assert!(!id.warnings.iter().any(|w| w.contains("repeat")), "{:?}", id.warnings);
+    assert!(!id.warnings.iter().any(|w| w.message.contains("repeat")), "{:?}", id.warnings);
     let table = id.model.parameters();
     let mut truth = vec![0.0; table.linear.len()];
     for (name, value) in &log.truth {

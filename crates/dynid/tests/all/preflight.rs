@@ -465,7 +465,7 @@ fn identification_refuses_nonsense_and_accepts_what_was_put_right() {
     assert!(error.hint().unwrap().contains("--fix"), "{error}");
     let warned = Config { preflight: dynid::config::Preflight::Warn, ..wrong.clone() };
     let warned = identify(&warned, &mut |_| {}).unwrap();
-    assert!(warned.warnings.iter().any(|w| w.contains("joint permutation")), "{:?}", warned.warnings);
+    assert!(warned.warnings.iter().any(|w| w.message.contains("joint permutation")), "{:?}", warned.warnings);
     let corrected = folder.path().join("right.toml");
     std::fs::write(&corrected, examine(&wrong).corrected(&wrong, None).unwrap()).unwrap();
     let right = identify(&Config::read(&corrected).unwrap(), &mut |_| {}).unwrap();

@@ -1,6 +1,10 @@
 //! Floor and own links of designs: kept without being asked for, checked by other means, turned off when told.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "helpers of tests outside of test functions; what was found is said"
+)]
 
 use std::path::{Path, PathBuf};
 

@@ -43,6 +43,12 @@ pub(super) fn summary(estimate: &Estimate) -> String {
         );
     }
     out += &parameters(estimate);
+    if !estimate.verdict.cautions.is_empty() {
+        out += "\nwhat mends it, the worst first (`dynid explain NAME` says more):\n";
+        for caution in &estimate.verdict.cautions {
+            let _ = writeln!(out, "  [{}] {}: {}", caution.status, caution.name, caution.remedy);
+        }
+    }
     let _ = writeln!(out, "\n{}: {}", estimate.verdict.status, estimate.verdict.headline);
     out
 }
@@ -57,6 +63,7 @@ fn setting(choice: &Choice) -> String {
             let word = |x: &Value| x.as_str().map_or_else(|| table::number(x.as_f64()), str::to_owned);
             list.iter().map(word).collect::<Vec<_>>().join(" ")
         }
+        Value::String(text) => text.clone(),
         other => other.to_string(),
     };
     format!("{} = {value} {} ({}: {})", choice.name, choice.unit, choice.origin, choice.reason)
@@ -64,14 +71,8 @@ fn setting(choice: &Choice) -> String {
 
 /// How many parameters are seen, those that a table does not hold, and what would help.
 fn parameters(estimate: &Estimate) -> String {
-    let count = |verdict: &str| estimate.parameters.iter().filter(|p| p.verdict == verdict).count();
-    let mut out = format!(
-        "\nparameters: {} of {} seen in the data, {} carried by the prior, {} not identifiable (one by one in the report)\n",
-        count("seen in the data"),
-        estimate.parameters.len(),
-        count("carried by the prior"),
-        count("not identifiable"),
-    );
+    let counted = estimate.counts.standard_in_words();
+    let mut out = format!("\nparameters: {counted} (one by one in the report)\n");
     let shapes = estimate.shape_parameters.iter().map(shape_parameter);
     let scales = estimate.log_scales.iter().map(log_scale);
     for line in shapes.chain(scales).chain(estimate.motions_that_would_help.iter().cloned()) {

@@ -12,7 +12,7 @@ pub use starts::{DesignStart, Starts};
 
 use serde::Serialize;
 
-use super::{Fact, Provenance, Robot, Verdict, Warning};
+use super::{Fact, Provenance, Robot, RobotPicture, Verdict, Warning};
 
 /// Everything the report of one designed trajectory shows.
 ///
@@ -140,6 +140,8 @@ pub struct DesignReport {
     pub joints: Vec<DesignJoint>,
     /// The motion to draw; `None` leaves out plots and paths.
     pub trajectory: Option<Trajectory>,
+    /// The robot on its way through the trajectory; `None` leaves the picture out.
+    pub picture: Option<RobotPicture>,
     /// What the paths of frames keep away from or stay within.
     pub obstacles: Vec<Obstacle>,
     /// Ends of the search's starts.

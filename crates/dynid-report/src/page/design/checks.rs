@@ -5,6 +5,9 @@ use crate::error::ReportError;
 use crate::page::checks::{length, per_joint, time};
 
 pub(in crate::page) fn check(data: &DesignReport) -> Result<(), ReportError> {
+    if let Some(picture) = &data.picture {
+        crate::page::picture::check(picture)?;
+    }
     let Some(trajectory) = &data.trajectory else { return Ok(()) };
     time("trajectory", &trajectory.time_s)?;
     if let Some(found) = trajectory.recorded_s

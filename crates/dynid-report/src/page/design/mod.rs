@@ -11,6 +11,7 @@ use minijinja::context;
 use minijinja::value::{Serde, Value};
 use serde::Serialize;
 
+use super::picture::picture;
 use crate::data::{DesignParameter, DesignQuality, DesignReport, Fact, RandomMotion};
 use crate::error::ReportError;
 
@@ -36,6 +37,9 @@ pub(super) fn context(data: &DesignReport) -> Result<Value, ReportError> {
         parameters => Serde(parameters),
         confounded => Serde(&data.confounded),
         seen_least => Serde(&data.seen_least),
+        picture => Serde(data.picture.as_ref().map(picture).transpose()?.flatten()),
+        acting => data.limits.iter().filter(|l| l.acts).count(),
+        limit_count => data.limits.len(),
         limits => Serde(limits::limits(data)),
         motion => Serde(motion::motion(data)?),
         paths => Serde(paths::paths(data)),
