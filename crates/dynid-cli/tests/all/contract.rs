@@ -304,7 +304,8 @@ fn a_clock_in_milliseconds_is_told_by_its_steps_unless_seconds_are_said() {
     std::fs::write(folder.path().join("slow.csv"), slow).unwrap();
     let identify = |log: &str| {
         let arguments = ["identify", "arm.urdf", "--log", log, "--out", "slow"];
-        text(&dynid().current_dir(folder.path()).args(arguments).output().unwrap().stderr)
+        let output = dynid().current_dir(folder.path()).args(arguments).output().unwrap();
+        text(&output.stdout) + &text(&output.stderr)
     };
     let said = identify("slow.csv");
     assert!(said.contains("time of slow.csv = `t` in ms, 100.0000 Hz"), "{said}");

@@ -143,7 +143,7 @@ fn a_flag_names_the_friction_file_and_predictions_ask_for_temperatures() {
     let output = run(folder.path(), &args, 0);
     let result = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(
-        result.contains("known friction of shoulder = \"Coulomb and exponential viscous friction"),
+        result.contains("known friction of shoulder = Coulomb and exponential viscous friction"),
         "{result}"
     );
     let said = String::from_utf8_lossy(&output.stderr).into_owned();

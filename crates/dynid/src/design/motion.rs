@@ -81,9 +81,14 @@ impl DesignedMotion {
         let length = |phase: Phase| shortest.span(phase).map_or(0.0, |s| s.end - s.start);
         let (mut approach, mut back) = (length(Phase::Approach), length(Phase::Return));
         let mut faults = Vec::new();
+        // The last sample is that of the end: a sampled motion comes to rest.
+        let on_grid = |end: f64| (end * t.sample_rate_hz - 1e-6).ceil() / t.sample_rate_hz;
+        let recorded = length(Phase::Record);
         for _ in 0..ATTEMPTS {
-            file.approach = Some(Leg { pose: parking.to_vec(), duration_s: approach });
-            file.back = Some(Leg { pose: parking.to_vec(), duration_s: back });
+            let coming = on_grid(approach);
+            let going = on_grid(coming + recorded + back) - (coming + recorded);
+            file.approach = Some(Leg { pose: parking.to_vec(), duration_s: coming });
+            file.back = Some(Leg { pose: parking.to_vec(), duration_s: going });
             let sequence = file.sequence()?;
             let found = leg_faults(set, &sequence);
             // Slowness helps efforts only, and only as long as it makes a difference.

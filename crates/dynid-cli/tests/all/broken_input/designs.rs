@@ -143,7 +143,8 @@ fn with_broken_regions_are_refused() {
         design(&capsules("forearm", "0"), &["capsule of `forearm`", "positive"], ""),
         design(&capsules("gripper", "0.1"), &["`gripper`", "base, upper_arm"], ""),
         design(
-            "[[capsule]]\nframe = \"forearm\"\nfrom = [0, 0, 0]\nto = [0, 0, 0.1]\nradius = 0.1",
+            "[safety]\nfloor = false\nself_collision = false\n[[capsule]]\nframe = \"forearm\"\nfrom = [0, 0, 0]\nto = [0, 0, 0.1]\n\
+             radius = 0.1",
             &["capsule", "two or more", "one"],
             "base",
         ),

@@ -104,6 +104,12 @@ pub(super) fn folder() -> &'static TempDir {
         );
         let spike = |row, k, cell: &str| whole(if (row, k) == (300, 3) { "90.0" } else { cell });
         write("spike.csv", &edited(&a, spike));
+        // An effort is missing in a row.
+        let hole = |row, k, cell: &str| whole(if (row, k) == (200, 3) { "" } else { cell });
+        write("hole.csv", &edited(&a, hole));
+        write("headless.csv", &a.split_once('\n').unwrap().1.to_owned());
+        let semicolons = a.replace(',', ";").replace('.', ",");
+        write("commas.csv", &semicolons);
         let mut last: Vec<String> = Vec::new();
         let repeated = a.lines().enumerate().map(|(row, line)| {
             let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
@@ -283,6 +289,31 @@ fn cases() -> Vec<Case> {
             "columns.allow_no_effort",
             text("", "path = \"no-effort.csv\"", "", ""),
             text("", "path = \"no-effort.csv\"", "", "[columns]\nallow_no_effort = true"),
+            Changes,
+        ),
+        table("columns.ignore", "[columns]\nignore = [\"q_j1\"]", Refused("j1")),
+        table("columns.names", "[columns]\nnames = [\"t\", \"q_j1\"]", Refused("names")),
+        with(
+            "columns.names",
+            text("", "path = \"headless.csv\"", "", "[columns]\nrate_hz = 100"),
+            text(
+                "",
+                "path = \"headless.csv\"",
+                "",
+                "[columns]\nnames = [\"t\", \"q_j1\", \"q_j2\", \"tau_j1\", \"tau_j2\", \"x\", \"y\"]",
+            ),
+            Changes,
+        ),
+        with(
+            "columns.decimal",
+            text("", "path = \"commas.csv\"", "", ""),
+            text("", "path = \"commas.csv\"", "", "[columns]\ndecimal = \".\""),
+            Refused("decimal"),
+        ),
+        with(
+            "columns.missing",
+            text("", "path = \"hole.csv\"", "", ""),
+            text("", "path = \"hole.csv\"", "", "[columns]\nmissing = \"drop\""),
             Changes,
         ),
         table("motor_side.matrix", "[motor_side]\nmatrix = [[2, 0], [0, 2]]", Changes),
