@@ -85,6 +85,9 @@ pub(crate) fn chart_svg(chart: &Chart) -> String {
     svg
 }
 
+/// Height of a line of names.
+const LINE: f64 = 12.0;
+
 /// Names beside their points, on the left of those near the right end, moved down where they would lie on each other.
 fn labels(chart: &Chart, px: &dyn Fn(f64) -> f64, py: &dyn Fn(f64) -> f64) -> String {
     let named = chart.curves.iter().filter(|curve| curve.style == CurveStyle::Named);
@@ -101,9 +104,11 @@ fn labels(chart: &Chart, px: &dyn Fn(f64) -> f64, py: &dyn Fn(f64) -> f64) -> St
         let left = x + 8.0 + width > WIDTH - RIGHT;
         let from = if left { x - 8.0 - width } else { x + 8.0 };
         let mut at = y + 4.0;
-        let lies_on = |at: f64, t: &[f64; 3]| (t[2] - at).abs() < 12.0 && t[0] < from + width && from < t[1];
+        // Less than a line, or the rounding of a place a line below would pass for lying on it for ever.
+        let lies_on =
+            |at: f64, t: &[f64; 3]| (t[2] - at).abs() < 0.95 * LINE && t[0] < from + width && from < t[1];
         while let Some(other) = taken.iter().find(|t| lies_on(at, t)) {
-            at = other[2] + 12.0;
+            at = other[2] + LINE;
         }
         taken.push([from, from + width, at]);
         let (place, anchor) = if left { (x - 8.0, "end") } else { (x + 8.0, "start") };
@@ -281,5 +286,20 @@ mod tests {
         let scale = Scale { low: -0.2, high: 6.1, logarithmic: true };
         let texts: Vec<String> = scale.ticks(5.0).into_iter().map(|(_, text)| text).collect();
         assert_eq!(texts, ["1", "10", "100", "1000", "10000", "100000", "1e6"]);
+    }
+
+    /// A place a line below another one may round to less than a line.
+    #[test]
+    fn names_of_points_that_lie_together_find_an_end() {
+        let mut named = chart(Vec::new(), false);
+        named.curves = (0..300)
+            .map(|k| ChartCurve {
+                name: "ordinary least squares".to_owned(),
+                style: CurveStyle::Named,
+                points: vec![[1.0, 0.1 + 1e-3 * f64::from(k % 17)]],
+                ..ChartCurve::default()
+            })
+            .collect();
+        assert_eq!(chart_svg(&named).matches("class=\"label\"").count(), 300);
     }
 }
