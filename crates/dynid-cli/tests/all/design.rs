@@ -504,7 +504,7 @@ fn keys_of_the_book() -> String {
         |line: &str| line.starts_with("[[") || line.split_once(" = ").is_some_and(|(k, _)| !k.contains(' '));
     let stated = list.lines().map(|line| line.strip_prefix("# ").filter(|rest| key(rest)).unwrap_or(line));
     // A start pose names all joints, files have to be there, and one capsule alone is none.
-    let unfit = ["start_pose", "earlier", "j6 = 0.0"];
+    let unfit = ["start_pose", "earlier", "j6 = 0.0", "package_dirs"];
     let lines: Vec<&str> = stated.filter(|line| !unfit.iter().any(|key| line.starts_with(key))).collect();
     let text = lines.join("\n").replace("\"tool\"", "\"link6\"").replace("robot.urdf", "indy7.toml");
     text + "\n[[capsule]]\nframe = \"base\"\nfrom = [0, 0, 0]\nto = [0, 0, 0.2]\nradius = 0.1\n"

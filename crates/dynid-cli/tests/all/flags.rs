@@ -278,6 +278,10 @@ fn cases() -> Vec<Case> {
             "design",
             "design small.toml",
             &[
+                "--no-floor",
+                "--floor-height -0.1",
+                "--no-self-collision",
+                "--margin 0.05",
                 "--out elsewhere",
                 "--period 5",
                 "--harmonics 4",
@@ -498,6 +502,7 @@ fn cases() -> Vec<Case> {
             "predict estimate.json --states clean.csv",
             "predict estimate.json --states none.csv",
         ),
+        refused("design --package-dir", "design small.toml --package-dir none", "none"),
         refused("design --earlier", "design small.toml --earlier none.json", "none.json"),
         case(
             "design --time-budget",

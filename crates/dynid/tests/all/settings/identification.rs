@@ -308,7 +308,7 @@ fn cases() -> Vec<Case> {
             "columns.decimal",
             text("", "path = \"commas.csv\"", "", ""),
             text("", "path = \"commas.csv\"", "", "[columns]\ndecimal = \".\""),
-            Refused("decimal"),
+            Refused("expected a number, found `0,"),
         ),
         with(
             "columns.missing",
