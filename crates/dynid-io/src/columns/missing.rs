@@ -105,7 +105,8 @@ fn interpolate(time: &[f64], values: &mut [f64], at: &[usize]) -> usize {
     if steps.is_empty() {
         return 0;
     }
-    let middle = steps.len() / 2;
+    // The lower one of two: a long silence is no usual step.
+    let middle = (steps.len() - 1) / 2;
     let longest = LONGEST_SILENCE * *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
     let mut filled = 0;
     for row in at {

@@ -25,7 +25,7 @@ pub fn write<H: AsRef<str>, C: AsRef<[f64]>>(
     writer.finish()
 }
 
-/// Columns under a header as text, as [`write`] writes them uncompressed. `name` stands for the file in messages.
+/// Columns under a header as text, as [`write()`] writes them uncompressed. `name` stands for the file in messages.
 ///
 /// # Errors
 /// [`OutputError`]: values that are not finite, columns that do not fit the header.

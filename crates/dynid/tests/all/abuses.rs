@@ -284,10 +284,9 @@ fn no_abuse_of_an_arm_ends_in_ok() {
 #[ignore = "minutes"]
 fn no_abuse_of_four_robots_ends_in_ok() {
     let robots = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../robots");
-    let mut faults = simulated("indy7", &robots.join("indy7.toml"), 60.0);
-    faults.extend(simulated("er16", &robots.join("er16.toml"), 60.0));
+    let mut faults = simulated("indy7", &robots.join("indy7.toml"), 150.0);
     if let Some(data) = data() {
-        for name in ["iiwa_250", "ur5_1k"] {
+        for name in ["iiwa_250", "ur5_1k", "ur5_dev"] {
             let folder = data.join("oracles/logs").join(name);
             let [robot, log, valid] =
                 ["nominal.urdf", "train.csv.gz", "valid_fourier.csv.gz"].map(|f| folder.join(f));

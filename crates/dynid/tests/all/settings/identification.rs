@@ -107,7 +107,7 @@ pub(super) fn folder() -> &'static TempDir {
         // An effort is missing in a row.
         let hole = |row, k, cell: &str| whole(if (row, k) == (200, 3) { "" } else { cell });
         write("hole.csv", &edited(&a, hole));
-        write("headless.csv", &a.split_once('\n').unwrap().1.to_owned());
+        write("headless.csv", a.split_once('\n').unwrap().1);
         let semicolons = a.replace(',', ";").replace('.', ",");
         write("commas.csv", &semicolons);
         let mut last: Vec<String> = Vec::new();
