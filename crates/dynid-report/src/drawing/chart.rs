@@ -297,7 +297,6 @@ mod tests {
                 name: "ordinary least squares".to_owned(),
                 style: CurveStyle::Named,
                 points: vec![[1.0, 0.1 + 1e-3 * f64::from(k % 17)]],
-                ..ChartCurve::default()
             })
             .collect();
         assert_eq!(chart_svg(&named).matches("class=\"label\"").count(), 300);
