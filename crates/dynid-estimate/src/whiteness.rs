@@ -138,6 +138,9 @@ pub fn in_band_whiteness(
 /// as if there were only `m n/N` frequencies, which the threshold uses. It errs on the cautious side (measured on 30 s
 /// of white noise: 4 % rejected without gaps, 1 to 3 % with a fifth to a half of the samples missing).
 ///
+/// Records beyond 2^18 samples are cut to the next length without prime factors above 7 (1.6 % shorter at most): the transform of a length
+/// with large factors takes more room than the log.
+///
 /// `None` with fewer than 8 effective frequencies in band, or for zero residuals.
 ///
 /// Source: Bartlett 1955 (cumulative periodogram), restricted to the band.
@@ -147,6 +150,10 @@ pub fn raw_in_band_whiteness(
     band_hz: f64,
     settings: &InBandSettings,
 ) -> Option<InBandWhiteness> {
+    let residuals = match residuals.len() {
+        0..=LONG => residuals,
+        long => &residuals[..smooth_length(long)],
+    };
     let counted = residuals.iter().filter(|r| **r != 0.0).count();
     let mean = residuals.iter().sum::<f64>() / counted.max(1) as f64;
     let centred: Vec<f64> = residuals.iter().map(|r| if *r != 0.0 { r - mean } else { 0.0 }).collect();
@@ -155,6 +162,21 @@ pub fn raw_in_band_whiteness(
     let powers: Vec<f64> =
         in_band(&periodogram, step, settings.band * band_hz, sample_rate).map(|(_, power)| power).collect();
     cumulative_test(&powers, step, counted as f64 / residuals.len() as f64, settings)
+}
+
+/// Records that are transformed whole, samples.
+const LONG: usize = 1 << 18;
+
+/// The largest number up to `most` whose prime factors are 2, 3, 5 and 7; 1 for 0.
+fn smooth_length(most: usize) -> usize {
+    let mut best = 1;
+    let powers = |of: usize, from: usize| {
+        std::iter::successors(Some(from), move |p| p.checked_mul(of).filter(|p| *p <= most))
+    };
+    for odd in powers(7, 1).flat_map(|p| powers(5, p)).flat_map(|p| powers(3, p)) {
+        best = best.max(powers(2, odd).last().unwrap_or(1));
+    }
+    best
 }
 
 /// Frequencies and powers above zero, below a limit and below half the sample rate.
@@ -192,4 +214,29 @@ fn cumulative_test(
         frequencies: count,
         dominant_frequency: (largest + 1) as f64 * step,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::smooth_length;
+
+    #[test]
+    fn smooth_lengths_have_small_factors_and_lose_little() {
+        let smooth = |mut n: usize| {
+            for factor in [2, 3, 5, 7] {
+                while n.is_multiple_of(factor) {
+                    n /= factor;
+                }
+            }
+            n == 1
+        };
+        for most in 1..3000 {
+            let largest = (1..=most).rev().find(|n| smooth(*n)).unwrap();
+            assert_eq!(smooth_length(most), largest, "{most}");
+        }
+        assert_eq!(smooth_length(1_000_001), 1_000_000);
+        for most in (1 << 18..1 << 23).step_by(997) {
+            assert!(smooth_length(most) as f64 > 0.984 * most as f64, "{most}");
+        }
+    }
 }

@@ -1,5 +1,8 @@
 //! Predicted against measured effort on a log.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use dynid_estimate::conditioning::{ConditioningSettings, Moving, PreparedLog, States, predict_along};
 use dynid_estimate::metrics::{Fit, FitSums};
 use dynid_model::EffortModel;
@@ -33,12 +36,11 @@ pub struct Agreement {
     /// Sample rate, Hz.
     pub rate_hz: f64,
     /// Per output: measured effort.
-    pub measured: Vec<Vec<f64>>,
+    pub measured: Vec<Arc<Vec<f64>>>,
     /// Per output: predicted effort.
-    pub predicted: Vec<Vec<f64>>,
-    /// Per output: prediction as pictures show it. Where a joint stands, friction of velocity is left out of it, since the sign of
-    /// its velocity is that of noise; elsewhere it is [`Agreement::predicted`], which all figures go by.
-    pub drawn: Vec<Vec<f64>>,
+    pub predicted: Vec<Arc<Vec<f64>>>,
+    /// Per output: where the prediction that pictures show differs; empty before [`Agreement::draw`].
+    drawn: Vec<Patches>,
     /// Per output: a drive acts there, so that its effort counts in figures over all joints.
     pub driven: Vec<bool>,
     /// Per output: the joint moves in this log.
@@ -98,19 +100,12 @@ pub fn compare(
         let lasts = format!("{:.2} s leave no sample between the filter's edges", log.duration());
         return Err(too_short(lasts));
     }
-    let mut states = States::of_motion(log, state_hz, settings)?;
+    let states = States::of_motion(log, state_hz, settings)?;
     let motion = Moving::new(log, &states, settings);
     let shape = model.parameters().shape_start();
     let lead = lead(log.rate_hz, alignment.delay_samples, alignment.delay_rate_hz);
     let mut predicted = predict_along(model, &shape, values, log, &states);
-    states.rest(&motion);
-    let mut drawn = predict_along(model, &shape, values, log, &states);
     drop(states);
-    if lead != 0.0 {
-        for signal in &mut drawn {
-            *signal = shift(signal, lead).map_err(conditioning)?.values;
-        }
-    }
     let filter = butterworth(4, filter_hz, log.rate_hz).map_err(conditioning)?;
     let filtered = |signal: &[f64]| forward_backward(&filter, signal).map_err(conditioning);
     let driven: Vec<bool> = (0..log.effort.len()).map(|output| !model.is_undriven(output)).collect();
@@ -124,9 +119,7 @@ pub fn compare(
         };
         let measured_filtered = filtered(measured)?;
         agree(&mut unaligned, &measured_filtered, &filtered(predicted)?, Part::All)?;
-        if lead != 0.0 {
-            *predicted = shift(predicted, lead).map_err(conditioning)?.values;
-        }
+        *predicted = led(std::mem::take(predicted), lead)?;
         agree(&mut raw, measured, predicted, Part::All)?;
         let predicted_filtered = filtered(predicted)?;
         agree(&mut all, &measured_filtered, &predicted_filtered, Part::All)?;
@@ -147,13 +140,21 @@ pub fn compare(
         filtered_unaligned: unaligned.fit(),
         measured: log.effort.clone(),
         driven,
-        predicted,
-        drawn,
+        predicted: predicted.into_iter().map(Arc::new).collect(),
+        drawn: Vec::new(),
         moves: log.moves.clone(),
         motion,
         counted,
         filter_hz,
     })
+}
+
+/// An effort ahead by the lead of a log, samples.
+fn led(signal: Vec<f64>, lead: f64) -> Result<Vec<f64>, Error> {
+    match lead {
+        0.0 => Ok(signal),
+        _ => shift(&signal, lead).map(|led| led.values).map_err(conditioning),
+    }
 }
 
 /// Which samples figures are formed on.
@@ -179,7 +180,77 @@ fn pick(signal: &[f64], is_kept: impl Fn(usize) -> bool) -> Vec<f64> {
     signal.iter().enumerate().filter(|(k, _)| is_kept(*k)).map(|(_, x)| *x).collect()
 }
 
+/// Samples at which a signal differs from another one; most do not.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Patches {
+    /// Stretches that differ, ascending.
+    stretches: Vec<Range<usize>>,
+    /// Values on all stretches, one after the other.
+    values: Vec<f64>,
+}
+
+impl Patches {
+    fn between(of: &[f64], to: &[f64]) -> Patches {
+        let mut out = Patches::default();
+        for (k, _) in of.iter().zip(to).enumerate().filter(|(_, (of, to))| of != to) {
+            match out.stretches.last_mut().filter(|last| last.end == k) {
+                Some(last) => last.end += 1,
+                None => out.stretches.push(k..k + 1),
+            }
+            out.values.push(to[k]);
+        }
+        out.values.shrink_to_fit();
+        out
+    }
+
+    fn apply(&self, to: &[f64]) -> Vec<f64> {
+        let mut out = to.to_vec();
+        let mut rest = &self.values[..];
+        for stretch in &self.stretches {
+            let (own, others) = rest.split_at(stretch.len());
+            out[stretch.clone()].copy_from_slice(own);
+            rest = others;
+        }
+        out
+    }
+}
+
 impl Agreement {
+    /// Predicts once more for pictures, with what [`compare`] was given.
+    ///
+    /// # Errors
+    /// [`Error::Conditioning`].
+    pub fn draw(
+        mut self,
+        model: &dyn EffortModel,
+        values: &[f64],
+        log: &PreparedLog,
+        alignment: &Alignment,
+        settings: &ConditioningSettings,
+    ) -> Result<Agreement, Error> {
+        let states = States::of_motion(log, alignment.state_hz, settings)?.resting(&self.motion);
+        let shape = model.parameters().shape_start();
+        let still = predict_along(model, &shape, values, log, &states);
+        drop(states);
+        let lead = lead(log.rate_hz, alignment.delay_samples, alignment.delay_rate_hz);
+        let drawn = still.into_iter().zip(&self.predicted);
+        self.drawn = drawn
+            .map(|(still, predicted)| Ok(Patches::between(predicted, &led(still, lead)?)))
+            .collect::<Result<_, Error>>()?;
+        Ok(self)
+    }
+
+    /// Prediction of an output as pictures show it, where that is not [`Agreement::predicted`], which all figures go by: where a joint stands,
+    /// friction of velocity is left out, since the sign of its velocity is that of noise. `None` without [`Agreement::draw`] too.
+    pub fn drawn(&self, output: usize) -> Option<Vec<f64>> {
+        self.is_drawn_otherwise(output).then(|| self.drawn[output].apply(&self.predicted[output]))
+    }
+
+    /// Whether pictures show another prediction of an output than figures go by ([`Agreement::drawn`]).
+    pub(crate) fn is_drawn_otherwise(&self, output: usize) -> bool {
+        self.drawn.get(output).is_some_and(|patches| !patches.stretches.is_empty())
+    }
+
     /// Measured effort of an output and its prediction as pictures show it, through the filter of the filtered figures; not a
     /// number near the ends and gaps, which do not count.
     ///
@@ -192,14 +263,18 @@ impl Agreement {
             let counted = filtered.into_iter().zip(&self.counted);
             Ok(counted.map(|(x, counts)| if *counts { x } else { f64::NAN }).collect())
         };
-        Ok([through(&self.measured[output])?, through(&self.drawn[output])?])
+        let predicted = match self.drawn(output) {
+            Some(drawn) => through(&drawn)?,
+            None => through(&self.predicted[output])?,
+        };
+        Ok([through(&self.measured[output])?, predicted])
     }
 
     /// Figures of a prediction that lacks `lost` of each output's effort, through the same filter.
     ///
     /// # Errors
     /// [`Error::Conditioning`], [`Error::TooShort`].
-    pub(crate) fn without(&self, lost: &[Vec<f64>]) -> Result<FileFit, Error> {
+    pub(crate) fn without(&self, lost: impl Iterator<Item = Vec<f64>>) -> Result<FileFit, Error> {
         let filter = butterworth(4, self.filter_hz, self.rate_hz).map_err(conditioning)?;
         let through = |signal: &[f64]| {
             let filtered = forward_backward(&filter, signal).map_err(conditioning)?;
@@ -207,8 +282,8 @@ impl Agreement {
         };
         let rms = |s: &[f64]| (s.iter().map(|x| x * x).sum::<f64>() / s.len() as f64).sqrt();
         let (mut sums, mut loss, mut loss_percent) = (FitSums::default(), Vec::new(), Vec::new());
-        for (output, lost) in lost.iter().enumerate() {
-            let (measured, lost) = (through(&self.measured[output])?, through(lost)?);
+        for (output, lost) in lost.enumerate() {
+            let (measured, lost) = (through(&self.measured[output])?, through(&lost)?);
             let whole = through(&self.predicted[output])?;
             let predicted: Vec<f64> = whole.iter().zip(&lost).map(|(w, l)| w - l).collect();
             sums.push(&measured, &predicted, self.driven[output])

@@ -136,7 +136,7 @@ pub fn backlash(
                 joints.push(JointBacklash::at_rest(&info.name, unit));
                 continue;
             }
-            let pairs = agreement.measured[output].iter().zip(&agreement.predicted[output]);
+            let pairs = agreement.measured[output].iter().zip(agreement.predicted[output].iter());
             let residual: Vec<f64> = pairs.map(|(m, p)| m - p).collect();
             // Flights last hundredths of a second: faster samples cost time and tell no more.
             let factor = ((prepared.rate_hz / FASTEST_HZ) as usize).max(1);
@@ -149,7 +149,7 @@ pub fn backlash(
                 load: &of(&parts.load),
                 friction: &of(&parts.friction),
                 inertia: &of(&parts.inertia),
-                velocity: &of(&states.dq),
+                velocity: &pick(&states.velocity(output), factor, 0),
                 counted: &pick(&agreement.counted, factor, 0),
                 step_s: factor as f64 / prepared.rate_hz,
                 state_hz: cutoff,
@@ -217,7 +217,8 @@ impl Parts {
         elements[..inertial].fill(0.0);
         let nothing = vec![0.0; values.len()];
         let remembered = states.remembered(model, &shape, &log.channels);
-        let still = vec![0.0; states.q.len()];
+        let motion = states.block(0..n);
+        let still = vec![0.0; motion.q.len()];
         let efforts = |linear: &[f64], velocity: &[f64], acceleration: &[f64]| {
             let mut effort = vec![0.0; outputs * n];
             states.with_block(0..n, &log.channels, &remembered, |motion| {
@@ -228,9 +229,9 @@ impl Parts {
         };
         let difference =
             |a: Vec<f64>, b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
-        let known = efforts(&nothing, &states.dq, &states.ddq);
-        let load = difference(efforts(&bodies, &states.dq, &states.ddq), &known);
-        let friction = efforts(&elements, &states.dq, &still);
+        let known = efforts(&nothing, &motion.dq, &motion.ddq);
+        let load = difference(efforts(&bodies, &motion.dq, &motion.ddq), &known);
+        let friction = efforts(&elements, &motion.dq, &still);
         let resting = efforts(&bodies, &still, &still);
         let mut inertia = vec![0.0; outputs * n];
         for output in 0..outputs {

@@ -196,12 +196,13 @@ impl Record<'_> {
     fn loads(&self) -> Vec<f64> {
         let n = self.states.samples;
         let rates = self.journals.joints().len();
-        let centred = |of: &[f64]| {
-            let mut out = of[..self.model.joints().len() * n].to_vec();
-            out.resize(rates * n, 0.0);
-            out
+        let centred = |mut of: Vec<f64>| {
+            of.truncate(self.model.joints().len() * n);
+            of.resize(rates * n, 0.0);
+            of
         };
-        let [q, dq, ddq] = [&self.states.q, &self.states.dq, &self.states.ddq].map(|of| centred(of));
+        let motion = self.states.block(0..n);
+        let [q, dq, ddq] = [motion.q, motion.dq, motion.ddq].map(centred);
         let mut linear = vec![0.0; self.journals.parameters().linear.len()];
         let bodies = self.robot.mechanism.inertial_parameters();
         linear[..bodies].copy_from_slice(&self.values[..bodies]);
@@ -225,12 +226,13 @@ impl Record<'_> {
             return Err(Error::UnknownJoint { name: spec.joint.clone(), known });
         };
         let output = contact.rotation;
+        let speed = self.states.velocity(output);
         let force: Vec<[f64; 2]> = counted
             .clone()
             .map(|s| {
                 let position = contact.translations.map(|rate| loads[rate * n + s]);
                 let path = JournalPath { position, ..JournalPath::default() };
-                path.in_journal([self.states.q[output * n + s], 0.0, 0.0]).position
+                path.in_journal([self.states.position(output)[s], 0.0, 0.0]).position
             })
             .collect();
         let sizes: Vec<f64> = force.iter().map(|[x, y]| x.hypot(*y)).collect();
@@ -243,7 +245,7 @@ impl Record<'_> {
                     .clone()
                     .zip(&force)
                     .map(|(s, load)| {
-                        let speed = self.states.dq[output * n + s] * contact.journal_radius;
+                        let speed = speed[s] * contact.journal_radius;
                         let sliding = orbit::sliding_of(&contact.friction, speed);
                         OrbitSample { offset: [x[s], y[s]], load: *load, sliding }
                     })

@@ -58,7 +58,7 @@ pub(crate) fn limits(
     }
     let mut joints: Vec<Rows> = model.outputs().iter().map(|_| Rows::default()).collect();
     for log in logs {
-        let states = States::of(log, state_hz, settings)?;
+        let states = States::of_motion(log, state_hz, settings)?;
         let moving = Moving::new(log, &states, settings);
         for (rate, joint) in joints.iter_mut().enumerate() {
             if plan.known_friction(&model.outputs()[rate].name).is_none() {
@@ -123,11 +123,11 @@ impl Rows {
         if n == 0 {
             return;
         }
-        let pick = |signals: &[f64]| -> Vec<f64> {
-            let channels = signals.chunks_exact(states.samples);
-            channels.flat_map(|channel| samples.iter().map(|k| channel[*k])).collect()
-        };
-        let (q, dq, ddq) = (pick(&states.q), pick(&states.dq), pick(&states.ddq));
+        let pick = |signal: &[f64]| -> Vec<f64> { samples.iter().map(|k| signal[*k]).collect() };
+        let outputs = 0..states.outputs();
+        let q: Vec<f64> = outputs.clone().flat_map(|output| pick(states.position(output))).collect();
+        let dq: Vec<f64> = outputs.clone().flat_map(|output| pick(&states.velocity(output))).collect();
+        let ddq: Vec<f64> = outputs.flat_map(|output| pick(&states.acceleration(output))).collect();
         let mut rest = dq.clone();
         rest[rate * n..][..n].fill(0.0);
         let channels: Vec<(&str, Vec<f64>)> =

@@ -25,7 +25,7 @@ use dynid_model::{BaseParameters, EffortModel, RobotModel};
 use dynid_motion::Log;
 
 use crate::Error;
-use crate::agreement::{self, Agreement};
+use crate::agreement::{self, Agreement, Alignment};
 use crate::caution::{self, Caution};
 use crate::check::{self, Finding, Severity};
 use crate::commands::RunFiles;
@@ -380,7 +380,7 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
     let (mut files_training, mut files_validation) = (Vec::new(), Vec::new());
     for (l, log) in prepared.iter().enumerate() {
         progress(Step::Validate(log.name.clone()));
-        let agreement = out.agreement(out.values(), log)?;
+        let agreement = out.drawn_agreement(log)?;
         out.whiteness.push(residuals.whiteness(l, &agreement, kernel_hz));
         if out.consistent.constrained() {
             let free = out.agreement(out.unconstrained_values(), log)?;
@@ -417,7 +417,7 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
             own.take_off(&mut prepared)?;
         }
         out.warnings.extend(known::cautions(known::logged_beyond(&out.plan.known, &prepared)));
-        let agreement = out.agreement(out.values(), &prepared)?;
+        let agreement = out.drawn_agreement(&prepared)?;
         files_validation.extend(files.judge(&out, &prepared, &agreement)?);
         out.validation.push(agreement);
         if out.consistent.constrained() {
@@ -490,18 +490,22 @@ impl Identification {
     pub fn agreement(&self, values: &[f64], log: &PreparedLog) -> Result<Agreement, Error> {
         let unfolded = self.unfolded(values)?;
         let (model, values) = unfolded.as_ref().map_or((&self.model, values), |(m, v)| (m, v));
-        agreement::compare(
-            model,
-            values,
-            log,
-            &agreement::Alignment {
-                state_hz: self.state_hz,
-                delay_samples: self.delay_samples,
-                delay_rate_hz: self.delay_rate_hz,
-                filter_hz: self.kernel_hz,
-            },
-            &self.settings,
-        )
+        agreement::compare(model, values, log, &self.alignment(), &self.settings)
+    }
+
+    /// [`Identification::agreement`] of [`Identification::values`], with what pictures show.
+    fn drawn_agreement(&self, log: &PreparedLog) -> Result<Agreement, Error> {
+        let (model, values) = self.identified_model();
+        self.agreement(self.values(), log)?.draw(model, values, log, &self.alignment(), &self.settings)
+    }
+
+    fn alignment(&self) -> Alignment {
+        Alignment {
+            state_hz: self.state_hz,
+            delay_samples: self.delay_samples,
+            delay_rate_hz: self.delay_rate_hz,
+            filter_hz: self.kernel_hz,
+        }
     }
 
     /// The nonlinear model and its linear parameters that parameters of the fit stand for; `None` if the fit's model is not

@@ -7,6 +7,8 @@ mod picture;
 mod settings;
 mod trust;
 
+use std::sync::Arc;
+
 use dynid_estimate::linear::LinearMethod;
 use dynid_report as report;
 use dynid_report::{Fact, Status, Value};
@@ -222,16 +224,17 @@ impl Identification {
                     self.state_hz,
                     self.delay_samples,
                     a.filter_hz,
-                    if a.drawn == a.predicted { "" } else { AT_REST }
+                    if (0..a.measured.len()).any(|j| a.is_drawn_otherwise(j)) { AT_REST } else { "" }
                 ),
                 joints: a
                     .measured
                     .iter()
-                    .zip(a.predicted.iter().zip(&a.drawn))
-                    .map(|(m, (p, d))| report::JointSeries {
-                        measured: m.clone(),
-                        predicted: Some(p.clone()),
-                        drawn: (p != d).then(|| d.clone()),
+                    .zip(&a.predicted)
+                    .enumerate()
+                    .map(|(j, (measured, predicted))| report::JointSeries {
+                        measured: Arc::clone(measured),
+                        predicted: Some(Arc::clone(predicted)),
+                        drawn: a.drawn(j),
                         used: Some(a.counted.clone()),
                     })
                     .collect(),

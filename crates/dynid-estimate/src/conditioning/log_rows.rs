@@ -60,14 +60,14 @@ impl<'a> ConditionedLog<'a> {
         choices: &Conditioning,
         settings: &ConditioningSettings,
     ) -> Result<Self, ConditioningError> {
-        let states = States::new(log, state_hz, settings)?;
+        let mut states = States::new(log, state_hz, settings)?;
         let masks = masks(log, &states, model, settings);
         let reach = choices.delay.samples.abs().ceil() as usize + 3;
         let kernels = Kernels::new(&choices.scales_hz, &states, reach)?;
-        let efforts = states
-            .effort
-            .iter()
-            .map(|e| Ok(shift::shift(e, -choices.delay.samples)?.values))
+        // Each unshifted effort goes as soon as it was read.
+        let efforts = std::mem::take(&mut states.effort)
+            .into_iter()
+            .map(|e| Ok(shift::shift(&e, -choices.delay.samples)?.values))
             .collect::<Result<Vec<Vec<f64>>, ConditioningError>>()?;
         let longest = (settings.block_s * log.rate_hz).max(5.0 * log.rate_hz / choices.kernel_hz);
         let block_length =

@@ -37,7 +37,7 @@ pub use reduce::reduce;
 pub(crate) use rows::KeptColumns;
 pub use settings::ConditioningSettings;
 pub use shaped_rows::{RefineError, ShapedRows, refine};
-pub use states::States;
+pub use states::{StateBlock, States};
 pub use textbook::{TextbookRoute, paired_textbook_rows, reduce_textbook, textbook_rows};
 
 use dynid_model::EffortModel;

@@ -27,7 +27,7 @@ impl Moving {
         let least_speed: Vec<f64> = outputs
             .map(|j| {
                 let v = states.velocity(j);
-                reversal_threshold(v, states.velocity_sigma[j], settings.stick_sigma, LEAST_SHARE)
+                reversal_threshold(&v, states.velocity_sigma[j], settings.stick_sigma, LEAST_SHARE)
             })
             .collect();
         let samples = least_speed

@@ -1,5 +1,7 @@
 //! From a log to clean uniform signals with known noise.
 
+use std::sync::Arc;
+
 use dynid_model::EffortModel;
 use dynid_motion::clock::{self, ClockReport};
 use dynid_motion::spectrum::{EffortNoise, PositionNoise, effort_noise, position_noise};
@@ -19,8 +21,8 @@ pub struct PreparedLog {
     pub rate_hz: f64,
     /// Per output: position, rad or m.
     pub position: Vec<Vec<f64>>,
-    /// Per output: effort, N m or N.
-    pub effort: Vec<Vec<f64>>,
+    /// Per output: effort, N m or N; shared with what is compared with it and drawn beside it.
+    pub effort: Vec<Arc<Vec<f64>>>,
     /// Extra channels.
     pub channels: Vec<Channel>,
     /// Per sample: false inside a gap of the clock.
@@ -114,7 +116,7 @@ pub fn prepare(
     };
     for (joint, moves, counts, position, effort) in done {
         out.position.push(joint.position);
-        out.effort.push(joint.effort);
+        out.effort.push(Arc::new(joint.effort));
         out.spikes.push(counts);
         out.moves.push(moves);
         out.position_noise.push(position);

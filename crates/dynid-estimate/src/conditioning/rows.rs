@@ -120,8 +120,8 @@ pub(crate) struct Pass<'a> {
 
 /// Samples whose rows are formed at a time, at least; a multiple of the kernels' reach otherwise.
 const BLOCK: usize = 2048;
-/// Entries of the regressor that are held at a time, 64 MB of them: the windows of wide kernels over fast logs are longer.
-const ENTRIES: usize = 1 << 23;
+/// Entries of the regressor that are held at a time, 16 MB of them: the windows of wide kernels over fast logs are longer.
+const ENTRIES: usize = 1 << 21;
 
 /// Rows of one output at one scale while their columns are summed.
 struct Rows {
@@ -224,12 +224,15 @@ impl Pass<'_> {
         (regressor, instruments): (&RegressorBlock, Option<&RegressorBlock>),
         rows: &mut [Rows],
     ) {
-        let speed = &self.states.velocity(output)[first..first + regressor.samples()];
+        let speed = match self.shapes[output].is_empty() {
+            true => Vec::new(),
+            false => self.states.velocity_in(output, first..first + regressor.samples()),
+        };
         let loads = match self.shapes[output].iter().any(|s| s.kind == ShapeKind::Load) {
             true => regressor.effort(output, self.load),
             false => Vec::new(),
         };
-        let shaped: Vec<Vec<f64>> = self.shapes[output].iter().map(|s| s.column(speed, &loads)).collect();
+        let shaped: Vec<Vec<f64>> = self.shapes[output].iter().map(|s| s.column(&speed, &loads)).collect();
         let local = &self.columns.local[output];
         for Rows { scale, centres, columns, .. } in rows {
             let sources = instruments

@@ -1,16 +1,21 @@
 //! States of a log at the state cut-off, and which samples spoil a row.
 
+use std::ops::Range;
+
 use dynid_model::{EffortModel, History, MotionBlock};
-use dynid_motion::Channel;
-use dynid_motion::difference::central;
+use dynid_motion::difference::central_part;
 use dynid_motion::filter::{Sections, butterworth, forward_backward};
 use dynid_motion::mask::{near_reversal, reversal_threshold};
-use dynid_motion::spectrum::velocity_noise;
+use dynid_motion::spectrum::{PositionNoise, velocity_noise};
+use dynid_motion::{Channel, SignalError};
 use rayon::prelude::*;
 
 use super::{ConditioningError, ConditioningSettings, Moving, PreparedLog};
 
-/// Filtered positions, their derivatives, and efforts through the same filter.
+/// Filtered positions and efforts of a log; velocities and accelerations are formed where they are asked for.
+///
+/// A long log leaves no room for its derivatives: they would take twice that of its positions, and forming them anew costs little
+/// beside whatever reads them.
 #[derive(Debug, Clone)]
 pub struct States {
     /// Number of samples.
@@ -19,16 +24,27 @@ pub struct States {
     pub rate_hz: f64,
     /// Cut-off of the state filter, Hz.
     pub cutoff_hz: f64,
-    /// Positions, output after output.
+    /// Per output: positions.
+    q: Vec<Vec<f64>>,
+    /// Per output: velocities and accelerations of a periodic motion, exact ones of its series.
+    periodic: Option<[Vec<Vec<f64>>; 2]>,
+    /// Per output and sample: the joint moves. Elsewhere its velocity is zero.
+    moves: Option<Vec<Vec<bool>>>,
+    /// Per output: effort through the state filter; empty where no effort was asked for.
+    pub effort: Vec<Vec<f64>>,
+    /// Per output: standard deviation of the velocity that comes from position noise.
+    pub velocity_sigma: Vec<f64>,
+}
+
+/// Motion of consecutive samples, output after output.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateBlock {
+    /// Positions.
     pub q: Vec<f64>,
     /// Velocities.
     pub dq: Vec<f64>,
     /// Accelerations.
     pub ddq: Vec<f64>,
-    /// Per output: effort through the state filter; empty where no effort was asked for.
-    pub effort: Vec<Vec<f64>>,
-    /// Per output: standard deviation of the velocity that comes from position noise.
-    pub velocity_sigma: Vec<f64>,
 }
 
 impl States {
@@ -39,48 +55,43 @@ impl States {
         cutoff_hz: f64,
         settings: &ConditioningSettings,
     ) -> Result<States, ConditioningError> {
-        States::build(log, cutoff_hz, settings, true)
+        let mut out = States::of_motion_at(log, cutoff_hz, settings)?;
+        let filter = butterworth(settings.state_order, cutoff_hz, log.rate_hz)?;
+        let effort = log.effort.par_iter().map(|effort| forward_backward(&filter, effort));
+        out.effort = effort.collect::<Result<_, _>>()?;
+        Ok(out)
     }
 
-    fn build(
+    /// [`States::new`] without efforts.
+    pub(super) fn of_motion_at(
         log: &PreparedLog,
         cutoff_hz: f64,
         settings: &ConditioningSettings,
-        with_effort: bool,
     ) -> Result<States, ConditioningError> {
         let filter = butterworth(settings.state_order, cutoff_hz, log.rate_hz)?;
-        let samples = log.samples();
-        let [mut q, mut dq, mut ddq] = [(); 3].map(|()| vec![0.0; samples * log.position.len()]);
-        // Every joint writes to its place: long logs leave no room for a second copy.
-        let places = q
-            .par_chunks_exact_mut(samples.max(1))
-            .zip(dq.par_chunks_exact_mut(samples.max(1)))
-            .zip(ddq.par_chunks_exact_mut(samples.max(1)));
-        let per_joint = places
-            .enumerate()
-            .map(|(j, ((q, dq), ddq))| {
-                let effort = match with_effort {
-                    true => forward_backward(&filter, &log.effort[j])?,
-                    false => Vec::new(),
+        let (q, velocity_sigma, periodic) = match &log.periodic {
+            Some(motion) => {
+                let rates = [motion.dq.clone(), motion.ddq.clone()];
+                (motion.q.clone(), motion.velocity_sigma.clone(), Some(rates))
+            }
+            None => {
+                let sigma = |noise: &PositionNoise| {
+                    velocity_noise(noise.floor_psd, settings.state_order, cutoff_hz, log.rate_hz)
                 };
-                if let Some(motion) = &log.periodic {
-                    q.copy_from_slice(&motion.q[j]);
-                    dq.copy_from_slice(&motion.dq[j]);
-                    ddq.copy_from_slice(&motion.ddq[j]);
-                    return Ok((effort, motion.velocity_sigma[j]));
-                }
-                for (place, signal) in
-                    [q, dq, ddq].into_iter().zip(motion(&filter, &log.position[j], log.rate_hz)?)
-                {
-                    place.copy_from_slice(&signal);
-                }
-                let floor = log.position_noise[j].floor_psd;
-                let sigma = velocity_noise(floor, settings.state_order, cutoff_hz, log.rate_hz)?;
-                Ok((effort, sigma))
-            })
-            .collect::<Result<Vec<_>, ConditioningError>>()?;
-        let (effort, velocity_sigma) = per_joint.into_iter().unzip();
-        Ok(States { samples, rate_hz: log.rate_hz, cutoff_hz, q, dq, ddq, effort, velocity_sigma })
+                let sigma = log.position_noise.iter().map(sigma).collect::<Result<_, _>>()?;
+                (positions(&filter, &log.position, log.rate_hz)?, sigma, None)
+            }
+        };
+        Ok(States {
+            samples: log.samples(),
+            rate_hz: log.rate_hz,
+            cutoff_hz,
+            q,
+            periodic,
+            moves: None,
+            effort: Vec::new(),
+            velocity_sigma,
+        })
     }
 
     /// States at a cut-off that counts up to what the sample rate of the log allows.
@@ -104,7 +115,7 @@ impl States {
         state_hz: f64,
         settings: &ConditioningSettings,
     ) -> Result<States, ConditioningError> {
-        States::build(log, state_hz.min(settings.cutoff.state_rate * log.rate_hz), settings, false)
+        States::of_motion_at(log, state_hz.min(settings.cutoff.state_rate * log.rate_hz), settings)
     }
 
     /// States of another motion on the same grid: through the same filter, differentiated alike. They have no effort and no
@@ -122,37 +133,94 @@ impl States {
         position: &[Vec<f64>],
         settings: &ConditioningSettings,
     ) -> Result<States, ConditioningError> {
-        assert_eq!(position.len(), self.effort.len(), "one motion per output");
-        let filter = butterworth(settings.state_order, self.cutoff_hz, self.rate_hz)?;
-        let moved = position.par_iter().map(|position| {
+        assert_eq!(position.len(), self.q.len(), "one motion per output");
+        for position in position {
             assert_eq!(position.len(), self.samples, "the motion is on the grid of the log");
-            motion(&filter, position, self.rate_hz)
-        });
-        let moved = moved.collect::<Result<Vec<_>, _>>()?;
-        let all = |k: usize| moved.iter().flat_map(|m| m[k].iter().copied()).collect();
+        }
+        let filter = butterworth(settings.state_order, self.cutoff_hz, self.rate_hz)?;
         Ok(States {
-            q: all(0),
-            dq: all(1),
-            ddq: all(2),
+            q: positions(&filter, position, self.rate_hz)?,
+            periodic: None,
+            moves: None,
             effort: Vec::new(),
             velocity_sigma: vec![0.0; position.len()],
             ..*self
         })
     }
 
-    /// Sets velocities of joints that stand to zero: their sign there is that of noise, and friction may have any value up to static friction. A
-    /// prediction along such states is the middle of what it may be, and does not jump.
-    pub fn rest(&mut self, moving: &Moving) {
-        for (velocity, moves) in self.dq.chunks_exact_mut(self.samples.max(1)).zip(&moving.samples) {
-            for (v, _) in velocity.iter_mut().zip(moves).filter(|(_, moves)| !**moves) {
+    /// The same with zero velocity wherever a joint stands: its sign there is that of noise, and friction may have any value up to static
+    /// friction. A prediction along such states is the middle of what it may be, and does not jump.
+    pub fn resting(self, moving: &Moving) -> States {
+        States { moves: Some(moving.samples.clone()), ..self }
+    }
+
+    /// Number of outputs.
+    pub fn outputs(&self) -> usize {
+        self.q.len()
+    }
+
+    /// Position of an output.
+    pub fn position(&self, output: usize) -> &[f64] {
+        &self.q[output]
+    }
+
+    /// Velocity of an output.
+    pub fn velocity(&self, output: usize) -> Vec<f64> {
+        self.velocity_in(output, 0..self.samples)
+    }
+
+    /// Velocity of an output in a run of samples.
+    pub fn velocity_in(&self, output: usize, range: Range<usize>) -> Vec<f64> {
+        let mut out = vec![0.0; range.len()];
+        self.fill_velocity(output, range, &mut out);
+        out
+    }
+
+    /// Acceleration of an output.
+    pub fn acceleration(&self, output: usize) -> Vec<f64> {
+        let mut out = vec![0.0; self.samples];
+        self.fill_acceleration(output, 0..self.samples, &mut out);
+        out
+    }
+
+    fn fill_velocity(&self, output: usize, range: Range<usize>, out: &mut [f64]) {
+        match &self.periodic {
+            Some([dq, _]) => out.copy_from_slice(&dq[output][range.clone()]),
+            None => central_part(&self.q[output], self.rate_hz, range.clone(), out),
+        }
+        if let Some(moves) = &self.moves {
+            for (v, _) in out.iter_mut().zip(&moves[output][range]).filter(|(_, moves)| !**moves) {
                 *v = 0.0;
             }
         }
     }
 
-    /// Velocity of an output.
-    pub fn velocity(&self, output: usize) -> &[f64] {
-        &self.dq[output * self.samples..][..self.samples]
+    fn fill_acceleration(&self, output: usize, range: Range<usize>, out: &mut [f64]) {
+        if let Some([_, ddq]) = &self.periodic {
+            out.copy_from_slice(&ddq[output][range]);
+            return;
+        }
+        // Velocities one sample further on either side; at the ends of the record there is none, and the difference is one-sided.
+        let wide = range.start.saturating_sub(1)..(range.end + 1).min(self.samples);
+        let mut velocity = vec![0.0; wide.len()];
+        central_part(&self.q[output], self.rate_hz, wide.clone(), &mut velocity);
+        let inside = range.start - wide.start..range.end - wide.start;
+        central_part(&velocity, self.rate_hz, inside, out);
+    }
+
+    /// Motion of a run of samples.
+    pub fn block(&self, range: Range<usize>) -> StateBlock {
+        let length = self.q.len() * range.len();
+        let mut block =
+            StateBlock { q: Vec::with_capacity(length), dq: vec![0.0; length], ddq: vec![0.0; length] };
+        let places =
+            block.dq.chunks_exact_mut(range.len().max(1)).zip(block.ddq.chunks_exact_mut(range.len().max(1)));
+        for (output, (dq, ddq)) in places.enumerate() {
+            block.q.extend(&self.q[output][range.clone()]);
+            self.fill_velocity(output, range.clone(), dq);
+            self.fill_acceleration(output, range.clone(), ddq);
+        }
+        block
     }
 
     /// Signals of a model that depend on the motion before, over the whole record. `channels`: whole channels of the log.
@@ -173,23 +241,16 @@ impl States {
     /// whole record ([`States::remembered`]).
     pub fn with_block<T>(
         &self,
-        range: std::ops::Range<usize>,
+        range: Range<usize>,
         channels: &[Channel],
         remembered: &[Channel],
         work: impl FnOnce(&MotionBlock<'_>) -> T,
     ) -> T {
         let channels: Vec<(&str, &[f64])> =
             channels.iter().chain(remembered).map(|c| (c.name.as_str(), &c.values[range.clone()])).collect();
-        work(&MotionBlock {
-            samples: range.len(),
-            stride: self.samples,
-            q: &self.q[range.start..],
-            dq: &self.dq[range.start..],
-            ddq: &self.ddq[range.start..],
-            gravity: None,
-            channels: &channels,
-            sign_width: 0.0,
-        })
+        let block = self.block(range.clone());
+        let motion = MotionBlock::plain(range.len(), &block.q, &block.dq, &block.ddq);
+        work(&MotionBlock { channels: &channels, ..motion })
     }
 
     /// Least speed of every reversal speed of an output at a level of the mask, `max(stick_sigma σ_v, level rms(v))`
@@ -214,7 +275,7 @@ impl States {
         let mut v = vec![0.0; self.samples];
         let mut variance = 0.0;
         for (rate, factor) in speed {
-            for (v, x) in v.iter_mut().zip(self.velocity(*rate)) {
+            for (v, x) in v.iter_mut().zip(&self.velocity(*rate)) {
                 *v += factor * x;
             }
             variance += (factor * self.velocity_sigma[*rate]).powi(2);
@@ -223,12 +284,21 @@ impl States {
     }
 }
 
-/// Filtered position, velocity and acceleration.
-fn motion(filter: &Sections, position: &[f64], rate_hz: f64) -> Result<[Vec<f64>; 3], ConditioningError> {
-    let q = forward_backward(filter, position)?;
-    let dq = central(&q, rate_hz)?;
-    let ddq = central(&dq, rate_hz)?;
-    Ok([q, dq, ddq])
+/// Positions through a filter, of which two derivatives can be formed.
+fn positions(
+    filter: &Sections,
+    position: &[Vec<f64>],
+    rate_hz: f64,
+) -> Result<Vec<Vec<f64>>, ConditioningError> {
+    let filtered = position.par_iter().map(|position| {
+        let q = forward_backward(filter, position)?;
+        let mut largest = q.windows(2).map(|w| (w[1] - w[0]) * rate_hz * rate_hz).enumerate();
+        match largest.find(|(_, acceleration)| !acceleration.is_finite()) {
+            Some((sample, found)) => Err(SignalError::NotFinite { sample, found }),
+            None => Ok(q),
+        }
+    });
+    Ok(filtered.collect::<Result<_, _>>()?)
 }
 
 /// Bad samples and their running counts, so that any window is judged by two look-ups. A count stands per word of 64 samples: one per sample

@@ -144,7 +144,7 @@ fn rows_of<'a>(
             let effort = if route.filter_effort {
                 forward_backward(&filter, &log.effort[output])?
             } else {
-                log.effort[output].clone()
+                log.effort[output].to_vec()
             };
             let offset = thin(regressor.offset(output))?;
             let effort: Vec<f64> = thin(&effort)?.iter().zip(offset).map(|(e, o)| e - o).collect();

@@ -55,9 +55,9 @@ impl TrialShapes<'_> {
     fn of_log(self, states: &States) -> Vec<Vec<FrictionShape>> {
         match self {
             TrialShapes::Library { shapes, .. } => shapes.to_vec(),
-            TrialShapes::Probes => (0..states.effort.len())
+            TrialShapes::Probes => (0..states.outputs())
                 .map(|output| {
-                    let rms = dynid_motion::signal::rms(states.velocity(output)).max(f64::MIN_POSITIVE);
+                    let rms = dynid_motion::signal::rms(&states.velocity(output)).max(f64::MIN_POSITIVE);
                     [
                         (ShapeKind::ViscousMagnitude, 1.0),
                         (ShapeKind::Stribeck, 0.25 * rms),

@@ -1,5 +1,7 @@
 //! A record as trial models see it: filtered, thinned, away from edges.
 
+use std::sync::Arc;
+
 use super::wiring::{Source, Wiring};
 use dynid_motion::cutoff::{CutoffSettings, kernel_limit};
 use dynid_motion::difference::central;
@@ -30,7 +32,7 @@ pub(crate) struct JointSamples {
     pub(crate) acceleration: Vec<f64>,
     pub(crate) effort: Vec<f64>,
     /// The filtered effort at every sample of the log.
-    pub(crate) whole_effort: Vec<f64>,
+    pub(crate) whole_effort: Arc<Vec<f64>>,
     /// Whether the joint is away from reversal.
     pub(crate) sliding: Vec<bool>,
     /// Whether the joint moves at all.
@@ -105,7 +107,7 @@ impl Samples {
                     velocity: pick(&velocity),
                     acceleration: pick(&acceleration),
                     effort: pick(&effort),
-                    whole_effort: effort,
+                    whole_effort: Arc::new(effort),
                     sliding: kept.iter().map(|k| !reversing[*k]).collect(),
                     moves: *moves,
                 })

@@ -170,8 +170,8 @@ fn judged(joints: usize, samples: usize) -> Judged {
         others: 1,
         joint,
         why: "the joint that is predicted worst".into(),
-        predicted: series.predicted.unwrap_or_default(),
-        measured: series.measured,
+        predicted: series.predicted.map_or_else(Vec::new, |p| p.to_vec()),
+        measured: series.measured.to_vec(),
         time_s,
         description: "Both curves passed a zero-phase filter of 15.0 Hz.".into(),
     }
@@ -272,7 +272,7 @@ fn effort(time_s: &[f64], j: usize, seed: u64) -> JointSeries {
         .collect();
     let memory: f64 = if j == 3 { 0.98 } else { 0.7 };
     let mut coloured: f64 = 0.0;
-    let measured = predicted
+    let measured: Vec<f64> = predicted
         .iter()
         .map(|p| {
             coloured = memory * coloured + (1.0 - memory * memory).sqrt() * noise.next();
@@ -280,14 +280,25 @@ fn effort(time_s: &[f64], j: usize, seed: u64) -> JointSeries {
         })
         .collect();
     let used = time_s.iter().map(|&t| velocity(t).abs() > 0.06).collect();
-    JointSeries { measured, predicted: Some(predicted), drawn: None, used: Some(used) }
+    JointSeries {
+        measured: measured.into(),
+        predicted: Some(predicted.into()),
+        drawn: None,
+        used: Some(used),
+    }
 }
 
 fn quality(series: &JointSeries) -> JointQuality {
     let measured = &series.measured;
     let samples = measured.len().max(1) as f64;
     let mean = measured.iter().sum::<f64>() / samples;
-    let errors = series.predicted.iter().flatten().zip(measured).map(|(p, m)| (m - p).powi(2)).sum::<f64>();
+    let errors = series
+        .predicted
+        .iter()
+        .flat_map(|p| p.iter())
+        .zip(measured.iter())
+        .map(|(p, m)| (m - p).powi(2))
+        .sum::<f64>();
     let spread = measured.iter().map(|m| (m - mean).powi(2)).sum::<f64>();
     let energy = measured.iter().map(|m| m * m).sum::<f64>();
     let scaled = |factor: f64| Quality {

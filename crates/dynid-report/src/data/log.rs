@@ -1,5 +1,7 @@
 //! Logs, the quality of the effort prediction on them, and the series drawn.
 
+use std::sync::Arc;
+
 use serde::Serialize;
 
 use super::Fact;
@@ -85,14 +87,16 @@ pub struct LogSeries {
 
 /// Effort of one joint, one entry per entry of [`LogSeries::time_s`], in the joint's effort unit.
 ///
+/// Long signals may be shared with whoever made the report.
+///
 /// A sample that is not finite is left out of the curve and of the statistics, and the number of such samples is
 /// stated beside the plot.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct JointSeries {
     /// Measured effort.
-    pub measured: Vec<f64>,
+    pub measured: Arc<Vec<f64>>,
     /// Effort predicted by the identified model; without it neither prediction nor residual is drawn.
-    pub predicted: Option<Vec<f64>>,
+    pub predicted: Option<Arc<Vec<f64>>>,
     /// Prediction to draw in place of [`JointSeries::predicted`], such as one that is steady while the joint stands. Residual
     /// statistics are those of `predicted`, the curves those of this. `None`: what is predicted is drawn.
     pub drawn: Option<Vec<f64>>,

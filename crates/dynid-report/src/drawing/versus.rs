@@ -68,19 +68,20 @@ pub(crate) fn versus(time_s: &[f64], curves: &[(&str, &[f64])]) -> Versus {
 
 /// Least and greatest of each stretch in the order in which they come; a stretch without finite values is a gap.
 fn thinned(time_s: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
+    let samples = time_s.len().min(values.len());
+    let point = |k: usize| (time_s[k], values[k]);
     let stretch = values.len().div_ceil(STRETCHES).max(1);
-    let pairs: Vec<(f64, f64)> = time_s.iter().copied().zip(values.iter().copied()).collect();
     if stretch <= 2 {
-        return pairs;
+        return (0..samples).map(point).collect();
     }
-    pairs
-        .chunks(stretch)
-        .flat_map(|chunk| {
-            let finite = || (0..chunk.len()).filter(|k| chunk[*k].1.is_finite());
-            let by = |a: &usize, b: &usize| chunk[*a].1.total_cmp(&chunk[*b].1);
+    (0..samples)
+        .step_by(stretch)
+        .flat_map(|start| {
+            let finite = || (start..(start + stretch).min(samples)).filter(|k| values[*k].is_finite());
+            let by = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
             match (finite().min_by(by), finite().max_by(by)) {
-                (Some(least), Some(most)) => [chunk[least.min(most)], chunk[least.max(most)]],
-                _ => [(chunk[0].0, f64::NAN); 2],
+                (Some(least), Some(most)) => [point(least.min(most)), point(least.max(most))],
+                _ => [(time_s[start], f64::NAN); 2],
             }
         })
         .collect()

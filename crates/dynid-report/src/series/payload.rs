@@ -112,7 +112,7 @@ fn joint_panel<'a>(
         values: encode_values(&decimation.values(samples)),
     };
     let mut series = vec![curve("measured", &efforts.measured)];
-    if let Some(predicted) = efforts.drawn.as_deref().or(efforts.predicted.as_deref()) {
+    if let Some(predicted) = efforts.drawn.as_ref().or(efforts.predicted.as_deref()) {
         series.push(curve("residual", &residual(&efforts.measured, predicted)));
         series.push(curve("predicted", predicted));
     }

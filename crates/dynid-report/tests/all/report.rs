@@ -3,6 +3,8 @@
 #[path = "../../examples/demo/synthetic.rs"]
 pub(crate) mod synthetic;
 
+use std::sync::Arc;
+
 use dynid_report::{
     BaseParameter, Caution, Chart, ChartAxis, ChartCurve, Check, Chosen, Consistency, Counts, Fact,
     FileJoint, FileJudgement, FrictionTrial, HeldOut, HeldOutJoint, InputFile, Joint, JointDelay,
@@ -70,7 +72,7 @@ fn hollow(text: &str) -> ReportData {
             series: Some(LogSeries {
                 time_s: vec![0.0, 1.0],
                 description: text(),
-                joints: vec![JointSeries { measured: vec![1.0, 2.0], ..JointSeries::default() }],
+                joints: vec![JointSeries { measured: vec![1.0, 2.0].into(), ..JointSeries::default() }],
             }),
             ..LogReport::default()
         }],
@@ -405,14 +407,14 @@ fn a_very_long_name_is_kept_whole() {
 #[test]
 fn samples_that_are_not_finite_are_counted_beside_the_plot() {
     let mut data = synthetic::report(2, 100);
-    data.logs[0].series.as_mut().unwrap().joints[1].measured[3..10].fill(f64::NAN);
+    Arc::make_mut(&mut data.logs[0].series.as_mut().unwrap().joints[1].measured)[3..10].fill(f64::NAN);
     assert!(render(&data).unwrap().contains("7 samples are not finite"));
 }
 
 #[test]
 fn lists_of_the_wrong_length_are_refused_with_their_place() {
     let mut short = synthetic::report(2, 100);
-    short.logs[1].series.as_mut().unwrap().joints[1].predicted.as_mut().unwrap().pop();
+    Arc::make_mut(short.logs[1].series.as_mut().unwrap().joints[1].predicted.as_mut().unwrap()).pop();
     let error = render(&short).unwrap_err();
     assert_eq!(
         error.to_string(),

@@ -64,7 +64,7 @@ fn moved(log: &PreparedLog, samples: f64) -> Result<PreparedLog, Error> {
     let mut out = log.clone();
     for effort in out.effort.iter_mut().filter(|_| samples != 0.0) {
         let shifted = shift(effort, -samples).map_err(|e| Error::Conditioning(e.into()))?;
-        *effort = shifted.values;
+        *effort = shifted.values.into();
         out.usable.iter_mut().enumerate().for_each(|(k, usable)| *usable &= shifted.valid.contains(&k));
     }
     Ok(out)

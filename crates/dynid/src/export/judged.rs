@@ -1,5 +1,7 @@
 //! What robot files predict on the logs of an identification, beside the identified model.
 
+use std::sync::Arc;
+
 use dynid_estimate::conditioning::{PreparedLog, predict};
 use dynid_io::mjcf::JointParameters;
 use dynid_model::{EffortModel, RobotModel};
@@ -70,15 +72,15 @@ impl FileModels {
             let shape = model.parameters().shape_start();
             predict(model, &shape, values, log, id.state_hz, delay, &id.settings)
         };
-        let (alone, values) = id.robot_alone();
-        let alone = run(alone, values)?;
+        // Without terms of single logs the model was predicted already.
+        let alone = match &id.alone {
+            Some((model, values)) => run(model, values)?.into_iter().map(Arc::new).collect(),
+            None => agreement.predicted.clone(),
+        };
         let file = |(model, values): &(RobotModel, Vec<f64>)| -> Result<FileFit, Error> {
-            let file = run(model, values)?;
             // What the file loses of the robot; terms of single logs stay.
-            let pairs = alone.iter().zip(&file);
-            let lost: Vec<Vec<f64>> =
-                pairs.map(|(a, f)| a.iter().zip(f).map(|(a, f)| a - f).collect()).collect();
-            agreement.without(&lost)
+            let pairs = alone.iter().zip(run(model, values)?);
+            agreement.without(pairs.map(|(a, f)| a.iter().zip(&f).map(|(a, f)| a - f).collect()))
         };
         Ok(Some(ExportedLog {
             log: log.name.clone(),

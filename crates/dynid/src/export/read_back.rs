@@ -60,10 +60,8 @@ impl CheckStates {
     /// # Errors
     /// [`Error::Conditioning`]: a log is too short for the filter.
     pub fn logs(logs: &[PreparedLog], state_hz: f64, settings: &ConditioningSettings) -> Result<Self, Error> {
-        let states = logs.iter().map(|log| {
-            let cutoff = state_hz.min(settings.cutoff.state_rate * log.rate_hz);
-            Ok((States::new(log, cutoff, settings)?, log.channels.clone()))
-        });
+        let states =
+            logs.iter().map(|log| Ok((States::of_motion(log, state_hz, settings)?, log.channels.clone())));
         Ok(CheckStates(Kind::Logs(states.collect::<Result<_, Error>>()?)))
     }
 

@@ -28,7 +28,7 @@ impl OwnDelay {
     pub(super) fn take_off(&self, log: &mut PreparedLog) -> Result<(), Error> {
         for effort in &mut log.effort {
             let shifted = shift::shift(effort, self.reference - self.samples);
-            *effort = shifted.map_err(|e| Error::Conditioning(e.into()))?.values;
+            *effort = shifted.map_err(|e| Error::Conditioning(e.into()))?.values.into();
         }
         Ok(())
     }

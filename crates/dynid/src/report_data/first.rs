@@ -61,7 +61,7 @@ impl Identification {
         let Some(log) = logs.position(|a| std::ptr::eq(a, worst)) else { return Ok(None) };
         let Some((joint, why)) = self.drawn_joint(worst) else { return Ok(None) };
         let [measured, predicted] = worst.in_band(joint)?;
-        let steady = if worst.drawn[joint] == worst.predicted[joint] { "" } else { BRIEFLY };
+        let steady = if worst.is_drawn_otherwise(joint) { BRIEFLY } else { "" };
         Ok(Some(report::Judged {
             log,
             unseen: !unseen.is_empty(),

@@ -229,7 +229,7 @@ fn panda_beats_both_published_parameter_sets() {
             let [a, b, c] = FRICTION.map(|row| row[j]);
             let q = dynid::motion::filter::forward_backward(&filter, &prepared.position[j]).unwrap();
             let sigmoid = |v: f64| a / (1.0 + (-b * (v + c)).exp()) - a / (1.0 + (-b * c).exp());
-            for (s, e) in effort.iter_mut().enumerate() {
+            for (s, e) in std::sync::Arc::make_mut(effort).iter_mut().enumerate() {
                 let (before, after) = (s.saturating_sub(1), (s + 1).min(q.len() - 1));
                 let speed = (q[after] - q[before]) * prepared.rate_hz / (after - before) as f64;
                 *e -= sigmoid(speed);

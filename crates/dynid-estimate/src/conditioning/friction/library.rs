@@ -56,7 +56,7 @@ pub(super) fn of_output(output: usize, kinds: &[ShapeKind], states: &[States]) -
     let mut ways = [0usize; 2];
     for log in states {
         let sigma = log.velocity_sigma[output];
-        for v in log.velocity(output) {
+        for v in &log.velocity(output) {
             square += v * v;
             ways[0] += usize::from(*v > LEAST.1 * sigma);
             ways[1] += usize::from(*v < -LEAST.1 * sigma);

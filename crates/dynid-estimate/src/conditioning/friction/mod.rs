@@ -147,7 +147,8 @@ pub fn choose_friction(
     let states = logs
         .iter()
         .map(|log| {
-            States::new(log, state_hz_of(choices.kernel_hz, crossing_hz, log.rate_hz, settings), settings)
+            let cutoff_hz = state_hz_of(choices.kernel_hz, crossing_hz, log.rate_hz, settings);
+            States::of_motion_at(log, cutoff_hz, settings)
         })
         .collect::<Result<Vec<_>, _>>()?;
     let library: Vec<Vec<FrictionShape>> =
