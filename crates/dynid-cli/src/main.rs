@@ -5,6 +5,7 @@
 
 mod args;
 mod commands;
+mod memory;
 mod message;
 mod outputs;
 mod progress;

@@ -9,6 +9,8 @@ use dynid::estimators::conditioning::Stage;
 use dynid::friction::FrictionStep;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::memory;
+
 /// Work of which the end is not known.
 const OPEN: &str = "{spinner} [{elapsed}] {msg}";
 /// Work of so many steps.
@@ -45,6 +47,7 @@ impl Progress {
 
     /// A step of an identification.
     pub(crate) fn step(&self, step: Step) {
+        memory::give_back();
         self.doing(match step {
             Step::Read(file) => format!("reading {file}"),
             Step::Preflight => "examining logs".to_owned(),
