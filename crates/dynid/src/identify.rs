@@ -246,7 +246,7 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
         }
         Route::Textbook => (model, None),
     };
-    let mut warnings = robot.cautions();
+    let mut warnings = robot.cautions(&structure.prior);
     warnings.extend(robot.clearance_warnings().map(|message| {
         let remedy = "`dynid clearance ROBOT dynid-out/estimate.json --log LOG`, with your files, tells the gap and its friction from the effort";
         Caution::warn(caution::CLEARANCE, message, remedy)
@@ -292,7 +292,7 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
     warnings.extend(findings.iter().filter_map(Finding::caution));
     warnings.extend(prior.warnings.iter().map(|message| {
         let remedy = "state mass, centre of mass and inertia of the link in the robot file: `<inertial>` in a URDF, `mass`, `com` and \
-                      `inertia_com` in TOML";
+                      `inertia_com = [xx, xy, xz, yy, yz, zz]` in TOML";
         Caution::warn(caution::ROBOT_FILE, message, remedy)
     }));
     let of_reading = read.iter().flat_map(|log| log.warnings.iter().cloned());

@@ -11,6 +11,7 @@ use crate::Error;
 use crate::caution::{self, Caution};
 use crate::elements::{ElasticFault, ElementPlan};
 use crate::logs::{self, LogAxis};
+use crate::prior::Prior;
 
 /// How a robot file is to be read.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -99,13 +100,22 @@ impl Robot {
         Ok(Robot { path: path.to_owned(), mechanism, closed, axes, elements, file, warnings })
     }
 
-    /// Oddities of the file, each with what mends it.
-    pub(crate) fn cautions(&self) -> Vec<Caution> {
-        let of = |message: &String| {
-            let known = self.mechanism.warnings().iter().find(|w| w.to_string() == *message);
-            Caution::warn(caution::ROBOT_FILE, message, remedy(known))
+    /// Oddities of the file, each with what mends it; without those of bodies of which the prior tells.
+    pub(crate) fn cautions(&self, prior: &Prior) -> Vec<Caution> {
+        let told = |name: &String| {
+            prior.bodies.iter().any(|body| body.links.contains(name) && body.warning().is_some())
         };
-        self.warnings.iter().map(of).collect()
+        let of =
+            |message: &String| {
+                let known = self.mechanism.warnings().iter().find(|w| w.to_string() == *message);
+                match known {
+                    Some(
+                        MechanismWarning::NotPhysical { body, .. } | MechanismWarning::NotStated { body },
+                    ) if told(body) => None,
+                    _ => Some(Caution::warn(caution::ROBOT_FILE, message, remedy(known))),
+                }
+            };
+        self.warnings.iter().filter_map(of).collect()
     }
 
     /// Returns the robot with more joints held still; a motor stands still with its joint.
@@ -221,7 +231,8 @@ fn is_fixed(description: &Description, joint: &str) -> bool {
 fn remedy(warning: Option<&MechanismWarning>) -> &'static str {
     match warning {
         Some(MechanismWarning::NotPhysical { .. } | MechanismWarning::NotStated { .. }) => {
-            "state mass, centre of mass and inertia of the body: `<inertial>` in a URDF, `mass`, `com` and `inertia_com` in TOML"
+            "state mass, centre of mass and inertia of the body: `<inertial>` in a URDF, `mass`, `com` and \
+             `inertia_com = [xx, xy, xz, yy, yz, zz]` in TOML"
         }
         Some(MechanismWarning::MimicIndependent { .. }) => {
             "`couple_mimics = true` in the configuration couples it"

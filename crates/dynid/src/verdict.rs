@@ -433,7 +433,7 @@ fn consistency(id: &Identification) -> Option<(Status, CheckResult)> {
         }
         _ => String::new(),
     };
-    let active = || {
+    let active = {
         let mut names: Vec<String> = found.active.iter().map(|a| format!("`{}`", a.name())).collect();
         names.dedup();
         names.join(", ")
@@ -452,15 +452,14 @@ fn consistency(id: &Identification) -> Option<(Status, CheckResult)> {
                 found.gap
             )
         } else if cost <= CHEAP {
-            format!(
-                "bodies that can exist do about as well as any numbers{each}; held at a limit: {}",
-                active()
-            )
+            let held = if active.is_empty() { String::new() } else { format!("; held at a limit: {active}") };
+            format!("bodies that can exist do about as well as any numbers{each}{held}")
         } else {
+            let acting =
+                if active.is_empty() { String::new() } else { format!(" where these limits act: {active}") };
             format!(
                 "bodies that can exist do worse than numbers without constraints{each}: chance, or something in the model or \
-                 in the log is wrong where these limits act: {}",
-                active()
+                 in the log is wrong{acting}"
             )
         },
     ))

@@ -33,7 +33,7 @@ pub(crate) fn run(args: &InitArgs) -> Result<u8, Failure> {
     Ok(u8::from(!found.open.is_empty()))
 }
 
-/// Asks on a terminal; elsewhere nobody answers.
+/// Asks on a terminal, again after what is no answer; elsewhere nobody answers.
 fn asked(question: &Question) -> Option<String> {
     let stdin = io::stdin();
     if !stdin.is_terminal() || !io::stderr().is_terminal() {
@@ -41,12 +41,16 @@ fn asked(question: &Question) -> Option<String> {
     }
     let mut err = io::stderr().lock();
     // A terminal that cannot be written to cannot ask.
-    write!(err, "{}\n  {} [Enter: leave open]: ", question.text, question.line)
-        .and_then(|()| err.flush())
-        .ok()?;
-    let mut answer = String::new();
-    stdin.read_line(&mut answer).ok()?;
-    Some(answer)
+    writeln!(err, "{}", question.text).ok()?;
+    loop {
+        write!(err, "  {} [Enter: leave open]: ", question.line).and_then(|()| err.flush()).ok()?;
+        let mut answer = String::new();
+        stdin.read_line(&mut answer).ok()?;
+        if answer.trim().is_empty() || question.accepts(&answer) {
+            return Some(answer);
+        }
+        writeln!(err, "  expected {}, found {}", question.expected, answer.trim()).ok()?;
+    }
 }
 
 fn tell(found: &Draft, out: &Path, to_stdout: bool) {

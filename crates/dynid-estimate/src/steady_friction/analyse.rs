@@ -89,7 +89,9 @@ pub fn analyse(points: &[SteadyPoint], settings: &SteadySettings) -> Result<Stea
         Some(t) => temperature_levels(&t, settings.level_tolerance),
         None => {
             notes.push(
-                "no temperature: the law holds for the temperature of the test, whatever it was".to_owned(),
+                "no temperature is logged: the law holds for the temperature of the test alone, and what changes between a \
+                 cold and a warm joint (up to half of its friction) is not in it"
+                    .to_owned(),
             );
             vec![(0..points.len()).collect()]
         }

@@ -4,6 +4,7 @@ use dynid_motion::UniformLog;
 use dynid_report as report;
 use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, Fact, StudySection, StudyTable, Value};
 
+use super::finding::FindingId;
 use super::{Check, CheckedLog, Severity, short};
 use crate::estimate::InputRecord;
 use crate::{Error, VERSION};
@@ -51,8 +52,19 @@ impl Check {
         let count = |severity: Severity| self.findings.iter().filter(|f| f.severity == severity).count();
         let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
         let plural = |n: usize, word: &str| format!("{n} {word}{}", if n == 1 { "" } else { "s" });
+        // A log that no model was tried on is no log that passed.
+        let untried: Vec<String> = self
+            .findings
+            .iter()
+            .filter(|f| f.id == FindingId::NotExamined.name() && f.severity == Severity::Info)
+            .map(|f| short(&f.log))
+            .collect();
         match (errors, warnings) {
-            (0, 0) => "Nothing speaks against identifying from these logs".to_owned(),
+            (0, 0) if untried.is_empty() => "Nothing speaks against identifying from these logs".to_owned(),
+            (0, 0) => format!(
+                "Clock and signals are fine; order, signs and units of the columns were not examined in {}",
+                untried.join(", ")
+            ),
             (0, w) => format!("{}, none of which makes nonsense of an identification", plural(w, "warning")),
             (e, w) => format!(
                 "{} that would make nonsense of an identification, {}",

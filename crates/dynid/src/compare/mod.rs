@@ -21,7 +21,7 @@ use crate::config::{Config, Route};
 use crate::elements::ElementPlan;
 use crate::identify::{ModelFit, Opened, Step, Structure, conditioned, fit_model, open};
 use estimators::{Contestant, contestants};
-pub use record::{ComparedEstimator, Comparison, JointError};
+pub use record::{CompareStatus, ComparedEstimator, Comparison, JointError};
 
 /// Folds of time per log.
 pub const FOLDS: usize = 5;

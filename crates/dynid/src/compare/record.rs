@@ -50,6 +50,20 @@ pub struct ComparedEstimator {
     pub failure: Option<String>,
 }
 
+/// Held-out error of an estimator that predicts well, mean over joints, at most, %.
+const WELL: f64 = 10.0;
+
+/// How well the best estimator of a comparison predicts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CompareStatus {
+    /// Within 10 % of the effort, mean over joints.
+    Well,
+    /// Worse: all estimators fit one model to the same rows, which do not go together.
+    Poorly,
+    /// None could be fitted.
+    NoneFitted,
+}
+
 /// Outcome of [`super::compare()`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
@@ -84,13 +98,25 @@ impl Comparison {
         let level: Vec<&str> =
             self.estimators.iter().skip(1).filter(|e| e.level_with_best).map(|e| e.name.as_str()).collect();
         let error = best.error.unwrap_or(0.0);
-        match level.is_empty() {
-            true => format!("`{}` predicts unseen time best, within {error:.2} % of the effort", best.name),
-            false => format!(
-                "`{}` predicts unseen time best, within {error:.2} % of the effort; level with it: {}",
-                best.name,
-                level.join(", ")
-            ),
+        let level = match level.is_empty() {
+            true => String::new(),
+            false => format!("; level with it: {}", level.join(", ")),
+        };
+        let well = match self.status() {
+            CompareStatus::Well => "",
+            _ => {
+                "; none predicts well, so the model or the logs are at fault, not the estimator: `dynid identify` says more"
+            }
+        };
+        format!("`{}` predicts unseen time best, within {error:.2} % of the effort{level}{well}", best.name)
+    }
+
+    /// How well the best estimator predicts time that it did not see.
+    pub fn status(&self) -> CompareStatus {
+        match self.estimators.first().filter(|e| e.rank.is_some()).and_then(|e| e.error) {
+            Some(error) if error <= WELL => CompareStatus::Well,
+            Some(_) => CompareStatus::Poorly,
+            None => CompareStatus::NoneFitted,
         }
     }
 }

@@ -5,7 +5,7 @@ use dynid_report::{
     Chart, ChartAxis, ChartCurve, CurveStyle, Ranked, Ranking, StudySection, StudyTable, Value,
 };
 
-use super::{ComparedEstimator, Comparison, JointError};
+use super::{CompareStatus, ComparedEstimator, Comparison, JointError};
 use crate::estimate::InputRecord;
 use crate::{Error, VERSION};
 
@@ -50,7 +50,11 @@ impl Comparison {
             ),
             robot: self.robot.clone(),
             verdict: report::Verdict {
-                status: report::Status::Ok,
+                status: match self.status() {
+                    CompareStatus::Well => report::Status::Ok,
+                    CompareStatus::Poorly => report::Status::Warn,
+                    CompareStatus::NoneFitted => report::Status::Fail,
+                },
                 headline: self.headline(),
                 ..report::Verdict::default()
             },

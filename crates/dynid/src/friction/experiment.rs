@@ -37,8 +37,6 @@ pub struct JointExperiment {
     pub pairing: Pairing,
     /// Samples of friction signals, in order of time, logs one after the other.
     pub series: Vec<SteadyPoint>,
-    /// Whether some log has no temperature.
-    pub without_temperature: bool,
     /// What to know about it.
     pub notes: Vec<String>,
 }
@@ -174,7 +172,6 @@ fn passes(
         let warmth = temperature(&signals.name, &grid.channels);
         if warmth.is_none() && !alone.is_empty() {
             missing_temperature(config, &file, &signals.name)?;
-            joint.without_temperature = true;
         }
         found += alone.len();
         for segment in alone {
@@ -215,7 +212,6 @@ fn series(
         let warmth = temperature(&signals.name, loaded.log.channels());
         if warmth.is_none() {
             missing_temperature(config, &file, &signals.name)?;
-            joint.without_temperature = true;
         }
         joint.series.extend(speeds.iter().zip(&signals.effort).enumerate().map(|(k, (speed, friction))| {
             SteadyPoint { speed: *speed, temperature: warmth.map(|t| t[k]), friction: *friction, std: 1.0 }

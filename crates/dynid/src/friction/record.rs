@@ -90,13 +90,6 @@ fn record(joint: &IdentifiedJoint, config: &FrictionConfig) -> JointFrictionMode
             out.notes.insert(0, reason.clone());
         }
     }
-    if joint.experiment.without_temperature {
-        out.notes.push(
-            "no temperature is logged: the law holds for the temperature of the test alone, and what changes between a cold \
-             and a warm joint (up to half of its friction) is not in it"
-                .to_owned(),
-        );
-    }
     bristle(&mut out, joint, config);
     out
 }

@@ -143,6 +143,11 @@ impl Question {
         }
     }
 
+    /// Whether it is an answer: it has the form that is expected, though it may name columns that the log does not have.
+    pub fn accepts(&self, answer: &str) -> bool {
+        self.take(answer, &mut MappingSpec::default())
+    }
+
     /// Puts an answer into a mapping; false: it is no answer.
     pub(super) fn take(&self, answer: &str, spec: &mut MappingSpec) -> bool {
         let answer = answer.trim().trim_matches('"');
