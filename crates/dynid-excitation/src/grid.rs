@@ -76,7 +76,7 @@ pub(crate) struct LimitValue {
 }
 
 /// Nearness of floor and own links: there are many of them, and none moves by more than some 15 cm in one step.
-const NEARNESS_OF_LINKS: f64 = 0.4;
+const NEARNESS_OF_LINKS: f64 = 0.3;
 
 fn nearness(kind: ConstraintKind) -> f64 {
     match kind {

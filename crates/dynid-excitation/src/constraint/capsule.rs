@@ -10,7 +10,7 @@ use dynid_model::{BodyPoint, Dynamics, Mechanism, MotionBlock, Vec3};
 
 use super::cartesian::{add_along, distance_row, resolve};
 use super::clearance::Clearance;
-use super::segment::{Closest, Segment, end_distance, segment_distance};
+use super::segment::{Closest, Segment, dot, end_distance, segment_distance};
 use super::{
     ConstraintError, ConstraintKind, ConstraintRow, DISTANCE_SCALE, PathConstraint, at_poses, finite,
     fixed_base, positive,
@@ -171,7 +171,7 @@ impl Capsules {
         let (a, b) = self.pairs[pair];
         let between = ends[2 * a] + ends[2 * a + 1] - ends[2 * b] - ends[2 * b + 1];
         let reach = self.far + self.radii[pair] + self.halves[a] + self.halves[b];
-        let squared = 0.25 * between.dot(between);
+        let squared = 0.25 * dot(between, between);
         (squared > reach * reach).then(|| squared.sqrt() - reach + self.far)
     }
 

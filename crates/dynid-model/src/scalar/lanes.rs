@@ -1,10 +1,23 @@
 //! Several samples at a time.
 
-use std::array::from_fn;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
 use super::Scalar;
 use super::sine::sin_cos_lanes;
+
+/// Lanes by their index. A loop and no closure: a closure that is not inlined is compiled for any processor, where a fused
+/// multiply-add is a call.
+macro_rules! lanes {
+    ($k:ident => $value:expr) => {{
+        let mut out = [0.0; N];
+        let mut $k = 0;
+        while $k < N {
+            out[$k] = $value;
+            $k += 1;
+        }
+        Lanes(out)
+    }};
+}
 
 /// `N` numbers that move in step, one sample each.
 ///
@@ -18,7 +31,7 @@ impl<const N: usize, const FUSED: bool> Lanes<N, FUSED> {
     #[inline(always)]
     pub fn load(from: &[f64]) -> Self {
         let from = &from[..N];
-        Lanes(from_fn(|k| from[k]))
+        lanes!(k => from[k])
     }
 
     /// Writes `N` consecutive numbers.
@@ -44,7 +57,7 @@ impl<const N: usize, const FUSED: bool> Scalar for Lanes<N, FUSED> {
     }
     #[inline(always)]
     fn recip(self) -> Self {
-        Lanes(self.0.map(|x| 1.0 / x))
+        lanes!(k => 1.0 / self.0[k])
     }
     #[inline(always)]
     fn is_positive_finite(self) -> bool {
@@ -77,19 +90,11 @@ impl<const N: usize, const FUSED: bool> Scalar for Lanes<N, FUSED> {
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, term: Self) -> Self {
-        if FUSED {
-            Lanes(from_fn(|k| self.0[k].mul_add(factor.0[k], term.0[k])))
-        } else {
-            self * factor + term
-        }
+        if FUSED { lanes!(k => self.0[k].mul_add(factor.0[k], term.0[k])) } else { self * factor + term }
     }
     #[inline(always)]
     fn mul_sub(self, factor: Self, term: Self) -> Self {
-        if FUSED {
-            Lanes(from_fn(|k| self.0[k].mul_add(factor.0[k], -term.0[k])))
-        } else {
-            self * factor - term
-        }
+        if FUSED { lanes!(k => self.0[k].mul_add(factor.0[k], -term.0[k])) } else { self * factor - term }
     }
 }
 
@@ -97,7 +102,7 @@ impl<const N: usize, const FUSED: bool> Add for Lanes<N, FUSED> {
     type Output = Self;
     #[inline(always)]
     fn add(self, o: Self) -> Self {
-        Lanes(from_fn(|k| self.0[k] + o.0[k]))
+        lanes!(k => self.0[k] + o.0[k])
     }
 }
 
@@ -105,7 +110,7 @@ impl<const N: usize, const FUSED: bool> Sub for Lanes<N, FUSED> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, o: Self) -> Self {
-        Lanes(from_fn(|k| self.0[k] - o.0[k]))
+        lanes!(k => self.0[k] - o.0[k])
     }
 }
 
@@ -113,7 +118,7 @@ impl<const N: usize, const FUSED: bool> Mul for Lanes<N, FUSED> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
-        Lanes(from_fn(|k| self.0[k] * o.0[k]))
+        lanes!(k => self.0[k] * o.0[k])
     }
 }
 
@@ -121,7 +126,7 @@ impl<const N: usize, const FUSED: bool> Neg for Lanes<N, FUSED> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Lanes(from_fn(|k| -self.0[k]))
+        lanes!(k => -self.0[k])
     }
 }
 
