@@ -321,6 +321,11 @@ impl MappingError {
 }
 
 /// Whether a header has columns that look like motor currents.
-fn holds_currents(header: &[String]) -> bool {
-    header.iter().any(|h| h.starts_with(['i', 'I']) || h.contains("current"))
+/// Whether some column looks like a motor current: `current` in its name, or `i` and a number (`i1`, `I_1`).
+pub fn holds_currents(header: &[String]) -> bool {
+    let is_numbered = |name: &str| {
+        let number = name.strip_prefix('i').map(|rest| rest.strip_prefix('_').unwrap_or(rest));
+        number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+    };
+    header.iter().map(|name| name.to_lowercase()).any(|name| name.contains("current") || is_numbered(&name))
 }

@@ -13,7 +13,7 @@ mod unnamed;
 
 pub use clock::TimeReading;
 pub use degrees::{DegreesEvidence, degrees_suspected};
-pub use error::MappingError;
+pub use error::{MappingError, holds_currents};
 pub use extract::Signals;
 pub use guess::GuessOptions;
 pub use missing::Sparse;

@@ -1,7 +1,9 @@
 //! What logs do not tell.
 
 use dynid_io::LogFileError;
-use dynid_io::columns::{ColumnNames, FullSignal, MappingError, MappingSpec, Signal, SignalSpec, Units};
+use dynid_io::columns::{
+    ColumnNames, FullSignal, MappingError, MappingSpec, Signal, SignalSpec, Units, holds_currents,
+};
 use dynid_io::log::{DecimalMark, Missing};
 
 use crate::Error;
@@ -104,9 +106,7 @@ impl Question {
                     Kind::Names,
                 ),
                 MappingError::NoGain { .. } => gains(&all, joints.len()),
-                MappingError::Missing { signal: Signal::Effort, header, .. }
-                    if header.iter().any(|h| h.to_lowercase().contains("current")) =>
-                {
+                MappingError::Missing { signal: Signal::Effort, header, .. } if holds_currents(header) => {
                     gains(&all, joints.len())
                 }
                 MappingError::Missing { signal: Signal::Position, joints: without, .. }

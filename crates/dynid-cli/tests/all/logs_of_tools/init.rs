@@ -68,7 +68,13 @@ fn degrees_are_written_with_their_reason() {
 #[test]
 fn what_the_log_does_not_tell_is_left_open() {
     // Nobody answers: stdin is no terminal.
-    let log = arm().rows("t,q1,q2,current_1,current_2", |k, t| {
+    for names in ["current_1,current_2", "i1,i2"] {
+        gains_are_left_open(names);
+    }
+}
+
+fn gains_are_left_open(names: &str) {
+    let log = arm().rows(&format!("t,q1,q2,{names}"), |k, t| {
         let Arm { q, tau, .. } = arm();
         format!("{t},{},{},{},{}", q[0][k], q[1][k], tau[0][k] / 11.5, tau[1][k] / 9.0)
     });
