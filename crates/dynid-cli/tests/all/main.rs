@@ -15,6 +15,8 @@ mod faults;
 mod flags;
 mod friction;
 mod logs_of_tools;
+#[cfg(target_os = "linux")]
+mod memory;
 mod online;
 mod other_libraries;
 mod payload;
