@@ -45,7 +45,7 @@ impl Progress {
         self.doing(what);
     }
 
-    /// A step of an identification.
+    /// A step of an identification; what the one before it freed goes back to the system first.
     pub(crate) fn step(&self, step: Step) {
         memory::give_back();
         self.doing(match step {

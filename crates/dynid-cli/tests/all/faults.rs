@@ -113,7 +113,7 @@ fn a_run_that_is_killed_leaves_files_of_one_run() {
 }
 
 #[test]
-#[ignore = "a minute"]
+#[ignore = "400 kills take half a minute; the ordinary run has fewer"]
 fn four_hundred_kills_leave_files_of_one_run() {
     killed(400);
 }
@@ -124,7 +124,7 @@ fn two_runs_at_once_leave_files_of_one() {
 }
 
 #[test]
-#[ignore = "minutes"]
+#[ignore = "200 pairs of runs take a minute; the ordinary run has fewer"]
 fn two_hundred_times_two_runs_leave_files_of_one() {
     at_once(200);
 }

@@ -94,18 +94,6 @@ impl States {
         })
     }
 
-    /// States at a cut-off that counts up to what the sample rate of the log allows.
-    ///
-    /// # Errors
-    /// Fails as [`States::new`] does.
-    pub fn of(
-        log: &PreparedLog,
-        state_hz: f64,
-        settings: &ConditioningSettings,
-    ) -> Result<States, ConditioningError> {
-        States::new(log, state_hz.min(settings.cutoff.state_rate * log.rate_hz), settings)
-    }
-
     /// States at a cut-off that counts up to what the sample rate of the log allows, without efforts.
     ///
     /// # Errors

@@ -56,18 +56,26 @@ impl Check {
         let untried: Vec<String> = self
             .findings
             .iter()
-            .filter(|f| f.id == FindingId::NotExamined.name() && f.severity == Severity::Info)
+            .filter(|f| f.id == FindingId::NotExamined.name())
             .map(|f| short(&f.log))
             .collect();
+        let untried = match untried.is_empty() {
+            true => String::new(),
+            false => {
+                format!("; order, signs and units of the columns were not examined in {}", untried.join(", "))
+            }
+        };
         match (errors, warnings) {
             (0, 0) if untried.is_empty() => "Nothing speaks against identifying from these logs".to_owned(),
-            (0, 0) => format!(
-                "Clock and signals are fine; order, signs and units of the columns were not examined in {}",
-                untried.join(", ")
-            ),
-            (0, w) => format!("{}, none of which makes nonsense of an identification", plural(w, "warning")),
+            (0, 0) => format!("Clock and signals are fine{untried}"),
+            (0, w) => {
+                format!(
+                    "{}, none of which makes nonsense of an identification{untried}",
+                    plural(w, "warning")
+                )
+            }
             (e, w) => format!(
-                "{} that would make nonsense of an identification, {}",
+                "{} that would make nonsense of an identification, {}{untried}",
                 plural(e, "fault"),
                 plural(w, "warning")
             ),

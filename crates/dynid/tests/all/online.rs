@@ -232,7 +232,7 @@ fn motion_beyond_what_was_learned_raises_no_alarm() {
 }
 
 #[test]
-#[ignore = "minutes"]
+#[ignore = "200 sessions take 20 s; the ordinary run has fewer"]
 fn two_hundred_stationary_logs_raise_alarms_at_the_stated_rate() {
     let found = stationary(1000..1200, false);
     println!("{found:?}");

@@ -68,7 +68,7 @@ fn commands_print_what_the_pages_show() {
 }
 
 #[test]
-#[ignore = "minutes: studies and other long commands"]
+#[ignore = "most of a minute: studies and other long commands of the book"]
 fn long_commands_print_what_the_pages_show() {
     demand_none(&console::run_all(&pages(), true));
 }
