@@ -145,6 +145,11 @@ pub struct Log {
 }
 
 impl Log {
+    /// Times, joints and channels.
+    pub fn into_parts(self) -> (Vec<f64>, Vec<JointSignals>, Vec<Channel>) {
+        (self.time, self.joints, self.channels)
+    }
+
     /// Checks and takes the signals. `time` in s; fails as [`LogError`] says.
     pub fn new(
         name: impl Into<String>,

@@ -122,7 +122,7 @@ pub fn backlash(
     let mut out = Vec::new();
     for entry in log_entries {
         let prepared =
-            logs::load(entry, &logs::axes(&model), columns, motor_side)?.prepare(&model, &settings)?;
+            logs::load(entry, &crate::log::axes(&model), columns, motor_side)?.prepare(&model, &settings)?;
         let agreement = compare(&model, &values, &prepared, &alignment, &settings)?;
         let cutoff = alignment.state_hz.min(settings.cutoff.state_rate * prepared.rate_hz);
         let states = States::new(&prepared, cutoff, &settings)?;

@@ -5,7 +5,7 @@ use dynid_io::closest;
 use dynid_model::{EffortModel, RobotModel};
 
 use crate::Error;
-use crate::config::BoundConfig;
+use crate::settings::BoundConfig;
 
 /// A range that leaves no room is given this much, relative to its size: the interior-point method needs an interior.
 const ROOM: f64 = 1e-6;

@@ -131,7 +131,8 @@ pub fn clearance(
     }
     let log = LogConfig { columns: None, ..log.clone() };
     let settings = ConditioningSettings::default();
-    let prepared = logs::load(&log, &logs::axes(&model), &columns, motor_side)?.prepare(&model, &settings)?;
+    let prepared =
+        logs::load(&log, &crate::log::axes(&model), &columns, motor_side)?.prepare(&model, &settings)?;
     let values = estimate.values(Split::Consistent);
     let alignment = Alignment {
         state_hz: estimate.model.state_hz,

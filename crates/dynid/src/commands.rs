@@ -2,8 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::config::Config;
-
 /// Robot, logs and configuration of a run.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct RunFiles {
@@ -16,15 +14,6 @@ pub struct RunFiles {
 }
 
 impl RunFiles {
-    /// Files that a configuration names.
-    pub fn of(config: &Config) -> Self {
-        RunFiles {
-            config: config.file.clone(),
-            robot: config.robot.clone(),
-            logs: config.log.iter().map(|log| log.path.clone()).collect(),
-        }
-    }
-
     /// The configuration, or robot and logs, as arguments of a command that takes either.
     pub fn arguments(&self) -> String {
         match &self.config {

@@ -1,38 +1,30 @@
 //! The configuration of a run, a TOML file.
 
-mod effect;
-mod estimator;
-mod friction;
 mod instruments;
 mod kind;
-mod log_terms;
 mod online;
-mod per_joint;
+mod settings;
 pub(crate) mod toml_file;
 
-pub(crate) use effect::serde_name;
-pub use estimator::{
-    BoundConfig, Consistency, EstimatorConfig, Method, PriorDistance, ShapeConfig, Variances,
-};
-pub use friction::{Friction, FrictionErrors};
-pub(crate) use instruments::reference_channel;
-pub use instruments::{InstrumentsConfig, NominalModel, ReferenceColumns};
+pub use instruments::{InstrumentsConfig, ReferenceColumns};
 pub use kind::is_configuration;
-pub(crate) use log_terms::MASSES;
-pub use log_terms::{Own, PayloadConfig, RATED_MASS};
 pub use online::{ForgettingRule, OnlineConfig};
-pub use per_joint::PerJoint;
-pub(crate) use per_joint::known;
+
+pub use crate::estimate::MotorSide;
+pub use crate::settings::{
+    BoundConfig, ConditioningConfig, Consistency, EstimatorConfig, Friction, FrictionErrors, Method,
+    NominalModel, Own, PayloadConfig, PerJoint, Preflight, PriorDistance, RATED_MASS, Route, ShapeConfig,
+    Variances,
+};
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use dynid_estimate::conditioning::{ConditioningSettings, TextbookRoute};
 use dynid_io::{CouplingForm, MappingSpec};
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 use crate::Error;
+use crate::settings::lists;
 
 /// What is to be identified from which logs, and how. Every key but `robot` and `log` has a default.
 #[derive(Debug, Clone, Default, Deserialize, PartialEq)]
@@ -48,7 +40,7 @@ pub struct Config {
     /// Seed of everything random (states of the structural analysis). Default 1.
     pub seed: Option<u64>,
     /// Gravity in base axes, m/s². Default: the robot file's, else 0 0 -9.81.
-    #[serde(deserialize_with = "exactly")]
+    #[serde(deserialize_with = "lists::exactly")]
     pub gravity: Option<[f64; 3]>,
     /// Couple mimic joints to their leaders. Default false.
     pub couple_mimics: Option<bool>,
@@ -132,17 +124,6 @@ pub struct CouplingConfig {
     pub form: CouplingForm,
 }
 
-/// Transmission between the motors that a log records and the joints: `q_motor = matrix · (q - offset)`,
-/// `effort_joint = matrixᵀ · effort_motor`.
-#[derive(Debug, Clone, Default, Deserialize, PartialEq, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct MotorSide {
-    /// Transmission matrix, one row per motor, one column per joint.
-    pub matrix: Vec<Vec<f64>>,
-    /// Joint position at motor position zero, rad or m. Default: zeros.
-    pub offset: Vec<f64>,
-}
-
 /// One log file.
 #[derive(Debug, Clone, Default, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
@@ -150,10 +131,10 @@ pub struct LogConfig {
     /// CSV or CSV.gz, relative to the configuration.
     pub path: PathBuf,
     /// First and last data row, from 1, both included. Default: all.
-    #[serde(deserialize_with = "pair")]
+    #[serde(deserialize_with = "lists::pair")]
     pub rows: Option<(usize, usize)>,
     /// First and last part of the record to use, as shares of its rows, e.g. `[0.0, 0.7]`. Default: all.
-    #[serde(deserialize_with = "pair")]
+    #[serde(deserialize_with = "lists::pair")]
     pub part: Option<(f64, f64)>,
     /// Data rows to leave out, from 1, each range with both ends, e.g. `[[120, 180]]`; what borders on them is not used
     /// either. Default: none.
@@ -178,62 +159,6 @@ pub struct LogConfig {
     pub own: Vec<Own>,
     /// Of a validation log: the training log whose own terms it shares. Default: none.
     pub like: Option<String>,
-}
-
-/// What an identification does about what its pre-flight finds ([`crate::check`]).
-#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
-#[serde(rename_all = "lowercase")]
-pub enum Preflight {
-    /// Refuses logs of which nonsense would come; warns of the rest.
-    #[default]
-    Refuse,
-    /// Warns.
-    Warn,
-    /// Is not made.
-    Off,
-}
-
-/// Which way from samples to rows.
-#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
-#[serde(rename_all = "lowercase")]
-pub enum Route {
-    /// States at a high cut-off, then one compact kernel over columns and effort; everything found from the data.
-    #[default]
-    Compact,
-    /// Zero-phase Butterworth, central differences, decimation.
-    Textbook,
-}
-
-/// Share of samples that a mask must leave for instruments: few rows of sure signs are better than many of doubtful ones.
-const LEAST_USABLE_BY_INSTRUMENTS: f64 = 0.05;
-
-/// Settings of the conditioning; those left out are found from the data.
-#[derive(Debug, Clone, Default, Deserialize, Serialize, PartialEq)]
-#[serde(deny_unknown_fields, default)]
-pub struct ConditioningConfig {
-    /// Route. Default `compact`.
-    pub route: Route,
-    /// Cut-off of the widest kernel, Hz; on the textbook route the cut-off of the filter (default 10).
-    pub kernel_hz: Option<f64>,
-    /// Cut-off of the state filter, Hz.
-    pub state_hz: Option<f64>,
-    /// Delay of the motion behind the logged effort, samples.
-    pub delay_samples: Option<f64>,
-    /// Reversal mask as a share of rms speed; negative: none. Default: found; 0 for instrumental variables, which noise in signs
-    /// of velocities biases: speeds within four standard deviations of their noise are left out.
-    pub reversal_mask: Option<f64>,
-    /// Remove spikes. Default true.
-    pub remove_spikes: Option<bool>,
-    /// Length of the time blocks behind standard deviations, s. Default 1.
-    pub block_s: Option<f64>,
-    /// Textbook route: keep every n-th row.
-    pub decimation: Option<usize>,
-    /// Textbook route: filter columns and effort before rows are dropped (MATLAB's `decimate`). Default false.
-    pub parallel_filter: Option<bool>,
-    /// Textbook route: filter the effort like the positions. Default true.
-    pub filter_effort: Option<bool>,
-    /// Textbook route: cut from both ends, s. Default 0.2.
-    pub trim_s: Option<f64>,
 }
 
 impl Config {
@@ -321,47 +246,16 @@ impl Config {
     /// # Errors
     /// [`Error::Setting`], [`Error::Coupling`].
     pub fn check(&self) -> Result<(), Error> {
-        let c = &self.conditioning;
-        for (name, value) in [("kernel_hz", c.kernel_hz), ("state_hz", c.state_hz), ("block_s", c.block_s)] {
-            if let Some(x) = value
-                && !(x.is_finite() && x > 0.0)
-            {
-                return Err(Error::setting(name, "a positive number", x));
-            }
-        }
-        for (name, value) in [("delay_samples", c.delay_samples), ("reversal_mask", c.reversal_mask)] {
-            if let Some(x) = value
-                && !(x.is_finite() && x.abs() <= 1e4)
-            {
-                return Err(Error::setting(name, "a number of moderate size", x));
-            }
-        }
-        if let Some(x) = c.trim_s
-            && !(x.is_finite() && x >= 0.0)
-        {
-            return Err(Error::setting("trim_s", "a number that is not negative", x));
-        }
-        if c.decimation == Some(0) {
-            return Err(Error::setting("decimation", "at least 1", 0));
-        }
         if let Some(g) = self.gravity
             && !g.iter().all(|x| x.is_finite())
         {
             return Err(Error::setting("gravity", "three finite numbers", format!("{g:?}")));
         }
-        for coupling in &self.coupling {
-            if !coupling.matrix.iter().flatten().all(|x| x.is_finite()) {
-                return Err(Error::Coupling {
-                    joints: coupling.joints.join(", "),
-                    fault: format!("expected finite numbers in the matrix, found {:?}", coupling.matrix),
-                });
-            }
-        }
+        self.plain_settings().check()?;
+        self.check_logs()?;
         self.elements.check()?;
         self.online.check()?;
-        self.check_log_terms()?;
-        self.check_estimator()?;
-        self.check_instruments()?;
+        self.instruments.iter().try_for_each(InstrumentsConfig::check)?;
         for (joint, position) in &self.locked {
             if !position.is_finite() {
                 return Err(Error::setting(&format!("locked.{joint}"), "a finite number", position));
@@ -402,53 +296,6 @@ impl Config {
         };
         self.log.iter().map(|log| if own(log) { log.clone() } else { with_run(log) }).collect()
     }
-
-    /// Checks the given cut-offs against the sample rate of a log.
-    ///
-    /// # Errors
-    /// [`Error::Cutoff`].
-    pub fn check_cutoffs(&self, file: &str, rate_hz: f64) -> Result<(), Error> {
-        let c = &self.conditioning;
-        for (name, value) in [("kernel_hz", c.kernel_hz), ("state_hz", c.state_hz)] {
-            if let Some(found) = value
-                && found >= 0.5 * rate_hz
-            {
-                return Err(Error::Cutoff { file: file.to_owned(), name: name.to_owned(), rate_hz, found });
-            }
-        }
-        Ok(())
-    }
-
-    /// Settings of the compact route.
-    pub fn conditioning_settings(&self) -> ConditioningSettings {
-        let c = &self.conditioning;
-        let defaults = ConditioningSettings::default();
-        let instruments = self.estimator.method == Method::Iv;
-        ConditioningSettings {
-            kernel_hz: c.kernel_hz,
-            state_hz: c.state_hz,
-            delay_samples: c.delay_samples,
-            reversal_mask: c.reversal_mask.or(instruments.then_some(0.0)),
-            least_usable: if instruments { LEAST_USABLE_BY_INSTRUMENTS } else { defaults.least_usable },
-            remove_spikes: c.remove_spikes.unwrap_or(defaults.remove_spikes),
-            block_s: c.block_s.unwrap_or(defaults.block_s),
-            ..defaults
-        }
-    }
-
-    /// Settings of the textbook route.
-    pub fn textbook_route(&self) -> TextbookRoute {
-        let c = &self.conditioning;
-        let defaults = TextbookRoute::default();
-        TextbookRoute {
-            cutoff_hz: c.kernel_hz.unwrap_or(defaults.cutoff_hz),
-            decimation: c.decimation,
-            parallel_filter: c.parallel_filter.unwrap_or(defaults.parallel_filter),
-            filter_effort: c.filter_effort.unwrap_or(defaults.filter_effort),
-            trim_s: c.trim_s.unwrap_or(defaults.trim_s),
-            ..defaults
-        }
-    }
 }
 
 impl ElementsConfig {
@@ -482,26 +329,4 @@ fn check_motion(trajectory: Option<&Path>, period_s: Option<f64>) -> Result<(), 
         }
         _ => Ok(()),
     }
-}
-
-/// A list of just so many entries; serde's own arrays and tuples pass over surplus ones.
-pub(crate) fn exactly<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
-    deserializer: D,
-) -> Result<Option<[T; N]>, D::Error> {
-    just(deserializer).map(Some)
-}
-
-/// A list of so many numbers that must be given.
-pub(crate) fn just<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
-    deserializer: D,
-) -> Result<[T; N], D::Error> {
-    let list = Vec::<T>::deserialize(deserializer)?;
-    <[T; N]>::try_from(list)
-        .map_err(|list| D::Error::custom(format!("expected a list of {N} numbers, found {}", list.len())))
-}
-
-pub(crate) fn pair<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
-    deserializer: D,
-) -> Result<Option<(T, T)>, D::Error> {
-    Ok(exactly(deserializer)?.map(|[lower, upper]| (lower, upper)))
 }

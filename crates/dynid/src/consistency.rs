@@ -2,19 +2,20 @@
 
 use dynid_estimate::conditioning::ReducedGroup;
 use dynid_estimate::consistent::{
-    Bound, ConsistentEstimate, Form, LinkPrior, Problem, ScalarPrior, Settings, estimate,
+    self as bodies, Bound, ConsistentEstimate, Form, LinkPrior, ScalarPrior, estimate,
 };
 use dynid_estimate::folds::FoldSettings;
 use dynid_estimate::held_out::{Comparison, Estimator, compare};
 use dynid_estimate::identifiability::{excited_regrouping, posterior};
 use dynid_estimate::linear::ols;
 use dynid_estimate::{Factor, Mat};
-use dynid_model::{BaseParameters, EffortModel, RobotModel};
+use dynid_model::{EffortModel, RobotModel};
 
 use crate::Error;
-use crate::config::{Config, Consistency, PriorDistance};
 use crate::fitting::Fitted;
+use crate::identify::{Problem, Structure};
 use crate::prior::Prior;
+use crate::settings::{Consistency, PriorDistance};
 use crate::shape;
 
 /// Index of the unconstrained estimate in [`Consistent::held_out`].
@@ -72,17 +73,13 @@ impl Consistent {
 ///
 /// # Errors
 /// [`Error::Consistency`].
-#[expect(clippy::too_many_arguments, reason = "one call site; the arguments are the whole problem")]
 pub(crate) fn consistent(
-    config: &Config,
-    model: &RobotModel,
-    base: &BaseParameters,
-    regrouping: &Mat<f64>,
-    prior: &Prior,
-    bounds: &[Bound],
+    asked: &Problem,
     fitted: &Fitted,
     groups: &[ReducedGroup],
 ) -> Result<Consistent, Error> {
+    let Problem { model, structure: Structure { base, regrouping, prior, bounds, .. }, .. } = asked;
+    let estimator = &asked.settings.estimator;
     let prior_base = base.values(&prior.values);
     let linear = |training: &Factor| -> Vec<f64> {
         // Base parameters that a fold does not excite keep the prior's value.
@@ -95,7 +92,7 @@ pub(crate) fn consistent(
     let training = &fitted.estimate.reduced;
     let groups: Vec<ReducedGroup> = groups.iter().map(|g| g.coarsened(fitted.merged_blocks)).collect();
     let folds = FoldSettings::default();
-    let Some(form) = form(config) else {
+    let Some(form) = form(estimator.consistency) else {
         let held_out = compare(&groups, training, &weights, base.len(), &folds, &[&linear]);
         let values = unconstrained.clone();
         return Ok(Consistent {
@@ -108,15 +105,19 @@ pub(crate) fn consistent(
         });
     };
     let problem = |factor: &Factor| problem(model, regrouping, factor, prior, bounds);
-    let trials: Vec<f64> = match config.estimator.prior_weight {
+    let trials: Vec<f64> = match estimator.prior_weight {
         Some(weight) => vec![weight],
         None => LADDER.iter().map(|share| share * fitted.inflation).collect(),
     };
-    let settings: Vec<Settings> = trials
+    let settings: Vec<bodies::Settings> = trials
         .iter()
-        .map(|weight| match config.estimator.prior {
-            PriorDistance::Quadratic => Settings { form, gaussian_weight: *weight, ..Settings::default() },
-            PriorDistance::Entropic => Settings { form, entropic_weight: *weight, ..Settings::default() },
+        .map(|weight| match estimator.prior {
+            PriorDistance::Quadratic => {
+                bodies::Settings { form, gaussian_weight: *weight, ..bodies::Settings::default() }
+            }
+            PriorDistance::Entropic => {
+                bodies::Settings { form, entropic_weight: *weight, ..bodies::Settings::default() }
+            }
         })
         .collect();
     let whole = problem(&fitted.estimate.factor);
@@ -163,8 +164,9 @@ fn unconstrained(regrouping: &Mat<f64>, prior: &Prior, fitted: &Fitted) -> Optio
     split.map(|p| p.mean)
 }
 
-pub(crate) fn form(config: &Config) -> Option<Form> {
-    match config.estimator.consistency {
+/// The form of a consistency; `None` without.
+pub fn form(consistency: Consistency) -> Option<Form> {
+    match consistency {
         Consistency::PseudoInertia => Some(Form::PseudoInertia),
         Consistency::SpatialInertia => Some(Form::SpatialInertia),
         Consistency::None => None,
@@ -178,7 +180,7 @@ pub(crate) fn problem(
     factor: &Factor,
     prior: &Prior,
     bounds: &[Bound],
-) -> Problem {
+) -> bodies::Problem {
     let bodies = model.mechanism().bodies();
     let payloads = prior.payloads.iter().map(|p| LinkPrior {
         name: p.name.clone(),
@@ -226,7 +228,7 @@ pub(crate) fn problem(
         bounds.extend(p.lower.filter(|l| *l != 0.0).map(|l| limit("≥", -1.0, l)));
         bounds.extend(p.upper.map(|u| limit("≤", 1.0, u)));
     }
-    Problem {
+    bodies::Problem {
         r: factor.r_matrix() * regrouping,
         z: factor.z(),
         links,

@@ -10,8 +10,8 @@ use dynid_model::{EffortModel, MotionBlock, RegressorBlock, RobotModel};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::config::MASSES;
 use crate::prior::{Origin, Prior};
+use crate::settings::MASSES;
 
 /// Gravity counts from this share of what stated bodies weigh at their size on (root mean square over the joints).
 pub(crate) const GRAVITY_SHARE: f64 = 0.02;

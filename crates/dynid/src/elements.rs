@@ -26,7 +26,7 @@ use dynid_model::element::{
 use dynid_model::{Coordinate, JointKind, Mechanism};
 
 use crate::Error;
-use crate::friction::KnownFriction;
+use crate::known_friction::KnownFriction;
 use crate::log_terms::LogTerms;
 
 /// Element names that a robot file or a configuration may use.

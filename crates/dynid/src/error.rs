@@ -289,6 +289,26 @@ pub enum Error {
     /// Friction experiments cannot be evaluated.
     #[error("{0}")]
     Friction(#[from] Box<crate::friction::FrictionError>),
+    /// No joint of the robot has a known friction law.
+    #[error("{file}: expected a friction law of {}, found {}", joints.join(", "), if stated.is_empty() { "none".to_owned() } else { format!("usable ones of none of these (joints of the file: {})", stated.join(", ")) })]
+    NoKnownFriction {
+        /// Where the laws come from.
+        file: String,
+        /// Joints there.
+        stated: Vec<String>,
+        /// Moving joints of the robot.
+        joints: Vec<String>,
+    },
+    /// A coefficient of known friction makes no sense.
+    #[error("{file}: joint `{joint}`: {fault}")]
+    KnownFriction {
+        /// Where the law comes from.
+        file: String,
+        /// Joint.
+        joint: String,
+        /// What is wrong.
+        fault: String,
+    },
     /// A setting has a value that makes no sense.
     #[error("setting `{name}`: expected {expected}, found {found}")]
     Setting {
@@ -383,6 +403,10 @@ impl Error {
             ),
             Error::Elastic { fault, .. } => Some(fault.hint().to_owned()),
             Error::Friction(e) => e.hint(),
+            Error::NoKnownFriction { .. } => Some(
+                "a friction file of this robot names its joints; laws with status `invalid` are not used".to_owned(),
+            ),
+            Error::KnownFriction { .. } => Some("run `dynid friction` again, or correct the coefficient".to_owned()),
             Error::Design(dynid_excitation::ProblemError::RankDeficient { .. }) => Some(
                 "widen the limits that leave so little motion, or leave out elements that it cannot show".to_owned(),
             ),

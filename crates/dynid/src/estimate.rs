@@ -6,6 +6,7 @@ mod friction;
 mod instruments;
 mod loops;
 mod model;
+mod reading;
 mod trust;
 
 pub use counts::{BaseCounts, ParameterCounts, ShapeCounts, StandardCounts};
@@ -14,6 +15,7 @@ pub use friction::{FrictionTrial, PassivityRecord};
 pub use instruments::{EffectRecord, ExogeneityRecord, InstrumentRecord};
 pub use loops::{ClosureRecord, FrameRecord, LoopsRecord};
 pub use model::{CouplingRecord, JointRecord, LinkRecord, ModelRecord, SettingRecord};
+pub use reading::{MotorSide, ReadingRecord};
 pub use trust::{
     ConsistencyRecord, HeldOutRecord, PrecisionRecord, PruningRecord, PruningStep, WhitenessRecord,
 };
@@ -30,7 +32,6 @@ use crate::effort_scale::EffortScale;
 use crate::identify::OwnDelay;
 use crate::log_agreement::LogAgreement;
 use crate::overlap::Overlaps;
-pub use crate::provenance::ReadingRecord;
 use crate::stiffness::JointStiffness;
 
 /// Version of the file's layout.
@@ -508,15 +509,13 @@ pub struct InputRecord {
 }
 
 impl Estimate {
-    /// Reads an estimate file.
+    /// An estimate from the bytes of its file, `file` in messages.
     ///
     /// # Errors
-    /// [`Error::Read`], [`Error::EstimateFile`].
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        let text =
-            dynid_io::input::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
-        let fault = |message: String| Error::EstimateFile { file: path.display().to_string(), message };
-        let estimate: Estimate = serde_json::from_slice(&text).map_err(|e| fault(e.to_string()))?;
+    /// [`Error::EstimateFile`].
+    pub fn parse(text: &[u8], file: &str) -> Result<Self, Error> {
+        let fault = |message: String| Error::EstimateFile { file: file.to_owned(), message };
+        let estimate: Estimate = serde_json::from_slice(text).map_err(|e| fault(e.to_string()))?;
         if estimate.schema != SCHEMA {
             return Err(fault(format!("expected schema {SCHEMA}, found {}", estimate.schema)));
         }

@@ -1,8 +1,6 @@
 //! The linear fit of a run: method, weights, covariance.
 
-use dynid_estimate::conditioning::{
-    Conditioning, ConditioningSettings, LogRows, PreparedLog, ReducedGroup, textbook_rows,
-};
+use dynid_estimate::conditioning::{Conditioning, LogRows, PreparedLog, ReducedGroup, textbook_rows};
 use dynid_estimate::covariance::{
     BlockLength, BlockLengthSettings, MIN_BLOCKS, ResidualSignal, block_length, output_inflation,
     variance_inflation,
@@ -19,8 +17,9 @@ use dynid_model::{BaseParameters, EffortModel, RobotModel};
 use crate::Error;
 use crate::agreement::Agreement;
 use crate::bounds;
-use crate::config::{Config, EstimatorConfig, Method, Variances};
+use crate::identify::Problem;
 use crate::prior::Prior;
+use crate::settings::{EstimatorConfig, Method, Settings, Variances};
 
 /// Joints whose variance inflation differs by more than this are deflated one by one.
 const UNEQUAL: f64 = 2.0;
@@ -91,19 +90,23 @@ impl Fitted {
     }
 }
 
-/// Rows of the final fit, whichever the route.
+/// Rows of the final fit of a problem, whichever the route.
+///
+/// # Errors
+/// [`Error::Conditioning`].
 pub(crate) fn rows<'a>(
-    config: &Config,
-    model: &'a RobotModel,
-    shape: &'a [f64],
-    kept: &[usize],
-    logs: &'a [PreparedLog],
+    problem: &'a Problem,
     conditioning: Option<&Conditioning>,
-    settings: &ConditioningSettings,
 ) -> Result<Box<dyn RowSource + 'a>, Error> {
+    let Problem { model, structure, logs, settings, .. } = problem;
+    let (shape, kept) = (&structure.shape, &structure.base.kept);
+    let conditioned = settings.conditioning_settings();
     Ok(match conditioning {
-        Some(found) => Box::new(LogRows::new(model, shape, kept, logs, found, settings)?),
-        None => Box::new(textbook_rows(model, shape, kept, logs, &config.textbook_route(), settings)?),
+        Some(found) => Box::new(LogRows::new(model, shape, kept, logs, found, &conditioned)?),
+        None => {
+            let route = settings.textbook_route();
+            Box::new(textbook_rows(model, shape, kept, logs, &route, &conditioned)?)
+        }
     })
 }
 
@@ -111,8 +114,8 @@ pub(crate) fn rows<'a>(
 ///
 /// # Errors
 /// [`Error::TooShort`], [`Error::Linear`].
-pub(crate) fn fit(
-    config: &Config,
+pub fn fit(
+    settings: &Settings,
     columns: usize,
     method: &LinearMethod,
     source: &dyn RowSource,
@@ -121,21 +124,21 @@ pub(crate) fn fit(
     let rows: usize = groups.iter().map(|g| g.rows()).sum();
     if rows <= columns {
         return Err(Error::TooShort {
-            file: config.log[0].path.display().to_string(),
+            file: settings.files.logs.first().map_or_else(String::new, |log| log.display().to_string()),
             message: format!(
                 "{rows} usable rows for {} parameters, expected more rows than parameters",
                 columns
             ),
         });
     }
-    let estimate = estimate(&groups, Some(source), columns, method, &linear_settings(config))?;
+    let estimate = estimate(&groups, Some(source), columns, method, &linear_settings(settings))?;
     Ok((estimate, groups))
 }
 
 /// Settings of linear estimators that a run asks for.
-pub(crate) fn linear_settings(config: &Config) -> LinearSettings {
+pub(crate) fn linear_settings(settings: &Settings) -> LinearSettings {
     LinearSettings {
-        sharing: match config.estimator.variances {
+        sharing: match settings.estimator.variances {
             Variances::Group => VarianceSharing::Group,
             Variances::JointAndLog => VarianceSharing::JointAndLog,
             Variances::Joint => VarianceSharing::Joint,
@@ -145,6 +148,7 @@ pub(crate) fn linear_settings(config: &Config) -> LinearSettings {
 }
 
 /// Residuals of the widest kernel's rows.
+#[derive(Debug)]
 pub(crate) struct RowResiduals {
     /// Log, output and residuals.
     groups: Vec<(usize, usize, GroupResiduals)>,

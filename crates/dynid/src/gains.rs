@@ -18,10 +18,11 @@ use crate::config::{Config, Own, PayloadConfig, Route};
 use crate::elements::ElementPlan;
 use crate::estimate::InputRecord;
 use crate::fitting::{self, Fitted};
-use crate::identify::{Step, plan_elements, read_logs};
+use crate::identify::{Step, TrainingLog, held_where_not_logged, plan_elements};
+use crate::log::Log;
 use crate::log_terms::{LogTerms, known_inertia};
-use crate::logs::LoadedLog;
-use crate::robot::{Robot, RobotOptions, refuse_internal_load};
+use crate::robot::{Robot, refuse_internal_load};
+use crate::run::{load_robot, read_training};
 use crate::trust::interval_quantile;
 
 /// Drive gains, with the fit that they come from.
@@ -66,22 +67,21 @@ pub fn identify_gains(config: &Config, progress: &mut dyn FnMut(Step)) -> Result
         let why = format!("drive gains beside `own = [\"{}\"]`: take `offset` and `friction`", own.word());
         return Err(Error::Unsupported(why));
     }
-    let settings = config.conditioning_settings();
     progress(Step::Read(config.robot.display().to_string()));
-    let options = RobotOptions {
-        gravity: config.gravity,
-        couple_mimics: config.couple_mimics.unwrap_or(false),
-        floating_base: false,
-        locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
-    };
-    let robot = Robot::load(&config.robot, &options)?;
+    let robot = load_robot(config)?;
     refuse_internal_load(&robot, "identified")?;
-    let (robot, mut loaded) = read_logs(config, &config.training_logs(), robot, progress)?;
+    let mut loaded = read_training(config, &robot, progress)?;
+    let robot = held_where_not_logged(robot, &loaded)?;
+    let asked = config.settings()?;
+    let settings = asked.conditioning_settings();
+    let training: Vec<TrainingLog> = (loaded.iter().zip(config.log_labels()))
+        .map(|(log, label)| TrainingLog { label, settings: log.settings.clone(), reference: None })
+        .collect();
     let scale = common_scale(&loaded)?;
-    let mut plan = plan_elements(config, &robot, &loaded)?;
-    let terms = LogTerms::of(config, &robot)?;
-    for ((loaded, log), label) in loaded.iter_mut().zip(&config.log).zip(config.log_labels()) {
-        loaded.log = terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
+    let mut plan = plan_elements(&asked, &robot, &loaded)?;
+    let terms = LogTerms::of(&asked, &training, &robot)?;
+    for (log, TrainingLog { label, settings, .. }) in loaded.iter_mut().zip(&training) {
+        log.log = terms.with_gates(log.log.clone(), Some(label), settings.payload.as_deref());
     }
     let body = terms.payloads[0].body;
     plan.log_terms = terms.without_payloads();
@@ -97,7 +97,7 @@ pub fn identify_gains(config: &Config, progress: &mut dyn FnMut(Step)) -> Result
     })?;
     progress(Step::Fit);
     let source = LogRows::new(&apart, &shape, &base.kept, &prepared, &choices, &settings)?;
-    let (fit, _) = fitting::fit(config, base.len(), &LinearMethod::Wls, &source)?;
+    let (fit, _) = fitting::fit(&asked, base.len(), &LinearMethod::Wls, &source)?;
     let residuals = fitting::residuals(&source, &fit)?;
     drop(source);
     let fitted = fitting::with_precision(fit, &residuals, &prepared, config.conditioning.block_s.is_some());
@@ -109,7 +109,7 @@ pub fn identify_gains(config: &Config, progress: &mut dyn FnMut(Step)) -> Result
     }
     let name = model.mechanism().name().to_owned();
     let mut inputs = InputRecord::of_robot(&robot);
-    inputs.extend(InputRecord::of_logs(&loaded));
+    inputs.extend(loaded.iter().flat_map(|log| log.source.inputs.iter().cloned()));
     inputs.extend(plan.known_source.iter().map(|source| InputRecord::of("friction", source)));
     Ok(GainIdentification { fitted, joints, payload: payload.clone(), warnings, robot: name, inputs })
 }
@@ -130,7 +130,7 @@ fn known_payload(config: &Config) -> Result<&PayloadConfig, Error> {
 }
 
 /// Factors from the columns of the drives to efforts, the same in all logs.
-fn common_scale(loaded: &[LoadedLog]) -> Result<Vec<f64>, Error> {
+fn common_scale(loaded: &[Log]) -> Result<Vec<f64>, Error> {
     let first = &loaded[0];
     let own = first.effort_factors();
     match loaded.iter().find(|l| l.effort_factors() != own) {

@@ -8,9 +8,11 @@ mod friction;
 pub(crate) mod known;
 mod model_fit;
 mod own_delay;
-mod own_scale;
+mod problem;
 mod shapes;
 mod structure;
+
+use std::sync::Arc;
 
 use dynid_estimate::conditioning::{
     Conditioning, ConditioningSettings, JointFriction, PreparedLog, ReducedGroup, Stage, predict,
@@ -19,42 +21,38 @@ use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::linear::LinearEstimate;
 use dynid_estimate::rank::numerical_rank;
 use dynid_estimate::whiteness::InBandWhiteness;
-use dynid_io::{ReadingNote, TrajectoryFile};
 use dynid_model::element::scale_name;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
-use dynid_motion::Log;
 
 use crate::Error;
 use crate::agreement::{self, Agreement, Alignment};
 use crate::caution::{self, Caution};
 use crate::check::{self, Finding, Severity};
-use crate::commands::RunFiles;
-use crate::config::{Config, LogConfig, Preflight, Route};
 use crate::consistency::Consistent;
 use crate::effort_scale::{self, EffortScale, WeighedMass};
 use crate::elements::ElementPlan;
-use crate::estimate::{ExportedRecord, InputRecord, LogFit, ReadingRecord};
-use crate::export::FileModels;
+use crate::estimate::{InputRecord, LogFit};
 use crate::fitting::Fitted;
 use crate::friction_power::FrictionPower;
 use crate::instruments::{self, Comparison, InstrumentRun};
+use crate::log::{self, Log, LogSource};
 use crate::log_agreement::{self, LogAgreement};
 use crate::log_terms::LogTerms;
-use crate::logs::{self, LoadedLog};
 use crate::overlap::Overlaps;
 use crate::passivity::SPEED_SPAN_S;
 use crate::prior::Prior;
 use crate::result::short_name;
-use crate::robot::{Robot, RobotOptions, refuse_internal_load};
+use crate::robot::{Robot, refuse_internal_load};
+use crate::settings::{LogSettings, Preflight, Settings, check_log_effect, labels};
 use crate::shape::{self, ShapeFit};
 use crate::stiffness::{self, JointStiffness};
 use crate::trust::{Evidence, Trust};
 use crate::verdict::CheckName;
 pub(crate) use elastic::REMEDY as SPRING_REMEDY;
-pub(crate) use model_fit::{ModelFit, fit as fit_model};
+pub use model_fit::ModelFit;
 pub use own_delay::OwnDelay;
-pub(crate) use own_scale::conditioned;
-pub(crate) use structure::Structure;
+pub use problem::{Problem, TrainingLog};
+pub use structure::Structure;
 pub(crate) use structure::{effort_sizes, stated_values};
 
 /// What is being worked on, for progress displays.
@@ -100,20 +98,18 @@ pub struct Identification {
     /// Base parameters of the model.
     pub base: BaseParameters,
     /// Training logs.
-    pub logs: Vec<PreparedLog>,
-    /// How their columns were understood.
-    pub columns: Vec<Vec<(String, String)>>,
-    /// Per training log, how the file was read where that was found out.
-    pub found_out: Vec<Vec<ReadingNote>>,
-    /// Files as they were read.
-    pub inputs: Vec<InputRecord>,
-    /// Files as commands name them.
-    pub files: RunFiles,
-    /// How logs were read.
-    pub(crate) reading: ReadingRecord,
+    pub logs: Arc<[PreparedLog]>,
+    /// Validation logs.
+    pub validation_logs: Vec<PreparedLog>,
+    /// Name in parameters and settings of every training log.
+    pub log_settings: Vec<(String, LogSettings)>,
+    /// Where the logs come from, validation logs behind the training logs.
+    pub sources: Vec<LogSource>,
     /// Stiffness of elastic joints by their deformation; empty without encoders on both sides of gears, and where sensors
     /// measure the load.
     pub stiffness: Vec<JointStiffness>,
+    /// Whether elastic joints were taken as stiff, since the deformation did not bear out the stiffness of the fit.
+    pub taken_as_stiff: bool,
     /// Choices of the compact route; `None` on the textbook route.
     pub conditioning: Option<Conditioning>,
     /// Per output: friction shapes chosen beside the elements asked for, and candidates that were not; empty where none
@@ -162,12 +158,8 @@ pub struct Identification {
     pub log_agreement: Option<LogAgreement>,
     /// Delays of single logs, taken off their efforts.
     pub own_delays: Vec<OwnDelay>,
-    /// Robot files beside the identified model.
-    pub exported: ExportedRecord,
     /// What was noticed on the way and is no check of its own.
     pub warnings: Vec<Caution>,
-    /// Whether the training logs were examined before.
-    pub preflight: bool,
     /// What the pre-flight of the training logs found.
     pub findings: Vec<Finding>,
     /// Rows that logs share.
@@ -177,7 +169,9 @@ pub struct Identification {
     /// What friction had to obey.
     pub(crate) power: FrictionPower,
     /// Settings of the conditioning.
-    pub settings: ConditioningSettings,
+    pub conditioning_settings: ConditioningSettings,
+    /// Settings of the identification.
+    pub settings: Settings,
     /// How the instruments of the fit came about; `None` for other estimators.
     pub instruments: Option<InstrumentRun>,
     /// Least squares against instruments; `None` if the configuration says nothing about the closed loop, or what was identified is not
@@ -185,29 +179,36 @@ pub struct Identification {
     pub comparison: Option<Comparison>,
 }
 
-/// Reads robot and logs, conditions, fits, validates.
+/// Identifies a robot from logs, validation logs ([`LogSettings::validation`]) among them: examines them, conditions, fits, judges, validates.
+///
+/// Logs are taken by value, since a long one may be most of the memory: clone what is to be kept.
 ///
 /// Elastic joints without sensors of their load, whose stiffness in the fit is not borne out by the deformation that their encoders show,
 /// are taken as stiff ones: the result is that of [`Identification::stiffness`] beside a model of stiff joints.
 ///
 /// # Errors
 /// [`Error`]: bad input. A rank-deficient log is a status of the result, not an error.
-pub fn identify(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Identification, Error> {
-    config.demand_inputs()?;
-    config.check_effect()?;
-    config.check()?;
-    progress(Step::Read(config.robot.display().to_string()));
-    let robot = load_robot(config)?;
-    let mut found = run(config, robot, progress)?;
+pub fn identify(
+    robot: &Robot,
+    logs: impl IntoIterator<Item = Log>,
+    settings: &Settings,
+    progress: &mut dyn FnMut(Step),
+) -> Result<Identification, Error> {
+    let logs: Vec<Log> = logs.into_iter().collect();
+    // A second look at elastic joints needs their logs once more.
+    let kept = if robot.elements.elastic.is_empty() { Vec::new() } else { logs.clone() };
+    let mut found = run(robot.clone(), logs, settings, progress)?;
     let stiffness = stiffness::of(&found)?;
     if stiffness.iter().all(JointStiffness::is_borne_out) {
         found.stiffness = stiffness;
         return Ok(found);
     }
     let doubts = elastic::warnings(&found.model, &found.logs);
-    let elastic = load_robot(config)?;
-    let stiff = stiffness::stiff_config(config, &elastic)?;
-    let mut found = run(&stiff, stiffness::stiff_robot(&elastic)?, progress)?;
+    drop(found);
+    let logs = kept.into_iter().map(|log| stiffness::at_motors(log, &robot.elements.elastic));
+    let logs = logs.collect::<Result<Vec<_>, Error>>()?;
+    let settings = stiffness::stiff_settings(settings, robot);
+    let mut found = run(stiffness::stiff_robot(robot)?, logs, &settings, progress)?;
     found.warnings.extend(doubts);
     let message = format!(
         "the deformation does not bear out the stiffness that rows of links and motors give: joints are taken as stiff, read at their \
@@ -216,51 +217,39 @@ pub fn identify(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Ident
     );
     found.warnings.push(Caution::warn(caution::SPRING, message, elastic::REMEDY));
     found.stiffness = stiffness;
+    found.taken_as_stiff = true;
     Ok(found)
 }
 
-/// One run with a robot as it was read.
-fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<Identification, Error> {
-    let settings = config.conditioning_settings();
-    let reference_trajectory = config.instruments.as_ref().and_then(|table| table.trajectory.as_ref());
-    let reference_trajectory = reference_trajectory.map(TrajectoryFile::read_source).transpose()?;
-    let reference_trajectory = reference_trajectory.map(|(_, source)| InputRecord::of("trajectory", &source));
-    let Opened {
-        robot,
-        read,
-        validation,
-        mut plan,
-        model,
-        logs: prepared,
-        structure,
-        own_delays,
-        findings,
-        overlaps,
-    } = open_robot(config, robot, progress)?;
-    let (model, conditioning) = match config.conditioning.route {
-        Route::Compact => {
-            let mut stages = |stage| progress(Step::Conditioning(stage));
-            let (model, found) =
-                conditioned(model, &structure, &mut plan, &prepared, &settings, &mut stages)?;
-            (model, Some(found))
-        }
-        Route::Textbook => (model, None),
-    };
-    let mut warnings = robot.cautions(&structure.prior);
-    warnings.extend(robot.clearance_warnings().map(|message| {
+/// One run with a robot as it is given.
+fn run(
+    robot: Robot,
+    logs: Vec<Log>,
+    settings: &Settings,
+    progress: &mut dyn FnMut(Step),
+) -> Result<Identification, Error> {
+    let Opened { mut problem, read, validation, own_delays, findings, overlaps } =
+        open(robot, logs, settings, progress)?;
+    let conditioning = problem.condition(&mut |stage| progress(Step::Conditioning(stage)))?;
+    let mut warnings = problem.robot.cautions(&problem.structure.prior);
+    warnings.extend(problem.robot.clearance_warnings().map(|message| {
         let remedy = "`dynid clearance ROBOT dynid-out/estimate.json --log LOG`, with your files, tells the gap and its friction from the effort";
         Caution::warn(caution::CLEARANCE, message, remedy)
     }));
-    warnings.extend(plan.alike(&robot.mechanism).iter().map(|pair| {
+    warnings.extend(problem.plan.alike(&problem.robot.mechanism).iter().map(|pair| {
         let remedy = format!(
             "leave one of them out: `{} = [..]` under `[elements.joint]` lists those to keep",
             pair.joint
         );
         Caution::warn(caution::ELEMENTS, pair.to_string(), remedy)
     }));
+    let (problem, fit) = problem.fit(conditioning, progress)?;
+    let (comparison, not_compared) = compared(&problem, &fit, progress)?;
+    let log_agreement = log_agreement::test(&problem, &fit.fitted, |log: &str| {
+        let table = fit.shapes.as_ref().map(|found| found.model.parameters());
+        table.and_then(|table| table.shape_value(&scale_name(log))).unwrap_or(1.0)
+    });
     let ModelFit {
-        model,
-        structure,
         conditioning,
         friction,
         shapes,
@@ -270,19 +259,12 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
         groups,
         consistent,
         power,
-    } = fit_model(
-        config,
-        &robot,
-        &mut plan,
-        (model, structure),
-        &prepared,
-        conditioning,
-        &settings,
-        progress,
-    )?;
-    warnings.extend(effect::warnings(config, shapes.is_some()));
+    } = fit;
+    let Problem { robot, plan, model, structure, logs: prepared, training, settings } = problem;
+    warnings.extend(effect::warnings(&settings, shapes.is_some()));
     let Structure { base, stated, prior, regrouping, space, .. } = structure;
-    let state_hz = model_fit::state_hz(config, conditioning.as_ref());
+    let conditioned = settings.conditioning_settings();
+    let state_hz = model_fit::state_hz(&settings, conditioning.as_ref());
     let (kernel_hz, delay_samples) = match &conditioning {
         Some(c) => (c.kernel_hz, c.delay.samples),
         None => (state_hz, 0.0),
@@ -296,44 +278,29 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
         Caution::warn(caution::ROBOT_FILE, message, remedy)
     }));
     let of_reading = read.iter().flat_map(|log| log.warnings.iter().cloned());
-    let of_reading = of_reading.chain(validation.iter().flat_map(LoadedLog::warnings));
+    let of_reading = of_reading.chain(validation.iter().flat_map(Log::warnings));
     warnings.extend(of_reading.map(|message| {
         let remedy = format!(
             "`{} --report check.html` draws the signals as they were read; columns and units are stated under `[columns]`",
-            RunFiles::of(config).check()
+            settings.files.check()
         );
         Caution::warn(caution::LOG, message, remedy)
     }));
     warnings.extend(log_warnings(&model, &prepared));
     warnings.extend(elastic::warnings(&model, &prepared));
     warnings.extend(known::warnings(&plan, &robot.mechanism, &prepared));
-    let scale = |log: &str| {
-        shapes
-            .as_ref()
-            .and_then(|found| found.model.parameters().shape_value(&scale_name(log)))
-            .unwrap_or(1.0)
-    };
-    let log_agreement = log_agreement::test(config, &model, &base, &fitted, &plan.log_terms, scale);
     warnings.extend(log_agreement.iter().flat_map(LogAgreement::warnings).map(|message| {
         let remedy = "give the log terms of its own in its `[[log]]`: `own = [\"offset\"]`, `own = [\"friction\"]`, \
                       `own = [\"friction_scale\"]` or `own = [\"delay\"]`; what it carries: `payload = \"tool\"`";
         Caution::warn(CheckName::AgreementOfLogs.name(), message, remedy)
     }));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
-    let found_out: Vec<Vec<ReadingNote>> = read.iter().map(|log| log.reading.clone()).collect();
-    let (understood, sources): (Vec<_>, Vec<_>) =
-        read.into_iter().map(|log| (log.columns, log.inputs)).unzip();
-    let mut inputs = InputRecord::of_robot(&robot);
-    inputs.extend(sources.into_iter().flatten());
     let mut out = Identification {
-        inputs,
-        files: RunFiles::of(config),
-        reading: ReadingRecord::of(config, &understood),
+        sources: read.into_iter().map(|log| log.source).collect(),
         stiffness: Vec::new(),
+        taken_as_stiff: false,
         plan,
         base,
-        columns: understood,
-        found_out,
         conditioning,
         friction,
         prior,
@@ -351,6 +318,7 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
         delay_rate_hz: prepared[0].rate_hz,
         training: Vec::new(),
         validation: Vec::new(),
+        validation_logs: Vec::new(),
         training_unconstrained: Vec::new(),
         validation_unconstrained: Vec::new(),
         whiteness: Vec::new(),
@@ -358,27 +326,25 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
         log_agreement,
         own_delays,
         warnings,
-        preflight: config.preflight != Preflight::Off,
         findings,
         overlaps,
         effort_scale: EffortScale::default(),
+        conditioning_settings: conditioned,
         settings,
+        log_settings: training.into_iter().map(|log| (log.label, log.settings)).collect(),
         power,
-        logs: Vec::new(),
+        logs: prepared,
         robot,
         model,
         shapes,
         nonlinear: None,
         alone: None,
-        exported: ExportedRecord::default(),
         instruments,
-        comparison: None,
+        comparison,
     };
     out.nonlinear = out.unfolded(out.values())?;
     out.alone = out.without_logs()?;
-    let (files, projections) = FileModels::of(&out, &prepared)?;
-    let (mut files_training, mut files_validation) = (Vec::new(), Vec::new());
-    for (l, log) in prepared.iter().enumerate() {
+    for (l, log) in out.logs.clone().iter().enumerate() {
         progress(Step::Validate(log.name.clone()));
         let agreement = out.drawn_agreement(log)?;
         out.whiteness.push(residuals.whiteness(l, &agreement, kernel_hz));
@@ -386,48 +352,26 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
             let free = out.agreement(out.unconstrained_values(), log)?;
             out.training_unconstrained.push(crate::result::log_fit(&free));
         }
-        files_training.extend(files.judge(&out, log, &agreement)?);
         out.training.push(agreement);
     }
-    out.logs = prepared;
-    if config.instruments.is_some() {
-        progress(Step::Instruments);
-        match instruments::compare(&out, config) {
-            Ok(found) => out.comparison = Some(found),
-            Err(Error::Unsupported(why)) => {
-                let message = format!("least squares was not compared with instruments: {why}");
-                out.warnings.push(Caution::warn(
-                    CheckName::Instruments.name(),
-                    message,
-                    "leave out `[instruments]`",
-                ));
-            }
-            Err(other) => return Err(other),
-        }
-    }
-    for (log, mut loaded) in config.validation.iter().zip(validation) {
-        progress(Step::Validate(log.path.display().to_string()));
-        out.inputs.extend(loaded.inputs.drain(..).map(|input| match input.kind.as_str() {
-            "log" => InputRecord { kind: "validation".to_owned(), ..input },
-            _ => input,
-        }));
-        loaded.log = out.plan.log_terms.of_validation(loaded.log, log);
-        let mut prepared = loaded.prepare(&out.model, &out.settings)?;
-        if let Some(own) = out.own_delays.iter().find(|d| Some(&d.log) == log.like.as_ref()) {
+    out.warnings.extend(not_compared);
+    for mut log in validation {
+        progress(Step::Validate(log.log.name().to_owned()));
+        log.log = out.plan.log_terms.of_validation(log.log, &log.settings);
+        let mut prepared = log.prepare(&out.model, &out.conditioning_settings)?;
+        if let Some(own) = out.own_delays.iter().find(|d| Some(&d.log) == log.settings.like.as_ref()) {
             own.take_off(&mut prepared)?;
         }
+        out.sources.push(log.source);
         out.warnings.extend(known::cautions(known::logged_beyond(&out.plan.known, &prepared)));
         let agreement = out.drawn_agreement(&prepared)?;
-        files_validation.extend(files.judge(&out, &prepared, &agreement)?);
         out.validation.push(agreement);
         if out.consistent.constrained() {
             let free = out.agreement(out.unconstrained_values(), &prepared)?;
             out.validation_unconstrained.push(crate::result::log_fit(&free));
         }
+        out.validation_logs.push(prepared);
     }
-    out.inputs.extend(out.plan.known_source.iter().map(|source| InputRecord::of("friction", source)));
-    out.inputs.extend(reference_trajectory);
-    out.exported = files.record(projections, files_training, files_validation);
     progress(Step::Trust);
     out.explained = figures::explained(out.training.iter().chain(&out.validation), &out.consistent);
     out.pruning = prune(&out.fit().kept_blocks(), &out.fit().solution.kept, &PruneSettings::default());
@@ -444,8 +388,29 @@ fn run(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<
         power: &out.power,
     }
     .trust();
-    out.effort_scale = out.scale_of_efforts(config)?;
+    out.effort_scale = out.scale_of_efforts()?;
     Ok(out)
+}
+
+/// Least squares against instruments where the settings describe the closed loop, or why they were not compared.
+fn compared(
+    problem: &Problem,
+    fit: &ModelFit,
+    progress: &mut dyn FnMut(Step),
+) -> Result<(Option<Comparison>, Option<Caution>), Error> {
+    if problem.settings.closed_loop.is_none() {
+        return Ok((None, None));
+    }
+    progress(Step::Instruments);
+    match instruments::compare(problem, fit) {
+        Ok(found) => Ok((Some(found), None)),
+        Err(Error::Unsupported(why)) => {
+            let message = format!("least squares was not compared with instruments: {why}");
+            let name = CheckName::Instruments.name();
+            Ok((None, Some(Caution::warn(name, message, "leave out `[instruments]`"))))
+        }
+        Err(other) => Err(other),
+    }
 }
 
 impl Identification {
@@ -490,13 +455,19 @@ impl Identification {
     pub fn agreement(&self, values: &[f64], log: &PreparedLog) -> Result<Agreement, Error> {
         let unfolded = self.unfolded(values)?;
         let (model, values) = unfolded.as_ref().map_or((&self.model, values), |(m, v)| (m, v));
-        agreement::compare(model, values, log, &self.alignment(), &self.settings)
+        agreement::compare(model, values, log, &self.alignment(), &self.conditioning_settings)
     }
 
     /// [`Identification::agreement`] of [`Identification::values`], with what pictures show.
     fn drawn_agreement(&self, log: &PreparedLog) -> Result<Agreement, Error> {
         let (model, values) = self.identified_model();
-        self.agreement(self.values(), log)?.draw(model, values, log, &self.alignment(), &self.settings)
+        self.agreement(self.values(), log)?.draw(
+            model,
+            values,
+            log,
+            &self.alignment(),
+            &self.conditioning_settings,
+        )
     }
 
     fn alignment(&self) -> Alignment {
@@ -536,12 +507,20 @@ impl Identification {
     pub fn predict(&self, log: &PreparedLog) -> Result<Vec<Vec<f64>>, Error> {
         let (model, values) = self.identified_model();
         let shape = model.parameters().shape_start();
-        Ok(predict(model, &shape, values, log, self.state_hz, self.delay_samples, &self.settings)?)
+        Ok(predict(
+            model,
+            &shape,
+            values,
+            log,
+            self.state_hz,
+            self.delay_samples,
+            &self.conditioning_settings,
+        )?)
     }
 
     /// What speaks for the scale of the efforts.
-    fn scale_of_efforts(&self, config: &Config) -> Result<EffortScale, Error> {
-        let weighed = effort_scale::mass_columns(&config.known_mass, &self.model)?;
+    fn scale_of_efforts(&self) -> Result<EffortScale, Error> {
+        let weighed = effort_scale::mass_columns(&self.settings.known_mass, &self.model)?;
         let of = |(name, column, known): (String, usize, f64)| {
             let trust = &self.trust.parameters[column];
             WeighedMass { name, known, identified: trust.unconstrained, interval: trust.interval }
@@ -553,9 +532,9 @@ impl Identification {
             &self.prior,
             &self.logs,
             self.state_hz,
-            &self.settings,
+            &self.conditioning_settings,
         )?;
-        Ok(EffortScale::of(masses, config.known_effort_scale, by_file))
+        Ok(EffortScale::of(masses, self.settings.known_effort_scale, by_file))
     }
 
     /// Standard deviations of all base parameters: reported and white; `None` where a column was dropped.
@@ -575,23 +554,15 @@ impl Identification {
     }
 }
 
-pub(crate) fn read_logs(
-    config: &Config,
-    files: &[LogConfig],
-    robot: Robot,
-    progress: &mut dyn FnMut(Step),
-) -> Result<(Robot, Vec<LoadedLog>), Error> {
-    let mut loaded = Vec::with_capacity(files.len());
-    for file in files {
-        progress(Step::Read(file.path.display().to_string()));
-        let motor_side = config.motor_side.as_ref();
-        loaded.push(logs::load(file, &robot.axes, &config.columns, motor_side)?);
-    }
-    // A joint without columns in any log is taken to stand still at zero.
+/// Locks joints without signals in any log: each is taken to stand still at zero.
+///
+/// # Errors
+/// [`Error::Unsupported`] for a drive of a mechanism with loops that no log holds.
+pub fn held_where_not_logged(robot: Robot, logs: &[Log]) -> Result<Robot, Error> {
     let mut still: Vec<(String, f64)> = Vec::new();
-    for name in loaded.iter().flat_map(|l| &l.not_logged) {
-        if !still.iter().any(|(n, _)| n == name) {
-            still.push((name.clone(), 0.0));
+    for name in logs.iter().flat_map(|log| log.not_logged(&robot.axes)) {
+        if !still.iter().any(|(n, _)| *n == name) {
+            still.push((name, 0.0));
         }
     }
     if let (Some(_), Some((name, _))) = (&robot.closed, still.first()) {
@@ -599,163 +570,172 @@ pub(crate) fn read_logs(
             "no column for the drive `{name}`: the logs of a mechanism with loops need all its drives"
         )));
     }
-    let robot = if still.is_empty() { robot } else { robot.locked(&still)? };
-    Ok((robot, loaded))
+    if still.is_empty() { Ok(robot) } else { robot.locked(&still) }
 }
 
-/// What stays of a log's file once its signals are prepared.
+/// What stays of a log once its signals are prepared.
+#[derive(Debug)]
 pub(crate) struct ReadLog {
     /// Doubts, and what was done about them, in words.
     pub(crate) warnings: Vec<String>,
-    /// How columns were understood.
-    pub(crate) columns: Vec<(String, String)>,
-    /// How the file was read where that was found out.
-    pub(crate) reading: Vec<ReadingNote>,
-    /// Files that were read.
-    pub(crate) inputs: Vec<InputRecord>,
+    pub(crate) source: LogSource,
 }
 
-/// Robot, logs and model of a run, before anything is fitted.
-pub(crate) struct Opened {
-    pub(crate) robot: Robot,
+/// A problem and its logs before anything is fitted.
+#[derive(Debug)]
+pub struct Opened {
+    /// The problem.
+    pub problem: Problem,
     pub(crate) read: Vec<ReadLog>,
-    pub(crate) validation: Vec<LoadedLog>,
-    pub(crate) plan: ElementPlan,
-    pub(crate) model: RobotModel,
-    pub(crate) logs: Vec<PreparedLog>,
-    pub(crate) structure: Structure,
-    pub(crate) own_delays: Vec<OwnDelay>,
-    pub(crate) findings: Vec<Finding>,
-    pub(crate) overlaps: Overlaps,
+    pub(crate) validation: Vec<Log>,
+    /// Delays of single logs, taken off their efforts.
+    pub own_delays: Vec<OwnDelay>,
+    /// What the pre-flight found.
+    pub findings: Vec<Finding>,
+    /// Rows that logs share.
+    pub overlaps: Overlaps,
 }
 
-/// Reads robot and logs, examines them, prepares them for a model with the elements asked for.
+impl Opened {
+    /// Files that the training logs were read from.
+    pub fn inputs(&self) -> impl Iterator<Item = &InputRecord> {
+        self.read.iter().flat_map(|log| &log.source.inputs)
+    }
+}
+
+/// Examines logs and prepares them for a model with the elements asked for.
 ///
 /// # Errors
 /// Fails as [`identify`] does.
-pub(crate) fn open(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Opened, Error> {
-    config.check()?;
-    config.demand_inputs()?;
-    progress(Step::Read(config.robot.display().to_string()));
-    open_robot(config, load_robot(config)?, progress)
-}
-
-fn load_robot(config: &Config) -> Result<Robot, Error> {
-    let options = RobotOptions {
-        gravity: config.gravity,
-        couple_mimics: config.couple_mimics.unwrap_or(false),
-        floating_base: false,
-        locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
-    };
-    Robot::load(&config.robot, &options)
-}
-
-fn open_robot(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<Opened, Error> {
-    let settings = config.conditioning_settings();
+pub fn open(
+    robot: Robot,
+    logs: Vec<Log>,
+    settings: &Settings,
+    progress: &mut dyn FnMut(Step),
+) -> Result<Opened, Error> {
+    let mut settings = settings.clone();
+    let (validation, mut loaded): (Vec<Log>, Vec<Log>) =
+        logs.into_iter().partition(|log| log.settings.validation);
+    if loaded.is_empty() {
+        return Err(Error::setting("log", "at least one log to identify from", "none"));
+    }
+    if settings.files.logs.is_empty() {
+        settings.files.logs = loaded.iter().map(|log| log.log.name().into()).collect();
+        settings.files.robot = robot.path.clone();
+    }
+    let labels = labels(loaded.iter().map(|log| (&log.settings, log.log.name())));
+    let training: Vec<TrainingLog> = (loaded.iter().zip(labels))
+        .map(|(log, label)| TrainingLog {
+            label,
+            settings: log.settings.clone(),
+            reference: log.reference.clone(),
+        })
+        .collect();
+    check_settings(&settings, &training, &loaded, &validation)?;
     if robot.closed.is_none() && robot.mechanism.positions() != robot.mechanism.rates() {
         return Err(Error::Unsupported(
             "a floating base cannot be identified from joint logs: lock the base or leave it out".to_owned(),
         ));
     }
     refuse_internal_load(&robot, "identified")?;
-    let mut files = config.training_logs();
-    if let Some(table) = &config.instruments {
-        table.read_reference(&mut files, &config.columns, &logs::names(&robot.axes))?;
-    }
-    let (robot, mut loaded) = read_logs(config, &files, robot, progress)?;
-    // What cannot be read is told before the long work.
-    let validation = config
-        .validation
-        .iter()
-        .map(|log| {
-            progress(Step::Read(log.path.display().to_string()));
-            logs::load(log, &robot.axes, &config.columns, config.motor_side.as_ref())
-        })
-        .collect::<Result<Vec<_>, Error>>()?;
+    let robot = held_where_not_logged(robot, &loaded)?;
     let overlaps = Overlaps::of(&loaded, &validation);
-    let mut plan = plan_elements(config, &robot, &loaded)?;
-    plan.log_terms = LogTerms::of(config, &robot)?;
-    for ((loaded, log), label) in loaded.iter_mut().zip(&config.log).zip(config.log_labels()) {
-        if !plan.log_terms.is_empty() {
-            loaded.log = plan.log_terms.with_gates(loaded.log.clone(), Some(&label), log.payload.as_deref());
+    let mut plan = plan_elements(&settings, &robot, &loaded)?;
+    plan.log_terms = LogTerms::of(&settings, &training, &robot)?;
+    if !plan.log_terms.is_empty() {
+        for (log, TrainingLog { label, settings, .. }) in loaded.iter_mut().zip(&training) {
+            log.log = plan.log_terms.with_gates(log.log.clone(), Some(label), settings.payload.as_deref());
         }
     }
     let model = plan.model(&robot.mechanism)?;
-    effect::check(config, &plan, &model)?;
-    effort_scale::mass_columns(&config.known_mass, &model)?;
-    logs::check_stated_temperatures(config.log.iter().chain(&config.validation), &model)?;
-    let findings = preflight(config, &robot, &loaded, &overlaps, progress);
+    let of_training: Vec<&LogSettings> = training.iter().map(|log| &log.settings).collect();
+    let sources = loaded.iter().chain(&validation).map(|log| &log.source);
+    let stated: Vec<String> = sources.flat_map(|source| source.stated_channels.iter().cloned()).collect();
+    effect::check(&settings, &of_training, &stated, &plan, &model)?;
+    effort_scale::mass_columns(&settings.known_mass, &model)?;
+    let of_validation = validation.iter().map(|log| &log.settings);
+    log::check_stated_temperatures(of_training.iter().copied().chain(of_validation), &model)?;
+    let findings = preflight(&settings, &robot, &loaded, &overlaps, progress);
     // Signals as they were read go as soon as they are prepared: a log may be most of the memory.
+    let conditioned = settings.conditioning_settings();
     let mut read = Vec::with_capacity(loaded.len());
     let mut prepared = Vec::with_capacity(loaded.len());
     for log in loaded {
-        prepared.push(log.prepare(&model, &settings)?);
-        let nearest = model.closed().and_then(|closed| logs::poses::nearest_singularity(closed, &log.log));
+        prepared.push(log.prepare(&model, &conditioned)?);
+        let nearest = model.closed().and_then(|closed| log::poses::nearest_singularity(closed, &log.log));
         let warnings = nearest.into_iter().chain(log.warnings()).collect();
-        read.push(ReadLog { warnings, columns: log.columns, reading: log.reading, inputs: log.inputs });
+        read.push(ReadLog { warnings, source: log.source });
     }
     for log in &prepared {
-        config.check_cutoffs(&log.name, log.rate_hz)?;
+        settings.check_cutoffs(&log.name, log.rate_hz)?;
     }
     // What cannot be prepared says so in its own words.
     let findings = findings?;
 
     progress(Step::Structure);
     // Names that do not exist are told before the long work.
-    let structure = Structure::of(config, &model, &plan, &prepared)?;
-    let start = model.parameters().shape_start();
-    let own_delays = own_delay::take_off(config, &model, &start, &structure.base, &mut prepared, &settings)?;
-    Ok(Opened {
-        robot,
-        read,
-        validation,
-        plan,
-        model,
-        logs: prepared,
-        structure,
-        own_delays,
-        findings,
-        overlaps,
-    })
+    let structure = Structure::of(&settings, &robot, &model, &plan, &prepared)?;
+    let base = &structure.base;
+    let own_delays =
+        own_delay::take_off(&settings, &training, &model, &structure.shape, base, &mut prepared)?;
+    let problem = Problem { robot, plan, model, structure, logs: prepared.into(), training, settings };
+    Ok(Opened { problem, read, validation, own_delays, findings, overlaps })
+}
+
+/// Refuses settings that make no sense, or do nothing beside the others.
+fn check_settings(
+    settings: &Settings,
+    training: &[TrainingLog],
+    logs: &[Log],
+    validation: &[Log],
+) -> Result<(), Error> {
+    settings.check()?;
+    settings.check_effect()?;
+    let of_training: Vec<&LogSettings> = training.iter().map(|log| &log.settings).collect();
+    let of_validation: Vec<&LogSettings> = validation.iter().map(|log| &log.settings).collect();
+    let labels: Vec<String> = training.iter().map(|log| log.label.clone()).collect();
+    let files: Vec<&str> = logs.iter().map(|log| log.log.name()).collect();
+    settings.check_logs(&of_training, &of_validation, &labels)?;
+    check_log_effect(&of_training, &of_validation, &labels, &files)
 }
 
 /// Examines the training logs before anything is made of them.
 fn preflight(
-    config: &Config,
+    settings: &Settings,
     robot: &Robot,
-    loaded: &[LoadedLog],
+    loaded: &[Log],
     overlaps: &Overlaps,
     progress: &mut dyn FnMut(Step),
 ) -> Result<Vec<Finding>, Error> {
-    if config.preflight == Preflight::Off {
+    if settings.preflight == Preflight::Off {
         return Ok(Vec::new());
     }
     progress(Step::Preflight);
-    let findings = check::of_loaded(config, robot, loaded, overlaps)?;
+    let findings = check::of_logs(settings, robot, loaded, overlaps)?;
     match findings.iter().find(|f| f.severity == Severity::Error) {
-        Some(fault) if config.preflight == Preflight::Refuse => {
+        Some(fault) if settings.preflight == Preflight::Refuse => {
             Err(Error::PreflightFault(Box::new(fault.clone())))
         }
         _ => Ok(findings),
     }
 }
 
-pub(crate) fn plan_elements(
-    config: &Config,
-    robot: &Robot,
-    logs: &[LoadedLog],
-) -> Result<ElementPlan, Error> {
+/// Elements of the joints that logs move, with bounds for the speeds that they reach.
+///
+/// # Errors
+/// Names and settings that no element has.
+pub fn plan_elements(settings: &Settings, robot: &Robot, logs: &[Log]) -> Result<ElementPlan, Error> {
     let names = robot.rate_names();
     let moves =
         |rate: usize| logs.iter().any(|l| l.log.joints().iter().any(|j| j.name == names[rate] && j.moves()));
-    let plan = ElementPlan::of_run(config, robot, moves)?;
+    let plan = ElementPlan::of_run(settings, robot, moves)?;
     let speeds: Vec<Option<f64>> =
         names.iter().map(|name| logs.iter().filter_map(|l| fastest(&l.log, name)).reduce(f64::max)).collect();
     Ok(plan.with_speeds(&robot.mechanism, &speeds))
 }
 
 /// Largest mean speed of a joint over [`SPEED_SPAN_S`] of a log.
-fn fastest(log: &Log, joint: &str) -> Option<f64> {
+fn fastest(log: &dynid_motion::Log, joint: &str) -> Option<f64> {
     let position = &log.joints().iter().find(|j| j.name == joint)?.position;
     let time = log.time();
     let rows = time.len().checked_sub(1)?;

@@ -1,12 +1,12 @@
 //! Whether the logs of one identification agree: deviations of single logs, tested and measured in units of effort.
 
 use dynid_estimate::log_deviations::{LogDeviations, OwnColumn, log_deviations};
-use dynid_model::{BaseParameters, EffortModel, RobotModel};
+use dynid_model::{EffortModel, RobotModel};
 use serde::{Deserialize, Serialize};
 
-use crate::config::{Config, Own};
 use crate::fitting::Fitted;
-use crate::log_terms::LogTerms;
+use crate::identify::{Problem, Structure};
+use crate::settings::Own;
 
 /// Deviations count from this share of the residual on; smaller ones do no harm, however certain they are.
 const RELEVANT: f64 = 0.25;
@@ -75,18 +75,12 @@ pub struct LogAgreement {
 
 /// Tests the training logs; `None` with a single log or too few time blocks. `scale`: factor on friction that a log has of its
 /// own, 1 without.
-pub(crate) fn test(
-    config: &Config,
-    model: &RobotModel,
-    base: &BaseParameters,
-    fitted: &Fitted,
-    terms: &LogTerms,
-    scale: impl Fn(&str) -> f64,
-) -> Option<LogAgreement> {
-    if config.log.len() < 2 {
+pub(crate) fn test(problem: &Problem, fitted: &Fitted, scale: impl Fn(&str) -> f64) -> Option<LogAgreement> {
+    let Problem { model, structure: Structure { base, .. }, plan, .. } = problem;
+    let (terms, labels) = (&plan.log_terms, problem.labels());
+    if labels.len() < 2 {
         return None;
     }
-    let labels = config.log_labels();
     let table = &model.parameters().linear;
     let name_of = |column: usize| table[base.kept[column]].name.as_str();
     let mut own = Vec::new();

@@ -11,8 +11,9 @@ use dynid_model::{Inertia, KnownElement, Mat3, Mechanism, Vec3};
 use dynid_motion::Log;
 
 use crate::Error;
-use crate::config::{Config, LogConfig, Own, PayloadConfig, Route};
+use crate::identify::TrainingLog;
 use crate::robot::Robot;
+use crate::settings::{LogSettings, Own, PayloadConfig, Route, Settings};
 
 /// Elements that a plan has beside those of its joints, each in some logs only.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -41,9 +42,9 @@ impl LogTerms {
     ///
     /// # Errors
     /// [`Error::Setting`], [`Error::Unsupported`].
-    pub fn of(config: &Config, robot: &Robot) -> Result<Self, Error> {
+    pub fn of(settings: &Settings, logs: &[TrainingLog], robot: &Robot) -> Result<Self, Error> {
         let mut terms = LogTerms::default();
-        for payload in &config.payload {
+        for payload in &settings.payload {
             let body = carrier(payload, robot)?;
             let known = known_inertia(payload);
             if let Some(fault) = known.and_then(|inertia| inertia.physical_fault()) {
@@ -52,15 +53,13 @@ impl LogTerms {
             }
             terms.payloads.push(PayloadTerm { config: payload.clone(), body, known });
         }
-        terms.deviations = deviations(config);
+        terms.deviations = deviations(logs);
         let scaled = terms.deviations.iter().filter(|(_, own)| *own == Own::FrictionScale);
         terms.scales = scaled.map(|(log, _)| (log.clone(), 1.0)).collect();
-        let no_factor = match config.conditioning.route {
+        let no_factor = match settings.conditioning.route {
             _ if terms.scales.is_empty() => None,
             Route::Textbook => Some("on the textbook route: it searches no shape parameters"),
-            _ if config.elements.known_friction.is_some() => {
-                Some("beside known friction, which it does not scale")
-            }
+            _ if settings.elements.known.is_some() => Some("beside known friction, which it does not scale"),
             Route::Compact => None,
         };
         match no_factor {
@@ -106,8 +105,8 @@ impl LogTerms {
     }
 
     /// The gates of a validation log.
-    pub(crate) fn of_validation(&self, log: Log, config: &LogConfig) -> Log {
-        self.with_gates(log, config.like.as_deref(), config.payload.as_deref())
+    pub(crate) fn of_validation(&self, log: Log, settings: &LogSettings) -> Log {
+        self.with_gates(log, settings.like.as_deref(), settings.payload.as_deref())
     }
 
     /// Elements with unknown parameters: payloads, then deviations. `per_rate`: names of the elements of every rate.
@@ -159,14 +158,13 @@ pub(crate) fn is_friction(name: &str) -> bool {
 }
 
 /// Deviations of all logs, log by log.
-fn deviations(config: &Config) -> Vec<(String, Own)> {
-    let labels = config.log_labels();
+fn deviations(logs: &[TrainingLog]) -> Vec<(String, Own)> {
     let mut out = Vec::new();
-    for (k, (log, label)) in config.log.iter().zip(&labels).enumerate() {
+    for (k, log) in logs.iter().enumerate() {
         for own in [Own::Offset, Own::Friction, Own::FrictionScale] {
-            let all = config.log.iter().all(|l| l.own.contains(&own));
-            if log.own.contains(&own) && !(all && k == 0) {
-                out.push((label.clone(), own));
+            let all = logs.iter().all(|l| l.settings.own.contains(&own));
+            if log.settings.own.contains(&own) && !(all && k == 0) {
+                out.push((log.label.clone(), own));
             }
         }
     }

@@ -2,84 +2,21 @@
 
 use std::path::Path;
 
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, prepare};
-use dynid_io::{ColumnMapping, MappingSpec, ReadingNote, Signals, SourceFile};
-use dynid_model::element::{is_temperature, temperature_channel};
-use dynid_model::{EffortModel, Limits, RobotModel};
+use dynid_io::columns::{ColumnNames, FullSignal, SignalSpec};
+use dynid_io::{ColumnMapping, MappingSpec, ReadingNote, Signals, SourceFile, TrajectoryFile};
 use dynid_motion::temperature::{self, TemperatureDoubt};
-use dynid_motion::{Channel, JointSignals, Log};
 use sha2::{Digest, Sha256};
 
-mod axes;
 mod known_motion;
-pub(crate) mod poses;
 mod reading;
-pub mod turns;
 
-pub use axes::{LogAxis, as_logged, axes, names};
 pub use reading::table;
 pub(crate) use reading::{header, map_columns};
 
 use crate::Error;
-use crate::config::{LogConfig, MotorSide, PerJoint};
+use crate::config::{Config, LogConfig, MotorSide};
 use crate::estimate::InputRecord;
-
-/// A log that was read, with what was read besides signals.
-#[derive(Debug, Clone)]
-pub struct LoadedLog {
-    /// Signals.
-    pub log: Log,
-    /// Joints of the robot without columns.
-    pub not_logged: Vec<String>,
-    /// How columns were understood: signal, column names.
-    pub columns: Vec<(String, String)>,
-    /// Period of the motion, if one was stated, s.
-    pub period_s: Option<f64>,
-    /// Columns of every signal with their factors.
-    pub mapping: ColumnMapping,
-    /// Per row of the log: its data row in the file, from 1.
-    pub rows: Vec<usize>,
-    /// Files that were read: the log, and its trajectory.
-    pub inputs: Vec<InputRecord>,
-    /// Positions that jumped by full turns and were unwrapped.
-    pub unwrapped: Vec<turns::Unwrapped>,
-    /// How the file was read where that was found out: format, decimal mark, unit of the time, rows without a value.
-    pub reading: Vec<ReadingNote>,
-}
-
-impl LoadedLog {
-    /// Factors from effort columns to efforts, drive gains with currents, in the order of the log's joints; empty without.
-    pub fn effort_factors(&self) -> Vec<f64> {
-        self.mapping.effort.iter().flatten().flatten().map(|c| c.factor).collect()
-    }
-
-    /// Doubts about the signals and what was done to them, in words.
-    pub(crate) fn warnings(&self) -> Vec<String> {
-        let file = file_name(self.log.name());
-        let turns = self.unwrapped.iter().map(|u| format!("{file}: {}", u.words()));
-        // A header that is missing leaves room for doubt.
-        let guessed = self.reading.iter().filter(|note| note.setting == "columns");
-        let guessed = guessed.map(|note| {
-            format!("{file}: columns without names are taken for {}: {}", note.value, note.reason)
-        });
-        turns.chain(guessed).chain(temperature_warnings(&self.log)).collect()
-    }
-
-    /// Conditions the log's signals; states of a motion with a stated period come from its Fourier series.
-    ///
-    /// # Errors
-    /// [`Error::Conditioning`]; [`Error::Pose`] for mechanisms with loops.
-    pub fn prepare(&self, model: &RobotModel, settings: &ConditioningSettings) -> Result<PreparedLog, Error> {
-        if let Some(closed) = model.closed() {
-            poses::follow(closed, &self.log)?;
-        }
-        let prepared = prepare(&self.log, model, settings)?;
-        match self.period_s {
-            Some(period_s) => Ok(prepared.with_period(period_s)?),
-            None => Ok(prepared),
-        }
-    }
-}
+use crate::log::{Log, LogAxis, LogReference, LogSource, assemble, check, names, turns, understood};
 
 /// Reads a log of a robot ([`Robot::axes`](crate::robot::Robot), [`axes`]).
 ///
@@ -91,12 +28,10 @@ pub fn load(
     axes: &[LogAxis],
     run_columns: &MappingSpec,
     motor_side: Option<&MotorSide>,
-) -> Result<LoadedLog, Error> {
+) -> Result<Log, Error> {
     let read = read(config, axes, run_columns, motor_side)?;
-    let (file, signals) = (config.path.display().to_string(), &read.signals);
-    check_degrees(signals, axes, &file)?;
-    check_reach(signals, &file)?;
-    check_temperatures(signals, &file)?;
+    let file = config.path.display().to_string();
+    check(&read.signals, axes, &file)?;
     finish(config, &file, read, axes)
 }
 
@@ -109,7 +44,7 @@ pub(crate) fn load_as_it_is(
     axes: &[LogAxis],
     run_columns: &MappingSpec,
     motor_side: Option<&MotorSide>,
-) -> Result<LoadedLog, Error> {
+) -> Result<Log, Error> {
     let read = read(config, axes, run_columns, motor_side)?;
     finish(config, &config.path.display().to_string(), read, axes)
 }
@@ -121,6 +56,9 @@ struct Read {
     source: SourceFile,
     unwrapped: Vec<turns::Unwrapped>,
     notes: Vec<ReadingNote>,
+    /// Those that the columns state.
+    channels: Vec<String>,
+    by_number: bool,
 }
 
 fn read(
@@ -144,7 +82,17 @@ fn read(
         to_joint_side(&mut signals, transmission)?;
     }
     state_temperatures(&mut signals, config, &joints)?;
-    Ok(Read { signals, mapping, source, unwrapped, notes })
+    let channels = spec.channels.keys().cloned().collect();
+    Ok(Read { signals, mapping, source, unwrapped, notes, channels, by_number: by_number(spec) })
+}
+
+/// Whether joints are told by the numbers of columns alone.
+fn by_number(spec: &MappingSpec) -> bool {
+    let is_numbered = |spec: &SignalSpec| {
+        let (SignalSpec::Full(FullSignal { columns, .. }) | SignalSpec::Names(columns)) = spec;
+        matches!(columns, ColumnNames::Pattern(pattern) if !pattern.contains("{joint}"))
+    };
+    spec.position.as_ref().is_none_or(is_numbered)
 }
 
 /// Puts the temperatures that a configuration states in place of the logged ones.
@@ -168,12 +116,11 @@ fn state_temperatures(signals: &mut Signals, config: &LogConfig, joints: &[Strin
     Ok(())
 }
 
-fn finish(config: &LogConfig, file: &str, read: Read, axes: &[LogAxis]) -> Result<LoadedLog, Error> {
-    let Read { mut signals, mapping, source, mut unwrapped, notes } = read;
+fn finish(config: &LogConfig, file: &str, read: Read, axes: &[LogAxis]) -> Result<Log, Error> {
+    let Read { mut signals, mapping, source, mut unwrapped, notes, channels, by_number } = read;
     // Many turns look like degrees: units were judged before.
     unwrapped.extend(turns::unwrap(&mut signals, axes));
     let joints: Vec<String> = mapping.joints.clone();
-    let not_logged = signals.not_logged.clone();
     let numbers = numbers(&signals, config.rows.map_or(1, |(first, _)| first));
     let whole = assemble(file, signals)?;
     let times = whole.time().to_vec();
@@ -195,9 +142,21 @@ fn finish(config: &LogConfig, file: &str, read: Read, axes: &[LogAxis]) -> Resul
         }
         None => (log, config.period_s),
     };
-    let columns = describe(&mapping);
+    let columns = understood(&mapping);
     let rows = data_rows(&times, log.time(), &numbers);
-    Ok(LoadedLog { period_s, log, not_logged, columns, mapping, rows, inputs, unwrapped, reading: notes })
+    let source = LogSource {
+        columns,
+        mapping: Some(mapping),
+        by_number,
+        rows,
+        inputs,
+        notes,
+        stated_channels: channels,
+        ..LogSource::default()
+    };
+    let mut settings = config.settings();
+    settings.period_s = period_s;
+    Ok(Log::of(log, unwrapped, source).with_settings(settings))
 }
 
 /// Data rows of the samples of a log. `first`: data row that its table begins with.
@@ -223,7 +182,11 @@ fn data_rows(times: &[f64], left: &[f64], numbers: &[usize]) -> Vec<usize> {
 }
 
 /// The log without the rows that its configuration leaves out; the clock takes what is missing for a gap.
-fn left_out(log: Log, config: &LogConfig, numbers: &[usize]) -> Result<Log, Error> {
+fn left_out(
+    log: dynid_motion::Log,
+    config: &LogConfig,
+    numbers: &[usize],
+) -> Result<dynid_motion::Log, Error> {
     let mut keep = vec![true; log.rows()];
     for (from, to) in &config.leave_out {
         let (from, to) = (numbers.partition_point(|n| n < from), numbers.partition_point(|n| n <= to));
@@ -235,6 +198,23 @@ fn left_out(log: Log, config: &LogConfig, numbers: &[usize]) -> Result<Log, Erro
         }
     }
     if keep.iter().all(|k| *k) { Ok(log) } else { Ok(log.retain(&keep)?) }
+}
+
+/// The motion that the controller of a log was told to follow, where a trajectory file says so.
+///
+/// # Errors
+/// [`Error::TrajectoryFile`].
+pub(crate) fn reference(config: &Config, log: &LogConfig) -> Result<Option<LogReference>, Error> {
+    let Some(table) = &config.instruments else { return Ok(None) };
+    let own = table.trajectory.as_ref();
+    let Some(path) = own.or(log.trajectory.as_ref()) else { return Ok(None) };
+    Ok(Some(LogReference {
+        trajectory: TrajectoryFile::read(path)?,
+        file: path.display().to_string(),
+        // Logs with a trajectory of their own are cut to its record.
+        cut: own.is_none(),
+        part: log.part.is_some() || log.rows.is_some(),
+    }))
 }
 
 /// Turns motor positions and efforts into those of the joints.
@@ -280,121 +260,6 @@ fn combine(signals: &[Vec<f64>], matrix: &[Vec<f64>], offset: impl Fn(usize) -> 
         .collect()
 }
 
-fn assemble(file: &str, signals: Signals) -> Result<Log, Error> {
-    let Signals { time, joints: names, position, mut velocity, mut effort, temperature, channels, .. } =
-        signals;
-    let take = |list: &mut Option<Vec<Vec<f64>>>, k: usize| list.as_mut().map(|l| std::mem::take(&mut l[k]));
-    let joints = names.iter().zip(position).enumerate().map(|(k, (name, position))| JointSignals {
-        name: name.clone(),
-        position,
-        velocity: take(&mut velocity, k),
-        effort: take(&mut effort, k).unwrap_or_default(),
-    });
-    let joints = joints.collect();
-    let temperatures = temperature.into_iter().flat_map(|list| names.iter().zip(list));
-    let measured = temperatures.filter_map(|(joint, values)| Some((temperature_channel(joint), values?)));
-    let channels = channels.into_iter().chain(measured).map(|(name, values)| Channel { name, values });
-    Ok(Log::new(file, time, joints, channels.collect())?)
-}
-
-/// Refuses temperatures that no joint has.
-fn check_temperatures(signals: &Signals, file: &str) -> Result<(), Error> {
-    for (joint, values) in signals.joints.iter().zip(signals.temperature.iter().flatten()) {
-        let doubt = values.as_ref().and_then(|values| temperature::doubt(values));
-        if let Some(TemperatureDoubt::Implausible { sample, found }) = doubt {
-            let (file, joint) = (file.to_owned(), joint.clone());
-            return Err(Error::Temperature { file, joint, row: sample + 1, found });
-        }
-    }
-    Ok(())
-}
-
-/// Refuses a temperature stated for a log that no element of the model reads.
-pub(crate) fn check_stated_temperatures<'a>(
-    logs: impl Iterator<Item = &'a LogConfig>,
-    model: &RobotModel,
-) -> Result<(), Error> {
-    let reads = |joint: &str| model.channels().contains(&temperature_channel(joint));
-    for log in logs {
-        let unread = match &log.temperature {
-            PerJoint::All(t) => (!model.joints().iter().any(|j| reads(&j.name))).then(|| t.to_string()),
-            PerJoint::Each(map) => {
-                map.iter().find(|(joint, _)| !reads(joint)).map(|(joint, t)| format!("{joint} = {t}"))
-            }
-        };
-        if let Some(found) = unread {
-            let expected = "temperatures of joints whose friction reads them from the log";
-            return Err(Error::setting("log.temperature", expected, found));
-        }
-    }
-    Ok(())
-}
-
-/// Name of a file without its folders.
-fn file_name(path: &str) -> String {
-    Path::new(path).file_name().map_or_else(|| path.to_owned(), |n| n.to_string_lossy().into_owned())
-}
-
-/// Doubts about the temperatures of a log, in words.
-pub(crate) fn temperature_warnings(log: &Log) -> Vec<String> {
-    let file = file_name(log.name());
-    let doubtful = log.channels().iter().filter(|c| is_temperature(&c.name));
-    doubtful
-        .filter_map(|c| match temperature::doubt(&c.values)? {
-            TemperatureDoubt::LooksLikeFahrenheit { least, greatest } => Some(format!(
-                "{file}: `{}` lies between {least:.0} and {greatest:.0}: if these are degrees Fahrenheit, say so (unit \"F\")",
-                c.name
-            )),
-            _ => None,
-        })
-        .collect()
-}
-
-/// Whether the positions of a log look like degrees although radians are said.
-pub(crate) fn degrees(loaded: &LoadedLog, axes: &[LogAxis]) -> Option<Error> {
-    let of_joint = |joint: &JointSignals| axes.iter().position(|a| a.name == joint.name);
-    let joints = loaded.log.joints();
-    let signals = Signals {
-        joints: joints.iter().map(|j| j.name.clone()).collect(),
-        indices: joints.iter().filter_map(of_joint).collect(),
-        position: joints.iter().map(|j| j.position.clone()).collect(),
-        ..Signals::default()
-    };
-    check_degrees(&signals, axes, loaded.log.name()).err()
-}
-
-fn check_degrees(signals: &Signals, axes: &[LogAxis], file: &str) -> Result<(), Error> {
-    // Motors turn as often as their gears say.
-    let turning: Vec<usize> = (0..signals.joints.len())
-        .filter(|k| !axes[signals.indices[*k]].slides && !axes[signals.indices[*k]].motor)
-        .collect();
-    let positions: Vec<Vec<f64>> = turning.iter().map(|k| signals.position[*k].clone()).collect();
-    let limits: Vec<Limits> = turning.iter().map(|k| axes[signals.indices[*k]].limits).collect();
-    match dynid_io::columns::degrees_suspected(&positions, &limits) {
-        None => Ok(()),
-        Some(evidence) => Err(Error::Degrees {
-            file: file.to_owned(),
-            joint: signals.joints[turning[evidence.joint]].clone(),
-            largest: evidence.largest,
-            limit: evidence.limit,
-        }),
-    }
-}
-
-/// Largest position that is taken for one, rad or m: beyond any cable drum or track, below encoder counts.
-pub(crate) const LARGEST_POSITION: f64 = 1e6;
-
-fn check_reach(signals: &Signals, file: &str) -> Result<(), Error> {
-    for (joint, position) in signals.joints.iter().zip(&signals.position) {
-        let largest = position.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        if largest > LARGEST_POSITION {
-            let (file, joint) = (file.to_owned(), joint.clone());
-            return Err(Error::FarPosition { file, joint, limit: LARGEST_POSITION, largest });
-        }
-    }
-    Ok(())
-}
-
 /// Refuses `q1..q7` for six joints: which of the seven is not the robot's, numbers do not tell.
 pub(crate) fn check_surplus(
     mapping: &ColumnMapping,
@@ -424,30 +289,10 @@ pub(crate) fn check_gains(spec: &MappingSpec, joints: usize) -> Result<(), Error
     }
 }
 
-fn describe(mapping: &ColumnMapping) -> Vec<(String, String)> {
-    let list = |columns: &[Option<dynid_io::columns::ColumnUse>]| {
-        columns.iter().flatten().map(|c| c.name.as_str()).collect::<Vec<_>>().join(" ")
-    };
-    let mut out = vec![(
-        "time".to_owned(),
-        match &mapping.time {
-            dynid_io::columns::TimeSource::Columns(time) => {
-                time.parts.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(" ")
-            }
-            dynid_io::columns::TimeSource::Rate(r) => format!("{r} Hz"),
-        },
-    )];
-    out.push(("position".to_owned(), list(&mapping.position)));
-    if let Some(effort) = &mapping.effort {
-        out.push(("effort".to_owned(), list(effort)));
-    }
-    if let Some(temperature) = &mapping.temperature {
-        out.push(("temperature".to_owned(), list(temperature)));
-    }
-    for (name, column) in &mapping.channels {
-        out.push((name.clone(), column.name.clone()));
-    }
-    out
+/// Columns of a log that was read from a file.
+pub(crate) fn mapping_of(log: &Log) -> &ColumnMapping {
+    let mapping = log.source.mapping.as_ref();
+    mapping.unwrap_or_else(|| unreachable!("logs from files have columns"))
 }
 
 /// SHA-256 of a file, hexadecimal.

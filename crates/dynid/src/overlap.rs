@@ -3,7 +3,7 @@
 use dynid_motion::faults::shared_rows;
 use serde::{Deserialize, Serialize};
 
-use crate::logs::LoadedLog;
+use crate::log::Log;
 
 /// From this share on a log repeats another one ...
 pub(crate) const REPEATS: f64 = 0.05;
@@ -55,7 +55,7 @@ pub struct Overlaps {
 
 impl Overlaps {
     /// Compares all logs of a run.
-    pub(crate) fn of(training: &[LoadedLog], validation: &[LoadedLog]) -> Overlaps {
+    pub(crate) fn of(training: &[Log], validation: &[Log]) -> Overlaps {
         let logs: Vec<_> = training.iter().chain(validation).map(|l| &l.log).collect();
         let mut out = Overlaps::default();
         for found in shared_rows(&logs) {

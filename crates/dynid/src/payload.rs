@@ -9,14 +9,15 @@ pub use difference::Difference;
 pub use record::{PayloadFile, PayloadRecord, Quantity};
 
 use crate::config::{Config, PayloadConfig};
-use crate::identify::{Identification, Step, identify};
+use crate::identify::{Identification, Step};
+use crate::run::{Run, identify};
 use crate::{Error, trust};
 
 /// An identification with payloads, and what it says about each of them.
 #[derive(Debug)]
 pub struct PayloadIdentification {
     /// The identification of robot and payloads together.
-    pub identification: Identification,
+    pub identification: Run,
     /// One record per payload, in the order of the configuration.
     pub payloads: Vec<PayloadRecord>,
 }
@@ -53,7 +54,7 @@ pub fn identify_payloads(
     };
     let run = Config { payload: config.payload.iter().map(unknown).collect(), ..config.clone() };
     let identification = identify(&run, progress)?;
-    let payloads = config.payload.iter().map(|p| record::of(&identification, &run, p)).collect();
+    let payloads = config.payload.iter().map(|p| record::of(&identification, p)).collect();
     Ok(PayloadIdentification { identification, payloads })
 }
 

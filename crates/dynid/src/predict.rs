@@ -51,8 +51,8 @@ fn with_recorded_columns(
         ..columns.clone()
     };
     let named = |source| Error::Columns { file: table.source.clone(), source: Box::new(source) };
-    let mapping =
-        logs::map_columns(&LogHeader::of_names(&table.header), &logs::axes(model), &spec).map_err(named)?;
+    let mapping = logs::map_columns(&LogHeader::of_names(&table.header), &crate::log::axes(model), &spec)
+        .map_err(named)?;
     let signals = mapping.extract(&table).map_err(named)?;
     let mut columns = signals.channels;
     let quantities = [("q", Some(signals.position)), ("dq", signals.velocity), ("ddq", signals.acceleration)];

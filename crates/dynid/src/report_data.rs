@@ -17,8 +17,8 @@ use crate::Error;
 use crate::agreement::Agreement;
 use crate::config::{Config, Method};
 use crate::estimate::{Choice, Estimate, Provenance};
-use crate::identify::Identification;
 use crate::result::short_name;
+use crate::run::Run;
 
 pub(crate) use picture::picture;
 pub(crate) use settings::settings_table;
@@ -28,13 +28,13 @@ const AT_REST: &str = " Where a joint stands, friction of velocity is left out o
                        static friction there, and the sign of a speed that is noise would make the curve jump. Errors and residual \
                        statistics count the full prediction there too.";
 
-impl Identification {
+impl Run {
     /// The report as one HTML page.
     ///
     /// # Errors
     /// [`Error::Report`].
-    pub fn report(&self, config: &Config, estimate: &Estimate) -> Result<String, Error> {
-        Ok(report::render(&self.report_data(config, estimate)?)?)
+    pub fn report(&self, estimate: &Estimate) -> Result<String, Error> {
+        Ok(report::render(&self.report_data(estimate)?)?)
     }
 
     /// Kind of the joint behind an output, in words.
@@ -58,7 +58,7 @@ impl Identification {
     ///
     /// # Errors
     /// [`Error::Conditioning`] for an effort that cannot be filtered for the first figure.
-    pub fn report_data(&self, config: &Config, estimate: &Estimate) -> Result<report::ReportData, Error> {
+    pub fn report_data(&self, estimate: &Estimate) -> Result<report::ReportData, Error> {
         use dynid_model::EffortModel;
         let mechanism = self.model.mechanism();
         Ok(report::ReportData {
@@ -70,7 +70,7 @@ impl Identification {
             picture: self.picture(),
             robot: report::Robot {
                 name: estimate.robot.clone(),
-                file: Some(config.robot.display().to_string()),
+                file: Some(self.config.robot.display().to_string()),
                 facts: vec![
                     Fact::new("moving joints", mechanism.bodies().len(), ""),
                     Fact::new("standard parameters, elements included", estimate.counts.standard.all, ""),
@@ -100,7 +100,7 @@ impl Identification {
             estimation: vec![
                 Fact::new(
                     "estimator",
-                    match config.estimator.method {
+                    match self.config.estimator.method {
                         Method::Ols => "ordinary least squares",
                         Method::Wls => "weighted least squares, residual variances found along the way",
                         Method::Huber => "Huber's loss, scales found along the way",
@@ -190,7 +190,11 @@ impl Identification {
         };
         let samples = a.counted.len();
         let facts = training.map_or_else(Vec::new, |k| {
-            self.columns[k].iter().map(|(s, c)| Fact::new(format!("column of {s}"), c.as_str(), "")).collect()
+            self.sources[k]
+                .columns
+                .iter()
+                .map(|(s, c)| Fact::new(format!("column of {s}"), c.as_str(), ""))
+                .collect()
         });
         report::LogReport {
             name: short_name(&a.name),
@@ -345,7 +349,7 @@ fn status(word: &str) -> Status {
 
 /// Settings of an identification beside those of a configuration that says nothing.
 pub(crate) fn run_settings(of: &Provenance) -> Vec<report::Chosen> {
-    settings_table(&of.settings, &crate::provenance::provenance(&Config::default(), Vec::new()).settings)
+    settings_table(&of.settings, &crate::provenance::settings_of(&Config::default()))
 }
 
 fn verdict(estimate: &Estimate) -> report::Verdict {

@@ -9,25 +9,22 @@ use dynid_model::element::{change_name, scale_name};
 use dynid_model::{EffortModel, Inertia, Owner};
 use serde_json::json;
 
-use crate::Error;
 use crate::agreement::Agreement;
-use crate::config::{Config, Route};
 use crate::estimate::{
-    BaseValue, ByMotion, Choice, ConditioningRecord, Estimate, FitSummary, FitValues, LogFit, LogScale,
-    ModelRecord, ParameterValue, Provenance, RankStatus, SCHEMA, ShapeValue,
+    BaseValue, ByMotion, Choice, ConditioningRecord, Estimate, ExportedRecord, FitSummary, FitValues,
+    InputRecord, LogFit, LogScale, ModelRecord, ParameterValue, Provenance, RankStatus, ReadingRecord,
+    SCHEMA, ShapeValue,
 };
 use crate::identify::Identification;
-use crate::provenance::provenance;
+use crate::log::LogSource;
+use crate::settings::Route;
 use crate::shape;
 use crate::trust::ParameterTrust;
 use crate::verdict;
 
 impl Identification {
     /// The result file of this identification.
-    ///
-    /// # Errors
-    /// [`Error`] of the records that the file is made of.
-    pub fn estimate(&self, config: &Config) -> Result<Estimate, Error> {
+    pub fn estimate(&self) -> Estimate {
         let solution = &self.fit().solution;
         let finite = |x: f64| x.is_finite().then_some(x);
         let (_, verdict) = verdict::judge(self);
@@ -40,7 +37,7 @@ impl Identification {
             columns.iter().map(name).map(|n| shape::of_change(&n).unwrap_or(&n).to_owned()).collect()
         };
         let not_excited: Vec<usize> = solution.dropped.iter().map(|c| self.base.kept[*c]).collect();
-        Ok(Estimate {
+        Estimate {
             schema: SCHEMA,
             robot: self.model.mechanism().name().to_owned(),
             joints: self.model.outputs().iter().map(|o| o.name.clone()).collect(),
@@ -67,7 +64,7 @@ impl Identification {
             stiffness: self.stiffness.clone(),
             friction_passivity: self.friction_passivity(),
             feasible: self.unphysical_bodies().is_empty(),
-            consistency: self.consistency_record(config),
+            consistency: self.consistency_record(),
             held_out: self.held_out_record(),
             precision: self.precision_record(),
             exogeneity: self.exogeneity_record(),
@@ -75,18 +72,44 @@ impl Identification {
             motions_that_would_help: self.trust.motions.clone(),
             fit: self.fit_summary(),
             validation: self.validation.iter().map(log_fit).collect(),
-            exported: self.exported.clone(),
+            exported: ExportedRecord::default(),
             preflight: self.findings.iter().map(Into::into).collect(),
             overlaps: self.overlaps.clone(),
             effort_scale: self.effort_scale.clone(),
             verdict,
-            conditioning: self.conditioning_record(config),
+            conditioning: self.conditioning_record(),
             model,
             provenance: Provenance {
-                reading: Some(self.reading.clone()),
-                ..provenance(config, self.inputs.clone())
+                inputs: self.inputs(),
+                reading: Some(ReadingRecord {
+                    understood: self.training_sources().map(|source| source.columns.clone()).collect(),
+                    ..ReadingRecord::default()
+                }),
+                settings: serde_json::to_value(&self.settings)
+                    .unwrap_or_else(|e| unreachable!("settings hold only plain data: {e}")),
+                seed: self.settings.seed.unwrap_or(1),
+                ..Provenance::default()
             },
-        })
+        }
+    }
+
+    /// Robot, logs and friction as they were read, with what their bytes hash to; what came as arrays is not among them.
+    pub fn inputs(&self) -> Vec<InputRecord> {
+        let mut out = InputRecord::of_robot(&self.robot);
+        for (k, source) in self.sources.iter().enumerate() {
+            let validates = k >= self.logs.len();
+            out.extend(source.inputs.iter().map(|input| match input.kind.as_str() {
+                "log" if validates => InputRecord { kind: "validation".to_owned(), ..input.clone() },
+                _ => input.clone(),
+            }));
+        }
+        out.extend(self.plan.known_source.iter().map(|source| InputRecord::of("friction", source)));
+        out
+    }
+
+    /// Where the training logs come from.
+    fn training_sources(&self) -> impl Iterator<Item = &LogSource> {
+        self.sources.iter().take(self.logs.len())
     }
 
     /// Links whose identified inertia no body could have, with the reason.
@@ -264,14 +287,14 @@ impl Identification {
         }
     }
 
-    fn conditioning_record(&self, config: &Config) -> ConditioningRecord {
+    fn conditioning_record(&self) -> ConditioningRecord {
         let delay = self.conditioning.as_ref().map(|c| &c.delay);
         ConditioningRecord {
-            route: match config.conditioning.route {
+            route: match self.settings.conditioning.route {
                 Route::Compact => "compact".to_owned(),
                 Route::Textbook => "textbook".to_owned(),
             },
-            choices: self.choices(config),
+            choices: self.choices(),
             delay_samples: self.delay_samples,
             delay_rate_hz: self.delay_rate_hz,
             delay_half_width: delay.map(|d| d.half_width),
@@ -289,7 +312,7 @@ impl Identification {
     }
 
     /// Every choice of the conditioning with its reason.
-    pub fn choices(&self, config: &Config) -> Vec<Choice> {
+    pub fn choices(&self) -> Vec<Choice> {
         let mut out = Vec::new();
         let mut add = |name: &str, value: serde_json::Value, unit: &str, origin: &str, reason: String| {
             out.push(Choice {
@@ -301,14 +324,14 @@ impl Identification {
             });
         };
         let given = |set: bool| if set { "given" } else { "found" };
-        for log in &self.logs {
+        for (log, source) in self.logs.iter().zip(self.training_sources()) {
             let name = short_name(&log.name);
             let resampled = if log.clock.resampled { "resampled on a uniform grid" } else { "used as it is" };
             add(
                 &format!("sample rate of {name}"),
                 json!(log.rate_hz),
                 "Hz",
-                given(config.columns.rate_hz.is_some()),
+                given(source.rate_given),
                 format!(
                     "median step; jitter {:.2e} of a sample, {} gaps: {resampled}",
                     log.clock.jitter,
@@ -324,9 +347,9 @@ impl Identification {
                 "isolated runs far outside the running median; chatter and steps at reversal stay".to_owned(),
             );
         }
-        for (log, notes) in self.logs.iter().zip(&self.found_out) {
+        for (log, source) in self.logs.iter().zip(self.training_sources()) {
             let name = short_name(&log.name);
-            for note in notes {
+            for note in &source.notes {
                 add(
                     &format!("{} of {name}", note.setting),
                     json!(note.value),
@@ -336,14 +359,14 @@ impl Identification {
                 );
             }
         }
-        for (log, columns) in self.logs.iter().zip(&self.columns) {
+        for (log, source) in self.logs.iter().zip(self.training_sources()) {
             let name = short_name(&log.name);
-            for (signal, used) in columns {
+            for (signal, used) in &source.columns {
                 add(
                     &format!("{signal} columns of {name}"),
                     json!(used),
                     "",
-                    given(config.columns != dynid_io::MappingSpec::default()),
+                    given(source.columns_given),
                     "by the names in the header unless the configuration says otherwise".to_owned(),
                 );
             }
@@ -352,7 +375,7 @@ impl Identification {
             let name = format!("known friction of {}", law.joint);
             add(&name, json!(law.in_words()), "", "given", friction::of_known(self, law));
         }
-        for log in &self.logs {
+        for log in self.logs.iter() {
             if let Some(motion) = &log.periodic {
                 add(
                     &format!("period of {}", short_name(&log.name)),
@@ -367,15 +390,15 @@ impl Identification {
             }
         }
         let Some(c) = &self.conditioning else {
-            let route = config.textbook_route();
+            let route = self.settings.textbook_route();
             add(
                 "filter cut-off",
                 json!(route.cutoff_hz),
                 "Hz",
-                given(config.conditioning.kernel_hz.is_some()),
+                given(self.settings.conditioning.kernel_hz.is_some()),
                 "textbook route: zero-phase Butterworth on positions and efforts".to_owned(),
             );
-            for log in &self.logs {
+            for log in self.logs.iter() {
                 add(
                     "decimation",
                     json!(route.factor(log.rate_hz)),
@@ -393,7 +416,7 @@ impl Identification {
             "kernel cut-off",
             json!(c.kernel_hz),
             "Hz",
-            given(config.conditioning.kernel_hz.is_some()),
+            given(self.settings.conditioning.kernel_hz.is_some()),
             format!(
                 "highest cut-off (limit {:.2} Hz from position noise up to {largest_noise:.1e} rad, crossing {:.1} Hz, excited band {:.2} Hz) that held-out blocks do not speak against",
                 c.limit.limit_hz, c.limit.crossing_hz, c.limit.excited_band_hz
@@ -410,7 +433,7 @@ impl Identification {
             "state cut-off",
             json!(self.state_hz),
             "Hz",
-            given(config.conditioning.state_hz.is_some()),
+            given(self.settings.conditioning.state_hz.is_some()),
             "states are filtered well above the kernel, so that signs of velocity stay sharp".to_owned(),
         );
         add(
@@ -432,7 +455,7 @@ impl Identification {
                 &format!("reversal mask of {}", output.name),
                 mask.0.map_or(json!(null), |m| json!(m)),
                 "of rms speed",
-                given(config.conditioning.reversal_mask.is_some()),
+                given(self.settings.conditioning.reversal_mask.is_some()),
                 format!(
                     "held-out error over the ladder of masks; {:.0} % of the samples stay",
                     100.0 * mask.1

@@ -10,7 +10,7 @@ use dynid_model::{Description, EffortModel, JointKind, Mechanism, MechanismWarni
 use crate::Error;
 use crate::caution::{self, Caution};
 use crate::elements::{ElasticFault, ElementPlan};
-use crate::logs::{self, LogAxis};
+use crate::log::{self, LogAxis};
 use crate::prior::Prior;
 
 /// How a robot file is to be read.
@@ -93,7 +93,7 @@ impl Robot {
         elements.elastic.retain(|e| !is_fixed(&file.description, &e.joint));
         elements.clearance.retain(|c| !is_fixed(&file.description, &c.joint));
         let bare = ElementPlan::bare(&mechanism, &elements)?.with_loops(closed.clone());
-        let axes = logs::axes(&bare.model(&mechanism)?);
+        let axes = log::axes(&bare.model(&mechanism)?);
         let inside = mechanism.rate_names();
         let is_joint = |joint: &String| axes.iter().any(|a| a.name == *joint) || inside.contains(joint);
         elements.per_joint.retain(|(joint, _)| is_joint(joint));
@@ -177,7 +177,7 @@ impl Robot {
     pub fn rate_names(&self) -> Vec<String> {
         match self.closed {
             Some(_) => self.mechanism.rate_names(),
-            None => logs::names(&self.axes),
+            None => crate::log::names(&self.axes),
         }
     }
 
@@ -266,7 +266,7 @@ fn held(locked: &[(String, f64)]) -> Vec<String> {
 /// Coordinates of a model as a states table names them.
 pub fn model_state_joints(model: &RobotModel) -> Vec<dynid_io::StateJoint> {
     let closed = model.closed().map(|closed| closed.machine().as_ref());
-    state_joints(model.mechanism(), closed, &logs::axes(model))
+    state_joints(model.mechanism(), closed, &crate::log::axes(model))
 }
 
 /// Joints of a mechanism, then the axes behind them; of one with loops the independent joints alone.

@@ -1,16 +1,16 @@
 //! Shape parameters of a run: found by separable least squares, then linearised, so that the final fit, its covariance and
 //! all that follows know of them.
 
-use dynid_estimate::conditioning::{Conditioning, ConditioningSettings, PreparedLog, refine};
+use dynid_estimate::conditioning::{Conditioning, refine};
 use dynid_estimate::separable::{
     Bound, SeparableEstimate, SeparableSettings, ShapeFinding, ShapeVerdict, StartReport,
 };
 use dynid_model::element::{JointElement, Linearised, change_name};
-use dynid_model::{BaseParameters, EffortModel, RobotModel};
+use dynid_model::{EffortModel, RobotModel};
 
 use crate::Error;
-use crate::config::Config;
 use crate::elements::ElementPlan;
+use crate::identify::Problem;
 
 /// Shape parameters found from logs.
 #[derive(Debug)]
@@ -23,26 +23,23 @@ pub struct ShapeFit {
     pub starts: StartReport,
 }
 
-/// Finds the shape parameters of a model on conditioned logs; also returns the linear parameters that go with them.
-pub(crate) fn find(
-    config: &Config,
-    model: RobotModel,
-    base: &BaseParameters,
-    logs: &[PreparedLog],
-    (choices, settings): (&Conditioning, &ConditioningSettings),
-) -> Result<(ShapeFit, Vec<f64>), Error> {
+/// Finds the shape parameters of a problem's model on its conditioned logs; also returns the linear parameters that go with them.
+pub(crate) fn find(problem: &Problem, choices: &Conditioning) -> Result<(ShapeFit, Vec<f64>), Error> {
+    let Problem { model, structure, logs, settings, .. } = problem;
     let shape = model.parameters().shape_start();
     let defaults = SeparableSettings::default();
-    let seed = config.seed.unwrap_or(1);
+    let seed = settings.seed.unwrap_or(1);
     let separable = SeparableSettings {
         seed,
-        search: config.estimator.shape.search(seed)?,
-        starts: config.estimator.shape.starts.unwrap_or(defaults.starts),
+        search: settings.estimator.shape.search(seed)?,
+        starts: settings.estimator.shape.starts.unwrap_or(defaults.starts),
         ..defaults
     };
-    let found: SeparableEstimate = refine(&model, &shape, &base.kept, logs, choices, settings, &separable)?;
+    let (base, conditioning) = (&structure.base, settings.conditioning_settings());
+    let found: SeparableEstimate =
+        refine(model, &shape, &base.kept, logs, choices, &conditioning, &separable)?;
     let linear = base.expanded(&found.linear);
-    let model = model.with_shape(&found.shape);
+    let model = problem.plan.model(&problem.robot.mechanism)?.with_shape(&found.shape);
     Ok((ShapeFit { model, findings: found.findings, starts: found.starts }, linear))
 }
 

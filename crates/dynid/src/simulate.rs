@@ -207,8 +207,7 @@ fn by_inverse_dynamics(
             (at, effort.0, effort.1, Some(journals))
         }
     };
-    let (clean_effort, led) =
-        (crate::logs::as_logged(model, clean_effort), crate::logs::as_logged(model, led));
+    let (clean_effort, led) = (crate::log::as_logged(model, clean_effort), crate::log::as_logged(model, led));
     let step = |j: usize| {
         let turn = if model.joints()[j].slides { 1.0 } else { std::f64::consts::TAU };
         turn / 2f64.powi(settings.encoder_bits as i32)

@@ -13,7 +13,7 @@ use dynid_estimate::deformation::{Deformation, Evidence, Verdict, fit, judge};
 use dynid_model::{EffortModel, RobotModel};
 use serde::{Deserialize, Serialize};
 
-pub(crate) use stiff::{stiff_config, stiff_robot};
+pub(crate) use stiff::{at_motors, stiff_robot, stiff_settings};
 
 use crate::Error;
 use crate::elements::ElementPlan;

@@ -51,7 +51,7 @@ pub fn validate(
     debug_assert_eq!(model.outputs().len(), estimate.joints.len());
     let mut out = Validation { agreements: Vec::new(), warnings: Vec::new() };
     for log in logs {
-        let loaded = logs::load(log, &logs::axes(&model), columns, motor_side)?;
+        let loaded = logs::load(log, &crate::log::axes(&model), columns, motor_side)?;
         let prepared = loaded.prepare(&model, &settings)?;
         out.warnings.extend(logged_beyond(&estimate.model.known_friction, &prepared));
         out.agreements.push(compare(&model, &values, &prepared, &alignment, &settings)?);

@@ -32,11 +32,11 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     let set = outputs::prepare_folder(&files, &inputs, args.force)?;
     let progress = Progress::new(args.print.quiet);
     let identification = identify(&config, &mut |step| progress.step(step))?;
-    let mut estimate = identification.estimate(&config)?;
+    let mut estimate = identification.estimate();
     estimate.provenance.command_line =
         std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
     estimate.provenance.revision = option_env!("DYNID_REVISION").map(str::to_owned);
-    let report = identification.report(&config, &estimate)?;
+    let report = identification.report(&estimate)?;
     let urdf = match identification.urdf() {
         Ok(exported) => Ok(exported),
         // What a URDF cannot state is no reason to lose the identification.

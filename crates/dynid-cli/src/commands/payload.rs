@@ -26,7 +26,7 @@ pub(crate) fn run(args: &PayloadArgs) -> Result<u8, Failure> {
     let set = outputs::prepare_folder(&files, &inputs, args.force)?;
     let progress = Progress::new(args.print.quiet);
     let found = identify_payloads(&config, &mut |step| progress.step(step))?;
-    let file = found.file(&config)?;
+    let file = found.file();
     let report = file.report()?;
     drop(progress);
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dynid::io::{ReadOptions, csv};
-use dynid::logs::as_logged;
+use dynid::log::as_logged;
 use dynid::predict::{efforts, read_states};
 use dynid::{Error, Estimate};
 

@@ -59,7 +59,7 @@ pub enum SettingValue {
 }
 
 /// A transmission: `q_motor = matrix · q_joint`, `effort_joint = matrixᵀ · effort_motor`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct CouplingSpec {
     /// Names of the motors, one per row.
     pub motors: Vec<String>,
@@ -72,7 +72,7 @@ pub struct CouplingSpec {
 }
 
 /// Parameters of a coupling.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CouplingForm {
     /// One inertia, viscous and Coulomb parameter per motor, carried through the matrix.

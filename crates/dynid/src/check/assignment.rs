@@ -1,26 +1,14 @@
 //! Numbered columns on robots whose joints have no one order.
 
-use dynid_io::columns::{ColumnMapping, ColumnNames, FullSignal, SignalSpec};
 use dynid_model::{JointKind, Mechanism};
 
 use super::finding::{FindingId, Findings, Severity};
-use crate::config::Config;
+use crate::log::LogSource;
 
 /// Warns where columns go to joints by number alone and a log cannot tell another order: branches that are alike fit each other's columns,
 /// and file order, depth first (children by name) and alphabetical order number the joints of a branched robot differently.
-pub(super) fn examine(
-    config: &Config,
-    mechanism: &Mechanism,
-    mapping: &ColumnMapping,
-    out: &mut Findings<'_>,
-) {
-    let by_number = |spec: &SignalSpec| {
-        let (SignalSpec::Full(FullSignal { columns, .. }) | SignalSpec::Names(columns)) = spec;
-        matches!(columns, ColumnNames::Pattern(pattern) if !pattern.contains("{joint}"))
-    };
-    if !config.columns.position.as_ref().is_none_or(by_number) {
-        return;
-    }
+pub(super) fn examine(mechanism: &Mechanism, source: &LogSource, out: &mut Findings<'_>) {
+    let Some(mapping) = source.mapping.as_ref().filter(|_| source.by_number) else { return };
     let pairs = mapping.joints.iter().zip(&mapping.position);
     let numbered: Vec<(&str, &str)> = pairs
         .filter_map(|(joint, column)| Some((joint.as_str(), column.as_ref()?.name.as_str())))

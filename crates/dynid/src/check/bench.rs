@@ -13,12 +13,12 @@ use dynid_motion::{JointSignals, Log, UniformLog};
 use super::columns::Velocities;
 use super::finding::{FindingId, Findings, Fix, Severity};
 use super::plausibility::{self, Taken};
-use crate::config::Config;
 use crate::elements::ElementPlan;
 use crate::identify::stated_values;
-use crate::logs::LARGEST_POSITION;
+use crate::log::LARGEST_POSITION;
 use crate::prior::{self, Prior};
 use crate::robot::Robot;
+use crate::settings::Settings;
 use crate::{Error, advice, consistency};
 
 /// Weight of the prior: it decides only what the log leaves open.
@@ -60,8 +60,8 @@ pub(super) struct Examined {
 
 impl Bench {
     /// With the elements of the configuration, or the usual ones.
-    pub(super) fn new(config: &Config, robot: &Robot) -> Result<Bench, Error> {
-        let plan = ElementPlan::of_run(config, robot, |rate| robot.is_driven(rate))?;
+    pub(super) fn new(settings: &Settings, robot: &Robot) -> Result<Bench, Error> {
+        let plan = ElementPlan::of_run(settings, robot, |rate| robot.is_driven(rate))?;
         let model = plan.model(&robot.mechanism)?;
         let shape = model.parameters().shape_start();
         let base = BaseParameters::of_model(&model, &shape, &BaseSettings::default());
@@ -70,9 +70,9 @@ impl Bench {
             slides: robot.axes.iter().map(|a| a.slides).collect(),
             stated: stated_values(&model, &plan),
             gravity: robot.file.description.gravity,
-            stated_delay: config.conditioning.delay_samples.unwrap_or(0.0),
+            stated_delay: settings.conditioning.delay_samples.unwrap_or(0.0),
             robot: robot.path.display().to_string(),
-            known_effort_scale: config.known_effort_scale,
+            known_effort_scale: settings.known_effort_scale,
             model,
             shape,
             base,

@@ -6,8 +6,8 @@ use dynid_motion::shift::shift;
 use super::bench::Bench;
 use super::finding::{FindingId, Findings, Fix, Severity};
 use crate::Error;
-use crate::config::{Config, Route};
-use crate::logs::LoadedLog;
+use crate::log::Log;
+use crate::settings::{Route, Settings};
 
 /// Delays between these are ordinary, samples: a command is held over a sample, a sensor filters.
 const ORDINARY: (f64, f64) = (-1.0, 2.5);
@@ -32,15 +32,15 @@ pub(super) struct Delay {
 /// # Errors
 /// [`Error`] where the log cannot be prepared.
 pub(super) fn find(
-    config: &Config,
+    settings: &Settings,
     bench: &Bench,
-    loaded: &LoadedLog,
+    loaded: &Log,
     start: f64,
 ) -> Result<Option<Delay>, Error> {
-    if config.conditioning.route == Route::Textbook {
+    if settings.conditioning.route == Route::Textbook {
         return Ok(None);
     }
-    let settings = ConditioningSettings { delay_samples: None, ..config.conditioning_settings() };
+    let settings = ConditioningSettings { delay_samples: None, ..settings.conditioning_settings() };
     let prepared = loaded.prepare(&bench.model, &settings)?;
     // What belongs to single logs repeats other columns within a log.
     let own = bench.model.log_columns();

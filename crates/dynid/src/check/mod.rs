@@ -22,11 +22,14 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::Error;
-use crate::config::{Config, LogConfig};
+use crate::config::Config;
 use crate::estimate::InputRecord;
-use crate::logs::{self, LoadedLog};
+use crate::log::Log;
+use crate::logs;
 use crate::overlap::{Overlap, Overlaps};
-use crate::robot::{Robot, RobotOptions};
+use crate::robot::Robot;
+use crate::run::load_robot;
+use crate::settings::Settings;
 use bench::{Bench, Examined};
 pub use finding::{Finding, FindingId, Severity};
 use finding::{Findings, Fix};
@@ -101,13 +104,8 @@ impl Check {
 pub fn check(config: &Config, progress: &mut dyn FnMut(&str)) -> Result<Check, Error> {
     config.check()?;
     config.demand_inputs()?;
-    let options = RobotOptions {
-        gravity: config.gravity,
-        couple_mimics: config.couple_mimics.unwrap_or(false),
-        floating_base: false,
-        locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
-    };
-    let robot = Robot::load(&config.robot, &options)?;
+    let robot = load_robot(config)?;
+    let settings = config.settings()?;
     let mut out = Check {
         robot: config.robot.display().to_string(),
         findings: Vec::new(),
@@ -118,27 +116,28 @@ pub fn check(config: &Config, progress: &mut dyn FnMut(&str)) -> Result<Check, E
     };
     let mut bench: Option<(Vec<String>, Bench)> = None;
     let training = config.training_logs();
-    let mut read: Vec<LoadedLog> = Vec::new();
+    let mut read: Vec<Log> = Vec::new();
     for log in training.iter().chain(&config.validation) {
         let file = log.path.display().to_string();
         progress(&file);
         let loaded = logs::load_as_it_is(log, &robot.axes, &config.columns, config.motor_side.as_ref())?;
-        if bench.as_ref().is_none_or(|(still, _)| *still != loaded.not_logged) {
-            let still: Vec<(String, f64)> = loaded.not_logged.iter().map(|n| (n.clone(), 0.0)).collect();
+        let not_logged = loaded.not_logged(&robot.axes);
+        if bench.as_ref().is_none_or(|(still, _)| *still != not_logged) {
+            let still: Vec<(String, f64)> = not_logged.iter().map(|n| (n.clone(), 0.0)).collect();
             let held = if still.is_empty() { robot.clone() } else { robot.locked(&still)? };
-            bench = Some((loaded.not_logged.clone(), Bench::new(config, &held)?));
+            bench = Some((not_logged, Bench::new(&settings, &held)?));
         }
         let Some((_, bench)) = &bench else { continue };
         let mut findings = Findings { log: &file, number: out.logs.len(), list: Vec::new() };
-        let (mut checked, trace) = examine(config, &loaded, bench, &mut findings)?;
-        if let Some(found) = late(config, &loaded, bench, &checked, &mut findings)? {
+        let (mut checked, trace) = examine(&loaded, bench, &mut findings)?;
+        if let Some(found) = late(&settings, &loaded, bench, &checked, &mut findings)? {
             checked.delay_samples = Some([found.samples, found.error]);
         }
-        out.inputs.extend(InputRecord::of_logs(std::slice::from_ref(&loaded)));
+        out.inputs.extend(loaded.source.inputs.iter().cloned());
         out.findings.extend(findings.list);
         out.logs.push(checked);
         out.traces.push(trace);
-        out.mapped.push(fix::Mapped { columns: loaded.mapping.clone(), joints: bench.names() });
+        out.mapped.push(fix::Mapped { columns: logs::mapping_of(&loaded).clone(), joints: bench.names() });
         read.push(loaded);
     }
     let overlaps = Overlaps::of(&read[..training.len()], &read[training.len()..]);
@@ -147,24 +146,21 @@ pub fn check(config: &Config, progress: &mut dyn FnMut(&str)) -> Result<Check, E
     Ok(out)
 }
 
-/// Examines logs that were read already. `robot`: joints that are not logged are locked.
-pub(crate) fn of_loaded(
-    config: &Config,
+/// Examines logs. `robot`: joints that are not logged are locked.
+pub(crate) fn of_logs(
+    settings: &Settings,
     robot: &Robot,
-    loaded: &[LoadedLog],
+    logs: &[Log],
     overlaps: &Overlaps,
 ) -> Result<Vec<Finding>, Error> {
-    let bench = Bench::new(config, robot)?;
-    let training = config.training_logs();
-    let logs: Vec<_> = loaded.iter().zip(&training).enumerate().collect();
-    let of_log = |(number, (log, entry)): &(usize, (&LoadedLog, &LogConfig))| {
-        let file = entry.path.display().to_string();
-        let mut findings = Findings { log: &file, number: *number, list: Vec::new() };
-        examine(config, log, &bench, &mut findings)?;
+    let bench = Bench::new(settings, robot)?;
+    let of_log = |(number, log): (usize, &Log)| {
+        let mut findings = Findings { log: log.log.name(), number, list: Vec::new() };
+        examine(log, &bench, &mut findings)?;
         Ok(findings.list)
     };
-    let mut out = logs.par_iter().map(of_log).collect::<Result<Vec<_>, Error>>()?.concat();
-    out.extend(repeated(overlaps).into_iter().filter(|f| f.number < loaded.len()));
+    let mut out = logs.par_iter().enumerate().map(of_log).collect::<Result<Vec<_>, Error>>()?.concat();
+    out.extend(repeated(overlaps).into_iter().filter(|f| f.number < logs.len()));
     Ok(out)
 }
 
@@ -191,8 +187,8 @@ fn repeated(overlaps: &Overlaps) -> Vec<Finding> {
 
 /// The delay of a log that is read as it should be. Identification, which finds it itself, does not ask for it twice.
 fn late(
-    config: &Config,
-    loaded: &LoadedLog,
+    settings: &Settings,
+    loaded: &Log,
     bench: &Bench,
     checked: &CheckedLog,
     out: &mut Findings<'_>,
@@ -201,13 +197,13 @@ fn late(
     if spoilt || checked.unexplained.is_none_or(|share| share > bench::UNEXPLAINED) {
         return Ok(None);
     }
-    let stated = config.conditioning.delay_samples;
+    let stated = settings.conditioning.delay_samples;
     let long = out.list.iter_mut().flat_map(|f| &mut f.fixes).find_map(|fix| match fix {
         Fix::Delay(samples) => Some(samples),
         _ => None,
     });
     let start = long.as_ref().map_or(stated.unwrap_or(0.0), |samples| **samples);
-    let found = delay::find(config, bench, loaded, start)?;
+    let found = delay::find(settings, bench, loaded, start)?;
     match (found, long) {
         (Some(found), Some(long)) => *long = found.samples,
         (Some(found), None) => delay::judge(found, stated, checked.rate_hz, out),
@@ -217,25 +213,24 @@ fn late(
 }
 
 fn examine(
-    config: &Config,
-    loaded: &LoadedLog,
+    loaded: &Log,
     bench: &Bench,
     out: &mut Findings<'_>,
 ) -> Result<(CheckedLog, report::Trace), Error> {
     if let Some(tree) = bench.tree() {
-        assignment::examine(config, tree, &loaded.mapping, out);
+        assignment::examine(tree, &loaded.source, out);
     }
     for turns in &loaded.unwrapped {
         let remedy = "nothing: the position was unwrapped; see that the logger keeps turns apart where a joint has limits";
         out.add(FindingId::PositionWrap, Severity::Info, Some(&turns.joint), turns.words(), remedy);
     }
-    let mut on_grid = record::examine(&loaded.log, &loaded.rows, |joint| bench.drives(joint), out)?;
+    let mut on_grid = record::examine(&loaded.log, &loaded.data_rows(), |joint| bench.drives(joint), out)?;
     bench.order(&mut on_grid);
     let idle = bench.idle(&loaded.log, out);
     let Examined { wiring, tilt, excitation } = bench.examine(&on_grid, &idle, out)?;
     let checked = CheckedLog {
         log: out.log.to_owned(),
-        reading: loaded.reading.clone(),
+        reading: loaded.source.notes.clone(),
         rows: loaded.log.rows(),
         rate_hz: on_grid.rate_hz,
         duration_s: on_grid.samples() as f64 / on_grid.rate_hz,

@@ -8,7 +8,7 @@ use dynid_motion::{ClockReport, Log, UniformLog};
 
 use super::finding::{FindingId, Findings, Fix, Severity};
 use crate::Error;
-use crate::logs::LARGEST_POSITION;
+use crate::log::LARGEST_POSITION;
 
 /// Jitter that is worth a word, samples.
 const JITTER: f64 = 0.05;

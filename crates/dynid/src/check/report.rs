@@ -6,7 +6,6 @@ use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, Fact, StudySection,
 
 use super::finding::FindingId;
 use super::{Check, CheckedLog, Severity, short};
-use crate::estimate::InputRecord;
 use crate::{Error, VERSION};
 
 /// Points per drawn curve.
@@ -110,7 +109,7 @@ impl Check {
             ..StudySection::default()
         }];
         sections.extend(self.logs.iter().zip(&self.traces).map(|(log, trace)| section(log, trace)));
-        let inputs = self.inputs.iter().map(InputRecord::shown).collect();
+        let inputs = self.inputs.iter().map(crate::provenance::shown).collect();
         Ok(report::render_log_page(&report::LogPage {
             kind: "Pre-flight".to_owned(),
             title: format!(

@@ -2,35 +2,35 @@
 
 use dynid_model::EffortModel;
 
-use crate::config::{Config, Consistency, Friction, Method, Route};
-use crate::identify::Opened;
+use crate::identify::Problem;
+use crate::settings::{Consistency, Friction, Method, Route, Settings};
 
 /// Evaluations of a search within a comparison.
 const EVALUATIONS: u64 = 150;
 
-/// An estimator, as the configuration that makes a run use it.
+/// An estimator, as the settings that make a run use it.
 #[derive(Debug, Clone)]
 pub(super) struct Contestant {
     pub(super) name: &'static str,
     pub(super) what: &'static str,
-    pub(super) config: Config,
+    pub(super) settings: Settings,
 }
 
 /// Estimators that apply: total least squares where errors of columns are stated, instruments where the closed loop is,
 /// searches where friction is not given.
-pub(super) fn contestants(config: &Config, opened: &Opened) -> Vec<Contestant> {
-    let free = opened.model.parameters().shape.is_empty();
-    let auto = config.elements.friction == Friction::Auto;
-    let with = |name, what, change: &dyn Fn(&mut Config)| {
-        let mut own = config.clone();
+pub(super) fn contestants(asked: &Settings, problem: &Problem) -> Vec<Contestant> {
+    let free = problem.model.parameters().shape.is_empty();
+    let auto = asked.elements.friction == Friction::Auto;
+    let with = |name, what, change: &dyn Fn(&mut Settings)| {
+        let mut own = asked.clone();
         own.conditioning.route = Route::Compact;
         own.elements.friction = if auto { Friction::Given } else { own.elements.friction };
         own.estimator.consistency = Consistency::None;
         own.estimator.shape.search = None;
         change(&mut own);
-        Contestant { name, what, config: own }
+        Contestant { name, what, settings: own }
     };
-    let method = |method: Method| move |c: &mut Config| c.estimator.method = method;
+    let method = |method: Method| move |c: &mut Settings| c.estimator.method = method;
     let mut out = vec![
         with(
             "textbook",
@@ -50,15 +50,15 @@ pub(super) fn contestants(config: &Config, opened: &Opened) -> Vec<Contestant> {
             c.estimator.consistency = Consistency::PseudoInertia;
         }),
     ];
-    if !config.estimator.column_noise.is_empty() {
+    if !asked.estimator.column_noise.is_empty() {
         out.push(with("tls", "total least squares with the stated errors", &method(Method::Tls)));
     }
-    if config.instruments.is_some() {
+    if asked.closed_loop.is_some() {
         out.push(with("iv", "instruments simulated in closed loop", &method(Method::Iv)));
     }
     if auto || !free {
-        let shapes = |c: &mut Config| {
-            c.elements.friction = config.elements.friction;
+        let shapes = |c: &mut Settings| {
+            c.elements.friction = asked.elements.friction;
             c.estimator.method = Method::Wls;
         };
         out.push(with("separable", "friction shapes by variable projection, weighted", &shapes));

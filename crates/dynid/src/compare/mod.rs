@@ -9,6 +9,7 @@ mod estimators;
 mod record;
 mod report;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use dynid_estimate::conditioning::{Conditioning, ConditioningSettings, PreparedLog};
@@ -18,8 +19,9 @@ use dynid_motion::mask::edges;
 use crate::Error;
 use crate::agreement::{Alignment, compare as against};
 use crate::config::{Config, Route};
-use crate::elements::ElementPlan;
-use crate::identify::{ModelFit, Opened, Step, Structure, conditioned, fit_model, open};
+use crate::estimate::InputRecord;
+use crate::identify::{ModelFit, Problem, Step};
+use crate::run::open;
 use estimators::{Contestant, contestants};
 pub use record::{CompareStatus, ComparedEstimator, Comparison, JointError};
 
@@ -42,7 +44,6 @@ struct FoldScore {
 /// # Errors
 /// Fails as [`crate::identify()`] does. An estimator that fails is in the table with its reason, and no error.
 pub fn compare(config: &Config, progress: &mut dyn FnMut(usize, usize, &str)) -> Result<Comparison, Error> {
-    let settings = config.conditioning_settings();
     progress(0, 1, "reading");
     let mut opened = open(
         &Config {
@@ -55,12 +56,16 @@ pub fn compare(config: &Config, progress: &mut dyn FnMut(usize, usize, &str)) ->
         &mut |_: Step| {},
     )?;
     progress(0, 1, "conditioning");
-    let (model, conditioning) =
-        conditioned(opened.model, &opened.structure, &mut opened.plan, &opened.logs, &settings, &mut |_| {})?;
-    opened.model = model;
-    let bench = Bench { opened: &opened, conditioning: &conditioning, settings: &settings };
-    let list = contestants(config, &opened);
-    let folds: Vec<[Vec<PreparedLog>; 2]> = (0..FOLDS).map(|k| split(&opened.logs, k)).collect();
+    let conditioning = opened.problem.condition(&mut |_| {})?;
+    let conditioning = conditioning.unwrap_or_else(|| unreachable!("the route is the compact one"));
+    let asked = config.settings()?;
+    let bench = Bench {
+        problem: &opened.problem,
+        conditioning: &conditioning,
+        settings: asked.conditioning_settings(),
+    };
+    let list = contestants(&asked, &opened.problem);
+    let folds: Vec<[Arc<[PreparedLog]>; 2]> = (0..FOLDS).map(|k| split(&opened.problem.logs, k)).collect();
     let total = list.len() * FOLDS;
     let scores = list
         .iter()
@@ -73,36 +78,38 @@ pub fn compare(config: &Config, progress: &mut dyn FnMut(usize, usize, &str)) ->
             each.collect::<Result<Vec<FoldScore>, Error>>().map_err(|e| e.to_string())
         })
         .collect();
-    Ok(record::ranked(config, &opened, &conditioning, &list, scores))
+    let mut inputs = InputRecord::of_robot(&opened.problem.robot);
+    inputs.extend(opened.inputs().cloned());
+    Ok(record::ranked(config, &opened.problem, inputs, &conditioning, &list, scores))
 }
 
 struct Bench<'a> {
-    opened: &'a Opened,
+    problem: &'a Problem,
     conditioning: &'a Conditioning,
-    settings: &'a ConditioningSettings,
+    settings: ConditioningSettings,
 }
 
 impl Bench<'_> {
     fn score(
         &self,
         contestant: &Contestant,
-        training: &[PreparedLog],
+        training: &Arc<[PreparedLog]>,
         held_out: &[PreparedLog],
     ) -> Result<FoldScore, Error> {
         let start = Instant::now();
-        let (fit, plan) = self.fit(contestant, training)?;
-        let unfolded = fit.unfolded(&plan)?;
+        let (problem, fit) = self.fit(contestant, training)?;
+        let unfolded = fit.unfolded(&problem)?;
         let seconds = start.elapsed().as_secs_f64();
         let (model, values): (&RobotModel, &[f64]) = match &unfolded {
             Some((model, values)) => (model, values),
-            None => (&fit.model, &fit.consistent.values),
+            None => (&problem.model, &fit.consistent.values),
         };
-        let textbook = contestant.config.conditioning.route == Route::Textbook;
+        let textbook = contestant.settings.conditioning.route == Route::Textbook;
         let alignment = Alignment {
             state_hz: self.conditioning.state_hz.iter().copied().fold(f64::INFINITY, f64::min),
             // The textbook route knows of no delay, and its predictions go without.
             delay_samples: if textbook { 0.0 } else { self.conditioning.delay.samples },
-            delay_rate_hz: self.opened.logs[0].rate_hz,
+            delay_rate_hz: self.problem.logs[0].rate_hz,
             filter_hz: self.conditioning.kernel_hz,
         };
         let mut sums = vec![(0.0, 0.0, 0.0); model.outputs().len()];
@@ -110,7 +117,7 @@ impl Bench<'_> {
         let mut apart = vec![[(0.0, 0.0); 2]; model.outputs().len()];
         for log in held_out {
             // A fold of a short log may hold nothing but edges.
-            let Ok(found) = against(model, values, log, &alignment, self.settings) else { continue };
+            let Ok(found) = against(model, values, log, &alignment, &self.settings) else { continue };
             let counted = found.counted.iter().filter(|c| **c).count() as f64;
             for (j, sum) in sums.iter_mut().enumerate().filter(|(j, _)| found.moves[*j]) {
                 let stands = counted * found.standing_share[j];
@@ -136,33 +143,20 @@ impl Bench<'_> {
     fn fit(
         &self,
         contestant: &Contestant,
-        training: &[PreparedLog],
-    ) -> Result<(ModelFit, ElementPlan), Error> {
-        let config = &contestant.config;
-        let mut plan = self.opened.plan.clone();
-        let model = plan.model(&self.opened.robot.mechanism)?;
-        let structure = Structure::of(config, &model, &plan, training)?;
-        let conditioning = match config.conditioning.route {
+        training: &Arc<[PreparedLog]>,
+    ) -> Result<(Problem, ModelFit), Error> {
+        let settings = contestant.settings.clone();
+        let conditioning = match settings.conditioning.route {
             Route::Compact => Some(self.conditioning.clone()),
             Route::Textbook => None,
         };
-        let fit = fit_model(
-            config,
-            &self.opened.robot,
-            &mut plan,
-            (model, structure),
-            training,
-            conditioning,
-            self.settings,
-            &mut |_| {},
-        )?;
-        Ok((fit, plan))
+        self.problem.on(training.clone(), settings)?.fit(conditioning, &mut |_| {})
     }
 }
 
 /// Logs without a fold of their time, and that fold alone.
-fn split(logs: &[PreparedLog], fold: usize) -> [Vec<PreparedLog>; 2] {
-    let with = |inside: bool| -> Vec<PreparedLog> {
+fn split(logs: &[PreparedLog], fold: usize) -> [Arc<[PreparedLog]>; 2] {
+    let with = |inside: bool| -> Arc<[PreparedLog]> {
         logs.iter()
             .map(|log| {
                 let n = log.samples();

@@ -8,7 +8,7 @@ use super::estimators::Contestant;
 use super::{FOLDS, FoldScore};
 use crate::config::Config;
 use crate::estimate::InputRecord;
-use crate::identify::Opened;
+use crate::identify::Problem;
 
 /// Error of an estimator on one joint.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -138,7 +138,8 @@ fn mean_and_error(values: &[f64]) -> (f64, f64) {
 /// The table, ranked.
 pub(super) fn ranked(
     config: &Config,
-    opened: &Opened,
+    problem: &Problem,
+    inputs: Vec<InputRecord>,
     conditioning: &Conditioning,
     list: &[Contestant],
     scores: Vec<Result<Vec<FoldScore>, String>>,
@@ -166,13 +167,11 @@ pub(super) fn ranked(
         estimator.behind = Some([mean, spread]);
         estimator.level_with_best = mean <= 2.0 * spread;
     }
-    let mut inputs = InputRecord::of_robot(&opened.robot);
-    inputs.extend(opened.read.iter().flat_map(|log| log.inputs.clone()));
     Comparison {
         inputs,
         robot: config.robot.display().to_string(),
-        logs: opened.logs.iter().map(|l| l.name.clone()).collect(),
-        joints: opened.model.outputs().iter().map(|o| o.name.clone()).collect(),
+        logs: problem.logs.iter().map(|l| l.name.clone()).collect(),
+        joints: problem.model.outputs().iter().map(|o| o.name.clone()).collect(),
         folds: FOLDS,
         filter_hz: conditioning.kernel_hz,
         estimators: estimators.into_iter().map(|(e, _)| e).collect(),

@@ -6,7 +6,6 @@ use dynid_report::{
 };
 
 use super::{CompareStatus, ComparedEstimator, Comparison, JointError};
-use crate::estimate::InputRecord;
 use crate::{Error, VERSION};
 
 impl Comparison {
@@ -15,7 +14,7 @@ impl Comparison {
     /// # Errors
     /// [`Error::Report`].
     pub fn report(&self) -> Result<String, Error> {
-        let inputs = self.inputs.iter().map(InputRecord::shown).collect();
+        let inputs = self.inputs.iter().map(crate::provenance::shown).collect();
         let sections = vec![
             StudySection {
                 title: "Errors on unseen time".to_owned(),

@@ -7,8 +7,10 @@ use dynid_io::MappingSpec;
 use dynid_io::columns::ChannelSpec;
 use serde::{Deserialize, Serialize};
 
-use super::{Config, LogConfig, Method};
+use super::LogConfig;
 use crate::Error;
+use crate::instruments::reference_channel;
+use crate::settings::{ClosedLoop, Given, NominalModel, refuse};
 
 /// Columns of the reference.
 #[derive(Debug, Clone, Deserialize, Serialize, PartialEq)]
@@ -20,17 +22,6 @@ pub enum ReferenceColumns {
     List(Vec<String>),
     /// Joint to column.
     Table(BTreeMap<String, String>),
-}
-
-/// What the controller takes the robot for.
-#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
-#[serde(rename_all = "kebab-case")]
-pub enum NominalModel {
-    /// The robot file, with bodies invented where it states none.
-    #[default]
-    RobotFile,
-    /// The parameters that are simulated.
-    Identified,
 }
 
 /// The closed loop that logs were recorded in, as a noise-free simulation runs it once more ([`crate::instruments`]).
@@ -101,11 +92,6 @@ impl Default for InstrumentsConfig {
     }
 }
 
-/// Name of the channel that holds the reference of a joint.
-pub(crate) fn reference_channel(joint: &str) -> String {
-    format!("reference_{joint}")
-}
-
 impl InstrumentsConfig {
     /// Lets logs be read with the columns of the reference as channels.
     ///
@@ -164,59 +150,59 @@ impl InstrumentsConfig {
         })
     }
 
-    fn check(&self) -> Result<(), Error> {
-        let positive = [
-            ("rate_hz", self.rate_hz.unwrap_or(1.0)),
-            ("bandwidth_hz", self.bandwidth_hz),
-            ("damping", self.damping),
-            ("velocity_cutoff_hz", self.velocity_cutoff_hz),
-            ("sign_width", self.sign_width),
-            ("settled", self.settled),
-            ("divergence", self.divergence),
-        ];
-        for (name, x) in positive {
-            if !(x.is_finite() && x > 0.0) {
-                return Err(Error::setting(&format!("instruments.{name}"), "a positive number", x));
-            }
-        }
+    /// Checks that numbers make sense.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub(super) fn check(&self) -> Result<(), Error> {
         if !(self.reference_scale.is_finite() && self.reference_scale != 0.0) {
             let expected = "a finite number that is not zero";
             return Err(Error::setting("instruments.reference_scale", expected, self.reference_scale));
         }
-        if !(0.0..=1000.0).contains(&self.delay_ticks) {
-            return Err(Error::setting("instruments.delay_ticks", "0 to 1000", self.delay_ticks));
-        }
-        if self.max_rounds == 0 {
-            return Err(Error::setting("instruments.max_rounds", "at least 1", 0));
-        }
-        if self.feed_forward && !self.reference_velocity {
-            let expected = "true with `feed_forward`, which needs the motion of the reference";
-            return Err(Error::setting("instruments.reference_velocity", expected, false));
-        }
-        let lists = [
-            ("position_gain", &self.position_gain),
-            ("velocity_gain", &self.velocity_gain),
-            ("effort_limit", &self.effort_limit),
-        ];
-        for (name, list) in lists {
-            if let Some(x) = list.iter().flatten().find(|x| x.is_nan() || **x < 0.0) {
-                return Err(Error::setting(&format!("instruments.{name}"), "numbers, none negative", x));
-            }
-        }
-        Ok(())
+        self.closed_loop().check()
     }
-}
 
-impl Config {
-    /// Checks what instrumental variables need.
-    pub(super) fn check_instruments(&self) -> Result<(), Error> {
-        if let Some(table) = &self.instruments {
-            return table.check();
+    /// Refuses settings that would do nothing beside the others.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub(super) fn check_effect(&self) -> Result<(), Error> {
+        let usual = InstrumentsConfig::default();
+        let set = |key, given, needs| Given { key, given, needs };
+        if self.reference.is_none() {
+            let given = self.reference_scale != usual.reference_scale;
+            refuse(
+                "none",
+                &[set("instruments.reference_scale", given, "`reference`, the columns that it scales,")],
+            )?;
+        } else {
+            let given = self.trajectory.is_some();
+            refuse(
+                "`reference`, which takes its place",
+                &[set("instruments.trajectory", given, "no columns of the reference")],
+            )?;
         }
-        if self.estimator.method == Method::Iv {
-            let expected = "a table with reference and controller, which `method = \"iv\"` simulates";
-            return Err(Error::setting("instruments", expected, "none"));
+        self.closed_loop().check_effect()
+    }
+
+    /// The closed loop without what is read from files.
+    pub(crate) fn closed_loop(&self) -> ClosedLoop {
+        ClosedLoop {
+            reference_velocity: self.reference_velocity,
+            rate_hz: self.rate_hz,
+            bandwidth_hz: self.bandwidth_hz,
+            damping: self.damping,
+            position_gain: self.position_gain.clone(),
+            velocity_gain: self.velocity_gain.clone(),
+            velocity_cutoff_hz: self.velocity_cutoff_hz,
+            feed_forward: self.feed_forward,
+            nominal: self.nominal,
+            delay_ticks: self.delay_ticks,
+            effort_limit: self.effort_limit.clone(),
+            sign_width: self.sign_width,
+            settled: self.settled,
+            max_rounds: self.max_rounds,
+            divergence: self.divergence,
         }
-        Ok(())
     }
 }

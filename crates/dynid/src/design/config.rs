@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::Error;
-use crate::config::{ElementsConfig, PerJoint, exactly, just, toml_file};
+use crate::config::{ElementsConfig, PerJoint, toml_file};
+use crate::settings::lists::{exactly, just};
 
 /// Seeds count up from start to start.
 const LARGEST_SEED: u64 = u64::MAX - 1_000_000;

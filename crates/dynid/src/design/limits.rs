@@ -9,8 +9,8 @@ use dynid_model::{EffortModel, RobotModel, Vec3};
 use super::config::DesignConfig;
 use super::safety::{Safety, given_capsules, safety};
 use crate::Error;
-use crate::config::known;
 use crate::robot::Robot;
+use crate::settings::known;
 
 /// Time to full speed where no acceleration limit is given, s.
 const TIME_TO_SPEED: f64 = 0.5;

@@ -15,10 +15,10 @@ use super::config::{ColumnsName, CriterionName, DesignConfig};
 use super::limits::{constraints, effort_limits, joint_limits};
 use super::safety::Safety;
 use crate::Error;
-use crate::config::known;
 use crate::elements::ElementPlan;
 use crate::nominal::{nominal_parameters, typical_efforts, with_nominal_shape};
 use crate::robot::{Robot, refuse_elastic, refuse_loops};
+use crate::settings::known;
 
 /// A nominal base parameter below this share of the largest of the same unit counts as so large: relative errors of what
 /// is next to nothing are not worth motion.

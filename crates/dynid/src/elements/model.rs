@@ -5,9 +5,9 @@ use dynid_model::{ClosedModel, Mechanism, RobotModel, TreeModel};
 
 use super::{ElementPlan, friction};
 use crate::Error;
-use crate::config::{Config, FrictionErrors, PerJoint, serde_name};
-use crate::friction::KnownFriction;
+use crate::known_friction::KnownFriction;
 use crate::robot::Robot;
+use crate::settings::{FrictionErrors, PerJoint, Settings, serde_name};
 
 impl ElementPlan {
     /// The plan of a run: elements of the robot file, then of the configuration, known friction with them.
@@ -15,27 +15,23 @@ impl ElementPlan {
     /// `moves`: whether the joint of a rate moves.
     ///
     /// # Errors
-    /// Fails as [`ElementPlan::new`] and [`KnownFriction::load`] do.
+    /// Fails as [`ElementPlan::new`] and [`KnownLaws::of_joints`](crate::known_friction::KnownLaws) do.
     pub(crate) fn of_run(
-        config: &Config,
+        settings: &Settings,
         robot: &Robot,
         moves: impl Fn(usize) -> bool,
     ) -> Result<ElementPlan, Error> {
         let mut spec = robot.elements.clone();
-        for (joint, list) in &config.elements.joint {
+        for (joint, list) in &settings.elements.joint {
             spec.per_joint.retain(|(j, _)| j != joint);
             spec.per_joint.push((joint.clone(), list.clone()));
         }
-        spec.couplings.extend(config.coupling.iter().map(|c| dynid_io::CouplingSpec {
-            motors: c.motors.clone(),
-            joints: c.joints.clone(),
-            matrix: c.matrix.clone(),
-            form: c.form,
-        }));
-        let mut plan = ElementPlan::new(&robot.mechanism, &spec, config.elements.default.as_deref(), moves)?
-            .with_loops(robot.closed.clone());
+        spec.couplings.extend(settings.couplings.iter().cloned());
+        let mut plan =
+            ElementPlan::new(&robot.mechanism, &spec, settings.elements.default.as_deref(), moves)?
+                .with_loops(robot.closed.clone());
         let names = plan.names(&robot.mechanism);
-        let law = config.elements.friction;
+        let law = settings.elements.friction;
         if !law.replaces_any(&plan.per_rate) {
             let found = format!("`{}` where no joint that moves has any", serde_name(&law));
             return Err(Error::setting(
@@ -47,13 +43,11 @@ impl ElementPlan {
         for list in &mut plan.per_rate {
             *list = law.of_joint(list);
         }
-        if let Some(file) = &config.elements.known_friction {
-            let temperatures = config.elements.temperature.finite("elements.temperature", &names)?;
-            let (known, source) = KnownFriction::load(file, &names, &temperatures)?;
-            plan.known = known;
-            plan.known_source = Some(source);
-            check_temperature(&config.elements.temperature, &plan.known)?;
-            plan.free_errors = config.elements.friction_errors == FrictionErrors::Free;
+        if let Some(known) = &settings.elements.known {
+            plan.known = known.of_joints(&names)?;
+            plan.known_source = Some(known.source.clone());
+            check_temperature(&known.temperature, &plan.known)?;
+            plan.free_errors = known.errors == FrictionErrors::Free;
         }
         Ok(plan)
     }

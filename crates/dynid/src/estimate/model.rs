@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::loops::LoopsRecord;
 use crate::Error;
 use crate::elements::ElementPlan;
-use crate::friction::KnownFriction;
+use crate::known_friction::KnownFriction;
 
 /// Robot, elements and settings that predictions need.
 #[derive(Debug, Clone, Serialize, Deserialize)]

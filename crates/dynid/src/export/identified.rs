@@ -7,8 +7,9 @@ use dynid_model::{Description, Inertia, RobotModel};
 
 use crate::Error;
 use crate::estimate::{Estimate, InputRecord, Split};
-use crate::friction::KnownFriction;
 use crate::identify::Identification;
+use crate::known_friction::KnownFriction;
+use crate::run::Run;
 
 /// A robot with identified parameters, whatever they come from.
 #[derive(Debug, Clone, Copy)]
@@ -100,17 +101,24 @@ impl Source {
     }
 }
 
-impl Identification {
-    /// The identified robot alone, for [`RobotExport`](super::RobotExport) and [`json`](super::json()).
-    pub fn identified(&self) -> Identified<'_> {
-        let (model, values) = self.robot_alone();
+impl<'a> Identified<'a> {
+    /// The robot of an identification without what belongs to single logs.
+    pub fn of(id: &'a Identification) -> Self {
+        let (model, values) = id.robot_alone();
         Identified {
-            description: &self.robot.file.description,
+            description: &id.robot.file.description,
             model,
             values,
-            load_reference: self.plan.load_reference.as_deref(),
-            known_friction: &self.plan.known,
+            load_reference: id.plan.load_reference.as_deref(),
+            known_friction: &id.plan.known,
         }
+    }
+}
+
+impl Run {
+    /// The identified robot alone, for [`RobotExport`](super::RobotExport) and [`json`](super::json()).
+    pub fn identified(&self) -> Identified<'_> {
+        Identified::of(&self.identification)
     }
 }
 

@@ -7,15 +7,31 @@ use dynid_io::mjcf::JointParameters;
 use dynid_model::{EffortModel, RobotModel};
 
 use super::joints::{self, Format};
-use super::{CheckStates, FrictionProjection, projection, read_back};
+use super::{CheckStates, FrictionProjection, Identified, projection, read_back};
 use crate::Error;
 use crate::agreement::Agreement;
 use crate::estimate::{ExportedJoint, ExportedLog, ExportedRecord, FileFit};
 use crate::identify::Identification;
 
+/// What robot files of an identification state and lose, on its training and validation logs.
+///
+/// # Errors
+/// Fails as [`crate::agreement::compare`] does.
+pub(crate) fn exported(id: &Identification) -> Result<ExportedRecord, Error> {
+    let (files, projections) = FileModels::of(id)?;
+    let judged = |logs: &[PreparedLog], agreements: &[Agreement]| {
+        let pairs = logs.iter().zip(agreements);
+        let each = pairs.filter_map(|(log, agreement)| files.judge(id, log, agreement).transpose());
+        each.collect::<Result<Vec<_>, Error>>()
+    };
+    let training = judged(&id.logs, &id.training)?;
+    let validation = judged(&id.validation_logs, &id.validation)?;
+    Ok(files.record(projections, training, validation))
+}
+
 /// Models of the files that an identification leaves.
 #[derive(Debug)]
-pub(crate) struct FileModels {
+struct FileModels {
     joints: Vec<JointParameters>,
     /// With rotors: MJCF, or URDF with the printed rotor inertias added. `None` where files do not hold the mechanism's efforts (motors
     /// behind springs, loads that sensors measure).
@@ -29,18 +45,15 @@ impl FileModels {
     ///
     /// # Errors
     /// [`Error::Conditioning`]: a log is too short for the state filter.
-    pub(crate) fn of(
-        id: &Identification,
-        logs: &[PreparedLog],
-    ) -> Result<(Self, Vec<FrictionProjection>), Error> {
-        let identified = id.identified();
+    fn of(id: &Identification) -> Result<(Self, Vec<FrictionProjection>), Error> {
+        let identified = Identified::of(id);
         let (model, values) = (identified.model, identified.values);
         let bodies = model.mechanism().bodies().len();
         if bodies == 0 || !model.coordinates().is_empty() {
             let nothing = FileModels { joints: Vec::new(), with_rotor: None, without_rotor: None };
             return Ok((nothing, Vec::new()));
         }
-        let states = CheckStates::logs(logs, id.state_hz, &id.settings)?;
+        let states = CheckStates::logs(&id.logs, id.state_hz, &id.conditioning_settings)?;
         let known = |joint: &str| identified.known_friction.iter().any(|law| law.joint == joint);
         let projected = projection::project(model, values, known, &states);
         let joints = joints::split(&identified, Format::Mjcf, &projected).joints;
@@ -58,7 +71,7 @@ impl FileModels {
     ///
     /// # Errors
     /// Fails as [`crate::agreement::compare`] does.
-    pub(crate) fn judge(
+    fn judge(
         &self,
         id: &Identification,
         log: &PreparedLog,
@@ -70,7 +83,7 @@ impl FileModels {
         let delay = id.delay_on(log);
         let run = |model: &RobotModel, values: &[f64]| {
             let shape = model.parameters().shape_start();
-            predict(model, &shape, values, log, id.state_hz, delay, &id.settings)
+            predict(model, &shape, values, log, id.state_hz, delay, &id.conditioning_settings)
         };
         // Without terms of single logs the model was predicted already.
         let alone = match &id.alone {
@@ -91,7 +104,7 @@ impl FileModels {
     }
 
     /// The record, once all logs are judged.
-    pub(crate) fn record(
+    fn record(
         &self,
         projections: Vec<FrictionProjection>,
         training: Vec<ExportedLog>,

@@ -41,7 +41,7 @@ use dynid_model::mechanism::ROOT_JOINT;
 use dynid_model::{Description, EffortModel, Inertia, JointKind};
 
 use crate::Error;
-use crate::identify::Identification;
+use crate::run::Run;
 
 use bodies::Shares;
 pub use error::{ExportError, LinkFault};
@@ -49,7 +49,7 @@ use identified::inertias;
 pub use identified::{Identified, IdentifiedRobot, Source};
 use joints::{Format, JointValues};
 pub use json::{ElasticJson, JointJson, LinkJson, OtherJson, ROBOT_JSON_SCHEMA, RobotJson, json};
-pub(crate) use judged::FileModels;
+pub(crate) use judged::exported;
 pub use projection::FrictionProjection;
 pub(crate) use read_back::with_slipping_bristles;
 pub use read_back::{CheckStates, READ_BACK_LIMIT};
@@ -313,7 +313,7 @@ pub(crate) fn held_joints(file: &Description, recorded: &Description) -> Result<
     Ok(held)
 }
 
-impl Identification {
+impl Run {
     /// URDF of the robot with identified inertias and friction, checked on the training logs; links that no body could
     /// be are written as they are and named in the notes.
     ///
@@ -323,7 +323,7 @@ impl Identification {
         let source = Source::read(&self.robot.path)?;
         let export =
             RobotExport::new(self.identified(), &source)?.with_projections(&self.exported.projections);
-        let states = CheckStates::logs(&self.logs, self.state_hz, &self.settings)?;
+        let states = CheckStates::logs(&self.logs, self.state_hz, &self.conditioning_settings)?;
         let mut exported = export.urdf(&states)?;
         exported.notes.extend(
             export

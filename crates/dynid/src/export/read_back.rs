@@ -78,7 +78,7 @@ impl CheckStates {
     ) -> Result<Self, Error> {
         let settings = ConditioningSettings::default();
         let prepared = logs.iter().map(|log| {
-            let loaded = crate::logs::load(log, &crate::logs::axes(model), columns, motor_side)?;
+            let loaded = crate::logs::load(log, &crate::log::axes(model), columns, motor_side)?;
             loaded.prepare(model, &settings)
         });
         Self::logs(&prepared.collect::<Result<Vec<_>, Error>>()?, state_hz, &settings)

@@ -9,7 +9,8 @@ use dynid_motion::constant_speed::{PairSettings, SegmentSettings};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::config::{LogConfig, exactly, toml_file};
+use crate::config::{LogConfig, toml_file};
+use crate::settings::lists::exactly;
 
 /// Friction experiments and how they are to be understood. Every key but `robot` and `log` has a default.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
@@ -195,10 +196,10 @@ pub struct FrictionLog {
     /// What the effort column is. Default `effort`.
     pub signal: LoggedSignal,
     /// First and last data row, from 1, both included. Default: all.
-    #[serde(deserialize_with = "crate::config::pair")]
+    #[serde(deserialize_with = "crate::settings::lists::pair")]
     pub rows: Option<(usize, usize)>,
     /// First and last part of the record, as shares of its rows. Default: all.
-    #[serde(deserialize_with = "crate::config::pair")]
+    #[serde(deserialize_with = "crate::settings::lists::pair")]
     pub part: Option<(f64, f64)>,
     /// Columns of this log in place of the run's.
     #[serde(skip_serializing)]
@@ -245,7 +246,7 @@ pub struct PreslidingLog {
     /// The effort between its samples. Default `auto`.
     pub effort_hold: HoldName,
     /// First and last data row, from 1, both included. Default: all.
-    #[serde(deserialize_with = "crate::config::pair")]
+    #[serde(deserialize_with = "crate::settings::lists::pair")]
     pub rows: Option<(usize, usize)>,
     /// Columns of this log in place of the run's.
     #[serde(skip_serializing)]

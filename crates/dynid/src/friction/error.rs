@@ -81,26 +81,6 @@ pub enum FrictionError {
         /// What is wrong.
         message: String,
     },
-    /// No joint of the robot has a law in the file.
-    #[error("{file}: expected a friction law of {}, found {}", joints.join(", "), if stated.is_empty() { "none".to_owned() } else { format!("usable ones of none of these (joints of the file: {})", stated.join(", ")) })]
-    NoLaw {
-        /// File.
-        file: String,
-        /// Joints of the file.
-        stated: Vec<String>,
-        /// Moving joints of the robot.
-        joints: Vec<String>,
-    },
-    /// A coefficient makes no sense.
-    #[error("{file}: joint `{joint}`: {fault}")]
-    Known {
-        /// File.
-        file: String,
-        /// Joint.
-        joint: String,
-        /// What is wrong.
-        fault: String,
-    },
 }
 
 impl FrictionError {
@@ -124,10 +104,6 @@ impl FrictionError {
                     "add logs at constant speed of this joint: bristles are found on top of its steady friction"
                 }
                 FrictionError::Law { .. } => "leave out `law`, or record more speeds",
-                FrictionError::NoLaw { .. } => {
-                    "a friction file of this robot names its joints; laws with status `invalid` are not used"
-                }
-                FrictionError::Known { .. } => "run `dynid friction` again, or correct the coefficient",
                 FrictionError::File { .. } => "a friction model is the friction.json that `dynid friction` writes",
                 _ => return None,
             }

@@ -9,7 +9,8 @@ use super::config::{FrictionConfig, FrictionLog, LoggedSignal, ThermalLines};
 use super::error::FrictionError;
 use crate::Error;
 use crate::estimate::InputRecord;
-use crate::logs::{self, LoadedLog};
+use crate::log::Log;
+use crate::logs;
 use crate::robot::Robot;
 
 /// Samples of one pass at constant speed.
@@ -83,8 +84,8 @@ pub(super) fn read(
             return Err(Error::UnknownJoint { name: name.clone(), known: names.clone() });
         }
         let loaded = logs::load(&log.plain(), &robot.axes, &config.columns, None)?;
-        inputs.extend(loaded.inputs.iter().cloned());
-        warnings.extend(logs::temperature_warnings(&loaded.log));
+        inputs.extend(loaded.source.inputs.iter().cloned());
+        warnings.extend(crate::log::temperature_warnings(&loaded.log));
         match log.signal {
             LoggedSignal::Effort => passes(config, log, &loaded, &mut joints, warnings)?,
             LoggedSignal::Friction => series(config, log, &loaded, &mut joints)?,
@@ -117,7 +118,7 @@ pub(super) fn read(
     Ok(joints)
 }
 
-pub(super) fn on_grid(loaded: &LoadedLog) -> Result<UniformLog, Error> {
+pub(super) fn on_grid(loaded: &Log) -> Result<UniformLog, Error> {
     let settings = ClockSettings::default();
     Ok(uniform(&loaded.log, &settings)
         .map_err(|e| FrictionError::Clock { file: loaded.log.name().to_owned(), source: e })?)
@@ -141,7 +142,7 @@ fn missing_temperature(config: &FrictionConfig, file: &str, joint: &str) -> Resu
 fn passes(
     config: &FrictionConfig,
     log: &FrictionLog,
-    loaded: &LoadedLog,
+    loaded: &Log,
     joints: &mut [JointExperiment],
     warnings: &mut Vec<String>,
 ) -> Result<(), Error> {
@@ -196,7 +197,7 @@ fn passes(
 fn series(
     config: &FrictionConfig,
     log: &FrictionLog,
-    loaded: &LoadedLog,
+    loaded: &Log,
     joints: &mut [JointExperiment],
 ) -> Result<(), Error> {
     let file = loaded.log.name().to_owned();

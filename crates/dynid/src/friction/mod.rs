@@ -20,13 +20,15 @@ mod presliding;
 mod record;
 mod report;
 
+pub use crate::known_friction::KnownFriction;
 pub use config::{
     BristlePrior, ConstantSpeedConfig, FrictionConfig, FrictionLog, HoldName, LawName, LoggedSignal,
     PairsConfig, PreslidingLog, ThermalLines,
 };
 pub use error::FrictionError;
 pub use experiment::{JointExperiment, PassSamples};
-pub use known::KnownFriction;
+pub use known::known_friction;
+pub(crate) use known::known_laws;
 pub use model::FrictionModel;
 pub use presliding::{PreslidingFit, PreslidingTest, fit_presliding};
 

@@ -4,12 +4,12 @@ use dynid_io::SourceFile;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use dynid_estimate::steady_friction::FrictionLaw;
 use serde::{Deserialize, Serialize};
 
 use super::error::FrictionError;
 use crate::Error;
 use crate::estimate::Provenance;
+pub use crate::known_friction::{BristleModel, ExponentialModel, ViscousModel};
 
 /// Schema of `friction.json`.
 pub const SCHEMA: u32 = 1;
@@ -92,70 +92,6 @@ pub struct JointFrictionModel {
     pub presliding: Vec<PreslidingRecord>,
     /// What the tests could not tell, in words.
     pub notes: Vec<String>,
-}
-
-/// Viscous friction.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum ViscousModel {
-    /// `s(v) σ2(T) (1 - exp(-|σ3(T) v|^σ4(T)))` with `σ_j(T) = σ_j + σ_j_slope (T - T_ref)`.
-    Exponential(ExponentialModel),
-    /// `coefficient · v`.
-    Linear {
-        /// N m s/rad or N s/m.
-        coefficient: f64,
-    },
-}
-
-impl ViscousModel {
-    /// Viscous friction of a fitted law; slopes that it lacks are 0.
-    pub fn of_law(law: &FrictionLaw) -> Option<Self> {
-        if let Some(coefficient) = law.value("fv") {
-            return Some(ViscousModel::Linear { coefficient });
-        }
-        let ((sigma2, sigma2_slope), (sigma3, sigma3_slope), (sigma4, sigma4_slope)) =
-            (law.line("sigma2")?, law.line("sigma3")?, law.line("sigma4")?);
-        Some(ViscousModel::Exponential(ExponentialModel {
-            reference_temperature: law.reference_temperature,
-            sigma2,
-            sigma2_slope,
-            sigma3,
-            sigma3_slope,
-            sigma4,
-            sigma4_slope,
-        }))
-    }
-}
-
-/// Coefficients of exponential viscous friction.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct ExponentialModel {
-    /// `T_ref`, °C.
-    pub reference_temperature: f64,
-    /// Amplitude at `T_ref`, N m or N.
-    pub sigma2: f64,
-    /// Slope of the amplitude, N m/K or N/K.
-    pub sigma2_slope: f64,
-    /// Rate at `T_ref`, s/rad or s/m.
-    pub sigma3: f64,
-    /// Slope of the rate, per K.
-    pub sigma3_slope: f64,
-    /// Exponent at `T_ref`.
-    pub sigma4: f64,
-    /// Slope of the exponent, per K.
-    pub sigma4_slope: f64,
-}
-
-/// Bristles of LuGre friction: `ż = v - σ0 |v| z/g(v)`, effort `σ0 z + σ1 ż`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct BristleModel {
-    /// Stiffness, N m/rad or N/m.
-    pub sigma0: f64,
-    /// Damping, N m s/rad or N s/m.
-    pub sigma1: f64,
-    /// True: stated as prior, not identified.
-    #[serde(default)]
-    pub prior: bool,
 }
 
 /// Friction at one speed and temperature.

@@ -95,8 +95,8 @@ pub(super) fn find(
     };
     let loaded = logs::load(&plain, &robot.axes, &config.columns, None)?;
     let presliding = |input: &InputRecord| InputRecord { kind: "presliding".to_owned(), ..input.clone() };
-    inputs.extend(loaded.inputs.iter().map(presliding));
-    warnings.extend(logs::temperature_warnings(&loaded.log));
+    inputs.extend(loaded.source.inputs.iter().map(presliding));
+    warnings.extend(crate::log::temperature_warnings(&loaded.log));
     let grid = on_grid(&loaded)?;
     let unknown = || FrictionError::NoSteadyLaw { file: file.clone(), joint: log.joint.clone() };
     let signals = grid.joints.iter().find(|j| j.name == log.joint).ok_or_else(unknown)?;

@@ -8,12 +8,13 @@ use dynid_sim::presliding::EffortHold;
 
 use super::config::FrictionConfig;
 use super::model::{
-    BristleModel, FrictionModel, FrictionVerdict, JointFrictionModel, LawRecord, LevelRecord, LineRecord,
-    PointRecord, PreslidingRecord, SCHEMA, UnpairedRecord, ViscousModel,
+    FrictionModel, FrictionVerdict, JointFrictionModel, LawRecord, LevelRecord, LineRecord, PointRecord,
+    PreslidingRecord, SCHEMA, UnpairedRecord,
 };
 use super::{FrictionIdentification, IdentifiedJoint, PreslidingFit};
 use crate::Error;
 use crate::estimate::{InputRecord, Provenance};
+use crate::known_friction::{BristleModel, ViscousModel};
 
 /// Names of coefficients in the file, by symbol.
 const NAMES: [(&str, &str); 10] = [

@@ -4,9 +4,10 @@ use dynid_estimate::steady_friction::{SteadyFriction, ThermalLine};
 use dynid_report as report;
 use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, Fact, StudyTable, Value};
 
-use super::model::{FrictionModel, JointFrictionModel, ViscousModel};
+use super::model::{FrictionModel, JointFrictionModel};
 use super::{FrictionIdentification, IdentifiedJoint, PreslidingFit};
 use crate::Error;
+use crate::known_friction::ViscousModel;
 use crate::report_data::settings_table;
 
 /// Points along a drawn curve.

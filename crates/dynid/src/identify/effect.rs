@@ -4,16 +4,22 @@ use dynid_model::{EffortModel, RobotModel};
 
 use crate::Error;
 use crate::caution::{self, Caution};
-use crate::config::{Config, Friction, Own, PayloadConfig, ShapeConfig};
 use crate::elements::ElementPlan;
 use crate::log_terms;
+use crate::settings::{Friction, LogSettings, Own, PayloadConfig, Settings, ShapeConfig};
 
 /// Refuses them.
 ///
 /// # Errors
 /// [`Error::Setting`].
-pub(super) fn check(config: &Config, plan: &ElementPlan, model: &RobotModel) -> Result<(), Error> {
-    for own in config.log.iter().flat_map(|log| &log.own) {
+pub(super) fn check(
+    settings: &Settings,
+    logs: &[&LogSettings],
+    stated: &[String],
+    plan: &ElementPlan,
+    model: &RobotModel,
+) -> Result<(), Error> {
+    for own in logs.iter().flat_map(|log| &log.own) {
         let acts = |element: &String| match own {
             Own::Offset => element == "offset",
             Own::Friction | Own::FrictionScale => log_terms::is_friction(element),
@@ -25,9 +31,9 @@ pub(super) fn check(config: &Config, plan: &ElementPlan, model: &RobotModel) -> 
             return Err(Error::setting("log.own", &expected, format!("`{}` where none has", own.word())));
         }
     }
-    let shape = &config.estimator.shape;
+    let shape = &settings.estimator.shape;
     // Friction that is found on the logs may bring some.
-    let none = model.parameters().shape.is_empty() && config.elements.friction != Friction::Auto;
+    let none = model.parameters().shape.is_empty() && settings.elements.friction != Friction::Auto;
     if none && *shape != ShapeConfig::default() {
         let key = match (&shape.search, shape.evaluations) {
             (Some(_), _) => "shape.search",
@@ -37,12 +43,12 @@ pub(super) fn check(config: &Config, plan: &ElementPlan, model: &RobotModel) -> 
         let expected = "friction with a shape parameter, such as `stribeck`, to search";
         return Err(Error::setting(key, expected, "none"));
     }
-    channels(config, model)
+    channels(settings, stated, model)
 }
 
 /// Settings that turned out to do nothing here, in words. `found`: there were shape parameters to search.
-pub(super) fn warnings(config: &Config, found: bool) -> Vec<Caution> {
-    let unsearched = !found && config.estimator.shape != ShapeConfig::default();
+pub(super) fn warnings(settings: &Settings, found: bool) -> Vec<Caution> {
+    let unsearched = !found && settings.estimator.shape != ShapeConfig::default();
     let search = unsearched.then(|| {
         "held-out blocks asked for no friction with a shape parameter, so there was nothing to search: `shape` (`--search`) \
          did nothing"
@@ -55,7 +61,7 @@ pub(super) fn warnings(config: &Config, found: bool) -> Vec<Caution> {
             "leave the setting out, so that nothing seems to depend on it",
         )
     };
-    search.into_iter().chain(config.payload.iter().filter_map(idle)).map(leave_out).collect()
+    search.into_iter().chain(settings.payload.iter().filter_map(idle)).map(leave_out).collect()
 }
 
 /// What is stated of a payload and not used by an identification.
@@ -83,15 +89,13 @@ fn idle(payload: &PayloadConfig) -> Option<String> {
 }
 
 /// Channels that the columns state have a reader: this model, instruments, or `dynid clearance`.
-fn channels(config: &Config, model: &RobotModel) -> Result<(), Error> {
-    let own = config.log.iter().chain(&config.validation).filter_map(|log| log.columns.as_ref());
+fn channels(settings: &Settings, stated: &[String], model: &RobotModel) -> Result<(), Error> {
     let read = |name: &String| {
         model.channels().contains(name)
             || name.starts_with("journal_")
-            || (config.instruments.is_some() && name.starts_with("reference_"))
+            || (settings.closed_loop.is_some() && name.starts_with("reference_"))
     };
-    let mut stated = own.chain([&config.columns]).flat_map(|spec| spec.channels.keys());
-    let Some(name) = stated.find(|name| !read(name)) else { return Ok(()) };
+    let Some(name) = stated.iter().find(|name| !read(name)) else { return Ok(()) };
     let expected = match model.channels() {
         [] => "no channels: no element of this robot reads one".to_owned(),
         known => format!("channels that elements read: `{}`", known.join("`, `")),

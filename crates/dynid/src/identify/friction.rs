@@ -1,16 +1,16 @@
 //! Friction shapes found beside the elements of a plan.
 
 use dynid_estimate::conditioning::{
-    BasePrior, Conditioning, ConditioningSettings, FrictionChoice, JointFriction, PreparedLog, ShapeKind,
-    ShapeTrial, Stage, choose_friction,
+    BasePrior, Conditioning, FrictionChoice, JointFriction, ShapeKind, ShapeTrial, Stage, choose_friction,
 };
 use dynid_estimate::separable::ShapeVerdict;
-use dynid_model::{EffortModel, RobotModel};
+use dynid_model::EffortModel;
 
+use super::problem::Problem;
 use super::structure::Structure;
 use crate::Error;
 use crate::elements::friction::is_shaped;
-use crate::elements::{ElementPlan, shape_element};
+use crate::elements::shape_element;
 use crate::shape::ShapeFit;
 
 /// Chooses shapes for all joints and adds them to the plan; shape parameters start at the values found.
@@ -18,14 +18,12 @@ use crate::shape::ShapeFit;
 /// # Errors
 /// [`Error::Conditioning`].
 pub(super) fn choose(
-    model: &RobotModel,
-    structure: &Structure,
-    plan: &mut ElementPlan,
-    logs: &[PreparedLog],
+    problem: &mut Problem,
     choices: &Conditioning,
-    settings: &ConditioningSettings,
     progress: &mut dyn FnMut(Stage),
 ) -> Result<FrictionChoice, Error> {
+    let settings = problem.conditioning_settings();
+    let Problem { model, structure, plan, logs, .. } = problem;
     let unloaded = model.mechanism().follows().is_some() || model.closed().is_some();
     let rates = model.mechanism().rates();
     let kinds: Vec<Vec<ShapeKind>> = (model.outputs().iter().enumerate())
@@ -46,7 +44,7 @@ pub(super) fn choose(
         &kinds,
         prior.as_ref(),
         choices,
-        settings,
+        &settings,
         progress,
     )?;
     for (rate, joint) in found.per_output.iter().enumerate() {
@@ -63,12 +61,12 @@ pub(super) fn choose(
 /// Drops chosen shapes whose shape parameter the logs do not see after all, and falls from rest that came out as rises (`fs` below
 /// `fc`); tells whether there were any.
 pub(super) fn drop_refuted(
-    model: &RobotModel,
+    problem: &mut Problem,
     (found, linear): (&ShapeFit, &[f64]),
     chosen: &mut [JointFriction],
-    plan: &mut ElementPlan,
 ) -> bool {
-    let table = found.model.parameters();
+    let (model, plan) = (&found.model, &mut problem.plan);
+    let table = model.parameters();
     let unseen = |joint: &str, trial: &ShapeTrial| {
         let (_, Some(symbol)) = shape_element(trial.shape.kind) else { return false };
         let name = format!("{joint}.{symbol}");

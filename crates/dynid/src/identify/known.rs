@@ -6,7 +6,7 @@ use dynid_model::element::temperature_channel;
 
 use crate::caution::{self, Caution};
 use crate::elements::ElementPlan;
-use crate::friction::KnownFriction;
+use crate::known_friction::KnownFriction;
 use crate::result::short_name;
 
 /// What helps where known friction does not reach.

@@ -1,12 +1,13 @@
 //! Delays of single logs, taken off before anything else is chosen.
 
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, condition};
+use dynid_estimate::conditioning::{PreparedLog, condition};
 use dynid_model::{BaseParameters, RobotModel};
 use dynid_motion::shift;
 use serde::{Deserialize, Serialize};
 
+use super::problem::TrainingLog;
 use crate::Error;
-use crate::config::{Config, Own, Route};
+use crate::settings::{Own, Route, Settings};
 
 /// A log with a delay of its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -41,20 +42,21 @@ impl OwnDelay {
 /// [`Error::Setting`] where a delay is given or rates differ, [`Error::Unsupported`] on the textbook route,
 /// [`Error::Conditioning`].
 pub(super) fn take_off(
-    config: &Config,
+    asked: &Settings,
+    training: &[TrainingLog],
     model: &RobotModel,
     shape: &[f64],
     base: &BaseParameters,
     logs: &mut [PreparedLog],
-    settings: &ConditioningSettings,
 ) -> Result<Vec<OwnDelay>, Error> {
-    let states = |k: usize| config.log[k].own.contains(&Own::Delay);
+    let settings = &asked.conditioning_settings();
+    let states = |k: usize| training[k].settings.own.contains(&Own::Delay);
     let all = (0..logs.len()).all(states);
     let own: Vec<usize> = (0..logs.len()).filter(|k| states(*k) && !(all && *k == 0)).collect();
     if own.is_empty() {
         return Ok(Vec::new());
     }
-    if config.conditioning.route == Route::Textbook {
+    if asked.conditioning.route == Route::Textbook {
         return Err(Error::Unsupported(
             "delays of single logs on the textbook route: it finds none".to_owned(),
         ));
@@ -76,12 +78,11 @@ pub(super) fn take_off(
         |logs: &[PreparedLog]| condition(model, shape, &kept, logs, settings, &mut |_| {}).map(|c| c.delay);
     let common = delay_of(&reference)?;
     drop(reference);
-    let labels = config.log_labels();
     own.into_iter()
         .map(|k| {
             let found = delay_of(std::slice::from_ref(&logs[k]))?;
             let own = OwnDelay {
-                log: labels[k].clone(),
+                log: training[k].label.clone(),
                 samples: found.samples,
                 half_width: found.half_width,
                 reference: common.samples,

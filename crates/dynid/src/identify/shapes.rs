@@ -1,20 +1,16 @@
 //! From chosen friction and shape parameters to the linear model that is fitted.
 
-use dynid_estimate::conditioning::{Conditioning, ConditioningSettings, JointFriction, PreparedLog};
-use dynid_model::{EffortModel, RobotModel};
+use dynid_estimate::conditioning::{Conditioning, JointFriction};
+use dynid_model::EffortModel;
 
-use super::structure::Structure;
+use super::problem::Problem;
 use super::{Step, friction};
 use crate::Error;
-use crate::config::{Config, Friction};
-use crate::elements::ElementPlan;
+use crate::settings::Friction;
 use crate::shape::{self, ShapeFit};
 
-/// A model with what is known of it before its fit, and how it came about.
+/// What was found on the way to a linear model.
 pub(super) struct Shaped {
-    /// Linear in all its parameters, unless no shape parameters were searched.
-    pub(super) model: RobotModel,
-    pub(super) structure: Structure,
     /// `None` on the textbook route.
     pub(super) conditioning: Option<Conditioning>,
     /// Shapes of friction per output; empty where none were looked for.
@@ -29,42 +25,29 @@ pub(super) struct Shaped {
 /// # Errors
 /// Fails as choice and search do: [`Error::Conditioning`], or settings that do not fit the model.
 pub(super) fn search(
-    config: &Config,
-    (model, structure): (RobotModel, Structure),
-    plan: &mut ElementPlan,
-    logs: &[PreparedLog],
+    problem: &mut Problem,
     conditioning: Option<Conditioning>,
-    settings: &ConditioningSettings,
     progress: &mut dyn FnMut(Step),
 ) -> Result<Shaped, Error> {
-    let mut out = Shaped { model, structure, conditioning, friction: Vec::new(), found: None };
+    let mut out = Shaped { conditioning, friction: Vec::new(), found: None };
     let Some(choices) = &mut out.conditioning else { return Ok(out) };
-    let mechanism = out.model.mechanism().clone();
-    let rebuilt = |plan: &ElementPlan| -> Result<(RobotModel, Structure), Error> {
-        let model = plan.model(&mechanism)?;
-        let structure = Structure::of(config, &model, plan, logs)?;
-        Ok((model, structure))
-    };
-    let all_known = plan.known.len() == plan.per_rate.len();
-    if config.elements.friction == Friction::Auto && !all_known {
-        let chosen =
-            friction::choose(&out.model, &out.structure, plan, logs, choices, settings, &mut |stage| {
-                progress(Step::Conditioning(stage));
-            })?;
-        (out.model, out.structure) = rebuilt(plan)?;
+    let all_known = problem.plan.known.len() == problem.plan.per_rate.len();
+    if problem.settings.elements.friction == Friction::Auto && !all_known {
+        let chosen = friction::choose(problem, choices, &mut |stage| progress(Step::Conditioning(stage)))?;
+        problem.rebuild()?;
         out.friction = chosen.per_output;
         *choices = chosen.conditioning;
     }
-    while !out.model.parameters().shape.is_empty() {
+    while !problem.model.parameters().shape.is_empty() {
         progress(Step::Shapes);
-        let (found, linear) = shape::find(config, out.model, &out.structure.base, logs, (choices, settings))?;
-        if friction::drop_refuted(&found.model, (&found, &linear), &mut out.friction, plan) {
-            (out.model, out.structure) = rebuilt(plan)?;
+        let (found, linear) = shape::find(problem, choices)?;
+        if friction::drop_refuted(problem, (&found, &linear), &mut out.friction) {
+            problem.rebuild()?;
             continue;
         }
         let free: Vec<bool> = found.findings.iter().map(shape::is_free).collect();
-        out.model = shape::linearised(plan, &found.model, &linear, &free)?;
-        out.structure = Structure::of(config, &out.model, plan, logs)?;
+        problem.model = shape::linearised(&problem.plan, &found.model, &linear, &free)?;
+        problem.restructure()?;
         out.found = Some(found);
     }
     Ok(out)

@@ -7,33 +7,45 @@ use dynid_estimate::identifiability::VisibleSpace;
 use dynid_estimate::linear::LinearMethod;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
 
-use crate::config::Config;
 use crate::elements::ElementPlan;
 use crate::prior::{self, Prior};
+use crate::robot::Robot;
+use crate::settings::Settings;
 use crate::{Error, advice, bounds, fitting};
 
-pub(crate) struct Structure {
-    pub(crate) base: BaseParameters,
+/// What is known of a model before its fit.
+#[derive(Debug)]
+pub struct Structure {
+    /// Base parameters.
+    pub base: BaseParameters,
+    /// Shape parameters of the model where it starts.
+    pub shape: Vec<f64>,
     /// Values stated by robot file, in parameter order.
-    pub(crate) stated: Vec<Option<f64>>,
-    pub(crate) prior: Prior,
-    pub(crate) regrouping: Mat<f64>,
-    pub(crate) space: VisibleSpace,
-    pub(crate) bounds: Vec<Bound>,
-    pub(crate) method: LinearMethod,
+    pub stated: Vec<Option<f64>>,
+    /// What is known about the parameters without logs.
+    pub prior: Prior,
+    /// Base parameters from standard ones, `K` in `β = K x`.
+    pub regrouping: Mat<f64>,
+    /// What any motion of the robot can show of the standard parameters.
+    pub space: VisibleSpace,
+    /// Bounds that the consistent estimate must meet.
+    pub bounds: Vec<Bound>,
+    /// The linear estimator.
+    pub method: LinearMethod,
 }
 
 impl Structure {
     pub(crate) fn of(
-        config: &Config,
+        settings: &Settings,
+        robot: &Robot,
         model: &RobotModel,
         plan: &ElementPlan,
         logs: &[PreparedLog],
     ) -> Result<Self, Error> {
         let shape = model.parameters().shape_start();
         let base_settings = BaseSettings {
-            seed: config.seed.unwrap_or(1),
-            preferred: preferred_columns(config, model)?,
+            seed: settings.seed.unwrap_or(1),
+            preferred: preferred_columns(&settings.preferred, model)?,
             ..BaseSettings::default()
         };
         let base = BaseParameters::of_model(model, &shape, &base_settings);
@@ -41,18 +53,17 @@ impl Structure {
             return Err(Error::Unsupported("no parameter of this robot acts on any effort".to_owned()));
         }
         let stated = stated_values(model, plan);
-        let prior = prior::of(model, &stated, &effort_sizes(logs), &config.robot.display().to_string())?;
+        let prior = prior::of(model, &stated, &effort_sizes(logs), &robot.path.display().to_string())?;
         let regrouping = advice::regrouping(&base);
         let space = VisibleSpace::new(&regrouping, &prior.std);
-        let bounds = bounds::rows(&config.bound, model)?;
-        let method = fitting::method(&config.estimator, model, &base, &prior, &space)?;
-        Ok(Structure { base, stated, prior, regrouping, space, bounds, method })
+        let bounds = bounds::rows(&settings.bound, model)?;
+        let method = fitting::method(&settings.estimator, model, &base, &prior, &space)?;
+        Ok(Structure { base, shape, stated, prior, regrouping, space, bounds, method })
     }
 }
 
-fn preferred_columns(config: &Config, model: &RobotModel) -> Result<Vec<usize>, Error> {
-    config
-        .preferred
+fn preferred_columns(preferred: &[String], model: &RobotModel) -> Result<Vec<usize>, Error> {
+    preferred
         .iter()
         .map(|name| {
             let by_symbol = || model.parameters().linear.iter().position(|p| p.symbol == *name);

@@ -4,28 +4,29 @@ use dynid_io::ColumnMapping;
 use dynid_io::columns::{ColumnNames, ColumnUse, SignalSpec};
 
 use super::question::in_unit;
-use crate::logs::LoadedLog;
+use crate::log::Log;
+use crate::logs::mapping_of;
 
 /// Least ratio of logged velocities to those of positions for the two to be in the same unit, and its inverse the most.
 const SAME_UNIT: f64 = 0.5;
 
 /// Positions in degrees, and velocities in degrees per second where these agree with positions as they stand in the file.
-pub(super) fn in_degrees(loaded: &LoadedLog) -> (SignalSpec, Option<SignalSpec>) {
+pub(super) fn in_degrees(loaded: &Log) -> (SignalSpec, Option<SignalSpec>) {
     let names = |columns: &[Option<ColumnUse>]| {
         ColumnNames::List(
             columns.iter().map(|c| c.as_ref().map_or_else(String::new, |c| c.name.clone())).collect(),
         )
     };
-    let position = in_unit(names(&loaded.mapping.position), "deg");
-    let velocity =
-        loaded.mapping.velocity.as_ref().map(|columns| {
-            in_unit(names(columns), if velocities_follow(loaded) { "deg/s" } else { "rad/s" })
-        });
+    let position = in_unit(names(&mapping_of(loaded).position), "deg");
+    let velocity = mapping_of(loaded)
+        .velocity
+        .as_ref()
+        .map(|columns| in_unit(names(columns), if velocities_follow(loaded) { "deg/s" } else { "rad/s" }));
     (position, velocity)
 }
 
 /// Whether logged velocities are the rates of the positions in the units that both are taken to have.
-fn velocities_follow(loaded: &LoadedLog) -> bool {
+fn velocities_follow(loaded: &Log) -> bool {
     let time = loaded.log.time();
     let (mut vv, mut dd) = (0.0, 0.0);
     for joint in loaded.log.joints() {

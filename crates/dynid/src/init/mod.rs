@@ -11,7 +11,8 @@ use dynid_io::MappingSpec;
 
 use crate::Error;
 use crate::config::{Config, LogConfig};
-use crate::logs::{self, LoadedLog};
+use crate::log::Log;
+use crate::logs;
 use crate::robot::{Robot, RobotOptions};
 
 pub use question::Question;
@@ -70,7 +71,8 @@ pub fn draft(
     let loaded = reading.of_log(first, &robot, ask)?;
     let mut found = Vec::new();
     if let Some(loaded) = &loaded {
-        found.extend(loaded.reading.iter().map(|n| format!("{}: {} ({})", n.setting, n.value, n.reason)));
+        found
+            .extend(loaded.source.notes.iter().map(|n| format!("{}: {} ({})", n.setting, n.value, n.reason)));
     }
     for other in settings.logs[1..].iter().filter(|_| loaded.is_some()) {
         logs::load_as_it_is(&entry(other), &robot.axes, &reading.trial, None)?;
@@ -110,7 +112,7 @@ pub(crate) struct Reading {
 
 impl Reading {
     /// States positions in degrees, and velocities in what agrees with them.
-    fn in_degrees(&mut self, loaded: &LoadedLog, reason: String) {
+    fn in_degrees(&mut self, loaded: &Log, reason: String) {
         let (position, velocity) = columns::in_degrees(loaded);
         for spec in [&mut self.spec, &mut self.trial] {
             spec.position = Some(position.clone());
@@ -127,10 +129,10 @@ impl Reading {
         path: &Path,
         robot: &Robot,
         ask: &mut dyn FnMut(&Question) -> Option<String>,
-    ) -> Result<Option<LoadedLog>, Error> {
+    ) -> Result<Option<Log>, Error> {
         for _ in 0..MOST_QUESTIONS {
             let error = match logs::load_as_it_is(&entry(path), &robot.axes, &self.trial, None) {
-                Ok(loaded) => match logs::degrees(&loaded, &robot.axes) {
+                Ok(loaded) => match crate::log::degrees(&loaded, &robot.axes) {
                     Some(error) if self.degrees.is_none() => {
                         self.in_degrees(&loaded, error.to_string());
                         continue;

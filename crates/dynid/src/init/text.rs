@@ -8,7 +8,8 @@ use dynid_io::log::{DecimalMark, Missing};
 use super::columns::names;
 use super::{DraftSettings, Reading, SHORTEST_TO_SPLIT, TRAINING_SHARE};
 use crate::elements::DEFAULTS;
-use crate::logs::LoadedLog;
+use crate::log::{Log, LogAxis};
+use crate::logs::mapping_of;
 use crate::robot::Robot;
 
 /// Columns named in comments.
@@ -44,7 +45,7 @@ pub(super) fn write(
     settings: &DraftSettings,
     robot: &Robot,
     reading: &Reading,
-    loaded: Option<&LoadedLog>,
+    loaded: Option<&Log>,
 ) -> String {
     let mut page = Page(String::new());
     page.line(
@@ -57,7 +58,7 @@ pub(super) fn write(
     page.entry("robot", &quoted(&shown(&settings.robot, settings)), "");
     page.entry("out", "\"dynid-out\"", "folder for estimate.json, report.html and the updated robot file");
     page.line("");
-    columns(&mut page, reading, loaded);
+    columns(&mut page, &robot.axes, reading, loaded);
     elements(&mut page, robot);
     logs(&mut page, settings, loaded);
     page.0
@@ -75,9 +76,9 @@ fn shown(path: &Path, settings: &DraftSettings) -> String {
     relative.display().to_string()
 }
 
-fn columns(page: &mut Page, reading: &Reading, loaded: Option<&LoadedLog>) {
+fn columns(page: &mut Page, axes: &[LogAxis], reading: &Reading, loaded: Option<&Log>) {
     page.line("[columns]");
-    for note in loaded.iter().flat_map(|l| &l.reading) {
+    for note in loaded.iter().flat_map(|l| &l.source.notes) {
         page.line(format!("# {}: {} ({})", note.setting, note.value, note.reason));
     }
     for question in &reading.open {
@@ -98,7 +99,7 @@ fn columns(page: &mut Page, reading: &Reading, loaded: Option<&LoadedLog>) {
         page.entry("ignore", &format!("[{}]", list.join(", ")), "");
     }
     if spec.allow_unlogged {
-        let held = loaded.map(|l| l.not_logged.join(", ")).unwrap_or_default();
+        let held = loaded.map(|l| l.not_logged(axes).join(", ")).unwrap_or_default();
         page.entry("allow_unlogged", "true", &format!("held at zero: {held}"));
     }
     match loaded {
@@ -108,8 +109,8 @@ fn columns(page: &mut Page, reading: &Reading, loaded: Option<&LoadedLog>) {
     page.line("");
 }
 
-fn signals(page: &mut Page, reading: &Reading, loaded: &LoadedLog) {
-    let (spec, mapping) = (&reading.spec, &loaded.mapping);
+fn signals(page: &mut Page, reading: &Reading, loaded: &Log) {
+    let (spec, mapping) = (&reading.spec, mapping_of(loaded));
     let is_open = |key: &str| reading.open.iter().any(|q| q.key == key);
     match &mapping.time {
         TimeSource::Rate(hz) if spec.rate_hz.is_some() => {
@@ -117,7 +118,8 @@ fn signals(page: &mut Page, reading: &Reading, loaded: &LoadedLog) {
         }
         TimeSource::Columns(time) if !is_open("time") => {
             let list: Vec<String> = time.parts.iter().map(|p| quoted(&p.name)).collect();
-            let why = loaded.reading.iter().find(|n| n.setting == "time").map_or("", |n| n.reason.as_str());
+            let why =
+                loaded.source.notes.iter().find(|n| n.setting == "time").map_or("", |n| n.reason.as_str());
             match time.parts.as_slice() {
                 [one] => {
                     page.entry("time", &format!("{{ columns = {}, {} }}", list[0], unit_of(one, TIME)), why)
@@ -173,7 +175,7 @@ fn signals(page: &mut Page, reading: &Reading, loaded: &LoadedLog) {
         Missing::Error => {}
         policy => {
             let word = if policy == Missing::Drop { "\"drop\"" } else { "\"interpolate\"" };
-            let why = loaded.reading.iter().find(|n| n.setting == "missing values");
+            let why = loaded.source.notes.iter().find(|n| n.setting == "missing values");
             page.entry("missing", word, why.map_or("", |n| n.reason.as_str()));
         }
     }
@@ -206,8 +208,8 @@ fn unit_of(column: &ColumnUse, known: KnownUnits) -> String {
 }
 
 /// A signal as the configuration states it: names alone where they are in SI.
-fn signal(columns: &[Option<ColumnUse>], loaded: &LoadedLog, known: KnownUnits) -> String {
-    let value = names(columns, &loaded.mapping);
+fn signal(columns: &[Option<ColumnUse>], loaded: &Log, known: KnownUnits) -> String {
+    let value = names(columns, mapping_of(loaded));
     let uses: Vec<&ColumnUse> = columns.iter().flatten().collect();
     if uses.iter().all(|c| c.factor == 1.0 && c.offset == 0.0) {
         // A unit in the brackets of a name is said already.
@@ -242,7 +244,7 @@ fn elements(page: &mut Page, robot: &Robot) {
     page.line("");
 }
 
-fn logs(page: &mut Page, settings: &DraftSettings, loaded: Option<&LoadedLog>) {
+fn logs(page: &mut Page, settings: &DraftSettings, loaded: Option<&Log>) {
     let path = |k: usize| quoted(&shown(&settings.logs[k], settings));
     let count = settings.logs.len();
     let entry = |page: &mut Page, section: &str, k: usize, part: Option<(f64, f64, &str)>| {

@@ -4,12 +4,12 @@
 //! regressor of the motion that the model itself makes along the same reference, simulated without noise, serves as instruments
 //! ([`dynid_estimate::instruments`]): parameters, simulation, instruments, parameters, until they settle.
 //!
-//! [`InstrumentsConfig`](crate::config::InstrumentsConfig) says what the simulation must know: reference and controller. They need not
+//! [`ClosedLoop`] says what the simulation must know: reference and controller. They need not
 //! be exact. Whatever the simulation gets wrong makes instruments weaker, not wrong, as long as they know nothing of the noise.
 //!
 //! What instruments do not cure is noise that goes through a kink: a sign of velocity that noise turns near reversal is an error that
 //! depends on the motion itself. Such rows must be left out, and are unless the configuration says otherwise
-//! ([`ConditioningConfig::reversal_mask`](crate::config::ConditioningConfig)). Shape parameters of friction are those that all rows
+//! ([`ConditioningConfig::reversal_mask`](crate::settings::ConditioningConfig)). Shape parameters of friction are those that all rows
 //! gave; simulations hold them.
 
 mod reference;
@@ -17,24 +17,20 @@ mod simulation;
 
 use std::cell::RefCell;
 
-use dynid_estimate::conditioning::{Conditioning, ConditioningSettings, PreparedLog, ReducedGroup};
-use dynid_estimate::identifiability::VisibleSpace;
+use dynid_estimate::conditioning::{Conditioning, ReducedGroup};
 use dynid_estimate::instruments::{
     Exogeneity, ExogeneitySettings, InstrumentSettings, Iteration, IterationEnd, Simulated, Strength,
     crossed, exogeneity, half, iterate, measured,
 };
 use dynid_estimate::linear::{LinearEstimate, LinearMethod, estimate};
-use dynid_model::{BaseParameters, RobotModel};
 
 use crate::Error;
-use crate::config::{Config, Method};
-use crate::elements::ElementPlan;
 use crate::fitting;
 use crate::friction_power::FrictionPower;
-use crate::identify::Identification;
-use crate::prior::Prior;
-use crate::robot::Robot;
+use crate::identify::{ModelFit, Problem};
+use crate::settings::{ClosedLoop, Method, Settings};
 use crate::shape::ShapeFit;
+pub(crate) use reference::reference_channel;
 use simulation::Bench;
 
 /// How the instruments of a fit came about.
@@ -82,88 +78,75 @@ impl Comparison {
     }
 }
 
-/// What is known of a model and its logs before its fit.
-pub(crate) struct Parts<'a> {
-    pub(crate) robot: &'a Robot,
-    pub(crate) plan: &'a ElementPlan,
-    /// The model of the fit.
-    pub(crate) model: &'a RobotModel,
+/// A problem with what its fit has found so far.
+pub(crate) struct Loop<'a> {
+    pub(crate) problem: &'a Problem,
     pub(crate) shapes: Option<&'a ShapeFit>,
-    pub(crate) base: &'a BaseParameters,
-    pub(crate) prior: &'a Prior,
-    pub(crate) logs: &'a [PreparedLog],
     /// `None` on the textbook route.
     pub(crate) conditioning: Option<&'a Conditioning>,
-    pub(crate) settings: &'a ConditioningSettings,
     pub(crate) power: &'a FrictionPower,
 }
 
-impl Parts<'_> {
+impl Loop<'_> {
     /// Prior deviations of the base parameters: sizes to measure changes and effects by.
     fn sizes(&self) -> Vec<f64> {
-        let regrouping = crate::advice::regrouping(self.base);
-        VisibleSpace::new(&regrouping, &self.prior.std).base_std().to_vec()
+        self.problem.structure.space.base_std().to_vec()
     }
 }
 
 /// Instrumental-variable fit, begun at a fit by least squares: that fit itself if a simulation diverges.
 ///
 /// # Errors
-/// [`Error::Setting`] without the table or a reference, [`Error::Unsupported`] for what is not simulated in closed loop, and errors of
+/// [`Error::Setting`] without a closed loop or a reference, [`Error::Unsupported`] for what is not simulated in closed loop, and errors of
 /// simulations that settings cause.
 pub(crate) fn fit(
-    config: &Config,
-    parts: &Parts<'_>,
+    closed: &Loop<'_>,
     start: LinearEstimate,
 ) -> Result<(LinearEstimate, InstrumentRun), Error> {
-    let table = table(config)?;
-    let bench = Bench::new(config, table, parts)?;
-    let found =
-        iterate(&start.x, &parts.sizes(), (table.settled, table.max_rounds), &settings(config), |last| {
-            bench.simulated(last.map_or(&start.factor, |e| &e.linear.factor))
-        })?;
+    let settings = &closed.problem.settings;
+    let table = table(settings)?;
+    let bench = Bench::new(table, closed)?;
+    let rounds = (table.settled, table.max_rounds);
+    let found = iterate(&start.x, &closed.sizes(), rounds, &iteration(settings), |last| {
+        bench.simulated(last.map_or(&start.factor, |e| &e.linear.factor))
+    })?;
     let run = InstrumentRun::of(&found);
     let linear = found.estimate.map(|e| e.linear).filter(|_| run.succeeded());
     Ok((linear.unwrap_or(start), run))
 }
 
-/// Compares least squares (ordinary where the run's method is, else weighted) with instruments, on the training logs of an
-/// identification (test of Durbin, Wu and Hausman; [`dynid_estimate::instruments::exogeneity()`]).
+/// Compares least squares (ordinary where the run's method is, else weighted) with instruments, on the training logs of a fitted
+/// problem (test of Durbin, Wu and Hausman; [`dynid_estimate::instruments::exogeneity()`]).
 ///
 /// No instrument knows anything of the samples that it is tested on: rows of the first half of every log are paired with simulations of
 /// parameters that were estimated on the second halves alone, by least squares and then by instruments until they settled, and the other
-/// way round. Time blocks are those of the identification's standard deviations; the prior size of a base parameter is its prior
+/// way round. Time blocks are those of the fit's standard deviations; the prior size of a base parameter is its prior
 /// standard deviation.
 ///
 /// # Errors
-/// [`Error::Setting`] without a table `[instruments]` or a reference, [`Error::Unsupported`] for what is not simulated in closed loop, and
+/// [`Error::Setting`] without a closed loop or a reference, [`Error::Unsupported`] for what is not simulated in closed loop, and
 /// errors of simulations that settings cause. A simulation that diverges is an outcome.
-pub fn compare(id: &Identification, config: &Config) -> Result<Comparison, Error> {
-    let parts = Parts {
-        robot: &id.robot,
-        plan: &id.plan,
-        model: &id.model,
-        shapes: id.shapes.as_ref(),
-        base: &id.base,
-        prior: &id.prior,
-        logs: &id.logs,
-        conditioning: id.conditioning.as_ref(),
-        settings: &id.settings,
-        power: &id.power,
+pub fn compare(problem: &Problem, fit: &ModelFit) -> Result<Comparison, Error> {
+    let closed = Loop {
+        problem,
+        shapes: fit.shapes.as_ref(),
+        conditioning: fit.conditioning.as_ref(),
+        power: &fit.power,
     };
-    let bench = Bench::new(config, table(config)?, &parts)?;
+    let settings = &problem.settings;
+    let bench = Bench::new(table(settings)?, &closed)?;
     let rows = bench.measured()?;
-    let sizes = parts.sizes();
-    let (front, of_front) = from_half(config, &bench, &rows, &sizes, false)?;
-    let (back, of_back) = from_half(config, &bench, &rows, &sizes, true)?;
+    let sizes = closed.sizes();
+    let (front, of_front) = from_half(settings, &bench, &rows, &sizes, false)?;
+    let (back, of_back) = from_half(settings, &bench, &rows, &sizes, true)?;
+    let total = problem.structure.base.len();
     let exogeneity = match (&front, &back) {
         (Some(front), Some(back)) => {
             let paired = crossed(back, front);
-            let fit = least_squares(config, &measured(&paired), id.base.len())?;
-            let merged = id.fitted.merged_blocks;
+            let squares = least_squares(settings, &measured(&paired), total)?;
+            let merged = fit.fitted.merged_blocks;
             let paired: Vec<ReducedGroup> = paired.iter().map(|g| g.coarsened(merged)).collect();
-            let total = id.base.len();
-            exogeneity(&paired, &fit.weights(), total, &sizes, &ExogeneitySettings::default())
+            exogeneity(&paired, &squares.weights(), total, &sizes, &ExogeneitySettings::default())
         }
         _ => None,
     };
@@ -172,17 +155,17 @@ pub fn compare(id: &Identification, config: &Config) -> Result<Comparison, Error
 
 /// Rows of the whole logs paired with simulations of parameters that one half of every log determines; `None` if one diverged.
 fn from_half(
-    config: &Config,
+    settings: &Settings,
     bench: &Bench<'_>,
     rows: &[ReducedGroup],
     sizes: &[f64],
     second: bool,
 ) -> Result<(Option<Vec<ReducedGroup>>, InstrumentRun), Error> {
-    let table = table(config)?;
-    let start = least_squares(config, &half(rows, second), sizes.len())?;
+    let table = table(settings)?;
+    let start = least_squares(settings, &half(rows, second), sizes.len())?;
     let whole = RefCell::new(None);
     let rounds = (table.settled, table.max_rounds);
-    let found = iterate(&start.x, sizes, rounds, &settings(config), |last| -> Result<Simulated, Error> {
+    let found = iterate(&start.x, sizes, rounds, &iteration(settings), |last| -> Result<Simulated, Error> {
         Ok(match bench.simulated(last.map_or(&start.factor, |e| &e.linear.factor))? {
             Simulated::Rows(paired) => {
                 let own = half(&paired, second);
@@ -196,19 +179,23 @@ fn from_half(
     Ok((whole.into_inner().filter(|_| run.succeeded()), run))
 }
 
-fn least_squares(config: &Config, groups: &[ReducedGroup], total: usize) -> Result<LinearEstimate, Error> {
-    let method = match config.estimator.method {
+fn least_squares(
+    settings: &Settings,
+    groups: &[ReducedGroup],
+    total: usize,
+) -> Result<LinearEstimate, Error> {
+    let method = match settings.estimator.method {
         Method::Ols => LinearMethod::Ols,
         _ => LinearMethod::Wls,
     };
-    Ok(estimate(groups, None, total, &method, &fitting::linear_settings(config))?)
+    Ok(estimate(groups, None, total, &method, &fitting::linear_settings(settings))?)
 }
 
-fn settings(config: &Config) -> InstrumentSettings {
-    InstrumentSettings { linear: fitting::linear_settings(config), ..InstrumentSettings::default() }
+fn iteration(settings: &Settings) -> InstrumentSettings {
+    InstrumentSettings { linear: fitting::linear_settings(settings), ..InstrumentSettings::default() }
 }
 
-fn table(config: &Config) -> Result<&crate::config::InstrumentsConfig, Error> {
+fn table(settings: &Settings) -> Result<&ClosedLoop, Error> {
     let missing = || Error::setting("instruments", "a table with reference and controller", "none");
-    config.instruments.as_ref().ok_or_else(missing)
+    settings.closed_loop.as_ref().ok_or_else(missing)
 }

@@ -1,13 +1,17 @@
 //! What the controller of a recorded motion wanted.
 
 use dynid_estimate::conditioning::PreparedLog;
-use dynid_io::TrajectoryFile;
 use dynid_model::RobotModel;
 use dynid_motion::trajectory::{Point, Sequence, Trajectory};
 use dynid_sim::Wanted;
 
 use crate::Error;
-use crate::config::{Config, LogConfig, reference_channel};
+use crate::log::LogReference;
+
+/// Name of the channel that holds the reference of a joint.
+pub(crate) fn reference_channel(joint: &str) -> String {
+    format!("reference_{joint}")
+}
 
 /// Reference of one log, in the order of the model's joints; time from the first sample of the log on.
 pub(super) enum Reference {
@@ -18,14 +22,13 @@ pub(super) enum Reference {
 }
 
 impl Reference {
-    /// From channels of the log, else the instruments' trajectory file, else that of the log.
+    /// From channels of the log, else from what is stated.
     ///
     /// # Errors
-    /// [`Error::Setting`] without any of them, or with channels of some joints only; [`Error::TrajectoryFile`]; [`Error::Unsupported`]
+    /// [`Error::Setting`] without any of them, or with channels of some joints only; [`Error::Unsupported`]
     /// for a part of a log with a trajectory file.
     pub(super) fn of(
-        config: &Config,
-        file: &LogConfig,
+        stated: Option<&LogReference>,
         model: &RobotModel,
         log: &PreparedLog,
     ) -> Result<Self, Error> {
@@ -45,28 +48,25 @@ impl Reference {
             let position = position.collect::<Result<_, _>>()?;
             return Ok(Reference::Sampled { rate_hz: log.rate_hz, position });
         }
-        let own = config.instruments.as_ref().and_then(|t| t.trajectory.as_ref());
-        let Some(path) = own.or(file.trajectory.as_ref()) else {
+        let Some(LogReference { trajectory, file, cut, part }) = stated else {
             return Err(Error::setting(
                 "instruments.reference",
                 "columns of the reference, or a `trajectory` file",
                 "neither",
             ));
         };
-        if file.part.is_some() || file.rows.is_some() {
+        if *part {
             return Err(Error::Unsupported(format!(
                 "{}: where in the trajectory a part of the log begins is not known: state the columns of the reference \
                  (`instruments.reference`)",
                 log.name
             )));
         }
-        let trajectory = TrajectoryFile::read(path)?;
         let order = trajectory.order_of(&joints).map_err(|joint| Error::InFile {
-            file: path.display().to_string(),
+            file: file.clone(),
             source: Box::new(Error::setting("joints", &format!("a trajectory of joint `{joint}`"), "none")),
         })?;
-        // Logs with a trajectory of their own are cut to its record.
-        let approach = trajectory.approach.as_ref().filter(|_| own.is_none());
+        let approach = trajectory.approach.as_ref().filter(|_| *cut);
         let from = approach.map_or(0.0, |leg| leg.duration_s);
         Ok(Reference::File { sequence: trajectory.sequence()?, order, from })
     }

@@ -2,22 +2,23 @@
 
 use std::sync::Arc;
 
+use dynid_estimate::Factor;
 use dynid_estimate::conditioning::{LogRows, paired_textbook_rows};
-use dynid_estimate::consistent::{Form, Settings, estimate};
+use dynid_estimate::consistent as bodies;
 use dynid_estimate::groups::ReducedGroup;
 use dynid_estimate::instruments::Simulated;
 use dynid_estimate::rows::{RowSource, reduce_rows};
-use dynid_estimate::{Factor, Mat};
 use dynid_model::{EffortModel, RobotModel};
 use dynid_sim::{ControlSettings, ExperimentSettings, Imperfections, Plant, Profile, SimError, Wanted, run};
 
-use super::Parts;
+use super::Loop;
 use super::reference::Reference;
-use crate::config::{Config, InstrumentsConfig, NominalModel};
 use crate::elements::LOAD;
 use crate::elements::clearance::refuse_clearance;
+use crate::identify::{Problem, Structure};
 use crate::robot::{refuse_elastic, refuse_loops};
-use crate::{Error, advice, bounds, consistency, fitting, shape};
+use crate::settings::{ClosedLoop, NominalModel};
+use crate::{Error, bounds, consistency, fitting, shape};
 
 /// Local error of the integration.
 const TOLERANCE: f64 = 1e-8;
@@ -31,54 +32,45 @@ type Motions = Vec<Vec<Vec<f64>>>;
 
 /// Everything that a simulation of the logs takes.
 pub(super) struct Bench<'a> {
-    config: &'a Config,
-    table: &'a InstrumentsConfig,
-    parts: &'a Parts<'a>,
+    table: &'a ClosedLoop,
+    closed: &'a Loop<'a>,
     references: Vec<Reference>,
-    regrouping: Mat<f64>,
-    bounds: Vec<dynid_estimate::consistent::Bound>,
+    bounds: Vec<bodies::Bound>,
     shape: Vec<f64>,
 }
 
 impl<'a> Bench<'a> {
     /// # Errors
     /// [`Error::Unsupported`] for robots that are not simulated in closed loop, and those of references.
-    pub(super) fn new(
-        config: &'a Config,
-        table: &'a InstrumentsConfig,
-        parts: &'a Parts<'a>,
-    ) -> Result<Self, Error> {
+    pub(super) fn new(table: &'a ClosedLoop, closed: &'a Loop<'a>) -> Result<Self, Error> {
         let what = "simulated for instruments";
-        refuse_elastic(parts.robot, what)?;
-        refuse_clearance(parts.robot, what)?;
-        refuse_loops(parts.robot, what)?;
-        if parts.plan.per_rate.iter().flatten().any(|name| name == LOAD) {
+        let Problem { robot, plan, model, logs, training, settings, .. } = closed.problem;
+        refuse_elastic(robot, what)?;
+        refuse_clearance(robot, what)?;
+        refuse_loops(robot, what)?;
+        if plan.per_rate.iter().flatten().any(|name| name == LOAD) {
             return Err(Error::Unsupported(format!(
                 "`{LOAD}` friction depends on accelerations through its load, for which the equation of motion has no form: \
                  state other friction (`elements.friction`) or leave out `[instruments]`"
             )));
         }
-        let files = config.training_logs();
-        let references = files
+        let references = training
             .iter()
-            .zip(parts.logs)
-            .map(|(file, log)| Reference::of(config, file, parts.model, log))
+            .zip(logs.iter())
+            .map(|(stated, log)| Reference::of(stated.reference.as_ref(), model, log))
             .collect::<Result<_, _>>()?;
         Ok(Bench {
-            config,
             table,
-            parts,
+            closed,
             references,
-            regrouping: advice::regrouping(parts.base),
-            bounds: [bounds::rows(&config.bound, parts.model)?, parts.power.bounds.clone()].concat(),
-            shape: parts.model.parameters().shape_start(),
+            bounds: [bounds::rows(&settings.bound, model)?, closed.power.bounds.clone()].concat(),
+            shape: model.parameters().shape_start(),
         })
     }
 
     /// Measured rows, one factor per group and time block.
     pub(super) fn measured(&self) -> Result<Vec<ReducedGroup>, Error> {
-        let Parts { model, base, logs, conditioning, settings, .. } = self.parts;
-        let rows = fitting::rows(self.config, model, &self.shape, &base.kept, logs, *conditioning, settings)?;
+        let rows = fitting::rows(self.closed.problem, self.closed.conditioning)?;
         reduce_rows(&*rows).map_err(|e| fitting::conditioning_fault(&*rows, e))
     }
 
@@ -91,16 +83,16 @@ impl<'a> Bench<'a> {
     }
 
     fn paired(&self, motions: &Motions) -> Result<Vec<ReducedGroup>, Error> {
-        let Parts { model, base, logs, conditioning, settings, .. } = self.parts;
-        let rows: Box<dyn RowSource> = match conditioning {
+        let Problem { model, structure, logs, settings, .. } = self.closed.problem;
+        let (kept, conditioned) = (&structure.base.kept, settings.conditioning_settings());
+        let rows: Box<dyn RowSource> = match self.closed.conditioning {
             Some(found) => {
-                let rows = LogRows::new(*model, &self.shape, &base.kept, logs, found, settings)?;
-                Box::new(rows.with_instruments(motions, settings)?)
+                let rows = LogRows::new(model, &self.shape, kept, logs, found, &conditioned)?;
+                Box::new(rows.with_instruments(motions, &conditioned)?)
             }
             None => {
-                let route = self.config.textbook_route();
-                let kept = &base.kept;
-                Box::new(paired_textbook_rows(*model, &self.shape, kept, logs, &route, motions, settings)?)
+                let route = settings.textbook_route();
+                Box::new(paired_textbook_rows(model, &self.shape, kept, logs, &route, motions, &conditioned)?)
             }
         };
         reduce_rows(&*rows).map_err(|e| fitting::conditioning_fault(&*rows, e))
@@ -112,7 +104,7 @@ impl<'a> Bench<'a> {
         let model = Arc::new(model);
         let nominal = match self.table.nominal {
             NominalModel::Identified => values.clone(),
-            NominalModel::RobotFile => self.unfolded(&self.parts.prior.values)?.1,
+            NominalModel::RobotFile => self.unfolded(&self.closed.problem.structure.prior.values)?.1,
         };
         let shape = model.parameters().shape_start();
         let plant =
@@ -148,7 +140,7 @@ impl<'a> Bench<'a> {
 
     /// The joint that is furthest beyond what is allowed.
     fn diverged(&self, log: usize, reference: &Reference, found: &[Vec<f64>]) -> Option<Diverged> {
-        let rate_hz = self.parts.logs[log].rate_hz;
+        let rate_hz = self.closed.problem.logs[log].rate_hz;
         let rows = found.first().map_or(0, Vec::len);
         let wanted: Vec<Vec<Wanted>> = (0..rows).map(|row| reference.at(row as f64 / rate_hz)).collect();
         let mut worst = Diverged { log, output: 0, distance: 0.0 };
@@ -165,7 +157,7 @@ impl<'a> Bench<'a> {
     }
 
     fn experiment(&self, model: &RobotModel, log: usize) -> Result<ExperimentSettings, Error> {
-        let log = &self.parts.logs[log];
+        let log = &self.closed.problem.logs[log];
         let table = self.table;
         let wanted =
             table.rate_hz.unwrap_or(log.rate_hz * (LEAST_CONTROL_RATE / log.rate_hz).ceil().max(1.0));
@@ -199,19 +191,22 @@ impl<'a> Bench<'a> {
 
     /// Parameters of bodies that can exist, as near as may be to those that a factor determines.
     fn possible(&self, factor: &Factor) -> Result<Vec<f64>, Error> {
-        let Parts { model, prior, .. } = self.parts;
-        let problem = consistency::problem(model, &self.regrouping, factor, prior, &self.bounds);
-        let form = consistency::form(self.config).unwrap_or(Form::PseudoInertia);
-        let settings = Settings { form, gaussian_weight: PRIOR_WEIGHT, ..Settings::default() };
-        Ok(estimate(&problem, &settings)?.x)
+        let Problem { model, structure, settings, .. } = self.closed.problem;
+        let Structure { prior, regrouping, .. } = structure;
+        let problem = consistency::problem(model, regrouping, factor, prior, &self.bounds);
+        let form = consistency::form(settings.estimator.consistency).unwrap_or(bodies::Form::PseudoInertia);
+        let settings =
+            bodies::Settings { form, gaussian_weight: PRIOR_WEIGHT, ..bodies::Settings::default() };
+        Ok(bodies::estimate(&problem, &settings)?.x)
     }
 
     /// The nonlinear model and its parameters that those of the fit stand for.
     fn unfolded(&self, values: &[f64]) -> Result<(RobotModel, Vec<f64>), Error> {
-        let model = self.parts.plan.model(self.parts.model.mechanism())?;
-        Ok(match self.parts.shapes {
+        let Problem { plan, model: fitted, .. } = self.closed.problem;
+        let model = plan.model(fitted.mechanism())?;
+        Ok(match self.closed.shapes {
             Some(found) => {
-                let unfolded = shape::unfold(&found.model, self.parts.model, values);
+                let unfolded = shape::unfold(&found.model, fitted, values);
                 (model.with_shape(&unfolded.shape), unfolded.linear)
             }
             None => (model, values.to_vec()),

@@ -19,9 +19,10 @@ use super::usual::Innovations;
 use crate::config::Config;
 use crate::elements::ElementPlan;
 use crate::identify::stated_values;
-use crate::logs::{self, LogAxis};
+use crate::log::{self, LogAxis};
 use crate::prior::{self, Prior};
-use crate::robot::{Robot, RobotOptions, refuse_loops};
+use crate::robot::refuse_loops;
+use crate::run::load_robot;
 use crate::stiffness;
 use crate::{Error, advice, bounds};
 
@@ -45,13 +46,7 @@ pub(super) struct Structure {
 impl Structure {
     /// `still`: joints without columns.
     pub(super) fn new(config: &Config, still: &[String]) -> Result<Structure, Error> {
-        let options = RobotOptions {
-            gravity: config.gravity,
-            couple_mimics: config.couple_mimics.unwrap_or(false),
-            floating_base: false,
-            locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
-        };
-        let mut robot = Robot::load(&config.robot, &options)?;
+        let mut robot = load_robot(config)?;
         refuse_loops(&robot, "identified on line")?;
         if robot.mechanism.positions() != robot.mechanism.rates() {
             return Err(Error::Unsupported(
@@ -63,7 +58,7 @@ impl Structure {
             let still: Vec<(String, f64)> = still.iter().map(|name| (name.clone(), 0.0)).collect();
             robot = robot.locked(&still)?;
         }
-        let plan = ElementPlan::of_run(config, &robot, |_| true)?;
+        let plan = ElementPlan::of_run(&config.settings()?, &robot, |_| true)?;
         let model = plan.model(&robot.mechanism)?;
         let shape = model.parameters().shape_start();
         let settings = BaseSettings { seed: config.seed.unwrap_or(1), ..BaseSettings::default() };
@@ -88,7 +83,7 @@ impl Structure {
 
     /// What a stream has columns for.
     pub(super) fn axes(&self) -> Vec<LogAxis> {
-        logs::axes(&self.model)
+        log::axes(&self.model)
     }
 
     /// Joints in the order of the outputs.
@@ -121,12 +116,13 @@ impl Learned {
         samples: &[Sample],
     ) -> Result<Result<Learned, String>, Error> {
         let model = &*structure.model;
-        let settings = config.conditioning_settings();
+        let asked = config.settings()?;
+        let settings = asked.conditioning_settings();
         let prepared = match prepare(&log(name, model, samples)?, model, &settings) {
             Ok(prepared) => prepared,
             Err(reason) => return insufficient(reason),
         };
-        config.check_cutoffs(name, prepared.rate_hz)?;
+        asked.check_cutoffs(name, prepared.rate_hz)?;
         let logs = [prepared];
         let found = condition(model, &structure.shape, &structure.base.kept, &logs, &settings, &mut |_| {});
         let choices = match found {

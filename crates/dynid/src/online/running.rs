@@ -364,7 +364,9 @@ impl Running {
     /// Standard parameters of bodies that can exist.
     fn standard(&self, config: &Config, structure: &Structure) -> Result<Vec<PlainValue>, Error> {
         let bodies = structure.model.mechanism().bodies().len();
-        let Some(form) = consistency::form(config).filter(|_| config.online.consistent && bodies > 0) else {
+        let Some(form) = consistency::form(config.estimator.consistency)
+            .filter(|_| config.online.consistent && bodies > 0)
+        else {
             return Ok(Vec::new());
         };
         let factor = factor_from_root(self.estimator.information(), &self.learned.prior_std);

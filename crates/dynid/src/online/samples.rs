@@ -6,7 +6,8 @@ use dynid_model::element::temperature_channel;
 
 use crate::Error;
 use crate::config::Config;
-use crate::logs::{self, LogAxis};
+use crate::log::LogAxis;
+use crate::logs;
 
 /// Rows converted at a time.
 pub(super) const BATCH: usize = 256;
@@ -42,7 +43,7 @@ impl Samples {
         let named = |source| Error::Columns { file: name.to_owned(), source: Box::new(source) };
         let mapping = logs::map_columns(header, axes, columns).map_err(named)?;
         if columns.position.is_none() {
-            logs::check_surplus(&mapping, &logs::names(axes), &header.names, name)?;
+            logs::check_surplus(&mapping, &crate::log::names(axes), &header.names, name)?;
         }
         logs::check_gains(columns, axes.len())?;
         if mapping.effort.is_none() {

@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 use super::body::{Body, NAMES, about_com};
 use super::difference::{Difference, difference};
 use super::{PayloadIdentification, quantile};
-use crate::config::{Config, PayloadConfig};
+use crate::advice;
+use crate::config::PayloadConfig;
 use crate::estimate::{
     CheckResult, ConsistencyRecord, LogScale, ParameterValue, Provenance, SCHEMA, Verdict,
 };
 use crate::identify::Identification;
 use crate::prior::PAYLOAD_SIZE;
 use crate::verdict::CheckName;
-use crate::{Error, advice};
 
 /// Checks of an identification that say what its logs are worth. The scale of the efforts is told by the stated mass.
 const INPUTS: [&str; 2] = [CheckName::Preflight.name(), CheckName::OwnLogs.name()];
@@ -102,7 +102,7 @@ pub struct PayloadFile {
 }
 
 /// The record of one payload. `run`: the configuration of the identification; `stated`: what was said about the payload.
-pub(super) fn of(id: &Identification, run: &Config, stated: &PayloadConfig) -> PayloadRecord {
+pub(super) fn of(id: &Identification, stated: &PayloadConfig) -> PayloadRecord {
     let (payload, first) = id
         .model
         .payloads()
@@ -142,10 +142,10 @@ pub(super) fn of(id: &Identification, run: &Config, stated: &PayloadConfig) -> P
             }
         })
         .collect();
-    let carries: Vec<Option<bool>> = run
-        .log
+    let carries: Vec<Option<bool>> = id
+        .log_settings
         .iter()
-        .map(|log| match &log.payload {
+        .map(|(_, log)| match &log.payload {
             None => Some(false),
             Some(name) if *name == stated.name => Some(true),
             Some(_) => None,
@@ -228,11 +228,8 @@ fn sentence(name: &str, found: &[Quantity], stated: &PayloadConfig) -> String {
 
 impl PayloadIdentification {
     /// The file `payload.json`.
-    ///
-    /// # Errors
-    /// [`Error::Read`] if an input file cannot be hashed any more.
-    pub fn file(&self, config: &Config) -> Result<PayloadFile, Error> {
-        let estimate = self.identification.estimate(config)?;
+    pub fn file(&self) -> PayloadFile {
+        let estimate = self.identification.estimate();
         let all = |of: &dyn Fn(&PayloadRecord) -> bool| self.payloads.iter().all(of);
         let mass = all(&|p| p.mass.interval.is_some_and(|(low, _)| low > 0.0));
         let centre = all(&|p| p.com.iter().all(|c| c.interval.is_some()));
@@ -261,7 +258,7 @@ impl PayloadIdentification {
                 estimate.verdict.headline
             ),
         };
-        Ok(PayloadFile {
+        PayloadFile {
             schema: SCHEMA,
             robot: estimate.robot,
             status: status.to_owned(),
@@ -272,7 +269,7 @@ impl PayloadIdentification {
             consistency: estimate.consistency,
             verdict: estimate.verdict,
             provenance: estimate.provenance,
-        })
+        }
     }
 }
 

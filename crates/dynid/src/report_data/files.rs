@@ -4,10 +4,10 @@ use dynid_model::EffortModel;
 use dynid_report::{FileJoint, FileJudgement, FileLoss};
 
 use crate::estimate::{EXPORT_LOSS_LIMIT, Estimate, FileFit};
-use crate::identify::Identification;
 use crate::result::short_name;
+use crate::run::Run;
 
-impl Identification {
+impl Run {
     /// Robot files on the log that they are judged on; `None` where files do not hold the efforts.
     pub(super) fn file_judgement(&self, estimate: &Estimate) -> Option<FileJudgement> {
         let record = &estimate.exported;

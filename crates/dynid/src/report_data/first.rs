@@ -7,8 +7,8 @@ use dynid_report::{RobotPicture, Value};
 use crate::Error;
 use crate::agreement::Agreement;
 use crate::estimate::Estimate;
-use crate::identify::Identification;
 use crate::result::short_name;
+use crate::run::Run;
 
 /// What the first figure leaves out of a prediction; below the curves of all joints it is told at length.
 const BRIEFLY: &str = " Where the joint stands, friction of velocity is left out of the predicted curve.";
@@ -46,7 +46,7 @@ pub(super) fn counts(estimate: &Estimate) -> report::Counts {
     }
 }
 
-impl Identification {
+impl Run {
     /// The log that the verdict speaks of, the worst predicted one that the model has not seen, else of the training logs; and
     /// the joint that is predicted worst on it.
     pub(super) fn judged(&self) -> Result<Option<report::Judged>, Error> {

@@ -5,10 +5,10 @@ use dynid_model::{EffortModel, Owner};
 use dynid_report as report;
 
 use crate::estimate::{ConsistencyRecord, Estimate, ParameterValue};
-use crate::identify::Identification;
 use crate::result::short_name;
+use crate::run::Run;
 
-impl Identification {
+impl Run {
     pub(super) fn consistency_report(&self, estimate: &Estimate) -> Option<report::Consistency> {
         let record = estimate.consistency.as_ref()?;
         let active = self.consistent.estimate.as_ref().map_or(&[][..], |e| &e.active);

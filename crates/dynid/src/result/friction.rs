@@ -5,8 +5,8 @@ use dynid_model::EffortModel;
 
 use crate::elements::shape_element;
 use crate::estimate::FrictionTrial;
-use crate::friction::KnownFriction;
 use crate::identify::Identification;
+use crate::known_friction::KnownFriction;
 
 /// All shapes tried, joint after joint, accepted ones first.
 pub(super) fn trials(id: &Identification) -> Vec<FrictionTrial> {

@@ -4,19 +4,19 @@ use dynid_estimate::consistent::Status;
 use dynid_estimate::whiteness::InBandWhiteness;
 use dynid_model::EffortModel;
 
-use crate::config::{Config, Consistency};
 use crate::consistency::UNCONSTRAINED;
 use crate::estimate::{
     ConsistencyRecord, HeldOutRecord, PrecisionRecord, PruningRecord, PruningStep, WhitenessRecord,
 };
 use crate::identify::Identification;
+use crate::settings::Consistency;
 
 impl Identification {
-    pub(super) fn consistency_record(&self, config: &Config) -> Option<ConsistencyRecord> {
+    pub(super) fn consistency_record(&self) -> Option<ConsistencyRecord> {
         let found = self.consistent.estimate.as_ref()?;
         let chance = self.fitted.inflation * self.fit().solution.kept.len() as f64;
         Some(ConsistencyRecord {
-            form: match config.estimator.consistency {
+            form: match self.settings.estimator.consistency {
                 Consistency::SpatialInertia => "spatial-inertia".to_owned(),
                 _ => "pseudo-inertia".to_owned(),
             },

@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 
 use dynid_io::columns::ColumnUse;
-use dynid_io::{ColumnMapping, ElasticSpec, ElementSetting, MappingSpec, SettingValue};
+use dynid_io::{ColumnMapping, ElasticSpec, ElementSetting, SettingValue};
+use dynid_motion::JointSignals;
 
-use crate::config::{Config, LogConfig};
+use crate::Error;
+use crate::log::{Log, LogSource, understood};
 use crate::robot::Robot;
-use crate::{Error, logs};
+use crate::settings::Settings;
 
 /// Settings of motors that a joint takes over, with the power of the ratio that carries them to its side.
 const CARRIED: [(&str, &str, i32); 3] =
@@ -70,20 +72,9 @@ fn carry(settings: &mut Vec<ElementSetting>, spec: &ElasticSpec) {
     *settings = rest;
 }
 
-/// The configuration that reads the logs of an elastic robot for the same robot with stiff joints: positions and efforts
-/// are those of the motors, on the side of the joints.
-///
-/// # Errors
-/// Fails as [`logs::load`] does.
-pub(crate) fn stiff_config(config: &Config, robot: &Robot) -> Result<Config, Error> {
-    let mut out = config.clone();
-    let read = |log: &mut LogConfig| -> Result<(), Error> {
-        let loaded = logs::load(log, &robot.axes, &config.columns, config.motor_side.as_ref())?;
-        let stated = log.columns.as_ref().unwrap_or(&config.columns);
-        log.columns = Some(at_motors(&loaded.mapping, &robot.elements.elastic).read_as(stated));
-        Ok(())
-    };
-    out.log.iter_mut().chain(&mut out.validation).try_for_each(read)?;
+/// Settings of an elastic robot for the same robot with stiff joints: joints have the elements of their motors too.
+pub(crate) fn stiff_settings(settings: &Settings, robot: &Robot) -> Settings {
+    let mut out = settings.clone();
     let lists: &mut BTreeMap<String, Vec<String>> = &mut out.elements.joint;
     for spec in &robot.elements.elastic {
         if let Some(of_motor) = lists.remove(&spec.motor) {
@@ -91,10 +82,45 @@ pub(crate) fn stiff_config(config: &Config, robot: &Robot) -> Result<Config, Err
             lists.insert(spec.joint.clone(), union(&own, &of_motor));
         }
     }
-    Ok(out)
+    out
 }
 
-fn at_motors(mapping: &ColumnMapping, elastic: &[ElasticSpec]) -> MappingSpec {
+/// A log of an elastic robot for the same robot with stiff joints: positions and efforts are those of the motors, on the side of the
+/// joints.
+///
+/// # Errors
+/// [`Error::Log`].
+pub(crate) fn at_motors(log: Log, elastic: &[ElasticSpec]) -> Result<Log, Error> {
+    let name = log.log.name().to_owned();
+    let (time, joints, channels) = log.log.into_parts();
+    let of_motor = |joint: &str| elastic.iter().find(|spec| spec.joint == joint);
+    let is_motor = |joint: &JointSignals| elastic.iter().any(|spec| spec.motor == joint.name);
+    let scaled = |signal: &[f64], factor: f64| signal.iter().map(|x| x * factor).collect::<Vec<f64>>();
+    let kept = joints.iter().filter(|joint| !is_motor(joint)).map(|joint| {
+        let spec = of_motor(&joint.name);
+        let motor = spec.and_then(|spec| Some((joints.iter().find(|j| j.name == spec.motor)?, spec.ratio)));
+        match motor {
+            None => joint.clone(),
+            Some((motor, ratio)) => JointSignals {
+                name: joint.name.clone(),
+                position: scaled(&motor.position, 1.0 / ratio),
+                velocity: motor.velocity.as_ref().map(|v| scaled(v, 1.0 / ratio)),
+                effort: scaled(&motor.effort, ratio),
+            },
+        }
+    });
+    let kept = kept.collect();
+    let mapping = log.source.mapping.map(|mapping| mapping_at_motors(&mapping, elastic));
+    let columns = mapping.as_ref().map_or_else(|| log.source.columns.clone(), understood);
+    Ok(Log {
+        log: dynid_motion::Log::new(name, time, kept, channels)?,
+        source: LogSource { mapping, columns, ..log.source },
+        ..log
+    })
+}
+
+/// The columns of a log of an elastic robot as those of the same robot with stiff joints.
+fn mapping_at_motors(mapping: &ColumnMapping, elastic: &[ElasticSpec]) -> ColumnMapping {
     let place = |name: &String| mapping.joints.iter().position(|j| j == name);
     let kept: Vec<usize> = (0..mapping.joints.len())
         .filter(|k| !elastic.iter().any(|e| e.motor == mapping.joints[*k]))
@@ -116,7 +142,7 @@ fn at_motors(mapping: &ColumnMapping, elastic: &[ElasticSpec]) -> MappingSpec {
         kept.iter().map(one).collect()
     };
     let motion: fn(f64) -> f64 = |ratio| 1.0 / ratio;
-    let at_joints = ColumnMapping {
+    ColumnMapping {
         joints: kept.iter().map(|k| mapping.joints[*k].clone()).collect(),
         time: mapping.time.clone(),
         position: list(&mapping.position, motion),
@@ -127,6 +153,5 @@ fn at_motors(mapping: &ColumnMapping, elastic: &[ElasticSpec]) -> MappingSpec {
         undriven: kept.iter().map(|k| mapping.undriven[*k] && source(*k).is_none()).collect(),
         channels: mapping.channels.clone(),
         missing: mapping.missing,
-    };
-    MappingSpec::from(&at_joints)
+    }
 }

@@ -5,6 +5,7 @@ use crate::check::Severity;
 use crate::effort_scale::{EffortScale, ScaleSource};
 use crate::estimate::CheckResult;
 use crate::identify::Identification;
+use crate::settings::Preflight;
 
 /// Masses of the robot file speak for the scale of the efforts within this factor.
 const FILE_AGREES: f64 = 1.25;
@@ -32,9 +33,10 @@ fn preflight(id: &Identification) -> (Status, CheckResult) {
         names.dedup();
         names
     };
+    let examined = id.settings.preflight != Preflight::Off;
     let (errors, doubts) = (named(Severity::Error), named(Severity::Warning));
     let count = (errors.len() + doubts.len()) as f64;
-    let (status, meaning) = if !id.preflight {
+    let (status, meaning) = if !examined {
         let meaning = "it was switched off: nobody looked whether columns, signs, units and gravity are what the log says";
         (Status::Warn, meaning.to_owned())
     } else if !errors.is_empty() {
@@ -45,7 +47,7 @@ fn preflight(id: &Identification) -> (Status, CheckResult) {
     } else {
         (Status::Ok, "columns, signs, units, clock and gravity are what the logs say".to_owned())
     };
-    check(status, CheckName::Preflight, id.preflight.then_some(count), "", "no error, no warning", meaning)
+    check(status, CheckName::Preflight, examined.then_some(count), "", "no error, no warning", meaning)
 }
 
 fn repeated(id: &Identification) -> Option<(Status, CheckResult)> {

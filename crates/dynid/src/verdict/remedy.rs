@@ -2,15 +2,16 @@
 
 use super::CheckName;
 use crate::identify::Identification;
+use crate::settings::Preflight;
 
 /// Blocks that standard deviations want.
 const BLOCKS_WANTED: f64 = 20.0;
 
 /// The remedy of a check.
 pub(super) fn of(id: &Identification, check: CheckName) -> String {
-    let files = &id.files;
+    let files = &id.settings.files;
     match check {
-        CheckName::Preflight if !id.preflight => {
+        CheckName::Preflight if id.settings.preflight == Preflight::Off => {
             "leave out `preflight = \"off\"`, so that the logs are examined".to_owned()
         }
         CheckName::Preflight => format!("`{} --fix fixed.toml` writes the configuration that puts it right", files.check()),
@@ -105,7 +106,7 @@ fn longer(id: &Identification) -> String {
     match wanted.is_finite() && wanted > have {
         true => format!(
             "record {wanted:.0} s in place of {have:.0} s, in one log or several `[[log]]`s (`{}` gives a motion that repeats)",
-            id.files.design() + " --periods 3"
+            id.settings.files.design() + " --periods 3"
         ),
         false => format!("record a longer log of the same kind than {have:.0} s, or add a second `[[log]]`"),
     }

@@ -55,7 +55,7 @@ fn write_log(path: &std::path::Path, gap: f64) {
 }
 
 fn look(config: &Config) -> Vec<LogBacklash> {
-    let estimate = identify(config, &mut |_| {}).unwrap().estimate(config).unwrap();
+    let estimate = identify(config, &mut |_| {}).unwrap().estimate();
     let logs: Vec<LogConfig> = config.training_logs();
     let found =
         backlash((&estimate, "estimate.json".as_ref()), &logs, &config.columns, config.motor_side.as_ref());
@@ -114,7 +114,7 @@ fn a_gap_between_motor_and_link_is_found_and_none_where_there_is_none() {
 fn recorded_robots_show_no_gap() {
     for text in [PANDA, UR10] {
         let Some((config, id)) = run(text) else { return };
-        let estimate = id.estimate(&config).unwrap();
+        let estimate = id.estimate();
         let logs = config.training_logs();
         let found = backlash((&estimate, "estimate.json".as_ref()), &logs, &config.columns, None).unwrap();
         for joint in &found[0].joints {

@@ -77,7 +77,7 @@ fn a_log_of_a_warming_arm_tells_its_friction() {
     std::fs::write(folder.join("robot.toml"), robot(1.5, 0.1, 1.0, 1.0)).unwrap();
     let config = run(folder, "[[log]]\npath = \"log.csv\"\n");
     let found = identify(&config, &mut |_| {}).unwrap();
-    let estimate = found.estimate(&config).unwrap();
+    let estimate = found.estimate();
     let shape = |name: &str| estimate.shape_parameters.iter().find(|p| p.name == name).unwrap().value;
     let linear = |name: &str| estimate.parameters.iter().find(|p| p.name == name).unwrap().value;
     for joint in ["j1", "j2"] {

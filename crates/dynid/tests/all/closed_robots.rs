@@ -5,11 +5,11 @@
 use std::path::{Path, PathBuf};
 
 use dynid::estimators::distribution::t_quantile;
-use dynid::identify::{Identification, identify};
 use dynid::model::EffortModel;
 use dynid::model::closed::ClosedDynamics;
 use dynid::simulate::{SimulateMode, SimulateSettings, SimulatedLog, simulate};
 use dynid::{Config, Robot, RobotOptions};
+use dynid::{Run, identify};
 
 fn robot_file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots").join(format!("{name}.toml"))
@@ -43,7 +43,7 @@ fn write(log: &SimulatedLog, path: &Path) {
 }
 
 /// Identifies a robot from logs of fast random motions, one per seed; truth in the order of the parameters.
-fn identified(name: &str, test: &str, elements: &str, seeds: &[u64]) -> (Identification, Vec<f64>) {
+fn identified(name: &str, test: &str, elements: &str, seeds: &[u64]) -> (Run, Vec<f64>) {
     let (robot, folder) = (load(name), folder(test));
     let mut text = format!("robot = {:?}\n[elements]\ndefault = {elements}\n", robot_file(name));
     let mut truth = Vec::new();
@@ -72,7 +72,7 @@ fn identified(name: &str, test: &str, elements: &str, seeds: &[u64]) -> (Identif
 }
 
 /// Errors of base parameters are as large as their standard deviations say.
-fn check_errors(name: &str, id: &Identification, truth: &[f64]) {
+fn check_errors(name: &str, id: &Run, truth: &[f64]) {
     let expected = id.base.values(truth);
     let quantile = t_quantile(0.995, id.blocks() as f64 - 1.0).unwrap();
     let deviations = id.standard_deviations();

@@ -52,7 +52,7 @@ fn identified(folder: &Path, trajectory: &Path, seed: u64) -> Estimate {
     dynid::io::csv::write(&path, &header, &columns).unwrap();
     let text = format!("robot = '{}'\n[[log]]\npath = '{}'\n", robot_path().display(), path.display());
     let config = Config::parse(&text, "run").unwrap();
-    identify(&config, &mut |_| {}).unwrap().estimate(&config).unwrap()
+    identify(&config, &mut |_| {}).unwrap().estimate()
 }
 
 /// Mean over base parameters of std(random) / std(designed), and the ratio of the mean relative standard deviations.

@@ -7,11 +7,11 @@ use std::path::Path;
 
 use dynid::config::Config;
 use dynid::estimate::{Estimate, Split};
-use dynid::identify::{Identification, identify};
 use dynid::model::EffortModel;
 use dynid::model::element::CubicSpring;
 use dynid::robot::{Robot, RobotOptions};
 use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
+use dynid::{Run, identify};
 
 /// Two links, one motor geared down with a hardening spring, one that turns against its joint with a linear one.
 const ARM: &str = r#"
@@ -76,11 +76,7 @@ fn simulated(robot: &Robot, seed: u64) -> SimulatedLog {
 }
 
 /// A folder with robot, logs and configuration, and what is identified from them.
-fn identified(
-    robot_text: &str,
-    logs: &[(&str, String)],
-    config: &str,
-) -> (tempfile::TempDir, Identification, Config) {
+fn identified(robot_text: &str, logs: &[(&str, String)], config: &str) -> (tempfile::TempDir, Run) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("robot.toml"), robot_text).unwrap();
     for (name, text) in logs {
@@ -90,7 +86,7 @@ fn identified(
     std::fs::write(&path, config).unwrap();
     let config = Config::read(&path).unwrap();
     let found = identify(&config, &mut |_| {}).unwrap();
-    (folder, found, config)
+    (folder, found)
 }
 
 /// How far a parameter is off, in its standard deviations.
@@ -108,8 +104,8 @@ fn an_elastic_arm_is_identified_from_positions_of_motors_and_joints() {
     let logs = [("train.csv", table(&train)), ("valid.csv", table(&valid))];
     let config =
         "robot = \"robot.toml\"\n[[log]]\npath = \"train.csv\"\n[[validation]]\npath = \"valid.csv\"\n";
-    let (folder, found, config) = identified(ARM, &logs, config);
-    let estimate = found.estimate(&config).unwrap();
+    let (folder, found) = identified(ARM, &logs, config);
+    let estimate = found.estimate();
 
     assert_eq!(estimate.joints, train.joints);
     // Forces of springs know their truth to four digits; three and a half deviations are passed once in 2000.
@@ -131,7 +127,7 @@ fn an_elastic_arm_is_identified_from_positions_of_motors_and_joints() {
     assert_eq!(estimate.model.elastic.len(), 2);
     assert_eq!(estimate.model.elastic[1].motor, "m2");
 
-    let report = found.report(&config, &estimate).unwrap();
+    let report = found.report(&estimate).unwrap();
     assert!(report.contains("driven by `j1_motor`") && report.contains("motor of `j2`"));
     let urdf = found.urdf().unwrap();
     assert!(urdf.text.contains("link2") && !urdf.text.contains("j1_motor"), "{}", urdf.text);
@@ -215,8 +211,8 @@ effort = { joint = "T_out", joint_motor = "tau" }
 [[log]]
 path = "log.csv"
 "#;
-    let (_folder, found, config) = identified(&robot_text, &[("log.csv", hit_log(60_000))], config);
-    let estimate = found.estimate(&config).unwrap();
+    let (_folder, found) = identified(&robot_text, &[("log.csv", hit_log(60_000))], config);
+    let estimate = found.estimate();
     assert!(found.model.mechanism().bodies().is_empty());
     let value = |name: &str| estimate.parameters.iter().find(|p| p.name == name).unwrap().value;
     // The acceptance of the published study for a data set of this kind: 1.5 %, 1 %, 8 %.
@@ -282,7 +278,7 @@ fn columns_of_undriven_joints_are_refused_and_unlogged_motors_told() {
     assert!(error.to_string().contains("position and effort of its motor `m2`"), "{error}");
     // A joint that is locked takes its motor along.
     let one = arm.locked(&[("j2".to_owned(), 0.0)]).unwrap();
-    assert_eq!(dynid::logs::names(&one.axes), ["j1", "j1_motor"]);
+    assert_eq!(dynid::log::names(&one.axes), ["j1", "j1_motor"]);
 }
 
 #[test]
@@ -309,7 +305,7 @@ fn a_motor_position_formed_from_the_joint_is_told() {
     // As where the drive's resolver is divided by the ratio and logged twice.
     log.position[2] = log.position[0].iter().map(|q| 100.0 * q).collect();
     let config = "robot = \"robot.toml\"\n[[log]]\npath = \"train.csv\"\n";
-    let (_folder, found, _) = identified(ARM, &[("train.csv", table(&log))], config);
+    let (_folder, found) = identified(ARM, &[("train.csv", table(&log))], config);
     let told = |joint: &str| {
         let about = format!("joint `{joint}`: the spring is never deformed");
         found.warnings.iter().any(|w| w.message.contains(&about))

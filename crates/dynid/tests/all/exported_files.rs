@@ -12,7 +12,7 @@ use dynid::model::{EffortModel, RobotModel};
 #[test]
 fn the_file_that_leaves_is_judged_beside_the_model() {
     let Some((config, id)) = run(UR10E) else { return };
-    let estimate = id.estimate(&config).unwrap();
+    let estimate = id.estimate();
     let record = estimate.exported.judged().unwrap();
     let source = Source::read(&data().unwrap().join("ur10e-innopolis/ur10e.urdf")).unwrap();
     let states = CheckStates::random(&id.model);
@@ -35,16 +35,16 @@ fn the_file_that_leaves_is_judged_beside_the_model() {
     let validation = &config.validation[0];
     let log =
         dynid::logs::load(validation, &id.robot.axes, &config.columns, config.motor_side.as_ref()).unwrap();
-    let own = log.prepare(&id.model, &id.settings).unwrap();
+    let own = log.prepare(&id.model, &id.conditioning_settings).unwrap();
     // The bodies of the file come in another order.
-    let log = log.prepare(&file, &id.settings).unwrap();
+    let log = log.prepare(&file, &id.conditioning_settings).unwrap();
     let alignment = Alignment {
         state_hz: id.state_hz,
         delay_samples: id.delay_samples,
         delay_rate_hz: id.delay_rate_hz,
         filter_hz: id.kernel_hz,
     };
-    let found = compare(&file, &values, &log, &alignment, &id.settings).unwrap();
+    let found = compare(&file, &values, &log, &alignment, &id.conditioning_settings).unwrap();
     let model = id.agreement(id.values(), &own).unwrap();
     let [file_error, model_error] = [&found, &model].map(|a| a.filtered.relative_error.unwrap());
     println!(

@@ -5,9 +5,9 @@
 
 use std::path::PathBuf;
 
+use dynid::Run;
 use dynid::estimate::{Estimate, ShapeValue, Split};
 use dynid::export::{CheckStates, RobotExport, RobotJson, Source, json};
-use dynid::identify::Identification;
 use dynid::io::csv;
 use dynid::predict::efforts;
 use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
@@ -110,13 +110,13 @@ impl Bench {
     }
 
     /// Identifies from `log.csv`; `more`: further lines of the configuration.
-    fn identify(&self, more: &str) -> (Identification, Estimate) {
+    fn identify(&self, more: &str) -> (Run, Estimate) {
         let text = format!("robot = \"arm.toml\"\n{more}\n[[log]]\npath = \"log.csv\"\n");
         let path = self.path("run.toml");
         std::fs::write(&path, text).unwrap();
         let config = Config::read(&path).unwrap();
         let found = identify(&config, &mut |_| {}).unwrap();
-        let estimate = found.estimate(&config).unwrap();
+        let estimate = found.estimate();
         std::fs::write(self.path("estimate.json"), estimate.to_json()).unwrap();
         let read = Estimate::read(&self.path("estimate.json")).unwrap();
         assert_eq!(read.to_json(), estimate.to_json(), "an estimate survives its file");
@@ -129,7 +129,7 @@ fn truth(log: &SimulatedLog, name: &str) -> f64 {
 }
 
 /// What is read from `estimate.json` predicts what was identified, for both splits.
-fn same_predictions(bench: &Bench, found: &Identification, read: &Estimate) {
+fn same_predictions(bench: &Bench, found: &Run, read: &Estimate) {
     let file = bench.path("estimate.json");
     let config = dynid::config::LogConfig { path: bench.path("log.csv"), ..Default::default() };
     for (split, values) in

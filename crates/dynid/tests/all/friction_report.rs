@@ -4,7 +4,7 @@
 
 use dynid::Config;
 use dynid::estimate::{Estimate, PassivityRecord};
-use dynid::identify::identify;
+use dynid::identify;
 
 /// Inertia about the joint's axis, kg m².
 const INERTIA: f64 = 3.0;
@@ -40,8 +40,8 @@ fn identified(friction: impl Fn(f64) -> f64, elements: &str, settings: &str) -> 
     );
     let config = Config::parse(&text, "test").unwrap();
     let identification = identify(&config, &mut |_| {}).unwrap();
-    let estimate = identification.estimate(&config).unwrap();
-    let page = identification.report(&config, &estimate).unwrap();
+    let estimate = identification.estimate();
+    let page = identification.report(&estimate).unwrap();
     let file = folder.path().join("estimate.json");
     std::fs::write(&file, estimate.to_json()).unwrap();
     let back = Estimate::read(&file).unwrap();

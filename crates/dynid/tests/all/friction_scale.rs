@@ -4,8 +4,8 @@
 
 use std::path::PathBuf;
 
+use dynid::Run;
 use dynid::estimate::{Estimate, Split};
-use dynid::identify::Identification;
 use dynid::io::csv;
 use dynid::simulate::{SimulateSettings, simulate};
 use dynid::validate::{log_fit, validate};
@@ -78,10 +78,10 @@ impl Bench {
         Config::read(&path).unwrap()
     }
 
-    fn identify(&self, text: &str) -> (Identification, Estimate) {
+    fn identify(&self, text: &str) -> (Run, Estimate) {
         let config = self.config(text);
         let found = identify(&config, &mut |_| {}).unwrap();
-        let estimate = found.estimate(&config).unwrap();
+        let estimate = found.estimate();
         std::fs::write(self.path("estimate.json"), estimate.to_json()).unwrap();
         (found, Estimate::read(&self.path("estimate.json")).unwrap())
     }
@@ -223,7 +223,7 @@ path = "{data}/rokae-xmate/run_b.csv.gz"
 own = ["offset", "friction_scale"]
 "#;
     let config = Config::parse(&text.replace("{data}", &data.display().to_string()), "test").unwrap();
-    let found = identify(&config, &mut |_| {}).unwrap().estimate(&config).unwrap();
+    let found = identify(&config, &mut |_| {}).unwrap().estimate();
     println!("{:?}", found.log_scales);
     assert!((found.log_scales[0].value - 1.0).abs() < 0.1, "{:?}", found.log_scales);
 }

@@ -10,7 +10,7 @@ use dynid::estimators::linear::LinearMethod;
 use dynid::io::csv;
 use dynid::model::EffortModel;
 use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
-use dynid::{Config, Identification, Robot, RobotOptions, identify};
+use dynid::{Config, Robot, RobotOptions, Run, identify};
 
 use crate::support::{data, emps_robot};
 
@@ -104,7 +104,7 @@ fn instruments(folder: &Path) -> String {
     format!("[instruments]\ntrajectory = {:?}\n{LOOP}", folder.join("motion.json"))
 }
 
-fn truth_of(id: &Identification, log: &SimulatedLog) -> Vec<f64> {
+fn truth_of(id: &Run, log: &SimulatedLog) -> Vec<f64> {
     let table = id.model.parameters();
     let mut values = vec![0.0; table.linear.len()];
     for (name, value) in &log.truth {
@@ -156,8 +156,8 @@ fn bias_of_an_arm_in_closed_loop_falls_to_a_fifth() {
             })
             .collect();
         if seed == 1 {
-            let estimate = id.estimate(&config).unwrap();
-            check_record(&id, &config, &estimate);
+            let estimate = id.estimate();
+            check_record(&id, &estimate);
         }
     }
     let mut squares = [0.0; 2];
@@ -178,7 +178,7 @@ fn bias_of_an_arm_in_closed_loop_falls_to_a_fifth() {
     assert!(ratio >= 5.0);
 }
 
-fn check_record(id: &Identification, config: &Config, estimate: &Estimate) {
+fn check_record(id: &Run, estimate: &Estimate) {
     let record = estimate.exogeneity.as_ref().unwrap();
     assert_eq!(record.verdict, "material");
     assert_eq!(record.parameters.len(), estimate.base_parameters.len());
@@ -187,7 +187,7 @@ fn check_record(id: &Identification, config: &Config, estimate: &Estimate) {
     let checks = &estimate.verdict.checks;
     let status = |name: &str| checks.iter().find(|c| c.name == name).unwrap().status.clone();
     assert_eq!((status("instruments"), status("closed-loop bias")), ("ok".to_owned(), "ok".to_owned()));
-    assert!(id.report(config, estimate).unwrap().contains("closed-loop bias"));
+    assert!(id.report(estimate).unwrap().contains("closed-loop bias"));
     let text = serde_json::to_string(estimate).unwrap();
     let again: Estimate = serde_json::from_str(&text).unwrap();
     assert_eq!(again.exogeneity.unwrap().parameters.len(), record.parameters.len());
@@ -266,7 +266,7 @@ phi = [2.0, 0.3, 0.02, 0.0, 0.01, 0.0, 0.0, 0.06, 0.0, 0.06]
         Config::parse(&text, "test").map_err(|e| e.to_string())
     }
 
-    fn identify(&self, more: &str) -> (Config, Identification) {
+    fn identify(&self, more: &str) -> (Config, Run) {
         let config = self.config(more).unwrap();
         let id = identify(&config, &mut |_| {}).unwrap();
         (config, id)
@@ -300,7 +300,7 @@ fn columns_of_the_reference_serve_as_its_trajectory_file_does() {
         (&by_columns.fit().x, &by_columns.comparison),
         "same bits"
     );
-    let estimate = by_columns.estimate(&config).unwrap();
+    let estimate = by_columns.estimate();
     assert_eq!(estimate.provenance.settings["instruments"]["reference"], "goal{}");
 }
 
@@ -343,24 +343,24 @@ fn least_squares_is_warned_of_a_material_bias_and_of_nothing_else() {
     let table =
         format!("[instruments]\nreference = \"goal{{}}\"\nreference_scale = 0.01\n{}", Pendulum::LOOP);
     let (config, id) = noisy.identify(&format!("{GIVEN}{WIDE}{table}"));
-    let estimate = id.estimate(&config).unwrap();
+    let estimate = id.estimate();
     let (check, record) = (check_of(&estimate, "closed-loop bias"), estimate.exogeneity.as_ref().unwrap());
     println!("{}", check.meaning);
     assert_eq!((check.status.as_str(), record.verdict.as_str()), ("warn", "material"));
     assert!(check.meaning.contains("method = \"iv\"") && record.fit.is_none());
-    assert_eq!(dynid::instruments::compare(&id, &config).unwrap(), *id.comparison.as_ref().unwrap());
+    assert_eq!(identify(&config, &mut |_| {}).unwrap().comparison, id.comparison, "the same bits");
 
     // The same motion with a good encoder, conditioned as usual.
     let fine = Pendulum::new(2e-6);
-    let (config, id) = fine.identify(&format!("{GIVEN}{table}"));
-    let estimate = id.estimate(&config).unwrap();
+    let (_, id) = fine.identify(&format!("{GIVEN}{table}"));
+    let estimate = id.estimate();
     let check = check_of(&estimate, "closed-loop bias");
     println!("{}", check.meaning);
     assert_eq!(check.status, "ok");
     assert!(["harmless", "exogenous"].contains(&estimate.exogeneity.unwrap().verdict.as_str()));
 
-    let (config, id) = fine.identify(GIVEN);
-    let estimate = id.estimate(&config).unwrap();
+    let (_, id) = fine.identify(GIVEN);
+    let estimate = id.estimate();
     assert!(id.comparison.is_none() && !serde_json::to_string(&estimate).unwrap().contains("exogeneity"));
     assert!(estimate.verdict.checks.iter().all(|c| c.name != "closed-loop bias"));
 }
@@ -372,12 +372,11 @@ fn a_simulation_that_diverges_is_told_and_least_squares_stays() {
     for (gain, found) in
         [("velocity_gain = [4]\neffort_limit = [0.2]\n", true), ("velocity_gain = [400]\n", false)]
     {
-        let (config, id) =
-            pendulum.identify(&format!("{GIVEN}{WIDE}[estimator]\nmethod = \"iv\"\n{table}{gain}"));
+        let (_, id) = pendulum.identify(&format!("{GIVEN}{WIDE}[estimator]\nmethod = \"iv\"\n{table}{gain}"));
         let run = id.instruments.as_ref().unwrap();
         assert!(!run.succeeded() && matches!(run.end, IterationEnd::Diverged { .. }), "{run:?}");
         assert_eq!(id.fit().method, LinearMethod::Wls);
-        let estimate = id.estimate(&config).unwrap();
+        let estimate = id.estimate();
         let check = check_of(&estimate, "instruments");
         println!("{}", check.meaning);
         assert_eq!((check.status.as_str(), estimate.verdict.status.as_str()), ("fail", "fail"));
@@ -387,7 +386,7 @@ fn a_simulation_that_diverges_is_told_and_least_squares_stays() {
             ("diverged", "diverged")
         );
         assert!(!found || record.distance.unwrap() > 0.5);
-        assert!(id.report(&config, &estimate).unwrap().contains("closed-loop bias"));
+        assert!(id.report(&estimate).unwrap().contains("closed-loop bias"));
     }
 }
 
@@ -430,7 +429,7 @@ velocity_gain = [8557.426]
 effort_limit = [351.5]
 "#;
 
-fn emps(robot: &Path, method: &str, route: &str) -> Option<Identification> {
+fn emps(robot: &Path, method: &str, route: &str) -> Option<Run> {
     let data = data()?;
     let text = format!(
         "robot = {robot:?}\n[columns]\nposition = [\"qm\"]\neffort = {{ columns = [\"vir\"], scale = 35.15065188 }}\n[elements]\n\
@@ -473,7 +472,7 @@ fn instruments_of_the_recorded_emps_agree_with_least_squares_and_with_the_publis
         );
         assert_eq!((&run.end, found.verdict), (&IterationEnd::Settled, ExogeneityVerdict::Harmless));
         assert!(run.strength.unwrap().1 > 0.99);
-        let at = |id: &Identification, name: &str| {
+        let at = |id: &Run, name: &str| {
             let column = id.model.parameters().column(name).unwrap();
             let k = id.base.kept.binary_search(&column).unwrap();
             (id.fit().x[k], id.standard_deviations()[k].0.unwrap())

@@ -205,7 +205,7 @@ fn corpus(folder: &Path) -> Vec<Entry> {
     let text =
         format!("robot = {robot_file:?}\npreflight = \"off\"\n[[log]]\npath = {:?}\n", folder.join("a.csv"));
     let config = Config::parse(&text, "corpus").unwrap();
-    let estimate = dynid::identify(&config, &mut |_| {}).unwrap().estimate(&config).unwrap();
+    let estimate = dynid::identify(&config, &mut |_| {}).unwrap().estimate();
     std::fs::write(folder.join("estimate.json"), estimate.to_json()).unwrap();
     let states = "q_j1,q_j2,dq_j1,dq_j2,ddq_j1,ddq_j2\n0.1,0.2,0.3,0.4,0.5,0.6\n-1,2,-3,1,0,1e-3\n";
     let friction = r#"{"schema":1,"robot":"arm","verdict":{"status":"pass","headline":""},"joints":[],"warnings":[],"provenance":{"version":"","seed":1,"inputs":[],"settings":{}}}"#;
@@ -362,7 +362,7 @@ fn commands(number: usize, robot: &Path, file: &Path, table: csv::Table) {
         0 | 1 => {
             if let Ok(found) = dynid::identify(&config, &mut |_| {}) {
                 assert!(found.values().iter().all(|x| x.is_finite()), "identified values");
-                found.estimate(&config).unwrap();
+                found.estimate();
             }
         }
         2 => drop(dynid::check::check(&config, &mut |_| {})),

@@ -185,13 +185,13 @@ fn a_simulated_payload_is_found_to_a_thousandth() {
         assert_eq!(record.mass.verdict, "seen in the data");
         let difference = record.difference.as_ref().unwrap();
         assert!((difference.mass - 2.6).abs() < 0.01, "seed {seed}: {difference:?}");
-        let file = found.file(&config).unwrap();
+        let file = found.file();
         assert_eq!(file.status, "ok", "{}", file.verdict.headline);
         let page = file.report().unwrap();
         assert!(page.contains("Payload tool") && page.contains("Mass, centre of mass, inertia"));
         assert!(record.urdf.contains("<parent link=\"link6\"/>"), "{}", record.urdf);
         // The robot's own result holds no trace of it.
-        let estimate = found.identification.estimate(&config).unwrap();
+        let estimate = found.identification.estimate();
         assert!(estimate.parameters.iter().all(|p| !p.name.starts_with("tool")));
         assert_eq!(estimate.log_parameters.len(), 10);
         estimate.effort_model(Path::new("estimate.json"), dynid::estimate::Split::Consistent).unwrap();
@@ -273,7 +273,7 @@ fn what_a_log_has_of_its_own_is_told_and_found() {
     let delay = &own.own_delays[0];
     println!("{delay:?}");
     assert!((delay.samples - delay.reference - 2.0).abs() < 0.3, "{delay:?}");
-    let estimate = own.estimate(&config).unwrap();
+    let estimate = own.estimate();
     let offset = estimate.log_parameters.iter().find(|p| p.name == "j2.fo[c]").unwrap();
     println!("{} = {} ± {:?}", offset.name, offset.value, offset.std);
     assert!((offset.value - 2.0).abs() < 4.0 * offset.std.unwrap().max(0.02), "{offset:?}");
@@ -291,7 +291,7 @@ fn the_same_bits_come_out_of_any_number_of_threads() {
     );
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| identify_payloads(&config, &mut |_| {}).unwrap().file(&config).unwrap().to_json())
+        pool.install(|| identify_payloads(&config, &mut |_| {}).unwrap().file().to_json())
     };
     assert_eq!(run(1), run(3));
 }
@@ -375,7 +375,7 @@ fn ur10e_payload_and_gains() {
     assert_eq!(p.mass.verdict, "seen in the data");
     assert!((p.mass.value / 2.805 - 1.0).abs() < 0.15, "{:?}", p.mass);
     assert!(p.mass.interval.unwrap().0 > 2.805, "{:?}", p.mass);
-    assert_eq!(found.file(&config).unwrap().status, "warn", "the stated mass is outside");
+    assert_eq!(found.file().status, "warn", "the stated mass is outside");
     let gains = identify_gains(&config, &mut |_| {}).unwrap();
     for j in &gains.joints {
         println!("{j:?}");

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use dynid::Config;
 use dynid::check::{Check, Severity, check};
 use dynid::config::LogConfig;
-use dynid::identify::identify;
+use dynid::identify;
 use dynid::io::csv::{ReadOptions, read};
 
 const JOINTS: usize = 6;

@@ -123,8 +123,8 @@ method = "ols"
 [[log]]
 path = "{data}/emps/emps_identification.csv.gz"
 "#;
-    let Some((config, id)) = run(&text) else { return };
-    let estimate = id.estimate(&config).unwrap();
+    let Some((_, id)) = run(&text) else { return };
+    let estimate = id.estimate();
     let published = [
         ("carriage.m", 95.1089, 0.1085),
         ("x.fc", 20.3935, 0.1012),
@@ -181,7 +181,7 @@ form = "columns"
     }
     let (_, with) = run(&text(coupling)).unwrap();
     let (_, without) = run(&text("")).unwrap();
-    let rows = |id: &dynid::Identification| id.row_rms.iter().map(|r| r.unwrap()).collect::<Vec<f64>>();
+    let rows = |id: &dynid::Run| id.row_rms.iter().map(|r| r.unwrap()).collect::<Vec<f64>>();
     let (with, without) = (rows(&with), rows(&without));
     println!("with {with:.3?}, without {without:.3?}");
     // README, same pipeline: 2.63 3.30 2.30 0.940 1.48 0.874 with the three terms, joint 5 4.44 without. One-sided: signs

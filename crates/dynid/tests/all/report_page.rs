@@ -6,17 +6,17 @@ use std::path::Path;
 
 use dynid::Config;
 use dynid::estimate::Estimate;
-use dynid::identify::{Identification, identify};
+use dynid::{Run, identify};
 
 const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/indy7/identify.toml");
 
 /// Friction of the table, N m.
 const COULOMB: f64 = 9.0;
 
-fn all_of(config: &Config) -> (Identification, Estimate, String) {
+fn all_of(config: &Config) -> (Run, Estimate, String) {
     let id = identify(config, &mut |_| {}).unwrap();
-    let estimate = id.estimate(config).unwrap();
-    let page = id.report(config, &estimate).unwrap();
+    let estimate = id.estimate();
+    let page = id.report(&estimate).unwrap();
     (id, estimate, page)
 }
 
@@ -51,7 +51,7 @@ fn cautions_have_remedies(estimate: &Estimate, page: &str) {
 }
 
 #[track_caller]
-fn counts_agree(id: &Identification, estimate: &Estimate, page: &str) {
+fn counts_agree(id: &Run, estimate: &Estimate, page: &str) {
     let counts = &estimate.counts;
     assert_eq!(*counts, id.counts());
     let seen = |verdict: &str| estimate.parameters.iter().filter(|p| p.verdict == verdict).count();

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use dynid::config::{Config, LogConfig};
 use dynid::estimate::{Estimate, Split};
-use dynid::identify::identify;
+use dynid::identify;
 use dynid::robot::{Robot, RobotOptions};
 use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
 use dynid::stiffness::{JointStiffness, StiffnessVerdict};
@@ -90,7 +90,7 @@ fn link_rows_of_a_kr300_do_not_make_a_stiffness_of_five() {
     std::fs::write(&path, text).unwrap();
     let config = Config::read(&path).unwrap();
     let found = identify(&config, &mut |_| {}).unwrap();
-    let estimate = found.estimate(&config).unwrap();
+    let estimate = found.estimate();
     for s in &estimate.stiffness {
         println!("{} (rows: {:.2e}), {s:?}", s.words(), s.of_rows);
         // The encoders are 3 ms apart, and what is left is no hysteresis.
@@ -184,7 +184,7 @@ fn told(late: usize, seed: u64, folder: &Path) -> (Vec<JointStiffness>, Vec<Stri
         .unwrap();
     let config = Config::read(&config).unwrap();
     let found = identify(&config, &mut |_| {}).unwrap();
-    let estimate = found.estimate(&config).unwrap();
+    let estimate = found.estimate();
     for s in &estimate.stiffness {
         println!("late {late}: {} (rows: {:.4e}, slope {:.3})", s.words(), s.of_rows, s.slope_of_rows);
     }

@@ -3,13 +3,13 @@
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
 
 use crate::support::{self, PANDA, TX40, UR10, data, run};
+use dynid::Run;
 use dynid::estimators::distribution::t_quantile;
 use dynid::estimators::identifiability::Verdict;
-use dynid::identify::Identification;
 use dynid::model::EffortModel;
 
 /// True value of every linear parameter: bodies of `truth.urdf`, elements of `truth.json`.
-fn truth(id: &Identification, folder: &str) -> Vec<f64> {
+fn truth(id: &Run, folder: &str) -> Vec<f64> {
     let folder = data().unwrap().join("oracles/logs").join(folder);
     let robot = dynid::Robot::load(&folder.join("truth.urdf"), &dynid::RobotOptions::default()).unwrap();
     let mut values = robot.mechanism.inertia_vector();
@@ -93,7 +93,7 @@ path = "{data}/oracles/logs/ur5_dev/train.csv.gz"
 }
 
 /// Ratio of the consistent to the unconstrained error on held-out folds and on the validation part.
-fn price(name: &str, id: &Identification) -> (f64, f64) {
+fn price(name: &str, id: &Run) -> (f64, f64) {
     let held_out = &id.consistent.held_out;
     let folds = held_out.relative(id.consistent.consistent()).unwrap() / held_out.relative(0).unwrap();
     let part = id.validation[0].filtered.relative_error.unwrap()
@@ -223,7 +223,7 @@ fn panda_beats_both_published_parameter_sets() {
         let log = &config.validation[0];
         let loaded = dynid::logs::load(log, &id.robot.axes, &config.columns, None).unwrap();
         let mut prepared =
-            dynid::estimators::conditioning::prepare(&loaded.log, &rigid, &id.settings).unwrap();
+            dynid::estimators::conditioning::prepare(&loaded.log, &rigid, &id.conditioning_settings).unwrap();
         let filter = dynid::motion::filter::butterworth(4, 5.0, prepared.rate_hz).unwrap();
         for (j, effort) in prepared.effort.iter_mut().enumerate() {
             let [a, b, c] = FRICTION.map(|row| row[j]);
@@ -241,7 +241,9 @@ fn panda_beats_both_published_parameter_sets() {
             delay_rate_hz: id.delay_rate_hz,
             filter_hz: 5.0,
         };
-        let theirs = dynid::agreement::compare(&rigid, &values, &prepared, &alignment, &id.settings).unwrap();
+        let theirs =
+            dynid::agreement::compare(&rigid, &values, &prepared, &alignment, &id.conditioning_settings)
+                .unwrap();
         let (a, b) = (support::rms(&ours.filtered), support::rms(&theirs.filtered));
         println!("{name}: ours {a:.3?}, theirs {b:.3?}");
         assert!(a.iter().zip(&b).all(|(ours, theirs)| ours < theirs), "{name}");

@@ -4,11 +4,11 @@
 
 use std::path::PathBuf;
 
+use dynid::Run;
 use dynid::config::LogConfig;
 use dynid::estimate::{Estimate, Split};
 use dynid::estimators::conditioning::ConditioningError;
 use dynid::export::{CheckStates, RobotExport, RobotJson, Source, json};
-use dynid::identify::Identification;
 use dynid::io::{States, csv};
 use dynid::model::EffortModel;
 use dynid::predict::efforts;
@@ -111,10 +111,10 @@ elements = ["stribeck", "exponential_viscous", "offset"]
         Config::read(&path).unwrap()
     }
 
-    fn identify(&self, elements: &str, logs: &str) -> (Identification, Estimate) {
+    fn identify(&self, elements: &str, logs: &str) -> (Run, Estimate) {
         let config = self.config(elements, logs);
         let found = identify(&config, &mut |_| {}).unwrap();
-        let estimate = found.estimate(&config).unwrap();
+        let estimate = found.estimate();
         std::fs::write(self.path("estimate.json"), estimate.to_json()).unwrap();
         let read = Estimate::read(&self.path("estimate.json")).unwrap();
         assert_eq!(read.to_json(), estimate.to_json(), "an estimate survives its file");
@@ -130,7 +130,7 @@ fn value(estimate: &Estimate, name: &str) -> f64 {
 }
 
 /// Distance of the inertial base parameters from the truth, in deviations of the prior.
-fn inertial_error(found: &Identification, log: &SimulatedLog) -> f64 {
+fn inertial_error(found: &Run, log: &SimulatedLog) -> f64 {
     let table = &found.model.parameters().linear;
     let truth: Vec<f64> = table
         .iter()
@@ -169,7 +169,7 @@ fn known_friction_carries_over_to_another_temperature() {
     assert!(told.reason.contains("j1.fc, j1.fv, j1.fo are errors of it, of any sign"), "{}", told.reason);
     let input = estimate.provenance.inputs.iter().find(|i| i.kind == "friction").unwrap();
     assert_eq!(input.sha256, dynid::logs::sha256(&bench.path("friction.json")).unwrap());
-    assert!(two_step.report(&bench.config(KNOWN, &logs), &estimate).unwrap().contains("known Stribeck"));
+    assert!(two_step.report(&estimate).unwrap().contains("known Stribeck"));
 }
 
 #[test]

@@ -132,7 +132,7 @@ fn outcome(file: &str, text: &str) -> Result<String, String> {
     std::fs::write(&path, text).unwrap();
     let run = || {
         let config = Config::read(&path)?;
-        identify(&config, &mut |_| {})?.estimate(&config)
+        Ok(identify(&config, &mut |_| {})?.estimate())
     };
     let estimate: dynid::Estimate = run().map_err(|e: dynid::Error| e.to_string())?;
     let mut json: serde_json::Value = serde_json::from_str(&estimate.to_json()).unwrap();

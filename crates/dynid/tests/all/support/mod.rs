@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use dynid::Config;
 use dynid::agreement::{Agreement, Alignment, compare};
 use dynid::estimators::conditioning::prepare;
-use dynid::identify::{Identification, identify};
+use dynid::{Run, identify};
 
 /// Panda with torque sensors, later 30 % kept back.
 pub(crate) const PANDA: &str = r#"
@@ -86,7 +86,7 @@ pub(crate) fn data() -> Option<PathBuf> {
 }
 
 /// Identifies by a configuration in which `{data}` stands for the data folder.
-pub(crate) fn run(text: &str) -> Option<(Config, Identification)> {
+pub(crate) fn run(text: &str) -> Option<(Config, Run)> {
     let data = data()?;
     let config = Config::parse(&text.replace("{data}", &data.display().to_string()), "test").unwrap();
     let identification = identify(&config, &mut |_| {}).unwrap();
@@ -94,11 +94,11 @@ pub(crate) fn run(text: &str) -> Option<(Config, Identification)> {
 }
 
 /// Agreement on the first validation log through a filter of the given cut-off.
-pub(crate) fn on_validation(config: &Config, id: &Identification, filter_hz: f64) -> Agreement {
+pub(crate) fn on_validation(config: &Config, id: &Run, filter_hz: f64) -> Agreement {
     let log =
         dynid::logs::load(&config.validation[0], &id.robot.axes, &config.columns, config.motor_side.as_ref())
             .unwrap();
-    let prepared = prepare(&log.log, &id.model, &id.settings).unwrap();
+    let prepared = prepare(&log.log, &id.model, &id.conditioning_settings).unwrap();
     let alignment = Alignment {
         state_hz: id.state_hz,
         delay_samples: id.delay_samples,
@@ -106,7 +106,7 @@ pub(crate) fn on_validation(config: &Config, id: &Identification, filter_hz: f64
         filter_hz,
     };
     let (model, values) = id.identified_model();
-    compare(model, values, &prepared, &alignment, &id.settings).unwrap()
+    compare(model, values, &prepared, &alignment, &id.conditioning_settings).unwrap()
 }
 
 /// Geometric mean of ratios.

@@ -1,8 +1,10 @@
 //! What differs from log to log: payloads and terms of their own.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 
-use super::{Config, LogConfig, exactly};
+use super::{PerJoint, Settings};
 use crate::Error;
 
 /// A body that some logs carry.
@@ -24,10 +26,10 @@ pub struct PayloadConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass_std: Option<f64>,
     /// Centre of mass if it is known, in the joint frame of the link, m.
-    #[serde(deserialize_with = "exactly", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "super::lists::exactly", skip_serializing_if = "Option::is_none")]
     pub com: Option<[f64; 3]>,
     /// Inertia about the centre of mass in the axes of the link if it is known, `[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]`, kg m².
-    #[serde(deserialize_with = "exactly", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "super::lists::exactly", skip_serializing_if = "Option::is_none")]
     pub inertia: Option<[f64; 6]>,
 }
 
@@ -104,37 +106,71 @@ impl PayloadConfig {
     }
 }
 
-impl Config {
-    /// Checks names and numbers of what differs from log to log.
-    ///
-    /// # Errors
-    /// [`Error::Setting`].
-    pub(super) fn check_log_terms(&self) -> Result<(), Error> {
-        for log in self.log.iter().chain(&self.validation) {
-            let known: Vec<String> = self.payload.iter().map(|p| p.name.clone()).collect();
-            one_of("payload", log.payload.as_ref(), &known, "[[payload]]")?;
-        }
-        let payloads = self.payload.iter().map(|p| ("payload.name", &p.name));
-        let logs = self.log.iter().filter_map(|log| Some(("log.name", log.name.as_ref()?)));
-        if let Some((key, name)) = payloads.chain(logs).find(|(_, name)| name.chars().any(char::is_control)) {
-            return Err(Error::setting(key, "a name without control characters", format!("{name:?}")));
-        }
+/// What an identification has to know of a log beside its signals.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct LogSettings {
+    /// Name in parameters and messages. Default: the name of the log's file up to its first dot.
+    pub name: Option<String>,
+    /// The payload that it carries. Default: none.
+    pub payload: Option<String>,
+    /// What it has of its own, beside the other training logs. Default: nothing.
+    pub own: Vec<Own>,
+    /// Of a validation log: the training log whose own terms it shares. Default: none.
+    pub like: Option<String>,
+    /// Temperature of joints throughout the log, °C, in place of the logged one, where it was stated.
+    #[serde(skip_serializing_if = "PerJoint::is_none")]
+    pub temperature: PerJoint,
+    /// Whether it is kept from the fit, to validate on. Default false.
+    pub validation: bool,
+    /// Period of its motion, s, if it repeats: states come from a Fourier series of that period. Default: none.
+    pub period_s: Option<f64>,
+}
+
+impl Settings {
+    /// Checks names and numbers of payloads.
+    pub(super) fn check_payloads(&self) -> Result<(), Error> {
         for (k, payload) in self.payload.iter().enumerate() {
             if payload.name.trim().is_empty() {
                 return Err(Error::setting("payload.name", "a name in every `[[payload]]`", "none"));
+            }
+            if payload.name.chars().any(char::is_control) {
+                let found = format!("{:?}", payload.name);
+                return Err(Error::setting("payload.name", "a name without control characters", found));
             }
             if self.payload[..k].iter().any(|p| p.name == payload.name) {
                 return Err(Error::setting("payload.name", "names that occur once", &payload.name));
             }
             payload.check()?;
-            let carried = |log: &LogConfig| log.payload.as_ref() == Some(&payload.name);
-            if !self.log.is_empty() && !self.log.iter().any(carried) {
+        }
+        Ok(())
+    }
+
+    /// Checks what differs from log to log. `labels`: names of the training logs ([`labels`]).
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub(crate) fn check_logs(
+        &self,
+        training: &[&LogSettings],
+        validation: &[&LogSettings],
+        labels: &[String],
+    ) -> Result<(), Error> {
+        for log in training.iter().chain(validation) {
+            let known: Vec<String> = self.payload.iter().map(|p| p.name.clone()).collect();
+            one_of("payload", log.payload.as_ref(), &known, "[[payload]]")?;
+        }
+        let mut names = training.iter().filter_map(|log| log.name.as_ref());
+        if let Some(name) = names.find(|name| name.chars().any(char::is_control)) {
+            return Err(Error::setting("log.name", "a name without control characters", format!("{name:?}")));
+        }
+        for payload in &self.payload {
+            let carried = |log: &&LogSettings| log.payload.as_ref() == Some(&payload.name);
+            if !training.is_empty() && !training.iter().any(carried) {
                 let expected = format!("`payload = \"{}\"` in a `[[log]]` at least", payload.name);
                 return Err(Error::setting(&format!("payload.{}", payload.name), &expected, "none"));
             }
         }
-        let labels = self.log_labels();
-        for (k, (log, label)) in self.log.iter().zip(&labels).enumerate() {
+        for (k, (log, label)) in training.iter().zip(labels).enumerate() {
             if log.name.is_some() && labels[..k].contains(label) {
                 return Err(Error::setting("log.name", "names that occur once", label));
             }
@@ -146,8 +182,8 @@ impl Config {
                 return Err(Error::setting("log.like", "it in `[[validation]]` only", like));
             }
         }
-        for log in &self.validation {
-            one_of("validation.like", log.like.as_ref(), &labels, "[[log]]")?;
+        for log in validation {
+            one_of("validation.like", log.like.as_ref(), labels, "[[log]]")?;
             if let Some(own) = log.own.first() {
                 return Err(Error::setting(
                     "validation.own",
@@ -158,18 +194,18 @@ impl Config {
         }
         Ok(())
     }
+}
 
-    /// Names of the training logs in parameters and messages: as stated, else the file's name, with `#2` where it comes again.
-    pub fn log_labels(&self) -> Vec<String> {
-        let mut labels: Vec<String> = Vec::new();
-        for log in &self.log {
-            let own = log.name.clone().unwrap_or_else(|| stem(log));
-            let again = (2..).map(|k| format!("{own}#{k}")).find(|label| !labels.contains(label));
-            let taken = labels.contains(&own) && log.name.is_none();
-            labels.push(again.filter(|_| taken).unwrap_or(own));
-        }
-        labels
+/// Names of training logs in parameters and messages: as stated, else the file's name, with `#2` where it comes again.
+pub(crate) fn labels<'a>(logs: impl Iterator<Item = (&'a LogSettings, &'a str)>) -> Vec<String> {
+    let mut labels: Vec<String> = Vec::new();
+    for (log, file) in logs {
+        let own = log.name.clone().unwrap_or_else(|| stem(file));
+        let again = (2..).map(|k| format!("{own}#{k}")).find(|label| !labels.contains(label));
+        let taken = labels.contains(&own) && log.name.is_none();
+        labels.push(again.filter(|_| taken).unwrap_or(own));
     }
+    labels
 }
 
 fn one_of(key: &str, name: Option<&String>, known: &[String], section: &str) -> Result<(), Error> {
@@ -181,7 +217,7 @@ fn one_of(key: &str, name: Option<&String>, known: &[String], section: &str) -> 
     Err(Error::setting(key, &expected, name))
 }
 
-fn stem(log: &LogConfig) -> String {
-    let name = log.path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+fn stem(file: &str) -> String {
+    let name = Path::new(file).file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     name.split('.').next().unwrap_or_default().to_owned()
 }

@@ -33,7 +33,7 @@ impl Unwrapped {
 
 /// Unwraps the positions of what turns. A position is wrapped if all of it lies within one turn and every step of more than half a turn is a full
 /// turn but for less than 1 rad; anything else stays as it is.
-pub(super) fn unwrap(signals: &mut Signals, axes: &[LogAxis]) -> Vec<Unwrapped> {
+pub fn unwrap(signals: &mut Signals, axes: &[LogAxis]) -> Vec<Unwrapped> {
     let mut out = Vec::new();
     for ((position, index), joint) in signals.position.iter_mut().zip(&signals.indices).zip(&signals.joints) {
         if axes.get(*index).is_some_and(|axis| axis.slides) {

@@ -1,26 +1,27 @@
 //! Settings that would do nothing: each takes effect or is refused.
 
 use super::{
-    ConditioningConfig, Config, Consistency, InstrumentsConfig, Method, PriorDistance, Route, Variances,
+    ClosedLoop, ConditioningConfig, Consistency, LogSettings, Method, PriorDistance, Route, Settings,
+    Variances,
 };
 use crate::Error;
 
 /// A setting that is given, and what it needs.
-struct Given<'a> {
-    key: &'a str,
-    given: bool,
-    needs: &'a str,
+pub(crate) struct Given<'a> {
+    pub(crate) key: &'a str,
+    pub(crate) given: bool,
+    pub(crate) needs: &'a str,
 }
 
 /// Fails at the first setting that is given although `found` is not what it needs.
-fn refuse(found: &str, settings: &[Given<'_>]) -> Result<(), Error> {
+pub(crate) fn refuse(found: &str, settings: &[Given<'_>]) -> Result<(), Error> {
     match settings.iter().find(|s| s.given) {
         Some(s) => Err(Error::setting(s.key, &format!("{} beside it", s.needs), found)),
         None => Ok(()),
     }
 }
 
-impl Config {
+impl Settings {
     /// Refuses settings of an identification that would do nothing beside the others.
     ///
     /// # Errors
@@ -28,8 +29,7 @@ impl Config {
     pub(crate) fn check_effect(&self) -> Result<(), Error> {
         self.conditioning.check_effect()?;
         self.check_estimator_effect()?;
-        self.check_log_effect()?;
-        self.instruments.iter().try_for_each(InstrumentsConfig::check_effect)
+        self.closed_loop.iter().try_for_each(ClosedLoop::check_effect)
     }
 
     fn check_estimator_effect(&self) -> Result<(), Error> {
@@ -94,33 +94,37 @@ impl Config {
             ),
         }
     }
+}
 
-    fn check_log_effect(&self) -> Result<(), Error> {
-        if let ([log], [own, ..]) = (&self.log[..], self.log.first().map_or(&[][..], |l| &l.own[..])) {
-            let expected = "a second `[[log]]`, from which this one deviates";
-            let found = format!("`own = [\"{}\"]` in the only log, {}", own.word(), log.path.display());
-            return Err(Error::setting("log.own", expected, found));
-        }
-        if let Some(name) = self.validation.iter().find_map(|log| log.name.as_ref()) {
-            let expected = "it in `[[log]]` only: a validation log has no parameters that it could name";
-            return Err(Error::setting("validation.name", expected, name));
-        }
-        let labels = self.log_labels();
-        for like in self.validation.iter().filter_map(|log| log.like.as_ref()) {
-            let own = |(log, label): (&super::LogConfig, &String)| label == like && !log.own.is_empty();
-            if !self.log.iter().zip(&labels).any(own) {
-                let expected = "the name of a `[[log]]` with `own`, whose own terms this log shares";
-                return Err(Error::setting("validation.like", expected, like));
-            }
-        }
-        let all_own = self.log.iter().all(|log| log.trajectory.is_some() || log.period_s.is_some());
-        let expected = "a `[[log]]` without `trajectory` and `period_s` of its own";
-        match (&self.trajectory, self.period_s) {
-            (Some(file), _) if all_own => Err(Error::setting("trajectory", expected, file.display())),
-            (_, Some(period)) if all_own => Err(Error::setting("period_s", expected, period)),
-            _ => Ok(()),
+/// Refuses what is said of logs and would do nothing. `files`: of the training logs, `labels`: their names.
+///
+/// # Errors
+/// [`Error::Setting`].
+pub(crate) fn check_log_effect(
+    training: &[&LogSettings],
+    validation: &[&LogSettings],
+    labels: &[String],
+    files: &[&str],
+) -> Result<(), Error> {
+    if let ([log], [file]) = (training, files)
+        && let Some(own) = log.own.first()
+    {
+        let expected = "a second `[[log]]`, from which this one deviates";
+        let found = format!("`own = [\"{}\"]` in the only log, {file}", own.word());
+        return Err(Error::setting("log.own", expected, found));
+    }
+    if let Some(name) = validation.iter().find_map(|log| log.name.as_ref()) {
+        let expected = "it in `[[log]]` only: a validation log has no parameters that it could name";
+        return Err(Error::setting("validation.name", expected, name));
+    }
+    for like in validation.iter().filter_map(|log| log.like.as_ref()) {
+        let own = |(log, label): (&&LogSettings, &String)| label == like && !log.own.is_empty();
+        if !training.iter().zip(labels).any(own) {
+            let expected = "the name of a `[[log]]` with `own`, whose own terms this log shares";
+            return Err(Error::setting("validation.like", expected, like));
         }
     }
+    Ok(())
 }
 
 impl ConditioningConfig {
@@ -152,46 +156,6 @@ impl ConditioningConfig {
         let keys: Vec<Given<'_>> =
             keys.into_iter().map(|(key, given)| Given { key, given, needs: wanted }).collect();
         refuse(found, &keys)
-    }
-}
-
-impl InstrumentsConfig {
-    fn check_effect(&self) -> Result<(), Error> {
-        let usual = InstrumentsConfig::default();
-        let set = |key, given, needs| Given { key, given, needs };
-        if self.reference.is_none() {
-            let given = self.reference_scale != usual.reference_scale;
-            refuse(
-                "none",
-                &[set("instruments.reference_scale", given, "`reference`, the columns that it scales,")],
-            )?;
-        } else {
-            let given = self.trajectory.is_some();
-            refuse(
-                "`reference`, which takes its place",
-                &[set("instruments.trajectory", given, "no columns of the reference")],
-            )?;
-        }
-        if self.position_gain.is_some() && self.velocity_gain.is_some() {
-            let needs = "gains that it decides, not both lists of gains,";
-            refuse(
-                "`position_gain` and `velocity_gain`",
-                &[
-                    set("instruments.bandwidth_hz", self.bandwidth_hz != usual.bandwidth_hz, needs),
-                    set("instruments.damping", self.damping != usual.damping, needs),
-                ],
-            )?;
-            if !self.feed_forward {
-                let needs = "`feed_forward`, or gains that it decides,";
-                let given = self.nominal != usual.nominal;
-                refuse("`position_gain` and `velocity_gain`", &[set("instruments.nominal", given, needs)])?;
-            }
-        } else if self.velocity_gain.is_some() {
-            let needs = "a velocity gain that it decides, no `velocity_gain`,";
-            let given = self.damping != usual.damping;
-            refuse("`velocity_gain`", &[set("instruments.damping", given, needs)])?;
-        }
-        Ok(())
     }
 }
 

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use dynid_estimate::search::{Algorithm, Settings};
+use dynid_estimate::search::{self, Algorithm};
 use dynid_estimate::separable::ShapeSearch;
 use serde::{Deserialize, Serialize};
 
-use super::{Config, pair};
+use super::Settings;
 use crate::Error;
 
 /// Limits beyond this are a slip or were meant to be infinite, whatever the unit.
@@ -29,8 +29,7 @@ pub enum Method {
     Ridge,
     /// Total least squares: columns with errors of their own, see [`EstimatorConfig::column_noise`].
     Tls,
-    /// Instrumental variables from simulations of the closed loop, weighted as `wls`; needs
-    /// [`Config::instruments`](super::Config::instruments).
+    /// Instrumental variables from simulations of the closed loop, weighted as `wls`; needs [`Settings::closed_loop`].
     Iv,
 }
 
@@ -102,7 +101,7 @@ impl ShapeConfig {
             Error::setting("shape.search", &format!("one of {}", Algorithm::NAMES.join(", ")), name)
         })?;
         let evaluations = Some(self.evaluations.unwrap_or(SEARCH_EVALUATIONS));
-        let settings = Settings { evaluations, seed, ..Settings::default() };
+        let settings = search::Settings { evaluations, seed, ..search::Settings::default() };
         Ok(Some(ShapeSearch { algorithm, settings }))
     }
 }
@@ -144,25 +143,25 @@ pub struct BoundConfig {
     /// Moving links; a link stands for everything welded to it.
     pub links: Vec<String>,
     /// Sum of their masses, kg.
-    #[serde(deserialize_with = "pair")]
+    #[serde(deserialize_with = "super::lists::pair")]
     pub mass: Option<(f64, f64)>,
     /// Centre of mass of a single link along x of its frame, m.
-    #[serde(deserialize_with = "pair")]
+    #[serde(deserialize_with = "super::lists::pair")]
     pub com_x: Option<(f64, f64)>,
     /// Centre of mass of a single link along y, m.
-    #[serde(deserialize_with = "pair")]
+    #[serde(deserialize_with = "super::lists::pair")]
     pub com_y: Option<(f64, f64)>,
     /// Centre of mass of a single link along z, m.
-    #[serde(deserialize_with = "pair")]
+    #[serde(deserialize_with = "super::lists::pair")]
     pub com_z: Option<(f64, f64)>,
     /// A parameter, by name such as `joint1.fc`.
     pub parameter: Option<String>,
     /// Range of the parameter, in its unit.
-    #[serde(deserialize_with = "pair")]
+    #[serde(deserialize_with = "super::lists::pair")]
     pub range: Option<(f64, f64)>,
 }
 
-impl Config {
+impl Settings {
     pub(super) fn check_estimator(&self) -> Result<(), Error> {
         let e = &self.estimator;
         let weights = [
@@ -203,6 +202,10 @@ impl Config {
                 "`pseudo-inertia` or `spatial-inertia`, as there are bounds",
                 "`none`",
             ));
+        }
+        if e.method == Method::Iv && self.closed_loop.is_none() {
+            let expected = "a table with reference and controller, which `method = \"iv\"` simulates";
+            return Err(Error::setting("instruments", expected, "none"));
         }
         self.bound.iter().try_for_each(BoundConfig::check)
     }
