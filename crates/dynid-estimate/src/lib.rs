@@ -55,11 +55,8 @@ pub mod rows;
 pub mod search;
 pub mod separable;
 pub mod steady_friction;
-mod triangular;
-mod vector;
 mod whitened;
 pub mod whiteness;
 
+pub use dynid_linalg::Mat;
 pub use factor::{Factor, FactorBuilder, FactorError};
-/// Dense matrix of results (column-major, indexed `m[(row, column)]`).
-pub use faer::Mat;

@@ -14,7 +14,7 @@ use crate::factor::Factor;
 use crate::groups::ReducedGroup;
 use crate::linear::{LinearSolution, WlsSettings, group_floors as floors, ols};
 use crate::rank::numerical_rank;
-use crate::triangular::{inverse, solve_upper};
+use dynid_linalg::triangular::{inverse, solve_upper};
 
 /// A parameter that one log may have of its own in the rows of one output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,7 +6,7 @@
 
 use crate::factor::Factor;
 use crate::rank::numerical_rank;
-use crate::triangular::{inverse, symmetric_from};
+use dynid_linalg::triangular::{inverse, symmetric_from};
 use faer::linalg::solvers::{Llt, Solve};
 use faer::{Mat, Side};
 

@@ -3,7 +3,7 @@
 use super::{DeformationError, Rows};
 use crate::factor::{Factor, FactorBuilder};
 use crate::linear::ols;
-use crate::triangular::gram_inverse;
+use dynid_linalg::triangular::gram_inverse;
 
 /// Columns and right-hand side of one row of the problem over all instants, placed among all unknowns.
 pub(super) struct Placed<'a> {

@@ -19,6 +19,7 @@ pub use builder::{DEFAULT_CHUNK_ROWS, FactorBuilder, FactorError};
 pub use double_double::DoubleDouble;
 pub use extended::{ExtendedBuilder, ExtendedFactor};
 
+use dynid_linalg::triangular::solve_upper;
 use faer::Mat;
 
 /// Triangular factor `(R, z, ρ, N)` of `N` rows of `[W y]`.
@@ -116,6 +117,13 @@ impl Factor {
         (0..self.columns)
             .map(|j| residual.iter().take(j + 1).enumerate().map(|(i, r)| self.triangle[(i, j)] * r).sum())
             .collect()
+    }
+
+    /// `R⁻¹ z`, the least-squares solution of a factor of full rank.
+    pub fn solve(&self) -> Vec<f64> {
+        let z = self.z();
+        let x = solve_upper(&self.r_matrix(), &Mat::from_fn(z.len(), 1, |i, _| z[i]));
+        (0..z.len()).map(|i| x[(i, 0)]).collect()
     }
 
     /// Column norms `‖W_c‖ = ‖R_c‖`, `p` entries.

@@ -8,7 +8,7 @@ use crate::distribution::f_exceedance;
 use crate::groups::{ReducedGroup, time_blocks};
 use crate::linear::ols;
 use crate::rank::numerical_rank;
-use crate::triangular::gram_inverse;
+use dynid_linalg::triangular::gram_inverse;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 

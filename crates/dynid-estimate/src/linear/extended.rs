@@ -2,7 +2,7 @@
 
 use super::ols::{LinearSolution, ols};
 use crate::factor::{DoubleDouble, ExtendedFactor};
-use crate::triangular::symmetric_from;
+use dynid_linalg::triangular::symmetric_from;
 use faer::Mat;
 
 /// Least squares on the merged rows of one extended factor.

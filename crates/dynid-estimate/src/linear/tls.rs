@@ -5,7 +5,7 @@ use super::ols::ols;
 use crate::factor::Factor;
 use crate::groups::ReducedGroup;
 use crate::rank::numerical_rank;
-use crate::triangular::solve_upper;
+use dynid_linalg::triangular::solve_upper;
 use faer::Mat;
 
 /// `s_min/s_{min-1}` above which the smallest singular value is not told from the next.

@@ -2,7 +2,7 @@
 
 use super::ols::{LinearSolution, ols};
 use crate::factor::Factor;
-use crate::triangular::inverse;
+use dynid_linalg::triangular::inverse;
 
 /// Settings of [`wls`].
 #[derive(Debug, Clone, PartialEq)]

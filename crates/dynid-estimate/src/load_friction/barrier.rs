@@ -1,6 +1,6 @@
 //! Small convex programs: a quadratic under linear and planar-body constraints, by a logarithmic barrier.
 
-use crate::Mat;
+use dynid_linalg::Mat;
 use faer::Side;
 use faer::linalg::solvers::Solve;
 

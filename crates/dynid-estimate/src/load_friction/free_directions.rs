@@ -5,9 +5,9 @@ use super::bounded::clipped;
 use super::error::{LoadFrictionError, in_range, same_size};
 use super::identifiability::right_singular;
 use super::problem::Problem;
-use crate::Mat;
 use crate::rank::rank_tolerance;
 use crate::search::Bounds;
+use dynid_linalg::Mat;
 
 /// Gap of the squared distance (or of the objective where the fit gives way).
 const TOLERANCE: f64 = 1e-9;

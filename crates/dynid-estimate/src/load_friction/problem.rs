@@ -3,7 +3,7 @@
 use super::error::{LoadFrictionError, in_range, same_size};
 use super::law::{Model, check_theta, decay, direction, split};
 use super::record::{Record, finite, product};
-use crate::Mat;
+use dynid_linalg::Mat;
 
 /// Law and choice of samples.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,7 @@
 //! Motions as arrays, checked once.
 
 use super::error::{LoadFrictionError, in_range, same_size};
-use crate::Mat;
+use dynid_linalg::Mat;
 
 /// A drive along a motion: everything that is linear in the inertial parameters `φ` (`p` of them).
 #[derive(Debug, Clone, PartialEq)]

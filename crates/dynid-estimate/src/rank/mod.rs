@@ -91,7 +91,7 @@ pub(crate) fn certainly_full_rank(factor: &Factor) -> bool {
     if factor.height() < factor.columns() || norms.contains(&0.0) {
         return false;
     }
-    let inverse = crate::triangular::inverse(&scaled_triangle(factor, &norms));
+    let inverse = dynid_linalg::triangular::inverse(&scaled_triangle(factor, &norms));
     let largest = (factor.columns() as f64).sqrt();
     1.0 / inverse.norm_l2() > rank_tolerance(factor.rows(), factor.columns(), largest)
 }

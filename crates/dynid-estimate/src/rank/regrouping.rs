@@ -2,7 +2,7 @@
 
 use super::{numerical_rank, rank_tolerance, scaled_triangle};
 use crate::factor::Factor;
-use crate::triangular::solve_upper;
+use dynid_linalg::triangular::solve_upper;
 use faer::Mat;
 
 /// Entries of the scaled regrouping below this are rounding and become zero.

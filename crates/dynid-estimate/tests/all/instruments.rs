@@ -7,7 +7,8 @@ use dynid_estimate::instruments::{
     exogeneity, half, instrumental, iterate, measured, paired_columns,
 };
 use dynid_estimate::linear::{LinearError, LinearMethod, LinearSettings, estimate};
-use dynid_estimate::{Factor, FactorBuilder, Mat};
+use dynid_estimate::{Factor, FactorBuilder};
+use dynid_linalg::Mat;
 use faer::linalg::solvers::Solve;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

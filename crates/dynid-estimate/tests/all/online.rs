@@ -9,7 +9,8 @@ use dynid_estimate::online::{
     BlockWindow, ConsistentPublisher, Estimator, Forgetting, RowNoise, RowWindow, Settings, SquareRoot,
     chow_test, factor_from_root, root_from_factor,
 };
-use dynid_estimate::{Factor, FactorBuilder, Mat};
+use dynid_estimate::{Factor, FactorBuilder};
+use dynid_linalg::Mat;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -7,10 +7,10 @@ use crate::prr3_machine::{
     GRAVITY, Pose, TRAJECTORY, TRUTH, base_matrix, bounds, circle, efforts, experiment, inverse_kinematics,
     null_directions, record, reference, rows, sampled,
 };
-use dynid_estimate::Mat;
 use dynid_estimate::load_friction::{
     DriveRows, LoadFrictionError, Model, Problem, Record, Settings, Verdict, verdicts,
 };
+use dynid_linalg::Mat;
 use serde_json::Value;
 
 #[track_caller]

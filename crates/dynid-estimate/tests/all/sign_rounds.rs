@@ -1,10 +1,10 @@
 //! Signs of reactions that no solution keeps.
 
-use dynid_estimate::Mat;
 use dynid_estimate::load_friction::{
     DriveRows, FitSettings, Model, Problem, Record, Settings, SignStatus, fit_separated,
 };
 use dynid_estimate::search::Bounds;
+use dynid_linalg::Mat;
 
 /// Effort `(1, -1, 0)`, regressor `(1, 0, 0)` and friction `(0, ±2, 0)`: with either sign of the reaction the least squares have the
 /// other one.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::flight::{Trace, follow};
 use super::noise::{Response, filtered, whitening};
 use super::{BacklashSignals, Path};
-use crate::vector::{add_scaled, dot, norm};
+use dynid_linalg::vector::{add_scaled, dot, norm};
 
 /// Share of the rms speed below which a joint counts as reversing.
 const REVERSAL: f64 = 0.1;

@@ -6,9 +6,9 @@
     reason = "shared by tests and a benchmark, which use different parts"
 )]
 
-use dynid_estimate::Mat;
 use dynid_estimate::load_friction::{DriveRows, Model, Problem, Record, Settings};
 use dynid_estimate::search::Bounds;
+use dynid_linalg::Mat;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,7 +1,8 @@
 //! Sums over vectors.
 
-/// Sum of products in eight interleaved sums, an order that the compiler turns into vector instructions.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+/// Sum of products `aᵀb` in eight interleaved sums, an order that the compiler turns into vector instructions. Vectors alike in length.
+#[inline]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     const LANES: usize = 8;
     let (a_lanes, a_rest) = a.as_chunks::<LANES>();
     let (b_lanes, b_rest) = b.as_chunks::<LANES>();
@@ -14,12 +15,15 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
 
-pub(crate) fn norm(a: &[f64]) -> f64 {
+/// `‖a‖ = √(aᵀa)`.
+#[inline]
+pub fn norm(a: &[f64]) -> f64 {
     dot(a, a).sqrt()
 }
 
 /// `to += factor * from`.
-pub(crate) fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
+#[inline]
+pub fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
     for (t, f) in to.iter_mut().zip(from) {
         *t += factor * f;
     }
