@@ -8,7 +8,7 @@ mod prr3_machine;
 
 use divan::Bencher;
 use dynid_estimate::load_friction::{FitSettings, Model, SquaredResiduals, fit_bounded, fit_separated};
-use dynid_estimate::search::{self, Algorithm, Objective};
+use dynid_search::{self as search, Algorithm, Objective};
 use prr3_machine::{bounds, experiment, start};
 use std::ops::ControlFlow;
 

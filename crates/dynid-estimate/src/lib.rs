@@ -23,7 +23,7 @@
 //! | standard parameters of bodies that can exist, with a proven gap | [`consistent`] |
 //! | which parameters the data determine, and which the prior | [`identifiability`] |
 //! | estimates while the machine runs, alarms on changes | [`online`] |
-//! | searches that need values only: populations, patterns | [`search`] |
+//! | misfit of an effort model as what a search minimises | [`effort_objective`] |
 //! | how well a prediction matches a measurement | [`metrics`] |
 //!
 //! Notation: `W` is the regressor (rows × `p` columns), `y` the effort, `x` the parameters,
@@ -37,6 +37,7 @@ pub mod cyclic;
 pub mod deformation;
 pub mod distribution;
 pub mod drive_gain;
+pub mod effort_objective;
 pub mod elimination;
 pub mod factor;
 pub mod folds;
@@ -52,11 +53,16 @@ pub mod online;
 pub mod preflight;
 pub mod rank;
 pub mod rows;
-pub mod search;
 pub mod separable;
 pub mod steady_friction;
 mod whitened;
 pub mod whiteness;
 
 pub use dynid_linalg::Mat;
+/// Searches, with the misfit of an effort model among what they minimise.
+pub mod search {
+    pub use crate::effort_objective::{EffortLoss, EffortObjective, EffortObjectiveError};
+    pub use dynid_search::*;
+}
+
 pub use factor::{Factor, FactorBuilder, FactorError};

@@ -3,12 +3,12 @@
 use super::error::{LoadFrictionError, same_size};
 use super::law::{FrictionParameter, check_theta};
 use super::problem::Problem;
-use crate::search::Bounds;
 use crate::separable::{
     Bound, RowGroup, SearchStatus, SeparableError, SeparableProblem, SeparableSettings, ShapedColumns,
     StartOutcome, Weighting, fit,
 };
 use dynid_model::ShapeParameter;
+use dynid_search::Bounds;
 
 /// Share of the sum of squared efforts below which differences of `J` are rounding.
 const ROUNDING: f64 = 1e-18;

@@ -1,7 +1,7 @@
 //! What an identification with load-dependent friction refuses.
 
-use crate::search::BoundsError;
 use crate::separable::SeparableError;
+use dynid_search::BoundsError;
 use thiserror::Error;
 
 /// Why a record, a problem or a question to it is refused.

@@ -6,8 +6,8 @@ use super::error::{LoadFrictionError, in_range, same_size};
 use super::identifiability::right_singular;
 use super::problem::Problem;
 use crate::rank::rank_tolerance;
-use crate::search::Bounds;
 use dynid_linalg::Mat;
+use dynid_search::Bounds;
 
 /// Gap of the squared distance (or of the objective where the fit gives way).
 const TOLERANCE: f64 = 1e-9;

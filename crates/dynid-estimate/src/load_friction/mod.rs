@@ -17,7 +17,7 @@
 //! | measured efforts, friction law, samples that count | [`Problem`], [`Settings`], [`Model`] |
 //! | efforts, friction, normal forces, also on another record | [`Problem::predict`], [`Problem::predict_on`] |
 //! | residuals and exact derivatives | [`Problem::residuals`], [`Problem::jacobian`] |
-//! | the misfit for [`crate::search`] | [`SquaredResiduals`] |
+//! | the misfit for [`dynid_search`] | [`SquaredResiduals`] |
 //! | least squares within bounds over all of `θ` | [`fit_bounded`] |
 //! | the same with `φ` and `f_v` eliminated | [`fit_separated`] |
 //! | rank, free directions, standard deviations of combinations | [`Problem::identifiability`] |

@@ -2,7 +2,7 @@
 
 use super::law::{Model, decay, split};
 use super::problem::{Problem, add_product, dot};
-use crate::search::Objective;
+use dynid_search::Objective;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 

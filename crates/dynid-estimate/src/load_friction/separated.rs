@@ -4,11 +4,11 @@ use super::bounded::{FitSettings, clipped, separable_settings, stribeck_starts};
 use super::error::LoadFrictionError;
 use super::law::{FrictionParameter, Model, decay};
 use super::problem::{Problem, add_product, sign};
-use crate::search::Bounds;
 use crate::separable::{
     RowGroup, SearchStatus, SeparableError, SeparableEstimate, SeparableProblem, ShapedColumns, fit,
 };
 use dynid_model::ShapeParameter;
+use dynid_search::Bounds;
 
 /// Of two starts, the first counts where they agree to this share of `J`.
 const SAME: f64 = 1e-9;

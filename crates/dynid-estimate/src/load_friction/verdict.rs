@@ -4,9 +4,9 @@ use super::bounded::bounds_reached;
 use super::error::LoadFrictionError;
 use super::identifiability::{CombinationValue, Identifiability};
 use super::problem::Problem;
-use crate::search::Bounds;
 use crate::separable::Bound;
 use dynid_linalg::Mat;
+use dynid_search::Bounds;
 
 /// Entries of the regrouping below this share of the largest are rounding.
 const NEGLIGIBLE: f64 = 1e-8;

@@ -14,8 +14,8 @@ use super::settings::{SeparableError, SeparableLoss, SeparableSettings, ShapeSea
 use super::starts::{START_FALL, StartReport, multi_start, starts};
 use crate::groups::ReducedGroup;
 use crate::linear::{LinearEstimate, LinearMethod, LinearSettings, estimate};
-use crate::search::{self, Bounds, PointObjective, SearchError};
 use dynid_model::ShapeParameter;
+use dynid_search::{self as search, Bounds, PointObjective, SearchError};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 

@@ -8,7 +8,7 @@ use dynid_estimate::load_friction::{
     Design, DesignStatus, FitSettings, Model, PlanarBody, Problem, SignStatus, SquaredResiduals, fit_bounded,
     fit_separated, nearest_to_design,
 };
-use dynid_estimate::search::{self, Algorithm, Objective, PatternSearch, SearchResult};
+use dynid_search::{self as search, Algorithm, Objective, PatternSearch, SearchResult};
 use std::ops::ControlFlow;
 
 const MODELS: [Model; 3] = [Model::Stribeck, Model::CoulombViscous, Model::Constant];

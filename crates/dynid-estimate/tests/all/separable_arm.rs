@@ -4,7 +4,6 @@
 use crate::er16_arm::Er16;
 use crate::{arm, er16, golden};
 use dynid_estimate::conditioning::{ConditioningSettings, condition, prepare, refine};
-use dynid_estimate::search;
 use dynid_estimate::separable::{
     EffortBlock, EffortProblem, SeparableError, SeparableEstimate, SeparableLoss, SeparableSettings,
     ShapeSearch, ShapeVerdict, Weighting, fit,
@@ -15,6 +14,7 @@ use dynid_model::{
     LinkDescription, MotionBlock, Placement, RegressorBlock, RobotModel,
 };
 use dynid_motion::{JointSignals, Log};
+use dynid_search as search;
 use std::io::Read;
 use std::path::Path;
 

@@ -3,8 +3,8 @@
 use dynid_estimate::load_friction::{
     DriveRows, FitSettings, Model, Problem, Record, Settings, SignStatus, fit_separated,
 };
-use dynid_estimate::search::Bounds;
 use dynid_linalg::Mat;
+use dynid_search::Bounds;
 
 /// Effort `(1, -1, 0)`, regressor `(1, 0, 0)` and friction `(0, ±2, 0)`: with either sign of the reaction the least squares have the
 /// other one.

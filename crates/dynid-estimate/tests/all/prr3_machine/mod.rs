@@ -7,8 +7,8 @@
 )]
 
 use dynid_estimate::load_friction::{DriveRows, Model, Problem, Record, Settings};
-use dynid_estimate::search::Bounds;
 use dynid_linalg::Mat;
+use dynid_search::Bounds;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

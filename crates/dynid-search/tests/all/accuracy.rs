@@ -4,9 +4,7 @@
 
 use std::ops::ControlFlow;
 
-use dynid_estimate::search::{
-    Algorithm, Bounds, PointObjective, Progress, SearchResult, Settings, Status, many, run,
-};
+use dynid_search::{Algorithm, Bounds, PointObjective, Progress, SearchResult, Settings, Status, many, run};
 
 const SEEDS: [u64; 5] = [1, 2, 3, 4, 5];
 
@@ -161,7 +159,7 @@ fn ends_are_told_apart() {
     assert_eq!(end("pso", patient), Status::Stalled);
     assert_eq!(end("gps", Settings::default()), Status::Converged);
     assert_eq!(end("de", Settings::default()), Status::Converged);
-    let once = Algorithm::CmaEs(dynid_estimate::search::CmaEs { restarts: 0, ..Default::default() });
+    let once = Algorithm::CmaEs(dynid_search::CmaEs { restarts: 0, ..Default::default() });
     let bounds = Bounds::new(vec![-5.0; 3], vec![5.0; 3]).unwrap();
     let objective = PointObjective::new(3, bowl);
     let result = run(&once, &objective, &bounds, &Settings::default(), &mut quiet);

@@ -5,7 +5,7 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use dynid_estimate::search::{
+use dynid_search::{
     Algorithm, BeeColony, Bounds, BoundsError, Checkpoint, CheckpointError, Objective, PatternSearch,
     PointObjective, Progress, SearchError, SearchResult, Settings, Status, many, resume, run,
 };

@@ -1,7 +1,7 @@
-//! Population and pattern searches behind one call.
+//! Population and pattern searches over any function, behind one call.
 //!
 //! ```
-//! use dynid_estimate::search::{Algorithm, Bounds, PointObjective, Settings, run};
+//! use dynid_search::{Algorithm, Bounds, PointObjective, Settings, run};
 //! use std::ops::ControlFlow;
 //!
 //! let rosenbrock = PointObjective::new(2, |x: &[f64]| {
@@ -12,7 +12,7 @@
 //! let settings = Settings { target: Some(1e-12), ..Settings::default() };
 //! let found = run(&algorithm, &rosenbrock, &bounds, &settings, &mut |_| ControlFlow::Continue(()))?;
 //! assert!((found.point[0] - 1.0).abs() < 1e-5);
-//! # Ok::<(), dynid_estimate::search::SearchError>(())
+//! # Ok::<(), dynid_search::SearchError>(())
 //! ```
 //!
 //! What all algorithms have in common:
@@ -35,7 +35,6 @@ mod cuckoo;
 mod curvature;
 mod differential_evolution;
 mod driver;
-mod effort_objective;
 mod error;
 mod history;
 mod objective;
@@ -60,7 +59,6 @@ pub use cma_es::CmaEs;
 pub use cuckoo::{CuckooSearch, ImprovedCuckooSearch};
 pub use curvature::covariance_of_values;
 pub use differential_evolution::DifferentialEvolution;
-pub use effort_objective::{EffortLoss, EffortObjective, EffortObjectiveError};
 pub use error::SearchError;
 pub use history::HistoryPoint;
 pub use objective::{Objective, PointObjective};

@@ -2,7 +2,7 @@
 
 use faer::{Mat, Side};
 
-use crate::search::random::Random;
+use crate::random::Random;
 use dynid_motion::words::Transfer;
 
 /// Differences of values, and steps over the width of the box, that count as none.

@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
-use dynid_estimate::search::rank_sum;
+use dynid_search::rank_sum;
 
 /// `count` numbers without order or ties, `factor k mod 101 + shift`.
 fn scattered(factor: usize, shift: f64, count: usize) -> Vec<f64> {

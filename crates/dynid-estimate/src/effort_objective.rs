@@ -2,8 +2,8 @@
 
 mod error;
 
-use super::objective::Objective;
 use dynid_model::{EffortModel, MotionBlock, RegressorBlock};
+use dynid_search::Objective;
 pub use error::EffortObjectiveError;
 use error::{check_efforts, check_loss};
 use faer::linalg::matmul::matmul;
