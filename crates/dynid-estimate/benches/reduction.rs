@@ -5,9 +5,9 @@
 
 use divan::{Bencher, black_box};
 use dynid_estimate::covariance::jackknife;
-use dynid_estimate::factor::ExtendedBuilder;
 use dynid_estimate::linear::ols;
-use dynid_estimate::{Factor, FactorBuilder};
+use dynid_factor::factor::ExtendedBuilder;
+use dynid_factor::{Factor, FactorBuilder};
 use dynid_linalg::Mat;
 use faer::Par;
 use faer::dyn_stack::{MemBuffer, MemStack};

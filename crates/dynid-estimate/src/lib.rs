@@ -39,9 +39,7 @@ pub mod distribution;
 pub mod drive_gain;
 pub mod effort_objective;
 pub mod elimination;
-pub mod factor;
 pub mod folds;
-pub mod groups;
 pub mod held_out;
 pub mod identifiability;
 pub mod instruments;
@@ -51,8 +49,6 @@ pub mod log_deviations;
 pub mod metrics;
 pub mod online;
 pub mod preflight;
-pub mod rank;
-pub mod rows;
 pub mod separable;
 pub mod steady_friction;
 mod whitened;
@@ -65,4 +61,4 @@ pub mod search {
     pub use dynid_search::*;
 }
 
-pub use factor::{Factor, FactorBuilder, FactorError};
+pub use dynid_factor::{Factor, FactorBuilder, FactorError, factor, groups, rank, rows};

@@ -11,7 +11,7 @@ use faer::{Mat, Side};
 use super::PreparedLog;
 use super::friction::BasePrior;
 use super::rows::{RowBatch, RowConsumer};
-use crate::rows::RowsError;
+use dynid_factor::rows::RowsError;
 
 /// `Xᵀ X` of rows `[W, friction shapes, efforts at lags]`.
 #[derive(Debug, Clone)]

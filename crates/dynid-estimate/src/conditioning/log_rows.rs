@@ -7,7 +7,7 @@ use super::rows::{KeptColumns, Kernels, Pass, RowBatch, RowConsumer, masks};
 use super::states::{Masks, States};
 use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog};
 use crate::instruments::paired_columns;
-use crate::rows::{GroupShape, RowSource, RowVisitor, Rows, RowsError};
+use dynid_factor::rows::{GroupShape, RowSource, RowVisitor, Rows, RowsError};
 
 /// Most time blocks per log ...
 const MAX_BLOCKS: usize = 64;
@@ -22,7 +22,7 @@ pub(super) fn most_blocks(logs: usize) -> usize {
 /// Rows of prepared logs with the choices made, one group per log, output and kernel scale, in that order.
 ///
 /// States of all logs are held; regressors and kernels are computed again on every pass. Where the rows fit in memory,
-/// [`crate::rows::MemoryRows::collect`] makes further passes cheap.
+/// [`dynid_factor::rows::MemoryRows::collect`] makes further passes cheap.
 pub struct LogRows<'a> {
     pub(super) model: &'a dyn EffortModel,
     shape: &'a [f64],

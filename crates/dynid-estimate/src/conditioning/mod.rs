@@ -21,8 +21,8 @@ mod states;
 mod textbook;
 mod trial;
 
-pub use crate::groups::ReducedGroup;
 pub use choose::{DelayEstimate, KernelTrial, MaskTrial};
+pub use dynid_factor::groups::ReducedGroup;
 pub use friction::{
     BasePrior, FrictionChoice, FrictionSettings, FrictionShape, JointFriction, ShapeKind, ShapeTrial,
     choose_friction,
@@ -43,7 +43,7 @@ pub use textbook::{TextbookRoute, paired_textbook_rows, reduce_textbook, textboo
 use dynid_model::EffortModel;
 use dynid_motion::cutoff::KernelLimit;
 
-use crate::factor::FactorError;
+use dynid_factor::factor::FactorError;
 use trial::{Trial, TrialShapes};
 
 /// Why a log cannot be conditioned.

@@ -4,8 +4,8 @@ use dynid_model::EffortModel;
 
 use super::log_rows::LogRows;
 use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog};
-use crate::groups::ReducedGroup;
-use crate::rows::{RowSource, RowsError, reduce_rows};
+use dynid_factor::groups::ReducedGroup;
+use dynid_factor::rows::{RowSource, RowsError, reduce_rows};
 
 /// Reduces all logs with the choices made, holding the states of one log at a time.
 pub fn reduce(

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::friction::{FrictionShape, ShapeKind};
 use super::states::{Masks, States};
 use super::{ConditioningSettings, PreparedLog};
-use crate::rows::RowsError;
+use dynid_factor::rows::RowsError;
 
 /// Which regressor columns a pass keeps, per output.
 #[derive(Debug, Clone)]

@@ -6,12 +6,12 @@ use rayon::prelude::*;
 use super::log_rows::LogRows;
 use super::reduce::unusable_row;
 use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog};
-use crate::factor::FactorError;
-use crate::rows::{RowSource, RowVisitor, Rows, visit_all};
 use crate::separable::{
     OutputPlaces, RowGroup, SeparableError, SeparableEstimate, SeparableProblem, SeparableSettings,
     ShapedColumns, fit, places,
 };
+use dynid_factor::factor::FactorError;
+use dynid_factor::rows::{RowSource, RowVisitor, Rows, visit_all};
 
 /// Samples whose shaped columns are formed at a time.
 const CHUNK: usize = 4096;

@@ -8,9 +8,9 @@ use super::reduce::unusable_row;
 use super::rows::KeptColumns;
 use super::states::States;
 use super::{ConditioningError, ConditioningSettings, PreparedLog};
-use crate::groups::ReducedGroup;
 use crate::instruments::paired_columns;
-use crate::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
+use dynid_factor::groups::ReducedGroup;
+use dynid_factor::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
 
 /// Settings of the textbook route.
 #[derive(Debug, Clone, PartialEq)]

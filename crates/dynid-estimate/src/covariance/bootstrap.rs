@@ -1,7 +1,7 @@
 //! Bootstrap over time blocks.
 
-use crate::factor::Factor;
 use crate::whitened::{Whitened, cholesky, solve, upper_times};
+use dynid_factor::factor::Factor;
 use dynid_linalg::triangular::symmetric_from;
 use faer::Mat;
 use rand::{RngExt, SeedableRng};

@@ -1,8 +1,8 @@
 //! Delete-a-block jackknife.
 
-use crate::factor::Factor;
 use crate::linear::ols;
-use crate::rank::certainly_full_rank;
+use dynid_factor::factor::Factor;
+use dynid_factor::rank::certainly_full_rank;
 use dynid_linalg::triangular::symmetric_from;
 use faer::Mat;
 use rayon::prelude::*;

@@ -21,8 +21,8 @@ pub(crate) use jackknife::{change_without, running_merges};
 pub use row_scores::{RowScores, row_scores};
 pub use sandwich::{block_sandwich, block_sandwich_with};
 
-use crate::factor::Factor;
 use crate::linear::merge_weighted;
+use dynid_factor::factor::Factor;
 use faer::Mat;
 
 /// Time blocks of the weighted problem: the factors of all groups of a block merged with weights `1/σ_j`.

@@ -1,7 +1,7 @@
 //! Sandwich covariance with block sums of scores.
 
 use super::sandwich;
-use crate::factor::Factor;
+use dynid_factor::factor::Factor;
 use dynid_linalg::triangular::{gram_inverse, symmetric_from};
 use faer::Mat;
 

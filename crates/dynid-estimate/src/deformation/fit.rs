@@ -231,7 +231,7 @@ impl<'a> Problem<'a> {
         &self,
         state: &State,
         used: &dyn Fn(usize) -> bool,
-    ) -> Result<crate::Factor, DeformationError> {
+    ) -> Result<dynid_factor::Factor, DeformationError> {
         let (first, unknowns) = self.places();
         let residuals = self.sum_residuals(&state.beta);
         let mut rows = self.sums_placed(&residuals, &state.sums_rms);

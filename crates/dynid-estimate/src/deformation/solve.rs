@@ -1,8 +1,8 @@
 //! Weighted least squares by factors, and what single rows contribute to a parameter.
 
 use super::{DeformationError, Rows};
-use crate::factor::{Factor, FactorBuilder};
 use crate::linear::ols;
+use dynid_factor::factor::{Factor, FactorBuilder};
 use dynid_linalg::triangular::gram_inverse;
 
 /// Columns and right-hand side of one row of the problem over all instants, placed among all unknowns.

@@ -2,10 +2,10 @@
 
 use faer::Mat;
 
-use crate::Factor;
 use crate::covariance::{Jackknife, jackknife_by};
 use crate::linear::{LinearSolution, ols};
-use crate::rank::{certainly_full_rank, numerical_rank, singular_values};
+use dynid_factor::Factor;
+use dynid_factor::rank::{certainly_full_rank, numerical_rank, singular_values};
 use dynid_linalg::triangular::{inverse, solve_upper};
 
 /// The oblique projection of paired rows onto independent columns.

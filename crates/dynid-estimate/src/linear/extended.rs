@@ -1,7 +1,7 @@
 //! Ordinary least squares on a factor in double-double arithmetic.
 
 use super::ols::{LinearSolution, ols};
-use crate::factor::{DoubleDouble, ExtendedFactor};
+use dynid_factor::factor::{DoubleDouble, ExtendedFactor};
 use dynid_linalg::triangular::symmetric_from;
 use faer::Mat;
 

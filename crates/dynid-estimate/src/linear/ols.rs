@@ -1,7 +1,7 @@
 //! Ordinary least squares, `min ‖z - R x‖²`.
 
-use crate::factor::Factor;
-use crate::rank::{RankReport, numerical_rank};
+use dynid_factor::factor::Factor;
+use dynid_factor::rank::{RankReport, numerical_rank};
 use dynid_linalg::triangular::gram_inverse;
 use faer::Mat;
 

@@ -2,9 +2,9 @@
 
 use super::method::LinearSettings;
 use super::ols::ols;
-use crate::factor::Factor;
-use crate::groups::ReducedGroup;
-use crate::rank::numerical_rank;
+use dynid_factor::factor::Factor;
+use dynid_factor::groups::ReducedGroup;
+use dynid_factor::rank::numerical_rank;
 use dynid_linalg::triangular::solve_upper;
 use faer::Mat;
 

@@ -1,7 +1,7 @@
 //! Weighted least squares with one residual variance per group of rows.
 
 use super::ols::{LinearSolution, ols};
-use crate::factor::Factor;
+use dynid_factor::factor::Factor;
 use dynid_linalg::triangular::inverse;
 
 /// Settings of [`wls`].

@@ -5,7 +5,7 @@ use super::bounded::clipped;
 use super::error::{LoadFrictionError, in_range, same_size};
 use super::identifiability::right_singular;
 use super::problem::Problem;
-use crate::rank::rank_tolerance;
+use dynid_factor::rank::rank_tolerance;
 use dynid_linalg::Mat;
 use dynid_search::Bounds;
 

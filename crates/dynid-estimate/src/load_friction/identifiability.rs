@@ -3,7 +3,7 @@
 use super::bounded::acts;
 use super::error::{LoadFrictionError, in_range, same_size};
 use super::problem::Problem;
-use crate::rank::rank_tolerance;
+use dynid_factor::rank::rank_tolerance;
 use dynid_linalg::Mat;
 
 /// A parameter or combination counts as determined when its share in the null directions is below this.

@@ -24,7 +24,7 @@ pub use stated::{AgainstStated, against_stated};
 pub use tilt::{Tilt, tilt};
 pub use wiring::{Rewiring, Source, Wiring};
 
-use crate::factor::FactorError;
+use dynid_factor::factor::FactorError;
 
 /// Why a log cannot be examined.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -8,8 +8,8 @@ use super::samples::{BLOCKS, Samples};
 use super::stated::fit;
 use super::wiring::Wiring;
 use crate::conditioning::KeptColumns;
-use crate::factor::Factor;
 use crate::linear::ols;
+use dynid_factor::factor::Factor;
 
 /// Gauss-Newton steps.
 const STEPS: usize = 8;

@@ -8,7 +8,7 @@ use super::samples::Samples;
 use super::search::Trial;
 use super::wiring::{Source, Wiring};
 use crate::conditioning::KeptColumns;
-use crate::factor::{Factor, FactorBuilder, FactorError};
+use dynid_factor::factor::{Factor, FactorBuilder, FactorError};
 
 /// Standard deviation of an effort that a good model leaves, as a share of its own.
 const RELATIVE_ERROR: f64 = 0.1;

@@ -13,7 +13,7 @@ use super::samples::Samples;
 use super::wiring::{Rewiring, Wiring};
 use super::{PreflightError, hypotheses};
 use crate::consistent::{Problem, Settings, estimate};
-use crate::factor::{Factor, FactorError};
+use dynid_factor::factor::{Factor, FactorError};
 
 /// A position beyond this is suspected to be in degrees, rad: a little over a turn.
 const MORE_THAN_A_TURN: f64 = 6.5;

@@ -7,8 +7,8 @@ use super::rows::{deviation, reduce, regressor};
 use super::samples::Samples;
 use super::wiring::Wiring;
 use crate::conditioning::KeptColumns;
-use crate::factor::Factor;
 use crate::linear::{LinearSolution, ols};
+use dynid_factor::factor::Factor;
 
 /// Efforts of a joint against those that stated inertias ask for.
 #[derive(Debug, Clone, Copy, PartialEq)]

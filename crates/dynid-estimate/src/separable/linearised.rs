@@ -5,9 +5,9 @@
 
 use super::problem::{RowGroup, SeparableProblem, ShapedColumns};
 use super::reduction::{Target, remainder};
-use crate::groups::ReducedGroup;
 use crate::linear::LinearError;
-use crate::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
+use dynid_factor::groups::ReducedGroup;
+use dynid_factor::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
 use rayon::prelude::*;
 
 /// Rows and factors of the linearised problem.

@@ -2,7 +2,7 @@
 
 use super::dense::{Columns, triangle};
 use super::problem::{RowGroup, ShapedColumns};
-use crate::factor::{Factor, FactorBuilder};
+use dynid_factor::factor::{Factor, FactorBuilder};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::householder::{
     apply_block_householder_sequence_transpose_on_the_left_in_place_scratch as rotation_scratch,

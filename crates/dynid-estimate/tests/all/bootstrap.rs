@@ -4,8 +4,8 @@
 use crate::simulated::{COLUMNS, NOISE, Normal, TRUTH, rows};
 use dynid_estimate::covariance::{Bootstrap, BootstrapSettings, bootstrap};
 use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate, ols};
-use dynid_estimate::rows::reduce_rows;
-use dynid_estimate::{Factor, FactorBuilder};
+use dynid_factor::rows::reduce_rows;
+use dynid_factor::{Factor, FactorBuilder};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

@@ -10,8 +10,8 @@ use crate::arm::{Arm, CUT_OFF_HZ, JOINTS, RATE_HZ};
 use dynid_estimate::covariance::{row_scores, variance_inflation};
 use dynid_estimate::distribution::t_quantile;
 use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate};
-use dynid_estimate::rows::reduce_rows;
 use dynid_estimate::whiteness::{InBandSettings, raw_in_band_whiteness};
+use dynid_factor::rows::reduce_rows;
 use dynid_linalg::Mat;
 use rayon::prelude::*;
 

@@ -8,7 +8,7 @@ use dynid_estimate::conditioning::{
 };
 use dynid_estimate::instruments::measured;
 use dynid_estimate::linear::{IrlsSettings, LinearMethod, LinearSettings, estimate};
-use dynid_estimate::rows::{MemoryRows, RowSource, reduce_rows};
+use dynid_factor::rows::{MemoryRows, RowSource, reduce_rows};
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RegressorBlock, RobotModel};
 use dynid_motion::{JointSignals, Log};
 

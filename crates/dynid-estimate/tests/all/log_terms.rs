@@ -6,7 +6,7 @@ use dynid_estimate::conditioning::ReducedGroup;
 use dynid_estimate::drive_gain::load_column;
 use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate, explain_difference, ols};
 use dynid_estimate::log_deviations::{OwnColumn, log_deviations};
-use dynid_estimate::{Factor, FactorBuilder};
+use dynid_factor::{Factor, FactorBuilder};
 use dynid_linalg::Mat;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -4,7 +4,7 @@
 use crate::simulated::{COLUMNS, NOISE, Normal, TRUTH, rows};
 use dynid_estimate::distribution::t_quantile;
 use dynid_estimate::linear::{IrlsSettings, LinearEstimate, LinearMethod, LinearSettings, estimate};
-use dynid_estimate::rows::{MemoryRows, RowSource, RowVisitor, Rows, RowsError, reduce_rows};
+use dynid_factor::rows::{MemoryRows, RowSource, RowVisitor, Rows, RowsError, reduce_rows};
 use rayon::prelude::*;
 
 /// One row in ten of every joint is off by 20 to 60 standard deviations, all to the same side.
@@ -111,7 +111,7 @@ struct OneByOne<'a>(&'a MemoryRows);
 struct Splitter<'a, 'b>(&'a mut &'b mut dyn RowVisitor);
 
 impl RowVisitor for Splitter<'_, '_> {
-    fn take(&mut self, rows: &Rows<'_>) -> Result<(), dynid_estimate::FactorError> {
+    fn take(&mut self, rows: &Rows<'_>) -> Result<(), dynid_factor::FactorError> {
         (0..rows.effort.len()).try_for_each(|i| {
             self.0.take(&Rows {
                 samples: &rows.samples[i..=i],
@@ -124,7 +124,7 @@ impl RowVisitor for Splitter<'_, '_> {
 }
 
 impl RowSource for OneByOne<'_> {
-    fn groups(&self) -> &[dynid_estimate::rows::GroupShape] {
+    fn groups(&self) -> &[dynid_factor::rows::GroupShape] {
         self.0.groups()
     }
 

@@ -1,7 +1,7 @@
 //! A six-joint arm with friction on an exciting motion, its rows filtered and thinned as a log's are.
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
-use dynid_estimate::rows::{GroupShape, MemoryRows, Rows};
+use dynid_factor::rows::{GroupShape, MemoryRows, Rows};
 use dynid_model::element::{Coulomb, JointElement, Offset, Viscous};
 use dynid_model::{
     BaseParameters, BaseSettings, Description, EffortModel, Inertia, JointDescription, JointKind, Limits,

@@ -144,7 +144,7 @@ fn givens(a: DoubleDouble, b: DoubleDouble) -> (DoubleDouble, DoubleDouble) {
 /// values. It does not help against noise, and takes 40 to 70 times as long as `FactorBuilder` at 8 columns, 130 to
 /// 250 times at 64 (2000 rows, target without fused multiply-add; `cargo bench -p dynid-estimate`).
 ///
-/// Solve by [`crate::linear::ols_extended`]; rounding the factor first gives back most of what was gained.
+/// Solve it as it is; rounding the factor first gives back most of what was gained.
 #[derive(Debug, Clone)]
 pub struct ExtendedBuilder {
     factor: ExtendedFactor,

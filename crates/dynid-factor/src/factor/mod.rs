@@ -90,7 +90,7 @@ impl Factor {
     }
 
     /// `[R z]` with its stored rows only.
-    pub(crate) fn triangle(&self) -> &Mat<f64> {
+    pub fn triangle(&self) -> &Mat<f64> {
         &self.triangle
     }
 

@@ -86,7 +86,7 @@ pub fn numerical_rank(factor: &Factor) -> RankReport {
 
 /// Whether [`numerical_rank`] must find full rank, told by an inverse instead of singular values: `1/‖A⁻¹‖_F` bounds the
 /// least singular value of the scaled triangle `A` from below, `√p` the largest from above.
-pub(crate) fn certainly_full_rank(factor: &Factor) -> bool {
+pub fn certainly_full_rank(factor: &Factor) -> bool {
     let norms = factor.column_norms();
     if factor.height() < factor.columns() || norms.contains(&0.0) {
         return false;
@@ -97,7 +97,7 @@ pub(crate) fn certainly_full_rank(factor: &Factor) -> bool {
 }
 
 /// `τ = 100 ε max(rows, columns) σ_1`.
-pub(crate) fn rank_tolerance(rows: usize, columns: usize, largest: f64) -> f64 {
+pub fn rank_tolerance(rows: usize, columns: usize, largest: f64) -> f64 {
     100.0 * f64::EPSILON * rows.max(columns) as f64 * largest
 }
 
@@ -109,7 +109,7 @@ pub(crate) fn scaled_triangle(factor: &Factor, column_norms: &[f64]) -> Mat<f64>
 }
 
 /// Singular values of a square matrix, descending.
-pub(crate) fn singular_values(matrix: &Mat<f64>) -> Vec<f64> {
+pub fn singular_values(matrix: &Mat<f64>) -> Vec<f64> {
     let n = matrix.nrows();
     let no = ComputeSvdVectors::No;
     let mut scratch = MemBuffer::new(svd_scratch::<f64>(n, n, no, no, Par::Seq, Default::default()));

@@ -1,8 +1,7 @@
 //! Rows of the regression, streamed again as often as an estimator asks.
 //!
 //! Squared losses need factors only. What looks at single residuals (robust losses, row scores) takes rows from a
-//! [`RowSource`]: in memory ([`MemoryRows`]) or formed anew from the logs on every pass
-//! ([`crate::conditioning::LogRows`]).
+//! [`RowSource`]: in memory ([`MemoryRows`]) or formed anew from the logs on every pass.
 
 mod memory;
 mod residuals;
@@ -95,24 +94,25 @@ pub trait RowSource: Sync {
 }
 
 /// Runs one visitor per group through a source.
-pub(crate) fn visit_all<V: RowVisitor>(source: &dyn RowSource, visitors: &mut [V]) -> Result<(), RowsError> {
+pub fn visit_all<V: RowVisitor>(source: &dyn RowSource, visitors: &mut [V]) -> Result<(), RowsError> {
     let mut all: Vec<&mut dyn RowVisitor> = visitors.iter_mut().map(|v| v as &mut dyn RowVisitor).collect();
     source.visit(&mut all)
 }
 
 /// Reduces the rows of one group to one factor per time block, weighted or not.
-pub(crate) struct BlockReducer {
+pub struct BlockReducer {
     builder: FactorBuilder,
     done: Vec<Factor>,
 }
 
 impl BlockReducer {
-    pub(crate) fn new(columns: usize) -> Self {
+    /// Reducer of rows with so many columns.
+    pub fn new(columns: usize) -> Self {
         BlockReducer { builder: FactorBuilder::with_chunk_rows(columns, CHUNK_ROWS), done: Vec::new() }
     }
 
     /// Appends rows, each multiplied by its root weight.
-    pub(crate) fn push(&mut self, rows: &Rows<'_>, root_weights: Option<&[f64]>) -> Result<(), FactorError> {
+    pub fn push(&mut self, rows: &Rows<'_>, root_weights: Option<&[f64]>) -> Result<(), FactorError> {
         self.finish_until(rows.block);
         let columns = self.builder.columns();
         self.builder.push_with(rows.effort.len(), |column, range, out| {
@@ -132,7 +132,8 @@ impl BlockReducer {
         }
     }
 
-    pub(crate) fn finish(mut self, shape: &GroupShape) -> ReducedGroup {
+    /// Factors of all time blocks of a group; blocks without rows are empty.
+    pub fn finish(mut self, shape: &GroupShape) -> ReducedGroup {
         self.finish_until(shape.blocks);
         ReducedGroup {
             log: shape.log,

@@ -110,7 +110,7 @@ impl Factor {
     /// Factor of `[W A, y + W b]`: other combinations of the same rows.
     ///
     /// `a`: `p × q`, `b`: `p` entries. Panics unless the shapes agree.
-    pub(crate) fn combined(&self, a: &Mat<f64>, b: &[f64]) -> Factor {
+    pub fn combined(&self, a: &Mat<f64>, b: &[f64]) -> Factor {
         assert!(
             a.nrows() == self.columns && b.len() == self.columns,
             "one row of the combination per column"
@@ -166,7 +166,7 @@ impl Factor {
     }
 
     /// Factor of `rows` samples from the `p × (p + 1)` entries of `[R z]` and `ρ`, with the signs of rows set right.
-    pub(crate) fn from_triangle(
+    pub fn from_triangle(
         columns: usize,
         entry: impl Fn(usize, usize) -> f64,
         rho: f64,

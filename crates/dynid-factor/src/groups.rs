@@ -39,8 +39,8 @@ impl ReducedGroup {
         self.blocks.iter().map(Factor::rows).sum()
     }
 
-    /// Returns the rows in blocks `factor` times as long, the last one taking the rest: what
-    /// [`crate::covariance::block_length`] asks for when residuals stay correlated beyond a block.
+    /// Returns the rows in blocks `factor` times as long, the last one taking the rest: needed where residuals stay correlated
+    /// beyond a block.
     ///
     /// A rest of less than half a block joins the one before. Panics if `factor` is zero.
     pub fn coarsened(&self, factor: usize) -> ReducedGroup {
