@@ -6,16 +6,11 @@
 //! | question | module |
 //! |---|---|
 //! | from logs to rows: kernel, mask, delay | [`conditioning`] |
-//! | reduce rows of `[W y]`, merge, scale, choose columns | [`factor`] |
-//! | which columns are excited, which depend on others | [`rank`] |
-//! | one time block or group of a log, and its rows again | [`groups`], [`rows`] |
 //! | every linear estimator through one call | [`linear::estimate`] |
 //! | rows spoilt by noise that a control loop feeds back | [`instruments`] |
 //! | shape parameters beside linear ones | [`separable`] |
 //! | clearance of a joint from its journal, or from the effort alone | [`clearance`] |
 //! | compliance of joints from encoders on both sides of their gears | [`deformation`] |
-//! | friction laws from constant-speed tests | [`steady_friction`] |
-//! | friction that follows reaction forces | [`load_friction`] |
 //! | covariance that survives filtering | [`covariance`] |
 //! | held-out error over folds of blocks; several estimators on the same folds | [`folds`], [`held_out`] |
 //! | which parameters a model can do without | [`elimination`] |
@@ -33,7 +28,6 @@ pub mod clearance;
 pub mod conditioning;
 pub mod consistent;
 pub mod covariance;
-pub mod cyclic;
 pub mod deformation;
 pub mod distribution;
 pub mod drive_gain;
@@ -44,21 +38,10 @@ pub mod held_out;
 pub mod identifiability;
 pub mod instruments;
 pub mod linear;
-pub mod load_friction;
 pub mod log_deviations;
 pub mod metrics;
 pub mod online;
 pub mod preflight;
 pub mod separable;
-pub mod steady_friction;
 mod whitened;
 pub mod whiteness;
-
-pub use dynid_linalg::Mat;
-/// Searches, with the misfit of an effort model among what they minimise.
-pub mod search {
-    pub use crate::effort_objective::{EffortLoss, EffortObjective, EffortObjectiveError};
-    pub use dynid_search::*;
-}
-
-pub use dynid_factor::{Factor, FactorBuilder, FactorError, factor, groups, rank, rows};

@@ -9,8 +9,8 @@ mod rows;
 pub use motions::{Motion, MotionKind, MotionSettings};
 pub use rows::FitRows;
 
-use dynid_estimate::Factor;
 use dynid_estimate::identifiability::{Identifiability, Verdict, VisibleSpace};
+use dynid_factor::Factor;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
 use rayon::prelude::*;
 
@@ -203,8 +203,8 @@ fn enumeration(parts: &[String]) -> String {
 }
 
 /// Regrouping `K` of base parameters as a matrix, `base × parameters`.
-pub fn regrouping(base: &BaseParameters) -> dynid_estimate::Mat<f64> {
+pub fn regrouping(base: &BaseParameters) -> dynid_linalg::Mat<f64> {
     let flat = base.matrix();
     let columns = base.kept.len() + base.folded.len() + base.zero.len();
-    dynid_estimate::Mat::from_fn(base.len(), columns, |i, j| flat[i * columns + j])
+    dynid_linalg::Mat::from_fn(base.len(), columns, |i, j| flat[i * columns + j])
 }

@@ -8,7 +8,8 @@ use dynid_estimate::folds::FoldSettings;
 use dynid_estimate::held_out::{Comparison, Estimator, compare};
 use dynid_estimate::identifiability::{excited_regrouping, posterior};
 use dynid_estimate::linear::ols;
-use dynid_estimate::{Factor, Mat};
+use dynid_factor::Factor;
+use dynid_linalg::Mat;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
 
 use crate::Error;

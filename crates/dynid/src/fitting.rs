@@ -11,9 +11,10 @@ use dynid_estimate::identifiability::VisibleSpace;
 use dynid_estimate::linear::{
     LinearEstimate, LinearMethod, LinearSettings, TlsNoise, VarianceSharing, estimate,
 };
-use dynid_estimate::rows::{GroupResiduals, RowSource, reduce_rows, row_residuals};
 use dynid_estimate::whiteness::{InBandSettings, InBandWhiteness, raw_in_band_whiteness};
-use dynid_estimate::{Factor, Mat};
+use dynid_factor::Factor;
+use dynid_factor::rows::{GroupResiduals, RowSource, reduce_rows, row_residuals};
+use dynid_linalg::Mat;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
 
 use crate::Error;
@@ -231,7 +232,7 @@ pub(crate) fn with_precision(
     }
 }
 
-pub(crate) fn conditioning_fault(source: &dyn RowSource, e: dynid_estimate::rows::RowsError) -> Error {
+pub(crate) fn conditioning_fault(source: &dyn RowSource, e: dynid_factor::rows::RowsError) -> Error {
     let output = source.groups()[e.group].output;
     Error::Conditioning(dynid_estimate::conditioning::ConditioningError::Rows { output, source: e.source })
 }

@@ -4,10 +4,10 @@ mod record;
 
 pub use record::{GainsFile, JointGain};
 
-use dynid_estimate::Factor;
 use dynid_estimate::conditioning::{LogRows, condition};
 use dynid_estimate::drive_gain::{LoadColumn, load_column};
 use dynid_estimate::linear::LinearMethod;
+use dynid_factor::Factor;
 use dynid_model::element::{JointElement, KnownLoad, Payload};
 use dynid_model::{
     BaseParameters, BaseSettings, EffortModel, Inertia, Mat3, Output, PerOutput, RobotModel, Vec3,

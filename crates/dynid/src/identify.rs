@@ -17,8 +17,8 @@ use dynid_estimate::conditioning::{
 };
 use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::linear::LinearEstimate;
-use dynid_estimate::rank::numerical_rank;
 use dynid_estimate::whiteness::InBandWhiteness;
+use dynid_factor::rank::numerical_rank;
 use dynid_io::{ReadingNote, TrajectoryFile};
 use dynid_model::element::scale_name;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};

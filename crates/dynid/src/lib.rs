@@ -59,13 +59,31 @@ pub use friction::{FrictionConfig, FrictionModel, identify_friction};
 pub use identify::{Identification, Step, identify};
 pub use robot::{Robot, RobotOptions};
 
-pub use dynid_estimate as estimators;
 pub use dynid_excitation as excitation;
 pub use dynid_io as io;
 pub use dynid_model as model;
 pub use dynid_motion as motion;
 pub use dynid_report as report;
 pub use dynid_sim as sim;
+
+/// Everything between rows and estimates, whichever room it is in.
+pub mod estimators {
+    pub use dynid_estimate::{clearance, deformation};
+    pub use dynid_estimate::{conditioning, preflight};
+    pub use dynid_estimate::{
+        consistent, covariance, distribution, drive_gain, elimination, folds, held_out, identifiability,
+        instruments, linear, log_deviations, metrics, online, separable, whiteness,
+    };
+    pub use dynid_factor::{Factor, FactorBuilder, FactorError, factor, groups, rank, rows};
+    pub use dynid_friction::{cyclic, load_friction, steady_friction};
+    pub use dynid_linalg::Mat;
+
+    /// Searches that need values only, and the misfit of an effort model as what they minimise.
+    pub mod search {
+        pub use dynid_estimate::effort_objective::{EffortLoss, EffortObjective, EffortObjectiveError};
+        pub use dynid_search::*;
+    }
+}
 
 /// Version of the program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -1,12 +1,12 @@
 //! How far each parameter can be trusted: verdict, interval, what the data see of it, and what would help.
 
-use dynid_estimate::Mat;
 use dynid_estimate::consistent::ActiveConstraint;
 use dynid_estimate::distribution::t_quantile;
 use dynid_estimate::identifiability::{
     Assessment, Carried, Identifiability, Verdict, VisibleSpace, excited_regrouping, posterior,
     visible_combinations,
 };
+use dynid_linalg::Mat;
 use dynid_model::{BaseParameters, EffortModel, Owner, RobotModel};
 
 use crate::advice::{Advice, FitRows, MotionSettings, Present, advise};

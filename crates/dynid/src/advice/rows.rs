@@ -1,6 +1,6 @@
 //! Rows of a motion, counted as the fit counts those of a log.
 
-use dynid_estimate::{Factor, FactorBuilder};
+use dynid_factor::{Factor, FactorBuilder};
 use dynid_model::element::is_gate;
 use dynid_model::{BaseParameters, EffortModel, MotionBlock, RegressorBlock, RobotModel};
 use dynid_motion::Kernel;

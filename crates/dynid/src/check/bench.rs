@@ -1,11 +1,11 @@
 //! What it takes a model to find: whose columns these are, the direction of gravity, excitation.
 
-use dynid_estimate::Factor;
 use dynid_estimate::consistent::Problem;
 use dynid_estimate::preflight::{
     Excitation, Found, GaussianPrior, PreflightError, Rewiring, Samples, Tilt, Trial, Wiring, WiringSearch,
     excitation, tilt,
 };
+use dynid_factor::Factor;
 use dynid_io::columns::degrees_suspected;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, Mechanism, RobotModel};
 use dynid_motion::{JointSignals, Log, UniformLog};
@@ -40,7 +40,7 @@ pub(super) struct Bench {
     pub(super) model: RobotModel,
     pub(super) shape: Vec<f64>,
     pub(super) base: BaseParameters,
-    regrouping: dynid_estimate::Mat<f64>,
+    regrouping: dynid_linalg::Mat<f64>,
     pub(super) slides: Vec<bool>,
     stated: Vec<Option<f64>>,
     pub(super) gravity: [f64; 3],

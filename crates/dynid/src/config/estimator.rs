@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use dynid_estimate::search::{Algorithm, Settings};
 use dynid_estimate::separable::ShapeSearch;
+use dynid_search::{Algorithm, Settings};
 use serde::{Deserialize, Serialize};
 
 use super::{Config, pair};
@@ -76,7 +76,7 @@ pub enum PriorDistance {
 #[serde(deny_unknown_fields, default)]
 pub struct ShapeConfig {
     /// A search over the whole box of bounds: `abc`, `cs`, `ics`, `pso`, `gps`, `cma-es`, `de` (see
-    /// [`Algorithm`](dynid_estimate::search::Algorithm)). Default: Gauss-Newton from several starts.
+    /// [`Algorithm`](dynid_search::Algorithm)). Default: Gauss-Newton from several starts.
     pub search: Option<String>,
     /// Evaluations of that search. Default 2000.
     pub evaluations: Option<u64>,

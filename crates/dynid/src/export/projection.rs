@@ -1,7 +1,7 @@
 //! Friction in the two terms that robot files have: least squares over the states of a log.
 
-use dynid_estimate::factor::{Factor, FactorBuilder};
 use dynid_estimate::linear::ols;
+use dynid_factor::factor::{Factor, FactorBuilder};
 use dynid_model::element::sign;
 use dynid_model::{EffortModel, RegressorBlock, RobotModel};
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! What keeps friction experiments from being evaluated.
 
-use dynid_estimate::steady_friction::SteadyError;
+use dynid_friction::steady_friction::SteadyError;
 use dynid_motion::ClockError;
 use dynid_motion::constant_speed::ConstantSpeedError;
 use thiserror::Error;
@@ -72,7 +72,7 @@ pub enum FrictionError {
     },
     /// The search of bristles cannot run.
     #[error("pre-sliding: {0}")]
-    Search(#[from] dynid_estimate::search::SearchError),
+    Search(#[from] dynid_search::SearchError),
     /// A friction file is none.
     #[error("{file}: not a friction model: {message}")]
     File {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynid_estimate::steady_friction::FrictionLaw;
+use dynid_friction::steady_friction::FrictionLaw;
 use dynid_io::SourceFile;
 use dynid_model::KnownElement;
 use dynid_model::element::{Coulomb, ExponentialViscous, LuGre, ShapeSetting, Stribeck, Viscous};

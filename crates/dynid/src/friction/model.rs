@@ -4,7 +4,7 @@ use dynid_io::SourceFile;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use dynid_estimate::steady_friction::FrictionLaw;
+use dynid_friction::steady_friction::FrictionLaw;
 use serde::{Deserialize, Serialize};
 
 use super::error::FrictionError;

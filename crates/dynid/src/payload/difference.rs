@@ -1,8 +1,8 @@
 //! The plain difference of two fits, with and without a payload.
 
-use dynid_estimate::Mat;
 use dynid_estimate::conditioning::ReducedGroup;
 use dynid_estimate::linear::{LinearEstimate, LinearMethod, LinearSettings, estimate, explain_difference};
+use dynid_linalg::Mat;
 use dynid_model::Inertia;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,8 @@
 //! What is found of a payload, and the file `payload.json`.
 
+use dynid_estimate::identifiability;
 use dynid_estimate::identifiability::{excited_regrouping, posterior};
-use dynid_estimate::{Mat, identifiability};
+use dynid_linalg::Mat;
 use dynid_model::Inertia;
 use serde::{Deserialize, Serialize};
 

@@ -3,7 +3,7 @@
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
-use crate::distribution::t_quantile;
+use dynid_estimate::distribution::t_quantile;
 
 /// `σ(T) = value + slope (T - T_ref)` through the coefficients of several temperatures.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,7 +7,7 @@
 mod prr3_machine;
 
 use divan::Bencher;
-use dynid_estimate::load_friction::{FitSettings, Model, SquaredResiduals, fit_bounded, fit_separated};
+use dynid_friction::load_friction::{FitSettings, Model, SquaredResiduals, fit_bounded, fit_separated};
 use dynid_search::{self as search, Algorithm, Objective};
 use prr3_machine::{bounds, experiment, start};
 use std::ops::ControlFlow;

@@ -6,7 +6,7 @@
     reason = "shared by tests and a benchmark, which use different parts"
 )]
 
-use dynid_estimate::load_friction::{DriveRows, Model, Problem, Record, Settings};
+use dynid_friction::load_friction::{DriveRows, Model, Problem, Record, Settings};
 use dynid_linalg::Mat;
 use dynid_search::Bounds;
 use rand::SeedableRng;

@@ -7,7 +7,7 @@ use crate::prr3_machine::{
     GRAVITY, Pose, TRAJECTORY, TRUTH, base_matrix, bounds, circle, efforts, experiment, inverse_kinematics,
     null_directions, record, reference, rows, sampled,
 };
-use dynid_estimate::load_friction::{
+use dynid_friction::load_friction::{
     DriveRows, LoadFrictionError, Model, Problem, Record, Settings, Verdict, verdicts,
 };
 use dynid_linalg::Mat;

@@ -1,6 +1,6 @@
 //! Several weighted problems whose parameters are shared in part.
 
-use crate::separable::{EffortProblem, RowGroup, SeparableProblem, ShapedColumns};
+use dynid_estimate::separable::{EffortProblem, RowGroup, SeparableProblem, ShapedColumns};
 use dynid_model::ShapeParameter;
 
 /// One effort problem with row weights; its parameters are those of the whole at the listed places.

@@ -3,7 +3,7 @@
 use super::error::{LoadFrictionError, same_size};
 use super::law::{FrictionParameter, check_theta};
 use super::problem::Problem;
-use crate::separable::{
+use dynid_estimate::separable::{
     Bound, RowGroup, SearchStatus, SeparableError, SeparableProblem, SeparableSettings, ShapedColumns,
     StartOutcome, Weighting, fit,
 };
@@ -62,11 +62,11 @@ pub struct BoundedFit {
 }
 
 /// Minimises `J(θ)` with `lower <= θ <= upper` by Levenberg-Marquardt with exact derivatives
-/// ([`crate::separable`] without linear parameters). A start outside is brought inside. Directions that the data do
+/// ([`dynid_estimate::separable`] without linear parameters). A start outside is brought inside. Directions that the data do
 /// not see stay as the path of damped steps leaves them: see [`super::nearest_to_design`].
 ///
 /// # Errors
-/// Sizes that differ, a start that is not finite, bounds that [`crate::separable::fit`] refuses, a model that is finite
+/// Sizes that differ, a start that is not finite, bounds that [`dynid_estimate::separable::fit`] refuses, a model that is finite
 /// at no start. How the search ended is a status.
 pub fn fit_bounded(
     problem: &Problem,

@@ -1,6 +1,6 @@
 //! Friction laws from points of constant-speed tests made from the closed form.
 
-use dynid_estimate::steady_friction::{
+use dynid_friction::steady_friction::{
     LawForm, SteadyError, SteadyPoint, SteadySettings, ViscousForm, analyse,
 };
 use rand::SeedableRng;

@@ -1,6 +1,6 @@
 //! Signs of reactions that no solution keeps.
 
-use dynid_estimate::load_friction::{
+use dynid_friction::load_friction::{
     DriveRows, FitSettings, Model, Problem, Record, Settings, SignStatus, fit_separated,
 };
 use dynid_linalg::Mat;

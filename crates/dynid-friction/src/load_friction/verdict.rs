@@ -4,7 +4,7 @@ use super::bounded::bounds_reached;
 use super::error::LoadFrictionError;
 use super::identifiability::{CombinationValue, Identifiability};
 use super::problem::Problem;
-use crate::separable::Bound;
+use dynid_estimate::separable::Bound;
 use dynid_linalg::Mat;
 use dynid_search::Bounds;
 

@@ -1,6 +1,6 @@
 //! What an identification with load-dependent friction refuses.
 
-use crate::separable::SeparableError;
+use dynid_estimate::separable::SeparableError;
 use dynid_search::BoundsError;
 use thiserror::Error;
 

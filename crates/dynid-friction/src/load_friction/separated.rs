@@ -4,7 +4,7 @@ use super::bounded::{FitSettings, clipped, separable_settings, stribeck_starts};
 use super::error::LoadFrictionError;
 use super::law::{FrictionParameter, Model, decay};
 use super::problem::{Problem, add_product, sign};
-use crate::separable::{
+use dynid_estimate::separable::{
     RowGroup, SearchStatus, SeparableError, SeparableEstimate, SeparableProblem, ShapedColumns, fit,
 };
 use dynid_model::ShapeParameter;

@@ -1,6 +1,6 @@
 //! Friction laws from steady points: friction at given speed and temperature, as constant-speed tests give it.
 //!
-//! [`analyse`] fits, with the elements of `dynid-model` as the physics and [`crate::separable`] as the solver,
+//! [`analyse`] fits, with the elements of `dynid-model` as the physics and [`dynid_estimate::separable`] as the solver,
 //!
 //! - the law that the points can carry, the simplest first (a [`LawForm`] each, see [`Rung`]): Coulomb or Stribeck
 //!   friction with viscous friction that is linear or exponential in speed. The one with the least AICc is kept; a more
@@ -29,7 +29,7 @@ pub use law::{Coefficient, CurveError, FrictionLaw, LawParts};
 pub use levels::temperature_levels;
 pub use lines::ThermalLine;
 
-use crate::separable::SeparableError;
+use dynid_estimate::separable::SeparableError;
 
 /// Friction at one speed and temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,7 +63,7 @@ pub struct SteadySettings {
     pub thermal: bool,
     /// Points are successive samples of a signal, whose residuals are correlated: AICc counts one sample per correlation
     /// time, and standard deviations of the law come from leaving out one block of time after the other, blocks of five correlation
-    /// times ([`block_length`](crate::covariance::block_length())). Default false.
+    /// times ([`block_length`](dynid_estimate::covariance::block_length())). Default false.
     pub series: bool,
     /// Confidence of intervals. Default 0.95.
     pub confidence: f64,

@@ -6,7 +6,9 @@ use super::levels::{mean, speed_levels, temperature_levels};
 use super::lines::{ThermalLine, line};
 use super::solve::{Rows, Solved, solve};
 use super::{SteadyError, SteadyPoint, SteadySettings};
-use crate::covariance::{BlockLengthSettings, BlockLengthStatus, MIN_BLOCKS, ResidualSignal, block_length};
+use dynid_estimate::covariance::{
+    BlockLengthSettings, BlockLengthStatus, MIN_BLOCKS, ResidualSignal, block_length,
+};
 
 /// Gain of AICc that a law with more coefficients must bring.
 const GAIN: f64 = 2.0;
@@ -108,8 +110,9 @@ pub fn analyse(points: &[SteadyPoint], settings: &SteadySettings) -> Result<Stea
         solved = solve(std::slice::from_ref(&rows), &form, &[], Some(block), settings)?;
     }
     let law = solved.laws[0].clone();
-    let quantile = crate::distribution::t_quantile(0.5 + 0.5 * settings.confidence, freedom.max(1) as f64)
-        .unwrap_or(f64::NAN);
+    let quantile =
+        dynid_estimate::distribution::t_quantile(0.5 + 0.5 * settings.confidence, freedom.max(1) as f64)
+            .unwrap_or(f64::NAN);
     let mut out = SteadyFriction {
         error,
         residuals: solved.residuals.concat(),

@@ -79,7 +79,7 @@ pub struct NearestDesign {
 /// are none, the fit gives way as little as possible, friction parameters held.
 ///
 /// Free directions are the null space of all rows `W`, `N_k`, `w` together. Bodies are the cone `m I >= Σh²`, so the
-/// program is convex. Its method is a barrier of its own: [`crate::consistent`] wants ten columns per body and meets
+/// program is convex. Its method is a barrier of its own: [`dynid_estimate::consistent`] wants ten columns per body and meets
 /// efforts up to the weight of its prior, while here the null space keeps them to rounding.
 ///
 /// # Errors

@@ -6,8 +6,8 @@ use super::SteadySettings;
 use super::form::LawForm;
 use super::law::{Coefficient, CurveError, FrictionLaw, ShapeScale, build, motion};
 use super::shared::{Part, Shared};
-use crate::linear::LinearEstimate;
-use crate::separable::{
+use dynid_estimate::linear::LinearEstimate;
+use dynid_estimate::separable::{
     Deviations, EffortBlock, EffortProblem, SeparableError, SeparableEstimate, SeparableProblem,
     SeparableSettings, Weighting, fit,
 };

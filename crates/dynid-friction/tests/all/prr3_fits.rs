@@ -4,7 +4,7 @@
 use crate::prr3_machine::{
     DESIGN, LEGS, TRUTH, base_matrix, bounds, circle, efforts, experiment, record, sampled, start,
 };
-use dynid_estimate::load_friction::{
+use dynid_friction::load_friction::{
     Design, DesignStatus, FitSettings, Model, PlanarBody, Problem, SignStatus, SquaredResiduals, fit_bounded,
     fit_separated, nearest_to_design,
 };
