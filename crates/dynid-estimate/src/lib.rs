@@ -9,8 +9,6 @@
 //! | every linear estimator through one call | [`linear::estimate`] |
 //! | rows spoilt by noise that a control loop feeds back | [`instruments`] |
 //! | shape parameters beside linear ones | [`separable`] |
-//! | clearance of a joint from its journal, or from the effort alone | [`clearance`] |
-//! | compliance of joints from encoders on both sides of their gears | [`deformation`] |
 //! | covariance that survives filtering | [`covariance`] |
 //! | held-out error over folds of blocks; several estimators on the same folds | [`folds`], [`held_out`] |
 //! | which parameters a model can do without | [`elimination`] |
@@ -24,11 +22,9 @@
 //! Notation: `W` is the regressor (rows × `p` columns), `y` the effort, `x` the parameters,
 //! `(R, z, ρ, N)` a factor. Results do not depend on the number of threads.
 
-pub mod clearance;
 pub mod conditioning;
 pub mod consistent;
 pub mod covariance;
-pub mod deformation;
 pub mod distribution;
 pub mod drive_gain;
 pub mod effort_objective;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use dynid_estimate::clearance::orbit::{self, OrbitSample, OrbitSettings};
-use dynid_estimate::clearance::swing::{self, SwingSettings};
+use dynid_clearance::orbit::{self, OrbitSample, OrbitSettings};
+use dynid_clearance::swing::{self, SwingSettings};
 use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, States};
 use dynid_io::columns::ChannelSpec;
 use dynid_io::{ClearanceSpec, MappingSpec};
@@ -31,8 +31,8 @@ pub struct Valued {
     pub std: f64,
 }
 
-impl From<dynid_estimate::clearance::Estimate> for Valued {
-    fn from(of: dynid_estimate::clearance::Estimate) -> Self {
+impl From<dynid_clearance::Estimate> for Valued {
+    fn from(of: dynid_clearance::Estimate) -> Self {
         Valued { value: of.value, std: of.std }
     }
 }

@@ -68,7 +68,8 @@ pub use dynid_sim as sim;
 
 /// Everything between rows and estimates, whichever room it is in.
 pub mod estimators {
-    pub use dynid_estimate::{clearance, deformation};
+    pub use dynid_clearance as clearance;
+    pub use dynid_clearance::deformation;
     pub use dynid_estimate::{conditioning, preflight};
     pub use dynid_estimate::{
         consistent, covariance, distribution, drive_gain, elimination, folds, held_out, identifiability,

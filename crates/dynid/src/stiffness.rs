@@ -8,8 +8,8 @@
 mod rows;
 mod stiff;
 
+use dynid_clearance::deformation::{Deformation, Evidence, Verdict, fit, judge};
 use dynid_estimate::conditioning::PreparedLog;
-use dynid_estimate::deformation::{Deformation, Evidence, Verdict, fit, judge};
 use dynid_model::{EffortModel, RobotModel};
 use serde::{Deserialize, Serialize};
 

@@ -1,15 +1,12 @@
 //! All tests of the crate from outside, in one program: each program would be linked against everything again.
 
 mod arm;
-mod backlash;
 mod blocks_and_choice;
 mod bootstrap;
 mod calibration;
-mod clearance;
 mod conditioned_rows;
 mod consistent_golden;
 mod consistent_random;
-mod deformation;
 mod determinism;
 mod double_double;
 mod er16;

@@ -1,7 +1,7 @@
 //! Sums of link and motor rows, and deformations, of all logs.
 
+use dynid_clearance::deformation::{DeformationRows, Rows, Settings, SumRows};
 use dynid_estimate::conditioning::PreparedLog;
-use dynid_estimate::deformation::{DeformationRows, Rows, Settings, SumRows};
 use dynid_model::{EffortModel, MotionBlock, RegressorBlock, RobotModel};
 use dynid_motion::SignalError;
 use dynid_motion::difference::central;

@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
-use dynid_estimate::clearance::{orbit, swing};
+use dynid_clearance::{orbit, swing};
 use dynid_model::contact::{
     ContactLaw, FractalLankaraniNikravesh, FractalSettings, FractalSurface, Hertz, HertzStiffness,
     JournalBearing, SurfaceSettings,

@@ -1,7 +1,7 @@
 //! Compliance of joints from encoders on both sides: `elastic_real_2r.json`, simulated arms, and fits that are no measurement.
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report; what was found is said")]
 
-use dynid_estimate::deformation::{
+use dynid_clearance::deformation::{
     Coefficients, Deformation, DeformationRows, Evidence, Fit, Rows, Settings, SumRows, Verdict, fit, judge,
 };
 use rand::{RngExt, SeedableRng};

@@ -3,7 +3,7 @@
 use dynid_motion::filter::{butterworth, forward_backward};
 
 use super::Path;
-use crate::whiteness::counted_autocorrelation;
+use dynid_estimate::whiteness::counted_autocorrelation;
 
 /// Memory of the noise model, s, and its longest in samples.
 const MEMORY: (f64, usize) = (0.06, 80);

@@ -1,7 +1,7 @@
 //! Weighted least squares by factors, and what single rows contribute to a parameter.
 
 use super::{DeformationError, Rows};
-use crate::linear::ols;
+use dynid_estimate::linear::ols;
 use dynid_factor::factor::{Factor, FactorBuilder};
 use dynid_linalg::triangular::gram_inverse;
 

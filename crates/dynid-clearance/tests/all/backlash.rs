@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 #![expect(clippy::print_stdout, reason = "says what was measured")]
 
-use dynid_estimate::clearance::backlash::{
+use dynid_clearance::backlash::{
     BacklashError, BacklashEstimate, BacklashSettings, BacklashSignals, BacklashVerdict, Path, estimate,
 };
 use dynid_motion::difference::central;
