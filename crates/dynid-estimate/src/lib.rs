@@ -1,11 +1,10 @@
 //! Estimators and statistics on triangular factors.
 //!
-//! A log enters through triangular factors [`Factor`], one per group of rows (a joint, or a joint of one log)
+//! A log enters through triangular factors [`Factor`](dynid_factor::Factor), one per group of rows (a joint, or a joint of one log)
 //! and time block. Everything quadratic then works on factors, never on samples:
 //!
 //! | question | module |
 //! |---|---|
-//! | from logs to rows: kernel, mask, delay | [`conditioning`] |
 //! | every linear estimator through one call | [`linear::estimate`] |
 //! | rows spoilt by noise that a control loop feeds back | [`instruments`] |
 //! | shape parameters beside linear ones | [`separable`] |
@@ -22,7 +21,6 @@
 //! Notation: `W` is the regressor (rows × `p` columns), `y` the effort, `x` the parameters,
 //! `(R, z, ρ, N)` a factor. Results do not depend on the number of threads.
 
-pub mod conditioning;
 pub mod consistent;
 pub mod covariance;
 pub mod distribution;
@@ -37,7 +35,6 @@ pub mod linear;
 pub mod log_deviations;
 pub mod metrics;
 pub mod online;
-pub mod preflight;
 pub mod separable;
 mod whitened;
 pub mod whiteness;

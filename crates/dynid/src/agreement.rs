@@ -3,11 +3,11 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use dynid_estimate::conditioning::{ConditioningSettings, Moving, PreparedLog, States, predict_along};
 use dynid_estimate::metrics::{Fit, FitSums};
 use dynid_model::EffortModel;
 use dynid_motion::filter::{butterworth, forward_backward};
 use dynid_motion::shift::shift;
+use dynid_rows::conditioning::{ConditioningSettings, Moving, PreparedLog, States, predict_along};
 
 use crate::Error;
 use crate::estimate::{FileFit, FitValues};

@@ -5,10 +5,10 @@ use std::path::Path;
 use dynid_clearance::backlash::{
     BacklashSettings, BacklashSignals, BacklashVerdict as Found, estimate as look_for,
 };
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, States};
 use dynid_io::MappingSpec;
 use dynid_model::{EffortModel, MotionBlock, RobotModel};
 use dynid_motion::filter::{anti_alias, pick};
+use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, States};
 use serde::Serialize;
 
 use crate::Error;

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use dynid_clearance::orbit::{self, OrbitSample, OrbitSettings};
 use dynid_clearance::swing::{self, SwingSettings};
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, States};
 use dynid_io::columns::ChannelSpec;
 use dynid_io::{ClearanceSpec, MappingSpec};
 use dynid_model::{EffortModel, JournalPath, MotionBlock, RobotModel};
+use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, States};
 use serde::Serialize;
 
 use crate::Error;

@@ -27,8 +27,8 @@ pub(crate) use per_joint::known;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use dynid_estimate::conditioning::{ConditioningSettings, TextbookRoute};
 use dynid_io::{CouplingForm, MappingSpec};
+use dynid_rows::conditioning::{ConditioningSettings, TextbookRoute};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 

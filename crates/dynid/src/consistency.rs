@@ -1,6 +1,5 @@
 //! Physically consistent standard parameters of a robot, and what consistency costs.
 
-use dynid_estimate::conditioning::ReducedGroup;
 use dynid_estimate::consistent::{
     Bound, ConsistentEstimate, Form, LinkPrior, Problem, ScalarPrior, Settings, estimate,
 };
@@ -11,6 +10,7 @@ use dynid_estimate::linear::ols;
 use dynid_factor::Factor;
 use dynid_linalg::Mat;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
+use dynid_rows::conditioning::ReducedGroup;
 
 use crate::Error;
 use crate::config::{Config, Consistency, PriorDistance};

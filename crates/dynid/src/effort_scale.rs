@@ -5,8 +5,8 @@
 
 use std::collections::BTreeMap;
 
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, predict};
 use dynid_model::{EffortModel, MotionBlock, RegressorBlock, RobotModel};
+use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, predict};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;

@@ -13,7 +13,6 @@ pub use pairs::AlikeElements;
 
 use std::sync::Arc;
 
-use dynid_estimate::conditioning::{FrictionShape, ShapeKind};
 use dynid_io::{
     CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, SettingValue, SourceFile,
 };
@@ -24,6 +23,7 @@ use dynid_model::element::{
     ViscousMagnitude,
 };
 use dynid_model::{Coordinate, JointKind, Mechanism};
+use dynid_rows::conditioning::{FrictionShape, ShapeKind};
 
 use crate::Error;
 use crate::friction::KnownFriction;

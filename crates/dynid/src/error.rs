@@ -138,7 +138,7 @@ pub enum Error {
     },
     /// A log cannot be conditioned.
     #[error(transparent)]
-    Conditioning(#[from] dynid_estimate::conditioning::ConditioningError),
+    Conditioning(#[from] dynid_rows::conditioning::ConditioningError),
     /// The pre-flight found a log of which nonsense would come.
     #[error(
         "{}: {}{}: {}",
@@ -160,7 +160,7 @@ pub enum Error {
     },
     /// A log cannot be examined.
     #[error(transparent)]
-    Preflight(#[from] dynid_estimate::preflight::PreflightError),
+    Preflight(#[from] dynid_rows::preflight::PreflightError),
     /// An element name is unknown.
     #[error("unknown element `{name}` for joint `{joint}`, expected one of {}", crate::elements::NAMES.join(", "))]
     UnknownElement {
@@ -238,7 +238,7 @@ pub enum Error {
     Linear(#[from] dynid_estimate::linear::LinearError),
     /// Shape parameters cannot be found.
     #[error("shape parameters: {0}")]
-    Shapes(#[from] dynid_estimate::conditioning::RefineError),
+    Shapes(#[from] dynid_rows::conditioning::RefineError),
     /// No physically consistent parameters meet the bounds.
     #[error("consistent estimate: {0}")]
     Consistency(#[from] dynid_estimate::consistent::ProblemError),
@@ -363,12 +363,12 @@ impl Error {
 
     /// What a user can do about it.
     pub fn hint(&self) -> Option<String> {
-        use dynid_estimate::conditioning::ConditioningError as C;
         use dynid_estimate::consistent::ProblemError as P;
         use dynid_estimate::linear::LinearError as L;
         use dynid_model::MechanismError as M;
         use dynid_model::closed::{ClosedError as Loops, PoseError as Pose};
         use dynid_model::element::is_temperature;
+        use dynid_rows::conditioning::ConditioningError as C;
         match self {
             Error::RobotFile(e) => e.hint(),
             Error::LogFile(e) => e.hint(),

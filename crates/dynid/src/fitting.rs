@@ -1,8 +1,5 @@
 //! The linear fit of a run: method, weights, covariance.
 
-use dynid_estimate::conditioning::{
-    Conditioning, ConditioningSettings, LogRows, PreparedLog, ReducedGroup, textbook_rows,
-};
 use dynid_estimate::covariance::{
     BlockLength, BlockLengthSettings, MIN_BLOCKS, ResidualSignal, block_length, output_inflation,
     variance_inflation,
@@ -16,6 +13,9 @@ use dynid_factor::Factor;
 use dynid_factor::rows::{GroupResiduals, RowSource, reduce_rows, row_residuals};
 use dynid_linalg::Mat;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
+use dynid_rows::conditioning::{
+    Conditioning, ConditioningSettings, LogRows, PreparedLog, ReducedGroup, textbook_rows,
+};
 
 use crate::Error;
 use crate::agreement::Agreement;
@@ -234,7 +234,7 @@ pub(crate) fn with_precision(
 
 pub(crate) fn conditioning_fault(source: &dyn RowSource, e: dynid_factor::rows::RowsError) -> Error {
     let output = source.groups()[e.group].output;
-    Error::Conditioning(dynid_estimate::conditioning::ConditioningError::Rows { output, source: e.source })
+    Error::Conditioning(dynid_rows::conditioning::ConditioningError::Rows { output, source: e.source })
 }
 
 /// The linear estimator that a run asks for.

@@ -1,10 +1,8 @@
 //! Friction that takes energy out of the motion, as rows of the consistent estimate.
 
-use dynid_estimate::conditioning::{
-    ConditioningSettings, JointFriction, Moving, PreparedLog, ShapeKind, States,
-};
 use dynid_estimate::consistent::Bound;
 use dynid_model::{EffortModel, MotionBlock, Output, RobotModel};
+use dynid_rows::conditioning::{ConditioningSettings, JointFriction, Moving, PreparedLog, ShapeKind, States};
 
 use crate::Error;
 use crate::elements::ElementPlan;

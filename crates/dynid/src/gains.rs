@@ -4,7 +4,6 @@ mod record;
 
 pub use record::{GainsFile, JointGain};
 
-use dynid_estimate::conditioning::{LogRows, condition};
 use dynid_estimate::drive_gain::{LoadColumn, load_column};
 use dynid_estimate::linear::LinearMethod;
 use dynid_factor::Factor;
@@ -12,6 +11,7 @@ use dynid_model::element::{JointElement, KnownLoad, Payload};
 use dynid_model::{
     BaseParameters, BaseSettings, EffortModel, Inertia, Mat3, Output, PerOutput, RobotModel, Vec3,
 };
+use dynid_rows::conditioning::{LogRows, condition};
 
 use crate::Error;
 use crate::config::{Config, Own, PayloadConfig, Route};

@@ -12,9 +12,6 @@ mod own_scale;
 mod shapes;
 mod structure;
 
-use dynid_estimate::conditioning::{
-    Conditioning, ConditioningSettings, JointFriction, PreparedLog, ReducedGroup, Stage, predict,
-};
 use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
 use dynid_estimate::linear::LinearEstimate;
 use dynid_estimate::whiteness::InBandWhiteness;
@@ -23,6 +20,9 @@ use dynid_io::{ReadingNote, TrajectoryFile};
 use dynid_model::element::scale_name;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
 use dynid_motion::Log;
+use dynid_rows::conditioning::{
+    Conditioning, ConditioningSettings, JointFriction, PreparedLog, ReducedGroup, Stage, predict,
+};
 
 use crate::Error;
 use crate::agreement::{self, Agreement, Alignment};

@@ -70,7 +70,6 @@ pub use dynid_sim as sim;
 pub mod estimators {
     pub use dynid_clearance as clearance;
     pub use dynid_clearance::deformation;
-    pub use dynid_estimate::{conditioning, preflight};
     pub use dynid_estimate::{
         consistent, covariance, distribution, drive_gain, elimination, folds, held_out, identifiability,
         instruments, linear, log_deviations, metrics, online, separable, whiteness,
@@ -78,6 +77,7 @@ pub mod estimators {
     pub use dynid_factor::{Factor, FactorBuilder, FactorError, factor, groups, rank, rows};
     pub use dynid_friction::{cyclic, load_friction, steady_friction};
     pub use dynid_linalg::Mat;
+    pub use dynid_rows::{conditioning, preflight};
 
     /// Searches that need values only, and the misfit of an effort model as what they minimise.
     pub mod search {

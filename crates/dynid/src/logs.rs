@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, prepare};
 use dynid_io::{ColumnMapping, MappingSpec, ReadingNote, Signals, SourceFile};
 use dynid_model::element::{is_temperature, temperature_channel};
 use dynid_model::{EffortModel, Limits, RobotModel};
 use dynid_motion::temperature::{self, TemperatureDoubt};
 use dynid_motion::{Channel, JointSignals, Log};
+use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, prepare};
 use sha2::{Digest, Sha256};
 
 mod axes;

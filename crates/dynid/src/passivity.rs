@@ -1,7 +1,7 @@
 //! Whether the identified friction takes energy out of the motion.
 
-use dynid_estimate::conditioning::PreparedLog;
 use dynid_model::{EffortModel, FrictionPassivity, Passivity};
+use dynid_rows::conditioning::PreparedLog;
 
 use crate::caution::{self, Caution};
 use crate::elements::friction;

@@ -1,12 +1,12 @@
 //! Shape parameters of a run: found by separable least squares, then linearised, so that the final fit, its covariance and
 //! all that follows know of them.
 
-use dynid_estimate::conditioning::{Conditioning, ConditioningSettings, PreparedLog, refine};
 use dynid_estimate::separable::{
     Bound, SeparableEstimate, SeparableSettings, ShapeFinding, ShapeVerdict, StartReport,
 };
 use dynid_model::element::{JointElement, Linearised, change_name};
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
+use dynid_rows::conditioning::{Conditioning, ConditioningSettings, PreparedLog, refine};
 
 use crate::Error;
 use crate::config::Config;

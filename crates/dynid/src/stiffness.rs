@@ -9,8 +9,8 @@ mod rows;
 mod stiff;
 
 use dynid_clearance::deformation::{Deformation, Evidence, Verdict, fit, judge};
-use dynid_estimate::conditioning::PreparedLog;
 use dynid_model::{EffortModel, RobotModel};
+use dynid_rows::conditioning::PreparedLog;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use stiff::{stiff_config, stiff_robot};

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use dynid_estimate::conditioning::ConditioningSettings;
 use dynid_io::MappingSpec;
 use dynid_model::EffortModel;
+use dynid_rows::conditioning::ConditioningSettings;
 
 use crate::Error;
 use crate::agreement::{Agreement, Alignment, compare};

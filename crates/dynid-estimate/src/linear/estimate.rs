@@ -12,9 +12,8 @@ use dynid_factor::rows::{MemoryRows, RowSource};
 
 /// Estimates the parameters of all `total` columns.
 ///
-/// `groups`: factors of all groups and time blocks, from [`crate::conditioning::reduce`] or
-/// [`dynid_factor::rows::reduce_rows`]; `rows`: the same groups' rows, needed by robust losses only
-/// ([`LinearMethod::needs_rows`]) and kept in memory where [`super::IrlsSettings::memory`] allows.
+/// `groups`: factors of all groups and time blocks, from [`reduce_rows`](dynid_factor::rows::reduce_rows); `rows`: the same
+/// groups' rows, needed by robust losses only ([`LinearMethod::needs_rows`]) and kept in memory where [`super::IrlsSettings::memory`] allows.
 ///
 /// Rank deficiency and the iteration limit are statuses of the estimate.
 ///

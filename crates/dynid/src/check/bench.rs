@@ -1,14 +1,14 @@
 //! What it takes a model to find: whose columns these are, the direction of gravity, excitation.
 
 use dynid_estimate::consistent::Problem;
-use dynid_estimate::preflight::{
-    Excitation, Found, GaussianPrior, PreflightError, Rewiring, Samples, Tilt, Trial, Wiring, WiringSearch,
-    excitation, tilt,
-};
 use dynid_factor::Factor;
 use dynid_io::columns::degrees_suspected;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, Mechanism, RobotModel};
 use dynid_motion::{JointSignals, Log, UniformLog};
+use dynid_rows::preflight::{
+    Excitation, Found, GaussianPrior, PreflightError, Rewiring, Samples, Tilt, Trial, Wiring, WiringSearch,
+    excitation, tilt,
+};
 
 use super::columns::Velocities;
 use super::finding::{FindingId, Findings, Fix, Severity};

@@ -1,8 +1,8 @@
 //! Columns that are not what the log says they are.
 
-use dynid_estimate::preflight::{Found, Rewiring, Wiring, WiringSearch};
 use dynid_motion::UniformLog;
 use dynid_motion::velocity::compare;
+use dynid_rows::preflight::{Found, Rewiring, Wiring, WiringSearch};
 
 use super::finding::{FindingId, Findings, Fix, Severity};
 

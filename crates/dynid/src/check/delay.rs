@@ -1,7 +1,7 @@
 //! Delay between effort and motion, by the estimator of identification.
 
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, condition};
 use dynid_motion::shift::shift;
+use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, condition};
 
 use super::bench::Bench;
 use super::finding::{FindingId, Findings, Fix, Severity};

@@ -144,7 +144,7 @@ pub(super) enum Fix {
     /// Columns stand for other joints, or have other factors: per joint, whose position and effort it is, with a factor.
     Wiring {
         /// What stands for what.
-        wiring: dynid_estimate::preflight::Wiring,
+        wiring: dynid_rows::preflight::Wiring,
         /// Whether velocities go with positions.
         velocities: bool,
     },

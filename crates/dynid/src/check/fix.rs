@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use dynid_estimate::preflight::Wiring;
 use dynid_io::columns::{ColumnUse, TimeSource};
 use dynid_io::{ColumnMapping, MappingSpec};
+use dynid_rows::preflight::Wiring;
 use toml::{Table, Value};
 
 use super::finding::Fix;

@@ -1,10 +1,8 @@
 //! Whether efforts have the size that a robot like this one asks for. No log tells the unit of all efforts together: bodies of any
 //! mass move alike. The robot file, effort limits and the arms that exist do.
 
-use dynid_estimate::preflight::{
-    AgainstStated, GaussianPrior, Trial, Wiring, against_stated, efforts_at_rest,
-};
 use dynid_model::{EffortModel, Mechanism};
+use dynid_rows::preflight::{AgainstStated, GaussianPrior, Trial, Wiring, against_stated, efforts_at_rest};
 
 use super::bench::Bench;
 use super::finding::{FindingId, Findings, Fix, Severity};

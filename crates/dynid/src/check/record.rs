@@ -104,15 +104,15 @@ pub(super) fn examine(
     let within = far(log, rows, out);
     let log = within.as_ref().unwrap_or(log);
     outlying(log, rows, out);
-    let mut on_grid = uniform(log, &ClockSettings::default())
-        .map_err(dynid_estimate::conditioning::ConditioningError::from)?;
+    let mut on_grid =
+        uniform(log, &ClockSettings::default()).map_err(dynid_rows::conditioning::ConditioningError::from)?;
     clock(&on_grid.report, rows, out);
     for joint in &mut on_grid.joints {
         let name = joint.name.clone();
         let position = spikes::remove(&mut joint.position, &SpikeSettings::position());
         let effort = spikes::remove(&mut joint.effort, &SpikeSettings::default());
         for (what, found) in [("position", position), ("effort", effort)] {
-            let found = found.map_err(dynid_estimate::conditioning::ConditioningError::from)?;
+            let found = found.map_err(dynid_rows::conditioning::ConditioningError::from)?;
             let count = found.flagged.len();
             // Of a joint at rest the flicker of its last digit stands out; single positions are found above.
             if count == 0 || what == "position" {

@@ -11,9 +11,9 @@ mod report;
 
 use std::time::Instant;
 
-use dynid_estimate::conditioning::{Conditioning, ConditioningSettings, PreparedLog};
 use dynid_model::{EffortModel, RobotModel};
 use dynid_motion::mask::edges;
+use dynid_rows::conditioning::{Conditioning, ConditioningSettings, PreparedLog};
 
 use crate::Error;
 use crate::agreement::{Alignment, compare as against};

@@ -1,7 +1,7 @@
 //! The table of a comparison.
 
-use dynid_estimate::conditioning::Conditioning;
 use dynid_model::EffortModel;
+use dynid_rows::conditioning::Conditioning;
 use serde::Serialize;
 
 use super::estimators::Contestant;

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use dynid_estimate::conditioning::{PreparedLog, predict};
 use dynid_io::mjcf::JointParameters;
 use dynid_model::{EffortModel, RobotModel};
+use dynid_rows::conditioning::{PreparedLog, predict};
 
 use super::joints::{self, Format};
 use super::{CheckStates, FrictionProjection, projection, read_back};

@@ -1,7 +1,7 @@
 //! Doubts about motions of elastic joints.
 
-use dynid_estimate::conditioning::PreparedLog;
 use dynid_model::{EffortModel, MotionBlock, RobotModel};
+use dynid_rows::conditioning::PreparedLog;
 
 use crate::caution::{self, Caution};
 use crate::result::short_name;

@@ -1,7 +1,7 @@
 //! Figures of a fit, output by output.
 
-use dynid_estimate::conditioning::{Conditioning, PreparedLog, ReducedGroup};
 use dynid_estimate::linear::LinearEstimate;
+use dynid_rows::conditioning::{Conditioning, PreparedLog, ReducedGroup};
 
 use crate::advice::FitRows;
 use crate::agreement::Agreement;

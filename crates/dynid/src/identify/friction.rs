@@ -1,11 +1,11 @@
 //! Friction shapes found beside the elements of a plan.
 
-use dynid_estimate::conditioning::{
+use dynid_estimate::separable::ShapeVerdict;
+use dynid_model::{EffortModel, RobotModel};
+use dynid_rows::conditioning::{
     BasePrior, Conditioning, ConditioningSettings, FrictionChoice, JointFriction, PreparedLog, ShapeKind,
     ShapeTrial, Stage, choose_friction,
 };
-use dynid_estimate::separable::ShapeVerdict;
-use dynid_model::{EffortModel, RobotModel};
 
 use super::structure::Structure;
 use crate::Error;

@@ -1,8 +1,8 @@
 //! Doubts about known friction.
 
-use dynid_estimate::conditioning::PreparedLog;
 use dynid_model::Mechanism;
 use dynid_model::element::temperature_channel;
+use dynid_rows::conditioning::PreparedLog;
 
 use crate::caution::{self, Caution};
 use crate::elements::ElementPlan;

@@ -1,9 +1,9 @@
 //! From a model and conditioned logs to values: shapes, linear fit, covariance, bodies that can exist.
 
-use dynid_estimate::conditioning::{
+use dynid_model::{EffortModel, RobotModel};
+use dynid_rows::conditioning::{
     Conditioning, ConditioningSettings, JointFriction, PreparedLog, ReducedGroup,
 };
-use dynid_model::{EffortModel, RobotModel};
 
 use super::Step;
 use super::shapes::{self, Shaped};

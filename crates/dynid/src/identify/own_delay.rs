@@ -1,8 +1,8 @@
 //! Delays of single logs, taken off before anything else is chosen.
 
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, condition};
 use dynid_model::{BaseParameters, RobotModel};
 use dynid_motion::shift;
+use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, condition};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;

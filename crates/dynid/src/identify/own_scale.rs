@@ -1,11 +1,9 @@
 //! Conditioning of logs of which some have a factor of their own on friction.
 
-use dynid_estimate::conditioning::{
-    Conditioning, ConditioningSettings, PreparedLog, Stage, condition, refine,
-};
 use dynid_estimate::separable::SeparableSettings;
 use dynid_model::element::scale_name;
 use dynid_model::{EffortModel, RobotModel};
+use dynid_rows::conditioning::{Conditioning, ConditioningSettings, PreparedLog, Stage, condition, refine};
 
 use super::structure::Structure;
 use crate::Error;

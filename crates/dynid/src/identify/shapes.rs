@@ -1,7 +1,7 @@
 //! From chosen friction and shape parameters to the linear model that is fitted.
 
-use dynid_estimate::conditioning::{Conditioning, ConditioningSettings, JointFriction, PreparedLog};
 use dynid_model::{EffortModel, RobotModel};
+use dynid_rows::conditioning::{Conditioning, ConditioningSettings, JointFriction, PreparedLog};
 
 use super::structure::Structure;
 use super::{Step, friction};

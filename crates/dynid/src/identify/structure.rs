@@ -1,11 +1,11 @@
 //! What is known of a model before its fit: base parameters, prior, bounds, estimator.
 
-use dynid_estimate::conditioning::PreparedLog;
 use dynid_estimate::consistent::Bound;
 use dynid_estimate::identifiability::VisibleSpace;
 use dynid_estimate::linear::LinearMethod;
 use dynid_linalg::Mat;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
+use dynid_rows::conditioning::PreparedLog;
 
 use crate::config::Config;
 use crate::elements::ElementPlan;

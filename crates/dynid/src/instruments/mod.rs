@@ -17,7 +17,6 @@ mod simulation;
 
 use std::cell::RefCell;
 
-use dynid_estimate::conditioning::{Conditioning, ConditioningSettings, PreparedLog, ReducedGroup};
 use dynid_estimate::identifiability::VisibleSpace;
 use dynid_estimate::instruments::{
     Exogeneity, ExogeneitySettings, InstrumentSettings, Iteration, IterationEnd, Simulated, Strength,
@@ -25,6 +24,7 @@ use dynid_estimate::instruments::{
 };
 use dynid_estimate::linear::{LinearEstimate, LinearMethod, estimate};
 use dynid_model::{BaseParameters, RobotModel};
+use dynid_rows::conditioning::{Conditioning, ConditioningSettings, PreparedLog, ReducedGroup};
 
 use crate::Error;
 use crate::config::{Config, Method};

@@ -1,9 +1,9 @@
 //! What the controller of a recorded motion wanted.
 
-use dynid_estimate::conditioning::PreparedLog;
 use dynid_io::TrajectoryFile;
 use dynid_model::RobotModel;
 use dynid_motion::trajectory::{Point, Sequence, Trajectory};
+use dynid_rows::conditioning::PreparedLog;
 use dynid_sim::Wanted;
 
 use crate::Error;

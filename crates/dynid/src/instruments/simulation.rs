@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use dynid_estimate::conditioning::{LogRows, paired_textbook_rows};
 use dynid_estimate::consistent::{Form, Settings, estimate};
 use dynid_estimate::instruments::Simulated;
 use dynid_factor::Factor;
@@ -10,6 +9,7 @@ use dynid_factor::groups::ReducedGroup;
 use dynid_factor::rows::{RowSource, reduce_rows};
 use dynid_linalg::Mat;
 use dynid_model::{EffortModel, RobotModel};
+use dynid_rows::conditioning::{LogRows, paired_textbook_rows};
 use dynid_sim::{ControlSettings, ExperimentSettings, Imperfections, Plant, Profile, SimError, Wanted, run};
 
 use super::Parts;

@@ -3,9 +3,6 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use dynid_estimate::conditioning::{
-    ConditioningError, LiveRow, LiveRowSettings, LiveRows, PreparedLog, States, condition, prepare,
-};
 use dynid_estimate::consistent::Bound;
 use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate};
 use dynid_factor::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
@@ -13,6 +10,9 @@ use dynid_linalg::Mat;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
 use dynid_motion::live::{LiveGrid, LiveSettings};
 use dynid_motion::{Channel, JointSignals, Log};
+use dynid_rows::conditioning::{
+    ConditioningError, LiveRow, LiveRowSettings, LiveRows, PreparedLog, States, condition, prepare,
+};
 
 use super::samples::Sample;
 use super::usual::Innovations;

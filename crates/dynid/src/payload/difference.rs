@@ -1,9 +1,9 @@
 //! The plain difference of two fits, with and without a payload.
 
-use dynid_estimate::conditioning::ReducedGroup;
 use dynid_estimate::linear::{LinearEstimate, LinearMethod, LinearSettings, estimate, explain_difference};
 use dynid_linalg::Mat;
 use dynid_model::Inertia;
+use dynid_rows::conditioning::ReducedGroup;
 use serde::{Deserialize, Serialize};
 
 use super::body::about_com;

@@ -1,7 +1,7 @@
 //! Friction shapes in words and records.
 
-use dynid_estimate::conditioning::{JointFriction, ShapeTrial};
 use dynid_model::EffortModel;
+use dynid_rows::conditioning::{JointFriction, ShapeTrial};
 
 use crate::elements::shape_element;
 use crate::estimate::FrictionTrial;

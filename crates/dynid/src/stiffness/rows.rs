@@ -1,7 +1,6 @@
 //! Sums of link and motor rows, and deformations, of all logs.
 
 use dynid_clearance::deformation::{DeformationRows, Rows, Settings, SumRows};
-use dynid_estimate::conditioning::PreparedLog;
 use dynid_model::{EffortModel, MotionBlock, RegressorBlock, RobotModel};
 use dynid_motion::SignalError;
 use dynid_motion::difference::central;
@@ -9,6 +8,7 @@ use dynid_motion::filter::{butterworth, forward_backward};
 use dynid_motion::mask::{self, dilate, near_reversal};
 use dynid_motion::shift::shift;
 use dynid_motion::signal::rms;
+use dynid_rows::conditioning::PreparedLog;
 
 use super::Spring;
 use crate::Error;

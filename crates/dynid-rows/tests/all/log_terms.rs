@@ -2,12 +2,12 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
-use dynid_estimate::conditioning::ReducedGroup;
 use dynid_estimate::drive_gain::load_column;
 use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate, explain_difference, ols};
 use dynid_estimate::log_deviations::{OwnColumn, log_deviations};
 use dynid_factor::{Factor, FactorBuilder};
 use dynid_linalg::Mat;
+use dynid_rows::conditioning::ReducedGroup;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::log_rows::LogRows;
 use super::reduce::unusable_row;
 use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog};
-use crate::separable::{
+use dynid_estimate::separable::{
     OutputPlaces, RowGroup, SeparableError, SeparableEstimate, SeparableProblem, SeparableSettings,
     ShapedColumns, fit, places,
 };

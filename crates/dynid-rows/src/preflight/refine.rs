@@ -8,7 +8,7 @@ use super::samples::{BLOCKS, Samples};
 use super::stated::fit;
 use super::wiring::Wiring;
 use crate::conditioning::KeptColumns;
-use crate::linear::ols;
+use dynid_estimate::linear::ols;
 use dynid_factor::factor::Factor;
 
 /// Gauss-Newton steps.

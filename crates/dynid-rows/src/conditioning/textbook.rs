@@ -8,7 +8,7 @@ use super::reduce::unusable_row;
 use super::rows::KeptColumns;
 use super::states::States;
 use super::{ConditioningError, ConditioningSettings, PreparedLog};
-use crate::instruments::paired_columns;
+use dynid_estimate::instruments::paired_columns;
 use dynid_factor::groups::ReducedGroup;
 use dynid_factor::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
 

@@ -12,7 +12,7 @@ use super::rows::TrialRows;
 use super::samples::Samples;
 use super::wiring::{Rewiring, Wiring};
 use super::{PreflightError, hypotheses};
-use crate::consistent::{Problem, Settings, estimate};
+use dynid_estimate::consistent::{Problem, Settings, estimate};
 use dynid_factor::factor::{Factor, FactorError};
 
 /// A position beyond this is suspected to be in degrees, rad: a little over a turn.

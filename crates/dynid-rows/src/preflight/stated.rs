@@ -7,7 +7,7 @@ use super::rows::{deviation, reduce, regressor};
 use super::samples::Samples;
 use super::wiring::Wiring;
 use crate::conditioning::KeptColumns;
-use crate::linear::{LinearSolution, ols};
+use dynid_estimate::linear::{LinearSolution, ols};
 use dynid_factor::factor::Factor;
 
 /// Efforts of a joint against those that stated inertias ask for.

@@ -5,12 +5,12 @@
 use std::sync::Arc;
 
 use crate::arm::{JOINTS, RATE_HZ, model, motion};
-use dynid_estimate::conditioning::{LiveRow, LiveRowSettings, LiveRows};
 use dynid_factor::Factor;
 use dynid_factor::FactorBuilder;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, MotionBlock, RegressorBlock};
 use dynid_motion::live::LiveSettings;
 use dynid_motion::words::Transfer;
+use dynid_rows::conditioning::{LiveRow, LiveRowSettings, LiveRows};
 
 struct Stream {
     rows: LiveRows,

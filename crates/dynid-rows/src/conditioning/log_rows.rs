@@ -6,7 +6,7 @@ use dynid_motion::{Kernel, shift};
 use super::rows::{KeptColumns, Kernels, Pass, RowBatch, RowConsumer, masks};
 use super::states::{Masks, States};
 use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog};
-use crate::instruments::paired_columns;
+use dynid_estimate::instruments::paired_columns;
 use dynid_factor::rows::{GroupShape, RowSource, RowVisitor, Rows, RowsError};
 
 /// Most time blocks per log ...
@@ -96,10 +96,10 @@ impl<'a> LogRows<'a> {
     }
 
     /// Rows of logs paired with instruments, `[Z | W | y]`: `Z` is the regressor of another motion on the logs' grids, through the
-    /// state filter, kernels, masks and centres of the measured one (see [`crate::instruments`]).
+    /// state filter, kernels, masks and centres of the measured one (see [`dynid_estimate::instruments`]).
     ///
     /// `motions`: one per log, per output its positions at the log's samples, rad or m. Columns of the groups are those of
-    /// [`crate::instruments::paired_columns`] for all base columns; `settings` as in [`LogRows::new`].
+    /// [`dynid_estimate::instruments::paired_columns`] for all base columns; `settings` as in [`LogRows::new`].
     ///
     /// # Errors
     /// [`ConditioningError::Signal`] for a position that is not finite.

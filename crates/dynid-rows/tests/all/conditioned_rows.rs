@@ -2,15 +2,15 @@
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use crate::arm::{self, Arm, JOINTS, RATE_HZ, model, motion};
-use dynid_estimate::conditioning::{
-    Conditioning, ConditioningSettings, LogRows, PreparedLog, ReducedGroup, TextbookRoute, condition,
-    paired_textbook_rows, prepare, reduce, reduce_textbook, textbook_rows,
-};
 use dynid_estimate::instruments::measured;
 use dynid_estimate::linear::{IrlsSettings, LinearMethod, LinearSettings, estimate};
 use dynid_factor::rows::{MemoryRows, RowSource, reduce_rows};
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RegressorBlock, RobotModel};
 use dynid_motion::{JointSignals, Log};
+use dynid_rows::conditioning::{
+    Conditioning, ConditioningSettings, LogRows, PreparedLog, ReducedGroup, TextbookRoute, condition,
+    paired_textbook_rows, prepare, reduce, reduce_textbook, textbook_rows,
+};
 
 struct Case {
     model: RobotModel,

@@ -2,12 +2,12 @@
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use crate::arm::{self, JOINTS, NOISE, RATE_HZ, model, motion};
-use dynid_estimate::conditioning::{
+use dynid_model::{BaseParameters, BaseSettings, EffortModel, MotionBlock, RegressorBlock, RobotModel};
+use dynid_motion::{JointSignals, Log};
+use dynid_rows::conditioning::{
     Conditioning, ConditioningSettings, FrictionChoice, PreparedLog, ShapeKind, choose_friction, condition,
     prepare,
 };
-use dynid_model::{BaseParameters, BaseSettings, EffortModel, MotionBlock, RegressorBlock, RobotModel};
-use dynid_motion::{JointSignals, Log};
 
 const ALL: [ShapeKind; 4] =
     [ShapeKind::ViscousMagnitude, ShapeKind::Stribeck, ShapeKind::Tanh, ShapeKind::Load];

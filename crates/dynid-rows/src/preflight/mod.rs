@@ -2,7 +2,7 @@
 //!
 //! [`Trial::search`]: which column is whose, with which sign, unit and zero, by which clock, at which time, under which gravity
 //! ([`Wiring`]). Every hypothesis is judged by how well bodies that can exist, with friction that takes energy, explain the
-//! efforts ([`crate::consistent`]): a flipped sign asks for negative friction and mass, exchanged columns for motions that the
+//! efforts ([`dynid_estimate::consistent`]): a flipped sign asks for negative friction and mass, exchanged columns for motions that the
 //! effort does not follow. [`tilt()`] and [`excitation()`] examine what the columns then say.
 
 mod excitation;

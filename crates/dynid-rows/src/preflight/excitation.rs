@@ -6,7 +6,7 @@ use super::PreflightError;
 use super::rows::TrialRows;
 use super::samples::Samples;
 use super::wiring::Wiring;
-use crate::linear::ols;
+use dynid_estimate::linear::ols;
 
 /// Condition number from which on a regressor counts as singular.
 const SINGULAR: f64 = 1e12;

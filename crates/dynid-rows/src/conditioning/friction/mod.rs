@@ -13,7 +13,7 @@ use faer::{Mat, Side};
 use super::states::States;
 use super::trial::{Trial, TrialShapes, state_hz_of};
 use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog, Stage, choose};
-use crate::linear::{LinearMethod, LinearSettings, estimate};
+use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate};
 use search::Search;
 
 /// When a friction shape is accepted.

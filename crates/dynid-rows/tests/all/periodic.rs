@@ -2,9 +2,9 @@
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use crate::arm::{JOINTS, RATE_HZ, model};
-use dynid_estimate::conditioning::{ConditioningError, ConditioningSettings, PreparedLog, States, prepare};
 use dynid_motion::trajectory::{Fourier, Point};
 use dynid_motion::{JointSignals, Log};
+use dynid_rows::conditioning::{ConditioningError, ConditioningSettings, PreparedLog, States, prepare};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
