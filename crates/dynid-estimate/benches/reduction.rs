@@ -5,9 +5,10 @@
 
 use divan::{Bencher, black_box};
 use dynid_estimate::covariance::jackknife;
-use dynid_estimate::factor::ExtendedBuilder;
 use dynid_estimate::linear::ols;
-use dynid_estimate::{Factor, FactorBuilder, Mat};
+use dynid_factor::factor::ExtendedBuilder;
+use dynid_factor::{Factor, FactorBuilder};
+use dynid_linalg::Mat;
 use faer::Par;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};

@@ -16,8 +16,9 @@ use std::error::Error;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use dynid_estimate::search::{Algorithm, Bounds, EffortLoss, Objective, PointObjective, Settings, run};
+use dynid_estimate::effort_objective::EffortLoss;
 use dynid_model::{EffortModel, RegressorBlock};
+use dynid_search::{Algorithm, Bounds, Objective, PointObjective, Settings, run};
 use er16::{Er16, Motion};
 use serde_json::json;
 

@@ -4,9 +4,9 @@
 //! exact columns, `i = W (x/g) + w_L (1/g)`. Moving it to the regressor, `w_L = g i - W x`, brings its noise there and pulls
 //! `g` towards zero.
 
-use crate::factor::Factor;
 use crate::linear::{TlsNoise, ols, tls};
-use crate::rank::numerical_rank;
+use dynid_factor::factor::Factor;
+use dynid_factor::rank::numerical_rank;
 
 /// What the rows of one drive say about its load column.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,9 +4,9 @@ mod prune;
 
 pub use prune::{PruneSettings, PruneStep, Pruning, prune};
 
-use crate::factor::Factor;
 use crate::folds::HeldOutError;
 use crate::linear::{LinearSolution, ols};
+use dynid_factor::factor::Factor;
 
 /// One model on the path of [`backward_elimination`].
 #[derive(Debug, Clone, PartialEq)]

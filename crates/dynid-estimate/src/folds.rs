@@ -1,6 +1,6 @@
 //! Held-out error over contiguous folds of time blocks.
 
-use crate::factor::Factor;
+use dynid_factor::factor::Factor;
 use rayon::prelude::*;
 use std::ops::Range;
 

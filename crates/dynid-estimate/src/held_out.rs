@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::factor::Factor;
 use crate::folds::{FoldSettings, contiguous_folds};
-use crate::groups::{ReducedGroup, time_blocks};
+use dynid_factor::factor::Factor;
+use dynid_factor::groups::{ReducedGroup, time_blocks};
 
 /// An estimator of all base parameters from the weighted factor of the training blocks.
 pub type Estimator<'a> = dyn Fn(&Factor) -> Vec<f64> + Sync + 'a;

@@ -1,21 +1,13 @@
 //! Estimators and statistics on triangular factors.
 //!
-//! A log enters through triangular factors [`Factor`], one per group of rows (a joint, or a joint of one log)
+//! A log enters through triangular factors [`Factor`](dynid_factor::Factor), one per group of rows (a joint, or a joint of one log)
 //! and time block. Everything quadratic then works on factors, never on samples:
 //!
 //! | question | module |
 //! |---|---|
-//! | from logs to rows: kernel, mask, delay | [`conditioning`] |
-//! | reduce rows of `[W y]`, merge, scale, choose columns | [`factor`] |
-//! | which columns are excited, which depend on others | [`rank`] |
-//! | one time block or group of a log, and its rows again | [`groups`], [`rows`] |
 //! | every linear estimator through one call | [`linear::estimate`] |
 //! | rows spoilt by noise that a control loop feeds back | [`instruments`] |
 //! | shape parameters beside linear ones | [`separable`] |
-//! | clearance of a joint from its journal, or from the effort alone | [`clearance`] |
-//! | compliance of joints from encoders on both sides of their gears | [`deformation`] |
-//! | friction laws from constant-speed tests | [`steady_friction`] |
-//! | friction that follows reaction forces | [`load_friction`] |
 //! | covariance that survives filtering | [`covariance`] |
 //! | held-out error over folds of blocks; several estimators on the same folds | [`folds`], [`held_out`] |
 //! | which parameters a model can do without | [`elimination`] |
@@ -23,43 +15,26 @@
 //! | standard parameters of bodies that can exist, with a proven gap | [`consistent`] |
 //! | which parameters the data determine, and which the prior | [`identifiability`] |
 //! | estimates while the machine runs, alarms on changes | [`online`] |
-//! | searches that need values only: populations, patterns | [`search`] |
+//! | misfit of an effort model as what a search minimises | [`effort_objective`] |
 //! | how well a prediction matches a measurement | [`metrics`] |
 //!
 //! Notation: `W` is the regressor (rows × `p` columns), `y` the effort, `x` the parameters,
 //! `(R, z, ρ, N)` a factor. Results do not depend on the number of threads.
 
-pub mod clearance;
-pub mod conditioning;
 pub mod consistent;
 pub mod covariance;
-pub mod cyclic;
-pub mod deformation;
 pub mod distribution;
 pub mod drive_gain;
+pub mod effort_objective;
 pub mod elimination;
-pub mod factor;
 pub mod folds;
-pub mod groups;
 pub mod held_out;
 pub mod identifiability;
 pub mod instruments;
 pub mod linear;
-pub mod load_friction;
 pub mod log_deviations;
 pub mod metrics;
 pub mod online;
-pub mod preflight;
-pub mod rank;
-pub mod rows;
-pub mod search;
 pub mod separable;
-pub mod steady_friction;
-mod triangular;
-mod vector;
 mod whitened;
 pub mod whiteness;
-
-pub use factor::{Factor, FactorBuilder, FactorError};
-/// Dense matrix of results (column-major, indexed `m[(row, column)]`).
-pub use faer::Mat;

@@ -10,11 +10,11 @@ use rayon::prelude::*;
 
 use crate::covariance::{MIN_BLOCKS, change_without, running_merges};
 use crate::distribution::{f_quantile, t_quantile};
-use crate::factor::Factor;
-use crate::groups::ReducedGroup;
 use crate::linear::{LinearSolution, WlsSettings, group_floors as floors, ols};
-use crate::rank::numerical_rank;
-use crate::triangular::{inverse, solve_upper};
+use dynid_factor::factor::Factor;
+use dynid_factor::groups::ReducedGroup;
+use dynid_factor::rank::numerical_rank;
+use dynid_linalg::triangular::{inverse, solve_upper};
 
 /// A parameter that one log may have of its own in the rows of one output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,9 +4,9 @@
 //! then conditioned as the statistics of the log are, not as its parameters: forming them loses no digits that matter,
 //! where the same sums of `R_bᵀR_b` would lose twice those of the condition number.
 
-use crate::factor::Factor;
-use crate::rank::numerical_rank;
-use crate::triangular::{inverse, symmetric_from};
+use dynid_factor::factor::Factor;
+use dynid_factor::rank::numerical_rank;
+use dynid_linalg::triangular::{inverse, symmetric_from};
 use faer::linalg::solvers::{Llt, Solve};
 use faer::{Mat, Side};
 

@@ -1,5 +1,6 @@
 //! Design of excitation trajectories for the condition number of a model's base columns.
 
+use dynid::fault::DesignError;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -52,8 +53,8 @@ impl Excitation<'_> {
             coordinates: mechanism.rate_names(),
             limits: limits.collect(),
             constraints: vec![
-                Box::new(EffortLimits::new(nominal, shape, linear, &torque)?),
-                Box::new(CartesianLimits::new(mechanism, self.regions)?),
+                Box::new(EffortLimits::new(nominal, shape, linear, &torque).map_err(DesignError::from)?),
+                Box::new(CartesianLimits::new(mechanism, self.regions).map_err(DesignError::from)?),
             ],
             base: self.base,
             harmonics: HARMONICS,

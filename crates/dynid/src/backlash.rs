@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use dynid_estimate::clearance::backlash::{
+use dynid_clearance::backlash::{
     BacklashSettings, BacklashSignals, BacklashVerdict as Found, estimate as look_for,
 };
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, States};
 use dynid_io::MappingSpec;
 use dynid_model::{EffortModel, MotionBlock, RobotModel};
 use dynid_motion::filter::{anti_alias, pick};
+use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, States};
 use serde::Serialize;
 
 use crate::Error;
@@ -90,7 +90,7 @@ const FASTEST_HZ: f64 = 1000.0;
 /// Gaps that are looked for where joints slide, m.
 const SLIDING_RANGE: (f64, f64) = (1e-6, 3e-3);
 
-/// Looks for backlash of every joint in logs of an identified robot ([`dynid_estimate::clearance::backlash`]).
+/// Looks for backlash of every joint in logs of an identified robot ([`dynid_clearance::backlash`]).
 ///
 /// Load and inertia are those of the identified bodies, friction that of the joints' elements; what the fit gave to a motor's
 /// inertia counts as the drive's. `file`: of the estimate, for messages.

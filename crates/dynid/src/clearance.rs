@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use dynid_estimate::clearance::orbit::{self, OrbitSample, OrbitSettings};
-use dynid_estimate::clearance::swing::{self, SwingSettings};
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, States};
+use dynid_clearance::orbit::{self, OrbitSample, OrbitSettings};
+use dynid_clearance::swing::{self, SwingSettings};
 use dynid_io::columns::ChannelSpec;
 use dynid_io::{ClearanceSpec, MappingSpec};
 use dynid_model::{EffortModel, JournalPath, MotionBlock, RobotModel};
+use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, States};
 use serde::Serialize;
 
 use crate::Error;
@@ -31,8 +31,8 @@ pub struct Valued {
     pub std: f64,
 }
 
-impl From<dynid_estimate::clearance::Estimate> for Valued {
-    fn from(of: dynid_estimate::clearance::Estimate) -> Self {
+impl From<dynid_clearance::Estimate> for Valued {
+    fn from(of: dynid_clearance::Estimate) -> Self {
         Valued { value: of.value, std: of.std }
     }
 }

@@ -19,6 +19,7 @@ use dynid_excitation::{
 use dynid_io::SourceFile;
 
 use crate::Error;
+use crate::fault::DesignError;
 use crate::robot::{Robot, RobotOptions};
 pub use config::{
     BoxConfig, CapsuleConfig, ColumnConfig, ColumnsName, CriterionConfig, CriterionName, CylinderConfig,
@@ -124,7 +125,8 @@ pub fn design(config: &DesignConfig, progress: &mut dyn FnMut(DesignStep)) -> Re
         if fault.is_none() {
             fault = file.push(start).err();
         }
-    })?;
+    })
+    .map_err(DesignError::from)?;
     if let Some(fault) = fault {
         return Err(fault);
     }

@@ -4,23 +4,23 @@ mod record;
 
 pub use record::{GainsFile, JointGain};
 
-use dynid_estimate::Factor;
-use dynid_estimate::conditioning::{LogRows, condition};
 use dynid_estimate::drive_gain::{LoadColumn, load_column};
 use dynid_estimate::linear::LinearMethod;
+use dynid_factor::Factor;
 use dynid_model::element::{JointElement, KnownLoad, Payload};
 use dynid_model::{
     BaseParameters, BaseSettings, EffortModel, Inertia, Mat3, Output, PerOutput, RobotModel, Vec3,
 };
+use dynid_rows::conditioning::{LogRows, condition};
 
 use crate::Error;
 use crate::config::{Config, Own, PayloadConfig, Route};
 use crate::elements::ElementPlan;
 use crate::estimate::InputRecord;
 use crate::fitting::{self, Fitted};
-use crate::identify::{Step, TrainingLog, held_where_not_logged, plan_elements};
 use crate::log::Log;
 use crate::log_terms::{LogTerms, known_inertia};
+use crate::pipeline::{Step, TrainingLog, held_where_not_logged, plan_elements};
 use crate::robot::{Robot, refuse_internal_load};
 use crate::run::{load_robot, read_training};
 use crate::trust::interval_quantile;

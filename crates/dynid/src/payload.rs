@@ -9,7 +9,7 @@ pub use difference::Difference;
 pub use record::{PayloadFile, PayloadRecord, Quantity};
 
 use crate::config::{Config, PayloadConfig};
-use crate::identify::{Identification, Step};
+use crate::pipeline::{Identification, Step};
 use crate::run::{Run, identify};
 use crate::{Error, trust};
 

@@ -16,8 +16,8 @@ use dynid_report::{Fact, Status, Value};
 use crate::Error;
 use crate::agreement::Agreement;
 use crate::config::{Config, Method};
+use crate::estimate::short_name;
 use crate::estimate::{Choice, Estimate, Provenance};
-use crate::result::short_name;
 use crate::run::Run;
 
 pub(crate) use picture::picture;
@@ -34,7 +34,7 @@ impl Run {
     /// # Errors
     /// [`Error::Report`].
     pub fn report(&self, estimate: &Estimate) -> Result<String, Error> {
-        Ok(report::render(&self.report_data(estimate)?)?)
+        crate::fault::page(report::render(&self.report_data(estimate)?))
     }
 
     /// Kind of the joint behind an output, in words.

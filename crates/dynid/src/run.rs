@@ -1,7 +1,6 @@
 //! From a configuration and its files to an identified model: the main job.
 
 use std::ops::Deref;
-use std::path::Path;
 
 use dynid_io::{MappingSpec, TrajectoryFile};
 
@@ -9,9 +8,9 @@ use crate::Error;
 use crate::config::{Config, LogConfig};
 use crate::estimate::{Estimate, ExportedRecord, InputRecord, Provenance, ReadingRecord};
 use crate::export::exported;
-use crate::identify::{self, Identification, Opened, Step};
 use crate::log::{Log, names};
 use crate::logs;
+use crate::pipeline::{self, Identification, Opened, Step};
 use crate::provenance::settings_of;
 use crate::robot::{Robot, RobotOptions};
 
@@ -51,7 +50,7 @@ pub fn identify(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Run, 
     let trajectory = config.instruments.as_ref().and_then(|table| table.trajectory.as_ref());
     let trajectory = trajectory.map(|path| TrajectoryFile::read_source(path)).transpose()?;
     let logs = read_all(config, &robot, progress)?;
-    let found = identify::identify(&robot, logs, &config.settings()?, progress)?;
+    let found = pipeline::identify(&robot, logs, &config.settings()?, progress)?;
     let mut inputs = found.inputs();
     inputs.extend(trajectory.map(|(_, source)| InputRecord::of("trajectory", &source)));
     let exported = exported(&found)?;
@@ -69,7 +68,7 @@ pub(crate) fn open(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Op
     progress(Step::Read(config.robot.display().to_string()));
     let robot = load_robot(config)?;
     let logs = read_all(config, &robot, progress)?;
-    identify::open(robot, logs, &config.settings()?, progress)
+    pipeline::open(robot, logs, &config.settings()?, progress)
 }
 
 /// The robot of a configuration.
@@ -114,7 +113,7 @@ pub(crate) fn read_training(
 fn read_all(config: &Config, robot: &Robot, progress: &mut dyn FnMut(Step)) -> Result<Vec<Log>, Error> {
     let mut out = read_training(config, robot, progress)?;
     // Joints that no training log holds are not looked for in others.
-    let held = identify::held_where_not_logged(robot.clone(), &out)?;
+    let held = pipeline::held_where_not_logged(robot.clone(), &out)?;
     for file in &config.validation {
         progress(Step::Read(file.path.display().to_string()));
         let mut log = logs::load(file, &held.axes, &config.columns, config.motor_side.as_ref())?;
@@ -158,17 +157,5 @@ impl Run {
             },
             ..estimate
         }
-    }
-}
-
-impl Estimate {
-    /// Reads an estimate file.
-    ///
-    /// # Errors
-    /// [`Error::Read`], [`Error::EstimateFile`].
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        let text =
-            dynid_io::input::read(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
-        Estimate::parse(&text, &path.display().to_string())
     }
 }

@@ -2,17 +2,17 @@
 
 use std::path::Path;
 
-use dynid_estimate::conditioning::ConditioningSettings;
 use dynid_io::MappingSpec;
 use dynid_model::EffortModel;
+use dynid_rows::conditioning::ConditioningSettings;
 
 use crate::Error;
 use crate::agreement::{Agreement, Alignment, compare};
 use crate::config::{LogConfig, MotorSide};
+pub use crate::estimate::log_fit;
 use crate::estimate::{Estimate, Split};
-use crate::identify::known::logged_beyond;
 use crate::logs;
-pub use crate::result::log_fit;
+use crate::pipeline::known::logged_beyond;
 
 /// Logs as predicted and as measured.
 #[derive(Debug, Clone)]

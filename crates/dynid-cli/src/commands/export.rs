@@ -51,7 +51,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
 
     let progress = Progress::new(args.print.quiet);
     progress.doing("reading");
-    let identified = estimate.identified_robot(&args.estimate)?;
+    let identified = dynid::export::IdentifiedRobot::of(&estimate, &args.estimate)?;
     let states = states(args, &estimate, &identified)?;
     let source = Source::read(&robot)?;
     let changed = match estimate.robot_file() {

@@ -5,6 +5,7 @@ mod summary;
 use std::path::{Path, PathBuf};
 
 use dynid::config::{Config, Consistency, Friction, Method, Route};
+use dynid::export::ExportError;
 use dynid::{Error, identify};
 
 use super::run::{GivenLogs, configuration as run_configuration, plain};
@@ -40,7 +41,9 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     let urdf = match identification.urdf() {
         Ok(exported) => Ok(exported),
         // What a URDF cannot state is no reason to lose the identification.
-        Err(reason @ (Error::RobotFile(_) | Error::Export(_))) => Err(reason),
+        Err(reason) if matches!(reason, Error::RobotFile(_)) || reason.job::<ExportError>().is_some() => {
+            Err(reason)
+        }
         Err(error) => return Err(error.into()),
     };
     drop(progress);

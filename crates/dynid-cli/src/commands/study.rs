@@ -29,7 +29,9 @@ pub(crate) fn run(args: &StudyArgs) -> Result<u8, Failure> {
         run_study(&args.name, &settings, &mut |step| progress.counted(step.done, step.steps, step.step))
             .map_err(failure)?;
     drop(progress);
-    let page = dynid::report::render_study(&study.report).map_err(dynid::Error::from)?;
+    let page = dynid::report::render_study(&study.report)
+        .map_err(dynid::fault::PageError::from)
+        .map_err(dynid::Error::from)?;
     let text = study.record.to_json();
     set.write(0, text.as_bytes())?;
     set.write(1, page.as_bytes())?;

@@ -1,8 +1,8 @@
 //! Bootstrap over time blocks.
 
-use crate::factor::Factor;
-use crate::triangular::symmetric_from;
 use crate::whitened::{Whitened, cholesky, solve, upper_times};
+use dynid_factor::factor::Factor;
+use dynid_linalg::triangular::symmetric_from;
 use faer::Mat;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,7 +1,7 @@
 //! Heteroscedasticity and autocorrelation consistent covariance from row scores.
 
 use super::sandwich;
-use crate::triangular::symmetric_from;
+use dynid_linalg::triangular::symmetric_from;
 use faer::Mat;
 
 /// Largest AR(1) coefficient in the plug-in lag: trajectories make scores nearly unit root.

@@ -1,8 +1,8 @@
 //! Variance inflation of each output by itself.
 
-use crate::factor::Factor;
-use crate::groups::ReducedGroup;
 use crate::linear::ols;
+use dynid_factor::factor::Factor;
+use dynid_factor::groups::ReducedGroup;
 
 /// Per output, by how much its coloured residuals inflate the variance that white ones would give:
 /// `κ_j = max(1, Σ_b ‖R_j⁻ᵀ g_jb‖² / rank_j)` with the block scores `g_jb` and the factor `R_j` of the output's weighted rows

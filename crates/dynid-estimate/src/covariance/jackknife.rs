@@ -1,9 +1,9 @@
 //! Delete-a-block jackknife.
 
-use crate::factor::Factor;
 use crate::linear::ols;
-use crate::rank::certainly_full_rank;
-use crate::triangular::{solve, symmetric_from};
+use dynid_factor::factor::Factor;
+use dynid_factor::rank::certainly_full_rank;
+use dynid_linalg::triangular::symmetric_from;
 use faer::Mat;
 use rayon::prelude::*;
 
@@ -116,7 +116,7 @@ pub(crate) fn running_merges<'a>(
 
 pub(crate) fn change_without(rest: &Factor, norms: &[f64]) -> (Vec<f64>, bool) {
     if certainly_full_rank(rest) {
-        return (solve(rest), false);
+        return (rest.solve(), false);
     }
     let solution = ols(rest);
     if solution.dropped.is_empty() {

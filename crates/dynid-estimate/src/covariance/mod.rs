@@ -21,8 +21,8 @@ pub(crate) use jackknife::{change_without, running_merges};
 pub use row_scores::{RowScores, row_scores};
 pub use sandwich::{block_sandwich, block_sandwich_with};
 
-use crate::factor::Factor;
 use crate::linear::merge_weighted;
+use dynid_factor::factor::Factor;
 use faer::Mat;
 
 /// Time blocks of the weighted problem: the factors of all groups of a block merged with weights `1/σ_j`.
@@ -60,5 +60,5 @@ pub fn variance_inflation(robust: &Mat<f64>, model: &Mat<f64>) -> Option<f64> {
 /// `C Ω C` for symmetric matrices, symmetric to the last bit.
 pub(crate) fn sandwich(bread: &Mat<f64>, filling: &Mat<f64>) -> Mat<f64> {
     let product = bread * filling * bread;
-    crate::triangular::symmetric_from(bread.nrows(), |i, j| 0.5 * (product[(i, j)] + product[(j, i)]))
+    dynid_linalg::triangular::symmetric_from(bread.nrows(), |i, j| 0.5 * (product[(i, j)] + product[(j, i)]))
 }

@@ -1,9 +1,9 @@
 //! Scores of the rows in time order, for the HAC covariance of a fit that is known by its factors only.
 
 use super::{hac_bartlett_logs, hac_lag};
-use crate::factor::FactorError;
 use crate::linear::LinearEstimate;
-use crate::rows::{RowSource, RowVisitor, Rows, RowsError, visit_all};
+use dynid_factor::factor::FactorError;
+use dynid_factor::rows::{RowSource, RowVisitor, Rows, RowsError, visit_all};
 use faer::Mat;
 
 /// Scores `s_k = Σ_j W_jkᵀ ψ_jk/σ_j` of all joints and kernel scales in equal steps of time.

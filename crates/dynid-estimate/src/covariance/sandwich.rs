@@ -1,8 +1,8 @@
 //! Sandwich covariance with block sums of scores.
 
 use super::sandwich;
-use crate::factor::Factor;
-use crate::triangular::{gram_inverse, symmetric_from};
+use dynid_factor::factor::Factor;
+use dynid_linalg::triangular::{gram_inverse, symmetric_from};
 use faer::Mat;
 
 /// `V = B/(B-1) · C (Σ_b s_b s_bᵀ) C` with block scores `s_b = R_bᵀ(z_b - R_b x)` and `C = (RᵀR)⁻¹`.

@@ -3,10 +3,10 @@
 use super::bayesian_information;
 use crate::covariance::MIN_BLOCKS;
 use crate::distribution::f_quantile;
-use crate::factor::Factor;
 use crate::folds::{FoldSettings, HeldOutError, contiguous_folds, held_out_error};
-use crate::triangular::inverse;
 use crate::whitened::{Whitened, WhitenedBlock, cholesky, solve, upper_times};
+use dynid_factor::factor::Factor;
+use dynid_linalg::triangular::inverse;
 use faer::Mat;
 use rayon::prelude::*;
 use std::ops::Range;

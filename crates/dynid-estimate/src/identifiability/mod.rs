@@ -26,7 +26,7 @@ pub use verdict::{Carried, Verdict, verdict};
 
 use faer::Mat;
 
-use crate::factor::Factor;
+use dynid_factor::factor::Factor;
 
 /// Half widths beyond this share of the value (or of the prior standard deviation, if larger) are wide.
 const WIDE: f64 = 0.3;
@@ -82,7 +82,9 @@ pub struct Identifiability {
 /// Panics if shapes disagree, if a standard deviation is not positive and finite, or if `inflation` is not.
 ///
 /// ```
-/// use dynid_estimate::{FactorBuilder, Mat, identifiability::{Verdict, assess}};
+/// use dynid_estimate::identifiability::{Verdict, assess};
+/// use dynid_factor::FactorBuilder;
+/// use dynid_linalg::Mat;
 ///
 /// // Two parameters that act only as their sum, a third that acts alone and a fourth that never acts.
 /// let regrouping = Mat::from_fn(2, 4, |i, j| [[1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]][i][j]);

@@ -3,7 +3,7 @@
 use faer::linalg::solvers::{Solve, SolveLstsq};
 use faer::{Mat, Side};
 
-use crate::factor::Factor;
+use dynid_factor::factor::Factor;
 
 /// Parameters after the data have been put together with the prior.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,8 +4,8 @@ use faer::Mat;
 
 use super::verdict::verdict;
 use super::{Assessment, Identifiability};
-use crate::factor::Factor;
-use crate::rank::numerical_rank;
+use dynid_factor::factor::Factor;
+use dynid_factor::rank::numerical_rank;
 
 /// What any motion could see, with prior standard deviations as units: `C0^½ Kᵀ = Q T`.
 ///

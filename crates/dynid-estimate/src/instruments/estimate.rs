@@ -1,11 +1,11 @@
 //! Instrumental-variable estimate from paired rows.
 
 use super::oblique::Oblique;
-use crate::Factor;
-use crate::groups::ReducedGroup;
 use crate::linear::{
     GroupFit, LinearError, LinearEstimate, LinearMethod, LinearSettings, assemble, floors, merge_weighted,
 };
+use dynid_factor::Factor;
+use dynid_factor::groups::ReducedGroup;
 
 /// Settings of [`instrumental`].
 #[derive(Debug, Clone, PartialEq)]

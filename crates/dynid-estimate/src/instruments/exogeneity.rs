@@ -2,13 +2,13 @@
 
 use super::jackknife;
 use super::oblique::{Oblique, pair};
-use crate::Factor;
 use crate::covariance::jackknife as least_squares_jackknife;
 use crate::distribution::f_exceedance;
-use crate::groups::{ReducedGroup, time_blocks};
 use crate::linear::ols;
-use crate::rank::numerical_rank;
-use crate::triangular::gram_inverse;
+use dynid_factor::Factor;
+use dynid_factor::groups::{ReducedGroup, time_blocks};
+use dynid_factor::rank::numerical_rank;
+use dynid_linalg::triangular::gram_inverse;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 

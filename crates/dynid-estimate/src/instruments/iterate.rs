@@ -1,8 +1,8 @@
 //! Instruments from simulations of the estimate itself, over and over.
 
 use super::{InstrumentSettings, InstrumentalEstimate, instrumental};
-use crate::groups::ReducedGroup;
 use crate::linear::LinearError;
+use dynid_factor::groups::ReducedGroup;
 
 /// What a simulation with some parameters gave.
 #[derive(Debug, Clone, PartialEq)]

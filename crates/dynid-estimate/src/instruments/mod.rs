@@ -6,9 +6,9 @@
 //! that bias whatever the noise, and the distance between them and least squares is the size of the bias.
 //!
 //! Everything works on factors of paired rows `[Z | W | y]`, one per log, output, kernel scale and time block: a
-//! [`ReducedGroup`](crate::groups::ReducedGroup) whose `2 k` columns are those of the instruments, base columns `c` of `total`, then
-//! those of the measured rows as columns `total + c`. [`crate::conditioning::LogRows::with_instruments`] makes such rows; samples
-//! are not touched again, by neither estimate, jackknife nor test.
+//! [`ReducedGroup`](dynid_factor::groups::ReducedGroup) whose `2 k` columns are those of the instruments, base columns `c` of `total`, then
+//! those of the measured rows as columns `total + c`. Samples are not touched again, by neither
+//! estimate, jackknife nor test.
 //!
 //! | question | function |
 //! |---|---|

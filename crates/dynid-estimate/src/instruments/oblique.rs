@@ -2,11 +2,11 @@
 
 use faer::Mat;
 
-use crate::Factor;
 use crate::covariance::{Jackknife, jackknife_by};
 use crate::linear::{LinearSolution, ols};
-use crate::rank::{certainly_full_rank, numerical_rank, singular_values};
-use crate::triangular::{inverse, solve, solve_upper};
+use dynid_factor::Factor;
+use dynid_factor::rank::{certainly_full_rank, numerical_rank, singular_values};
+use dynid_linalg::triangular::{inverse, solve_upper};
 
 /// The oblique projection of paired rows onto independent columns.
 pub(super) struct Oblique {
@@ -118,6 +118,6 @@ pub(crate) fn jackknife(blocks: &[Factor], x: &[f64]) -> Option<Jackknife> {
         let instruments: Vec<usize> = (0..p).collect();
         let fitted = Factor::from_triangle(p, entry, 0.0, rest.rows());
         (certainly_full_rank(&rest.select(&instruments)) && certainly_full_rank(&fitted))
-            .then(|| solve(&fitted))
+            .then(|| fitted.solve())
     })
 }

@@ -1,6 +1,6 @@
 //! Factors of paired rows `[Z | W | y]`.
 
-use crate::groups::ReducedGroup;
+use dynid_factor::groups::ReducedGroup;
 
 /// Columns of paired rows for the base columns of a group: those of the instruments, then those of the measured rows.
 pub fn paired_columns(columns: &[usize], total: usize) -> Vec<usize> {
@@ -62,7 +62,7 @@ pub fn half(groups: &[ReducedGroup], second: bool) -> Vec<ReducedGroup> {
             let kept = |k: usize| (k >= middle) == second;
             let blocks = group.blocks.iter().enumerate().map(|(k, b)| match kept(k) {
                 true => b.clone(),
-                false => crate::Factor::empty(b.columns()),
+                false => dynid_factor::Factor::empty(b.columns()),
             });
             ReducedGroup { columns: group.columns.clone(), blocks: blocks.collect(), ..*group }
         })

@@ -6,15 +6,14 @@ use super::method::{LinearError, LinearMethod, LinearSettings};
 use super::ols::{LinearSolution, ols};
 use super::tls::{ColumnErrors, TlsNoise, tls_groups};
 use super::wls::{PriorRows, WlsEstimate, floors, wls_with};
-use crate::factor::Factor;
-use crate::groups::{ReducedGroup, time_blocks};
-use crate::rows::{MemoryRows, RowSource};
+use dynid_factor::factor::Factor;
+use dynid_factor::groups::{ReducedGroup, time_blocks};
+use dynid_factor::rows::{MemoryRows, RowSource};
 
 /// Estimates the parameters of all `total` columns.
 ///
-/// `groups`: factors of all groups and time blocks, from [`crate::conditioning::reduce`] or
-/// [`crate::rows::reduce_rows`]; `rows`: the same groups' rows, needed by robust losses only
-/// ([`LinearMethod::needs_rows`]) and kept in memory where [`super::IrlsSettings::memory`] allows.
+/// `groups`: factors of all groups and time blocks, from [`reduce_rows`](dynid_factor::rows::reduce_rows); `rows`: the same
+/// groups' rows, needed by robust losses only ([`LinearMethod::needs_rows`]) and kept in memory where [`super::IrlsSettings::memory`] allows.
 ///
 /// Rank deficiency and the iteration limit are statuses of the estimate.
 ///

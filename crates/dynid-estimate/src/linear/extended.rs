@@ -1,8 +1,8 @@
 //! Ordinary least squares on a factor in double-double arithmetic.
 
 use super::ols::{LinearSolution, ols};
-use crate::factor::{DoubleDouble, ExtendedFactor};
-use crate::triangular::symmetric_from;
+use dynid_factor::factor::{DoubleDouble, ExtendedFactor};
+use dynid_linalg::triangular::symmetric_from;
 use faer::Mat;
 
 /// Least squares on the merged rows of one extended factor.

@@ -2,9 +2,9 @@
 
 use super::method::{IrlsSettings, LinearError};
 use super::ols::{LinearSolution, ols};
-use crate::factor::{Factor, FactorError};
-use crate::groups::{ReducedGroup, time_blocks};
-use crate::rows::{BlockReducer, RowSource, RowVisitor, Rows, visit_all};
+use dynid_factor::factor::{Factor, FactorError};
+use dynid_factor::groups::{ReducedGroup, time_blocks};
+use dynid_factor::rows::{BlockReducer, RowSource, RowVisitor, Rows, visit_all};
 
 /// `1/Φ⁻¹(3/4)`: the median absolute deviation of a normal law times this is its standard deviation.
 const MAD_TO_SIGMA: f64 = 1.4826;

@@ -5,9 +5,9 @@ use super::method::LinearMethod;
 use super::ols::LinearSolution;
 use super::tls::{TlsNoise, tls};
 use crate::covariance::{Jackknife, block_sandwich_with, jackknife_by, jackknife_with};
-use crate::factor::Factor;
-use crate::groups::{ReducedGroup, time_blocks};
 use crate::instruments::{jackknife as instrumental_jackknife, paired_columns};
+use dynid_factor::factor::Factor;
+use dynid_factor::groups::{ReducedGroup, time_blocks};
 use faer::Mat;
 
 /// What an estimator found about one group of rows.

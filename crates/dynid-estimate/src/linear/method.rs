@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use super::tls::{TlsNoise, TlsRefusal};
 use super::wls::WlsSettings;
-use crate::groups::ReducedGroup;
-use crate::rows::RowsError;
+use dynid_factor::groups::ReducedGroup;
+use dynid_factor::rows::RowsError;
 
 /// A linear estimator.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,7 +35,7 @@ pub enum LinearMethod {
 }
 
 impl LinearMethod {
-    /// Whether single rows must be seen again: [`super::estimate`] then needs a [`crate::rows::RowSource`].
+    /// Whether single rows must be seen again: [`super::estimate`] then needs a [`dynid_factor::rows::RowSource`].
     pub fn needs_rows(&self) -> bool {
         matches!(self, LinearMethod::Huber | LinearMethod::Tukey)
     }

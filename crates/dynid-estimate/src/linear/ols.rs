@@ -1,8 +1,8 @@
 //! Ordinary least squares, `min ‖z - R x‖²`.
 
-use crate::factor::Factor;
-use crate::rank::{RankReport, numerical_rank};
-use crate::triangular::{gram_inverse, solve};
+use dynid_factor::factor::Factor;
+use dynid_factor::rank::{RankReport, numerical_rank};
+use dynid_linalg::triangular::gram_inverse;
 use faer::Mat;
 
 /// Least-squares solution of one factor, on an independent subset of the columns where the rank is deficient.
@@ -85,7 +85,7 @@ pub fn ols(factor: &Factor) -> LinearSolution {
         (reduced, of_kept.condition, of_kept.condition_scaled)
     };
     let mut x = vec![0.0; rank.columns];
-    for (&column, value) in kept.iter().zip(solve(&reduced)) {
+    for (&column, value) in kept.iter().zip(reduced.solve()) {
         x[column] = value;
     }
     let rss = reduced.rho() * reduced.rho();

@@ -1,7 +1,7 @@
 //! Ridge regression towards a prior.
 
 use super::ols::{LinearSolution, ols};
-use crate::factor::Factor;
+use dynid_factor::factor::Factor;
 use faer::Mat;
 
 /// Solution of [`ridge`].

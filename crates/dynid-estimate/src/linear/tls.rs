@@ -2,10 +2,10 @@
 
 use super::method::LinearSettings;
 use super::ols::ols;
-use crate::factor::Factor;
-use crate::groups::ReducedGroup;
-use crate::rank::numerical_rank;
-use crate::triangular::solve_upper;
+use dynid_factor::factor::Factor;
+use dynid_factor::groups::ReducedGroup;
+use dynid_factor::rank::numerical_rank;
+use dynid_linalg::triangular::solve_upper;
 use faer::Mat;
 
 /// `s_min/s_{min-1}` above which the smallest singular value is not told from the next.

@@ -1,8 +1,8 @@
 //! Weighted least squares with one residual variance per group of rows.
 
 use super::ols::{LinearSolution, ols};
-use crate::factor::Factor;
-use crate::triangular::inverse;
+use dynid_factor::factor::Factor;
+use dynid_linalg::triangular::inverse;
 
 /// Settings of [`wls`].
 #[derive(Debug, Clone, PartialEq)]

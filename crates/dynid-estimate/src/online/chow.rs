@@ -2,9 +2,9 @@
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
-use crate::Factor;
 use crate::linear::ols;
-use crate::rank::numerical_rank;
+use dynid_factor::Factor;
+use dynid_factor::rank::numerical_rank;
 
 /// A parameter and its change between two stretches.
 #[derive(Debug, Clone, Copy, PartialEq)]

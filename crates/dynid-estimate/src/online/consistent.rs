@@ -2,8 +2,8 @@
 
 use dynid_online::Estimator;
 
-use crate::Mat;
 use crate::consistent::{ConsistentEstimate, Problem, ProblemError, Settings, estimate};
+use dynid_linalg::Mat;
 
 /// A consistent estimate and the sample it stands for.
 #[derive(Debug, Clone, PartialEq)]

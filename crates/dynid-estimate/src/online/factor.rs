@@ -2,7 +2,7 @@
 
 use dynid_online::SquareRoot;
 
-use crate::Factor;
+use dynid_factor::Factor;
 
 /// Recursive state with the information of a factor, parameters divided by `scale`, rows divided by `sigma`.
 ///

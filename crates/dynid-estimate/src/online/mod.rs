@@ -2,7 +2,7 @@
 //!
 //! The recursive estimator is a crate of its own, `dynid-online`, which needs no standard library and
 //! allocates at construction only; all of it is here again. Beside it stands what needs more: conversions
-//! between its state and [`Factor`](crate::Factor), physical consistency of the estimate, the Chow test,
+//! between its state and [`Factor`](dynid_factor::Factor), physical consistency of the estimate, the Chow test,
 //! and hypotheses on what changed.
 
 mod chow;

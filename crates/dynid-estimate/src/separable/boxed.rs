@@ -1,7 +1,7 @@
 //! The damped linear step within bounds.
 
 use super::dense::{Columns, PivotedQr, triangle};
-use crate::vector::{add_scaled, dot, norm};
+use dynid_linalg::vector::{add_scaled, dot, norm};
 
 /// `min ‖r + J δ‖² + λ ‖D δ‖²` with `lower <= δ <= upper`, where `lower <= 0 <= upper`; every column of `J` is to be
 /// damped, so that the minimum is unique.

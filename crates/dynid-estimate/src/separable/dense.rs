@@ -1,6 +1,6 @@
 //! Small dense matrices, and Householder triangles of them with a rank.
 
-use crate::vector::{add_scaled, dot, norm};
+use dynid_linalg::vector::{add_scaled, dot, norm};
 
 /// A dense matrix, column after column.
 #[derive(Debug, Clone)]

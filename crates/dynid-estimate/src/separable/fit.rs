@@ -12,10 +12,10 @@ use super::robust::{Robust, refine_robust};
 use super::scale::SearchBox;
 use super::settings::{SeparableError, SeparableLoss, SeparableSettings, ShapeSearch, Weighting};
 use super::starts::{START_FALL, StartReport, multi_start, starts};
-use crate::groups::ReducedGroup;
 use crate::linear::{LinearEstimate, LinearMethod, LinearSettings, estimate};
-use crate::search::{self, Bounds, PointObjective, SearchError};
+use dynid_factor::groups::ReducedGroup;
 use dynid_model::ShapeParameter;
+use dynid_search::{self as search, Bounds, PointObjective, SearchError};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 

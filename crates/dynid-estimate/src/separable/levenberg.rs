@@ -5,7 +5,7 @@ use super::dense::{Columns, PivotedQr};
 use super::projection::{Point, Projection};
 use super::reduction::Target;
 use super::scale::SearchBox;
-use crate::vector::{add_scaled, dot, norm};
+use dynid_linalg::vector::{add_scaled, dot, norm};
 
 /// First damping, in units of the squared column norms.
 const FIRST_DAMPING: f64 = 1e-3;

@@ -5,9 +5,9 @@
 
 use super::problem::{RowGroup, SeparableProblem, ShapedColumns};
 use super::reduction::{Target, remainder};
-use crate::groups::ReducedGroup;
 use crate::linear::LinearError;
-use crate::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
+use dynid_factor::groups::ReducedGroup;
+use dynid_factor::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
 use rayon::prelude::*;
 
 /// Rows and factors of the linearised problem.
@@ -93,7 +93,7 @@ fn rows_of(
     let mut values = vec![0.0; rows * columns.len()];
     let mut add = |column: usize, factor: f64, from: &[f64]| {
         let at = columns.partition_point(|c| *c < column);
-        crate::vector::add_scaled(&mut values[at * rows..][..rows], factor, from);
+        dynid_linalg::vector::add_scaled(&mut values[at * rows..][..rows], factor, from);
     };
     for (k, &column) in group.fixed.iter().enumerate() {
         add(column, 1.0, group.fixed_column(k));

@@ -9,7 +9,6 @@
 //! |---|---|
 //! | rows, columns, derivatives of one's own problem | [`SeparableProblem`] |
 //! | an effort model over motion and measured efforts | [`EffortProblem`] |
-//! | rows of logs through kernels | [`crate::conditioning::refine`] |
 //! | friction measured in steady motion | [`SteadyRows`] |
 //! | several of these together | [`JoinedProblem`] |
 //! | the fit | [`fit`], [`SeparableSettings`] |
@@ -49,7 +48,7 @@ pub use fit::fit;
 pub use joined::JoinedProblem;
 pub use levenberg::SearchStatus;
 pub use limit::limit_model;
-pub(crate) use places::{OutputPlaces, places};
+pub use places::{OutputPlaces, places};
 pub use problem::{Bound, RowGroup, SeparableProblem, ShapedColumns};
 pub use profile::{ShapeFinding, ShapeVerdict};
 pub use settings::{SeparableError, SeparableLoss, SeparableSettings, ShapeSearch, Weighting};

@@ -5,17 +5,17 @@ use dynid_model::EffortModel;
 
 /// Columns of one output.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct OutputPlaces {
+pub struct OutputPlaces {
     /// `(position among the output's acting columns, kept column)`.
-    pub(crate) fixed: Vec<(usize, usize)>,
+    pub fixed: Vec<(usize, usize)>,
     /// `(index into the model's shaped columns, kept column)`.
-    pub(crate) shaped: Vec<(usize, usize)>,
+    pub shaped: Vec<(usize, usize)>,
     /// `(index into the model's shape dependence, index into shaped, shape parameter)`.
-    pub(crate) dependence: Vec<(usize, usize, usize)>,
+    pub dependence: Vec<(usize, usize, usize)>,
 }
 
 /// Places for all outputs. `kept`: base columns of the model, ascending.
-pub(crate) fn places(model: &dyn EffortModel, kept: &[usize]) -> Vec<OutputPlaces> {
+pub fn places(model: &dyn EffortModel, kept: &[usize]) -> Vec<OutputPlaces> {
     let layout = model.layout();
     (0..layout.outputs())
         .map(|output| {
@@ -39,7 +39,7 @@ pub(crate) fn places(model: &dyn EffortModel, kept: &[usize]) -> Vec<OutputPlace
 
 impl OutputPlaces {
     /// A group of this output without rows.
-    pub(crate) fn group(&self, log: usize, output: usize, scale: usize) -> RowGroup {
+    pub fn group(&self, log: usize, output: usize, scale: usize) -> RowGroup {
         RowGroup {
             log,
             output,

@@ -4,7 +4,7 @@ use super::dense::{Columns, PivotedQr};
 use super::projection::Projection;
 use super::reduction::Target;
 use super::scale::SearchBox;
-use crate::vector::norm;
+use dynid_linalg::vector::norm;
 
 /// Most steps; two are the rule, slow ones belong to large residuals.
 const MOST_STEPS: usize = 60;

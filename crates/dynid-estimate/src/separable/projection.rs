@@ -3,7 +3,7 @@
 use super::dense::{Columns, PivotedQr};
 use super::problem::{SeparableProblem, ShapedColumns};
 use super::reduction::{GroupReduction, Rotated, Target};
-use crate::vector::{add_scaled, dot, norm};
+use dynid_linalg::vector::{add_scaled, dot, norm};
 use rayon::prelude::*;
 
 /// Values per group above which groups are rotated in parallel.

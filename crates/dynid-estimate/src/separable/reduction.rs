@@ -2,7 +2,7 @@
 
 use super::dense::{Columns, triangle};
 use super::problem::{RowGroup, ShapedColumns};
-use crate::factor::{Factor, FactorBuilder};
+use dynid_factor::factor::{Factor, FactorBuilder};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::householder::{
     apply_block_householder_sequence_transpose_on_the_left_in_place_scratch as rotation_scratch,
@@ -109,7 +109,7 @@ impl GroupReduction {
         z.truncate(factor.height());
         if let Target::Residual(linear) = target {
             for (k, &column) in group.fixed.iter().enumerate() {
-                crate::vector::add_scaled(&mut z, -linear[column], self.head.column(k));
+                dynid_linalg::vector::add_scaled(&mut z, -linear[column], self.head.column(k));
             }
         }
         Some(z)
@@ -163,11 +163,11 @@ pub(super) fn remainder(group: &RowGroup, columns: &ShapedColumns, target: Targe
             (Some(_), Target::Effort) => continue,
             (Some(column), Target::Residual(linear)) => linear[*column],
         };
-        crate::vector::add_scaled(&mut rest, -factor, columns.value(k));
+        dynid_linalg::vector::add_scaled(&mut rest, -factor, columns.value(k));
     }
     if let Target::Residual(linear) = target {
         for (k, &column) in group.fixed.iter().enumerate() {
-            crate::vector::add_scaled(&mut rest, -linear[column], group.fixed_column(k));
+            dynid_linalg::vector::add_scaled(&mut rest, -linear[column], group.fixed_column(k));
         }
     }
     rest

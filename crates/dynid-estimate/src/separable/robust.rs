@@ -5,8 +5,8 @@ use super::levenberg::{Stops, search};
 use super::projection::Projection;
 use super::reduction::GroupReduction;
 use super::settings::{SeparableError, SeparableLoss, Weighting};
-use crate::groups::ReducedGroup;
 use crate::linear::robust_scales;
+use dynid_factor::groups::ReducedGroup;
 use rayon::prelude::*;
 
 /// Smoothing of `|r|` about zero in units of the scale: begun wide, so that no row sticks to a residual that was small by

@@ -1,7 +1,7 @@
 //! Settings and errors of separable fits.
 
 use crate::linear::{IrlsSettings, LinearError, VarianceSharing, WlsSettings};
-use crate::search::{self, Algorithm, SearchError};
+use dynid_search::{self as search, Algorithm, SearchError};
 
 /// Loss of the residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -5,7 +5,8 @@ use dynid_estimate::covariance::{hac_lag, jackknife, variance_inflation};
 use dynid_estimate::elimination::{backward_elimination, within_one_standard_error};
 use dynid_estimate::folds::{HeldOutError, contiguous_folds};
 use dynid_estimate::linear::ols;
-use dynid_estimate::{Factor, FactorBuilder, Mat};
+use dynid_factor::{Factor, FactorBuilder};
+use dynid_linalg::Mat;
 
 /// Twelve blocks of ten rows; column 1 is excited in block 4 only.
 fn blocks() -> Vec<Factor> {

@@ -4,14 +4,14 @@
 use crate::simulated::{COLUMNS, NOISE, Normal, TRUTH, rows};
 use dynid_estimate::covariance::{Bootstrap, BootstrapSettings, bootstrap};
 use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate, ols};
-use dynid_estimate::rows::reduce_rows;
-use dynid_estimate::{Factor, FactorBuilder};
+use dynid_factor::rows::reduce_rows;
+use dynid_factor::{Factor, FactorBuilder};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 /// Noise whose correlation falls below a tenth within five samples, an eighth of a block.
-fn blocks(seed: u64) -> (Vec<Factor>, Vec<f64>, dynid_estimate::Mat<f64>) {
+fn blocks(seed: u64) -> (Vec<Factor>, Vec<f64>, dynid_linalg::Mat<f64>) {
     let mut normal = Normal::new(seed, 0);
     let mut state = 0.0;
     let source = rows(1, 24, 40, |joint, _| {

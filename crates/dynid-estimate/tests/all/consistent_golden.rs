@@ -3,11 +3,11 @@
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use crate::golden::{check_close, load, number, vector};
-use dynid_estimate::Mat;
 use dynid_estimate::consistent::{
     Bound, Form, LinkPrior, Margin, Problem, ProblemError, ScalarPrior, Settings, Status, certificate,
     entropic, estimate,
 };
+use dynid_linalg::Mat;
 use dynid_model::Inertia;
 use dynid_model::symmetric::least_eigenvalue;
 use serde_json::Value;

@@ -4,7 +4,7 @@
 use dynid_estimate::covariance::jackknife;
 use dynid_estimate::folds::{FoldSettings, cross_validate};
 use dynid_estimate::linear::ols;
-use dynid_estimate::{Factor, FactorBuilder};
+use dynid_factor::{Factor, FactorBuilder};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

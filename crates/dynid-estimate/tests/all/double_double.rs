@@ -1,6 +1,6 @@
 //! Double-double arithmetic against exact integers.
 
-use dynid_estimate::factor::DoubleDouble;
+use dynid_factor::factor::DoubleDouble;
 use proptest::prelude::*;
 
 /// The integer nearest to `value`; both parts are integers where these tests need the last digit.

@@ -1,9 +1,9 @@
 //! The reduction in double-double arithmetic: same bits however rows are portioned, identities, what it refuses.
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
-use dynid_estimate::factor::{DoubleDouble, ExtendedBuilder, ExtendedFactor};
 use dynid_estimate::linear::{ols, ols_extended};
-use dynid_estimate::{FactorBuilder, FactorError};
+use dynid_factor::factor::{DoubleDouble, ExtendedBuilder, ExtendedFactor};
+use dynid_factor::{FactorBuilder, FactorError};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

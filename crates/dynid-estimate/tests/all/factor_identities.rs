@@ -2,8 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use dynid_estimate::linear::{WlsSettings, ols, wls};
-use dynid_estimate::rank::{base_columns, numerical_rank};
-use dynid_estimate::{Factor, FactorBuilder, FactorError};
+use dynid_factor::rank::{base_columns, numerical_rank};
+use dynid_factor::{Factor, FactorBuilder, FactorError};
 use proptest::prelude::*;
 
 #[derive(Debug, Clone)]

@@ -4,7 +4,8 @@ use crate::golden::{check_close, load, number, vector};
 use dynid_estimate::covariance::{andrews_lag, block_sandwich, hac_bartlett, jackknife};
 use dynid_estimate::linear::ols;
 use dynid_estimate::whiteness::ljung_box;
-use dynid_estimate::{Factor, FactorBuilder, Mat};
+use dynid_factor::{Factor, FactorBuilder};
+use dynid_linalg::Mat;
 use serde_json::Value;
 
 const BLOCK_ROWS: usize = 9;

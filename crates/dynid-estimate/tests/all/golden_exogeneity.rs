@@ -2,12 +2,12 @@
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use crate::golden::{check_close, load, number, vector};
-use dynid_estimate::FactorBuilder;
-use dynid_estimate::groups::ReducedGroup;
 use dynid_estimate::instruments::{
     ExogeneitySettings, InstrumentSettings, Strength, exogeneity, instrumental, measured,
 };
 use dynid_estimate::linear::ols;
+use dynid_factor::FactorBuilder;
+use dynid_factor::groups::ReducedGroup;
 use serde_json::Value;
 
 const BLOCK_ROWS: usize = 6;

@@ -6,8 +6,9 @@ use dynid_estimate::covariance::{jackknife, weighted_blocks};
 use dynid_estimate::elimination::{backward_elimination, rss_increase};
 use dynid_estimate::folds::{FoldSettings, cross_validate};
 use dynid_estimate::linear::{WlsEstimate, WlsSettings, ols, ridge, wls};
-use dynid_estimate::rank::{base_columns, numerical_rank};
-use dynid_estimate::{Factor, FactorBuilder, Mat};
+use dynid_factor::rank::{base_columns, numerical_rank};
+use dynid_factor::{Factor, FactorBuilder};
+use dynid_linalg::Mat;
 use serde_json::Value;
 
 const KEPT: [usize; 5] = [0, 1, 2, 3, 4];

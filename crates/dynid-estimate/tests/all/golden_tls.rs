@@ -3,7 +3,7 @@
 
 use crate::golden::{check_close, load, number, vector};
 use dynid_estimate::linear::{TlsNoise, TlsRefusal, ols, tls};
-use dynid_estimate::{Factor, FactorBuilder};
+use dynid_factor::{Factor, FactorBuilder};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

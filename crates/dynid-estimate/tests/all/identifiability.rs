@@ -6,7 +6,8 @@ use dynid_estimate::identifiability::{
     Carried, Identifiability, Verdict, VisibleSpace, assess, visible_combinations,
 };
 use dynid_estimate::linear::ols;
-use dynid_estimate::{Factor, FactorBuilder, Mat};
+use dynid_factor::{Factor, FactorBuilder};
+use dynid_linalg::Mat;
 use faer::linalg::solvers::DenseSolveCore;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,13 +1,14 @@
 //! Instrumental variables: what must hold whatever the numbers.
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
-use dynid_estimate::groups::{ReducedGroup, time_blocks};
 use dynid_estimate::instruments::{
     ExogeneitySettings, ExogeneityVerdict, InstrumentSettings, IterationEnd, Simulated, Strength, crossed,
     exogeneity, half, instrumental, iterate, measured, paired_columns,
 };
 use dynid_estimate::linear::{LinearError, LinearMethod, LinearSettings, estimate};
-use dynid_estimate::{Factor, FactorBuilder, Mat};
+use dynid_factor::groups::{ReducedGroup, time_blocks};
+use dynid_factor::{Factor, FactorBuilder};
+use dynid_linalg::Mat;
 use faer::linalg::solvers::Solve;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,13 +1,13 @@
 //! One joint in a position loop, many logs: bias of least squares and of instruments, and how often the test rejects.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
 
-use dynid_estimate::FactorBuilder;
-use dynid_estimate::groups::ReducedGroup;
 use dynid_estimate::instruments::{
     Exogeneity, ExogeneitySettings, ExogeneityVerdict, InstrumentSettings, crossed, exogeneity, half,
     instrumental, measured,
 };
 use dynid_estimate::linear::{LinearEstimate, LinearMethod, LinearSettings, estimate};
+use dynid_factor::FactorBuilder;
+use dynid_factor::groups::ReducedGroup;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

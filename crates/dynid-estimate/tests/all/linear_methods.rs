@@ -3,13 +3,13 @@
 
 use crate::simulated::{COLUMNS, NOISE, Normal, TRUTH, rows};
 use dynid_estimate::covariance::{jackknife, jackknife_with};
-use dynid_estimate::groups::{ReducedGroup, time_blocks};
 use dynid_estimate::linear::{
     LinearError, LinearEstimate, LinearMethod, LinearSettings, TlsNoise, VarianceSharing, WlsSettings,
     estimate, ols, ridge, tls, wls,
 };
-use dynid_estimate::rows::{MemoryRows, RowSource, reduce_rows};
-use dynid_estimate::{Factor, FactorBuilder};
+use dynid_factor::groups::{ReducedGroup, time_blocks};
+use dynid_factor::rows::{MemoryRows, RowSource, reduce_rows};
+use dynid_factor::{Factor, FactorBuilder};
 
 fn noisy(seed: u64) -> MemoryRows {
     let mut normal = Normal::new(seed, 0);

@@ -2,9 +2,9 @@
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "in tests a panic is the report")]
 
 use crate::nist::{Dataset, datasets};
-use dynid_estimate::FactorBuilder;
-use dynid_estimate::factor::ExtendedBuilder;
 use dynid_estimate::linear::{LinearSolution, ols, ols_extended};
+use dynid_factor::FactorBuilder;
+use dynid_factor::factor::ExtendedBuilder;
 
 /// Digits asked of the reduction in double-double arithmetic, of every figure of every set. Nine are needed; what
 /// remains lost of 15 is the rounding of decimal data to double, so that fewer than 12 would be the reduction's.

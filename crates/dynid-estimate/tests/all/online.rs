@@ -3,13 +3,14 @@
 
 use crate::golden::{check_close, load, number, vector};
 use dynid_estimate::consistent::{Problem, Settings as ConsistentSettings, Status, estimate};
-use dynid_estimate::factor::{ExtendedBuilder, ExtendedFactor};
 use dynid_estimate::linear::{ols, ols_extended};
 use dynid_estimate::online::{
     BlockWindow, ConsistentPublisher, Estimator, Forgetting, RowNoise, RowWindow, Settings, SquareRoot,
     chow_test, factor_from_root, root_from_factor,
 };
-use dynid_estimate::{Factor, FactorBuilder, Mat};
+use dynid_factor::factor::{ExtendedBuilder, ExtendedFactor};
+use dynid_factor::{Factor, FactorBuilder};
+use dynid_linalg::Mat;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

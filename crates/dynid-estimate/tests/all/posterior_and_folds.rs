@@ -3,12 +3,13 @@
 
 use dynid_estimate::covariance::output_inflation;
 use dynid_estimate::folds::{FoldSettings, contiguous_folds};
-use dynid_estimate::groups::{ReducedGroup, time_blocks};
 use dynid_estimate::held_out::compare;
 use dynid_estimate::identifiability::{excited_regrouping, posterior};
 use dynid_estimate::linear::ols;
-use dynid_estimate::rows::{GroupShape, MemoryRows, Rows, row_residuals};
-use dynid_estimate::{Factor, FactorBuilder, Mat};
+use dynid_factor::groups::{ReducedGroup, time_blocks};
+use dynid_factor::rows::{GroupShape, MemoryRows, Rows, row_residuals};
+use dynid_factor::{Factor, FactorBuilder};
+use dynid_linalg::Mat;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -6,7 +6,7 @@ use dynid_estimate::covariance::{jackknife, variance_inflation};
 use dynid_estimate::elimination::{PruneSettings, prune};
 use dynid_estimate::folds::{FoldSettings, cross_validate};
 use dynid_estimate::linear::ols;
-use dynid_estimate::{Factor, FactorBuilder};
+use dynid_factor::{Factor, FactorBuilder};
 
 /// `columns` columns of which the last `idle` have no effect; `blocks` blocks of coloured residuals of variance near 1.
 fn problem(columns: usize, idle: usize, blocks: usize, seed: u64) -> Vec<Factor> {

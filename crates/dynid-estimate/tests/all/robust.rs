@@ -4,7 +4,7 @@
 use crate::simulated::{COLUMNS, NOISE, Normal, TRUTH, rows};
 use dynid_estimate::distribution::t_quantile;
 use dynid_estimate::linear::{IrlsSettings, LinearEstimate, LinearMethod, LinearSettings, estimate};
-use dynid_estimate::rows::{MemoryRows, RowSource, RowVisitor, Rows, RowsError, reduce_rows};
+use dynid_factor::rows::{MemoryRows, RowSource, RowVisitor, Rows, RowsError, reduce_rows};
 use rayon::prelude::*;
 
 /// One row in ten of every joint is off by 20 to 60 standard deviations, all to the same side.
@@ -69,7 +69,7 @@ fn clean_logs_lose_little() {
     let spread = |m| run(&source, &m, &LinearSettings::default()).jackknife().unwrap().covariance;
     let (plain, huber, tukey) =
         (spread(LinearMethod::Wls), spread(LinearMethod::Huber), spread(LinearMethod::Tukey));
-    let ratio = |v: &dynid_estimate::Mat<f64>| {
+    let ratio = |v: &dynid_linalg::Mat<f64>| {
         (0..COLUMNS).map(|i| v[(i, i)] / plain[(i, i)]).sum::<f64>() / COLUMNS as f64
     };
     // 95 % efficient by design, and a jackknife over 20 blocks is good to a third.
@@ -111,7 +111,7 @@ struct OneByOne<'a>(&'a MemoryRows);
 struct Splitter<'a, 'b>(&'a mut &'b mut dyn RowVisitor);
 
 impl RowVisitor for Splitter<'_, '_> {
-    fn take(&mut self, rows: &Rows<'_>) -> Result<(), dynid_estimate::FactorError> {
+    fn take(&mut self, rows: &Rows<'_>) -> Result<(), dynid_factor::FactorError> {
         (0..rows.effort.len()).try_for_each(|i| {
             self.0.take(&Rows {
                 samples: &rows.samples[i..=i],
@@ -124,7 +124,7 @@ impl RowVisitor for Splitter<'_, '_> {
 }
 
 impl RowSource for OneByOne<'_> {
-    fn groups(&self) -> &[dynid_estimate::rows::GroupShape] {
+    fn groups(&self) -> &[dynid_factor::rows::GroupShape] {
         self.0.groups()
     }
 

@@ -1,11 +1,9 @@
 //! Searches on the ER-16 problem.
 
 use crate::er16::{Er16, Motion, median, numbers, reference, value};
-use dynid_estimate::search::{
-    Algorithm, EffortLoss, EffortObjective, EffortObjectiveError, Objective, Settings, TentMap, many,
-    rank_sum,
-};
+use dynid_estimate::effort_objective::{EffortLoss, EffortObjective, EffortObjectiveError};
 use dynid_model::EffortModel;
+use dynid_search::{Algorithm, Objective, Settings, TentMap, many, rank_sum};
 
 #[test]
 fn tent_map_agrees_with_golden_numbers() {
@@ -149,7 +147,7 @@ fn improved_cuckoos_beat_plain_ones_and_both_beat_the_swarm() {
     };
     let [ics, cs, pso] = ["ics", "cs", "pso"].map(search);
     let values = |results: &[_]| -> Vec<f64> {
-        results.iter().map(|r: &dynid_estimate::search::SearchResult| r.value).collect()
+        results.iter().map(|r: &dynid_search::SearchResult| r.value).collect()
     };
     let medians = [&ics, &cs, &pso].map(|r| median(&values(r)));
     let ics_below_cs = rank_sum(&values(&ics), &values(&cs)).unwrap().less;
@@ -158,7 +156,7 @@ fn improved_cuckoos_beat_plain_ones_and_both_beat_the_swarm() {
     assert!(medians[0] < medians[1] && medians[1] < medians[2], "{medians:?}");
     assert!(ics_below_cs < 0.05 && cs_below_pso < 0.05, "{ics_below_cs} {cs_below_pso}");
 
-    let correlations = |results: &[dynid_estimate::search::SearchResult]| -> Vec<f64> {
+    let correlations = |results: &[dynid_search::SearchResult]| -> Vec<f64> {
         let best_of_three = results.chunks_exact(3).map(|three| {
             let best = three.iter().min_by(|a, b| a.value.total_cmp(&b.value)).unwrap();
             let rest = residuals(&robot, &motion, &efforts, &best.point);

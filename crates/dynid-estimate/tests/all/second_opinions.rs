@@ -5,8 +5,9 @@ use dynid_estimate::covariance::{
     BlockLengthSettings, BlockLengthStatus, ResidualSignal, block_length, hac_bartlett, row_scores,
 };
 use dynid_estimate::linear::{LinearMethod, LinearSettings, VarianceSharing, estimate};
-use dynid_estimate::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
-use dynid_estimate::{Factor, Mat};
+use dynid_factor::Factor;
+use dynid_factor::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
+use dynid_linalg::Mat;
 
 fn coloured(seed: u64, pole: f64, samples: usize) -> Vec<f64> {
     let mut normal = Normal::new(seed, 0);

@@ -2,6 +2,7 @@
 
 use dynid::excitation::constraint::{FramePoint, Region};
 use dynid::excitation::{Outcome, Problem, Settings as SearchSettings, design, information, limit_points};
+use dynid::fault::DesignError;
 use dynid::model::{RobotModel, Vec3};
 use dynid::motion::trajectory::{Form, Fourier, RowOrder};
 use serde_json::json;
@@ -129,7 +130,7 @@ pub(super) fn designed(
     let problem = problem(arm, settings, columns)?;
     let search =
         SearchSettings { starts: if run.quick { 4 } else { 8 }, seed: run.seed, ..SearchSettings::default() };
-    let outcome = design(&problem, &search, Vec::new(), &mut |_| {})?;
+    let outcome = design(&problem, &search, Vec::new(), &mut |_| {}).map_err(DesignError::from)?;
     let Outcome::Found(design) = outcome else { return Ok(None) };
     let starts = conditions_of_starts(&design);
     let Some(condition) = condition(&problem, &design.coefficients) else { return Ok(None) };

@@ -1,5 +1,6 @@
 //! Row 7: excitation trajectories.
 
+use dynid::fault::DesignError;
 use std::sync::Arc;
 
 use dynid::excitation::constraint::{FramePoint, Region};
@@ -81,7 +82,11 @@ pub(super) fn designed(
     let problem = problem(arm, settings, arm.regression())?;
     let starts = if run.quick { 4 } else { 16 };
     let search = SearchSettings { starts, seed: run.seed, ..SearchSettings::default() };
-    let Outcome::Found(found) = design(&problem, &search, Vec::new(), &mut |_| {})? else { return Ok(None) };
+    let Outcome::Found(found) =
+        design(&problem, &search, Vec::new(), &mut |_| {}).map_err(DesignError::from)?
+    else {
+        return Ok(None);
+    };
     if !limit_points(&problem, &found.coefficients, 4 * SAMPLES, 0.0).is_empty() {
         return Ok(None);
     }

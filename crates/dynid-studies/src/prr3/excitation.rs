@@ -1,5 +1,6 @@
 //! Row B5: trajectories of the platform designed within the limits of sliders and legs.
 
+use dynid::fault::DesignError;
 use std::f64::consts::{PI, TAU};
 
 use dynid::excitation::constraint::{JointLimits, JointQuantity, JointRange};
@@ -208,7 +209,11 @@ fn designed(
         report_samples: settings.criterion.samples,
         ..SearchSettings::default()
     };
-    let Outcome::Found(found) = design(problem, &search, Vec::new(), &mut |_| {})? else { return Ok(None) };
+    let Outcome::Found(found) =
+        design(problem, &search, Vec::new(), &mut |_| {}).map_err(DesignError::from)?
+    else {
+        return Ok(None);
+    };
     let motion = trajectory::designed_motion(settings, &found.coefficients, settings.trajectory.samples)?;
     let forces = trajectory::true_forces(machine, settings, &motion, Plane::Horizontal)?;
     let excess = limit_points(problem, &found.coefficients, FINE, f64::NEG_INFINITY);

@@ -5,6 +5,7 @@ use dynid::excitation::{
     Outcome, Problem, RobotExcitation, Settings as SearchSettings, StartConditions, design, information,
     limit_points,
 };
+use dynid::fault::DesignError;
 use dynid::model::{BaseParameters, BaseSettings, RobotModel};
 use serde_json::json;
 
@@ -119,10 +120,12 @@ pub(super) fn designed(
     let at_random =
         SearchSettings { starts: if run.quick { 2 } else { 8 }, from: None, ..from_print.clone() };
     let first = if base_frequency == settings.base_frequency { &from_print } else { &at_random };
-    let Outcome::Found(found) = design(&problem, first, Vec::new(), &mut |_| {})? else {
+    let Outcome::Found(found) =
+        design(&problem, first, Vec::new(), &mut |_| {}).map_err(DesignError::from)?
+    else {
         return Ok(None);
     };
-    let random = match design(&problem, &at_random, Vec::new(), &mut |_| {})? {
+    let random = match design(&problem, &at_random, Vec::new(), &mut |_| {}).map_err(DesignError::from)? {
         Outcome::Found(random) => conditions_of_starts(&random),
         Outcome::Infeasible(_) => Vec::new(),
     };

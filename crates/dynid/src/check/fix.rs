@@ -2,15 +2,16 @@
 
 use std::path::Path;
 
-use dynid_estimate::preflight::Wiring;
 use dynid_io::columns::{ColumnUse, TimeSource};
 use dynid_io::{ColumnMapping, MappingSpec};
+use dynid_rows::preflight::Wiring;
 use toml::{Table, Value};
 
-use super::finding::Fix;
-use super::{Check, Finding, short};
+use super::{Check, Finding};
 use crate::Error;
 use crate::config::{Config, LogConfig};
+use crate::estimate::short_name;
+use crate::preflight::Fix;
 
 /// Columns of a log, and its joints in the order of a wiring.
 #[derive(Debug, Clone)]
@@ -81,7 +82,8 @@ impl Check {
         let mut out = String::from("# Configuration with remedies for what a pre-flight found:\n");
         for finding in self.mended() {
             let joint = finding.joint.as_ref().map_or_else(String::new, |j| format!(" of {j}"));
-            out += &format!("# - {}: {}{joint}: {}\n", short(&finding.log), finding.id, finding.evidence);
+            out +=
+                &format!("# - {}: {}{joint}: {}\n", short_name(&finding.log), finding.id, finding.evidence);
         }
         out += &toml::to_string(&table).unwrap_or_default();
         Ok(out)

@@ -4,8 +4,8 @@ use dynid_motion::UniformLog;
 use dynid_report as report;
 use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, Fact, StudySection, StudyTable, Value};
 
-use super::finding::FindingId;
-use super::{Check, CheckedLog, Severity, short};
+use super::{Check, CheckedLog, FindingId, Severity};
+use crate::estimate::short_name;
 use crate::{Error, VERSION};
 
 /// Points per drawn curve.
@@ -56,7 +56,7 @@ impl Check {
             .findings
             .iter()
             .filter(|f| f.id == FindingId::NotExamined.name())
-            .map(|f| short(&f.log))
+            .map(|f| short_name(&f.log))
             .collect();
         let untried = match untried.is_empty() {
             true => String::new(),
@@ -98,7 +98,7 @@ impl Check {
                 Severity::Info => report::Status::Ok,
             },
             name: f.id.replace('_', " "),
-            log: short(&f.log),
+            log: short_name(&f.log),
             joint: f.joint.clone().unwrap_or_default(),
             evidence: f.evidence.clone(),
             remedy: f.remedy.clone(),
@@ -110,13 +110,13 @@ impl Check {
         }];
         sections.extend(self.logs.iter().zip(&self.traces).map(|(log, trace)| section(log, trace)));
         let inputs = self.inputs.iter().map(crate::provenance::shown).collect();
-        Ok(report::render_log_page(&report::LogPage {
+        crate::fault::page(report::render_log_page(&report::LogPage {
             kind: "Pre-flight".to_owned(),
             title: format!(
                 "Pre-flight of {}",
-                self.logs.iter().map(|l| short(&l.log)).collect::<Vec<_>>().join(", ")
+                self.logs.iter().map(|l| short_name(&l.log)).collect::<Vec<_>>().join(", ")
             ),
-            robot: short(&self.robot),
+            robot: short_name(&self.robot),
             verdict: report::Verdict { status, headline: self.headline(), ..report::Verdict::default() },
             introduction: Vec::new(),
             findings: findings.collect(),
@@ -126,7 +126,7 @@ impl Check {
                 inputs,
                 ..report::Provenance::default()
             },
-        })?)
+        }))
     }
 }
 
@@ -137,7 +137,7 @@ fn table(logs: &[CheckedLog]) -> StudyTable {
     };
     let row = |log: &CheckedLog| {
         vec![
-            Value::Text(short(&log.log)),
+            Value::Text(short_name(&log.log)),
             Value::Count(log.rows as u64),
             Value::Number(log.rate_hz),
             Value::Number(log.duration_s),
@@ -181,7 +181,7 @@ fn section(log: &CheckedLog, trace: &Trace) -> StudySection {
         ..Chart::default()
     };
     StudySection {
-        title: short(&log.log),
+        title: short_name(&log.log),
         facts: vec![Fact::new("file".to_owned(), log.log.clone(), "")],
         charts: vec![
             chart("position", "rad or m", |j| &j.position),

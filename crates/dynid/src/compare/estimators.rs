@@ -2,7 +2,7 @@
 
 use dynid_model::EffortModel;
 
-use crate::identify::Problem;
+use crate::pipeline::Problem;
 use crate::settings::{Consistency, Friction, Method, Route, Settings};
 
 /// Evaluations of a search within a comparison.

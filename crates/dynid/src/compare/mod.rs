@@ -12,15 +12,15 @@ mod report;
 use std::sync::Arc;
 use std::time::Instant;
 
-use dynid_estimate::conditioning::{Conditioning, ConditioningSettings, PreparedLog};
 use dynid_model::{EffortModel, RobotModel};
 use dynid_motion::mask::edges;
+use dynid_rows::conditioning::{Conditioning, ConditioningSettings, PreparedLog};
 
 use crate::Error;
 use crate::agreement::{Alignment, compare as against};
 use crate::config::{Config, Route};
 use crate::estimate::InputRecord;
-use crate::identify::{ModelFit, Problem, Step};
+use crate::pipeline::{ModelFit, Problem, Step};
 use crate::run::open;
 use estimators::{Contestant, contestants};
 pub use record::{CompareStatus, ComparedEstimator, Comparison, JointError};

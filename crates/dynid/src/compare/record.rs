@@ -1,14 +1,14 @@
 //! The table of a comparison.
 
-use dynid_estimate::conditioning::Conditioning;
 use dynid_model::EffortModel;
+use dynid_rows::conditioning::Conditioning;
 use serde::Serialize;
 
 use super::estimators::Contestant;
 use super::{FOLDS, FoldScore};
 use crate::config::Config;
 use crate::estimate::InputRecord;
-use crate::identify::Problem;
+use crate::pipeline::Problem;
 
 /// Error of an estimator on one joint.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

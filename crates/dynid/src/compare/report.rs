@@ -39,7 +39,7 @@ impl Comparison {
                 ..StudySection::default()
             },
         ];
-        Ok(report::render_log_page(&report::LogPage {
+        crate::fault::page(report::render_log_page(&report::LogPage {
             kind: "Comparison of estimators".to_owned(),
             title: format!(
                 "{} estimators on {} log{}",
@@ -70,7 +70,7 @@ impl Comparison {
                 inputs,
                 ..report::Provenance::default()
             },
-        })?)
+        }))
     }
 
     fn table(&self) -> StudyTable {

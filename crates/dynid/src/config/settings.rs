@@ -1,6 +1,8 @@
 //! From a configuration to the settings of an identification.
 
-use super::{Config, LogConfig};
+use dynid_io::CouplingSpec;
+
+use super::{Config, CouplingConfig, InstrumentsConfig, LogConfig};
 use crate::Error;
 use crate::commands::RunFiles;
 use crate::friction::known_laws;
@@ -21,30 +23,30 @@ impl Config {
 
     /// Settings without what files hold.
     pub(super) fn plain_settings(&self) -> Settings {
-        Settings {
-            seed: self.seed,
-            elements: Elements {
+        Settings::default().with(|settings| {
+            settings.seed = self.seed;
+            settings.elements = Elements {
                 default: self.elements.default.clone(),
                 joint: self.elements.joint.clone(),
                 friction: self.elements.friction,
                 known: None,
-            },
-            couplings: self.coupling.iter().map(Into::into).collect(),
-            conditioning: self.conditioning.clone(),
-            known_effort_scale: self.known_effort_scale,
-            known_mass: self.known_mass.clone(),
-            preflight: self.preflight,
-            estimator: self.estimator.clone(),
-            closed_loop: self.instruments.as_ref().map(|table| table.closed_loop()),
-            bound: self.bound.clone(),
-            preferred: self.preferred.clone(),
-            payload: self.payload.clone(),
-            files: RunFiles {
+            };
+            settings.couplings = self.coupling.iter().map(coupling).collect();
+            settings.conditioning = self.conditioning.clone();
+            settings.known_effort_scale = self.known_effort_scale;
+            settings.known_mass = self.known_mass.clone();
+            settings.preflight = self.preflight;
+            settings.estimator = self.estimator.clone();
+            settings.closed_loop = self.instruments.as_ref().map(InstrumentsConfig::closed_loop);
+            settings.bound = self.bound.clone();
+            settings.preferred = self.preferred.clone();
+            settings.payload = self.payload.clone();
+            settings.files = RunFiles {
                 config: self.file.clone(),
                 robot: self.robot.clone(),
                 logs: self.log.iter().map(|log| log.path.clone()).collect(),
-            },
-        }
+            };
+        })
     }
 
     /// Names of the training logs in parameters and messages: as stated, else the file's name, with `#2` where it comes again.
@@ -83,7 +85,7 @@ impl Config {
         match (&self.trajectory, self.period_s) {
             (Some(file), _) if all_own => Err(Error::setting("trajectory", expected, file.display())),
             (_, Some(period)) if all_own => Err(Error::setting("period_s", expected, period)),
-            _ => self.instruments.iter().try_for_each(super::InstrumentsConfig::check_effect),
+            _ => self.instruments.iter().try_for_each(InstrumentsConfig::check_effect),
         }
     }
 }
@@ -103,13 +105,11 @@ impl LogConfig {
     }
 }
 
-impl From<&super::CouplingConfig> for dynid_io::CouplingSpec {
-    fn from(of: &super::CouplingConfig) -> Self {
-        dynid_io::CouplingSpec {
-            motors: of.motors.clone(),
-            joints: of.joints.clone(),
-            matrix: of.matrix.clone(),
-            form: of.form,
-        }
+fn coupling(of: &CouplingConfig) -> CouplingSpec {
+    CouplingSpec {
+        motors: of.motors.clone(),
+        joints: of.joints.clone(),
+        matrix: of.matrix.clone(),
+        form: of.form,
     }
 }

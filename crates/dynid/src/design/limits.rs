@@ -9,6 +9,7 @@ use dynid_model::{EffortModel, RobotModel, Vec3};
 use super::config::DesignConfig;
 use super::safety::{Safety, given_capsules, safety};
 use crate::Error;
+use crate::fault::DesignError;
 use crate::robot::Robot;
 use crate::settings::known;
 
@@ -117,18 +118,21 @@ pub(super) fn constraints(
     let mut out: Vec<Box<dyn PathConstraint>> = Vec::new();
     if config.limits.efforts && effort_limits.iter().any(Option::is_some) {
         match nominal {
-            Some(nominal) => out.push(Box::new(EffortLimits::new(
-                model.clone(),
-                model.parameters().shape_start(),
-                nominal.to_vec(),
-                effort_limits,
-            )?)),
+            Some(nominal) => out.push(Box::new(
+                EffortLimits::new(
+                    model.clone(),
+                    model.parameters().shape_start(),
+                    nominal.to_vec(),
+                    effort_limits,
+                )
+                .map_err(DesignError::from)?,
+            )),
             None => assumptions.push("effort limits cannot be kept without inertias".to_owned()),
         }
     }
     let regions = regions(config);
     if !regions.is_empty() {
-        out.push(Box::new(CartesianLimits::new(mechanism, &regions)?));
+        out.push(Box::new(CartesianLimits::new(mechanism, &regions).map_err(DesignError::from)?));
     }
     let ranges: Vec<(f64, f64)> = limits.iter().map(|l| l.position).collect();
     out.extend(given_capsules(config, mechanism, &ranges, assumptions)?);

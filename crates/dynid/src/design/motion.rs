@@ -11,6 +11,7 @@ use super::config::DesignConfig;
 use super::problem::RobotProblem;
 use super::shapes::LinkCapsule;
 use crate::Error;
+use crate::fault::DesignError;
 
 /// Samples of approach and return at which efforts and distances are checked.
 const CHECKS: usize = 500;
@@ -155,7 +156,8 @@ pub(super) fn capsule_poses(
     let mechanism = set.model.mechanism();
     let mut points = Vec::new();
     for LinkCapsule { capsule, .. } in &set.safety.capsules {
-        let frame = mechanism.frame(&capsule.frame).map_err(ConstraintError::from)?;
+        let frame =
+            mechanism.frame(&capsule.frame).map_err(ConstraintError::from).map_err(DesignError::from)?;
         for end in capsule.ends {
             let position = frame.placement.rotation.mul_vec(end) + frame.placement.translation;
             points.push(BodyPoint { body: frame.body, position });

@@ -14,8 +14,11 @@ use dynid_motion::trajectory::{Form, RowOrder};
 use super::config::{ColumnsName, CriterionName, DesignConfig};
 use super::limits::{constraints, effort_limits, joint_limits};
 use super::safety::Safety;
+use dynid_excitation::constraint::ConstraintError;
+
 use crate::Error;
 use crate::elements::ElementPlan;
+use crate::fault::DesignError;
 use crate::nominal::{nominal_parameters, typical_efforts, with_nominal_shape};
 use crate::robot::{Robot, refuse_elastic, refuse_loops};
 use crate::settings::known;
@@ -96,7 +99,7 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
         ));
     }
     for frame in &config.trajectory.frames {
-        mechanism.frame(frame).map_err(dynid_excitation::constraint::ConstraintError::from)?;
+        mechanism.frame(frame).map_err(ConstraintError::from).map_err(DesignError::from)?;
     }
     let mut assumptions = Vec::new();
     let stated = mechanism.bodies().iter().any(|b| b.stated);

@@ -23,7 +23,7 @@ impl DesignRun {
     /// # Errors
     /// [`Error::Report`], [`Error::UnknownLink`] for a frame that does not exist.
     pub fn report(&self, config: &DesignConfig, record: &DesignRecord) -> Result<String, Error> {
-        Ok(report::render_design(&self.report_data(config, record)?)?)
+        crate::fault::page(report::render_design(&self.report_data(config, record)?))
     }
 
     fn report_data(

@@ -1,8 +1,8 @@
 //! What every design keeps unless it is turned off: links above the floor, and apart from each other.
 
 use dynid_excitation::constraint::{
-    Capsule, CapsulePairs, Capsules, CartesianLimits, ConstraintKind, FramePoint, PathConstraint, Plane,
-    PlaneScreening, mean_place, screen,
+    Capsule, CapsulePairs, Capsules, CartesianLimits, ConstraintError, ConstraintKind, FramePoint,
+    PathConstraint, Plane, PlaneScreening, mean_place, screen,
 };
 use dynid_io::SourceFile;
 use dynid_model::{BodyPoint, Mechanism, Vec3};
@@ -11,6 +11,7 @@ use serde::Serialize;
 use super::config::DesignConfig;
 use super::shapes::{CapsuleSource, LinkCapsule, LinkCapsules, link_capsules};
 use crate::Error;
+use crate::fault::DesignError;
 use crate::robot::Robot;
 
 /// Cosine of the angle between the z axis of the base and the vertical up to which the base is upright: 45°.
@@ -218,7 +219,7 @@ impl Safety {
     ) -> Result<(), Error> {
         let margin = config.safety.margin_m;
         let capsules: Vec<Capsule> = self.capsules.iter().map(|c| c.capsule.clone()).collect();
-        let screened = screen(mechanism, &capsules, planes, margin, ranges)?;
+        let screened = screen(mechanism, &capsules, planes, margin, ranges).map_err(DesignError::from)?;
         let record = |c: &LinkCapsule| CapsuleRecord {
             link: c.capsule.frame.clone(),
             from_m: c.capsule.ends[0].0,
@@ -267,7 +268,9 @@ impl Safety {
             always_low,
         });
         if !points.is_empty() {
-            self.constraints.push(Box::new(CartesianLimits::above_plane(mechanism, &points, plane)?));
+            self.constraints.push(Box::new(
+                CartesianLimits::above_plane(mechanism, &points, plane).map_err(DesignError::from)?,
+            ));
         }
         Ok(())
     }
@@ -320,7 +323,9 @@ impl Safety {
         self.record.exempt.extend(exempt.into_iter().map(|links| ExemptRecord { links, reason }));
         self.record.pairs = distinct(kept.iter().map(names));
         if !kept.is_empty() {
-            self.constraints.push(Box::new(Capsules::own_links(mechanism, capsules, &kept, margin)?));
+            self.constraints.push(Box::new(
+                Capsules::own_links(mechanism, capsules, &kept, margin).map_err(DesignError::from)?,
+            ));
         }
         Ok(())
     }
@@ -330,7 +335,7 @@ impl Safety {
 fn check_exempt(exempt: &[[String; 2]], mechanism: &Mechanism, used: &[[String; 2]]) -> Result<(), Error> {
     for pair in exempt {
         for link in pair {
-            mechanism.frame(link).map_err(dynid_excitation::constraint::ConstraintError::from)?;
+            mechanism.frame(link).map_err(ConstraintError::from).map_err(DesignError::from)?;
         }
         let [a, b] = pair;
         if !used.iter().any(|u| u == pair || (u[0] == *b && u[1] == *a)) {
@@ -358,7 +363,7 @@ pub(super) fn given_capsules(
     if capsules.len() < 2 {
         return Ok(None);
     }
-    let kept = Capsules::new(mechanism, &capsules, &CapsulePairs::All, ranges)?;
+    let kept = Capsules::new(mechanism, &capsules, &CapsulePairs::All, ranges).map_err(DesignError::from)?;
     if kept.pairs().is_empty() {
         assumptions.push(
             "no two capsules are kept apart: they cannot touch within the position limits, or stand on one link or on two that \
@@ -373,7 +378,7 @@ pub(super) fn given_capsules(
 fn side_of_links(mechanism: &Mechanism, ranges: &[(f64, f64)]) -> Result<Option<Vec3<f64>>, Error> {
     let origin = |body| BodyPoint { body: Some(body), position: Vec3::zero() };
     let origins: Vec<BodyPoint> = (0..mechanism.bodies().len()).map(origin).collect();
-    let (mean, reach) = mean_place(mechanism, &origins, ranges)?;
+    let (mean, reach) = mean_place(mechanism, &origins, ranges).map_err(DesignError::from)?;
     let distance = mean.norm();
     Ok((distance > NO_SIDE * reach).then(|| mean.scale(1.0 / distance)))
 }

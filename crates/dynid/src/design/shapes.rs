@@ -11,7 +11,9 @@ use serde::Serialize;
 
 use super::config::DesignConfig;
 use crate::Error;
+use crate::fault::DesignError;
 use crate::robot::Robot;
+use dynid_excitation::constraint::ConstraintError;
 
 /// A mesh that is this much larger than the robot is in other units.
 const LARGEST_SHARE: f64 = 3.0;
@@ -66,7 +68,8 @@ pub(super) fn link_capsules(robot: &Robot, config: &DesignConfig) -> Result<Link
     let mut known = Vec::new();
     let mut unknown = Vec::new();
     for link in links {
-        let body = mechanism.frame(link).map_err(dynid_excitation::constraint::ConstraintError::from)?.body;
+        let frame = mechanism.frame(link).map_err(ConstraintError::from).map_err(DesignError::from)?;
+        let body = frame.body;
         let own = |role| shapes.iter().filter(|s| s.link == link && s.role == role).collect::<Vec<_>>();
         let (collision, visual) = (own(ShapeRole::Collision), own(ShapeRole::Visual));
         match reader.first_whole(&collision, &visual) {

@@ -2,7 +2,7 @@
 
 use super::Text;
 
-super::names! {
+dynid_identify::names! {
     /// Words of results that are neither findings nor checks.
     Word {
         /// A limit moved the value.

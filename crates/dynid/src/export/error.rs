@@ -1,8 +1,9 @@
 //! Why a robot is not exported.
 
-use thiserror::Error;
+use thiserror::Error as ThisError;
 
 use super::READ_BACK_LIMIT;
+use crate::{Error, Fault};
 
 /// A link that no body could be, and why.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,7 +15,7 @@ pub struct LinkFault {
 }
 
 /// Why a robot is not exported; nothing is written then.
-#[derive(Debug, Error)]
+#[derive(Debug, ThisError)]
 #[non_exhaustive]
 pub enum ExportError {
     /// The robot file does not have the joints that were identified.
@@ -43,9 +44,14 @@ pub enum ExportError {
     },
 }
 
-impl ExportError {
-    /// What to do about it.
-    pub fn hint(&self) -> Option<String> {
+impl From<ExportError> for Error {
+    fn from(fault: ExportError) -> Self {
+        Error::Job(Box::new(fault))
+    }
+}
+
+impl Fault for ExportError {
+    fn hint(&self) -> Option<String> {
         Some(match self {
             ExportError::OtherRobot { .. } => {
                 "give the file that was identified: `dynid export ESTIMATE --robot FILE`".to_owned()

@@ -6,9 +6,9 @@ use dynid_io::RobotFile;
 use dynid_model::{Description, Inertia, RobotModel};
 
 use crate::Error;
-use crate::estimate::{Estimate, InputRecord, Split};
-use crate::identify::Identification;
+use crate::estimate::{Estimate, Split};
 use crate::known_friction::KnownFriction;
+use crate::pipeline::Identification;
 use crate::run::Run;
 
 /// A robot with identified parameters, whatever they come from.
@@ -50,29 +50,24 @@ impl IdentifiedRobot {
     }
 }
 
-impl Estimate {
-    /// The identified robot; `file` stands in messages.
+impl IdentifiedRobot {
+    /// The robot of an estimate; `file` stands in messages.
     ///
     /// # Errors
     /// [`Error::EstimateFile`] if the record contradicts itself.
-    pub fn identified_robot(&self, file: &Path) -> Result<IdentifiedRobot, Error> {
-        let model = self.effort_model(file, Split::Consistent)?;
-        let description = self
+    pub fn of(estimate: &Estimate, file: &Path) -> Result<IdentifiedRobot, Error> {
+        let model = estimate.effort_model(file, Split::Consistent)?;
+        let description = estimate
             .model
-            .description(&self.robot)
+            .description(&estimate.robot)
             .map_err(|message| Error::EstimateFile { file: file.display().to_string(), message })?;
         Ok(IdentifiedRobot {
             description,
             model,
-            values: self.values(Split::Consistent),
-            load_reference: self.model.load_reference.clone(),
-            known_friction: self.model.known_friction.clone(),
+            values: estimate.values(Split::Consistent),
+            load_reference: estimate.model.load_reference.clone(),
+            known_friction: estimate.model.known_friction.clone(),
         })
-    }
-
-    /// The robot file that was identified, if the estimate names it.
-    pub fn robot_file(&self) -> Option<&InputRecord> {
-        self.provenance.inputs.iter().find(|i| i.kind == "robot")
     }
 }
 

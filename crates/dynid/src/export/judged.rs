@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use dynid_estimate::conditioning::{PreparedLog, predict};
 use dynid_io::mjcf::JointParameters;
 use dynid_model::{EffortModel, RobotModel};
+use dynid_rows::conditioning::{PreparedLog, predict};
 
 use super::joints::{self, Format};
 use super::{CheckStates, FrictionProjection, Identified, projection, read_back};
 use crate::Error;
 use crate::agreement::Agreement;
 use crate::estimate::{ExportedJoint, ExportedLog, ExportedRecord, FileFit};
-use crate::identify::Identification;
+use crate::pipeline::Identification;
 
 /// What robot files of an identification state and lose, on its training and validation logs.
 ///

@@ -1,35 +1,12 @@
 //! Friction in the two terms that robot files have: least squares over the states of a log.
 
-use dynid_estimate::factor::{Factor, FactorBuilder};
+pub use crate::estimate::FrictionProjection;
 use dynid_estimate::linear::ols;
+use dynid_factor::factor::{Factor, FactorBuilder};
 use dynid_model::element::sign;
 use dynid_model::{EffortModel, RegressorBlock, RobotModel};
-use serde::{Deserialize, Serialize};
 
 use super::read_back::{CheckStates, with_slipping_bristles};
-
-/// Friction loss and damping that stand in a robot file for friction of other forms.
-///
-/// `effort of the joint's elements ≈ friction_loss · sign(q̇) + damping · q̇ + constant`, least squares over the states
-/// of the training logs in which the joint moves; neither coefficient is negative, since simulators refuse that. The constant keeps
-/// sensor offsets and loads out of both and has no place in a file. Rotor inertia is not part of it, but where motors are coupled: their
-/// rotors and that of the joint only make sense together, and `+ rotor_inertia · q̈` stands for all of them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FrictionProjection {
-    /// Joint.
-    pub joint: String,
-    /// Coefficient of `sign(q̇)`, N m or N.
-    pub friction_loss: f64,
-    /// Coefficient of `q̇`, N m s/rad or N s/m.
-    pub damping: f64,
-    /// Coefficient of `q̈` where coupled motors act on the joint, kg m² or kg; absent: the joint's own rotor inertia.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub rotor_inertia: Option<f64>,
-    /// Linear parameters of the elements that it stands for, name and value.
-    pub parameters: Vec<(String, f64)>,
-    /// States that it was formed over, in words.
-    pub states: String,
-}
 
 /// Samples slower than this share of the joint's greatest speed are left out: there the sign of the velocity is noise.
 const MOVING_SHARE: f64 = 0.02;

@@ -1,6 +1,5 @@
 //! Whether a written robot gives the identified effort.
 
-use dynid_estimate::conditioning::{ConditioningSettings, PreparedLog, States};
 use dynid_io::MappingSpec;
 use dynid_io::mjcf::JointParameters;
 use dynid_model::closed::ClosedMechanism;
@@ -10,6 +9,7 @@ use dynid_model::{
     TreeModel,
 };
 use dynid_motion::Channel;
+use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, States};
 
 use super::error::ExportError;
 use crate::Error;

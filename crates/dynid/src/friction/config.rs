@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use dynid_estimate::steady_friction::{LawForm, SteadySettings, ViscousForm};
+use dynid_friction::steady_friction::{LawForm, SteadySettings, ViscousForm};
 use dynid_io::MappingSpec;
 use dynid_motion::constant_speed::{PairSettings, SegmentSettings};
 use serde::{Deserialize, Serialize};

@@ -1,12 +1,14 @@
 //! What keeps friction experiments from being evaluated.
 
-use dynid_estimate::steady_friction::SteadyError;
+use dynid_friction::steady_friction::SteadyError;
 use dynid_motion::ClockError;
 use dynid_motion::constant_speed::ConstantSpeedError;
-use thiserror::Error;
+use thiserror::Error as ThisError;
+
+use crate::{Error, Fault};
 
 /// Bad input of friction experiments; [`FrictionError::hint`] says what to do about it.
-#[derive(Debug, Error)]
+#[derive(Debug, ThisError)]
 #[non_exhaustive]
 pub enum FrictionError {
     /// No log has a stretch of constant speed.
@@ -72,7 +74,7 @@ pub enum FrictionError {
     },
     /// The search of bristles cannot run.
     #[error("pre-sliding: {0}")]
-    Search(#[from] dynid_estimate::search::SearchError),
+    Search(#[from] dynid_search::SearchError),
     /// A friction file is none.
     #[error("{file}: not a friction model: {message}")]
     File {
@@ -83,9 +85,14 @@ pub enum FrictionError {
     },
 }
 
-impl FrictionError {
-    /// What a user can do about it.
-    pub fn hint(&self) -> Option<String> {
+impl From<FrictionError> for Error {
+    fn from(fault: FrictionError) -> Self {
+        Error::Job(Box::new(fault))
+    }
+}
+
+impl Fault for FrictionError {
+    fn hint(&self) -> Option<String> {
         Some(
             match self {
                 FrictionError::NoConstantSpeed { .. } => {

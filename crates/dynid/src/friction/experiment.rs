@@ -1,6 +1,6 @@
 //! From logs to points of steady friction.
 
-use dynid_estimate::steady_friction::SteadyPoint;
+use dynid_friction::steady_friction::SteadyPoint;
 use dynid_model::element::temperature_channel;
 use dynid_motion::clock::{ClockSettings, UniformLog, uniform};
 use dynid_motion::constant_speed::{Pairing, Pass, Segment, at_rest, pair, segments, speed};

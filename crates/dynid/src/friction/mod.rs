@@ -5,7 +5,7 @@
 //! - friction by speed and temperature, half the difference of both directions at equal position (gravity and offset
 //!   cancel): [`dynid_motion::constant_speed`];
 //! - the friction law that these points can carry, with straight lines of its viscous coefficients over temperature:
-//!   [`dynid_estimate::steady_friction`];
+//!   [`dynid_friction::steady_friction`];
 //! - stiffness and damping of LuGre's bristles from pre-sliding logs, by simulation error: [`dynid_sim::presliding`].
 //!
 //! [`FrictionModel`] is what it leaves behind, `friction.json`. What the logs cannot tell is said, not guessed: with one
@@ -32,7 +32,7 @@ pub(crate) use known::known_laws;
 pub use model::FrictionModel;
 pub use presliding::{PreslidingFit, PreslidingTest, fit_presliding};
 
-use dynid_estimate::steady_friction::{SteadyError, SteadyFriction, analyse};
+use dynid_friction::steady_friction::{SteadyError, SteadyFriction, analyse};
 
 use crate::Error;
 use crate::estimate::InputRecord;

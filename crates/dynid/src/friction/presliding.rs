@@ -2,11 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use dynid_estimate::search::{
-    Algorithm, Bounds, PointObjective, SearchError, Settings, covariance_of_values, run,
-};
-use dynid_estimate::steady_friction::FrictionLaw;
+use dynid_friction::steady_friction::FrictionLaw;
 use dynid_motion::signal::quantum;
+use dynid_search::{Algorithm, Bounds, PointObjective, SearchError, Settings, covariance_of_values, run};
 use dynid_sim::presliding::{EffortHold, PreslidingJoint, SteadyTable, presliding};
 
 use super::config::{FrictionConfig, HoldName, PreslidingLog};
@@ -225,7 +223,7 @@ impl Task<'_> {
             .flat_map(|a| places.iter().flat_map(move |b| [guess[0] * a, guess[1] * b]))
             .collect();
         let mut values = vec![0.0; GRID * GRID];
-        dynid_estimate::search::Objective::evaluate(&objective, &candidates, &mut values);
+        dynid_search::Objective::evaluate(&objective, &candidates, &mut values);
         *simulations += values.len() as u64;
         for (value, point) in values.iter().zip(candidates.chunks_exact(2)) {
             if *value < least {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use dynid_estimate::distribution::f_quantile;
-use dynid_estimate::steady_friction::{LevelFit, SteadyFriction};
+use dynid_friction::steady_friction::{LevelFit, SteadyFriction};
 use dynid_sim::presliding::EffortHold;
 
 use super::config::FrictionConfig;

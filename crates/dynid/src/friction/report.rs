@@ -1,6 +1,6 @@
 //! The report page of friction experiments.
 
-use dynid_estimate::steady_friction::{SteadyFriction, ThermalLine};
+use dynid_friction::steady_friction::{SteadyFriction, ThermalLine};
 use dynid_report as report;
 use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, Fact, StudyTable, Value};
 
@@ -24,7 +24,7 @@ impl FrictionIdentification {
     /// [`Error::Report`].
     pub fn report(&self, model: &FrictionModel) -> Result<String, Error> {
         let p = &model.provenance;
-        Ok(report::render_friction(&report::FrictionReport {
+        crate::fault::page(report::render_friction(&report::FrictionReport {
             title: format!("Friction of {}", model.robot),
             verdict: report::Verdict {
                 status: match model.verdict.status.as_str() {
@@ -61,7 +61,7 @@ impl FrictionIdentification {
                 seed: None,
                 settings: settings_table(&p.settings, &super::record::default_settings()),
             },
-        })?)
+        }))
     }
 
     fn test(&self, joint: &IdentifiedJoint, record: &JointFrictionModel) -> report::FrictionTest {
@@ -349,7 +349,7 @@ fn surface(joint: &IdentifiedJoint, record: &JointFrictionModel, units: &Units) 
     let found = joint.law.as_ref().ok().filter(|f| f.law.form.thermal)?;
     let [cold, hot] = record.temperature_range?;
     let law =
-        dynid_estimate::steady_friction::FrictionLaw { temperature_range: (cold, hot), ..found.law.clone() };
+        dynid_friction::steady_friction::FrictionLaw { temperature_range: (cold, hot), ..found.law.clone() };
     let xs = speeds(record, GRID[0]);
     let ys: Vec<f64> = (0..GRID[1]).map(|k| cold + (hot - cold) * k as f64 / (GRID[1] - 1) as f64).collect();
     let values = ys.iter().map(|t| law.friction(&xs, &vec![*t; xs.len()])).collect();

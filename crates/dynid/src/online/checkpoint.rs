@@ -14,7 +14,7 @@ use super::samples::Samples;
 use super::usual::Innovations;
 use crate::config::Config;
 use crate::{Error, sealed};
-use dynid_estimate::conditioning::LiveRowSettings;
+use dynid_rows::conditioning::LiveRowSettings;
 
 const SCHEMA: &str = "dynid-online-checkpoint/2";
 

@@ -3,23 +3,23 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use dynid_estimate::Mat;
-use dynid_estimate::conditioning::{
-    ConditioningError, LiveRow, LiveRowSettings, LiveRows, PreparedLog, States, condition, prepare,
-};
 use dynid_estimate::consistent::Bound;
 use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate};
-use dynid_estimate::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
+use dynid_factor::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
+use dynid_linalg::Mat;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
 use dynid_motion::live::{LiveGrid, LiveSettings};
 use dynid_motion::{Channel, JointSignals, Log};
+use dynid_rows::conditioning::{
+    ConditioningError, LiveRow, LiveRowSettings, LiveRows, PreparedLog, States, condition, prepare,
+};
 
 use super::samples::Sample;
 use super::usual::Innovations;
 use crate::config::Config;
 use crate::elements::ElementPlan;
-use crate::identify::stated_values;
 use crate::log::{self, LogAxis};
+use crate::pipeline::stated_values;
 use crate::prior::{self, Prior};
 use crate::robot::refuse_loops;
 use crate::run::load_robot;
@@ -246,7 +246,7 @@ fn log(name: &str, model: &RobotModel, samples: &[Sample]) -> Result<Log, Error>
 }
 
 fn effort_sizes(log: &PreparedLog) -> Vec<f64> {
-    crate::identify::effort_sizes(std::slice::from_ref(log))
+    crate::pipeline::effort_sizes(std::slice::from_ref(log))
 }
 
 /// All rows of the stretch.

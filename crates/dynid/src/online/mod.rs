@@ -1,8 +1,8 @@
 //! On-line identification: an estimate that follows a stream of samples, alarms when something changes.
 //!
 //! A [`Session`] takes rows of numbers as they come. The first stretch is *learned* off line: filter, delay, reversal masks and
-//! noise are found as for a log ([`dynid_estimate::conditioning::condition`]). From then on samples become rows one by one
-//! ([`dynid_estimate::conditioning::LiveRows`]), and rows update a square-root information filter
+//! noise are found as for a log ([`dynid_rows::conditioning::condition`]). From then on samples become rows one by one
+//! ([`dynid_rows::conditioning::LiveRows`]), and rows update a square-root information filter
 //! ([`dynid_estimate::online::Estimator`]). What there is to say comes as [`Event`]s. The state goes to a checkpoint and back without a
 //! change of bits.
 

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use dynid_estimate::Mat;
 use dynid_estimate::online::{ChangeHypothesis, ChangeJudgement};
+use dynid_linalg::Mat;
 use dynid_model::{EffortModel, Owner};
 
 use super::event::{Moved, MovedParameter};

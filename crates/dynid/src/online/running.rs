@@ -1,6 +1,5 @@
 //! The estimate that follows the stream.
 
-use dynid_estimate::conditioning::{LiveRow, LiveRows};
 use dynid_estimate::consistent::{Settings as ConsistentSettings, estimate};
 use dynid_estimate::online::{
     Estimator, Forgetting, JudgeSettings, RowNoise, Settings, SquareRoot, after_change, factor_from_root,
@@ -9,6 +8,7 @@ use dynid_estimate::online::{
 use dynid_model::EffortModel;
 use dynid_motion::live::LiveGrid;
 use dynid_motion::words::Transfer;
+use dynid_rows::conditioning::{LiveRow, LiveRows};
 
 use super::event::{Counts, Event, ParameterValue, PlainValue};
 use super::ground::Ground;

@@ -125,7 +125,7 @@ impl Samples {
                 };
                 stated.or_else(measured).ok_or_else(|| {
                     let (log, channel) = (self.name.clone(), wanted.clone());
-                    Error::Conditioning(dynid_estimate::conditioning::ConditioningError::MissingChannel {
+                    Error::Conditioning(dynid_rows::conditioning::ConditioningError::MissingChannel {
                         log,
                         channel,
                     })

@@ -1,6 +1,6 @@
 //! Centre of mass and inertia about it as functions of ten standard parameters, with their covariance.
 
-use dynid_estimate::Mat;
+use dynid_linalg::Mat;
 use dynid_model::Inertia;
 
 /// Mass, centre of mass and inertia about it: `m, cx, cy, cz, Jxx, Jxy, Jxz, Jyy, Jyz, Jzz`, with `c = h/m` and

@@ -1,13 +1,13 @@
 //! The plain difference of two fits, with and without a payload.
 
-use dynid_estimate::Mat;
-use dynid_estimate::conditioning::ReducedGroup;
 use dynid_estimate::linear::{LinearEstimate, LinearMethod, LinearSettings, estimate, explain_difference};
+use dynid_linalg::Mat;
 use dynid_model::Inertia;
+use dynid_rows::conditioning::ReducedGroup;
 use serde::{Deserialize, Serialize};
 
 use super::body::about_com;
-use crate::identify::Identification;
+use crate::pipeline::Identification;
 
 /// A payload from the difference of two fits of the robot, one to the logs that carry it and one to those that carry
 /// nothing: a check only, since its variance is larger and nothing keeps the body possible

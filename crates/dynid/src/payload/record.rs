@@ -1,7 +1,8 @@
 //! What is found of a payload, and the file `payload.json`.
 
+use dynid_estimate::identifiability;
 use dynid_estimate::identifiability::{excited_regrouping, posterior};
-use dynid_estimate::{Mat, identifiability};
+use dynid_linalg::Mat;
 use dynid_model::Inertia;
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +14,7 @@ use crate::config::PayloadConfig;
 use crate::estimate::{
     CheckResult, ConsistencyRecord, LogScale, ParameterValue, Provenance, SCHEMA, Verdict,
 };
-use crate::identify::Identification;
+use crate::pipeline::Identification;
 use crate::prior::PAYLOAD_SIZE;
 use crate::verdict::CheckName;
 

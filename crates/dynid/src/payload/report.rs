@@ -56,7 +56,7 @@ impl PayloadFile {
                 settings: run_settings(p),
             },
         };
-        Ok(report::render_kind("Payload", &page)?)
+        crate::fault::page(report::render_kind("Payload", &page))
     }
 
     fn sections(&self) -> Vec<StudySection> {

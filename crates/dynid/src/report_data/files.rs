@@ -3,8 +3,8 @@
 use dynid_model::EffortModel;
 use dynid_report::{FileJoint, FileJudgement, FileLoss};
 
+use crate::estimate::short_name;
 use crate::estimate::{EXPORT_LOSS_LIMIT, Estimate, FileFit};
-use crate::result::short_name;
 use crate::run::Run;
 
 impl Run {

@@ -7,7 +7,7 @@ use dynid_report::{RobotPicture, Value};
 use crate::Error;
 use crate::agreement::Agreement;
 use crate::estimate::Estimate;
-use crate::result::short_name;
+use crate::estimate::short_name;
 use crate::run::Run;
 
 /// What the first figure leaves out of a prediction; below the curves of all joints it is told at length.

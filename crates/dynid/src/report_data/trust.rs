@@ -4,8 +4,8 @@ use dynid_estimate::consistent::ActiveConstraint;
 use dynid_model::{EffortModel, Owner};
 use dynid_report as report;
 
+use crate::estimate::short_name;
 use crate::estimate::{ConsistencyRecord, Estimate, ParameterValue};
-use crate::result::short_name;
 use crate::run::Run;
 
 impl Run {

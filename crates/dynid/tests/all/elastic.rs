@@ -153,7 +153,7 @@ fn an_elastic_arm_is_identified_from_positions_of_motors_and_joints() {
     let agreement = &again.agreements[0];
     assert!(agreement.filtered.relative_error.unwrap() < 5.0);
     let exported = dynid::export::json(
-        &read.identified_robot(&path).unwrap().identified(),
+        &dynid::export::IdentifiedRobot::of(&read, &path).unwrap().identified(),
         &dynid::export::CheckStates::random(&model),
     )
     .unwrap();

@@ -319,7 +319,7 @@ fn run(reader: Reader, bytes: &[u8], folder: &Path, number: usize) {
         Reader::Estimate => {
             std::fs::write(&file, bytes).unwrap();
             if let Ok(estimate) = Estimate::read(&file) {
-                drop(estimate.identified_robot(&file));
+                drop(dynid::export::IdentifiedRobot::of(&estimate, &file));
                 if let Ok(model) = estimate.effort_model(&file, dynid::estimate::Split::Consistent) {
                     drop(model);
                 }

@@ -375,7 +375,7 @@ fn an_estimate_predicts_with_the_known_friction() {
         assert!(share < 0.03, "{:.2} % off the true effort", 100.0 * share);
     }
 
-    let robot = read.identified_robot(&file).unwrap();
+    let robot = dynid::export::IdentifiedRobot::of(&read, &file).unwrap();
     let states = CheckStates::random(robot.identified().model);
     let stated: RobotJson = serde_json::from_str(&json(&robot.identified(), &states).unwrap().text).unwrap();
     assert_eq!(stated.known_friction, read.model.known_friction);

@@ -4,13 +4,14 @@
 
 use std::path::Path;
 
-use dynid_estimate::search::{Bounds, EffortLoss, EffortObjective, Objective};
+use dynid_estimate::effort_objective::{EffortLoss, EffortObjective};
 use dynid_model::element::{Arctangent, Coulomb, JointElement, Offset, Viscous};
 use dynid_model::{
     BaseParameters, BaseSettings, Description, EffortModel, JointDescription, JointKind, Limits,
     LinkDescription, MotionBlock, Placement, RobotModel,
 };
 use dynid_motion::trajectory::Fourier;
+use dynid_search::{Bounds, Objective};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

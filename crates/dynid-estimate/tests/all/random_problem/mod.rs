@@ -1,7 +1,7 @@
 //! Random identification problems with known truth, from easy to hopeless.
 
-use dynid_estimate::Mat;
 use dynid_estimate::consistent::{Bound, LinkPrior, Problem, ScalarPrior};
+use dynid_linalg::Mat;
 use dynid_model::Inertia;
 use dynid_model::symmetric::{Square, cholesky, congruence};
 use rand::{RngExt, SeedableRng};

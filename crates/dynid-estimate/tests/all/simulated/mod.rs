@@ -1,6 +1,6 @@
 //! Logs of a made-up arm shared by the tests: smooth regressors, joints that share columns, rows in time blocks.
 
-use dynid_estimate::rows::{GroupShape, MemoryRows, Rows};
+use dynid_factor::rows::{GroupShape, MemoryRows, Rows};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

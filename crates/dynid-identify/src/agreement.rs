@@ -1,0 +1,320 @@
+//! Predicted against measured effort on a log.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use dynid_estimate::metrics::{Fit, FitSums};
+use dynid_model::EffortModel;
+use dynid_motion::filter::{butterworth, forward_backward};
+use dynid_motion::shift::shift;
+use dynid_rows::conditioning::{ConditioningSettings, Moving, PreparedLog, States, predict_along};
+
+use crate::Error;
+use crate::estimate::{FileFit, FitValues};
+
+/// How prediction and measurement are brought together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alignment {
+    /// Cut-off of the states, Hz.
+    pub state_hz: f64,
+    /// Lead of the logged effort before the motion, samples.
+    pub delay_samples: f64,
+    /// Sample rate that the lead was found at, Hz. A lead of samples (a held command) and one of time (transport) part
+    /// ways at another rate, so logs whose rate differs by more than 5 % are not aligned.
+    pub delay_rate_hz: f64,
+    /// Cut-off of the filter that both pass for the filtered figures, Hz.
+    pub filter_hz: f64,
+}
+
+/// Predicted and measured effort of a log with their agreement.
+#[derive(Debug, Clone)]
+pub struct Agreement {
+    /// Log.
+    pub name: String,
+    /// Time of the first sample, s.
+    pub start: f64,
+    /// Sample rate, Hz.
+    pub rate_hz: f64,
+    /// Per output: measured effort.
+    pub measured: Vec<Arc<Vec<f64>>>,
+    /// Per output: predicted effort.
+    pub predicted: Vec<Arc<Vec<f64>>>,
+    /// Per output: where the prediction that pictures show differs; empty before [`Agreement::draw`].
+    drawn: Vec<Patches>,
+    /// Per output: a drive acts there, so that its effort counts in figures over all joints.
+    pub driven: Vec<bool>,
+    /// Per output: the joint moves in this log.
+    pub moves: Vec<bool>,
+    /// Per sample: counted (not near an end or a gap of the clock).
+    pub counted: Vec<bool>,
+    /// On raw effort.
+    pub raw: Fit,
+    /// Through the same zero-phase Butterworth filter of order 4.
+    pub filtered: Fit,
+    /// Agreement after filtering, without aligning by the delay.
+    pub filtered_unaligned: Fit,
+    /// Cut-off of that filter, Hz.
+    pub filter_hz: f64,
+    /// Where the joints move, over all samples.
+    pub motion: Moving,
+    /// Agreement as in [`Agreement::filtered`], per output on the samples in which its joint moves.
+    pub moving: Fit,
+    /// Agreement per output on the samples in which its joint stands: friction may then have any value up to static friction, which no model of the speed
+    /// tells.
+    pub standing: Fit,
+    /// Per output: share of the counted samples in which its joint stands.
+    pub standing_share: Vec<f64>,
+}
+
+/// Lead of the effort to align a log by, samples: the one found, at the rate that it was found at.
+pub(crate) fn lead(rate_hz: f64, delay_samples: f64, delay_rate_hz: f64) -> f64 {
+    let same_rate = (rate_hz / delay_rate_hz - 1.0).abs() <= 0.05;
+    if same_rate { delay_samples } else { 0.0 }
+}
+
+/// Cut from both ends before figures are formed, in periods of the lower of the two cut-offs.
+const EDGE_PERIODS: f64 = 1.0;
+
+/// Predicts a log with given parameters and compares with the measured effort.
+///
+/// Samples within one period of the filter's cut-off from an end or a gap do not count.
+///
+/// # Errors
+/// [`Error::Conditioning`], [`Error::TooShort`].
+pub fn compare(
+    model: &dyn EffortModel,
+    values: &[f64],
+    log: &PreparedLog,
+    alignment: &Alignment,
+    settings: &ConditioningSettings,
+) -> Result<Agreement, Error> {
+    let state_hz = alignment.state_hz;
+    let filter_hz = alignment.filter_hz.min(0.4 * log.rate_hz);
+    let margin = (EDGE_PERIODS * log.rate_hz / filter_hz.min(state_hz)).ceil() as usize;
+    let mut bad: Vec<bool> = log.usable.iter().map(|u| !u).collect();
+    bad = dynid_motion::mask::dilate(&bad, margin);
+    dynid_motion::mask::merge(&mut bad, &dynid_motion::mask::edges(log.samples(), margin));
+    let counted: Vec<bool> = bad.iter().map(|b| !b).collect();
+    let too_short = |message: String| Error::TooShort { file: log.name.clone(), message };
+    if !counted.contains(&true) {
+        let lasts = format!("{:.2} s leave no sample between the filter's edges", log.duration());
+        return Err(too_short(lasts));
+    }
+    let states = States::of_motion(log, state_hz, settings)?;
+    let motion = Moving::new(log, &states, settings);
+    let shape = model.parameters().shape_start();
+    let lead = lead(log.rate_hz, alignment.delay_samples, alignment.delay_rate_hz);
+    let mut predicted = predict_along(model, &shape, values, log, &states);
+    drop(states);
+    let filter = butterworth(4, filter_hz, log.rate_hz).map_err(conditioning)?;
+    let filtered = |signal: &[f64]| forward_backward(&filter, signal).map_err(conditioning);
+    let driven: Vec<bool> = (0..log.effort.len()).map(|output| !model.is_undriven(output)).collect();
+    let [mut raw, mut all, mut unaligned, mut moving, mut standing] = [(); 5].map(|()| FitSums::default());
+    // One output at a time: long logs leave no room for filtered copies of all.
+    for (output, (measured, predicted)) in log.effort.iter().zip(&mut predicted).enumerate() {
+        let agree = |sums: &mut FitSums, measured: &[f64], predicted: &[f64], part: Part| {
+            let is_of = |k: usize| counted[k] && part.holds(motion.samples[output][k]);
+            sums.push(&pick(measured, is_of), &pick(predicted, is_of), driven[output])
+                .map_err(|e| too_short(e.to_string()))
+        };
+        let measured_filtered = filtered(measured)?;
+        agree(&mut unaligned, &measured_filtered, &filtered(predicted)?, Part::All)?;
+        *predicted = led(std::mem::take(predicted), lead)?;
+        agree(&mut raw, measured, predicted, Part::All)?;
+        let predicted_filtered = filtered(predicted)?;
+        agree(&mut all, &measured_filtered, &predicted_filtered, Part::All)?;
+        agree(&mut moving, &measured_filtered, &predicted_filtered, Part::Moving)?;
+        agree(&mut standing, &measured_filtered, &predicted_filtered, Part::Standing)?;
+    }
+    let samples = counted.iter().filter(|c| **c).count() as f64;
+    let stands = |moves: &Vec<bool>| moves.iter().zip(&counted).filter(|(m, c)| !**m && **c).count() as f64;
+    Ok(Agreement {
+        moving: moving.fit(),
+        standing: standing.fit(),
+        standing_share: motion.samples.iter().map(|moves| stands(moves) / samples).collect(),
+        name: log.name.clone(),
+        start: log.start,
+        rate_hz: log.rate_hz,
+        raw: raw.fit(),
+        filtered: all.fit(),
+        filtered_unaligned: unaligned.fit(),
+        measured: log.effort.clone(),
+        driven,
+        predicted: predicted.into_iter().map(Arc::new).collect(),
+        drawn: Vec::new(),
+        moves: log.moves.clone(),
+        motion,
+        counted,
+        filter_hz,
+    })
+}
+
+/// An effort ahead by the lead of a log, samples.
+fn led(signal: Vec<f64>, lead: f64) -> Result<Vec<f64>, Error> {
+    match lead {
+        0.0 => Ok(signal),
+        _ => shift(&signal, lead).map(|led| led.values).map_err(conditioning),
+    }
+}
+
+/// Which samples figures are formed on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Part {
+    All,
+    Moving,
+    Standing,
+}
+
+impl Part {
+    fn holds(self, moves: bool) -> bool {
+        match self {
+            Part::All => true,
+            Part::Moving => moves,
+            Part::Standing => !moves,
+        }
+    }
+}
+
+/// The samples of a signal that are asked for.
+fn pick(signal: &[f64], is_kept: impl Fn(usize) -> bool) -> Vec<f64> {
+    signal.iter().enumerate().filter(|(k, _)| is_kept(*k)).map(|(_, x)| *x).collect()
+}
+
+/// Samples at which a signal differs from another one; most do not.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Patches {
+    /// Stretches that differ, ascending.
+    stretches: Vec<Range<usize>>,
+    /// Values on all stretches, one after the other.
+    values: Vec<f64>,
+}
+
+impl Patches {
+    fn between(of: &[f64], to: &[f64]) -> Patches {
+        let mut out = Patches::default();
+        for (k, _) in of.iter().zip(to).enumerate().filter(|(_, (of, to))| of != to) {
+            match out.stretches.last_mut().filter(|last| last.end == k) {
+                Some(last) => last.end += 1,
+                None => out.stretches.push(k..k + 1),
+            }
+            out.values.push(to[k]);
+        }
+        out.values.shrink_to_fit();
+        out
+    }
+
+    fn apply(&self, to: &[f64]) -> Vec<f64> {
+        let mut out = to.to_vec();
+        let mut rest = &self.values[..];
+        for stretch in &self.stretches {
+            let (own, others) = rest.split_at(stretch.len());
+            out[stretch.clone()].copy_from_slice(own);
+            rest = others;
+        }
+        out
+    }
+}
+
+impl Agreement {
+    /// Predicts once more for pictures, with what [`compare`] was given.
+    ///
+    /// # Errors
+    /// [`Error::Conditioning`].
+    pub fn draw(
+        mut self,
+        model: &dyn EffortModel,
+        values: &[f64],
+        log: &PreparedLog,
+        alignment: &Alignment,
+        settings: &ConditioningSettings,
+    ) -> Result<Agreement, Error> {
+        let states = States::of_motion(log, alignment.state_hz, settings)?.resting(&self.motion);
+        let shape = model.parameters().shape_start();
+        let still = predict_along(model, &shape, values, log, &states);
+        drop(states);
+        let lead = lead(log.rate_hz, alignment.delay_samples, alignment.delay_rate_hz);
+        let drawn = still.into_iter().zip(&self.predicted);
+        self.drawn = drawn
+            .map(|(still, predicted)| Ok(Patches::between(predicted, &led(still, lead)?)))
+            .collect::<Result<_, Error>>()?;
+        Ok(self)
+    }
+
+    /// Prediction of an output as pictures show it, where that is not [`Agreement::predicted`], which all figures go by: where a joint stands,
+    /// friction of velocity is left out, since the sign of its velocity is that of noise. `None` without [`Agreement::draw`] too.
+    pub fn drawn(&self, output: usize) -> Option<Vec<f64>> {
+        self.is_drawn_otherwise(output).then(|| self.drawn[output].apply(&self.predicted[output]))
+    }
+
+    /// Whether pictures show another prediction of an output than figures go by ([`Agreement::drawn`]).
+    pub fn is_drawn_otherwise(&self, output: usize) -> bool {
+        self.drawn.get(output).is_some_and(|patches| !patches.stretches.is_empty())
+    }
+
+    /// Measured effort of an output and its prediction as pictures show it, through the filter of the filtered figures; not a
+    /// number near the ends and gaps, which do not count.
+    ///
+    /// # Errors
+    /// [`Error::Conditioning`].
+    pub fn in_band(&self, output: usize) -> Result<[Vec<f64>; 2], Error> {
+        let filter = butterworth(4, self.filter_hz, self.rate_hz).map_err(conditioning)?;
+        let through = |signal: &[f64]| -> Result<Vec<f64>, Error> {
+            let filtered = forward_backward(&filter, signal).map_err(conditioning)?;
+            let counted = filtered.into_iter().zip(&self.counted);
+            Ok(counted.map(|(x, counts)| if *counts { x } else { f64::NAN }).collect())
+        };
+        let predicted = match self.drawn(output) {
+            Some(drawn) => through(&drawn)?,
+            None => through(&self.predicted[output])?,
+        };
+        Ok([through(&self.measured[output])?, predicted])
+    }
+
+    /// Figures of a prediction that lacks `lost` of each output's effort, through the same filter.
+    ///
+    /// # Errors
+    /// [`Error::Conditioning`], [`Error::TooShort`].
+    pub fn without(&self, lost: impl Iterator<Item = Vec<f64>>) -> Result<FileFit, Error> {
+        let filter = butterworth(4, self.filter_hz, self.rate_hz).map_err(conditioning)?;
+        let through = |signal: &[f64]| {
+            let filtered = forward_backward(&filter, signal).map_err(conditioning)?;
+            Ok::<_, Error>(pick(&filtered, |k| self.counted[k]))
+        };
+        let rms = |s: &[f64]| (s.iter().map(|x| x * x).sum::<f64>() / s.len() as f64).sqrt();
+        let (mut sums, mut loss, mut loss_percent) = (FitSums::default(), Vec::new(), Vec::new());
+        for (output, lost) in lost.enumerate() {
+            let (measured, lost) = (through(&self.measured[output])?, through(&lost)?);
+            let whole = through(&self.predicted[output])?;
+            let predicted: Vec<f64> = whole.iter().zip(&lost).map(|(w, l)| w - l).collect();
+            sums.push(&measured, &predicted, self.driven[output])
+                .map_err(|e| Error::TooShort { file: self.name.clone(), message: e.to_string() })?;
+            let (own, of) = (rms(&lost), rms(&measured));
+            loss.push(own);
+            loss_percent.push((of > 0.0).then(|| 100.0 * own / of));
+        }
+        let found = sums.fit();
+        Ok(FileFit {
+            rms: found.channels.iter().map(|c| c.rms).collect(),
+            relative_error_per_joint: found.channels.iter().map(|c| c.relative_error).collect(),
+            relative_error: found.relative_error,
+            loss_percent,
+            loss,
+        })
+    }
+}
+
+fn conditioning(e: dynid_motion::SignalError) -> Error {
+    Error::Conditioning(e.into())
+}
+
+impl From<&Fit> for FitValues {
+    fn from(fit: &Fit) -> Self {
+        FitValues {
+            rms: fit.channels.iter().map(|c| c.rms).collect(),
+            nrmse: fit.channels.iter().map(|c| c.nrmse).collect(),
+            r2: fit.channels.iter().map(|c| c.r2).collect(),
+            relative_error_per_joint: fit.channels.iter().map(|c| c.relative_error).collect(),
+            relative_error: fit.relative_error,
+        }
+    }
+}

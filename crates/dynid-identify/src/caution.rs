@@ -1,0 +1,144 @@
+//! What to look at before a result is used, the worst first, each with what mends it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::estimate::CheckResult;
+use crate::preflight::FindingId;
+use crate::verdict::CheckName;
+
+/// Something to look at before a result is used.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Caution {
+    /// `fail`: the result is not to be used before this is mended; `warn`: usable, with a reservation.
+    pub status: String,
+    /// What it is about: the name of a check, of a finding, or of a part of the input. All cautions of a kind share it.
+    pub name: String,
+    /// What was found, with its place and number.
+    pub message: String,
+    /// What mends it: a command, or the line to write and its place.
+    pub remedy: String,
+}
+
+/// Kinds of cautions from those that matter most, since nothing holds beside them, to those that are good to know.
+const ORDER: [&str; 31] = [
+    CheckName::Preflight.name(),
+    FINDING,
+    CheckName::OwnLogs.name(),
+    CheckName::EffortScale.name(),
+    CheckName::ValidationFit.name(),
+    CheckName::TrainingFit.name(),
+    CheckName::OwnValidation.name(),
+    CheckName::Excitation.name(),
+    CheckName::RankGap.name(),
+    CheckName::Explained.name(),
+    CheckName::AgreementOfLogs.name(),
+    CheckName::PriceOfConsistency.name(),
+    CheckName::Stiffness.name(),
+    CheckName::Instruments.name(),
+    CheckName::ClosedLoopBias.name(),
+    CheckName::Residual.name(),
+    CheckName::Delay.name(),
+    CheckName::ReversalMask.name(),
+    CheckName::TimeBlocks.name(),
+    CheckName::Whiteness.name(),
+    CheckName::Condition.name(),
+    CheckName::TermsOfLogs.name(),
+    FRICTION,
+    KNOWN_FRICTION,
+    BODY,
+    SPRING,
+    ELEMENTS,
+    LOG,
+    SETTING,
+    CLEARANCE,
+    ROBOT_FILE,
+];
+
+/// A finding of the pre-flight, whatever its name.
+const FINDING: &str = "finding";
+/// Friction that drives the motion, or rises from rest.
+pub(crate) const FRICTION: &str = "identified friction";
+/// Known friction and its range.
+pub(crate) const KNOWN_FRICTION: &str = "known friction";
+/// An identified body that could not exist.
+pub(crate) const BODY: &str = "identified body";
+/// A spring that the logs tell little of.
+pub(crate) const SPRING: &str = "elastic joint";
+/// Elements that are nearly the same.
+pub(crate) const ELEMENTS: &str = "elements of a joint";
+/// How a log was read.
+pub(crate) const LOG: &str = "reading of a log";
+/// A setting that did nothing.
+pub(crate) const SETTING: &str = "setting without effect";
+/// Clearance that the fit leaves out.
+pub(crate) const CLEARANCE: &str = "clearance";
+/// What the robot file states or leaves out.
+pub(crate) const ROBOT_FILE: &str = "robot file";
+
+impl Caution {
+    /// A reservation.
+    pub(crate) fn warn(name: &str, message: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Caution {
+            status: "warn".to_owned(),
+            name: name.to_owned(),
+            message: message.into(),
+            remedy: remedy.into(),
+        }
+    }
+
+    /// A check that did not come out as it should, with what mends it.
+    pub(crate) fn of(check: &CheckResult, remedy: String) -> Self {
+        Caution {
+            status: check.status.clone(),
+            name: check.name.clone(),
+            message: check.meaning.clone(),
+            remedy,
+        }
+    }
+
+    /// The sentence in which a command line says it.
+    pub fn words(&self) -> String {
+        format!("[{}] {}: {}\n  mend: {}", self.status, self.name, self.message, self.remedy)
+    }
+
+    fn rank(&self) -> (bool, usize) {
+        let finding = FindingId::ALL.iter().any(|id| id.name().replace('_', " ") == self.name);
+        let name = if finding { FINDING } else { self.name.as_str() };
+        (self.status != "fail", ORDER.iter().position(|known| *known == name).unwrap_or(ORDER.len()))
+    }
+}
+
+/// Cautions by how much they matter: failures first, then in the order of what they put in doubt; equals stay as they are.
+pub(crate) fn ranked(mut cautions: Vec<Caution>) -> Vec<Caution> {
+    cautions.sort_by_key(Caution::rank);
+    cautions
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn failures_come_first_then_what_puts_more_in_doubt() {
+        let of =
+            |status: &str, name: &str| Caution { status: status.to_owned(), ..Caution::warn(name, "", "") };
+        let sorted = ranked(vec![
+            of("warn", ROBOT_FILE),
+            of("warn", CheckName::Condition.name()),
+            of("fail", CheckName::TrainingFit.name()),
+            of("warn", "joint permutation"),
+            of("warn", "never heard of"),
+        ]);
+        let names: Vec<&str> = sorted.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(
+            names,
+            [
+                CheckName::TrainingFit.name(),
+                "joint permutation",
+                CheckName::Condition.name(),
+                ROBOT_FILE,
+                "never heard of"
+            ]
+        );
+    }
+}

@@ -1,0 +1,312 @@
+//! The model in the result file, from which efforts can be predicted again.
+
+use dynid_io::{CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, SettingValue};
+use dynid_model::{
+    Description, Inertia, JointDescription, JointKind, Limits, LinkDescription, Mat3, Mechanism, Mimic,
+    Placement, Vec3,
+};
+use serde::{Deserialize, Serialize};
+
+use super::loops::LoopsRecord;
+use crate::Error;
+use crate::elements::ElementPlan;
+use crate::known_friction::KnownFriction;
+
+/// Robot, elements and settings that predictions need.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct ModelRecord {
+    /// Gravity, m/s².
+    pub gravity: [f64; 3],
+    /// Floating base under the root link.
+    pub floating_base: bool,
+    /// Mimic joints follow their leaders.
+    pub couple_mimics: bool,
+    /// Links: name, and the inertia of the robot file.
+    pub links: Vec<LinkRecord>,
+    /// Joints.
+    pub joints: Vec<JointRecord>,
+    /// Cut joints that close loops, if there are some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub loops: Option<LoopsRecord>,
+    /// Element names per effort; per rate of the tree where loops are closed.
+    pub elements: Vec<Vec<String>>,
+    /// Couplings.
+    pub couplings: Vec<CouplingRecord>,
+    /// Joints that motors drive through springs; their stiffness is among the parameters.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub elastic: Vec<ElasticRecord>,
+    /// Settings of elements that are numbers or flags: joint, element, key, value.
+    pub element_settings: Vec<(String, String, String, SettingRecord)>,
+    /// Standard parameters of all bodies whose rigid effort loads the gears of `load` elements; absent: those of the links.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub load_reference: Option<Vec<f64>>,
+    /// Friction whose effort is known; coefficients of friction among the parameters of these joints are its errors.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub known_friction: Vec<KnownFriction>,
+    /// Cut-off of the state filter, Hz.
+    pub state_hz: f64,
+    /// Cut-off of the widest kernel, Hz.
+    pub kernel_hz: f64,
+}
+
+/// A joint that its motor drives through a spring.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ElasticRecord {
+    /// Joint.
+    pub joint: String,
+    /// Motor of the joint, an effort of its own.
+    pub motor: String,
+    /// Travel of the motor over that of the joint with a stiff spring.
+    pub ratio: f64,
+    /// The spring has a cubic part, `<joint>.k2`.
+    pub cubic: bool,
+    /// Whether the spring is damped, `<joint>.d`.
+    pub damping: bool,
+    /// A sensor behind the spring measures its torque; efforts of the joint are the negative readings.
+    pub sensor: bool,
+}
+
+impl ElasticRecord {
+    fn new(e: &ElasticSpec) -> Self {
+        ElasticRecord {
+            joint: e.joint.clone(),
+            motor: e.motor.clone(),
+            ratio: e.ratio,
+            cubic: e.cubic,
+            damping: e.damping,
+            sensor: e.sensor,
+        }
+    }
+
+    fn spec(&self) -> Result<ElasticSpec, Error> {
+        if !(self.ratio.is_finite() && self.ratio != 0.0) {
+            return Err(Error::setting("elastic.ratio", "a finite number other than 0", self.ratio));
+        }
+        let (k1, k2, d) = (None, None, None);
+        let ElasticRecord { joint, motor, ratio, cubic, damping, sensor } = self.clone();
+        Ok(ElasticSpec { joint, motor, ratio, cubic, damping, sensor, k1, k2, d })
+    }
+}
+
+/// Value of an element's setting.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum SettingRecord {
+    /// A number.
+    Number(f64),
+    /// True or false.
+    Flag(bool),
+}
+
+/// A link.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct LinkRecord {
+    /// Name.
+    pub name: String,
+    /// Ten standard parameters, if the file states them.
+    pub phi: Option<[f64; 10]>,
+}
+
+/// A joint.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct JointRecord {
+    /// Name.
+    pub name: String,
+    /// Parent link.
+    pub parent: String,
+    /// Child link.
+    pub child: String,
+    /// Kind.
+    pub kind: String,
+    /// Pitch of a helical joint, m/rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pitch: Option<f64>,
+    /// Rows of the rotation parent ← joint.
+    pub rotation: [[f64; 3]; 3],
+    /// Origin in the parent, m.
+    pub translation: [f64; 3],
+    /// Axis.
+    pub axis: [f64; 3],
+    /// Position limits.
+    pub position_limits: Option<(f64, f64)>,
+    /// Leader, ratio and offset of a mimic joint.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mimic: Option<(String, f64, f64)>,
+}
+
+/// A coupling.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct CouplingRecord {
+    /// Motors.
+    pub motors: Vec<String>,
+    /// Joints.
+    pub joints: Vec<String>,
+    /// Matrix.
+    pub matrix: Vec<Vec<f64>>,
+    /// `strict` or `columns`.
+    pub form: String,
+}
+
+impl ModelRecord {
+    /// Records a description and what acts at its joints.
+    pub fn new(description: &Description, mechanism: &Mechanism, plan: &ElementPlan) -> Self {
+        let links = description
+            .links
+            .iter()
+            .map(|l| LinkRecord { name: l.name.clone(), phi: l.inertia.map(|i| i.0) })
+            .collect();
+        let joints = description.joints.iter().map(joint_record).collect();
+        let couplings = plan
+            .couplings
+            .iter()
+            .map(|c| CouplingRecord {
+                motors: c.motors.clone(),
+                joints: c.joints.clone(),
+                matrix: c.matrix.clone(),
+                form: match c.form {
+                    CouplingForm::Strict => "strict".to_owned(),
+                    CouplingForm::Columns => "columns".to_owned(),
+                },
+            })
+            .collect();
+        let element_settings = plan
+            .settings()
+            .iter()
+            .filter_map(|s| {
+                let value = match s.value {
+                    SettingValue::Number(x) => SettingRecord::Number(x),
+                    SettingValue::Flag(x) => SettingRecord::Flag(x),
+                    _ => return None,
+                };
+                Some((s.joint.clone(), s.element.clone(), s.key.clone(), value))
+            })
+            .collect();
+        ModelRecord {
+            gravity: mechanism.gravity().0,
+            floating_base: description.floating_base,
+            couple_mimics: description.couple_mimics,
+            links,
+            joints,
+            loops: plan.closed.as_deref().map(LoopsRecord::new),
+            elements: plan.per_rate.clone(),
+            couplings,
+            elastic: plan.elastic.iter().map(ElasticRecord::new).collect(),
+            element_settings,
+            load_reference: plan.load_reference.clone(),
+            known_friction: plan.known.clone(),
+            state_hz: 0.0,
+            kernel_hz: 0.0,
+        }
+    }
+
+    /// The robot that is recorded, under a name.
+    ///
+    /// # Errors
+    /// What contradicts itself, in words.
+    pub fn description(&self, name: &str) -> Result<Description, String> {
+        let mut d = Description::new(name);
+        d.gravity = self.gravity;
+        d.floating_base = self.floating_base;
+        d.couple_mimics = self.couple_mimics;
+        d.links = self
+            .links
+            .iter()
+            .map(|l| LinkDescription { name: l.name.clone(), inertia: l.phi.map(Inertia) })
+            .collect();
+        d.joints = self.joints.iter().map(joint_description).collect::<Result<_, _>>()?;
+        Ok(d)
+    }
+
+    pub(super) fn plan(&self, mechanism: &Mechanism) -> Result<ElementPlan, Error> {
+        let couplings = self
+            .couplings
+            .iter()
+            .map(|c| CouplingSpec {
+                motors: c.motors.clone(),
+                joints: c.joints.clone(),
+                matrix: c.matrix.clone(),
+                form: if c.form == "columns" { CouplingForm::Columns } else { CouplingForm::Strict },
+            })
+            .collect();
+        let settings = self
+            .element_settings
+            .iter()
+            .map(|(joint, element, key, value)| ElementSetting {
+                joint: joint.clone(),
+                element: element.clone(),
+                key: key.clone(),
+                value: match *value {
+                    SettingRecord::Number(x) => SettingValue::Number(x),
+                    SettingRecord::Flag(x) => SettingValue::Flag(x),
+                },
+            })
+            .collect();
+        let elastic = self.elastic.iter().map(ElasticRecord::spec).collect::<Result<Vec<_>, _>>()?;
+        if let Some(joint) = repeated(mechanism, &elastic) {
+            return Err(Error::setting("elastic", "names that occur once", joint));
+        }
+        let spec = ElementSpec { settings, elastic, ..ElementSpec::default() };
+        let mut plan = ElementPlan::recorded(mechanism, self.elements.clone(), couplings, spec)?;
+        plan.load_reference.clone_from(&self.load_reference);
+        plan.known.clone_from(&self.known_friction);
+        Ok(plan)
+    }
+}
+
+/// A joint or motor that stands twice.
+fn repeated(mechanism: &Mechanism, elastic: &[ElasticSpec]) -> Option<String> {
+    let mut names = mechanism.rate_names();
+    for e in elastic {
+        if names.contains(&e.motor) {
+            return Some(e.motor.clone());
+        }
+        names.push(e.motor.clone());
+    }
+    let twice = elastic.iter().enumerate().find(|(k, e)| elastic[..*k].iter().any(|b| b.joint == e.joint));
+    twice.map(|(_, e)| e.joint.clone())
+}
+
+fn joint_record(j: &JointDescription) -> JointRecord {
+    let (kind, pitch) = match j.kind {
+        JointKind::Revolute => ("revolute", None),
+        JointKind::Continuous => ("continuous", None),
+        JointKind::Prismatic => ("prismatic", None),
+        JointKind::Helical { pitch } => ("helical", Some(pitch)),
+        JointKind::Floating => ("floating", None),
+        JointKind::Fixed => ("fixed", None),
+    };
+    JointRecord {
+        name: j.name.clone(),
+        parent: j.parent.clone(),
+        child: j.child.clone(),
+        kind: kind.to_owned(),
+        pitch,
+        rotation: j.placement.rotation.rows(),
+        translation: j.placement.translation.0,
+        axis: j.axis,
+        position_limits: j.limits.position,
+        mimic: j.mimic.as_ref().map(|m| (m.of.clone(), m.ratio, m.offset)),
+    }
+}
+
+fn joint_description(j: &JointRecord) -> Result<JointDescription, String> {
+    let kind = match (j.kind.as_str(), j.pitch) {
+        ("revolute", _) => JointKind::Revolute,
+        ("continuous", _) => JointKind::Continuous,
+        ("prismatic", _) => JointKind::Prismatic,
+        ("helical", Some(pitch)) => JointKind::Helical { pitch },
+        ("floating", _) => JointKind::Floating,
+        ("fixed", _) => JointKind::Fixed,
+        (other, _) => return Err(format!("joint `{}`: unknown kind `{other}`", j.name)),
+    };
+    Ok(JointDescription {
+        name: j.name.clone(),
+        parent: j.parent.clone(),
+        child: j.child.clone(),
+        kind,
+        placement: Placement { rotation: Mat3::from_rows(j.rotation), translation: Vec3(j.translation) },
+        axis: j.axis,
+        limits: Limits { position: j.position_limits, ..Limits::default() },
+        mimic: j.mimic.clone().map(|(of, ratio, offset)| Mimic { of, ratio, offset }),
+    })
+}

@@ -1,0 +1,283 @@
+//! The linear fit of a run: method, weights, covariance.
+
+use dynid_estimate::covariance::{
+    BlockLength, BlockLengthSettings, MIN_BLOCKS, ResidualSignal, block_length, output_inflation,
+    variance_inflation,
+};
+use dynid_estimate::identifiability::VisibleSpace;
+use dynid_estimate::linear::{
+    LinearEstimate, LinearMethod, LinearSettings, TlsNoise, VarianceSharing, estimate,
+};
+use dynid_estimate::whiteness::{InBandSettings, InBandWhiteness, raw_in_band_whiteness};
+use dynid_factor::Factor;
+use dynid_factor::rows::{GroupResiduals, RowSource, reduce_rows, row_residuals};
+use dynid_linalg::Mat;
+use dynid_model::{BaseParameters, EffortModel, RobotModel};
+use dynid_rows::conditioning::{Conditioning, LogRows, PreparedLog, ReducedGroup, textbook_rows};
+
+use crate::Error;
+use crate::agreement::Agreement;
+use crate::bounds;
+use crate::pipeline::Problem;
+use crate::prior::Prior;
+use crate::settings::{EstimatorConfig, Method, Settings, Variances};
+
+/// Joints whose variance inflation differs by more than this are deflated one by one.
+const UNEQUAL: f64 = 2.0;
+
+/// Variance inflation of rows that count for nothing.
+const TRACE: f64 = 1e12;
+
+/// The fit of the base parameters with what its residuals say about its precision.
+#[derive(Debug)]
+pub struct Fitted {
+    /// The estimate in base columns.
+    pub estimate: LinearEstimate,
+    /// Covariance for white residuals, of the kept columns.
+    pub white: Mat<f64>,
+    /// Jackknife covariance over time blocks, if there are enough of them.
+    pub jackknife: Option<Mat<f64>>,
+    /// Variance inflation `κ`: by how much coloured residuals inflate the variances that white ones would give.
+    pub inflation: f64,
+    /// Variance inflation joint by joint, where it can be told.
+    pub inflation_per_output: Vec<Option<f64>>,
+    /// Length of time blocks that the residuals ask for.
+    pub block_length: BlockLength,
+    /// Length of the time blocks in use, s.
+    pub block_s: f64,
+    /// How many blocks of the rows make up one of these.
+    pub merged_blocks: usize,
+}
+
+impl Fitted {
+    /// The covariance to report: jackknife, or for too few blocks that of white residuals.
+    pub fn covariance(&self) -> &Mat<f64> {
+        self.jackknife.as_ref().unwrap_or(&self.white)
+    }
+
+    /// Weighted factor of all base columns with every joint's rows deflated by `κ`, joint by joint where joints differ.
+    ///
+    /// Rows of an output that the model does not explain (`explained[output]` is false) count for nothing: whatever its
+    /// effort consists of may pass for a parameter. They keep a trace of weight, so that what they could have shown is "too
+    /// noisy", not "not excited".
+    pub(crate) fn information(&self, explained: &[bool]) -> Factor {
+        let estimate = &self.estimate;
+        let known: Vec<f64> = self.inflation_per_output.iter().flatten().copied().collect();
+        let least = known.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = known.iter().copied().fold(1.0, f64::max);
+        let equal = known.len() < 2 || most <= UNEQUAL * least;
+        if equal && explained.iter().all(|e| *e) {
+            return estimate.factor.scaled(1.0 / self.inflation.sqrt());
+        }
+        // Joint by joint, scaled so that together they make up the inflation found for all.
+        let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
+        let inflation = |output: usize| -> f64 {
+            if !explained[output] {
+                return TRACE;
+            }
+            match self.inflation_per_output[output].filter(|_| !equal) {
+                Some(own) => (own * self.inflation / mean).max(1.0),
+                None => self.inflation,
+            }
+        };
+        let total = estimate.x.len();
+        let parts: Vec<Factor> = estimate
+            .reduced
+            .iter()
+            .zip(estimate.weights())
+            .map(|(group, weight)| group.merged(total).scaled(weight / inflation(group.output).sqrt()))
+            .collect();
+        Factor::merge(&parts.iter().collect::<Vec<_>>())
+    }
+}
+
+/// Rows of the final fit of a problem, whichever the route.
+///
+/// # Errors
+/// [`Error::Conditioning`].
+pub(crate) fn rows<'a>(
+    problem: &'a Problem,
+    conditioning: Option<&Conditioning>,
+) -> Result<Box<dyn RowSource + 'a>, Error> {
+    let Problem { model, structure, logs, settings, .. } = problem;
+    let (shape, kept) = (&structure.shape, &structure.base.kept);
+    let conditioned = settings.conditioning_settings();
+    Ok(match conditioning {
+        Some(found) => Box::new(LogRows::new(model, shape, kept, logs, found, &conditioned)?),
+        None => {
+            let route = settings.textbook_route();
+            Box::new(textbook_rows(model, shape, kept, logs, &route, &conditioned)?)
+        }
+    })
+}
+
+/// Fits the base parameters; with the estimate come the groups of rows that it was made from.
+///
+/// # Errors
+/// [`Error::TooShort`], [`Error::Linear`].
+pub fn fit(
+    settings: &Settings,
+    columns: usize,
+    method: &LinearMethod,
+    source: &dyn RowSource,
+) -> Result<(LinearEstimate, Vec<ReducedGroup>), Error> {
+    let groups = reduce_rows(source).map_err(|e| conditioning_fault(source, e))?;
+    let rows: usize = groups.iter().map(|g| g.rows()).sum();
+    if rows <= columns {
+        return Err(Error::TooShort {
+            file: settings.files.logs.first().map_or_else(String::new, |log| log.display().to_string()),
+            message: format!(
+                "{rows} usable rows for {} parameters, expected more rows than parameters",
+                columns
+            ),
+        });
+    }
+    let estimate = estimate(&groups, Some(source), columns, method, &linear_settings(settings))?;
+    Ok((estimate, groups))
+}
+
+/// Settings of linear estimators that a run asks for.
+pub(crate) fn linear_settings(settings: &Settings) -> LinearSettings {
+    LinearSettings {
+        sharing: match settings.estimator.variances {
+            Variances::Group => VarianceSharing::Group,
+            Variances::JointAndLog => VarianceSharing::JointAndLog,
+            Variances::Joint => VarianceSharing::Joint,
+        },
+        ..LinearSettings::default()
+    }
+}
+
+/// Residuals of the widest kernel's rows.
+#[derive(Debug)]
+pub struct RowResiduals {
+    /// Log, output and residuals.
+    groups: Vec<(usize, usize, GroupResiduals)>,
+}
+
+/// Residuals of the rows of the widest kernel.
+///
+/// # Errors
+/// [`Error::Conditioning`].
+pub fn residuals(source: &dyn RowSource, estimate: &LinearEstimate) -> Result<RowResiduals, Error> {
+    let all = row_residuals(source, &estimate.x).map_err(|e| conditioning_fault(source, e))?;
+    let widest = source.groups().iter().zip(all).filter(|(shape, _)| shape.scale == 0);
+    Ok(RowResiduals { groups: widest.map(|(shape, r)| (shape.log, shape.output, r)).collect() })
+}
+
+impl RowResiduals {
+    /// Whether raw residuals of a training log are white below the kernel's cut-off, per output; only samples near a row
+    /// count.
+    pub(crate) fn whiteness(
+        &self,
+        log: usize,
+        agreement: &Agreement,
+        kernel_hz: f64,
+    ) -> Vec<Option<InBandWhiteness>> {
+        (0..agreement.measured.len())
+            .map(|output| {
+                let (_, _, rows) = self.groups.iter().find(|(l, o, _)| (*l, *o) == (log, output))?;
+                let samples = agreement.counted.len();
+                let covered = rows.coverage(samples);
+                let residual: Vec<f64> = (0..samples)
+                    .map(|s| match covered[s] && agreement.counted[s] {
+                        true => agreement.measured[output][s] - agreement.predicted[output][s],
+                        false => 0.0,
+                    })
+                    .collect();
+                raw_in_band_whiteness(&residual, agreement.rate_hz, kernel_hz, &InBandSettings::default())
+            })
+            .collect()
+    }
+}
+
+/// Covariance from time blocks that are long enough for the residuals found.
+///
+/// Blocks are merged until they are five correlation times long, but never to fewer than [`MIN_BLOCKS`]; `fixed`: they stay
+/// as they are.
+pub fn with_precision(
+    estimate: LinearEstimate,
+    residuals: &RowResiduals,
+    logs: &[PreparedLog],
+    fixed: bool,
+) -> Fitted {
+    let grids: Vec<(usize, f64, Vec<f64>)> = residuals
+        .groups
+        .iter()
+        .filter_map(|(log, _, rows)| {
+            let (step, grid) = rows.on_grid()?;
+            Some((*log, logs[*log].rate_hz / step as f64, grid))
+        })
+        .collect();
+    let signals: Vec<ResidualSignal<'_>> = grids
+        .iter()
+        .map(|(log, rate_hz, residual)| ResidualSignal { log: *log, rate_hz: *rate_hz, residual })
+        .collect();
+    let wanted = block_length(&signals, &BlockLengthSettings::default());
+    let duration: f64 = logs.iter().map(PreparedLog::duration).sum();
+    let block_s = duration / estimate.blocks.len().max(1) as f64;
+    let most = (estimate.blocks.len() / MIN_BLOCKS).max(1);
+    let factor = if fixed { 1 } else { ((wanted.seconds / block_s).ceil() as usize).clamp(1, most) };
+    let estimate = estimate.with_longer_blocks(factor);
+    let white = estimate.model_covariance();
+    let jackknife =
+        (estimate.blocks.len() >= MIN_BLOCKS).then(|| estimate.jackknife()).flatten().map(|j| j.covariance);
+    let inflation = jackknife.as_ref().and_then(|v| variance_inflation(v, &white)).unwrap_or(1.0);
+    let per_output = output_inflation(&estimate.reduced, &estimate.weights(), &estimate.x);
+    Fitted {
+        white,
+        jackknife,
+        inflation,
+        inflation_per_output: per_output,
+        block_length: wanted,
+        block_s: block_s * factor as f64,
+        merged_blocks: factor,
+        estimate,
+    }
+}
+
+pub(crate) fn conditioning_fault(source: &dyn RowSource, e: dynid_factor::rows::RowsError) -> Error {
+    let output = source.groups()[e.group].output;
+    Error::Conditioning(dynid_rows::conditioning::ConditioningError::Rows { output, source: e.source })
+}
+
+/// The linear estimator that a run asks for.
+///
+/// # Errors
+/// [`Error::UnknownParameter`], [`Error::Setting`].
+pub(crate) fn method(
+    config: &EstimatorConfig,
+    model: &RobotModel,
+    base: &BaseParameters,
+    prior: &Prior,
+    space: &VisibleSpace,
+) -> Result<LinearMethod, Error> {
+    Ok(match config.method {
+        Method::Ols => LinearMethod::Ols,
+        // Instruments start from weighted least squares.
+        Method::Wls | Method::Iv => LinearMethod::Wls,
+        Method::Huber => LinearMethod::Huber,
+        Method::Tukey => LinearMethod::Tukey,
+        Method::Ridge => LinearMethod::Ridge {
+            prior: base.values(&prior.values),
+            scale: space.base_std().to_vec(),
+            kappa: config.ridge_weight.unwrap_or(1.0),
+        },
+        Method::Tls => {
+            let mut columns = vec![0.0; base.len()];
+            for (name, noise) in &config.column_noise {
+                let column = bounds::parameter(name, model)?;
+                let kept = base.kept.binary_search(&column).map_err(|_| Error::Setting {
+                    name: format!("column_noise.{name}"),
+                    expected: "the name of a base parameter".to_owned(),
+                    found: format!(
+                        "{}, which acts only together with others or not at all",
+                        model.parameters().linear[column].name
+                    ),
+                })?;
+                columns[kept] = *noise;
+            }
+            LinearMethod::Tls(TlsNoise { columns, effort: config.effort_noise.unwrap_or(1.0) })
+        }
+    })
+}

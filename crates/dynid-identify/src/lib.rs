@@ -1,0 +1,60 @@
+//! Arrays in, value out: from a robot, logs as named arrays and settings to an [`Identification`].
+//!
+//! ```no_run
+//! use dynid_identify::{Log, Robot, RobotOptions, Settings, identify};
+//! # fn arrays() -> dynid_motion::Log { unimplemented!() }
+//! # fn main() -> Result<(), dynid_identify::Error> {
+//! let robot = Robot::load("arm.urdf".as_ref(), &RobotOptions::default())?;
+//! let log = Log::new(&robot, arrays())?;
+//! let found = identify(&robot, [log], &Settings::default(), &mut |_| {})?;
+//! println!("{}", found.estimate().verdict.headline);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! What stands between a fit and parameters that can be trusted is here: the structure of a model, a prior for every parameter, the
+//! conditioned fit, bodies that can exist and what they cost, verdicts, intervals and advice, agreement of logs, pre-flight, friction that
+//! is passive. No file is opened but those of robots and estimates; `dynid` reads logs and configurations.
+
+#[macro_use]
+mod names;
+
+pub mod advice;
+pub mod agreement;
+pub mod bounds;
+pub mod caution;
+pub mod commands;
+pub mod consistency;
+pub mod effort_scale;
+pub mod elements;
+mod error;
+pub mod estimate;
+pub mod fitting;
+mod friction_power;
+pub mod instruments;
+pub mod known_friction;
+pub mod log;
+pub mod log_agreement;
+pub mod log_terms;
+pub mod overlap;
+pub mod passivity;
+pub mod pipeline;
+pub mod preflight;
+pub mod prior;
+mod result;
+pub mod robot;
+pub mod settings;
+pub mod shape;
+pub mod stiffness;
+pub mod trust;
+pub mod verdict;
+
+pub use error::{Error, Fault};
+pub use estimate::Estimate;
+pub use log::Log;
+pub use pipeline::{Identification, Step, identify};
+pub use robot::{Robot, RobotOptions};
+pub use settings::Settings;
+
+/// Version of the program.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");

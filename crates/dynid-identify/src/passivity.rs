@@ -1,0 +1,212 @@
+//! Whether the identified friction takes energy out of the motion.
+
+use dynid_model::{EffortModel, FrictionPassivity, Passivity};
+use dynid_rows::conditioning::PreparedLog;
+
+use crate::caution::{self, Caution};
+use crate::elements::friction;
+use crate::estimate::PassivityRecord;
+use crate::pipeline::Identification;
+
+/// [`PassivityRecord::passivity`] of a law that is passive on all of the range.
+pub const PASSIVE: &str = "passive";
+/// Of one that is passive on parts of it.
+pub(crate) const PASSIVE_ON: &str = "passive on";
+/// Of one that is passive nowhere.
+pub(crate) const NOT_PASSIVE: &str = "not passive";
+
+/// Positions are compared over this time, s: spikes and noise count little then.
+pub(crate) const SPEED_SPAN_S: f64 = 0.05;
+
+/// Least and greatest mean velocity of an output over [`SPEED_SPAN_S`] in logs that move it, with rest; `None` if none does.
+fn velocities(logs: &[PreparedLog], output: usize) -> Option<(f64, f64)> {
+    let mut range: Option<(f64, f64)> = None;
+    for log in logs.iter().filter(|log| log.moves[output]) {
+        let position = &log.position[output];
+        let span = ((SPEED_SPAN_S * log.rate_hz).ceil() as usize).max(1);
+        let mut sound = 0;
+        for (k, usable) in log.usable.iter().enumerate() {
+            sound = if *usable { sound + 1 } else { 0 };
+            if sound > span {
+                let v = (position[k] - position[k - span]) * log.rate_hz / span as f64;
+                let (low, high) = range.unwrap_or((0.0, 0.0));
+                range = Some((low.min(v), high.max(v)));
+            }
+        }
+    }
+    range.filter(|(low, high)| low.is_finite() && high.is_finite() && low < high)
+}
+
+/// Largest power that friction feeds in, W.
+fn fed(found: &FrictionPassivity) -> f64 {
+    found.worst.map_or(0.0, |(_, power)| power)
+}
+
+impl Identification {
+    /// Channels of the identified model at their least and at their greatest values of the training logs.
+    pub fn held_channels(&self) -> Vec<Vec<(&str, f64)>> {
+        let (model, _) = self.robot_alone();
+        let names = model.channels();
+        if names.is_empty() {
+            return vec![Vec::new()];
+        }
+        let extreme = |name: &String, pick: fn(f64, f64) -> f64| {
+            let channels = self.logs.iter().flat_map(|log| &log.channels).filter(|c| c.name == *name);
+            channels.flat_map(|c| c.values.iter().copied()).reduce(pick).unwrap_or(0.0)
+        };
+        [f64::min, f64::max]
+            .map(|pick| names.iter().map(|name| (name.as_str(), extreme(name, pick))).collect())
+            .to_vec()
+    }
+
+    /// Passivity of the identified friction on the velocities that the training logs reach, joint by joint, at the worse of
+    /// the coldest and the warmest state logged; joints without friction and those that no log moves are left out.
+    pub fn friction_passivity(&self) -> Vec<PassivityRecord> {
+        let (model, linear) = self.robot_alone();
+        let shape = model.parameters().shape_start();
+        let outputs = self.model.outputs().iter().enumerate();
+        outputs
+            .filter_map(|(rate, output)| {
+                let known = self.plan.known_friction(&output.name).is_some();
+                if !known
+                    && !self.plan.per_rate[self.model.tree_rate(rate)]
+                        .iter()
+                        .any(|name| friction::is_law(name))
+                {
+                    return None;
+                }
+                let (low, high) = velocities(&self.logs, rate)?;
+                let found = self
+                    .held_channels()
+                    .iter()
+                    .map(|held| model.friction_passivity(rate, &shape, linear, (low, high), held))
+                    .max_by(|a, b| fed(a).total_cmp(&fed(b)))?;
+                let (passivity, intervals) = match found.passivity {
+                    Passivity::Passive => (PASSIVE, Vec::new()),
+                    Passivity::PassiveOn(intervals) => (PASSIVE_ON, intervals),
+                    Passivity::NotPassive => (NOT_PASSIVE, Vec::new()),
+                };
+                Some(PassivityRecord {
+                    joint: output.name.clone(),
+                    velocity_range: (low, high),
+                    passivity: passivity.to_owned(),
+                    intervals,
+                    worst_velocity: found.worst.map(|(v, _)| v),
+                    worst_power: found.worst.map(|(_, power)| power),
+                    // Errors of known friction may have any order.
+                    static_below_coulomb: found.static_below_coulomb && !known,
+                })
+            })
+            .collect()
+    }
+
+    /// Warnings about friction that drives the motion, and about static friction below Coulomb friction.
+    pub(crate) fn friction_warnings(&self) -> Vec<Caution> {
+        let records = self.friction_passivity();
+        let mut out: Vec<Caution> = records
+            .iter()
+            .filter(|r| r.passivity != PASSIVE)
+            .map(|r| {
+                let remedy = match self.plan.known_friction(&r.joint) {
+                    Some(_) => "The errors of its known friction outweigh it: look at both with doubt, or keep them positive \
+                         (`friction_errors = \"nonnegative\"`)"
+                        .to_owned(),
+                    None => format!(
+                        "{}, or ask for a simpler law (`--friction linear`)",
+                        self.bound_on_friction(&r.joint)
+                    ),
+                };
+                let message = format!(
+                    "the identified friction of `{}` is {}; a simulator with it may not come to rest. {remedy}",
+                    r.joint,
+                    in_words(r, self.speed_unit(&r.joint)),
+                );
+                Caution::warn(caution::FRICTION, message, remedy)
+            })
+            .collect();
+        let rising: Vec<&str> =
+            records.iter().filter(|r| r.static_below_coulomb).map(|r| r.joint.as_str()).collect();
+        if !rising.is_empty() {
+            let message = format!(
+                "static friction of `{}` is identified below Coulomb friction (`fs` < `fc`): friction rises from rest, which is \
+                 no Stribeck effect, and `fs` and `vs` tell the shape of the law alone. Take a law that rises from rest \
+                 (`--friction tanh`) or a simpler one (`--friction linear`), or bound `{}.fs` from below (`[[bound]]`)",
+                rising.join("`, `"),
+                rising[0]
+            );
+            let remedy = "a law that rises from rest, `friction = \"tanh\"`, or a simpler one, `friction = \"linear\"`, under `[elements]`";
+            out.push(Caution::warn(caution::FRICTION, message, remedy));
+        }
+        out
+    }
+
+    /// The remedy that keeps the law: coefficients that must not be negative.
+    fn bound_on_friction(&self, joint: &str) -> String {
+        let (model, linear) = self.robot_alone();
+        let table = &model.parameters().linear;
+        let coefficient = |name: &str| match name.rsplit_once('.') {
+            Some((owner, symbol)) => owner == joint && friction::COEFFICIENTS.contains(&symbol),
+            None => false,
+        };
+        let negative = table.iter().zip(linear).filter(|(p, value)| **value < 0.0 && coefficient(&p.name));
+        let names: Vec<String> = negative.map(|(p, _)| format!("`{}`", p.name)).collect();
+        let what = match names.is_empty() {
+            true => "its coefficients".to_owned(),
+            false => format!("{} to at least 0", names.join(" and ")),
+        };
+        // Bounds are kept by the consistent estimate alone.
+        let ask = if self.consistent.estimate.is_some() {
+            "Bound"
+        } else {
+            "Ask for physical consistency and bound"
+        };
+        format!("{ask} {what} (`[[bound]]`)")
+    }
+
+    /// Unit of a joint's velocity.
+    pub fn speed_unit(&self, joint: &str) -> &'static str {
+        match self.model.outputs().iter().find(|o| o.name == joint) {
+            Some(output) if output.unit == "N" => "m/s",
+            _ => "rad/s",
+        }
+    }
+}
+
+/// Where the friction is passive, after "is".
+pub(crate) fn in_words(record: &PassivityRecord, unit: &str) -> String {
+    let range =
+        |(low, high): (f64, f64)| format!("from {} to {} {unit}", three_digits(low), three_digits(high));
+    let all = range(record.velocity_range);
+    let worst = match (record.worst_velocity, record.worst_power) {
+        (Some(v), Some(power)) => {
+            format!("it drives the motion, most at {} {unit} with {} W", three_digits(v), three_digits(power))
+        }
+        _ => "it drives the motion".to_owned(),
+    };
+    match record.passivity.as_str() {
+        PASSIVE => format!("passive {all}, all that the training logs reach"),
+        PASSIVE_ON => {
+            let parts: Vec<String> = record.intervals.iter().copied().map(range).collect();
+            format!(
+                "passive {} alone; elsewhere {all}, the range of the training logs, {worst}",
+                parts.join(" and ")
+            )
+        }
+        _ => format!("nowhere passive {all}, the range of the training logs: {worst}"),
+    }
+}
+
+/// What there is to say about a law in its chart.
+pub fn sentence(record: &PassivityRecord, unit: &str) -> String {
+    let words = in_words(record, unit);
+    let mut out = words[..1].to_uppercase() + &words[1..] + ".";
+    if record.static_below_coulomb {
+        out.push_str(" Static friction is identified below Coulomb friction.");
+    }
+    out
+}
+
+/// `x` rounded to three significant digits.
+fn three_digits(x: f64) -> String {
+    format!("{x:.2e}").parse::<f64>().map_or_else(|_| x.to_string(), |rounded| rounded.to_string())
+}

@@ -1,0 +1,92 @@
+//! Figures of a fit, output by output.
+
+use dynid_estimate::linear::LinearEstimate;
+use dynid_rows::conditioning::{Conditioning, PreparedLog, ReducedGroup};
+
+use crate::advice::FitRows;
+use crate::agreement::Agreement;
+use crate::consistency::{self, Consistent};
+
+/// Share of an effort that a model must explain for its residual to count as noise: of its variance on every log
+/// in which the joint moves, and of its mean square on held-out folds.
+const EXPLAINED: f64 = 0.5;
+
+pub(super) fn explained<'a>(
+    agreements: impl Iterator<Item = &'a Agreement> + Clone,
+    consistent: &Consistent,
+) -> Vec<bool> {
+    let outputs = agreements.clone().next().map_or(0, |a| a.filtered.channels.len());
+    let held_out = |j: usize| {
+        let share = |estimator| consistent.held_out.explained(estimator, j);
+        // Whichever estimator does better: a log that is too short for one is no fault of the joint.
+        share(consistency::UNCONSTRAINED).into_iter().chain(share(consistent.consistent())).reduce(f64::max)
+    };
+    // An effort that never changes has no R² and nothing to explain.
+    (0..outputs)
+        .map(|j| {
+            let moving = agreements.clone().filter(|a| a.moves[j]);
+            let logs = moving.filter_map(|a| a.filtered.channels[j].r2);
+            logs.chain(if consistent.held_out.folds.is_empty() { None } else { held_out(j) })
+                .all(|x| x >= EXPLAINED)
+        })
+        .collect()
+}
+
+/// How the fit counts rows, for motions that are proposed.
+pub(super) fn fit_rows(fit: &LinearEstimate, conditioning: Option<&Conditioning>, kernel_hz: f64) -> FitRows {
+    let outputs = fit.groups.iter().map(|g| g.output + 1).max().unwrap_or(0);
+    let sigma = (0..outputs)
+        .map(|output| {
+            // Of several logs the noisiest decides.
+            let own = fit.groups.iter().filter(|g| g.output == output && g.scale == 0 && g.rows > 0);
+            own.map(|g| g.variance.sqrt()).reduce(f64::max)
+        })
+        .collect();
+    FitRows {
+        scales_hz: conditioning.map_or_else(|| vec![kernel_hz], |c| c.scales_hz.clone()),
+        mask: conditioning.map_or_else(|| vec![None; outputs], |c| c.mask.clone()),
+        sigma,
+    }
+}
+
+pub(super) fn row_rms(groups: &[ReducedGroup], x: &[f64], columns: usize) -> Vec<Option<f64>> {
+    let outputs = groups.iter().map(|g| g.output + 1).max().unwrap_or(0);
+    (0..outputs)
+        .map(|output| {
+            let (mut rss, mut rows) = (0.0, 0);
+            for group in groups.iter().filter(|g| g.output == output) {
+                rss += group.merged(columns).rss(x);
+                rows += group.rows();
+            }
+            (rows > 0).then(|| (rss / rows as f64).sqrt())
+        })
+        .collect()
+}
+
+pub(super) fn residual_ratios(
+    groups: &[ReducedGroup],
+    fit: &LinearEstimate,
+    logs: &[PreparedLog],
+    kernel_hz: f64,
+) -> Vec<Option<f64>> {
+    let outputs = groups.iter().map(|g| g.output + 1).max().unwrap_or(0);
+    let spread = 0.265 / kernel_hz;
+    (0..outputs)
+        .map(|output| {
+            let (mut found, mut expected) = (0.0, 0.0);
+            for (k, group) in groups.iter().enumerate() {
+                if group.output != output || group.scale != 0 || fit.groups.len() != groups.len() {
+                    continue;
+                }
+                let log = &logs[group.log];
+                let noise = log.effort_noise[output].sigma;
+                let passed = 1.0 / (2.0 * std::f64::consts::PI.sqrt() * spread * log.rate_hz);
+                let rows = group.rows() as f64;
+                found += rows * fit.groups[k].variance;
+                expected += rows * noise * noise * passed;
+            }
+            // A pre-smoothed effort has no noise floor to compare with.
+            (expected > 1e-10 * found && found > 0.0).then(|| (found / expected).sqrt())
+        })
+        .collect()
+}

@@ -1,0 +1,132 @@
+//! Friction shapes found beside the elements of a plan.
+
+use dynid_estimate::separable::ShapeVerdict;
+use dynid_model::EffortModel;
+use dynid_rows::conditioning::{
+    BasePrior, Conditioning, FrictionChoice, JointFriction, ShapeKind, ShapeTrial, Stage, choose_friction,
+};
+
+use super::problem::Problem;
+use super::structure::Structure;
+use crate::Error;
+use crate::elements::friction::is_shaped;
+use crate::elements::shape_element;
+use crate::shape::ShapeFit;
+
+/// Chooses shapes for all joints and adds them to the plan; shape parameters start at the values found.
+///
+/// # Errors
+/// [`Error::Conditioning`].
+pub(super) fn choose(
+    problem: &mut Problem,
+    choices: &Conditioning,
+    progress: &mut dyn FnMut(Stage),
+) -> Result<FrictionChoice, Error> {
+    let settings = problem.conditioning_settings();
+    let Problem { model, structure, plan, logs, .. } = problem;
+    let unloaded = model.mechanism().follows().is_some() || model.closed().is_some();
+    let rates = model.mechanism().rates();
+    let kinds: Vec<Vec<ShapeKind>> = (model.outputs().iter().enumerate())
+        .map(|(rate, output)| match plan.known_friction(&output.name) {
+            // Its shape is known already.
+            Some(_) => Vec::new(),
+            None => kinds_beside(&plan.per_rate[model.tree_rate(rate)], unloaded || rate >= rates),
+        })
+        .collect();
+    let Structure { base, prior, regrouping, .. } = structure;
+    let prior = BasePrior::new(regrouping, &prior.values, &prior.std);
+    let shape = model.parameters().shape_start();
+    let found = choose_friction(
+        model,
+        &shape,
+        &base.kept,
+        logs,
+        &kinds,
+        prior.as_ref(),
+        choices,
+        &settings,
+        progress,
+    )?;
+    for (rate, joint) in found.per_output.iter().enumerate() {
+        for accepted in &joint.accepted {
+            plan.add_shape(model.tree_rate(rate), &model.outputs()[rate].name, &accepted.shape);
+        }
+    }
+    if !found.load.is_empty() {
+        plan.load_reference = Some(found.load[..model.mechanism().inertial_parameters()].to_vec());
+    }
+    Ok(found)
+}
+
+/// Drops chosen shapes whose shape parameter the logs do not see after all, and falls from rest that came out as rises (`fs` below
+/// `fc`); tells whether there were any.
+pub(super) fn drop_refuted(
+    problem: &mut Problem,
+    (found, linear): (&ShapeFit, &[f64]),
+    chosen: &mut [JointFriction],
+) -> bool {
+    let (model, plan) = (&found.model, &mut problem.plan);
+    let table = model.parameters();
+    let unseen = |joint: &str, trial: &ShapeTrial| {
+        let (_, Some(symbol)) = shape_element(trial.shape.kind) else { return false };
+        let name = format!("{joint}.{symbol}");
+        let place = table.shape.iter().position(|s| s.name == name);
+        place.is_some_and(|k| found.findings[k].verdict == ShapeVerdict::NotSeen)
+    };
+    let rises = |joint: &str, trial: &ShapeTrial| {
+        let value = |symbol: &str| table.column(&format!("{joint}.{symbol}")).map(|c| linear[c]);
+        trial.shape.kind == ShapeKind::Stribeck
+            && matches!((value("fs"), value("fc")), (Some(fs), Some(fc)) if fs < fc)
+    };
+    let mut dropped = false;
+    for (rate, (output, joint)) in model.outputs().iter().zip(chosen).enumerate() {
+        let (gone, kept): (Vec<ShapeTrial>, Vec<ShapeTrial>) = joint
+            .accepted
+            .drain(..)
+            .partition(|trial| unseen(&output.name, trial) || rises(&output.name, trial));
+        joint.accepted = kept;
+        for trial in gone {
+            plan.remove_shape(model.tree_rate(rate), &output.name, &trial.shape);
+            joint.rejected.push(trial);
+            dropped = true;
+        }
+    }
+    dropped
+}
+
+/// Kinds of shapes that say something new beside given elements. `unloaded`: no rigid effort is to be had for a gear's load.
+fn kinds_beside(elements: &[String], unloaded: bool) -> Vec<ShapeKind> {
+    let has = |name: &str| elements.iter().any(|e| e == name);
+    let shaped = elements.iter().any(|name| is_shaped(name));
+    let mut out = Vec::new();
+    if has("viscous") && !has("viscous_magnitude") {
+        out.push(ShapeKind::ViscousMagnitude);
+    }
+    if has("coulomb") && !shaped {
+        out.push(ShapeKind::Stribeck);
+    }
+    if (has("coulomb") || has("viscous") || has("asymmetric")) && !shaped {
+        out.push(ShapeKind::Tanh);
+    }
+    if (has("coulomb") || has("stribeck")) && !has("load") && !unloaded {
+        out.push(ShapeKind::Load);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shapes_are_tried_beside_what_they_add_to() {
+        let kinds =
+            |list: &[&str]| kinds_beside(&list.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>(), false);
+        let all = [ShapeKind::ViscousMagnitude, ShapeKind::Stribeck, ShapeKind::Tanh, ShapeKind::Load];
+        assert_eq!(kinds(&["coulomb", "viscous", "offset", "rotor"]), all);
+        assert_eq!(kinds(&["stribeck", "viscous"]), [ShapeKind::ViscousMagnitude, ShapeKind::Load]);
+        assert_eq!(kinds(&["asymmetric"]), [ShapeKind::Tanh]);
+        assert_eq!(kinds(&["coulomb", "viscous", "viscous_magnitude", "arctangent"]), [ShapeKind::Load]);
+        assert_eq!(kinds(&["rotor"]), []);
+    }
+}

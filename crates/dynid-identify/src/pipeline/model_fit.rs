@@ -1,0 +1,115 @@
+//! From a problem to values: shapes, linear fit, covariance, bodies that can exist.
+
+use dynid_model::RobotModel;
+use dynid_rows::conditioning::{Conditioning, JointFriction, ReducedGroup};
+
+use super::Step;
+use super::problem::Problem;
+use super::shapes::{self, Shaped};
+use crate::Error;
+use crate::consistency::{self, Consistent};
+use crate::fitting::{self, Fitted, RowResiduals};
+use crate::friction_power::{self, FrictionPower};
+use crate::instruments::{self, InstrumentRun, Loop};
+use crate::settings::{Method, Settings};
+use crate::shape::{self, ShapeFit};
+
+/// What a fit found. The model, plan and structure that it ended with are those of its problem.
+#[derive(Debug)]
+pub struct ModelFit {
+    /// `None` on the textbook route.
+    pub conditioning: Option<Conditioning>,
+    /// Shapes of friction per output.
+    pub friction: Vec<JointFriction>,
+    /// Shape parameters as found.
+    pub shapes: Option<ShapeFit>,
+    /// How instruments came about, for the estimator that uses them.
+    pub instruments: Option<InstrumentRun>,
+    pub(crate) residuals: RowResiduals,
+    /// The fit in the base columns.
+    pub fitted: Fitted,
+    /// Rows of the fit, reduced.
+    pub groups: Vec<ReducedGroup>,
+    /// Standard parameters.
+    pub consistent: Consistent,
+    /// What friction had to obey.
+    pub(crate) power: FrictionPower,
+}
+
+impl Problem {
+    /// Fits the model to the logs as the settings ask for.
+    ///
+    /// # Errors
+    /// Settings that do not fit the model, too few rows, what the estimators refuse.
+    pub fn fit(
+        mut self,
+        conditioning: Option<Conditioning>,
+        progress: &mut dyn FnMut(Step),
+    ) -> Result<(Problem, ModelFit), Error> {
+        let Shaped { conditioning, friction, found: shapes } =
+            shapes::search(&mut self, conditioning, progress)?;
+        let state_hz = state_hz(&self.settings, conditioning.as_ref());
+        let settings = self.conditioning_settings();
+        let power = friction_power::limits(&self.model, &self.plan, &self.logs, state_hz, &settings)?;
+        self.model = power.free(self.model);
+        self.structure.bounds.extend(power.bounds.iter().cloned());
+        self.structure.bounds.extend(friction_power::falls(&self.model, &friction));
+        progress(Step::Fit);
+        let base = self.structure.base.len();
+        let source = fitting::rows(&self, conditioning.as_ref())?;
+        let (fit, groups) = fitting::fit(&self.settings, base, &self.structure.method, &*source)?;
+        let (fit, instruments) = match self.settings.estimator.method {
+            Method::Iv => {
+                progress(Step::Instruments);
+                let closed = Loop {
+                    problem: &self,
+                    shapes: shapes.as_ref(),
+                    conditioning: conditioning.as_ref(),
+                    power: &power,
+                };
+                let (fit, run) = instruments::fit(&closed, fit)?;
+                (fit, Some(run))
+            }
+            _ => (fit, None),
+        };
+        let residuals = fitting::residuals(&*source, &fit)?;
+        drop(source);
+        let fixed = self.settings.conditioning.block_s.is_some();
+        let fitted = fitting::with_precision(fit, &residuals, &self.logs, fixed);
+        progress(Step::Consistency);
+        let consistent = consistency::consistent(&self, &fitted, &groups)?;
+        let fit = ModelFit {
+            conditioning,
+            friction,
+            shapes,
+            instruments,
+            residuals,
+            fitted,
+            groups,
+            consistent,
+            power,
+        };
+        Ok((self, fit))
+    }
+}
+
+/// Cut-off of the states behind predictions, Hz.
+pub(crate) fn state_hz(settings: &Settings, conditioning: Option<&Conditioning>) -> f64 {
+    match conditioning {
+        Some(c) => c.state_hz.iter().copied().fold(f64::INFINITY, f64::min),
+        None => settings.textbook_route().cutoff_hz,
+    }
+}
+
+impl ModelFit {
+    /// The nonlinear model and its linear parameters that the fit's values stand for; `None` if the model of its problem is not linearised.
+    ///
+    /// # Errors
+    /// Fails as the plan of the problem does.
+    pub fn unfolded(&self, problem: &Problem) -> Result<Option<(RobotModel, Vec<f64>)>, Error> {
+        let Some(found) = &self.shapes else { return Ok(None) };
+        let unfolded = shape::unfold(&found.model, &problem.model, &self.consistent.values);
+        let model = problem.plan.model(problem.model.mechanism())?;
+        Ok(Some((model.with_shape(&unfolded.shape), unfolded.linear)))
+    }
+}

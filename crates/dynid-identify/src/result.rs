@@ -1,0 +1,565 @@
+//! From an identification to its result file.
+
+mod counts;
+mod friction;
+mod instruments;
+mod trust;
+
+use dynid_model::element::{change_name, scale_name};
+use dynid_model::{EffortModel, Inertia, Owner};
+use serde_json::json;
+
+use crate::agreement::Agreement;
+use crate::estimate::{
+    BaseValue, ByMotion, Choice, ConditioningRecord, Estimate, ExportedRecord, FitSummary, FitValues,
+    InputRecord, LogFit, LogScale, ModelRecord, ParameterValue, Provenance, RankStatus, ReadingRecord,
+    SCHEMA, ShapeValue,
+};
+use crate::log::LogSource;
+use crate::pipeline::Identification;
+use crate::settings::Route;
+use crate::shape;
+use crate::trust::ParameterTrust;
+use crate::verdict;
+
+impl Identification {
+    /// The result file of this identification.
+    pub fn estimate(&self) -> Estimate {
+        let solution = &self.fit().solution;
+        let finite = |x: f64| x.is_finite().then_some(x);
+        let (_, verdict) = verdict::judge(self);
+        let mut model = ModelRecord::new(&self.robot.file.description, &self.robot.mechanism, &self.plan);
+        model.state_hz = self.state_hz;
+        model.kernel_hz = self.kernel_hz;
+        let names = |columns: &[usize]| -> Vec<String> {
+            let name = |c: &usize| self.model.parameters().linear[*c].name.clone();
+            // The change of a shape parameter stands for the parameter itself.
+            columns.iter().map(name).map(|n| shape::of_change(&n).unwrap_or(&n).to_owned()).collect()
+        };
+        let not_excited: Vec<usize> = solution.dropped.iter().map(|c| self.base.kept[*c]).collect();
+        Estimate {
+            schema: SCHEMA,
+            robot: self.model.mechanism().name().to_owned(),
+            joints: self.model.outputs().iter().map(|o| o.name.clone()).collect(),
+            samples: self.samples(),
+            rows: self.rows,
+            condition_number: finite(solution.condition),
+            condition_number_scaled: finite(solution.condition_scaled),
+            condition_number_without_shapes: finite(self.condition_without_shapes()),
+            rank: RankStatus {
+                structural: self.base.len(),
+                excited: solution.kept.len(),
+                structural_gap: finite(self.base.gap.ratio()),
+                not_excited: names(&not_excited),
+                never_seen: names(&self.base.zero),
+            },
+            counts: self.counts(),
+            parameters: self.robot_parameters(),
+            log_agreement: self.log_agreement.clone(),
+            log_delays: self.own_delays.clone(),
+            log_parameters: self.parameter_values(self.model.log_columns()),
+            base_parameters: self.base_values(),
+            shape_parameters: self.robot_shapes(),
+            log_scales: self.log_scales(),
+            stiffness: self.stiffness.clone(),
+            friction_passivity: self.friction_passivity(),
+            feasible: self.unphysical_bodies().is_empty(),
+            consistency: self.consistency_record(),
+            held_out: self.held_out_record(),
+            precision: self.precision_record(),
+            exogeneity: self.exogeneity_record(),
+            pruning: self.pruning_record(),
+            motions_that_would_help: self.trust.motions.clone(),
+            fit: self.fit_summary(),
+            validation: self.validation.iter().map(log_fit).collect(),
+            exported: ExportedRecord::default(),
+            preflight: self.findings.iter().map(Into::into).collect(),
+            overlaps: self.overlaps.clone(),
+            effort_scale: self.effort_scale.clone(),
+            verdict,
+            conditioning: self.conditioning_record(),
+            model,
+            provenance: Provenance {
+                inputs: self.inputs(),
+                reading: Some(ReadingRecord {
+                    understood: self.training_sources().map(|source| source.columns.clone()).collect(),
+                    ..ReadingRecord::default()
+                }),
+                settings: serde_json::to_value(&self.settings)
+                    .unwrap_or_else(|e| unreachable!("settings hold only plain data: {e}")),
+                seed: self.settings.seed.unwrap_or(1),
+                ..Provenance::default()
+            },
+        }
+    }
+
+    /// Robot, logs and friction as they were read, with what their bytes hash to; what came as arrays is not among them.
+    pub fn inputs(&self) -> Vec<InputRecord> {
+        let mut out = InputRecord::of_robot(&self.robot);
+        for (k, source) in self.sources.iter().enumerate() {
+            let validates = k >= self.logs.len();
+            out.extend(source.inputs.iter().map(|input| match input.kind.as_str() {
+                "log" if validates => InputRecord { kind: "validation".to_owned(), ..input.clone() },
+                _ => input.clone(),
+            }));
+        }
+        out.extend(self.plan.known_source.iter().map(|source| InputRecord::of("friction", source)));
+        out
+    }
+
+    /// Where the training logs come from.
+    fn training_sources(&self) -> impl Iterator<Item = &LogSource> {
+        self.sources.iter().take(self.logs.len())
+    }
+
+    /// Links whose identified inertia no body could have, with the reason.
+    pub fn unphysical_bodies(&self) -> Vec<(String, &'static str)> {
+        self.model
+            .mechanism()
+            .bodies()
+            .iter()
+            .zip(self.inertias())
+            .filter_map(|(body, inertia)| inertia.physical_fault().map(|fault| (body.name.clone(), fault)))
+            .collect()
+    }
+
+    /// Identified inertia of every body, in body order.
+    pub fn inertias(&self) -> Vec<Inertia> {
+        self.values()
+            .chunks_exact(10)
+            .take(self.model.mechanism().bodies().len())
+            .map(|ten| {
+                let mut phi = [0.0; 10];
+                phi.copy_from_slice(ten);
+                Inertia(phi)
+            })
+            .collect()
+    }
+
+    /// Parameters of some columns as the result file holds them.
+    pub fn parameter_values(&self, columns: std::ops::Range<usize>) -> Vec<ParameterValue> {
+        self.model
+            .parameters()
+            .linear
+            .iter()
+            .zip(&self.trust.parameters)
+            .enumerate()
+            .filter(|(c, (p, _))| columns.contains(c) && shape::of_change(&p.name).is_none())
+            .map(|(c, (p, trust))| {
+                let (link, joint) = match &p.owner {
+                    Owner::Link(name) => (Some(name.clone()), None),
+                    Owner::Joint(name) => (None, Some(name.clone())),
+                };
+                let value = self.values()[c];
+                ParameterValue {
+                    name: p.name.clone(),
+                    link,
+                    joint,
+                    unit: p.unit.to_owned(),
+                    value,
+                    unconstrained: Some(trust.unconstrained),
+                    std: trust.std,
+                    rel_std: relative(Some(value), trust.std),
+                    interval: trust.interval,
+                    wide: trust.wide,
+                    at_boundary: trust.at_boundary,
+                    verdict: trust.assessment.verdict.words().to_owned(),
+                    reason: trust.assessment.verdict.reason().map(str::to_owned),
+                    share: Some(trust.assessment.achieved),
+                    possible_share: Some(trust.assessment.structural_limit),
+                    combination: trust.combination.clone(),
+                    advice: trust.advice.clone(),
+                    prior: self.stated[c],
+                }
+            })
+            .collect()
+    }
+
+    /// Parameters of the robot alone, in the order of the model that the result file records.
+    fn robot_parameters(&self) -> Vec<ParameterValue> {
+        let table = self.robot_alone().0.parameters();
+        let mut out = self.parameter_values(0..self.model.log_columns().start);
+        out.sort_by_cached_key(|p| table.column(&p.name));
+        out
+    }
+
+    fn robot_shapes(&self) -> Vec<ShapeValue> {
+        let table = self.robot_alone().0.parameters();
+        let all = self.shape_values();
+        table.shape.iter().filter_map(|s| all.iter().find(|v| v.name == s.name).cloned()).collect()
+    }
+
+    /// Factors on friction of the logs that have one of their own.
+    pub(crate) fn log_scales(&self) -> Vec<LogScale> {
+        let all = self.shape_values();
+        let of = |(log, _): (String, f64)| {
+            let found = all.iter().find(|s| s.name == scale_name(&log))?.clone();
+            Some(LogScale {
+                log,
+                value: found.value,
+                std: found.std,
+                interval: found.interval,
+                verdict: found.verdict,
+                reason: found.reason,
+            })
+        };
+        self.plan.log_terms.scaled().into_iter().filter_map(of).collect()
+    }
+
+    fn base_values(&self) -> Vec<BaseValue> {
+        let table = self.model.parameters();
+        let expressions = self.base.expressions(table);
+        let consistent = self.base.values(self.values());
+        self.standard_deviations()
+            .into_iter()
+            .enumerate()
+            .filter(|(k, _)| shape::of_change(&table.linear[self.base.kept[*k]].name).is_none())
+            .map(|(k, (std, white))| {
+                let p = &table.linear[self.base.kept[k]];
+                let value = std.map(|_| self.fit().x[k]);
+                BaseValue {
+                    name: p.name.clone(),
+                    expression: expressions[k].clone(),
+                    unit: p.unit.to_owned(),
+                    value,
+                    consistent_value: Some(consistent[k]),
+                    half_width: self.trust.base_half_width[k],
+                    verdict: Some(self.trust.base[k].verdict.words().to_owned()),
+                    share: Some(self.trust.base[k].achieved),
+                    std,
+                    std_white: white,
+                    rel_std: relative(value, std),
+                }
+            })
+            .collect()
+    }
+
+    fn shape_values(&self) -> Vec<ShapeValue> {
+        let (model, _) = self.identified_model();
+        let columns = self.model.parameters();
+        let free = self
+            .shapes
+            .as_ref()
+            .map(|found| shape::unfold(&found.model, &self.model, self.unconstrained_values()));
+        model
+            .parameters()
+            .shape
+            .iter()
+            .enumerate()
+            .map(|(k, p)| {
+                let finding = self.shapes.as_ref().map(|found| &found.findings[k]);
+                let trust = columns.column(&change_name(&p.name)).map(|c| &self.trust.parameters[c]);
+                let (verdict, one_sided) = shape::verdict(finding.map(|f| f.verdict));
+                let seen = verdict == shape::SEEN;
+                let std = trust.and_then(|t| t.std).filter(|_| seen);
+                let at =
+                    self.shapes.as_ref().map_or(p.start, |found| found.model.parameters().shape[k].start);
+                let around = trust.and_then(|t| t.interval).filter(|_| seen).map(|(low, high)| {
+                    ((at + low).clamp(p.lower, p.upper), (at + high).clamp(p.lower, p.upper))
+                });
+                ShapeValue {
+                    name: p.name.clone(),
+                    unit: p.unit.to_owned(),
+                    value: p.start,
+                    unconstrained: free.as_ref().map(|free| free.shape[k]),
+                    range: (p.lower, p.upper),
+                    std,
+                    interval: around.or(one_sided),
+                    verdict: verdict.to_owned(),
+                    reason: shape::reason(finding, self.conditioning.is_some())
+                        .or_else(|| trust.filter(|t| seen && t.std.is_none()).map(without_interval)),
+                }
+            })
+            .collect()
+    }
+
+    fn fit_summary(&self) -> FitSummary {
+        // One log is shown as it is; of several, the worst joint by joint would mislead, so errors are pooled.
+        let pooled = |pick: &dyn Fn(&Agreement) -> FitValues| -> FitValues {
+            let all: Vec<(FitValues, usize)> =
+                self.training.iter().map(|a| (pick(a), a.counted.iter().filter(|c| **c).count())).collect();
+            pool(&all)
+        };
+        FitSummary {
+            raw: pooled(&|a| FitValues::from(&a.raw)),
+            filtered: pooled(&|a| FitValues::from(&a.filtered)),
+            filter_hz: self.kernel_hz,
+            by_motion: by_motion(&self.training),
+        }
+    }
+
+    fn conditioning_record(&self) -> ConditioningRecord {
+        let delay = self.conditioning.as_ref().map(|c| &c.delay);
+        ConditioningRecord {
+            route: match self.settings.conditioning.route {
+                Route::Compact => "compact".to_owned(),
+                Route::Textbook => "textbook".to_owned(),
+            },
+            choices: self.choices(),
+            delay_samples: self.delay_samples,
+            delay_rate_hz: self.delay_rate_hz,
+            delay_half_width: delay.map(|d| d.half_width),
+            delay_per_joint: delay.map_or_else(Vec::new, |d| d.per_output.clone()),
+            kernel_trials: self.conditioning.as_ref().map_or_else(Vec::new, |c| {
+                c.kernel_trials.iter().map(|t| (t.kernel_hz, t.loss, t.loss_rich)).collect()
+            }),
+            mask_trials: self.conditioning.as_ref().map_or_else(Vec::new, |c| {
+                c.mask_trials.iter().map(|t| (t.level, t.loss, t.standard_error, t.kept)).collect()
+            }),
+            friction_trials: friction::trials(self),
+            row_rms: self.row_rms.clone(),
+            residual_ratio: self.residual_ratio.clone(),
+        }
+    }
+
+    /// Every choice of the conditioning with its reason.
+    pub fn choices(&self) -> Vec<Choice> {
+        let mut out = Vec::new();
+        let mut add = |name: &str, value: serde_json::Value, unit: &str, origin: &str, reason: String| {
+            out.push(Choice {
+                name: name.to_owned(),
+                value,
+                unit: unit.to_owned(),
+                origin: origin.to_owned(),
+                reason,
+            });
+        };
+        let given = |set: bool| if set { "given" } else { "found" };
+        for (log, source) in self.logs.iter().zip(self.training_sources()) {
+            let name = short_name(&log.name);
+            let resampled = if log.clock.resampled { "resampled on a uniform grid" } else { "used as it is" };
+            add(
+                &format!("sample rate of {name}"),
+                json!(log.rate_hz),
+                "Hz",
+                given(source.rate_given),
+                format!(
+                    "median step; jitter {:.2e} of a sample, {} gaps: {resampled}",
+                    log.clock.jitter,
+                    log.clock.gaps.len()
+                ),
+            );
+            let spikes: usize = log.spikes.iter().map(|s| s.0 + s.1).sum();
+            add(
+                &format!("spikes removed from {name}"),
+                json!(spikes),
+                "samples",
+                "found",
+                "isolated runs far outside the running median; chatter and steps at reversal stay".to_owned(),
+            );
+        }
+        for (log, source) in self.logs.iter().zip(self.training_sources()) {
+            let name = short_name(&log.name);
+            for note in &source.notes {
+                add(
+                    &format!("{} of {name}", note.setting),
+                    json!(note.value),
+                    "",
+                    "found",
+                    note.reason.clone(),
+                );
+            }
+        }
+        for (log, source) in self.logs.iter().zip(self.training_sources()) {
+            let name = short_name(&log.name);
+            for (signal, used) in &source.columns {
+                add(
+                    &format!("{signal} columns of {name}"),
+                    json!(used),
+                    "",
+                    given(source.columns_given),
+                    "by the names in the header unless the configuration says otherwise".to_owned(),
+                );
+            }
+        }
+        for law in &self.plan.known {
+            let name = format!("known friction of {}", law.joint);
+            add(&name, json!(law.in_words()), "", "given", friction::of_known(self, law));
+        }
+        for log in self.logs.iter() {
+            if let Some(motion) = &log.periodic {
+                add(
+                    &format!("period of {}", short_name(&log.name)),
+                    json!(motion.period_s),
+                    "s",
+                    "found",
+                    format!(
+                        "states from Fourier series over {} periods, harmonics per joint {:?}; the stated period is corrected by the positions",
+                        motion.periods, motion.harmonics
+                    ),
+                );
+            }
+        }
+        let Some(c) = &self.conditioning else {
+            let route = self.settings.textbook_route();
+            add(
+                "filter cut-off",
+                json!(route.cutoff_hz),
+                "Hz",
+                given(self.settings.conditioning.kernel_hz.is_some()),
+                "textbook route: zero-phase Butterworth on positions and efforts".to_owned(),
+            );
+            for log in self.logs.iter() {
+                add(
+                    "decimation",
+                    json!(route.factor(log.rate_hz)),
+                    "",
+                    given(route.decimation.is_some()),
+                    "about five rows per period of the cut-off".to_owned(),
+                );
+            }
+            return out;
+        };
+        let noise: Vec<f64> =
+            self.logs.iter().flat_map(|l| l.position_noise.iter().map(|n| n.sigma)).collect();
+        let largest_noise = noise.iter().copied().fold(0.0, f64::max);
+        add(
+            "kernel cut-off",
+            json!(c.kernel_hz),
+            "Hz",
+            given(self.settings.conditioning.kernel_hz.is_some()),
+            format!(
+                "highest cut-off (limit {:.2} Hz from position noise up to {largest_noise:.1e} rad, crossing {:.1} Hz, excited band {:.2} Hz) that held-out blocks do not speak against",
+                c.limit.limit_hz, c.limit.crossing_hz, c.limit.excited_band_hz
+            ),
+        );
+        add(
+            "kernels used together",
+            json!(c.scales_hz),
+            "Hz",
+            "found",
+            "narrower kernels fill what the widest cannot reach between reversals".to_owned(),
+        );
+        add(
+            "state cut-off",
+            json!(self.state_hz),
+            "Hz",
+            given(self.settings.conditioning.state_hz.is_some()),
+            "states are filtered well above the kernel, so that signs of velocity stay sharp".to_owned(),
+        );
+        add(
+            "delay of the effort",
+            json!(c.delay.samples),
+            "samples",
+            given(c.delay.given),
+            match c.delay.chi_squared {
+                _ if c.delay.given => "as given".to_owned(),
+                Some(chi) => format!(
+                    "fitted with the parameters, ± {:.3} (95 %), joints agree with χ²/dof {chi:.2}",
+                    c.delay.half_width
+                ),
+                None => format!("fitted with the parameters, ± {:.3} (95 %)", c.delay.half_width),
+            },
+        );
+        for (output, mask) in self.model.outputs().iter().zip(c.mask.iter().zip(&c.usable)) {
+            add(
+                &format!("reversal mask of {}", output.name),
+                mask.0.map_or(json!(null), |m| json!(m)),
+                "of rms speed",
+                given(self.settings.conditioning.reversal_mask.is_some()),
+                format!(
+                    "held-out error over the ladder of masks; {:.0} % of the samples stay",
+                    100.0 * mask.1
+                ),
+            );
+        }
+        for (output, joint) in self.model.outputs().iter().zip(&self.friction) {
+            let (shapes, reason) = friction::in_words(joint);
+            add(&format!("friction shapes of {}", output.name), json!(shapes), "", "found", reason);
+        }
+        out
+    }
+}
+
+/// Name of a file without its folders.
+pub fn short_name(path: &str) -> String {
+    std::path::Path::new(path)
+        .file_name()
+        .map_or_else(|| path.to_owned(), |n| n.to_string_lossy().into_owned())
+}
+
+/// The figures of one log as the result file holds them.
+pub fn log_fit(a: &Agreement) -> LogFit {
+    LogFit {
+        log: a.name.clone(),
+        raw: FitValues::from(&a.raw),
+        filtered: FitValues::from(&a.filtered),
+        filter_hz: a.filter_hz,
+        filtered_unaligned: FitValues::from(&a.filtered_unaligned),
+        by_motion: by_motion(std::slice::from_ref(a)),
+    }
+}
+
+/// Figures in motion and at rest, those of several logs pooled joint by joint over the samples of either kind.
+fn by_motion(all: &[Agreement]) -> ByMotion {
+    let joints = all.first().map_or(0, |a| a.standing_share.len());
+    let counted = |a: &Agreement| a.counted.iter().filter(|c| **c).count() as f64;
+    let stands = |a: &Agreement, j: usize| counted(a) * a.standing_share[j];
+    let pooled = |fit: &dyn Fn(&Agreement) -> FitValues, count: &dyn Fn(&Agreement, usize) -> f64| {
+        let each: Vec<(FitValues, &Agreement)> = all.iter().map(|a| (fit(a), a)).collect();
+        if let [(only, _)] = &each[..] {
+            return only.clone();
+        }
+        let mean = |j: usize, pick: &dyn Fn(&FitValues) -> Option<f64>| -> Option<f64> {
+            let parts = || each.iter().filter_map(|(f, a)| Some((pick(f)?, count(a, j))));
+            let total: f64 = parts().map(|(_, n)| n).sum();
+            (total > 0.0).then(|| parts().map(|(x, n)| x * n).sum::<f64>() / total)
+        };
+        let of = |pick: &dyn Fn(&FitValues, usize) -> Option<f64>| -> Vec<Option<f64>> {
+            (0..joints).map(|j| mean(j, &|f| pick(f, j))).collect()
+        };
+        FitValues {
+            rms: of(&|f, j| f.rms[j].map(|r| r * r)).into_iter().map(|m| m.map(f64::sqrt)).collect(),
+            nrmse: of(&|f, j| f.nrmse[j]),
+            r2: of(&|f, j| f.r2[j]),
+            relative_error_per_joint: of(&|f, j| f.relative_error_per_joint[j]),
+            relative_error: None,
+        }
+    };
+    let total: f64 = all.iter().map(counted).sum();
+    let least = |j: usize| all.iter().map(|a| a.motion.least_speed[j]).fold(f64::INFINITY, f64::min);
+    ByMotion {
+        moving: pooled(&|a| FitValues::from(&a.moving), &|a, j| counted(a) - stands(a, j)),
+        standing: pooled(&|a| FitValues::from(&a.standing), &stands),
+        standing_share: (0..joints).map(|j| all.iter().map(|a| stands(a, j)).sum::<f64>() / total).collect(),
+        least_speed: (0..joints).map(least).collect(),
+    }
+}
+
+fn pool(all: &[(FitValues, usize)]) -> FitValues {
+    let [(only, _)] = all else {
+        let joints = all.first().map_or(0, |(f, _)| f.rms.len());
+        let total: usize = all.iter().map(|(_, n)| n).sum();
+        let mean_square = |j: usize| -> Option<f64> {
+            let sum = all.iter().try_fold(0.0, |s, (f, n)| Some(s + f.rms[j]?.powi(2) * *n as f64))?;
+            (total > 0).then(|| (sum / total as f64).sqrt())
+        };
+        // Range, R² and relative errors have no meaning across logs with different motions; the log-by-log figures do.
+        let weighted = |pick: &dyn Fn(&FitValues) -> Option<f64>| -> Option<f64> {
+            let sum = all.iter().try_fold(0.0, |s, (f, n)| Some(s + pick(f)? * *n as f64))?;
+            (total > 0).then(|| sum / total as f64)
+        };
+        return FitValues {
+            rms: (0..joints).map(mean_square).collect(),
+            nrmse: (0..joints).map(|j| weighted(&|f| f.nrmse[j])).collect(),
+            r2: (0..joints).map(|j| weighted(&|f| f.r2[j])).collect(),
+            relative_error_per_joint: (0..joints)
+                .map(|j| weighted(&|f| f.relative_error_per_joint[j]))
+                .collect(),
+            relative_error: weighted(&|f| f.relative_error),
+        };
+    };
+    only.clone()
+}
+
+/// Why a shape parameter that the search finds in the data has no interval.
+fn without_interval(trust: &ParameterTrust) -> String {
+    let verdict = &trust.assessment.verdict;
+    let reason = verdict.reason().map_or_else(String::new, |r| format!(" ({r})"));
+    format!("no interval: beside all other parameters it is {}{reason}", verdict.words())
+}
+
+fn relative(value: Option<f64>, std: Option<f64>) -> Option<f64> {
+    let (value, std) = (value?, std?);
+    (value.abs() >= 2.0 * std && value != 0.0).then(|| 100.0 * std / value.abs())
+}

@@ -1,0 +1,69 @@
+//! Least squares against instruments, for the result file.
+
+use dynid_estimate::instruments::{ExogeneityVerdict, IterationEnd};
+use dynid_model::EffortModel;
+
+use crate::estimate::{EffectRecord, ExogeneityRecord, InstrumentRecord};
+use crate::instruments::InstrumentRun;
+use crate::pipeline::Identification;
+use crate::verdict;
+
+impl Identification {
+    pub(super) fn exogeneity_record(&self) -> Option<ExogeneityRecord> {
+        let comparison = self.comparison.as_ref()?;
+        let found = comparison.exogeneity.as_ref();
+        let parameter = |column: usize| &self.model.parameters().linear[self.base.kept[column]];
+        let verdict = match (found.map(|f| f.verdict), comparison.diverged()) {
+            (_, Some(_)) => "diverged",
+            (None, None) => "undetermined",
+            (Some(ExogeneityVerdict::Exogenous), None) => "exogenous",
+            (Some(ExogeneityVerdict::Harmless), None) => "harmless",
+            (Some(ExogeneityVerdict::Material), None) => "material",
+            (Some(ExogeneityVerdict::Weak), None) => "weak",
+        };
+        let effects = found.iter().flat_map(|f| f.effects.iter().zip(&f.unexplained));
+        Some(ExogeneityRecord {
+            verdict: verdict.to_owned(),
+            summary: verdict::closed_loop_bias_in_words(self)?,
+            p_value: found.and_then(|f| f.robust).map(|t| t.p_value),
+            p_value_independent: found.and_then(|f| f.naive).map(|t| t.p_value),
+            blocks: found.map(|f| f.blocks),
+            tested: found.iter().flat_map(|f| &f.tested).map(|c| parameter(*c).name.clone()).collect(),
+            instrument_strength: found.map(|f| f.least_cosine),
+            rounds: [comparison.halves[0].rounds, comparison.halves[1].rounds],
+            distance: comparison.diverged().and_then(distance),
+            parameters: effects
+                .map(|(effect, unexplained)| EffectRecord {
+                    name: parameter(effect.column).name.clone(),
+                    unit: parameter(effect.column).unit.to_owned(),
+                    least_squares: effect.least_squares,
+                    instruments: effect.instruments,
+                    std_least_squares: effect.std.0,
+                    std_instruments: effect.std.1,
+                    difference: effect.difference(),
+                    limit: effect.limit,
+                    unexplained: *unexplained,
+                })
+                .collect(),
+            fit: self.instruments.as_ref().map(|run| InstrumentRecord {
+                rounds: run.rounds,
+                end: match run.end {
+                    IterationEnd::Settled => "settled",
+                    IterationEnd::Limit => "limit",
+                    IterationEnd::Diverged { .. } => "diverged",
+                }
+                .to_owned(),
+                last_change: run.last_change,
+                strength: run.strength.map(|(_, cosine)| cosine),
+            }),
+        })
+    }
+}
+
+/// How far a simulation was off its reference when it diverged.
+fn distance(run: &InstrumentRun) -> Option<f64> {
+    match run.end {
+        IterationEnd::Diverged { distance, .. } => Some(distance).filter(|d| d.is_finite()),
+        _ => None,
+    }
+}

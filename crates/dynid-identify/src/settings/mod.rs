@@ -1,0 +1,125 @@
+//! How logs are identified: elements, conditioning, estimator, bounds, closed loop.
+
+mod closed_loop;
+mod conditioning;
+mod effect;
+mod estimator;
+mod friction;
+pub mod lists;
+mod log_terms;
+mod per_joint;
+
+use std::collections::BTreeMap;
+
+use dynid_io::CouplingSpec;
+use serde::Serialize;
+
+pub use closed_loop::{ClosedLoop, NominalModel};
+pub use conditioning::{ConditioningConfig, Route};
+pub use effect::{Given, check_log_effect, refuse, serde_name};
+pub use estimator::{
+    BoundConfig, Consistency, EstimatorConfig, Method, PriorDistance, ShapeConfig, Variances,
+};
+pub use friction::{Friction, FrictionErrors};
+pub use log_terms::{LogSettings, Own, PayloadConfig, RATED_MASS};
+pub use log_terms::{MASSES, labels};
+pub use per_joint::PerJoint;
+pub use per_joint::known;
+
+use crate::Error;
+use crate::commands::RunFiles;
+use crate::known_friction::KnownLaws;
+
+/// Settings of an identification. All have defaults: `Settings::default()` is what `dynid identify` does without a configuration.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Settings {
+    /// Seed of everything random (states of the structural analysis). Default 1.
+    pub seed: Option<u64>,
+    /// Elements of joints.
+    pub elements: Elements,
+    /// Couplings of joints, besides those of the robot.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub couplings: Vec<CouplingSpec>,
+    /// Conditioning.
+    pub conditioning: ConditioningConfig,
+    /// The size of the efforts is right, whatever the robot file, its effort limits and other arms say of it: the pre-flight then
+    /// tells the difference without a warning. Default false.
+    pub known_effort_scale: bool,
+    /// Masses that were weighed, kg, by the name of the payload or link: the identified ones against them tell the scale of the efforts. They
+    /// are no prior. Default: none.
+    pub known_mass: BTreeMap<String, f64>,
+    /// What the pre-flight of the training logs may do. Default `refuse`.
+    pub preflight: Preflight,
+    /// Estimator.
+    pub estimator: EstimatorConfig,
+    /// Closed loop of the logs, for instrumental variables and the test of least squares against them. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub closed_loop: Option<ClosedLoop>,
+    /// Bounds on masses, centres of mass and parameters.
+    pub bound: Vec<BoundConfig>,
+    /// Columns to keep as base parameters where there is a choice, by name (`link2.Izz`) or symbol (`Izz2`).
+    pub preferred: Vec<String>,
+    /// Bodies that some logs carry.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub payload: Vec<PayloadConfig>,
+    /// Files behind robot, logs and settings, named in the commands that remedies give.
+    #[serde(skip)]
+    pub files: RunFiles,
+}
+
+/// Elements at joints.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Elements {
+    /// For every joint about which nothing else is said.
+    pub default: Option<Vec<String>>,
+    /// For single joints.
+    pub joint: BTreeMap<String, Vec<String>>,
+    /// Friction in place of that of the lists, or shapes found beside it. Default `auto`.
+    pub friction: Friction,
+    /// Friction whose laws are known: their efforts are taken off, and what remains of Coulomb and viscous friction and offset of these
+    /// joints are errors of the laws. Shapes are then found at other joints alone. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub known: Option<KnownLaws>,
+}
+
+/// What an identification does about what its pre-flight finds ([`crate::preflight`]).
+#[derive(Debug, Clone, Copy, Default, serde::Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum Preflight {
+    /// Refuses logs of which nonsense would come; warns of the rest.
+    #[default]
+    Refuse,
+    /// Warns.
+    Warn,
+    /// Is not made.
+    Off,
+}
+
+impl Settings {
+    /// Returns the settings with a change: `Settings::default().with(|s| s.seed = Some(7))`.
+    #[must_use]
+    pub fn with(mut self, change: impl FnOnce(&mut Settings)) -> Settings {
+        change(&mut self);
+        self
+    }
+
+    /// Checks that every number makes sense, whatever robot and logs.
+    ///
+    /// # Errors
+    /// [`Error::Setting`], [`Error::Coupling`].
+    pub fn check(&self) -> Result<(), Error> {
+        self.conditioning.check()?;
+        for coupling in &self.couplings {
+            if !coupling.matrix.iter().flatten().all(|x| x.is_finite()) {
+                return Err(Error::Coupling {
+                    joints: coupling.joints.join(", "),
+                    fault: format!("expected finite numbers in the matrix, found {:?}", coupling.matrix),
+                });
+            }
+        }
+        self.check_payloads()?;
+        self.check_estimator()?;
+        self.closed_loop.iter().try_for_each(ClosedLoop::check)
+    }
+}

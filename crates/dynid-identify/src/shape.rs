@@ -1,0 +1,176 @@
+//! Shape parameters of a run: found by separable least squares, then linearised, so that the final fit, its covariance and
+//! all that follows know of them.
+
+use dynid_estimate::separable::{
+    Bound, SeparableEstimate, SeparableSettings, ShapeFinding, ShapeVerdict, StartReport,
+};
+use dynid_model::element::{JointElement, Linearised, change_name};
+use dynid_model::{EffortModel, RobotModel};
+use dynid_rows::conditioning::{Conditioning, refine};
+
+use crate::Error;
+use crate::elements::ElementPlan;
+use crate::pipeline::Problem;
+
+/// Shape parameters found from logs.
+#[derive(Debug)]
+pub struct ShapeFit {
+    /// The nonlinear model with the values found.
+    pub model: RobotModel,
+    /// What the data say about each.
+    pub findings: Vec<ShapeFinding>,
+    /// What other starts of the search reached.
+    pub starts: StartReport,
+}
+
+/// Finds the shape parameters of a problem's model on its conditioned logs; also returns the linear parameters that go with them.
+pub(crate) fn find(problem: &Problem, choices: &Conditioning) -> Result<(ShapeFit, Vec<f64>), Error> {
+    let Problem { model, structure, logs, settings, .. } = problem;
+    let shape = model.parameters().shape_start();
+    let defaults = SeparableSettings::default();
+    let seed = settings.seed.unwrap_or(1);
+    let separable = SeparableSettings {
+        seed,
+        search: settings.estimator.shape.search(seed)?,
+        starts: settings.estimator.shape.starts.unwrap_or(defaults.starts),
+        ..defaults
+    };
+    let (base, conditioning) = (&structure.base, settings.conditioning_settings());
+    let found: SeparableEstimate =
+        refine(model, &shape, &base.kept, logs, choices, &conditioning, &separable)?;
+    let linear = base.expanded(&found.linear);
+    let model = problem.plan.model(&problem.robot.mechanism)?.with_shape(&found.shape);
+    Ok((ShapeFit { model, findings: found.findings, starts: found.starts }, linear))
+}
+
+/// Whether a linearised model may change a shape parameter: not if the logs do not see it or it lies at a bound, since a
+/// step would then have no evidence or lead out of its range.
+pub(crate) fn is_free(finding: &ShapeFinding) -> bool {
+    !matches!(finding.verdict, ShapeVerdict::NotSeen | ShapeVerdict::Held) && finding.at_bound.is_none()
+}
+
+/// The model of a plan, linearised about its shape parameters and the given linear parameters: every shape parameter
+/// that is `free` becomes a linear one, the change from its value; the others stay.
+///
+/// # Errors
+/// Fails as [`ElementPlan::build`] does.
+///
+/// # Panics
+/// If `linear` is not one value per linear parameter of `model`, `free` not one per shape parameter, or `model` is not of
+/// this plan.
+pub fn linearised(
+    plan: &ElementPlan,
+    model: &RobotModel,
+    linear: &[f64],
+    free: &[bool],
+) -> Result<RobotModel, Error> {
+    assert_eq!(free.len(), model.parameters().shape.len(), "length of free");
+    assert_eq!(linear.len(), model.parameters().linear.len(), "length of linear");
+    let (mechanism, joints) = (model.mechanism(), model.tree().joints());
+    let shape = model.parameters().shape_start();
+    let (mut shape, mut free) = (shape.as_slice(), free);
+    let mut linear = &linear[mechanism.inertial_parameters()..];
+    let mut elements: Vec<Box<dyn JointElement>> = Vec::new();
+    for element in plan.build(mechanism)? {
+        let own_shape = take(&mut shape, element.shape(joints).len());
+        let own_linear = take(&mut linear, element.parameters(joints).len());
+        let own_free = take(&mut free, own_shape.len());
+        elements.push(match own_shape {
+            [] => element,
+            _ => Box::new(Linearised::new(
+                element,
+                joints,
+                own_shape.to_vec(),
+                own_linear.to_vec(),
+                own_free.to_vec(),
+            )),
+        });
+    }
+    plan.complete(mechanism, elements)
+}
+
+fn take<'a, T>(rest: &mut &'a [T], count: usize) -> &'a [T] {
+    let (own, others) = rest.split_at(count);
+    *rest = others;
+    own
+}
+
+/// Parameters of a linearised model taken apart again.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unfolded {
+    /// Linear parameters of the nonlinear model.
+    pub linear: Vec<f64>,
+    /// Shape parameters of the nonlinear model: where the model was linearised, plus the changes, within their bounds.
+    pub shape: Vec<f64>,
+}
+
+/// Values of the nonlinear model from those of the linearised one.
+///
+/// # Panics
+/// If `values` is not one value per linear parameter of `linearised`.
+pub fn unfold(model: &RobotModel, linearised: &RobotModel, values: &[f64]) -> Unfolded {
+    let table = linearised.parameters();
+    assert_eq!(values.len(), table.linear.len(), "length of values");
+    let shape = &model.parameters().shape;
+    let change = |name: &str| table.column(&change_name(name)).map_or(0.0, |c| values[c]);
+    Unfolded {
+        shape: shape.iter().map(|s| (s.start + change(&s.name)).clamp(s.lower, s.upper)).collect(),
+        linear: kept_columns(model, linearised).map(|c| values[c]).collect(),
+    }
+}
+
+/// Columns of the linearised model that the nonlinear one has too, in its order.
+pub(crate) fn kept_columns<'a>(
+    model: &'a RobotModel,
+    linearised: &'a RobotModel,
+) -> impl Iterator<Item = usize> + 'a {
+    let names: Vec<String> = model.parameters().shape.iter().map(|s| change_name(&s.name)).collect();
+    let table = &linearised.parameters().linear;
+    (0..table.len()).filter(move |c| !names.contains(&table[*c].name))
+}
+
+/// Name of the shape parameter whose change a linear parameter is.
+pub(crate) fn of_change(name: &str) -> Option<&str> {
+    name.strip_suffix(change_name("").as_str())
+}
+
+/// Verdict of a shape parameter that the logs show.
+pub const SEEN: &str = "seen in the data";
+
+/// Verdict of one that they bound on one side.
+pub const ONE_SIDED: &str = "bounded on one side";
+/// Verdict of one of which any value fits.
+pub const NOT_SEEN: &str = "not seen";
+
+/// Verdict in words, and the interval of one that is bounded on one side.
+pub(crate) fn verdict(found: Option<ShapeVerdict>) -> (&'static str, Option<(f64, f64)>) {
+    match found {
+        Some(ShapeVerdict::Seen) => (SEEN, None),
+        Some(ShapeVerdict::OneSided { lower, upper }) => (ONE_SIDED, Some((lower, upper))),
+        Some(ShapeVerdict::NotSeen) => (NOT_SEEN, None),
+        Some(ShapeVerdict::Held | ShapeVerdict::NotJudged) | None => ("given", None),
+    }
+}
+
+/// Why, in words. `searched`: the route searches shape parameters.
+pub(crate) fn reason(finding: Option<&ShapeFinding>, searched: bool) -> Option<String> {
+    let Some(finding) = finding else {
+        return (!searched)
+            .then(|| "the textbook route does not search it: it is held at its start".to_owned());
+    };
+    match (finding.verdict, finding.at_bound) {
+        (ShapeVerdict::NotSeen, _) => {
+            Some("any value within its range fits these logs alike: it is held at its start".to_owned())
+        }
+        (_, Some(bound)) => {
+            let side = match bound {
+                Bound::Lower => "lower",
+                Bound::Upper => "upper",
+            };
+            let limit = finding.limit.map_or_else(String::new, |l| format!(": the law is then {l}"));
+            Some(format!("at its {side} bound{limit}"))
+        }
+        (ShapeVerdict::OneSided { .. }, None) => Some("the logs bound it on one side only".to_owned()),
+        _ => None,
+    }
+}

@@ -1,0 +1,208 @@
+//! How far each parameter can be trusted: verdict, interval, what the data see of it, and what would help.
+
+use dynid_estimate::consistent::ActiveConstraint;
+use dynid_estimate::distribution::t_quantile;
+use dynid_estimate::identifiability::{
+    Assessment, Carried, Identifiability, Verdict, VisibleSpace, excited_regrouping, posterior,
+    visible_combinations,
+};
+use dynid_linalg::Mat;
+use dynid_model::{BaseParameters, EffortModel, Owner, RobotModel};
+
+use crate::advice::{Advice, FitRows, MotionSettings, Present, advise};
+use crate::consistency::Consistent;
+use crate::fitting::Fitted;
+use crate::friction_power::{self, FrictionPower};
+use crate::prior::{Prior, link_lengths};
+
+/// Confidence of the intervals.
+pub const CONFIDENCE: f64 = 0.95;
+
+/// What is known about one standard parameter.
+#[derive(Debug, Clone)]
+pub struct ParameterTrust {
+    /// Shares and verdict.
+    pub assessment: Assessment,
+    /// Value without constraints, split as near as possible to the prior, in the parameter's unit.
+    pub unconstrained: f64,
+    /// Standard deviation of that, the prior's doubt about the split included; `None` unless the parameter is seen in the data.
+    pub std: Option<f64>,
+    /// 95 % interval around it, cut to where the parameter can lie; `None` unless seen in the data.
+    pub interval: Option<(f64, f64)>,
+    /// The interval is wide: beyond 30 % of the value or of what was known before.
+    pub wide: bool,
+    /// A constraint moved the value by more than a standard deviation.
+    pub at_boundary: bool,
+    /// What the data see of a parameter that acts only together with others.
+    pub combination: Option<String>,
+    /// The motion that would help.
+    pub advice: Option<String>,
+}
+
+/// What is known about all parameters.
+#[derive(Debug, Clone, Default)]
+pub struct Trust {
+    /// Standard parameters, in column order.
+    pub parameters: Vec<ParameterTrust>,
+    /// Shares and verdicts of the base parameters.
+    pub base: Vec<Assessment>,
+    /// 95 % half widths of the base parameters; `None` where the logs do not excite them.
+    pub base_half_width: Vec<Option<f64>>,
+    /// Motions that would help, most helpful first, a sentence each.
+    pub motions: Vec<String>,
+}
+
+/// Everything that a verdict rests on.
+pub(crate) struct Evidence<'a> {
+    pub model: &'a RobotModel,
+    pub base: &'a BaseParameters,
+    pub regrouping: &'a Mat<f64>,
+    pub space: &'a VisibleSpace,
+    pub prior: &'a Prior,
+    pub fitted: &'a Fitted,
+    pub consistent: &'a Consistent,
+    pub rows: &'a FitRows,
+    /// Per output: whether the model explains its effort.
+    pub explained: &'a [bool],
+    pub power: &'a FrictionPower,
+}
+
+/// Half width of intervals of [`CONFIDENCE`] in standard deviations.
+pub fn interval_quantile(fitted: &Fitted) -> f64 {
+    let fit = &fitted.estimate;
+    let freedom = match fitted.jackknife {
+        Some(_) => fit.blocks.len() as f64 - 1.0,
+        None => fit.solution.rows as f64 - fit.solution.kept.len() as f64,
+    };
+    t_quantile(0.5 + 0.5 * CONFIDENCE, freedom.max(1.0)).unwrap_or(f64::INFINITY)
+}
+
+impl Evidence<'_> {
+    /// Verdicts of all parameters.
+    pub(crate) fn trust(&self) -> Trust {
+        let information = &self.fitted.information(self.explained);
+        let assessed = self.space.assess(information, 1.0);
+        let present = Present { space: self.space, information, inflation: 1.0, assessed: &assessed };
+        let advice = advise(self.model, self.base, &present, self.rows, &MotionSettings::default());
+        let quantile = interval_quantile(self.fitted);
+        let base_half_width = self.base_deviations().into_iter().map(|s| s.map(|s| quantile * s)).collect();
+        let joints: Vec<String> = self.model.outputs().iter().map(|o| o.name.clone()).collect();
+        let symbols: Vec<&str> = self.model.parameters().linear.iter().map(|p| p.symbol.as_str()).collect();
+        let mut trust = Trust {
+            parameters: Vec::new(),
+            base: assessed.base.clone(),
+            base_half_width,
+            motions: advice.by_motion(&joints, &symbols),
+        };
+        trust.parameters = self.parameters(&assessed, &advice, &joints, &symbols, quantile, &trust);
+        trust
+    }
+
+    /// Standard deviations of all base parameters; `None` where a column was dropped.
+    fn base_deviations(&self) -> Vec<Option<f64>> {
+        let mut out = vec![None; self.base.len()];
+        let covariance = self.fitted.covariance();
+        for (k, c) in self.fitted.estimate.solution.kept.iter().enumerate() {
+            out[*c] = Some(covariance[(k, k)].max(0.0).sqrt());
+        }
+        out
+    }
+
+    fn parameters(
+        &self,
+        assessed: &Identifiability,
+        advice: &Advice,
+        joints: &[String],
+        symbols: &[&str],
+        quantile: f64,
+        trust: &Trust,
+    ) -> Vec<ParameterTrust> {
+        let fit = &self.fitted.estimate;
+        let after = posterior(
+            &excited_regrouping(&fit.factor, &fit.solution.kept, self.regrouping),
+            &fit.kept_x(),
+            &self.fitted.white,
+            0.0,
+            self.fitted.covariance(),
+            &self.prior.values,
+            &self.prior.std,
+        );
+        let lengths = link_lengths(self.model.mechanism());
+        let table = self.model.parameters();
+        // Motions are proposed for the robot alone.
+        let of_logs = self.model.log_columns();
+        (0..table.linear.len())
+            .map(|j| {
+                let assessment = assessed.parameters[j].clone();
+                let seen = assessment.verdict == Verdict::Seen;
+                let unconstrained = self.consistent.unconstrained[j];
+                let std = after.as_ref().map(|a| a.std[j]).filter(|_| seen);
+                let lower = table.linear[j].lower.unwrap_or(f64::NEG_INFINITY);
+                let interval = std.map(|s| {
+                    let (low, high) = (unconstrained - quantile * s, unconstrained + quantile * s);
+                    (low.max(lower), high.max(lower))
+                });
+                let value = self.consistent.values[j];
+                // Of what no motion separates from others, "no motion would" says nothing new.
+                let in_combination = assessment.verdict
+                    == Verdict::CarriedByPrior(Carried::OnlyInCombination)
+                    && !advice.suggestions.iter().any(|s| s.parameter == j);
+                let moved = (value - unconstrained).abs();
+                ParameterTrust {
+                    wide: std.is_some_and(|s| assessment.is_wide(value, quantile * s)),
+                    at_boundary: self.constrained(j) && std.is_some_and(|s| moved > s),
+                    combination: self.combination(j, &assessment, symbols, trust, &lengths),
+                    advice: advice
+                        .sentence(j, joints, symbols[j])
+                        .filter(|_| !in_combination && !of_logs.contains(&j)),
+                    assessment,
+                    unconstrained,
+                    std,
+                    interval,
+                }
+            })
+            .collect()
+    }
+
+    /// Whether a constraint acts on the parameter or on its link.
+    fn constrained(&self, column: usize) -> bool {
+        let p = &self.model.parameters().linear[column];
+        let Some(estimate) = &self.consistent.estimate else { return false };
+        estimate.active.iter().any(|a| match (a, &p.owner) {
+            (ActiveConstraint::AtZero { parameter }, _) => *parameter == p.name,
+            (ActiveConstraint::AtBound { bound }, Owner::Joint(joint)) => {
+                self.power.kept.contains(&p.name) && *bound == friction_power::bound_name(joint)
+            }
+            (ActiveConstraint::AtBound { .. }, _) => false,
+            (on_link, Owner::Link(link)) => on_link.name() == link,
+            _ => false,
+        })
+    }
+
+    /// The base parameter that a parameter is best seen in, in words with its value.
+    fn combination(
+        &self,
+        column: usize,
+        assessment: &Assessment,
+        symbols: &[&str],
+        trust: &Trust,
+        lengths: &[(f64, String)],
+    ) -> Option<String> {
+        if assessment.verdict != Verdict::CarriedByPrior(Carried::OnlyInCombination) {
+            return None;
+        }
+        let all = visible_combinations(self.regrouping, &self.prior.std, &self.base.kept, column);
+        // Seen combinations say more than others.
+        let seen = |i: usize| trust.base[i].verdict == Verdict::Seen;
+        let best = all.iter().find(|c| seen(c.base)).or(all.first())?;
+        let value = self.fitted.estimate.x[best.base];
+        let measured = trust.base_half_width[best.base].filter(|_| seen(best.base)).map(|h| (value, h));
+        let unit = self.model.parameters().linear[self.base.kept[best.base]].unit;
+        let mut sentence = best.sentence(symbols, measured, unit);
+        let constants = best.constants(lengths);
+        if !constants.is_empty() {
+            sentence.push_str(&format!(" ({})", constants.join(", ")));
+        }
+        Some(sentence)
+    }
+}

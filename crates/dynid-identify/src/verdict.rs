@@ -1,0 +1,495 @@
+//! What an identification is worth, in plain words.
+
+mod inputs;
+mod instruments;
+mod logs;
+mod names;
+mod remedy;
+
+use dynid_estimate::consistent::Status as ConsistentStatus;
+use dynid_estimate::whiteness::InBandWhiteness;
+
+pub(crate) use instruments::in_words as closed_loop_bias_in_words;
+pub use names::CheckName;
+
+use crate::agreement::Agreement;
+use crate::caution::{self, Caution};
+use crate::consistency::UNCONSTRAINED;
+use crate::estimate::{BaseCounts, CheckResult, Verdict};
+use crate::pipeline::Identification;
+use crate::stiffness::JointStiffness;
+
+/// How bad a check came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Status {
+    /// All is as it should be.
+    Ok,
+    /// Usable, with a reservation.
+    Warn,
+    /// Not to be trusted.
+    Fail,
+}
+
+impl Status {
+    /// `ok`, `warn` or `fail`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Status::Ok => "ok",
+            Status::Warn => "warn",
+            Status::Fail => "fail",
+        }
+    }
+
+    fn of(good: bool, tolerable: bool) -> Self {
+        match (good, tolerable) {
+            (true, _) => Status::Ok,
+            (false, true) => Status::Warn,
+            (false, false) => Status::Fail,
+        }
+    }
+}
+
+fn check(
+    status: Status,
+    name: CheckName,
+    value: Option<f64>,
+    unit: &str,
+    limit: &str,
+    meaning: impl Into<String>,
+) -> (Status, CheckResult) {
+    let result = CheckResult {
+        status: status.word().to_owned(),
+        name: name.name().to_owned(),
+        value,
+        unit: unit.to_owned(),
+        limit: limit.to_owned(),
+        meaning: meaning.into(),
+    };
+    (status, result)
+}
+
+/// Judges an identification.
+///
+/// A failure is: rank doubtful, most parameters not excited, or a prediction that explains less than half of the effort
+/// on some joint that moves. A warning is anything that should make a user look.
+pub fn judge(id: &Identification) -> (Status, Verdict) {
+    let mut checks = vec![excitation(id), rank_gap(id), condition(id), training_fit(id)];
+    if !id.unseen().is_empty() {
+        checks.push(validation_fit(id));
+    }
+    checks.extend(explained(id));
+    checks.extend(residual(id));
+    checks.extend(delay(id));
+    checks.extend(mask(id));
+    checks.push(blocks(id));
+    checks.extend(consistency(id));
+    checks.extend(stiffness(id));
+    checks.extend(whiteness(id));
+    checks.extend(instruments::instruments(id));
+    checks.extend(instruments::closed_loop_bias(id));
+    checks.extend(logs::checks(id));
+    checks.extend(inputs::checks(id));
+    let status = checks.iter().map(|(s, _)| *s).max().unwrap_or(Status::Ok);
+    let relative =
+        |a: &[&Agreement]| a.iter().filter_map(|v| v.filtered.relative_error).fold(f64::NAN, f64::max);
+    let unseen = id.unseen();
+    let (error, agrees) = if unseen.is_empty() {
+        (relative(&id.training.iter().collect::<Vec<_>>()), "reproduces the training logs")
+    } else {
+        (relative(&unseen), "predicts logs it has not seen")
+    };
+    let named = |level: Status| {
+        let names = checks.iter().filter(|(s, _)| *s == level).map(|(_, c)| c.name.as_str());
+        names.collect::<Vec<_>>().join(", ")
+    };
+    let assumptions: Vec<String> = id.effort_scale.assumption().into_iter().collect();
+    let reservation = match status {
+        Status::Ok => match &assumptions[..] {
+            [] => "All checks passed.".to_owned(),
+            assumed => format!("All checks passed; {}.", assumed.join("; ")),
+        },
+        Status::Warn => format!("These checks call for a look: {}.", named(Status::Warn)),
+        Status::Fail => {
+            format!("It should not be used without a look at the failed checks: {}.", named(Status::Fail))
+        }
+    };
+    let line =
+        format!("{}; the model {agrees} within {error:.1} % of the effort", id.counts().base_in_words());
+    let warnings: Vec<Caution> =
+        id.warnings.iter().cloned().chain(unphysical(id)).chain(id.friction_warnings()).collect();
+    let verdict = Verdict {
+        status: status.word().to_owned(),
+        headline: format!("{line}. {reservation}"),
+        line,
+        assumptions,
+        cautions: cautions(id, &checks, &warnings),
+        checks: checks.into_iter().map(|(_, c)| c).collect(),
+        warnings: warnings.into_iter().map(|w| w.message).collect(),
+    };
+    (status, verdict)
+}
+
+/// Checks that did not pass and warnings, the worst first. A check that only sums up warnings, which stand for themselves, is
+/// left out.
+fn cautions(id: &Identification, checks: &[(Status, CheckResult)], warnings: &[Caution]) -> Vec<Caution> {
+    let told = |name: CheckName| match name {
+        CheckName::Preflight => id.findings.iter().any(|f| f.warning().is_some()),
+        _ => warnings.iter().any(|w| w.name == name.name()),
+    };
+    let open = checks.iter().filter(|(status, _)| *status != Status::Ok).filter_map(|(_, c)| {
+        let name = CheckName::of_name(&c.name).filter(|name| !told(*name))?;
+        Some(Caution::of(c, remedy::of(id, name)))
+    });
+    caution::ranked(open.chain(warnings.iter().cloned()).collect())
+}
+
+impl Identification {
+    /// Validation logs that hold nothing of the training logs to speak of.
+    pub fn unseen(&self) -> Vec<&Agreement> {
+        let is_new = |(k, _): &(usize, &Agreement)| !self.overlaps.repeats(self.training.len() + k);
+        self.validation.iter().enumerate().filter(is_new).map(|(_, log)| log).collect()
+    }
+}
+
+/// Bodies whose split of base values into standard parameters no body could have.
+fn unphysical(id: &Identification) -> impl Iterator<Item = Caution> {
+    id.unphysical_bodies().into_iter().map(|(body, fault)| {
+        let message = format!(
+            "the identified body `{body}` {fault}: the split of what is seen into its ten parameters is not physical; \
+             predictions are not affected, but a simulator may refuse the robot file"
+        );
+        let remedy = "ask for bodies that can exist: `consistency = \"pseudo-inertia\"` under `[estimator]`";
+        Caution::warn(caution::BODY, message, remedy)
+    })
+}
+
+/// Stiffness that no log tells is no fault of the model, whose joints are stiff ones then.
+fn stiffness(id: &Identification) -> Option<(Status, CheckResult)> {
+    let told = id.stiffness.iter().filter(|s| s.stiffness.is_some()).count();
+    let all = id.stiffness.len();
+    let words: Vec<String> = id.stiffness.iter().map(JointStiffness::words).collect();
+    let status = Status::of(id.stiffness.iter().all(JointStiffness::is_borne_out), true);
+    let meaning = match status {
+        Status::Ok => {
+            format!("the deformation of the joints bears the stiffness of the fit out: {}", words.join("; "))
+        }
+        _ => format!(
+            "rows of links behind springs tell no stiffness here, so joints are taken as stiff ones; by their deformation: {}; a stiffness \
+             has the scale of the efforts: 5 % in a torque constant are 5 % in it",
+            words.join("; ")
+        ),
+    };
+    (all > 0).then(|| {
+        let limit = format!("all {all} joints");
+        check(status, CheckName::Stiffness, Some(told as f64), "", &limit, meaning)
+    })
+}
+
+fn excitation(id: &Identification) -> (Status, CheckResult) {
+    let BaseCounts { all, excited: kept, .. } = id.counts().base;
+    check(
+        Status::of(kept == all, 2 * kept > all),
+        CheckName::Excitation,
+        Some(kept as f64),
+        "",
+        &format!("all {all} base parameters"),
+        if kept == all {
+            "the logs excite every parameter combination that this robot can reveal".to_owned()
+        } else {
+            match all - kept {
+                1 => "the logs leave one combination unexcited; it keeps the robot file's value".to_owned(),
+                n => format!("the logs leave {n} combinations unexcited; these keep the robot file's values"),
+            }
+        },
+    )
+}
+
+fn rank_gap(id: &Identification) -> (Status, CheckResult) {
+    // Beyond the reciprocal of machine epsilon a gap says nothing more.
+    let gap = id.base.gap.ratio().min(1.0 / f64::EPSILON);
+    check(
+        Status::of(gap >= 1e4, gap >= 1e2),
+        CheckName::RankGap,
+        gap.is_finite().then_some(gap),
+        "",
+        "at least 1e4",
+        "how clearly the robot's geometry separates what can be identified from what cannot",
+    )
+}
+
+fn condition(id: &Identification) -> (Status, CheckResult) {
+    let condition = id.condition_without_shapes();
+    // It amplifies errors, and standard deviations know of it: no reason to throw a model away.
+    check(
+        Status::of(condition < 100.0, true),
+        CheckName::Condition,
+        condition.is_finite().then_some(condition),
+        "",
+        "below 100",
+        "how strongly errors of the effort are amplified, columns of shape parameters left out; a better excitation trajectory \
+         (`dynid design`) lowers it",
+    )
+}
+
+/// Of samples in which the joint moves; of a joint that never does, of all.
+fn worst_r2(agreements: &[&Agreement]) -> Option<f64> {
+    agreements
+        .iter()
+        .flat_map(|a| {
+            a.moving.channels.iter().zip(&a.filtered.channels).filter_map(|(m, all)| m.r2.or(all.r2))
+        })
+        .fold(None, |m: Option<f64>, x| Some(m.map_or(x, |m| m.min(x))))
+}
+
+fn fit_check(name: CheckName, agreements: &[&Agreement], where_: &str) -> (Status, CheckResult) {
+    let worst = worst_r2(agreements);
+    let r2 = worst.unwrap_or(f64::NAN);
+    check(
+        Status::of(r2 >= 0.9, r2 >= 0.5),
+        name,
+        worst,
+        "",
+        "R² of every joint at least 0.9",
+        format!(
+            "share of the effort's variance explained on {where_} where the joint moves, worst joint{}",
+            standing_apart(agreements)
+        ),
+    )
+}
+
+/// Share of the samples at rest from which on they are told apart.
+const STANDS: f64 = 0.05;
+
+/// What the error is where joints stand, of the joint that stands longest.
+fn standing_apart(agreements: &[&Agreement]) -> String {
+    let joints = agreements.iter().flat_map(|a| a.standing_share.iter().copied().zip(&a.standing.channels));
+    let longest = joints.filter(|(share, _)| *share > STANDS).max_by(|a, b| a.0.total_cmp(&b.0));
+    longest.map_or_else(String::new, |(share, standing)| {
+        let error = standing.relative_error.map_or_else(String::new, |e| format!(", error there {e:.1} % of its effort"));
+        format!(
+            "; samples at rest (up to {:.0} % of a joint's{error}) are shown apart, since friction has any value there",
+            100.0 * share
+        )
+    })
+}
+
+fn training_fit(id: &Identification) -> (Status, CheckResult) {
+    let training: Vec<&Agreement> = id.training.iter().collect();
+    fit_check(CheckName::TrainingFit, &training, "the logs it was fitted to")
+}
+
+fn validation_fit(id: &Identification) -> (Status, CheckResult) {
+    fit_check(CheckName::ValidationFit, &id.unseen(), "logs it has not seen")
+}
+
+fn explained(id: &Identification) -> Option<(Status, CheckResult)> {
+    let outputs = dynid_model::EffortModel::outputs(&id.model);
+    let poor: Vec<&str> =
+        outputs.iter().zip(&id.explained).filter(|(_, e)| !**e).map(|(o, _)| o.name.as_str()).collect();
+    (!poor.is_empty()).then(|| {
+        check(
+            Status::Warn,
+            CheckName::Explained,
+            Some(poor.len() as f64),
+            "",
+            "none: at least half of the effort of every joint explained, on logs that move it and on held-out folds",
+            format!(
+                "the effort of `{}` is mostly something else than this model (poor current sensing, friction at rest, a wrong \
+                 column?): its rows count for nothing in the verdicts, so that what only they could show stays with the prior",
+                poor.join("`, `")
+            ),
+        )
+    })
+}
+
+fn residual(id: &Identification) -> Option<(Status, CheckResult)> {
+    let worst = id
+        .residual_ratio
+        .iter()
+        .flatten()
+        .copied()
+        .fold(None, |m: Option<f64>, x| Some(m.map_or(x, |m| m.max(x))))?;
+    Some(check(
+        Status::of(worst < 2.0, true),
+        CheckName::Residual,
+        Some(worst),
+        "",
+        "below 2 on every joint",
+        if worst < 2.0 {
+            "what the model leaves over is sensor noise"
+        } else {
+            "the residual is larger than sensor noise: something acts that the model does not hold (friction shape, \
+             elasticity, ripple); standard deviations do not cover it"
+        },
+    ))
+}
+
+fn delay(id: &Identification) -> Option<(Status, CheckResult)> {
+    let delay = &id.conditioning.as_ref()?.delay;
+    if delay.given {
+        return None;
+    }
+    let chi = delay.chi_squared.unwrap_or(0.0);
+    Some(check(
+        Status::of(!delay.at_limit && chi < 3.0, true),
+        CheckName::Delay,
+        Some(delay.samples),
+        "samples",
+        "off the limits of the search, joints in agreement (χ²/dof below 3)",
+        if delay.at_limit {
+            "the delay ran into the limit of the search: it is not a measurement".to_owned()
+        } else if chi >= 3.0 {
+            format!(
+                "the joints disagree about the delay (χ²/dof {chi:.1}): a missing friction shape biases it"
+            )
+        } else {
+            format!("lead of the logged effort before the motion, ± {:.2} samples (95 %)", delay.half_width)
+        },
+    ))
+}
+
+fn mask(id: &Identification) -> Option<(Status, CheckResult)> {
+    let trials = &id.conditioning.as_ref()?.mask_trials;
+    let masked = || trials.iter().filter(|t| t.level.is_some());
+    let least = masked().map(|t| t.loss).fold(f64::INFINITY, f64::min);
+    let most = masked().map(|t| t.loss).fold(0.0, f64::max);
+    if masked().count() < 2 {
+        return None;
+    }
+    // Differences within two standard errors are chance.
+    let chance = 2.0 * masked().map(|t| t.standard_error).fold(0.0, f64::max);
+    let spread = 100.0 * (most / least - 1.0);
+    // A ladder that scatters by half its loss tells nothing, chance or not.
+    let good = spread <= 50.0 && most - least <= (0.05 * least).max(chance);
+    Some(check(
+        Status::of(good, true),
+        CheckName::ReversalMask,
+        Some(spread),
+        "%",
+        "below 5 %, or below 50 % and two standard errors",
+        if spread <= 5.0 {
+            "the result does not depend on how much of the motion near reversal is left out"
+        } else if good {
+            "held-out errors along the ladder differ by no more than chance"
+        } else if most - least <= chance {
+            "held-out errors scatter too much to tell how the result depends on the motion near reversal: the log is short"
+        } else {
+            "held-out error depends on how much of the motion near reversal is left out: low-speed friction is not \
+             what the model says"
+        },
+    ))
+}
+
+fn blocks(id: &Identification) -> (Status, CheckResult) {
+    let fitted = &id.fitted;
+    let wanted = fitted.block_length.seconds;
+    let short = wanted > 1.01 * fitted.block_s;
+    check(
+        Status::of(id.blocks() >= 20 && !short, true),
+        CheckName::TimeBlocks,
+        Some(id.blocks() as f64),
+        "",
+        "at least 20, each five correlation times of the residual long",
+        if fitted.jackknife.is_none() {
+            "the logs are too short for standard deviations that survive coloured residuals; those shown assume white ones"
+                .to_owned()
+        } else if short {
+            format!(
+                "the residuals stay correlated for so long that independent blocks would take {wanted:.1} s each, found {:.1} s: \
+                 the log is too short for honest intervals, those shown are somewhat too narrow",
+                fitted.block_s
+            )
+        } else if id.blocks() >= 20 {
+            "standard deviations come from leaving out one block of time at a time, so coloured residuals are covered"
+                .to_owned()
+        } else {
+            "few blocks: the standard deviations are themselves uncertain".to_owned()
+        },
+    )
+}
+
+/// Held-out error may rise by this much before consistency counts as dear, percent.
+const CHEAP: f64 = 2.0;
+/// Beyond this the robot file or the model contradicts the data, percent.
+const DEAR: f64 = 10.0;
+
+fn consistency(id: &Identification) -> Option<(Status, CheckResult)> {
+    let found = id.consistent.estimate.as_ref()?;
+    let held_out = &id.consistent.held_out;
+    let rise = |free: Option<f64>, consistent: Option<f64>| match (free, consistent) {
+        (Some(free), Some(consistent)) if free > 0.0 => Some(100.0 * (consistent / free - 1.0)),
+        _ => None,
+    };
+    let folds = rise(held_out.relative(UNCONSTRAINED), held_out.relative(id.consistent.consistent()));
+    let logs = id.validation_unconstrained.iter().zip(&id.validation);
+    let logs =
+        logs.filter_map(|(free, with)| rise(free.filtered.relative_error, with.filtered.relative_error));
+    let validation = logs.reduce(f64::max);
+    let cost = folds.into_iter().chain(validation).fold(f64::NEG_INFINITY, f64::max);
+    let rise = cost.is_finite().then_some(cost);
+    let each = match (folds, validation) {
+        (Some(folds), Some(logs)) => {
+            format!(" ({folds:+.1} % on held-out folds, {logs:+.1} % on validation logs)")
+        }
+        _ => String::new(),
+    };
+    let active = {
+        let mut names: Vec<String> = found.active.iter().map(|a| format!("`{}`", a.name())).collect();
+        names.dedup();
+        names.join(", ")
+    };
+    Some(check(
+        Status::of(cost <= CHEAP && found.status != ConsistentStatus::Stalled, cost <= DEAR),
+        CheckName::PriceOfConsistency,
+        rise,
+        "%",
+        "error on held-out folds and on validation logs rises by at most 2 %",
+        if found.status == ConsistentStatus::Unconstrained {
+            "the parameters that fit best belong to bodies that can exist".to_owned()
+        } else if found.status == ConsistentStatus::Stalled {
+            format!(
+                "the parameters are consistent, but a better fit by up to {:.2e} residual variances is not ruled out",
+                found.gap
+            )
+        } else if cost <= CHEAP {
+            let held = if active.is_empty() { String::new() } else { format!("; held at a limit: {active}") };
+            format!("bodies that can exist do about as well as any numbers{each}{held}")
+        } else {
+            let acting =
+                if active.is_empty() { String::new() } else { format!(" where these limits act: {active}") };
+            format!(
+                "bodies that can exist do worse than numbers without constraints{each}: chance, or something in the model or \
+                 in the log is wrong{acting}"
+            )
+        },
+    ))
+}
+
+fn whiteness(id: &Identification) -> Option<(Status, CheckResult)> {
+    let tested: Vec<(usize, &InBandWhiteness)> = id
+        .whiteness
+        .iter()
+        .flat_map(|log| log.iter().enumerate().filter_map(|(j, w)| w.as_ref().map(|w| (j, w))))
+        .collect();
+    let ratio = |w: &InBandWhiteness| w.distance / w.threshold;
+    let (joint, worst) = tested.into_iter().max_by(|a, b| ratio(a.1).total_cmp(&ratio(b.1)))?;
+    let robust = id.fitted.jackknife.is_some();
+    Some(check(
+        Status::of(!worst.rejected() || robust, true),
+        CheckName::Whiteness,
+        Some(ratio(worst)),
+        "",
+        "largest distance of the cumulative periodogram below its 5 % threshold (1), or robust intervals",
+        if !worst.rejected() {
+            "inside the band of the fit the residuals look like white noise".to_owned()
+        } else {
+            let joint = dynid_model::EffortModel::outputs(&id.model)[joint].name.clone();
+            let shown = if robust { "; the ones shown are robust" } else { "" };
+            format!(
+                "the residual of `{joint}` is coloured, most at {:.2} Hz: standard deviations of plain least squares are not \
+                 to be believed{shown}. Intervals cover noise, not errors of the model",
+                worst.dominant_frequency
+            )
+        },
+    ))
+}

@@ -1,0 +1,49 @@
+//! Names of the checks behind a verdict.
+
+crate::names! {
+    /// Checks behind the verdict of an identification.
+    CheckName {
+        /// Whether the training logs agree in what the fit holds the same.
+        AgreementOfLogs = "agreement of the training logs",
+        /// Least squares against instrumental variables.
+        ClosedLoopBias = "closed-loop bias",
+        /// Amplification of errors.
+        Condition = "condition number (scaled columns)",
+        /// The delay that was found.
+        Delay = "delay of the effort",
+        /// Scale of the efforts against known masses.
+        EffortScale = "scale of the efforts",
+        /// Base parameters that the logs excite.
+        Excitation = "excitation",
+        /// Joints whose effort is mostly something else than the model.
+        Explained = "joints that the model does not explain",
+        /// How instruments came about.
+        Instruments = "instruments",
+        /// Training logs that share rows.
+        OwnLogs = "training logs of their own",
+        /// Validation logs that share rows with training logs.
+        OwnValidation = "validation logs of their own",
+        /// What the pre-flight found.
+        Preflight = "pre-flight of the logs",
+        /// What bodies that can exist cost in fit.
+        PriceOfConsistency = "price of physical consistency",
+        /// How clearly the structure separates what can be identified.
+        RankGap = "structural rank gap",
+        /// What is left over against sensor noise.
+        Residual = "residual against sensor noise",
+        /// Dependence on rows near reversal.
+        ReversalMask = "sensitivity to the reversal mask",
+        /// Stiffness of elastic joints.
+        Stiffness = "stiffness told by deformation",
+        /// What logs have of their own.
+        TermsOfLogs = "terms of single logs",
+        /// Time blocks behind standard deviations.
+        TimeBlocks = "time blocks behind the standard deviations",
+        /// Fit on the training logs.
+        TrainingFit = "fit on training logs",
+        /// Prediction of validation logs.
+        ValidationFit = "prediction of validation logs",
+        /// Colour of the residuals.
+        Whiteness = "whiteness of the residuals",
+    }
+}

@@ -1,0 +1,219 @@
+//! Friction shapes, chosen per joint on held-out time blocks.
+
+mod library;
+mod losses;
+mod search;
+
+pub use library::{FrictionShape, ShapeKind};
+
+use dynid_model::{EffortModel, Owner};
+use faer::linalg::solvers::Solve;
+use faer::{Mat, Side};
+
+use super::states::States;
+use super::trial::{Trial, TrialShapes, state_hz_of};
+use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog, Stage, choose};
+use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate};
+use search::Search;
+
+/// When a friction shape is accepted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrictionSettings {
+    /// First shape of a joint: standard errors of the gain over time blocks, share of the joint's held-out loss.
+    /// Default 1.4, 0.01.
+    pub first: (f64, f64),
+    /// What a second shape must gain: standard errors over blocks, and share of the mean square. Default 2.5, 0.03.
+    pub second: (f64, f64),
+    /// Candidates tried on held-out blocks, after all were ranked by the loss on all rows. Default 4.
+    pub tried: usize,
+    /// Fewest time blocks with rows of a joint; with fewer nothing is chosen for it. Default 4.
+    pub least_blocks: usize,
+    /// Least gain for another rung of the mask ladder after the choice: standard errors of the gain, share of the loss.
+    /// Default 1.4, 0.005.
+    pub mask_again: (f64, f64),
+}
+
+impl Default for FrictionSettings {
+    fn default() -> Self {
+        FrictionSettings {
+            first: (1.4, 0.01),
+            second: (2.5, 0.03),
+            tried: 4,
+            least_blocks: 4,
+            mask_again: (1.4, 0.005),
+        }
+    }
+}
+
+/// A friction shape that was tried on held-out blocks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShapeTrial {
+    /// The shape.
+    pub shape: FrictionShape,
+    /// By how much the joint's held-out loss (mean square residual off reversal, mean over time blocks) falls with it, as a
+    /// share of the loss without it.
+    pub gain: f64,
+    /// Standard error of the gain over time blocks.
+    pub standard_error: f64,
+}
+
+/// What was chosen for one joint.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct JointFriction {
+    /// Shapes to add to the joint's elements, at most two, of different kinds.
+    pub accepted: Vec<ShapeTrial>,
+    /// The best candidate of every kind that was tried and not taken, with its gain over the final choice.
+    pub rejected: Vec<ShapeTrial>,
+    /// Time blocks with rows that the choice rests on. Below [`FrictionSettings::least_blocks`] nothing was tried.
+    pub blocks: usize,
+}
+
+/// Friction shapes of all joints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrictionChoice {
+    /// Per output.
+    pub per_output: Vec<JointFriction>,
+    /// The choices made before, with masks and delay brought up to date.
+    pub conditioning: Conditioning,
+    /// Linear parameters whose effort is the load of [`ShapeKind::Load`]: inertial ones of a fit without shapes, zeros
+    /// elsewhere. Empty if no joint took that shape.
+    pub load: Vec<f64>,
+}
+
+/// What is known of base parameters without logs: a normal distribution.
+#[derive(Debug, Clone)]
+pub struct BasePrior {
+    pub(crate) values: Vec<f64>,
+    pub(crate) precision: Mat<f64>,
+}
+
+impl BasePrior {
+    /// From values and standard deviations of all linear parameters. `regrouping`: `K` of the base parameters,
+    /// base × parameters. `None` where `K` has dependent rows.
+    ///
+    /// # Panics
+    /// If a length disagrees with `regrouping`.
+    pub fn new(regrouping: &Mat<f64>, values: &[f64], std: &[f64]) -> Option<BasePrior> {
+        let (base, parameters) = (regrouping.nrows(), regrouping.ncols());
+        assert!(
+            values.len() == parameters && std.len() == parameters,
+            "one value and deviation per parameter"
+        );
+        let row = |i: usize| regrouping.row(i);
+        let covariance = Mat::from_fn(base, base, |i, j| {
+            row(i).iter().zip(row(j).iter()).zip(std).map(|((a, b), s)| a * b * s * s).sum::<f64>()
+        });
+        let unit: Vec<f64> = (0..base).map(|i| 1.0 / covariance[(i, i)].sqrt()).collect();
+        let scaled = Mat::from_fn(base, base, |i, j| unit[i] * unit[j] * covariance[(i, j)]);
+        let inverse = scaled.llt(Side::Lower).ok()?.solve(&Mat::<f64>::identity(base, base));
+        Some(BasePrior {
+            values: (0..base).map(|i| row(i).iter().zip(values).map(|(k, x)| k * x).sum()).collect(),
+            precision: Mat::from_fn(base, base, |i, j| unit[i] * unit[j] * inverse[(i, j)]),
+        })
+    }
+}
+
+/// Chooses friction shapes beside the model's own columns.
+///
+/// Columns `|v|`, `s(v) exp(-(v/v_s)²)` and `tanh(v/v_c)` of every output's speed pass the kernels like the model's. Per
+/// joint the candidates are ranked by the loss on all rows; the best are fitted without one time block and scored
+/// on it, in rows off reversal, where low speeds count. After the choice masks and delay are found again.
+///
+/// `kept`: base columns of the model, ascending; `kinds`: per output the kinds to try (a kind whose columns the
+/// model spans is passed over); `choices`: found by [`super::condition`] for these logs. Joints that move in one direction
+/// only get no shape: what depends on speed cannot be told from what depends on its sign there.
+///
+/// # Errors
+/// [`ConditioningError`] if a signal cannot be filtered or a row is not finite.
+///
+/// # Panics
+/// If `kinds` has another length than the model has outputs.
+#[expect(clippy::too_many_arguments, reason = "those of `condition` and what it found")]
+pub fn choose_friction(
+    model: &dyn EffortModel,
+    shape: &[f64],
+    kept: &[usize],
+    logs: &[PreparedLog],
+    kinds: &[Vec<ShapeKind>],
+    prior: Option<&BasePrior>,
+    choices: &Conditioning,
+    settings: &ConditioningSettings,
+    progress: &mut dyn FnMut(Stage),
+) -> Result<FrictionChoice, ConditioningError> {
+    assert_eq!(kinds.len(), model.outputs().len(), "kinds of shapes per output");
+    let settings = &super::with_given_mask(settings);
+    progress(Stage::Friction);
+    let crossing_hz = choices.limit.crossing_hz;
+    let states = logs
+        .iter()
+        .map(|log| {
+            let cutoff_hz = state_hz_of(choices.kernel_hz, crossing_hz, log.rate_hz, settings);
+            States::of_motion_at(log, cutoff_hz, settings)
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let library: Vec<Vec<FrictionShape>> =
+        kinds.iter().enumerate().map(|(output, kinds)| library::of_output(output, kinds, &states)).collect();
+    drop(states);
+    let has_load = library.iter().flatten().any(|s| s.kind == ShapeKind::Load);
+    let load = match has_load {
+        true => rigid_parameters(model, shape, kept, logs, choices, settings)?,
+        false => Vec::new(),
+    };
+    let limits = choose::delay_limits(logs, settings);
+    let trial = Trial::new(
+        model,
+        shape,
+        kept,
+        logs,
+        choices.kernel_hz,
+        crossing_hz,
+        limits,
+        TrialShapes::Library { shapes: &library, load: &load },
+        settings,
+    )?;
+    let mut search = Search::new(&trial, &library, prior, choices, settings);
+    let per_output = search.run();
+    let (mut rung, chosen) = search.into_parts();
+    let mut conditioning = choices.clone();
+    if chosen.iter().any(|c| !c.is_empty()) {
+        let trial = trial.with_shapes(&chosen);
+        let all: Vec<Vec<usize>> = chosen.iter().map(|c| (0..c.len()).collect()).collect();
+        progress(Stage::Delay);
+        let first = choose::delay(&trial, &rung, &all, limits, settings, choices.delay.samples);
+        progress(Stage::Mask);
+        if settings.reversal_mask.is_none() {
+            rung = choose::masks_again(&trial, &rung, &all, first.samples, settings);
+        }
+        progress(Stage::Delay);
+        conditioning.delay = choose::delay(&trial, &rung, &all, limits, settings, first.samples);
+        conditioning.usable = rung.iter().enumerate().map(|(j, r)| trial.coverage[j][*r]).collect();
+        conditioning.mask = rung.iter().map(|r| (*r > 0).then(|| settings.ladder[*r - 1])).collect();
+        conditioning.rung = rung;
+    }
+    let loaded = |joint: &JointFriction| joint.accepted.iter().any(|t| t.shape.kind == ShapeKind::Load);
+    let load = if per_output.iter().any(loaded) { load } else { Vec::new() };
+    Ok(FrictionChoice { per_output, conditioning, load })
+}
+
+/// Inertial parameters of a fit without shapes, zeros elsewhere.
+fn rigid_parameters(
+    model: &dyn EffortModel,
+    shape: &[f64],
+    kept: &[usize],
+    logs: &[PreparedLog],
+    choices: &Conditioning,
+    settings: &ConditioningSettings,
+) -> Result<Vec<f64>, ConditioningError> {
+    let groups = super::reduce(model, shape, kept, logs, choices, settings)?;
+    let table = &model.parameters().linear;
+    let mut out = vec![0.0; table.len()];
+    // Without a fit there is no load, and its column is passed over as empty.
+    if let Ok(fit) = estimate(&groups, None, kept.len(), &LinearMethod::Wls, &LinearSettings::default()) {
+        for (column, value) in kept.iter().zip(&fit.x) {
+            if matches!(table[*column].owner, Owner::Link(_)) {
+                out[*column] = *value;
+            }
+        }
+    }
+    Ok(out)
+}

@@ -1,0 +1,240 @@
+//! Rows of the final fit, formed from the logs on every pass.
+
+use dynid_model::EffortModel;
+use dynid_motion::{Kernel, shift};
+
+use super::rows::{KeptColumns, Kernels, Pass, RowBatch, RowConsumer, masks};
+use super::states::{Masks, States};
+use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog};
+use dynid_estimate::instruments::paired_columns;
+use dynid_factor::rows::{GroupShape, RowSource, RowVisitor, Rows, RowsError};
+
+/// Most time blocks per log ...
+const MAX_BLOCKS: usize = 64;
+/// ... and of all logs together, but for one per log: every block takes a factor per output and kernel.
+const MOST_BLOCKS: usize = 256;
+
+/// Most time blocks of each of so many logs.
+pub(super) fn most_blocks(logs: usize) -> usize {
+    (MOST_BLOCKS / logs.max(1)).clamp(1, MAX_BLOCKS)
+}
+
+/// Rows of prepared logs with the choices made, one group per log, output and kernel scale, in that order.
+///
+/// States of all logs are held; regressors and kernels are computed again on every pass. Where the rows fit in memory,
+/// [`dynid_factor::rows::MemoryRows::collect`] makes further passes cheap.
+pub struct LogRows<'a> {
+    pub(super) model: &'a dyn EffortModel,
+    shape: &'a [f64],
+    columns: KeptColumns,
+    /// Per output: the rung of its mask, as a bit.
+    wanted: Vec<u8>,
+    pub(super) logs: Vec<ConditionedLog<'a>>,
+    groups: Vec<GroupShape>,
+}
+
+impl std::fmt::Debug for LogRows<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("LogRows").field("groups", &self.groups).finish_non_exhaustive()
+    }
+}
+
+pub(super) struct ConditionedLog<'a> {
+    pub(super) log: &'a PreparedLog,
+    pub(super) states: States,
+    /// States of a simulated motion, where rows are paired with instruments.
+    instruments: Option<States>,
+    masks: Vec<Masks>,
+    pub(super) kernels: Kernels,
+    /// Per output: effort led by the delay.
+    efforts: Vec<Vec<f64>>,
+    block_length: usize,
+    blocks: usize,
+}
+
+impl<'a> ConditionedLog<'a> {
+    fn new(
+        model: &dyn EffortModel,
+        log: &'a PreparedLog,
+        state_hz: f64,
+        choices: &Conditioning,
+        settings: &ConditioningSettings,
+    ) -> Result<Self, ConditioningError> {
+        let mut states = States::new(log, state_hz, settings)?;
+        let masks = masks(log, &states, model, settings);
+        let reach = choices.delay.samples.abs().ceil() as usize + 3;
+        let kernels = Kernels::new(&choices.scales_hz, &states, reach)?;
+        // Each unshifted effort goes as soon as it was read.
+        let efforts = std::mem::take(&mut states.effort)
+            .into_iter()
+            .map(|e| Ok(shift::shift(&e, -choices.delay.samples)?.values))
+            .collect::<Result<Vec<Vec<f64>>, ConditioningError>>()?;
+        let longest = (settings.block_s * log.rate_hz).max(5.0 * log.rate_hz / choices.kernel_hz);
+        let block_length =
+            (longest.ceil() as usize).max(log.samples().div_ceil(most_blocks(choices.state_hz.len()))).max(1);
+        let blocks = (log.samples() / block_length).max(1);
+        Ok(ConditionedLog { log, states, instruments: None, masks, kernels, efforts, block_length, blocks })
+    }
+}
+
+impl<'a> LogRows<'a> {
+    /// Rows of all logs.
+    ///
+    /// `kept`: base columns of the model, ascending; `choices`: found by [`super::condition`] for these logs.
+    ///
+    /// # Errors
+    /// [`ConditioningError`] if a signal cannot be filtered.
+    pub fn new(
+        model: &'a dyn EffortModel,
+        shape: &'a [f64],
+        kept: &[usize],
+        logs: &'a [PreparedLog],
+        choices: &Conditioning,
+        settings: &ConditioningSettings,
+    ) -> Result<Self, ConditioningError> {
+        Self::of(model, shape, kept, logs.iter().enumerate(), choices, settings)
+    }
+
+    /// Rows of logs paired with instruments, `[Z | W | y]`: `Z` is the regressor of another motion on the logs' grids, through the
+    /// state filter, kernels, masks and centres of the measured one (see [`dynid_estimate::instruments`]).
+    ///
+    /// `motions`: one per log, per output its positions at the log's samples, rad or m. Columns of the groups are those of
+    /// [`dynid_estimate::instruments::paired_columns`] for all base columns; `settings` as in [`LogRows::new`].
+    ///
+    /// # Errors
+    /// [`ConditioningError::Signal`] for a position that is not finite.
+    ///
+    /// # Panics
+    /// Unless there is one motion per log with a position per output and sample, or if the rows are paired already.
+    pub fn with_instruments(
+        mut self,
+        motions: &[Vec<Vec<f64>>],
+        settings: &ConditioningSettings,
+    ) -> Result<Self, ConditioningError> {
+        assert_eq!(motions.len(), self.logs.len(), "one motion per log");
+        for (log, motion) in self.logs.iter_mut().zip(motions) {
+            assert!(log.instruments.is_none(), "rows are paired once");
+            log.instruments = Some(log.states.along(motion, settings)?);
+        }
+        for group in &mut self.groups {
+            group.columns = paired_columns(&group.columns, self.columns.total);
+        }
+        Ok(self)
+    }
+
+    pub(super) fn of(
+        model: &'a dyn EffortModel,
+        shape: &'a [f64],
+        kept: &[usize],
+        logs: impl Iterator<Item = (usize, &'a PreparedLog)>,
+        choices: &Conditioning,
+        settings: &ConditioningSettings,
+    ) -> Result<Self, ConditioningError> {
+        let settings = &super::with_given_mask(settings);
+        let columns = KeptColumns::new(model, kept);
+        let (mut conditioned, mut groups) = (Vec::new(), Vec::new());
+        for (index, log) in logs {
+            let one = ConditionedLog::new(model, log, choices.state_hz[index], choices, settings)?;
+            for (output, positions) in columns.global.iter().enumerate() {
+                groups.extend((0..one.kernels.kernels.len()).map(|scale| GroupShape {
+                    log: index,
+                    output,
+                    scale,
+                    columns: positions.clone(),
+                    blocks: one.blocks,
+                }));
+            }
+            conditioned.push(one);
+        }
+        let wanted = choices.rung.iter().map(|r| 1 << r).collect();
+        Ok(LogRows { model, shape, columns, wanted, logs: conditioned, groups })
+    }
+}
+
+impl RowSource for LogRows<'_> {
+    fn groups(&self) -> &[GroupShape] {
+        &self.groups
+    }
+
+    fn visit(&self, visitors: &mut [&mut dyn RowVisitor]) -> Result<(), RowsError> {
+        assert_eq!(visitors.len(), self.groups.len(), "one visitor per group");
+        let mut rest = visitors;
+        let mut first_group = 0;
+        for log in &self.logs {
+            let scales = log.kernels.kernels.len();
+            let (own, others) = rest.split_at_mut(scales * log.efforts.len());
+            let mut consumers: Vec<OutputRows<'_, '_>> = own
+                .chunks_mut(scales)
+                .enumerate()
+                .map(|(output, visitors)| OutputRows {
+                    visitors,
+                    first_group: first_group + output * scales,
+                    effort: &log.efforts[output],
+                    kernels: &log.kernels.kernels,
+                    columns: self.columns.local[output].len() * (1 + usize::from(log.instruments.is_some())),
+                    block_length: log.block_length,
+                    blocks: log.blocks,
+                    net_effort: Vec::new(),
+                })
+                .collect();
+            Pass {
+                model: self.model,
+                shape: self.shape,
+                columns: &self.columns,
+                log: log.log,
+                states: &log.states,
+                instruments: log.instruments.as_ref(),
+                masks: &log.masks,
+                kernels: &log.kernels,
+                wanted: &self.wanted,
+                shapes: &vec![Vec::new(); log.efforts.len()],
+                load: &[],
+            }
+            .run(&mut consumers)?;
+            first_group += scales * log.efforts.len();
+            rest = others;
+        }
+        Ok(())
+    }
+}
+
+/// Hands the rows of one output to the visitors of its scales, block by block.
+struct OutputRows<'a, 'b> {
+    visitors: &'a mut [&'b mut dyn RowVisitor],
+    first_group: usize,
+    effort: &'a [f64],
+    kernels: &'a [Kernel],
+    columns: usize,
+    block_length: usize,
+    blocks: usize,
+    net_effort: Vec<f64>,
+}
+
+impl RowConsumer for OutputRows<'_, '_> {
+    fn take(&mut self, _output: usize, batch: &RowBatch<'_>) -> Result<(), RowsError> {
+        let n = batch.centres.len();
+        let kernel = &self.kernels[batch.scale];
+        self.net_effort.clear();
+        let offset = &batch.columns[self.columns * n..][..n];
+        let centres = batch.centres.iter().zip(offset);
+        self.net_effort.extend(centres.map(|(centre, known)| kernel.apply_at(self.effort, *centre) - known));
+        let mut start = 0;
+        while start < n {
+            let block_of = |centre: usize| (centre / self.block_length).min(self.blocks - 1);
+            let block = block_of(batch.centres[start]);
+            let count = batch.centres[start..].iter().take_while(|c| block_of(**c) == block).count();
+            let rows = Rows {
+                block,
+                samples: &batch.centres[start..start + count],
+                regressor: &batch.columns[start..],
+                stride: n,
+                effort: &self.net_effort[start..start + count],
+            };
+            self.visitors[batch.scale]
+                .take(&rows)
+                .map_err(|source| RowsError { group: self.first_group + batch.scale, source })?;
+            start += count;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,259 @@
+//! From logs to regression rows: every setting found from the logs themselves.
+//!
+//! Nonlinear columns are computed from states at a high cut-off; then columns and effort pass through one compact kernel,
+//! and a row counts only if nothing unusable lies under it. Kernel, reversal mask and delay are chosen on held-out
+//! time blocks.
+
+mod choose;
+mod friction;
+mod gram;
+mod live_rows;
+mod log_rows;
+mod moving;
+mod periodic;
+mod predict;
+mod prepare;
+mod reduce;
+mod rows;
+mod settings;
+mod shaped_rows;
+mod states;
+mod textbook;
+mod trial;
+
+pub use choose::{DelayEstimate, KernelTrial, MaskTrial};
+pub use dynid_factor::groups::ReducedGroup;
+pub use friction::{
+    BasePrior, FrictionChoice, FrictionSettings, FrictionShape, JointFriction, ShapeKind, ShapeTrial,
+    choose_friction,
+};
+pub use live_rows::{LiveRow, LiveRowSettings, LiveRows};
+pub use log_rows::LogRows;
+pub use moving::Moving;
+pub use periodic::PeriodicMotion;
+pub use predict::{predict, predict_along};
+pub use prepare::{PreparedLog, prepare};
+pub use reduce::reduce;
+pub(crate) use rows::KeptColumns;
+pub use settings::ConditioningSettings;
+pub use shaped_rows::{RefineError, ShapedRows, refine};
+pub use states::{StateBlock, States};
+pub use textbook::{TextbookRoute, paired_textbook_rows, reduce_textbook, textbook_rows};
+
+use dynid_model::EffortModel;
+use dynid_motion::cutoff::KernelLimit;
+
+use dynid_factor::factor::FactorError;
+use trial::{Trial, TrialShapes};
+
+/// Why a log cannot be conditioned.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConditioningError {
+    /// The clock is beyond repair.
+    #[error(transparent)]
+    Clock(#[from] dynid_motion::ClockError),
+    /// A signal cannot be filtered.
+    #[error("signal: {0}")]
+    Signal(#[from] dynid_motion::SignalError),
+    /// A joint of the model has no columns in the log.
+    #[error("{log}: no signals of joint `{joint}`")]
+    MissingJoint {
+        /// Log.
+        log: String,
+        /// Joint.
+        joint: String,
+    },
+    /// A channel that an element needs is missing.
+    #[error("{log}: no channel `{channel}`")]
+    MissingChannel {
+        /// Log.
+        log: String,
+        /// Channel.
+        channel: String,
+    },
+    /// An effort is constant.
+    #[error("{log}: the effort of joint `{joint}` never changes")]
+    ConstantEffort {
+        /// Log.
+        log: String,
+        /// Joint.
+        joint: String,
+    },
+    /// No joint moves.
+    #[error("{log}: no joint moves")]
+    NothingMoves {
+        /// Log.
+        log: String,
+    },
+    /// A log without a whole period of its motion.
+    #[error(
+        "{log}: expected at least one whole period of {expected} s, of 8 samples or more, found {found:.3} s"
+    )]
+    ShorterThanPeriod {
+        /// Log.
+        log: String,
+        /// Period, s.
+        expected: f64,
+        /// Duration of the log, s.
+        found: f64,
+    },
+    /// The positions repeat after another time than stated.
+    #[error(
+        "{log}: expected a motion that repeats every {expected} s, found {found:.6} s and no end of the search"
+    )]
+    OtherPeriod {
+        /// Log.
+        log: String,
+        /// Period stated, s.
+        expected: f64,
+        /// Where the search left the stated period by more than 1 %, s.
+        found: f64,
+    },
+    /// No row is left.
+    #[error(
+        "no usable row is left: the logs are too short for a kernel of {kernel_hz:.3} Hz, expected at least {expected:.2} s of uninterrupted motion, found {found:.2} s"
+    )]
+    NoRows {
+        /// Kernel cut-off, Hz.
+        kernel_hz: f64,
+        /// Seconds that one row needs.
+        expected: f64,
+        /// Seconds of the longest log.
+        found: f64,
+    },
+    /// A row holds a number that is not finite.
+    #[error("output {output}: {source}")]
+    Rows {
+        /// Index of the output.
+        output: usize,
+        /// What was found.
+        source: FactorError,
+    },
+}
+
+/// The choices made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conditioning {
+    /// Highest kernel that noise and band allow.
+    pub limit: KernelLimit,
+    /// Cut-off of the widest kernel, Hz.
+    pub kernel_hz: f64,
+    /// Cut-offs of all kernels, widest kernel first, Hz.
+    pub scales_hz: Vec<f64>,
+    /// Per log: cut-off of the state filter, Hz.
+    pub state_hz: Vec<f64>,
+    /// Delay.
+    pub delay: DelayEstimate,
+    /// Per output: rung of the mask ladder, 0 = no mask.
+    pub rung: Vec<usize>,
+    /// Per output: mask as a share of the rms speed; `None` = no mask.
+    pub mask: Vec<Option<f64>>,
+    /// Per output: share of samples that stay usable.
+    pub usable: Vec<f64>,
+    /// Kernels tried.
+    pub kernel_trials: Vec<KernelTrial>,
+    /// Ladder of masks.
+    pub mask_trials: Vec<MaskTrial>,
+}
+
+/// A step of the work, for progress displays.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Stage {
+    /// Sums of one kernel candidate: index, number of candidates.
+    Kernel(usize, usize),
+    /// Choosing the kernel.
+    Veto,
+    /// Choosing the mask.
+    Mask,
+    /// Estimating the delay.
+    Delay,
+    /// Choosing friction shapes.
+    Friction,
+}
+
+/// Finds kernel, delay and masks for prepared logs.
+///
+/// `kept`: base columns of the model, ascending. `progress` is told what is being worked on.
+///
+/// # Panics
+/// If the ladder has more than 7 rungs or there are fewer than 2 folds.
+pub fn condition(
+    model: &dyn EffortModel,
+    shape: &[f64],
+    kept: &[usize],
+    logs: &[PreparedLog],
+    settings: &ConditioningSettings,
+    progress: &mut dyn FnMut(Stage),
+) -> Result<Conditioning, ConditioningError> {
+    let settings = &with_given_mask(settings);
+    assert!(settings.ladder.len() <= 7, "rungs are bits of a byte, and one stands for no mask");
+    assert!(settings.folds >= 2, "held-out error needs two time blocks");
+    let limit = choose::limit(logs, settings)?;
+    let candidates = choose::candidates(&limit, settings);
+    let delay_limits = choose::delay_limits(logs, settings);
+    let mut trials = Vec::with_capacity(candidates.len());
+    for (k, kernel_hz) in candidates.iter().enumerate() {
+        progress(Stage::Kernel(k, candidates.len()));
+        let trial = Trial::new(
+            model,
+            shape,
+            kept,
+            logs,
+            *kernel_hz,
+            limit.crossing_hz,
+            delay_limits,
+            TrialShapes::Probes,
+            settings,
+        )?;
+        if trial.rows() > 0.0 {
+            trials.push(trial);
+        }
+    }
+    if trials.is_empty() {
+        let kernel_hz = candidates.first().copied().unwrap_or(limit.limit_hz);
+        return Err(ConditioningError::NoRows {
+            kernel_hz,
+            expected: 2.0 * 0.93 / kernel_hz + 2.0 / (2.0 * kernel_hz),
+            found: logs.iter().map(PreparedLog::duration).fold(0.0, f64::max),
+        });
+    }
+    progress(Stage::Veto);
+    let (chosen, kernel_trials) = choose::kernel(&trials, delay_limits, settings);
+    let trial = trials.swap_remove(chosen);
+    drop(trials);
+    progress(Stage::Delay);
+    let (prior, _) = settings.delay_prior;
+    let middle: Vec<usize> = (0..trial.outputs())
+        .map(|j| trial.allowed(j, settings.ladder.len().div_ceil(2), settings.least_usable))
+        .collect();
+    let plain = vec![Vec::new(); trial.outputs()];
+    let first = choose::delay(&trial, &middle, &plain, delay_limits, settings, prior);
+    progress(Stage::Mask);
+    let (rung, mask_trials) = choose::masks(&trial, first.samples, settings);
+    progress(Stage::Delay);
+    let delay = choose::delay(&trial, &rung, &plain, delay_limits, settings, first.samples);
+    let usable = (0..trial.outputs()).map(|j| trial.coverage[j][rung[j]]).collect();
+    let mask = rung.iter().map(|r| (*r > 0).then(|| settings.ladder[*r - 1])).collect();
+    Ok(Conditioning {
+        limit,
+        kernel_hz: trial.kernel_hz,
+        scales_hz: trial.scales_hz.clone(),
+        state_hz: trial.state_hz.clone(),
+        delay,
+        rung,
+        mask,
+        usable,
+        kernel_trials,
+        mask_trials,
+    })
+}
+
+/// With a mask given, the ladder has that one rung.
+pub(crate) fn with_given_mask(settings: &ConditioningSettings) -> ConditioningSettings {
+    let mut settings = settings.clone();
+    if let Some(level) = settings.reversal_mask {
+        settings.ladder = vec![level.max(0.0)];
+    }
+    settings
+}
