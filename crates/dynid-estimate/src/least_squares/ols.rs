@@ -27,7 +27,7 @@ pub struct LinearSolution {
     /// Factor of the kept columns.
     pub factor: Factor,
     /// `C` found beyond double precision, where the reduction allowed it.
-    pub(super) extended_covariance: Option<Mat<f64>>,
+    pub(crate) extended_covariance: Option<Mat<f64>>,
 }
 
 impl LinearSolution {

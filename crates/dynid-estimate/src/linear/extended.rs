@@ -1,6 +1,6 @@
 //! Ordinary least squares on a factor in double-double arithmetic.
 
-use super::ols::{LinearSolution, ols};
+use crate::least_squares::{LinearSolution, ols};
 use dynid_factor::factor::{DoubleDouble, ExtendedFactor};
 use dynid_linalg::triangular::symmetric_from;
 use faer::Mat;
