@@ -2,7 +2,6 @@
 
 mod difference;
 mod estimate;
-mod extended;
 mod irls;
 mod linear_estimate;
 mod method;
@@ -11,7 +10,6 @@ mod row_scores;
 pub use difference::{DifferenceFit, explain_difference};
 pub(crate) use estimate::assemble;
 pub use estimate::estimate;
-pub use extended::ols_extended;
 pub(crate) use irls::robust_scales;
 pub use linear_estimate::{GroupFit, LinearEstimate};
 pub use method::{IrlsSettings, LinearError, LinearMethod, LinearSettings, VarianceSharing};
