@@ -6,7 +6,6 @@
 use divan::{Bencher, black_box};
 use dynid_estimate::covariance::jackknife;
 use dynid_estimate::linear::ols;
-use dynid_factor::factor::ExtendedBuilder;
 use dynid_factor::{Factor, FactorBuilder};
 use dynid_linalg::Mat;
 use faer::Par;
@@ -15,7 +14,7 @@ use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, re
 use std::time::{Duration, Instant};
 
 const SHAPES: [(usize, usize); 2] = [(100_000, 64), (200_000, 80)];
-const EXTENDED_SHAPES: [(usize, usize); 3] = [(2_000, 8), (2_000, 16), (2_000, 64)];
+const SMALL_SHAPES: [(usize, usize); 3] = [(2_000, 8), (2_000, 16), (2_000, 64)];
 
 fn main() {
     for (rows, width) in SHAPES {
@@ -47,22 +46,11 @@ fn streamed_by_chunk_rows(bencher: Bencher<'_, '_>, chunk_rows: usize) {
     bencher.bench_local(|| stream_with(&mut builder, &samples));
 }
 
-#[divan::bench(args = EXTENDED_SHAPES, sample_count = 5)]
+#[divan::bench(args = SMALL_SHAPES, sample_count = 5)]
 fn small_streamed(bencher: Bencher<'_, '_>, (rows, width): (usize, usize)) {
     let samples = samples(rows, width);
     let mut builder = FactorBuilder::new(width - 1);
     bencher.bench_local(|| stream_with(&mut builder, &samples));
-}
-
-#[divan::bench(args = EXTENDED_SHAPES, sample_count = 5)]
-fn small_streamed_in_double_double(bencher: Bencher<'_, '_>, (rows, width): (usize, usize)) {
-    let samples = samples(rows, width);
-    let (regressor, effort) = samples.split_at((width - 1) * rows);
-    let mut builder = ExtendedBuilder::new(width - 1);
-    bencher.bench_local(|| {
-        builder.push_block(regressor, rows, effort).expect("finite samples");
-        builder.take()
-    });
 }
 
 #[divan::bench(sample_count = 5)]

@@ -4,7 +4,7 @@
 //! exact columns, `i = W (x/g) + w_L (1/g)`. Moving it to the regressor, `w_L = g i - W x`, brings its noise there and pulls
 //! `g` towards zero.
 
-use crate::linear::{TlsNoise, ols, tls};
+use crate::least_squares::{TlsNoise, ols, tls};
 use dynid_factor::factor::Factor;
 use dynid_factor::rank::numerical_rank;
 

@@ -5,7 +5,7 @@ mod prune;
 pub use prune::{PruneSettings, PruneStep, Pruning, prune};
 
 use crate::folds::HeldOutError;
-use crate::linear::{LinearSolution, ols};
+use crate::least_squares::{LinearSolution, ols};
 use dynid_factor::factor::Factor;
 
 /// One model on the path of [`backward_elimination`].

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::covariance::{MIN_BLOCKS, change_without, running_merges};
 use crate::distribution::{f_quantile, t_quantile};
-use crate::linear::{LinearSolution, WlsSettings, group_floors as floors, ols};
+use crate::least_squares::{LinearSolution, WlsSettings, group_floors as floors, ols};
 use dynid_factor::factor::Factor;
 use dynid_factor::groups::ReducedGroup;
 use dynid_factor::rank::numerical_rank;

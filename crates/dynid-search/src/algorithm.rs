@@ -133,7 +133,7 @@ impl FromStr for Algorithm {
             "gps" => Algorithm::PatternSearch(PatternSearch::default()),
             "cma-es" => Algorithm::CmaEs(CmaEs::default()),
             "de" => Algorithm::DifferentialEvolution(DifferentialEvolution::default()),
-            _ => return Err(SearchError::UnknownAlgorithm { name: name.to_owned() }),
+            _ => return Err(SearchError::UnknownAlgorithm { name: name.to_owned(), known: &Self::NAMES }),
         })
     }
 }
@@ -142,38 +142,4 @@ impl fmt::Display for Algorithm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
-}
-
-/// Checks `lower < value < upper`; not met by a value that is no number.
-pub(super) fn inside(
-    algorithm: &'static str,
-    parameter: &'static str,
-    value: f64,
-    lower: f64,
-    upper: f64,
-    expected: &'static str,
-) -> Result<(), SearchError> {
-    if lower < value && value < upper {
-        return Ok(());
-    }
-    Err(SearchError::Parameter { algorithm, parameter, expected, found: value })
-}
-
-pub(super) fn positive(
-    algorithm: &'static str,
-    parameter: &'static str,
-    value: f64,
-) -> Result<(), SearchError> {
-    inside(algorithm, parameter, value, 0.0, f64::INFINITY, "positive and finite")
-}
-
-pub(super) fn not_negative(
-    algorithm: &'static str,
-    parameter: &'static str,
-    value: f64,
-) -> Result<(), SearchError> {
-    if value == 0.0 {
-        return Ok(());
-    }
-    inside(algorithm, parameter, value, 0.0, f64::INFINITY, "not negative and finite")
 }

@@ -21,9 +21,9 @@
 //!
 //! Sources: Karaboga & Basturk 2007; Akay & Karaboga 2012 for the share of coordinates.
 
-use super::algorithm::{inside, positive};
 use super::error::SearchError;
 use super::population::Population;
+use super::range::{inside, positive};
 use super::run::{Method, Run, Step};
 use dynid_motion::words::Transfer;
 
@@ -61,7 +61,7 @@ impl BeeColony {
 
     pub(super) fn check(&self, algorithm: &'static str) -> Result<(), SearchError> {
         positive(algorithm, "acceleration", self.acceleration)?;
-        super::algorithm::not_negative(algorithm, "guidance", self.guidance)?;
+        super::range::not_negative(algorithm, "guidance", self.guidance)?;
         inside(algorithm, "changed_share", self.changed_share, 0.0, 1.0 + f64::EPSILON, "in (0, 1]")?;
         if self.trial_limit == Some(0) {
             let (parameter, expected) = ("trial_limit", "at least 1");

@@ -25,9 +25,9 @@
 mod descent;
 mod fold;
 
-use super::algorithm::inside;
 use super::error::SearchError;
 use super::population::Population;
+use super::range::inside;
 use super::run::{Method, Run, Step};
 use descent::Descent;
 use dynid_motion::words::Transfer;

@@ -17,9 +17,9 @@
 //!
 //! Sources: Yang & Deb 2009 (plain); Ding, Li, Li & Chao 2018 (improved).
 
-use super::algorithm::{inside, positive};
 use super::error::SearchError;
 use super::population::Population;
+use super::range::{inside, positive};
 use super::run::{Method, Run, Step};
 use super::tent::TentMap;
 use dynid_motion::words::Transfer;

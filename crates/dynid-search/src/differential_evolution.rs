@@ -18,10 +18,10 @@
 //! Sources: Tanabe & Fukunaga 2013, memory and means as in 2014 (L-SHADE, without its shrinking population); Zhang &
 //! Sanderson 2009 for mutation, archive and bounds.
 
-use super::algorithm::not_negative;
 use super::error::SearchError;
 use super::population::Population;
 use super::random::Random;
+use super::range::not_negative;
 use super::run::{Method, Run, Step};
 use dynid_motion::words::Transfer;
 
@@ -50,7 +50,7 @@ impl DifferentialEvolution {
         }
         not_negative(algorithm, "archive", self.archive)?;
         let wide = 1.0 + f64::EPSILON;
-        super::algorithm::inside(algorithm, "best_share", self.best_share, 0.0, wide, "in (0, 1]")
+        super::range::inside(algorithm, "best_share", self.best_share, 0.0, wide, "in (0, 1]")
     }
 }
 

@@ -2,7 +2,6 @@
 
 use thiserror::Error;
 
-use super::algorithm::Algorithm;
 use super::bounds::BoundsError;
 use super::checkpoint::CheckpointError;
 
@@ -83,10 +82,12 @@ pub enum SearchError {
         upper: f64,
     },
     /// No algorithm of this name.
-    #[error("no search algorithm `{name}`; known are {}", Algorithm::NAMES.join(", "))]
+    #[error("no search algorithm `{name}`; known are {}", known.join(", "))]
     UnknownAlgorithm {
         /// The name asked for.
         name: String,
+        /// The names that are known.
+        known: &'static [&'static str],
     },
     /// None of the points that were tried has a finite value.
     #[error("the objective was finite at none of {evaluations} points")]

@@ -42,6 +42,7 @@ mod particle_swarm;
 mod pattern;
 mod population;
 mod random;
+mod range;
 mod rank_sum;
 mod run;
 mod settings;

@@ -24,9 +24,9 @@
 //!
 //! Source: Kennedy & Eberhart 1995; Shi & Eberhart 1998 for `w`.
 
-use super::algorithm::{inside, not_negative};
 use super::error::SearchError;
 use super::population::Population;
+use super::range::{inside, not_negative};
 use super::run::{Method, Run, Step};
 use dynid_motion::words::Transfer;
 

@@ -14,8 +14,8 @@
 //!
 //! Deterministic: the seed has no effect. Sources: Torczon 1997; Rosyid & El-Khasawneh 2020 (scales, factors and limits).
 
-use super::algorithm::positive;
 use super::error::SearchError;
+use super::range::positive;
 use super::run::{Method, Run, Step};
 use dynid_motion::words::Transfer;
 

@@ -1,7 +1,7 @@
 //! Two steps, then maximum likelihood.
 
 use super::solve::{Placed, combine, factor, gain, rms, solution, with_prior};
-use super::spread::{long_run, spread_of_blocks};
+use super::spread::{State, long_run, spread_of_blocks};
 use super::{Coefficients, Deformation, DeformationError, Fit, Rows, Settings};
 
 /// Rounds of weights or Gauss-Newton steps until they must have settled.
@@ -77,15 +77,6 @@ fn check(rows: &Rows) -> Result<(), DeformationError> {
         return Ok(());
     }
     Err(DeformationError::Rows { expected: "rows, columns of one length, and priors with positive spreads" })
-}
-
-/// Values of all unknowns on the way: `β`, per joint `[c, b..]`, and what weights are made of.
-#[derive(Debug, Clone)]
-pub(super) struct State {
-    pub beta: Vec<f64>,
-    pub joints: Vec<Vec<f64>>,
-    sums_rms: Vec<f64>,
-    joints_rms: Vec<f64>,
 }
 
 struct Problem<'a> {

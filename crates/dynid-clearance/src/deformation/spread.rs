@@ -1,6 +1,13 @@
 //! Spreads that hold where residuals are correlated in time.
 
-use super::fit::State;
+/// Values of all unknowns on the way: `β`, per joint `[c, b..]`, and what weights are made of.
+#[derive(Debug, Clone)]
+pub(super) struct State {
+    pub beta: Vec<f64>,
+    pub joints: Vec<Vec<f64>>,
+    pub sums_rms: Vec<f64>,
+    pub joints_rms: Vec<f64>,
+}
 
 /// Standard deviation of a sum of correlated contributions: Bartlett window (Newey & West 1987).
 pub(super) fn long_run(contributions: &[f64], lag: usize) -> f64 {

@@ -11,8 +11,8 @@ use faer::Mat;
 use super::certificate;
 use super::cone::{LINK, Scaling, add_scaled, diagonal, least_product};
 use super::program::Program;
-use direction::{Direction, Target};
-use newton::Newton;
+use direction::Direction;
+use newton::{Newton, Target};
 
 const MAX_ITERATIONS: usize = 150;
 /// Without visible progress for this many iterations the method stops.

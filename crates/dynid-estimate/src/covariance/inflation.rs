@@ -1,6 +1,6 @@
 //! Variance inflation of each output by itself.
 
-use crate::linear::ols;
+use crate::least_squares::ols;
 use dynid_factor::factor::Factor;
 use dynid_factor::groups::ReducedGroup;
 

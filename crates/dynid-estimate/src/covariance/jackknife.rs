@@ -1,6 +1,6 @@
 //! Delete-a-block jackknife.
 
-use crate::linear::ols;
+use crate::least_squares::ols;
 use dynid_factor::factor::Factor;
 use dynid_factor::rank::certainly_full_rank;
 use dynid_linalg::triangular::symmetric_from;

@@ -9,7 +9,6 @@ mod bootstrap;
 mod hac;
 mod inflation;
 mod jackknife;
-mod row_scores;
 mod sandwich;
 
 pub use block_length::{BlockLength, BlockLengthSettings, BlockLengthStatus, ResidualSignal, block_length};
@@ -18,10 +17,9 @@ pub use hac::{andrews_lag, hac_bartlett, hac_bartlett_logs, hac_lag};
 pub use inflation::output_inflation;
 pub use jackknife::{Jackknife, MIN_BLOCKS, jackknife, jackknife_by, jackknife_with};
 pub(crate) use jackknife::{change_without, running_merges};
-pub use row_scores::{RowScores, row_scores};
 pub use sandwich::{block_sandwich, block_sandwich_with};
 
-use crate::linear::merge_weighted;
+use crate::least_squares::merge_weighted;
 use dynid_factor::factor::Factor;
 use faer::Mat;
 

@@ -1,9 +1,8 @@
 //! Instrumental-variable estimate from paired rows.
 
-use super::oblique::Oblique;
-use crate::linear::{
-    GroupFit, LinearError, LinearEstimate, LinearMethod, LinearSettings, assemble, floors, merge_weighted,
-};
+use crate::least_squares::{floors, merge_weighted};
+use crate::linear::{GroupFit, LinearError, LinearEstimate, LinearMethod, LinearSettings, assemble};
+use crate::oblique::Oblique;
 use dynid_factor::Factor;
 use dynid_factor::groups::ReducedGroup;
 

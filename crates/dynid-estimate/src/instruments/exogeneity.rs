@@ -1,10 +1,9 @@
 //! The test of Durbin, Wu and Hausman: may least squares be believed beside instruments?
 
-use super::jackknife;
-use super::oblique::{Oblique, pair};
 use crate::covariance::jackknife as least_squares_jackknife;
 use crate::distribution::f_exceedance;
-use crate::linear::ols;
+use crate::least_squares::ols;
+use crate::oblique::{Oblique, jackknife, pair};
 use dynid_factor::Factor;
 use dynid_factor::groups::{ReducedGroup, time_blocks};
 use dynid_factor::rank::numerical_rank;

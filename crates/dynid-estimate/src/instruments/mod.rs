@@ -22,11 +22,9 @@
 mod estimate;
 mod exogeneity;
 mod iterate;
-mod oblique;
-mod paired;
 
 pub use estimate::{InstrumentSettings, InstrumentalEstimate, Strength, instrumental};
 pub use exogeneity::{Effect, Exogeneity, ExogeneitySettings, ExogeneityVerdict, FTest, exogeneity};
 pub use iterate::{Iteration, IterationEnd, Simulated, iterate};
-pub(crate) use oblique::jackknife;
-pub use paired::{crossed, half, measured, paired_columns};
+
+pub use crate::oblique::{crossed, half, measured, paired_columns};

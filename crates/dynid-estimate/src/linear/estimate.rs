@@ -3,9 +3,9 @@
 use super::irls::{Irls, Loss, Start, irls};
 use super::linear_estimate::{GroupFit, LinearEstimate};
 use super::method::{LinearError, LinearMethod, LinearSettings};
-use super::ols::{LinearSolution, ols};
-use super::tls::{ColumnErrors, TlsNoise, tls_groups};
-use super::wls::{PriorRows, WlsEstimate, floors, wls_with};
+use crate::least_squares::{ColumnErrors, TlsNoise, tls_groups};
+use crate::least_squares::{LinearSolution, ols};
+use crate::least_squares::{PriorRows, WlsEstimate, floors, wls_with};
 use dynid_factor::factor::Factor;
 use dynid_factor::groups::{ReducedGroup, time_blocks};
 use dynid_factor::rows::{MemoryRows, RowSource};
@@ -124,7 +124,7 @@ fn total_least_squares(
     settings: &LinearSettings,
 ) -> Result<LinearEstimate, LinearError> {
     let mut fits = group_fits(groups, &start);
-    let found = tls_groups(groups, factors, total, noise, settings)?;
+    let found = tls_groups(groups, factors, total, noise, settings.irls.max_passes)?;
     let errors = |group: &ReducedGroup| ColumnErrors::new(noise, group, &found.x);
     let sum: f64 = groups.iter().zip(factors).map(|(g, f)| f.rss(&found.x) / errors(g).d).sum();
     let freedom = factors.iter().map(Factor::rows).sum::<usize>() as f64 - found.kept.len() as f64;

@@ -1,7 +1,7 @@
 //! Robust losses by iteratively re-weighted least squares.
 
 use super::method::{IrlsSettings, LinearError};
-use super::ols::{LinearSolution, ols};
+use crate::least_squares::{LinearSolution, ols};
 use dynid_factor::factor::{Factor, FactorError};
 use dynid_factor::groups::{ReducedGroup, time_blocks};
 use dynid_factor::rows::{BlockReducer, RowSource, RowVisitor, Rows, visit_all};

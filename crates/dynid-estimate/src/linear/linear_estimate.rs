@@ -2,10 +2,10 @@
 
 use super::irls::Loss;
 use super::method::LinearMethod;
-use super::ols::LinearSolution;
-use super::tls::{TlsNoise, tls};
 use crate::covariance::{Jackknife, block_sandwich_with, jackknife_by, jackknife_with};
-use crate::instruments::{jackknife as instrumental_jackknife, paired_columns};
+use crate::least_squares::LinearSolution;
+use crate::least_squares::{TlsNoise, tls};
+use crate::oblique::{jackknife as instrumental_jackknife, paired_columns};
 use dynid_factor::factor::Factor;
 use dynid_factor::groups::{ReducedGroup, time_blocks};
 use faer::Mat;

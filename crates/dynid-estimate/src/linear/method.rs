@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::tls::{TlsNoise, TlsRefusal};
-use super::wls::WlsSettings;
+use crate::least_squares::WlsSettings;
+use crate::least_squares::{TlsNoise, TlsRefusal};
 use dynid_factor::groups::ReducedGroup;
 use dynid_factor::rows::RowsError;
 

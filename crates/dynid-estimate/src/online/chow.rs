@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
-use crate::linear::ols;
+use crate::least_squares::ols;
 use dynid_factor::Factor;
 use dynid_factor::rank::numerical_rank;
 

@@ -1,6 +1,7 @@
 //! Problems with the same parameters, fitted together.
 
-use super::problem::{Bound, RowGroup, SeparableProblem, ShapedColumns};
+use super::limit::Bound;
+use super::problem::{RowGroup, SeparableProblem, ShapedColumns};
 use dynid_model::ShapeParameter;
 
 /// The rows of several problems that share linear and shape parameters: logs of motion and points of a friction

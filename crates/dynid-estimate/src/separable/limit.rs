@@ -1,6 +1,13 @@
 //! What simpler model a shape parameter at its bound stands for.
 
-use super::problem::Bound;
+/// An end of a shape parameter's range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bound {
+    /// The lower bound.
+    Lower,
+    /// The upper bound.
+    Upper,
+}
 
 /// The limit model of a friction shape, by the symbol after the last dot of the parameter's name (`joint.fb`).
 ///

@@ -41,15 +41,16 @@ mod settings;
 mod sobol;
 mod starts;
 mod steady_rows;
+mod work;
 
 pub use effort_problem::{EffortBlock, EffortProblem};
 pub use estimate::{Deviations, SeparableEstimate};
 pub use fit::fit;
 pub use joined::JoinedProblem;
 pub use levenberg::SearchStatus;
-pub use limit::limit_model;
+pub use limit::{Bound, limit_model};
 pub use places::{OutputPlaces, places};
-pub use problem::{Bound, RowGroup, SeparableProblem, ShapedColumns};
+pub use problem::{RowGroup, SeparableProblem, ShapedColumns};
 pub use profile::{ShapeFinding, ShapeVerdict};
 pub use settings::{SeparableError, SeparableLoss, SeparableSettings, ShapeSearch, Weighting};
 pub use starts::{StartOutcome, StartReport};

@@ -1,6 +1,7 @@
 //! Problems that are linear in most of their parameters, as rows.
 
 use super::SeparableError;
+use super::limit::Bound;
 use dynid_model::ShapeParameter;
 
 /// Rows that share a residual variance: one output of one log at one kernel scale, in time order.
@@ -81,15 +82,6 @@ impl ShapedColumns {
     pub(super) fn is_finite(&self) -> bool {
         self.values.iter().chain(&self.derivatives).all(|v| v.is_finite())
     }
-}
-
-/// An end of a shape parameter's range.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Bound {
-    /// The lower bound.
-    Lower,
-    /// The upper bound.
-    Upper,
 }
 
 /// A model `y ≈ Φ(α) c` over groups of rows: `c` linear, `α` shape parameters.

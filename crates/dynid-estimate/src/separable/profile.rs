@@ -1,7 +1,8 @@
 //! Whether the data see a shape parameter: the loss over its range, all others fitted anew.
 
 use super::levenberg::{Stops, search};
-use super::problem::{Bound, SeparableProblem};
+use super::limit::Bound;
+use super::problem::SeparableProblem;
 use super::projection::Projection;
 use super::scale::SearchBox;
 use rayon::prelude::*;

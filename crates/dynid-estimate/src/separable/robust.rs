@@ -1,10 +1,10 @@
 //! Robust losses: Levenberg-Marquardt inside iteratively re-weighted least squares.
 
-use super::fit::Work;
 use super::levenberg::{Stops, search};
 use super::projection::Projection;
 use super::reduction::GroupReduction;
 use super::settings::{SeparableError, SeparableLoss, Weighting};
+use super::work::Work;
 use crate::linear::robust_scales;
 use dynid_factor::groups::ReducedGroup;
 use rayon::prelude::*;

@@ -1,14 +1,14 @@
 //! The recursive estimator against batch solutions of the same rows, and what stands beside it.
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
+use crate::extended::{DoubleDouble, ExtendedFactor};
 use crate::golden::{check_close, load, number, vector};
 use dynid_estimate::consistent::{Problem, Settings as ConsistentSettings, Status, estimate};
-use dynid_estimate::linear::{ols, ols_extended};
+use dynid_estimate::linear::ols;
 use dynid_estimate::online::{
     BlockWindow, ConsistentPublisher, Estimator, Forgetting, RowNoise, RowWindow, Settings, SquareRoot,
     chow_test, factor_from_root, root_from_factor,
 };
-use dynid_factor::factor::{ExtendedBuilder, ExtendedFactor};
 use dynid_factor::{Factor, FactorBuilder};
 use dynid_linalg::Mat;
 use rand::SeedableRng;
@@ -54,12 +54,9 @@ impl Graded {
 }
 
 fn batch(rows: &[Vec<f64>]) -> Vec<f64> {
-    let mut builder = ExtendedBuilder::new(COLUMNS);
-    for row in rows {
-        builder.push_row(&row[..COLUMNS], row[COLUMNS]).unwrap();
-    }
-    let factor: ExtendedFactor = builder.finish();
-    ols_extended(&factor).x
+    let mut factor = ExtendedFactor::new(COLUMNS);
+    rows.iter().for_each(|row| factor.push(row.iter().map(|v| DoubleDouble::from(*v))));
+    factor.solve().x
 }
 
 fn worst(root: &SquareRoot, expected: &[f64]) -> f64 {

@@ -2,9 +2,9 @@
 
 use crate::simulated::{ACTING, COLUMNS, NOISE, Normal, TRUTH, regressor, rows};
 use dynid_estimate::covariance::{
-    BlockLengthSettings, BlockLengthStatus, ResidualSignal, block_length, hac_bartlett, row_scores,
+    BlockLengthSettings, BlockLengthStatus, ResidualSignal, block_length, hac_bartlett,
 };
-use dynid_estimate::linear::{LinearMethod, LinearSettings, VarianceSharing, estimate};
+use dynid_estimate::linear::{LinearMethod, LinearSettings, VarianceSharing, estimate, row_scores};
 use dynid_factor::Factor;
 use dynid_factor::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
 use dynid_linalg::Mat;

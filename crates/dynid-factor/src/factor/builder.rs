@@ -236,7 +236,7 @@ fn canonical(buffer: &Mat<f64>, height: usize, columns: usize) -> (Mat<f64>, f64
 }
 
 /// Filler for `push_with` that copies a column-major block, checked for its shape.
-pub(super) fn block_rows<'a>(
+fn block_rows<'a>(
     columns: usize,
     regressor: &'a [f64],
     stride: usize,
@@ -264,7 +264,7 @@ pub(super) fn block_rows<'a>(
 }
 
 /// Fails if a value is not finite; `values` are those of `column` from row `first_row` on.
-pub(super) fn require_finite(
+fn require_finite(
     values: &[f64],
     first_row: usize,
     column: Option<usize>,

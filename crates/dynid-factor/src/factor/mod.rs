@@ -5,19 +5,12 @@
 //!
 //! `‖y - W x‖² = ‖z - R x‖² + ρ²` and `Wᵀ(y - W x) = Rᵀ(z - R x)`.
 //!
-//! [`FactorBuilder`] works in double precision and is the one to use on logs; [`ExtendedBuilder`] does the same with
-//! 32 digits, for small problems that double precision cannot carry.
-//!
 //! Source: Golub & Van Loan, *Matrix Computations*, sections 5.2 and 5.3.
 
 mod algebra;
 mod builder;
-mod double_double;
-mod extended;
 
 pub use builder::{DEFAULT_CHUNK_ROWS, FactorBuilder, FactorError};
-pub use double_double::DoubleDouble;
-pub use extended::{ExtendedBuilder, ExtendedFactor};
 
 use dynid_linalg::triangular::solve_upper;
 use faer::Mat;

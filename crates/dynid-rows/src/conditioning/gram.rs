@@ -9,7 +9,7 @@ use faer::linalg::solvers::{Llt, Solve};
 use faer::{Mat, Side};
 
 use super::PreparedLog;
-use super::friction::BasePrior;
+use super::base_prior::BasePrior;
 use super::rows::{RowBatch, RowConsumer};
 use dynid_factor::rows::RowsError;
 

@@ -4,8 +4,10 @@
 //! and a row counts only if nothing unusable lies under it. Kernel, reversal mask and delay are chosen on held-out
 //! time blocks.
 
+mod base_prior;
 mod choose;
 mod friction;
+mod friction_shape;
 mod gram;
 mod live_rows;
 mod log_rows;
@@ -21,21 +23,19 @@ mod states;
 mod textbook;
 mod trial;
 
+pub use base_prior::BasePrior;
 pub use choose::{DelayEstimate, KernelTrial, MaskTrial};
 pub use dynid_factor::groups::ReducedGroup;
-pub use friction::{
-    BasePrior, FrictionChoice, FrictionSettings, FrictionShape, JointFriction, ShapeKind, ShapeTrial,
-    choose_friction,
-};
+pub use friction::{FrictionChoice, JointFriction, ShapeTrial, choose_friction};
+pub use friction_shape::{FrictionShape, ShapeKind};
 pub use live_rows::{LiveRow, LiveRowSettings, LiveRows};
 pub use log_rows::LogRows;
 pub use moving::Moving;
-pub use periodic::PeriodicMotion;
 pub use predict::{predict, predict_along};
-pub use prepare::{PreparedLog, prepare};
+pub use prepare::{PeriodicMotion, PreparedLog, prepare};
 pub use reduce::reduce;
 pub(crate) use rows::KeptColumns;
-pub use settings::ConditioningSettings;
+pub use settings::{ConditioningSettings, FrictionSettings};
 pub use shaped_rows::{RefineError, ShapedRows, refine};
 pub use states::{StateBlock, States};
 pub use textbook::{TextbookRoute, paired_textbook_rows, reduce_textbook, textbook_rows};

@@ -52,3 +52,12 @@ impl Moving {
         Ok(Moving::new(log, &States::of_motion(log, state_hz, settings)?, settings))
     }
 }
+
+impl States {
+    /// The same with zero velocity wherever a joint stands: its sign there is that of noise, and friction may have any value up to static
+    /// friction. A prediction along such states is the middle of what it may be, and does not jump.
+    pub fn resting(mut self, moving: &Moving) -> States {
+        self.moves = Some(moving.samples.clone());
+        self
+    }
+}

@@ -4,29 +4,7 @@ use dynid_motion::harmonics::Harmonics;
 use dynid_motion::median::median;
 use rayon::prelude::*;
 
-use super::{ConditioningError, PreparedLog};
-
-/// Periodic motion found in a log; see [`PreparedLog::with_period`].
-#[derive(Debug, Clone)]
-pub struct PeriodicMotion {
-    /// Period after which the positions repeat, s of the log's clock.
-    pub period_s: f64,
-    /// Whole periods in the log.
-    pub periods: usize,
-    /// Per output: number of harmonics.
-    pub harmonics: Vec<usize>,
-    /// Per output: RMS of measured positions about the series in parts of the position noise: about 1 where the motion
-    /// repeats, more where it does not. `None` without noise.
-    pub residual_ratio: Vec<Option<f64>>,
-    /// Per output: standard deviation of the velocity that follows from position noise, per s.
-    pub velocity_sigma: Vec<f64>,
-    /// Per output: positions at all samples.
-    pub q: Vec<Vec<f64>>,
-    /// Velocities.
-    pub dq: Vec<Vec<f64>>,
-    /// Accelerations.
-    pub ddq: Vec<Vec<f64>>,
-}
+use super::{ConditioningError, PeriodicMotion, PreparedLog};
 
 /// Largest correction of a stated period, in parts of it: clocks differ by far less.
 const PERIOD_SLACK: f64 = 0.01;

@@ -8,7 +8,7 @@ use dynid_motion::spectrum::{EffortNoise, PositionNoise, effort_noise, position_
 use dynid_motion::{Channel, Log, spikes};
 use rayon::prelude::*;
 
-use super::{ConditioningError, ConditioningSettings, PeriodicMotion};
+use super::{ConditioningError, ConditioningSettings};
 
 /// A log on a uniform grid without spikes, joints in the order of the model's outputs.
 #[derive(Debug, Clone)]
@@ -39,6 +39,28 @@ pub struct PreparedLog {
     pub clock: ClockReport,
     /// Motion of a known period, if one was stated; states then come from it.
     pub periodic: Option<PeriodicMotion>,
+}
+
+/// Periodic motion found in a log; see [`PreparedLog::with_period`].
+#[derive(Debug, Clone)]
+pub struct PeriodicMotion {
+    /// Period after which the positions repeat, s of the log's clock.
+    pub period_s: f64,
+    /// Whole periods in the log.
+    pub periods: usize,
+    /// Per output: number of harmonics.
+    pub harmonics: Vec<usize>,
+    /// Per output: RMS of measured positions about the series in parts of the position noise: about 1 where the motion
+    /// repeats, more where it does not. `None` without noise.
+    pub residual_ratio: Vec<Option<f64>>,
+    /// Per output: standard deviation of the velocity that follows from position noise, per s.
+    pub velocity_sigma: Vec<f64>,
+    /// Per output: positions at all samples.
+    pub q: Vec<Vec<f64>>,
+    /// Velocities.
+    pub dq: Vec<Vec<f64>>,
+    /// Accelerations.
+    pub ddq: Vec<Vec<f64>>,
 }
 
 impl PreparedLog {

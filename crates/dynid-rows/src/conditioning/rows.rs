@@ -4,7 +4,7 @@ use dynid_model::{EffortModel, RegressorBlock};
 use dynid_motion::{Channel, Kernel, SignalError};
 use rayon::prelude::*;
 
-use super::friction::{FrictionShape, ShapeKind};
+use super::friction_shape::{FrictionShape, ShapeKind};
 use super::states::{Masks, States};
 use super::{ConditioningSettings, PreparedLog};
 use dynid_factor::rows::RowsError;

@@ -5,8 +5,6 @@ use dynid_motion::cutoff::CutoffSettings;
 use dynid_motion::spectrum::NoiseSettings;
 use dynid_motion::spikes::SpikeSettings;
 
-use super::FrictionSettings;
-
 /// How a log is brought from samples to regression rows. `None` means: found from the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConditioningSettings {
@@ -84,6 +82,35 @@ impl Default for ConditioningSettings {
             position_spikes: SpikeSettings::position(),
             noise: NoiseSettings::default(),
             cutoff: CutoffSettings::default(),
+        }
+    }
+}
+
+/// When a friction shape is accepted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrictionSettings {
+    /// First shape of a joint: standard errors of the gain over time blocks, share of the joint's held-out loss.
+    /// Default 1.4, 0.01.
+    pub first: (f64, f64),
+    /// What a second shape must gain: standard errors over blocks, and share of the mean square. Default 2.5, 0.03.
+    pub second: (f64, f64),
+    /// Candidates tried on held-out blocks, after all were ranked by the loss on all rows. Default 4.
+    pub tried: usize,
+    /// Fewest time blocks with rows of a joint; with fewer nothing is chosen for it. Default 4.
+    pub least_blocks: usize,
+    /// Least gain for another rung of the mask ladder after the choice: standard errors of the gain, share of the loss.
+    /// Default 1.4, 0.005.
+    pub mask_again: (f64, f64),
+}
+
+impl Default for FrictionSettings {
+    fn default() -> Self {
+        FrictionSettings {
+            first: (1.4, 0.01),
+            second: (2.5, 0.03),
+            tried: 4,
+            least_blocks: 4,
+            mask_again: (1.4, 0.005),
         }
     }
 }

@@ -10,7 +10,7 @@ use dynid_motion::spectrum::{PositionNoise, velocity_noise};
 use dynid_motion::{Channel, SignalError};
 use rayon::prelude::*;
 
-use super::{ConditioningError, ConditioningSettings, Moving, PreparedLog};
+use super::{ConditioningError, ConditioningSettings, PreparedLog};
 
 /// Filtered positions and efforts of a log; velocities and accelerations are formed where they are asked for.
 ///
@@ -29,7 +29,7 @@ pub struct States {
     /// Per output: velocities and accelerations of a periodic motion, exact ones of its series.
     periodic: Option<[Vec<Vec<f64>>; 2]>,
     /// Per output and sample: the joint moves. Elsewhere its velocity is zero.
-    moves: Option<Vec<Vec<bool>>>,
+    pub(super) moves: Option<Vec<Vec<bool>>>,
     /// Per output: effort through the state filter; empty where no effort was asked for.
     pub effort: Vec<Vec<f64>>,
     /// Per output: standard deviation of the velocity that comes from position noise.
@@ -134,12 +134,6 @@ impl States {
             velocity_sigma: vec![0.0; position.len()],
             ..*self
         })
-    }
-
-    /// The same with zero velocity wherever a joint stands: its sign there is that of noise, and friction may have any value up to static
-    /// friction. A prediction along such states is the middle of what it may be, and does not jump.
-    pub fn resting(self, moving: &Moving) -> States {
-        States { moves: Some(moving.samples.clone()), ..self }
     }
 
     /// Number of outputs.

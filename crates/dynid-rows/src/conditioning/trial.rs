@@ -1,6 +1,6 @@
 //! Fits for choices: one pass over the logs, then any number of fits with other masks, delays and columns.
 
-use super::friction::{FrictionShape, ShapeKind};
+use super::friction_shape::{FrictionShape, ShapeKind};
 use super::gram::{Classes, Gram, GramConsumer, Group, Lags, RowClass, rss, solve};
 use super::rows::{KeptColumns, Kernels, Pass, masks};
 use super::states::States;

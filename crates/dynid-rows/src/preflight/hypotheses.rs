@@ -9,7 +9,7 @@ use super::PreflightError;
 use super::refine::{Unknown, dot, norm};
 use super::rows::{reduce, regressor};
 use super::samples::Samples;
-use super::search::Trial;
+use super::trial::Trial;
 use super::wiring::{Rewiring, Wiring};
 use crate::conditioning::KeptColumns;
 

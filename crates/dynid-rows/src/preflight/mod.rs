@@ -13,15 +13,16 @@ mod samples;
 mod search;
 mod stated;
 mod tilt;
+mod trial;
 mod wiring;
 
 pub use excitation::{Excitation, excitation};
 pub use refine::GaussianPrior;
-pub use rows::efforts_at_rest;
 pub use samples::Samples;
-pub use search::{Found, Trial, WiringSearch};
+pub use search::{Found, WiringSearch};
 pub use stated::{AgainstStated, against_stated};
 pub use tilt::{Tilt, tilt};
+pub use trial::{Trial, efforts_at_rest};
 pub use wiring::{Rewiring, Source, Wiring};
 
 use dynid_factor::factor::FactorError;

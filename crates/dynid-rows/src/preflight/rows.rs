@@ -5,7 +5,6 @@ use std::borrow::Cow;
 use dynid_model::{EffortModel, MotionBlock, RegressorBlock, ShapeParameter};
 
 use super::samples::Samples;
-use super::search::Trial;
 use super::wiring::{Source, Wiring};
 use crate::conditioning::KeptColumns;
 use dynid_factor::factor::{Factor, FactorBuilder, FactorError};
@@ -105,18 +104,6 @@ pub(crate) fn regressor(
     let shape = under_clock(model, shape, wiring.clock);
     model.regressor(&wired.block(n, &channels, constant.as_deref()), &shape, &mut block);
     block
-}
-
-/// Efforts that parameters ask for at rest, in every sample, output by output.
-pub fn efforts_at_rest(trial: &Trial<'_>, wiring: &Wiring, values: &[f64]) -> Vec<Vec<f64>> {
-    let samples = trial.samples;
-    let mut still = samples.clone();
-    for joint in &mut still.joints {
-        joint.velocity.fill(0.0);
-        joint.acceleration.fill(0.0);
-    }
-    let block = regressor(trial.model, trial.shape, &still, wiring);
-    (0..samples.joints.len()).map(|output| block.effort(output, values)).collect()
 }
 
 impl TrialRows {

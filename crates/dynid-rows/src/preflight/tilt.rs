@@ -2,7 +2,7 @@
 
 use super::PreflightError;
 use super::refine::{Problem, Unknown, dot, norm};
-use super::search::Trial;
+use super::trial::Trial;
 use super::wiring::Wiring;
 
 /// Gravity as the efforts show it.

@@ -7,9 +7,9 @@
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "in tests a panic is the report")]
 
 use crate::arm::{Arm, CUT_OFF_HZ, JOINTS, RATE_HZ};
-use dynid_estimate::covariance::{row_scores, variance_inflation};
+use dynid_estimate::covariance::variance_inflation;
 use dynid_estimate::distribution::t_quantile;
-use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate};
+use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate, row_scores};
 use dynid_estimate::whiteness::{InBandSettings, raw_in_band_whiteness};
 use dynid_factor::rows::reduce_rows;
 use dynid_linalg::Mat;

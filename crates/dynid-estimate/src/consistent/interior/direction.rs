@@ -4,14 +4,8 @@ use dynid_model::symmetric::{Square, inner};
 
 use super::super::cone::{LINK, add_scaled, longest};
 use super::super::program::Program;
-use super::newton::Newton;
+use super::newton::{Newton, Target};
 use super::{Iterate, Scalings};
-
-/// What slack and multiplier shall sum up to after the step, in scaled form: `m d⁻¹ - c` per cone.
-pub(super) struct Target<const N: usize> {
-    pub links: Vec<Square<N>>,
-    pub rays: Vec<f64>,
-}
 
 /// Changes for a full step.
 pub(super) struct Direction<const N: usize> {

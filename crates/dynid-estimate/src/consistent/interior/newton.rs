@@ -7,7 +7,12 @@ use faer::{Mat, Side};
 use super::super::cone::{LINK, Lmi};
 use super::super::program::Program;
 use super::Scalings;
-use super::direction::Target;
+
+/// What slack and multiplier shall sum up to after the step, in scaled form: `m d⁻¹ - c` per cone.
+pub(super) struct Target<const N: usize> {
+    pub links: Vec<Square<N>>,
+    pub rays: Vec<f64>,
+}
 
 /// Factorised `2 AᵀA + 2 diag w + BᵀB + γ B_LᵀB_L`, `B` the scaled cones, `B_L` the entropic distance.
 pub(super) enum Newton {

@@ -4,7 +4,7 @@
 //! Government in the public domain. The tables were checked by solving each problem in rational arithmetic:
 //! all certified values agree to the digits NIST gives.
 
-use dynid_factor::factor::DoubleDouble;
+use crate::extended::DoubleDouble;
 
 pub(crate) enum Model {
     /// `y = b0 + b1 x1 + ...`

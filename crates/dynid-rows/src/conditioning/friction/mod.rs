@@ -1,49 +1,17 @@
 //! Friction shapes, chosen per joint on held-out time blocks.
 
-mod library;
 mod losses;
 mod search;
 
-pub use library::{FrictionShape, ShapeKind};
-
 use dynid_model::{EffortModel, Owner};
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
 
+use super::base_prior::BasePrior;
+use super::friction_shape::{self, FrictionShape, ShapeKind};
 use super::states::States;
 use super::trial::{Trial, TrialShapes, state_hz_of};
 use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog, Stage, choose};
 use dynid_estimate::linear::{LinearMethod, LinearSettings, estimate};
 use search::Search;
-
-/// When a friction shape is accepted.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FrictionSettings {
-    /// First shape of a joint: standard errors of the gain over time blocks, share of the joint's held-out loss.
-    /// Default 1.4, 0.01.
-    pub first: (f64, f64),
-    /// What a second shape must gain: standard errors over blocks, and share of the mean square. Default 2.5, 0.03.
-    pub second: (f64, f64),
-    /// Candidates tried on held-out blocks, after all were ranked by the loss on all rows. Default 4.
-    pub tried: usize,
-    /// Fewest time blocks with rows of a joint; with fewer nothing is chosen for it. Default 4.
-    pub least_blocks: usize,
-    /// Least gain for another rung of the mask ladder after the choice: standard errors of the gain, share of the loss.
-    /// Default 1.4, 0.005.
-    pub mask_again: (f64, f64),
-}
-
-impl Default for FrictionSettings {
-    fn default() -> Self {
-        FrictionSettings {
-            first: (1.4, 0.01),
-            second: (2.5, 0.03),
-            tried: 4,
-            least_blocks: 4,
-            mask_again: (1.4, 0.005),
-        }
-    }
-}
 
 /// A friction shape that was tried on held-out blocks.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,7 +32,7 @@ pub struct JointFriction {
     pub accepted: Vec<ShapeTrial>,
     /// The best candidate of every kind that was tried and not taken, with its gain over the final choice.
     pub rejected: Vec<ShapeTrial>,
-    /// Time blocks with rows that the choice rests on. Below [`FrictionSettings::least_blocks`] nothing was tried.
+    /// Time blocks with rows that the choice rests on. Below [`super::FrictionSettings::least_blocks`] nothing was tried.
     pub blocks: usize,
 }
 
@@ -78,39 +46,6 @@ pub struct FrictionChoice {
     /// Linear parameters whose effort is the load of [`ShapeKind::Load`]: inertial ones of a fit without shapes, zeros
     /// elsewhere. Empty if no joint took that shape.
     pub load: Vec<f64>,
-}
-
-/// What is known of base parameters without logs: a normal distribution.
-#[derive(Debug, Clone)]
-pub struct BasePrior {
-    pub(crate) values: Vec<f64>,
-    pub(crate) precision: Mat<f64>,
-}
-
-impl BasePrior {
-    /// From values and standard deviations of all linear parameters. `regrouping`: `K` of the base parameters,
-    /// base × parameters. `None` where `K` has dependent rows.
-    ///
-    /// # Panics
-    /// If a length disagrees with `regrouping`.
-    pub fn new(regrouping: &Mat<f64>, values: &[f64], std: &[f64]) -> Option<BasePrior> {
-        let (base, parameters) = (regrouping.nrows(), regrouping.ncols());
-        assert!(
-            values.len() == parameters && std.len() == parameters,
-            "one value and deviation per parameter"
-        );
-        let row = |i: usize| regrouping.row(i);
-        let covariance = Mat::from_fn(base, base, |i, j| {
-            row(i).iter().zip(row(j).iter()).zip(std).map(|((a, b), s)| a * b * s * s).sum::<f64>()
-        });
-        let unit: Vec<f64> = (0..base).map(|i| 1.0 / covariance[(i, i)].sqrt()).collect();
-        let scaled = Mat::from_fn(base, base, |i, j| unit[i] * unit[j] * covariance[(i, j)]);
-        let inverse = scaled.llt(Side::Lower).ok()?.solve(&Mat::<f64>::identity(base, base));
-        Some(BasePrior {
-            values: (0..base).map(|i| row(i).iter().zip(values).map(|(k, x)| k * x).sum()).collect(),
-            precision: Mat::from_fn(base, base, |i, j| unit[i] * unit[j] * inverse[(i, j)]),
-        })
-    }
 }
 
 /// Chooses friction shapes beside the model's own columns.
@@ -151,8 +86,11 @@ pub fn choose_friction(
             States::of_motion_at(log, cutoff_hz, settings)
         })
         .collect::<Result<Vec<_>, _>>()?;
-    let library: Vec<Vec<FrictionShape>> =
-        kinds.iter().enumerate().map(|(output, kinds)| library::of_output(output, kinds, &states)).collect();
+    let library: Vec<Vec<FrictionShape>> = kinds
+        .iter()
+        .enumerate()
+        .map(|(output, kinds)| friction_shape::of_output(output, kinds, &states))
+        .collect();
     drop(states);
     let has_load = library.iter().flatten().any(|s| s.kind == ShapeKind::Load);
     let load = match has_load {

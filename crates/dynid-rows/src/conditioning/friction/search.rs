@@ -7,7 +7,9 @@ use faer::linalg::solvers::Solve;
 use rayon::prelude::*;
 
 use super::losses::Losses;
-use super::{BasePrior, FrictionShape, JointFriction, ShapeKind, ShapeTrial};
+use super::{JointFriction, ShapeTrial};
+use crate::conditioning::base_prior::BasePrior;
+use crate::conditioning::friction_shape::{FrictionShape, ShapeKind};
 use crate::conditioning::gram::{Group, Normal, rss, solve};
 use crate::conditioning::trial::{BlockSums, Trial};
 use crate::conditioning::{Conditioning, ConditioningSettings};

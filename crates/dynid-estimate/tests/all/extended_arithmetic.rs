@@ -1,6 +1,6 @@
 //! Double-double arithmetic against exact integers.
 
-use dynid_factor::factor::DoubleDouble;
+use crate::extended::DoubleDouble;
 use proptest::prelude::*;
 
 /// The integer nearest to `value`; both parts are integers where these tests need the last digit.

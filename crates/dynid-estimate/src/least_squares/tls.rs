@@ -1,6 +1,5 @@
 //! Total least squares with exact columns.
 
-use super::method::LinearSettings;
 use super::ols::ols;
 use dynid_factor::factor::Factor;
 use dynid_factor::groups::ReducedGroup;
@@ -147,16 +146,16 @@ fn last_singular_vector(block: &Mat<f64>) -> Result<(Vec<f64>, Vec<f64>), TlsRef
 }
 
 /// What the residual of a group tells of the errors of its columns: `E{W error | r} = -r gᵀ`.
-pub(super) struct ColumnErrors {
+pub(crate) struct ColumnErrors {
     /// Variance of a residual over that of the effort, `1 + Σ_c x_c² s_c²/s_y²` over the columns that act.
-    pub(super) d: f64,
+    pub(crate) d: f64,
     x: Vec<f64>,
     /// `g_c = x_c s_c²/(s_y² d)`.
     g: Vec<f64>,
 }
 
 impl ColumnErrors {
-    pub(super) fn new(noise: &TlsNoise, group: &ReducedGroup, x: &[f64]) -> Self {
+    pub(crate) fn new(noise: &TlsNoise, group: &ReducedGroup, x: &[f64]) -> Self {
         let ratio = |c: usize| (noise.columns[c] / noise.effort).powi(2);
         let d = 1.0 + group.columns.iter().map(|&c| ratio(c) * x[c] * x[c]).sum::<f64>();
         ColumnErrors {
@@ -167,20 +166,20 @@ impl ColumnErrors {
     }
 
     /// The group with columns freed of these errors; its residuals at `x` stay.
-    pub(super) fn removed(&self, group: &ReducedGroup) -> ReducedGroup {
+    pub(crate) fn removed(&self, group: &ReducedGroup) -> ReducedGroup {
         let blocks = group.blocks.iter().map(|b| b.with_residual_in_columns(&self.x, &self.g)).collect();
         ReducedGroup { columns: group.columns.clone(), blocks, ..*group }
     }
 }
 
 /// Solution of [`tls_groups`].
-pub(super) struct GroupedTls {
-    pub(super) x: Vec<f64>,
-    pub(super) kept: Vec<usize>,
-    pub(super) passes: usize,
-    pub(super) converged: bool,
+pub(crate) struct GroupedTls {
+    pub(crate) x: Vec<f64>,
+    pub(crate) kept: Vec<usize>,
+    pub(crate) passes: usize,
+    pub(crate) converged: bool,
     /// Whether one singular value decomposition of all rows holds the solution.
-    pub(super) alike: bool,
+    pub(crate) alike: bool,
 }
 
 /// Change of `x`, relative to its standard deviation, at which the iteration over groups stops.
@@ -191,12 +190,12 @@ const GROUPED_TOLERANCE: f64 = 1e-9;
 /// Where all noisy columns act on all groups this is [`tls`] of the merged rows. Otherwise it is iterated from least
 /// squares: columns freed of the errors that the residuals at `x` tell, rows divided by `√d_j`, solved again. A fixed
 /// point is stationary.
-pub(super) fn tls_groups(
+pub(crate) fn tls_groups(
     groups: &[ReducedGroup],
     factors: &[Factor],
     total: usize,
     noise: &TlsNoise,
-    settings: &LinearSettings,
+    max_passes: usize,
 ) -> Result<GroupedTls, TlsRefusal> {
     let all = Factor::merge(&factors.iter().collect::<Vec<_>>());
     let noisy: Vec<usize> = (0..total).filter(|&c| noise.columns[c] > 0.0).collect();
@@ -206,7 +205,7 @@ pub(super) fn tls_groups(
     }
     let start = ols(&all);
     let (mut x, kept) = (start.x, start.kept);
-    for passes in 1..=settings.irls.max_passes {
+    for passes in 1..=max_passes {
         let corrected: Vec<Factor> = groups
             .iter()
             .map(|group| {
@@ -227,7 +226,7 @@ pub(super) fn tls_groups(
         for (&column, value) in kept.iter().zip(&solution.x) {
             x[column] = *value;
         }
-        if moved < GROUPED_TOLERANCE || passes == settings.irls.max_passes {
+        if moved < GROUPED_TOLERANCE || passes == max_passes {
             let converged = moved < GROUPED_TOLERANCE;
             return Ok(GroupedTls { x, kept, passes, converged, alike: false });
         }

@@ -12,61 +12,53 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Unevaluated sum `high + low` of two doubles, `high` being the sum rounded to double.
 #[derive(Debug, Clone, Copy, Default, PartialEq, PartialOrd)]
-pub struct DoubleDouble {
+pub(crate) struct DoubleDouble {
     high: f64,
     low: f64,
 }
 
 impl DoubleDouble {
     /// Zero.
-    pub const ZERO: Self = Self { high: 0.0, low: 0.0 };
+    pub(crate) const ZERO: Self = Self { high: 0.0, low: 0.0 };
     /// One.
-    pub const ONE: Self = Self { high: 1.0, low: 0.0 };
+    pub(crate) const ONE: Self = Self { high: 1.0, low: 0.0 };
 
     /// `a + b` without error (Knuth's two-sum).
-    #[inline]
-    pub fn sum_of(a: f64, b: f64) -> Self {
+    pub(crate) fn sum_of(a: f64, b: f64) -> Self {
         let high = a + b;
         let of_b = high - a;
         Self { high, low: (a - (high - of_b)) + (b - of_b) }
     }
 
     /// `a · b` without error (by a fused multiply-add).
-    #[inline]
-    pub fn product_of(a: f64, b: f64) -> Self {
+    pub(crate) fn product_of(a: f64, b: f64) -> Self {
         let high = a * b;
         Self { high, low: a.mul_add(b, -high) }
     }
 
     /// `a + b` without error for `|a| ≥ |b|` or `a = 0` (Dekker's fast two-sum).
-    #[inline]
     fn renormalised(a: f64, b: f64) -> Self {
         let high = a + b;
         Self { high, low: b - (high - a) }
     }
 
     /// The nearest double.
-    pub fn to_f64(self) -> f64 {
+    pub(crate) fn to_f64(self) -> f64 {
         self.high
     }
 
     /// Correction that [`Self::to_f64`] leaves out, at most half a unit in its last place.
-    pub fn low(self) -> f64 {
+    pub(crate) fn low(self) -> f64 {
         self.low
     }
 
-    /// Whether both parts are neither NaN nor infinite.
-    pub fn is_finite(self) -> bool {
-        self.high.is_finite() && self.low.is_finite()
-    }
-
     /// Magnitude, exact.
-    pub fn abs(self) -> Self {
+    pub(crate) fn abs(self) -> Self {
         if self.high < 0.0 { -self } else { self }
     }
 
     /// Square root of a number that is not negative, within `4 u²`: one Newton step from the root of `high`.
-    pub fn sqrt(self) -> Self {
+    pub(crate) fn sqrt(self) -> Self {
         if self.high == 0.0 {
             return Self::ZERO;
         }
@@ -84,7 +76,6 @@ impl From<f64> for DoubleDouble {
 
 impl Neg for DoubleDouble {
     type Output = Self;
-    #[inline]
     fn neg(self) -> Self {
         Self { high: -self.high, low: -self.low }
     }
@@ -93,7 +84,6 @@ impl Neg for DoubleDouble {
 /// Within `3 u²` of the sum, also under cancellation.
 impl Add for DoubleDouble {
     type Output = Self;
-    #[inline]
     fn add(self, other: Self) -> Self {
         let high = Self::sum_of(self.high, other.high);
         let low = Self::sum_of(self.low, other.low);
@@ -105,7 +95,6 @@ impl Add for DoubleDouble {
 /// Within `3 u²` of the difference, also under cancellation.
 impl Sub for DoubleDouble {
     type Output = Self;
-    #[inline]
     fn sub(self, other: Self) -> Self {
         self + -other
     }
@@ -114,7 +103,6 @@ impl Sub for DoubleDouble {
 /// Within `5 u²` of the product.
 impl Mul for DoubleDouble {
     type Output = Self;
-    #[inline]
     fn mul(self, other: Self) -> Self {
         let high = Self::product_of(self.high, other.high);
         let cross = self.high * other.low + self.low * other.high;

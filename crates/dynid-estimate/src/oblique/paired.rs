@@ -23,7 +23,7 @@ pub fn measured(paired: &[ReducedGroup]) -> Vec<ReducedGroup> {
 }
 
 /// Base columns of a paired group.
-pub(super) fn base_columns(group: &ReducedGroup) -> &[usize] {
+fn base_columns(group: &ReducedGroup) -> &[usize] {
     assert!(group.columns.len().is_multiple_of(2), "paired rows have an instrument per column");
     &group.columns[..group.columns.len() / 2]
 }

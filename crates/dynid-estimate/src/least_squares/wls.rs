@@ -76,16 +76,16 @@ pub fn wls(groups: &[Factor], settings: &WlsSettings) -> WlsEstimate {
 
 /// Rows `(x - x0)_i/scale_i` that hold every solution near a prior, whatever the weights of the groups.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct PriorRows {
+pub(crate) struct PriorRows {
     /// `√κ/scale_i`.
-    pub(super) weights: Vec<f64>,
-    pub(super) x0: Vec<f64>,
+    pub(crate) weights: Vec<f64>,
+    pub(crate) x0: Vec<f64>,
 }
 
 /// Weighted least squares as by [`wls`], groups of the same class sharing one variance, and with prior rows.
 ///
 /// `classes`: one index below the number of groups per group.
-pub(super) fn wls_with(
+pub(crate) fn wls_with(
     groups: &[Factor],
     classes: &[usize],
     prior: Option<&PriorRows>,

@@ -1,8 +1,8 @@
-//! Candidates for the friction of a joint.
+//! Shapes of friction, and the candidates for a joint.
 
 use dynid_model::element::sign;
 
-use crate::conditioning::states::States;
+use super::states::States;
 
 /// A kind of friction shape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,30 +1,34 @@
 //! Projection along instruments: what the factor of paired rows says of `(ZᵀW)⁻¹Zᵀ`.
 
+mod paired;
+
+pub use paired::{crossed, half, measured, paired_columns};
+
 use faer::Mat;
 
 use crate::covariance::{Jackknife, jackknife_by};
-use crate::linear::{LinearSolution, ols};
+use crate::least_squares::{LinearSolution, ols};
 use dynid_factor::Factor;
 use dynid_factor::rank::{certainly_full_rank, numerical_rank, singular_values};
 use dynid_linalg::triangular::{inverse, solve_upper};
 
 /// The oblique projection of paired rows onto independent columns.
-pub(super) struct Oblique {
+pub(crate) struct Oblique {
     /// Base columns in use, ascending; the others are not excited, or not by the instruments.
-    pub(super) kept: Vec<usize>,
+    pub(crate) kept: Vec<usize>,
     /// Number of base columns that the log excites.
-    pub(super) excited: usize,
+    pub(crate) excited: usize,
     /// `[Q_ZᵀW | Q_Zᵀy]` as a factor, `ρ` zero: its least-squares solution is that of `Zᵀ(W x - y) = 0`.
-    pub(super) fitted: Factor,
+    pub(crate) fitted: Factor,
     /// `A = Z⁺W`, `kept × kept`: fitted regressors are `Z A`.
-    pub(super) fit: Mat<f64>,
+    pub(crate) fit: Mat<f64>,
     /// Smallest singular value of `Q_ZᵀQ_W`: the cosine of the largest angle between instruments and regressors.
-    pub(super) strength: f64,
+    pub(crate) strength: f64,
 }
 
 impl Oblique {
     /// From a merged, weighted factor of paired rows in `2 total` columns.
-    pub(super) fn new(paired: &Factor) -> Self {
+    pub(crate) fn new(paired: &Factor) -> Self {
         let total = paired.columns() / 2;
         let of_w: Vec<usize> = (total..2 * total).collect();
         let independent = numerical_rank(&paired.select(&of_w)).independent;
@@ -43,7 +47,7 @@ impl Oblique {
     }
 
     /// On given columns, independent among the instruments.
-    pub(super) fn on(paired: &Factor, kept: Vec<usize>) -> Self {
+    pub(crate) fn on(paired: &Factor, kept: Vec<usize>) -> Self {
         let p = kept.len();
         let own = paired.select(&pair(&kept, paired.columns() / 2));
         let (zz, zw) = (corner(&own, 0), corner(&own, p));
@@ -57,12 +61,12 @@ impl Oblique {
     }
 
     /// Solution in the kept columns, with rank and conditioning of the fitted regressors.
-    pub(super) fn solution(&self) -> LinearSolution {
+    pub(crate) fn solution(&self) -> LinearSolution {
         ols(&self.fitted)
     }
 
     /// Leverage `tr W_g (ZᵀW)⁻¹ Z_gᵀ` of paired rows in `2 total` columns, weighted as the whole.
-    pub(super) fn leverage(&self, group: &Factor) -> f64 {
+    pub(crate) fn leverage(&self, group: &Factor) -> f64 {
         let p = self.kept.len();
         let own = group.select(&pair(&self.kept, group.columns() / 2));
         let rows = own.triangle();
@@ -75,7 +79,7 @@ impl Oblique {
 
     /// Combination that turns paired rows in `2 total` columns into fitted ones, `[Z A | Z A x + y - W x]`: `A` in all columns,
     /// and what is added to the effort.
-    pub(super) fn fitted_rows(&self, total: usize, x: &[f64]) -> (Mat<f64>, Vec<f64>) {
+    pub(crate) fn fitted_rows(&self, total: usize, x: &[f64]) -> (Mat<f64>, Vec<f64>) {
         let mut a = Mat::zeros(2 * total, total);
         for (j, to) in self.kept.iter().enumerate() {
             for (i, from) in self.kept.iter().enumerate() {
@@ -89,8 +93,8 @@ impl Oblique {
 }
 
 /// Instrument and regressor columns of the base columns given.
-pub(super) fn pair(kept: &[usize], total: usize) -> Vec<usize> {
-    super::paired_columns(kept, total)
+pub(crate) fn pair(kept: &[usize], total: usize) -> Vec<usize> {
+    paired_columns(kept, total)
 }
 
 fn chosen(of: &[usize], positions: &[usize]) -> Vec<usize> {

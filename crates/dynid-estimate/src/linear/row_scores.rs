@@ -1,7 +1,7 @@
 //! Scores of the rows in time order, for the HAC covariance of a fit that is known by its factors only.
 
-use super::{hac_bartlett_logs, hac_lag};
-use crate::linear::LinearEstimate;
+use super::LinearEstimate;
+use crate::covariance::{hac_bartlett_logs, hac_lag};
 use dynid_factor::factor::FactorError;
 use dynid_factor::rows::{RowSource, RowVisitor, Rows, RowsError, visit_all};
 use faer::Mat;

@@ -26,14 +26,12 @@ pub struct LinearSolution {
     pub rank: RankReport,
     /// Factor of the kept columns.
     pub factor: Factor,
-    /// `C` found beyond double precision, where the reduction allowed it.
-    pub(super) extended_covariance: Option<Mat<f64>>,
 }
 
 impl LinearSolution {
     /// `C = (RᵀR)⁻¹` of the kept columns (`kept × kept`): the covariance for unit residual variance.
     pub fn unit_covariance(&self) -> Mat<f64> {
-        self.extended_covariance.clone().unwrap_or_else(|| gram_inverse(&self.factor.r_matrix()))
+        gram_inverse(&self.factor.r_matrix())
     }
 
     /// Residual variance `rss/(N - rank)`, effort²; `None` without a degree of freedom.
@@ -99,6 +97,5 @@ pub fn ols(factor: &Factor) -> LinearSolution {
         condition_scaled,
         rank,
         factor: reduced,
-        extended_covariance: None,
     }
 }
