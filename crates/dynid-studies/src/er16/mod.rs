@@ -21,12 +21,8 @@ use excitation::Columns;
 use measurement::Measurement;
 use settings::Settings;
 
-/// Name on the command line.
-pub const NAME: &str = "er16";
-/// What is studied.
-pub const TITLE: &str = "ER-16: nonlinear friction by improved cuckoo search, and by separable least squares";
-/// Where it was published.
-pub const SOURCE: &str = "dynamical identification of an industrial robot by an improved cuckoo search (believed Ding, Li, Li & Chao 2018)";
+/// What was published.
+pub use dynid_terminal::study::ER16 as STUDY;
 
 /// Rate of the data on which friction models are compared at reversal, Hz.
 const REVERSAL_RATE_HZ: f64 = 50.0;
@@ -89,7 +85,7 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     step("the chain from noisy signals");
     let chain = chain::by_rate(&arm, &settings, run)?;
 
-    let record = StudyRecord::new(NAME, run, rows, &DRAWN);
+    let record = StudyRecord::new(STUDY.name, run, rows, &DRAWN);
     let report = report::Contents {
         arm: &arm,
         settings: &settings,

@@ -10,7 +10,7 @@ use super::measurement::Measurement;
 use super::search::{Searched, Searches, unknowns};
 use super::separable::{FrictionComparison, Identified, objective_of};
 use super::settings::Settings;
-use super::{REVERSAL_RATE_HZ, TITLE};
+use super::{REVERSAL_RATE_HZ, STUDY};
 use crate::statistics::median;
 use crate::{StudyError, StudyRecord};
 
@@ -38,7 +38,7 @@ fn table(caption: &str, head: &[&str], rows: Vec<Vec<Value>>) -> StudyTable {
 impl Contents<'_> {
     pub(super) fn report(&self, record: &StudyRecord) -> Result<StudyReport, StudyError> {
         Ok(StudyReport {
-            title: TITLE.into(),
+            title: STUDY.title.into(),
             verdict: record.verdict(),
             warnings: Vec::new(),
             introduction: vec![

@@ -21,13 +21,8 @@ use realisations::{Realisation, clean, decimated, noisy};
 use settings::Settings;
 use tracking::Tracks;
 
-/// Name on the command line.
-pub const NAME: &str = "hit-joint";
-/// What is studied.
-pub const TITLE: &str = "HIT joint: stiffness and damping of a harmonic drive, off line and while it runs";
-/// Where it was published.
-pub const SOURCE: &str =
-    "Sun, Shi, Zhang, Wang & Liu, Parameters Identification Applied to Large Space Robotic Manipulators";
+/// What was published.
+pub use dynid_terminal::study::HIT_JOINT as STUDY;
 
 /// `k1, k2, b_in, b_inD, b_out, b_outC`.
 const PARAMETERS: usize = 6;
@@ -112,7 +107,7 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     rows.sort_by_key(|r| (r.id.parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
 
     step("report");
-    let record = StudyRecord::new(NAME, run, rows, &DRAWN);
+    let record = StudyRecord::new(STUDY.name, run, rows, &DRAWN);
     let report = report::Contents {
         settings: &settings,
         data: &data,

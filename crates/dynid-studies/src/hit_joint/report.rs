@@ -14,7 +14,7 @@ use super::online::{CYCLES, samples};
 use super::realisations::{Interval, Realisation, errors, spread};
 use super::settings::Settings;
 use super::tracking::{OneWay, Point, Tracks, dropped};
-use super::{NAMES, PARAMETERS, TITLE, Values};
+use super::{NAMES, PARAMETERS, STUDY, Values};
 use crate::{StudyError, StudyRecord};
 
 const UNITS: [&str; PARAMETERS] = ["N m/rad", "N m/rad³", "N m s/rad", "N m", "N m s/rad", "N m"];
@@ -56,7 +56,7 @@ fn in_per_cent(x: f64) -> Value {
 impl Contents<'_> {
     pub(super) fn report(&self, record: &StudyRecord) -> Result<StudyReport, StudyError> {
         Ok(StudyReport {
-            title: TITLE.into(),
+            title: STUDY.title.into(),
             verdict: record.verdict(),
             warnings: Vec::new(),
             introduction: vec![

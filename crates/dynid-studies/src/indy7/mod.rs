@@ -27,12 +27,8 @@ use rows::Four;
 use settings::Settings;
 use validation::{Ends, Realisation, Validation, known, log, realisation};
 
-/// Name on the command line.
-pub const NAME: &str = "indy7";
-/// What is studied.
-pub const TITLE: &str = "Indy7: two-step identification with friction of speed and temperature";
-/// Where it was published.
-pub const SOURCE: &str = "Tadese, Pico, Seo & Moon 2022, Sensors 22, 9708";
+/// What was published.
+pub use dynid_terminal::study::INDY7 as STUDY;
 
 /// Joints of the arm.
 const JOINTS: usize = 6;
@@ -107,7 +103,7 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     rows.push(drift(&arm, &settings, excitation, first, run.seed)?);
 
     rows.sort_by_key(|r| (r.id.parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
-    let record = StudyRecord::new(NAME, run, rows, &DRAWN);
+    let record = StudyRecord::new(STUDY.name, run, rows, &DRAWN);
     let report = report::Contents {
         arm: &arm,
         settings: &settings,

@@ -13,7 +13,7 @@ use super::robot::{Indy7, TABLE_A1};
 use super::rows::Four;
 use super::settings::Settings;
 use super::validation::{Ends, NAMES, Realisation};
-use super::{Conditions, JOINTS, TITLE};
+use super::{Conditions, JOINTS, STUDY};
 use crate::{StudyError, StudyRecord};
 
 /// What the report is made of.
@@ -43,7 +43,7 @@ fn curve(name: &str, style: CurveStyle, points: Vec<[f64; 2]>) -> ChartCurve {
 impl Contents<'_> {
     pub(super) fn report(&self, record: &StudyRecord) -> Result<StudyReport, StudyError> {
         Ok(StudyReport {
-            title: TITLE.into(),
+            title: STUDY.title.into(),
             verdict: record.verdict(),
             warnings: Vec::new(),
             introduction: vec![

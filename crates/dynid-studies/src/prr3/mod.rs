@@ -28,12 +28,8 @@ use machine::{Machine, Plane};
 use rank::Rank;
 use settings::Settings;
 
-/// Name on the command line.
-pub const NAME: &str = "prr3";
-/// What is studied.
-pub const TITLE: &str = "3PRR mechanism: friction of sliders that follows the forces on their guideway";
-/// Where it was published.
-pub const SOURCE: &str = "Rosyid & El-Khasawneh, Applied Sciences 2020, 10(14), 4820";
+/// What was published.
+pub use dynid_terminal::study::PRR3 as STUDY;
 
 /// Noise, random poses (B2) and random starts (B5).
 const DRAWN: [Drawn; 11] = [
@@ -109,7 +105,7 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     rows.push(designs.row());
     step("report");
     rows.sort_by_key(|r| (r.id.trim_matches(['B', '\'']).parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
-    let record = StudyRecord::new(NAME, run, rows, &DRAWN);
+    let record = StudyRecord::new(STUDY.name, run, rows, &DRAWN);
     let report = report::Contents {
         machine: &machine,
         settings: &settings,

@@ -13,7 +13,7 @@ use super::machine::Machine;
 use super::rank::Rank;
 use super::settings::Settings;
 use super::trajectory::Share;
-use super::{TITLE, figures};
+use super::{STUDY, figures};
 use crate::{StudyError, StudyRecord};
 
 /// What the report is made of.
@@ -43,7 +43,7 @@ pub(super) fn table(caption: &str, head: &[&str], rows: Vec<Vec<Value>>) -> Stud
 impl Contents<'_> {
     pub(super) fn report(&self, record: &StudyRecord) -> Result<StudyReport, StudyError> {
         Ok(StudyReport {
-            title: TITLE.into(),
+            title: STUDY.title.into(),
             verdict: record.verdict(),
             warnings: Vec::new(),
             introduction: vec![

@@ -41,12 +41,8 @@ use settings::Settings;
 use simulation::Solutions;
 use sweep::Sweeps;
 
-/// Name on the command line.
-pub const NAME: &str = "xy-pointing";
-/// What is studied.
-pub const TITLE: &str = "X-Y pointing mechanism: parameters of a mechanism whose joints have clearance";
-/// Where it was published.
-pub const SOURCE: &str = "Sun, Han, Li & Li, Robotics 2021, 10(1), 36";
+/// What was published.
+pub use dynid_terminal::study::XY_POINTING as STUDY;
 
 /// A fault of this study's data or of the rooms below.
 fn fault(error: impl std::fmt::Display) -> StudyError {
@@ -129,7 +125,7 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     rows.sort_by_key(|r| (r.id.parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
 
     step("report");
-    let record = StudyRecord::new(NAME, run, rows, &DRAWN);
+    let record = StudyRecord::new(STUDY.name, run, rows, &DRAWN);
     let report = report::Contents {
         pointing: &pointing,
         settings: &settings,

@@ -16,7 +16,7 @@ use super::settings::Settings;
 use super::simulation::Solutions;
 use super::sweep::Sweeps;
 use super::trajectory::travel;
-use super::{TITLE, figures, table as table3};
+use super::{STUDY, figures, table as table3};
 use crate::{StudyError, StudyRecord};
 
 /// What the report is made of.
@@ -46,7 +46,7 @@ pub(super) fn table(caption: &str, head: &[&str], rows: Vec<Vec<Value>>) -> Stud
 impl Contents<'_> {
     pub(super) fn report(&self, record: &StudyRecord) -> Result<StudyReport, StudyError> {
         Ok(StudyReport {
-            title: TITLE.into(),
+            title: STUDY.title.into(),
             verdict: record.verdict(),
             warnings: Vec::new(),
             introduction: vec![
