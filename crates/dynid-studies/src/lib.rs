@@ -10,6 +10,7 @@ mod error;
 mod excitation;
 pub mod hit_joint;
 pub mod indy7;
+mod page;
 pub mod prr3;
 mod record;
 mod reference;
@@ -44,6 +45,25 @@ pub struct StudyRun {
     pub record: StudyRecord,
     /// The report's contents.
     pub report: StudyReport,
+}
+
+/// The steps of a study, told as they begin.
+struct Steps<'a> {
+    progress: &'a mut dyn FnMut(Progress),
+    begun: usize,
+    of: usize,
+}
+
+impl<'a> Steps<'a> {
+    fn new(progress: &'a mut dyn FnMut(Progress), of: usize) -> Self {
+        Steps { progress, begun: 0, of }
+    }
+
+    /// Tells that the next step begins.
+    fn begin(&mut self, step: &str) {
+        (self.progress)(Progress { step: step.to_owned(), done: self.begun, steps: self.of });
+        self.begun += 1;
+    }
 }
 
 type Driver = fn(&RunSettings, &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError>;
