@@ -5,31 +5,15 @@
 
 mod args;
 mod commands;
-mod memory;
-mod message;
-mod outputs;
-mod progress;
 
 use std::process::ExitCode;
 
+use dynid_terminal::message::{Failure, end};
+
 use args::{Cli, Command};
-use message::Failure;
 
 fn main() -> ExitCode {
-    let outcome = match Cli::of_program() {
-        Ok(Ok(cli)) => run(&cli.command),
-        Ok(Err(failure)) => Err(failure),
-        Err(error) => {
-            // Help and version are asked for and go to stdout; clap exits with 2 on misuse.
-            let code = u8::try_from(error.exit_code()).unwrap_or(2);
-            let _ = error.print();
-            return ExitCode::from(code);
-        }
-    };
-    match outcome {
-        Ok(code) => ExitCode::from(code),
-        Err(failure) => failure.report(),
-    }
+    end(Cli::of_program().map(|cli| cli.and_then(|cli| run(&cli.command))))
 }
 
 fn run(command: &Command) -> Result<u8, Failure> {

@@ -1,14 +1,16 @@
 //! Studies: systems that others have published, identified again with this toolkit, every claim beside what was measured.
 //!
 //! A study is data and a thin driver in a folder of its own: robot file, settings, reference numbers and a `README.md` with
-//! the table "paper / ours / verdict". All physics and numerics are those of the rooms below. [`list`] names the studies,
-//! [`run`] runs one.
+//! the table "paper / ours / verdict". All physics and numerics are those of the rooms below.
+//! [`PUBLISHED`] names the studies, [`run`] runs one; the program `dynid-studies` does so for
+//! `dynid study`.
 
 pub mod er16;
 mod error;
 mod excitation;
 pub mod hit_joint;
 pub mod indy7;
+mod page;
 pub mod prr3;
 mod record;
 mod reference;
@@ -19,6 +21,7 @@ pub use error::StudyError;
 pub use record::{Row, StudyRecord};
 
 use dynid::report::StudyReport;
+use dynid_terminal::study::PUBLISHED;
 
 /// How a study is run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,19 +47,34 @@ pub struct StudyRun {
     pub report: StudyReport,
 }
 
+/// The steps of a study, told as they begin.
+struct Steps<'a> {
+    progress: &'a mut dyn FnMut(Progress),
+    begun: usize,
+    of: usize,
+}
+
+impl<'a> Steps<'a> {
+    fn new(progress: &'a mut dyn FnMut(Progress), of: usize) -> Self {
+        Steps { progress, begun: 0, of }
+    }
+
+    /// Tells that the next step begins.
+    fn begin(&mut self, step: &str) {
+        (self.progress)(Progress { step: step.to_owned(), done: self.begun, steps: self.of });
+        self.begun += 1;
+    }
+}
+
 type Driver = fn(&RunSettings, &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError>;
 
-/// A study that can be run.
-#[derive(Debug, Clone, Copy)]
-pub struct Study {
-    /// Name on the command line.
-    pub name: &'static str,
-    /// What is studied.
-    pub title: &'static str,
-    /// Where it was published.
-    pub source: &'static str,
-    driver: Driver,
-}
+const DRIVERS: [(&str, Driver); PUBLISHED.len()] = [
+    (er16::STUDY.name, er16::run),
+    (hit_joint::STUDY.name, hit_joint::run),
+    (indy7::STUDY.name, indy7::run),
+    (prr3::STUDY.name, prr3::run),
+    (xy_pointing::STUDY.name, xy_pointing::run),
+];
 
 /// What is being worked on: a step of so many.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -69,29 +87,6 @@ pub struct Progress {
     pub steps: usize,
 }
 
-const STUDIES: [Study; 5] = [
-    Study { name: er16::NAME, title: er16::TITLE, source: er16::SOURCE, driver: er16::run },
-    Study {
-        name: hit_joint::NAME,
-        title: hit_joint::TITLE,
-        source: hit_joint::SOURCE,
-        driver: hit_joint::run,
-    },
-    Study { name: indy7::NAME, title: indy7::TITLE, source: indy7::SOURCE, driver: indy7::run },
-    Study { name: prr3::NAME, title: prr3::TITLE, source: prr3::SOURCE, driver: prr3::run },
-    Study {
-        name: xy_pointing::NAME,
-        title: xy_pointing::TITLE,
-        source: xy_pointing::SOURCE,
-        driver: xy_pointing::run,
-    },
-];
-
-/// All studies.
-pub fn list() -> &'static [Study] {
-    &STUDIES
-}
-
 /// Runs the study of a name.
 ///
 /// # Errors
@@ -101,9 +96,9 @@ pub fn run(
     settings: &RunSettings,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<StudyRun, StudyError> {
-    let study = STUDIES.iter().find(|s| s.name == name).ok_or_else(|| StudyError::Unknown {
+    let (_, driver) = DRIVERS.iter().find(|(own, _)| *own == name).ok_or_else(|| StudyError::Unknown {
         found: name.to_owned(),
-        known: STUDIES.iter().map(|s| s.name.to_owned()).collect(),
+        known: DRIVERS.iter().map(|(own, _)| (*own).to_owned()).collect(),
     })?;
-    (study.driver)(settings, progress)
+    driver(settings, progress)
 }

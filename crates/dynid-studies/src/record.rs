@@ -1,6 +1,7 @@
 //! The rows of a study, for programs.
 
-use dynid::report::{Status, StudyRow, Verdict};
+use dynid::report::{Chosen, Provenance, Status, StudyReport, StudyRow, StudySection, Verdict};
+use dynid_terminal::study::Published;
 use serde::Serialize;
 use serde_json::Value as Json;
 
@@ -78,13 +79,16 @@ pub struct StudyRecord {
 }
 
 impl StudyRecord {
-    /// A record of rows; `drawn` are those that the seed enters.
+    /// A record of rows, by number and then by letter; `drawn` are those that the seed enters.
     pub(crate) fn new(
         study: &str,
         settings: &crate::RunSettings,
         mut rows: Vec<Row>,
         drawn: &[Drawn],
     ) -> Self {
+        // `B11'` stands behind `B11`.
+        let number = |row: &Row| row.id.trim_matches(['B', '\'']).parse::<u32>().unwrap_or(u32::MAX);
+        rows.sort_by_key(|row| (number(row), row.id.clone()));
         for row in &mut rows {
             let Some(known) = drawn.iter().find(|d| d.id == row.id) else { continue };
             row.depends_on_seed = true;
@@ -108,20 +112,36 @@ impl StudyRecord {
         text
     }
 
-    /// The rows as the report shows them.
-    pub fn report_rows(&self) -> Vec<StudyRow> {
-        self.rows
-            .iter()
-            .map(|r| StudyRow {
-                id: r.id.clone(),
-                claim: r.claim.clone(),
-                required: r.required.clone(),
-                measured: r.words.clone(),
-                pass: r.pass,
-                depends_on_seed: r.depends_on_seed,
-                cause: r.cause.clone(),
-            })
-            .collect()
+    /// The page of the study: verdict and rows, what it is about, its tables and figures.
+    pub(crate) fn page(
+        &self,
+        study: Published,
+        introduction: &[&str],
+        sections: Vec<StudySection>,
+    ) -> StudyReport {
+        let row = |r: &Row| StudyRow {
+            id: r.id.clone(),
+            claim: r.claim.clone(),
+            required: r.required.clone(),
+            measured: r.words.clone(),
+            pass: r.pass,
+            depends_on_seed: r.depends_on_seed,
+            cause: r.cause.clone(),
+        };
+        StudyReport {
+            title: study.title.into(),
+            verdict: self.verdict(),
+            warnings: Vec::new(),
+            introduction: introduction.iter().map(|words| (*words).to_owned()).collect(),
+            rows: self.rows.iter().map(row).collect(),
+            sections,
+            provenance: Provenance {
+                version: dynid::VERSION.into(),
+                seed: Some(self.seed),
+                settings: vec![Chosen::given("quick run", self.quick, "")],
+                ..Provenance::default()
+            },
+        }
     }
 
     /// How many rows hold, in words.

@@ -8,10 +8,11 @@ mod identify;
 mod logs;
 mod model;
 mod online;
-mod output;
 mod robot;
 mod simulate;
-mod study;
+
+pub(crate) use dynid_terminal::args::{ForceArgs, PrintArgs};
+pub(crate) use dynid_terminal::study::StudyArgs;
 
 pub(crate) use about::{CompletionsArgs, ExplainArgs, ManArgs};
 pub(crate) use design::{ColumnsArg, CriterionArg, DesignArgs};
@@ -22,14 +23,11 @@ pub(crate) use identify::{
 pub(crate) use logs::{InitArgs, LogArgs, MissingArg, ReadingArgs};
 pub(crate) use model::{DiffArgs, ExportArgs, InspectArgs, PredictArgs, RegressorArgs, ValidateArgs};
 pub(crate) use online::{OnlineArgs, StreamArg};
-pub(crate) use output::{ForceArgs, PrintArgs};
 pub(crate) use robot::RobotArgs;
 pub(crate) use simulate::SimulateArgs;
-pub(crate) use study::StudyArgs;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueHint};
-
-use crate::message::Failure;
+use dynid_terminal::message::Failure;
 
 /// Version with the revision that the program was built from, where that is known.
 pub(crate) const VERSION: &str = match option_env!("DYNID_VERSION") {

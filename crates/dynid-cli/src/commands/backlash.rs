@@ -2,11 +2,11 @@
 
 use dynid::backlash::{BacklashVerdict, JointBacklash, backlash};
 use dynid::estimate::Estimate;
+use dynid_terminal::message::{Failure, data, json};
+use dynid_terminal::progress::Progress;
 
 use super::Reading;
 use crate::args::BacklashArgs;
-use crate::message::{Failure, data, json};
-use crate::progress::Progress;
 
 pub(crate) fn run(args: &BacklashArgs) -> Result<u8, Failure> {
     let estimate = Estimate::read(&args.estimate)?;

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use dynid::check::{Check, Finding, Severity, check};
 use dynid::config::{Config, is_configuration};
+use dynid_terminal::message::{Failure, Notes, data};
+use dynid_terminal::outputs::{self, marked_toml};
+use dynid_terminal::progress::Progress;
 
 use super::run::{GivenLogs, configuration as run_configuration};
 use super::{apply_log_args_to, demand_stdout, result};
 use crate::args::CheckArgs;
-use crate::message::{Failure, Notes, data};
-use crate::outputs::{self, marked_toml};
-use crate::progress::Progress;
 
 pub(crate) fn run(args: &CheckArgs) -> Result<u8, Failure> {
     let notes = Notes::new(args.print.quiet);

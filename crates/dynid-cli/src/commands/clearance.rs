@@ -3,11 +3,11 @@
 use dynid::clearance::{JointClearance, Valued, clearance};
 use dynid::estimate::Estimate;
 use dynid::{Robot, RobotOptions};
+use dynid_terminal::message::{Failure, data, json};
+use dynid_terminal::progress::Progress;
 
 use super::Reading;
 use crate::args::ClearanceArgs;
-use crate::message::{Failure, data, json};
-use crate::progress::Progress;
 
 pub(crate) fn run(args: &ClearanceArgs) -> Result<u8, Failure> {
     let robot = Robot::load(&args.robot, &RobotOptions::default())?;

@@ -5,10 +5,10 @@ use std::path::Path;
 use super::run::{GivenLogs, configuration};
 use super::{apply_log_args_to, demand_stdout, result, table};
 use crate::args::CompareArgs;
-use crate::message::{Failure, Notes, data};
-use crate::outputs;
-use crate::progress::Progress;
 use dynid::compare::{ComparedEstimator, Comparison, compare};
+use dynid_terminal::message::{Failure, Notes, data};
+use dynid_terminal::outputs;
+use dynid_terminal::progress::Progress;
 
 pub(crate) fn run(args: &CompareArgs) -> Result<u8, Failure> {
     let notes = Notes::new(args.print.quiet);

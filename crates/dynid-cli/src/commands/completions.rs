@@ -1,7 +1,8 @@
 //! `dynid completions`.
 
+use dynid_terminal::message::{Failure, bytes};
+
 use crate::args::{CompletionsArgs, definition};
-use crate::message::{Failure, bytes};
 
 pub(crate) fn run(args: &CompletionsArgs) -> Result<u8, Failure> {
     let mut script = Vec::new();

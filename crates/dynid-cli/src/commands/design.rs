@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use dynid::config::PerJoint;
 use dynid::design::{ColumnsName, CriterionName, DesignConfig, DesignRecord, MotionPaths, design};
+use dynid_terminal::message::{Failure, Notes, data};
+use dynid_terminal::outputs;
+use dynid_terminal::progress::Progress;
 
 use super::{element_names, table};
 use crate::args::{ColumnsArg, CriterionArg, DesignArgs, ForceArgs};
-use crate::message::{Failure, Notes, data};
-use crate::outputs;
-use crate::progress::Progress;
 
 const DEFAULT_OUT: &str = "dynid-design";
 

@@ -2,11 +2,11 @@
 
 use dynid::diff::{At, ModelDiff, ParameterDiff, Side, diff};
 use dynid::io::ReadOptions;
+use dynid_terminal::message::{Failure, Notes, data, json};
+use dynid_terminal::progress::Progress;
 
 use super::table;
 use crate::args::DiffArgs;
-use crate::message::{Failure, Notes, data, json};
-use crate::progress::Progress;
 
 pub(crate) fn run(args: &DiffArgs) -> Result<u8, Failure> {
     let progress = Progress::new(args.print.quiet);

@@ -1,9 +1,9 @@
 //! `dynid explain`.
 
 use dynid::explain::{Explanation, Kind, all, find, nearest, page};
+use dynid_terminal::message::{Failure, data, json};
 
 use crate::args::ExplainArgs;
-use crate::message::{Failure, data, json};
 
 /// Width of a line of text, characters.
 const WIDTH: usize = 100;

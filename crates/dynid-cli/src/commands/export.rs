@@ -7,13 +7,13 @@ use dynid::estimate::{EXPORT_LOSS_LIMIT, Estimate, FileFit};
 use dynid::export::{CheckStates, Exported, IdentifiedRobot, RobotExport, Source, json};
 use dynid::io::MappingSpec;
 use dynid::logs::sha256;
+use dynid_terminal::message::{Failure, Notes, json as print_json, note};
+use dynid_terminal::outputs::{self, is_stdout, marked_toml, marked_xml};
+use dynid_terminal::progress::Progress;
 
 use super::run::plain;
 use super::{apply_log_args, demand_stdout, table};
 use crate::args::ExportArgs;
-use crate::message::{Failure, Notes, json as print_json, note};
-use crate::outputs::{self, is_stdout, marked_toml, marked_xml};
-use crate::progress::Progress;
 
 pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
     let notes = Notes::new(args.print.quiet);

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use dynid::friction::model::{FrictionModel, JointFrictionModel, ViscousModel};
 use dynid::friction::{FrictionConfig, identify_friction};
+use dynid_terminal::message::{Failure, Notes, data};
+use dynid_terminal::outputs;
+use dynid_terminal::progress::Progress;
 
 use super::table;
 use crate::args::FrictionTestArgs;
-use crate::message::{Failure, Notes, data};
-use crate::outputs;
-use crate::progress::Progress;
 
 const DEFAULT_OUT: &str = "dynid-friction";
 

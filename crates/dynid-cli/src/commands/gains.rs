@@ -2,11 +2,11 @@
 
 use dynid::Config;
 use dynid::gains::{GainsFile, JointGain, identify_gains};
+use dynid_terminal::message::{Failure, Notes, data, json};
+use dynid_terminal::progress::Progress;
 
 use super::table;
 use crate::args::GainsArgs;
-use crate::message::{Failure, Notes, data, json};
-use crate::progress::Progress;
 
 pub(crate) fn run(args: &GainsArgs) -> Result<u8, Failure> {
     let config = Config::read(&args.input)?;

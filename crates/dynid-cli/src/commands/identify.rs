@@ -11,9 +11,9 @@ use dynid::{Error, identify};
 use super::run::{GivenLogs, configuration as run_configuration, plain};
 use super::{apply_log_args_to, element_names, export};
 use crate::args::{ConsistencyArg, FrictionArg, IdentifyArgs, MethodArg, RouteArg};
-use crate::message::{Failure, Notes, data};
-use crate::outputs::{self, marked_toml, marked_xml};
-use crate::progress::Progress;
+use dynid_terminal::message::{Failure, Notes, data};
+use dynid_terminal::outputs::{self, marked_toml, marked_xml};
+use dynid_terminal::progress::Progress;
 use summary::summary;
 
 const DEFAULT_OUT: &str = "dynid-out";

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use dynid::init::{Draft, DraftSettings, Question, draft};
 use dynid::io::MappingSpec;
+use dynid_terminal::message::{Failure, note};
+use dynid_terminal::outputs::{self, is_stdout, marked_toml};
 
 use super::apply_log_args;
 use crate::args::InitArgs;
-use crate::message::{Failure, note};
-use crate::outputs::{self, is_stdout, marked_toml};
 
 pub(crate) fn run(args: &InitArgs) -> Result<u8, Failure> {
     let to_stdout = is_stdout(&args.out);

@@ -3,11 +3,11 @@
 use std::fmt::Write;
 
 use dynid::inspect::{ClearanceRow, Inspection, LoopsInspection, MotorRow, inspect};
+use dynid_terminal::message::{Failure, Notes, data, json};
+use dynid_terminal::progress::Progress;
 
 use super::{element_names, load_robot, table};
 use crate::args::InspectArgs;
-use crate::message::{Failure, Notes, data, json};
-use crate::progress::Progress;
 
 pub(crate) fn run(args: &InspectArgs) -> Result<u8, Failure> {
     let robot = load_robot(&args.robot)?;

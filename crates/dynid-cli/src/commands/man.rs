@@ -1,10 +1,10 @@
 //! `dynid man`.
 
 use clap_mangen::Man;
+use dynid_terminal::message::{Failure, Notes, bytes};
+use dynid_terminal::outputs::{self, is_stdout, marked_roff};
 
 use crate::args::{ManArgs, definition};
-use crate::message::{Failure, Notes, bytes};
-use crate::outputs::{self, is_stdout, marked_roff};
 
 pub(crate) fn run(args: &ManArgs) -> Result<u8, Failure> {
     let pages = pages()?;

@@ -32,10 +32,10 @@ use dynid::estimate::{Estimate, ReadingRecord};
 use dynid::io::columns::{FullSignal, PerJoint, SignalSpec};
 use dynid::io::log::Missing;
 use dynid::{Error, Robot, RobotOptions};
+use dynid_terminal::message::{Failure, Notes, data};
+use dynid_terminal::outputs::Outputs;
 
 use crate::args::{LogArgs, MissingArg, PrintArgs, ReadingArgs, RobotArgs};
-use crate::message::{Failure, Notes, data};
-use crate::outputs::Outputs;
 
 fn load_robot(args: &RobotArgs) -> Result<Robot, Failure> {
     let options = RobotOptions {

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::run;
 use crate::args::{OnlineArgs, StreamArg};
-use crate::message::{Failure, Notes, json_while_read, note};
+use dynid_terminal::message::{Failure, Notes, json_while_read, note};
 use view::View;
 
 /// Bad lines that are told one by one.

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use dynid::Config;
 use dynid::payload::{PayloadFile, PayloadRecord, Quantity, identify_payloads};
+use dynid_terminal::message::{Failure, Notes, data};
+use dynid_terminal::outputs::{self, marked_xml};
+use dynid_terminal::progress::Progress;
 
 use super::table;
 use crate::args::PayloadArgs;
-use crate::message::{Failure, Notes, data};
-use crate::outputs::{self, marked_xml};
-use crate::progress::Progress;
 
 const DEFAULT_OUT: &str = "dynid-payload";
 

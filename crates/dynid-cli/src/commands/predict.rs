@@ -6,11 +6,11 @@ use dynid::io::{ReadOptions, csv};
 use dynid::log::as_logged;
 use dynid::predict::{efforts, read_states};
 use dynid::{Error, Estimate};
+use dynid_terminal::message::{Failure, Notes, data, json};
+use dynid_terminal::outputs;
+use dynid_terminal::progress::Progress;
 
 use crate::args::PredictArgs;
-use crate::message::{Failure, Notes, data, json};
-use crate::outputs;
-use crate::progress::Progress;
 
 pub(crate) fn run(args: &PredictArgs) -> Result<u8, Failure> {
     let out: Vec<(&str, &Path)> = args.out.iter().map(|out| ("--out", out.as_path())).collect();

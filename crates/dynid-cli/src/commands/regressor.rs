@@ -3,13 +3,13 @@
 use dynid::io::{ReadOptions, states};
 use dynid::model::{BaseParameters, BaseSettings, EffortModel};
 use dynid::predict::{efforts, regressors};
+use dynid_terminal::message::{Failure, data, json};
+use dynid_terminal::progress::Progress;
 use serde::Serialize;
 
 use super::load_robot;
 use super::predict::csv_text;
 use crate::args::RegressorArgs;
-use crate::message::{Failure, data, json};
-use crate::progress::Progress;
 
 #[derive(Serialize)]
 struct Output {

@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use dynid::config::{Config, LogConfig, is_configuration};
-
-use crate::message::{Failure, Notes};
+use dynid_terminal::message::{Failure, Notes};
 
 /// The logs of the command line.
 pub(super) struct GivenLogs<'a> {

@@ -6,12 +6,12 @@ use dynid::sim::clearance::ContactEventKind;
 use dynid::simulate::{
     ClearanceSummary, ExperimentSummary, SimulateMode, SimulateSettings, SimulatedLog, simulate,
 };
+use dynid_terminal::message::{Failure, Notes, json};
+use dynid_terminal::outputs::{self, Outputs, is_stdout};
+use dynid_terminal::progress::Progress;
 
 use super::{demand_stdout, load_robot};
 use crate::args::SimulateArgs;
-use crate::message::{Failure, Notes, json};
-use crate::outputs::{self, Outputs, is_stdout};
-use crate::progress::Progress;
 
 /// Columns of efforts; joints without a drive have none.
 const EFFORT: &str = "tau";

@@ -1,83 +1,75 @@
-//! `dynid study`.
+//! `dynid study`: hands over to the program `dynid-studies`.
 
-use std::path::PathBuf;
+use std::env::{self, consts::EXE_SUFFIX};
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
-use dynid_studies::{RunSettings, StudyError, StudyRecord, list, run as run_study};
+use dynid_terminal::message::Failure;
+use dynid_terminal::study::{PROGRAM, StudyArgs, VERSION, list};
 
-use crate::args::StudyArgs;
-use crate::message::{Failure, Notes, data, json};
-use crate::outputs;
-use crate::progress::Progress;
+/// How the program gets there.
+const CURE: &str =
+    "in a checkout `cargo build --release -p dynid-studies` builds it into target/release, beside dynid";
 
 pub(crate) fn run(args: &StudyArgs) -> Result<u8, Failure> {
-    if args.name == "list" {
-        return list_studies(args);
+    if args.asks_for_list() {
+        return list(args.print).map(|()| 0);
     }
-    if !list().iter().any(|s| s.name == args.name) {
-        let known: Vec<&str> = list().iter().map(|s| s.name).collect();
-        return Err(Failure::Usage(
-            format!("no study `{}`; known: {}", args.name, known.join(", ")),
-            "`dynid study list` says what each is about",
-        ));
-    }
-    let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("dynid-study-{}", args.name)));
-    let files = ["study.json", "report.html"].map(|name| out.join(name));
-    let set = outputs::prepare_folder(&files, &[], args.force)?;
-    let progress = Progress::new(args.print.quiet);
-    let settings = RunSettings { quick: args.quick, seed: args.seed };
-    let study =
-        run_study(&args.name, &settings, &mut |step| progress.counted(step.done, step.steps, step.step))
-            .map_err(failure)?;
-    drop(progress);
-    let page = dynid::report::render_study(&study.report)
-        .map_err(dynid::fault::PageError::from)
-        .map_err(dynid::Error::from)?;
-    let text = study.record.to_json();
-    set.write(0, text.as_bytes())?;
-    set.write(1, page.as_bytes())?;
-    let written = set.publish()?;
-    data(&if args.print.json { text } else { summary(&study.record) })?;
-    Notes::new(args.print.quiet).written(&written);
-    Ok(u8::from(!study.record.pass))
+    args.published()?;
+    let program = find()?;
+    demand_same_version(&program)?;
+    // Behind the names of the program and of the command.
+    let given: Vec<OsString> = env::args_os().skip(2).collect();
+    become_it(Command::new(&program).args(given), &program)
 }
 
-fn list_studies(args: &StudyArgs) -> Result<u8, Failure> {
-    if args.print.json {
-        let studies: Vec<_> = list()
-            .iter()
-            .map(|s| serde_json::json!({ "study": s.name, "title": s.title, "source": s.source }))
-            .collect();
-        json(&studies)?;
-    } else {
-        let text: String =
-            list().iter().map(|s| format!("{:12} {}\n{:12} {}\n", s.name, s.title, "", s.source)).collect();
-        data(&text)?;
-    }
-    Ok(0)
+/// The program beside this one, else on the path.
+fn find() -> Result<PathBuf, Failure> {
+    let name = format!("{PROGRAM}{EXE_SUFFIX}");
+    let own = env::current_exe().ok().and_then(|dynid| Some(dynid.parent()?.to_owned()));
+    let path = env::var_os("PATH").unwrap_or_default();
+    let folders = own.iter().cloned().chain(env::split_paths(&path));
+    folders.map(|folder| folder.join(&name)).find(|file| file.is_file()).ok_or_else(|| {
+        let beside = own.map_or_else(|| "dynid".to_owned(), |folder| folder.display().to_string());
+        Failure::Usage(
+            format!("studies are run by the program {PROGRAM}, which is neither in {beside} nor on the path"),
+            CURE,
+        )
+    })
 }
 
-fn failure(error: StudyError) -> Failure {
-    match error {
-        StudyError::Dynid(error) => Failure::Input(error),
-        other => Failure::Usage(other.to_string(), "this is a fault of the program, please report it"),
+/// Refuses a program of another version: it may know other arguments, or give other results.
+fn demand_same_version(program: &Path) -> Result<(), Failure> {
+    let output = Command::new(program).arg("--version").output().map_err(|e| unusable(program, &e))?;
+    let told = String::from_utf8_lossy(&output.stdout);
+    let found = match told.trim().strip_prefix(PROGRAM).unwrap_or(&told).trim() {
+        "" => "none",
+        found => found,
+    };
+    match found == VERSION {
+        true => Ok(()),
+        false => Err(Failure::Usage(
+            format!("{}: expected version {VERSION}, as dynid is, found {found}", program.display()),
+            CURE,
+        )),
     }
 }
 
-fn summary(record: &StudyRecord) -> String {
-    let mut out = String::new();
-    for row in &record.rows {
-        let verdict = match row.pass {
-            Some(true) => "ok",
-            Some(false) => "FAIL",
-            None => "-",
-        };
-        let seed = if row.depends_on_seed { " (depends on the seed)" } else { "" };
-        out += &format!("[{verdict:>4}] {:>2}  {}{seed}\n", row.id, row.claim);
-        out += &format!("           required: {}\n", row.required);
-        out += &format!("           measured: {}\n", row.words);
-        if let Some(cause) = &row.cause {
-            out += &format!("           cause: {cause}\n");
-        }
-    }
-    out + &format!("\n{}\n", record.verdict().headline)
+fn unusable(program: &Path, error: &std::io::Error) -> Failure {
+    Failure::Usage(format!("{}: {error}", program.display()), CURE)
+}
+
+/// Runs the program in the place of this one, so that streams, signals and exit code are its own.
+#[cfg(unix)]
+fn become_it(command: &mut Command, program: &Path) -> Result<u8, Failure> {
+    use std::os::unix::process::CommandExt;
+    Err(unusable(program, &command.exec()))
+}
+
+/// Runs the program on the streams of this one, and gives its exit code.
+#[cfg(not(unix))]
+fn become_it(command: &mut Command, program: &Path) -> Result<u8, Failure> {
+    let status = command.status().map_err(|e| unusable(program, &e))?;
+    Ok(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(2))
 }

@@ -2,11 +2,11 @@
 
 use dynid::estimate::{Estimate, FitValues, LogFit};
 use dynid::validate::{log_fit, validate};
+use dynid_terminal::message::{Failure, Notes, data, json};
+use dynid_terminal::progress::Progress;
 
 use super::{Reading, table};
 use crate::args::ValidateArgs;
-use crate::message::{Failure, Notes, data, json};
-use crate::progress::Progress;
 
 pub(crate) fn run(args: &ValidateArgs) -> Result<u8, Failure> {
     let estimate = Estimate::read(&args.estimate)?;

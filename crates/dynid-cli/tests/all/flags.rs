@@ -56,7 +56,7 @@ const ELSEWHERE: [(&str, &str); 25] = [
     ("identify --names", "`logs_of_tools`"),
     ("validate --names", "columns are read alike by all commands: `logs_of_tools`"),
     ("validate --missing", "columns are read alike by all commands: `logs_of_tools`"),
-    ("study ", "studies run for a minute and more: `study`"),
+    ("study ", "studies are run by another program, whose tests are its own"),
     ("clearance ", "needs a robot with clearance: `clearance`"),
     ("friction ", "needs constant speeds: `friction`"),
     ("backlash --quiet", "hides progress, which terminals alone show"),

@@ -2,7 +2,7 @@
 
 use dynid::model::{BodyPoint, Dynamics, EffortModel, MotionBlock, RobotModel, Vec3};
 use dynid::motion::trajectory::Sampled;
-use dynid::report::{Chart, ChartAxis, ChartCurve, CurveStyle};
+use dynid::report::{Chart, ChartCurve, CurveStyle};
 
 use super::arm::{Arm, INERTIAL, JOINTS};
 use super::excitation::WRIST;
@@ -10,14 +10,7 @@ use super::measurement::{Measurement, trajectory};
 use super::search::Searches;
 use super::settings::Settings;
 use crate::StudyError;
-
-fn axis(label: &str, unit: &str) -> ChartAxis {
-    ChartAxis { label: label.into(), unit: unit.into(), logarithmic: false }
-}
-
-fn curve(name: &str, points: Vec<[f64; 2]>, style: CurveStyle) -> ChartCurve {
-    ChartCurve { name: name.into(), points, style }
-}
+use crate::page::{axis, curve, logarithmic};
 
 /// Figure 5: how the objective falls. `levels`: objectives to mark across.
 pub(super) fn convergence(searches: &Searches, levels: &[(&str, f64)]) -> Chart {
@@ -31,7 +24,7 @@ pub(super) fn convergence(searches: &Searches, levels: &[(&str, f64)]) -> Chart 
         title: "Objective against evaluations, median over seeds".into(),
         note: "The separable solver needs no more than a few hundred evaluations of three unknowns; its level is drawn for comparison.".into(),
         x: axis("evaluations", ""),
-        y: ChartAxis { logarithmic: true, ..axis("objective", "N m") },
+        y: logarithmic("objective", "N m"),
         curves,
         ..Chart::default()
     }

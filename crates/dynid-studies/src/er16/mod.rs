@@ -15,18 +15,14 @@ mod settings;
 mod signals;
 
 use crate::record::{Drawn, drawn};
-use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
+use crate::{Progress, RunSettings, Steps, StudyError, StudyRecord, StudyRun};
 use arm::Arm;
 use excitation::Columns;
 use measurement::Measurement;
 use settings::Settings;
 
-/// Name on the command line.
-pub const NAME: &str = "er16";
-/// What is studied.
-pub const TITLE: &str = "ER-16: nonlinear friction by improved cuckoo search, and by separable least squares";
-/// Where it was published.
-pub const SOURCE: &str = "dynamical identification of an industrial robot by an improved cuckoo search (believed Ding, Li, Li & Chao 2018)";
+/// What was published.
+pub use dynid_terminal::study::ER16 as STUDY;
 
 /// Rate of the data on which friction models are compared at reversal, Hz.
 const REVERSAL_RATE_HZ: f64 = 50.0;
@@ -50,19 +46,14 @@ const DRAWN: [Drawn; 10] = [
 /// # Errors
 /// [`StudyError`]: faults of the embedded data or of the rooms below.
 pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError> {
-    const STEPS: usize = 8;
-    let mut done = 0;
-    let mut step = |what: &str| {
-        progress(Progress { step: what.to_owned(), done, steps: STEPS });
-        done += 1;
-    };
+    let mut steps = Steps::new(progress, 8);
     let settings = Settings::read()?;
     let arm = Arm::new(&settings)?;
     let mut rows = dynamics::rows(&arm, &settings)?.to_vec();
     rows.push(signals::row()?);
     rows.push(excitation::printed_trajectory(&arm, &settings)?);
 
-    step("designing trajectories");
+    steps.begin("designing trajectories");
     let own = excitation::designed(&arm, &settings, run, Columns::Inertial)?;
     let with_friction = excitation::designed(&arm, &settings, run, Columns::WithLinearFriction)?;
     rows.push(excitation::own_trajectory(own.as_ref()));
@@ -70,8 +61,8 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
 
     let measure = |rate_hz| Measurement::new(&arm, &settings, &settings.reference, rate_hz, run.seed);
     let data = measure(settings.search_rate_hz)?;
-    let searches = search::searches(&arm, &settings, &data, run, &mut step)?;
-    step("separable least squares");
+    let searches = search::searches(&arm, &settings, &data, run, &mut steps)?;
+    steps.begin("separable least squares");
     let found = separable::identify_plain(&arm, &data)?;
     let absolute = separable::identify_absolute(&arm, &data)?;
     let predicted = arm.efforts(&data.block(), &found.unknowns);
@@ -81,15 +72,14 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     rows.push(separable::reversal_row(&fast, &friction));
     rows.push(separable::separable_row(&arm, &settings, &data, &found, &absolute)?);
 
-    step("intervals and polish");
+    steps.begin("intervals and polish");
     rows.extend(separable::beyond(&arm, &settings, &data, &found, &absolute, &searches, run)?);
     rows.push(excitation::better_trajectory(own.as_ref(), with_friction.as_ref()));
     rows.push(separable::passivity_row(&arm, &friction.unknowns));
-    rows.sort_by_key(|r| (r.id.parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
-    step("the chain from noisy signals");
+    steps.begin("the chain from noisy signals");
     let chain = chain::by_rate(&arm, &settings, run)?;
 
-    let record = StudyRecord::new(NAME, run, rows, &DRAWN);
+    let record = StudyRecord::new(STUDY.name, run, rows, &DRAWN);
     let report = report::Contents {
         arm: &arm,
         settings: &settings,

@@ -1,6 +1,6 @@
 //! The study's report.
 
-use dynid::report::{Chosen, Fact, Provenance, StudyReport, StudySection, StudyTable, Value};
+use dynid::report::{Fact, StudyReport, StudySection, Value};
 
 use super::arm::{Arm, JOINTS};
 use super::chain::ChainRow;
@@ -10,7 +10,8 @@ use super::measurement::Measurement;
 use super::search::{Searched, Searches, unknowns};
 use super::separable::{FrictionComparison, Identified, objective_of};
 use super::settings::Settings;
-use super::{REVERSAL_RATE_HZ, TITLE};
+use super::{REVERSAL_RATE_HZ, STUDY};
+use crate::page::{table, text};
 use crate::statistics::median;
 use crate::{StudyError, StudyRecord};
 
@@ -27,46 +28,25 @@ pub(super) struct Contents<'a> {
     pub(super) chain: &'a [ChainRow],
 }
 
-fn text(words: &str) -> Value {
-    Value::from(words)
-}
-
-fn table(caption: &str, head: &[&str], rows: Vec<Vec<Value>>) -> StudyTable {
-    StudyTable { caption: caption.into(), head: head.iter().map(|h| (*h).to_owned()).collect(), rows }
-}
-
 impl Contents<'_> {
     pub(super) fn report(&self, record: &StudyRecord) -> Result<StudyReport, StudyError> {
-        Ok(StudyReport {
-            title: TITLE.into(),
-            verdict: record.verdict(),
-            warnings: Vec::new(),
-            introduction: vec![
-                "Joints 1 to 3 of a 16 kg industrial arm, 15 base inertial parameters and five of friction per joint: offset, \
-                 Coulomb, viscous, and an arctangent whose slope enters nonlinearly. The paper minimises the mean absolute \
-                 error of torque by cuckoo search, an improved cuckoo search and a particle swarm."
-                    .into(),
-                "The paper prints neither the geometry of the arm nor the bounds of the search, and its printed trajectory \
-                 breaks its own limits. What stands in for them is a decision, listed in the study's `README.md`. The arm is \
-                 simulated with the parameters of the paper's Table 3 and torque noise of 4, 5 and 3 N m, so the truth is known."
-                    .into(),
-            ],
-            rows: record.report_rows(),
-            sections: vec![
-                self.search_section(),
-                self.torque_section(),
-                self.friction_section(),
-                self.parameter_section(),
-                self.trajectory_section()?,
-                self.chain_section(),
-            ],
-            provenance: Provenance {
-                version: dynid::VERSION.into(),
-                seed: Some(record.seed),
-                settings: vec![Chosen::given("quick run", record.quick, "")],
-                ..Provenance::default()
-            },
-        })
+        let introduction = [
+            "Joints 1 to 3 of a 16 kg industrial arm, 15 base inertial parameters and five of friction per joint: offset, \
+             Coulomb, viscous, and an arctangent whose slope enters nonlinearly. The paper minimises the mean absolute \
+             error of torque by cuckoo search, an improved cuckoo search and a particle swarm.",
+            "The paper prints neither the geometry of the arm nor the bounds of the search, and its printed trajectory \
+             breaks its own limits. What stands in for them is a decision, listed in the study's `README.md`. The arm is \
+             simulated with the parameters of the paper's Table 3 and torque noise of 4, 5 and 3 N m, so the truth is known.",
+        ];
+        let sections = vec![
+            self.search_section(),
+            self.torque_section(),
+            self.friction_section(),
+            self.parameter_section(),
+            self.trajectory_section()?,
+            self.chain_section(),
+        ];
+        Ok(record.page(STUDY, &introduction, sections))
     }
 
     fn truth(&self) -> Vec<f64> {

@@ -11,7 +11,7 @@ use super::measurement::Measurement;
 use super::reference;
 use super::settings::Settings;
 use crate::statistics::median;
-use crate::{Row, RunSettings, StudyError};
+use crate::{Row, RunSettings, Steps, StudyError};
 
 /// A search with the results of all seeds.
 #[derive(Debug)]
@@ -125,13 +125,13 @@ pub(super) fn searches(
     settings: &Settings,
     data: &Measurement,
     run: &RunSettings,
-    progress: &mut dyn FnMut(&str),
+    steps: &mut Steps<'_>,
 ) -> Result<Searches, StudyError> {
     let objective = objective(arm, data)?;
     let bounds = bounds(arm, settings)?;
     let seeds: Vec<u64> = (0..if run.quick { 30 } else { 60 }).map(|k| run.seed + k).collect();
     let mut search = |name: &'static str, algorithm: &Algorithm| -> Result<Searched, StudyError> {
-        progress(&format!("{} runs of {name}", seeds.len()));
+        steps.begin(&format!("{} runs of {name}", seeds.len()));
         let results = many(algorithm, &objective, &bounds, &SearchSettings::default(), &seeds)
             .map_err(|e| StudyError::Data { file: "er16", message: e.to_string() })?;
         Ok(Searched { name, results })

@@ -13,7 +13,7 @@ mod settings;
 mod tracking;
 
 use crate::record::{Drawn, drawn};
-use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
+use crate::{Progress, RunSettings, Steps, StudyError, StudyRecord, StudyRun};
 use joint::Extras;
 use offline::Tables;
 use online::Machine;
@@ -21,13 +21,8 @@ use realisations::{Realisation, clean, decimated, noisy};
 use settings::Settings;
 use tracking::Tracks;
 
-/// Name on the command line.
-pub const NAME: &str = "hit-joint";
-/// What is studied.
-pub const TITLE: &str = "HIT joint: stiffness and damping of a harmonic drive, off line and while it runs";
-/// Where it was published.
-pub const SOURCE: &str =
-    "Sun, Shi, Zhang, Wang & Liu, Parameters Identification Applied to Large Space Robotic Manipulators";
+/// What was published.
+pub use dynid_terminal::study::HIT_JOINT as STUDY;
 
 /// `k1, k2, b_in, b_inD, b_out, b_outC`.
 const PARAMETERS: usize = 6;
@@ -69,20 +64,15 @@ const DRAWN: [Drawn; 15] = [
 /// # Errors
 /// [`StudyError`]: faults of the embedded data or of the rooms below.
 pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError> {
-    const STEPS: usize = 6;
-    let mut done = 0;
-    let mut step = |what: &str| {
-        progress(Progress { step: what.to_owned(), done, steps: STEPS });
-        done += 1;
-    };
+    let mut steps = Steps::new(progress, 6);
     let (realisations, streams, change_free) = if run.quick { (60, 2, 60) } else { (400, 10, 1000) };
     let settings = Settings::read()?;
-    step("parts, batch and recursion against references");
+    steps.begin("parts, batch and recursion against references");
     let mut rows = vec![golden::parts_row(&settings)?];
     rows.extend(golden::batch_rows(&settings)?);
     rows.push(golden::recursion_row(&settings)?);
 
-    step("batch identification");
+    steps.begin("batch identification");
     let raw = clean(&settings, Extras::default())?;
     let measured = noisy(&settings, &raw, settings.noise.deformation, run.seed);
     let data = decimated(&settings, &measured);
@@ -99,20 +89,19 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     rows.push(batch::full_friction_row(&settings, run.seed)?);
     rows.push(batch::catalogue_row(&settings, &tables)?);
 
-    step("a spring that softens");
+    steps.begin("a spring that softens");
     let machine = Machine::new(&settings)?;
     let tracks = Tracks::new(&settings, &machine, run.seed, streams)?;
     rows.push(tracking::tracking_row(&machine, &tracks));
     rows.push(tracking::reaction_row(&tracks));
-    step("streams without a change");
+    steps.begin("streams without a change");
     rows.push(tracking::false_alarm_row(&settings, &machine, run.seed, change_free)?);
-    step("one direction for long");
+    steps.begin("one direction for long");
     let (row, one_way) = tracking::one_way_row(&settings, &machine, run.seed)?;
     rows.push(row);
-    rows.sort_by_key(|r| (r.id.parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
 
-    step("report");
-    let record = StudyRecord::new(NAME, run, rows, &DRAWN);
+    steps.begin("report");
+    let record = StudyRecord::new(STUDY.name, run, rows, &DRAWN);
     let report = report::Contents {
         settings: &settings,
         data: &data,

@@ -2,10 +2,7 @@
 
 use dynid::estimators::online::error_driven_factor;
 use dynid::model::element::CubicSpring;
-use dynid::report::{
-    Chart, ChartAxis, ChartCurve, Chosen, CurveStyle, Fact, Provenance, StudyReport, StudySection,
-    StudyTable, Value,
-};
+use dynid::report::{Chart, CurveStyle, Fact, StudyReport, StudySection, Value};
 
 use super::joint::{Damping, identified};
 use super::measurement::Signals;
@@ -14,7 +11,8 @@ use super::online::{CYCLES, samples};
 use super::realisations::{Interval, Realisation, errors, spread};
 use super::settings::Settings;
 use super::tracking::{OneWay, Point, Tracks, dropped};
-use super::{NAMES, PARAMETERS, TITLE, Values};
+use super::{NAMES, PARAMETERS, STUDY, Values};
+use crate::page::{axis, curve, table, text};
 use crate::{StudyError, StudyRecord};
 
 const UNITS: [&str; PARAMETERS] = ["N m/rad", "N m/rad³", "N m s/rad", "N m", "N m s/rad", "N m"];
@@ -33,59 +31,30 @@ pub(super) struct Contents<'a> {
     pub(super) one_way: &'a [OneWay],
 }
 
-fn text(words: impl Into<String>) -> Value {
-    Value::from(words.into())
-}
-
-fn axis(label: &str, unit: &str) -> ChartAxis {
-    ChartAxis { label: label.to_owned(), unit: unit.to_owned(), logarithmic: false }
-}
-
-fn curve(name: &str, style: CurveStyle, points: Vec<[f64; 2]>) -> ChartCurve {
-    ChartCurve { name: name.to_owned(), points, style }
-}
-
-fn table(caption: &str, head: &[&str], rows: Vec<Vec<Value>>) -> StudyTable {
-    StudyTable { caption: caption.to_owned(), head: head.iter().map(|h| (*h).to_owned()).collect(), rows }
-}
-
 fn in_per_cent(x: f64) -> Value {
     text(format!("{:+.2} %", 100.0 * x))
 }
 
 impl Contents<'_> {
     pub(super) fn report(&self, record: &StudyRecord) -> Result<StudyReport, StudyError> {
-        Ok(StudyReport {
-            title: TITLE.into(),
-            verdict: record.verdict(),
-            warnings: Vec::new(),
-            introduction: vec![
-                "One joint of a large space manipulator: a motor, a harmonic drive of ratio 290 and a torque sensor. The paper finds \
-                 the spring `k1 Δ + k2 Δ³` and the damping of both sides by least squares on constant-speed tests, with models that \
-                 have more and more damping, then follows the same six parameters on line by recursive least squares whose \
-                 forgetting factor falls with the relative error."
-                    .into(),
-                "The joint here is simulated with the values of the paper's Table III, so the truth is known. Inertias, speeds, load \
-                 and noise are not printed; decisions are listed in the study's `README.md`."
-                    .into(),
-            ],
-            rows: record.report_rows(),
-            sections: vec![
-                self.spring_section(),
-                self.table_section(),
-                self.noise_section(),
-                self.residual_section(),
-                self.forgetting_section(),
-                self.track_section(),
-                self.one_way_section(),
-            ],
-            provenance: Provenance {
-                version: dynid::VERSION.into(),
-                seed: Some(record.seed),
-                settings: vec![Chosen::given("quick run", record.quick, "")],
-                ..Provenance::default()
-            },
-        })
+        let introduction = [
+            "One joint of a large space manipulator: a motor, a harmonic drive of ratio 290 and a torque sensor. The paper finds \
+             the spring `k1 Δ + k2 Δ³` and the damping of both sides by least squares on constant-speed tests, with models that \
+             have more and more damping, then follows the same six parameters on line by recursive least squares whose \
+             forgetting factor falls with the relative error.",
+            "The joint here is simulated with the values of the paper's Table III, so the truth is known. Inertias, speeds, load \
+             and noise are not printed; decisions are listed in the study's `README.md`.",
+        ];
+        let sections = vec![
+            self.spring_section(),
+            self.table_section(),
+            self.noise_section(),
+            self.residual_section(),
+            self.forgetting_section(),
+            self.track_section(),
+            self.one_way_section(),
+        ];
+        Ok(record.page(STUDY, &introduction, sections))
     }
 
     fn truth(&self) -> Values {
@@ -106,28 +75,28 @@ impl Contents<'_> {
             })
         });
         let mut curves = vec![
-            curve("measured, friction taken off", CurveStyle::Dots, measured.collect()),
-            curve("identified", CurveStyle::Line, law(&|d| spring.torque(d))),
-            curve("input row, no damping", CurveStyle::Dashed, law(&|d| none.torque(d))),
+            curve("measured, friction taken off", measured.collect(), CurveStyle::Dots),
+            curve("identified", law(&|d| spring.torque(d)), CurveStyle::Line),
+            curve("input row, no damping", law(&|d| none.torque(d)), CurveStyle::Dashed),
         ];
         let mut facts = Vec::new();
         let mut differences = Vec::new();
         if let Some(fit) = spring.piecewise(catalogue.torques, catalogue.largest) {
-            curves.push(curve("maker's three stiffnesses", CurveStyle::Line, law(&|d| fit.spring.torque(d))));
+            curves.push(curve("maker's three stiffnesses", law(&|d| fit.spring.torque(d)), CurveStyle::Line));
             for (k, stiffness) in fit.spring.stiffness.iter().enumerate() {
                 facts.push(Fact::new(format!("K{}", k + 1), *stiffness, "N m/rad"));
             }
             let torques = (-200..=200).map(|k| catalogue.largest * f64::from(k) / 200.0);
             let points =
                 torques.filter_map(|t| Some([t, 1e6 * (fit.spring.deformation(t) - spring.deformation(t)?)]));
-            differences.push(curve("three lines less cubic", CurveStyle::Line, points.collect()));
+            differences.push(curve("three lines less cubic", points.collect(), CurveStyle::Line));
         }
         let truth = self.truth();
         let exact = CubicSpring { k1: truth[0], k2: truth[1] };
         let torques = (-200..=200).map(|k| catalogue.largest * f64::from(k) / 200.0);
         let points =
             torques.filter_map(|t| Some([t, 1e6 * (spring.deformation(t)? - exact.deformation(t)?)]));
-        differences.push(curve("identified less truth", CurveStyle::Line, points.collect()));
+        differences.push(curve("identified less truth", points.collect(), CurveStyle::Line));
         StudySection {
             title: "The spring".into(),
             text: vec![
@@ -277,8 +246,8 @@ impl Contents<'_> {
                     x: axis("time of the cruise", "s"),
                     y: axis("residual on the joint's side", "N m"),
                     curves: vec![
-                        curve("no damping, this row", CurveStyle::Dots, residual(row, &none)),
-                        curve("full model", CurveStyle::Dots, residual(row, &self.tables.full.x)),
+                        curve("no damping, this row", residual(row, &none), CurveStyle::Dots),
+                        curve("full model", residual(row, &self.tables.full.x), CurveStyle::Dots),
                     ],
                     ..Chart::default()
                 }
@@ -306,7 +275,7 @@ impl Contents<'_> {
                     title: "Forgetting factor over relative error (Figure 5)".into(),
                     x: axis("relative error", ""),
                     y: axis("λ", ""),
-                    curves: vec![curve("α = 0.05, β = -4.68", CurveStyle::Line, law.collect())],
+                    curves: vec![curve("α = 0.05, β = -4.68", law.collect(), CurveStyle::Line)],
                     ..Chart::default()
                 },
                 self.along("Forgetting factor along the stream", "λ", "", |p| p.lambda, false),
@@ -332,9 +301,9 @@ impl Contents<'_> {
             list.iter().filter(|p| seconds(p) >= start).map(|p| [seconds(p), of(p)]).collect()
         };
         let mut curves =
-            vec![curve("paper's factor", CurveStyle::Line, points(&self.tracks.published[0].points))];
+            vec![curve("paper's factor", points(&self.tracks.published[0].points), CurveStyle::Line)];
         if reacting {
-            curves.push(curve("alarm and reaction", CurveStyle::Line, points(&self.tracks.stated[0].points)));
+            curves.push(curve("alarm and reaction", points(&self.tracks.stated[0].points), CurveStyle::Line));
         }
         Chart { title: title.into(), x: axis("time", "s"), y: axis(label, unit), curves, ..Chart::default() }
     }
@@ -357,6 +326,9 @@ impl Contents<'_> {
                     list.iter().map(|p| [seconds(p), inside(of(p))]).collect()
                 };
                 let ours = &self.tracks.stated[0].points;
+                let mut band = points(ours, &|p| p.x[k] + 2.0 * p.std[k]);
+                band.push([f64::NAN; 2]);
+                band.extend(points(ours, &|p| p.x[k] - 2.0 * p.std[k]));
                 Chart {
                     title: format!("{} along the stream ({})", NAMES[k], figures[k]),
                     note: String::new(),
@@ -366,25 +338,20 @@ impl Contents<'_> {
                     curves: vec![
                         curve(
                             "paper's factor",
-                            CurveStyle::Line,
                             points(&self.tracks.published[0].points, &|p| p.x[k]),
+                            CurveStyle::Line,
                         ),
                         curve(
                             "no forgetting",
-                            CurveStyle::Line,
                             points(&self.tracks.none[0].points, &|p| p.x[k]),
+                            CurveStyle::Line,
                         ),
-                        curve("alarm and reaction", CurveStyle::Line, points(ours, &|p| p.x[k])),
-                        curve("± 2 deviations", CurveStyle::Dashed, {
-                            let mut band = points(ours, &|p| p.x[k] + 2.0 * p.std[k]);
-                            band.push([f64::NAN; 2]);
-                            band.extend(points(ours, &|p| p.x[k] - 2.0 * p.std[k]));
-                            band
-                        }),
+                        curve("alarm and reaction", points(ours, &|p| p.x[k]), CurveStyle::Line),
+                        curve("± 2 deviations", band, CurveStyle::Dashed),
                         curve(
                             "truth",
-                            CurveStyle::Dashed,
                             vec![[0.0, truth[k]], [change, truth[k]], [change, after], [end, after]],
+                            CurveStyle::Dashed,
                         ),
                     ],
                 }

@@ -19,7 +19,7 @@ use dynid::estimators::conditioning::PreparedLog;
 use dynid::sim::Profile;
 
 use crate::record::{Drawn, drawn};
-use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
+use crate::{Progress, RunSettings, Steps, StudyError, StudyRecord, StudyRun};
 use experiment::Experiment;
 use identification::{Identified, OURS, PAPER, regression};
 use robot::Indy7;
@@ -27,12 +27,8 @@ use rows::Four;
 use settings::Settings;
 use validation::{Ends, Realisation, Validation, known, log, realisation};
 
-/// Name on the command line.
-pub const NAME: &str = "indy7";
-/// What is studied.
-pub const TITLE: &str = "Indy7: two-step identification with friction of speed and temperature";
-/// Where it was published.
-pub const SOURCE: &str = "Tadese, Pico, Seo & Moon 2022, Sensors 22, 9708";
+/// What was published.
+pub use dynid_terminal::study::INDY7 as STUDY;
 
 /// Joints of the arm.
 const JOINTS: usize = 6;
@@ -62,24 +58,19 @@ const DRAWN: [Drawn; 10] = [
 /// [`StudyError`]: faults of the embedded data or of the rooms below.
 pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError> {
     let seeds: u64 = if run.quick { 1 } else { 10 };
-    let steps = 5 + seeds as usize;
-    let mut done = 0;
-    let mut step = |what: &str| {
-        progress(Progress { step: what.to_owned(), done, steps });
-        done += 1;
-    };
+    let mut steps = Steps::new(progress, 5 + seeds as usize);
     let settings = Settings::read()?;
     let arm = Indy7::new(&settings)?;
-    step("dynamics and estimators against references");
+    steps.begin("dynamics and estimators against references");
     let mut rows = dynamics::rows(&arm, &settings)?;
     rows.extend(estimators::rows(&arm, &settings)?);
 
-    step("designing trajectories");
+    steps.begin("designing trajectories");
     let designed = excitation::designed(&arm, &settings, run)?;
     rows.extend(excitation::rows(designed.as_ref()));
     let excitation = designed.as_ref().map_or(&settings.trajectories.excitation, |d| &d.rows);
 
-    step("validation logs");
+    steps.begin("validation logs");
     let thermal = &settings.thermal;
     let (cold, hot) = rayon::join(
         || Validation::new(&arm, &settings, thermal.cold, run.seed),
@@ -89,7 +80,7 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
 
     let mut realisations: Vec<Realisation> = Vec::new();
     for k in 0..seeds {
-        step(&format!("friction experiment and identification {} of {seeds}", k + 1));
+        steps.begin(&format!("friction experiment and identification {} of {seeds}", k + 1));
         realisations.push(realisation(&arm, &settings, excitation, &ends, run, run.seed + k)?);
     }
     let first = &realisations[0];
@@ -99,15 +90,14 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     rows.push(rows::missing_temperature_row(&arm, &settings, &ends, first)?);
     rows.push(rows::price_row(first));
 
-    step("identification cold and hot");
+    steps.begin("identification cold and hot");
     let conditions = Conditions::new(&arm, &settings, excitation, run.seed)?;
     let (four, realistic) = conditions.estimates(&arm, &settings, first)?;
     rows.extend(rows::robustness_rows(&arm, &four, &realistic));
-    step("a record in which joints warm up");
+    steps.begin("a record in which joints warm up");
     rows.push(drift(&arm, &settings, excitation, first, run.seed)?);
 
-    rows.sort_by_key(|r| (r.id.parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
-    let record = StudyRecord::new(NAME, run, rows, &DRAWN);
+    let record = StudyRecord::new(STUDY.name, run, rows, &DRAWN);
     let report = report::Contents {
         arm: &arm,
         settings: &settings,

@@ -1,10 +1,7 @@
 //! The study's report: the paper's tables and figures again.
 
 use dynid::motion::trajectory::{Point, Trajectory};
-use dynid::report::{
-    Chart, ChartAxis, ChartCurve, Chosen, CurveStyle, Provenance, StudyReport, StudySection, StudyTable,
-    Value,
-};
+use dynid::report::{Chart, ChartCurve, CurveStyle, StudyReport, StudySection, Value};
 
 use super::experiment::trajectory;
 use super::friction::JointFriction;
@@ -13,7 +10,8 @@ use super::robot::{Indy7, TABLE_A1};
 use super::rows::Four;
 use super::settings::Settings;
 use super::validation::{Ends, NAMES, Realisation};
-use super::{Conditions, JOINTS, TITLE};
+use super::{Conditions, JOINTS, STUDY};
+use crate::page::{axis, curve, logarithmic, table, text};
 use crate::{StudyError, StudyRecord};
 
 /// What the report is made of.
@@ -28,51 +26,26 @@ pub(super) struct Contents<'a> {
     pub(super) conditions: &'a Conditions,
 }
 
-fn text(words: &str) -> Value {
-    Value::from(words)
-}
-
-fn axis(label: &str, unit: &str) -> ChartAxis {
-    ChartAxis { label: label.to_owned(), unit: unit.to_owned(), logarithmic: false }
-}
-
-fn curve(name: &str, style: CurveStyle, points: Vec<[f64; 2]>) -> ChartCurve {
-    ChartCurve { name: name.to_owned(), points, style }
-}
-
 impl Contents<'_> {
     pub(super) fn report(&self, record: &StudyRecord) -> Result<StudyReport, StudyError> {
-        Ok(StudyReport {
-            title: TITLE.into(),
-            verdict: record.verdict(),
-            warnings: Vec::new(),
-            introduction: vec![
-                "A collaborative arm of six joints whose friction changes by a factor of two from a cold to a warm joint. The \
-                 paper identifies friction by speed and temperature first and the rigid bodies from what is left of the torque \
-                 second, and compares with the usual regression in which three columns a joint stand for all friction."
-                    .into(),
-                "The arm here is simulated: bristles (LuGre) and viscous friction of temperature in closed loop at 4 kHz, 16-bit \
-                 encoders, noise of torque and velocity, and a torque ripple that no model is told of. The truth is known; it \
-                 is chosen so that the paper's own fits come out close to its tables. Decisions are listed in the study's \
-                 `README.md`."
-                    .into(),
-            ],
-            rows: record.report_rows(),
-            sections: vec![
-                self.friction_section()?,
-                self.trajectory_section()?,
-                self.torque_section()?,
-                self.validation_section()?,
-                self.robustness_section(),
-                self.one_shot_section()?,
-            ],
-            provenance: Provenance {
-                version: dynid::VERSION.into(),
-                seed: Some(record.seed),
-                settings: vec![Chosen::given("quick run", record.quick, "")],
-                ..Provenance::default()
-            },
-        })
+        let introduction = [
+            "A collaborative arm of six joints whose friction changes by a factor of two from a cold to a warm joint. The \
+             paper identifies friction by speed and temperature first and the rigid bodies from what is left of the torque \
+             second, and compares with the usual regression in which three columns a joint stand for all friction.",
+            "The arm here is simulated: bristles (LuGre) and viscous friction of temperature in closed loop at 4 kHz, 16-bit \
+             encoders, noise of torque and velocity, and a torque ripple that no model is told of. The truth is known; it \
+             is chosen so that the paper's own fits come out close to its tables. Decisions are listed in the study's \
+             `README.md`.",
+        ];
+        let sections = vec![
+            self.friction_section()?,
+            self.trajectory_section()?,
+            self.torque_section()?,
+            self.validation_section()?,
+            self.robustness_section(),
+            self.one_shot_section()?,
+        ];
+        Ok(record.page(STUDY, &introduction, sections))
     }
 
     /// Figures 4 and 5.
@@ -95,10 +68,10 @@ impl Contents<'_> {
                 y: axis(line.symbol, ""),
                 equal_units: false,
                 curves: vec![
-                    curve("95 % from", CurveStyle::Dashed, band(-1.0)),
-                    curve("95 % to", CurveStyle::Dashed, band(1.0)),
-                    curve("line", CurveStyle::Line, grid.iter().map(|t| [*t, line.at(*t)]).collect()),
-                    curve("per temperature", CurveStyle::Dots, markers.collect()),
+                    curve("95 % from", band(-1.0), CurveStyle::Dashed),
+                    curve("95 % to", band(1.0), CurveStyle::Dashed),
+                    curve("line", grid.iter().map(|t| [*t, line.at(*t)]).collect(), CurveStyle::Line),
+                    curve("per temperature", markers.collect(), CurveStyle::Dots),
                 ],
             }
         }));
@@ -128,16 +101,14 @@ impl Contents<'_> {
                  bristles come from motion within friction, by simulation error."
                     .into(),
             ],
-            tables: vec![StudyTable {
-                caption: "What was found beside the truth: bristles, and friction at three points (N m)".into(),
-                head: [
+            tables: vec![table(
+                "What was found beside the truth: bristles, and friction at three points (N m)",
+                &[
                     "joint", "σ0", "true", "σ1", "true", "0.05 rad/s, 31 °C", "true", "1 rad/s, 20.5 °C", "true",
                     "1 rad/s, 43 °C", "true",
-                ]
-                .map(str::to_owned)
-                .to_vec(),
-                rows: rows.collect(),
-            }],
+                ],
+                rows.collect(),
+            )],
             charts,
             ..StudySection::default()
         })
@@ -149,15 +120,15 @@ impl Contents<'_> {
         for level in &found.fit.levels {
             let friction = found.fit.law.friction(&speeds, &vec![level.temperature; speeds.len()]);
             let points = speeds.iter().zip(friction).map(|(v, f)| [*v, f]).collect();
-            curves.push(curve(&format!("{:.0} °C", level.temperature), CurveStyle::Line, points));
+            curves.push(curve(&format!("{:.0} °C", level.temperature), points, CurveStyle::Line));
         }
         let points = found.points.iter().map(|p| [p.speed, p.friction]).collect();
-        curves.push(curve("measured", CurveStyle::Dots, points));
+        curves.push(curve("measured", points, CurveStyle::Dots));
         Chart {
             title: "Joint 1: friction by speed and temperature (Figure 5)".into(),
             note: "At 1 rad/s friction falls by more than a third from 20.5 to 43 °C; Coulomb and static friction are free of temperature."
                 .into(),
-            x: ChartAxis { logarithmic: true, ..axis("speed", "rad/s") },
+            x: logarithmic("speed", "rad/s"),
             y: axis("friction", "N m"),
             equal_units: false,
             curves,
@@ -169,7 +140,7 @@ impl Contents<'_> {
         let motion = trajectory(self.excitation)?;
         let mut points = vec![Point::default(); JOINTS];
         let mut curves: Vec<ChartCurve> =
-            (1..=JOINTS).map(|j| curve(&format!("joint {j}"), CurveStyle::Line, Vec::new())).collect();
+            (1..=JOINTS).map(|j| curve(&format!("joint {j}"), Vec::new(), CurveStyle::Line)).collect();
         for k in 0..=400 {
             let t = motion.period() * f64::from(k) / 400.0;
             motion.at(t, &mut points);
@@ -216,9 +187,9 @@ impl Contents<'_> {
                     y: axis("torque", "N m"),
                     equal_units: false,
                     curves: vec![
-                        curve("measured", CurveStyle::Line, line(&proposed[joint].measured)),
-                        curve("conventional", CurveStyle::Line, line(&conventional[joint].predicted)),
-                        curve("two-step", CurveStyle::Line, line(&proposed[joint].predicted)),
+                        curve("measured", line(&proposed[joint].measured), CurveStyle::Line),
+                        curve("conventional", line(&conventional[joint].predicted), CurveStyle::Line),
+                        curve("two-step", line(&proposed[joint].predicted), CurveStyle::Line),
                     ],
                 });
                 charts.push(Chart {
@@ -228,8 +199,8 @@ impl Contents<'_> {
                     y: axis("measured less predicted", "N m"),
                     equal_units: false,
                     curves: vec![
-                        curve("conventional", CurveStyle::Line, line(&conventional[joint].error())),
-                        curve("two-step", CurveStyle::Line, line(&proposed[joint].error())),
+                        curve("conventional", line(&conventional[joint].error()), CurveStyle::Line),
+                        curve("two-step", line(&proposed[joint].error()), CurveStyle::Line),
                     ],
                 });
             }
@@ -264,13 +235,11 @@ impl Contents<'_> {
                     }
                 }
             }
-            tables.push(StudyTable {
-                caption: format!("{name}: RMSE of torque, N m"),
-                head: ["trajectory", "estimate", "", "1", "2", "3", "4", "5", "6"]
-                    .map(str::to_owned)
-                    .to_vec(),
+            tables.push(table(
+                &format!("{name}: RMSE of torque, N m"),
+                &["trajectory", "estimate", "", "1", "2", "3", "4", "5", "6"],
                 rows,
-            });
+            ));
         }
         Ok(StudySection {
             title: "Validation on other trajectories".into(),
@@ -313,15 +282,14 @@ impl Contents<'_> {
                  values below 0.001 count as 0.001."
                     .into(),
             ],
-            tables: vec![StudyTable {
-                caption: "Each row by the parameter that stands for its combination; SI units".into(),
-                head: [
-                    "parameter", "truth", "conventional cold", "hot", "change %", "two-step cold", "hot", "change %", "paper's two-step cold", "hot",
-                ]
-                .map(str::to_owned)
-                .to_vec(),
-                rows: rows.collect(),
-            }],
+            tables: vec![table(
+                "Each row by the parameter that stands for its combination; SI units",
+                &[
+                    "parameter", "truth", "conventional cold", "hot", "change %", "two-step cold", "hot", "change %",
+                    "paper's two-step cold", "hot",
+                ],
+                rows.collect(),
+            )],
             ..StudySection::default()
         }
     }
@@ -360,13 +328,11 @@ impl Contents<'_> {
                  {}); with it in the model the error falls to that of noise and friction at reversal.",
                 orders.join(", ")
             )],
-            tables: vec![StudyTable {
-                caption: "RMSE of torque, N m, where prediction and measurement pass the same filter".into(),
-                head: ["", "trajectory", "estimate", "1", "2", "3", "4", "5", "6"]
-                    .map(str::to_owned)
-                    .to_vec(),
+            tables: vec![table(
+                "RMSE of torque, N m, where prediction and measurement pass the same filter",
+                &["", "trajectory", "estimate", "1", "2", "3", "4", "5", "6"],
                 rows,
-            }],
+            )],
             charts: vec![Chart {
                 title: "Joint 1, cold, trajectory A: what is left".into(),
                 note: "The two-step estimate is left with the ripple.".into(),
@@ -374,8 +340,8 @@ impl Contents<'_> {
                 y: axis("measured less predicted", "N m"),
                 equal_units: false,
                 curves: vec![
-                    curve("two-step", CurveStyle::Line, line(two[0].error())),
-                    curve("one fit with ripple", CurveStyle::Line, line(one[0].error())),
+                    curve("two-step", line(two[0].error()), CurveStyle::Line),
+                    curve("one fit with ripple", line(one[0].error()), CurveStyle::Line),
                 ],
             }],
             ..StudySection::default()

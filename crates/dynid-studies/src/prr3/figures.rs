@@ -9,18 +9,7 @@ use super::encoders::Signals;
 use super::fits::{self, Batch};
 use super::machine::{Machine, SLIDERS};
 use crate::StudyError;
-
-pub(super) fn axis(label: &str, unit: &str) -> ChartAxis {
-    ChartAxis { label: label.into(), unit: unit.into(), logarithmic: false }
-}
-
-fn curve(name: &str, points: Vec<[f64; 2]>, style: CurveStyle) -> ChartCurve {
-    ChartCurve { name: name.into(), points, style }
-}
-
-fn over(time: &[f64], signal: &[f64]) -> Vec<[f64; 2]> {
-    time.iter().zip(signal).map(|(t, x)| [*t, *x]).collect()
-}
+use crate::page::{axis, curve, logarithmic, over};
 
 /// Every few samples: dots of all of them would hide the lines.
 fn dots(name: &str, time: &[f64], signal: &[f64]) -> ChartCurve {
@@ -231,8 +220,8 @@ pub(super) fn convergence(
         note: format!(
             "Over that of least squares, which needs {iterations} iterations from all of its starts together."
         ),
-        x: ChartAxis { logarithmic: true, ..axis("evaluations", "") },
-        y: ChartAxis { logarithmic: true, ..axis("J over that of least squares", "") },
+        x: logarithmic("evaluations", ""),
+        y: logarithmic("J over that of least squares", ""),
         curves,
         ..Chart::default()
     }

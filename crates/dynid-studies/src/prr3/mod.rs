@@ -18,7 +18,7 @@ mod settings;
 mod trajectory;
 
 use crate::record::{Drawn, drawn};
-use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
+use crate::{Progress, RunSettings, Steps, StudyError, StudyRecord, StudyRun};
 use beyond::{Shares, Upright};
 use encoders::Encoders;
 use excitation::Designs;
@@ -28,12 +28,8 @@ use machine::{Machine, Plane};
 use rank::Rank;
 use settings::Settings;
 
-/// Name on the command line.
-pub const NAME: &str = "prr3";
-/// What is studied.
-pub const TITLE: &str = "3PRR mechanism: friction of sliders that follows the forces on their guideway";
-/// Where it was published.
-pub const SOURCE: &str = "Rosyid & El-Khasawneh, Applied Sciences 2020, 10(14), 4820";
+/// What was published.
+pub use dynid_terminal::study::PRR3 as STUDY;
 
 /// Noise, random poses (B2) and random starts (B5).
 const DRAWN: [Drawn; 11] = [
@@ -70,13 +66,8 @@ fn worst(a: f64, b: f64) -> f64 {
 /// # Errors
 /// [`StudyError`]: faults of the embedded data or of the rooms below.
 pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError> {
-    const STEPS: usize = 5;
-    let mut done = 0;
-    let mut step = |what: &str| {
-        progress(Progress { step: what.to_owned(), done, steps: STEPS });
-        done += 1;
-    };
-    step("dynamics and trajectory against references");
+    let mut steps = Steps::new(progress, 5);
+    steps.begin("dynamics and trajectory against references");
     let settings = Settings::read()?;
     let machine = Machine::new(&settings)?;
     let motion = trajectory::identification_motion(&settings, settings.trajectory.samples)?;
@@ -91,25 +82,24 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
         rank.row(&settings),
         trajectory::friction_row(&shares),
     ];
-    step("fitting three laws of friction");
+    steps.begin("fitting three laws of friction");
     let fits = Fits::new(&machine, &settings, &rank, run)?;
     rows.extend(fits.rows());
     let knowable = Knowable::new(&settings, &rank, &fits)?;
     rows.push(knowable.row(&settings, &fits));
     rows.push(knowable::separated_row(&fits));
-    step("beyond the paper");
+    steps.begin("beyond the paper");
     let upright = Upright::new(&machine, &settings, &fits, run)?;
     rows.push(upright.row());
     let weights = Shares::new(&machine, &settings, &fits, &rank)?;
     rows.push(weights.row());
     let encoders = Encoders::new(&machine, &settings, &fits, &rank, run)?;
     rows.push(encoders.row());
-    step("designing trajectories");
+    steps.begin("designing trajectories");
     let designs = Designs::new(&machine, &settings, run)?;
     rows.push(designs.row());
-    step("report");
-    rows.sort_by_key(|r| (r.id.trim_matches(['B', '\'']).parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
-    let record = StudyRecord::new(NAME, run, rows, &DRAWN);
+    steps.begin("report");
+    let record = StudyRecord::new(STUDY.name, run, rows, &DRAWN);
     let report = report::Contents {
         machine: &machine,
         settings: &settings,

@@ -2,7 +2,7 @@
 
 use dynid::estimators::load_friction::Prediction;
 use dynid::motion::trajectory::Sampled;
-use dynid::report::{Chosen, Provenance, StudyReport, StudySection, StudyTable, Value};
+use dynid::report::{StudyReport, StudySection, Value};
 
 use super::beyond::{Shares, Upright};
 use super::encoders::Encoders;
@@ -13,7 +13,8 @@ use super::machine::Machine;
 use super::rank::Rank;
 use super::settings::Settings;
 use super::trajectory::Share;
-use super::{TITLE, figures};
+use super::{STUDY, figures};
+use crate::page::{table, text};
 use crate::{StudyError, StudyRecord};
 
 /// What the report is made of.
@@ -32,49 +33,28 @@ pub(super) struct Contents<'a> {
     pub(super) designs: &'a Designs,
 }
 
-pub(super) fn text(words: &str) -> Value {
-    Value::from(words)
-}
-
-pub(super) fn table(caption: &str, head: &[&str], rows: Vec<Vec<Value>>) -> StudyTable {
-    StudyTable { caption: caption.into(), head: head.iter().map(|h| (*h).to_owned()).collect(), rows }
-}
-
 impl Contents<'_> {
     pub(super) fn report(&self, record: &StudyRecord) -> Result<StudyReport, StudyError> {
-        Ok(StudyReport {
-            title: TITLE.into(),
-            verdict: record.verdict(),
-            warnings: Vec::new(),
-            introduction: vec![
-                "Three sliders on one guideway carry a platform on three legs. The paper identifies 13 inertial and 4 friction \
-                 parameters from the forces of the sliders by pattern search, with friction that follows the forces on the guideway; \
-                 these are Lagrange multipliers of the mechanism."
-                    .into(),
-                "No measured data are published. Data here are simulated with the paper's estimates for the truth; what is missing or \
-                 contradictory in the paper is decided in the study's `README.md`. Kinematics, dynamics and reactions are those of a \
-                 tree with three cut pins, Table 1 a linear map onto its parameters."
-                    .into(),
-            ],
-            rows: record.report_rows(),
-            sections: vec![
-                self.table_section(),
-                self.motion_section(),
-                self.law_section()?,
-                self.circle_section()?,
-                self.friction_section(),
-                self.search_section(),
-                self.upright_section(),
-                self.shares_section(),
-                self.design_section()?,
-            ],
-            provenance: Provenance {
-                version: dynid::VERSION.into(),
-                seed: Some(record.seed),
-                settings: vec![Chosen::given("quick run", record.quick, "")],
-                ..Provenance::default()
-            },
-        })
+        let introduction = [
+            "Three sliders on one guideway carry a platform on three legs. The paper identifies 13 inertial and 4 friction \
+             parameters from the forces of the sliders by pattern search, with friction that follows the forces on the guideway; \
+             these are Lagrange multipliers of the mechanism.",
+            "No measured data are published. Data here are simulated with the paper's estimates for the truth; what is missing or \
+             contradictory in the paper is decided in the study's `README.md`. Kinematics, dynamics and reactions are those of a \
+             tree with three cut pins, Table 1 a linear map onto its parameters.",
+        ];
+        let sections = vec![
+            self.table_section(),
+            self.motion_section(),
+            self.law_section()?,
+            self.circle_section()?,
+            self.friction_section(),
+            self.search_section(),
+            self.upright_section(),
+            self.shares_section(),
+            self.design_section()?,
+        ];
+        Ok(record.page(STUDY, &introduction, sections))
     }
 
     fn table_section(&self) -> StudySection {
@@ -103,7 +83,7 @@ impl Contents<'_> {
             .verdicts
             .iter()
             .zip(&names)
-            .map(|(verdict, (name, _))| vec![text(name), text(&told(verdict, &names))]);
+            .map(|(verdict, (name, _))| vec![text(*name), text(told(verdict, &names))]);
         let base = (0..self.rank.base.nrows()).map(|i| {
             let term = |k: usize| match self.rank.base[(i, k)] {
                 0.0 => None,
@@ -114,7 +94,7 @@ impl Contents<'_> {
             let own = &self.knowable.base[i];
             let expression = terms.join(" ");
             vec![
-                text(&format!("b{}", i + 1)),
+                text(format!("b{}", i + 1)),
                 text(expression.trim_start_matches("+ ")),
                 Value::from(self.knowable.base_truth[i]),
                 Value::from(own.value),
@@ -233,7 +213,7 @@ impl Contents<'_> {
     fn friction_section(&self) -> StudySection {
         let rows = self.shares.iter().enumerate().map(|(k, s)| {
             vec![
-                text(&(k + 1).to_string()),
+                text((k + 1).to_string()),
                 Value::from(s.total),
                 Value::from(s.friction),
                 Value::from(s.frictionless),
@@ -272,12 +252,12 @@ impl Contents<'_> {
             vec![
                 text("least squares within bounds"),
                 Value::from(best),
-                text(&format!("{iterations} iterations")),
+                text(format!("{iterations} iterations")),
             ],
             vec![
                 text("three parameters searched, the rest linear"),
                 Value::from(batch.separated.sum_of_squares),
-                text(&format!("{} rounds of signs", batch.separated.rounds)),
+                text(format!("{} rounds of signs", batch.separated.rounds)),
             ],
         ];
         let mut searches = Vec::new();
@@ -287,9 +267,9 @@ impl Contents<'_> {
         searches.push(("pattern search, mesh at most 1", &batch.capped));
         for (name, found) in &searches {
             rows.push(vec![
-                text(name),
+                text(*name),
                 Value::from(found.value),
-                text(&format!("{} evaluations", found.evaluations)),
+                text(format!("{} evaluations", found.evaluations)),
             ]);
         }
         StudySection {

@@ -2,9 +2,10 @@
 
 use dynid::report::{StudySection, Value};
 
-use super::report::{Contents, table, text};
+use super::report::Contents;
 use super::{figures, fits, trajectory};
 use crate::StudyError;
+use crate::page::{table, text};
 
 impl Contents<'_> {
     pub(super) fn upright_section(&self) -> StudySection {
@@ -19,7 +20,7 @@ impl Contents<'_> {
             ]
         });
         let forces = self.upright.normal.iter().enumerate().map(|(k, [low, mean, high])| {
-            vec![text(&(k + 1).to_string()), Value::from(*low), Value::from(*mean), Value::from(*high)]
+            vec![text((k + 1).to_string()), Value::from(*low), Value::from(*mean), Value::from(*high)]
         });
         StudySection {
             title: "The mechanism upright".into(),
@@ -67,8 +68,8 @@ impl Contents<'_> {
             vec![vec![text("reference"), text("-"), Value::from(self.designs.reference), text("-")]];
         for d in &self.designs.found {
             rows.push(vec![
-                text(&format!("random, seed {}", d.seed)),
-                text(&format!("{:.2e}", d.start)),
+                text(format!("random, seed {}", d.seed)),
+                text(format!("{:.2e}", d.start)),
                 Value::from(d.end),
                 Value::from(d.force),
             ]);

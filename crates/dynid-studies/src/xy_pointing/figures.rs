@@ -1,26 +1,15 @@
 //! The paper's figures, redone.
 
 use dynid::model::Limits;
-use dynid::report::{Chart, ChartAxis, ChartCurve, CurveStyle};
+use dynid::report::{Chart, ChartCurve, CurveStyle};
 
 use super::pointing::{JOINTS, Pointing};
 use super::settings::Settings;
 use super::trajectory::Motion;
 use crate::StudyError;
+use crate::page::{axis, curve};
 
 const SAMPLES: usize = 600;
-
-pub(super) fn axis(label: &str, unit: &str) -> ChartAxis {
-    ChartAxis { label: label.into(), unit: unit.into(), logarithmic: false }
-}
-
-pub(super) fn logarithmic(label: &str, unit: &str) -> ChartAxis {
-    ChartAxis { logarithmic: true, ..axis(label, unit) }
-}
-
-pub(super) fn curve(name: &str, points: Vec<[f64; 2]>, style: CurveStyle) -> ChartCurve {
-    ChartCurve { name: name.into(), points, style }
-}
 
 /// Positions, velocities and accelerations of every joint along trajectories, with their limits.
 pub(super) fn motion(

@@ -17,9 +17,9 @@ use super::fault;
 use super::knowable::{Knowable, NAMES, PARAMETERS, Start, fast};
 use super::parameters::Parameters;
 use super::pointing::{JOINTS, Pointing};
-use super::report::{table, text};
 use super::settings::Settings;
 use super::tree::{RATES, translations, with_clearance};
+use crate::page::{table, text};
 use crate::{Row, RunSettings, StudyError};
 
 /// Rate of the fast record, Hz; every tenth of its samples makes the slow one.
@@ -328,7 +328,7 @@ impl Gaps {
             for found in of {
                 cells.push(micro([found.clearance.value, found.clearance.std]));
                 cells.push(micro([found.length.value, found.length.std]));
-                cells.push(text(&format!("{:.4} ± {:.4}", found.friction.value, found.friction.std)));
+                cells.push(text(format!("{:.4} ± {:.4}", found.friction.value, found.friction.std)));
             }
             cells
         };
@@ -338,19 +338,19 @@ impl Gaps {
             let length = first.swing[joint].length;
             swing.push(micro(first.clearance[joint]));
             swing.push(micro([length.value, length.std]));
-            swing.push(text(&format!("{:.4}", first.friction[joint])));
+            swing.push(text(format!("{:.4}", first.friction[joint])));
         }
         let truth = (0..JOINTS).flat_map(|joint| {
             [1e6 * self.clearance, 1e6 * self.lengths[joint]]
-                .map(|x| text(&format!("{x:.2}")))
+                .map(|x| text(format!("{x:.2}")))
                 .into_iter()
-                .chain([text(&format!("{:.4}", self.friction))])
+                .chain([text(format!("{:.4}", self.friction))])
         });
         let truth = std::iter::once(text("truth")).chain(truth).collect();
         let cases = ["probes and torque at 100 Hz", "torque at 100 Hz", "torque at 1 kHz"];
         let bounds = cases.iter().zip(&self.knowable.bounds).map(|(name, bounds)| {
-            let percent = |p: usize| text(&format!("{:.3} %", 100.0 * bounds[0][p].max(bounds[1][p])));
-            std::iter::once(text(name)).chain((0..PARAMETERS).map(percent)).collect()
+            let percent = |p: usize| text(format!("{:.3} %", 100.0 * bounds[0][p].max(bounds[1][p])));
+            std::iter::once(text(*name)).chain((0..PARAMETERS).map(percent)).collect()
         });
         StudySection {
             title: "The clearance itself".into(),

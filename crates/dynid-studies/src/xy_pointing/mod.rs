@@ -28,7 +28,7 @@ mod trajectory;
 mod tree;
 
 use crate::record::{Drawn, drawn};
-use crate::{Progress, RunSettings, StudyError, StudyRecord, StudyRun};
+use crate::{Progress, RunSettings, Steps, StudyError, StudyRecord, StudyRun};
 use data::Data;
 use excitation::Designs;
 use faster::Excitations;
@@ -41,12 +41,8 @@ use settings::Settings;
 use simulation::Solutions;
 use sweep::Sweeps;
 
-/// Name on the command line.
-pub const NAME: &str = "xy-pointing";
-/// What is studied.
-pub const TITLE: &str = "X-Y pointing mechanism: parameters of a mechanism whose joints have clearance";
-/// Where it was published.
-pub const SOURCE: &str = "Sun, Han, Li & Li, Robotics 2021, 10(1), 36";
+/// What was published.
+pub use dynid_terminal::study::XY_POINTING as STUDY;
 
 /// A fault of this study's data or of the rooms below.
 fn fault(error: impl std::fmt::Display) -> StudyError {
@@ -78,13 +74,8 @@ const DRAWN: [Drawn; 11] = [
 /// # Errors
 /// [`StudyError`]: faults of the embedded data or of the rooms below.
 pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<StudyRun, StudyError> {
-    const STEPS: usize = 7;
-    let mut done = 0;
-    let mut step = |what: &str| {
-        progress(Progress { step: what.to_owned(), done, steps: STEPS });
-        done += 1;
-    };
-    step("dynamics and trajectory against references");
+    let mut steps = Steps::new(progress, 7);
+    steps.begin("dynamics and trajectory against references");
     let settings = Settings::read()?;
     let pointing = Pointing::ideal()?;
     let mut rows = vec![
@@ -96,7 +87,7 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     let (identifiability, row) = rank::identifiability(&pointing, &settings, run)?;
     rows.push(row);
 
-    step("simulating clearance");
+    steps.begin("simulating clearance");
     let record = simulation::published(&settings, &settings.bearing)?;
     let data = Data::of(&pointing, record, settings.data.discarded)?;
     let solutions = Solutions::new(&settings, run)?;
@@ -105,31 +96,30 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     let fits = Fits::new(&pointing, &data)?;
     rows.extend(fits.rows());
 
-    step("the clearance itself");
+    steps.begin("the clearance itself");
     let gaps = Gaps::new(&pointing, &settings, run)?;
     rows.extend(gaps.rows());
 
-    step("searching with both models");
+    steps.begin("searching with both models");
     let searches = Searches::new(&pointing, &settings, &data, run)?;
     rows.extend(searches.rows());
 
     rows.push(feasible::row(&pointing, &data, &searches, settings.data.torque_noise)?);
 
-    step("noise and other bearings");
+    steps.begin("noise and other bearings");
     let noise = NoiseStudy::new(&pointing, &data, run)?;
     rows.push(noise.row());
     let sweeps = Sweeps::new(&pointing, &settings, run)?;
     rows.extend(sweeps.rows());
 
-    step("designing trajectories");
+    steps.begin("designing trajectories");
     let designs = Designs::new(&pointing, &settings, run)?;
     rows.push(excitation::row(&designs));
     let excitations = Excitations::new(&pointing, &settings, &designs, run)?;
     rows.push(excitations.row());
-    rows.sort_by_key(|r| (r.id.parse::<u32>().unwrap_or(u32::MAX), r.id.clone()));
 
-    step("report");
-    let record = StudyRecord::new(NAME, run, rows, &DRAWN);
+    steps.begin("report");
+    let record = StudyRecord::new(STUDY.name, run, rows, &DRAWN);
     let report = report::Contents {
         pointing: &pointing,
         settings: &settings,

@@ -1,22 +1,24 @@
 //! Figures of the simulation and of what is identified from it.
 
+use std::borrow::Borrow;
+
 use dynid::estimators::search::SearchResult;
 use dynid::report::{Chart, ChartCurve, CurveStyle};
 
 use super::data::{Data, Knowledge};
-use super::figures::{axis, curve, logarithmic};
 use super::parameters::{PARAMETERS, Parameters};
 use super::pointing::JOINTS;
 use super::search::{Pair, Searches};
 use super::simulation::Closeup;
 use super::sweep::{Sweeps, Variant};
+use crate::page::{self, axis, curve, logarithmic};
 use crate::statistics::median;
 
 /// Points of a curve over a whole period.
 const POINTS: usize = 1571;
 
-fn over(time: &[f64], signal: impl IntoIterator<Item = f64>) -> Vec<[f64; 2]> {
-    time.iter().zip(signal).map(|(t, x)| [*t, x]).take(POINTS).collect()
+fn over(time: &[f64], signal: impl IntoIterator<Item = impl Borrow<f64>>) -> Vec<[f64; 2]> {
+    page::over(time, signal.into_iter().take(POINTS))
 }
 
 /// Median over seeds of the best objective after so many evaluations.
@@ -66,11 +68,11 @@ pub(super) fn torques(data: &Data, searches: &Searches) -> Vec<Chart> {
     let mut charts = Vec::new();
     for joint in 0..JOINTS {
         let measured = data.joint(&searches.torque, joint);
-        let mut curves = vec![curve("measured", over(time, measured.iter().copied()), CurveStyle::Dots)];
+        let mut curves = vec![curve("measured", over(time, measured), CurveStyle::Dots)];
         let mut errors = Vec::new();
         for (name, torque) in &models {
             let own = data.joint(torque, joint);
-            curves.push(curve(name, over(time, own.iter().copied()), CurveStyle::Line));
+            curves.push(curve(name, over(time, own), CurveStyle::Line));
             let error = measured.iter().zip(own).map(|(m, p)| m - p);
             errors.push(curve(name, over(time, error), CurveStyle::Line));
         }
@@ -155,9 +157,8 @@ pub(super) fn journals(data: &Data, landing: &Closeup, swing: &Closeup, clearanc
     let mut ringing = swinging;
     ringing.push(curve("joint 1, samples of the data", sampled(0), CurveStyle::Dashed));
     let time = data.counted(&data.record.time);
-    let friction = joints(|joint| {
-        curve(&joint_name(joint), over(time, data.friction[joint].iter().copied()), CurveStyle::Line)
-    });
+    let friction =
+        joints(|joint| curve(&joint_name(joint), over(time, &data.friction[joint]), CurveStyle::Line));
     let of_time = |title: &str, note: &str, unit: &str, y, curves| Chart {
         title: title.into(),
         note: note.into(),
@@ -192,7 +193,7 @@ pub(super) fn journals(data: &Data, landing: &Closeup, swing: &Closeup, clearanc
             "ms",
             axis("normal force", "N"),
             joints(|joint| {
-                let force = early.journals[joint].normal_force.iter().copied();
+                let force = early.journals[joint].normal_force.iter();
                 curve(&joint_name(joint), over(&milliseconds, force), CurveStyle::Line)
             }),
         ),
@@ -216,7 +217,7 @@ pub(super) fn journals(data: &Data, landing: &Closeup, swing: &Closeup, clearanc
             "s",
             axis("normal force", "N"),
             joints(|joint| {
-                let force = data.counted(&data.record.journals[joint].normal_force).iter().copied();
+                let force = data.counted(&data.record.journals[joint].normal_force).iter();
                 curve(&joint_name(joint), over(time, force), CurveStyle::Line)
             }),
         ),

@@ -1,6 +1,6 @@
 //! The study's report.
 
-use dynid::report::{Chosen, Provenance, StudyReport, StudySection, StudyTable, Value};
+use dynid::report::{StudyReport, StudySection, Value};
 
 use super::data::Data;
 use super::excitation::{Designed, Designs};
@@ -16,7 +16,8 @@ use super::settings::Settings;
 use super::simulation::Solutions;
 use super::sweep::Sweeps;
 use super::trajectory::travel;
-use super::{TITLE, figures, table as table3};
+use super::{STUDY, figures, table as table3};
+use crate::page::{table, text};
 use crate::{StudyError, StudyRecord};
 
 /// What the report is made of.
@@ -35,53 +36,32 @@ pub(super) struct Contents<'a> {
     pub(super) gaps: &'a Gaps,
 }
 
-pub(super) fn text(words: &str) -> Value {
-    Value::from(words)
-}
-
-pub(super) fn table(caption: &str, head: &[&str], rows: Vec<Vec<Value>>) -> StudyTable {
-    StudyTable { caption: caption.into(), head: head.iter().map(|h| (*h).to_owned()).collect(), rows }
-}
-
 impl Contents<'_> {
     pub(super) fn report(&self, record: &StudyRecord) -> Result<StudyReport, StudyError> {
-        Ok(StudyReport {
-            title: TITLE.into(),
-            verdict: record.verdict(),
-            warnings: Vec::new(),
-            introduction: vec![
-                "Two axes that cross, X over Y, with clearance in both joints: the journals are offset from the centres of their \
-                 bearings. The paper identifies 11 inertial parameters from torques on a Fourier trajectory."
-                    .into(),
-                "The paper gives neither the length between the axes nor the frequency of the trajectory. What stands in for them \
-                 is a decision, listed in the study's `README.md`. Joints with clearance are trees with two slides in front of \
-                 every joint."
-                    .into(),
-            ],
-            rows: record.report_rows(),
-            sections: vec![
-                self.simulation_section()?,
-                self.gaps.section(),
-                self.search_section(),
-                self.table_section(),
-                self.base_section(self.fits, self.noise),
-                self.beyond_section(self.excitations, self.sweeps),
-                self.identifiability_section()?,
-                self.trajectory_section()?,
-            ],
-            provenance: Provenance {
-                version: dynid::VERSION.into(),
-                seed: Some(record.seed),
-                settings: vec![Chosen::given("quick run", record.quick, "")],
-                ..Provenance::default()
-            },
-        })
+        let introduction = [
+            "Two axes that cross, X over Y, with clearance in both joints: the journals are offset from the centres of their \
+             bearings. The paper identifies 11 inertial parameters from torques on a Fourier trajectory.",
+            "The paper gives neither the length between the axes nor the frequency of the trajectory. What stands in for them \
+             is a decision, listed in the study's `README.md`. Joints with clearance are trees with two slides in front of \
+             every joint.",
+        ];
+        let sections = vec![
+            self.simulation_section()?,
+            self.gaps.section(),
+            self.search_section(),
+            self.table_section(),
+            self.base_section(self.fits, self.noise),
+            self.beyond_section(self.excitations, self.sweeps),
+            self.identifiability_section()?,
+            self.trajectory_section()?,
+        ];
+        Ok(record.page(STUDY, &introduction, sections))
     }
 
     fn trajectory_section(&self) -> Result<StudySection, StudyError> {
         let designs = self.designs;
         let moves =
-            |travel: &[f64]| text(&travel.iter().map(|x| format!("{x:.4}")).collect::<Vec<_>>().join(", "));
+            |travel: &[f64]| text(travel.iter().map(|x| format!("{x:.4}")).collect::<Vec<_>>().join(", "));
         let mut drawn: Vec<(&str, &[Vec<f64>])> = vec![("Table 1", &self.settings.trajectory)];
         let mut conditions = vec![vec![
             text("Table 1"),
@@ -101,7 +81,7 @@ impl Contents<'_> {
                 Value::from(designed.conditions[0]),
                 Value::from(designed.conditions[1]),
                 moves(&designed.travel),
-                text(&random.join(", ")),
+                text(random.join(", ")),
             ]);
         }
         Ok(StudySection {
@@ -130,8 +110,8 @@ impl Contents<'_> {
         });
         let values = [&found.trajectory, &found.random].map(|report| &report.singular_values);
         let singular = (0..PARAMETERS).map(|k| {
-            let cell = |of: &Vec<f64>| text(&of.get(k).map_or_else(String::new, |s| format!("{s:.1e}")));
-            vec![text(&(k + 1).to_string()), cell(values[0]), cell(values[1])]
+            let cell = |of: &Vec<f64>| text(of.get(k).map_or_else(String::new, |s| format!("{s:.1e}")));
+            vec![text((k + 1).to_string()), cell(values[0]), cell(values[1])]
         });
         Ok(StudySection {
             title: "What ideal joints show".into(),

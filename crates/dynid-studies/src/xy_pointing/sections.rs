@@ -8,11 +8,12 @@ use super::fit::{Fits, SYMBOLS};
 use super::noise::{LEVELS, NoiseStudy};
 use super::parameters::{NAMES, PARAMETERS};
 use super::plots;
-use super::report::{Contents, table, text};
+use super::report::Contents;
 use super::search::{Contestant, Searches};
 use super::simulation::{Closeup, TOLERANCE};
 use super::sweep::{Sweeps, Variant};
 use crate::StudyError;
+use crate::page::{table, text};
 use crate::statistics::median;
 
 /// From when to when close-ups go, s: the landing, and the swing later on.
@@ -20,7 +21,7 @@ const LANDING: [f64; 2] = [0.0, 0.012];
 const SWING: [f64; 2] = [1.0, 1.15];
 
 fn exponential(x: f64) -> Value {
-    text(&format!("{x:.2e}"))
+    text(format!("{x:.2e}"))
 }
 
 impl Contents<'_> {
@@ -46,14 +47,14 @@ impl Contents<'_> {
         let solutions = self.solutions;
         let (evaluations, error) = solutions.collocation;
         let mut rows = vec![vec![
-            text(&format!("implicit, steps for a tolerance of {TOLERANCE:.0e}")),
-            text(&evaluations.to_string()),
+            text(format!("implicit, steps for a tolerance of {TOLERANCE:.0e}")),
+            text(evaluations.to_string()),
             exponential(error),
         ]];
         for (step, found) in &solutions.explicit {
             rows.push(vec![
-                text(&format!("Runge-Kutta, {step:.0e} s")),
-                text(&found.map_or("broke down".to_owned(), |f| f.0.to_string())),
+                text(format!("Runge-Kutta, {step:.0e} s")),
+                text(found.map_or("broke down".to_owned(), |f| f.0.to_string())),
                 found.map_or_else(|| text("-"), |f| exponential(f.1)),
             ]);
         }
@@ -138,7 +139,7 @@ impl Contents<'_> {
         let spreads = (0..SYMBOLS.len()).map(|k| {
             let of = strongest.iter().flat_map(|s| {
                 let first = if s.knowledge == Knowledge::Clearance { s.deviation[k] } else { s.bias[k] };
-                let share = text(&format!("{:.0} %", 100.0 * s.coverage[k]));
+                let share = text(format!("{:.0} %", 100.0 * s.coverage[k]));
                 [exponential(first), exponential(s.stated[k]), share]
             });
             std::iter::once(text(SYMBOLS[k])).chain(of).collect()
@@ -192,8 +193,8 @@ impl Contents<'_> {
         let row = |v: &Variant| {
             vec![
                 text(&v.name),
-                text(&format!("{:.3}, {:.3}", 1e6 * v.penetration[0], 1e6 * v.penetration[1])),
-                text(&v.onsets.to_string()),
+                text(format!("{:.3}, {:.3}", 1e6 * v.penetration[0], 1e6 * v.penetration[1])),
+                text(v.onsets.to_string()),
                 Value::from(v.swing_hz),
                 Value::from(v.ringing[0]),
                 Value::from(100.0 * v.ideal[0]),

@@ -3,10 +3,10 @@
 use std::io::{self, IsTerminal};
 
 use dynid::online::{Event, Moved, ParameterValue};
+use dynid_terminal::message::note;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::commands::table;
-use crate::message::note;
 
 /// Parameters of the live view; more do not fit on a screen.
 const SHOWN: usize = 24;

@@ -86,8 +86,6 @@ fn laws_and_settings_are_refused() {
             "",
         ),
         case("other", "", "study nonsense", &["`nonsense`", "er16"], "study list"),
-        case("taken", "a file", "study er16 --quick --out taken", &["taken"], ""),
-        case("taken", "a file", "study er16 --quick --out taken/deeper", &["taken"], ""),
         case(
             "other",
             "",

@@ -14,11 +14,11 @@ use dynid::io::output::{OutputError, OutputSet};
 use crate::args::ForceArgs;
 use crate::message::{self, Failure, note};
 use origin::Origin;
-pub(crate) use origin::{marked_roff, marked_toml, marked_xml};
+pub use origin::{marked_roff, marked_toml, marked_xml};
 
 /// Files that a command is about to write, by their numbers.
 #[derive(Debug)]
-pub(crate) struct Outputs {
+pub struct Outputs {
     set: OutputSet,
     /// Number in the set; `None` for standard output.
     places: Vec<Option<usize>>,
@@ -27,7 +27,7 @@ pub(crate) struct Outputs {
 }
 
 /// Whether a path stands for standard output.
-pub(crate) fn is_stdout(path: &Path) -> bool {
+pub fn is_stdout(path: &Path) -> bool {
     path == Path::new("-")
 }
 
@@ -37,7 +37,7 @@ pub(crate) fn is_stdout(path: &Path) -> bool {
 ///
 /// # Errors
 /// A missing folder, a folder in the place of a file, one file named twice, an input, what cannot be written, what dynid did not write.
-pub(crate) fn prepare_files(
+pub fn prepare_files(
     outputs: &[(&str, &Path)],
     inputs: &[&Path],
     force: ForceArgs,
@@ -58,11 +58,7 @@ pub(crate) fn prepare_files(
 ///
 /// # Errors
 /// As [`prepare_files`]; something that is no folder in the place of the folder or of a parent.
-pub(crate) fn prepare_folder(
-    files: &[PathBuf],
-    inputs: &[&Path],
-    force: ForceArgs,
-) -> Result<Outputs, Failure> {
+pub fn prepare_folder(files: &[PathBuf], inputs: &[&Path], force: ForceArgs) -> Result<Outputs, Failure> {
     if let Some(file) = files.iter().find(|file| file.parent().is_some_and(is_stdout)) {
         let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
         return Err(Failure::Usage(
@@ -88,7 +84,7 @@ pub(crate) fn prepare_folder(
 ///
 /// # Errors
 /// The first such output.
-pub(crate) fn check(outputs: &[(&str, &Path)], inputs: &[&Path]) -> Result<(), Failure> {
+pub fn check(outputs: &[(&str, &Path)], inputs: &[&Path]) -> Result<(), Failure> {
     let files: Vec<(&str, &Path)> = outputs.iter().filter(|(_, path)| !is_stdout(path)).copied().collect();
     for (k, (argument, path)) in files.iter().enumerate() {
         if path.is_dir() {
@@ -145,7 +141,7 @@ fn prepare(outputs: &[(&str, &Path)]) -> Result<Outputs, Failure> {
 
 impl Outputs {
     /// Whether standard output is taken by a file.
-    pub(crate) fn take_stdout(&self) -> bool {
+    pub fn take_stdout(&self) -> bool {
         self.places.contains(&None)
     }
 
@@ -153,7 +149,7 @@ impl Outputs {
     ///
     /// # Panics
     /// If there is none.
-    pub(crate) fn staged(&self, number: usize) -> &Path {
+    pub fn staged(&self, number: usize) -> &Path {
         let place = self.places[number].unwrap_or_else(|| unreachable!("a file of a folder"));
         self.set.staged(place)
     }
@@ -165,7 +161,7 @@ impl Outputs {
     ///
     /// # Panics
     /// If there is none.
-    pub(crate) fn write(&self, number: usize, bytes: &[u8]) -> Result<(), Failure> {
+    pub fn write(&self, number: usize, bytes: &[u8]) -> Result<(), Failure> {
         match self.places[number] {
             Some(place) => self.set.write(place, bytes)?,
             None => self.printed.borrow_mut().extend_from_slice(bytes),
@@ -180,7 +176,7 @@ impl Outputs {
     ///
     /// # Panics
     /// If there is none.
-    pub(crate) fn write_table<H: AsRef<str>, C: AsRef<[f64]>>(
+    pub fn write_table<H: AsRef<str>, C: AsRef<[f64]>>(
         &self,
         number: usize,
         header: &[H],
@@ -197,7 +193,7 @@ impl Outputs {
     ///
     /// # Errors
     /// What cannot be written.
-    pub(crate) fn publish(self) -> Result<Vec<PathBuf>, Failure> {
+    pub fn publish(self) -> Result<Vec<PathBuf>, Failure> {
         let written = self.set.publish()?;
         let printed = self.printed.into_inner();
         if !printed.is_empty() {

@@ -17,10 +17,11 @@ const OPEN: &str = "{spinner} [{elapsed}] {msg}";
 const COUNTED: &str = "{spinner} [{elapsed}] {bar:30} {pos}/{len} {msg}";
 
 /// Shows what is being worked on, in a line that goes with it; silent unless stderr is a terminal.
-pub(crate) struct Progress(ProgressBar);
+pub struct Progress(ProgressBar);
 
 impl Progress {
-    pub(crate) fn new(quiet: bool) -> Self {
+    /// A line that is shown, unless the user asked for quiet.
+    pub fn new(quiet: bool) -> Self {
         if quiet || !std::io::stderr().is_terminal() {
             return Progress(ProgressBar::hidden());
         }
@@ -31,12 +32,12 @@ impl Progress {
     }
 
     /// The work in words.
-    pub(crate) fn doing(&self, what: impl Into<String>) {
+    pub fn doing(&self, what: impl Into<String>) {
         self.0.set_message(what.into());
     }
 
     /// Steps done, of how many, and the work in words.
-    pub(crate) fn counted(&self, done: usize, of: usize, what: impl Into<String>) {
+    pub fn counted(&self, done: usize, of: usize, what: impl Into<String>) {
         if self.0.length() != Some(of as u64) {
             self.0.set_length(of as u64);
             restyle(&self.0, COUNTED);
@@ -46,7 +47,7 @@ impl Progress {
     }
 
     /// A step of an identification; what the one before it freed goes back to the system first.
-    pub(crate) fn step(&self, step: Step) {
+    pub fn step(&self, step: Step) {
         memory::give_back();
         self.doing(match step {
             Step::Read(file) => format!("reading {file}"),
@@ -67,7 +68,7 @@ impl Progress {
     }
 
     /// A step of a friction experiment.
-    pub(crate) fn friction(&self, step: FrictionStep) {
+    pub fn friction(&self, step: FrictionStep) {
         self.doing(match step {
             FrictionStep::Read(file) => format!("reading {file}"),
             FrictionStep::Law(joint) => format!("fitting friction of {joint}"),
@@ -76,7 +77,7 @@ impl Progress {
     }
 
     /// A step of a design.
-    pub(crate) fn design(&self, step: DesignStep) {
+    pub fn design(&self, step: DesignStep) {
         match step {
             DesignStep::Starts { ended, of, best } => {
                 let best =

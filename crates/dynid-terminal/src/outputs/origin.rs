@@ -77,7 +77,7 @@ fn ends(path: &Path) -> std::io::Result<String> {
 }
 
 /// An XML text with a comment at its end that says who wrote it; all else stays byte for byte.
-pub(crate) fn marked_xml(text: &str) -> String {
+pub fn marked_xml(text: &str) -> String {
     if text.contains(MARK) {
         return text.to_owned();
     }
@@ -86,12 +86,12 @@ pub(crate) fn marked_xml(text: &str) -> String {
 }
 
 /// A TOML text with a comment at its beginning that says who wrote it.
-pub(crate) fn marked_toml(text: &str) -> String {
+pub fn marked_toml(text: &str) -> String {
     if text.contains(MARK) { text.to_owned() } else { format!("# {MARK}\n{text}") }
 }
 
 /// A manual page with a comment at its end that says who wrote it.
-pub(crate) fn marked_roff(mut page: Vec<u8>) -> Vec<u8> {
+pub fn marked_roff(mut page: Vec<u8>) -> Vec<u8> {
     page.extend_from_slice(format!(".\\\" {MARK}\n").as_bytes());
     page
 }

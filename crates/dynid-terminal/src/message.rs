@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 /// Why a command ended early.
 #[derive(Debug)]
-pub(crate) enum Failure {
+pub enum Failure {
     /// Bad input, with a hint.
     Input(Box<dynid::Error>),
     /// Bad usage that the argument parser cannot see: what is wrong, what to do about it.
@@ -24,9 +24,24 @@ impl<E: Into<dynid::Error>> From<E> for Failure {
     }
 }
 
+/// The end of a program: what became of its command line, and of the command.
+///
+/// Help and version are asked for and go to stdout; the parser's exit code of misuse is 2.
+pub fn end(outcome: Result<Result<u8, Failure>, clap::Error>) -> ExitCode {
+    match outcome {
+        Ok(Ok(code)) => ExitCode::from(code),
+        Ok(Err(failure)) => failure.report(),
+        Err(error) => {
+            let code = u8::try_from(error.exit_code()).unwrap_or(2);
+            let _ = error.print();
+            ExitCode::from(code)
+        }
+    }
+}
+
 impl Failure {
     /// Tells the user and gives the exit code.
-    pub(crate) fn report(self) -> ExitCode {
+    pub fn report(self) -> ExitCode {
         let (text, hint) = match self {
             Failure::Closed => return ExitCode::SUCCESS,
             Failure::Input(error) => (error.to_string(), error.hint()),
@@ -44,12 +59,12 @@ impl Failure {
 }
 
 /// Writes text to stdout; a reader that has gone is no error.
-pub(crate) fn data(text: &str) -> Result<(), Failure> {
+pub fn data(text: &str) -> Result<(), Failure> {
     bytes(text.as_bytes())
 }
 
 /// Writes bytes to stdout; a reader that has gone is no error.
-pub(crate) fn bytes(bytes: &[u8]) -> Result<(), Failure> {
+pub fn bytes(bytes: &[u8]) -> Result<(), Failure> {
     match while_read(bytes) {
         Err(Failure::Closed) => Ok(()),
         written => written,
@@ -69,35 +84,36 @@ fn while_read(bytes: &[u8]) -> Result<(), Failure> {
 
 /// What a command tells beside its result, on stderr; nothing if it was asked to be quiet.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Notes {
+pub struct Notes {
     quiet: bool,
 }
 
 impl Notes {
-    pub(crate) fn new(quiet: bool) -> Self {
+    /// Notes, or none if the user asked for quiet.
+    pub fn new(quiet: bool) -> Self {
         Notes { quiet }
     }
 
     /// Tells a line.
-    pub(crate) fn tell(self, text: &str) {
+    pub fn tell(self, text: &str) {
         if !self.quiet {
             note(text);
         }
     }
 
     /// Tells what a user should know of the result.
-    pub(crate) fn warnings<'a>(self, warnings: impl IntoIterator<Item = &'a String>) {
+    pub fn warnings<'a>(self, warnings: impl IntoIterator<Item = &'a String>) {
         warnings.into_iter().for_each(|warning| self.tell(&format!("warning: {warning}")));
     }
 
     /// Tells which files appeared.
-    pub(crate) fn written(self, files: &[PathBuf]) {
+    pub fn written(self, files: &[PathBuf]) {
         files.iter().for_each(|file| self.tell(&format!("written: {}", file.display())));
     }
 }
 
 /// Writes a line for people to stderr.
-pub(crate) fn note(text: &str) {
+pub fn note(text: &str) {
     // A closed stderr is the user's choice.
     let _ = writeln!(io::stderr().lock(), "{}", printable(text));
 }
@@ -113,7 +129,7 @@ fn printable(text: &str) -> Cow<'_, str> {
 }
 
 /// Prints a value as a line of JSON.
-pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
+pub fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
     data(&line(value)?)
 }
 
@@ -121,7 +137,7 @@ pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
 ///
 /// # Errors
 /// [`Failure::Closed`] once nobody reads any more.
-pub(crate) fn json_while_read(value: &impl serde::Serialize) -> Result<(), Failure> {
+pub fn json_while_read(value: &impl serde::Serialize) -> Result<(), Failure> {
     while_read(line(value)?.as_bytes())
 }
 

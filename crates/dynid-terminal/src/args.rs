@@ -4,19 +4,19 @@ use clap::Args;
 
 /// What is printed.
 #[derive(Debug, Clone, Copy, Args)]
-pub(crate) struct PrintArgs {
+pub struct PrintArgs {
     /// Print JSON in place of text.
     #[arg(long)]
-    pub(crate) json: bool,
+    pub json: bool,
     /// Print nothing but the result and errors: no progress, notes or warnings.
     #[arg(long, short)]
-    pub(crate) quiet: bool,
+    pub quiet: bool,
 }
 
 /// Which files may be replaced.
 #[derive(Debug, Clone, Copy, Args)]
-pub(crate) struct ForceArgs {
+pub struct ForceArgs {
     /// Replace files that are not known to come from dynid.
     #[arg(long)]
-    pub(crate) force: bool,
+    pub force: bool,
 }
