@@ -97,7 +97,7 @@ function!(
 );
 function!(
     /// `1 - e^-x` for `x >= 0`, exact for small `x` too.
-    Rise, |x, f| -(-x).exp_m1(), decay(x), -decay(x)
+    Rise, |x, f| elementary::rise(x), decay(x), -decay(x)
 );
 function!(
     /// `e^x`.
@@ -171,7 +171,7 @@ impl FunctionOfTwo for Power {
         } else if p == 1.0 {
             x
         } else {
-            x.powf(p)
+            elementary::power(x, p)
         }
     }
     #[inline(always)]
@@ -188,12 +188,12 @@ impl FunctionOfTwo for Power {
     }
     #[inline(always)]
     fn by_second(self, x: f64, _: f64, f: f64) -> f64 {
-        if x > 0.0 { f * x.ln() } else { 0.0 }
+        if x > 0.0 { f * elementary::logarithm(x) } else { 0.0 }
     }
     #[inline(always)]
     fn bends(self, x: f64, p: f64, f: f64) -> [f64; 3] {
         if x > 0.0 {
-            let (log, per) = (x.ln(), f / x);
+            let (log, per) = (elementary::logarithm(x), f / x);
             [p * (p - 1.0) * per / x, per * (1.0 + p * log), f * log * log]
         } else {
             [if p == 2.0 { 2.0 } else { 0.0 }, if p == 1.0 { 1.0 } else { 0.0 }, 0.0]
