@@ -647,7 +647,7 @@ fn load_robot(config: &Config) -> Result<Robot, Error> {
         floating_base: false,
         locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
     };
-    Robot::load(&config.robot, &options)
+    Ok(Robot::load(&config.robot, &options)?.with_registry(config.registry.clone()))
 }
 
 fn open_robot(config: &Config, robot: Robot, progress: &mut dyn FnMut(Step)) -> Result<Opened, Error> {

@@ -17,6 +17,7 @@ pub mod laws;
 mod linearised;
 mod log_scaled;
 mod payload;
+mod registry;
 mod rotor;
 mod shape;
 mod transmission;
@@ -39,6 +40,9 @@ pub use law::{AtJoint, LinearTerm, ShapeScale, ShapeTerm, Velocity, VelocityLaw,
 pub use linearised::{Linearised, change_name};
 pub use log_scaled::{LogScaled, ScaledPart, scale_name};
 pub use payload::{KnownLoad, Payload};
+pub use registry::{
+    Candidate, ElementKind, ElementRegistry, OptionTerm, OptionValue, Placement, RegistryFault, StatedTerm,
+};
 pub use rotor::RotorInertia;
 pub use shape::{ShapeFault, ShapeSetting};
 pub use transmission::{CoupledWrist, Transmission};

@@ -107,7 +107,7 @@ pub fn check(config: &Config, progress: &mut dyn FnMut(&str)) -> Result<Check, E
         floating_base: false,
         locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
     };
-    let robot = Robot::load(&config.robot, &options)?;
+    let robot = Robot::load(&config.robot, &options)?.with_registry(config.registry.clone());
     let mut out = Check {
         robot: config.robot.display().to_string(),
         findings: Vec::new(),

@@ -6,7 +6,6 @@ use crate::Error;
 use crate::caution::{self, Caution};
 use crate::config::{Config, Friction, Own, PayloadConfig, ShapeConfig};
 use crate::elements::ElementPlan;
-use crate::log_terms;
 
 /// Refuses them.
 ///
@@ -16,7 +15,7 @@ pub(super) fn check(config: &Config, plan: &ElementPlan, model: &RobotModel) -> 
     for own in config.log.iter().flat_map(|log| &log.own) {
         let acts = |element: &String| match own {
             Own::Offset => element == "offset",
-            Own::Friction | Own::FrictionScale => log_terms::is_friction(element),
+            Own::Friction | Own::FrictionScale => plan.registry().is_friction(element),
             Own::Delay => true,
         };
         if !matches!(own, Own::Delay) && !plan.per_rate.iter().flatten().any(acts) {

@@ -51,7 +51,7 @@ impl Structure {
             floating_base: false,
             locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
         };
-        let mut robot = Robot::load(&config.robot, &options)?;
+        let mut robot = Robot::load(&config.robot, &options)?.with_registry(config.registry.clone());
         refuse_loops(&robot, "identified on line")?;
         if robot.mechanism.positions() != robot.mechanism.rates() {
             return Err(Error::Unsupported(
