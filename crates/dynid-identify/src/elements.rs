@@ -2,7 +2,6 @@
 
 pub mod clearance;
 mod elastic;
-pub mod friction;
 mod model;
 mod pairs;
 mod settings;
@@ -18,9 +17,8 @@ use dynid_io::{
 };
 use dynid_model::closed::ClosedMechanism;
 use dynid_model::element::{
-    AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, DriveGain, ExternalLoad, JointElement,
-    JointInfo, LoadFriction, LogScaled, Offset, RotorInertia, Spring, Transmission, Viscous,
-    ViscousMagnitude,
+    Candidate, CoupledWrist, ElementKind, ElementRegistry, JointElement, JointInfo, LoadFriction, LogScaled,
+    Transmission,
 };
 use dynid_model::{Coordinate, JointKind, Mechanism};
 use dynid_rows::conditioning::{FrictionShape, ShapeKind};
@@ -28,31 +26,6 @@ use dynid_rows::conditioning::{FrictionShape, ShapeKind};
 use crate::Error;
 use crate::known_friction::KnownFriction;
 use crate::log_terms::LogTerms;
-
-/// Element names that a robot file or a configuration may use.
-pub const NAMES: [&str; 21] = [
-    "coulomb",
-    "viscous",
-    "offset",
-    "asymmetric",
-    "rotor",
-    "spring",
-    "cyclic",
-    "drive_gain",
-    "stribeck",
-    "arctangent",
-    "tanh",
-    "sigmoid",
-    "sigmoid_offset",
-    "power",
-    "viscous_magnitude",
-    "load",
-    "exponential_viscous",
-    "lugre",
-    "stribeck_viscous",
-    "external_load",
-    "elastic",
-];
 
 /// Friction that grows with the load of the gear.
 pub const LOAD: &str = "load";
@@ -106,7 +79,7 @@ impl ElementPlan {
         moves: impl Fn(usize) -> bool,
     ) -> Result<Self, Error> {
         elastic::check(mechanism, &spec.elastic)?;
-        settings::check(&spec.settings)?;
+        settings::check(&spec.registry, &spec.settings)?;
         let mut plan = ElementPlan {
             per_rate: Vec::new(),
             coordinates: elastic::coordinates(mechanism, &spec.elastic),
@@ -172,7 +145,8 @@ impl ElementPlan {
     /// # Errors
     /// [`Error::UnknownJoint`], [`Error::Elastic`].
     pub fn bare(mechanism: &Mechanism, spec: &ElementSpec) -> Result<Self, Error> {
-        let spec = ElementSpec { elastic: spec.elastic.clone(), ..ElementSpec::default() };
+        let ElementSpec { elastic, registry, .. } = spec.clone();
+        let spec = ElementSpec { elastic, registry, ..ElementSpec::default() };
         ElementPlan::new(mechanism, &spec, Some(&[]), |_| false)
     }
 
@@ -186,6 +160,11 @@ impl ElementPlan {
         ElementPlan { log_terms: LogTerms::default(), ..self.clone() }
     }
 
+    /// The kinds of elements that its names are of.
+    pub fn registry(&self) -> &ElementRegistry {
+        &self.spec.registry
+    }
+
     /// Settings of the elements.
     pub fn settings(&self) -> &[dynid_io::ElementSetting] {
         &self.spec.settings
@@ -197,15 +176,16 @@ impl ElementPlan {
         let names = self.names(mechanism);
         for ((joint, list), speed) in names.iter().zip(&self.per_rate).zip(speeds) {
             let Some(speed) = speed.filter(|v| v.is_finite() && *v > 0.0) else { continue };
-            for element in list.iter().filter(|name| friction::scales(name)) {
+            let scales = |name: &&String| self.spec.registry.kind(name).is_some_and(ElementKind::scales);
+            for element in list.iter().filter(scales) {
                 let is_speed = |s: &ElementSetting| {
-                    s.joint == *joint && s.element == *element && s.key == friction::SPEED
+                    s.joint == *joint && s.element == *element && s.key == settings::SPEED
                 };
                 if !self.spec.settings.iter().any(is_speed) {
                     self.spec.settings.push(ElementSetting {
                         joint: joint.clone(),
                         element: element.clone(),
-                        key: friction::SPEED.to_owned(),
+                        key: settings::SPEED.to_owned(),
                         value: SettingValue::Number(speed),
                     });
                 }
@@ -217,16 +197,21 @@ impl ElementPlan {
     /// Pairs of elements at a joint that only a suitable motion tells apart.
     pub fn alike(&self, mechanism: &Mechanism) -> Vec<AlikeElements> {
         let names = self.names(mechanism);
-        names.iter().zip(&self.per_rate).flat_map(|(joint, list)| pairs::alike(joint, list)).collect()
+        names
+            .iter()
+            .zip(&self.per_rate)
+            .flat_map(|(joint, list)| pairs::alike(self.registry(), joint, list))
+            .collect()
     }
 
-    /// Adds a friction shape to a joint, its speed the start of a search within a factor of 3. Stribeck friction takes
-    /// the place of Coulomb friction.
+    /// Adds a friction shape to a joint, its speed the start of a search within a factor of 3. Its element may take the place of
+    /// another ([`Candidate::instead_of`]).
     pub(crate) fn add_shape(&mut self, rate: usize, joint: &str, shape: &FrictionShape) {
         let (name, key) = shape_element(shape.kind);
         let list = &mut self.per_rate[rate];
-        match list.iter_mut().find(|n| name == "stribeck" && *n == "coulomb") {
-            Some(coulomb) => *coulomb = name.to_owned(),
+        let instead = candidate(&self.spec.registry, shape.kind).and_then(|c| c.instead_of);
+        match list.iter_mut().find(|n| Some(n.as_str()) == instead) {
+            Some(other) => *other = name.to_owned(),
             None => list.push(name.to_owned()),
         }
         for (field, value) in
@@ -246,9 +231,9 @@ impl ElementPlan {
         let (name, _) = shape_element(shape.kind);
         let list = &mut self.per_rate[rate];
         if let Some(place) = list.iter().position(|n| *n == name) {
-            match name {
-                "stribeck" => list[place] = "coulomb".to_owned(),
-                _ => drop(list.remove(place)),
+            match candidate(&self.spec.registry, shape.kind).and_then(|c| c.instead_of) {
+                Some(other) => list[place] = other.to_owned(),
+                None => drop(list.remove(place)),
             }
         }
         self.spec.settings.retain(|s| !(s.joint == joint && s.element == name));
@@ -267,10 +252,11 @@ impl ElementPlan {
         let names = self.names(mechanism);
         let mut out: Vec<Box<dyn JointElement>> = Vec::new();
         for (rate, list) in self.per_rate.iter().enumerate() {
-            pairs::check(&names[rate], list)?;
+            pairs::check(self.registry(), &names[rate], list)?;
             let speed = self.limits(mechanism, rate).velocity;
-            for name in list.iter().filter(|name| *name != LOAD) {
-                out.push(self.element(name, rate, &names[rate], speed)?);
+            for name in list {
+                let kind = settings::kind(self.registry(), name, &names[rate])?;
+                out.extend(settings::place(kind, rate, &names[rate], speed, &self.spec.settings)?);
             }
         }
         let load = self.load(mechanism, &names)?;
@@ -286,7 +272,7 @@ impl ElementPlan {
             out.push(build_coupling(coupling, &names)?);
         }
         out.extend(self.transmissions(&names)?);
-        out.extend(self.log_terms.elements(mechanism, &self.per_rate));
+        out.extend(self.log_terms.elements(mechanism, &self.per_rate, self.registry()));
         Ok(out)
     }
 
@@ -307,44 +293,6 @@ impl ElementPlan {
             Some(why) => Err(Error::Unsupported(format!("`own = [\"friction_scale\"]` {why}"))),
             None => Ok(Box::new(LogScaled::new(friction, &joints, logs))),
         }
-    }
-
-    fn element(
-        &self,
-        name: &str,
-        rate: usize,
-        joint: &str,
-        speed: Option<f64>,
-    ) -> Result<Box<dyn JointElement>, Error> {
-        if let Some(built) = friction::build(name, rate, joint, speed, &self.spec.settings) {
-            return built;
-        }
-        Ok(match name {
-            "viscous_magnitude" => Box::new(ViscousMagnitude { rate }),
-            "coulomb" => Box::new(Coulomb { rate }),
-            "viscous" => Box::new(Viscous { rate }),
-            "offset" => Box::new(Offset { rate }),
-            "asymmetric" => Box::new(AsymmetricFriction { rate }),
-            "rotor" => Box::new(RotorInertia { rate }),
-            "spring" => Box::new(Spring { rate }),
-            "drive_gain" => Box::new(DriveGain { rate }),
-            "external_load" => {
-                let brake = self.flag(joint, name, "brake")?.unwrap_or(false);
-                Box::new(ExternalLoad { rate, brake })
-            }
-            "cyclic" => {
-                let cycles = self.number(joint, "cyclic", "cycles").unwrap_or(1.0);
-                if cycles <= 0.0 {
-                    return Err(Error::ElementSetting {
-                        element: name.to_owned(),
-                        joint: joint.to_owned(),
-                        fault: format!("`cycles` must be positive, found {cycles}"),
-                    });
-                }
-                Box::new(CyclicTorque { rate, cycles })
-            }
-            _ => return Err(Error::UnknownElement { name: name.to_owned(), joint: joint.to_owned() }),
-        })
     }
 
     /// The loads of all gears, one element: they need the same rigid efforts.
@@ -375,45 +323,18 @@ impl ElementPlan {
         Ok(Some(Box::new(LoadFriction::new(mechanism, rates, reference.into()))))
     }
 
-    fn number(&self, joint: &str, element: &str, key: &str) -> Option<f64> {
-        self.spec.settings.iter().find_map(|s| match s.value {
-            SettingValue::Number(x) if s.joint == joint && s.element == element && s.key == key => Some(x),
-            _ => None,
-        })
-    }
-
-    fn flag(&self, joint: &str, element: &str, key: &str) -> Result<Option<bool>, Error> {
-        let own = |s: &&ElementSetting| s.joint == joint && s.element == element && s.key == key;
-        match self.spec.settings.iter().find(own).map(|s| &s.value) {
-            None => Ok(None),
-            Some(SettingValue::Flag(flag)) => Ok(Some(*flag)),
-            Some(other) => Err(Error::ElementSetting {
-                element: element.to_owned(),
-                joint: joint.to_owned(),
-                fault: format!("`{key}`: expected true or false, found {other:?}"),
-            }),
-        }
-    }
-
     /// Values that the robot file states for element parameters: `(parameter name, value)`. It states friction, not errors of
     /// known friction.
     ///
-    /// `[element.j1] rotor = { inertia = 0.4 }` states `j1.Ia`; `coulomb = { effort = .. }`, `viscous = { coefficient = .. }`
-    /// and `offset = { effort = .. }` state `fc`, `fv`, `fo`; `arctangent`, `tanh`, `sigmoid`, `sigmoid_offset` have an
-    /// `effort`, `power` and `viscous_magnitude` a `coefficient`, `stribeck` has `coulomb` and `static`; `elastic` has `k1`, `k2`, `d`.
+    /// `[element.j1] rotor = { inertia = 0.4 }` states `j1.Ia`: keys and symbols are those of the [registry](ElementKind::stated),
+    /// and `k1`, `k2`, `d` of `elastic`.
     pub fn stated_values(&self) -> Vec<(String, f64)> {
         self.spec
             .settings
             .iter()
             .filter_map(|s| {
-                let symbol = match (s.element.as_str(), s.key.as_str()) {
-                    ("rotor", "inertia") => "Ia",
-                    ("coulomb", "effort") => "fc",
-                    ("viscous", "coefficient") => "fv",
-                    ("offset", "effort") => "fo",
-                    ("external_load", "factor") => "load",
-                    (element, key) => friction::STATED.iter().find(|(e, k, _)| *e == element && *k == key)?.2,
-                };
+                let kind = self.registry().kind(&s.element)?;
+                let symbol = kind.stated.iter().find(|stated| stated.key == s.key)?.symbol;
                 match s.value {
                     SettingValue::Number(x) => Some((format!("{}.{symbol}", s.joint), x)),
                     _ => None,
@@ -425,14 +346,31 @@ impl ElementPlan {
     }
 }
 
+/// Where a friction shape is a candidate.
+fn candidate(registry: &ElementRegistry, kind: ShapeKind) -> Option<&Candidate> {
+    registry.kind(kind.element())?.candidate.as_ref()
+}
+
 /// Element of a friction shape, and the shape parameter that its speed is.
 pub(crate) fn shape_element(kind: ShapeKind) -> (&'static str, Option<&'static str>) {
-    match kind {
-        ShapeKind::ViscousMagnitude => ("viscous_magnitude", None),
-        ShapeKind::Stribeck => ("stribeck", Some("vs")),
-        ShapeKind::Tanh => ("tanh", Some("w")),
-        ShapeKind::Load => (LOAD, None),
-    }
+    let registry = ElementRegistry::default();
+    (kind.element(), candidate(&registry, kind).and_then(|candidate| candidate.speed))
+}
+
+/// Kinds of shapes that say something new beside given elements. `unloaded`: no rigid effort is to be had for a gear's load.
+pub(crate) fn shapes_beside(
+    registry: &ElementRegistry,
+    elements: &[String],
+    unloaded: bool,
+) -> Vec<ShapeKind> {
+    let has = |name: &str| elements.iter().any(|e| e == name);
+    let shaped = elements.iter().any(|name| registry.is_shaped(name));
+    let says_new = |kind: &ShapeKind| {
+        let Some(candidate) = candidate(registry, *kind) else { return false };
+        let beside = candidate.beside.iter().any(|name| has(name)) && !has(kind.element());
+        beside && !(candidate.unless_shaped && shaped) && !(*kind == ShapeKind::Load && unloaded)
+    };
+    ShapeKind::ALL.into_iter().filter(says_new).collect()
 }
 
 fn build_coupling(coupling: &CouplingSpec, names: &[String]) -> Result<Box<dyn JointElement>, Error> {

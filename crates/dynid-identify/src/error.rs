@@ -162,12 +162,14 @@ pub enum Error {
     #[error(transparent)]
     Preflight(#[from] dynid_rows::preflight::PreflightError),
     /// An element name is unknown.
-    #[error("unknown element `{name}` for joint `{joint}`, expected one of {}", crate::elements::NAMES.join(", "))]
+    #[error("unknown element `{name}` for joint `{joint}`, expected one of {}", known.join(", "))]
     UnknownElement {
         /// The name.
         name: String,
         /// The joint.
         joint: String,
+        /// Names that there are.
+        known: Vec<String>,
     },
     /// An element setting is wrong.
     #[error("element `{element}` of joint `{joint}`: {fault}")]
@@ -489,11 +491,12 @@ impl Error {
                 Some("check the time column; `rate_hz` in [columns] states a sample rate instead".to_owned())
             }
             Error::Conditioning(C::Signal(_)) => Some("record a longer log, or set cut-offs below half the sample rate".to_owned()),
-            Error::UnknownElement { .. } => Some(
-                "elements are given by --elements, under [elements] in a configuration, under [defaults] and \
-                 [element.<joint>] in a robot file"
+            Error::UnknownElement { name, known, .. } => Some(match dynid_io::closest(name, known) {
+                Some(meant) => format!("did you mean `{meant}`?"),
+                None => "elements are given by --elements, under [elements] in a configuration, under [defaults] and \
+                         [element.<joint>] in a robot file; one of a program's own is known to that program alone"
                     .to_owned(),
-            ),
+            }),
             Error::EstimateFile { .. } => {
                 Some("an estimate is the estimate.json that `dynid identify` writes".to_owned())
             }

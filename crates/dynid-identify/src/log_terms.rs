@@ -5,7 +5,7 @@
 //! ordinary columns, and a model whose gates are 0 is that of the robot alone.
 
 use dynid_model::element::{
-    Coulomb, Gated, JointElement, Offset, Payload, Viscous, log_channel, payload_channel,
+    Coulomb, ElementRegistry, Gated, JointElement, Offset, Payload, Viscous, log_channel, payload_channel,
 };
 use dynid_model::{Inertia, KnownElement, Mat3, Mechanism, Vec3};
 use dynid_motion::Log;
@@ -114,6 +114,7 @@ impl LogTerms {
         &self,
         mechanism: &Mechanism,
         per_rate: &[Vec<String>],
+        registry: &ElementRegistry,
     ) -> Vec<Box<dyn JointElement>> {
         let mut out: Vec<Box<dyn JointElement>> = Vec::new();
         for term in self.payloads.iter().filter(|term| term.known.is_none()) {
@@ -125,7 +126,7 @@ impl LogTerms {
                 let mut add = |element: Box<dyn JointElement>| out.push(Box::new(Gated::new(element, log)));
                 match own {
                     Own::Offset if names.iter().any(|n| n == "offset") => add(Box::new(Offset { rate })),
-                    Own::Friction if names.iter().any(|n| is_friction(n)) => {
+                    Own::Friction if names.iter().any(|n| registry.is_friction(n)) => {
                         add(Box::new(Coulomb { rate }));
                         add(Box::new(Viscous { rate }));
                     }
@@ -147,14 +148,6 @@ impl LogTerms {
             })
             .collect()
     }
-}
-
-/// Elements that are no friction; all others have a part that a colder gear changes.
-const NO_FRICTION: [&str; 8] =
-    ["offset", "rotor", "spring", "cyclic", "drive_gain", "external_load", "elastic", "load"];
-
-pub(crate) fn is_friction(name: &str) -> bool {
-    !NO_FRICTION.contains(&name)
 }
 
 /// Deviations of all logs, log by log.

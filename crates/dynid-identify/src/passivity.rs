@@ -4,7 +4,6 @@ use dynid_model::{EffortModel, FrictionPassivity, Passivity};
 use dynid_rows::conditioning::PreparedLog;
 
 use crate::caution::{self, Caution};
-use crate::elements::friction;
 use crate::estimate::PassivityRecord;
 use crate::pipeline::Identification;
 
@@ -71,7 +70,7 @@ impl Identification {
                 if !known
                     && !self.plan.per_rate[self.model.tree_rate(rate)]
                         .iter()
-                        .any(|name| friction::is_law(name))
+                        .any(|name| self.plan.registry().is_friction(name))
                 {
                     return None;
                 }
@@ -145,7 +144,7 @@ impl Identification {
         let (model, linear) = self.robot_alone();
         let table = &model.parameters().linear;
         let coefficient = |name: &str| match name.rsplit_once('.') {
-            Some((owner, symbol)) => owner == joint && friction::COEFFICIENTS.contains(&symbol),
+            Some((owner, symbol)) => owner == joint && self.plan.registry().is_coefficient(symbol),
             None => false,
         };
         let negative = table.iter().zip(linear).filter(|(p, value)| **value < 0.0 && coefficient(&p.name));

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use dynid_io::{ElementSpec, RobotFile};
 use dynid_model::closed::ClosedMechanism;
+use dynid_model::element::ElementRegistry;
 use dynid_model::{Description, EffortModel, JointKind, Mechanism, MechanismWarning, RobotModel};
 
 use crate::Error;
@@ -139,6 +140,13 @@ impl Robot {
         warnings.extend(robot.warnings.iter().filter(|w| !self.warnings.contains(w)).cloned());
         robot.warnings = warnings;
         Ok(robot)
+    }
+
+    /// Returns the robot with kinds of elements of a program's own among those that its joints may have.
+    pub fn with_registry(mut self, registry: ElementRegistry) -> Self {
+        self.file.elements.registry = registry.clone();
+        self.elements.registry = registry;
+        self
     }
 
     /// Returns the robot with another file.

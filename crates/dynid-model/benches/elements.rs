@@ -7,6 +7,7 @@ use dynid_model::contact::{
 };
 use dynid_model::element::{
     Arctangent, ExponentialViscous, JointElement, LuGre, ShapeSetting, Sigmoid, Stribeck, TanhFriction,
+    Viscous,
 };
 use dynid_model::*;
 
@@ -65,7 +66,101 @@ fn tanh(bencher: Bencher<'_, '_>, samples: usize) {
     refill(bencher, samples, Box::new(TanhFriction::new(0)));
 }
 
+/// Columns of an exponent other than 2.
+#[divan::bench(args = SAMPLES)]
+fn stribeck_with_an_exponent(bencher: Bencher<'_, '_>, samples: usize) {
+    refill(bencher, samples, Box::new(Stribeck { delta: free(1.4), ..Stribeck::new(0) }));
+}
+
+#[divan::bench(args = SAMPLES)]
+fn exponential_viscous(bencher: Bencher<'_, '_>, samples: usize) {
+    let law = ExponentialViscous { temperature: Some(31.0), ..ExponentialViscous::new(0) };
+    refill(bencher, samples, Box::new(law));
+}
+
+#[divan::bench(args = SAMPLES)]
+fn arctangent_by_shape(bencher: Bencher<'_, '_>, samples: usize) {
+    derive(bencher, samples, Box::new(Arctangent::new(0)));
+}
+
+#[divan::bench(args = SAMPLES)]
+fn stribeck_by_shape(bencher: Bencher<'_, '_>, samples: usize) {
+    derive(bencher, samples, Box::new(Stribeck::new(0)));
+}
+
+/// By speed and exponent.
+#[divan::bench(args = SAMPLES)]
+fn stribeck_with_an_exponent_by_shape(bencher: Bencher<'_, '_>, samples: usize) {
+    derive(bencher, samples, Box::new(Stribeck { delta: free(1.4), ..Stribeck::new(0) }));
+}
+
+#[divan::bench(args = SAMPLES)]
+fn sigmoid_by_shape(bencher: Bencher<'_, '_>, samples: usize) {
+    derive(bencher, samples, Box::new(Sigmoid::new(0)));
+}
+
+#[divan::bench(args = SAMPLES)]
+fn tanh_by_shape(bencher: Bencher<'_, '_>, samples: usize) {
+    derive(bencher, samples, Box::new(TanhFriction::new(0)));
+}
+
+#[divan::bench(args = SAMPLES)]
+fn exponential_viscous_by_shape(bencher: Bencher<'_, '_>, samples: usize) {
+    let law = ExponentialViscous { temperature: Some(31.0), ..ExponentialViscous::new(0) };
+    derive(bencher, samples, Box::new(law));
+}
+
+/// Efforts and their derivatives by velocity under a smooth sign, as designs take them.
+#[divan::bench(args = SAMPLES)]
+fn friction_by_velocity(bencher: Bencher<'_, '_>, samples: usize) {
+    let elements: Vec<Box<dyn JointElement>> = vec![
+        Box::new(Stribeck::new(0)),
+        Box::new(Viscous { rate: 0 }),
+        Box::new(TanhFriction::new(0)),
+        Box::new(Arctangent::new(0)),
+    ];
+    let model = one_joint(elements);
+    let (v, rest) = (speeds(samples), vec![0.0; samples]);
+    let motion = MotionBlock { sign_width: 0.05, ..MotionBlock::plain(samples, &rest, &v, &rest) };
+    let shape = model.parameters().shape_start();
+    let linear = vec![1.0; model.parameters().linear.len()];
+    let weights = vec![1.0; samples];
+    bencher.counter(ItemsCount::new(samples)).bench_local(|| {
+        let mut out = MotionAdjoint::new(1, 1, samples);
+        model.effort_adjoint(black_box(&motion), &shape, &linear, samples, &weights, &mut out);
+        black_box(&out);
+    });
+}
+
+fn free(start: f64) -> ShapeSetting {
+    ShapeSetting { start, lower: 0.5 * start, upper: 2.0 * start, held: false }
+}
+
+fn derive(bencher: Bencher<'_, '_>, samples: usize, element: Box<dyn JointElement>) {
+    let model = one_joint(vec![element]);
+    let (v, rest) = (speeds(samples), vec![0.0; samples]);
+    let motion = MotionBlock::plain(samples, &rest, &v, &rest);
+    let shape = model.parameters().shape_start();
+    let mut derivatives = vec![0.0; model.shape_dependence().len() * samples];
+    bencher.counter(ItemsCount::new(samples)).bench_local(|| {
+        model.shaped(black_box(&motion), &shape, samples, &mut [], &mut derivatives);
+        black_box(&derivatives);
+    });
+}
+
 fn refill(bencher: Bencher<'_, '_>, samples: usize, element: Box<dyn JointElement>) {
+    let model = one_joint(vec![element]);
+    let (v, rest) = (speeds(samples), vec![0.0; samples]);
+    let motion = MotionBlock::plain(samples, &rest, &v, &rest);
+    let shape = model.parameters().shape_start();
+    let mut values = vec![0.0; model.shaped_columns().len() * samples];
+    bencher.counter(ItemsCount::new(samples)).bench_local(|| {
+        model.shaped(black_box(&motion), &shape, samples, &mut values, &mut []);
+        black_box(&values);
+    });
+}
+
+fn one_joint(elements: Vec<Box<dyn JointElement>>) -> RobotModel {
     let mut d = Description::new("bench");
     d.links.extend(["l0", "l1"].map(|l| LinkDescription { name: l.into(), inertia: None }));
     d.joints.push(JointDescription {
@@ -78,15 +173,7 @@ fn refill(bencher: Bencher<'_, '_>, samples: usize, element: Box<dyn JointElemen
         limits: Limits::default(),
         mimic: None,
     });
-    let model = RobotModel::new(d.build().expect("the bench robot is sound"), vec![element]);
-    let (v, rest) = (speeds(samples), vec![0.0; samples]);
-    let motion = MotionBlock::plain(samples, &rest, &v, &rest);
-    let shape = model.parameters().shape_start();
-    let mut values = vec![0.0; model.shaped_columns().len() * samples];
-    bencher.counter(ItemsCount::new(samples)).bench_local(|| {
-        model.shaped(black_box(&motion), &shape, samples, &mut values, &mut []);
-        black_box(&values);
-    });
+    RobotModel::new(d.build().expect("the bench robot is sound"), elements)
 }
 
 /// 20 s at 4 kHz.

@@ -21,6 +21,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use dynid_io::{CouplingForm, MappingSpec};
+use dynid_model::element::ElementRegistry;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
@@ -33,6 +34,9 @@ pub struct Config {
     /// The file that the configuration was read from; `None` if it was put together.
     #[serde(skip)]
     pub file: Option<PathBuf>,
+    /// The kinds of elements that joints may have; no key: a program puts those of its own here.
+    #[serde(skip)]
+    pub registry: ElementRegistry,
     /// Robot file (URDF or TOML), relative to the configuration.
     pub robot: PathBuf,
     /// Output folder, relative to the configuration. Without it the program writes to `dynid-out` in the current folder.

@@ -82,7 +82,7 @@ pub(crate) fn load_robot(config: &Config) -> Result<Robot, Error> {
         floating_base: false,
         locked: config.locked.iter().map(|(j, x)| (j.clone(), *x)).collect(),
     };
-    Robot::load(&config.robot, &options)
+    Ok(Robot::load(&config.robot, &options)?.with_registry(config.registry.clone()))
 }
 
 /// Reads the training logs of a configuration.

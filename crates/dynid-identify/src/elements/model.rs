@@ -3,7 +3,7 @@
 use dynid_model::element::JointElement;
 use dynid_model::{ClosedModel, Mechanism, RobotModel, TreeModel};
 
-use super::{ElementPlan, friction};
+use super::ElementPlan;
 use crate::Error;
 use crate::known_friction::KnownFriction;
 use crate::robot::Robot;
@@ -32,7 +32,7 @@ impl ElementPlan {
                 .with_loops(robot.closed.clone());
         let names = plan.names(&robot.mechanism);
         let law = settings.elements.friction;
-        if !law.replaces_any(&plan.per_rate) {
+        if !law.replaces_any(plan.registry(), &plan.per_rate) {
             let found = format!("`{}` where no joint that moves has any", serde_name(&law));
             return Err(Error::setting(
                 "elements.friction",
@@ -40,9 +40,7 @@ impl ElementPlan {
                 found,
             ));
         }
-        for list in &mut plan.per_rate {
-            *list = law.of_joint(list);
-        }
+        plan.per_rate = plan.per_rate.iter().map(|list| law.of_joint(plan.registry(), list)).collect();
         if let Some(known) = &settings.elements.known {
             plan.known = known.of_joints(&names)?;
             plan.known_source = Some(known.source.clone());
@@ -108,7 +106,7 @@ impl ElementPlan {
     /// Whether a parameter is the error of a coefficient of known friction.
     pub fn is_friction_error(&self, name: &str) -> bool {
         name.rsplit_once('.').is_some_and(|(joint, symbol)| {
-            friction::COEFFICIENTS.contains(&symbol) && self.known_friction(joint).is_some()
+            self.registry().is_coefficient(symbol) && self.known_friction(joint).is_some()
         })
     }
 }

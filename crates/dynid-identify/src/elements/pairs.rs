@@ -2,45 +2,9 @@
 
 use std::fmt;
 
+use dynid_model::element::ElementRegistry;
+
 use crate::Error;
-
-/// Elements whose columns depend on each other whatever the motion, the one to be left out first, and why.
-const EQUAL: [(&str, &str, &str); 11] = [
-    ("offset", "asymmetric", "its Coulomb columns differ by a constant"),
-    ("coulomb", "asymmetric", "its Coulomb columns add up to the sign"),
-    ("viscous", "asymmetric", "its viscous columns add up to the velocity"),
-    ("viscous_magnitude", "asymmetric", "its viscous columns differ by the speed"),
-    ("stribeck", "asymmetric", "the columns of both add up to the sign"),
-    ("coulomb", "stribeck", "its columns add up to the sign"),
-    ("coulomb", "lugre", "its bristles, once bent, are the sign"),
-    ("stribeck", "lugre", "its bristles, once bent, are Stribeck friction"),
-    ("stribeck_viscous", "stribeck", "both have a Stribeck speed `vs`"),
-    ("stribeck_viscous", "lugre", "both have a Stribeck speed `vs`"),
-    ("asymmetric", "lugre", "its bristles, once bent, are the sign"),
-];
-
-/// Elements whose columns are alike unless the motion tells them apart, and what it takes.
-const ALIKE: [(&str, &str, &str); 18] = [
-    ("coulomb", "tanh", SLOW),
-    ("coulomb", "sigmoid", SLOW),
-    ("coulomb", "sigmoid_offset", SLOW),
-    ("stribeck", "tanh", SLOW),
-    ("stribeck", "sigmoid", SLOW),
-    ("stribeck", "sigmoid_offset", SLOW),
-    ("tanh", "arctangent", SLOW),
-    ("tanh", "sigmoid", SLOW),
-    ("tanh", "sigmoid_offset", SLOW),
-    ("arctangent", "sigmoid", SLOW),
-    ("arctangent", "sigmoid_offset", SLOW),
-    ("viscous", "arctangent", "speeds far above 1/fb"),
-    ("viscous", "exponential_viscous", "speeds far above 1/sigma3"),
-    ("power", "exponential_viscous", "speeds far above 1/sigma3"),
-    ("lugre", "tanh", SLOW),
-    ("coulomb", "load", "loads that vary"),
-    ("stribeck", "load", "loads that vary"),
-    ("viscous", "power", "speeds that differ by an order of magnitude"),
-];
-const SLOW: &str = "many samples close to rest";
 
 /// Two elements of a joint that only a suitable motion tells apart.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,7 +27,7 @@ impl fmt::Display for AlikeElements {
 }
 
 /// Refuses elements that no motion can tell apart.
-pub(super) fn check(joint: &str, elements: &[String]) -> Result<(), Error> {
+pub(super) fn check(registry: &ElementRegistry, joint: &str, elements: &[String]) -> Result<(), Error> {
     let equal = |first: &str, second: &str, reason: &str| Error::EqualElements {
         joint: joint.to_owned(),
         first: first.to_owned(),
@@ -76,18 +40,20 @@ pub(super) fn check(joint: &str, elements: &[String]) -> Result<(), Error> {
             return Err(equal(name, name, "it stands there twice"));
         }
     }
-    match EQUAL.iter().find(|(first, second, _)| has(first) && has(second)) {
-        Some((first, second, reason)) => Err(equal(first, second, reason)),
-        None => Ok(()),
+    for kind in registry.kinds().filter(|kind| has(kind.name)) {
+        if let Some((other, why)) = kind.excludes.iter().find(|(other, _)| has(other)) {
+            return Err(equal(other, kind.name, why));
+        }
     }
+    Ok(())
 }
 
 /// Pairs that only a suitable motion tells apart.
-pub(super) fn alike(joint: &str, elements: &[String]) -> Vec<AlikeElements> {
+pub(super) fn alike(registry: &ElementRegistry, joint: &str, elements: &[String]) -> Vec<AlikeElements> {
     let has = |name: &str| elements.iter().any(|e| e == name);
-    ALIKE
-        .iter()
-        .filter(|(first, second, _)| has(first) && has(second))
-        .map(|(first, second, needs)| AlikeElements { joint: joint.to_owned(), first, second, needs })
+    let pairs = registry.kinds().flat_map(|kind| kind.alike.iter().map(move |other| (kind.name, other)));
+    pairs
+        .filter(|(first, (second, _))| has(first) && has(second))
+        .map(|(first, (second, needs))| AlikeElements { joint: joint.to_owned(), first, second, needs })
         .collect()
 }

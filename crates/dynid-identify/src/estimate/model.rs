@@ -1,6 +1,7 @@
 //! The model in the result file, from which efforts can be predicted again.
 
 use dynid_io::{CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, SettingValue};
+use dynid_model::element::ElementRegistry;
 use dynid_model::{
     Description, Inertia, JointDescription, JointKind, Limits, LinkDescription, Mat3, Mechanism, Mimic,
     Placement, Vec3,
@@ -47,6 +48,10 @@ pub struct ModelRecord {
     pub state_hz: f64,
     /// Cut-off of the widest kernel, Hz.
     pub kernel_hz: f64,
+    /// The kinds of elements that the names are of; no part of the file. A program with elements of its own puts them here before it
+    /// asks for the model of an estimate that was read.
+    #[serde(skip)]
+    pub registry: ElementRegistry,
 }
 
 /// A joint that its motor drives through a spring.
@@ -196,6 +201,7 @@ impl ModelRecord {
             known_friction: plan.known.clone(),
             state_hz: 0.0,
             kernel_hz: 0.0,
+            registry: plan.registry().clone(),
         }
     }
 
@@ -245,7 +251,8 @@ impl ModelRecord {
         if let Some(joint) = repeated(mechanism, &elastic) {
             return Err(Error::setting("elastic", "names that occur once", joint));
         }
-        let spec = ElementSpec { settings, elastic, ..ElementSpec::default() };
+        let registry = self.registry.clone();
+        let spec = ElementSpec { settings, elastic, registry, ..ElementSpec::default() };
         let mut plan = ElementPlan::recorded(mechanism, self.elements.clone(), couplings, spec)?;
         plan.load_reference.clone_from(&self.load_reference);
         plan.known.clone_from(&self.known_friction);

@@ -5,7 +5,6 @@ use dynid_model::{EffortModel, RobotModel};
 use crate::Error;
 use crate::caution::{self, Caution};
 use crate::elements::ElementPlan;
-use crate::log_terms;
 use crate::settings::{Friction, LogSettings, Own, PayloadConfig, Settings, ShapeConfig};
 
 /// Refuses them.
@@ -22,7 +21,7 @@ pub(super) fn check(
     for own in logs.iter().flat_map(|log| &log.own) {
         let acts = |element: &String| match own {
             Own::Offset => element == "offset",
-            Own::Friction | Own::FrictionScale => log_terms::is_friction(element),
+            Own::Friction | Own::FrictionScale => plan.registry().is_friction(element),
             Own::Delay => true,
         };
         if !matches!(own, Own::Delay) && !plan.per_rate.iter().flatten().any(acts) {

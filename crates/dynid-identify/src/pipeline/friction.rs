@@ -9,8 +9,7 @@ use dynid_rows::conditioning::{
 use super::problem::Problem;
 use super::structure::Structure;
 use crate::Error;
-use crate::elements::friction::is_shaped;
-use crate::elements::shape_element;
+use crate::elements::{shape_element, shapes_beside};
 use crate::shape::ShapeFit;
 
 /// Chooses shapes for all joints and adds them to the plan; shape parameters start at the values found.
@@ -30,7 +29,10 @@ pub(super) fn choose(
         .map(|(rate, output)| match plan.known_friction(&output.name) {
             // Its shape is known already.
             Some(_) => Vec::new(),
-            None => kinds_beside(&plan.per_rate[model.tree_rate(rate)], unloaded || rate >= rates),
+            None => {
+                let elements = &plan.per_rate[model.tree_rate(rate)];
+                shapes_beside(plan.registry(), elements, unloaded || rate >= rates)
+            }
         })
         .collect();
     let Structure { base, prior, regrouping, .. } = structure;
@@ -94,34 +96,18 @@ pub(super) fn drop_refuted(
     dropped
 }
 
-/// Kinds of shapes that say something new beside given elements. `unloaded`: no rigid effort is to be had for a gear's load.
-fn kinds_beside(elements: &[String], unloaded: bool) -> Vec<ShapeKind> {
-    let has = |name: &str| elements.iter().any(|e| e == name);
-    let shaped = elements.iter().any(|name| is_shaped(name));
-    let mut out = Vec::new();
-    if has("viscous") && !has("viscous_magnitude") {
-        out.push(ShapeKind::ViscousMagnitude);
-    }
-    if has("coulomb") && !shaped {
-        out.push(ShapeKind::Stribeck);
-    }
-    if (has("coulomb") || has("viscous") || has("asymmetric")) && !shaped {
-        out.push(ShapeKind::Tanh);
-    }
-    if (has("coulomb") || has("stribeck")) && !has("load") && !unloaded {
-        out.push(ShapeKind::Load);
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
+    use dynid_model::element::ElementRegistry;
+
     use super::*;
 
     #[test]
     fn shapes_are_tried_beside_what_they_add_to() {
-        let kinds =
-            |list: &[&str]| kinds_beside(&list.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>(), false);
+        let kinds = |list: &[&str]| {
+            let list: Vec<String> = list.iter().map(|n| (*n).to_owned()).collect();
+            shapes_beside(&ElementRegistry::default(), &list, false)
+        };
         let all = [ShapeKind::ViscousMagnitude, ShapeKind::Stribeck, ShapeKind::Tanh, ShapeKind::Load];
         assert_eq!(kinds(&["coulomb", "viscous", "offset", "rotor"]), all);
         assert_eq!(kinds(&["stribeck", "viscous"]), [ShapeKind::ViscousMagnitude, ShapeKind::Load]);

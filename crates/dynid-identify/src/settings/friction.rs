@@ -1,5 +1,6 @@
 //! Friction laws by name.
 
+use dynid_model::element::ElementRegistry;
 use serde::{Deserialize, Serialize};
 
 /// Friction of the joints that move.
@@ -40,23 +41,6 @@ pub enum FrictionErrors {
     Nonnegative,
 }
 
-/// Elements of all these laws.
-const FRICTION_ELEMENTS: [&str; 13] = [
-    "coulomb",
-    "viscous",
-    "offset",
-    "asymmetric",
-    "viscous_magnitude",
-    "arctangent",
-    "stribeck",
-    "stribeck_viscous",
-    "tanh",
-    "sigmoid",
-    "sigmoid_offset",
-    "power",
-    "load",
-];
-
 impl Friction {
     fn elements(self) -> Option<&'static [&'static str]> {
         Some(match self {
@@ -73,18 +57,18 @@ impl Friction {
     }
 
     /// Whether the law takes the place of something; what is no law need not.
-    pub(crate) fn replaces_any(self, lists: &[Vec<String>]) -> bool {
-        let is_friction = |name: &String| FRICTION_ELEMENTS.contains(&name.as_str());
-        self.elements().is_none() || lists.iter().flatten().any(is_friction)
+    pub(crate) fn replaces_any(self, registry: &ElementRegistry, lists: &[Vec<String>]) -> bool {
+        let gives_way = |name: &String| registry.kind(name).is_some_and(|kind| kind.gives_way);
+        self.elements().is_none() || lists.iter().flatten().any(gives_way)
     }
 
     /// Element names of a joint with this friction in place of the one listed; a joint without any keeps none.
-    pub(crate) fn of_joint(self, listed: &[String]) -> Vec<String> {
-        let is_friction = |name: &&String| FRICTION_ELEMENTS.contains(&name.as_str());
-        let Some(law) = self.elements().filter(|_| listed.iter().any(|n| is_friction(&n))) else {
+    pub(crate) fn of_joint(self, registry: &ElementRegistry, listed: &[String]) -> Vec<String> {
+        let gives_way = |name: &&String| registry.kind(name).is_some_and(|kind| kind.gives_way);
+        let Some(law) = self.elements().filter(|_| listed.iter().any(|n| gives_way(&n))) else {
             return listed.to_vec();
         };
-        let others = listed.iter().filter(|n| !is_friction(n)).cloned();
+        let others = listed.iter().filter(|n| !gives_way(n)).cloned();
         law.iter().map(|n| (*n).to_owned()).chain(others).collect()
     }
 }
@@ -96,7 +80,8 @@ mod tests {
     #[test]
     fn a_law_replaces_friction_and_leaves_the_rest() {
         let listed = ["coulomb", "viscous", "offset", "rotor"].map(str::to_owned);
-        let names = |law: Friction, listed: &[String]| law.of_joint(listed).join(" ");
+        let names =
+            |law: Friction, listed: &[String]| law.of_joint(&ElementRegistry::default(), listed).join(" ");
         assert_eq!(names(Friction::Stribeck, &listed), "stribeck viscous offset rotor");
         assert_eq!(names(Friction::Asymmetric, &listed), "asymmetric rotor");
         assert_eq!(names(Friction::Auto, &listed), "coulomb viscous offset rotor");

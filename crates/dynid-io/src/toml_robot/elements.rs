@@ -3,6 +3,7 @@
 //! Which elements exist and which settings they take is decided by those who build them.
 
 use dynid_model::Description;
+use dynid_model::element::ElementRegistry;
 use serde::Deserialize;
 use toml::Value;
 
@@ -28,6 +29,9 @@ pub struct ElementSpec {
     pub elastic: Vec<ElasticSpec>,
     /// Joints with clearance: `[element.<joint>] clearance = { .. }`, in joint order.
     pub clearance: Vec<ClearanceSpec>,
+    /// The kinds of elements that these names and settings are of. A file knows those that come with the library; a program
+    /// may put others in their place.
+    pub registry: ElementRegistry,
 }
 
 /// One setting: `[element.j1] stribeck = { vs = { start = 0.04 } }` has element `stribeck`, key `vs.start`.

@@ -1,6 +1,6 @@
 //! Elements over signals that carry their time derivatives.
 
-use super::sign;
+use crate::scalar::function::SmoothSign;
 use crate::scalar::{Jet, Scalar};
 
 /// Motion at one instant with time derivatives of every signal.
@@ -22,18 +22,11 @@ impl JetMotion<'_> {
     /// The sign that elements take of a velocity; the exact one is constant in time.
     pub fn sign(&self, v: Jet) -> Jet {
         let w = self.sign_width;
-        if w > 0.0 { hyperbolic(v, w) } else { Jet::from_f64(sign(v.value)) }
+        if w > 0.0 { v.through(SmoothSign { width: w }) } else { v.sign() }
     }
 
     /// An extra channel.
     pub fn channel(&self, name: &str) -> Option<Jet> {
         self.channels.iter().find(|(n, _)| *n == name).map(|(_, jet)| *jet)
     }
-}
-
-/// `tanh(v/w)`.
-pub(super) fn hyperbolic(v: Jet, w: f64) -> Jet {
-    let t = (v.value / w).tanh();
-    let slope = (1.0 - t) * (1.0 + t) / w;
-    v.through([t, slope, -2.0 * t * slope / w])
 }

@@ -12,9 +12,12 @@ mod external_load;
 mod friction;
 mod gated;
 mod jets;
+mod law;
+pub mod laws;
 mod linearised;
 mod log_scaled;
 mod payload;
+mod registry;
 mod rotor;
 mod shape;
 mod transmission;
@@ -33,9 +36,13 @@ pub use friction::{
 };
 pub use gated::{Gated, is_gate, log_channel, payload_channel};
 pub use jets::JetMotion;
+pub use law::{AtJoint, LinearTerm, ShapeScale, ShapeTerm, Velocity, VelocityLaw, units};
 pub use linearised::{Linearised, change_name};
 pub use log_scaled::{LogScaled, ScaledPart, scale_name};
 pub use payload::{KnownLoad, Payload};
+pub use registry::{
+    Candidate, ElementKind, ElementRegistry, OptionTerm, OptionValue, Placement, RegistryFault, StatedTerm,
+};
 pub use rotor::RotorInertia;
 pub use shape::{ShapeFault, ShapeSetting};
 pub use transmission::{CoupledWrist, Transmission};
@@ -46,7 +53,7 @@ use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::mechanism::Mechanism;
 use crate::parameter::{Owner, Parameter, ShapeParameter};
 use crate::scalar::Jet;
-use crate::scalar::elementary::{Curve, map_curve};
+pub use crate::scalar::function::sign;
 
 /// An output as elements see it.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,26 +127,19 @@ impl ElementColumns<'_> {
         &mut self.data[self.slots[entry] * self.stride..][..self.samples]
     }
 
-    /// The columns of two entries.
+    /// The columns of the entries from `first` on.
     ///
     /// # Panics
-    /// If they are the same column.
-    pub fn two_columns(&mut self, a: usize, b: usize) -> [&mut [f64]; 2] {
+    /// If two of them are the same column.
+    pub fn columns<const N: usize>(&mut self, first: usize) -> [&mut [f64]; N] {
         let range = |entry: usize| {
-            let first = self.slots[entry] * self.stride;
-            first..first + self.samples
+            let begin = self.slots[entry] * self.stride;
+            begin..begin + self.samples
         };
-        match self.data.get_disjoint_mut([range(a), range(b)]) {
+        match self.data.get_disjoint_mut(std::array::from_fn(|k| range(first + k))) {
             Ok(columns) => columns,
-            Err(fault) => panic!("columns {a} and {b}: {fault}"),
+            Err(fault) => panic!("columns from {first} on: {fault}"),
         }
-    }
-
-    /// Fills the column of an entry with a curve of one signal.
-    fn curve(&mut self, entry: usize, signal: &[f64], curve: &impl Curve) {
-        let column = self.column(entry);
-        column.copy_from_slice(signal);
-        map_curve(curve, column);
     }
 
     /// Fills the column of an entry from one signal.
@@ -300,15 +300,4 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
         weights: &ElementWeights<'_>,
         out: &mut MotionAdjoint,
     );
-}
-
-/// Sign with `s(0) = 0`.
-pub fn sign(v: f64) -> f64 {
-    if v > 0.0 {
-        1.0
-    } else if v < 0.0 {
-        -1.0
-    } else {
-        0.0
-    }
 }

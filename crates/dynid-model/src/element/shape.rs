@@ -49,11 +49,6 @@ pub enum ShapeFault {
 }
 
 impl ShapeSetting {
-    /// Between two positive bounds, starting at their geometric mean.
-    pub(super) fn between(lower: f64, upper: f64) -> Self {
-        ShapeSetting { start: (lower * upper).sqrt(), lower, upper, held: false }
-    }
-
     /// Held at a value.
     pub fn held(value: f64) -> Self {
         ShapeSetting { start: value, lower: value, upper: value, held: true }
@@ -103,9 +98,4 @@ pub(super) fn values<const N: usize>(settings: [&ShapeSetting; N], shape: &[f64]
 pub(super) fn places<const N: usize>(settings: [&ShapeSetting; N]) -> [Option<usize>; N] {
     let mut next = 0..;
     settings.map(|s| if s.held { None } else { next.next() })
-}
-
-/// The parameters whose setting does not hold them.
-pub(super) fn free<const N: usize>(parameters: [(&ShapeSetting, ShapeParameter); N]) -> Vec<ShapeParameter> {
-    parameters.into_iter().filter(|(setting, _)| !setting.held).map(|(_, parameter)| parameter).collect()
 }

@@ -3,7 +3,7 @@
 use std::array::from_fn;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
-use super::Scalar;
+use super::{Function, FunctionOfTwo, Scalar};
 
 /// `value + Σₖ derivativeₖ εₖ` with `εᵢ εⱼ = 0`: exact first derivatives in `N` directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +57,32 @@ impl<const N: usize> Scalar for Dual<N> {
             Dual { value: s, derivative: self.derivative.map(|d| c * d) },
             Dual { value: c, derivative: self.derivative.map(|d| -s * d) },
         )
+    }
+    #[inline(always)]
+    fn through(self, function: impl Function) -> Self {
+        let value = function.value(self.value);
+        let slope = function.slope(self.value, value);
+        Dual { value, derivative: from_fn(|k| slope * self.derivative[k]) }
+    }
+    #[inline(always)]
+    fn through_two(self, second: Self, function: impl FunctionOfTwo) -> Self {
+        let (x, y) = (self.value, second.value);
+        let value = function.value(x, y);
+        let first = product(&self.derivative, || function.by_first(x, y, value));
+        let second = product(&second.derivative, || function.by_second(x, y, value));
+        Dual { value, derivative: from_fn(|k| first[k] + second[k]) }
+    }
+}
+
+/// `slope · derivative`; along directions that do not move the argument the slope, however dear or infinite, counts nothing.
+#[inline(always)]
+fn product<const N: usize>(derivative: &[f64; N], slope: impl Fn() -> f64) -> [f64; N] {
+    match derivative.iter().all(|d| *d == 0.0) {
+        true => [0.0; N],
+        false => {
+            let slope = slope();
+            from_fn(|k| slope * derivative[k])
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Arctangent, decaying exponential and what is made of it, without branches, so that lanes stay in step.
+//! Arctangent, logarithm, decaying exponential and what is made of them, without branches, so that lanes stay in step.
 //!
 //! Polynomials of fdlibm (Sun Microsystems 1993) after reductions that need no branch. Errors stay within 2 units in the last
 //! place (`1e-16` absolute where a value is the difference of two). No product is fused with a sum, so that every
@@ -149,6 +149,66 @@ pub(crate) fn decay(x: f64) -> f64 {
     if beyond { 0.0 } else { scale + scale * p }
 }
 
+/// `1 - e^-x` for `x >= 0`, exact for small `x` too.
+#[inline(always)]
+pub(crate) fn rise(x: f64) -> f64 {
+    // From 40 on the result is 1.
+    let (scale, p) = decay_parts(if x > 40.0 { 40.0 } else { x });
+    -(scale * p + (scale - 1.0))
+}
+
+const LOGARITHM: [f64; 7] = [
+    6.666_666_666_666_735e-1,
+    3.999_999_999_940_942e-1,
+    2.857_142_874_366_239e-1,
+    2.222_219_843_214_978_4e-1,
+    1.818_357_216_161_805e-1,
+    1.531_383_769_920_937_3e-1,
+    1.479_819_860_511_658_6e-1,
+];
+/// Bits of a number just below `√½`, from where on mantissas count.
+const ROOT_HALF: u64 = 0x3fe6_a09e_0000_0000;
+const ONE: u64 = 0x3ff0_0000_0000_0000;
+/// An integer below `2^52` in the low bits of this is that integer and `2^52` as a number.
+const INTEGER: u64 = 0x4330_0000_0000_0000;
+/// `2^54`, which makes any number a normal one.
+const NORMAL: f64 = 18_014_398_509_481_984.0;
+
+/// Natural logarithm for finite `x >= 0`; minus infinity at 0.
+#[inline(always)]
+pub(crate) fn logarithm(x: f64) -> f64 {
+    let small = x < f64::MIN_POSITIVE;
+    let bits = (if small { x * NORMAL } else { x }).to_bits().wrapping_add(ONE - ROOT_HALF);
+    let above = if small { 4_503_599_627_370_496.0 + 1077.0 } else { 4_503_599_627_370_496.0 + 1023.0 };
+    let k = f64::from_bits((bits >> 52) | INTEGER) - above;
+    let f = f64::from_bits((bits & 0x000f_ffff_ffff_ffff).wrapping_add(ROOT_HALF)) - 1.0;
+    let half_square = 0.5 * f * f;
+    let s = f / (2.0 + f);
+    let z = s * s;
+    let w = z * z;
+    let c = &LOGARITHM;
+    let odd = z * (c[0] + w * (c[2] + w * (c[4] + w * c[6])));
+    let even = w * (c[1] + w * (c[3] + w * c[5]));
+    let found = s * (half_square + (odd + even)) + k * LN_2_LOW - half_square + f + k * LN_2_HIGH;
+    if x > 0.0 { found } else { f64::NEG_INFINITY }
+}
+
+/// `x^p` for finite `x >= 0` and `p > 0`, as the exponential of a logarithm: relative error about `|p ln x|` units in the last
+/// place.
+#[inline(always)]
+pub(crate) fn power(x: f64, p: f64) -> f64 {
+    let y = p * logarithm(x);
+    let (under, over) = (y < -DECAYED, y > DECAYED);
+    let (scale, part) = decay_parts(if under || over { 0.0 } else { -y });
+    if under {
+        0.0
+    } else if over {
+        f64::INFINITY
+    } else {
+        scale + scale * part
+    }
+}
+
 /// Hyperbolic tangent.
 #[inline(always)]
 pub(crate) fn tanh(x: f64) -> f64 {
@@ -208,6 +268,17 @@ mod tests {
         let positive = || magnitudes().filter(|x| *x > 0.0 && *x < DECAYED);
         let exponential = worst(decay, |x| (-x).exp(), positive());
         assert!(exponential <= 2.0, "{exponential}");
+        let natural = worst(logarithm, f64::ln, magnitudes().filter(|x| *x > 0.0));
+        assert!(natural <= 2.0, "{natural}");
+        let risen = worst(rise, |x| -(-x).exp_m1(), positive());
+        assert!(risen <= 2.0, "{risen}");
+        for p in [0.3, 1.4, 1.99] {
+            for x in positive() {
+                let (found, expected) = (power(x, p), x.powf(p));
+                let units = 2.0 + (p * x.ln()).abs();
+                assert!((found - expected).abs() <= units * f64::EPSILON * expected, "{x}^{p}: {found}");
+            }
+        }
         // The library's own error is some 2 units here.
         let hyperbolic = worst(tanh, f64::tanh, magnitudes());
         assert!(hyperbolic <= 4.0, "{hyperbolic}");
@@ -232,12 +303,19 @@ mod tests {
         assert_eq!((atan(f64::INFINITY), atan(-1e300)), (f64::INFINITY.atan(), -f64::INFINITY.atan()));
         assert_eq!((tanh(f64::INFINITY), tanh(-50.0)), (1.0, -1.0));
         assert_eq!((decay(f64::INFINITY), decay(709.0)), (0.0, 0.0));
+        assert_eq!((rise(0.0), rise(f64::INFINITY), rise(1e-300)), (0.0, 1.0, 1e-300));
+        assert_eq!((logarithm(0.0), logarithm(1.0)), (f64::NEG_INFINITY, 0.0));
+        for x in [5e-324, 1e-310, f64::MIN_POSITIVE, f64::MAX] {
+            assert!((logarithm(x) - x.ln()).abs() <= 2.0 * f64::EPSILON * x.ln().abs(), "{x}");
+        }
+        assert_eq!((power(0.0, 0.5), power(1.0, 0.7), power(1e-300, 2.0)), (0.0, 1.0, 0.0));
+        assert_eq!(power(1e300, 2.0), f64::INFINITY);
         assert!(atan(f64::NAN).is_nan() && tanh(f64::NAN).is_nan() && decay(f64::NAN).is_nan());
     }
 
     #[test]
     fn wide_registers_give_the_same_bits() {
-        for function in [atan as fn(f64) -> f64, tanh, logistic, logistic_slope] {
+        for function in [atan as fn(f64) -> f64, tanh, logistic, logistic_slope, |x| power(x.abs(), 0.7)] {
             let arguments: Vec<f64> = magnitudes().step_by(7).collect();
             let mut values = arguments.clone();
             map_curve(&Of(function), &mut values);

@@ -1,8 +1,8 @@
 //! Jets: a value with its first two time derivatives.
 
-use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
-use super::Scalar;
+use super::{Function, FunctionOfTwo, Scalar};
 
 /// Value, first and second time derivative of a signal, carried exactly through any formula (a Taylor polynomial of order
 /// two).
@@ -29,7 +29,7 @@ impl Jet {
 
     /// A function of the signal, from the function's value and first two derivatives at [`Jet::value`].
     #[inline(always)]
-    pub fn through(self, [f, slope, bend]: [f64; 3]) -> Self {
+    pub fn composed(self, [f, slope, bend]: [f64; 3]) -> Self {
         Jet {
             value: f,
             first: slope * self.first,
@@ -61,7 +61,7 @@ impl Scalar for Jet {
     #[inline(always)]
     fn recip(self) -> Self {
         let value = 1.0 / self.value;
-        self.through([value, -value * value, 2.0 * value * value * value])
+        self.composed([value, -value * value, 2.0 * value * value * value])
     }
     #[inline(always)]
     fn is_positive_finite(self) -> bool {
@@ -70,7 +70,35 @@ impl Scalar for Jet {
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         let (s, c) = Scalar::sin_cos(self.value);
-        (self.through([s, c, -s]), self.through([c, -s, -c]))
+        (self.composed([s, c, -s]), self.composed([c, -s, -c]))
+    }
+    #[inline(always)]
+    fn through(self, function: impl Function) -> Self {
+        let f = function.value(self.value);
+        self.composed([f, function.slope(self.value, f), function.bend(self.value, f)])
+    }
+    #[inline(always)]
+    fn through_two(self, o: Self, function: impl FunctionOfTwo) -> Self {
+        let (x, y) = (self.value, o.value);
+        let f = function.value(x, y);
+        let (by_x, by_y) = (function.by_first(x, y, f), function.by_second(x, y, f));
+        let [xx, xy, yy] = function.bends(x, y, f);
+        let bent = xx * self.first * self.first + 2.0 * xy * self.first * o.first + yy * o.first * o.first;
+        Jet {
+            value: f,
+            first: by_x * self.first + by_y * o.first,
+            second: bent + by_x * self.second + by_y * o.second,
+        }
+    }
+}
+
+impl Div for Jet {
+    type Output = Self;
+    #[expect(clippy::suspicious_arithmetic_impl, reason = "the quotient rule subtracts products")]
+    fn div(self, o: Self) -> Self {
+        let value = self.value / o.value;
+        let first = (self.first - value * o.first) / o.value;
+        Jet { value, first, second: (self.second - 2.0 * first * o.first - value * o.second) / o.value }
     }
 }
 

@@ -1,9 +1,9 @@
 //! Several samples at a time.
 
-use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
-use super::Scalar;
 use super::sine::sin_cos_lanes;
+use super::{Function, FunctionOfTwo, Scalar};
 
 /// Lanes by their index. A loop and no closure: a closure that is not inlined is compiled for any processor, where a fused
 /// multiply-add is a call.
@@ -69,6 +69,14 @@ impl<const N: usize, const FUSED: bool> Scalar for Lanes<N, FUSED> {
         (Lanes(s), Lanes(c))
     }
     #[inline(always)]
+    fn through(self, function: impl Function) -> Self {
+        lanes!(k => function.value(self.0[k]))
+    }
+    #[inline(always)]
+    fn through_two(self, second: Self, function: impl FunctionOfTwo) -> Self {
+        lanes!(k => function.value(self.0[k], second.0[k]))
+    }
+    #[inline(always)]
     fn sin_cos_all(angles: &[Self], out: &mut [(Self, Self)]) {
         if N > 1 {
             for (angle, pair) in angles.iter().zip(out) {
@@ -119,6 +127,14 @@ impl<const N: usize, const FUSED: bool> Mul for Lanes<N, FUSED> {
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
         lanes!(k => self.0[k] * o.0[k])
+    }
+}
+
+impl<const N: usize, const FUSED: bool> Div for Lanes<N, FUSED> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, o: Self) -> Self {
+        lanes!(k => self.0[k] / o.0[k])
     }
 }
 

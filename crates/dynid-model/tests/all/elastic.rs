@@ -6,9 +6,10 @@ use std::path::PathBuf;
 
 use crate::random_tree::tree;
 use dynid_model::element::{
-    Arctangent, Coulomb, CubicSpring, CyclicTorque, ElasticDoubt, ElasticTransmission, ExternalLoad,
-    JetMotion, JointElement, Offset, PiecewiseSpring, PowerLaw, RotorInertia, ShapeSetting, Spring, Stribeck,
-    StribeckViscous, TanhFriction, Viscous, ViscousMagnitude,
+    Arctangent, AsymmetricFriction, Coulomb, CubicSpring, CyclicTorque, ElasticDoubt, ElasticTransmission,
+    ExponentialViscous, ExternalLoad, JetMotion, JointElement, LuGre, Offset, PiecewiseSpring, PowerLaw,
+    RotorInertia, ShapeSetting, Sigmoid, SigmoidOffset, Spring, Stribeck, StribeckViscous, TanhFriction,
+    Viscous, ViscousMagnitude,
 };
 use dynid_model::scalar::{Jet, Scalar as _};
 use dynid_model::*;
@@ -476,6 +477,16 @@ fn jets_of_bodies_and_elements_are_their_derivatives_by_time() {
         Box::new(Stribeck { rate: 1, vs: held(0.9), delta: held(1.4) }),
         Box::new(Stribeck { rate: 2, vs: held(0.6), delta: held(2.0) }),
         Box::new(StribeckViscous { rate: 0, vs: held(0.8), delta: held(1.0) }),
+        Box::new(PowerLaw { rate: 1, p: held(1.3) }),
+        Box::new(Sigmoid { rate: 2, phi2: held(2.1), phi3: held(0.1) }),
+        Box::new(SigmoidOffset { rate: 0, alpha: held(1.6), nu: held(-0.2) }),
+        Box::new(AsymmetricFriction { rate: 1 }),
+        Box::new(ExponentialViscous {
+            sigma3: held(1.2),
+            sigma4: held(1.1),
+            temperature: Some(31.0),
+            ..ExponentialViscous::new(2)
+        }),
         Box::new(ExternalLoad { rate: 0, brake: true }),
         Box::new(ExternalLoad { rate: 1, brake: false }),
     ];
@@ -509,7 +520,7 @@ fn jets_of_bodies_and_elements_are_their_derivatives_by_time() {
             dynamics.inverse_dynamics(&state, &inertias, &mut dynamics.workspace(), &mut found);
             let motion = JetMotion { q: &q, dq: &dq, ddq: &ddq, channels: &channels, sign_width };
             model.element_jets(&motion, &[], &linear, |_| true, &mut found).unwrap();
-            // Errors of third and fourth derivatives, some 1e3, times h², and of rounding over h².
+            // Errors of third and fourth derivatives, some 2e3, times h², and of rounding over h².
             let h = 1e-4;
             let (below, here, above) = (effort(t - h), effort(t), effort(t + h));
             for (o, jet) in found.iter().enumerate() {
@@ -520,18 +531,18 @@ fn jets_of_bodies_and_elements_are_their_derivatives_by_time() {
                     "{o}: {jet:?} {}",
                     here[o]
                 );
-                assert!((jet.first - first).abs() <= 1e-5, "{o}, first: {jet:?} {first}");
+                assert!((jet.first - first).abs() <= 2e-5, "{o}, first: {jet:?} {first}");
                 assert!((jet.second - second).abs() <= 1e-4, "{o}, second: {jet:?} {second}");
             }
         }
     }
-    let silent = RobotModel::new(model.mechanism().clone(), vec![Box::new(PowerLaw::new(1))]);
+    let silent = RobotModel::new(model.mechanism().clone(), vec![Box::new(LuGre::new(1))]);
     let rest = [Jet::default(); 3];
     let motion = JetMotion { q: &rest, dq: &rest, ddq: &rest, channels: &[], sign_width: 0.0 };
     let shape = silent.parameters().shape_start();
     let ask =
-        |rate: usize| silent.element_jets(&motion, &shape, &[0.0; 31], |r| r == rate, &mut rest.clone());
-    assert_eq!((ask(0), ask(1)), (Ok(()), Err("j2.fp".into())));
+        |rate: usize| silent.element_jets(&motion, &shape, &[0.0; 32], |r| r == rate, &mut rest.clone());
+    assert_eq!((ask(0), ask(1)), (Ok(()), Err("j2.fc".into())));
 }
 
 #[test]

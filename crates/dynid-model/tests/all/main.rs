@@ -10,6 +10,7 @@ mod friction;
 mod golden;
 mod history;
 mod identities;
+mod laws;
 mod linearised;
 mod passivity;
 mod payload;

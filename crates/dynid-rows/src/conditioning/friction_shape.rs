@@ -17,6 +17,22 @@ pub enum ShapeKind {
     Load,
 }
 
+impl ShapeKind {
+    /// All kinds, in the order in which they are tried.
+    pub const ALL: [ShapeKind; 4] =
+        [ShapeKind::ViscousMagnitude, ShapeKind::Stribeck, ShapeKind::Tanh, ShapeKind::Load];
+
+    /// Name of the element that it is one of.
+    pub fn element(self) -> &'static str {
+        match self {
+            ShapeKind::ViscousMagnitude => "viscous_magnitude",
+            ShapeKind::Stribeck => "stribeck",
+            ShapeKind::Tanh => "tanh",
+            ShapeKind::Load => "load",
+        }
+    }
+}
+
 /// A column of friction over the speed `v` of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionShape {

@@ -6,8 +6,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::arm::arm;
 use dynid_model::element::{
-    Coulomb, CubicSpring, CyclicTorque, ElasticTransmission, ExternalLoad, JointElement, PowerLaw,
-    RotorInertia, Transmission, Viscous,
+    Coulomb, CubicSpring, CyclicTorque, ElasticTransmission, ExternalLoad, JointElement, LuGre, RotorInertia,
+    Transmission, Viscous,
 };
 use dynid_model::*;
 use dynid_sim::*;
@@ -201,12 +201,12 @@ fn what_cannot_be_inverted_is_told() {
         ElasticInverse::new(&twice, &[1.0; 4], &[], 0.0),
         Err(SimError::Setting { name: "link", .. })
     ));
-    let power: [Box<dyn JointElement>; 2] =
-        [Box::new(ElasticTransmission::new(0, 1, 10.0)), Box::new(PowerLaw::new(0))];
-    let power = model(power.into());
-    let inverse = ElasticInverse::new(&power, &[1.0; 3], &[0.5], 0.0).unwrap();
+    let bristles: [Box<dyn JointElement>; 2] =
+        [Box::new(ElasticTransmission::new(0, 1, 10.0)), Box::new(LuGre::new(0))];
+    let bristles = model(bristles.into());
+    let inverse = ElasticInverse::new(&bristles, &[1.0; 4], &[1.3, 0.1], 0.0).unwrap();
     let found = inverse.at(&[[0.0; 5]], &[]);
-    assert_eq!(found, Err(SimError::NoTimeDerivatives { parameter: "link.fp".into() }));
+    assert_eq!(found, Err(SimError::NoTimeDerivatives { parameter: "link.fc".into() }));
     let soft: [Box<dyn JointElement>; 2] =
         [Box::new(ElasticTransmission::new(0, 1, 10.0)), Box::new(RotorInertia { rate: 0 })];
     let soft = model(soft.into());

@@ -3,7 +3,6 @@
 use dynid_model::EffortModel;
 use dynid_report as report;
 
-use crate::elements::friction::{is_law, is_shaped};
 use crate::estimate::{Estimate, PassivityRecord};
 use crate::passivity;
 use crate::run::Run;
@@ -20,8 +19,9 @@ impl Run {
             .filter_map(|(rate, joint)| {
                 let record = estimate.friction_passivity.iter().find(|r| r.joint == *joint)?;
                 let known = self.plan.known_friction(joint).is_some();
-                let shaped =
-                    self.plan.per_rate[self.model.tree_rate(rate)].iter().any(|name| is_shaped(name));
+                let shaped = self.plan.per_rate[self.model.tree_rate(rate)]
+                    .iter()
+                    .any(|name| self.plan.registry().is_shaped(name));
                 (known || shaped).then(|| self.law(record, rate))
             })
             .collect()
@@ -64,7 +64,7 @@ impl Run {
         let own = self.plan.per_rate[self.model.tree_rate(rate)]
             .iter()
             .map(String::as_str)
-            .filter(|name| is_law(name));
+            .filter(|name| self.plan.registry().is_friction(name));
         let laws: Vec<String> = match known {
             Some(law) => {
                 let errors: Vec<&str> = own.collect();

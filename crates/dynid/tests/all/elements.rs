@@ -5,7 +5,8 @@
 use dynid::Error;
 use dynid::elements::ElementPlan;
 use dynid::io::toml_robot;
-use dynid::model::{EffortModel, Mechanism, ParameterTable, RobotModel};
+use dynid::model::element::ElementRegistry;
+use dynid::model::{EffortModel, Mechanism, Parameter, ParameterTable, RobotModel};
 
 /// A joint with a speed limit of 4 rad/s, and what is said about its elements.
 fn planned(elements: &str) -> (Mechanism, Result<ElementPlan, Error>) {
@@ -36,13 +37,33 @@ fn fault(elements: &str) -> String {
 
 #[test]
 fn every_name_builds_an_element_with_parameters_of_its_own() {
-    let names = dynid::elements::NAMES;
-    for name in names {
+    for kind in ElementRegistry::default().kinds() {
+        let name = kind.name;
         // A transmission has no ratio that could be a default.
         let stated = if name == "elastic" { "\nelastic = { ratio = 100 }" } else { "" };
         let (mechanism, plan) = plan(&format!("elements = [\"{name}\"]{stated}"));
         let model = plan.model(&mechanism).unwrap();
-        assert!(model.parameters().linear.len() > 10, "{name}");
+        // The registry says what the element is.
+        let table = model.parameters();
+        assert!(table.linear.len() > 10, "{name}");
+        for term in &kind.linear {
+            let optional = name == "elastic" && term.symbol != "k1";
+            let found = table.linear.iter().find(|p| p.name == format!("j1.{}", term.symbol));
+            let Some(found) = found else {
+                assert!(optional, "{name}: no parameter {}", term.symbol);
+                continue;
+            };
+            assert_eq!((found.unit, found.lower), (term.units[0], term.lower), "{name}.{}", term.symbol);
+        }
+        let motor = |p: &&Parameter| p.name.starts_with("j1.");
+        assert!(table.linear.iter().skip(10).filter(motor).count() <= kind.linear.len(), "{name}");
+        for term in &kind.shape {
+            let held = term.setting(4.0).held;
+            let found = table.shape.iter().find(|p| p.name == format!("j1.{}", term.symbol));
+            assert_eq!(found.is_none(), held, "{name}.{}", term.symbol);
+        }
+        let friction = plan.build(&mechanism).unwrap().iter().any(|e| e.is_friction());
+        assert_eq!(friction, kind.friction, "{name}");
     }
     let apart = ["arctangent", "tanh", "sigmoid", "sigmoid_offset", "power", "viscous_magnitude", "stribeck"];
     let all = table(&format!("elements = {apart:?}"));

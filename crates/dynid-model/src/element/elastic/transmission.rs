@@ -126,7 +126,7 @@ impl ElasticTransmission {
 
     /// Fills the motor's and the link's column of a torque.
     fn put(&self, entry: usize, torque: impl Iterator<Item = f64>, out: &mut ElementColumns<'_>) {
-        let [motor, link] = out.two_columns(entry, entry + 1);
+        let [motor, link] = out.columns(entry);
         for ((m, l), t) in motor.iter_mut().zip(link).zip(torque) {
             *m = t / self.ratio;
             *l = -t;

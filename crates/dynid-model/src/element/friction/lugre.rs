@@ -1,12 +1,15 @@
 //! LuGre friction: bristles that bend before they slip.
 
-use super::stribeck::{fill_falling, raised};
-use super::{EFFORT, NUMBER, PER_ANGLE, SPEED, VISCOUS};
+use super::{EFFORT, NUMBER, PER_ANGLE, VISCOUS};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
-use crate::element::shape::{self, places, values};
-use crate::element::{ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting, sign};
+use crate::element::laws::falling;
+use crate::element::shape::{places, values};
+use crate::element::{
+    ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting, ShapeTerm, sign,
+};
 use crate::parameter::{Parameter, ShapeParameter};
-use crate::scalar::elementary::{decay, map_decay};
+use crate::scalar::elementary::{Curve, map_curve, map_decay};
+use crate::scalar::{Cross, Dual, Scalar};
 
 /// Bristles with deflection `z`, `ż = v - σ0 |v| z / g(v)` with `g = F_c + (F_s - F_c) E`, `E = exp(-|v/v_s|^δ)`, and effort
 /// `σ0 z + σ1 ż` (Canudas de Wit, Olsson, Åström & Lischinsky 1995), in a form that is linear in `F_c` and `σ1`: with
@@ -59,6 +62,14 @@ impl LuGre {
     /// Name of the signal `w`, after that of the joint and a dot.
     pub const BRISTLE: &str = "bristle";
 
+    /// Its shape parameters `kappa`, `rho`, `vs`, `delta`.
+    pub const TERMS: [ShapeTerm; SHAPES] = [
+        ShapeTerm::positive("kappa", PER_ANGLE, 1e2, 1e5).held_at(1e3),
+        ShapeTerm::positive("rho", NUMBER, 1.0, 3.0).from(1.3),
+        ShapeTerm::speed("vs", 1e-3, 0.3),
+        ShapeTerm::positive("delta", NUMBER, 0.5, 2.0).held_at(2.0),
+    ];
+
     /// For speeds up to about 1 rad/s or m/s.
     pub fn new(rate: usize) -> Self {
         Self::scaled(rate, 1.0)
@@ -66,13 +77,8 @@ impl LuGre {
 
     /// For speeds up to `v_max`, rad/s or m/s, above 0.
     pub fn scaled(rate: usize, v_max: f64) -> Self {
-        LuGre {
-            rate,
-            kappa: ShapeSetting { start: 1e3, lower: 1e2, upper: 1e5, held: true },
-            rho: ShapeSetting { start: 1.3, lower: 1.0, upper: 3.0, held: false },
-            vs: ShapeSetting::between(1e-3 * v_max, 0.3 * v_max),
-            delta: ShapeSetting { start: 2.0, lower: 0.5, upper: 2.0, held: true },
-        }
+        let [kappa, rho, vs, delta] = Self::TERMS.map(|term| term.setting(v_max));
+        LuGre { rate, kappa, rho, vs, delta }
     }
 
     /// Least viscous coefficient (effort over speed, N m s/rad or N s/m) with which bristles with a constant `σ1` give no
@@ -112,28 +118,41 @@ impl LuGre {
     }
 }
 
-/// `γ` over a block, and on demand its derivatives by `ρ`, `v_s`, `δ`.
-fn fill_gamma(speeds: &[f64], [_, rho, vs, delta]: [f64; SHAPES], out: &mut [f64]) {
-    fill_falling(speeds, [vs, delta], out);
-    out.iter_mut().for_each(|e| *e = 1.0 + (rho - 1.0) * *e);
+/// `γ` at a speed.
+#[inline(always)]
+fn gamma<S: Scalar>(v: S, [_, rho, vs, delta]: [S; SHAPES]) -> S {
+    S::one() + (rho - S::one()) * falling(v, vs, delta)
 }
 
-/// `∂γ/∂ρ`, `∂γ/∂v_s`, `∂γ/∂δ` at a speed, `∂γ/∂κ = 0` before them.
-fn gamma_by_shape(v: f64, [_, rho, vs, delta]: [f64; SHAPES]) -> [f64; SHAPES] {
-    let x = (v / vs).abs();
-    let power = raised(x, delta);
-    let e = decay(power);
-    let logarithm = if x > 0.0 { x.ln() } else { 0.0 };
-    [0.0, e, (rho - 1.0) * e * power * delta / vs, -(rho - 1.0) * e * power * logarithm]
-}
-
-/// `∂γ/∂v` times `v`, from which both sides of rest follow.
-fn gamma_slope(v: f64, [_, rho, vs, delta]: [f64; SHAPES]) -> f64 {
-    if v == 0.0 {
-        return 0.0;
+/// `γ` over a block.
+fn fill_gamma(speeds: &[f64], shape: [f64; SHAPES], out: &mut [f64]) {
+    struct Gamma([f64; SHAPES]);
+    impl Curve for Gamma {
+        #[inline(always)]
+        fn at(&self, v: f64) -> f64 {
+            gamma(v, self.0)
+        }
     }
-    let power = raised((v / vs).abs(), delta);
-    -(rho - 1.0) * decay(power) * delta * power / v
+    out.copy_from_slice(speeds);
+    map_curve(&Gamma(shape), out);
+}
+
+/// Derivatives of `γ` by the shape parameters.
+fn gamma_by_shape(v: f64, shape: [f64; SHAPES]) -> [f64; SHAPES] {
+    let shape: [Dual<SHAPES>; SHAPES] = std::array::from_fn(|k| Dual::variable(shape[k], k));
+    gamma(Dual::from_f64(v), shape).derivative
+}
+
+/// `∂γ/∂v`.
+fn gamma_slope(v: f64, shape: [f64; SHAPES]) -> f64 {
+    gamma(Dual::<1>::variable(v, 0), shape.map(Dual::from_f64)).derivative[0]
+}
+
+/// `∂²γ/∂v∂p` for a shape parameter.
+fn gamma_bend(v: f64, shape: [f64; SHAPES], parameter: usize) -> f64 {
+    let along = |k: usize| if k == parameter { 1.0 } else { 0.0 };
+    let shape = std::array::from_fn(|k| Cross { value: shape[k], a: 0.0, b: along(k), ab: 0.0 });
+    gamma(Cross { value: v, a: 1.0, b: 0.0, ab: 0.0 }, shape).ab
 }
 
 impl JointElement for LuGre {
@@ -146,12 +165,8 @@ impl JointElement for LuGre {
     }
     fn shape(&self, joints: &[JointInfo]) -> Vec<ShapeParameter> {
         let joint = &joints[self.rate];
-        shape::free([
-            (&self.kappa, self.kappa.parameter(joint, "kappa", PER_ANGLE, true)),
-            (&self.rho, self.rho.parameter(joint, "rho", NUMBER, true)),
-            (&self.vs, self.vs.parameter(joint, "vs", SPEED, true)),
-            (&self.delta, self.delta.parameter(joint, "delta", NUMBER, true)),
-        ])
+        let terms = Self::TERMS.iter().zip(self.settings()).filter(|(_, setting)| !setting.held);
+        terms.map(|(term, setting)| term.parameter(setting, joint)).collect()
     }
     fn is_friction(&self) -> bool {
         true
@@ -180,10 +195,8 @@ impl JointElement for LuGre {
         let Some(first) = speeds.first() else { return };
         if state.is_empty() {
             let by_shape = gamma_by_shape(*first, shape);
-            let mut gamma = [0.0];
-            fill_gamma(&[*first], shape, &mut gamma);
             let s = sign(*first);
-            state.push(s * gamma[0]);
+            state.push(s * gamma(*first, shape));
             state.extend(free.iter().map(|p| s * by_shape[*p]));
         }
         let n = speeds.len();
@@ -242,7 +255,7 @@ impl JointElement for LuGre {
             return;
         }
         let speeds = motion.rate(self.rate);
-        let [bent, rate] = out.two_columns(0, 1);
+        let [bent, rate] = out.columns(0);
         fill_gamma(speeds, values(self.settings(), shape), bent);
         motion.fill_signs(speeds, rate);
         for (w, s) in bent.iter_mut().zip(rate) {
@@ -265,7 +278,7 @@ impl JointElement for LuGre {
         for (p, place) in places(self.settings()).into_iter().enumerate() {
             let Some(place) = place else { continue };
             let signals = [2 * p + 2, 2 * p + 3].map(|index| self.remembered(joints, motion, index));
-            let [bent, rate] = out.two_columns(2 * place, 2 * place + 1);
+            let [bent, rate] = out.columns(2 * place);
             if let [Some(by_shape), Some(rate_by_shape)] = signals {
                 bent.copy_from_slice(by_shape);
                 rate.copy_from_slice(rate_by_shape);
@@ -286,25 +299,11 @@ impl JointElement for LuGre {
         out: &mut MotionAdjoint,
     ) {
         let shape = values(self.settings(), shape);
-        let [_, rho, vs, delta] = shape;
         let speeds = motion.rate(self.rate);
         for (p, place) in places(self.settings()).into_iter().enumerate() {
             let Some(place) = place else { continue };
             let bend = |v: f64| {
-                if v == 0.0 {
-                    return 0.0;
-                }
-                let x = (v / vs).abs();
-                let power = raised(x, delta);
-                let e = decay(power);
-                let falling = delta * (1.0 - power) / v;
-                let slope = match p {
-                    0 => 0.0,
-                    1 => -e * delta * power / v,
-                    2 => (rho - 1.0) * e * power * delta / vs * falling,
-                    _ => -(rho - 1.0) * e * power * (falling * x.ln() + 1.0 / v),
-                };
-                motion.sign_slope(v) * gamma_by_shape(v, shape)[p] + motion.sign(v) * slope
+                motion.sign_slope(v) * gamma_by_shape(v, shape)[p] + motion.sign(v) * gamma_bend(v, shape, p)
             };
             weights.add(2 * place, self.rate, speeds, bend, &mut out.dq);
         }
@@ -322,11 +321,7 @@ impl JointElement for LuGre {
             return;
         }
         let shape = values(self.settings(), shape);
-        let steady = |v: f64| {
-            let mut gamma = [0.0];
-            fill_gamma(&[v], shape, &mut gamma);
-            motion.sign_slope(v) * gamma[0] + motion.sign(v) * gamma_slope(v, shape)
-        };
+        let steady = |v: f64| motion.sign_slope(v) * gamma(v, shape) + motion.sign(v) * gamma_slope(v, shape);
         weights.add(0, self.rate, motion.rate(self.rate), steady, &mut out.dq);
     }
 }

@@ -1,8 +1,10 @@
 //! Friction that follows the forces which press on a joint.
 
 use super::NUMBER;
-use super::stribeck::Stribeck;
+use super::placed::Stribeck;
 use crate::dynamics::{MotionAdjoint, MotionBlock};
+use crate::element::laws::falling;
+use crate::element::shape::values;
 use crate::element::{ElementColumns, ElementWeights, JointElement, JointInfo};
 use crate::parameter::{Parameter, ShapeParameter};
 
@@ -46,10 +48,16 @@ impl ReactionFriction {
         })
     }
 
+    /// `E` at one speed.
+    fn falling(&self, v: f64, shape: &[f64]) -> f64 {
+        let [vs, delta] = values([&self.law.vs, &self.law.delta], shape);
+        falling(v, vs, delta)
+    }
+
     /// Friction per unit of `F` and of `F_w` at one speed, for coefficients in the order of the parameters.
     pub(crate) fn per_force(&self, motion: &MotionBlock<'_>, v: f64, shape: &[f64], mu: &[f64]) -> [f64; 2] {
         let sign = motion.sign(v);
-        let falling = if self.falls { self.law.falling(v, shape) } else { 0.0 };
+        let falling = if self.falls { self.falling(v, shape) } else { 0.0 };
         let fixed = mu.get(1).copied().unwrap_or(mu[0]);
         [sign * (mu[0] + (fixed - mu[0]) * falling), sign * mu[0]]
     }
