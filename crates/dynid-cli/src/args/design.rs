@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum, ValueHint};
 
+use super::elements::with_elements;
 use super::robot::joint_value;
 use super::{ForceArgs, PrintArgs};
 
@@ -78,7 +79,7 @@ pub(crate) struct DesignArgs {
     #[arg(long, value_name = "TRAJECTORY.json", value_hint = ValueHint::FilePath)]
     pub(crate) earlier: Vec<PathBuf>,
     /// Elements at every joint, comma separated; `none`: rigid bodies alone.
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = with_elements("Elements at every joint, comma separated; `none`: rigid bodies alone."))]
     pub(crate) elements: Option<Vec<String>>,
     /// Hold a joint at a position, rad or m.
     #[arg(long, value_name = "JOINT=POSITION", value_parser = joint_value)]

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum, ValueHint};
 
+use super::elements::with_elements;
 use super::logs::row_range;
 use super::robot::{joint_value, vector};
 use super::{ForceArgs, LogArgs, PrintArgs};
@@ -145,7 +146,7 @@ pub(crate) struct IdentifyArgs {
     pub(crate) columns: LogArgs,
     /// Elements at every joint that moves, comma separated; `none`: rigid bodies alone (default: the robot file's, else
     /// coulomb,viscous,offset,rotor).
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = with_elements("Elements at every joint that moves, comma separated; `none`: rigid bodies alone (default: the robot file's, else coulomb,viscous,offset,rotor)."))]
     pub(crate) elements: Option<Vec<String>>,
     /// Friction of joints that have any: shapes found on held-out data, or one law for all.
     #[arg(long, value_enum)]

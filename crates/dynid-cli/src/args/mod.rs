@@ -2,6 +2,7 @@
 
 mod about;
 mod design;
+mod elements;
 mod examples;
 mod experiments;
 mod identify;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueHint};
 use dynid::estimate::Split;
 
+use super::elements::with_elements;
 use super::logs::row_range;
 use super::{ForceArgs, LogArgs, PrintArgs, ReadingArgs, RobotArgs};
 
@@ -13,7 +14,7 @@ pub(crate) struct InspectArgs {
     #[command(flatten)]
     pub(crate) robot: RobotArgs,
     /// Elements at every joint, comma separated; `none`: rigid bodies alone (default: the robot file's, else none).
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', long_help = with_elements("Elements at every joint, comma separated; `none`: rigid bodies alone (default: the robot file's, else none)."))]
     pub(crate) elements: Option<Vec<String>>,
     #[command(flatten)]
     pub(crate) print: PrintArgs,

@@ -200,13 +200,9 @@ pub(crate) fn power(x: f64, p: f64) -> f64 {
     let y = p * logarithm(x);
     let (under, over) = (y < -DECAYED, y > DECAYED);
     let (scale, part) = decay_parts(if under || over { 0.0 } else { -y });
-    if under {
-        0.0
-    } else if over {
-        f64::INFINITY
-    } else {
-        scale + scale * part
-    }
+    let within = scale + scale * part;
+    let bounded = if under { 0.0 } else { within };
+    if over { f64::INFINITY } else { bounded }
 }
 
 /// Hyperbolic tangent.

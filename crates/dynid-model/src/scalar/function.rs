@@ -164,31 +164,35 @@ impl Function for Clamp {
 pub(super) struct Power;
 
 impl FunctionOfTwo for Power {
+    // What is dear stands before the choices, which are then no branches; where the exponent is known, it is not computed.
     #[inline(always)]
     fn value(self, x: f64, p: f64) -> f64 {
+        let any = elementary::power(x, p);
         if p == 2.0 {
             x * x
         } else if p == 1.0 {
             x
         } else {
-            elementary::power(x, p)
+            any
         }
     }
     #[inline(always)]
     fn by_first(self, x: f64, p: f64, f: f64) -> f64 {
+        let any = p * f / x;
         if p == 2.0 {
             2.0 * x
         } else if p == 1.0 {
             1.0
         } else if x > 0.0 {
-            p * f / x
+            any
         } else {
             0.0
         }
     }
     #[inline(always)]
     fn by_second(self, x: f64, _: f64, f: f64) -> f64 {
-        if x > 0.0 { f * elementary::logarithm(x) } else { 0.0 }
+        let logarithm = elementary::logarithm(x);
+        if x > 0.0 { f * logarithm } else { 0.0 }
     }
     #[inline(always)]
     fn bends(self, x: f64, p: f64, f: f64) -> [f64; 3] {

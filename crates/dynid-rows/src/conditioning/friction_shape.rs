@@ -1,6 +1,6 @@
 //! Shapes of friction, and the candidates for a joint.
 
-use dynid_model::element::sign;
+use dynid_model::element::{Velocity, VelocityLaw as _, laws, sign};
 
 use super::states::States;
 
@@ -45,11 +45,15 @@ pub struct FrictionShape {
 impl FrictionShape {
     /// The column, one entry per speed. `loads`: rigid efforts at the same samples; read by [`ShapeKind::Load`] alone.
     pub(crate) fn column(&self, speeds: &[f64], loads: &[f64]) -> Vec<f64> {
-        let map = |f: &dyn Fn(f64) -> f64| speeds.iter().map(|v| f(*v)).collect();
+        let velocities = speeds.iter().map(|v| Velocity::new(*v));
         match self.kind {
-            ShapeKind::ViscousMagnitude => map(&f64::abs),
-            ShapeKind::Stribeck => map(&|v| sign(v) * (-(v / self.speed).powi(2)).exp()),
-            ShapeKind::Tanh => map(&|v| (v / self.speed).tanh()),
+            ShapeKind::ViscousMagnitude => {
+                velocities.map(|v| laws::ViscousMagnitude.columns(v, [])[0]).collect()
+            }
+            ShapeKind::Stribeck => {
+                velocities.map(|v| laws::Stribeck.columns(v, [self.speed, 2.0])[1]).collect()
+            }
+            ShapeKind::Tanh => velocities.map(|v| laws::Tanh.columns(v, [self.speed])[0]).collect(),
             ShapeKind::Load => speeds.iter().zip(loads).map(|(v, load)| sign(*v) * load.abs()).collect(),
         }
     }

@@ -23,6 +23,7 @@ mod instruments;
 mod least_squares;
 mod mutations;
 mod online;
+mod own_law;
 mod payload;
 mod periodic;
 mod preflight;

@@ -16,6 +16,7 @@
 
 mod blocks;
 mod console;
+mod elements;
 mod files;
 mod keys;
 mod links;

@@ -21,6 +21,11 @@ pub struct Velocity<S> {
 }
 
 impl<S: Scalar> Velocity<S> {
+    /// A velocity with an exact sign, rad/s or m/s.
+    pub fn new(value: S) -> Self {
+        Velocity { value, sign_width: 0.0, temperature: S::zero() }
+    }
+
     /// The velocity itself, rad/s or m/s.
     #[inline(always)]
     pub fn value(self) -> S {

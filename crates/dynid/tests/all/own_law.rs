@@ -1,0 +1,129 @@
+//! A law of friction of a program's own: simulated, identified, recorded, read back, exported, and refused where it is not known.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
+use dynid::config::{Config, Friction, LogConfig};
+use dynid::estimate::{Estimate, Split};
+use dynid::export::{CheckStates, RobotExport, Source};
+use dynid::io::csv;
+use dynid::model::Scalar;
+use dynid::model::element::{
+    ElementKind, ElementRegistry, LinearTerm, RegistryFault, ShapeTerm, Velocity, VelocityLaw, laws, units,
+};
+use dynid::predict::efforts;
+use dynid::simulate::{SimulateSettings, simulate};
+use dynid::{Robot, RobotOptions, identify};
+
+/// Friction that falls from `hs` at rest to `hc` as `1 / (1 + (v/hv)²)` (Hess & Soom 1990).
+#[derive(Debug, Clone)]
+struct HessSoom;
+
+impl VelocityLaw<1, 2> for HessSoom {
+    fn linear(&self) -> [LinearTerm; 2] {
+        [LinearTerm::effort("hc").friction(), LinearTerm::effort("hs").friction()]
+    }
+    fn shape(&self) -> [ShapeTerm; 1] {
+        [ShapeTerm::speed("hv", 0.001, 0.3)]
+    }
+    fn columns<S: Scalar>(&self, v: Velocity<S>, [hv]: [S; 1]) -> [S; 2] {
+        let x = v.value() / hv;
+        let falling = (S::one() + x * x).recip();
+        [v.sign() * (S::one() - falling), v.sign() * falling]
+    }
+}
+
+fn registry() -> ElementRegistry {
+    let law = ElementKind::law("hess_soom", HessSoom)
+        .equation("sign(q̇) (hc + (hs - hc) / (1 + (q̇/hv)²))")
+        .excludes("coulomb", "its columns add up to the sign");
+    ElementRegistry::default().with(law).unwrap()
+}
+
+const ARM: &str = r#"schema = 1
+name = "arm"
+dh = "modified"
+[[joint]]
+name = "j1"
+alpha = "-90deg"
+limits = { position = [-2.0, 2.0], velocity = 3.0, effort = 100.0 }
+phi = [3.0, 0.6, 0.03, 0.0, 0.06, -0.006, 0.0, 0.17, 0.0, 0.18]
+[element.j1]
+elements = ["hess_soom", "viscous", "offset"]
+viscous = { coefficient = 1.2 }
+"#;
+const VALUES: &str = "hess_soom = { hc = 2.0, hs = 4.0, hv = { start = 0.25, lower = 0.05, upper = 1.0 } }\n";
+
+#[test]
+fn an_own_law_goes_the_whole_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("truth.toml"), format!("{ARM}{VALUES}")).unwrap();
+    std::fs::write(path("arm.toml"), ARM).unwrap();
+    let robot = Robot::load(&path("truth.toml"), &RobotOptions::default()).unwrap().with_registry(registry());
+    let settings = SimulateSettings::parse("rate_hz = 250\nseed = 3", "simulation").unwrap();
+    let log = simulate(&robot, &settings).unwrap();
+    assert_eq!(log.truth.iter().find(|(name, _)| name == "j1.hs").map(|(_, x)| *x), Some(4.0));
+    let columns: [&[f64]; 3] = [&log.time, &log.position[0], &log.effort[0]];
+    csv::write(path("log.csv"), &["t", "q1", "tau1"], &columns).unwrap();
+
+    let log_config = LogConfig { path: path("log.csv"), ..LogConfig::default() };
+    let mut config = Config { robot: path("arm.toml"), log: vec![log_config], ..Config::default() };
+    config.elements.friction = Friction::Given;
+    let unknown = identify(&config, &mut |_| {}).unwrap_err();
+    assert!(unknown.to_string().contains("unknown element `hess_soom` for joint `j1`"), "{unknown}");
+    config.registry = registry();
+    let found = identify(&config, &mut |_| {}).unwrap();
+    let estimate = found.estimate(&config).unwrap();
+    let [shape] = &estimate.shape_parameters[..] else { panic!("{:?}", estimate.shape_parameters) };
+    assert_eq!((shape.name.as_str(), shape.verdict.as_str()), ("j1.hv", "seen in the data"));
+    assert!((shape.value - 0.25).abs() <= 4.0 * shape.std.unwrap(), "{shape:?}");
+    for (name, truth) in [("j1.hc", 2.0), ("j1.hs", 4.0)] {
+        let p = estimate.parameters.iter().find(|p| p.name == name).unwrap();
+        assert_eq!(p.verdict, "seen in the data");
+        assert!((p.value - truth).abs() <= 4.0 * p.std.unwrap(), "{p:?}");
+    }
+    assert_eq!(estimate.friction_passivity[0].passivity, "passive");
+
+    // Read back, by those who know the law and by those who do not.
+    let file = path("estimate.json");
+    std::fs::write(&file, estimate.to_json()).unwrap();
+    let mut read = Estimate::read(&file).unwrap();
+    let fault = read.effort_model(&file, Split::Consistent).unwrap_err().to_string();
+    assert!(fault.contains("`hess_soom`") && fault.contains("expected one of"), "{fault}");
+    read.model.registry = registry();
+    let model = read.effort_model(&file, Split::Consistent).unwrap();
+    let states = dynid::io::States {
+        rows: log.time.len(),
+        position: log.clean[0].clone(),
+        velocity: log.clean[1].clone(),
+        acceleration: log.clean[2].clone(),
+        gravity: None,
+        channels: Vec::new(),
+    };
+    let predicted = efforts(&model, &read.values(Split::Consistent), &states).unwrap();
+    let square = |list: &mut dyn Iterator<Item = f64>| list.map(|x| x * x).sum::<f64>();
+    let error = square(&mut predicted[0].iter().zip(&log.clean[3][0]).map(|(p, c)| p - c));
+    let share = (error / square(&mut log.clean[3][0].iter().copied())).sqrt();
+    assert!(share < 0.02, "{:.2} % off the true effort", 100.0 * share);
+
+    // Files of simulators state it as they do every law that they have no place for.
+    let robot = read.identified_robot(&file).unwrap();
+    let states = CheckStates::random(robot.identified().model);
+    let source = Source::read(&path("arm.toml")).unwrap();
+    let export = RobotExport::new(robot.identified(), &source).unwrap();
+    for exported in [export.urdf(&states).unwrap(), export.mjcf(&states).unwrap()] {
+        let notes = exported.notes.join("\n");
+        assert!(notes.contains("friction of `j1` has a form that"), "{notes}");
+    }
+}
+
+#[test]
+fn a_registry_refuses_names_and_symbols_that_are_taken() {
+    let found = registry().with(ElementKind::law("hess_soom", laws::Coulomb)).unwrap_err();
+    assert_eq!(found, RegistryFault::Name { name: "hess_soom" });
+    let found = registry().with(ElementKind::law("dry", laws::Coulomb)).unwrap_err();
+    assert_eq!(found, RegistryFault::Symbol { name: "dry", symbol: "fc", other: "coulomb" });
+    assert!(registry().is_friction("hess_soom") && registry().is_coefficient("hs"));
+    assert_ne!(registry(), ElementRegistry::default());
+    assert_eq!(LinearTerm::effort("hc").units, units::EFFORT);
+}
