@@ -264,11 +264,7 @@ fn block_rows<'a>(
 }
 
 /// Fails if a value is not finite; `values` are those of `column` from row `first_row` on.
-fn require_finite(
-    values: &[f64],
-    first_row: usize,
-    column: Option<usize>,
-) -> Result<(), FactorError> {
+fn require_finite(values: &[f64], first_row: usize, column: Option<usize>) -> Result<(), FactorError> {
     match first_not_finite(values) {
         Some(offset) => {
             Err(FactorError::NotFinite { row: first_row + offset, column, found: values[offset] })
