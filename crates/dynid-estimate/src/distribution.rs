@@ -10,6 +10,11 @@ pub fn t_quantile(probability: f64, freedom: f64) -> Option<f64> {
     inside(probability).then(|| law.inverse_cdf(probability))
 }
 
+/// Probability that Student's t with `freedom` degrees of freedom exceeds `value`.
+pub fn t_exceedance(value: f64, freedom: f64) -> Option<f64> {
+    Some(StudentsT::new(0.0, 1.0, freedom).ok()?.sf(value))
+}
+
 /// Quantile of Fisher's F with `(numerator, denominator)` degrees of freedom.
 pub fn f_quantile(probability: f64, numerator: f64, denominator: f64) -> Option<f64> {
     let law = FisherSnedecor::new(numerator, denominator).ok()?;
