@@ -2,25 +2,6 @@
 
 use dynid_motion::spectrum::{lagged_products, periodogram};
 
-use crate::distribution::chi_squared_exceedance;
-
-/// Autocorrelations `ρ_1..ρ_lags` of a signal about its mean; `None` for a constant signal or one no longer
-/// than `lags`.
-pub fn autocorrelation(signal: &[f64], lags: usize) -> Option<Vec<f64>> {
-    let mean = signal.iter().sum::<f64>() / signal.len() as f64;
-    autocorrelation_about(signal, mean, lags)
-}
-
-fn autocorrelation_about(signal: &[f64], mean: f64, lags: usize) -> Option<Vec<f64>> {
-    let energy: f64 = signal.iter().map(|v| (v - mean).powi(2)).sum();
-    if signal.len() <= lags || energy.is_nan() || energy <= 0.0 {
-        return None;
-    }
-    let shifted =
-        |lag: usize| signal[lag..].iter().zip(signal).map(|(a, b)| (a - mean) * (b - mean)).sum::<f64>();
-    Some((1..=lags).map(|lag| shifted(lag) / energy).collect())
-}
-
 /// Autocorrelations `ρ_1..ρ_lags` about zero over pairs of samples that both count, a sample of exactly zero not
 /// counting: `ρ_i = (Σ r_k r_{k+i}/n_i)/(Σ r_k²/n_0)`, zero for lags without a pair.
 ///
@@ -37,40 +18,7 @@ pub fn counted_autocorrelation(signal: &[f64], lags: usize) -> Option<Vec<f64>> 
     Some((1..=lags).map(at).collect())
 }
 
-/// First lag at which the autocorrelation falls below `level` in absolute value, in samples; `None` if it does
-/// not within `longest` lags. Blocks of five times the largest of this over the joints (level 0.1) are safe.
-pub fn correlation_length(signal: &[f64], level: f64, longest: usize) -> Option<usize> {
-    let correlations = autocorrelation(signal, longest.min(signal.len().checked_sub(1)?))?;
-    correlations.iter().position(|r| r.abs() < level).map(|lag| lag + 1)
-}
-
-/// Outcome of [`ljung_box`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct LjungBox {
-    /// `Q = T (T+2) Σ_{i=1..h} ρ_i²/(T-i)`.
-    pub statistic: f64,
-    /// Degrees of freedom `h`.
-    pub freedom: usize,
-    /// Probability of a larger `Q` under white noise.
-    pub p_value: f64,
-}
-
-/// Ljung-Box test on *unfiltered* residuals at the raw rate, `χ²(h)` with `h = lags` (20 is usual).
-///
-/// Autocorrelations are taken about zero, as residuals are. Filtered residuals are rejected whatever the noise:
-/// use [`in_band_whiteness`] for those. `None` for a zero signal or one no longer than `lags`.
-///
-/// Source: Ljung & Box 1978.
-pub fn ljung_box(residuals: &[f64], lags: usize) -> Option<LjungBox> {
-    let samples = residuals.len() as f64;
-    let correlations = autocorrelation_about(residuals, 0.0, lags)?;
-    let sum: f64 = correlations.iter().zip(1..).map(|(r, lag)| r * r / (samples - f64::from(lag))).sum();
-    let statistic = samples * (samples + 2.0) * sum;
-    let p_value = chi_squared_exceedance(statistic, lags as f64)?;
-    Some(LjungBox { statistic, freedom: lags, p_value })
-}
-
-/// Settings of [`in_band_whiteness`].
+/// Settings of [`raw_in_band_whiteness`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct InBandSettings {
     /// Share of the cut-off frequency that counts as in band. Default 0.8.
@@ -85,7 +33,7 @@ impl Default for InBandSettings {
     }
 }
 
-/// Outcome of [`in_band_whiteness`].
+/// Outcome of [`raw_in_band_whiteness`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct InBandWhiteness {
     /// `D = max_k |cumulative share - k/m|`.
@@ -103,29 +51,6 @@ impl InBandWhiteness {
     pub fn rejected(&self) -> bool {
         self.distance > self.threshold
     }
-}
-
-/// Cumulative periodogram test of filtered, decimated residuals inside the pass band.
-///
-/// Compares the running share of `I(f_k)/|H(f_k)|⁴`, `0 < f_k < 0.8 f_c`, with a straight line. `sample_rate`:
-/// after decimation, Hz; `cut_off`: `f_c`, Hz; `gain`: `|H(f)|` of one pass of the filter (run forth and back it
-/// acts squared on amplitudes). `None` with fewer than 8 frequencies in band, for zero residuals, or if the gain
-/// vanishes in band.
-///
-/// Source: Bartlett 1955 (cumulative periodogram), restricted to the band.
-pub fn in_band_whiteness(
-    residuals: &[f64],
-    sample_rate: f64,
-    cut_off: f64,
-    gain: impl Fn(f64) -> f64,
-    settings: &InBandSettings,
-) -> Option<InBandWhiteness> {
-    let periodogram = periodogram(residuals)?;
-    let step = sample_rate / residuals.len() as f64;
-    let whitened: Vec<f64> = in_band(&periodogram, step, settings.band * cut_off, sample_rate)
-        .map(|(frequency, power)| power / gain(frequency).powi(4))
-        .collect();
-    cumulative_test(&whitened, step, 1.0, settings)
 }
 
 /// Cumulative periodogram test of *raw* residuals below a band limit: no filter to divide by.

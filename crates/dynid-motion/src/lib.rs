@@ -7,7 +7,7 @@
 //! [`velocity`] judges a measured velocity, [`constant_speed`] finds constant-speed passes and pairs both directions,
 //! [`trajectory`] holds the excitation trajectories. For motions that repeat:
 //! [`periods`] averages records, [`frequency`] differentiates them by their [`harmonics`], [`smoothing`] fits cubics.
-//! [`faults`] finds what is wrong with a record. [`live`] forms states of a stream, sample by sample; [`words`] carries its state to checkpoints.
+//! [`faults`] finds what is wrong with a record. [`live`] forms states of a stream, sample by sample.
 //!
 //! Units: s, Hz, rad (or m), rad/s, N m (or N). Signals are slices of `f64` on a uniform grid of `rate_hz`.
 //! Every function that takes data from outside checks that it is finite and returns a typed error if not, so that
@@ -36,7 +36,6 @@ pub mod temperature;
 pub mod textbook;
 pub mod trajectory;
 pub mod velocity;
-pub mod words;
 
 pub use clock::{ClockError, ClockReport, ClockSettings, UniformLog};
 pub use kernel::Kernel;

@@ -2,8 +2,8 @@
 
 use crate::correlation::InnovationCorrelation;
 use crate::settings::{DetectionSettings, FalseAlarms, Whiteness};
-use crate::state::Transfer;
 use crate::thresholds::{cusum_threshold, run_length_for_rate};
+use dynid_words::Transfer;
 
 /// Thresholds are not lowered below this, however long the correlation time.
 const LEAST_THRESHOLD: f64 = 2.0;
@@ -101,7 +101,7 @@ impl ChangeDetection {
     }
 
     pub(crate) fn transfer(&mut self, transfer: &mut Transfer<'_>) {
-        transfer.real(&mut self.statistic);
+        transfer.finite(&mut self.statistic);
         if let Some(correlation) = &mut self.correlation {
             correlation.transfer(transfer);
         }

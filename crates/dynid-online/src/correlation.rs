@@ -3,7 +3,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::state::Transfer;
+use dynid_words::Transfer;
 
 /// Autocorrelation that passes for none, beside one standard error.
 const NEGLIGIBLE: f64 = 0.1;
@@ -154,14 +154,14 @@ impl InnovationCorrelation {
         for value in [&mut self.seen, &mut self.count, &mut self.next_look, &mut self.looks] {
             transfer.counter(value);
         }
-        transfer.reals(&mut self.ring);
-        transfer.count(&mut self.newest, self.longest);
-        transfer.reals(&mut self.sums);
-        transfer.count(&mut self.time, self.longest);
+        transfer.finites(&mut self.ring);
+        transfer.count(&mut self.newest, self.longest + 1);
+        transfer.finites(&mut self.sums);
+        transfer.count(&mut self.time, self.longest + 1);
         if self.time == 0 {
             transfer.fail();
         }
-        transfer.real(&mut self.inflation);
-        transfer.reals(&mut self.variance);
+        transfer.finite(&mut self.inflation);
+        transfer.finites(&mut self.variance);
     }
 }

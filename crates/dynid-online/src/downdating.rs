@@ -4,8 +4,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::square_root::SquareRoot;
-use crate::state::Transfer;
 use crate::window::BlockWindow;
+use dynid_words::Transfer;
 
 /// `|s|` of a hyperbolic rotation beyond which the factor is refreshed at once.
 const STEEPEST: f64 = 1.0 - 1e-8;
@@ -150,12 +150,12 @@ impl RowWindow {
     pub(crate) fn transfer(&mut self, transfer: &mut Transfer<'_>) {
         self.blocks.transfer(transfer);
         self.root.transfer(transfer);
-        transfer.reals(&mut self.ring);
-        transfer.counts(&mut self.counts, self.most);
-        transfer.count(&mut self.next, self.length - 1);
-        transfer.count(&mut self.held, self.length);
-        transfer.reals(&mut self.amplified);
-        transfer.count(&mut self.age, self.length);
+        transfer.finites(&mut self.ring);
+        transfer.counts(&mut self.counts, self.most + 1);
+        transfer.count(&mut self.next, self.length);
+        transfer.count(&mut self.held, self.length + 1);
+        transfer.finites(&mut self.amplified);
+        transfer.count(&mut self.age, self.length + 1);
         transfer.counter(&mut self.refreshes);
         if self.held < self.blocks.samples() {
             transfer.fail();

@@ -17,7 +17,8 @@ use crate::reaction::{Reaction, TargetedReaction};
 use crate::rows::{RowNoise, WeightedRows};
 use crate::settings::Settings;
 use crate::square_root::{SquareRoot, dot};
-use crate::state::{Fingerprint, Transfer};
+use crate::state::Fingerprint;
+use dynid_words::Transfer;
 
 /// Nothing is discounted once a diagonal entry of `R` is below this (parameters in scales): it would become
 /// zero.
@@ -458,18 +459,24 @@ impl Estimator {
     pub fn load(&mut self, words: &[u64]) -> Result<(), StateError> {
         let mut loaded = self.clone();
         let mut transfer = Transfer::load(words);
-        loaded.transfer(&mut transfer);
-        transfer.finish()?;
+        if !loaded.transfer(&mut transfer) {
+            return Err(StateError::OtherSettings);
+        }
+        if !transfer.complete() {
+            return Err(StateError::Damaged);
+        }
         loaded.publish();
         *self = loaded;
         Ok(())
     }
 
-    fn transfer(&mut self, transfer: &mut Transfer<'_>) {
-        transfer.fingerprint(STATE_VERSION);
-        transfer.fingerprint(self.fingerprint);
+    /// Whether the words are of these settings; always when saving.
+    fn transfer(&mut self, transfer: &mut Transfer<'_>) -> bool {
+        let own = [STATE_VERSION, self.fingerprint];
+        let mut found = own;
+        found.iter_mut().for_each(|word| transfer.integer(word));
         transfer.counter(&mut self.samples);
-        transfer.reals(&mut self.scaled);
+        transfer.finites(&mut self.scaled);
         self.memory.transfer(transfer);
         if !self.memory.root().is_regular() {
             transfer.fail();
@@ -486,6 +493,7 @@ impl Estimator {
         if let Some(reaction) = &mut self.reaction {
             reaction.transfer(transfer);
         }
+        found == own
     }
 }
 

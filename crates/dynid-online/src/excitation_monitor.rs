@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use crate::forgetting::orthonormalise;
 use crate::square_root::SquareRoot;
-use crate::state::Transfer;
+use dynid_words::Transfer;
 
 /// Share of the prior's information that keeps the monitor's factor regular.
 const REGULARISATION: f64 = 1e-8;
@@ -125,8 +125,8 @@ impl ExcitationMonitor {
 
     pub(crate) fn transfer(&mut self, transfer: &mut Transfer<'_>) {
         self.stretch.transfer(transfer);
-        transfer.count(&mut self.count, self.samples);
-        transfer.reals(&mut self.information);
+        transfer.count(&mut self.count, self.samples + 1);
+        transfer.finites(&mut self.information);
         self.frozen.iter_mut().for_each(|frozen| transfer.flag(frozen));
         self.frozen_count = self.frozen.iter().filter(|frozen| **frozen).count();
     }

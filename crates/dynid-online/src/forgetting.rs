@@ -207,7 +207,7 @@ impl BoundedCovariance {
         }
     }
 
-    pub(crate) fn transfer(&mut self, transfer: &mut crate::state::Transfer<'_>) {
-        transfer.reals(&mut self.left);
+    pub(crate) fn transfer(&mut self, transfer: &mut dynid_words::Transfer<'_>) {
+        transfer.finites(&mut self.left);
     }
 }

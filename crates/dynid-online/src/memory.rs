@@ -3,8 +3,8 @@
 use crate::downdating::RowWindow;
 use crate::forgetting::Forgetting;
 use crate::square_root::SquareRoot;
-use crate::state::Transfer;
 use crate::window::BlockWindow;
+use dynid_words::Transfer;
 
 /// Where information is kept.
 #[derive(Debug, Clone)]

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use crate::distribution::chi_squared_upper_quantile;
 use crate::settings::ReactionSettings;
 use crate::square_root::{SquareRoot, dot};
-use crate::state::Transfer;
+use dynid_words::Transfer;
 
 /// Squared share of a column below which a jump of its parameter cannot be told from the other columns.
 const LEAST_SHARE: f64 = 1e-24;
@@ -177,7 +177,7 @@ impl TargetedReaction {
 
     pub(crate) fn transfer(&mut self, transfer: &mut Transfer<'_>) {
         self.window.transfer(transfer);
-        transfer.count(&mut self.collected, self.samples);
+        transfer.count(&mut self.collected, self.samples + 1);
         transfer.flag(&mut self.active);
     }
 }

@@ -3,7 +3,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::state::Transfer;
+use dynid_words::Transfer;
 
 /// Entries of a row that are reflected at a time; they stay in registers and the first cache.
 const STRIP: usize = 32;
@@ -348,9 +348,9 @@ impl SquareRoot {
     }
 
     pub(crate) fn transfer(&mut self, transfer: &mut Transfer<'_>) {
-        transfer.reals(&mut self.triangle);
-        transfer.real(&mut self.rss);
-        transfer.real(&mut self.weight);
+        transfer.finites(&mut self.triangle);
+        transfer.finite(&mut self.rss);
+        transfer.finite(&mut self.weight);
         if (0..self.columns).any(|j| self.row(j)[0] < 0.0) {
             transfer.fail();
         }

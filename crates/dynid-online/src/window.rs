@@ -4,7 +4,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::square_root::SquareRoot;
-use crate::state::Transfer;
+use dynid_words::Transfer;
 
 /// Window over whole blocks of samples, kept in two stacks.
 ///
@@ -117,9 +117,9 @@ impl BlockWindow {
 
     pub(crate) fn transfer(&mut self, transfer: &mut Transfer<'_>) {
         let blocks = self.back.len();
-        transfer.count(&mut self.front_blocks, blocks);
-        transfer.count(&mut self.back_blocks, blocks);
-        transfer.count(&mut self.open_samples, self.block_samples);
+        transfer.count(&mut self.front_blocks, blocks + 1);
+        transfer.count(&mut self.back_blocks, blocks + 1);
+        transfer.count(&mut self.open_samples, self.block_samples + 1);
         if self.front_blocks + self.back_blocks >= blocks {
             transfer.fail();
         }

@@ -25,7 +25,7 @@ use super::error::SearchError;
 use super::population::Population;
 use super::range::{inside, positive};
 use super::run::{Method, Run, Step};
-use dynid_motion::words::Transfer;
+use dynid_words::Transfer;
 
 /// Parameters of a bee colony.
 #[derive(Debug, Clone, PartialEq)]

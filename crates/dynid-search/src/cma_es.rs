@@ -30,7 +30,7 @@ use super::population::Population;
 use super::range::inside;
 use super::run::{Method, Run, Step};
 use descent::Descent;
-use dynid_motion::words::Transfer;
+use dynid_words::Transfer;
 
 /// Parameters of the evolution strategy.
 #[derive(Debug, Clone, PartialEq)]

@@ -22,7 +22,7 @@ use super::population::Population;
 use super::range::{inside, positive};
 use super::run::{Method, Run, Step};
 use super::tent::TentMap;
-use dynid_motion::words::Transfer;
+use dynid_words::Transfer;
 use statrs::function::gamma::gamma;
 
 /// Parameters of plain cuckoo search; population 25 and 200 iterations by default.

@@ -23,7 +23,7 @@ use super::population::Population;
 use super::random::Random;
 use super::range::not_negative;
 use super::run::{Method, Run, Step};
-use dynid_motion::words::Transfer;
+use dynid_words::Transfer;
 
 /// Parameters of differential evolution; population 60 by default.
 #[derive(Debug, Clone, PartialEq)]

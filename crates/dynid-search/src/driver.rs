@@ -7,7 +7,7 @@ use super::error::SearchError;
 use super::history::History;
 use super::run::{Method, Progress, Run, SearchResult, Status, Step};
 use super::settings::Settings;
-use dynid_motion::words::Transfer;
+use dynid_words::Transfer;
 
 /// Limits of a run, defaults filled in.
 pub(super) struct Limits {

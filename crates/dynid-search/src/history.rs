@@ -1,6 +1,6 @@
 //! How the best value fell.
 
-use dynid_motion::words::Transfer;
+use dynid_words::Transfer;
 
 /// Best value known after a number of evaluations.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -28,7 +28,7 @@ use super::error::SearchError;
 use super::population::Population;
 use super::range::{inside, not_negative};
 use super::run::{Method, Run, Step};
-use dynid_motion::words::Transfer;
+use dynid_words::Transfer;
 
 /// Which memories a particle hears of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -17,7 +17,7 @@
 use super::error::SearchError;
 use super::range::positive;
 use super::run::{Method, Run, Step};
-use dynid_motion::words::Transfer;
+use dynid_words::Transfer;
 
 /// Parameters of pattern search.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,7 @@
 //! Points of a population and their values.
 
 use super::run::Run;
-use dynid_motion::words::Transfer;
+use dynid_words::Transfer;
 
 /// `count` points in search coordinates, row after row, and their values.
 #[derive(Debug, Clone, Default)]

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use dynid_motion::words::Transfer;
+use dynid_words::Transfer;
 
 /// ChaCha8 from the seed of a run; its position in the stream is all its state.
 #[derive(Clone)]

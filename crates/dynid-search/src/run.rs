@@ -6,7 +6,7 @@ use super::history::HistoryPoint;
 use super::objective::Objective;
 use super::random::Random;
 use super::settings::Settings;
-use dynid_motion::words::Transfer;
+use dynid_words::Transfer;
 
 /// Whether an algorithm has more to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

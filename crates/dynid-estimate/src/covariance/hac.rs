@@ -4,9 +4,6 @@ use super::sandwich;
 use dynid_linalg::triangular::symmetric_from;
 use faer::Mat;
 
-/// Largest AR(1) coefficient in the plug-in lag: trajectories make scores nearly unit root.
-const LARGEST_AR1: f64 = 0.97;
-
 /// HAC covariance with Bartlett weights, `V = C Ω C · T/(T-p)`,
 /// `Ω = Γ_0 + Σ_{i=1..S} (1 - i/(S+1)) (Γ_i + Γ_iᵀ)`, `Γ_i = Σ_k s_k s_{k-i}ᵀ`.
 ///
@@ -58,27 +55,4 @@ fn bartlett_sum(scores: &Mat<f64>, lag: usize) -> Mat<f64> {
 /// cut-off. `sample_rate` after decimation and `cut_off` in Hz, both positive.
 pub fn hac_lag(sample_rate: f64, cut_off: f64) -> usize {
     ((2.0 * sample_rate / cut_off).ceil() as usize).max(4)
-}
-
-/// Plug-in lag of Andrews 1991 for the Bartlett kernel, `S = ⌈1.1447 (α(1) T)^{1/3}⌉`, from AR(1) fits to each
-/// column of the scores (coefficient clipped at ±0.97), innovations weighted by `C_jj²`.
-///
-/// Reported for comparison; it asks for too long a lag on smooth trajectories. `None` for all-zero scores.
-pub fn andrews_lag(scores: &Mat<f64>, unit_covariance: &Mat<f64>) -> Option<usize> {
-    let samples = scores.nrows();
-    let (mut numerator, mut denominator) = (0.0, 0.0);
-    for (j, column) in scores.col_iter().enumerate() {
-        let lagged: f64 = (1..samples).map(|k| column[k] * column[k - 1]).sum();
-        let energy: f64 = (1..samples).map(|k| column[k - 1] * column[k - 1]).sum();
-        if energy == 0.0 {
-            continue;
-        }
-        let a = (lagged / energy).clamp(-LARGEST_AR1, LARGEST_AR1);
-        let innovation: f64 =
-            (1..samples).map(|k| (column[k] - a * column[k - 1]).powi(2)).sum::<f64>() / (samples - 1) as f64;
-        let share = (innovation * unit_covariance[(j, j)].powi(2)).powi(2);
-        numerator += share * 4.0 * a * a / ((1.0 - a).powi(6) * (1.0 + a).powi(2));
-        denominator += share / (1.0 - a).powi(4);
-    }
-    (denominator > 0.0).then(|| (1.1447 * (numerator / denominator * samples as f64).cbrt()).ceil() as usize)
 }

@@ -13,31 +13,13 @@ mod sandwich;
 
 pub use block_length::{BlockLength, BlockLengthSettings, BlockLengthStatus, ResidualSignal, block_length};
 pub use bootstrap::{Bootstrap, BootstrapSettings, bootstrap};
-pub use hac::{andrews_lag, hac_bartlett, hac_bartlett_logs, hac_lag};
+pub use hac::{hac_bartlett, hac_bartlett_logs, hac_lag};
 pub use inflation::output_inflation;
 pub use jackknife::{Jackknife, MIN_BLOCKS, jackknife, jackknife_by, jackknife_with};
 pub(crate) use jackknife::{change_without, running_merges};
 pub use sandwich::{block_sandwich, block_sandwich_with};
 
-use crate::least_squares::merge_weighted;
-use dynid_factor::factor::Factor;
 use faer::Mat;
-
-/// Time blocks of the weighted problem: the factors of all groups of a block merged with weights `1/σ_j`.
-///
-/// `groups[j][b]`: factor of group `j` (a joint) in time block `b`; `variances[j] = σ_j²`; `columns`: the columns
-/// to keep. Panics unless there is one variance per group and each group has the same number of blocks.
-pub fn weighted_blocks(groups: &[Vec<Factor>], variances: &[f64], columns: &[usize]) -> Vec<Factor> {
-    assert_eq!(groups.len(), variances.len(), "one variance per group");
-    let blocks = groups.first().map_or(0, Vec::len);
-    assert!(groups.iter().all(|g| g.len() == blocks), "every group has every time block");
-    (0..blocks)
-        .map(|b| {
-            let selected: Vec<Factor> = groups.iter().map(|g| g[b].select(columns)).collect();
-            merge_weighted(&selected, variances)
-        })
-        .collect()
-}
 
 /// Variance inflation `κ = max(1, median_i V_ii/C_ii)`: by how much `model` understates `robust`.
 ///

@@ -4,8 +4,6 @@
 const SEEN: f64 = 0.90;
 /// Least structural limit of what is identifiable at all; also the limit above which nothing but noise is in the way.
 const IDENTIFIABLE: f64 = 0.10;
-/// A gap between structural limit and achieved share that speaks of missing excitation.
-const EXCITATION_GAP: f64 = 0.3;
 
 /// What a value rests on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -21,20 +19,12 @@ pub enum Verdict {
 /// Why a value is carried by the prior.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Carried {
-    /// The parameter acts only together with others (structural limit below 0.9): no motion separates them. The log may miss
-    /// excitation besides; see [`Carried::lacks_excitation`].
+    /// The parameter acts only together with others (structural limit below 0.9): no motion separates them.
     OnlyInCombination,
     /// Another motion would reveal the parameter, the logged one does not.
     NotExcited,
     /// The logged motion would reveal it if there were less noise or more of it.
     TooNoisy,
-}
-
-impl Carried {
-    /// Whether the logged motion misses most of what some motion could reveal: `p - s ≥ 0.3` and `l < 0.9`.
-    pub fn lacks_excitation(achieved: f64, log_limit: f64, structural_limit: f64) -> bool {
-        structural_limit - achieved >= EXCITATION_GAP && log_limit < SEEN
-    }
 }
 
 /// The verdict from achieved share `s`, limit of the log `l` and structural limit `p`.
@@ -96,7 +86,5 @@ mod tests {
         ] {
             assert_eq!(verdict(s, l, p), expected, "s {s}, l {l}, p {p}");
         }
-        assert!(Carried::lacks_excitation(0.1, 0.2, 0.5));
-        assert!(!Carried::lacks_excitation(0.3, 0.3, 0.5));
     }
 }

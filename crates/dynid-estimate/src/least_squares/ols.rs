@@ -47,16 +47,6 @@ impl LinearSolution {
         self.expand((0..self.kept.len()).map(|i| (variance * covariance[(i, i)]).sqrt()))
     }
 
-    /// Relative standard deviations `100 σ_i/|x_i|` in percent; `None` for dropped columns and where
-    /// `|x_i| < 2 σ_i`, since the ratio then says nothing.
-    pub fn relative_standard_deviations(&self, variance: f64) -> Vec<Option<f64>> {
-        self.standard_deviations(variance)
-            .into_iter()
-            .zip(&self.x)
-            .map(|(std, x)| std.filter(|s| x.abs() > 0.0 && x.abs() >= 2.0 * s).map(|s| 100.0 * s / x.abs()))
-            .collect()
-    }
-
     fn expand(&self, values: impl Iterator<Item = f64>) -> Vec<Option<f64>> {
         let mut full = vec![None; self.x.len()];
         for (&column, value) in self.kept.iter().zip(values) {

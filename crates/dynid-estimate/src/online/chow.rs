@@ -1,7 +1,6 @@
 //! Whether two stretches of samples have the same parameters.
 
-use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
-
+use crate::distribution::{f_exceedance, t_exceedance};
 use crate::least_squares::ols;
 use dynid_factor::Factor;
 use dynid_factor::rank::numerical_rank;
@@ -64,17 +63,16 @@ pub fn chow_test(first: &Factor, second: &Factor, inflation: f64) -> Option<Chow
     }
     let merged = Factor::merge(&[first, second]);
     let f = (merged.rss(&ols(&merged).x) - own).max(0.0) / p as f64 / variance;
-    let p_value = FisherSnedecor::new(p as f64, freedom).ok()?.sf(f);
-    let t = StudentsT::new(0.0, 1.0, freedom).ok()?;
+    let p_value = f_exceedance(f, p as f64, freedom)?;
     let (c1, c2) = (before.unit_covariance(), after.unit_covariance());
     let mut parameters: Vec<MovedParameter> = (0..p)
         .map(|j| {
             let change = after.x[j] - before.x[j];
             let statistic = change * change / (variance * (c1[(j, j)] + c2[(j, j)]));
-            let p_value = 2.0 * t.sf(statistic.sqrt());
-            MovedParameter { parameter: j, change, statistic, p_value, adjusted: p_value }
+            let p_value = 2.0 * t_exceedance(statistic.sqrt(), freedom)?;
+            Some(MovedParameter { parameter: j, change, statistic, p_value, adjusted: p_value })
         })
-        .collect();
+        .collect::<Option<_>>()?;
     parameters.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
     let mut least = 0.0_f64;
     for (k, parameter) in parameters.iter_mut().enumerate() {

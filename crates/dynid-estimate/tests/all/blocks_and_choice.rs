@@ -2,8 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use dynid_estimate::covariance::{hac_lag, jackknife, variance_inflation};
-use dynid_estimate::elimination::{backward_elimination, within_one_standard_error};
-use dynid_estimate::folds::{HeldOutError, contiguous_folds};
+use dynid_estimate::folds::contiguous_folds;
 use dynid_estimate::linear::ols;
 use dynid_factor::{Factor, FactorBuilder};
 use dynid_linalg::Mat;
@@ -46,17 +45,6 @@ fn changes_equal_those_of_refitting() {
         let others = blocks.iter().enumerate().filter(|(i, _)| *i != b).map(|(_, f)| f).collect();
         assert!((change[0] - (fit(others) - x)).abs() < 1e-14);
     }
-}
-
-#[test]
-fn the_smallest_model_within_one_standard_error_is_chosen() {
-    let path = backward_elimination(&Factor::merge(&blocks().iter().collect::<Vec<_>>()), 120.0);
-    assert_eq!(path.iter().map(|s| s.columns.len()).collect::<Vec<_>>(), [2, 1]);
-    let error = |mean| Some(HeldOutError { mean, standard_error: 0.1 });
-    assert_eq!(within_one_standard_error(&path, &[error(1.0), error(1.05)]), Some(1));
-    assert_eq!(within_one_standard_error(&path, &[error(1.0), error(1.2)]), Some(0));
-    assert_eq!(within_one_standard_error(&path, &[None, error(1.2)]), Some(1));
-    assert_eq!(within_one_standard_error(&path, &[None, None]), None);
 }
 
 #[test]

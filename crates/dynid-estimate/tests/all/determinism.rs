@@ -2,8 +2,10 @@
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use dynid_estimate::covariance::jackknife;
-use dynid_estimate::folds::{FoldSettings, cross_validate};
+use dynid_estimate::folds::FoldSettings;
+use dynid_estimate::held_out::compare;
 use dynid_estimate::linear::ols;
+use dynid_factor::groups::ReducedGroup;
 use dynid_factor::{Factor, FactorBuilder};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -80,7 +82,10 @@ fn thread_count_does_not_matter() {
             let merged = Factor::merge(&blocks.iter().collect::<Vec<_>>());
             let x = ols(&merged).x;
             let spread = jackknife(&blocks, &x).unwrap();
-            let folds = cross_validate(&[blocks], &FoldSettings::default(), |t| ols(&t[0]).x);
+            let groups =
+                [ReducedGroup { log: 0, output: 0, scale: 0, columns: (0..COLUMNS).collect(), blocks }];
+            let settings = FoldSettings::default();
+            let folds = compare(&groups, &groups, &[1.0], COLUMNS, &settings, &[&|t| ols(t).x]);
             (merged, x, spread, folds)
         })
     };

@@ -1,11 +1,12 @@
-//! `estimation_reduction.json`: reduction, rank, weighted least squares, jackknife, folds, elimination, ridge.
+//! `estimation_reduction.json`: reduction, rank, weighted least squares, jackknife, folds, ridge.
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use crate::golden::{check_close, load, number, vector};
-use dynid_estimate::covariance::{jackknife, weighted_blocks};
-use dynid_estimate::elimination::{backward_elimination, rss_increase};
-use dynid_estimate::folds::{FoldSettings, cross_validate};
+use dynid_estimate::covariance::jackknife;
+use dynid_estimate::folds::FoldSettings;
+use dynid_estimate::held_out::{FoldErrors, compare};
 use dynid_estimate::linear::{WlsEstimate, WlsSettings, ols, ridge, wls};
+use dynid_factor::groups::{ReducedGroup, time_blocks};
 use dynid_factor::rank::{base_columns, numerical_rank};
 use dynid_factor::{Factor, FactorBuilder};
 use dynid_linalg::Mat;
@@ -47,12 +48,20 @@ fn kept_wls(blocks: &[Vec<Factor>]) -> WlsEstimate {
     wls(&joints, &settled())
 }
 
-fn flat(matrix: &Mat<f64>) -> Vec<f64> {
-    (0..matrix.nrows()).flat_map(|i| (0..matrix.ncols()).map(move |j| matrix[(i, j)])).collect()
+/// The kept columns of every joint and block.
+fn groups(blocks: &[Vec<Factor>]) -> Vec<ReducedGroup> {
+    let group = |(output, blocks): (usize, &Vec<Factor>)| ReducedGroup {
+        log: 0,
+        output,
+        scale: 0,
+        columns: KEPT.to_vec(),
+        blocks: blocks.iter().map(|b| b.select(&KEPT)).collect(),
+    };
+    blocks.iter().enumerate().map(group).collect()
 }
 
-fn indices(value: &Value) -> Vec<usize> {
-    value.as_array().unwrap().iter().map(|v| v.as_u64().unwrap() as usize).collect()
+fn flat(matrix: &Mat<f64>) -> Vec<f64> {
+    (0..matrix.nrows()).flat_map(|i| (0..matrix.ncols()).map(move |j| matrix[(i, j)])).collect()
 }
 
 fn flat_golden(value: &Value) -> Vec<f64> {
@@ -143,8 +152,8 @@ fn jackknife_covariance() {
     let tolerance = number(&golden["tolerance_rel"]);
     let blocks = block_factors(&golden);
     let estimate = kept_wls(&blocks);
-    let variances: Vec<f64> = estimate.groups.iter().map(|g| g.variance).collect();
-    let result = jackknife(&weighted_blocks(&blocks, &variances, &KEPT), &estimate.solution.x).unwrap();
+    let weighted = time_blocks(&groups(&blocks), &estimate.weights(), KEPT.len());
+    let result = jackknife(&weighted, &estimate.solution.x).unwrap();
     assert_eq!((result.blocks(), result.indispensable.len()), (6, 0));
     check_close(
         "jackknife",
@@ -158,36 +167,15 @@ fn jackknife_covariance() {
 fn held_out_error_per_joint_and_fold() {
     let Some(golden) = load("estimation_reduction.json") else { return };
     let tolerance = number(&golden["tolerance_rel"]);
-    let blocks: Vec<Vec<Factor>> =
-        block_factors(&golden).iter().map(|g| g.iter().map(|f| f.select(&KEPT)).collect()).collect();
-    let weights = kept_wls(&block_factors(&golden)).weights();
+    let blocks = block_factors(&golden);
+    let groups = groups(&blocks);
+    let weights = kept_wls(&blocks).weights();
     let settings = FoldSettings { folds: 6, dropped_neighbours: 0 };
-    let outcome = cross_validate(&blocks, &settings, |training| {
-        let weighted: Vec<Factor> = training.iter().zip(&weights).map(|(f, w)| f.scaled(*w)).collect();
-        ols(&merged(&weighted)).x
-    });
+    let outcome = compare(&groups, &groups, &weights, KEPT.len(), &settings, &[&|training| ols(training).x]);
     for joint in 0..2 {
-        let found: Vec<f64> = outcome.folds.iter().map(|f| f.errors[joint].unwrap()).collect();
+        let error = |f: &FoldErrors| f.squares[0][joint] / f.rows[joint] as f64;
+        let found: Vec<f64> = outcome.folds.iter().map(error).collect();
         check_close("held-out error", &found, &vector(&golden["kfold"][joint]), tolerance);
-    }
-}
-
-#[test]
-fn elimination_path() {
-    let Some(golden) = load("estimation_reduction.json") else { return };
-    let tolerance = number(&golden["tolerance_rel"]);
-    let estimate = kept_wls(&block_factors(&golden));
-    let increase = rss_increase(&estimate.solution);
-    check_close("rss increase", &increase, &vector(&golden["rss_increase"]), tolerance);
-    let path = backward_elimination(&estimate.factor, 84.0);
-    let expected = golden["path"].as_array().unwrap();
-    assert_eq!(path.len(), expected.len());
-    for (step, expected) in path.iter().zip(expected) {
-        assert_eq!(step.columns, indices(&expected["columns"]));
-        assert_eq!(step.weakest as u64, expected["drop"].as_u64().unwrap());
-        check_close("rss", &[step.rss], &[number(&expected["rss"])], tolerance);
-        check_close("bic", &[step.bic], &[number(&expected["bic"])], tolerance);
-        check_close("F", &[step.statistic], &[number(&expected["F"])], tolerance);
     }
 }
 

@@ -4,8 +4,10 @@
 use crate::simulated::Normal;
 use dynid_estimate::covariance::{jackknife, variance_inflation};
 use dynid_estimate::elimination::{PruneSettings, prune};
-use dynid_estimate::folds::{FoldSettings, cross_validate};
+use dynid_estimate::folds::FoldSettings;
+use dynid_estimate::held_out::{FoldErrors, compare};
 use dynid_estimate::linear::ols;
+use dynid_factor::groups::ReducedGroup;
 use dynid_factor::{Factor, FactorBuilder};
 
 /// `columns` columns of which the last `idle` have no effect; `blocks` blocks of coloured residuals of variance near 1.
@@ -62,9 +64,19 @@ fn every_step_is_what_refitting_finds() {
         let n = found.effective_rows;
         let bic = n * (solution.rss / rows as f64).ln() + step.columns.len() as f64 * n.ln();
         assert!((step.bic - bic).abs() < 1e-6);
-        let folds = cross_validate(&[own], &FoldSettings::default(), |t| ols(&t[0]).x);
-        let (a, b) = (step.held_out.as_ref().unwrap(), folds.group_error(0).unwrap());
-        assert!(close(a.mean, b.mean) && close(a.standard_error, b.standard_error));
+        let columns = step.columns.len();
+        let groups =
+            [ReducedGroup { log: 0, output: 0, scale: 0, columns: (0..columns).collect(), blocks: own }];
+        let folds =
+            compare(&groups, &groups, &[1.0], columns, &FoldSettings::default(), &[&|t| ols(t).x]).folds;
+        let errors: Vec<f64> =
+            folds.iter().map(|f: &FoldErrors| f.squares[0][0] / f.rows[0] as f64).collect();
+        let count = errors.len() as f64;
+        let mean = errors.iter().sum::<f64>() / count;
+        let spread: f64 = errors.iter().map(|e| (e - mean).powi(2)).sum();
+        let found = step.held_out.as_ref().unwrap();
+        assert!(close(found.mean, mean));
+        assert!(close(found.standard_error, (spread / (count - 1.0) / count).sqrt()));
     }
 }
 

@@ -1,7 +1,7 @@
 //! The uniform grid of a live clock.
 
 use crate::signal::{SignalError, check_positive};
-use crate::words::Transfer;
+use dynid_words::Transfer;
 
 /// A step longer than this many samples is a gap.
 const GAP_STEPS: f64 = 2.5;

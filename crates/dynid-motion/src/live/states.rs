@@ -3,7 +3,7 @@
 use super::LocalPolynomial;
 use crate::shift::lagrange;
 use crate::signal::SignalError;
-use crate::words::Transfer;
+use dynid_words::Transfer;
 
 /// How states of a stream are formed.
 #[derive(Debug, Clone, PartialEq)]

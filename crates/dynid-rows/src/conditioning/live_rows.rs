@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use dynid_model::{EffortModel, History, MotionBlock, RegressorBlock};
 use dynid_motion::live::{LiveBlock, LiveSettings, LiveStates};
-use dynid_motion::words::Transfer;
 use dynid_motion::{Kernel, SignalError};
+use dynid_words::Transfer;
 
 use super::rows::KeptColumns;
 

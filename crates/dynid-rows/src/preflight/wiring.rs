@@ -119,11 +119,6 @@ impl Wiring {
         Wiring { position: plain.clone(), effort: plain, gravity: None, clock: 1.0, delay_s: 0.0 }
     }
 
-    /// Whether every column is taken as the log says.
-    pub fn is_identity(&self) -> bool {
-        *self == Wiring::identity(self.position.len())
-    }
-
     /// With one more difference. `slides`: per joint, whether its position is a length, which has no unit of angle.
     pub fn with(&self, change: &Rewiring, slides: &[bool]) -> Wiring {
         let mut out = self.clone();

@@ -9,8 +9,8 @@ use dynid_factor::Factor;
 use dynid_factor::FactorBuilder;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, MotionBlock, RegressorBlock};
 use dynid_motion::live::LiveSettings;
-use dynid_motion::words::Transfer;
 use dynid_rows::conditioning::{LiveRow, LiveRowSettings, LiveRows};
+use dynid_words::Transfer;
 
 struct Stream {
     rows: LiveRows,

@@ -3,7 +3,7 @@
 use faer::{Mat, Side};
 
 use crate::random::Random;
-use dynid_motion::words::Transfer;
+use dynid_words::Transfer;
 
 /// Differences of values, and steps over the width of the box, that count as none.
 const TOLERANCE: f64 = 1e-12;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dynid_model::EffortModel;
 use dynid_motion::live::LiveSettings;
-use dynid_motion::words::Transfer;
+use dynid_words::Transfer;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 

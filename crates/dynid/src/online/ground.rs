@@ -1,7 +1,7 @@
 //! Whether rows lie where something was learned.
 
 use dynid_estimate::online::{Innovation, Watch};
-use dynid_motion::words::Transfer;
+use dynid_words::Transfer;
 
 use super::usual::Innovations;
 

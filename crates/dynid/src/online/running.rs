@@ -7,8 +7,8 @@ use dynid_estimate::online::{
 };
 use dynid_model::EffortModel;
 use dynid_motion::live::LiveGrid;
-use dynid_motion::words::Transfer;
 use dynid_rows::conditioning::{LiveRow, LiveRows};
+use dynid_words::Transfer;
 
 use super::event::{Counts, Event, ParameterValue, PlainValue};
 use super::ground::Ground;

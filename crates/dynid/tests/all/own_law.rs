@@ -73,7 +73,7 @@ fn an_own_law_goes_the_whole_way() {
     assert!(unknown.to_string().contains("unknown element `hess_soom` for joint `j1`"), "{unknown}");
     config.registry = registry();
     let found = identify(&config, &mut |_| {}).unwrap();
-    let estimate = found.estimate(&config).unwrap();
+    let estimate = found.estimate();
     let [shape] = &estimate.shape_parameters[..] else { panic!("{:?}", estimate.shape_parameters) };
     assert_eq!((shape.name.as_str(), shape.verdict.as_str()), ("j1.hv", "seen in the data"));
     assert!((shape.value - 0.25).abs() <= 4.0 * shape.std.unwrap(), "{shape:?}");
@@ -107,7 +107,7 @@ fn an_own_law_goes_the_whole_way() {
     assert!(share < 0.02, "{:.2} % off the true effort", 100.0 * share);
 
     // Files of simulators state it as they do every law that they have no place for.
-    let robot = read.identified_robot(&file).unwrap();
+    let robot = dynid::export::IdentifiedRobot::of(&read, &file).unwrap();
     let states = CheckStates::random(robot.identified().model);
     let source = Source::read(&path("arm.toml")).unwrap();
     let export = RobotExport::new(robot.identified(), &source).unwrap();

@@ -1,4 +1,10 @@
-//! States as words of 64 bits, for checkpoints in any file format.
+//! States as words of 64 bits, for checkpoints in any file format. Without the standard library.
+
+#![no_std]
+
+extern crate alloc;
+
+use alloc::vec::Vec;
 
 /// Carries fields into a list of words or out of it, in the same order both ways.
 ///
@@ -43,6 +49,19 @@ impl<'a> Transfer<'a> {
         }
     }
 
+    /// Counts of which each stays below `limit`.
+    pub fn counts(&mut self, values: &mut [usize], limit: usize) {
+        values.iter_mut().for_each(|value| self.count(value, limit));
+    }
+
+    /// A count that only grows; damaged beyond what any run reaches.
+    pub fn counter(&mut self, value: &mut u64) {
+        self.integer(value);
+        if *value > 1 << 60 {
+            self.fail();
+        }
+    }
+
     /// Yes or no.
     pub fn flag(&mut self, value: &mut bool) {
         let mut count = usize::from(*value);
@@ -55,6 +74,19 @@ impl<'a> Transfer<'a> {
         let mut bits = value.to_bits();
         self.integer(&mut bits);
         *value = f64::from_bits(bits);
+    }
+
+    /// A real number that must be finite.
+    pub fn finite(&mut self, value: &mut f64) {
+        self.real(value);
+        if !value.is_finite() {
+            self.fail();
+        }
+    }
+
+    /// Finite numbers whose count is known beforehand.
+    pub fn finites(&mut self, values: &mut [f64]) {
+        values.iter_mut().for_each(|value| self.finite(value));
     }
 
     /// Numbers whose count is known beforehand.
