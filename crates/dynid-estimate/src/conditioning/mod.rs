@@ -20,6 +20,7 @@ mod shaped_rows;
 mod states;
 mod textbook;
 mod trial;
+mod windows;
 
 pub use crate::groups::ReducedGroup;
 pub use choose::{DelayEstimate, KernelTrial, MaskTrial};

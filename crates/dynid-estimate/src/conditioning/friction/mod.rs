@@ -9,6 +9,7 @@ pub use library::{FrictionShape, ShapeKind};
 use dynid_model::{EffortModel, Owner};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
+use rayon::prelude::*;
 
 use super::states::States;
 use super::trial::{Trial, TrialShapes, state_hz_of};
@@ -151,8 +152,11 @@ pub fn choose_friction(
             States::of_motion_at(log, cutoff_hz, settings)
         })
         .collect::<Result<Vec<_>, _>>()?;
-    let library: Vec<Vec<FrictionShape>> =
-        kinds.iter().enumerate().map(|(output, kinds)| library::of_output(output, kinds, &states)).collect();
+    let library: Vec<Vec<FrictionShape>> = kinds
+        .par_iter()
+        .enumerate()
+        .map(|(output, kinds)| library::of_output(output, kinds, &states))
+        .collect();
     drop(states);
     let has_load = library.iter().flatten().any(|s| s.kind == ShapeKind::Load);
     let load = match has_load {
