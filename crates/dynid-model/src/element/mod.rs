@@ -29,7 +29,7 @@ pub use external_load::{ExternalLoad, load_channel};
 pub use friction::{
     Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, LoadFriction, LuGre, Offset, PowerLaw,
     ReactionFriction, Sigmoid, SigmoidOffset, Stribeck, StribeckViscous, TanhFriction, Viscous,
-    ViscousMagnitude, reaction_channel, weight_channel,
+    ViscousMagnitude, falling_friction, reaction_channel, saturating_friction, weight_channel,
 };
 pub use gated::{Gated, is_gate, log_channel, payload_channel};
 pub use jets::JetMotion;

@@ -1,6 +1,6 @@
 //! Candidates for the friction of a joint.
 
-use dynid_model::element::sign;
+use dynid_model::element::{falling_friction, saturating_friction, sign};
 
 use crate::conditioning::states::States;
 
@@ -29,11 +29,10 @@ pub struct FrictionShape {
 impl FrictionShape {
     /// The column, one entry per speed. `loads`: rigid efforts at the same samples; read by [`ShapeKind::Load`] alone.
     pub(crate) fn column(&self, speeds: &[f64], loads: &[f64]) -> Vec<f64> {
-        let map = |f: &dyn Fn(f64) -> f64| speeds.iter().map(|v| f(*v)).collect();
         match self.kind {
-            ShapeKind::ViscousMagnitude => map(&f64::abs),
-            ShapeKind::Stribeck => map(&|v| sign(v) * (-(v / self.speed).powi(2)).exp()),
-            ShapeKind::Tanh => map(&|v| (v / self.speed).tanh()),
+            ShapeKind::ViscousMagnitude => speeds.iter().map(|v| v.abs()).collect(),
+            ShapeKind::Stribeck => falling_friction(speeds, self.speed),
+            ShapeKind::Tanh => saturating_friction(speeds, self.speed),
             ShapeKind::Load => speeds.iter().zip(loads).map(|(v, load)| sign(*v) * load.abs()).collect(),
         }
     }

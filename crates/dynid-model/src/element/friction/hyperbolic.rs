@@ -7,7 +7,7 @@ use crate::element::shape::{self, places, values};
 use crate::element::{ElementColumns, ElementWeights, JetMotion, JointElement, JointInfo, ShapeSetting};
 use crate::parameter::{Parameter, ShapeParameter};
 use crate::scalar::Jet;
-use crate::scalar::elementary::{Curve, tanh};
+use crate::scalar::elementary::{Curve, map_curve, tanh};
 
 /// Friction `F_t tanh(v/w)`: one column for `ft`, one shape parameter `w` (rad/s, m/s).
 ///
@@ -56,6 +56,13 @@ impl Curve for Law {
     fn at(&self, v: f64) -> f64 {
         tanh(v / self.w)
     }
+}
+
+/// `tanh(v/w)` for all speeds: friction that saturates, the column of [`TanhFriction`].
+pub fn saturating_friction(speeds: &[f64], w: f64) -> Vec<f64> {
+    let mut out = speeds.to_vec();
+    map_curve(&Law { w }, &mut out);
+    out
 }
 
 /// Derivative by the width.

@@ -14,14 +14,14 @@ mod stribeck_viscous;
 
 pub use arctangent::Arctangent;
 pub use exponential_viscous::ExponentialViscous;
-pub use hyperbolic::TanhFriction;
+pub use hyperbolic::{TanhFriction, saturating_friction};
 pub use linear::{AsymmetricFriction, Coulomb, Offset, Viscous, ViscousMagnitude};
 pub use load::LoadFriction;
 pub use lugre::LuGre;
 pub use power_law::PowerLaw;
 pub use reaction::{ReactionFriction, reaction_channel, weight_channel};
 pub use sigmoid::{Sigmoid, SigmoidOffset};
-pub use stribeck::Stribeck;
+pub use stribeck::{Stribeck, falling_friction};
 pub use stribeck_viscous::StribeckViscous;
 
 pub(super) const EFFORT: [&str; 2] = ["N m", "N"];

@@ -75,6 +75,25 @@ impl Curve for Gauss {
     }
 }
 
+/// `v` to `s(v) exp(-(v/v_s)²)`.
+struct SignedGauss(Gauss);
+
+impl Curve for SignedGauss {
+    #[inline(always)]
+    fn at(&self, v: f64) -> f64 {
+        let e = self.0.at(v);
+        let sign = f64::from(u8::from(v > 0.0)) - f64::from(u8::from(v < 0.0));
+        sign * e
+    }
+}
+
+/// `s(v) exp(-(v/v_s)²)` for all speeds: friction that falls from rest, the column `fs` of [`Stribeck`] with `δ = 2`.
+pub fn falling_friction(speeds: &[f64], vs: f64) -> Vec<f64> {
+    let mut out = speeds.to_vec();
+    map_curve(&SignedGauss(Gauss { per_vs: 1.0 / vs }), &mut out);
+    out
+}
+
 /// Fills `E`.
 pub(super) fn fill_falling(speeds: &[f64], [vs, delta]: [f64; 2], out: &mut [f64]) {
     if delta == 2.0 {
