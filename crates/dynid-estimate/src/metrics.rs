@@ -86,13 +86,22 @@ impl FitSums {
     /// # Errors
     /// [`MetricsError::Samples`], [`MetricsError::NotFinite`].
     pub fn push(&mut self, measured: &[f64], predicted: &[f64], counts: bool) -> Result<(), MetricsError> {
-        let sums = Sums::of(self.channels.len(), measured, predicted)?;
+        if measured.len() != predicted.len() {
+            let (channel, expected, found) = (self.channels.len(), measured.len(), predicted.len());
+            return Err(MetricsError::Samples { channel, expected, found });
+        }
+        let pairs = measured.iter().copied().zip(predicted.iter().copied());
+        self.add(&ChannelSums::of(self.channels.len(), pairs)?, counts);
+        Ok(())
+    }
+
+    /// Takes the sums of the next channel. `counts`: whether it counts in the figure over all channels.
+    pub fn add(&mut self, sums: &ChannelSums, counts: bool) {
         if counts {
             self.error_energy += sums.error_energy;
             self.energy += sums.energy;
         }
         self.channels.push(sums.fit());
-        Ok(())
     }
 
     /// Agreement of all channels taken.
@@ -101,7 +110,9 @@ impl FitSums {
     }
 }
 
-struct Sums {
+/// What the agreement of a channel is formed from.
+#[derive(Debug, Clone, Copy)]
+pub struct ChannelSums {
     samples: usize,
     error_energy: f64,
     energy: f64,
@@ -109,27 +120,28 @@ struct Sums {
     range: f64,
 }
 
-impl Sums {
-    fn of(channel: usize, measured: &[f64], predicted: &[f64]) -> Result<Self, MetricsError> {
-        if measured.len() != predicted.len() {
-            let (expected, found) = (measured.len(), predicted.len());
-            return Err(MetricsError::Samples { channel, expected, found });
-        }
-        for (sample, (&measured, &predicted)) in measured.iter().zip(predicted).enumerate() {
+impl ChannelSums {
+    /// Sums over samples, measured and predicted. `channel`: number of the channel, for errors.
+    ///
+    /// # Errors
+    /// [`MetricsError::NotFinite`].
+    pub fn of(channel: usize, pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Result<Self, MetricsError> {
+        let (mut samples, mut sum, mut error_energy, mut energy) = (0, 0.0, 0.0, 0.0);
+        let (mut highest, mut lowest) = (f64::NEG_INFINITY, f64::INFINITY);
+        for (measured, predicted) in pairs.clone() {
             if !measured.is_finite() || !predicted.is_finite() {
-                return Err(MetricsError::NotFinite { channel, sample, measured, predicted });
+                return Err(MetricsError::NotFinite { channel, sample: samples, measured, predicted });
             }
+            samples += 1;
+            sum += measured;
+            error_energy += (measured - predicted).powi(2);
+            energy += measured * measured;
+            highest = highest.max(measured);
+            lowest = lowest.min(measured);
         }
-        let mean = measured.iter().sum::<f64>() / measured.len().max(1) as f64;
-        let highest = measured.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let lowest = measured.iter().copied().fold(f64::INFINITY, f64::min);
-        Ok(Self {
-            samples: measured.len(),
-            error_energy: measured.iter().zip(predicted).map(|(m, p)| (m - p).powi(2)).sum(),
-            energy: measured.iter().map(|m| m * m).sum(),
-            variation: measured.iter().map(|m| (m - mean).powi(2)).sum(),
-            range: highest - lowest,
-        })
+        let mean = sum / samples.max(1) as f64;
+        let variation = pairs.map(|(measured, _)| (measured - mean).powi(2)).sum();
+        Ok(Self { samples, error_energy, energy, variation, range: highest - lowest })
     }
 
     fn fit(&self) -> ChannelFit {

@@ -3,11 +3,12 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use dynid_estimate::metrics::{Fit, FitSums};
+use dynid_estimate::metrics::{ChannelSums, Fit, FitSums};
 use dynid_model::EffortModel;
-use dynid_motion::filter::{butterworth, forward_backward};
+use dynid_motion::filter::{butterworth, forward_backward, forward_backward_in_step};
 use dynid_motion::shift::shift;
 use dynid_rows::conditioning::{ConditioningSettings, Moving, PreparedLog, States, predict_along};
+use rayon::prelude::*;
 
 use crate::Error;
 use crate::estimate::{FileFit, FitValues};
@@ -104,28 +105,39 @@ pub fn compare(
     let motion = Moving::new(log, &states, settings);
     let shape = model.parameters().shape_start();
     let lead = lead(log.rate_hz, alignment.delay_samples, alignment.delay_rate_hz);
-    let mut predicted = predict_along(model, &shape, values, log, &states);
+    let predicted = predict_along(model, &shape, values, log, &states);
     drop(states);
     let filter = butterworth(4, filter_hz, log.rate_hz).map_err(conditioning)?;
-    let filtered = |signal: &[f64]| forward_backward(&filter, signal).map_err(conditioning);
     let driven: Vec<bool> = (0..log.effort.len()).map(|output| !model.is_undriven(output)).collect();
-    let [mut raw, mut all, mut unaligned, mut moving, mut standing] = [(); 5].map(|()| FitSums::default());
-    // One output at a time: long logs leave no room for filtered copies of all.
-    for (output, (measured, predicted)) in log.effort.iter().zip(&mut predicted).enumerate() {
-        let agree = |sums: &mut FitSums, measured: &[f64], predicted: &[f64], part: Part| {
-            let is_of = |k: usize| counted[k] && part.holds(motion.samples[output][k]);
-            sums.push(&pick(measured, is_of), &pick(predicted, is_of), driven[output])
-                .map_err(|e| too_short(e.to_string()))
+    let of_output = |(output, unaligned): (usize, Vec<f64>)| -> Result<(Vec<f64>, [ChannelSums; 5]), Error> {
+        let measured = &log.effort[output];
+        let agree = |measured: &[f64], predicted: &[f64], part: Part| {
+            let is_of = |k: &usize| counted[*k] && part.holds(motion.samples[output][*k]);
+            let pairs = (0..measured.len()).filter(is_of).map(|k| (measured[k], predicted[k]));
+            ChannelSums::of(output, pairs).map_err(|e| too_short(e.to_string()))
         };
-        let measured_filtered = filtered(measured)?;
-        agree(&mut unaligned, &measured_filtered, &filtered(predicted)?, Part::All)?;
-        *predicted = led(std::mem::take(predicted), lead)?;
-        agree(&mut raw, measured, predicted, Part::All)?;
-        let predicted_filtered = filtered(predicted)?;
-        agree(&mut all, &measured_filtered, &predicted_filtered, Part::All)?;
-        agree(&mut moving, &measured_filtered, &predicted_filtered, Part::Moving)?;
-        agree(&mut standing, &measured_filtered, &predicted_filtered, Part::Standing)?;
+        let filtered = |predicted: &[f64]| {
+            forward_backward_in_step(&filter, [measured, predicted]).map_err(conditioning)
+        };
+        let [measured_filtered, unaligned_filtered] = filtered(&unaligned)?;
+        let unaligned_sums = agree(&measured_filtered, &unaligned_filtered, Part::All)?;
+        drop(unaligned_filtered);
+        let predicted = led(unaligned, lead)?;
+        let raw = agree(measured, &predicted, Part::All)?;
+        let predicted_filtered = forward_backward(&filter, &predicted).map_err(conditioning)?;
+        let part = |part: Part| agree(&measured_filtered, &predicted_filtered, part);
+        let sums = [raw, part(Part::All)?, unaligned_sums, part(Part::Moving)?, part(Part::Standing)?];
+        Ok((predicted, sums))
+    };
+    let of_outputs = predicted.into_par_iter().enumerate().map(of_output).collect::<Vec<Result<_, Error>>>();
+    let mut fits = [(); 5].map(|()| FitSums::default());
+    let mut predicted = Vec::with_capacity(driven.len());
+    for (outcome, driven) in of_outputs.into_iter().zip(&driven) {
+        let (effort, sums) = outcome?;
+        predicted.push(effort);
+        fits.iter_mut().zip(&sums).for_each(|(fit, sums)| fit.add(sums, *driven));
     }
+    let [raw, all, unaligned, moving, standing] = fits;
     let samples = counted.iter().filter(|c| **c).count() as f64;
     let stands = |moves: &Vec<bool>| moves.iter().zip(&counted).filter(|(m, c)| !**m && **c).count() as f64;
     Ok(Agreement {
@@ -173,11 +185,6 @@ impl Part {
             Part::Standing => !moves,
         }
     }
-}
-
-/// The samples of a signal that are asked for.
-fn pick(signal: &[f64], is_kept: impl Fn(usize) -> bool) -> Vec<f64> {
-    signal.iter().enumerate().filter(|(k, _)| is_kept(*k)).map(|(_, x)| *x).collect()
 }
 
 /// Samples at which a signal differs from another one; most do not.
@@ -233,7 +240,7 @@ impl Agreement {
         let still = predict_along(model, &shape, values, log, &states);
         drop(states);
         let lead = lead(log.rate_hz, alignment.delay_samples, alignment.delay_rate_hz);
-        let drawn = still.into_iter().zip(&self.predicted);
+        let drawn = still.into_par_iter().zip(&self.predicted);
         self.drawn = drawn
             .map(|(still, predicted)| Ok(Patches::between(predicted, &led(still, lead)?)))
             .collect::<Result<_, Error>>()?;
@@ -258,37 +265,47 @@ impl Agreement {
     /// [`Error::Conditioning`].
     pub fn in_band(&self, output: usize) -> Result<[Vec<f64>; 2], Error> {
         let filter = butterworth(4, self.filter_hz, self.rate_hz).map_err(conditioning)?;
-        let through = |signal: &[f64]| -> Result<Vec<f64>, Error> {
-            let filtered = forward_backward(&filter, signal).map_err(conditioning)?;
-            let counted = filtered.into_iter().zip(&self.counted);
-            Ok(counted.map(|(x, counts)| if *counts { x } else { f64::NAN }).collect())
-        };
-        let predicted = match self.drawn(output) {
-            Some(drawn) => through(&drawn)?,
-            None => through(&self.predicted[output])?,
-        };
-        Ok([through(&self.measured[output])?, predicted])
+        let drawn = self.drawn(output);
+        let predicted = drawn.as_ref().unwrap_or(&self.predicted[output]);
+        let filtered = forward_backward_in_step(&filter, [&self.measured[output], predicted]);
+        Ok(filtered.map_err(conditioning)?.map(|mut signal| {
+            signal
+                .iter_mut()
+                .zip(&self.counted)
+                .filter(|(_, counts)| !**counts)
+                .for_each(|(x, _)| *x = f64::NAN);
+            signal
+        }))
     }
 
     /// Figures of a prediction that lacks `lost` of each output's effort, through the same filter.
     ///
     /// # Errors
     /// [`Error::Conditioning`], [`Error::TooShort`].
-    pub fn without(&self, lost: impl Iterator<Item = Vec<f64>>) -> Result<FileFit, Error> {
+    pub fn without(&self, lost: impl IndexedParallelIterator<Item = Vec<f64>>) -> Result<FileFit, Error> {
         let filter = butterworth(4, self.filter_hz, self.rate_hz).map_err(conditioning)?;
-        let through = |signal: &[f64]| {
-            let filtered = forward_backward(&filter, signal).map_err(conditioning)?;
-            Ok::<_, Error>(pick(&filtered, |k| self.counted[k]))
+        let counts = |k: &usize| self.counted[*k];
+        let rms = |signal: &[f64]| {
+            let (mut square, mut samples) = (0.0, 0usize);
+            for k in (0..signal.len()).filter(counts) {
+                square += signal[k] * signal[k];
+                samples += 1;
+            }
+            (square / samples as f64).sqrt()
         };
-        let rms = |s: &[f64]| (s.iter().map(|x| x * x).sum::<f64>() / s.len() as f64).sqrt();
-        let (mut sums, mut loss, mut loss_percent) = (FitSums::default(), Vec::new(), Vec::new());
-        for (output, lost) in lost.enumerate() {
-            let (measured, lost) = (through(&self.measured[output])?, through(&lost)?);
-            let whole = through(&self.predicted[output])?;
-            let predicted: Vec<f64> = whole.iter().zip(&lost).map(|(w, l)| w - l).collect();
-            sums.push(&measured, &predicted, self.driven[output])
+        let of_output = |(output, lost): (usize, Vec<f64>)| {
+            let signals = [self.measured[output].as_slice(), &lost, &self.predicted[output]];
+            let [measured, lost, whole] = forward_backward_in_step(&filter, signals).map_err(conditioning)?;
+            let pairs = (0..measured.len()).filter(counts).map(|k| (measured[k], whole[k] - lost[k]));
+            let sums = ChannelSums::of(output, pairs)
                 .map_err(|e| Error::TooShort { file: self.name.clone(), message: e.to_string() })?;
-            let (own, of) = (rms(&lost), rms(&measured));
+            Ok((sums, rms(&lost), rms(&measured)))
+        };
+        let of_outputs = lost.enumerate().map(of_output).collect::<Vec<Result<_, Error>>>();
+        let (mut sums, mut loss, mut loss_percent) = (FitSums::default(), Vec::new(), Vec::new());
+        for (outcome, driven) in of_outputs.into_iter().zip(&self.driven) {
+            let (channel, own, of) = outcome?;
+            sums.add(&channel, *driven);
             loss.push(own);
             loss_percent.push((of > 0.0).then(|| 100.0 * own / of));
         }

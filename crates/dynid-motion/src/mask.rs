@@ -7,7 +7,12 @@ use crate::signal::rms;
 /// `sigma_v`: velocity noise after the state filter (see [`crate::spectrum::velocity_noise`]), same unit as
 /// `velocity`; `stick_sigma` is 4 and `level` one of 0, 0.03, 0.06, 0.12, 0.25 in the usual ladder.
 pub fn reversal_threshold(velocity: &[f64], sigma_v: f64, stick_sigma: f64, level: f64) -> f64 {
-    (stick_sigma * sigma_v).max(level * rms(velocity))
+    threshold_at(rms(velocity), sigma_v, stick_sigma, level)
+}
+
+/// [`reversal_threshold`] of a velocity whose root mean square is known.
+pub fn threshold_at(rms: f64, sigma_v: f64, stick_sigma: f64, level: f64) -> f64 {
+    (stick_sigma * sigma_v).max(level * rms)
 }
 
 /// Samples with `|v| < threshold`, and both samples of every change of the sign of `v` (the sign of 0 is 0).

@@ -68,10 +68,17 @@ fn interpolate(
     let weights = weights(samples - whole);
     let whole = whole as i64;
     let at = |k: i64| signal[k.clamp(0, n - 1) as usize];
-    let values =
-        (0..n).map(|k| weights.iter().zip(k + whole - 2..).map(|(w, node)| w * at(node)).sum()).collect();
+    let near_end = |k: i64| weights.iter().zip(k + whole - 2..).map(|(w, node)| w * at(node)).sum::<f64>();
     let start = (2 - whole).clamp(0, n);
     let end = (n - 3 - whole).clamp(start, n);
+    let mut values: Vec<f64> = (0..start).map(near_end).collect();
+    values.reserve_exact((n - start) as usize);
+    if start < end {
+        let inside = &signal[(start + whole - 2) as usize..(end + whole + 3) as usize];
+        let sum = |nodes: &[f64]| weights.iter().zip(nodes).map(|(w, x)| w * x).sum::<f64>();
+        values.extend(inside.windows(weights.len()).map(sum));
+    }
+    values.extend((end..n).map(near_end));
     Ok(Shifted { values, valid: start as usize..end as usize })
 }
 

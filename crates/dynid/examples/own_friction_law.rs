@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut config = Config { robot: folder.join("robot.toml"), log: vec![log], ..Config::default() };
     config.registry = ElementRegistry::default().with(law)?;
     config.elements.friction = Friction::Given;
-    let estimate = dynid::identify(&config, &mut |_| {})?.estimate(&config)?;
+    let estimate = dynid::identify(&config, &mut |_| {})?.estimate();
     for p in estimate.parameters.iter().filter(|p| p.name.starts_with("j1.")) {
         println!("{} = {:.4} in {:.4?} {}, {}", p.name, p.value, p.interval, p.unit, p.verdict);
     }

@@ -79,6 +79,12 @@ impl ShapedColumns {
         &mut self.derivatives[d * self.rows..][..self.rows]
     }
 
+    /// Makes all entries zero, to be added to.
+    pub fn clear(&mut self) {
+        self.values.fill(0.0);
+        self.derivatives.fill(0.0);
+    }
+
     pub(super) fn is_finite(&self) -> bool {
         self.values.iter().chain(&self.derivatives).all(|v| v.is_finite())
     }

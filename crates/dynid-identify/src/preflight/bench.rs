@@ -9,6 +9,7 @@ use dynid_rows::preflight::{
     Excitation, Found, GaussianPrior, PreflightError, Rewiring, Samples, Tilt, Trial, Wiring, WiringSearch,
     excitation, tilt,
 };
+use rayon::prelude::*;
 
 use super::columns::Velocities;
 use super::finding::{FindingId, Findings, Fix, Severity};
@@ -117,11 +118,13 @@ impl Bench {
                 within.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| (a.min(*q), b.max(*q)));
             (high - low).max(0.0)
         };
+        let seen: Vec<(f64, bool)> = log.joints().par_iter().map(|j| (travel(j), j.moves())).collect();
         let mut idle = Vec::new();
-        for joint in log.joints() {
-            let alike = log.joints().iter().filter(|other| slides(&other.name) == slides(&joint.name));
-            let (own, largest) = (travel(joint), alike.map(travel).fold(0.0, f64::max));
-            let evidence = if !joint.moves() {
+        for (joint, (own, moves)) in log.joints().iter().zip(&seen) {
+            let alike = log.joints().iter().zip(&seen);
+            let alike = alike.filter(|(other, _)| slides(&other.name) == slides(&joint.name));
+            let (own, largest) = (*own, alike.map(|(_, (travel, _))| *travel).fold(0.0, f64::max));
+            let evidence = if !moves {
                 "the position does not leave its resolution and noise".to_owned()
             } else if own < STILL * largest {
                 let unit = if slides(&joint.name) { "m" } else { "rad" };

@@ -4,7 +4,8 @@ use dynid_motion::clock::{ClockSettings, uniform};
 use dynid_motion::faults::{Run, clipped, frozen_effort, frozen_position, outliers, repeated};
 use dynid_motion::signal::{quantum, rms};
 use dynid_motion::spikes::{self, SpikeSettings};
-use dynid_motion::{ClockReport, Log, UniformLog};
+use dynid_motion::{ClockReport, JointSignals, Log, UniformLog};
+use rayon::prelude::*;
 
 use super::finding::{FindingId, Findings, Fix, Severity};
 use crate::Error;
@@ -37,9 +38,20 @@ pub(super) fn examine(
 ) -> Result<UniformLog, Error> {
     repetitions(log, rows, out);
     let rate_hz = median_rate(log);
-    for joint in log.joints() {
+    let shown: Vec<_> = log
+        .joints()
+        .par_iter()
+        .map(|joint| {
+            let effort = &joint.effort;
+            let position = frozen_position(&joint.position, rate_hz);
+            match effort.is_empty() || joint.effort_is_constant() {
+                true => (position, Vec::new(), Vec::new()),
+                false => (position, frozen_effort(effort, rate_hz), clipped(effort)),
+            }
+        })
+        .collect();
+    for (joint, (frozen, mut hanging, clipped)) in log.joints().iter().zip(shown) {
         let name = Some(joint.name.as_str());
-        let frozen = frozen_position(&joint.position, rate_hz);
         if !frozen.is_empty() {
             let evidence = format!(
                 "the position stops changing within one sample, at speed: {}",
@@ -65,8 +77,8 @@ pub(super) fn examine(
             }
             continue;
         }
-        let mut frozen = frozen_effort(&joint.effort, rate_hz);
-        frozen.retain(|run| moves_during(log, run));
+        hanging.retain(|run| moves_during(log, run));
+        let frozen = hanging;
         let hung: usize = frozen.iter().map(|r| r.length).sum();
         if hung as f64 > COARSE * joint.effort.len() as f64 {
             let mut values: Vec<f64> = joint.effort.clone();
@@ -88,7 +100,7 @@ pub(super) fn examine(
             out.add(FindingId::FrozenSignal, Severity::Warning, name, evidence, LEAVE_OUT).fixes =
                 leave_out(&frozen, rows);
         }
-        for flat in clipped(&joint.effort) {
+        for flat in clipped {
             let evidence = format!(
                 "the effort stays exactly at its {} {:.4} for {} samples in {} runs",
                 if flat.level > 0.0 { "largest value" } else { "smallest value" },
@@ -107,10 +119,16 @@ pub(super) fn examine(
     let mut on_grid =
         uniform(log, &ClockSettings::default()).map_err(dynid_rows::conditioning::ConditioningError::from)?;
     clock(&on_grid.report, rows, out);
-    for joint in &mut on_grid.joints {
+    let removed: Vec<_> = on_grid
+        .joints
+        .par_iter_mut()
+        .map(|joint| {
+            let position = spikes::remove(&mut joint.position, &SpikeSettings::position());
+            (position, spikes::remove(&mut joint.effort, &SpikeSettings::default()))
+        })
+        .collect();
+    for (joint, (position, effort)) in on_grid.joints.iter().zip(removed) {
         let name = joint.name.clone();
-        let position = spikes::remove(&mut joint.position, &SpikeSettings::position());
-        let effort = spikes::remove(&mut joint.effort, &SpikeSettings::default());
         for (what, found) in [("position", position), ("effort", effort)] {
             let found = found.map_err(dynid_rows::conditioning::ConditioningError::from)?;
             let count = found.flagged.len();
@@ -156,12 +174,13 @@ fn moves_during(log: &Log, run: &Run) -> bool {
 
 /// Single positions off their neighbours.
 fn outlying(log: &Log, rows: &[usize], out: &mut Findings<'_>) {
-    for joint in log.joints().iter().filter(|j| j.moves()) {
-        let wrong: Vec<Run> = outliers(&joint.position)
-            .into_iter()
-            .filter(|k| joint.position[*k].abs() <= LARGEST_POSITION)
-            .map(|first| Run { first, length: 1 })
-            .collect();
+    let of_joint = |joint: &JointSignals| -> Vec<Run> {
+        let found = if joint.moves() { outliers(&joint.position) } else { Vec::new() };
+        let near = found.into_iter().filter(|k| joint.position[*k].abs() <= LARGEST_POSITION);
+        near.map(|first| Run { first, length: 1 }).collect()
+    };
+    let wrong: Vec<Vec<Run>> = log.joints().par_iter().map(of_joint).collect();
+    for (joint, wrong) in log.joints().iter().zip(wrong) {
         let Some(first) = wrong.first() else { continue };
         let evidence = format!(
             "{} single positions are off the line between their neighbours (first: row {})",

@@ -123,6 +123,7 @@ pub fn uniform(log: &Log, settings: &ClockSettings) -> Result<UniformLog, ClockE
     let take = |values: &[f64]| -> Vec<f64> {
         match &grid {
             Some(places) => places.iter().map(|place| place.of(values, &kept)).collect(),
+            None if kept.len() == values.len() => values.to_vec(),
             None => kept.iter().map(|row| values[*row]).collect(),
         }
     };

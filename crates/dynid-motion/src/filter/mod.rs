@@ -11,4 +11,4 @@ pub use butterworth::butterworth;
 pub use chebyshev::chebyshev;
 pub use decimate::{Alignment, anti_alias, decimate, pick};
 pub use sections::{Section, Sections};
-pub use zero_phase::forward_backward;
+pub use zero_phase::{forward_backward, forward_backward_all, forward_backward_in_step};

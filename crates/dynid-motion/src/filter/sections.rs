@@ -22,14 +22,6 @@ impl Section {
         let first = (b1 - a1 * b0 + b2 - a2 * b0) / (1.0 + a1 + a2);
         [first, (1.0 + a1) * first - (b1 - a1 * b0)]
     }
-
-    #[inline]
-    fn step(&self, state: &mut [f64; 2], x: f64) -> f64 {
-        let y = self.b[0] * x + state[0];
-        state[0] = self.b[1] * x - self.a[0] * y + state[1];
-        state[1] = self.b[2] * x - self.a[1] * y;
-        y
-    }
 }
 
 /// A filter as a chain of second-order sections, in the order in which they are applied.
@@ -49,16 +41,82 @@ impl Sections {
 
     /// Filters in place, as if the signal had always been at `level` before its first sample.
     pub fn run(&self, signal: &mut [f64], level: f64) {
-        let mut input_level = level;
-        let mut state: Vec<[f64; 2]> = Vec::with_capacity(self.0.len());
-        for section in &self.0 {
-            state.push(section.steady_state().map(|z| z * input_level));
-            input_level *= section.dc_gain();
+        let mut run = Run::new(self, [level]);
+        run.forward([signal]);
+    }
+}
+
+/// A filter on its way through `N` signals of one length, which move in step.
+///
+/// A sample of a recursive filter waits for the one before; the other signals fill that time. Every signal gets the bits that it would
+/// have alone.
+pub(super) struct Run<'a, const N: usize> {
+    sections: &'a [Section],
+    /// Per section: the two entries of its state.
+    states: Vec<[[f64; N]; 2]>,
+}
+
+impl<'a, const N: usize> Run<'a, N> {
+    /// As if every signal had always been at its level.
+    pub(super) fn new(filter: &'a Sections, levels: [f64; N]) -> Self {
+        let mut levels = levels;
+        let start = |section: &Section| {
+            let state = section.steady_state().map(|z| levels.map(|level| z * level));
+            levels = levels.map(|level| level * section.dc_gain());
+            state
+        };
+        Run { sections: &filter.0, states: filter.0.iter().map(start).collect() }
+    }
+
+    /// Filters the next samples in place.
+    pub(super) fn forward(&mut self, signals: [&mut [f64]; N]) {
+        self.run::<false>(signals);
+    }
+
+    /// Filters the next samples in place, from the last one to the first.
+    pub(super) fn backward(&mut self, signals: [&mut [f64]; N]) {
+        self.run::<true>(signals);
+    }
+
+    /// Two sections at a time, so that their states stay in registers.
+    fn run<const BACKWARD: bool>(&mut self, mut signals: [&mut [f64]; N]) {
+        let (pairs, single) = self.sections.as_chunks::<2>();
+        let (states, last) = self.states.as_chunks_mut::<2>();
+        for (sections, states) in pairs.iter().zip(states) {
+            pass::<BACKWARD, 2, N>(sections, states, &mut signals);
         }
-        for x in signal {
-            *x = self.0.iter().zip(&mut state).fold(*x, |x, (section, state)| section.step(state, x));
+        if let ([section], [state]) = (single, last) {
+            pass::<BACKWARD, 1, N>(&[*section], std::array::from_mut(state), &mut signals);
         }
     }
+}
+
+fn pass<const BACKWARD: bool, const M: usize, const N: usize>(
+    sections: &[Section; M],
+    states: &mut [[[f64; N]; 2]; M],
+    signals: &mut [&mut [f64]; N],
+) {
+    let samples = signals.first().map_or(0, |signal| signal.len());
+    for signal in &*signals {
+        assert_eq!(signal.len(), samples, "signals of one length");
+    }
+    let mut now = *states;
+    for k in 0..samples {
+        let n = if BACKWARD { samples - 1 - k } else { k };
+        let mut x: [f64; N] = std::array::from_fn(|lane| signals[lane][n]);
+        for (Section { b, a }, [first, second]) in sections.iter().zip(&mut now) {
+            for lane in 0..N {
+                let y = b[0] * x[lane] + first[lane];
+                first[lane] = b[1] * x[lane] - a[0] * y + second[lane];
+                second[lane] = b[2] * x[lane] - a[1] * y;
+                x[lane] = y;
+            }
+        }
+        for lane in 0..N {
+            signals[lane][n] = x[lane];
+        }
+    }
+    *states = now;
 }
 
 #[cfg(test)]

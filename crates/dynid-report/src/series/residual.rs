@@ -85,12 +85,38 @@ fn histogram(residual: &[f64], std: f64) -> Histogram {
 }
 
 fn autocorrelation(centred: &[f64], energy: f64, step_s: f64) -> Autocorrelation {
-    let at = |lag: usize| centred.iter().zip(&centred[lag..]).map(|(a, b)| a * b).sum::<f64>() / energy;
     let wished = LONGEST_LAG_S / step_s / LAGS as f64;
     let stride = if wished.is_finite() { (wished.round() as usize).max(1) } else { 1 };
     let stride = stride.min((centred.len() / 4 / LAGS).max(1));
-    let values = (1..=LAGS).map(|j| j * stride).take_while(|&lag| lag < centred.len() / 2).map(at).collect();
-    Autocorrelation { stride, values, first: at(1), white_band: 1.96 / (centred.len() as f64).sqrt() }
+    let lags: Vec<usize> =
+        (1..=LAGS).map(|j| j * stride).take_while(|&lag| lag < centred.len() / 2).collect();
+    let (groups, rest) = lags.as_chunks::<AT_ONCE>();
+    let sums = groups.iter().flat_map(|lags| lagged_sums(centred, *lags));
+    let sums = sums.chain(rest.iter().flat_map(|lag| lagged_sums(centred, [*lag])));
+    let values = sums.map(|sum| sum / energy).collect();
+    let [first] = lagged_sums(centred, [1]);
+    let white_band = 1.96 / (centred.len() as f64).sqrt();
+    Autocorrelation { stride, values, first: first / energy, white_band }
+}
+
+/// Lags that are summed side by side: a sum waits for its last addition, others fill that time.
+const AT_ONCE: usize = 4;
+
+/// `Σ_k x_k x_{k + lag}` for ascending lags.
+fn lagged_sums<const N: usize>(x: &[f64], lags: [usize; N]) -> [f64; N] {
+    let shortest = x.len() - lags[N - 1];
+    let later = lags.map(|lag| &x[lag..]);
+    let mut sums = [0.0; N];
+    for (k, x) in x[..shortest].iter().enumerate() {
+        for (sum, later) in sums.iter_mut().zip(&later) {
+            *sum += x * later[k];
+        }
+    }
+    for (sum, later) in sums.iter_mut().zip(&later) {
+        let rest = x[shortest..].iter().zip(&later[shortest..]);
+        *sum = rest.fold(*sum, |sum, (x, later)| sum + x * later);
+    }
+    sums
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use faer::{Mat, Side};
 use super::PreparedLog;
 use super::base_prior::BasePrior;
 use super::rows::{RowBatch, RowConsumer};
+use super::windows::means;
 use dynid_factor::rows::RowsError;
 
 /// `Xᵀ X` of rows `[W, friction shapes, efforts at lags]`.
@@ -153,20 +154,25 @@ impl<'a> GramConsumer<'a> {
 
 impl RowConsumer for GramConsumer<'_> {
     fn take(&mut self, _output: usize, batch: &RowBatch<'_>) -> Result<(), RowsError> {
-        let n = batch.centres.len();
-        let width = batch.columns.len() / n;
+        let width = batch.columns.len() / batch.stride;
         let size = width - 1 + self.lags.count;
+        let lagged = batch.centres.iter().flat_map(|centre| {
+            (0..self.lags.count as i64)
+                .map(|k| (*centre as i64 - (self.lags.first + k) * self.lags.step as i64) as usize)
+        });
+        let efforts = means(&self.kernels[batch.scale], self.effort, lagged);
         let mut row = vec![0.0; size];
         let fold_length = self.samples.div_ceil(self.folds);
-        for (r, centre) in batch.centres.iter().enumerate() {
-            for (c, x) in row[..width - 1].iter_mut().enumerate() {
-                *x = batch.columns[c * n + r];
+        for (r, (centre, efforts)) in
+            batch.centres.iter().zip(efforts.chunks_exact(self.lags.count)).enumerate()
+        {
+            let at = |column: usize| batch.columns[column * batch.stride + r];
+            let (columns, lags) = row.split_at_mut(width - 1);
+            for (c, x) in columns.iter_mut().enumerate() {
+                *x = at(c);
             }
-            let offset = batch.columns[(width - 1) * n + r];
-            for (k, x) in row[width - 1..].iter_mut().enumerate() {
-                let lag = (self.lags.first + k as i64) * self.lags.step as i64;
-                let at = (*centre as i64 - lag) as usize;
-                *x = self.kernels[batch.scale].apply_at(self.effort, at) - offset;
+            for (x, effort) in lags.iter_mut().zip(efforts) {
+                *x = effort - at(width - 1);
             }
             let fold = centre / fold_length;
             let inside = (centre.saturating_sub(batch.half_width)) / fold_length == fold

@@ -2,9 +2,11 @@
 
 use dynid_model::EffortModel;
 use dynid_motion::{Kernel, shift};
+use rayon::prelude::*;
 
 use super::rows::{KeptColumns, Kernels, Pass, RowBatch, RowConsumer, masks};
 use super::states::{Masks, States};
+use super::windows::means;
 use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog};
 use dynid_estimate::instruments::paired_columns;
 use dynid_factor::rows::{GroupShape, RowSource, RowVisitor, Rows, RowsError};
@@ -66,7 +68,7 @@ impl<'a> ConditionedLog<'a> {
         let kernels = Kernels::new(&choices.scales_hz, &states, reach)?;
         // Each unshifted effort goes as soon as it was read.
         let efforts = std::mem::take(&mut states.effort)
-            .into_iter()
+            .into_par_iter()
             .map(|e| Ok(shift::shift(&e, -choices.delay.samples)?.values))
             .collect::<Result<Vec<Vec<f64>>, ConditioningError>>()?;
         let longest = (settings.block_s * log.rate_hz).max(5.0 * log.rate_hz / choices.kernel_hz);
@@ -213,11 +215,9 @@ struct OutputRows<'a, 'b> {
 impl RowConsumer for OutputRows<'_, '_> {
     fn take(&mut self, _output: usize, batch: &RowBatch<'_>) -> Result<(), RowsError> {
         let n = batch.centres.len();
-        let kernel = &self.kernels[batch.scale];
-        self.net_effort.clear();
-        let offset = &batch.columns[self.columns * n..][..n];
-        let centres = batch.centres.iter().zip(offset);
-        self.net_effort.extend(centres.map(|(centre, known)| kernel.apply_at(self.effort, *centre) - known));
+        self.net_effort = means(&self.kernels[batch.scale], self.effort, batch.centres.iter().copied());
+        let offset = &batch.columns[self.columns * batch.stride..][..n];
+        self.net_effort.iter_mut().zip(offset).for_each(|(effort, known)| *effort -= known);
         let mut start = 0;
         while start < n {
             let block_of = |centre: usize| (centre / self.block_length).min(self.blocks - 1);
@@ -227,7 +227,7 @@ impl RowConsumer for OutputRows<'_, '_> {
                 block,
                 samples: &batch.centres[start..start + count],
                 regressor: &batch.columns[start..],
-                stride: n,
+                stride: batch.stride,
                 effort: &self.net_effort[start..start + count],
             };
             self.visitors[batch.scale]

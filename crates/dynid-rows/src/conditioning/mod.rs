@@ -22,6 +22,7 @@ mod shaped_rows;
 mod states;
 mod textbook;
 mod trial;
+mod windows;
 
 pub use base_prior::BasePrior;
 pub use choose::{DelayEstimate, KernelTrial, MaskTrial};

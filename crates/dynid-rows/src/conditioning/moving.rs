@@ -1,6 +1,7 @@
 //! In which samples a joint moves, and in which it stands.
 
 use dynid_motion::mask::reversal_threshold;
+use rayon::prelude::*;
 
 use super::states::States;
 use super::{ConditioningError, ConditioningSettings, PreparedLog};
@@ -23,20 +24,12 @@ pub struct Moving {
 impl Moving {
     /// Of a log with its states.
     pub fn new(log: &PreparedLog, states: &States, settings: &ConditioningSettings) -> Moving {
-        let outputs = 0..log.position.len();
-        let least_speed: Vec<f64> = outputs
-            .map(|j| {
-                let v = states.velocity(j);
-                reversal_threshold(&v, states.velocity_sigma[j], settings.stick_sigma, LEAST_SHARE)
-            })
-            .collect();
-        let samples = least_speed
-            .iter()
-            .enumerate()
-            .map(|(j, least)| {
-                states.velocity(j).iter().map(|v| log.moves[j] && *v != 0.0 && v.abs() >= *least).collect()
-            })
-            .collect();
+        let of_output = |j: usize| {
+            let v = states.velocity(j);
+            let least = reversal_threshold(&v, states.velocity_sigma[j], settings.stick_sigma, LEAST_SHARE);
+            (least, v.iter().map(|v| log.moves[j] && *v != 0.0 && v.abs() >= least).collect())
+        };
+        let (least_speed, samples) = (0..log.position.len()).into_par_iter().map(of_output).unzip();
         Moving { least_speed, samples }
     }
 

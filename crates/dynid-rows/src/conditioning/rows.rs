@@ -1,11 +1,14 @@
 //! Rows of the regression: columns and efforts through the compact kernels.
 
+use std::ops::Range;
+
 use dynid_model::{EffortModel, RegressorBlock};
 use dynid_motion::{Channel, Kernel, SignalError};
 use rayon::prelude::*;
 
 use super::friction_shape::{FrictionShape, ShapeKind};
 use super::states::{Masks, States};
+use super::windows::add_windows;
 use super::{ConditioningSettings, PreparedLog};
 use dynid_factor::rows::RowsError;
 
@@ -87,9 +90,11 @@ pub(crate) struct RowBatch<'a> {
     pub(crate) centres: &'a [usize],
     /// Rungs at which each row is used.
     pub(crate) rungs: &'a [u8],
-    /// Kept regressor columns, then columns of friction shapes, column-major with stride `centres.len()`; the model's known
-    /// offset is the last column. Where the pass has instruments, their kept columns come before all.
+    /// Kept regressor columns, then columns of friction shapes, column-major; the model's known offset is the last column. Where the
+    /// pass has instruments, their kept columns come before all.
     pub(crate) columns: &'a [f64],
+    /// Distance between the starts of two columns, at least the number of rows.
+    pub(crate) stride: usize,
     /// Half width of the kernel.
     pub(crate) half_width: usize,
 }
@@ -118,102 +123,113 @@ pub(crate) struct Pass<'a> {
     pub(crate) load: &'a [f64],
 }
 
-/// Samples whose rows are formed at a time, at least; a multiple of the kernels' reach otherwise.
-const BLOCK: usize = 2048;
-/// Entries of the regressor that are held at a time, 16 MB of them: the windows of wide kernels over fast logs are longer.
-const ENTRIES: usize = 1 << 21;
+/// Samples of the log that one thread takes at a time, at least; twice the reach of the kernels otherwise.
+const STRETCH: usize = 8192;
+/// Samples whose regressor is held at a time: with some 300 entries per sample it stays in the second-level cache.
+const PIECE: usize = 256;
+/// Stretches worked on at a time per thread: more even out the time that they take.
+const PER_THREAD: usize = 2;
 
 /// Rows of one output at one scale while their columns are summed.
+#[derive(Default)]
 struct Rows {
-    scale: usize,
     centres: Vec<usize>,
     rungs: Vec<u8>,
+    /// Column-major.
     columns: Vec<f64>,
+}
+
+/// Signals that depend on the motion before, of the states and of the instruments.
+struct Remembered {
+    own: Vec<Channel>,
+    instruments: Vec<Channel>,
 }
 
 impl Pass<'_> {
     /// Runs through the log once and hands every row to the consumer of its output, in time order for each scale.
+    ///
+    /// Threads take stretches of the log. Windows that reach over the end of a stretch are summed in two parts, and no regressor is
+    /// formed twice.
     pub(crate) fn run<C: RowConsumer>(&self, consumers: &mut [C]) -> Result<(), RowsError> {
         let samples = self.states.samples;
-        let reach = self.kernels.kernels[0].half_width();
-        let block = BLOCK.max(6 * reach);
-        let layout = self.model.layout();
-        let slots = (0..layout.outputs()).map(|output| layout.columns(output).len() + 1).sum::<usize>();
-        let piece = (block + 2 * reach).min((ENTRIES / slots).max(BLOCK)).min(samples);
-        let mut regressor = RegressorBlock::new(layout.clone(), piece);
-        let mut instruments = self.instruments.map(|_| regressor.clone());
-        let remembered = self.remembered(self.states);
-        let simulated = self.instruments.map(|states| self.remembered(states));
-        let mut start = 0;
-        while start < samples {
-            let end = (start + block).min(samples);
-            let mut rows: Vec<Vec<Rows>> =
-                (0..consumers.len()).into_par_iter().map(|output| self.rows(output, start..end)).collect();
-            let mut first = start.saturating_sub(reach);
-            let last = (end + reach).min(samples);
-            while first < last {
-                let range = first..(first + piece).min(last);
-                self.fill(self.states, range.clone(), &remembered, &mut regressor);
-                if let (Some(states), Some(signals), Some(block)) =
-                    (self.instruments, &simulated, &mut instruments)
-                {
-                    self.fill(states, range.clone(), signals, block);
-                }
-                let blocks = (&regressor, instruments.as_ref());
-                rows.par_iter_mut().enumerate().for_each(|(output, rows)| {
-                    self.add_columns(output, range.start, blocks, rows);
-                });
-                first = range.end;
-            }
-            consumers
-                .par_iter_mut()
-                .zip(rows)
-                .enumerate()
-                .map(|(output, (consumer, rows))| self.hand_over(output, &rows, consumer))
-                .collect::<Result<Vec<()>, _>>()?;
-            start = end;
+        let stretch = STRETCH.max(2 * self.kernels.kernels[0].half_width());
+        let stretches: Vec<Range<usize>> =
+            (0..samples).step_by(stretch).map(|start| start..(start + stretch).min(samples)).collect();
+        let remembered = Remembered {
+            own: self.states.remembered(self.model, self.shape, &self.log.channels),
+            instruments: self
+                .instruments
+                .map(|states| states.remembered(self.model, self.shape, &self.log.channels))
+                .unwrap_or_default(),
+        };
+        // Per output and scale: rows that the next stretch has a part of.
+        let mut open: Vec<Vec<Rows>> = consumers.iter().map(|_| self.no_rows()).collect();
+        let mut formed = Vec::new();
+        // While rows are handed over, the next ones are formed.
+        let groups = stretches.chunks(PER_THREAD * rayon::current_num_threads());
+        for group in groups.chain([&[][..]]) {
+            let (next, handed) = rayon::join(
+                || group.par_iter().map(|part| self.rows(part.clone(), &remembered)).collect::<Vec<_>>(),
+                || self.hand_over(std::mem::take(&mut formed), &mut open, consumers),
+            );
+            handed?;
+            formed = group.iter().map(|part| part.end).zip(next).collect();
         }
         Ok(())
     }
 
-    fn remembered(&self, states: &States) -> Vec<Channel> {
-        states.remembered(self.model, self.shape, &self.log.channels)
+    fn no_rows(&self) -> Vec<Rows> {
+        self.kernels.kernels.iter().map(|_| Rows::default()).collect()
     }
 
-    fn fill(
-        &self,
-        states: &States,
-        range: std::ops::Range<usize>,
-        remembered: &[Channel],
-        block: &mut RegressorBlock,
-    ) {
+    /// Per output and scale: rows whose windows reach into a stretch of the log, with what it holds of them.
+    fn rows(&self, stretch: Range<usize>, remembered: &Remembered) -> Vec<Vec<Rows>> {
+        let layout = self.model.layout();
+        let mut regressor = RegressorBlock::new(layout.clone(), PIECE.min(stretch.len()));
+        let mut instruments = self.instruments.map(|_| regressor.clone());
+        let outputs = 0..layout.outputs();
+        let mut rows: Vec<Vec<Rows>> =
+            outputs.clone().map(|output| self.empty_rows(output, &stretch)).collect();
+        for start in stretch.clone().step_by(PIECE) {
+            let piece = start..(start + PIECE).min(stretch.end);
+            self.fill(self.states, piece.clone(), &remembered.own, &mut regressor);
+            if let (Some(states), Some(block)) = (self.instruments, &mut instruments) {
+                self.fill(states, piece.clone(), &remembered.instruments, block);
+            }
+            let blocks = (&regressor, instruments.as_ref());
+            for (output, rows) in outputs.clone().zip(&mut rows) {
+                self.add_columns(output, start, blocks, rows);
+            }
+        }
+        rows
+    }
+
+    fn fill(&self, states: &States, range: Range<usize>, remembered: &[Channel], block: &mut RegressorBlock) {
         states.with_block(range, &self.log.channels, remembered, |motion| {
             self.model.regressor(motion, self.shape, block);
         });
     }
 
-    /// Rows of an output whose centres lie in a range, their columns still empty.
-    fn rows(&self, output: usize, centres_in: std::ops::Range<usize>) -> Vec<Rows> {
+    /// Rows of an output whose windows reach into a stretch of the log, their columns still empty.
+    fn empty_rows(&self, output: usize, stretch: &Range<usize>) -> Vec<Rows> {
         let own = self.columns.local[output].len() * (1 + usize::from(self.instruments.is_some()));
         let width = own + self.shapes[output].len() + 1;
-        let mut out = Vec::new();
-        for (scale, kernel) in self.kernels.kernels.iter().enumerate() {
-            let (mut centres, mut rungs) = (Vec::new(), Vec::new());
-            let spacing = kernel.spacing();
-            let from = centres_in.start.div_ceil(spacing) * spacing;
-            for centre in (from..centres_in.end).step_by(spacing) {
+        let of_scale = |(scale, kernel): (usize, &Kernel)| {
+            let mut rows = Rows::default();
+            let (spacing, half_width) = (kernel.spacing(), kernel.half_width());
+            let from = stretch.start.saturating_sub(half_width).div_ceil(spacing) * spacing;
+            let end = (stretch.end + half_width).min(self.states.samples);
+            for centre in (from..end).step_by(spacing) {
                 let used = self.kernels.used(&self.masks[output], scale, centre) & self.wanted[output];
                 if used != 0 {
-                    centres.push(centre);
-                    rungs.push(used);
+                    rows.centres.push(centre);
+                    rows.rungs.push(used);
                 }
             }
-            if !centres.is_empty() {
-                let columns = vec![0.0; width * centres.len()];
-                out.push(Rows { scale, centres, rungs, columns });
-            }
-        }
-        out
+            rows.columns = vec![0.0; width * rows.centres.len()];
+            rows
+        };
+        self.kernels.kernels.iter().enumerate().map(of_scale).collect()
     }
 
     /// Adds what a piece of the regressor, from sample `first` on, holds of the rows' windows.
@@ -234,30 +250,102 @@ impl Pass<'_> {
         };
         let shaped: Vec<Vec<f64>> = self.shapes[output].iter().map(|s| s.column(&speed, &loads)).collect();
         let local = &self.columns.local[output];
-        for Rows { scale, centres, columns, .. } in rows {
-            let sources = instruments
-                .iter()
-                .flat_map(|block| local.iter().map(|k| block.column(output, *k)))
-                .chain(local.iter().map(|k| regressor.column(output, *k)))
-                .chain(shaped.iter().map(Vec::as_slice))
-                .chain([regressor.offset(output)]);
-            for (source, out) in sources.zip(columns.chunks_exact_mut(centres.len())) {
-                self.kernels.kernels[*scale].add_block(source, first, centres, out);
-            }
+        let columns: Vec<&[f64]> = instruments
+            .iter()
+            .flat_map(|block| local.iter().map(|k| block.column(output, *k)))
+            .chain(local.iter().map(|k| regressor.column(output, *k)))
+            .chain(shaped.iter().map(Vec::as_slice))
+            .chain([regressor.offset(output)])
+            .collect();
+        for (rows, kernel) in rows.iter_mut().zip(&self.kernels.kernels) {
+            add_windows(kernel, first, &rows.centres, &columns, &mut rows.columns);
         }
     }
 
+    /// Hands over the rows that are complete. `formed`: ends of stretches with their rows; `open`: rows that the stretch before the
+    /// first one left.
     fn hand_over<C: RowConsumer>(
         &self,
+        formed: Vec<(usize, Vec<Vec<Rows>>)>,
+        open: &mut [Vec<Rows>],
+        consumers: &mut [C],
+    ) -> Result<(), RowsError> {
+        let mut of_outputs: Vec<Vec<(usize, Vec<Rows>)>> = consumers.iter().map(|_| Vec::new()).collect();
+        for (end, outputs) in formed {
+            for (all, rows) in of_outputs.iter_mut().zip(outputs) {
+                all.push((end, rows));
+            }
+        }
+        let outcomes: Vec<Result<(), RowsError>> = consumers
+            .par_iter_mut()
+            .zip(open)
+            .zip(of_outputs)
+            .enumerate()
+            .map(|(output, ((consumer, open), stretches))| {
+                for (end, mut rows) in stretches {
+                    for (scale, (rows, open)) in rows.iter_mut().zip(&mut *open).enumerate() {
+                        rows.add_first(open);
+                        self.hand_over_complete(output, scale, end, rows, consumer)?;
+                        *open = rows.last(self.complete(scale, end, &rows.centres));
+                    }
+                }
+                Ok(())
+            })
+            .collect();
+        outcomes.into_iter().collect()
+    }
+
+    fn hand_over_complete<C: RowConsumer>(
+        &self,
         output: usize,
-        rows: &[Rows],
+        scale: usize,
+        end: usize,
+        rows: &Rows,
         consumer: &mut C,
     ) -> Result<(), RowsError> {
-        for Rows { scale, centres, rungs, columns } in rows {
-            let half_width = self.kernels.kernels[*scale].half_width();
-            consumer.take(output, &RowBatch { scale: *scale, centres, rungs, columns, half_width })?;
+        let count = self.complete(scale, end, &rows.centres);
+        if count == 0 {
+            return Ok(());
         }
-        Ok(())
+        consumer.take(
+            output,
+            &RowBatch {
+                scale,
+                centres: &rows.centres[..count],
+                rungs: &rows.rungs[..count],
+                columns: &rows.columns,
+                stride: rows.centres.len(),
+                half_width: self.kernels.kernels[scale].half_width(),
+            },
+        )
+    }
+
+    /// Number of rows, of those with the centres given, whose windows end before a sample.
+    fn complete(&self, scale: usize, end: usize, centres: &[usize]) -> usize {
+        let half_width = self.kernels.kernels[scale].half_width();
+        centres.partition_point(|centre| centre + half_width < end)
+    }
+}
+
+impl Rows {
+    /// Adds to the first rows what the stretch before holds of them.
+    fn add_first(&mut self, before: &Rows) {
+        let (count, own) = (before.centres.len(), self.centres.len());
+        assert_eq!(self.centres[..count], before.centres, "rows that two stretches share");
+        if count > 0 {
+            let pairs = self.columns.chunks_exact_mut(own).zip(before.columns.chunks_exact(count));
+            pairs.for_each(|(to, from)| to.iter_mut().zip(from).for_each(|(to, from)| *to += from));
+        }
+    }
+
+    /// Copy of all rows but the first ones.
+    fn last(&self, from: usize) -> Rows {
+        let columns = self.columns.chunks_exact(self.centres.len().max(1));
+        Rows {
+            centres: self.centres[from..].to_vec(),
+            rungs: self.rungs[from..].to_vec(),
+            columns: columns.flat_map(|column| &column[from..]).copied().collect(),
+        }
     }
 }
 

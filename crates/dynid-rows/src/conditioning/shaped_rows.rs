@@ -1,10 +1,14 @@
 //! Shape parameters fitted to the rows of logs: shaped columns at sample rate, then through the kernels of the rows.
 
+use std::ops::Range;
+
 use dynid_model::{EffortModel, ShapeParameter};
+use dynid_motion::Channel;
 use rayon::prelude::*;
 
-use super::log_rows::LogRows;
+use super::log_rows::{ConditionedLog, LogRows};
 use super::reduce::unusable_row;
+use super::windows::add_windows;
 use super::{Conditioning, ConditioningError, ConditioningSettings, PreparedLog};
 use dynid_estimate::separable::{
     OutputPlaces, RowGroup, SeparableError, SeparableEstimate, SeparableProblem, SeparableSettings,
@@ -13,8 +17,10 @@ use dynid_estimate::separable::{
 use dynid_factor::factor::FactorError;
 use dynid_factor::rows::{RowSource, RowVisitor, Rows, visit_all};
 
+/// Samples of a log that one thread takes at a time, at least; twice the reach of the kernels otherwise.
+const STRETCH: usize = 8192;
 /// Samples whose shaped columns are formed at a time.
-const CHUNK: usize = 4096;
+const PIECE: usize = 1024;
 
 /// Why shape parameters cannot be fitted to logs.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -110,6 +116,62 @@ impl<'a> ShapedRows<'a> {
     }
 }
 
+/// What a stretch of a log holds of a group's rows.
+struct Part {
+    /// Rows of the group whose windows reach into the stretch.
+    rows: Range<usize>,
+    /// Their values, then their derivatives, column-major.
+    sums: Vec<f64>,
+}
+
+impl ShapedRows<'_> {
+    /// What a stretch of a log holds of the rows of its groups.
+    fn parts(
+        &self,
+        log: &ConditionedLog<'_>,
+        groups: &[RowGroup],
+        centres: &[Vec<usize>],
+        stretch: Range<usize>,
+        shape: &[f64],
+        remembered: &[Channel],
+    ) -> Vec<Part> {
+        let model = self.rows.model;
+        let (shaped, dependent) = (model.shaped_columns().len(), model.shape_dependence().len());
+        let mut parts: Vec<Part> = groups
+            .iter()
+            .zip(centres)
+            .map(|(group, centres)| {
+                let half_width = log.kernels.kernels[group.scale].half_width();
+                let rows = centres.partition_point(|c| c + half_width < stretch.start)
+                    ..centres.partition_point(|c| *c < stretch.end + half_width);
+                let places = &self.places[group.output];
+                let columns = places.shaped.len() + places.dependence.len();
+                Part { sums: vec![0.0; columns * rows.len()], rows }
+            })
+            .collect();
+        // Values, then derivatives, each column `PIECE` long.
+        let mut all = vec![0.0; (shaped + dependent) * PIECE];
+        for start in stretch.clone().step_by(PIECE) {
+            let range = start..(start + PIECE).min(stretch.end);
+            let count = range.len();
+            let (values, derivatives) = all.split_at_mut(shaped * PIECE);
+            log.states.with_block(range, &log.log.channels, remembered, |motion| {
+                model.shaped(motion, shape, PIECE, values, derivatives);
+            });
+            let column = |k: usize| &all[k * PIECE..][..count];
+            for ((group, centres), part) in groups.iter().zip(centres).zip(&mut parts) {
+                let places = &self.places[group.output];
+                let values = places.shaped.iter().map(|(index, _)| column(*index));
+                let derivatives = places.dependence.iter().map(|(index, ..)| column(shaped + index));
+                let columns: Vec<&[f64]> = values.chain(derivatives).collect();
+                let kernel = &log.kernels.kernels[group.scale];
+                add_windows(kernel, start, &centres[part.rows.clone()], &columns, &mut part.sums);
+            }
+        }
+        parts
+    }
+}
+
 impl SeparableProblem for ShapedRows<'_> {
     fn linear(&self) -> usize {
         self.linear
@@ -125,43 +187,40 @@ impl SeparableProblem for ShapedRows<'_> {
 
     fn shaped(&self, shape: &[f64], out: &mut [ShapedColumns]) {
         let model = self.rows.model;
-        let (shaped, dependent) = (model.shaped_columns().len(), model.shape_dependence().len());
+        for columns in &mut *out {
+            columns.clear();
+        }
         let mut rest = out;
         let mut first = 0;
         for log in &self.rows.logs {
             let samples = log.states.samples;
             let remembered = log.states.remembered(model, shape, &log.log.channels);
-            // Chunk after chunk: values, then derivatives, each column `CHUNK` long.
-            let chunks: Vec<Vec<f64>> = (0..samples.div_ceil(CHUNK))
-                .into_par_iter()
-                .map(|c| {
-                    let range = c * CHUNK..((c + 1) * CHUNK).min(samples);
-                    let mut all = vec![0.0; (shaped + dependent) * CHUNK];
-                    let (values, derivatives) = all.split_at_mut(shaped * CHUNK);
-                    log.states.with_block(range, &log.log.channels, &remembered, |motion| {
-                        model.shaped(motion, shape, CHUNK, values, derivatives);
-                    });
-                    all
-                })
-                .collect();
-            let signal = |column: usize| {
-                let parts = chunks.iter().flat_map(|c| c[column * CHUNK..][..CHUNK].iter().copied());
-                parts.take(samples).collect::<Vec<f64>>()
-            };
             let (own, others) = rest.split_at_mut(log.kernels.kernels.len() * self.places.len());
-            own.par_iter_mut().enumerate().for_each(|(g, out)| {
-                let (group, centres) = (&self.groups[first + g], &self.centres[first + g]);
-                let (places, kernel) = (&self.places[group.output], &log.kernels.kernels[group.scale]);
-                if centres.is_empty() {
-                    return;
-                }
-                for (k, (index, _)) in places.shaped.iter().enumerate() {
-                    kernel.apply_block(&signal(*index), 0, centres, out.value_mut(k));
-                }
-                for (d, (index, ..)) in places.dependence.iter().enumerate() {
-                    kernel.apply_block(&signal(shaped + index), 0, centres, out.derivative_mut(d));
-                }
-            });
+            let (groups, centres) = (&self.groups[first..][..own.len()], &self.centres[first..][..own.len()]);
+            let stretch = STRETCH.max(2 * log.kernels.kernels[0].half_width());
+            let stretches: Vec<Range<usize>> =
+                (0..samples).step_by(stretch).map(|s| s..(s + stretch).min(samples)).collect();
+            // A few at a time: their sums are held until they are added, in order.
+            for stretches in stretches.chunks(4 * rayon::current_num_threads()) {
+                let parts: Vec<Vec<Part>> = stretches
+                    .par_iter()
+                    .map(|range| self.parts(log, groups, centres, range.clone(), shape, &remembered))
+                    .collect();
+                own.par_iter_mut().zip(groups).enumerate().for_each(|(g, (out, group))| {
+                    let places = &self.places[group.output];
+                    for Part { rows, sums } in
+                        parts.iter().map(|parts| &parts[g]).filter(|p| !p.rows.is_empty())
+                    {
+                        let mut columns = sums.chunks_exact(rows.len());
+                        let add = |to: &mut [f64], from: Option<&[f64]>| {
+                            let from = from.into_iter().flatten();
+                            to[rows.clone()].iter_mut().zip(from).for_each(|(to, from)| *to += from);
+                        };
+                        (0..places.shaped.len()).for_each(|k| add(out.value_mut(k), columns.next()));
+                        (0..places.dependence.len()).for_each(|d| add(out.derivative_mut(d), columns.next()));
+                    }
+                });
+            }
             first += own.len();
             rest = others;
         }

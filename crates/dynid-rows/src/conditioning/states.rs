@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use dynid_model::{EffortModel, History, MotionBlock};
 use dynid_motion::difference::central_part;
-use dynid_motion::filter::{Sections, butterworth, forward_backward};
-use dynid_motion::mask::{near_reversal, reversal_threshold};
+use dynid_motion::filter::{Sections, butterworth, forward_backward_all};
+use dynid_motion::mask::{near_reversal, reversal_threshold, threshold_at};
+use dynid_motion::signal::rms;
 use dynid_motion::spectrum::{PositionNoise, velocity_noise};
 use dynid_motion::{Channel, SignalError};
 use rayon::prelude::*;
@@ -57,8 +58,8 @@ impl States {
     ) -> Result<States, ConditioningError> {
         let mut out = States::of_motion_at(log, cutoff_hz, settings)?;
         let filter = butterworth(settings.state_order, cutoff_hz, log.rate_hz)?;
-        let effort = log.effort.par_iter().map(|effort| forward_backward(&filter, effort));
-        out.effort = effort.collect::<Result<_, _>>()?;
+        let effort: Vec<&[f64]> = log.effort.iter().map(|effort| effort.as_slice()).collect();
+        out.effort = filtered(&filter, &effort)?;
         Ok(out)
     }
 
@@ -161,7 +162,7 @@ impl States {
     /// Acceleration of an output.
     pub fn acceleration(&self, output: usize) -> Vec<f64> {
         let mut out = vec![0.0; self.samples];
-        self.fill_acceleration(output, 0..self.samples, &mut out);
+        self.fill_rates(output, 0..self.samples, &mut vec![0.0; self.samples], &mut out);
         out
     }
 
@@ -170,16 +171,23 @@ impl States {
             Some([dq, _]) => out.copy_from_slice(&dq[output][range.clone()]),
             None => central_part(&self.q[output], self.rate_hz, range.clone(), out),
         }
+        self.rest(output, range, out);
+    }
+
+    /// Takes the velocity away where the joint stands.
+    fn rest(&self, output: usize, range: Range<usize>, velocity: &mut [f64]) {
         if let Some(moves) = &self.moves {
-            for (v, _) in out.iter_mut().zip(&moves[output][range]).filter(|(_, moves)| !**moves) {
+            for (v, _) in velocity.iter_mut().zip(&moves[output][range]).filter(|(_, moves)| !**moves) {
                 *v = 0.0;
             }
         }
     }
 
-    fn fill_acceleration(&self, output: usize, range: Range<usize>, out: &mut [f64]) {
-        if let Some([_, ddq]) = &self.periodic {
-            out.copy_from_slice(&ddq[output][range]);
+    /// Velocity and acceleration of a run of samples.
+    fn fill_rates(&self, output: usize, range: Range<usize>, dq: &mut [f64], ddq: &mut [f64]) {
+        if let Some([_, exact]) = &self.periodic {
+            self.fill_velocity(output, range.clone(), dq);
+            ddq.copy_from_slice(&exact[output][range]);
             return;
         }
         // Velocities one sample further on either side; at the ends of the record there is none, and the difference is one-sided.
@@ -187,7 +195,9 @@ impl States {
         let mut velocity = vec![0.0; wide.len()];
         central_part(&self.q[output], self.rate_hz, wide.clone(), &mut velocity);
         let inside = range.start - wide.start..range.end - wide.start;
-        central_part(&velocity, self.rate_hz, inside, out);
+        dq.copy_from_slice(&velocity[inside.clone()]);
+        central_part(&velocity, self.rate_hz, inside, ddq);
+        self.rest(output, range, dq);
     }
 
     /// Motion of a run of samples.
@@ -199,8 +209,7 @@ impl States {
             block.dq.chunks_exact_mut(range.len().max(1)).zip(block.ddq.chunks_exact_mut(range.len().max(1)));
         for (output, (dq, ddq)) in places.enumerate() {
             block.q.extend(&self.q[output][range.clone()]);
-            self.fill_velocity(output, range.clone(), dq);
-            self.fill_acceleration(output, range.clone(), ddq);
+            self.fill_rates(output, range.clone(), dq, ddq);
         }
         block
     }
@@ -272,15 +281,25 @@ fn positions(
     position: &[Vec<f64>],
     rate_hz: f64,
 ) -> Result<Vec<Vec<f64>>, ConditioningError> {
-    let filtered = position.par_iter().map(|position| {
-        let q = forward_backward(filter, position)?;
+    let position: Vec<&[f64]> = position.iter().map(Vec::as_slice).collect();
+    let filtered = filtered(filter, &position)?;
+    filtered.par_iter().try_for_each(|q| {
         let mut largest = q.windows(2).map(|w| (w[1] - w[0]) * rate_hz * rate_hz).enumerate();
         match largest.find(|(_, acceleration)| !acceleration.is_finite()) {
             Some((sample, found)) => Err(SignalError::NotFinite { sample, found }),
-            None => Ok(q),
+            None => Ok(()),
         }
-    });
-    Ok(filtered.collect::<Result<_, _>>()?)
+    })?;
+    Ok(filtered)
+}
+
+/// Signals that are filtered by one thread: as many as the filter takes in the time of one.
+const IN_STEP: usize = 4;
+
+/// Signals of one length through a filter, forward and backward.
+fn filtered(filter: &Sections, signals: &[&[f64]]) -> Result<Vec<Vec<f64>>, SignalError> {
+    let groups = signals.par_chunks(IN_STEP).map(|signals| forward_backward_all(filter, signals));
+    Ok(groups.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 
 /// Bad samples and their running counts, so that any window is judged by two look-ups. A count stands per word of 64 samples: one per sample
@@ -347,13 +366,16 @@ impl Masks {
     ) -> Self {
         let speeds: Vec<(Vec<f64>, f64)> =
             model.reversal_speeds(output).iter().map(|speed| states.combined(speed)).collect();
+        // What does not change with the rung: the rms speed, and where the sign changes.
+        let speeds: Vec<(&Vec<f64>, f64, f64, Vec<bool>)> =
+            speeds.iter().map(|(v, sigma)| (v, *sigma, rms(v), near_reversal(v, 0.0))).collect();
         let mut reversal = vec![None];
         for level in &settings.ladder {
             let mut bad = vec![false; states.samples];
-            for (v, sigma) in &speeds {
-                let threshold = reversal_threshold(v, *sigma, settings.stick_sigma, *level);
-                for (b, n) in bad.iter_mut().zip(near_reversal(v, threshold)) {
-                    *b |= n;
+            for (v, sigma, rms, changes) in &speeds {
+                let threshold = threshold_at(*rms, *sigma, settings.stick_sigma, *level);
+                for ((b, v), changes) in bad.iter_mut().zip(*v).zip(changes) {
+                    *b |= *changes | (v.abs() < threshold);
                 }
             }
             reversal.push(Some(BadSamples::new(bad.into_iter())));

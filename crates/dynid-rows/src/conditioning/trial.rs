@@ -56,6 +56,7 @@ impl TrialShapes<'_> {
         match self {
             TrialShapes::Library { shapes, .. } => shapes.to_vec(),
             TrialShapes::Probes => (0..states.outputs())
+                .into_par_iter()
                 .map(|output| {
                     let rms = dynid_motion::signal::rms(&states.velocity(output)).max(f64::MIN_POSITIVE);
                     [

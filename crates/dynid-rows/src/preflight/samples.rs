@@ -5,11 +5,12 @@ use std::sync::Arc;
 use super::wiring::{Source, Wiring};
 use dynid_motion::cutoff::{CutoffSettings, kernel_limit};
 use dynid_motion::difference::central;
-use dynid_motion::filter::{butterworth, forward_backward};
+use dynid_motion::filter::{butterworth, forward_backward_in_step};
 use dynid_motion::mask::{dilate, near_reversal};
 use dynid_motion::signal::rms;
 use dynid_motion::spectrum::{NoiseSettings, position_noise};
 use dynid_motion::{Channel, SignalError, UniformLog};
+use rayon::prelude::*;
 
 /// Highest cut-off of a pre-flight, Hz: what rigid bodies do lies below, what joints and sensors do above.
 const HIGHEST_HZ: f64 = 10.0;
@@ -72,17 +73,28 @@ impl Samples {
         assert_eq!(moves.len(), log.joints.len(), "one entry of moves per joint");
         let noise = log
             .joints
-            .iter()
+            .par_iter()
             .map(|j| position_noise(&j.position, log.rate_hz, &NoiseSettings::default()))
             .collect::<Result<Vec<_>, _>>()?;
         let Some(limit) = kernel_limit(&noise, log.rate_hz, &CutoffSettings::default()) else {
             return Ok(None);
         };
-        let cutoff_hz = limit.limit_hz.min(HIGHEST_HZ);
+        let efforts: Vec<&[f64]> = log.joints.iter().map(|joint| joint.effort.as_slice()).collect();
+        Samples::filtered(log, &efforts, &log.usable, moves, limit.limit_hz.min(HIGHEST_HZ))
+    }
+
+    /// [`Samples::new`] at a cut-off, Hz, and with other efforts and usable samples than those of the log.
+    pub(super) fn filtered(
+        log: &UniformLog,
+        efforts: &[&[f64]],
+        usable: &[bool],
+        moves: &[bool],
+        cutoff_hz: f64,
+    ) -> Result<Option<Samples>, SignalError> {
         let filter = butterworth(4, cutoff_hz, log.rate_hz)?;
         let n = log.samples();
         let reach = (2.0 * log.rate_hz / cutoff_hz).ceil() as usize;
-        let bad: Vec<bool> = log.usable.iter().map(|u| !u).collect();
+        let bad: Vec<bool> = usable.iter().map(|u| !u).collect();
         let near_gap = dilate(&bad, reach / 2);
         let thin = ((log.rate_hz / (PER_PERIOD * cutoff_hz)) as usize).max(n.div_ceil(MOST)).max(1);
         let kept: Vec<usize> =
@@ -93,13 +105,13 @@ impl Samples {
         let pick = |signal: &[f64]| kept.iter().map(|k| signal[*k]).collect::<Vec<_>>();
         let joints = log
             .joints
-            .iter()
+            .par_iter()
+            .zip(efforts)
             .zip(moves)
-            .map(|(joint, moves)| {
-                let position = forward_backward(&filter, &joint.position)?;
+            .map(|((joint, effort), moves)| {
+                let [position, effort] = forward_backward_in_step(&filter, [&joint.position, effort])?;
                 let velocity = central(&position, log.rate_hz)?;
                 let acceleration = central(&velocity, log.rate_hz)?;
-                let effort = forward_backward(&filter, &joint.effort)?;
                 let reversing = near_reversal(&velocity, REVERSAL * rms(&velocity));
                 let reversing = dilate(&reversing, reach / 4);
                 Ok(JointSamples {

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use dynid_model::EffortModel;
 use dynid_motion::UniformLog;
 use dynid_motion::shift::shift;
+use rayon::prelude::*;
 
 use super::refine::{self, GaussianPrior};
 use super::rows::{TrialRows, regressor};
@@ -63,15 +64,16 @@ impl Trial<'_> {
         if delay_s == 0.0 {
             return Some(Cow::Borrowed(self.samples));
         }
-        let mut moved = self.log.clone();
-        for joint in &mut moved.joints {
-            let shifted = shift(&joint.effort, -delay_s * self.log.rate_hz).ok()?;
-            joint.effort = shifted.values;
-            // Beyond the ends of the record nothing is known of the efforts.
-            let known = |k: usize| shifted.valid.contains(&k);
-            moved.usable.iter_mut().enumerate().for_each(|(k, usable)| *usable &= known(k));
-        }
-        Samples::new(&moved, self.moves).ok().flatten().map(Cow::Owned)
+        let samples = -delay_s * self.log.rate_hz;
+        let shifted = self.log.joints.par_iter().map(|joint| shift(&joint.effort, samples).ok());
+        let shifted = shifted.collect::<Option<Vec<_>>>()?;
+        // Beyond the ends of the record nothing is known of the efforts.
+        let known = |k: usize| shifted.iter().all(|effort| effort.valid.contains(&k));
+        let usable: Vec<bool> =
+            self.log.usable.iter().enumerate().map(|(k, usable)| *usable && known(k)).collect();
+        let efforts: Vec<&[f64]> = shifted.iter().map(|effort| effort.values.as_slice()).collect();
+        let moved = Samples::filtered(self.log, &efforts, &usable, self.moves, self.samples.cutoff_hz);
+        moved.ok().flatten().map(Cow::Owned)
     }
 
     /// How badly bodies that can exist, with friction that takes energy, explain efforts: `min ‖R x - z‖² + ρ²` plus the

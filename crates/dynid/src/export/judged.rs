@@ -5,6 +5,7 @@ use std::sync::Arc;
 use dynid_io::mjcf::JointParameters;
 use dynid_model::{EffortModel, RobotModel};
 use dynid_rows::conditioning::{PreparedLog, predict};
+use rayon::prelude::*;
 
 use super::joints::{self, Format};
 use super::{CheckStates, FrictionProjection, Identified, projection, read_back};
@@ -92,7 +93,7 @@ impl FileModels {
         };
         let file = |(model, values): &(RobotModel, Vec<f64>)| -> Result<FileFit, Error> {
             // What the file loses of the robot; terms of single logs stay.
-            let pairs = alone.iter().zip(run(model, values)?);
+            let pairs = alone.par_iter().zip(run(model, values)?);
             agreement.without(pairs.map(|(a, f)| a.iter().zip(&f).map(|(a, f)| a - f).collect()))
         };
         Ok(Some(ExportedLog {

@@ -4,6 +4,7 @@ mod losses;
 mod search;
 
 use dynid_model::{EffortModel, Owner};
+use rayon::prelude::*;
 
 use super::base_prior::BasePrior;
 use super::friction_shape::{self, FrictionShape, ShapeKind};
@@ -87,7 +88,7 @@ pub fn choose_friction(
         })
         .collect::<Result<Vec<_>, _>>()?;
     let library: Vec<Vec<FrictionShape>> = kinds
-        .iter()
+        .par_iter()
         .enumerate()
         .map(|(output, kinds)| friction_shape::of_output(output, kinds, &states))
         .collect();
