@@ -3,11 +3,12 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Stdio;
 use std::sync::OnceLock;
 
 use crate::support::{TWO_LINKS, dynid, indy7, run};
+use dynid_testing::shared;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -515,21 +516,10 @@ fn every_command_has_a_help_text_and_the_program_a_version() {
     assert!(text(&misuse.stderr).starts_with("error: ") && misuse.stdout.is_empty());
 }
 
-/// Shared data of other software, or `None` with a note.
-#[expect(clippy::print_stdout, reason = "a skipped test says so")]
-fn oracles() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/oracles");
-    if path.is_dir() {
-        return Some(path);
-    }
-    println!("skipped: ../shared not present");
-    None
-}
-
 /// Compares efforts and regressor of the program with those of another library, matched by name.
 fn check_oracle(robot: &str, oracle: &str, flags: &[&str]) {
     const FLOATING: [&str; 6] = [".vx", ".vy", ".vz", ".wx", ".wy", ".wz"];
-    let Some(data) = oracles() else { return };
+    let Some(data) = shared("data/oracles") else { return };
     let oracle = json(std::fs::read(data.join(oracle)).unwrap());
     let floating = |j: &Value| j["type"].as_str().unwrap().contains("FreeFlyer");
     let mut header: Vec<String> = Vec::new();

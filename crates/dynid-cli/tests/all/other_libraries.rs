@@ -10,6 +10,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::support::{TWO_LINKS, dynid, indy7, run};
+use dynid_testing::{shared_if_there, skip};
 use serde_json::Value;
 
 /// Every kind of joint, a branch, and links on fixed joints. The boxes must not turn into mass.
@@ -121,8 +122,7 @@ fn lively(name: &str, _: f64, truth: f64) -> f64 {
 #[test]
 fn pinocchio_and_mujoco_give_the_effort_of_the_estimate() {
     let Some(python) = python() else {
-        println!("skipped: no Python with pinocchio and mujoco, and none could be installed");
-        return;
+        return skip("no Python with pinocchio and mujoco, and none could be installed");
     };
     let folder = tempfile::tempdir().unwrap();
     let robot = |name: &str, text: &str| {
@@ -139,11 +139,7 @@ fn pinocchio_and_mujoco_give_the_effort_of_the_estimate() {
     check(&python, "welded links without mass", &welded, |name, identified, truth| {
         if name.starts_with("ram.") { 0.3 * truth } else { lively(name, identified, truth) }
     });
-    let oracles = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/oracles");
-    if !oracles.is_dir() {
-        println!("skipped: ../shared not present");
-        return;
-    }
+    let Some(oracles) = shared_if_there("data/oracles") else { return };
     for robot in ["ur5", "iiwa14", "panda"] {
         let file = oracles.join(format!("{robot}.urdf"));
         check(&python, robot, &file, lively);

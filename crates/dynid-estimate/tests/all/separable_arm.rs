@@ -13,8 +13,8 @@ use dynid_model::{
     Placement, RobotModel,
 };
 use dynid_search as search;
+use dynid_testing::shared;
 use std::io::Read;
-use std::path::Path;
 
 fn equal() -> SeparableSettings {
     SeparableSettings { weighting: Weighting::Equal, ..SeparableSettings::default() }
@@ -147,11 +147,7 @@ fn single_joint() -> RobotModel {
 
 #[test]
 fn recorded_friction_of_single_joints_is_fitted_as_well_as_by_the_readme() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/franka-friction");
-    if !folder.exists() {
-        println!("skipped: ../shared not present");
-        return;
-    }
+    let Some(folder) = shared("data/franka-friction") else { return };
     let model = single_joint();
     let friction = |name: &str| model.parameters().column(&format!("joint.{name}")).unwrap();
     let mut kept: Vec<usize> = model

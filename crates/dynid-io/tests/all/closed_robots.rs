@@ -1,25 +1,17 @@
 //! The committed robots with loops against the data they come from.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use dynid_io::{RobotFile, robot};
 use dynid_model::closed::{Condition, CutKind, LinkFrame};
 use dynid_model::{JointKind, Placement};
+use dynid_testing::shared;
 use serde_json::Value;
 
 fn committed(path: &str) -> RobotFile {
     robot::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap_or_else(|e| panic!("{e}"))
-}
-
-fn shared(path: &str) -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    if !root.is_dir() {
-        println!("skipped: ../shared not present");
-        return None;
-    }
-    Some(root.join(path))
 }
 
 fn numbers<const N: usize>(value: &Value) -> [f64; N] {

@@ -7,6 +7,7 @@ use std::fs;
 use dynid_io::columns::{EffortColumn, MappingSpec, TimeReading};
 use dynid_io::log::{LogFormat, Missing, Wanted};
 use dynid_io::{ColumnMapping, LogFileError, LogHeader, LogText, Signals, Table};
+use dynid_testing::shared;
 
 fn strings(list: &str) -> Vec<String> {
     list.split(',').map(str::to_owned).collect()
@@ -250,11 +251,7 @@ fn headers_with_faults_are_refused() {
 
 #[test]
 fn a_recorded_log_with_lists_in_cells() {
-    let recorded = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/data/so101-sage/multisine_state_motor_as_recorded.csv.gz");
-    if !recorded.exists() {
-        return;
-    }
+    let Some(recorded) = shared("data/so101-sage/multisine_state_motor_as_recorded.csv.gz") else { return };
     let spec = MappingSpec::default();
     let log = LogText::open(&recorded, &spec.options(None)).unwrap();
     let joints = strings("a,b,c,d,e,f");

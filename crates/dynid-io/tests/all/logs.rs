@@ -1,23 +1,14 @@
 //! Logs: reading, finding columns, units, writing, states.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use std::fs;
-use std::path::{Path, PathBuf};
 
 use dynid_io::columns::{MappingSpec, degrees_suspected};
 use dynid_io::csv::{self, ReadOptions};
 use dynid_io::{ColumnMapping, GuessOptions, Signals, StateJoint, Table, robot, states};
 use dynid_model::Limits;
-
-fn shared(path: &str) -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    if !root.exists() {
-        println!("skipped: ../shared not present");
-        return None;
-    }
-    Some(root.join(path))
-}
+use dynid_testing::shared;
 
 fn table(text: &str, options: &ReadOptions) -> Table {
     let folder = tempfile::tempdir().unwrap();

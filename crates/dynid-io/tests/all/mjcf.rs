@@ -2,11 +2,10 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
-use std::path::Path;
-
 use dynid_io::mjcf::{self, JointParameters};
 use dynid_io::{robot, urdf};
 use dynid_model::*;
+use dynid_testing::shared;
 
 /// A tree with every kind of joint that MJCF knows, welded links, a mimic joint and awkward names.
 const TREE: &str = r#"<robot name="a &amp; b">
@@ -145,11 +144,7 @@ fn other_mjcf_is_not_half_understood() {
 
 #[test]
 fn public_robots_survive() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/oracles");
-    if !folder.exists() {
-        println!("skipped: ../shared not present");
-        return;
-    }
+    let Some(folder) = shared("data/oracles") else { return };
     for (name, floating) in
         [("ur5", false), ("panda", false), ("iiwa14", false), ("tiago", false), ("solo12", true)]
     {

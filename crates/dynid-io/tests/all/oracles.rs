@@ -1,24 +1,16 @@
 //! Public robots against numbers of an independent library (`data/oracles`: conventions, order, licences).
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use dynid_io::robot;
 use dynid_model::*;
+use dynid_testing::shared;
 use serde_json::Value;
 
 /// Our parameter `c` is the oracle's parameter `ORACLE_ORDER[c]`: there Iyy comes before Ixz.
 const ORACLE_ORDER: [usize; 10] = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9];
-
-fn folder() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/oracles");
-    if !folder.exists() {
-        println!("skipped: ../shared not present");
-        return None;
-    }
-    Some(folder)
-}
 
 fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
@@ -220,7 +212,7 @@ fn check_base_parameters(oracle: &Oracle, name: &str) {
 }
 
 fn check(name: &str, base_parameters: usize) {
-    let Some(folder) = folder() else { return };
+    let Some(folder) = shared("data/oracles") else { return };
     let oracle = oracle(&folder, name);
     assert_eq!(oracle.base_parameters, base_parameters);
     check_parameters(&oracle, name);
@@ -256,7 +248,7 @@ fn solo12_with_a_floating_base() {
 
 #[test]
 fn coupled_fingers_of_the_panda_add_their_efforts() {
-    let Some(folder) = folder() else { return };
+    let Some(folder) = shared("data/oracles") else { return };
     let oracle = oracle(&folder, "panda");
     let mut coupled = description(&folder, "panda.urdf", false);
     coupled.couple_mimics = true;

@@ -1,21 +1,13 @@
 //! URDF and TOML robots: numbers, order, edits, bounds, and every public robot at hand.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use std::path::{Path, PathBuf};
 
 use dynid_io::urdf::{self, JointDynamics};
 use dynid_io::{SettingValue, robot, toml_robot};
 use dynid_model::{Description, Inertia, JointKind, Mat3, Placement, Vec3};
-
-fn shared(path: &str) -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    if !root.exists() {
-        println!("skipped: ../shared not present");
-        return None;
-    }
-    Some(root.join(path))
-}
+use dynid_testing::shared;
 
 fn urdfs(folder: &Path, out: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap() {

@@ -2,11 +2,10 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
-use std::path::PathBuf;
-
 use dynid_model::contact::{HertzStiffness, LankaraniNikravesh, SlidingFriction};
 use dynid_model::element::{ClearanceContact, JointElement, JournalMotion, impact_speed_signal};
 use dynid_model::*;
+use dynid_testing::golden;
 use serde_json::Value;
 
 const CLEARANCE: f64 = 5e-5;
@@ -55,12 +54,7 @@ fn inertias(p: &[f64]) -> [Option<Inertia>; 2] {
 
 #[test]
 fn torques_and_reactions_are_those_of_the_golden_file() {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/golden/xy_dynamics.json");
-    let Ok(text) = std::fs::read_to_string(path) else {
-        println!("skipped: ../shared not present");
-        return;
-    };
-    let golden: Value = serde_json::from_str(&text).unwrap();
+    let Some(golden) = golden("xy_dynamics.json") else { return };
     let number = |key: &str| golden[key].as_f64().unwrap();
     for state in golden["states"].as_array().unwrap() {
         let of = |key: &str| numbers(&state[key]);

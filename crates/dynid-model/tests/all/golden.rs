@@ -1,26 +1,14 @@
 //! Dynamics and base parameters against golden numbers and against each other.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
-
-use std::path::PathBuf;
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use dynid_model::element::{
     Arctangent, AsymmetricFriction, Coulomb, CoupledWrist, CyclicTorque, JointElement, Offset, RotorInertia,
     Spring, Transmission, Viscous,
 };
 use dynid_model::*;
+pub(crate) use dynid_testing::golden;
 use serde_json::Value;
-
-pub(crate) fn golden(name: &str) -> Option<Value> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/golden").join(name);
-    match std::fs::read_to_string(&path) {
-        Ok(text) => Some(serde_json::from_str(&text).unwrap()),
-        Err(_) => {
-            println!("skipped: ../shared not present");
-            None
-        }
-    }
-}
 
 pub(crate) fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()

@@ -1,25 +1,13 @@
 //! Elements that depend on the motion before, on temperature, and elements that are known.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
-
-use std::path::PathBuf;
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use dynid_model::element::{
     Coulomb, ExponentialViscous, JointElement, Linearised, LuGre, ShapeSetting, Stribeck, Viscous,
 };
 use dynid_model::*;
+use dynid_testing::golden;
 use serde_json::Value;
-
-fn golden(name: &str) -> Option<Value> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/golden").join(name);
-    match std::fs::read_to_string(&path) {
-        Ok(text) => Some(serde_json::from_str(&text).unwrap()),
-        Err(_) => {
-            println!("skipped: ../shared not present");
-            None
-        }
-    }
-}
 
 fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()

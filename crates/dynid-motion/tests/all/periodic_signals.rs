@@ -1,24 +1,15 @@
 //! Signals of periodic motions: smoothing, derivatives by harmonics, averages over periods.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use std::f64::consts::TAU;
-use std::path::Path;
 
 use dynid_motion::SignalError;
 use dynid_motion::frequency::{HarmonicPath, differentiate};
 use dynid_motion::periods::average_periods;
 use dynid_motion::smoothing::five_point_cubic;
+use dynid_testing::golden;
 use serde_json::Value;
-
-fn golden(name: &str) -> Option<Value> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/golden").join(name);
-    let Ok(text) = std::fs::read_to_string(path) else {
-        println!("skipped: ../shared not present");
-        return None;
-    };
-    Some(serde_json::from_str(&text).unwrap())
-}
 
 fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()

@@ -10,6 +10,7 @@ use dynid_motion::cutoff::{CutoffSettings, KernelLimit, kernel_limit};
 use dynid_motion::spectrum::{NoiseSettings, PositionNoise, effort_noise, position_noise};
 use dynid_motion::spikes::{SpikeSettings, remove};
 use dynid_motion::{JointSignals, Log};
+use dynid_testing::shared;
 
 struct Table {
     header: Vec<String>,
@@ -37,12 +38,7 @@ impl Table {
 }
 
 fn data(path: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(path);
-    if !path.exists() {
-        println!("skipped: ../shared not present");
-        return None;
-    }
-    Some(path)
+    shared(&format!("data/{path}"))
 }
 
 /// Logs without a time column were recorded at a known rate, Hz.

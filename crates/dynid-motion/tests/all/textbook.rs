@@ -1,14 +1,14 @@
 //! The textbook route from a log to states, and the EMPS benchmark through its pieces.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
 use std::io::Read;
-use std::path::Path;
 
 use dynid_motion::clock::{ClockSettings, uniform};
 use dynid_motion::filter::{Alignment, decimate, forward_backward};
 use dynid_motion::textbook::{TextbookSettings, low_pass, states, textbook};
 use dynid_motion::{Channel, JointSignals, Log, SignalError};
+use dynid_testing::shared;
 
 fn log_of(samples: usize, rate: f64, position: impl Fn(f64) -> f64) -> Log {
     let time: Vec<f64> = (0..samples).map(|n| n as f64 / rate).collect();
@@ -57,12 +57,7 @@ fn short_or_constant_logs_are_defined() {
 }
 
 fn emps() -> Option<[Vec<f64>; 2]> {
-    let path =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/emps/emps_identification.csv.gz");
-    let Ok(file) = std::fs::File::open(path) else {
-        println!("skipped: ../shared not present");
-        return None;
-    };
+    let file = std::fs::File::open(shared("data/emps/emps_identification.csv.gz")?).unwrap();
     let mut text = String::new();
     flate2::read::GzDecoder::new(file).read_to_string(&mut text).unwrap();
     let mut columns = [vec![], vec![]];

@@ -1,23 +1,14 @@
 //! Published trajectories against golden numbers, and what they keep and break of their limits.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
 use std::f64::consts::{PI, TAU};
-use std::path::Path;
 
 use dynid_motion::trajectory::{
     Extremes, Form, Fourier, FourierTrajectory, PaulBlend, Point, Profile, RowOrder, Trajectory,
 };
+use dynid_testing::golden;
 use serde_json::Value;
-
-fn golden(name: &str) -> Option<Value> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/golden").join(name);
-    let Ok(text) = std::fs::read_to_string(path) else {
-        println!("skipped: ../shared not present");
-        return None;
-    };
-    Some(serde_json::from_str(&text).unwrap())
-}
 
 fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()

@@ -5,17 +5,8 @@ use dynid_online::{
     BlockWindow, Estimator, Forgetting, RowNoise, RowWindow, SquareRoot, average_run_length, cusum_threshold,
     error_driven_factor,
 };
+use dynid_testing::golden as load;
 use serde_json::Value;
-use std::path::Path;
-
-fn load(name: &str) -> Option<Value> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/golden").join(name);
-    if !path.exists() {
-        println!("skipped: ../shared not present");
-        return None;
-    }
-    Some(serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap())
-}
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap()

@@ -1,8 +1,6 @@
 //! Journals in their bearings: against reference numbers, closed forms, the classical method, and their own energy.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
-
-use std::path::PathBuf;
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use dynid_model::contact::{
     ContactLaw, Hertz, HertzStiffness, KelvinVoigt, LankaraniNikravesh, SlidingFriction,
@@ -16,6 +14,7 @@ use dynid_sim::clearance::{
     ClearanceRecord, ClearanceSettings, ClearanceStart, ContactEventKind, Driving, Method, simulate,
 };
 use dynid_sim::{Plant, SimError};
+use dynid_testing::golden;
 
 use crate::pointing::{self, CLEARANCE, JOURNAL_RADIUS};
 
@@ -34,20 +33,9 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
     (sum / count).sqrt()
 }
 
-fn golden() -> Option<serde_json::Value> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/golden/xy_sim.json");
-    match std::fs::read_to_string(path) {
-        Ok(text) => Some(serde_json::from_str(&text).unwrap()),
-        Err(_) => {
-            println!("skipped: ../shared not present");
-            None
-        }
-    }
-}
-
 #[test]
 fn half_a_second_of_the_published_mechanism_agrees_with_the_reference() {
-    let Some(golden) = golden() else { return };
+    let Some(golden) = golden("xy_sim.json") else { return };
     let record = prescribed(&[0.0, 0.5], Method::default());
     let at = &golden["at_0_5s"];
     let tolerance = at["tolerance_rel"].as_f64().unwrap();

@@ -1,19 +1,9 @@
 //! Friction experiments on recorded logs: what they tell and what they cannot.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
-
-use std::path::PathBuf;
+#![expect(clippy::unwrap_used, reason = "a test may stop, and says what it measured")]
 
 use dynid::friction::{FrictionConfig, FrictionModel, identify_friction};
-
-fn data(set: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(set);
-    if path.is_dir() {
-        return Some(path);
-    }
-    println!("{} is not there: the test did not run", path.display());
-    None
-}
+use dynid_testing::shared;
 
 fn model(text: &str) -> FrictionModel {
     let config = FrictionConfig::parse(text, "test").unwrap();
@@ -23,7 +13,7 @@ fn model(text: &str) -> FrictionModel {
 /// Single joints of a Gen3 run in one direction at one speed: effort is all that can be stated.
 #[test]
 fn one_direction_of_the_gen3() {
-    let Some(data) = data("kinova-gen3") else { return };
+    let Some(data) = shared("data/kinova-gen3") else { return };
     let mut text = format!("robot = \"{}/gen3.urdf\"\n", data.display());
     text += "[columns]\ntime = { columns = [\"Time\"], unit = \"ms\" }\nposition = \"Position{}\"\n\
              velocity = \"Velocity{}\"\neffort = \"TorqueCur{}\"\ntemperature = \"Temp{}\"\n";
@@ -66,7 +56,7 @@ fn one_direction_of_the_gen3() {
 /// with an offset) and the published LuGre models.
 #[test]
 fn friction_signals_of_a_franka() {
-    let Some(data) = data("franka-friction") else { return };
+    let Some(data) = shared("data/franka-friction") else { return };
     let folder = tempfile::tempdir().unwrap();
     let robot = folder.path().join("robot.toml");
     let joint = "schema = 1\nname = \"one\"\ndh = \"modified\"\n[[joint]]\nname = \"j\"\na = 0.0\nalpha = 0.0\nd = 0.0\noffset = 0.0\n";

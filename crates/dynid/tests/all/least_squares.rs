@@ -8,6 +8,7 @@ use dynid::estimators::linear::{WlsSettings, ols, wls};
 use dynid::estimators::{Factor, FactorBuilder};
 use dynid::model::element::{Coulomb, JointElement, Offset, RotorInertia, Viscous};
 use dynid::model::{BaseParameters, BaseSettings, EffortModel, MotionBlock, RegressorBlock, RobotModel};
+use dynid_testing::golden;
 use serde_json::Value;
 
 fn matrix(value: &Value) -> Vec<Vec<f64>> {
@@ -17,14 +18,8 @@ fn matrix(value: &Value) -> Vec<Vec<f64>> {
 
 #[test]
 fn indy7_least_squares() {
-    let shared = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/golden");
-    let Ok(text) = std::fs::read_to_string(shared.join("indy7_least_squares.json")) else {
-        println!("skipped: ../shared not present");
-        return;
-    };
-    let g: Value = serde_json::from_str(&text).unwrap();
-    let base_golden: Value =
-        serde_json::from_str(&std::fs::read_to_string(shared.join("indy7_base.json")).unwrap()).unwrap();
+    let Some(g) = golden("indy7_least_squares.json") else { return };
+    let Some(base_golden) = golden("indy7_base.json") else { return };
     let robot = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../robots/indy7.toml");
     let mechanism = dynid::Robot::load(&robot, &dynid::RobotOptions::default()).unwrap().mechanism;
     let mut elements: Vec<Box<dyn JointElement>> = Vec::new();

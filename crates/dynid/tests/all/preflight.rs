@@ -13,6 +13,7 @@ use dynid::check::{Check, Severity, check};
 use dynid::config::LogConfig;
 use dynid::identify;
 use dynid::io::csv::{ReadOptions, read};
+use dynid_testing::shared;
 
 const JOINTS: usize = 6;
 
@@ -508,11 +509,7 @@ fn rows_are_those_of_the_file() {
 /// One joint moves, the others tremble by some 1e-5 rad: there is nothing to tell columns by, and nothing is made up.
 #[test]
 fn single_joint_runs_of_a_gen3_raise_no_error() {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/kinova-gen3");
-    if !data.is_dir() {
-        println!("skipped: {} is not there", data.display());
-        return;
-    }
+    let Some(data) = shared("data/kinova-gen3") else { return };
     let mut text = format!(
         "robot = \"{}/gen3.urdf\"\n[columns]\ntime = {{ columns = [\"Time\"], unit = \"ms\" }}\nposition = \"Position{{}}\"\n\
          velocity = \"Velocity{{}}\"\neffort = \"TorqueCur{{}}\"\n",

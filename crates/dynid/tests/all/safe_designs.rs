@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use dynid::design::{CapsuleSource, DesignConfig, DesignRecord, DesignRun, design};
 use dynid::model::{Dynamics, Placement, Vec3};
 use dynid::{Robot, RobotOptions};
+use dynid_testing::shared;
 
 const INSTANTS: usize = 10_000;
 
@@ -152,13 +153,8 @@ fn the_indy7_keeps_its_links_apart_and_above_the_floor() {
 
 #[test]
 fn robots_of_public_files_keep_their_links_apart_and_above_the_floor() {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    for file in ["ur10e-innopolis/ur10e.urdf", "oracles/iiwa14.urdf"] {
-        let path = data.join(file);
-        if !path.exists() {
-            println!("skipped: {file} is not there");
-            continue;
-        }
+    for file in ["data/ur10e-innopolis/ur10e.urdf", "data/oracles/iiwa14.urdf"] {
+        let Some(path) = shared(file) else { return };
         check(&quick(&path));
     }
 }

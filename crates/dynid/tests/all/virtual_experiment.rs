@@ -3,7 +3,7 @@
 //! The table of docs/results.md:
 //! `cargo test --release -p dynid --test all virtual_experiment:: -- --ignored --nocapture`
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
+#![expect(clippy::unwrap_used, reason = "a test may stop, and says what it measured")]
 
 use std::path::{Path, PathBuf};
 
@@ -14,6 +14,7 @@ use dynid::io::csv;
 use dynid::model::{BaseParameters, BaseSettings, EffortModel, MotionBlock, RegressorBlock, RobotModel};
 use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
 use dynid::{Config, Robot, RobotOptions, identify};
+use dynid_testing::shared_if_there;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -22,12 +23,7 @@ use rand_distr::{Distribution, StandardNormal};
 fn robots() -> Vec<(&'static str, PathBuf)> {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     let mut robots = vec![("Indy7", root.join("../../robots/indy7.toml"))];
-    let ur5 = root.join("../../../shared/data/oracles/ur5.urdf");
-    if ur5.exists() {
-        robots.push(("UR5", ur5));
-    } else {
-        println!("skipped for the UR5: ../shared not present");
-    }
+    robots.extend(shared_if_there("data/oracles/ur5.urdf").map(|file| ("UR5", file)));
     robots
 }
 

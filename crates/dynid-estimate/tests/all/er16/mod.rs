@@ -1,8 +1,6 @@
 //! The ER-16 problem : joints 1 to 3, 15 base parameters, five of friction per joint.
 #![allow(dead_code, reason = "an example uses a part of it")]
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
-
-use std::path::Path;
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use dynid_estimate::effort_objective::{EffortLoss, EffortObjective};
 use dynid_model::element::{Arctangent, Coulomb, JointElement, Offset, Viscous};
@@ -12,22 +10,11 @@ use dynid_model::{
 };
 use dynid_motion::trajectory::Fourier;
 use dynid_search::{Bounds, Objective};
+pub(crate) use dynid_testing::reference;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde_json::Value;
-
-/// A file of the reference data, or nothing (and a notice) without it.
-pub(crate) fn reference(path: &str) -> Option<Value> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec").join(path);
-    match std::fs::read_to_string(&path) {
-        Ok(text) => Some(serde_json::from_str(&text).unwrap()),
-        Err(_) => {
-            println!("skipped: ../shared not present");
-            None
-        }
-    }
-}
 
 pub(crate) fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()

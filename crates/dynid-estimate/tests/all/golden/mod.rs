@@ -1,18 +1,8 @@
 //! Golden numbers shared by the tests.
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
+pub(crate) use dynid_testing::golden as load;
 use serde_json::Value;
-use std::path::Path;
-
-/// Reads a golden file, or says that it is absent and returns `None`.
-pub(crate) fn load(name: &str) -> Option<Value> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/golden").join(name);
-    if !path.exists() {
-        println!("skipped: ../shared not present");
-        return None;
-    }
-    Some(serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap())
-}
 
 pub(crate) fn number(value: &Value) -> f64 {
     value.as_f64().unwrap()

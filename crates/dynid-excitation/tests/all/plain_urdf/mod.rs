@@ -1,21 +1,14 @@
 //! UR10 of the reference data.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
-
-use std::path::PathBuf;
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use dynid_model::*;
+use dynid_testing::shared;
 
 /// UR10 from its URDF, or nothing (and a notice) without the reference data.
 pub(crate) fn ur10() -> Option<Mechanism> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/oracles/ur10.urdf");
-    match std::fs::read_to_string(&path) {
-        Ok(text) => Some(plain_urdf(&text).build().unwrap()),
-        Err(_) => {
-            println!("skipped: ../shared not present");
-            None
-        }
-    }
+    let text = std::fs::read_to_string(shared("data/oracles/ur10.urdf")?).unwrap();
+    Some(plain_urdf(&text).build().unwrap())
 }
 
 /// Links and joints of a URDF without comments, namespaces or nesting: this crate does not know the file reader.

@@ -1,27 +1,15 @@
 //! Robots of the reference data, problems of its acceptance tables.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 #![allow(dead_code, unreachable_pub, reason = "a benchmark uses a part of it")]
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use dynid_excitation::{MotionLimits, RobotExcitation};
 use dynid_model::element::{Coulomb, JointElement, Offset, RotorInertia, Viscous};
 use dynid_model::*;
+pub use dynid_testing::reference;
 use serde_json::Value;
-
-/// A file of the reference data, or nothing (and a notice) without it.
-pub fn reference(path: &str) -> Option<Value> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec").join(path);
-    match std::fs::read_to_string(&path) {
-        Ok(text) => Some(serde_json::from_str(&text).unwrap()),
-        Err(_) => {
-            println!("skipped: ../shared not present");
-            None
-        }
-    }
-}
 
 pub fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()

@@ -1,23 +1,12 @@
 //! Golden numbers of the rough contact and of friction.
 
 use dynid_model::contact::*;
+use dynid_testing::golden;
 use serde_json::Value;
 
 use super::{check_relative, quadrature};
 
 const RELATIVE: f64 = 1e-8;
-
-fn load() -> Option<Value> {
-    let path =
-        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/golden/xy_contact.json");
-    match std::fs::read_to_string(path) {
-        Ok(text) => Some(serde_json::from_str(&text).unwrap()),
-        Err(_) => {
-            println!("skipped: ../shared not present");
-            None
-        }
-    }
-}
 
 fn number(of: &Value, name: &str) -> f64 {
     of[name].as_f64().unwrap()
@@ -54,7 +43,7 @@ fn law(case: &Value, literal: bool) -> FractalLankaraniNikravesh {
 
 #[test]
 fn constants_of_the_surface_agree() {
-    let Some(golden) = load() else { return };
+    let Some(golden) = golden("xy_contact.json") else { return };
     for case in list(&golden, "cases") {
         let law = law(case, false);
         let found = law.surface().constants();
@@ -80,7 +69,7 @@ fn constants_of_the_surface_agree() {
 
 #[test]
 fn contact_agrees_at_every_penetration() {
-    let Some(golden) = load() else { return };
+    let Some(golden) = golden("xy_contact.json") else { return };
     for case in list(&golden, "cases") {
         let (law, literal) = (law(case, false), law(case, true));
         let impact = number(&case["constants"], "impact_speed");
@@ -118,7 +107,7 @@ fn contact_agrees_at_every_penetration() {
 
 #[test]
 fn friction_agrees() {
-    let Some(golden) = load() else { return };
+    let Some(golden) = golden("xy_contact.json") else { return };
     for given in list(&golden, "friction_c_d") {
         let friction = SlidingFriction::new(0.1, number(given, "v_0"), number(given, "v_m")).unwrap();
         let v = number(given, "v_t");

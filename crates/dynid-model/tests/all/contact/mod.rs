@@ -1,6 +1,6 @@
 //! Contact laws against golden numbers, quadrature, differences and each other.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 mod energy;
 mod errors;

@@ -1,13 +1,11 @@
 //! Closed mechanisms in motion.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 mod experiment;
 mod forward;
 mod friction;
 mod motion;
-
-use std::path::PathBuf;
 
 use dynid_model::closed::{
     ClosedDynamics, ClosedMechanism, ClosedWarning, ClosureDescription, Condition, CutKind, LinkFrame,
@@ -15,6 +13,7 @@ use dynid_model::closed::{
 use dynid_model::element::{Coulomb, JointElement, RotorInertia, Viscous};
 use dynid_model::*;
 use dynid_sim::ClosedPlant;
+use dynid_testing::reference;
 use serde_json::Value;
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -70,12 +69,7 @@ fn described(bodies: &[Value], gravity: [f64; 3]) -> Mechanism {
 
 /// A robot of the reference data; `driven` in place of its own.
 pub(crate) fn robot(name: &str, variant: Option<&str>, driven: Option<&[&str]>) -> Option<ClosedMechanism> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/robots");
-    let Ok(text) = std::fs::read_to_string(path.join(format!("{name}.json"))) else {
-        println!("skipped: ../shared not present");
-        return None;
-    };
-    let robot: Value = serde_json::from_str(&text).unwrap();
+    let robot = reference(&format!("robots/{name}.json"))?;
     let all = robot["bodies"].as_array().unwrap();
     let changed = variant.map(|v| &robot["variants"][v]);
     let pick = |key: &str| changed.map(|v| &v[key]).filter(|v| !v.is_null()).unwrap_or(&robot[key]);

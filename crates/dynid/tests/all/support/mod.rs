@@ -1,6 +1,6 @@
 //! What the tests on recorded and simulated logs share.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use std::path::PathBuf;
 
@@ -75,14 +75,9 @@ path = "{data}/ur10-unisa/exciting_trajectory.csv.gz"
 part = [0.7, 1.0]
 "#;
 
-/// Folder of shared data, or `None` with a note.
+/// Folder of shared data; without it the test is skipped.
 pub(crate) fn data() -> Option<PathBuf> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    if path.is_dir() {
-        return Some(path);
-    }
-    println!("skipped: ../shared not present");
-    None
+    dynid_testing::shared("data")
 }
 
 /// Identifies by a configuration in which `{data}` stands for the data folder.
