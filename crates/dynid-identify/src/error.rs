@@ -491,12 +491,14 @@ impl Error {
                 Some("check the time column; `rate_hz` in [columns] states a sample rate instead".to_owned())
             }
             Error::Conditioning(C::Signal(_)) => Some("record a longer log, or set cut-offs below half the sample rate".to_owned()),
-            Error::UnknownElement { name, known, .. } => Some(match dynid_io::closest(name, known) {
-                Some(meant) => format!("did you mean `{meant}`?"),
-                None => "elements are given by --elements, under [elements] in a configuration, under [defaults] and \
-                         [element.<joint>] in a robot file; one of a program's own is known to that program alone"
-                    .to_owned(),
-            }),
+            Error::UnknownElement { name, known, .. } => {
+                let meant = dynid_io::closest(name, known);
+                let meant = meant.map_or_else(String::new, |meant| format!("did you mean `{meant}`? "));
+                Some(format!(
+                    "{meant}elements are given by --elements, under [elements] in a configuration, under [defaults] and \
+                     [element.<joint>] in a robot file; one of a program's own is known to that program alone"
+                ))
+            }
             Error::EstimateFile { .. } => {
                 Some("an estimate is the estimate.json that `dynid identify` writes".to_owned())
             }

@@ -46,7 +46,7 @@ pub fn reference(path: &str) -> Option<Value> {
 /// The golden numbers of `../shared/spec/golden/NAME`; without them the test is skipped.
 ///
 /// # Panics
-/// As [`reference`].
+/// As [`reference()`].
 pub fn golden(name: &str) -> Option<Value> {
     reference(&format!("golden/{name}"))
 }

@@ -18,7 +18,7 @@ use crate::config::{Config, LogConfig, MotorSide};
 use crate::estimate::InputRecord;
 use crate::log::{Log, LogAxis, LogReference, LogSource, assemble, check, names, turns, understood};
 
-/// Reads a log of a robot ([`Robot::axes`](crate::robot::Robot), [`axes`]).
+/// Reads a log of a robot ([`Robot::axes`](crate::robot::Robot)).
 ///
 /// # Errors
 /// [`Error::LogFile`], [`Error::Columns`], [`Error::SurplusColumn`], [`Error::Setting`], [`Error::Log`],

@@ -32,7 +32,7 @@ impl Run {
     /// The report as one HTML page.
     ///
     /// # Errors
-    /// [`Error::Report`].
+    /// [`PageError`](crate::fault::PageError).
     pub fn report(&self, estimate: &Estimate) -> Result<String, Error> {
         crate::fault::page(report::render(&self.report_data(estimate)?))
     }

@@ -47,8 +47,8 @@ pub fn identify(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Run, 
     config.check()?;
     progress(Step::Read(config.robot.display().to_string()));
     let robot = load_robot(config)?;
-    let trajectory = config.instruments.as_ref().and_then(|table| table.trajectory.as_ref());
-    let trajectory = trajectory.map(|path| TrajectoryFile::read_source(path)).transpose()?;
+    let trajectory = config.instruments.as_ref().and_then(|table| table.trajectory.as_deref());
+    let trajectory = trajectory.map(TrajectoryFile::read_source).transpose()?;
     let logs = read_all(config, &robot, progress)?;
     let found = pipeline::identify(&robot, logs, &config.settings()?, progress)?;
     let mut inputs = found.inputs();

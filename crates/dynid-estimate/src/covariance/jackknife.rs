@@ -40,8 +40,7 @@ impl Jackknife {
 
 /// Jackknife over time blocks with fixed weights.
 ///
-/// `blocks`: weighted factors, one per time block, all joints of a block merged (see
-/// [`super::weighted_blocks`]), in independent columns. `x`: their joint least-squares solution. The `B`
+/// `blocks`: weighted factors, one per time block, all joints of a block merged, in independent columns. `x`: their joint least-squares solution. The `B`
 /// reduced problems come from prefix and suffix merges, so none is obtained by subtraction.
 /// `None` with fewer than two blocks; see [`MIN_BLOCKS`] for how many are enough.
 ///

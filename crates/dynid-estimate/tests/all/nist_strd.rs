@@ -1,5 +1,5 @@
 //! Linear-regression sets of the NIST Statistical Reference Datasets through the reduction and least squares.
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "in tests a panic is the report")]
+#![expect(clippy::print_stdout, reason = "in tests a panic is the report")]
 
 use crate::extended::{DoubleDouble, ExtendedFactor};
 use crate::nist::{Dataset, datasets};

@@ -1,6 +1,6 @@
 //! Joints with clearance: bodies whose journals move in their bearings.
 //!
-//! Only [simulation](crate::simulate) and [inspection](crate::inspect) know them; all else takes joints as ideal.
+//! Only simulation and inspection know them; all else takes joints as ideal.
 
 use dynid_model::element::{ClearanceContact, JointElement};
 use dynid_model::mechanism::translation_names;

@@ -132,19 +132,25 @@ impl<'a> Settings<'a> {
         match self.setting(key) {
             None => Ok(None),
             Some(SettingValue::Flag(flag)) => Ok(Some(*flag)),
-            // Result files record settings as numbers.
+            // Result files record what is held as a number.
             Some(SettingValue::Number(x)) if *x == 0.0 || *x == 1.0 => Ok(Some(*x == 1.0)),
-            Some(other) => {
-                Err(self.fault(format!("`{key}`: expected true or false, found {}", in_words(other))))
-            }
+            Some(_) => Err(self.not_a_flag(key)),
         }
+    }
+
+    fn not_a_flag(&self, key: &str) -> Error {
+        let found = self.setting(key).map_or_else(String::new, in_words);
+        self.fault(format!("`{key}`: expected true or false, found {found}"))
     }
 
     fn options(&self) -> Result<Vec<(&'static str, OptionValue)>, Error> {
         let mut out = Vec::new();
         for option in &self.kind.options {
             let value = match *option {
-                OptionTerm::Flag { key } => self.flag(key)?.map(OptionValue::Flag),
+                OptionTerm::Flag { key } => match self.setting(key) {
+                    Some(SettingValue::Number(_)) => return Err(self.not_a_flag(key)),
+                    _ => self.flag(key)?.map(OptionValue::Flag),
+                },
                 OptionTerm::Number { key, expected, holds, .. } => match self.number(key)? {
                     Some(x) if !holds(x) => {
                         return Err(self.fault(format!("`{key}`: expected {expected}, found {x}")));

@@ -29,7 +29,7 @@ pub enum Method {
     Ridge,
     /// Total least squares: columns with errors of their own, see [`EstimatorConfig::column_noise`].
     Tls,
-    /// Instrumental variables from simulations of the closed loop, weighted as `wls`; needs [`Settings::closed_loop`].
+    /// Instrumental variables from simulations of the closed loop, weighted as `wls`; needs the closed loop (`[instruments]`).
     Iv,
 }
 

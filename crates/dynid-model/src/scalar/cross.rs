@@ -89,7 +89,6 @@ impl Sub for Cross {
 impl Mul for Cross {
     type Output = Self;
     #[inline(always)]
-    #[expect(clippy::suspicious_arithmetic_impl, reason = "the product rule adds")]
     fn mul(self, o: Self) -> Self {
         Cross {
             value: self.value * o.value,
@@ -103,7 +102,6 @@ impl Mul for Cross {
 impl Div for Cross {
     type Output = Self;
     #[inline(always)]
-    #[expect(clippy::suspicious_arithmetic_impl, reason = "the quotient rule subtracts products")]
     fn div(self, o: Self) -> Self {
         let value = self.value / o.value;
         let a = (self.a - value * o.a) / o.value;

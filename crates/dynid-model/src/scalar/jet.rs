@@ -94,7 +94,6 @@ impl Scalar for Jet {
 
 impl Div for Jet {
     type Output = Self;
-    #[expect(clippy::suspicious_arithmetic_impl, reason = "the quotient rule subtracts products")]
     fn div(self, o: Self) -> Self {
         let value = self.value / o.value;
         let first = (self.first - value * o.first) / o.value;

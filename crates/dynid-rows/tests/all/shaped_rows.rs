@@ -1,5 +1,4 @@
 //! Shape parameters fitted to rows of a log through kernels.
-#![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use crate::arm;
 use dynid_estimate::separable::{SeparableSettings, ShapeVerdict};

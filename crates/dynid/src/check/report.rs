@@ -84,7 +84,7 @@ impl Check {
     /// The page as HTML.
     ///
     /// # Errors
-    /// [`Error::Report`].
+    /// [`PageError`](crate::fault::PageError).
     pub fn report(&self) -> Result<String, Error> {
         let status = match self.worst() {
             Some(Severity::Error) => report::Status::Fail,

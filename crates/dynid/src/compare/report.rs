@@ -12,7 +12,7 @@ impl Comparison {
     /// The page as HTML.
     ///
     /// # Errors
-    /// [`Error::Report`].
+    /// [`PageError`](crate::fault::PageError).
     pub fn report(&self) -> Result<String, Error> {
         let inputs = self.inputs.iter().map(crate::provenance::shown).collect();
         let sections = vec![

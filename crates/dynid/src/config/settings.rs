@@ -12,7 +12,7 @@ impl Config {
     /// Settings of an identification, friction files read.
     ///
     /// # Errors
-    /// [`Error::Read`], [`Error::Friction`] for a friction file that is none.
+    /// [`Error::Read`], [`FrictionError`](crate::friction::FrictionError) for a friction file that is none.
     pub fn settings(&self) -> Result<Settings, Error> {
         let mut settings = self.plain_settings();
         if let Some(file) = &self.elements.known_friction {

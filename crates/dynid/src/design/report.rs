@@ -21,7 +21,7 @@ impl DesignRun {
     /// The report as one HTML page.
     ///
     /// # Errors
-    /// [`Error::Report`], [`Error::UnknownLink`] for a frame that does not exist.
+    /// [`PageError`](crate::fault::PageError), [`Error::UnknownLink`] for a frame that does not exist.
     pub fn report(&self, config: &DesignConfig, record: &DesignRecord) -> Result<String, Error> {
         crate::fault::page(report::render_design(&self.report_data(config, record)?))
     }

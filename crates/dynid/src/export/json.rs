@@ -108,7 +108,7 @@ pub struct OtherJson {
 /// Writes an identified robot as JSON and reads it back; see [`RobotJson`].
 ///
 /// # Errors
-/// [`Error::Export`] with [`ExportError::ReadBack`](super::ExportError::ReadBack).
+/// [`ExportError::ReadBack`](super::ExportError::ReadBack).
 pub fn json(identified: &Identified<'_>, states: &CheckStates) -> Result<Exported, Error> {
     let Identified { model, values, .. } = *identified;
     let robot = RobotJson::new(identified);

@@ -83,7 +83,7 @@ impl<'a> RobotExport<'a> {
     /// Lays parameters out on a robot file.
     ///
     /// # Errors
-    /// [`Error::Export`]: the file is another robot's; [`Error::Mechanism`]: it is none.
+    /// [`ExportError`]: the file is another robot's; [`Error::Mechanism`]: it is none.
     pub fn new(identified: Identified<'a>, source: &'a Source) -> Result<Self, Error> {
         let mechanism = identified.model.mechanism();
         let mut description = source.file.description.clone();
@@ -185,7 +185,7 @@ impl<'a> RobotExport<'a> {
     /// TOML is written anew.
     ///
     /// # Errors
-    /// [`Error::RobotFile`]: URDF cannot state the robot; [`Error::Export`]: see [`ExportError::ReadBack`].
+    /// [`Error::RobotFile`]: URDF cannot state the robot; [`ExportError`]: see [`ExportError::ReadBack`].
     pub fn urdf(&self, states: &CheckStates) -> Result<Exported, Error> {
         let JointValues { joints, notes } = self.joint_values(Format::Urdf, states);
         let source = match &self.source.urdf {
@@ -238,7 +238,7 @@ impl<'a> RobotExport<'a> {
     /// MJCF, written anew; see [`dynid_io::mjcf::from_description`].
     ///
     /// # Errors
-    /// [`Error::RobotFile`]: MJCF cannot state the robot; [`Error::Export`]: see [`ExportError::ReadBack`].
+    /// [`Error::RobotFile`]: MJCF cannot state the robot; [`ExportError`]: see [`ExportError::ReadBack`].
     pub fn mjcf(&self, states: &CheckStates) -> Result<Exported, Error> {
         if self.identified.model.closed().is_some() {
             return Err(Error::Unsupported(

@@ -214,7 +214,7 @@ impl FrictionModel {
     /// Reads a friction file.
     ///
     /// # Errors
-    /// [`Error::Read`], [`Error::Friction`] with [`FrictionError::File`] for other files and schemas.
+    /// [`Error::Read`], [`FrictionError`] with [`FrictionError::File`] for other files and schemas.
     pub fn load(path: &Path) -> Result<Self, Error> {
         Ok(Self::load_source(path)?.0)
     }

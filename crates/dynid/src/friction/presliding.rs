@@ -124,7 +124,7 @@ pub(super) fn find(
 /// residuals counted as correlated as they are.
 ///
 /// # Errors
-/// [`Error::Friction`] for numbers that no search can start from. What the motion does not tell is said in the outcome.
+/// [`FrictionError`](crate::friction::FrictionError) for numbers that no search can start from. What the motion does not tell is said in the outcome.
 pub fn fit_presliding(test: &PreslidingTest<'_>, law: &FrictionLaw) -> Result<PreslidingFit, Error> {
     let (low, high) =
         test.position.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));

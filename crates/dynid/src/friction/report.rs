@@ -21,7 +21,7 @@ impl FrictionIdentification {
     /// The report as one HTML page.
     ///
     /// # Errors
-    /// [`Error::Report`].
+    /// [`PageError`](crate::fault::PageError).
     pub fn report(&self, model: &FrictionModel) -> Result<String, Error> {
         let p = &model.provenance;
         crate::fault::page(report::render_friction(&report::FrictionReport {

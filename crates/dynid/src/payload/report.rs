@@ -12,7 +12,7 @@ impl PayloadFile {
     /// The report as one HTML page.
     ///
     /// # Errors
-    /// [`Error::Report`].
+    /// [`PageError`](crate::fault::PageError).
     pub fn report(&self) -> Result<String, Error> {
         let sentences: Vec<String> = self.payloads.iter().map(|p| p.sentence.clone()).collect();
         let p = &self.provenance;

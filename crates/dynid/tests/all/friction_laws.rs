@@ -151,7 +151,7 @@ fn same_predictions(bench: &Bench, found: &Run, read: &Estimate) {
 /// Every value of the JSON export is that of the estimate, and URDF and MJCF say what stands for the friction.
 fn exports(bench: &Bench, read: &Estimate) {
     let file = bench.path("estimate.json");
-    let robot = dynid::export::IdentifiedRobot::of(&read, &file).unwrap();
+    let robot = dynid::export::IdentifiedRobot::of(read, &file).unwrap();
     let states = CheckStates::random(robot.identified().model);
     let text = json(&robot.identified(), &states).unwrap().text;
     let stated: RobotJson = serde_json::from_str(&text).unwrap();

@@ -2,6 +2,7 @@
 
 mod abuses;
 mod accuracy;
+mod arrays;
 mod backlash;
 mod bristles;
 mod clearance;

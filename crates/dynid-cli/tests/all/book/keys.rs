@@ -26,7 +26,14 @@ const PAGES: [Keys; 5] = [
         opening: "Read by `identify`, `check`, `compare`, `payload`, `gains` and `online`. An example with comments: \
                   [The run configuration](../files/run.md).",
         top: "Config",
-        sources: &["crates/dynid/src/config.rs", "crates/dynid/src/config", COLUMNS, COUPLING],
+        sources: &[
+            "crates/dynid/src/config.rs",
+            "crates/dynid/src/config",
+            SETTINGS,
+            MOTOR_SIDE,
+            COLUMNS,
+            COUPLING,
+        ],
     },
     Keys {
         page: "design",
@@ -37,6 +44,7 @@ const PAGES: [Keys; 5] = [
             "crates/dynid/src/design",
             "crates/dynid/src/config.rs",
             "crates/dynid/src/config",
+            SETTINGS,
             "crates/dynid-excitation/src/criterion/mod.rs",
             COUPLING,
         ],
@@ -46,7 +54,7 @@ const PAGES: [Keys; 5] = [
         title: "Keys of a friction experiment",
         opening: "Read by `friction`. An example with comments: [The file of a friction experiment](../files/friction.md).",
         top: "FrictionConfig",
-        sources: &["crates/dynid/src/friction", "crates/dynid/src/config.rs", COLUMNS],
+        sources: &["crates/dynid/src/friction", "crates/dynid/src/config.rs", MOTOR_SIDE, COLUMNS],
     },
     Keys {
         page: "simulate",
@@ -66,6 +74,8 @@ const PAGES: [Keys; 5] = [
     },
 ];
 
+const SETTINGS: &str = "crates/dynid-identify/src/settings";
+const MOTOR_SIDE: &str = "crates/dynid-identify/src/estimate/reading.rs";
 const COLUMNS: &str = "crates/dynid-io/src/columns";
 const COUPLING: &str = "crates/dynid-io/src/toml_robot/elements.rs";
 

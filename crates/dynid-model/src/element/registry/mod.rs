@@ -14,9 +14,16 @@ use std::sync::{Arc, LazyLock};
 ///
 /// A value that travels with what a robot file says of elements; the default holds what comes with the crate. Cheap to clone.
 /// Two are equal if they hold kinds of the same names.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct ElementRegistry {
     kinds: Arc<Vec<ElementKind>>,
+}
+
+/// Names alone: kinds hold functions, whose addresses differ from run to run.
+impl std::fmt::Debug for ElementRegistry {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_list().entries(self.names()).finish()
+    }
 }
 
 /// Why a kind of element cannot join a registry.
