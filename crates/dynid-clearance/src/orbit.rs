@@ -13,8 +13,8 @@
 //! the stiffness, of which the offset tells only as far as the load changes: `κ`, the factor of the law's force, has a
 //! prior. The estimate minimises `Σ |e - e(c, μ, ln κ)|²/σ² + (ln κ/s)²` by damped Gauss-Newton steps.
 
+use dynid_linalg::Mat;
 use dynid_model::contact::{ContactError, ContactLaw, SlidingFriction};
-use faer::Mat;
 
 use super::Estimate;
 
@@ -353,7 +353,7 @@ impl Normal {
         )
     }
 
-    fn scaled(&self) -> Mat<f64> {
+    fn scaled(&self) -> Mat {
         let s = self.scales();
         Mat::from_fn(3, 3, |i, j| match self.free[i] && self.free[j] {
             true => self.matrix[i][j] / (s[i] * s[j]),
@@ -361,18 +361,18 @@ impl Normal {
         })
     }
 
-    fn covariance(&self) -> Mat<f64> {
+    fn covariance(&self) -> Mat {
         let s = self.scales();
         // Three unknowns at most, scaled; where clearance and stiffness cannot be told apart, the least eigenvalue says so.
         let scaled = self.scaled();
-        let inverse = match scaled.self_adjoint_eigen(faer::Side::Lower) {
-            Ok(eigen) => {
-                let (u, l) = (eigen.U(), eigen.S().column_vector());
+        let inverse = match scaled.symmetric_eigen() {
+            Some(eigen) => {
+                let (u, l) = (eigen.vectors, eigen.values);
                 Mat::from_fn(3, 3, |i, j| {
                     (0..3).map(|k| u[(i, k)] * u[(j, k)] / l[k].max(1e-16)).sum::<f64>()
                 })
             }
-            Err(_) => Mat::from_fn(3, 3, |i, j| if i == j { f64::INFINITY } else { 0.0 }),
+            None => Mat::from_fn(3, 3, |i, j| if i == j { f64::INFINITY } else { 0.0 }),
         };
         Mat::from_fn(3, 3, |i, j| match self.free[i] && self.free[j] {
             true => inverse[(i, j)] / (s[i] * s[j]),

@@ -2,12 +2,11 @@
 
 mod error;
 
+use dynid_linalg::multiply_into;
 use dynid_model::{EffortModel, MotionBlock, RegressorBlock};
 use dynid_search::Objective;
 pub use error::EffortObjectiveError;
 use error::{check_efforts, check_loss};
-use faer::linalg::matmul::matmul;
-use faer::{Accum, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 /// How residuals `r` of an output count.
@@ -170,14 +169,7 @@ impl<'a> EffortObjective<'a> {
                 to.iter_mut().zip(&output.fixed).for_each(|(c, unknown)| *c = x[*unknown]);
             }
             let product = &mut room.products[j * GROUP * ROWS..][..GROUP * rows];
-            matmul(
-                MatMut::from_column_major_slice_mut(product, rows, GROUP),
-                Accum::Replace,
-                MatRef::from_column_major_slice(&chunk.fixed[j], rows, p),
-                MatRef::from_column_major_slice(&room.coefficients, p, GROUP),
-                1.0,
-                Par::Seq,
-            );
+            multiply_into(product, &chunk.fixed[j], &room.coefficients, (rows, p, GROUP));
         }
         for (k, (x, value)) in candidates.chunks_exact(d).zip(values).enumerate() {
             let shape = &x[self.linear..];

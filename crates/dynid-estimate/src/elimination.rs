@@ -3,10 +3,10 @@
 use crate::covariance::MIN_BLOCKS;
 use crate::distribution::f_quantile;
 use crate::folds::{FoldSettings, HeldOutError, contiguous_folds, held_out_error};
-use crate::whitened::{Whitened, WhitenedBlock, cholesky, solve, upper_times};
+use crate::whitened::{Whitened, WhitenedBlock, cholesky, upper_times};
 use dynid_factor::factor::Factor;
+use dynid_linalg::Mat;
 use dynid_linalg::triangular::inverse;
-use faer::Mat;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -93,7 +93,7 @@ pub fn prune(blocks: &[Factor], columns: &[usize], settings: &PruneSettings) -> 
     let mut path = Vec::with_capacity(columns.len());
     let mut all_significant = None;
     loop {
-        let grams: Vec<Mat<f64>> = model.blocks.par_iter().map(WhitenedBlock::gram).collect();
+        let grams: Vec<Mat> = model.blocks.par_iter().map(WhitenedBlock::gram).collect();
         let inverse = inverse(&model.r);
         let x = upper_times(&inverse, &model.d);
         let unit: Vec<f64> =
@@ -146,7 +146,7 @@ fn inflation(variances: &[f64], unit: &[f64]) -> f64 {
 /// The columns still in the model, in the coordinates `d = R x` in which it is orthonormal.
 struct Model {
     columns: Vec<usize>,
-    r: Mat<f64>,
+    r: Mat,
     d: Vec<f64>,
     rss: f64,
     rows: usize,
@@ -197,12 +197,12 @@ impl Model {
                     (block.q[(i, t)], block.q[(i, t + 1)]) = (c * a + s * b, c * b - s * a);
                 }
             }
-            block.q.truncate(block.q.nrows(), k - 1);
+            block.q.truncate_columns(k - 1);
         });
     }
 
     /// Diagonal of the jackknife covariance in the model's own parameters.
-    fn jackknife_variances(&self, grams: &[Mat<f64>], inverse: &Mat<f64>) -> Option<Vec<f64>> {
+    fn jackknife_variances(&self, grams: &[Mat], inverse: &Mat) -> Option<Vec<f64>> {
         let k = self.d.len();
         let changes: Vec<Vec<f64>> = self
             .blocks
@@ -211,7 +211,7 @@ impl Model {
             .map(|(block, gram)| {
                 let score = block.transposed(&block.residual(&self.d));
                 let rest = Mat::from_fn(k, k, |i, j| if i == j { 1.0 } else { 0.0 } - gram[(i, j)]);
-                Some(upper_times(inverse, &solve(&cholesky(&rest)?.0, &score)))
+                Some(upper_times(inverse, &cholesky(&rest)?.0.solve_vector(&score)))
             })
             .collect::<Option<_>>()?;
         let share = (changes.len() - 1) as f64 / changes.len() as f64;
@@ -232,7 +232,7 @@ impl Folds {
         Folds(folds.map(|held| (held.clone(), training(&held))).filter(|(_, t)| !t.is_empty()).collect())
     }
 
-    fn error(&self, blocks: &[WhitenedBlock], grams: &[Mat<f64>]) -> Option<HeldOutError> {
+    fn error(&self, blocks: &[WhitenedBlock], grams: &[Mat]) -> Option<HeldOutError> {
         let errors: Vec<Option<f64>> = self
             .0
             .par_iter()
@@ -244,7 +244,7 @@ impl Folds {
                     let own = blocks[b].transposed(&blocks[b].z);
                     right.iter_mut().zip(own).for_each(|(r, v)| *r += v);
                 }
-                let d = solve(&cholesky(&gram)?.0, &right);
+                let d = cholesky(&gram)?.0.solve_vector(&right);
                 let held = &blocks[held.clone()];
                 let rows: usize = held.iter().map(|b| b.rows).sum();
                 let sum: f64 = held

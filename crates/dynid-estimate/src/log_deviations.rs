@@ -5,7 +5,7 @@
 //! its own by itself, and what remains of all logs is solved for the common parameters, so that time and memory grow with the
 //! number of logs and no faster.
 
-use faer::Mat;
+use dynid_linalg::Mat;
 use rayon::prelude::*;
 
 use crate::covariance::{MIN_BLOCKS, change_without, running_merges};
@@ -257,7 +257,7 @@ fn weighted(logs: &mut [OneLog], total: usize, settings: &WlsSettings) -> Option
 
 impl OneLog {
     /// `rss/(N - ℓ)` per group with the exact leverage `ℓ`; a group without half a degree of freedom keeps its variance.
-    fn variances(&self, common: &LinearSolution, reduced: &Mat<f64>, total: usize) -> Vec<f64> {
+    fn variances(&self, common: &LinearSolution, reduced: &Mat, total: usize) -> Vec<f64> {
         let k = self.own.len();
         let columns: Vec<usize> = (0..k).chain(common.kept.iter().map(|c| k + c)).collect();
         let own = self.merged(total).select(&columns);
@@ -335,8 +335,8 @@ fn deviations_by_jackknife(
         let d = Mat::from_fn(n, changes.len(), |i, b| changes[b][i]);
         &d * d.transpose()
     };
-    let spreads: Vec<Mat<f64>> = of_logs.par_iter().map(|(changes, _)| spread(changes)).collect();
-    let mut sum: Mat<f64> = Mat::zeros(n, n);
+    let spreads: Vec<Mat> = of_logs.par_iter().map(|(changes, _)| spread(changes)).collect();
+    let mut sum: Mat = Mat::zeros(n, n);
     spreads.iter().for_each(|s| sum += s);
     let number = blocks.iter().map(Vec::len).sum::<usize>() as f64;
     let correction = (number - 1.0) / number;

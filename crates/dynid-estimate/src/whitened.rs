@@ -7,8 +7,7 @@
 use dynid_factor::factor::Factor;
 use dynid_factor::rank::numerical_rank;
 use dynid_linalg::triangular::{inverse, symmetric_from};
-use faer::linalg::solvers::{Llt, Solve};
-use faer::{Mat, Side};
+use dynid_linalg::{Cholesky, Mat};
 
 /// Least squared pivot at which a set of blocks still counts as exciting every direction.
 const LEAST_PIVOT: f64 = 1e-10;
@@ -19,14 +18,14 @@ const FALLBACK_RIDGE: f64 = 1e-8;
 /// One time block: `q = R_b R⁻¹`, and its effort `z`, `ρ`.
 #[derive(Debug, Clone)]
 pub(crate) struct WhitenedBlock {
-    pub(crate) q: Mat<f64>,
+    pub(crate) q: Mat,
     pub(crate) z: Vec<f64>,
     pub(crate) rho: f64,
     pub(crate) rows: usize,
 }
 
 impl WhitenedBlock {
-    fn new(factor: &Factor, inverse: &Mat<f64>) -> Self {
+    fn new(factor: &Factor, inverse: &Mat) -> Self {
         let height = factor.height();
         let triangle = Mat::from_fn(height, factor.columns(), |i, j| factor.r(i, j));
         let mut z = factor.z();
@@ -51,7 +50,7 @@ impl WhitenedBlock {
     }
 
     /// `qᵀ q`.
-    pub(crate) fn gram(&self) -> Mat<f64> {
+    pub(crate) fn gram(&self) -> Mat {
         self.q.transpose() * &self.q
     }
 }
@@ -59,7 +58,7 @@ impl WhitenedBlock {
 /// Blocks, rows outside all blocks, and `R⁻¹` of all of them; `None` if the columns are dependent or there is no block.
 pub(crate) struct Whitened {
     pub(crate) merged: Factor,
-    pub(crate) inverse: Mat<f64>,
+    pub(crate) inverse: Mat,
     pub(crate) blocks: Vec<WhitenedBlock>,
     pub(crate) fixed: Option<WhitenedBlock>,
 }
@@ -81,26 +80,20 @@ impl Whitened {
 }
 
 /// Cholesky factor of a sum of Gram matrices, and whether it took a ridge.
-pub(crate) fn cholesky(gram: &Mat<f64>) -> Option<(Llt<f64>, bool)> {
-    if let Ok(factor) = gram.llt(Side::Lower) {
-        let l = factor.L();
+pub(crate) fn cholesky(gram: &Mat) -> Option<(Cholesky, bool)> {
+    if let Some(factor) = gram.cholesky() {
+        let l = factor.lower();
         if (0..gram.nrows()).all(|i| l[(i, i)] * l[(i, i)] > LEAST_PIVOT) {
             return Some((factor, false));
         }
     }
     let ridged =
         symmetric_from(gram.nrows(), |i, j| gram[(i, j)] + if i == j { FALLBACK_RIDGE } else { 0.0 });
-    ridged.llt(Side::Lower).ok().map(|factor| (factor, true))
-}
-
-/// Solution of a Cholesky factor.
-pub(crate) fn solve(factor: &Llt<f64>, right: &[f64]) -> Vec<f64> {
-    let x = factor.solve(&Mat::from_fn(right.len(), 1, |i, _| right[i]));
-    (0..right.len()).map(|i| x[(i, 0)]).collect()
+    ridged.cholesky().map(|factor| (factor, true))
 }
 
 /// `U v` with `U` upper triangular.
-pub(crate) fn upper_times(u: &Mat<f64>, v: &[f64]) -> Vec<f64> {
+pub(crate) fn upper_times(u: &Mat, v: &[f64]) -> Vec<f64> {
     let mut out = vec![0.0; v.len()];
     for (j, value) in v.iter().enumerate() {
         for (o, u) in out.iter_mut().zip(u.col(j).iter()).take(j + 1) {

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use dynid_linalg::Mat;
 use dynid_model::{ClosedModel, EffortModel, MotionAdjoint, MotionBlock, RegressorBlock};
-use faer::Mat;
 
 use crate::model::{ColumnInfo, ExcitationModel, Sensitivity};
 
@@ -69,7 +69,7 @@ impl ExcitationModel for ClosedExcitation {
         &self.columns
     }
 
-    fn observe(&self, motion: &MotionBlock<'_>, w: &mut Mat<f64>) {
+    fn observe(&self, motion: &MotionBlock<'_>, w: &mut Mat) {
         let samples = motion.samples;
         assert_eq!((w.nrows(), w.ncols()), (self.outputs() * samples, self.columns.len()), "size of W");
         let layout = self.model.layout();
@@ -81,7 +81,7 @@ impl ExcitationModel for ClosedExcitation {
                 for (column, factors) in self.factors.iter().enumerate() {
                     let factor = factors[*parameter];
                     if factor != 0.0 {
-                        let to = &mut w.col_as_slice_mut(column)[output * samples..][..samples];
+                        let to = &mut w.col_mut(column)[output * samples..][..samples];
                         to.iter_mut().zip(block.column(output, k)).for_each(|(t, x)| *t += factor * x);
                     }
                 }
@@ -103,7 +103,7 @@ impl ExcitationModel for ClosedExcitation {
                         for (column, factors) in self.factors.iter().enumerate() {
                             let factor = factors[*parameter];
                             if factor != 0.0 {
-                                let from = &g.col_as_slice(column)[output * samples..][..samples];
+                                let from = &g.col(column)[output * samples..][..samples];
                                 to.iter_mut().zip(from).for_each(|(t, x)| *t += factor * x);
                             }
                         }

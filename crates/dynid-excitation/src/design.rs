@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-use faer::Mat;
+use dynid_linalg::Mat;
 
 use crate::criterion::{Criterion, Measure, Smoothing};
 use crate::feasibility::{Infeasible, diagnose, violated_at_start};
@@ -343,7 +343,7 @@ fn exact_criterion(problem: &Problem, grid: &Grid<'_>, z: &[f64]) -> Option<f64>
 }
 
 /// Triangle of the weighted observation matrix with exact signs.
-pub(crate) fn exact_triangle(problem: &Problem, grid: &Grid<'_>, z: &[f64]) -> Mat<f64> {
+pub(crate) fn exact_triangle(problem: &Problem, grid: &Grid<'_>, z: &[f64]) -> Mat {
     Observation::new(problem, &grid.motion(z), 0.0).triangle
 }
 
@@ -363,7 +363,7 @@ fn refuse_rank_deficient(problem: &Problem, grid: &Grid<'_>) -> Result<(), Probl
     }
     let columns = problem.model.columns();
     let n = triangle.ncols();
-    let lengths: Vec<f64> = (0..n).map(|j| triangle.col(j).norm_l2()).collect();
+    let lengths: Vec<f64> = (0..n).map(|j| triangle.col_norm(j)).collect();
     let silent: Vec<String> =
         (0..n).filter(|j| lengths[*j] == 0.0).map(|j| columns[j].name.clone()).collect();
     if !silent.is_empty() {
@@ -374,7 +374,7 @@ fn refuse_rank_deficient(problem: &Problem, grid: &Grid<'_>) -> Result<(), Probl
     if sigma.last().is_some_and(|last| *last > 1e-9 * sigma[0]) {
         return Ok(());
     }
-    let direction = v.col_as_slice(n - 1);
+    let direction = v.col(n - 1);
     let largest = direction.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     let columns = (0..n).filter(|j| direction[*j].abs() > 0.1 * largest).map(|j| columns[j].name.clone());
     Err(ProblemError::RankDeficient { columns: columns.collect() })

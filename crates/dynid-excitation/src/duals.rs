@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use dynid_linalg::Mat;
 use dynid_model::scalar::Dual;
 use dynid_model::{MotionAdjoint, MotionBlock};
-use faer::Mat;
 
 use crate::constraint::{ConstraintRow, PathConstraint};
 use crate::model::{ColumnInfo, ExcitationModel, Sensitivity};
@@ -89,7 +89,7 @@ impl<const N: usize> ExcitationModel for DualModel<N> {
         &self.columns
     }
 
-    fn observe(&self, motion: &MotionBlock<'_>, w: &mut Mat<f64>) {
+    fn observe(&self, motion: &MotionBlock<'_>, w: &mut Mat) {
         let p = self.columns.len();
         self.function.each(motion, 0..motion.samples, |sample, entries| {
             for (k, entry) in entries.iter().enumerate() {

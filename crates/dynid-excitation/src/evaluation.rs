@@ -7,7 +7,7 @@ use crate::problem::Problem;
 use crate::search::Observation;
 
 /// Fisher information `M_f = RᵀR` as its triangle `R`.
-pub type Information = faer::Mat<f64>;
+pub type Information = dynid_linalg::Mat;
 
 /// Triangle `R` of the weighted observation matrix of a trajectory on `samples` equidistant samples of its period, prior
 /// information included, with exact signs of velocities: `M_f = RᵀR`.

@@ -1,6 +1,6 @@
 //! What the log of a designed trajectory will tell.
 
-use faer::Mat;
+use dynid_linalg::Mat;
 
 use crate::criterion::{inverse, singular_values};
 use crate::evaluation::{information, limit_points};
@@ -89,7 +89,7 @@ pub fn forecast(problem: &Problem, coefficients: &[Vec<f64>], samples: usize) ->
     }
     let (sigma, _) = singular_values(&triangle, false)?;
     let n = triangle.ncols();
-    let lengths: Vec<f64> = (0..n).map(|j| triangle.col(j).norm_l2()).collect();
+    let lengths: Vec<f64> = (0..n).map(|j| triangle.col_norm(j)).collect();
     let scaled = Mat::from_fn(n, n, |i, j| triangle[(i, j)] / lengths[j]);
     let (scaled_sigma, v) = singular_values(&scaled, true)?;
     let columns: Vec<ColumnForecast> = problem
@@ -110,7 +110,7 @@ pub fn forecast(problem: &Problem, coefficients: &[Vec<f64>], samples: usize) ->
         condition_unit_norm: scaled_sigma[0] / scaled_sigma[n - 1],
         singular_values: (sigma[0], sigma[n - 1]),
         confounded: confounded(&inverse, &stds, &columns),
-        weakest: weakest(v.col_as_slice(n - 1), &columns),
+        weakest: weakest(v.col(n - 1), &columns),
         active: limit_points(problem, coefficients, samples, ACTIVE - 1.0),
         random: random_comparison(problem, &stds, samples),
         columns,
@@ -118,12 +118,12 @@ pub fn forecast(problem: &Problem, coefficients: &[Vec<f64>], samples: usize) ->
 }
 
 /// Square roots of the diagonal of `R⁻¹R⁻ᵀ`.
-fn deviations(inverse: &Mat<f64>) -> Vec<f64> {
+fn deviations(inverse: &Mat) -> Vec<f64> {
     let n = inverse.nrows();
     (0..n).map(|i| (i..n).map(|j| inverse[(i, j)].powi(2)).sum::<f64>().sqrt()).collect()
 }
 
-fn confounded(inverse: &Mat<f64>, stds: &[f64], columns: &[ColumnForecast]) -> Vec<ConfoundedPair> {
+fn confounded(inverse: &Mat, stds: &[f64], columns: &[ColumnForecast]) -> Vec<ConfoundedPair> {
     let covariance = inverse * inverse.transpose();
     let mut pairs = Vec::new();
     for a in 0..stds.len() {

@@ -1,13 +1,13 @@
 //! What can be designed for: observation matrices with an adjoint.
 
+use dynid_linalg::Mat;
 use dynid_model::{MotionAdjoint, MotionBlock};
-use faer::Mat;
 
 /// Sensitivity of a criterion to the observation matrix.
 #[derive(Debug, Clone, Copy)]
 pub enum Sensitivity<'a> {
     /// One number per entry of `W`.
-    Full(&'a Mat<f64>),
+    Full(&'a Mat),
     /// `Σ uᵢ vᵢᵀ`: one number per row and one per column each.
     Outer(&'a [(Vec<f64>, Vec<f64>)]),
 }
@@ -37,7 +37,7 @@ pub trait ExcitationModel: Send + Sync {
     ///
     /// # Panics
     /// If `w` has another size.
-    fn observe(&self, motion: &MotionBlock<'_>, w: &mut Mat<f64>);
+    fn observe(&self, motion: &MotionBlock<'_>, w: &mut Mat);
     /// Adds to `out` the derivatives of `Σ G ∘ W` with respect to the motion, `G` fixed.
     fn adjoint(&self, motion: &MotionBlock<'_>, sensitivity: Sensitivity<'_>, out: &mut MotionAdjoint);
 }

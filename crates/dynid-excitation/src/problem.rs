@@ -1,6 +1,6 @@
 //! What is to be designed: model, limits, criterion, period.
 
-use faer::Mat;
+use dynid_linalg::Mat;
 
 use crate::constraint::PathConstraint;
 use crate::criterion::{ColumnScaling, Criterion, Measure};
@@ -33,7 +33,7 @@ pub struct Problem {
     /// whatever grid it is computed.
     pub effective_samples: f64,
     /// Information that is there already: a triangle of earlier rows, weighted alike, in the model's columns.
-    pub prior: Option<Mat<f64>>,
+    pub prior: Option<Mat>,
     /// Width of the smoothed sign of velocities during the search, rad/s or m/s.
     pub sign_width: f64,
     /// Samples of a period during the search.
@@ -109,7 +109,7 @@ impl Problem {
         if let Some(prior) = &self.prior {
             count("prior information", p, prior.ncols())?;
             for column in 0..p {
-                prior.col_as_slice(column).iter().try_for_each(|x| finite("prior information", *x))?;
+                prior.col(column).iter().try_for_each(|x| finite("prior information", *x))?;
             }
         }
         self.check_criterion(p)?;

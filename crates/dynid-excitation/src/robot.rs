@@ -1,7 +1,7 @@
 //! Robots as models to design for: base columns of their regressor.
 
+use dynid_linalg::Mat;
 use dynid_model::{BaseParameters, EffortModel, MotionAdjoint, MotionBlock, RegressorBlock, RobotModel};
-use faer::Mat;
 
 use crate::model::{ColumnInfo, ExcitationModel, Sensitivity};
 
@@ -77,7 +77,7 @@ impl ExcitationModel for RobotExcitation {
         &self.columns
     }
 
-    fn observe(&self, motion: &MotionBlock<'_>, w: &mut Mat<f64>) {
+    fn observe(&self, motion: &MotionBlock<'_>, w: &mut Mat) {
         let samples = motion.samples;
         assert_eq!((w.nrows(), w.ncols()), (self.outputs() * samples, self.columns.len()), "size of W");
         let mut block = RegressorBlock::new(self.model.layout().clone(), samples);
@@ -86,8 +86,7 @@ impl ExcitationModel for RobotExcitation {
         for (output, places) in self.places.iter().enumerate() {
             for (k, place) in places.iter().enumerate() {
                 if let Some(place) = place {
-                    w.col_as_slice_mut(*place)[output * samples..][..samples]
-                        .copy_from_slice(block.column(output, k));
+                    w.col_mut(*place)[output * samples..][..samples].copy_from_slice(block.column(output, k));
                 }
             }
         }
@@ -104,7 +103,7 @@ impl ExcitationModel for RobotExcitation {
                         let to = weights.column_mut(output, k);
                         match place {
                             Some(place) => {
-                                to.copy_from_slice(&g.col_as_slice(*place)[output * samples..][..samples]);
+                                to.copy_from_slice(&g.col(*place)[output * samples..][..samples]);
                             }
                             None => to.fill(0.0),
                         }

@@ -1,7 +1,7 @@
 //! The design problem as the optimiser sees it.
 
+use dynid_linalg::Mat;
 use dynid_model::MotionAdjoint;
-use faer::Mat;
 
 use crate::criterion::{Criterion, GramSensitivity, Measure, Smoothing, triangle};
 use crate::grid::{Grid, GridMotion, LimitValues, SidedRow};
@@ -12,8 +12,8 @@ use crate::problem::Problem;
 /// Weighted observation matrix of a motion and its triangle, prior information included.
 pub(crate) struct Observation {
     /// `W`, rows weighted.
-    weighted: Mat<f64>,
-    pub(crate) triangle: Mat<f64>,
+    weighted: Mat,
+    pub(crate) triangle: Mat,
 }
 
 impl Observation {
@@ -23,7 +23,7 @@ impl Observation {
         let mut weighted = Mat::zeros(outputs * samples, columns);
         problem.model.observe(&motion.block(sign_width), &mut weighted);
         for column in 0..columns {
-            let column = weighted.col_as_slice_mut(column);
+            let column = weighted.col_mut(column);
             for (part, weight) in column.chunks_exact_mut(samples).zip(row_weights(problem, samples)) {
                 part.iter_mut().for_each(|x| *x *= weight);
             }
@@ -32,9 +32,9 @@ impl Observation {
         let extra = prior.map_or(0, Mat::nrows);
         let rows = outputs * samples;
         let mut stacked = Mat::zeros(rows + extra, columns);
-        stacked.subrows_mut(0, rows).copy_from(&weighted);
+        stacked.set_rows(0, &weighted);
         if let Some(prior) = prior {
-            stacked.subrows_mut(rows, extra).copy_from(prior);
+            stacked.set_rows(rows, prior);
         }
         let triangle = triangle(&mut stacked);
         Observation { weighted, triangle }
@@ -57,7 +57,7 @@ impl Observation {
             GramSensitivity::Full(h) => {
                 let mut g = &self.weighted * h;
                 for column in 0..g.ncols() {
-                    let column = g.col_as_slice_mut(column);
+                    let column = g.col_mut(column);
                     column.iter_mut().enumerate().for_each(|(row, x)| *x *= weights(row));
                 }
                 problem.model.adjoint(&block, Sensitivity::Full(&g), &mut out);
@@ -66,8 +66,8 @@ impl Observation {
                 let outer: Vec<(Vec<f64>, Vec<f64>)> = terms
                     .iter()
                     .map(|(factor, v)| {
-                        let image = &self.weighted * faer::Col::from_fn(v.len(), |i| v[i]);
-                        let u = (0..image.nrows()).map(|row| factor * weights(row) * image[row]).collect();
+                        let image = self.weighted.times(v);
+                        let u = image.iter().enumerate().map(|(row, x)| factor * weights(row) * x).collect();
                         (u, v.clone())
                     })
                     .collect();

@@ -203,7 +203,7 @@ fn enumeration(parts: &[String]) -> String {
 }
 
 /// Regrouping `K` of base parameters as a matrix, `base × parameters`.
-pub fn regrouping(base: &BaseParameters) -> dynid_linalg::Mat<f64> {
+pub fn regrouping(base: &BaseParameters) -> dynid_linalg::Mat {
     let flat = base.matrix();
     let columns = base.kept.len() + base.folded.len() + base.zero.len();
     dynid_linalg::Mat::from_fn(base.len(), columns, |i, j| flat[i * columns + j])

@@ -157,7 +157,7 @@ pub(crate) fn consistent(
 }
 
 /// Base values as fitted, split as near as possible to the prior in units of its standard deviations.
-fn unconstrained(regrouping: &Mat<f64>, prior: &Prior, fitted: &Fitted) -> Option<Vec<f64>> {
+fn unconstrained(regrouping: &Mat, prior: &Prior, fitted: &Fitted) -> Option<Vec<f64>> {
     let fit = &fitted.estimate;
     let excited = excited_regrouping(&fit.factor, &fit.solution.kept, regrouping);
     let split =
@@ -177,7 +177,7 @@ pub fn form(consistency: Consistency) -> Option<Form> {
 /// `R = R_β K` in standard columns with the priors of links and elements.
 pub fn problem(
     model: &RobotModel,
-    regrouping: &Mat<f64>,
+    regrouping: &Mat,
     factor: &Factor,
     prior: &Prior,
     bounds: &[Bound],

@@ -34,9 +34,9 @@ pub struct Fitted {
     /// The estimate in base columns.
     pub estimate: LinearEstimate,
     /// Covariance for white residuals, of the kept columns.
-    pub white: Mat<f64>,
+    pub white: Mat,
     /// Jackknife covariance over time blocks, if there are enough of them.
-    pub jackknife: Option<Mat<f64>>,
+    pub jackknife: Option<Mat>,
     /// Variance inflation `κ`: by how much coloured residuals inflate the variances that white ones would give.
     pub inflation: f64,
     /// Variance inflation joint by joint, where it can be told.
@@ -51,7 +51,7 @@ pub struct Fitted {
 
 impl Fitted {
     /// The covariance to report: jackknife, or for too few blocks that of white residuals.
-    pub fn covariance(&self) -> &Mat<f64> {
+    pub fn covariance(&self) -> &Mat {
         self.jackknife.as_ref().unwrap_or(&self.white)
     }
 

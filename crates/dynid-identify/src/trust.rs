@@ -56,7 +56,7 @@ pub struct Trust {
 pub(crate) struct Evidence<'a> {
     pub model: &'a RobotModel,
     pub base: &'a BaseParameters,
-    pub regrouping: &'a Mat<f64>,
+    pub regrouping: &'a Mat,
     pub space: &'a VisibleSpace,
     pub prior: &'a Prior,
     pub fitted: &'a Fitted,

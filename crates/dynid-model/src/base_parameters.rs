@@ -4,8 +4,8 @@ mod expression;
 
 pub use expression::{linear_combination, significant};
 
-use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
-use faer::{Mat, Par};
+use dynid_linalg::Mat;
+use dynid_linalg::triangular::solve_upper_in_place;
 
 use crate::closed_model::{ClosedModel, Reaction};
 use crate::dynamics::MotionBlock;
@@ -299,7 +299,7 @@ impl BaseParameters {
         let n = self.len();
         let missing: Vec<f64> = beta.iter().zip(self.values(prior)).map(|(b, p)| b - p).collect();
         // x = prior + S² Kᵀ y with (K S² Kᵀ) y = missing; the kept part is diagonal, so this is well conditioned.
-        let mut gram = Mat::<f64>::zeros(n, n);
+        let mut gram = Mat::zeros(n, n);
         for (i, c) in self.kept.iter().enumerate() {
             gram[(i, i)] += scale[*c] * scale[*c];
         }
@@ -313,9 +313,8 @@ impl BaseParameters {
                 }
             }
         }
-        use faer::linalg::solvers::Solve;
         let rhs = Mat::from_fn(n, 1, |i, _| missing[i]);
-        let y = gram.full_piv_lu().solve(&rhs);
+        let y = gram.full_lu().solve(&rhs);
         let mut x = prior.to_vec();
         for (i, c) in self.kept.iter().enumerate() {
             x[*c] += scale[*c] * scale[*c] * y[(i, 0)];
@@ -339,7 +338,7 @@ fn preference(table: &ParameterTable, preferred: &[usize]) -> Vec<usize> {
 
 fn singular_values(rows: usize, active: &[usize], columns: &[Vec<f64>]) -> Vec<f64> {
     let matrix = Mat::from_fn(rows, active.len(), |i, j| columns[active[j]][i]);
-    matrix.singular_values().unwrap_or_else(|_| vec![f64::NAN; active.len().min(rows)])
+    matrix.singular_values().unwrap_or_else(|| vec![f64::NAN; active.len().min(rows)])
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -358,7 +357,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// Gram-Schmidt with every projection done twice, which keeps the directions orthogonal to rounding; blocks of columns are projected together.
 struct Projection {
     /// Orthonormal directions, the first [`Projection::count`] columns.
-    directions: Mat<f64>,
+    directions: Mat,
     count: usize,
     /// Column `k` of the triangular factor: coefficients on directions `0..k`, then the length left.
     triangle: Vec<Vec<f64>>,
@@ -366,7 +365,7 @@ struct Projection {
 
 /// Columns of a block, projected on the directions that there were when it began.
 struct Remainders {
-    columns: Mat<f64>,
+    columns: Mat,
     /// Coefficients on the directions, one list per column.
     coefficients: Vec<Vec<f64>>,
 }
@@ -386,16 +385,16 @@ impl Projection {
         let (rows, width) = (self.directions.nrows(), columns.len());
         let mut block = Mat::zeros(rows, width);
         for (k, column) in columns.enumerate() {
-            block.col_as_slice_mut(k).copy_from_slice(column);
+            block.col_mut(k).copy_from_slice(column);
         }
         let mut coefficients = vec![vec![0.0; self.count]; width];
         if self.count > 0 {
-            let directions = self.directions.as_ref().subcols(0, self.count);
+            let directions = self.directions.columns(0..self.count);
             for _ in 0..2 {
                 let along = directions.transpose() * &block;
                 block -= directions * &along;
                 for (k, own) in coefficients.iter_mut().enumerate() {
-                    own.iter_mut().zip(along.col_as_slice(k)).for_each(|(sum, x)| *sum += x);
+                    own.iter_mut().zip(along.col(k)).for_each(|(sum, x)| *sum += x);
                 }
             }
         }
@@ -405,12 +404,12 @@ impl Projection {
     /// Projects a column of a block on the directions that came since; the length that is left.
     fn project(&self, block: &mut Remainders, k: usize) -> f64 {
         let Remainders { columns, coefficients } = block;
-        let (own, residual) = (&mut coefficients[k], columns.col_as_slice_mut(k));
+        let (own, residual) = (&mut coefficients[k], columns.col_mut(k));
         let before = own.len();
         own.resize(self.count, 0.0);
         for _ in 0..2 {
             for (place, coefficient) in own.iter_mut().enumerate().skip(before) {
-                let direction = self.directions.col_as_slice(place);
+                let direction = self.directions.col(place);
                 let along = dot(direction, residual);
                 *coefficient += along;
                 for (r, d) in residual.iter_mut().zip(direction) {
@@ -422,8 +421,8 @@ impl Projection {
     }
 
     fn keep(&mut self, block: &mut Remainders, k: usize, length: f64) {
-        let direction = self.directions.col_as_slice_mut(self.count);
-        direction.iter_mut().zip(block.columns.col_as_slice(k)).for_each(|(d, x)| *d = x / length);
+        let direction = self.directions.col_mut(self.count);
+        direction.iter_mut().zip(block.columns.col(k)).for_each(|(d, x)| *d = x / length);
         self.count += 1;
         let mut coefficients = block.coefficients(k);
         coefficients.push(length);
@@ -451,9 +450,9 @@ impl Projection {
         let n = self.count;
         let triangle = Mat::from_fn(n, n, |i, k| if i <= k { self.triangle[k][i] } else { 0.0 });
         let mut x = Mat::from_fn(n, folded.len(), |i, c| folded[c].1.get(i).copied().unwrap_or(0.0));
-        solve_upper_triangular_in_place(triangle.as_ref(), x.as_mut(), Par::Seq);
+        solve_upper_in_place(&triangle, &mut x);
         for (c, (_, out)) in folded.iter_mut().enumerate() {
-            *out = x.col_as_slice(c).to_vec();
+            *out = x.col(c).to_vec();
         }
     }
 }

@@ -1,7 +1,6 @@
 //! How sharply a minimum is defined, from values of the objective alone.
 
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
+use dynid_linalg::Mat;
 
 /// Covariance of the coordinates at the minimum of a sum of squares, from the parabola through values around it.
 ///
@@ -16,7 +15,7 @@ pub fn covariance_of_values(
     minimum: &[f64],
     steps: &[f64],
     variance: f64,
-) -> Option<Mat<f64>> {
+) -> Option<Mat> {
     let n = minimum.len();
     let at = |moves: &[(usize, f64)]| {
         let mut x = minimum.to_vec();
@@ -38,7 +37,7 @@ pub fn covariance_of_values(
     }
     let scale: Vec<f64> = (0..n).map(|i| hessian[(i, i)].sqrt()).collect();
     let unit = Mat::from_fn(n, n, |i, j| hessian[(i, j)] / (scale[i] * scale[j]));
-    let inverse = unit.llt(Side::Lower).ok()?.solve(&Mat::<f64>::identity(n, n));
+    let inverse = unit.cholesky()?.solve(&Mat::identity(n, n));
     Some(Mat::from_fn(n, n, |i, j| {
         2.0 * variance * inverse[(i, j)] * steps[i] * steps[j] / (scale[i] * scale[j])
     }))

@@ -1,7 +1,7 @@
 //! A start that meets the bounds, or the bounds that exclude each other.
 
+use dynid_linalg::Mat;
 use dynid_model::symmetric::trace;
-use faer::Mat;
 
 use super::cone::{LINK, Ray};
 use super::interior;

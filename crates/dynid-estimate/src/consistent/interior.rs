@@ -5,8 +5,8 @@
 mod direction;
 mod newton;
 
+use dynid_linalg::Mat;
 use dynid_model::symmetric::{Square, cholesky, congruence, inner, lower_inverse, product, trace, transpose};
-use faer::Mat;
 
 use super::certificate;
 use super::cone::{LINK, Scaling, add_scaled, diagonal, least_product};
@@ -245,7 +245,7 @@ impl Marks {
 /// One iteration: predictor, corrector, and where these are blocked a plain centring step.
 fn advance<const N: usize>(
     program: &Program<N>,
-    quadratic: &Mat<f64>,
+    quadratic: &Mat,
     at: &Iterate<N>,
     orthogonal: bool,
 ) -> Option<Iterate<N>> {

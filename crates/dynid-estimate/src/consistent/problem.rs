@@ -1,8 +1,8 @@
 //! What is to be estimated, and what may be wrong with asking for it.
 
+use dynid_linalg::Mat;
 use dynid_model::Inertia;
 use dynid_model::symmetric::cholesky;
-use faer::Mat;
 
 /// Which bodies are allowed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -94,7 +94,7 @@ pub struct Bound {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
     /// Weighted regressor or its triangular factor: any number of rows, one column per standard parameter.
-    pub r: Mat<f64>,
+    pub r: Mat,
     /// Weighted effort of the rows of `r`.
     pub z: Vec<f64>,
     /// Links.

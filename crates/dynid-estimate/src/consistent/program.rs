@@ -1,15 +1,14 @@
 //! The convex program in whitened unknowns.
 
+use dynid_linalg::{Mat, PivotedQr};
 use dynid_model::symmetric::{cholesky, lower_inverse, product, transpose};
-use faer::Mat;
-use faer::linalg::solvers::SolveLstsq;
 
 use super::cone::{Lmi, Ray};
 
 /// `min F(ξ) = ‖A ξ - b‖² + Σ w (ξ - ξ0)² + γ Σ_i D(X_i | 1)` over matrix inequalities and half-lines.
 #[derive(Debug)]
 pub(super) struct Program<const N: usize> {
-    pub a: Mat<f64>,
+    pub a: Mat,
     pub b: Vec<f64>,
     /// Rows of `A` that are data; those below are a Gaussian prior's.
     pub data_rows: usize,
@@ -102,9 +101,9 @@ impl<const N: usize> Program<N> {
     }
 
     /// `2 AᵀA + 2 diag w`.
-    pub(super) fn quadratic(&self) -> Mat<f64> {
+    pub(super) fn quadratic(&self) -> Mat {
         let mut h = self.a.transpose() * &self.a;
-        h *= faer::Scale(2.0);
+        h *= 2.0;
         for (k, w) in self.weight.iter().enumerate() {
             h[(k, k)] += 2.0 * w;
         }
@@ -122,22 +121,22 @@ impl<const N: usize> Program<N> {
             Some(_) => 0.0,
         });
         let rhs = Mat::from_fn(rows + n, 1, |i, _| if i < rows { -residual[i] } else { 0.0 });
-        let change = stack.qr().solve_lstsq(&rhs);
+        let change = stack.qr().solve_least_squares(&rhs);
         self.centre.iter().enumerate().map(|(k, c)| c + change[(k, 0)]).collect()
     }
 
     /// `min ‖A ξ - b‖²` of the data over all `ξ`, by column-pivoted QR.
     pub(super) fn least_fit(&self) -> f64 {
-        let qr = self.a.subrows(0, self.data_rows).col_piv_qr();
-        let r = qr.R();
+        let qr = PivotedQr::new(&self.a.rows(0..self.data_rows));
+        let r = qr.r();
         let size = r.nrows().min(r.ncols());
         let threshold = self.data_rows.max(self.unknowns()) as f64 * f64::EPSILON * r.norm_max();
         let rank = (0..size).take_while(|k| r[(*k, *k)].abs() > threshold).count();
         let b = Mat::from_fn(self.data_rows, 1, |i, _| self.b[i]);
-        let q = qr.compute_thin_Q();
-        let seen = q.subcols(0, rank);
+        let q = qr.thin_q();
+        let seen = q.columns(0..rank);
         let left = &b - seen * (seen.transpose() * &b);
-        left.col(0).squared_norm_l2()
+        left.col_squares(0)
     }
 
     /// Whether every constraint holds with room to spare.

@@ -1,8 +1,9 @@
 //! Whitened parameters: the prior body is the unit matrix, scalars are in units of their scale.
 
+use dynid_linalg::Mat;
+use dynid_linalg::vector::add_scaled;
 use dynid_model::Inertia;
 use dynid_model::symmetric::{Square, cholesky, congruence, lower_inverse, product, transpose};
-use faer::Mat;
 
 use super::cone::{LINK, Lmi, Ray};
 use super::problem::{LinkPrior, Margin, Problem, ProblemError, Settings};
@@ -161,21 +162,21 @@ impl Whitening {
     }
 
     /// `R T`: rows that act on `x` as rows that act on `ξ`.
-    fn whitened_columns(&self, rows: &Mat<f64>) -> Mat<f64> {
+    fn whitened_columns(&self, rows: &Mat) -> Mat {
         let mut a = Mat::zeros(rows.nrows(), self.columns);
         for link in &self.links {
             for (j, unit) in link.units.iter().enumerate() {
-                let mut column = a.col_mut(link.first + j);
+                let column = a.col_mut(link.first + j);
                 for (k, u) in unit.iter().enumerate() {
                     if *u != 0.0 {
-                        column += faer::Scale(*u) * rows.col(link.first + k);
+                        add_scaled(column, *u, rows.col(link.first + k));
                     }
                 }
             }
         }
         for (column, scale) in &self.scalars {
-            let mut to = a.col_mut(*column);
-            to += faer::Scale(*scale) * rows.col(*column);
+            let to = a.col_mut(*column);
+            add_scaled(to, *scale, rows.col(*column));
         }
         a
     }

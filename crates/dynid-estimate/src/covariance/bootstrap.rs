@@ -1,9 +1,9 @@
 //! Bootstrap over time blocks.
 
-use crate::whitened::{Whitened, cholesky, solve, upper_times};
+use crate::whitened::{Whitened, cholesky, upper_times};
 use dynid_factor::factor::Factor;
+use dynid_linalg::Mat;
 use dynid_linalg::triangular::symmetric_from;
-use faer::Mat;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -40,7 +40,7 @@ pub struct Bootstrap {
 
 impl Bootstrap {
     /// Covariance of the replicates about their mean; `None` with fewer than two.
-    pub fn covariance(&self) -> Option<Mat<f64>> {
+    pub fn covariance(&self) -> Option<Mat> {
         let count = self.replicates.len();
         if count < 2 {
             return None;
@@ -120,10 +120,10 @@ pub fn bootstrap(
 /// Blocks centred at the estimate: Gram matrices and scores.
 struct Problem {
     x: Vec<f64>,
-    inverse: Mat<f64>,
-    grams: Vec<Mat<f64>>,
+    inverse: Mat,
+    grams: Vec<Mat>,
     scores: Vec<Vec<f64>>,
-    fixed: Option<(Mat<f64>, Vec<f64>)>,
+    fixed: Option<(Mat, Vec<f64>)>,
 }
 
 impl Problem {
@@ -147,17 +147,17 @@ impl Problem {
         let (mut gram, mut score) = self.fixed.clone().unwrap_or_else(|| (Mat::zeros(p, p), vec![0.0; p]));
         let drawn = || multiplicity.iter().enumerate().filter(|(_, m)| **m > 0).map(|(b, m)| (b, *m as f64));
         for (b, m) in drawn() {
-            gram += faer::Scale(m) * &self.grams[b];
+            gram += &self.grams[b] * m;
             score.iter_mut().zip(&self.scores[b]).for_each(|(s, g)| *s += m * g);
         }
         let (factor, deficient) = cholesky(&gram)?;
-        let change = solve(&factor, &score);
+        let change = factor.solve_vector(&score);
         let mut variances = vec![0.0; p];
         for (b, m) in drawn() {
             let moved = Mat::from_fn(p, 1, |i, _| change[i]);
             let shifted = &self.grams[b] * moved;
             let own: Vec<f64> = (0..p).map(|i| self.scores[b][i] - shifted[(i, 0)]).collect();
-            let influence = upper_times(&self.inverse, &solve(&factor, &own));
+            let influence = upper_times(&self.inverse, &factor.solve_vector(&own));
             variances.iter_mut().zip(influence).for_each(|(v, u)| *v += m * u * u);
         }
         let blocks = multiplicity.len() as f64;

@@ -1,8 +1,8 @@
 //! Heteroscedasticity and autocorrelation consistent covariance from row scores.
 
 use super::sandwich;
+use dynid_linalg::Mat;
 use dynid_linalg::triangular::symmetric_from;
-use faer::Mat;
 
 /// HAC covariance with Bartlett weights, `V = C Ω C · T/(T-p)`,
 /// `Ω = Γ_0 + Σ_{i=1..S} (1 - i/(S+1)) (Γ_i + Γ_iᵀ)`, `Γ_i = Σ_k s_k s_{k-i}ᵀ`.
@@ -12,14 +12,14 @@ use faer::Mat;
 /// `None` unless `T > p`. Panics unless `C` is `p × p`.
 ///
 /// Source: Newey & West 1987.
-pub fn hac_bartlett(scores: &Mat<f64>, unit_covariance: &Mat<f64>, lag: usize) -> Option<Mat<f64>> {
+pub fn hac_bartlett(scores: &Mat, unit_covariance: &Mat, lag: usize) -> Option<Mat> {
     hac_bartlett_logs(std::slice::from_ref(scores), unit_covariance, &[lag])
 }
 
 /// Covariance as by [`hac_bartlett`], over several logs that are independent of each other: `Ω = Σ_l Ω_l`, `T = Σ_l T_l`.
 ///
 /// `lags`: one per log. `None` unless `T > p`. Panics unless there is one lag per log and all have `p` columns.
-pub fn hac_bartlett_logs(logs: &[Mat<f64>], unit_covariance: &Mat<f64>, lags: &[usize]) -> Option<Mat<f64>> {
+pub fn hac_bartlett_logs(logs: &[Mat], unit_covariance: &Mat, lags: &[usize]) -> Option<Mat> {
     let p = unit_covariance.nrows();
     assert!(unit_covariance.ncols() == p && logs.iter().all(|l| l.ncols() == p), "C is p × p");
     assert_eq!(logs.len(), lags.len(), "one lag per log");
@@ -37,11 +37,10 @@ pub fn hac_bartlett_logs(logs: &[Mat<f64>], unit_covariance: &Mat<f64>, lags: &[
 }
 
 /// `Γ_0 + Σ_i (1 - i/(S+1)) (Γ_i + Γ_iᵀ)`.
-fn bartlett_sum(scores: &Mat<f64>, lag: usize) -> Mat<f64> {
+fn bartlett_sum(scores: &Mat, lag: usize) -> Mat {
     let samples = scores.nrows();
-    let autocovariance = |shift: usize| {
-        scores.subrows(shift, samples - shift).transpose() * scores.subrows(0, samples - shift)
-    };
+    let autocovariance =
+        |shift: usize| scores.rows(shift..samples).transpose() * scores.rows(0..samples - shift);
     let mut sum = autocovariance(0);
     for shift in 1..=lag.min(samples.saturating_sub(1)) {
         let weight = 1.0 - shift as f64 / (lag + 1) as f64;

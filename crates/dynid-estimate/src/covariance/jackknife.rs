@@ -3,8 +3,8 @@
 use crate::least_squares::ols;
 use dynid_factor::factor::Factor;
 use dynid_factor::rank::certainly_full_rank;
+use dynid_linalg::Mat;
 use dynid_linalg::triangular::symmetric_from;
-use faer::Mat;
 use rayon::prelude::*;
 
 /// Fewest time blocks for an honest interval; below 20 the interval deserves a warning.
@@ -17,7 +17,7 @@ const FALLBACK_RIDGE: f64 = 1e-8;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Jackknife {
     /// `V = (B-1)/B Σ_b d_b d_bᵀ`.
-    pub covariance: Mat<f64>,
+    pub covariance: Mat,
     /// `d_b = x_(−b) - x`: change of the estimate without block `b`.
     pub changes: Vec<Vec<f64>>,
     /// Blocks whose removal lowers the rank: some parameter is seen in that block only. Their `d_b` is that of a

@@ -19,12 +19,12 @@ pub use jackknife::{Jackknife, MIN_BLOCKS, jackknife, jackknife_by, jackknife_wi
 pub(crate) use jackknife::{change_without, running_merges};
 pub use sandwich::{block_sandwich, block_sandwich_with};
 
-use faer::Mat;
+use dynid_linalg::Mat;
 
 /// Variance inflation `κ = max(1, median_i V_ii/C_ii)`: by how much `model` understates `robust`.
 ///
 /// The effective number of samples is `N/κ`. `None` for empty matrices or without a positive `C_ii`.
-pub fn variance_inflation(robust: &Mat<f64>, model: &Mat<f64>) -> Option<f64> {
+pub fn variance_inflation(robust: &Mat, model: &Mat) -> Option<f64> {
     let mut ratios: Vec<f64> =
         (0..model.nrows()).filter(|&i| model[(i, i)] > 0.0).map(|i| robust[(i, i)] / model[(i, i)]).collect();
     ratios.sort_unstable_by(f64::total_cmp);
@@ -38,7 +38,7 @@ pub fn variance_inflation(robust: &Mat<f64>, model: &Mat<f64>) -> Option<f64> {
 }
 
 /// `C Ω C` for symmetric matrices, symmetric to the last bit.
-pub(crate) fn sandwich(bread: &Mat<f64>, filling: &Mat<f64>) -> Mat<f64> {
+pub(crate) fn sandwich(bread: &Mat, filling: &Mat) -> Mat {
     let product = bread * filling * bread;
     dynid_linalg::triangular::symmetric_from(bread.nrows(), |i, j| 0.5 * (product[(i, j)] + product[(j, i)]))
 }

@@ -2,8 +2,8 @@
 
 use super::sandwich;
 use dynid_factor::factor::Factor;
+use dynid_linalg::Mat;
 use dynid_linalg::triangular::{gram_inverse, symmetric_from};
-use faer::Mat;
 
 /// `V = B/(B-1) · C (Σ_b s_b s_bᵀ) C` with block scores `s_b = R_bᵀ(z_b - R_b x)` and `C = (RᵀR)⁻¹`.
 ///
@@ -11,13 +11,13 @@ use faer::Mat;
 /// `None` with fewer than two blocks.
 ///
 /// Source: Newey & West 1987, with the block as the unit of dependence.
-pub fn block_sandwich(blocks: &[Factor], x: &[f64]) -> Option<Mat<f64>> {
+pub fn block_sandwich(blocks: &[Factor], x: &[f64]) -> Option<Mat> {
     block_sandwich_with(blocks, None, x)
 }
 
 /// Covariance as by [`block_sandwich`], with rows that belong to no block, such as those of a prior: they add to `C` but have no
 /// score of their own, being fixed numbers.
-pub fn block_sandwich_with(blocks: &[Factor], fixed: Option<&Factor>, x: &[f64]) -> Option<Mat<f64>> {
+pub fn block_sandwich_with(blocks: &[Factor], fixed: Option<&Factor>, x: &[f64]) -> Option<Mat> {
     let count = blocks.len();
     if count < 2 {
         return None;

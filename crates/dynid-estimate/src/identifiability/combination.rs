@@ -1,7 +1,7 @@
 //! What the data see of a parameter that acts only together with others, in words.
 
+use dynid_linalg::Mat;
 use dynid_model::base_parameters::{linear_combination, significant};
-use faer::Mat;
 
 /// Terms below this share of the largest are left out.
 const SHOWN: f64 = 0.03;
@@ -29,7 +29,7 @@ pub struct Combination {
 /// `regrouping`: `K`, `r × p`; `prior_std`: `p` standard deviations; `kept`: column that base parameter `i` is named
 /// after. Empty if the parameter never acts. Panics if shapes disagree.
 pub fn visible_combinations(
-    regrouping: &Mat<f64>,
+    regrouping: &Mat,
     prior_std: &[f64],
     kept: &[usize],
     parameter: usize,

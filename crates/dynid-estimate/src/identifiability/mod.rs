@@ -24,7 +24,7 @@ pub use posterior::{Posterior, excited_regrouping, posterior};
 pub use space::VisibleSpace;
 pub use verdict::{Carried, Verdict, verdict};
 
-use faer::Mat;
+use dynid_linalg::Mat;
 
 use dynid_factor::factor::Factor;
 
@@ -98,11 +98,6 @@ pub struct Identifiability {
 /// assert_eq!(found.parameters[3].verdict, Verdict::NotIdentifiable);
 /// assert_eq!(found.base[0].verdict, Verdict::Seen);
 /// ```
-pub fn assess(
-    information: &Factor,
-    inflation: f64,
-    regrouping: &Mat<f64>,
-    prior_std: &[f64],
-) -> Identifiability {
+pub fn assess(information: &Factor, inflation: f64, regrouping: &Mat, prior_std: &[f64]) -> Identifiability {
     VisibleSpace::new(regrouping, prior_std).assess(information, inflation)
 }

@@ -1,7 +1,6 @@
 //! Standard parameters by themselves: data and prior put together, with an interval that colour does not fool.
 
-use faer::linalg::solvers::{Solve, SolveLstsq};
-use faer::{Mat, Side};
+use dynid_linalg::Mat;
 
 use dynid_factor::factor::Factor;
 
@@ -14,7 +13,7 @@ pub struct Posterior {
     /// room.
     pub std: Vec<f64>,
     /// Covariance that these are the roots of the diagonal of, `p × p`.
-    pub covariance: Mat<f64>,
+    pub covariance: Mat,
 }
 
 /// Posterior of `β = K x + noise` with the prior `x ~ N(x0, C0)`.
@@ -29,11 +28,11 @@ pub struct Posterior {
 ///
 /// `None` if `K C0 Kᵀ + Σ` is not positive definite to rounding. Panics if shapes disagree.
 pub fn posterior(
-    regrouping: &Mat<f64>,
+    regrouping: &Mat,
     estimate: &[f64],
-    white: &Mat<f64>,
+    white: &Mat,
     inflation: f64,
-    covariance: &Mat<f64>,
+    covariance: &Mat,
     prior: &[f64],
     prior_std: &[f64],
 ) -> Option<Posterior> {
@@ -41,17 +40,17 @@ pub fn posterior(
     assert!(estimate.len() == k && prior.len() == p && prior_std.len() == p, "one entry per column or row");
     assert!(white.nrows() == k && covariance.nrows() == k, "covariances of the estimate");
     let whitened = Mat::from_fn(k, p, |i, j| regrouping[(i, j)] * prior_std[j]);
-    let sum = &whitened * whitened.transpose() + white * faer::Scale(inflation);
+    let sum = &whitened * whitened.transpose() + white * inflation;
     let scale: Vec<f64> = (0..k).map(|i| 1.0 / sum[(i, i)].sqrt()).collect();
     let scaled = Mat::from_fn(k, k, |i, j| sum[(i, j)] * scale[i] * scale[j]);
-    let factor = scaled.llt(Side::Lower).ok()?;
+    let factor = scaled.cholesky()?;
     let rows = Mat::from_fn(k, p, |i, j| scale[i] * whitened[(i, j)]);
     let solved = factor.solve(&rows);
     // Gain in units of the prior deviations, p × k.
     let gain = Mat::from_fn(p, k, |j, i| solved[(i, j)] * scale[i]);
     let missing: Vec<f64> =
         (0..k).map(|i| estimate[i] - (0..p).map(|j| regrouping[(i, j)] * prior[j]).sum::<f64>()).collect();
-    let left = Mat::<f64>::identity(p, p) - &gain * &whitened;
+    let left = Mat::identity(p, p) - &gain * &whitened;
     let of_prior = &left * left.transpose();
     let of_noise = &gain * covariance * gain.transpose();
     let between = |i: usize, j: usize| {
@@ -70,11 +69,11 @@ pub fn posterior(
 /// ones.
 ///
 /// `factor`: all base columns; `kept`: independent ones; `regrouping`: `K`, `r × p`. Returns `kept × p`.
-pub fn excited_regrouping(factor: &Factor, kept: &[usize], regrouping: &Mat<f64>) -> Mat<f64> {
+pub fn excited_regrouping(factor: &Factor, kept: &[usize], regrouping: &Mat) -> Mat {
     if kept.len() == regrouping.nrows() {
         return regrouping.clone();
     }
     let r = factor.r_matrix();
     let independent = Mat::from_fn(r.nrows(), kept.len(), |i, k| r[(i, kept[k])]);
-    independent.qr().solve_lstsq(&r) * regrouping
+    independent.qr().solve_least_squares(&r) * regrouping
 }

@@ -1,6 +1,6 @@
 //! The visible space of a model in units of prior standard deviations.
 
-use faer::Mat;
+use dynid_linalg::Mat;
 
 use super::verdict::verdict;
 use super::{Assessment, Identifiability};
@@ -13,11 +13,11 @@ use dynid_factor::rank::numerical_rank;
 #[derive(Debug, Clone)]
 pub struct VisibleSpace {
     /// `Q`, `p × r`: orthonormal basis of the row space of `K C0^½`.
-    visible: Mat<f64>,
+    visible: Mat,
     /// Per parameter: squared length in the orthogonal complement, `1 - p_j`.
     hidden: Vec<f64>,
     /// `T`, `r × r` upper triangular.
-    triangle: Mat<f64>,
+    triangle: Mat,
     /// Per base parameter: prior standard deviation, the length of its column of `T`.
     base_std: Vec<f64>,
     prior_std: Vec<f64>,
@@ -26,7 +26,7 @@ pub struct VisibleSpace {
 /// What a log excites: the singular values of `R_β Tᵀ`.
 struct Excitation {
     /// Right singular vectors, `r × r`: those of the excited directions first.
-    directions: Mat<f64>,
+    directions: Mat,
     /// Singular values of the excited directions.
     strengths: Vec<f64>,
 }
@@ -45,7 +45,7 @@ impl VisibleSpace {
     /// Visible space of the regrouping `K` (`r × p`) with `p` prior standard deviations.
     ///
     /// Panics if shapes disagree or a standard deviation is not positive and finite.
-    pub fn new(regrouping: &Mat<f64>, prior_std: &[f64]) -> Self {
+    pub fn new(regrouping: &Mat, prior_std: &[f64]) -> Self {
         let (r, p) = (regrouping.nrows(), regrouping.ncols());
         assert_eq!(prior_std.len(), p, "one standard deviation per parameter");
         assert!(r <= p, "no more base parameters than parameters");
@@ -55,12 +55,12 @@ impl VisibleSpace {
         );
         let whitened = Mat::from_fn(p, r, |j, i| regrouping[(i, j)] * prior_std[j]);
         let qr = whitened.qr();
-        let all = qr.compute_Q();
-        let triangle = qr.thin_R().to_owned();
+        let all = qr.q();
+        let triangle = qr.r().to_mat();
         VisibleSpace {
             visible: Mat::from_fn(p, r, |j, k| all[(j, k)]),
             hidden: (0..p).map(|j| (r..p).map(|k| all[(j, k)].powi(2)).sum()).collect(),
-            base_std: (0..r).map(|i| triangle.col(i).norm_l2()).collect(),
+            base_std: (0..r).map(|i| triangle.col_norm(i)).collect(),
             triangle,
             prior_std: prior_std.to_vec(),
         }
@@ -113,14 +113,14 @@ impl VisibleSpace {
         let weight = 1.0 / inflation.sqrt();
         // The rank that least squares goes by: what it would drop must not count as seen.
         let rank = numerical_rank(information).rank;
-        let strength = (information.r_matrix() * self.triangle.transpose()) * faer::Scale(weight);
-        let Ok(svd) = strength.svd() else {
+        let strength = (information.r_matrix() * self.triangle.transpose()) * weight;
+        let Some(svd) = strength.svd() else {
             // The iteration of a finite matrix does not fail in practice; nothing is claimed if it did.
             return Excitation { directions: Mat::identity(r, r), strengths: Vec::new() };
         };
-        let tolerance = 100.0 * f64::EPSILON * r as f64 * if r > 0 { svd.S()[0] } else { 0.0 };
-        let strengths = (0..rank).map(|k| svd.S()[k]).take_while(|s| *s > tolerance).collect();
-        Excitation { directions: svd.V().to_owned(), strengths }
+        let tolerance = 100.0 * f64::EPSILON * r as f64 * if r > 0 { svd.values[0] } else { 0.0 };
+        let strengths = svd.values.iter().copied().take(rank).take_while(|s| *s > tolerance).collect();
+        Excitation { directions: svd.v, strengths }
     }
 }
 

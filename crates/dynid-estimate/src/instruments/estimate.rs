@@ -112,7 +112,7 @@ fn solved(merged: &Factor, total: usize) -> (Oblique, Vec<f64>) {
 }
 
 /// Rows of one paired group as least squares on them would see the instruments' estimate.
-fn fitted(group: &ReducedGroup, total: usize, a: &faer::Mat<f64>, b: &[f64]) -> ReducedGroup {
+fn fitted(group: &ReducedGroup, total: usize, a: &dynid_linalg::Mat, b: &[f64]) -> ReducedGroup {
     let blocks = group.blocks.iter().map(|block| block.embed(2 * total, &group.columns).combined(a, b));
     ReducedGroup { columns: (0..total).collect(), blocks: blocks.collect(), ..*group }
 }

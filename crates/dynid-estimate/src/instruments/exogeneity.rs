@@ -7,9 +7,8 @@ use crate::oblique::{Oblique, jackknife, pair};
 use dynid_factor::Factor;
 use dynid_factor::groups::{ReducedGroup, time_blocks};
 use dynid_factor::rank::numerical_rank;
+use dynid_linalg::Mat;
 use dynid_linalg::triangular::gram_inverse;
-use faer::Mat;
-use faer::linalg::solvers::Solve;
 
 /// Settings of [`exogeneity()`].
 #[derive(Debug, Clone, PartialEq)]
@@ -180,7 +179,7 @@ pub fn exogeneity(
 }
 
 /// Blocks of `[W | V | y]` from paired ones.
-fn with_unexplained(blocks: &[Factor], fit: &Mat<f64>) -> Vec<Factor> {
+fn with_unexplained(blocks: &[Factor], fit: &Mat) -> Vec<Factor> {
     let p = fit.nrows();
     let one = |on: bool| f64::from(u8::from(on));
     let combination = Mat::from_fn(2 * p, 2 * p, |i, j| match (i < p, j < p) {
@@ -234,7 +233,7 @@ fn robust_test(with_v: &[Factor], tested: &[usize]) -> Option<FTest> {
     let covariance = least_squares_jackknife(&blocks, &solution.x)?.covariance;
     let own = Mat::from_fn(m, m, |i, j| covariance[(p + i, p + j)]);
     let delta = Mat::from_fn(m, 1, |i, _| solution.x[p + i]);
-    let weighted = own.col_piv_qr().solve(&delta);
+    let weighted = own.pivoted_qr().solve(&delta);
     let wald: f64 = (0..m).map(|i| delta[(i, 0)] * weighted[(i, 0)]).sum();
     let freedom = (m as f64, (b - m) as f64);
     let statistic = wald * freedom.1 / (freedom.0 * (b - 1) as f64);

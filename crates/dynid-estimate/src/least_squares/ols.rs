@@ -2,8 +2,8 @@
 
 use dynid_factor::factor::Factor;
 use dynid_factor::rank::{RankReport, numerical_rank};
+use dynid_linalg::Mat;
 use dynid_linalg::triangular::gram_inverse;
-use faer::Mat;
 
 /// Least-squares solution of one factor, on an independent subset of the columns where the rank is deficient.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +30,7 @@ pub struct LinearSolution {
 
 impl LinearSolution {
     /// `C = (RᵀR)⁻¹` of the kept columns (`kept × kept`): the covariance for unit residual variance.
-    pub fn unit_covariance(&self) -> Mat<f64> {
+    pub fn unit_covariance(&self) -> Mat {
         gram_inverse(&self.factor.r_matrix())
     }
 

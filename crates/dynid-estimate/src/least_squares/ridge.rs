@@ -2,7 +2,7 @@
 
 use super::ols::{LinearSolution, ols};
 use dynid_factor::factor::Factor;
-use faer::Mat;
+use dynid_linalg::Mat;
 
 /// Solution of [`ridge`].
 #[derive(Debug, Clone, PartialEq)]
@@ -21,7 +21,7 @@ pub struct RidgeSolution {
 impl RidgeSolution {
     /// `(RᵀR + κD²)⁻¹`: the posterior covariance when the factor is weighted by `1/σ`, `κ = 1`, and the prior is
     /// Gaussian with standard deviations `scale`.
-    pub fn unit_covariance(&self) -> Mat<f64> {
+    pub fn unit_covariance(&self) -> Mat {
         self.deviation.unit_covariance()
     }
 }

@@ -4,8 +4,8 @@ use super::ols::ols;
 use dynid_factor::factor::Factor;
 use dynid_factor::groups::ReducedGroup;
 use dynid_factor::rank::numerical_rank;
+use dynid_linalg::Mat;
 use dynid_linalg::triangular::solve_upper;
-use faer::Mat;
 
 /// `s_min/s_{min-1}` above which the smallest singular value is not told from the next.
 const LARGEST_RATIO: f64 = 0.99;
@@ -127,17 +127,17 @@ pub fn tls(factor: &Factor, noise: &TlsNoise) -> Result<TlsSolution, TlsRefusal>
 }
 
 /// `-v_{1..}/v_end` of the last right singular vector of a square block, and all singular values, descending.
-fn last_singular_vector(block: &Mat<f64>) -> Result<(Vec<f64>, Vec<f64>), TlsRefusal> {
+fn last_singular_vector(block: &Mat) -> Result<(Vec<f64>, Vec<f64>), TlsRefusal> {
     let size = block.nrows();
-    let decomposition = block.svd().map_err(|_| TlsRefusal::Decomposition)?;
-    let values: Vec<f64> = decomposition.S().column_vector().iter().copied().collect();
+    let decomposition = block.svd().ok_or(TlsRefusal::Decomposition)?;
+    let values = decomposition.values;
     if size > 1 {
         let ratio = values[size - 1] / values[size - 2];
         if ratio.is_nan() || ratio > LARGEST_RATIO {
             return Err(TlsRefusal::RepeatedSingularValue { ratio });
         }
     }
-    let vector = decomposition.V().col(size - 1);
+    let vector = decomposition.v.col(size - 1);
     let last = vector[size - 1];
     if last.abs() < LEAST_LAST_ENTRY {
         return Err(TlsRefusal::EffortNotInvolved { share: last.abs() });

@@ -1,8 +1,7 @@
 //! What the difference of two estimates is made of.
 
-use faer::linalg::solvers::SolveLstsq;
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{Mat, Par, Side};
+use dynid_linalg::Mat;
+use dynid_linalg::triangular::solve_lower_in_place;
 
 use super::LinearEstimate;
 
@@ -15,7 +14,7 @@ pub struct DifferenceFit {
     /// The unknowns `x`.
     pub x: Vec<f64>,
     /// Covariance of `x`.
-    pub covariance: Mat<f64>,
+    pub covariance: Mat,
 }
 
 /// Generalised least squares for `β₁ - β₂ = K x` with the weight `(κ₁ C₁ + κ₂ C₂)⁻¹`, `C` the covariances of both
@@ -29,7 +28,7 @@ pub struct DifferenceFit {
 pub fn explain_difference(
     estimates: [&LinearEstimate; 2],
     inflation: [f64; 2],
-    map: &Mat<f64>,
+    map: &Mat,
 ) -> Option<DifferenceFit> {
     let [first, second] = estimates;
     assert!(map.nrows() == first.x.len() && map.nrows() == second.x.len(), "rows of the map");
@@ -38,27 +37,26 @@ pub fn explain_difference(
         return None;
     }
     let (n, p) = (kept.len(), map.ncols());
-    let sum = first.model_covariance() * faer::Scale(inflation[0])
-        + second.model_covariance() * faer::Scale(inflation[1]);
+    let sum = first.model_covariance() * inflation[0] + second.model_covariance() * inflation[1];
     let scale: Vec<f64> = (0..n).map(|i| 1.0 / sum[(i, i)].sqrt()).collect();
-    let factor = Mat::from_fn(n, n, |i, j| scale[i] * sum[(i, j)] * scale[j]).llt(Side::Lower).ok()?;
+    let factor = Mat::from_fn(n, n, |i, j| scale[i] * sum[(i, j)] * scale[j]).cholesky()?;
     let mut white = Mat::from_fn(n, p + 1, |i, j| {
         let row = kept[i];
         scale[i] * if j == p { first.x[row] - second.x[row] } else { map[(row, j)] }
     });
-    solve_lower_triangular_in_place(factor.L(), white.as_mut(), Par::Seq);
-    let lengths: Vec<f64> = (0..p).map(|j| white.col(j).norm_l2()).collect();
+    solve_lower_in_place(&factor.lower(), &mut white);
+    let lengths: Vec<f64> = (0..p).map(|j| white.col_norm(j)).collect();
     if n < p || !lengths.iter().all(|l| *l > 0.0) {
         return None;
     }
     let unit = Mat::from_fn(n, p, |i, j| white[(i, j)] / lengths[j]);
-    let svd = unit.thin_svd().ok()?;
-    let (singular, v) = (svd.S().column_vector(), svd.V());
+    let svd = unit.thin_svd()?;
+    let (singular, v) = (svd.values, svd.v);
     if singular[p - 1] < LEAST_SINGULAR * singular[0] {
         return None;
     }
     let target = Mat::from_fn(n, 1, |i, _| white[(i, p)]);
-    let solved = unit.qr().solve_lstsq(&target);
+    let solved = unit.qr().solve_least_squares(&target);
     let covariance = |i: usize, j: usize| {
         let sum: f64 = (0..p).map(|k| v[(i, k)] * v[(j, k)] / (singular[k] * singular[k])).sum();
         sum / (lengths[i] * lengths[j])

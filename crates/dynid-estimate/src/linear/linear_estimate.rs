@@ -8,7 +8,7 @@ use crate::least_squares::{TlsNoise, tls};
 use crate::oblique::{jackknife as instrumental_jackknife, paired_columns};
 use dynid_factor::factor::Factor;
 use dynid_factor::groups::{ReducedGroup, time_blocks};
-use faer::Mat;
+use dynid_linalg::Mat;
 
 /// What an estimator found about one group of rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,7 +142,7 @@ impl LinearEstimate {
     ///
     /// `C = (RᵀR)⁻¹` for the squared losses; `C (Σ_j τ_j J_j) C` for robust ones, with the information `J_j` of each group
     /// and the mean square `τ_j` of its weighted residuals, `E ψ²/E ψ'`.
-    pub fn model_covariance(&self) -> Mat<f64> {
+    pub fn model_covariance(&self) -> Mat {
         let unit = self.solution.unit_covariance();
         if !self.method.needs_rows() {
             return unit;
@@ -154,7 +154,7 @@ impl LinearEstimate {
             let freedom = (fit.rows as f64 - fit.leverage).max(1.0);
             let tau = weighted.rss(&self.kept_x()) / freedom;
             let r = weighted.r_matrix();
-            filling += faer::Scale(tau) * (r.transpose() * &r);
+            filling += (r.transpose() * &r) * tau;
         }
         crate::covariance::sandwich(&unit, &filling)
     }
@@ -184,7 +184,7 @@ impl LinearEstimate {
     }
 
     /// Sandwich covariance from block scores, as a second opinion; `None` with fewer than two blocks.
-    pub fn block_sandwich(&self) -> Option<Mat<f64>> {
+    pub fn block_sandwich(&self) -> Option<Mat> {
         block_sandwich_with(&self.kept_blocks(), self.kept_prior().as_ref(), &self.kept_x())
     }
 }

@@ -4,13 +4,13 @@ use super::LinearEstimate;
 use crate::covariance::{hac_bartlett_logs, hac_lag};
 use dynid_factor::factor::FactorError;
 use dynid_factor::rows::{RowSource, RowVisitor, Rows, RowsError, visit_all};
-use faer::Mat;
+use dynid_linalg::Mat;
 
 /// Scores `s_k = Σ_j W_jkᵀ ψ_jk/σ_j` of all joints and kernel scales in equal steps of time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RowScores {
     /// Per log, in ascending order of the logs' indices: steps × kept columns. Steps without a row are zero.
-    pub logs: Vec<Mat<f64>>,
+    pub logs: Vec<Mat>,
     /// Per log: length of a step in samples, the spacing of the rows of the widest kernel.
     pub step: Vec<usize>,
 }
@@ -20,7 +20,7 @@ impl RowScores {
     ///
     /// `rate_hz`: sample rate of each log; `cut_off`: of the widest kernel, Hz. The lag is [`hac_lag`] at the rate of the
     /// steps. `None` with fewer steps than columns. Panics unless there is one rate per log.
-    pub fn covariance(&self, estimate: &LinearEstimate, rate_hz: &[f64], cut_off: f64) -> Option<Mat<f64>> {
+    pub fn covariance(&self, estimate: &LinearEstimate, rate_hz: &[f64], cut_off: f64) -> Option<Mat> {
         assert_eq!(rate_hz.len(), self.logs.len(), "one sample rate per log");
         let lags: Vec<usize> = rate_hz
             .iter()

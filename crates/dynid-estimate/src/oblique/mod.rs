@@ -4,7 +4,7 @@ mod paired;
 
 pub use paired::{crossed, half, measured, paired_columns};
 
-use faer::Mat;
+use dynid_linalg::Mat;
 
 use crate::covariance::{Jackknife, jackknife_by};
 use crate::least_squares::{LinearSolution, ols};
@@ -21,7 +21,7 @@ pub(crate) struct Oblique {
     /// `[Q_ZᵀW | Q_Zᵀy]` as a factor, `ρ` zero: its least-squares solution is that of `Zᵀ(W x - y) = 0`.
     pub(crate) fitted: Factor,
     /// `A = Z⁺W`, `kept × kept`: fitted regressors are `Z A`.
-    pub(crate) fit: Mat<f64>,
+    pub(crate) fit: Mat,
     /// Smallest singular value of `Q_ZᵀQ_W`: the cosine of the largest angle between instruments and regressors.
     pub(crate) strength: f64,
 }
@@ -71,7 +71,7 @@ impl Oblique {
         let own = group.select(&pair(&self.kept, group.columns() / 2));
         let rows = own.triangle();
         let inverse = inverse(&self.fitted.r_matrix());
-        let (z, w) = (rows.get(.., ..p), rows.get(.., p..2 * p));
+        let (z, w) = (rows.columns(0..p), rows.columns(p..2 * p));
         let (left, right) = (w * &inverse, z * &self.fit * &inverse);
         let product = |(i, j): (usize, usize)| left[(i, j)] * right[(i, j)];
         (0..left.nrows()).flat_map(|i| (0..p).map(move |j| (i, j))).map(product).sum()
@@ -79,7 +79,7 @@ impl Oblique {
 
     /// Combination that turns paired rows in `2 total` columns into fitted ones, `[Z A | Z A x + y - W x]`: `A` in all columns,
     /// and what is added to the effort.
-    pub(crate) fn fitted_rows(&self, total: usize, x: &[f64]) -> (Mat<f64>, Vec<f64>) {
+    pub(crate) fn fitted_rows(&self, total: usize, x: &[f64]) -> (Mat, Vec<f64>) {
         let mut a = Mat::zeros(2 * total, total);
         for (j, to) in self.kept.iter().enumerate() {
             for (i, from) in self.kept.iter().enumerate() {
@@ -102,7 +102,7 @@ fn chosen(of: &[usize], positions: &[usize]) -> Vec<usize> {
 }
 
 /// First `p` rows of `p` columns of a factor in `2 p` columns, from a column on.
-fn corner(factor: &Factor, from: usize) -> Mat<f64> {
+fn corner(factor: &Factor, from: usize) -> Mat {
     let p = factor.columns() / 2;
     Mat::from_fn(p, p, |i, j| factor.r(i, from + j))
 }

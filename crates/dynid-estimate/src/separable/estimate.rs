@@ -5,7 +5,7 @@ use super::profile::ShapeFinding;
 use super::starts::StartReport;
 use crate::covariance::{MIN_BLOCKS, variance_inflation};
 use crate::linear::{LinearEstimate, LinearMethod};
-use faer::Mat;
+use dynid_linalg::Mat;
 
 /// Estimate of linear and shape parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,7 +76,7 @@ impl SeparableEstimate {
         variance.unwrap_or(1.0)
     }
 
-    fn spread(&self, fit: &LinearEstimate, covariance: &Mat<f64>, factor: f64) -> Deviations {
+    fn spread(&self, fit: &LinearEstimate, covariance: &Mat, factor: f64) -> Deviations {
         let mut all = vec![None; fit.x.len()];
         for (i, &column) in fit.solution.kept.iter().enumerate() {
             all[column] = Some((factor * covariance[(i, i)]).sqrt());

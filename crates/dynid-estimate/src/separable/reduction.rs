@@ -3,16 +3,7 @@
 use super::dense::{Columns, triangle};
 use super::problem::{RowGroup, ShapedColumns};
 use dynid_factor::factor::{Factor, FactorBuilder};
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::householder::{
-    apply_block_householder_sequence_transpose_on_the_left_in_place_scratch as rotation_scratch,
-    apply_block_householder_sequence_transpose_on_the_left_in_place_with_conj as rotate,
-};
-use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch};
-use faer::{Conj, Mat, MatMut, Par};
-
-/// Width of the panels of Householder reflectors.
-const PANEL: usize = 16;
+use dynid_linalg::{Mat, Reflectors};
 
 /// What changing columns are put beside.
 #[derive(Debug, Clone, Copy)]
@@ -38,7 +29,7 @@ enum Kind {
     /// Without shaped columns: the effort is reduced as well.
     Constant(Factor),
     /// With shaped columns: `Q` as reflectors.
-    Shaped { basis: Mat<f64>, reflectors: Mat<f64> },
+    Shaped(Reflectors),
 }
 
 /// Columns of a group after rotation by `Qᵀ`.
@@ -72,33 +63,17 @@ impl GroupReduction {
                 kind: Kind::Constant(factor),
             };
         }
-        let mut basis = Mat::from_fn(rows, fixed, |i, j| weighted(i, group.fixed_column(j)[i]));
-        let height = rows.min(fixed);
-        let panel = PANEL.min(height.max(1));
-        let mut reflectors = Mat::zeros(panel, height);
-        if height > 0 {
-            let scratch = qr_in_place_scratch::<f64>(rows, fixed, panel, Par::Seq, Default::default());
-            qr_in_place(
-                basis.as_mut(),
-                reflectors.as_mut(),
-                Par::Seq,
-                MemStack::new(&mut MemBuffer::new(scratch)),
-                Default::default(),
-            );
-        }
-        let head = columns_of(height, fixed, |i, j| if i <= j { basis[(i, j)] } else { 0.0 });
-        GroupReduction {
-            root_weights: root_weights.map(<[f64]>::to_vec),
-            head,
-            kind: Kind::Shaped { basis, reflectors },
-        }
+        let basis = Mat::from_fn(rows, fixed, |i, j| weighted(i, group.fixed_column(j)[i]));
+        let basis = Reflectors::of(basis);
+        let head = columns_of(basis.height(), fixed, |i, j| basis.r(i, j));
+        GroupReduction { root_weights: root_weights.map(<[f64]>::to_vec), head, kind: Kind::Shaped(basis) }
     }
 
     /// Residual sum of squares that no parameter reaches, of a group without shaped columns.
     pub(super) fn constant_rss(&self) -> f64 {
         match &self.kind {
             Kind::Constant(factor) => factor.rho() * factor.rho(),
-            Kind::Shaped { .. } => 0.0,
+            Kind::Shaped(_) => 0.0,
         }
     }
 
@@ -122,7 +97,7 @@ impl GroupReduction {
         columns: &ShapedColumns,
         target: Target<'_>,
     ) -> Option<Rotated> {
-        let Kind::Shaped { basis, reflectors } = &self.kind else { return None };
+        let Kind::Shaped(basis) = &self.kind else { return None };
         let rows = group.rows();
         let (shaped, dependent) = (group.shaped.len(), group.dependence.len());
         let width = shaped + dependent + 1;
@@ -137,18 +112,8 @@ impl GroupReduction {
                 out.iter_mut().zip(weights).for_each(|(v, w)| *v *= w);
             }
         }
-        let height = reflectors.ncols();
-        if height > 0 {
-            let scratch = rotation_scratch::<f64>(rows, reflectors.nrows(), width);
-            rotate(
-                basis.as_ref(),
-                reflectors.as_ref(),
-                Conj::No,
-                MatMut::from_column_major_slice_mut(&mut all, rows, width),
-                Par::Seq,
-                MemStack::new(&mut MemBuffer::new(scratch)),
-            );
-        }
+        let height = basis.height();
+        basis.apply_transposed(&mut all);
         let part = |from: usize, count: usize| columns_of(count, width, |i, j| all[j * rows + from + i]);
         Some(Rotated { head: part(0, height), below: triangle(part(height, rows - height)) })
     }

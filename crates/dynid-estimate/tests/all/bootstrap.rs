@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 /// Noise whose correlation falls below a tenth within five samples, an eighth of a block.
-fn blocks(seed: u64) -> (Vec<Factor>, Vec<f64>, dynid_linalg::Mat<f64>) {
+fn blocks(seed: u64) -> (Vec<Factor>, Vec<f64>, dynid_linalg::Mat) {
     let mut normal = Normal::new(seed, 0);
     let mut state = 0.0;
     let source = rows(1, 24, 40, |joint, _| {

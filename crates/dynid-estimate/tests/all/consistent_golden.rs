@@ -16,7 +16,7 @@ fn ten(values: &[f64]) -> Inertia {
     Inertia(std::array::from_fn(|k| values[k]))
 }
 
-fn matrix(value: &Value) -> Mat<f64> {
+fn matrix(value: &Value) -> Mat {
     let rows: Vec<Vec<f64>> = value.as_array().unwrap().iter().map(vector).collect();
     Mat::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j])
 }
@@ -140,7 +140,7 @@ fn entropic_distance_and_its_derivatives() {
 }
 
 /// Columns of the golden grouping matrix: links, then rotor inertias.
-fn indy7(base: &Value) -> (Mat<f64>, Vec<usize>) {
+fn indy7(base: &Value) -> (Mat, Vec<usize>) {
     let names: Vec<&str> =
         base["names_standard"].as_array().unwrap().iter().map(|n| n.as_str().unwrap()).collect();
     let symbols = ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];

@@ -25,7 +25,7 @@ fn covariance_estimators() {
         })
         .collect();
     let solution = ols(&Factor::merge(&blocks.iter().collect::<Vec<_>>()));
-    let check = |what: &str, found: &Mat<f64>, expected: &Value| {
+    let check = |what: &str, found: &Mat, expected: &Value| {
         let expected: Vec<f64> = expected.as_array().unwrap().iter().flat_map(vector).collect();
         let found: Vec<f64> = (0..9).map(|k| found[(k / 3, k % 3)]).collect();
         check_close(what, &found, &expected, tolerance);

@@ -60,7 +60,7 @@ fn groups(blocks: &[Vec<Factor>]) -> Vec<ReducedGroup> {
     blocks.iter().enumerate().map(group).collect()
 }
 
-fn flat(matrix: &Mat<f64>) -> Vec<f64> {
+fn flat(matrix: &Mat) -> Vec<f64> {
     (0..matrix.nrows()).flat_map(|i| (0..matrix.ncols()).map(move |j| matrix[(i, j)])).collect()
 }
 

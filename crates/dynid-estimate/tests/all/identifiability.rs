@@ -8,7 +8,6 @@ use dynid_estimate::identifiability::{
 use dynid_estimate::linear::ols;
 use dynid_factor::{Factor, FactorBuilder};
 use dynid_linalg::Mat;
-use faer::linalg::solvers::DenseSolveCore;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -18,7 +17,7 @@ fn normal(rng: &mut impl Rng) -> f64 {
 }
 
 /// A regrouping of `p` columns into `r` kept ones (identity first), sparse, factors over two decades.
-fn random_regrouping(rng: &mut impl Rng, r: usize, p: usize) -> Mat<f64> {
+fn random_regrouping(rng: &mut impl Rng, r: usize, p: usize) -> Mat {
     Mat::from_fn(r, p, |i, j| {
         if j < r {
             f64::from(u8::from(i == j))
@@ -45,12 +44,12 @@ fn random_log(rng: &mut impl Rng, r: usize, rows: usize, silent: &[usize], tied:
 }
 
 /// `(J + C0⁻¹)⁻¹` by an LU of the whitened normal matrix: another route, good to about its condition number.
-fn direct_covariance(information: &Factor, kappa: f64, k: &Mat<f64>, std: &[f64]) -> Mat<f64> {
+fn direct_covariance(information: &Factor, kappa: f64, k: &Mat, std: &[f64]) -> Mat {
     let p = std.len();
     let whitened = Mat::from_fn(k.nrows(), p, |i, j| k[(i, j)] * std[j]);
     let r = information.r_matrix() * whitened;
-    let normal = r.transpose() * &r * faer::Scale(1.0 / kappa) + Mat::<f64>::identity(p, p);
-    let inverse = normal.partial_piv_lu().inverse();
+    let normal = r.transpose() * &r * (1.0 / kappa) + Mat::identity(p, p);
+    let inverse = normal.lu().inverse();
     Mat::from_fn(p, p, |i, j| std[i] * inverse[(i, j)] * std[j])
 }
 

@@ -9,7 +9,6 @@ use dynid_estimate::linear::{LinearError, LinearMethod, LinearSettings, estimate
 use dynid_factor::groups::{ReducedGroup, time_blocks};
 use dynid_factor::{Factor, FactorBuilder};
 use dynid_linalg::Mat;
-use faer::linalg::solvers::Solve;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -76,7 +75,7 @@ fn close(found: &[f64], expected: &[f64], tolerance: f64) {
     }
 }
 
-fn entries(matrix: &Mat<f64>) -> Vec<f64> {
+fn entries(matrix: &Mat) -> Vec<f64> {
     (0..matrix.ncols()).flat_map(|j| (0..matrix.nrows()).map(move |i| matrix[(i, j)])).collect()
 }
 
@@ -105,8 +104,8 @@ fn with_the_regressor_as_its_own_instrument_least_squares_comes_back() {
 
 /// Solves `Zᵀ(W x - y) = 0` over rows that `keep` admits, rows of a group weighted, by the normal form.
 fn direct(rows: &[Vec<Row>], weights: &[f64], keep: impl Fn(&Row) -> bool) -> Vec<f64> {
-    let mut left = Mat::<f64>::zeros(TOTAL, TOTAL);
-    let mut right = Mat::<f64>::zeros(TOTAL, 1);
+    let mut left = Mat::zeros(TOTAL, TOTAL);
+    let mut right = Mat::zeros(TOTAL, 1);
     for ((rows, columns), weight) in rows.iter().zip(COLUMNS).zip(weights) {
         for row in rows.iter().filter(|r| keep(r)) {
             for (i, a) in columns.iter().enumerate() {
@@ -117,7 +116,7 @@ fn direct(rows: &[Vec<Row>], weights: &[f64], keep: impl Fn(&Row) -> bool) -> Ve
             }
         }
     }
-    let x = left.partial_piv_lu().solve(&right);
+    let x = left.lu().solve(&right);
     (0..TOTAL).map(|i| x[(i, 0)]).collect()
 }
 

@@ -26,11 +26,10 @@ fn posterior_is_that_of_bayes() {
     let sigma = Mat::from_fn(2, 2, |i, j| [[0.3, 0.1], [0.1, 0.2]][i][j]);
     let (prior, std) = ([1.0, -2.0, 0.5, 3.0], [0.7, 1.3, 0.4, 2.0]);
     let beta = [5.0, 1.0];
-    let found = posterior(&k, &beta, &sigma, 2.0, &(&sigma * faer::Scale(2.0)), &prior, &std).unwrap();
-    use faer::linalg::solvers::DenseSolveCore;
-    let sigma_inverse = (&sigma * faer::Scale(2.0)).partial_piv_lu().inverse();
+    let found = posterior(&k, &beta, &sigma, 2.0, &(&sigma * 2.0), &prior, &std).unwrap();
+    let sigma_inverse = (&sigma * 2.0).lu().inverse();
     let c0_inverse = Mat::from_fn(4, 4, |i, j| if i == j { std[i].powi(-2) } else { 0.0 });
-    let covariance = (k.transpose() * &sigma_inverse * &k + &c0_inverse).partial_piv_lu().inverse();
+    let covariance = (k.transpose() * &sigma_inverse * &k + &c0_inverse).lu().inverse();
     let right = k.transpose() * &sigma_inverse * Mat::from_fn(2, 1, |i, _| beta[i])
         + &c0_inverse * Mat::from_fn(4, 1, |i, _| prior[i]);
     let mean = &covariance * right;

@@ -69,9 +69,8 @@ fn clean_logs_lose_little() {
     let spread = |m| run(&source, &m, &LinearSettings::default()).jackknife().unwrap().covariance;
     let (plain, huber, tukey) =
         (spread(LinearMethod::Wls), spread(LinearMethod::Huber), spread(LinearMethod::Tukey));
-    let ratio = |v: &dynid_linalg::Mat<f64>| {
-        (0..COLUMNS).map(|i| v[(i, i)] / plain[(i, i)]).sum::<f64>() / COLUMNS as f64
-    };
+    let ratio =
+        |v: &dynid_linalg::Mat| (0..COLUMNS).map(|i| v[(i, i)] / plain[(i, i)]).sum::<f64>() / COLUMNS as f64;
     // 95 % efficient by design, and a jackknife over 20 blocks is good to a third.
     assert!((0.8..1.35).contains(&ratio(&huber)), "{}", ratio(&huber));
     assert!((0.8..1.35).contains(&ratio(&tukey)), "{}", ratio(&tukey));

@@ -8,7 +8,7 @@
 
 mod triangle;
 
-use faer::Mat;
+use dynid_linalg::Mat;
 pub(crate) use triangle::{inverse, singular_values, triangle};
 
 /// What is minimised.
@@ -56,7 +56,7 @@ pub struct Criterion {
 /// Symmetric `H` of `∂c/∂W = W H`.
 #[derive(Debug, Clone)]
 pub(crate) enum GramSensitivity {
-    Full(Mat<f64>),
+    Full(Mat),
     /// `Σ factor · v vᵀ`.
     Outer(Vec<(f64, Vec<f64>)>),
 }
@@ -81,11 +81,11 @@ impl Criterion {
     }
 
     /// Value for a triangle; `None` if it is singular or not finite.
-    pub fn value(&self, triangle: &Mat<f64>) -> Option<f64> {
+    pub fn value(&self, triangle: &Mat) -> Option<f64> {
         self.smooth_value(triangle, None)
     }
 
-    pub(crate) fn smooth_value(&self, triangle: &Mat<f64>, smoothing: Smoothing) -> Option<f64> {
+    pub(crate) fn smooth_value(&self, triangle: &Mat, smoothing: Smoothing) -> Option<f64> {
         let (scaled, _) = self.scaled(triangle)?;
         let value = match &self.measure {
             Measure::Determinant => {
@@ -101,17 +101,13 @@ impl Criterion {
     }
 
     /// Value and sensitivity `H` for a triangle.
-    pub(crate) fn sensitivity(
-        &self,
-        triangle: &Mat<f64>,
-        smoothing: Smoothing,
-    ) -> Option<(f64, GramSensitivity)> {
+    pub(crate) fn sensitivity(&self, triangle: &Mat, smoothing: Smoothing) -> Option<(f64, GramSensitivity)> {
         let (scaled, scale) = self.scaled(triangle)?;
         let (value, sensitivity) = match &self.measure {
             Measure::Determinant => {
                 let inverse = inverse(&scaled)?;
                 let value = -2.0 * (0..scaled.nrows()).map(|i| scaled[(i, i)].abs().ln()).sum::<f64>();
-                (value, GramSensitivity::Full((&inverse * inverse.transpose()) * faer::Scale(-2.0)))
+                (value, GramSensitivity::Full((&inverse * inverse.transpose()) * -2.0))
             }
             Measure::Trace(weights) => {
                 let inverse = inverse(&scaled)?;
@@ -119,26 +115,25 @@ impl Criterion {
                 let covariance = &inverse * inverse.transpose();
                 let n = covariance.nrows();
                 let left = Mat::from_fn(n, n, |i, j| covariance[(i, j)] * weights[j]);
-                (trace.ln(), GramSensitivity::Full((left * &covariance) * faer::Scale(-2.0 / trace)))
+                (trace.ln(), GramSensitivity::Full((left * &covariance) * (-2.0 / trace)))
             }
             _ => {
                 let (sigma, v) = singular_values(&scaled, true)?;
                 let spectral = Spectral::new(&sigma, smoothing)?;
                 let slope = spectral.slope(&self.measure);
                 let acting = (0..sigma.len()).filter(|i| slope[*i] != 0.0);
-                let outer =
-                    acting.map(|i| (slope[i] / sigma[i], v.col_as_slice(i).to_vec())).collect::<Vec<_>>();
+                let outer = acting.map(|i| (slope[i] / sigma[i], v.col(i).to_vec())).collect::<Vec<_>>();
                 (spectral.value(&self.measure), GramSensitivity::Outer(outer).condensed(sigma.len()))
             }
         };
         value.is_finite().then(|| (value, self.unscaled(sensitivity, &scaled, &scale)))
     }
 
-    fn scaled(&self, triangle: &Mat<f64>) -> Option<(Mat<f64>, Vec<f64>)> {
+    fn scaled(&self, triangle: &Mat) -> Option<(Mat, Vec<f64>)> {
         let n = triangle.nrows();
         let scale = match &self.scaling {
             ColumnScaling::Raw => return Some((triangle.clone(), vec![1.0; n])),
-            ColumnScaling::UnitNorm => (0..n).map(|j| triangle.col(j).norm_l2()).collect(),
+            ColumnScaling::UnitNorm => (0..n).map(|j| triangle.col_norm(j)).collect(),
             ColumnScaling::Given(scale) => scale.clone(),
         };
         if scale.iter().any(|s| !(*s > 0.0 && s.is_finite())) {
@@ -148,7 +143,7 @@ impl Criterion {
     }
 
     /// From the scaled matrix back to the columns themselves.
-    fn unscaled(&self, sensitivity: GramSensitivity, scaled: &Mat<f64>, scale: &[f64]) -> GramSensitivity {
+    fn unscaled(&self, sensitivity: GramSensitivity, scaled: &Mat, scale: &[f64]) -> GramSensitivity {
         match self.scaling {
             ColumnScaling::Raw => sensitivity,
             ColumnScaling::Given(_) => match sensitivity {
@@ -174,12 +169,12 @@ impl Criterion {
     }
 }
 
-fn divided(h: &Mat<f64>, scale: &[f64]) -> Mat<f64> {
+fn divided(h: &Mat, scale: &[f64]) -> Mat {
     Mat::from_fn(h.nrows(), h.ncols(), |i, j| h[(i, j)] / (scale[i] * scale[j]))
 }
 
 /// `tr(C R⁻¹R⁻ᵀ)`.
-fn weighted_trace(inverse: &Mat<f64>, weights: &[f64]) -> f64 {
+fn weighted_trace(inverse: &Mat, weights: &[f64]) -> f64 {
     (0..inverse.nrows())
         .map(|i| weights[i] * (i..inverse.ncols()).map(|j| inverse[(i, j)].powi(2)).sum::<f64>())
         .sum()
@@ -194,7 +189,7 @@ impl GramSensitivity {
         }
     }
 
-    fn dense(&self, n: usize) -> Mat<f64> {
+    fn dense(&self, n: usize) -> Mat {
         match self {
             GramSensitivity::Full(h) => h.clone(),
             GramSensitivity::Outer(terms) => {
@@ -290,7 +285,7 @@ mod tests {
     }
 
     /// Tall matrices with spectra from flat to spread over six decades.
-    fn matrices() -> Vec<Mat<f64>> {
+    fn matrices() -> Vec<Mat> {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         [0.0, 1.0, 3.0, 6.0]
             .map(|decades| {
@@ -300,7 +295,7 @@ mod tests {
             .to_vec()
     }
 
-    fn triangle_of(w: &Mat<f64>) -> Mat<f64> {
+    fn triangle_of(w: &Mat) -> Mat {
         triangle(&mut w.clone())
     }
 
@@ -316,7 +311,7 @@ mod tests {
                         let g = &w * h.dense(7);
                         for (row, column) in [(0, 0), (3, 2), (11, 6), (29, 4)] {
                             // In units of the column, whose length may be 1e-6.
-                            let unit = w.col(column).norm_l2();
+                            let unit = w.col_norm(column);
                             let moved = |steps: f64| {
                                 let mut w = w.clone();
                                 w[(row, column)] += steps * 1e-4 * unit;
@@ -341,7 +336,7 @@ mod tests {
     fn smooth_values_close_in_on_the_extremes() {
         for w in matrices() {
             for unit in [1e-30, 1.0, 1e30] {
-                let triangle = triangle_of(&(&w * faer::Scale(unit)));
+                let triangle = triangle_of(&(&w * unit));
                 let criterion = Criterion::raw(Measure::Condition);
                 let exact = criterion.value(&triangle).unwrap();
                 let mut before = f64::INFINITY;

@@ -5,7 +5,7 @@
 use crate::problems;
 use dynid_excitation::criterion::{Criterion, Measure};
 use dynid_excitation::*;
-use faer::Mat;
+use dynid_linalg::Mat;
 
 fn best(problem: &Problem, starts: usize) -> Design {
     let settings = Settings { starts, ..Settings::default() };
@@ -87,8 +87,7 @@ fn standard_deviations_are_those_of_the_covariance() {
     let triangle = information(&problem, &found.coefficients, 500);
     let gram = triangle.transpose() * &triangle;
     let n = gram.nrows();
-    use faer::linalg::solvers::Solve;
-    let covariance = gram.llt(faer::Side::Lower).unwrap().solve(Mat::<f64>::identity(n, n));
+    let covariance = gram.cholesky().unwrap().solve(&Mat::identity(n, n));
     for (k, column) in forecast.columns.iter().enumerate() {
         let wanted = covariance[(k, k)].sqrt();
         assert!((column.std / wanted - 1.0).abs() < 1e-8, "{}: {} {wanted}", column.name, column.std);

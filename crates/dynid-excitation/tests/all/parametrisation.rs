@@ -89,7 +89,7 @@ fn unknowns_reach_every_motion_that_meets_the_conditions() {
     let map = Parametrisation::new(&limits(), 0.5, 5, &start);
     // Unit steps of all unknowns of a coordinate are independent: so many dimensions as there are unknowns.
     let columns = map.range(0).len();
-    let image = faer::Mat::from_fn(11, columns, |row, k| {
+    let image = dynid_linalg::Mat::from_fn(11, columns, |row, k| {
         let mut z = vec![0.0; map.unknowns()];
         z[k] = 1.0;
         map.coefficients(&z)[0][row]

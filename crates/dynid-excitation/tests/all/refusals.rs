@@ -3,7 +3,7 @@
 use crate::problems;
 use dynid_excitation::criterion::{ColumnScaling, Criterion, Measure};
 use dynid_excitation::*;
-use faer::Mat;
+use dynid_linalg::Mat;
 
 /// What is wrong with a problem.
 type Change = Box<dyn FnOnce(&mut Problem)>;

@@ -1,7 +1,7 @@
 //! Operations that take factors to factors.
 
 use super::{DEFAULT_CHUNK_ROWS, Factor, FactorBuilder};
-use faer::Mat;
+use dynid_linalg::Mat;
 
 impl Factor {
     /// Merges factors of disjoint rows with the same columns, always in the order given.
@@ -110,13 +110,13 @@ impl Factor {
     /// Factor of `[W A, y + W b]`: other combinations of the same rows.
     ///
     /// `a`: `p × q`, `b`: `p` entries. Panics unless the shapes agree.
-    pub fn combined(&self, a: &Mat<f64>, b: &[f64]) -> Factor {
+    pub fn combined(&self, a: &Mat, b: &[f64]) -> Factor {
         assert!(
             a.nrows() == self.columns && b.len() == self.columns,
             "one row of the combination per column"
         );
         let height = self.height();
-        let regressor = self.triangle.get(..height, ..self.columns);
+        let regressor = self.triangle.columns(0..self.columns);
         let columns = regressor * a;
         let effort = regressor * Mat::from_fn(b.len(), 1, |i, _| b[i]);
         let mut builder = FactorBuilder::with_chunk_rows(a.ncols(), height);

@@ -1,16 +1,11 @@
 //! Streaming QR: rows in, one triangle out, in fixed memory.
 
 use super::Factor;
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch};
-use faer::{Mat, Par};
+use dynid_linalg::{Mat, QrRoom};
 use std::ops::Range;
 
 /// Rows stacked under the current triangle before it is renewed, unless chosen otherwise.
 pub const DEFAULT_CHUNK_ROWS: usize = 2048;
-
-/// Width of the panels of Householder reflectors.
-const PANEL: usize = 16;
 
 /// Rows that a [`FactorBuilder`] cannot take.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -55,9 +50,8 @@ fn column_name(column: Option<usize>) -> String {
 /// portioned into calls. Backward stable column by column, so column scaling is neither needed nor done here.
 pub struct FactorBuilder {
     columns: usize,
-    buffer: Mat<f64>,
-    reflectors: Mat<f64>,
-    scratch: MemBuffer,
+    buffer: Mat,
+    room: QrRoom,
     /// Rows of the buffer taken by the current triangle.
     head: usize,
     /// Rows of the buffer in use, triangle included.
@@ -90,14 +84,7 @@ impl FactorBuilder {
         Self {
             columns,
             buffer: Mat::zeros(capacity, width),
-            reflectors: Mat::zeros(PANEL.min(width), width),
-            scratch: MemBuffer::new(qr_in_place_scratch::<f64>(
-                capacity,
-                width,
-                PANEL.min(width),
-                Par::Seq,
-                Default::default(),
-            )),
+            room: QrRoom::new(capacity, width),
             head: 0,
             filled: 0,
             rows: 0,
@@ -151,7 +138,7 @@ impl FactorBuilder {
             }
             let taken = (rows - start).min(self.buffer.nrows() - self.filled);
             for column in 0..=self.columns {
-                let out = &mut self.buffer.col_as_slice_mut(column)[self.filled..self.filled + taken];
+                let out = &mut self.buffer.col_mut(column)[self.filled..self.filled + taken];
                 fill(column, start..start + taken, out);
                 require_finite(out, self.rows, (column < self.columns).then_some(column))?;
             }
@@ -203,23 +190,17 @@ impl FactorBuilder {
 
     fn condense(&mut self) {
         let height = self.filled.min(self.columns + 1);
-        qr_in_place(
-            self.buffer.subrows_mut(0, self.filled),
-            self.reflectors.get_mut(..PANEL.min(height), ..height),
-            Par::Seq,
-            MemStack::new(&mut self.scratch),
-            Default::default(),
-        );
+        self.room.reduce(&mut self.buffer, self.filled);
         for j in 0..=self.columns {
             let below = (j + 1).min(height);
-            self.buffer.col_as_slice_mut(j)[below..height].fill(0.0);
+            self.buffer.col_mut(j)[below..height].fill(0.0);
         }
         (self.head, self.filled) = (height, height);
     }
 }
 
 /// `[R z]` with positive leading entries, and the norm of what sits in `z` beside empty rows of `R`.
-fn canonical(buffer: &Mat<f64>, height: usize, columns: usize) -> (Mat<f64>, f64) {
+fn canonical(buffer: &Mat, height: usize, columns: usize) -> (Mat, f64) {
     let mut kept = Vec::with_capacity(height);
     let mut remainder = 0.0_f64;
     for i in 0..height {

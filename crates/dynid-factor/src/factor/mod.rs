@@ -12,8 +12,8 @@ mod builder;
 
 pub use builder::{DEFAULT_CHUNK_ROWS, FactorBuilder, FactorError};
 
+use dynid_linalg::Mat;
 use dynid_linalg::triangular::solve_upper;
-use faer::Mat;
 
 /// Triangular factor `(R, z, ρ, N)` of `N` rows of `[W y]`.
 ///
@@ -27,7 +27,7 @@ use faer::Mat;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Factor {
     /// `[R z]`, `height × (columns + 1)`, zeros below the diagonal.
-    triangle: Mat<f64>,
+    triangle: Mat,
     rho: f64,
     columns: usize,
     rows: usize,
@@ -61,7 +61,7 @@ impl Factor {
     }
 
     /// `R` as a `p × p` matrix, padded by zero rows.
-    pub fn r_matrix(&self) -> Mat<f64> {
+    pub fn r_matrix(&self) -> Mat {
         Mat::from_fn(self.columns, self.columns, |i, j| self.r(i, j))
     }
 
@@ -79,11 +79,11 @@ impl Factor {
 
     /// `‖y‖ = √(‖z‖² + ρ²)`.
     pub fn effort_norm(&self) -> f64 {
-        self.triangle.col(self.columns).norm_l2().hypot(self.rho)
+        self.triangle.col_norm(self.columns).hypot(self.rho)
     }
 
     /// `[R z]` with its stored rows only.
-    pub fn triangle(&self) -> &Mat<f64> {
+    pub fn triangle(&self) -> &Mat {
         &self.triangle
     }
 
@@ -121,6 +121,6 @@ impl Factor {
 
     /// Column norms `‖W_c‖ = ‖R_c‖`, `p` entries.
     pub fn column_norms(&self) -> Vec<f64> {
-        (0..self.columns).map(|j| self.triangle.col(j).norm_l2()).collect()
+        (0..self.columns).map(|j| self.triangle.col_norm(j)).collect()
     }
 }

@@ -10,10 +10,7 @@ pub use regrouping::{BaseColumns, base_columns};
 pub use reliability::column_reliability;
 
 use crate::factor::Factor;
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::qr::col_pivoting::factor::{qr_in_place, qr_in_place_scratch};
-use faer::linalg::svd::{ComputeSvdVectors, svd, svd_scratch};
-use faer::{Mat, Par};
+use dynid_linalg::{Mat, pivots};
 
 /// Numerical rank of a factor and the evidence for it.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,7 +60,7 @@ pub fn numerical_rank(factor: &Factor) -> RankReport {
     let tolerance = rank_tolerance(factor.rows(), columns, singular_values.first().copied().unwrap_or(0.0));
     let rank = singular_values.iter().take_while(|&&s| s > tolerance).count();
     let gap = (rank > 0 && rank < columns).then(|| ratio(singular_values[rank - 1], singular_values[rank]));
-    let pivot_order = pivot_order(scaled);
+    let pivot_order = pivots(scaled).0;
     let mut independent = pivot_order[..rank].to_vec();
     independent.sort_unstable();
     let (unexcited, dependent): (Vec<usize>, Vec<usize>) =
@@ -102,55 +99,16 @@ pub fn rank_tolerance(rows: usize, columns: usize, largest: f64) -> f64 {
 }
 
 /// `R S⁻¹`, `s_c = 1` where the column is zero.
-pub(crate) fn scaled_triangle(factor: &Factor, column_norms: &[f64]) -> Mat<f64> {
+pub(crate) fn scaled_triangle(factor: &Factor, column_norms: &[f64]) -> Mat {
     Mat::from_fn(factor.columns(), factor.columns(), |i, j| {
         if column_norms[j] == 0.0 { 0.0 } else { factor.r(i, j) / column_norms[j] }
     })
 }
 
 /// Singular values of a square matrix, descending.
-pub fn singular_values(matrix: &Mat<f64>) -> Vec<f64> {
-    let n = matrix.nrows();
-    let no = ComputeSvdVectors::No;
-    let mut scratch = MemBuffer::new(svd_scratch::<f64>(n, n, no, no, Par::Seq, Default::default()));
-    let mut values = faer::diag::Diag::<f64>::zeros(n);
-    let outcome = svd(
-        matrix.as_ref(),
-        values.as_mut(),
-        None,
-        None,
-        Par::Seq,
-        MemStack::new(&mut scratch),
-        Default::default(),
-    );
-    match outcome {
-        Ok(()) => (0..n).map(|i| values[i]).collect(),
-        // The iteration of a finite matrix does not fail in practice; the pivoted diagonal brackets the values.
-        Err(_) => pivoted_diagonal(matrix.clone()).1,
-    }
-}
-
-fn pivot_order(matrix: Mat<f64>) -> Vec<usize> {
-    pivoted_diagonal(matrix).0
-}
-
-fn pivoted_diagonal(mut matrix: Mat<f64>) -> (Vec<usize>, Vec<f64>) {
-    let n = matrix.nrows();
-    let mut reflectors = Mat::zeros(1, n);
-    let (mut order, mut inverse) = (vec![0_usize; n], vec![0_usize; n]);
-    let mut scratch =
-        MemBuffer::new(qr_in_place_scratch::<usize, f64>(n, n, 1, Par::Seq, Default::default()));
-    qr_in_place(
-        matrix.as_mut(),
-        reflectors.as_mut(),
-        &mut order,
-        &mut inverse,
-        Par::Seq,
-        MemStack::new(&mut scratch),
-        Default::default(),
-    );
-    let diagonal = (0..n).map(|i| matrix[(i, i)].abs()).collect();
-    (order, diagonal)
+pub fn singular_values(matrix: &Mat) -> Vec<f64> {
+    // The iteration of a finite matrix does not fail in practice; the pivoted diagonal brackets the values.
+    matrix.singular_values().unwrap_or_else(|| pivots(matrix.clone()).1)
 }
 
 fn spread(singular_values: &[f64]) -> f64 {

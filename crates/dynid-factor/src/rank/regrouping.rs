@@ -2,8 +2,8 @@
 
 use super::{numerical_rank, rank_tolerance, scaled_triangle};
 use crate::factor::Factor;
+use dynid_linalg::Mat;
 use dynid_linalg::triangular::solve_upper;
-use faer::Mat;
 
 /// Entries of the scaled regrouping below this are rounding and become zero.
 const NEGLIGIBLE: f64 = 1e-10;
@@ -20,7 +20,7 @@ pub struct BaseColumns {
     /// Zero columns: in no combination.
     pub unexcited: Vec<usize>,
     /// `R1⁻¹ R2`, `kept × dependent`, in the units of the parameters.
-    pub regrouping: Mat<f64>,
+    pub regrouping: Mat,
     /// Whether the preference gave another rank than the singular values, so that pivoted QR chose instead.
     pub fell_back_to_pivoting: bool,
 }
@@ -55,7 +55,7 @@ pub fn base_columns(factor: &Factor, preference: &[usize]) -> BaseColumns {
 }
 
 /// Gram-Schmidt with one repetition ("twice is enough"), in the given order.
-fn independent_in_order(unit: &Mat<f64>, order: &[usize], tolerance: f64) -> Vec<usize> {
+fn independent_in_order(unit: &Mat, order: &[usize], tolerance: f64) -> Vec<usize> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let mut kept = Vec::new();
     for &column in order {
@@ -76,7 +76,7 @@ fn independent_in_order(unit: &Mat<f64>, order: &[usize], tolerance: f64) -> Vec
     kept
 }
 
-fn regroup(factor: &Factor, kept: &[usize], dependent: &[usize], norms: &[f64]) -> Mat<f64> {
+fn regroup(factor: &Factor, kept: &[usize], dependent: &[usize], norms: &[f64]) -> Mat {
     let order: Vec<usize> = kept.iter().chain(dependent).copied().collect();
     let sorted = factor.select(&order);
     let k = kept.len();

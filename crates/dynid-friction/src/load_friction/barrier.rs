@@ -1,8 +1,6 @@
 //! Small convex programs: a quadratic under linear and planar-body constraints, by a logarithmic barrier.
 
 use dynid_linalg::Mat;
-use faer::Side;
-use faer::linalg::solvers::Solve;
 
 /// Growth of the weight of the objective from one centre to the next.
 const GROWTH: f64 = 10.0;
@@ -40,7 +38,7 @@ pub(super) enum Constraint {
 }
 
 /// Value, gradient and Hessian of a term.
-type Term = (f64, Vec<f64>, Mat<f64>);
+type Term = (f64, Vec<f64>, Mat);
 
 impl Constraint {
     /// Whether it says nothing about `x`; then whether it holds.
@@ -139,7 +137,7 @@ impl Constraint {
 /// `min ½ xᵀ H x + g · x`, `H` positive definite, under constraints.
 #[derive(Debug, Clone)]
 pub(super) struct Program {
-    pub(super) hessian: Mat<f64>,
+    pub(super) hessian: Mat,
     pub(super) gradient: Vec<f64>,
     pub(super) constraints: Vec<Constraint>,
 }
@@ -230,15 +228,15 @@ impl Program {
     /// A damped Newton step; false at the centre, or where rounding allows none.
     fn step(&self, x: &mut Vec<f64>, weight: f64) -> bool {
         let n = x.len();
-        let mut term: Term = (0.0, vec![0.0; n], &self.hessian * faer::Scale(weight));
+        let mut term: Term = (0.0, vec![0.0; n], &self.hessian * weight);
         for i in 0..n {
             let row: f64 = (0..n).map(|j| self.hessian[(i, j)] * x[j]).sum();
             term.1[i] = weight * (row + self.gradient[i]);
         }
         self.constraints.iter().for_each(|c| c.add_to(x, &mut term));
         let (_, gradient, hessian) = term;
-        let Ok(factor) = hessian.llt(Side::Lower) else { return false };
-        let step = factor.solve(Mat::from_fn(n, 1, |i, _| -gradient[i]));
+        let Some(factor) = hessian.cholesky() else { return false };
+        let step = factor.solve(&Mat::from_fn(n, 1, |i, _| -gradient[i]));
         let decrement: f64 = -(0..n).map(|i| gradient[i] * step[(i, 0)]).sum::<f64>();
         if decrement.is_nan() || decrement <= CENTRED {
             return false;

@@ -181,7 +181,7 @@ fn check(design: &Design, p: usize) -> Result<Vec<f64>, LoadFrictionError> {
 }
 
 /// Orthonormal null space of the movable columns, with zeros for the others and for parameters it does not move.
-fn null_space(scaled: &Mat<f64>, movable: &[bool]) -> Result<Mat<f64>, LoadFrictionError> {
+fn null_space(scaled: &Mat, movable: &[bool]) -> Result<Mat, LoadFrictionError> {
     let columns: Vec<usize> = (0..movable.len()).filter(|k| movable[*k]).collect();
     let part = Mat::from_fn(scaled.nrows(), columns.len(), |i, j| scaled[(i, columns[j])]);
     if columns.is_empty() {
@@ -212,10 +212,10 @@ struct Task<'a> {
 
 impl Task<'_> {
     /// All rows `W`, `N_k`, `w`, columns in units of the scales.
-    fn structure(&self) -> Result<Mat<f64>, LoadFrictionError> {
+    fn structure(&self) -> Result<Mat, LoadFrictionError> {
         let drives = self.problem.record.drives();
         let samples = self.problem.record.samples();
-        let blocks: Vec<&Mat<f64>> =
+        let blocks: Vec<&Mat> =
             drives.iter().flat_map(|d| std::iter::once(&d.regressor).chain(&d.reactions)).collect();
         let rows = blocks.len() * samples;
         // A weight acts in every sample.
@@ -230,7 +230,7 @@ impl Task<'_> {
     }
 
     /// Half the squared distance along `φ = φ̂ + S Z x`.
-    fn along(&self, theta: &[f64], space: &Mat<f64>) -> Program {
+    fn along(&self, theta: &[f64], space: &Mat) -> Program {
         let n = space.ncols();
         let off = |k: usize| (theta[k] - self.design.values[k]) / self.design.scales[k];
         Program {
@@ -241,12 +241,7 @@ impl Task<'_> {
     }
 
     /// Half of `(RMS change of efforts/ρ)² + 1e-6 distance²` along `φ = start + S Z x`, the change counted from `theta`.
-    fn giving_way(
-        &self,
-        start: &[f64],
-        theta: &[f64],
-        space: &Mat<f64>,
-    ) -> Result<Program, LoadFrictionError> {
+    fn giving_way(&self, start: &[f64], theta: &[f64], space: &Mat) -> Result<Program, LoadFrictionError> {
         let jacobian = self.problem.jacobian(start)?;
         let rows = self.problem.rows() as f64;
         let rms = |sum: f64| (sum / rows).sqrt();
@@ -259,14 +254,14 @@ impl Task<'_> {
         let off = Mat::from_fn(self.p, 1, |k, _| (start[k] - theta[k]) / self.design.scales[k]);
         let first = moved.transpose() * (&scaled * off);
         let mut program = self.along(start, space);
-        program.hessian = &program.hessian * faer::Scale(DISTANCE_WEIGHT) + moved.transpose() * &moved;
+        program.hessian = &program.hessian * DISTANCE_WEIGHT + moved.transpose() * &moved;
         for (i, g) in program.gradient.iter_mut().enumerate() {
             *g = DISTANCE_WEIGHT * *g + first[(i, 0)];
         }
         Ok(program)
     }
 
-    fn constraints(&self, theta: &[f64], space: &Mat<f64>) -> Vec<Constraint> {
+    fn constraints(&self, theta: &[f64], space: &Mat) -> Vec<Constraint> {
         let scales = &self.design.scales;
         // `factor φ_k + shift` as a function of x.
         let affine = |terms: &[(usize, f64)], shift: f64| Affine {

@@ -28,7 +28,7 @@ pub struct Identifiability {
     pub gap: Option<f64>,
     /// Directions in `θ` that change no effort to first order, (p + 4) × (p + 4 - rank), in units of the parameters;
     /// orthonormal after division by the scales.
-    pub null_directions: Mat<f64>,
+    pub null_directions: Mat,
     /// Per parameter: whether the efforts depend on it at all here.
     pub acts: Vec<bool>,
     /// Per parameter: whether no null direction contains it (and it acts).
@@ -36,7 +36,7 @@ pub struct Identifiability {
     /// `J/(rows - rank)`, effort²; `None` without a row to spare.
     pub residual_variance: Option<f64>,
     /// `S V_r Σ_r⁻¹/√rows`: covariance of estimable combinations is `σ² K Kᵀ`.
-    root: Mat<f64>,
+    root: Mat,
     theta: Vec<f64>,
 }
 
@@ -78,8 +78,8 @@ impl Problem {
         let mut acting = vec![false; n];
         for k in 0..n {
             let factor = scales[k] / root_rows;
-            jacobian.col_as_slice_mut(k).iter_mut().for_each(|v| *v *= factor);
-            acting[k] = acts(self, k) && jacobian.col_as_slice(k).iter().any(|v| *v != 0.0);
+            jacobian.col_mut(k).iter_mut().for_each(|v| *v *= factor);
+            acting[k] = acts(self, k) && jacobian.col(k).iter().any(|v| *v != 0.0);
         }
         let (singular_values, v) = right_singular(&jacobian)?;
         let tolerance = rank_tolerance(rows, n, singular_values[0]);
@@ -104,7 +104,7 @@ impl Problem {
 }
 
 /// Singular values, as many as columns, and right singular vectors.
-pub(super) fn right_singular(matrix: &Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), LoadFrictionError> {
+pub(super) fn right_singular(matrix: &Mat) -> Result<(Vec<f64>, Mat), LoadFrictionError> {
     let n = matrix.ncols();
     // Rows of zeros change nothing and make the decomposition complete.
     let tall = match matrix.nrows() {
@@ -112,9 +112,9 @@ pub(super) fn right_singular(matrix: &Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), 
         rows => Mat::from_fn(n, n, |i, j| if i < rows { matrix[(i, j)] } else { 0.0 }),
     };
     let qr = tall.qr();
-    let triangle = qr.thin_R().to_owned();
-    let svd = triangle.svd().map_err(|_| LoadFrictionError::Decomposition { what: "the scaled rows" })?;
-    Ok(((0..n).map(|i| svd.S()[i]).collect(), svd.V().to_owned()))
+    let triangle = qr.r().to_mat();
+    let svd = triangle.svd().ok_or(LoadFrictionError::Decomposition { what: "the scaled rows" })?;
+    Ok((svd.values, svd.v))
 }
 
 impl Identifiability {
@@ -124,9 +124,7 @@ impl Identifiability {
     /// A wrong number of factors.
     pub fn combination(&self, factors: &[f64]) -> Result<CombinationValue, LoadFrictionError> {
         same_size("factors of a combination", self.theta.len(), factors.len())?;
-        let along = |m: &Mat<f64>, i: usize| -> f64 {
-            factors.iter().zip(m.col_as_slice(i)).map(|(f, v)| f * v).sum()
-        };
+        let along = |m: &Mat, i: usize| -> f64 { factors.iter().zip(m.col(i)).map(|(f, v)| f * v).sum() };
         let size = factors.iter().zip(&self.scales).map(|(f, s)| (f * s).powi(2)).sum::<f64>().sqrt();
         let hidden = (0..self.null_directions.ncols()).map(|i| along(&self.null_directions, i).powi(2));
         let determined = size > 0.0 && hidden.sum::<f64>().sqrt() < DETERMINED * size;
@@ -140,7 +138,7 @@ impl Identifiability {
     ///
     /// # Errors
     /// A wrong number of columns.
-    pub fn combinations(&self, rows: &Mat<f64>) -> Result<Vec<CombinationValue>, LoadFrictionError> {
+    pub fn combinations(&self, rows: &Mat) -> Result<Vec<CombinationValue>, LoadFrictionError> {
         let n = self.theta.len();
         if rows.ncols() != n {
             same_size("columns of the combinations", n - 4, rows.ncols())?;
@@ -166,7 +164,7 @@ impl Identifiability {
     }
 
     /// Null space in scaled coordinates, orthonormal: row `k` belongs to parameter `k`.
-    pub(super) fn scaled_null_space(&self) -> Mat<f64> {
+    pub(super) fn scaled_null_space(&self) -> Mat {
         let null = &self.null_directions;
         Mat::from_fn(null.nrows(), null.ncols(), |k, i| null[(k, i)] / self.scales[k])
     }

@@ -90,7 +90,7 @@ impl Problem {
             finite("effort", drive, effort.iter().copied())?;
             let sign: Vec<f64> = rows.speed.iter().map(|v| direction(*v, rest)).collect();
             let moving: Vec<bool> = sign.iter().map(|s| *s != 0.0).collect();
-            let flat = |m: &Mat<f64>| m.col_iter().flat_map(|c| c.iter().copied()).collect::<Vec<f64>>();
+            let flat = |m: &Mat| m.col_iter().flat_map(|c| c.iter().copied()).collect::<Vec<f64>>();
             let mut used = UsedRows {
                 samples: (0..record.samples()).collect(),
                 regressor: flat(&rows.regressor),
@@ -219,7 +219,7 @@ impl Problem {
     ///
     /// # Errors
     /// Fails as [`Problem::residuals`] does.
-    pub fn jacobian(&self, theta: &[f64]) -> Result<Mat<f64>, LoadFrictionError> {
+    pub fn jacobian(&self, theta: &[f64]) -> Result<Mat, LoadFrictionError> {
         check_theta(self.settings.model, self.inertial(), theta)?;
         let mut out = Mat::zeros(self.rows(), self.parameters());
         let mut first = 0;

@@ -7,10 +7,10 @@ use dynid_linalg::Mat;
 #[derive(Debug, Clone, PartialEq)]
 pub struct DriveRows {
     /// `W`, samples × p: `W φ` is the effort without friction.
-    pub regressor: Mat<f64>,
+    pub regressor: Mat,
     /// `N_k`, each samples × p: `N_k φ` is a component of the reaction that presses on the drive; its size counts,
     /// whatever its sign. None for a drive without such a reaction.
-    pub reactions: Vec<Mat<f64>>,
+    pub reactions: Vec<Mat>,
     /// `w`, p: `w · φ` is a normal force that does not change, such as a weight; empty for none. Physical parameters give
     /// `w · φ >= 0`; its sign is not touched.
     pub weight: Vec<f64>,
@@ -86,10 +86,10 @@ pub(super) fn finite(
 }
 
 /// `matrix · x`.
-pub(super) fn product(matrix: &Mat<f64>, x: &[f64]) -> Vec<f64> {
+pub(super) fn product(matrix: &Mat, x: &[f64]) -> Vec<f64> {
     let mut out = vec![0.0; matrix.nrows()];
     for (k, factor) in x.iter().enumerate() {
-        for (to, m) in out.iter_mut().zip(matrix.col_as_slice(k)) {
+        for (to, m) in out.iter_mut().zip(matrix.col(k)) {
             *to += factor * m;
         }
     }

@@ -61,7 +61,7 @@ pub fn verdicts(
         .collect()
 }
 
-fn in_combination(found: &Identifiability, sums: &Mat<f64>, k: usize) -> Result<Verdict, LoadFrictionError> {
+fn in_combination(found: &Identifiability, sums: &Mat, k: usize) -> Result<Verdict, LoadFrictionError> {
     let n = found.scales.len();
     let weight = |i: usize, j: usize| (sums[(i, j)] * found.scales[j]).abs();
     let share = |i: usize| weight(i, k) / (0..n).map(|j| weight(i, j)).sum::<f64>();
@@ -75,7 +75,7 @@ fn in_combination(found: &Identifiability, sums: &Mat<f64>, k: usize) -> Result<
 
 /// A basis of the sums that no null direction changes, each with few terms: `θ_j + Σ_d K_jd θ_d` for parameters `j` and
 /// those `d` that carry the null directions (as many as these). One row per sum, its own parameter with the factor 1.
-fn determined_sums(found: &Identifiability) -> Mat<f64> {
+fn determined_sums(found: &Identifiability) -> Mat {
     let null = found.scaled_null_space();
     let (n, free) = (null.nrows(), null.ncols());
     let carriers = carriers(&null);
@@ -84,10 +84,7 @@ fn determined_sums(found: &Identifiability) -> Mat<f64> {
     }
     let block = Mat::from_fn(free, free, |i, j| null[(carriers[i], j)]);
     // Null vectors with the unit matrix at their carriers: Z Z_c⁻¹.
-    let inverse = {
-        use faer::linalg::solvers::DenseSolveCore;
-        block.partial_piv_lu().inverse()
-    };
+    let inverse = block.lu().inverse();
     let echelon = &null * &inverse;
     let others: Vec<usize> = (0..n).filter(|k| !carriers.contains(k) && found.acts[*k]).collect();
     let mut sums = Mat::zeros(others.len(), n);
@@ -104,7 +101,7 @@ fn determined_sums(found: &Identifiability) -> Mat<f64> {
 }
 
 /// Rows of an orthonormal null space that are independent, the longest remainder first.
-fn carriers(null: &Mat<f64>) -> Vec<usize> {
+fn carriers(null: &Mat) -> Vec<usize> {
     let (n, free) = (null.nrows(), null.ncols());
     let mut rest: Vec<Vec<f64>> = (0..n).map(|k| (0..free).map(|i| null[(k, i)]).collect()).collect();
     let length = |row: &[f64]| row.iter().map(|v| v * v).sum::<f64>().sqrt();

@@ -1,7 +1,6 @@
 //! Straight lines of coefficients over temperature.
 
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
+use dynid_linalg::Mat;
 
 use dynid_estimate::distribution::t_quantile;
 
@@ -51,7 +50,7 @@ pub(super) fn line(
     symbol: &'static str,
     temperatures: &[f64],
     values: &[f64],
-    errors: &Mat<f64>,
+    errors: &Mat,
     (reference, confidence, freedom): (f64, f64, usize),
 ) -> Option<ThermalLine> {
     let n = values.len();
@@ -64,7 +63,7 @@ pub(super) fn line(
         return None;
     }
     let unit = Mat::from_fn(n, n, |i, j| errors[(i, j)] / (s[i] * s[j]));
-    let factor = unit.llt(Side::Lower).ok()?;
+    let factor = unit.cholesky()?;
     let columns = Mat::from_fn(n, 3, |i, j| [1.0, temperatures[i] - reference, values[i]][j] / s[i]);
     let solved = factor.solve(&columns);
     let dot = |a: usize, b: usize| (0..n).map(|i| columns[(i, a)] * solved[(i, b)]).sum::<f64>();

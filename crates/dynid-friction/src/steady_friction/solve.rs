@@ -1,6 +1,6 @@
 //! One fit of a law to points in one or several parts.
 
-use faer::Mat;
+use dynid_linalg::Mat;
 
 use super::SteadySettings;
 use super::form::LawForm;
@@ -65,12 +65,12 @@ pub(super) struct Solved {
     places: Vec<Vec<usize>>,
     largest_friction: f64,
     /// Covariance of all coefficients; NaN where the points do not tell.
-    covariance: Mat<f64>,
+    covariance: Mat,
 }
 
 impl Solved {
     /// Covariance of one coefficient over the parts; `None` if one of them is not told.
-    pub(super) fn covariance_of(&self, symbol: &str) -> Option<Mat<f64>> {
+    pub(super) fn covariance_of(&self, symbol: &str) -> Option<Mat> {
         let places: Vec<usize> = self
             .laws
             .iter()
@@ -174,7 +174,7 @@ fn solved(
     parts: &[Rows],
     form: &LawForm,
     settings: &SteadySettings,
-    (found, mut covariance): (&SeparableEstimate, Mat<f64>),
+    (found, mut covariance): (&SeparableEstimate, Mat),
     places: &[(Vec<usize>, Vec<usize>)],
     (linear_count, range): (usize, (f64, f64)),
 ) -> Solved {
@@ -185,7 +185,7 @@ fn solved(
     // that decide need not.
     let freedom = rows.saturating_sub(coefficients) as f64;
     if !settings.series && chi_squared > 0.0 && chi_squared < freedom {
-        covariance *= faer::Scale(freedom / chi_squared);
+        covariance *= freedom / chi_squared;
     }
     let std = |at: usize| Some(covariance[(at, at)].sqrt()).filter(|s| s.is_finite());
     let symbols: Vec<&'static str> = form.linear().into_iter().chain(form.shape()).collect();
@@ -226,7 +226,7 @@ fn solved(
 }
 
 /// Covariance of linear and shape parameters for independent rows, NaN where there is none.
-fn covariance(found: &SeparableEstimate) -> Mat<f64> {
+fn covariance(found: &SeparableEstimate) -> Mat {
     match (&found.linearised, found.standard_deviations()) {
         (Some(fit), Some(deviations)) => placed(found, fit, &fit.model_covariance(), deviations),
         _ => nothing(found),
@@ -234,7 +234,7 @@ fn covariance(found: &SeparableEstimate) -> Mat<f64> {
 }
 
 /// Covariance from the delete-a-block jackknife.
-fn jackknifed(found: &SeparableEstimate) -> Mat<f64> {
+fn jackknifed(found: &SeparableEstimate) -> Mat {
     let jackknife = found.linearised.as_ref().and_then(LinearEstimate::jackknife);
     match (&found.linearised, jackknife, found.jackknife_deviations()) {
         (Some(fit), Some(jackknife), Some(deviations)) => {
@@ -244,18 +244,13 @@ fn jackknifed(found: &SeparableEstimate) -> Mat<f64> {
     }
 }
 
-fn nothing(found: &SeparableEstimate) -> Mat<f64> {
+fn nothing(found: &SeparableEstimate) -> Mat {
     let n = found.linear.len() + found.shape.len();
     Mat::from_fn(n, n, |_, _| f64::NAN)
 }
 
 /// A covariance of kept columns, scaled to standard deviations, in the places of all parameters.
-fn placed(
-    found: &SeparableEstimate,
-    fit: &LinearEstimate,
-    unit: &Mat<f64>,
-    deviations: Deviations,
-) -> Mat<f64> {
+fn placed(found: &SeparableEstimate, fit: &LinearEstimate, unit: &Mat, deviations: Deviations) -> Mat {
     let linear = found.linear.len();
     let mut all = nothing(found);
     let std: Vec<Option<f64>> = deviations.linear.into_iter().chain(deviations.shape).collect();

@@ -25,7 +25,7 @@ pub struct Structure {
     /// What is known about the parameters without logs.
     pub prior: Prior,
     /// Base parameters from standard ones, `K` in `β = K x`.
-    pub regrouping: Mat<f64>,
+    pub regrouping: Mat,
     /// What any motion of the robot can show of the standard parameters.
     pub space: VisibleSpace,
     /// Bounds that the consistent estimate must meet.

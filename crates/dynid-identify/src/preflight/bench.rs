@@ -41,7 +41,7 @@ pub struct Bench {
     pub(super) model: RobotModel,
     pub(super) shape: Vec<f64>,
     pub(super) base: BaseParameters,
-    regrouping: dynid_linalg::Mat<f64>,
+    regrouping: dynid_linalg::Mat,
     pub(super) slides: Vec<bool>,
     stated: Vec<Option<f64>>,
     pub(super) gravity: [f64; 3],

@@ -1,6 +1,6 @@
 //! From a tree and closures to a checked closed mechanism.
 
-use faer::Mat;
+use dynid_linalg::Mat;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -237,7 +237,7 @@ impl ClosedMechanism {
         let mut dependent: Vec<usize> = Vec::new();
         for group in [others.as_slice(), candidates] {
             let scaled = self.scaled(&jacobian, group);
-            let column = |j: usize| -> Vec<f64> { scaled.col(j).iter().copied().collect() };
+            let column = |j: usize| -> Vec<f64> { scaled.col(j).to_vec() };
             let mut left: Vec<(usize, Vec<f64>)> =
                 group.iter().enumerate().map(|(j, r)| (*r, column(j))).collect();
             while dependent.len() < self.tree.rates - mobility && !left.is_empty() {
@@ -374,12 +374,12 @@ fn rank_of(values: &[f64]) -> usize {
 }
 
 /// `A⁺ b`, without singular values below a share of the largest.
-fn least_norm(matrix: &Mat<f64>, b: &[f64], cut: f64) -> Vec<f64> {
+fn least_norm(matrix: &Mat, b: &[f64], cut: f64) -> Vec<f64> {
     let mut x = vec![0.0; matrix.ncols()];
-    let Ok(svd) = matrix.svd() else { return vec![f64::NAN; matrix.ncols()] };
-    let (u, s, v) = (svd.U(), svd.S().column_vector(), svd.V());
+    let Some(svd) = matrix.svd() else { return vec![f64::NAN; matrix.ncols()] };
+    let (u, s, v) = (svd.u, svd.values, svd.v);
     let largest = s.iter().fold(0.0_f64, |m, x| m.max(*x));
-    for k in 0..s.nrows() {
+    for k in 0..s.len() {
         if s[k] > cut * largest {
             let along = b.iter().enumerate().map(|(i, b)| u[(i, k)] * b).sum::<f64>() / s[k];
             x.iter_mut().enumerate().for_each(|(i, x)| *x += along * v[(i, k)]);

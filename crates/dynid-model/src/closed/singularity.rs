@@ -1,6 +1,6 @@
 //! How near a pose is to a singular one.
 
-use faer::Mat;
+use dynid_linalg::Mat;
 
 use super::error::NamedMotion;
 use super::mechanism::ClosedMechanism;
@@ -41,7 +41,7 @@ impl ClosedMechanism {
     }
 
     /// Columns of the Jacobian, in lengths.
-    pub(super) fn scaled(&self, jacobian: &[f64], rates: &[usize]) -> Mat<f64> {
+    pub(super) fn scaled(&self, jacobian: &[f64], rates: &[usize]) -> Mat {
         let n = self.tree.rates;
         Mat::from_fn(self.rows.len(), rates.len(), |i, j| {
             jacobian[i * n + rates[j]] * self.row_scale[i] / self.rate_scale[rates[j]]
@@ -51,11 +51,10 @@ impl ClosedMechanism {
 
 /// Singular values, descending, and the right singular vector of the smallest (of a null vector, if there are more
 /// columns than rows).
-pub(super) fn smallest(matrix: &Mat<f64>) -> (Vec<f64>, Vec<f64>) {
-    let Ok(svd) = matrix.svd() else {
+pub(super) fn smallest(matrix: &Mat) -> (Vec<f64>, Vec<f64>) {
+    let Some(svd) = matrix.svd() else {
         return (vec![f64::NAN; matrix.ncols().min(matrix.nrows())], vec![f64::NAN; matrix.ncols()]);
     };
-    let values = svd.S().column_vector().iter().copied().collect();
     let last = matrix.ncols().checked_sub(1);
-    (values, last.map_or_else(Vec::new, |k| svd.V().col(k).iter().copied().collect()))
+    (svd.values, last.map_or_else(Vec::new, |k| svd.v.col(k).to_vec()))
 }

@@ -1,13 +1,12 @@
 //! What is known of base parameters without logs.
 
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
+use dynid_linalg::Mat;
 
 /// What is known of base parameters without logs: a normal distribution.
 #[derive(Debug, Clone)]
 pub struct BasePrior {
     pub(crate) values: Vec<f64>,
-    pub(crate) precision: Mat<f64>,
+    pub(crate) precision: Mat,
 }
 
 impl BasePrior {
@@ -16,7 +15,7 @@ impl BasePrior {
     ///
     /// # Panics
     /// If a length disagrees with `regrouping`.
-    pub fn new(regrouping: &Mat<f64>, values: &[f64], std: &[f64]) -> Option<BasePrior> {
+    pub fn new(regrouping: &Mat, values: &[f64], std: &[f64]) -> Option<BasePrior> {
         let (base, parameters) = (regrouping.nrows(), regrouping.ncols());
         assert!(
             values.len() == parameters && std.len() == parameters,
@@ -24,13 +23,13 @@ impl BasePrior {
         );
         let row = |i: usize| regrouping.row(i);
         let covariance = Mat::from_fn(base, base, |i, j| {
-            row(i).iter().zip(row(j).iter()).zip(std).map(|((a, b), s)| a * b * s * s).sum::<f64>()
+            row(i).zip(row(j)).zip(std).map(|((a, b), s)| a * b * s * s).sum::<f64>()
         });
         let unit: Vec<f64> = (0..base).map(|i| 1.0 / covariance[(i, i)].sqrt()).collect();
         let scaled = Mat::from_fn(base, base, |i, j| unit[i] * unit[j] * covariance[(i, j)]);
-        let inverse = scaled.llt(Side::Lower).ok()?.solve(&Mat::<f64>::identity(base, base));
+        let inverse = scaled.cholesky()?.solve(&Mat::identity(base, base));
         Some(BasePrior {
-            values: (0..base).map(|i| row(i).iter().zip(values).map(|(k, x)| k * x).sum()).collect(),
+            values: (0..base).map(|i| row(i).zip(values).map(|(k, x)| k * x).sum()).collect(),
             precision: Mat::from_fn(base, base, |i, j| unit[i] * unit[j] * inverse[(i, j)]),
         })
     }

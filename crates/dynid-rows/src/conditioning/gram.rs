@@ -5,8 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use faer::linalg::solvers::{Llt, Solve};
-use faer::{Mat, Side};
+use dynid_linalg::{Cholesky, Mat};
 
 use super::PreparedLog;
 use super::base_prior::BasePrior;
@@ -222,14 +221,14 @@ pub(crate) fn solve(groups: &[Group], unknowns: usize, passes: usize) -> (Vec<f6
 
 /// Normal equations with one weight per group.
 pub(crate) struct Normal {
-    pub(crate) matrix: Mat<f64>,
-    pub(crate) rhs: Mat<f64>,
+    pub(crate) matrix: Mat,
+    pub(crate) rhs: Mat,
 }
 
 impl Normal {
     pub(crate) fn new(groups: &[Group], unknowns: usize, variances: &[f64]) -> Self {
-        let mut matrix = Mat::<f64>::zeros(unknowns, unknowns);
-        let mut rhs = Mat::<f64>::zeros(unknowns, 1);
+        let mut matrix = Mat::zeros(unknowns, unknowns);
+        let mut rhs = Mat::zeros(unknowns, 1);
         for (group, variance) in groups.iter().zip(variances) {
             let y = group.gram.size - 1;
             for (i, gi) in group.unknowns.iter().enumerate() {
@@ -244,8 +243,8 @@ impl Normal {
 
     /// Adds what is known of the first unknowns beforehand.
     pub(crate) fn add_prior(&mut self, prior: &BasePrior) {
-        for (i, row) in prior.precision.row_iter().enumerate() {
-            for (j, p) in row.iter().enumerate() {
+        for i in 0..prior.precision.nrows() {
+            for (j, p) in prior.precision.row(i).enumerate() {
                 self.matrix[(i, j)] += p;
                 self.rhs[(i, 0)] += p * prior.values[j];
             }
@@ -269,7 +268,7 @@ impl Normal {
     }
 
     /// Factor of the first `unknowns` columns in the unit lengths of `scale`.
-    pub(crate) fn unit(&self, unknowns: usize, scale: &[f64]) -> Option<Llt<f64>> {
+    pub(crate) fn unit(&self, unknowns: usize, scale: &[f64]) -> Option<Cholesky> {
         // A trace of ridge in unit columns: choices must not fail where a log leaves a direction unexcited.
         let unit = Mat::from_fn(unknowns, unknowns, |i, j| {
             scale[i] * scale[j] * self.matrix[(i, j)]
@@ -281,7 +280,7 @@ impl Normal {
                     1.0
                 }
         });
-        unit.llt(Side::Lower).ok()
+        unit.cholesky()
     }
 }
 

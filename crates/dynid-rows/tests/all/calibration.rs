@@ -32,7 +32,7 @@ fn one(arm: &Arm, seed: u64, tau: f64) -> [f64; 5] {
     let found = estimate(&groups, None, p, &LinearMethod::Wls, &LinearSettings::default()).unwrap();
     assert!(found.solution.dropped.is_empty() && found.converged);
     let by_blocks = t_quantile(0.975, found.blocks.len() as f64 - 1.0).unwrap();
-    let inside = |v: &Mat<f64>, quantile: f64| {
+    let inside = |v: &Mat, quantile: f64| {
         let held = (0..p).filter(|&i| (found.x[i] - arm.truth[i]).abs() <= quantile * v[(i, i)].sqrt());
         held.count() as f64 / p as f64
     };

@@ -1,6 +1,6 @@
 //! One descent of the strategy, from a mean to where it gets stuck.
 
-use faer::{Mat, Side};
+use dynid_linalg::Mat;
 
 use crate::random::Random;
 use dynid_words::Transfer;
@@ -182,11 +182,11 @@ impl Descent {
         let n = self.mean.len();
         self.since_axes = 0;
         let covariance = Mat::from_fn(n, n, |i, j| self.covariance[i.max(j) + n * i.min(j)]);
-        let Ok(eigen) = covariance.self_adjoint_eigen(Side::Lower) else {
+        let Some(eigen) = covariance.symmetric_eigen() else {
             self.stuck = true;
             return;
         };
-        let values = || (0..n).map(|i| eigen.S().column_vector()[i]);
+        let values = || eigen.values.iter().copied();
         let (least, largest) = values().fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
         // Written so that values that are no numbers end the descent too.
         if !(least > 0.0 && largest < LARGEST_CONDITION * least) {
@@ -195,7 +195,7 @@ impl Descent {
         }
         self.lengths = values().map(f64::sqrt).collect();
         for (j, axis) in self.axes.chunks_exact_mut(n).enumerate() {
-            axis.iter_mut().enumerate().for_each(|(i, b)| *b = eigen.U()[(i, j)]);
+            axis.iter_mut().enumerate().for_each(|(i, b)| *b = eigen.vectors[(i, j)]);
         }
     }
 

@@ -102,7 +102,7 @@ fn nearest(arm: &Indy7, target: &[f64], form: Form) -> Result<Vec<f64>, StudyErr
     // The problem has no noise level; with one of 1e-4 the default weights mean what they should.
     let weight = 1e4;
     let columns = 11 * JOINTS;
-    let mut r = Mat::<f64>::zeros(target.len(), columns);
+    let mut r = Mat::zeros(target.len(), columns);
     for column in 0..columns {
         let mut unit = vec![0.0; columns];
         unit[column] = weight;

@@ -207,7 +207,7 @@ pub(super) fn feasible(
     let table = &model.parameters().linear;
     let (linear, rows) = (table.len(), weighted.columns());
     let columns = linear + rows - base.len();
-    let mut regrouping = Mat::<f64>::zeros(rows, columns);
+    let mut regrouping = Mat::zeros(rows, columns);
     for column in 0..linear {
         let mut unit = vec![0.0; linear];
         unit[column] = 1.0;

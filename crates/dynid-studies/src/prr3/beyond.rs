@@ -160,7 +160,7 @@ fn with_shares(
 fn with_free_shares(machine: &Machine, settings: &Settings, record: &Record) -> Result<Record, StudyError> {
     let place = settings.place("m_p")?;
     let g = machine.gravity_size();
-    let widened = |m: &Mat<f64>| {
+    let widened = |m: &Mat| {
         let columns = m.ncols();
         Mat::from_fn(m.nrows(), columns + 2, |i, k| if k < columns { m[(i, k)] } else { 0.0 })
     };

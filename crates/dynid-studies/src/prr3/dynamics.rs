@@ -7,7 +7,6 @@ use dynid::model::{
     Description, Dynamics, JointDescription, JointKind, Limits, LinkDescription, MotionBlock, Placement,
     State, Vec3,
 };
-use faer::linalg::solvers::Solve;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
@@ -258,8 +257,8 @@ pub(super) fn ways_row(machine: &Machine, settings: &Settings, run: &RunSettings
         let drive =
             |rate: usize| machine.driven().iter().position(|r| *r == rate).map_or(0.0, |k| found.drives[k]);
         let right = Mat::from_fn(n + m, 1, |i, _| if i < n { drive(i) - rest[i] } else { -drift[i - n] });
-        let solved = system.partial_piv_lu().solve(&right);
-        let solution = solved.col_as_slice(0);
+        let solved = system.lu().solve(&right);
+        let solution = solved.col(0);
         off.block = worst(off.block, apart(&ddq, &solution[..n]));
         off.block = worst(off.block, apart(&found.multipliers, &solution[n..]));
 

@@ -20,7 +20,7 @@ pub(super) struct Rank {
     /// Of all parameters, at the true ones.
     pub(super) whole: Identifiability,
     /// Base parameters as sums of Table 1's.
-    pub(super) base: Mat<f64>,
+    pub(super) base: Mat,
     /// Free directions of all parameters with the mass of a slider, or of the platform, changed by one and the other held.
     pub(super) free: Vec<Vec<f64>>,
     /// Ranks of the columns of forces without friction.
@@ -33,7 +33,7 @@ pub(super) struct Rank {
 }
 
 /// `matrix` with rows over the inertial parameters.
-fn base_matrix(reference: &IdentifiabilityReference) -> Mat<f64> {
+fn base_matrix(reference: &IdentifiabilityReference) -> Mat {
     let rows = &reference.base_matrix;
     Mat::from_fn(rows.len(), rows.first().map_or(0, |r| r.len()), |i, k| rows[i][k])
 }
@@ -48,8 +48,8 @@ impl Rank {
         for direction in reference.null_directions() {
             for drive in record.drives() {
                 for (largest, matrix) in null.iter_mut().zip([&drive.regressor, &drive.reactions[0]]) {
-                    for row in matrix.row_iter() {
-                        let sum: f64 = row.iter().zip(&direction).map(|(w, d)| w * d).sum();
+                    for k in 0..matrix.nrows() {
+                        let sum: f64 = matrix.row(k).zip(&direction).map(|(w, d)| w * d).sum();
                         *largest = worst(*largest, sum.abs());
                     }
                 }
@@ -141,7 +141,7 @@ impl Rank {
 }
 
 /// The two columns of a null space, combined so that one pivot is 1 and the other 0.
-fn directions(null: &Mat<f64>, pivots: [usize; 2]) -> Result<Vec<Vec<f64>>, StudyError> {
+fn directions(null: &Mat, pivots: [usize; 2]) -> Result<Vec<Vec<f64>>, StudyError> {
     if null.ncols() != 2 {
         return Err(fault(format!("{} free directions, expected 2", null.ncols())));
     }

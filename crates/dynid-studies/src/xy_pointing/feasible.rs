@@ -47,7 +47,7 @@ fn nearest(
         scale: 1.0,
         nonnegative: true,
     });
-    let r: Mat<f64> = factor.r_matrix();
+    let r: Mat = factor.r_matrix();
     let problem = Problem {
         r,
         z: factor.z(),

@@ -37,7 +37,7 @@ pub(super) struct Structure {
     pub(super) model: Arc<RobotModel>,
     pub(super) shape: Vec<f64>,
     pub(super) base: BaseParameters,
-    pub(super) regrouping: Mat<f64>,
+    pub(super) regrouping: Mat,
     pub(super) bounds: Vec<Bound>,
     pub(super) stated: Vec<Option<f64>>,
     pub(super) warnings: Vec<String>,

@@ -123,7 +123,7 @@ fn reaches(structure: &Structure, prior: &Prior) -> Vec<f64> {
         .collect()
 }
 
-fn acts(regrouping: &Mat<f64>, column: usize, scale: &[f64]) -> bool {
+fn acts(regrouping: &Mat, column: usize, scale: &[f64]) -> bool {
     let length = |c: usize| -> f64 {
         (0..scale.len()).map(|row| (regrouping[(row, c)] / scale[row]).powi(2)).sum::<f64>().sqrt()
     };

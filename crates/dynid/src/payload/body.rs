@@ -31,7 +31,7 @@ const ENTRIES: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2
 impl Body {
     /// From parameters about the joint frame and their `10 × 10` covariance, to first order. Entries are not finite for a
     /// mass of zero.
-    pub(super) fn new(inertia: &Inertia, covariance: &Mat<f64>) -> Self {
+    pub(super) fn new(inertia: &Inertia, covariance: &Mat) -> Self {
         let derivatives = jacobian(inertia);
         let std = std::array::from_fn(|k| {
             let d = &derivatives[k];

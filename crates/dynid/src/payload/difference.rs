@@ -27,7 +27,7 @@ pub struct Difference {
 /// `carries`: per training log, whether it carries the payload; `None`: another one, which counts on neither side.
 pub(super) fn difference(
     id: &Identification,
-    regrouping: &Mat<f64>,
+    regrouping: &Mat,
     body: usize,
     carries: &[Option<bool>],
 ) -> Option<Difference> {

@@ -181,7 +181,7 @@ fn degree(k: usize) -> i32 {
 }
 
 /// Covariance and standard deviations of ten parameters, data and prior put together.
-fn covariance(id: &Identification, regrouping: &Mat<f64>, first: usize) -> (Mat<f64>, Vec<f64>) {
+fn covariance(id: &Identification, regrouping: &Mat, first: usize) -> (Mat, Vec<f64>) {
     let fit = id.fit();
     let after = posterior(
         &excited_regrouping(&fit.factor, &fit.solution.kept, regrouping),

@@ -1,8 +1,7 @@
 //! The linear system behind a direction: normal equations, or QR of the stacked rows where rounding forbids these.
 
+use dynid_linalg::{Cholesky, Mat, Qr};
 use dynid_model::symmetric::{Square, cholesky, congruence, inner, lower_inverse, product, transpose};
-use faer::linalg::solvers::{Llt, Qr, Solve, SolveLstsq};
-use faer::{Mat, Side};
 
 use super::super::cone::{LINK, Lmi};
 use super::super::program::Program;
@@ -17,9 +16,9 @@ pub(super) struct Target<const N: usize> {
 /// Factorised `2 AᵀA + 2 diag w + BᵀB + γ B_LᵀB_L`, `B` the scaled cones, `B_L` the entropic distance.
 pub(super) enum Newton {
     /// Normal equations with the matrix, for refinement, and `∇F`.
-    Normal(Box<Llt<f64>>, Mat<f64>, Vec<f64>),
+    Normal(Box<Cholesky>, Mat, Vec<f64>),
     /// QR of the stack `[√2 A; √(2w); B; √γ B_L]`.
-    Stack(Box<Qr<f64>>),
+    Stack(Box<Qr>),
 }
 
 /// Matrix inequalities of the entropic distance at a point: `L⁻¹ E_j L⁻ᵀ` per link, with `L`.
@@ -37,7 +36,7 @@ fn entropic<const N: usize>(program: &Program<N>, xi: &[f64]) -> Option<Entropic
     program.cones.iter().map(of).collect()
 }
 
-fn add_gram<const N: usize>(h: &mut Mat<f64>, first: usize, factor: f64, basis: &[Square<N>; LINK]) {
+fn add_gram<const N: usize>(h: &mut Mat, first: usize, factor: f64, basis: &[Square<N>; LINK]) {
     for j in 0..LINK {
         for k in 0..=j {
             let entry = factor * inner(&basis[j], &basis[k]);
@@ -53,7 +52,7 @@ impl Newton {
     /// `None` if the matrix is not positive definite to rounding.
     pub(super) fn new<const N: usize>(
         program: &Program<N>,
-        quadratic: &Mat<f64>,
+        quadratic: &Mat,
         xi: &[f64],
         scalings: &Scalings<N>,
         orthogonal: bool,
@@ -76,7 +75,7 @@ impl Newton {
                 }
             }
         }
-        let factor = h.llt(Side::Lower).ok()?;
+        let factor = h.cholesky()?;
         Some(Newton::Normal(Box::new(factor), h, program.gradient(xi)?))
     }
 
@@ -96,7 +95,7 @@ impl Newton {
                 change += factor.solve(&left);
                 change
             }
-            Newton::Stack(factor) => factor.solve_lstsq(&stack_side(program, xi, target)?),
+            Newton::Stack(factor) => factor.solve_least_squares(&stack_side(program, xi, target)?),
         };
         let change: Vec<f64> = (0..program.unknowns()).map(|k| change[(k, 0)]).collect();
         change.iter().all(|x| x.is_finite()).then_some(change)
@@ -109,7 +108,7 @@ fn normal_side<const N: usize>(
     gradient: &[f64],
     scalings: &Scalings<N>,
     target: &Target<N>,
-) -> Mat<f64> {
+) -> Mat {
     let mut rhs = Mat::from_fn(program.unknowns(), 1, |k, _| -gradient[k]);
     for (i, (cone, scaling)) in program.cones.iter().zip(&scalings.links).enumerate() {
         for (j, basis) in scaling.basis.iter().enumerate() {
@@ -140,7 +139,7 @@ fn stack_rows<const N: usize>(program: &Program<N>) -> usize {
     program.a.nrows() + program.unknowns() + per_link * triangle(N) * program.cones.len() + program.rays.len()
 }
 
-fn stack<const N: usize>(program: &Program<N>, scalings: &Scalings<N>, entropic: &Entropic<N>) -> Mat<f64> {
+fn stack<const N: usize>(program: &Program<N>, scalings: &Scalings<N>, entropic: &Entropic<N>) -> Mat {
     let (m, n) = (program.a.nrows(), program.unknowns());
     let mut j = Mat::zeros(stack_rows(program), n);
     for k in 0..n {
@@ -166,7 +165,7 @@ fn stack<const N: usize>(program: &Program<N>, scalings: &Scalings<N>, entropic:
     j
 }
 
-fn stack_side<const N: usize>(program: &Program<N>, xi: &[f64], target: &Target<N>) -> Option<Mat<f64>> {
+fn stack_side<const N: usize>(program: &Program<N>, xi: &[f64], target: &Target<N>) -> Option<Mat> {
     let (m, n) = (program.a.nrows(), program.unknowns());
     let fit = Mat::from_fn(n, 1, |k, _| xi[k]);
     let fitted = &program.a * &fit;

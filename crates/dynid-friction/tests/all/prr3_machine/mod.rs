@@ -49,7 +49,7 @@ pub(crate) fn start() -> Vec<f64> {
 }
 
 /// Base parameters as rows.
-pub(crate) fn base_matrix() -> Mat<f64> {
+pub(crate) fn base_matrix() -> Mat {
     let [l1, l2, l3] = LEGS;
     let rows: [&[(usize, f64)]; 9] = [
         &[(0, 3.0), (1, 1.0), (2, 1.0), (3, 1.0), (4, 1.0)],

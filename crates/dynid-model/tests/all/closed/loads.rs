@@ -1,9 +1,9 @@
 //! Friction that follows reactions.
 
+use dynid_linalg::Mat;
 use dynid_model::closed::ClosedMechanism;
 use dynid_model::element::{JointElement, ReactionFriction, Stribeck};
 use dynid_model::*;
-use faer::Mat;
 
 use crate::golden::check_close;
 use crate::robots::robot;
@@ -69,9 +69,9 @@ fn columns(model: &ClosedModel, motion: &MotionBlock<'_>) -> Vec<Vec<f64>> {
 fn fit(columns: &[Vec<f64>], left: &[f64], size: &[f64]) -> Vec<f64> {
     let w = Mat::from_fn(left.len(), columns.len(), |i, j| columns[j][i] * size[j]);
     let svd = w.svd().unwrap();
-    let (u, s, v) = (svd.U(), svd.S().column_vector(), svd.V());
+    let (u, s, v) = (svd.u, svd.values, svd.v);
     let mut change = vec![0.0; columns.len()];
-    for k in (0..s.nrows()).filter(|k| s[*k] > 1e-9 * s[0]) {
+    for k in (0..s.len()).filter(|k| s[*k] > 1e-9 * s[0]) {
         let along = left.iter().enumerate().map(|(i, l)| u[(i, k)] * l).sum::<f64>() / s[k];
         change.iter_mut().enumerate().for_each(|(j, c)| *c += along * v[(j, k)] * size[j]);
     }

@@ -106,9 +106,9 @@ pub(crate) fn rank(columns: &[Vec<f64>]) -> usize {
     singular.iter().filter(|s| **s > 1e-9 * singular[0]).count()
 }
 
-fn scaled(columns: &[Vec<f64>]) -> faer::Mat<f64> {
+fn scaled(columns: &[Vec<f64>]) -> dynid_linalg::Mat {
     let norms: Vec<f64> = columns.iter().map(|c| c.iter().map(|x| x * x).sum::<f64>().sqrt()).collect();
-    faer::Mat::from_fn(columns[0].len(), columns.len(), |i, j| {
+    dynid_linalg::Mat::from_fn(columns[0].len(), columns.len(), |i, j| {
         if norms[j] > 0.0 { columns[j][i] / norms[j] } else { 0.0 }
     })
 }

@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use faer::Mat;
-use faer::linalg::solvers::Solve;
+use dynid_linalg::Mat;
 use rayon::prelude::*;
 
 use super::losses::Losses;

@@ -1,0 +1,41 @@
+//! Square matrices.
+
+use crate::{AsView, Mat};
+use faer::linalg::solvers::{DenseSolveCore, FullPivLu, PartialPivLu, Solve};
+
+/// `A = L U` of a square matrix, with exchanges. A singular matrix gives solutions that are not finite.
+#[derive(Debug, Clone)]
+pub struct Lu(Kind);
+
+#[derive(Debug, Clone)]
+enum Kind {
+    Rows(PartialPivLu<f64>),
+    Full(FullPivLu<f64>),
+}
+
+impl Lu {
+    pub(crate) fn new(a: &Mat) -> Self {
+        Lu(Kind::Rows(a.0.partial_piv_lu()))
+    }
+
+    pub(crate) fn full(a: &Mat) -> Self {
+        Lu(Kind::Full(a.0.full_piv_lu()))
+    }
+
+    /// `A⁻¹ B`.
+    pub fn solve(&self, b: &impl AsView) -> Mat {
+        let b = b.view().0;
+        Mat(match &self.0 {
+            Kind::Rows(lu) => lu.solve(b),
+            Kind::Full(lu) => lu.solve(b),
+        })
+    }
+
+    /// `A⁻¹`, where every entry of it is wanted.
+    pub fn inverse(&self) -> Mat {
+        Mat(match &self.0 {
+            Kind::Rows(lu) => lu.inverse(),
+            Kind::Full(lu) => lu.inverse(),
+        })
+    }
+}
