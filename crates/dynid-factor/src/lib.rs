@@ -9,6 +9,7 @@
 //! | which columns are excited, which depend on others | [`rank`] |
 //! | rows of all groups, in any number of passes | [`rows`] |
 //! | the factors of one output of one log at one kernel scale | [`groups`] |
+//! | the same as bytes | [`wire`] |
 //!
 //! Notation: `W` is the regressor (rows × `p` columns), `y` the effort, `x` the parameters, `(R, z, ρ, N)` a factor.
 
@@ -16,5 +17,6 @@ pub mod factor;
 pub mod groups;
 pub mod rank;
 pub mod rows;
+pub mod wire;
 
 pub use factor::{Factor, FactorBuilder, FactorError};

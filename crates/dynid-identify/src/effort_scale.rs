@@ -5,7 +5,8 @@
 
 use std::collections::BTreeMap;
 
-use dynid_model::{EffortModel, MotionBlock, RegressorBlock, RobotModel};
+use dynid_factor::groups::ReducedGroup;
+use dynid_model::{BaseParameters, EffortModel, MotionBlock, RegressorBlock, RobotModel};
 use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, predict};
 use serde::{Deserialize, Serialize};
 
@@ -192,6 +193,33 @@ pub(crate) fn by_robot_file(
     }
     let ratio = rms(&identified) / rms(&expected);
     Ok((ratio.is_finite() && ratio > 0.0).then_some(ratio))
+}
+
+/// The same from factors of rows, where samples are gone: of what bodies do in all rows of the widest kernel.
+pub(crate) fn by_robot_file_in_rows(
+    base: &BaseParameters,
+    values: &[f64],
+    prior: &Prior,
+    groups: &[ReducedGroup],
+) -> Option<f64> {
+    if !states_bodies(prior) {
+        return None;
+    }
+    let bodies = 10 * prior.bodies.len();
+    let alone = |values: &[f64]| -> Vec<f64> {
+        let of_bodies = |(c, x): (usize, &f64)| if c < bodies { *x } else { 0.0 };
+        base.values(&values.iter().enumerate().map(of_bodies).collect::<Vec<_>>())
+    };
+    let (found, stated) = (alone(values), alone(&prior.values));
+    let squares = |x: &[f64]| -> f64 {
+        let widest = groups.iter().filter(|g| g.scale == 0);
+        widest
+            .map(|g| g.merged(x.len()))
+            .map(|f| f.r_matrix().times(x).iter().map(|e| e * e).sum::<f64>())
+            .sum()
+    };
+    let ratio = (squares(&found) / squares(&stated)).sqrt();
+    (ratio.is_finite() && ratio > 0.0).then_some(ratio)
 }
 
 /// Efforts that parameters ask for at rest in postures of a log, output by output.

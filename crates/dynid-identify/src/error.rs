@@ -8,6 +8,9 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
+    /// Logs that cannot be reduced, factors that cannot be merged or solved.
+    #[error(transparent)]
+    Reduction(#[from] crate::reduction::ReductionError),
     /// A robot file cannot be read.
     #[error(transparent)]
     RobotFile(#[from] dynid_io::RobotFileError),
@@ -389,6 +392,7 @@ impl Error {
         use dynid_model::element::is_temperature;
         use dynid_rows::conditioning::ConditioningError as C;
         match self {
+            Error::Reduction(e) => e.hint(),
             Error::RobotFile(e) => e.hint(),
             Error::LogFile(e) => e.hint(),
             Error::PreflightFault(found) => Some(format!(

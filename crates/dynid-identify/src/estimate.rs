@@ -332,6 +332,20 @@ pub struct FitValues {
     pub relative_error: Option<f64>,
 }
 
+impl FitValues {
+    /// Figures of so many joints of which nothing is known.
+    pub fn unknown(joints: usize) -> Self {
+        let none = || vec![None; joints];
+        FitValues {
+            rms: none(),
+            nrmse: none(),
+            r2: none(),
+            relative_error_per_joint: none(),
+            relative_error: None,
+        }
+    }
+}
+
 /// Agreement in motion and at rest apart, on equally filtered effort.
 ///
 /// A joint moves where `|v| ≥ max(4 σ_v, 3 % of its rms speed)`, `σ_v` the noise of its speed: below, the sign of the speed is chance.

@@ -1,8 +1,8 @@
 //! The linear fit of a run: method, weights, covariance.
 
 use dynid_estimate::covariance::{
-    BlockLength, BlockLengthSettings, MIN_BLOCKS, ResidualSignal, block_length, output_inflation,
-    variance_inflation,
+    BlockLength, BlockLengthSettings, BlockLengthStatus, MIN_BLOCKS, ResidualSignal, block_length,
+    output_inflation, variance_inflation,
 };
 use dynid_estimate::identifiability::VisibleSpace;
 use dynid_estimate::linear::{
@@ -122,18 +122,24 @@ pub fn fit(
     source: &dyn RowSource,
 ) -> Result<(LinearEstimate, Vec<ReducedGroup>), Error> {
     let groups = reduce_rows(source).map_err(|e| conditioning_fault(source, e))?;
-    let rows: usize = groups.iter().map(|g| g.rows()).sum();
-    if rows <= columns {
-        return Err(Error::TooShort {
-            file: settings.files.logs.first().map_or_else(String::new, |log| log.display().to_string()),
-            message: format!(
-                "{rows} usable rows for {} parameters, expected more rows than parameters",
-                columns
-            ),
-        });
-    }
+    let file = || settings.files.logs.first().map_or_else(String::new, |log| log.display().to_string());
+    check_rows(&groups, columns, file)?;
     let estimate = estimate(&groups, Some(source), columns, method, &linear_settings(settings))?;
     Ok((estimate, groups))
+}
+
+/// Refuses fewer rows than parameters. `file`: a log to name.
+pub(crate) fn check_rows(
+    groups: &[ReducedGroup],
+    columns: usize,
+    file: impl Fn() -> String,
+) -> Result<(), Error> {
+    let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
+    if rows > columns {
+        return Ok(());
+    }
+    let message = format!("{rows} usable rows for {columns} parameters, expected more rows than parameters");
+    Err(Error::TooShort { file: file(), message })
 }
 
 /// Settings of linear estimators that a run asks for.
@@ -166,6 +172,11 @@ pub fn residuals(source: &dyn RowSource, estimate: &LinearEstimate) -> Result<Ro
 }
 
 impl RowResiduals {
+    /// Of rows that are gone.
+    pub(crate) fn none() -> Self {
+        RowResiduals { groups: Vec::new() }
+    }
+
     /// Whether raw residuals of a training log are white below the kernel's cut-off, per output; only samples near a row
     /// count.
     pub(crate) fn whiteness(
@@ -218,21 +229,39 @@ pub fn with_precision(
     let block_s = duration / estimate.blocks.len().max(1) as f64;
     let most = (estimate.blocks.len() / MIN_BLOCKS).max(1);
     let factor = if fixed { 1 } else { ((wanted.seconds / block_s).ceil() as usize).clamp(1, most) };
-    let estimate = estimate.with_longer_blocks(factor);
-    let white = estimate.model_covariance();
-    let jackknife =
-        (estimate.blocks.len() >= MIN_BLOCKS).then(|| estimate.jackknife()).flatten().map(|j| j.covariance);
-    let inflation = jackknife.as_ref().and_then(|v| variance_inflation(v, &white)).unwrap_or(1.0);
-    let per_output = output_inflation(&estimate.reduced, &estimate.weights(), &estimate.x);
-    Fitted {
-        white,
-        jackknife,
-        inflation,
-        inflation_per_output: per_output,
-        block_length: wanted,
-        block_s: block_s * factor as f64,
-        merged_blocks: factor,
-        estimate,
+    Fitted::of(estimate.with_longer_blocks(factor), wanted, block_s * factor as f64, factor)
+}
+
+impl Fitted {
+    fn of(estimate: LinearEstimate, wanted: BlockLength, block_s: f64, merged_blocks: usize) -> Self {
+        let white = estimate.model_covariance();
+        let jackknife = (estimate.blocks.len() >= MIN_BLOCKS).then(|| estimate.jackknife()).flatten();
+        let jackknife = jackknife.map(|j| j.covariance);
+        let inflation = jackknife.as_ref().and_then(|v| variance_inflation(v, &white)).unwrap_or(1.0);
+        let per_output = output_inflation(&estimate.reduced, &estimate.weights(), &estimate.x);
+        Fitted {
+            white,
+            jackknife,
+            inflation,
+            inflation_per_output: per_output,
+            block_length: wanted,
+            block_s,
+            merged_blocks,
+            estimate,
+        }
+    }
+
+    /// Covariance from time blocks as they are, of logs of a total length; `wanted_s`: the length that residuals ask for.
+    pub(crate) fn with_blocks(estimate: LinearEstimate, wanted_s: f64, duration_s: f64) -> Self {
+        let blocks = estimate.blocks.len();
+        let wanted = BlockLength {
+            seconds: wanted_s,
+            blocks,
+            correlation_s: Vec::new(),
+            worst: None,
+            status: if blocks >= MIN_BLOCKS { BlockLengthStatus::Enough } else { BlockLengthStatus::Few },
+        };
+        Fitted::of(estimate, wanted, duration_s / blocks.max(1) as f64, 1)
     }
 }
 

@@ -21,6 +21,13 @@ pub(crate) struct FrictionPower {
     pub(crate) kept: Vec<String>,
 }
 
+impl FrictionPower {
+    /// What earlier logs asked of friction, whose rows stand among the bounds.
+    pub(crate) fn of_earlier(kept: Vec<String>) -> Self {
+        FrictionPower { bounds: Vec::new(), kept }
+    }
+}
+
 /// Name of the rows of a joint.
 pub(crate) fn bound_name(joint: &str) -> String {
     format!("power of the friction of {joint} ≥ 0")

@@ -41,6 +41,7 @@ pub mod passivity;
 pub mod pipeline;
 pub mod preflight;
 pub mod prior;
+pub mod reduction;
 mod result;
 pub mod robot;
 pub mod settings;

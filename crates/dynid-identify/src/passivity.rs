@@ -1,11 +1,10 @@
 //! Whether the identified friction takes energy out of the motion.
 
 use dynid_model::{EffortModel, FrictionPassivity, Passivity};
-use dynid_rows::conditioning::PreparedLog;
 
 use crate::caution::{self, Caution};
 use crate::estimate::PassivityRecord;
-use crate::pipeline::Identification;
+use crate::pipeline::{Identification, TrainedLog};
 
 /// [`PassivityRecord::passivity`] of a law that is passive on all of the range.
 pub const PASSIVE: &str = "passive";
@@ -14,25 +13,10 @@ pub(crate) const PASSIVE_ON: &str = "passive on";
 /// Of one that is passive nowhere.
 pub(crate) const NOT_PASSIVE: &str = "not passive";
 
-/// Positions are compared over this time, s: spikes and noise count little then.
-pub(crate) const SPEED_SPAN_S: f64 = 0.05;
-
-/// Least and greatest mean velocity of an output over [`SPEED_SPAN_S`] in logs that move it, with rest; `None` if none does.
-fn velocities(logs: &[PreparedLog], output: usize) -> Option<(f64, f64)> {
-    let mut range: Option<(f64, f64)> = None;
-    for log in logs.iter().filter(|log| log.moves[output]) {
-        let position = &log.position[output];
-        let span = ((SPEED_SPAN_S * log.rate_hz).ceil() as usize).max(1);
-        let mut sound = 0;
-        for (k, usable) in log.usable.iter().enumerate() {
-            sound = if *usable { sound + 1 } else { 0 };
-            if sound > span {
-                let v = (position[k] - position[k - span]) * log.rate_hz / span as f64;
-                let (low, high) = range.unwrap_or((0.0, 0.0));
-                range = Some((low.min(v), high.max(v)));
-            }
-        }
-    }
+/// Least and greatest velocity of an output over all training logs; `None` if none moves it.
+pub(crate) fn velocities(logs: &[TrainedLog], output: usize) -> Option<(f64, f64)> {
+    let all = logs.iter().filter_map(|log| log.velocities[output]);
+    let range = all.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     range.filter(|(low, high)| low.is_finite() && high.is_finite() && low < high)
 }
 
@@ -50,8 +34,8 @@ impl Identification {
             return vec![Vec::new()];
         }
         let extreme = |name: &String, pick: fn(f64, f64) -> f64| {
-            let channels = self.logs.iter().flat_map(|log| &log.channels).filter(|c| c.name == *name);
-            channels.flat_map(|c| c.values.iter().copied()).reduce(pick).unwrap_or(0.0)
+            let channels = self.trained.iter().flat_map(|log| &log.channels).filter(|c| c.0 == *name);
+            channels.flat_map(|c| [c.1, c.2]).reduce(pick).unwrap_or(0.0)
         };
         [f64::min, f64::max]
             .map(|pick| names.iter().map(|name| (name.as_str(), extreme(name, pick))).collect())
@@ -74,7 +58,7 @@ impl Identification {
                 {
                     return None;
                 }
-                let (low, high) = velocities(&self.logs, rate)?;
+                let (low, high) = velocities(&self.trained, rate)?;
                 let found = self
                     .held_channels()
                     .iter()

@@ -11,13 +11,17 @@ mod own_delay;
 mod problem;
 mod shapes;
 mod structure;
+mod trained;
 
 use std::sync::Arc;
 
+use dynid_estimate::consistent::Bound;
 use dynid_estimate::elimination::{PruneSettings, Pruning, prune};
+use dynid_estimate::identifiability::VisibleSpace;
 use dynid_estimate::linear::LinearEstimate;
 use dynid_estimate::whiteness::InBandWhiteness;
 use dynid_factor::rank::numerical_rank;
+use dynid_linalg::Mat;
 use dynid_model::element::scale_name;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
 use dynid_rows::conditioning::{
@@ -31,16 +35,16 @@ use crate::consistency::Consistent;
 use crate::effort_scale::{self, EffortScale, WeighedMass};
 use crate::elements::ElementPlan;
 use crate::estimate::{InputRecord, LogFit};
-use crate::fitting::Fitted;
+use crate::fitting::{Fitted, RowResiduals};
 use crate::friction_power::FrictionPower;
 use crate::instruments::{self, Comparison, InstrumentRun};
 use crate::log::{self, Log, LogSource};
 use crate::log_agreement::{self, LogAgreement};
 use crate::log_terms::LogTerms;
 use crate::overlap::Overlaps;
-use crate::passivity::SPEED_SPAN_S;
 use crate::preflight::{self as before, Finding, Severity};
 use crate::prior::Prior;
+use crate::reduction::RowFit;
 use crate::result::short_name;
 use crate::robot::{Robot, refuse_internal_load};
 use crate::settings::{LogSettings, Preflight, Settings, check_log_effect, labels};
@@ -49,11 +53,14 @@ use crate::stiffness::{self, JointStiffness};
 use crate::trust::{Evidence, Trust};
 use crate::verdict::CheckName;
 pub(crate) use elastic::REMEDY as SPRING_REMEDY;
+pub(crate) use figures::{EXPLAINED, explained};
 pub use model_fit::ModelFit;
 pub use own_delay::OwnDelay;
 pub use problem::{Problem, TrainingLog};
 pub use structure::Structure;
 pub use structure::{effort_sizes, stated_values};
+use trained::SPEED_SPAN_S;
+pub use trained::TrainedLog;
 
 /// What is being worked on, for progress displays.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,8 +104,10 @@ pub struct Identification {
     pub alone: Option<(RobotModel, Vec<f64>)>,
     /// Base parameters of the model.
     pub base: BaseParameters,
-    /// Training logs.
+    /// Training logs; empty where the fit was made from what was left of them.
     pub logs: Arc<[PreparedLog]>,
+    /// What is known of every training log without its samples.
+    pub trained: Vec<TrainedLog>,
     /// Validation logs.
     pub validation_logs: Vec<PreparedLog>,
     /// Name in parameters and settings of every training log.
@@ -142,8 +151,10 @@ pub struct Identification {
     pub delay_samples: f64,
     /// Sample rate of the training logs, Hz; the delay is not applied to logs of another rate.
     pub delay_rate_hz: f64,
-    /// Agreement on the training logs.
+    /// Agreement on the training logs; empty where the fit was made from what was left of them.
     pub training: Vec<Agreement>,
+    /// Figures on the rows of the training logs, where these are all that is left of them; else empty.
+    pub row_fits: Vec<RowFit>,
     /// Agreement on the validation logs.
     pub validation: Vec<Agreement>,
     /// Figures of the unconstrained parameters on the training logs, where they predict differently.
@@ -168,6 +179,12 @@ pub struct Identification {
     pub effort_scale: EffortScale,
     /// What friction had to obey.
     pub(crate) power: FrictionPower,
+    /// What the consistent estimate had to meet.
+    pub(crate) bounds: Vec<Bound>,
+    /// Standard deviations that the prior leaves of the base parameters.
+    pub(crate) base_scales: Vec<f64>,
+    /// Per output, the effort that 99 % of the samples stay below.
+    pub(crate) effort_sizes: Vec<f64>,
     /// Settings of the conditioning.
     pub conditioning_settings: ConditioningSettings,
     /// Settings of the identification.
@@ -245,6 +262,78 @@ fn run(
     }));
     let (problem, fit) = problem.fit(conditioning, progress)?;
     let (comparison, not_compared) = compared(&problem, &fit, progress)?;
+    let of_reading = read.iter().flat_map(|log| log.warnings.iter().cloned());
+    let of_reading = of_reading.chain(validation.iter().flat_map(Log::warnings));
+    let reading = of_reading.map(|message| {
+        let remedy = format!(
+            "`{} --report check.html` draws the signals as they were read; columns and units are stated under `[columns]`",
+            problem.settings.files.check()
+        );
+        Caution::warn(caution::LOG, message, remedy)
+    });
+    let reading = reading.collect();
+    let training = problem.logs.iter().map(TrainedLog::of).collect();
+    let sources = read.into_iter().map(|log| log.source).collect();
+    let beside = Beside { training, sources, findings, overlaps, own_delays, warnings, reading, comparison };
+    let (mut out, left) = assemble(problem, fit, beside)?;
+    for (l, log) in out.logs.clone().iter().enumerate() {
+        progress(Step::Validate(log.name.clone()));
+        let agreement = out.drawn_agreement(log)?;
+        out.whiteness.push(left.residuals.whiteness(l, &agreement, out.kernel_hz));
+        if out.consistent.constrained() {
+            let free = out.agreement(out.unconstrained_values(), log)?;
+            out.training_unconstrained.push(crate::result::log_fit(&free));
+        }
+        out.training.push(agreement);
+    }
+    out.warnings.extend(not_compared);
+    for log in validation {
+        progress(Step::Validate(log.log.name().to_owned()));
+        out.validate(log)?;
+    }
+    progress(Step::Trust);
+    out.explained =
+        explained(out.training.iter().chain(&out.validation), out.model.outputs().len(), &out.consistent);
+    out.judge(&left)?;
+    Ok(out)
+}
+
+/// What an identification knows beside its problem and its fit.
+pub(crate) struct Beside {
+    pub(crate) training: Vec<TrainedLog>,
+    pub(crate) sources: Vec<LogSource>,
+    pub(crate) findings: Vec<Finding>,
+    pub(crate) overlaps: Overlaps,
+    pub(crate) own_delays: Vec<OwnDelay>,
+    pub(crate) warnings: Vec<Caution>,
+    /// Doubts about how logs were read.
+    pub(crate) reading: Vec<Caution>,
+    pub(crate) comparison: Option<Comparison>,
+}
+
+/// What of a fit no identification keeps, but its judgement needs.
+pub(crate) struct Left {
+    residuals: RowResiduals,
+    regrouping: Mat,
+    space: VisibleSpace,
+}
+
+/// An identification before samples are predicted and parameters judged.
+pub(crate) fn assemble(
+    problem: Problem,
+    fit: ModelFit,
+    beside: Beside,
+) -> Result<(Identification, Left), Error> {
+    let Beside {
+        training: trained,
+        sources,
+        findings,
+        overlaps,
+        own_delays,
+        mut warnings,
+        reading,
+        comparison,
+    } = beside;
     let log_agreement = log_agreement::test(&problem, &fit.fitted, |log: &str| {
         let table = fit.shapes.as_ref().map(|found| found.model.parameters());
         table.and_then(|table| table.shape_value(&scale_name(log))).unwrap_or(1.0)
@@ -262,7 +351,7 @@ fn run(
     } = fit;
     let Problem { robot, plan, model, structure, logs: prepared, training, settings } = problem;
     warnings.extend(effect::warnings(&settings, shapes.is_some()));
-    let Structure { base, stated, prior, regrouping, space, .. } = structure;
+    let Structure { base, stated, effort_sizes, prior, regrouping, space, bounds, .. } = structure;
     let conditioned = settings.conditioning_settings();
     let state_hz = model_fit::state_hz(&settings, conditioning.as_ref());
     let (kernel_hz, delay_samples) = match &conditioning {
@@ -270,23 +359,15 @@ fn run(
         None => (state_hz, 0.0),
     };
     let row_rms = figures::row_rms(&groups, &fitted.estimate.x, base.len());
-    let residual_ratio = figures::residual_ratios(&groups, &fitted.estimate, &prepared, kernel_hz);
+    let residual_ratio = figures::residual_ratios(&groups, &fitted.estimate, &trained, kernel_hz);
     warnings.extend(findings.iter().filter_map(Finding::caution));
     warnings.extend(prior.warnings.iter().map(|message| {
         let remedy = "state mass, centre of mass and inertia of the link in the robot file: `<inertial>` in a URDF, `mass`, `com` and \
                       `inertia_com = [xx, xy, xz, yy, yz, zz]` in TOML";
         Caution::warn(caution::ROBOT_FILE, message, remedy)
     }));
-    let of_reading = read.iter().flat_map(|log| log.warnings.iter().cloned());
-    let of_reading = of_reading.chain(validation.iter().flat_map(Log::warnings));
-    warnings.extend(of_reading.map(|message| {
-        let remedy = format!(
-            "`{} --report check.html` draws the signals as they were read; columns and units are stated under `[columns]`",
-            settings.files.check()
-        );
-        Caution::warn(caution::LOG, message, remedy)
-    }));
-    warnings.extend(log_warnings(&model, &prepared));
+    warnings.extend(reading);
+    warnings.extend(log_cautions(&model, &prepared));
     warnings.extend(elastic::warnings(&model, &prepared));
     warnings.extend(known::warnings(&plan, &robot.mechanism, &prepared));
     warnings.extend(log_agreement.iter().flat_map(LogAgreement::warnings).map(|message| {
@@ -296,11 +377,14 @@ fn run(
     }));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
     let mut out = Identification {
-        sources: read.into_iter().map(|log| log.source).collect(),
+        sources,
         stiffness: Vec::new(),
         taken_as_stiff: false,
         plan,
+        base_scales: space.base_std().to_vec(),
         base,
+        effort_sizes,
+        bounds,
         conditioning,
         friction,
         prior,
@@ -315,8 +399,10 @@ fn run(
         state_hz,
         kernel_hz,
         delay_samples,
-        delay_rate_hz: prepared[0].rate_hz,
+        delay_rate_hz: trained[0].rate_hz,
+        trained,
         training: Vec::new(),
+        row_fits: Vec::new(),
         validation: Vec::new(),
         validation_logs: Vec::new(),
         training_unconstrained: Vec::new(),
@@ -344,52 +430,7 @@ fn run(
     };
     out.nonlinear = out.unfolded(out.values())?;
     out.alone = out.without_logs()?;
-    for (l, log) in out.logs.clone().iter().enumerate() {
-        progress(Step::Validate(log.name.clone()));
-        let agreement = out.drawn_agreement(log)?;
-        out.whiteness.push(residuals.whiteness(l, &agreement, kernel_hz));
-        if out.consistent.constrained() {
-            let free = out.agreement(out.unconstrained_values(), log)?;
-            out.training_unconstrained.push(crate::result::log_fit(&free));
-        }
-        out.training.push(agreement);
-    }
-    out.warnings.extend(not_compared);
-    for mut log in validation {
-        progress(Step::Validate(log.log.name().to_owned()));
-        log.log = out.plan.log_terms.of_validation(log.log, &log.settings);
-        let mut prepared = log.prepare(&out.model, &out.conditioning_settings)?;
-        if let Some(own) = out.own_delays.iter().find(|d| Some(&d.log) == log.settings.like.as_ref()) {
-            own.take_off(&mut prepared)?;
-        }
-        out.sources.push(log.source);
-        out.warnings.extend(known::cautions(known::logged_beyond(&out.plan.known, &prepared)));
-        let agreement = out.drawn_agreement(&prepared)?;
-        out.validation.push(agreement);
-        if out.consistent.constrained() {
-            let free = out.agreement(out.unconstrained_values(), &prepared)?;
-            out.validation_unconstrained.push(crate::result::log_fit(&free));
-        }
-        out.validation_logs.push(prepared);
-    }
-    progress(Step::Trust);
-    out.explained = figures::explained(out.training.iter().chain(&out.validation), &out.consistent);
-    out.pruning = prune(&out.fit().kept_blocks(), &out.fit().solution.kept, &PruneSettings::default());
-    out.trust = Evidence {
-        model: &out.model,
-        base: &out.base,
-        regrouping: &regrouping,
-        space: &space,
-        prior: &out.prior,
-        fitted: &out.fitted,
-        consistent: &out.consistent,
-        rows: &figures::fit_rows(out.fit(), out.conditioning.as_ref(), kernel_hz),
-        explained: &out.explained,
-        power: &out.power,
-    }
-    .trust();
-    out.effort_scale = out.scale_of_efforts()?;
-    Ok(out)
+    Ok((out, Left { residuals, regrouping, space }))
 }
 
 /// Least squares against instruments where the settings describe the closed loop, or why they were not compared.
@@ -414,6 +455,45 @@ fn compared(
 }
 
 impl Identification {
+    /// Pruning, verdicts of the parameters and the scale of the efforts, once it is known which efforts the model explains.
+    pub(crate) fn judge(&mut self, left: &Left) -> Result<(), Error> {
+        self.pruning = prune(&self.fit().kept_blocks(), &self.fit().solution.kept, &PruneSettings::default());
+        self.trust = Evidence {
+            model: &self.model,
+            base: &self.base,
+            regrouping: &left.regrouping,
+            space: &left.space,
+            prior: &self.prior,
+            fitted: &self.fitted,
+            consistent: &self.consistent,
+            rows: &figures::fit_rows(self.fit(), self.conditioning.as_ref(), self.kernel_hz),
+            explained: &self.explained,
+            power: &self.power,
+        }
+        .trust();
+        self.effort_scale = self.scale_of_efforts()?;
+        Ok(())
+    }
+
+    /// Predicts a validation log and compares.
+    pub(crate) fn validate(&mut self, mut log: Log) -> Result<(), Error> {
+        log.log = self.plan.log_terms.of_validation(log.log, &log.settings);
+        let mut prepared = log.prepare(&self.model, &self.conditioning_settings)?;
+        if let Some(own) = self.own_delays.iter().find(|d| Some(&d.log) == log.settings.like.as_ref()) {
+            own.take_off(&mut prepared)?;
+        }
+        self.sources.push(log.source);
+        self.warnings.extend(known::cautions(known::logged_beyond(&self.plan.known, &prepared)));
+        let agreement = self.drawn_agreement(&prepared)?;
+        self.validation.push(agreement);
+        if self.consistent.constrained() {
+            let free = self.agreement(self.unconstrained_values(), &prepared)?;
+            self.validation_unconstrained.push(crate::result::log_fit(&free));
+        }
+        self.validation_logs.push(prepared);
+        Ok(())
+    }
+
     /// Standard parameters of bodies that can exist (unless no consistency was asked for), in column order: what predictions
     /// use and what goes into robot files.
     pub fn values(&self) -> &[f64] {
@@ -526,6 +606,11 @@ impl Identification {
             WeighedMass { name, known, identified: trust.unconstrained, interval: trust.interval }
         };
         let masses = weighed.into_iter().map(of).collect();
+        if self.logs.is_empty() {
+            let (base, groups) = (&self.base, &self.fit().reduced);
+            let by_file = effort_scale::by_robot_file_in_rows(base, self.values(), &self.prior, groups);
+            return Ok(EffortScale::of(masses, self.settings.known_effort_scale, by_file));
+        }
         let by_file = effort_scale::by_robot_file(
             &self.model,
             self.values(),
@@ -550,7 +635,7 @@ impl Identification {
 
     /// Samples of all training logs.
     pub fn samples(&self) -> usize {
-        self.logs.iter().map(PreparedLog::samples).sum()
+        self.trained.iter().map(|log| log.samples).sum()
     }
 }
 
@@ -700,7 +785,7 @@ fn check_settings(
 }
 
 /// Examines the training logs before anything is made of them.
-fn preflight(
+pub(crate) fn preflight(
     settings: &Settings,
     robot: &Robot,
     loaded: &[Log],
@@ -754,7 +839,7 @@ const SLOWEST_HZ: f64 = 10.0;
 const REPEATS: f64 = 2.0;
 
 /// What is wrong with the clock and the motion of logs.
-fn log_warnings(model: &RobotModel, logs: &[PreparedLog]) -> Vec<Caution> {
+pub(crate) fn log_cautions(model: &RobotModel, logs: &[PreparedLog]) -> Vec<Caution> {
     let mut out = Vec::new();
     for log in logs {
         let name = short_name(&log.name);

@@ -97,7 +97,7 @@ impl Identification {
     pub fn inputs(&self) -> Vec<InputRecord> {
         let mut out = InputRecord::of_robot(&self.robot);
         for (k, source) in self.sources.iter().enumerate() {
-            let validates = k >= self.logs.len();
+            let validates = k >= self.trained.len();
             out.extend(source.inputs.iter().map(|input| match input.kind.as_str() {
                 "log" if validates => InputRecord { kind: "validation".to_owned(), ..input.clone() },
                 _ => input.clone(),
@@ -109,7 +109,7 @@ impl Identification {
 
     /// Where the training logs come from.
     fn training_sources(&self) -> impl Iterator<Item = &LogSource> {
-        self.sources.iter().take(self.logs.len())
+        self.sources.iter().take(self.trained.len())
     }
 
     /// Links whose identified inertia no body could have, with the reason.
@@ -274,6 +274,18 @@ impl Identification {
     }
 
     fn fit_summary(&self) -> FitSummary {
+        if !self.row_fits.is_empty() {
+            let rows: Vec<(FitValues, usize)> =
+                self.row_fits.iter().map(|fit| (fit.values.clone(), fit.rows)).collect();
+            let none = FitValues::unknown(self.row_fits[0].values.rms.len());
+            let filter_hz = self.kernel_hz;
+            return FitSummary {
+                raw: none,
+                filtered: pool(&rows),
+                filter_hz,
+                by_motion: ByMotion::default(),
+            };
+        }
         // One log is shown as it is; of several, the worst joint by joint would mislead, so errors are pooled.
         let pooled = |pick: &dyn Fn(&Agreement) -> FitValues| -> FitValues {
             let all: Vec<(FitValues, usize)> =
@@ -410,8 +422,7 @@ impl Identification {
             }
             return out;
         };
-        let noise: Vec<f64> =
-            self.logs.iter().flat_map(|l| l.position_noise.iter().map(|n| n.sigma)).collect();
+        let noise: Vec<f64> = self.trained.iter().flat_map(|l| l.position_noise.iter().copied()).collect();
         let largest_noise = noise.iter().copied().fold(0.0, f64::max);
         add(
             "kernel cut-off",

@@ -76,6 +76,14 @@ impl Robot {
         Self::compile(path, file, &options.locked)
     }
 
+    /// A robot that a program has put together; `path` stands in messages and provenance.
+    ///
+    /// # Errors
+    /// [`Error::Mechanism`], [`Error::Elastic`], [`Error::Loops`].
+    pub fn of_parts(path: &Path, file: RobotFile) -> Result<Robot, Error> {
+        Self::compile(path, file, &[])
+    }
+
     fn compile(path: &Path, mut file: RobotFile, locked: &[(String, f64)]) -> Result<Robot, Error> {
         let named = |source| Error::Mechanism { file: path.display().to_string(), source };
         file.description.lock(locked).map_err(|e| match e {

@@ -17,14 +17,16 @@ use crate::pipeline::Problem;
 pub struct ShapeFit {
     /// The nonlinear model with the values found.
     pub model: RobotModel,
+    /// The linear parameters that go with them, about which the model is linearised.
+    pub linear: Vec<f64>,
     /// What the data say about each.
     pub findings: Vec<ShapeFinding>,
     /// What other starts of the search reached.
     pub starts: StartReport,
 }
 
-/// Finds the shape parameters of a problem's model on its conditioned logs; also returns the linear parameters that go with them.
-pub(crate) fn find(problem: &Problem, choices: &Conditioning) -> Result<(ShapeFit, Vec<f64>), Error> {
+/// Finds the shape parameters of a problem's model on its conditioned logs.
+pub(crate) fn find(problem: &Problem, choices: &Conditioning) -> Result<ShapeFit, Error> {
     let Problem { model, structure, logs, settings, .. } = problem;
     let shape = model.parameters().shape_start();
     let defaults = SeparableSettings::default();
@@ -40,7 +42,7 @@ pub(crate) fn find(problem: &Problem, choices: &Conditioning) -> Result<(ShapeFi
         refine(model, &shape, &base.kept, logs, choices, &conditioning, &separable)?;
     let linear = base.expanded(&found.linear);
     let model = problem.plan.model(&problem.robot.mechanism)?.with_shape(&found.shape);
-    Ok((ShapeFit { model, findings: found.findings, starts: found.starts }, linear))
+    Ok(ShapeFit { model, linear, findings: found.findings, starts: found.starts })
 }
 
 /// Whether a linearised model may change a shape parameter: not if the logs do not see it or it lies at a bound, since a

@@ -92,8 +92,11 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
     let status = checks.iter().map(|(s, _)| *s).max().unwrap_or(Status::Ok);
     let relative =
         |a: &[&Agreement]| a.iter().filter_map(|v| v.filtered.relative_error).fold(f64::NAN, f64::max);
+    let of_rows = || id.row_fits.iter().filter_map(|f| f.values.relative_error).fold(f64::NAN, f64::max);
     let unseen = id.unseen();
-    let (error, agrees) = if unseen.is_empty() {
+    let (error, agrees) = if unseen.is_empty() && !id.row_fits.is_empty() {
+        (of_rows(), "reproduces the rows of the training logs")
+    } else if unseen.is_empty() {
         (relative(&id.training.iter().collect::<Vec<_>>()), "reproduces the training logs")
     } else {
         (relative(&unseen), "predicts logs it has not seen")
@@ -274,8 +277,33 @@ fn standing_apart(agreements: &[&Agreement]) -> String {
 }
 
 fn training_fit(id: &Identification) -> (Status, CheckResult) {
+    if !id.row_fits.is_empty() {
+        return row_fit(id);
+    }
     let training: Vec<&Agreement> = id.training.iter().collect();
     fit_check(CheckName::TrainingFit, &training, "the logs it was fitted to")
+}
+
+/// How well the rows of the training logs are explained, where these are all that is left of them.
+fn row_fit(id: &Identification) -> (Status, CheckResult) {
+    let all = id.row_fits.iter().flat_map(|fit| {
+        let joints = fit.values.r2.iter().zip(dynid_model::EffortModel::outputs(&id.model));
+        joints.filter_map(|(r2, output)| Some(((*r2)?, &fit.log, &output.name)))
+    });
+    let worst = all.min_by(|a, b| a.0.total_cmp(&b.0));
+    let r2 = worst.map_or(f64::NAN, |(r2, ..)| r2);
+    let place = worst.map_or_else(String::new, |(_, log, joint)| format!(": `{joint}` in `{log}`"));
+    check(
+        Status::of(r2 >= 0.9, r2 >= 0.5),
+        CheckName::TrainingFit,
+        worst.map(|(r2, ..)| r2),
+        "",
+        "R² of every joint at least 0.9",
+        format!(
+            "share of the variance explained in the rows of the logs (through the kernel, off reversals) that move the joint, worst log and \
+             joint{place}"
+        ),
+    )
 }
 
 fn validation_fit(id: &Identification) -> (Status, CheckResult) {

@@ -23,6 +23,7 @@ pub mod online;
 pub mod payload;
 pub mod predict;
 mod provenance;
+pub mod reduce;
 mod report_data;
 mod run;
 mod sealed;
@@ -38,6 +39,7 @@ pub use dynid_identify::{
 
 pub use config::Config;
 pub use friction::{FrictionConfig, FrictionModel, identify_friction};
+pub use report_data::report as report_page;
 pub use run::{Run, identify};
 
 pub use dynid_excitation as excitation;

@@ -7,6 +7,7 @@ mod picture;
 mod settings;
 mod trust;
 
+use std::ops::Deref;
 use std::sync::Arc;
 
 use dynid_estimate::linear::LinearMethod;
@@ -18,7 +19,7 @@ use crate::agreement::Agreement;
 use crate::config::{Config, Method};
 use crate::estimate::short_name;
 use crate::estimate::{Choice, Estimate, Provenance};
-use crate::run::Run;
+use crate::pipeline::Identification;
 
 pub(crate) use picture::picture;
 pub(crate) use settings::settings_table;
@@ -28,15 +29,26 @@ const AT_REST: &str = " Where a joint stands, friction of velocity is left out o
                        static friction there, and the sign of a speed that is noise would make the curve jump. Errors and residual \
                        statistics count the full prediction there too.";
 
-impl Run {
-    /// The report as one HTML page.
-    ///
-    /// # Errors
-    /// [`PageError`](crate::fault::PageError).
-    pub fn report(&self, estimate: &Estimate) -> Result<String, Error> {
-        crate::fault::page(report::render(&self.report_data(estimate)?))
-    }
+/// The report of an identification as one HTML page.
+///
+/// # Errors
+/// [`PageError`](crate::fault::PageError); [`Error::Conditioning`] for an effort that cannot be filtered for the first figure.
+pub fn report(found: &Identification, estimate: &Estimate) -> Result<String, Error> {
+    crate::fault::page(report::render(&Shown(found).report_data(estimate)?))
+}
 
+/// An identification as its page shows it.
+struct Shown<'a>(&'a Identification);
+
+impl Deref for Shown<'_> {
+    type Target = Identification;
+
+    fn deref(&self) -> &Identification {
+        self.0
+    }
+}
+
+impl Shown<'_> {
     /// Kind of the joint behind an output, in words.
     fn joint_kind(&self, output: usize) -> String {
         let (mechanism, joints) = (self.model.mechanism(), self.model.joints());
@@ -58,7 +70,7 @@ impl Run {
     ///
     /// # Errors
     /// [`Error::Conditioning`] for an effort that cannot be filtered for the first figure.
-    pub fn report_data(&self, estimate: &Estimate) -> Result<report::ReportData, Error> {
+    fn report_data(&self, estimate: &Estimate) -> Result<report::ReportData, Error> {
         use dynid_model::EffortModel;
         let mechanism = self.model.mechanism();
         Ok(report::ReportData {
@@ -70,7 +82,7 @@ impl Run {
             picture: self.picture(),
             robot: report::Robot {
                 name: estimate.robot.clone(),
-                file: Some(self.config.robot.display().to_string()),
+                file: Some(self.robot.path.display().to_string()),
                 facts: vec![
                     Fact::new("moving joints", mechanism.bodies().len(), ""),
                     Fact::new("standard parameters, elements included", estimate.counts.standard.all, ""),
@@ -100,7 +112,7 @@ impl Run {
             estimation: vec![
                 Fact::new(
                     "estimator",
-                    match self.config.estimator.method {
+                    match self.settings.estimator.method {
                         Method::Ols => "ordinary least squares",
                         Method::Wls => "weighted least squares, residual variances found along the way",
                         Method::Huber => "Huber's loss, scales found along the way",

@@ -12,6 +12,7 @@ use crate::log::{Log, names};
 use crate::logs;
 use crate::pipeline::{self, Identification, Opened, Step};
 use crate::provenance::settings_of;
+use crate::report_data::report as report_page;
 use crate::robot::{Robot, RobotOptions};
 
 /// An identification from files: the result, and where it comes from.
@@ -144,6 +145,14 @@ fn reading(config: &Config, found: &Identification) -> ReadingRecord {
 }
 
 impl Run {
+    /// The report as one HTML page.
+    ///
+    /// # Errors
+    /// As [`report`](crate::report_page).
+    pub fn report(&self, estimate: &Estimate) -> Result<String, Error> {
+        report_page(&self.identification, estimate)
+    }
+
     /// The result file.
     pub fn estimate(&self) -> Estimate {
         let estimate = self.identification.estimate();

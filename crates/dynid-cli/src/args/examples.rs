@@ -168,6 +168,11 @@ const ENDINGS: &[Ending] = &[
         ],
     },
     Ending {
+        command: "merge",
+        negative: "",
+        examples: &[("All factors of a folder as one file", "merge cells/*.factors --out all.factors")],
+    },
+    Ending {
         command: "online",
         negative: "something changed",
         examples: &[
@@ -192,6 +197,20 @@ const ENDINGS: &[Ending] = &[
         ],
     },
     Ending {
+        command: "reduce",
+        negative: "a check of the identification that teaches the recipe failed",
+        examples: &[
+            (
+                "Learn a recipe on the logs of a configuration, and reduce them",
+                "reduce dynid.toml --out cell.factors",
+            ),
+            (
+                "Reduce another log by the same recipe, anywhere",
+                "reduce cell.factors --log other.csv --out other.factors",
+            ),
+        ],
+    },
+    Ending {
         command: "regressor",
         negative: "",
         examples: &[
@@ -212,6 +231,17 @@ const ENDINGS: &[Ending] = &[
                 "simulate arm.urdf --closed-loop --follow dynid-design/trajectory.json --out log.csv.gz",
             ),
             ("To another program", "simulate arm.urdf --out - --quiet"),
+        ],
+    },
+    Ending {
+        command: "solve",
+        negative: "a check failed",
+        examples: &[
+            ("Estimate from factors that several machines made", "solve a.factors b.factors --out dynid-out"),
+            (
+                "Put the result into the robot file",
+                "export dynid-out/estimate.json --urdf arm_identified.urdf",
+            ),
         ],
     },
     Ending {

@@ -9,6 +9,7 @@ mod identify;
 mod logs;
 mod model;
 mod online;
+mod reduce;
 mod robot;
 mod simulate;
 
@@ -24,6 +25,7 @@ pub(crate) use identify::{
 pub(crate) use logs::{InitArgs, LogArgs, MissingArg, ReadingArgs};
 pub(crate) use model::{DiffArgs, ExportArgs, InspectArgs, PredictArgs, RegressorArgs, ValidateArgs};
 pub(crate) use online::{OnlineArgs, StreamArg};
+pub(crate) use reduce::{MergeArgs, ReduceArgs, SolveArgs};
 pub(crate) use robot::RobotArgs;
 pub(crate) use simulate::SimulateArgs;
 
@@ -77,6 +79,8 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
     /// Write manual pages, one per command.
     Man(ManArgs),
+    /// Merge factors of logs, in any order with the same bytes.
+    Merge(MergeArgs),
     /// Follow a stream or logs: estimates as JSON lines, alarms when something changes.
     Online(OnlineArgs),
     /// Payloads from logs with and without them: mass, centre of mass, inertia; writes payload.json, payload.html and a URDF
@@ -84,10 +88,14 @@ pub(crate) enum Command {
     Payload(PayloadArgs),
     /// Effort of an identified model at given states.
     Predict(PredictArgs),
+    /// Reduce logs to factors, by what an identification chose: whatever lies apart can be merged and solved.
+    Reduce(Box<ReduceArgs>),
     /// Effort and regressor rows of a robot file at given states.
     Regressor(RegressorArgs),
     /// Make a virtual log: by inverse dynamics, or of a controlled robot.
     Simulate(SimulateArgs),
+    /// Estimate from factors of logs: writes estimate.json and report.html.
+    Solve(SolveArgs),
     /// Published systems, every claim of their papers beside what is measured here.
     Study(StudyArgs),
     /// Compare an identified model with other logs.

@@ -14,7 +14,7 @@ use crate::args::{ConsistencyArg, FrictionArg, IdentifyArgs, MethodArg, RouteArg
 use dynid_terminal::message::{Failure, Notes, data};
 use dynid_terminal::outputs::{self, marked_toml, marked_xml};
 use dynid_terminal::progress::Progress;
-use summary::summary;
+pub(super) use summary::summary;
 
 const DEFAULT_OUT: &str = "dynid-out";
 

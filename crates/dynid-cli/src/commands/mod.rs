@@ -18,6 +18,7 @@ pub(crate) mod man;
 pub(crate) mod online;
 pub(crate) mod payload;
 pub(crate) mod predict;
+pub(crate) mod reduce;
 pub(crate) mod regressor;
 mod run;
 pub(crate) mod simulate;
@@ -111,26 +112,24 @@ struct Reading {
 
 impl Reading {
     fn of(args: &ReadingArgs, estimate: &Estimate, file: &Path) -> Result<Self, Failure> {
+        Self::recorded(args, estimate.provenance.reading.as_ref(), file)
+    }
+
+    /// `recorded`: how the logs behind `file` were read.
+    fn recorded(args: &ReadingArgs, recorded: Option<&ReadingRecord>, file: &Path) -> Result<Self, Failure> {
         let rows = args.rows;
-        let mut reading =
-            match (args.config.as_deref().map(Config::read).transpose()?, &estimate.provenance.reading) {
-                (Some(config), _) => {
-                    let stated = config.training_logs();
-                    Self {
-                        columns: config.columns,
-                        motor_side: config.motor_side,
-                        stated,
-                        rows,
-                        recorded: None,
-                    }
-                }
-                (None, recorded) => {
-                    let ReadingRecord { columns, motor_side, .. } = recorded.clone().unwrap_or_default();
-                    let stated = recorded.as_ref().is_some_and(ReadingRecord::states_columns);
-                    let recorded = stated.then(|| file.to_owned());
-                    Self { columns, motor_side, stated: Vec::new(), rows, recorded }
-                }
-            };
+        let mut reading = match (args.config.as_deref().map(Config::read).transpose()?, recorded) {
+            (Some(config), _) => {
+                let stated = config.training_logs();
+                Self { columns: config.columns, motor_side: config.motor_side, stated, rows, recorded: None }
+            }
+            (None, recorded) => {
+                let ReadingRecord { columns, motor_side, .. } = recorded.cloned().unwrap_or_default();
+                let stated = recorded.is_some_and(ReadingRecord::states_columns);
+                let recorded = stated.then(|| file.to_owned());
+                Self { columns, motor_side, stated: Vec::new(), rows, recorded }
+            }
+        };
         apply_log_args(&mut reading.columns, &args.columns);
         // Recorded effort columns keep their names, and take the gains that are given for their scale.
         if reading.recorded.is_some()

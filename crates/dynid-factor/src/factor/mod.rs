@@ -39,6 +39,12 @@ impl Factor {
         Self { triangle: Mat::zeros(0, columns + 1), rho: 0.0, columns, rows: 0 }
     }
 
+    /// A factor from what was written of one: `[R z]` column-major with `height` rows.
+    pub(crate) fn of_parts(columns: usize, triangle: Vec<f64>, height: usize, rho: f64, rows: usize) -> Self {
+        let triangle = Mat::from_fn(height, columns + 1, |i, j| triangle[j * height + i]);
+        Self { triangle, rho, columns, rows }
+    }
+
     /// Number `p` of parameters.
     pub fn columns(&self) -> usize {
         self.columns

@@ -58,10 +58,14 @@ impl LoopsRecord {
         }
     }
 
+    /// The closures as a robot file states them.
+    pub(super) fn descriptions(&self) -> Result<Vec<ClosureDescription>, String> {
+        self.closures.iter().map(ClosureRecord::description).collect()
+    }
+
     /// Closes the loops again.
     pub(super) fn close(&self, mechanism: &Mechanism) -> Result<ClosedMechanism, String> {
-        let closures = self.closures.iter().map(ClosureRecord::description).collect::<Result<_, _>>()?;
-        ClosedMechanism::new(mechanism.clone(), closures, Some(&self.driven), &self.home)
+        ClosedMechanism::new(mechanism.clone(), self.descriptions()?, Some(&self.driven), &self.home)
             .map_err(|e| e.to_string())
     }
 }

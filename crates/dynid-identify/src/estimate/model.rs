@@ -1,6 +1,8 @@
 //! The model in the result file, from which efforts can be predicted again.
 
-use dynid_io::{CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, SettingValue};
+use dynid_io::{
+    CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, RobotFile, SettingValue,
+};
 use dynid_model::element::ElementRegistry;
 use dynid_model::{
     Description, Inertia, JointDescription, JointKind, Limits, LinkDescription, Mat3, Mechanism, Mimic,
@@ -223,7 +225,22 @@ impl ModelRecord {
         Ok(d)
     }
 
-    pub(super) fn plan(&self, mechanism: &Mechanism) -> Result<ElementPlan, Error> {
+    /// The robot that is recorded, as a robot file would state it, with the elements of its joints.
+    ///
+    /// # Errors
+    /// What contradicts itself, in words.
+    pub(crate) fn robot_file(&self, name: &str) -> Result<RobotFile, String> {
+        let elements = ElementSpec { registry: self.registry.clone(), ..ElementSpec::default() };
+        let mut file = RobotFile::plain(self.description(name)?, elements);
+        if let Some(loops) = &self.loops {
+            file.closures = loops.descriptions()?;
+            file.actuated = Some(loops.driven.clone());
+            file.home.clone_from(&loops.home);
+        }
+        Ok(file)
+    }
+
+    pub(crate) fn plan(&self, mechanism: &Mechanism) -> Result<ElementPlan, Error> {
         let couplings = self
             .couplings
             .iter()

@@ -1,35 +1,41 @@
 //! Figures of a fit, output by output.
 
 use dynid_estimate::linear::LinearEstimate;
-use dynid_rows::conditioning::{Conditioning, PreparedLog, ReducedGroup};
+use dynid_rows::conditioning::{Conditioning, ReducedGroup};
 
+use super::trained::TrainedLog;
 use crate::advice::FitRows;
 use crate::agreement::Agreement;
 use crate::consistency::{self, Consistent};
 
 /// Share of an effort that a model must explain for its residual to count as noise: of its variance on every log
 /// in which the joint moves, and of its mean square on held-out folds.
-const EXPLAINED: f64 = 0.5;
+pub(crate) const EXPLAINED: f64 = 0.5;
 
-pub(super) fn explained<'a>(
+/// Per output: whether the model explains its effort, on logs that move the joint and on held-out folds.
+pub(crate) fn explained<'a>(
     agreements: impl Iterator<Item = &'a Agreement> + Clone,
+    outputs: usize,
     consistent: &Consistent,
 ) -> Vec<bool> {
-    let outputs = agreements.clone().next().map_or(0, |a| a.filtered.channels.len());
-    let held_out = |j: usize| {
-        let share = |estimator| consistent.held_out.explained(estimator, j);
-        // Whichever estimator does better: a log that is too short for one is no fault of the joint.
-        share(consistency::UNCONSTRAINED).into_iter().chain(share(consistent.consistent())).reduce(f64::max)
-    };
     // An effort that never changes has no R² and nothing to explain.
     (0..outputs)
         .map(|j| {
             let moving = agreements.clone().filter(|a| a.moves[j]);
             let logs = moving.filter_map(|a| a.filtered.channels[j].r2);
-            logs.chain(if consistent.held_out.folds.is_empty() { None } else { held_out(j) })
-                .all(|x| x >= EXPLAINED)
+            logs.chain(held_out_share(consistent, j)).all(|x| x >= EXPLAINED)
         })
         .collect()
+}
+
+/// Share of the mean square of an output that is explained on held-out folds; `None` without folds.
+fn held_out_share(consistent: &Consistent, output: usize) -> Option<f64> {
+    if consistent.held_out.folds.is_empty() {
+        return None;
+    }
+    let share = |estimator| consistent.held_out.explained(estimator, output);
+    // Whichever estimator does better: a log that is too short for one is no fault of the joint.
+    share(consistency::UNCONSTRAINED).into_iter().chain(share(consistent.consistent())).reduce(f64::max)
 }
 
 /// How the fit counts rows, for motions that are proposed.
@@ -66,7 +72,7 @@ pub(super) fn row_rms(groups: &[ReducedGroup], x: &[f64], columns: usize) -> Vec
 pub(super) fn residual_ratios(
     groups: &[ReducedGroup],
     fit: &LinearEstimate,
-    logs: &[PreparedLog],
+    logs: &[TrainedLog],
     kernel_hz: f64,
 ) -> Vec<Option<f64>> {
     let outputs = groups.iter().map(|g| g.output + 1).max().unwrap_or(0);
@@ -79,7 +85,7 @@ pub(super) fn residual_ratios(
                     continue;
                 }
                 let log = &logs[group.log];
-                let noise = log.effort_noise[output].sigma;
+                let noise = log.effort_noise[output];
                 let passed = 1.0 / (2.0 * std::f64::consts::PI.sqrt() * spread * log.rate_hz);
                 let rows = group.rows() as f64;
                 found += rows * fit.groups[k].variance;

@@ -62,11 +62,7 @@ pub(super) fn choose(
 
 /// Drops chosen shapes whose shape parameter the logs do not see after all, and falls from rest that came out as rises (`fs` below
 /// `fc`); tells whether there were any.
-pub(super) fn drop_refuted(
-    problem: &mut Problem,
-    (found, linear): (&ShapeFit, &[f64]),
-    chosen: &mut [JointFriction],
-) -> bool {
+pub(super) fn drop_refuted(problem: &mut Problem, found: &ShapeFit, chosen: &mut [JointFriction]) -> bool {
     let (model, plan) = (&found.model, &mut problem.plan);
     let table = model.parameters();
     let unseen = |joint: &str, trial: &ShapeTrial| {
@@ -76,7 +72,7 @@ pub(super) fn drop_refuted(
         place.is_some_and(|k| found.findings[k].verdict == ShapeVerdict::NotSeen)
     };
     let rises = |joint: &str, trial: &ShapeTrial| {
-        let value = |symbol: &str| table.column(&format!("{joint}.{symbol}")).map(|c| linear[c]);
+        let value = |symbol: &str| table.column(&format!("{joint}.{symbol}")).map(|c| found.linear[c]);
         trial.shape.kind == ShapeKind::Stribeck
             && matches!((value("fs"), value("fc")), (Some(fs), Some(fc)) if fs < fc)
     };

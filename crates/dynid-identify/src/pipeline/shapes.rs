@@ -40,13 +40,13 @@ pub(super) fn search(
     }
     while !problem.model.parameters().shape.is_empty() {
         progress(Step::Shapes);
-        let (found, linear) = shape::find(problem, choices)?;
-        if friction::drop_refuted(problem, (&found, &linear), &mut out.friction) {
+        let found = shape::find(problem, choices)?;
+        if friction::drop_refuted(problem, &found, &mut out.friction) {
             problem.rebuild()?;
             continue;
         }
         let free: Vec<bool> = found.findings.iter().map(shape::is_free).collect();
-        problem.model = shape::linearised(&problem.plan, &found.model, &linear, &free)?;
+        problem.model = shape::linearised(&problem.plan, &found.model, &found.linear, &free)?;
         problem.restructure()?;
         out.found = Some(found);
     }

@@ -22,6 +22,8 @@ pub struct Structure {
     pub shape: Vec<f64>,
     /// Values stated by robot file, in parameter order.
     pub stated: Vec<Option<f64>>,
+    /// Per output, the effort that 99 % of the samples of all logs stay below, N m or N.
+    pub effort_sizes: Vec<f64>,
     /// What is known about the parameters without logs.
     pub prior: Prior,
     /// Base parameters from standard ones, `K` in `β = K x`.
@@ -42,6 +44,20 @@ impl Structure {
         plan: &ElementPlan,
         logs: &[PreparedLog],
     ) -> Result<Self, Error> {
+        let stated = stated_values(model, plan);
+        let bounds = bounds::rows(&settings.bound, model)?;
+        Self::known(settings, robot, model, &stated, &effort_sizes(logs), bounds)
+    }
+
+    /// The structure where values of the robot file, sizes of the efforts and bounds are known.
+    pub(crate) fn known(
+        settings: &Settings,
+        robot: &Robot,
+        model: &RobotModel,
+        stated: &[Option<f64>],
+        effort_sizes: &[f64],
+        bounds: Vec<Bound>,
+    ) -> Result<Self, Error> {
         let shape = model.parameters().shape_start();
         let base_settings = BaseSettings {
             seed: settings.seed.unwrap_or(1),
@@ -52,13 +68,12 @@ impl Structure {
         if base.is_empty() {
             return Err(Error::Unsupported("no parameter of this robot acts on any effort".to_owned()));
         }
-        let stated = stated_values(model, plan);
-        let prior = prior::of(model, &stated, &effort_sizes(logs), &robot.path.display().to_string())?;
+        let prior = prior::of(model, stated, effort_sizes, &robot.path.display().to_string())?;
         let regrouping = advice::regrouping(&base);
         let space = VisibleSpace::new(&regrouping, &prior.std);
-        let bounds = bounds::rows(&settings.bound, model)?;
         let method = fitting::method(&settings.estimator, model, &base, &prior, &space)?;
-        Ok(Structure { base, shape, stated, prior, regrouping, space, bounds, method })
+        let (stated, effort_sizes) = (stated.to_vec(), effort_sizes.to_vec());
+        Ok(Structure { base, shape, stated, effort_sizes, prior, regrouping, space, bounds, method })
     }
 }
 

@@ -102,7 +102,7 @@ fn unexplained(id: &Identification) -> &str {
 fn longer(id: &Identification) -> String {
     let fitted = &id.fitted;
     let wanted = BLOCKS_WANTED * fitted.block_length.seconds.max(fitted.block_s);
-    let have: f64 = id.logs.iter().map(dynid_rows::conditioning::PreparedLog::duration).sum();
+    let have: f64 = id.trained.iter().map(|log| log.duration_s).sum();
     match wanted.is_finite() && wanted > have {
         true => format!(
             "record {wanted:.0} s in place of {have:.0} s, in one log or several `[[log]]`s (`{}` gives a motion that repeats)",

@@ -1,5 +1,4 @@
 //! Products and decompositions multiply back.
-#![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use dynid_linalg::{AsView, Mat, PivotedQr, QrRoom, Reflectors, multiply_into, pivots, right_singular};
 

@@ -16,8 +16,8 @@ const MAX_BLOCKS: usize = 64;
 /// ... and of all logs together, but for one per log: every block takes a factor per output and kernel.
 const MOST_BLOCKS: usize = 256;
 
-/// Most time blocks of each of so many logs.
-pub(super) fn most_blocks(logs: usize) -> usize {
+/// Most time blocks of each of so many logs, unless [`ConditioningSettings::most_blocks`] says otherwise.
+pub fn most_blocks(logs: usize) -> usize {
     (MOST_BLOCKS / logs.max(1)).clamp(1, MAX_BLOCKS)
 }
 
@@ -72,8 +72,8 @@ impl<'a> ConditionedLog<'a> {
             .map(|e| Ok(shift::shift(&e, -choices.delay.samples)?.values))
             .collect::<Result<Vec<Vec<f64>>, ConditioningError>>()?;
         let longest = (settings.block_s * log.rate_hz).max(5.0 * log.rate_hz / choices.kernel_hz);
-        let block_length =
-            (longest.ceil() as usize).max(log.samples().div_ceil(most_blocks(choices.state_hz.len()))).max(1);
+        let most = settings.most_blocks.unwrap_or_else(|| most_blocks(choices.state_hz.len()));
+        let block_length = (longest.ceil() as usize).max(log.samples().div_ceil(most)).max(1);
         let blocks = (log.samples() / block_length).max(1);
         Ok(ConditionedLog { log, states, instruments: None, masks, kernels, efforts, block_length, blocks })
     }

@@ -30,7 +30,7 @@ pub use dynid_factor::groups::ReducedGroup;
 pub use friction::{FrictionChoice, JointFriction, ShapeTrial, choose_friction};
 pub use friction_shape::{FrictionShape, ShapeKind};
 pub use live_rows::{LiveRow, LiveRowSettings, LiveRows};
-pub use log_rows::LogRows;
+pub use log_rows::{LogRows, most_blocks};
 pub use moving::Moving;
 pub use predict::{predict, predict_along};
 pub use prepare::{PeriodicMotion, PreparedLog, prepare};
@@ -40,6 +40,7 @@ pub use settings::{ConditioningSettings, FrictionSettings};
 pub use shaped_rows::{RefineError, ShapedRows, refine};
 pub use states::{StateBlock, States};
 pub use textbook::{TextbookRoute, paired_textbook_rows, reduce_textbook, textbook_rows};
+pub use trial::state_hz_of;
 
 use dynid_model::EffortModel;
 use dynid_motion::cutoff::KernelLimit;

@@ -43,8 +43,10 @@ pub struct ConditioningSettings {
     pub remove_spikes: bool,
     /// Order of the state filter (Butterworth, run forward and backward). Default 4.
     pub state_order: usize,
-    /// Length of the time blocks behind standard deviations, s; at most 64 blocks per log, and 256 (or one per log) of all logs together. Default 1.
+    /// Length of the time blocks behind standard deviations, s; longer where there would be more than `most_blocks`. Default 1.
     pub block_s: f64,
+    /// Most time blocks of a log, at least 1. Default: 64 per log, and 256 (or one per log) of all logs together.
+    pub most_blocks: Option<usize>,
     /// Clock.
     pub clock: ClockSettings,
     /// Spikes in efforts.
@@ -77,6 +79,7 @@ impl Default for ConditioningSettings {
             remove_spikes: true,
             state_order: 4,
             block_s: 1.0,
+            most_blocks: None,
             clock: ClockSettings::default(),
             effort_spikes: SpikeSettings::default(),
             position_spikes: SpikeSettings::position(),

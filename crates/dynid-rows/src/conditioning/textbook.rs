@@ -111,7 +111,7 @@ fn rows_of<'a>(
     let columns = KeptColumns::new(model, kept);
     let settings = ConditioningSettings { state_order: route.order, ..settings.clone() };
     let mut out = MemoryRows::new();
-    let most = most_blocks(logs.len());
+    let most = settings.most_blocks.unwrap_or_else(|| most_blocks(logs.len()));
     for (l, log, motion) in logs {
         let cutoff = route.cutoff_hz.min(settings.cutoff.state_rate * log.rate_hz);
         let states = States::new(log, cutoff, &settings)?;

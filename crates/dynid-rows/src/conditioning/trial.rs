@@ -339,13 +339,8 @@ pub(crate) struct BlockSums {
     pub(crate) scored: Vec<Gram>,
 }
 
-/// State cut-off of a log for a kernel.
-pub(crate) fn state_hz_of(
-    kernel_hz: f64,
-    crossing_hz: f64,
-    rate_hz: f64,
-    settings: &ConditioningSettings,
-) -> f64 {
+/// State cut-off of a log for a kernel, Hz. `crossing_hz`: where noise and motion are equal in the positions.
+pub fn state_hz_of(kernel_hz: f64, crossing_hz: f64, rate_hz: f64, settings: &ConditioningSettings) -> f64 {
     settings
         .state_hz
         .unwrap_or_else(|| state_cutoff(kernel_hz, crossing_hz, rate_hz, &settings.cutoff))

@@ -40,6 +40,7 @@ impl Origin {
         let marked = match () {
             () if is(".csv") && has_efforts_alone(path) => true,
             () if [".csv", ".yaml", ".ros2.json"].iter().any(|e| is(e)) => return Origin::Unmarked,
+            () if dynid::reduce::is_factor_file(path) => true,
             () if is(".json") => is_result(path),
             () => ends(path).is_ok_and(|text| text.contains(MARK) || text.contains(GENERATOR)),
         };

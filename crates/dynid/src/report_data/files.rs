@@ -3,11 +3,11 @@
 use dynid_model::EffortModel;
 use dynid_report::{FileJoint, FileJudgement, FileLoss};
 
+use super::Shown;
 use crate::estimate::short_name;
 use crate::estimate::{EXPORT_LOSS_LIMIT, Estimate, FileFit};
-use crate::run::Run;
 
-impl Run {
+impl Shown<'_> {
     /// Robot files on the log that they are judged on; `None` where files do not hold the efforts.
     pub(super) fn file_judgement(&self, estimate: &Estimate) -> Option<FileJudgement> {
         let record = &estimate.exported;

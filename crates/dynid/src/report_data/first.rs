@@ -4,11 +4,11 @@ use dynid_model::EffortModel;
 use dynid_report as report;
 use dynid_report::{RobotPicture, Value};
 
+use super::Shown;
 use crate::Error;
 use crate::agreement::Agreement;
 use crate::estimate::Estimate;
 use crate::estimate::short_name;
-use crate::run::Run;
 
 /// What the first figure leaves out of a prediction; below the curves of all joints it is told at length.
 const BRIEFLY: &str = " Where the joint stands, friction of velocity is left out of the predicted curve.";
@@ -46,7 +46,7 @@ pub(super) fn counts(estimate: &Estimate) -> report::Counts {
     }
 }
 
-impl Run {
+impl Shown<'_> {
     /// The log that the verdict speaks of, the worst predicted one that the model has not seen, else of the training logs; and
     /// the joint that is predicted worst on it.
     pub(super) fn judged(&self) -> Result<Option<report::Judged>, Error> {

@@ -3,15 +3,15 @@
 use dynid_model::EffortModel;
 use dynid_report as report;
 
+use super::Shown;
 use crate::estimate::{Estimate, PassivityRecord};
 use crate::passivity;
-use crate::run::Run;
 use crate::shape::{self, NOT_SEEN, ONE_SIDED};
 
 /// Velocities drawn on each side of rest.
 const POINTS: usize = 200;
 
-impl Run {
+impl Shown<'_> {
     /// Friction over velocity of joints that have a law with shape parameters, or whose friction is known.
     pub(super) fn friction_laws(&self, estimate: &Estimate) -> Vec<report::Chart> {
         let outputs = estimate.joints.iter().enumerate();

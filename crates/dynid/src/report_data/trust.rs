@@ -4,11 +4,11 @@ use dynid_estimate::consistent::ActiveConstraint;
 use dynid_model::{EffortModel, Owner};
 use dynid_report as report;
 
+use super::Shown;
 use crate::estimate::short_name;
 use crate::estimate::{ConsistencyRecord, Estimate, ParameterValue};
-use crate::run::Run;
 
-impl Run {
+impl Shown<'_> {
     pub(super) fn consistency_report(&self, estimate: &Estimate) -> Option<report::Consistency> {
         let record = estimate.consistency.as_ref()?;
         let active = self.consistent.estimate.as_ref().map_or(&[][..], |e| &e.active);

@@ -30,6 +30,7 @@ mod periodic;
 mod preflight;
 mod preflight_causes;
 mod recorded_logs;
+mod reduce;
 mod report_page;
 mod safe_designs;
 mod settings;

@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::commands::table;
 
 /// Settings, fits, checks and verdict.
-pub(super) fn summary(estimate: &Estimate) -> String {
+pub(in crate::commands) fn summary(estimate: &Estimate) -> String {
     let mut out = String::from("settings:\n");
     for choice in &estimate.conditioning.choices {
         let _ = writeln!(out, "  {}", setting(choice));

@@ -1,0 +1,75 @@
+//! What is known of a training log without its samples.
+
+use dynid_rows::conditioning::PreparedLog;
+use serde::{Deserialize, Serialize};
+
+/// Positions are compared over this time, s: spikes and noise count little then.
+pub(super) const SPEED_SPAN_S: f64 = 0.05;
+
+/// A training log without its samples.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TrainedLog {
+    /// Name.
+    pub name: String,
+    /// Samples on its uniform grid.
+    pub samples: usize,
+    /// Length, s.
+    pub duration_s: f64,
+    /// Sample rate, Hz.
+    pub rate_hz: f64,
+    /// Per output: standard deviation of the noise of the position, rad or m.
+    pub position_noise: Vec<f64>,
+    /// Per output: standard deviation of the noise of the effort, N m or N.
+    pub effort_noise: Vec<f64>,
+    /// Per output: whether its joint moves.
+    pub moves: Vec<bool>,
+    /// Per output: least and greatest velocity, rad/s or m/s, as means over 0.05 s, rest among them; absent where its joint does not
+    /// move.
+    pub velocities: Vec<Option<(f64, f64)>>,
+    /// Channels at their least and at their greatest values.
+    pub channels: Vec<(String, f64, f64)>,
+}
+
+impl TrainedLog {
+    pub(crate) fn of(log: &PreparedLog) -> Self {
+        let range = |values: &[f64]| {
+            let (low, high) = (f64::INFINITY, f64::NEG_INFINITY);
+            values.iter().fold((low, high), |(low, high), x| (low.min(*x), high.max(*x)))
+        };
+        let channels = log.channels.iter().map(|c| {
+            let (low, high) = range(&c.values);
+            (c.name.clone(), low, high)
+        });
+        TrainedLog {
+            name: log.name.clone(),
+            samples: log.samples(),
+            duration_s: log.duration(),
+            rate_hz: log.rate_hz,
+            position_noise: log.position_noise.iter().map(|noise| noise.sigma).collect(),
+            effort_noise: log.effort_noise.iter().map(|noise| noise.sigma).collect(),
+            moves: log.moves.clone(),
+            velocities: (0..log.moves.len()).map(|output| velocities(log, output)).collect(),
+            channels: channels.filter(|(_, low, high)| low <= high).collect(),
+        }
+    }
+}
+
+/// Least and greatest mean velocity of an output over [`SPEED_SPAN_S`], with rest; `None` if it does not move.
+fn velocities(log: &PreparedLog, output: usize) -> Option<(f64, f64)> {
+    if !log.moves[output] {
+        return None;
+    }
+    let position = &log.position[output];
+    let span = ((SPEED_SPAN_S * log.rate_hz).ceil() as usize).max(1);
+    let mut range: Option<(f64, f64)> = None;
+    let mut sound = 0;
+    for (k, usable) in log.usable.iter().enumerate() {
+        sound = if *usable { sound + 1 } else { 0 };
+        if sound > span {
+            let v = (position[k] - position[k - span]) * log.rate_hz / span as f64;
+            let (low, high) = range.unwrap_or((0.0, 0.0));
+            range = Some((low.min(v), high.max(v)));
+        }
+    }
+    range
+}

@@ -1,0 +1,156 @@
+//! The factor file.
+//!
+//! | part | |
+//! |---|---|
+//! | line | `dynid factors 1` and a line feed: what it is, and its version |
+//! | `u64` | length of the description, little-endian like all numbers |
+//! | description | JSON: `recipe`, `recipe_sha256`, and per log `key`, its facts, and how many bytes its factors take |
+//! | factors | of one log after the other, as [`dynid_factor::wire`] writes them |
+//! | 32 bytes | SHA-256 of all before |
+//!
+//! The same reduction gives the same bytes.
+
+use dynid_factor::wire::{read_groups, write_groups};
+use serde::{Deserialize, Serialize};
+
+use super::error::FactorFileFault as Fault;
+use super::{LogFacts, Recipe, ReducedLog, Reduction, ReductionError, plain};
+
+/// Version of the factor file.
+pub const VERSION: u32 = 1;
+
+const MAGIC: &str = "dynid factors ";
+const DIGEST: usize = 32;
+
+#[derive(Serialize, Deserialize)]
+struct Description {
+    recipe: Recipe,
+    recipe_sha256: String,
+    logs: Vec<LogEntry>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct LogEntry {
+    key: String,
+    facts: LogFacts,
+    bytes: u64,
+}
+
+/// Key of a log: what it contributes, by which recipe.
+pub(super) fn key(recipe: &str, factors: &[u8]) -> String {
+    dynid_io::digest::sha256(&[recipe.as_bytes(), factors].concat())
+}
+
+impl Reduction {
+    /// The bytes of a factor file.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut factors = Vec::new();
+        let mut logs = Vec::new();
+        for log in &self.logs {
+            let before = factors.len();
+            write_groups(&log.groups, &mut factors);
+            let bytes = (factors.len() - before) as u64;
+            logs.push(LogEntry { key: log.key.clone(), facts: log.facts.clone(), bytes });
+        }
+        let description =
+            Description { recipe: self.recipe.clone(), recipe_sha256: self.recipe.hash(), logs };
+        let text = plain(&description);
+        let mut out = format!("{MAGIC}{VERSION}\n").into_bytes();
+        out.extend((text.len() as u64).to_le_bytes());
+        out.extend(text.as_bytes());
+        out.extend(factors);
+        out.extend(dynid_io::digest::sha256_bytes(&out));
+        out
+    }
+
+    /// Reads a factor file; `name` stands in messages.
+    ///
+    /// # Errors
+    /// [`ReductionError::File`].
+    pub fn from_bytes(bytes: &[u8], name: &str) -> Result<Reduction, ReductionError> {
+        read(bytes).map_err(|fault| ReductionError::File { file: name.to_owned(), fault })
+    }
+}
+
+fn read(bytes: &[u8]) -> Result<Reduction, Fault> {
+    let rest = bytes.strip_prefix(MAGIC.as_bytes()).ok_or(Fault::NotFactors)?;
+    let end = rest.iter().take(12).position(|b| *b == b'\n').ok_or(Fault::NotFactors)?;
+    let version = String::from_utf8_lossy(&rest[..end]).into_owned();
+    if version != VERSION.to_string() {
+        return Err(Fault::Version { expected: VERSION, found: version });
+    }
+    let rest = &rest[end + 1..];
+    let head = (bytes.len() - rest.len() + 8 + DIGEST) as u64;
+    let cut = |expected: u64| Fault::Length { expected, found: bytes.len() as u64 };
+    let (length, rest) = rest.split_first_chunk::<8>().ok_or(cut(head))?;
+    let length = u64::from_le_bytes(*length);
+    let expected = head.saturating_add(length);
+    if (bytes.len() as u64) < expected {
+        return Err(cut(expected));
+    }
+    let (before, digest) = bytes.split_at(bytes.len() - DIGEST);
+    if dynid_io::digest::sha256_bytes(before) != digest {
+        return Err(Fault::Damaged);
+    }
+    // Both fit: the file holds them.
+    let (text, rest) = rest.split_at(length as usize);
+    let mut factors = &rest[..rest.len() - DIGEST];
+    let Description { recipe, recipe_sha256, logs } =
+        serde_json::from_slice(text).map_err(|e| Fault::Description(e.to_string()))?;
+    let promised: u64 = logs.iter().fold(0, |sum: u64, log| sum.saturating_add(log.bytes));
+    if promised != factors.len() as u64 {
+        return Err(cut(expected.saturating_add(promised)));
+    }
+    if recipe.hash() != recipe_sha256 {
+        return Err(Fault::Description("the recipe is not the one that it was".to_owned()));
+    }
+    let mut out: Vec<ReducedLog> = Vec::new();
+    for LogEntry { key: expected, facts, bytes } in logs {
+        let (own, others) = factors.split_at(bytes as usize);
+        factors = others;
+        let named = |fault| Fault::Factors { log: facts.name.clone(), fault };
+        let groups = read_groups(own, 0, recipe.columns.len()).map_err(named)?;
+        let wrong = |what: &str| Err(Fault::Log { log: facts.name.clone(), what: what.to_owned() });
+        if key(&recipe_sha256, own) != expected {
+            return wrong("its key is not that of its factors");
+        }
+        if out.last().is_some_and(|last| last.key >= expected) {
+            return wrong("logs are not in the order of their keys");
+        }
+        let outputs = recipe.outputs.len();
+        let scales = recipe.choices.scales_hz.len();
+        if groups.is_empty()
+            || groups.iter().any(|g| g.output >= outputs || g.scale >= scales || g.blocks.is_empty())
+        {
+            return wrong("factors of an effort or kernel that the recipe does not have");
+        }
+        if !facts.fit(outputs) {
+            return wrong(
+                "facts of another number of efforts than the recipe has, or numbers that cannot be",
+            );
+        }
+        out.push(ReducedLog { key: expected, facts, groups });
+    }
+    Ok(Reduction { recipe, logs: out })
+}
+
+impl LogFacts {
+    /// Whether there is one of everything per output, and every number can be.
+    fn fit(&self, outputs: usize) -> bool {
+        let LogFacts { log, efforts, .. } = self;
+        let lengths = [
+            log.position_noise.len(),
+            log.effort_noise.len(),
+            log.moves.len(),
+            log.velocities.len(),
+            efforts.len(),
+        ];
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        let counts = |x: &f64| x.is_finite() && *x >= 0.0;
+        lengths.iter().all(|n| *n == outputs)
+            && positive(log.rate_hz)
+            && positive(log.duration_s)
+            && log.effort_noise.iter().chain(&log.position_noise).all(counts)
+            && efforts.iter().all(|e| counts(&e.squares) && e.sum.is_finite() && e.least <= e.greatest)
+    }
+}

@@ -1,0 +1,526 @@
+//! What decides the rows of a log: everything that an identification chose, so that other logs of the robot are reduced alike.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use dynid_estimate::consistent::Bound;
+use dynid_estimate::separable::{self, ShapeFinding, ShapeVerdict, StartReport};
+use dynid_model::{EffortModel, RobotModel};
+use dynid_motion::cutoff::KernelLimit;
+use dynid_rows::conditioning::{Conditioning, DelayEstimate, most_blocks, state_hz_of};
+use serde::{Deserialize, Serialize};
+
+use super::{ReductionError, plain};
+use crate::Error;
+use crate::estimate::{InputRecord, ModelRecord, ReadingRecord};
+use crate::friction_power::FrictionPower;
+use crate::passivity::velocities;
+use crate::pipeline::{Identification, Problem, Structure, TrainingLog};
+use crate::robot::Robot;
+use crate::settings::{ConditioningConfig, EstimatorConfig, Method, Preflight, Route, Settings};
+use crate::shape::{self, ShapeFit};
+
+/// What decides the rows of a log, and how factors of such rows are solved.
+///
+/// It comes from an identification ([`Identification::recipe`]) on logs that stand for all others: kernel, mask, delay, shapes of
+/// friction and the point about which they are linearised, length of the time blocks, size of the efforts behind the prior, and the speeds at
+/// which friction must not drive are those of these logs.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Recipe {
+    /// Robot.
+    pub robot: String,
+    /// The robot, its elements and shapes.
+    pub model: ModelRecord,
+    /// Largest speed and effort of joints, where the robot file states them.
+    limits: Vec<JointLimit>,
+    /// Efforts, in the order of the rows.
+    pub outputs: Vec<Output>,
+    /// Columns of the factors: base parameters of the model, changes of shape parameters among them.
+    pub columns: Vec<Column>,
+    /// Shape parameters and the point about which the model is linear; absent where there are none.
+    shapes: Option<Shapes>,
+    /// Values of the robot file, in parameter order.
+    stated: Vec<Option<f64>>,
+    /// Per output: 99 % of the efforts are smaller, N m or N.
+    effort_sizes: Vec<f64>,
+    /// Per output: least and greatest velocity of the logs, rad/s or m/s; absent where none moves it.
+    pub velocities: Vec<Option<(f64, f64)>>,
+    /// Choices of the conditioning.
+    pub choices: Choices,
+    /// Time blocks.
+    pub blocks: Blocks,
+    /// What a consistent estimate must meet.
+    bounds: Vec<BoundRecord>,
+    /// Parameters that have no limit of their own beside these.
+    free: Vec<String>,
+    /// Whether errors of known friction may have any sign.
+    free_errors: bool,
+    /// Settings that were asked for.
+    settings: Asked,
+    /// Files of the robot, and of friction that is known.
+    pub inputs: Vec<InputRecord>,
+    /// How logs are read.
+    pub reading: ReadingRecord,
+}
+
+/// Largest speed and effort of a joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct JointLimit {
+    joint: String,
+    velocity: Option<f64>,
+    effort: Option<f64>,
+}
+
+/// An effort.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Output {
+    /// Joint or motor.
+    pub name: String,
+    /// `N m` or `N`.
+    pub unit: String,
+}
+
+/// A column of the factors.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Column {
+    /// Base parameter, by the standard parameter that stands for it.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Size of the parameter: standard deviation that its prior leaves, in its unit.
+    pub scale: f64,
+}
+
+/// Shape parameters and the point about which a model is linear.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Shapes {
+    linear: Vec<f64>,
+    shape: Vec<f64>,
+    findings: Vec<Finding>,
+}
+
+/// What the logs of the recipe said of a shape parameter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Finding {
+    verdict: FindingVerdict,
+    /// At its lower (`false`) or upper bound.
+    at_upper_bound: Option<bool>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum FindingVerdict {
+    Seen,
+    OneSided { lower: f64, upper: f64 },
+    NotSeen,
+    Held,
+    NotJudged,
+}
+
+/// Choices of the conditioning.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Choices {
+    /// Cut-off of the widest kernel, Hz.
+    pub kernel_hz: f64,
+    /// Cut-offs of all kernels, widest first, Hz.
+    pub scales_hz: Vec<f64>,
+    /// Highest kernel that noise and band allow, Hz.
+    limit_hz: f64,
+    /// Frequency at which the noise of the positions reaches their spectrum, Hz.
+    crossing_hz: f64,
+    /// Band of the motion, Hz.
+    band_hz: f64,
+    /// Delay of the motion behind the logged effort, samples.
+    pub delay_samples: f64,
+    /// Half width of its 95 % interval, samples.
+    delay_half_width: f64,
+    /// Sample rate at which the delay was found, Hz.
+    pub rate_hz: f64,
+    /// Per output: rung of the mask ladder, 0 = no mask.
+    rung: Vec<usize>,
+    /// Per output: mask as a share of the rms speed; absent: no mask.
+    pub mask: Vec<Option<f64>>,
+    /// Per output: share of samples that stay usable.
+    usable: Vec<f64>,
+}
+
+/// Time blocks behind standard deviations.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Blocks {
+    /// Most time blocks of a log.
+    pub most: usize,
+    /// How many of them make one.
+    pub merged: usize,
+    /// Length that the residuals asked for, s.
+    pub wanted_s: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct BoundRecord {
+    name: String,
+    terms: Vec<(usize, f64)>,
+    upper: f64,
+}
+
+/// Settings that a recipe keeps.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Asked {
+    seed: Option<u64>,
+    preferred: Vec<String>,
+    conditioning: ConditioningConfig,
+    estimator: EstimatorConfig,
+    known_effort_scale: bool,
+    known_mass: BTreeMap<String, f64>,
+    preflight: Preflight,
+}
+
+impl Identification {
+    /// What decides the rows of other logs as it decided those of these.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for what no factor of single logs holds: the textbook route, robust losses and instruments, which look at
+    /// single rows; terms of single logs; elastic joints, whose stiffness is told by the deformation.
+    pub fn recipe(&self) -> Result<Recipe, Error> {
+        let Some(found) =
+            self.conditioning.as_ref().filter(|_| self.settings.conditioning.route != Route::Textbook)
+        else {
+            return Err(not_reduced("the textbook route", "leave out `route`"));
+        };
+        match self.settings.estimator.method {
+            Method::Huber | Method::Tukey | Method::Iv => {
+                return Err(not_reduced(
+                    "estimators that look at single rows",
+                    "take `method = \"wls\"`, the default",
+                ));
+            }
+            Method::Ols | Method::Wls | Method::Ridge | Method::Tls => {}
+        }
+        if self.settings.closed_loop.is_some() {
+            return Err(not_reduced("`[instruments]`", "leave the table out"));
+        }
+        if !self.plan.log_terms.is_empty() || !self.own_delays.is_empty() {
+            return Err(not_reduced("terms of single logs", "leave out `payload` and `own`"));
+        }
+        if !self.plan.elastic.is_empty() || self.taken_as_stiff {
+            return Err(not_reduced("elastic joints", "use the robot file without `elastic`"));
+        }
+        let table = self.model.parameters();
+        let mut model = ModelRecord::new(&self.robot.file.description, &self.robot.mechanism, &self.plan);
+        (model.state_hz, model.kernel_hz) = (self.state_hz, self.kernel_hz);
+        let limit = |j: &dynid_model::JointDescription| {
+            let dynid_model::Limits { velocity, effort, .. } = j.limits;
+            (velocity.is_some() || effort.is_some()).then(|| JointLimit {
+                joint: j.name.clone(),
+                velocity,
+                effort,
+            })
+        };
+        let column = |(c, scale): (&usize, &f64)| {
+            let p = &table.linear[*c];
+            Column { name: p.name.clone(), unit: p.unit.to_owned(), scale: *scale }
+        };
+        let output = |o: &dynid_model::Output| Output { name: o.name.clone(), unit: o.unit.to_owned() };
+        let bound = |b: &Bound| {
+            let Bound { name, terms, upper } = b.clone();
+            BoundRecord { name, terms, upper }
+        };
+        Ok(Recipe {
+            robot: self.model.mechanism().name().to_owned(),
+            limits: self.robot.file.description.joints.iter().filter_map(limit).collect(),
+            outputs: self.model.outputs().iter().map(output).collect(),
+            columns: self.base.kept.iter().zip(&self.base_scales).map(column).collect(),
+            shapes: self.shapes.as_ref().map(Shapes::of),
+            stated: self.stated.clone(),
+            effort_sizes: self.effort_sizes.clone(),
+            velocities: (0..self.model.outputs().len()).map(|j| velocities(&self.trained, j)).collect(),
+            choices: Choices::of(found, self.delay_rate_hz),
+            blocks: Blocks {
+                most: most_blocks(self.trained.len()),
+                merged: self.fitted.merged_blocks,
+                wanted_s: self.fitted.block_length.seconds,
+            },
+            bounds: self.bounds.iter().map(bound).collect(),
+            free: self.power.kept.clone(),
+            free_errors: self.plan.free_errors,
+            settings: Asked::of(&self.settings),
+            inputs: InputRecord::of_robot(&self.robot)
+                .into_iter()
+                .chain(self.plan.known_source.iter().map(|source| InputRecord::of("friction", source)))
+                .collect(),
+            reading: ReadingRecord::default(),
+            model,
+        })
+    }
+}
+
+fn not_reduced(what: &str, instead: &str) -> Error {
+    Error::Unsupported(format!("{what} cannot be reduced to factors: {instead}"))
+}
+
+impl Recipe {
+    /// SHA-256 of everything in it but where files lie, hexadecimal: factors of the same rows go together.
+    pub fn hash(&self) -> String {
+        let without_paths = Recipe {
+            inputs: self.inputs.iter().map(|i| InputRecord { path: String::new(), ..i.clone() }).collect(),
+            reading: ReadingRecord::default(),
+            ..self.clone()
+        };
+        dynid_io::digest::sha256(plain(&without_paths).as_bytes())
+    }
+
+    /// Returns the recipe with how its logs were read, for other logs to be read alike.
+    #[must_use]
+    pub fn with_reading(self, reading: ReadingRecord) -> Self {
+        Recipe { reading, ..self }
+    }
+
+    /// The problem without logs: robot, elements, model, what is known before a fit.
+    ///
+    /// # Errors
+    /// [`ReductionError::Contradiction`]: the recipe is not one that this version would have written.
+    pub(super) fn problem(&self) -> Result<(Problem, Solved), Error> {
+        let contradiction = |what: String| Error::from(ReductionError::Contradiction { what });
+        let mut file = self.model.robot_file(&self.robot).map_err(contradiction)?;
+        for limit in &self.limits {
+            let joint = file.description.joints.iter_mut().find(|j| j.name == limit.joint);
+            let joint =
+                joint.ok_or_else(|| contradiction(format!("limits of `{}`, no joint", limit.joint)))?;
+            (joint.limits.velocity, joint.limits.effort) = (limit.velocity, limit.effort);
+        }
+        let path = self.inputs.first().map_or_else(|| self.robot.clone(), |input| input.path.clone());
+        let robot = Robot::of_parts(Path::new(&path), file)?;
+        let mut plan = self.model.plan(&robot.mechanism)?.with_loops(robot.closed.clone());
+        plan.free_errors = self.free_errors;
+        if plan.per_rate.len() != plan.names(&robot.mechanism).len() {
+            return Err(contradiction(
+                "elements for another number of efforts than the robot has".to_owned(),
+            ));
+        }
+        let nonlinear = plan.model(&robot.mechanism)?;
+        let (shapes, model) = match &self.shapes {
+            None => (None, nonlinear),
+            Some(shapes) => {
+                let (found, model) = shapes.fit(&plan, nonlinear)?;
+                (Some(found), model)
+            }
+        };
+        let model = model.with_free_sign(|p| self.free.contains(&p.name));
+        let settings = self.settings.settings();
+        let rows = model.parameters().linear.len();
+        let bounds: Vec<Bound> = self.bounds.iter().map(|b| b.bound(rows)).collect::<Result<_, _>>()?;
+        if self.stated.len() != rows || self.effort_sizes.len() != model.outputs().len() {
+            return Err(contradiction("values of the robot file for another model".to_owned()));
+        }
+        let structure =
+            Structure::known(&settings, &robot, &model, &self.stated, &self.effort_sizes, bounds)?;
+        self.check(&model, &structure)?;
+        let power = FrictionPower::of_earlier(self.free.clone());
+        let problem = Problem {
+            robot,
+            plan,
+            model,
+            structure,
+            logs: Vec::new().into(),
+            training: Vec::new(),
+            settings,
+        };
+        Ok((problem, Solved { shapes, power }))
+    }
+
+    /// Outputs, columns and choices are those of the model that the recipe describes.
+    fn check(&self, model: &RobotModel, structure: &Structure) -> Result<(), Error> {
+        let table = &model.parameters().linear;
+        let contradiction = |what: &str| Err(ReductionError::Contradiction { what: what.to_owned() }.into());
+        if !self.outputs.iter().map(|o| &o.name).eq(model.outputs().iter().map(|o| &o.name)) {
+            return contradiction("outputs of another robot");
+        }
+        if !self.columns.iter().map(|c| &c.name).eq(structure.base.kept.iter().map(|c| &table[*c].name)) {
+            return contradiction("columns of another model, or of another version of the analysis");
+        }
+        let outputs = self.outputs.len();
+        let Choices { kernel_hz, scales_hz, rung, mask, usable, rate_hz, delay_samples, .. } = &self.choices;
+        let numbers = [*kernel_hz, *rate_hz].iter().chain(scales_hz).all(|x| x.is_finite() && *x > 0.0);
+        let per_output =
+            [rung.len(), mask.len(), usable.len(), self.velocities.len()].iter().all(|n| *n == outputs);
+        let ladder = self.settings.settings().conditioning_settings().ladder.len();
+        if !numbers
+            || !per_output
+            || scales_hz.is_empty()
+            || !(delay_samples.abs() <= 1e6)
+            || rung.iter().any(|r| *r > ladder)
+        {
+            return contradiction("choices that no conditioning makes");
+        }
+        let Blocks { most, merged, wanted_s } = self.blocks;
+        if most == 0 || merged == 0 || !(wanted_s >= 0.0) {
+            return contradiction("time blocks of no length");
+        }
+        Ok(())
+    }
+
+    /// The choices for logs of given sample rates.
+    pub(super) fn conditioning(&self, rates_hz: &[f64]) -> Conditioning {
+        let c = &self.choices;
+        let settings = self.settings.settings().conditioning_settings();
+        Conditioning {
+            limit: KernelLimit {
+                per_joint_hz: Vec::new(),
+                crossing_hz: c.crossing_hz,
+                excited_band_hz: c.band_hz,
+                limit_hz: c.limit_hz,
+            },
+            kernel_hz: c.kernel_hz,
+            scales_hz: c.scales_hz.clone(),
+            state_hz: rates_hz
+                .iter()
+                .map(|rate| state_hz_of(c.kernel_hz, c.crossing_hz, *rate, &settings))
+                .collect(),
+            delay: DelayEstimate {
+                samples: c.delay_samples,
+                half_width: c.delay_half_width,
+                per_output: Vec::new(),
+                chi_squared: None,
+                at_limit: false,
+                given: true,
+            },
+            rung: c.rung.clone(),
+            mask: c.mask.clone(),
+            usable: c.usable.clone(),
+            kernel_trials: Vec::new(),
+            mask_trials: Vec::new(),
+        }
+    }
+}
+
+/// What a recipe knows of a fit beside its problem.
+pub(super) struct Solved {
+    pub(super) shapes: Option<ShapeFit>,
+    pub(super) power: FrictionPower,
+}
+
+impl Shapes {
+    fn of(found: &ShapeFit) -> Self {
+        let finding = |f: &ShapeFinding| Finding {
+            verdict: match f.verdict {
+                ShapeVerdict::Seen => FindingVerdict::Seen,
+                ShapeVerdict::OneSided { lower, upper } => FindingVerdict::OneSided { lower, upper },
+                ShapeVerdict::NotSeen => FindingVerdict::NotSeen,
+                ShapeVerdict::Held => FindingVerdict::Held,
+                ShapeVerdict::NotJudged => FindingVerdict::NotJudged,
+            },
+            at_upper_bound: f.at_bound.map(|bound| bound == separable::Bound::Upper),
+        };
+        Shapes {
+            linear: found.linear.clone(),
+            shape: found.model.parameters().shape_start(),
+            findings: found.findings.iter().map(finding).collect(),
+        }
+    }
+
+    /// The nonlinear model with these shapes, and the one that is linear about them.
+    fn fit(
+        &self,
+        plan: &crate::elements::ElementPlan,
+        model: RobotModel,
+    ) -> Result<(ShapeFit, RobotModel), Error> {
+        let table = model.parameters();
+        let shapes = table.shape.len();
+        if self.shape.len() != shapes
+            || self.findings.len() != shapes
+            || self.linear.len() != table.linear.len()
+        {
+            let what = "shapes of another model".to_owned();
+            return Err(ReductionError::Contradiction { what }.into());
+        }
+        let model = model.with_shape(&self.shape);
+        let finding = |f: &Finding| ShapeFinding {
+            verdict: match f.verdict {
+                FindingVerdict::Seen => ShapeVerdict::Seen,
+                FindingVerdict::OneSided { lower, upper } => ShapeVerdict::OneSided { lower, upper },
+                FindingVerdict::NotSeen => ShapeVerdict::NotSeen,
+                FindingVerdict::Held => ShapeVerdict::Held,
+                FindingVerdict::NotJudged => ShapeVerdict::NotJudged,
+            },
+            profile: Vec::new(),
+            at_bound: f
+                .at_upper_bound
+                .map(|upper| if upper { separable::Bound::Upper } else { separable::Bound::Lower }),
+            limit: None,
+        };
+        let findings: Vec<ShapeFinding> = self.findings.iter().map(finding).collect();
+        let free: Vec<bool> = findings.iter().map(shape::is_free).collect();
+        let linearised = shape::linearised(plan, &model, &self.linear, &free)?;
+        let starts = StartReport { outcomes: Vec::new(), reached: 0, distinct: 0 };
+        Ok((ShapeFit { model, linear: self.linear.clone(), findings, starts }, linearised))
+    }
+}
+
+impl Choices {
+    fn of(found: &Conditioning, rate_hz: f64) -> Self {
+        Choices {
+            kernel_hz: found.kernel_hz,
+            scales_hz: found.scales_hz.clone(),
+            limit_hz: found.limit.limit_hz,
+            crossing_hz: found.limit.crossing_hz,
+            band_hz: found.limit.excited_band_hz,
+            delay_samples: found.delay.samples,
+            delay_half_width: found.delay.half_width,
+            rate_hz,
+            rung: found.rung.clone(),
+            mask: found.mask.clone(),
+            usable: found.usable.clone(),
+        }
+    }
+}
+
+impl BoundRecord {
+    fn bound(&self, columns: usize) -> Result<Bound, Error> {
+        let BoundRecord { name, terms, upper } = self.clone();
+        match terms.iter().all(|(column, _)| *column < columns) {
+            true => Ok(Bound { name, terms, upper }),
+            false => {
+                let what = format!("`{name}` bounds a parameter that the model does not have");
+                Err(ReductionError::Contradiction { what }.into())
+            }
+        }
+    }
+}
+
+impl Asked {
+    fn of(settings: &Settings) -> Self {
+        let Settings {
+            seed,
+            preferred,
+            conditioning,
+            estimator,
+            known_effort_scale,
+            known_mass,
+            preflight,
+            ..
+        } = settings.clone();
+        Asked { seed, preferred, conditioning, estimator, known_effort_scale, known_mass, preflight }
+    }
+
+    fn settings(&self) -> Settings {
+        let Asked { seed, preferred, conditioning, estimator, known_effort_scale, known_mass, preflight } =
+            self.clone();
+        Settings::default().with(|s| {
+            s.seed = seed;
+            s.preferred = preferred;
+            s.conditioning = conditioning;
+            s.estimator = estimator;
+            s.known_effort_scale = known_effort_scale;
+            s.known_mass = known_mass;
+            s.preflight = preflight;
+        })
+    }
+}
+
+/// The training log of a label, without what no recipe allows it.
+pub(super) fn training_log(label: &str) -> TrainingLog {
+    TrainingLog {
+        label: label.to_owned(),
+        settings: crate::settings::LogSettings::default(),
+        reference: None,
+    }
+}

@@ -1,0 +1,128 @@
+//! From factors to an identification.
+
+use dynid_estimate::linear::estimate;
+use dynid_factor::groups::ReducedGroup;
+
+use super::recipe::{Solved, training_log};
+use super::{LogFacts, Reduction, ReductionError};
+use crate::Error;
+use crate::consistency;
+use crate::estimate::FitValues;
+use crate::fitting::{self, Fitted, RowResiduals};
+use crate::log::{Log, LogSource};
+use crate::overlap::Overlaps;
+use crate::pipeline::{Beside, EXPLAINED, Identification, ModelFit, Step, TrainedLog, assemble, explained};
+
+/// Figures of a fit on the rows of one log.
+#[derive(Debug, Clone)]
+pub struct RowFit {
+    /// Log.
+    pub log: String,
+    /// Rows of the widest kernel, all outputs together.
+    pub rows: usize,
+    /// Figures, output by output, of outputs that move in the log.
+    pub values: FitValues,
+}
+
+impl Reduction {
+    /// Solves for the parameters of all logs: fit, covariance, bodies that can exist, verdicts, validation logs.
+    ///
+    /// The result has no samples of the training logs: [`Identification::training`] is empty, and [`Identification::row_fits`] says how well
+    /// rows are explained. Rows leave out reversals and rest: what a model does there, only a validation log tells.
+    ///
+    /// # Errors
+    /// [`Error::Reduction`]; else as [`crate::identify()`].
+    pub fn solve(
+        &self,
+        validation: impl IntoIterator<Item = Log>,
+        progress: &mut dyn FnMut(Step),
+    ) -> Result<Identification, Error> {
+        if self.logs.is_empty() {
+            return Err(ReductionError::Nothing.into());
+        }
+        progress(Step::Structure);
+        let (mut problem, Solved { shapes, power }) = self.recipe.problem()?;
+        problem.training = self.logs.iter().map(|log| training_log(&log.facts.name)).collect();
+        problem.settings.files.robot.clone_from(&problem.robot.path);
+        let columns = problem.structure.base.len();
+        let groups: Vec<ReducedGroup> = (self.logs.iter().enumerate())
+            .flat_map(|(k, log)| log.groups.iter().map(move |g| ReducedGroup { log: k, ..g.clone() }))
+            .collect();
+        progress(Step::Fit);
+        fitting::check_rows(&groups, columns, || self.logs[0].facts.name.clone())?;
+        let settings = fitting::linear_settings(&problem.settings);
+        let found = estimate(&groups, None, columns, &problem.structure.method, &settings)?;
+        let duration_s = self.logs.iter().map(|log| log.facts.log.duration_s).sum();
+        let fitted = Fitted::with_blocks(found, self.recipe.blocks.wanted_s, duration_s);
+        progress(Step::Consistency);
+        let consistent = consistency::consistent(&problem, &fitted, &groups)?;
+        let rates: Vec<f64> = self.logs.iter().map(|log| log.facts.log.rate_hz).collect();
+        let base = problem.structure.base.values(&consistent.values);
+        let fit = ModelFit {
+            conditioning: Some(self.recipe.conditioning(&rates)),
+            friction: Vec::new(),
+            shapes,
+            instruments: None,
+            residuals: RowResiduals::none(),
+            fitted,
+            groups,
+            consistent,
+            power,
+        };
+        let row_fits: Vec<RowFit> = (self.logs.iter())
+            .map(|log| row_fit(&log.facts, &log.groups, &base, self.recipe.outputs.len()))
+            .collect();
+        let source = |facts: &LogFacts| LogSource { inputs: facts.inputs.clone(), ..LogSource::default() };
+        let named = |facts: &LogFacts| TrainedLog { name: facts.name.clone(), ..facts.log.clone() };
+        let facts = || self.logs.iter().map(|log| &log.facts);
+        let beside = Beside {
+            training: facts().map(named).collect(),
+            sources: facts().map(source).collect(),
+            findings: Vec::new(),
+            overlaps: Overlaps::default(),
+            own_delays: Vec::new(),
+            warnings: facts().flat_map(|facts| facts.cautions.iter().cloned()).collect(),
+            reading: Vec::new(),
+            comparison: None,
+        };
+        let (mut out, left) = assemble(problem, fit, beside)?;
+        for log in validation {
+            progress(Step::Validate(log.log.name().to_owned()));
+            out.validate(log)?;
+        }
+        progress(Step::Trust);
+        let rows =
+            |j: usize| row_fits.iter().filter_map(move |fit| fit.values.r2[j]).all(|r2| r2 >= EXPLAINED);
+        let samples = explained(out.validation.iter(), self.recipe.outputs.len(), &out.consistent);
+        out.explained = samples.into_iter().enumerate().map(|(j, held)| held && rows(j)).collect();
+        out.row_fits = row_fits;
+        out.judge(&left)?;
+        Ok(out)
+    }
+}
+
+/// How well the rows of a log are explained by values in base columns.
+fn row_fit(facts: &LogFacts, groups: &[ReducedGroup], x: &[f64], outputs: usize) -> RowFit {
+    let mut values = FitValues::unknown(outputs);
+    let (mut residual, mut squares, mut rows) = (0.0, 0.0, 0);
+    for group in groups.iter().filter(|g| g.scale == 0 && g.rows() > 0) {
+        let (j, n) = (group.output, group.rows() as f64);
+        let rss = group.merged(x.len()).rss(x);
+        let sums = &facts.efforts[j];
+        residual += rss;
+        squares += sums.squares;
+        rows += group.rows();
+        let rms = (rss / n).sqrt();
+        let about_mean = sums.squares - sums.sum * sums.sum / n;
+        let range = sums.greatest - sums.least;
+        values.rms[j] = Some(rms);
+        values.nrmse[j] = (range > 0.0).then(|| rms / range);
+        // Rows of a joint at rest hold friction that no model of the speed tells.
+        values.r2[j] =
+            (facts.log.moves[j] && about_mean > 1e-12 * sums.squares).then(|| 1.0 - rss / about_mean);
+        values.relative_error_per_joint[j] =
+            (sums.squares > 0.0).then(|| 100.0 * (rss / sums.squares).sqrt());
+    }
+    values.relative_error = (squares > 0.0).then(|| 100.0 * (residual / squares).sqrt());
+    RowFit { log: facts.name.clone(), rows, values }
+}

@@ -1,0 +1,120 @@
+//! Logs to factors, factors to an estimate: the files around [`dynid_identify::reduction`].
+
+use std::path::Path;
+
+use dynid_io::MappingSpec;
+
+pub use dynid_identify::reduction::{
+    Column, FactorFileFault, LogFacts, Recipe, ReducedLog, Reducer, Reduction, ReductionError, VERSION,
+};
+
+use crate::Error;
+use crate::config::{Config, LogConfig, MotorSide};
+use crate::estimate::{Estimate, ReadingRecord};
+use crate::logs;
+use crate::pipeline::{Identification, Step};
+use crate::run::{identify, read_training};
+
+/// A recipe that was learned, the factors of the logs behind it, and what came out of these.
+#[derive(Debug)]
+pub struct Learned {
+    /// Factors of the training logs.
+    pub reduction: Reduction,
+    /// The estimate of the same logs, with samples and validation logs.
+    pub estimate: Estimate,
+}
+
+/// Identifies the logs of a configuration, makes a recipe of what was chosen, and reduces the training logs by it.
+///
+/// # Errors
+/// As [`crate::identify()`], [`Identification::recipe`] and [`Reducer::reduce`].
+pub fn learn(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Learned, Error> {
+    let run = identify(config, progress)?;
+    let reading = ReadingRecord { understood: Vec::new(), ..run.reading.clone() };
+    let recipe = run.recipe()?.with_reading(reading);
+    let estimate = run.estimate();
+    // Samples go before they are read once more.
+    drop(run);
+    let reducer = recipe.reducer()?;
+    let logs = read_training(config, reducer.robot(), progress)?;
+    Ok(Learned { reduction: Reduction::of(&reducer, logs)?, estimate })
+}
+
+/// Reduces logs by a recipe.
+///
+/// # Errors
+/// As [`logs::load`] and [`Reducer::reduce`].
+pub fn reduce(
+    recipe: Recipe,
+    logs: &[LogConfig],
+    columns: &MappingSpec,
+    motor_side: Option<&MotorSide>,
+    progress: &mut dyn FnMut(Step),
+) -> Result<Reduction, Error> {
+    let reducer = recipe.reducer()?;
+    let mut reduced = Vec::new();
+    for log in logs {
+        progress(Step::Read(log.path.display().to_string()));
+        reduced
+            .push(Reduction::of(&reducer, [logs::load(log, &reducer.robot().axes, columns, motor_side)?])?);
+    }
+    Ok(Reduction::merge(reduced)?)
+}
+
+/// Reads a factor file.
+///
+/// # Errors
+/// [`Error::Read`], [`Error::Reduction`].
+pub fn read(path: &Path) -> Result<Reduction, Error> {
+    let bytes = dynid_io::input::read(path).map_err(|source| Error::Read { file: path.into(), source })?;
+    Ok(Reduction::from_bytes(&bytes, &path.display().to_string())?)
+}
+
+/// Reads factor files and merges them.
+///
+/// # Errors
+/// [`Error::Read`], [`Error::Reduction`].
+pub fn read_all<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Result<Reduction, Error> {
+    let parts = paths.into_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
+    Ok(Reduction::merge(parts)?)
+}
+
+/// Whether a file begins as factor files do.
+pub fn is_factor_file(path: &Path) -> bool {
+    let mut head = [0; 14];
+    let opened = dynid_io::input::open(path);
+    opened.is_ok_and(|mut file| std::io::Read::read_exact(&mut file, &mut head).is_ok())
+        && head == *b"dynid factors "
+}
+
+/// Solves factors, and compares the result with logs that are read.
+///
+/// # Errors
+/// As [`logs::load`] and [`Reduction::solve`].
+pub fn solve(
+    reduction: &Reduction,
+    validation: &[LogConfig],
+    columns: &MappingSpec,
+    motor_side: Option<&MotorSide>,
+    progress: &mut dyn FnMut(Step),
+) -> Result<Identification, Error> {
+    let mut logs = Vec::new();
+    if !validation.is_empty() {
+        let reducer = reduction.recipe().clone().reducer()?;
+        for log in validation {
+            progress(Step::Read(log.path.display().to_string()));
+            let mut log = logs::load(log, &reducer.robot().axes, columns, motor_side)?;
+            log.settings.validation = true;
+            logs.push(log);
+        }
+    }
+    reduction.solve(logs, progress)
+}
+
+/// The result file of solved factors: as an identification gives it, and how logs are read.
+pub fn estimate(solved: &Identification, recipe: &Recipe) -> Estimate {
+    let mut estimate = solved.estimate();
+    estimate.provenance.inputs = recipe.inputs.iter().cloned().chain(estimate.provenance.inputs).collect();
+    estimate.provenance.reading = Some(recipe.reading.clone());
+    estimate
+}

@@ -1,0 +1,252 @@
+//! Logs reduced to factors apart, merged in any order, and solved, against one identification of all logs.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use dynid::Error;
+use dynid::config::{Config, LogConfig};
+use dynid::estimate::Estimate;
+use dynid::io::MappingSpec;
+use dynid::io::digest::sha256_bytes;
+use dynid::log::Log;
+use dynid::reduce::{FactorFileFault, Learned, Reduction, ReductionError, learn, reduce};
+use dynid::settings::{LogSettings, Own};
+
+fn example(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/indy7").join(name)
+}
+
+/// Two parts of the example's log, and its other log.
+fn parts() -> [LogConfig; 3] {
+    let part = |path: &str, part| LogConfig { path: example(path), part, ..LogConfig::default() };
+    [
+        part("train.csv.gz", Some((0.0, 0.6))),
+        part("train.csv.gz", Some((0.6, 1.0))),
+        part("valid.csv.gz", None),
+    ]
+}
+
+/// What the first two parts teach.
+fn learned() -> &'static Learned {
+    static LEARNED: OnceLock<Learned> = OnceLock::new();
+    LEARNED.get_or_init(|| {
+        let [first, second, _] = parts();
+        let robot = example("robot.toml");
+        learn(&Config { robot, log: vec![first, second], ..Config::default() }, &mut |_| {}).unwrap()
+    })
+}
+
+fn reduced(logs: &[LogConfig]) -> Reduction {
+    let recipe = learned().reduction.recipe().clone();
+    reduce(recipe, logs, &MappingSpec::default(), None, &mut |_| {}).unwrap()
+}
+
+fn load(log: &LogConfig) -> Log {
+    let robot = learned().reduction.recipe().clone().reducer().unwrap().robot().clone();
+    dynid::logs::load(log, &robot.axes, &MappingSpec::default(), None).unwrap()
+}
+
+/// Largest difference of two estimates of the same model: values in standard deviations, and these themselves.
+fn apart(a: &Estimate, b: &Estimate) -> (f64, f64) {
+    assert_eq!(a.base_parameters.len(), b.base_parameters.len());
+    let mut out = (0.0_f64, 0.0_f64);
+    for (x, y) in a.base_parameters.iter().zip(&b.base_parameters) {
+        assert_eq!(x.name, y.name);
+        let (Some(p), Some(q), Some(s), Some(t)) = (x.value, y.value, x.std, y.std) else {
+            assert_eq!((x.value, x.std), (y.value, y.std));
+            continue;
+        };
+        out = (out.0.max((p - q).abs() / s), out.1.max((s / t - 1.0).abs()));
+    }
+    out
+}
+
+#[test]
+fn factors_of_the_logs_of_an_identification_give_its_parameters() {
+    let solved = learned().reduction.solve([], &mut |_| {}).unwrap().estimate();
+    let (values, deviations) = apart(&learned().estimate, &solved);
+    assert!(values < 1e-12 && deviations < 1e-11, "{values:e} std, {deviations:e}");
+    for (a, b) in learned().estimate.parameters.iter().zip(&solved.parameters) {
+        assert_eq!((&a.name, &a.verdict), (&b.name, &b.verdict));
+        assert!(
+            (a.value - b.value).abs() <= 1e-11 * (1.0 + a.value.abs()),
+            "{} {} {}",
+            a.name,
+            a.value,
+            b.value
+        );
+    }
+    assert_eq!(solved.samples, learned().estimate.samples);
+    assert!(solved.fit.filtered.relative_error.unwrap() < 1.0, "figures are those of the rows");
+    assert_eq!(solved.fit.raw.relative_error, None, "no sample was predicted");
+}
+
+#[test]
+fn any_split_in_any_order_gives_the_same_bytes() {
+    let [first, second, third] = parts();
+    let all = reduced(&[first.clone(), second.clone(), third.clone()]);
+    let each: Vec<Vec<u8>> =
+        [&first, &second, &third].map(|log| reduced(std::slice::from_ref(log)).to_bytes()).to_vec();
+    for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+        let read = |k: &usize| Reduction::from_bytes(&each[*k], "part").unwrap();
+        let merged = Reduction::merge(order.iter().map(read)).unwrap();
+        assert_eq!(merged.to_bytes(), all.to_bytes(), "{order:?}");
+        let pairs = Reduction::merge([read(&order[0]), read(&order[1])]).unwrap();
+        let nested = Reduction::merge([pairs.clone(), read(&order[2]), pairs]).unwrap();
+        assert_eq!(nested.to_bytes(), all.to_bytes(), "in steps, and some twice: {order:?}");
+    }
+    let learned = learned().reduction.to_bytes();
+    let again = Reduction::merge([reduced(&[second]), reduced(&[first])]).unwrap();
+    assert_eq!(again.to_bytes(), learned, "reduced later, by the recipe alone");
+}
+
+#[test]
+fn more_logs_narrow_what_is_known_and_a_validation_log_judges_it() {
+    let [_, _, third] = parts();
+    let more =
+        Reduction::merge([learned().reduction.clone(), reduced(std::slice::from_ref(&third))]).unwrap();
+    let unseen = load(&third).with_settings(LogSettings { validation: true, ..LogSettings::default() });
+    let solved = more.solve([], &mut |_| {}).unwrap().estimate();
+    let narrower = |(a, b): (&dynid::estimate::BaseValue, &dynid::estimate::BaseValue)| b.std < a.std;
+    let count = learned()
+        .estimate
+        .base_parameters
+        .iter()
+        .zip(&solved.base_parameters)
+        .filter(|p| narrower(*p))
+        .count();
+    assert!(4 * count > 3 * solved.base_parameters.len(), "{count} narrower");
+    let judged = learned().reduction.solve([unseen], &mut |_| {}).unwrap().estimate();
+    let [log] = &judged.validation[..] else { panic!("one validation log") };
+    assert!(log.filtered.relative_error.unwrap() < 1.0);
+    assert!(judged.verdict.line.contains("predicts logs it has not seen"), "{}", judged.verdict.line);
+}
+
+#[test]
+fn what_no_recipe_knows_is_refused() {
+    let reducer = learned().reduction.recipe().clone().reducer().unwrap();
+    let [first, ..] = parts();
+    let refused =
+        |settings: LogSettings| reducer.reduce(load(&first).with_settings(settings)).unwrap_err().to_string();
+    let own = refused(LogSettings { own: vec![Own::Offset], ..LogSettings::default() });
+    assert!(own.contains("log.own") && own.contains("offset"), "{own}");
+    let payload = refused(LogSettings { payload: Some("tool".to_owned()), ..LogSettings::default() });
+    assert!(payload.contains("log.payload"), "{payload}");
+    let slow = LogConfig { columns: None, ..first.clone() };
+    let rate = MappingSpec { rate_hz: Some(100.0), ..MappingSpec::default() };
+    let recipe = || learned().reduction.recipe().clone();
+    let found = reduce(recipe(), &[slow], &rate, None, &mut |_| {}).unwrap_err();
+    assert!(matches!(found, Error::Reduction(ReductionError::Rate { .. })), "{found}");
+    assert!(found.hint().is_some());
+
+    let [first, second, _] = parts();
+    let robot = example("robot.toml");
+    let refused = |change: &dyn Fn(&mut Config)| {
+        let mut config =
+            Config { robot: robot.clone(), log: vec![first.clone(), second.clone()], ..Config::default() };
+        change(&mut config);
+        learn(&config, &mut |_| {}).unwrap_err().to_string()
+    };
+    let textbook = refused(&|c| c.conditioning.route = dynid::config::Route::Textbook);
+    assert!(textbook.contains("textbook route"), "{textbook}");
+    let robust = refused(&|c| c.estimator.method = dynid::config::Method::Huber);
+    assert!(robust.contains("method = \"wls\""), "{robust}");
+    let single = refused(&|c| c.log[1].own = vec![Own::Offset]);
+    assert!(single.contains("terms of single logs"), "{single}");
+}
+
+#[test]
+fn factors_of_another_recipe_do_not_mix() {
+    let [first, ..] = parts();
+    let mut config = Config { robot: example("robot.toml"), log: vec![first], ..Config::default() };
+    config.conditioning.kernel_hz = Some(2.0);
+    let other = learn(&config, &mut |_| {}).unwrap().reduction;
+    let found = Reduction::merge([learned().reduction.clone(), other]).unwrap_err();
+    assert!(matches!(found, ReductionError::OtherRecipe { .. }), "{found}");
+    assert_eq!(Reduction::merge([]).unwrap_err(), ReductionError::Nothing);
+}
+
+/// Bytes with the digest that they ought to have, to get behind it.
+fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
+    let end = bytes.len() - 32;
+    let digest = sha256_bytes(&bytes[..end]);
+    bytes[end..].copy_from_slice(&digest);
+    bytes
+}
+
+fn fault(bytes: &[u8]) -> FactorFileFault {
+    match Reduction::from_bytes(bytes, "file").unwrap_err() {
+        ReductionError::File { fault, .. } => fault,
+        other => panic!("{other}"),
+    }
+}
+
+#[test]
+fn damaged_files_are_refused() {
+    let [_, second, _] = parts();
+    let good = reduced(&[second]).to_bytes();
+    assert!(Reduction::from_bytes(&good, "file").is_ok());
+    assert_eq!(fault(b""), FactorFileFault::NotFactors);
+    assert_eq!(
+        fault(b"dynid factors 99\nrest"),
+        FactorFileFault::Version { expected: 1, found: "99".to_owned() }
+    );
+    for cut in [20, 100, good.len() / 2, good.len() - 1] {
+        let found = fault(&good[..cut]);
+        assert!(matches!(found, FactorFileFault::Length { .. } | FactorFileFault::Damaged), "{cut}: {found}");
+    }
+    let mut flipped = good.clone();
+    flipped[good.len() / 2] ^= 1;
+    assert_eq!(fault(&flipped), FactorFileFault::Damaged);
+    // A factor that was changed, with a new digest: the log's key tells.
+    let mut changed = good.clone();
+    let place = good.len() - 40;
+    changed[place] ^= 1;
+    assert!(matches!(fault(&sealed(changed)), FactorFileFault::Log { .. }));
+    // A recipe that was changed, with a new digest.
+    let at = good.windows(12).position(|w| w == b"\"kernel_hz\":".as_slice()).unwrap() + 12;
+    let mut changed = good.clone();
+    changed[at] = if good[at] == b'9' { b'8' } else { b'9' };
+    assert!(matches!(fault(&sealed(changed)), FactorFileFault::Description(_)));
+}
+
+#[test]
+fn no_damage_behind_the_digest_ends_in_a_panic() {
+    let [_, second, _] = parts();
+    let good = reduced(&[second]).to_bytes();
+    let head = good.iter().position(|b| *b == b'\n').unwrap() + 1;
+    let text = u64::from_le_bytes(good[head..head + 8].try_into().unwrap()) as usize;
+    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+    let mut next = |below: usize| {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state % below as u64) as usize
+    };
+    let mut read = 0;
+    for case in 0..400 {
+        let mut bytes = good.clone();
+        // Half of the damage in the description, where it is read as structure, the rest anywhere.
+        let (from, span) = if case % 2 == 0 { (head, 8 + text) } else { (0, good.len() - 32) };
+        for _ in 0..1 + next(4) {
+            let place = from + next(span);
+            match next(3) {
+                0 => bytes[place] = next(256) as u8,
+                1 => {
+                    bytes.remove(place);
+                }
+                _ => bytes.insert(place, b'0' + next(10) as u8),
+            }
+        }
+        if let Ok(reduction) = Reduction::from_bytes(&sealed(bytes), "damaged") {
+            read += 1;
+            let solved = reduction.solve([], &mut |_| {}).map(|found| found.estimate());
+            assert!(
+                solved.is_err() || solved.is_ok_and(|e| e.parameters.iter().all(|p| p.value.is_finite()))
+            );
+        }
+    }
+    assert!(read < 40, "most damage is seen: {read} of 400 were read");
+}
