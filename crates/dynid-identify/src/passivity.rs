@@ -5,7 +5,7 @@ use dynid_rows::conditioning::PreparedLog;
 
 use crate::caution::{self, Caution};
 use crate::estimate::PassivityRecord;
-use crate::pipeline::Identification;
+use crate::identification::Identification;
 
 /// [`PassivityRecord::passivity`] of a law that is passive on all of the range.
 pub const PASSIVE: &str = "passive";

@@ -11,7 +11,7 @@ use crate::elements::ElementPlan;
 use crate::prior::{self, Prior};
 use crate::robot::Robot;
 use crate::settings::Settings;
-use crate::{Error, advice, bounds, fitting};
+use crate::{Error, advice, bounds, linear_method};
 
 /// What is known of a model before its fit.
 #[derive(Debug)]
@@ -57,7 +57,7 @@ impl Structure {
         let regrouping = advice::regrouping(&base);
         let space = VisibleSpace::new(&regrouping, &prior.std);
         let bounds = bounds::rows(&settings.bound, model)?;
-        let method = fitting::method(&settings.estimator, model, &base, &prior, &space)?;
+        let method = linear_method::method(&settings.estimator, model, &base, &prior, &space)?;
         Ok(Structure { base, shape, stated, prior, regrouping, space, bounds, method })
     }
 }
