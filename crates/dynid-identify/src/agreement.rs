@@ -9,9 +9,9 @@ use dynid_motion::filter::{butterworth, forward_backward, forward_backward_in_st
 use dynid_motion::shift::shift;
 use dynid_rows::conditioning::{ConditioningSettings, Moving, PreparedLog, States, predict_along};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::estimate::{FileFit, FitValues};
 
 /// How prediction and measurement are brought together.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -324,6 +324,20 @@ fn conditioning(e: dynid_motion::SignalError) -> Error {
     Error::Conditioning(e.into())
 }
 
+impl FitValues {
+    /// Figures of so many joints of which nothing is known.
+    pub fn unknown(joints: usize) -> Self {
+        let none = || vec![None; joints];
+        FitValues {
+            rms: none(),
+            nrmse: none(),
+            r2: none(),
+            relative_error_per_joint: none(),
+            relative_error: None,
+        }
+    }
+}
+
 impl From<&Fit> for FitValues {
     fn from(fit: &Fit) -> Self {
         FitValues {
@@ -334,4 +348,34 @@ impl From<&Fit> for FitValues {
             relative_error: fit.relative_error,
         }
     }
+}
+
+/// Per-joint agreement, in the effort's unit.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct FitValues {
+    /// Root mean square error per joint.
+    pub rms: Vec<Option<f64>>,
+    /// RMS over the range of the measured effort, per joint.
+    pub nrmse: Vec<Option<f64>>,
+    /// Coefficient of determination per joint.
+    pub r2: Vec<Option<f64>>,
+    /// `100 ‖residual‖ / ‖effort‖` per joint, percent.
+    pub relative_error_per_joint: Vec<Option<f64>>,
+    /// `100 ‖residual‖ / ‖effort‖` over all joints, percent.
+    pub relative_error: Option<f64>,
+}
+
+/// Figures of a file on a log, per joint in joint order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FileFit {
+    /// RMS of measured minus predicted effort.
+    pub rms: Vec<Option<f64>>,
+    /// `100 ‖measured - predicted‖/‖measured‖` per joint, percent.
+    pub relative_error_per_joint: Vec<Option<f64>>,
+    /// `100 ‖measured - predicted‖/‖measured‖` over all joints, percent.
+    pub relative_error: Option<f64>,
+    /// RMS of the identified model's effort minus the file's, in the effort's unit.
+    pub loss: Vec<f64>,
+    /// Loss in per cent of the RMS of the measured effort.
+    pub loss_percent: Vec<Option<f64>>,
 }

@@ -2,9 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::CheckResult;
-use crate::preflight::FindingId;
-use crate::verdict::CheckName;
+use crate::check::{CheckName, CheckResult};
+use crate::finding::{Finding, FindingId, Severity};
 
 /// Something to look at before a result is used.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -105,6 +104,16 @@ impl Caution {
         let finding = FindingId::ALL.iter().any(|id| id.name().replace('_', " ") == self.name);
         let name = if finding { FINDING } else { self.name.as_str() };
         (self.status != "fail", ORDER.iter().position(|known| *known == name).unwrap_or(ORDER.len()))
+    }
+}
+
+impl Finding {
+    /// The finding as a caution of an identification; `None` unless it counts.
+    pub(crate) fn caution(&self) -> Option<Caution> {
+        let message = self.warning()?;
+        let status = if self.severity == Severity::Error { "fail" } else { "warn" };
+        let caution = Caution::warn(&self.id.replace('_', " "), message, &*self.remedy);
+        Some(Caution { status: status.to_owned(), ..caution })
     }
 }
 

@@ -12,12 +12,12 @@ use dynid_linalg::Mat;
 use dynid_model::{EffortModel, RobotModel};
 use dynid_rows::conditioning::ReducedGroup;
 
-use crate::Error;
 use crate::fitting::Fitted;
-use crate::pipeline::{Problem, Structure};
 use crate::prior::Prior;
+use crate::problem::Problem;
 use crate::settings::{Consistency, PriorDistance};
-use crate::shape;
+use crate::structure::Structure;
+use crate::{Error, shape};
 
 /// Index of the unconstrained estimate in [`Consistent::held_out`].
 pub const UNCONSTRAINED: usize = 0;

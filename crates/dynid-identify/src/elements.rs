@@ -1,14 +1,9 @@
 //! Joint elements by name.
 
-pub mod clearance;
 mod elastic;
 mod model;
 mod pairs;
 mod settings;
-
-pub use elastic::ElasticFault;
-pub(crate) use elastic::{ELASTIC, stated_springs};
-pub use pairs::AlikeElements;
 
 use std::sync::Arc;
 
@@ -24,8 +19,11 @@ use dynid_model::{Coordinate, JointKind, Mechanism};
 use dynid_rows::conditioning::{FrictionShape, ShapeKind};
 
 use crate::Error;
+pub use crate::error::ElasticFault;
 use crate::known_friction::KnownFriction;
 use crate::log_terms::LogTerms;
+pub(crate) use elastic::{ELASTIC, stated_springs};
+pub use pairs::AlikeElements;
 
 /// Friction that grows with the load of the gear.
 pub const LOAD: &str = "load";

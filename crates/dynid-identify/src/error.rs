@@ -1,5 +1,6 @@
 //! One error type for the pipeline, made of those of the rooms below.
 
+use std::fmt;
 use std::path::PathBuf;
 
 use thiserror::Error;
@@ -10,7 +11,7 @@ use thiserror::Error;
 pub enum Error {
     /// Logs that cannot be reduced, factors that cannot be merged or solved.
     #[error(transparent)]
-    Reduction(#[from] crate::reduction::ReductionError),
+    Reduction(#[from] crate::reduction_error::ReductionError),
     /// A robot file cannot be read.
     #[error(transparent)]
     RobotFile(#[from] dynid_io::RobotFileError),
@@ -150,7 +151,7 @@ pub enum Error {
         .0.joint.as_ref().map_or_else(String::new, |j| format!(" of `{j}`")),
         .0.evidence
     )]
-    PreflightFault(Box<crate::preflight::Finding>),
+    PreflightFault(Box<crate::finding::Finding>),
     /// Two models that say nothing about each other.
     #[error("{a} and {b} cannot be compared: {fault}")]
     NotComparable {
@@ -210,7 +211,7 @@ pub enum Error {
         /// Joint.
         joint: String,
         /// What is wrong.
-        fault: crate::elements::ElasticFault,
+        fault: crate::error::ElasticFault,
     },
     /// A joint that the run names does not exist.
     #[error("no joint is named `{name}`, the robot has {}", known.join(", "))]
@@ -594,4 +595,67 @@ fn setting_hint(name: &str) -> Option<&'static str> {
         }
         _ => return None,
     })
+}
+
+/// Why a joint cannot be elastic as it is stated.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ElasticFault {
+    /// The joint floats.
+    Floats,
+    /// The joint does not move.
+    Fixed,
+    /// The joint follows another joint, or others follow it.
+    Follows,
+    /// The motor is one of a coupling of joints.
+    Coupled,
+    /// The joint has a sensor, but bodies act on other joints, which have none.
+    OthersWithoutSensor(Vec<String>),
+    /// `elastic` is among its elements, but nothing states the ratio.
+    NoRatio,
+    /// The position of the joint is logged, that of its motor is not.
+    MotorNotLogged(String),
+}
+
+impl fmt::Display for ElasticFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ElasticFault::Floats => f.write_str("expected a joint with one coordinate, found a floating one"),
+            ElasticFault::Fixed => f.write_str("expected a joint that moves, found a fixed one"),
+            ElasticFault::Follows => f.write_str(
+                "expected a joint that moves by itself, found one that is coupled to others (mimic)",
+            ),
+            ElasticFault::Coupled => f.write_str(
+                "expected a motor of its own, found one of a `[[coupling]]`, which has stiff gears",
+            ),
+            ElasticFault::OthersWithoutSensor(joints) => {
+                write!(f, "expected a sensor at every joint or at none, found none at {}", joints.join(", "))
+            }
+            ElasticFault::NoRatio => f.write_str("expected a ratio, found none"),
+            ElasticFault::MotorNotLogged(motor) => {
+                write!(f, "expected position and effort of its motor `{motor}` in the log, found none")
+            }
+        }
+    }
+}
+
+impl ElasticFault {
+    /// What to do about it.
+    pub(crate) fn hint(&self) -> &'static str {
+        match self {
+            ElasticFault::Floats | ElasticFault::Fixed | ElasticFault::Follows => {
+                "leave `elastic` out: the joint counts as stiff then"
+            }
+            ElasticFault::Coupled => "leave out the coupling, or `elastic`",
+            ElasticFault::OthersWithoutSensor(_) => {
+                "a measured torque takes the place of the bodies behind it: state `sensor = true` at all joints, lock the others, \
+                 or leave `sensor` out"
+            }
+            ElasticFault::NoRatio => {
+                "state it in the robot file: `[element.<joint>] elastic = { ratio = 100 }`"
+            }
+            ElasticFault::MotorNotLogged(_) => {
+                "without it the deformation is not seen: name its columns under [columns], or leave `elastic` out"
+            }
+        }
+    }
 }

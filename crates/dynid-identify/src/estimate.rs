@@ -4,24 +4,11 @@ mod counts;
 mod exported;
 mod friction;
 mod instruments;
+mod log_fit;
 mod loops;
 mod model;
 mod reading;
 mod trust;
-
-pub use crate::result::{log_fit, short_name};
-pub use counts::{BaseCounts, ParameterCounts, ShapeCounts, StandardCounts};
-pub use exported::{
-    EXPORT_LOSS_LIMIT, ExportedJoint, ExportedLog, ExportedRecord, FileFit, FrictionProjection,
-};
-pub use friction::{FrictionTrial, PassivityRecord};
-pub use instruments::{EffectRecord, ExogeneityRecord, InstrumentRecord};
-pub use loops::{ClosureRecord, FrameRecord, LoopsRecord};
-pub use model::{CouplingRecord, JointRecord, LinkRecord, ModelRecord, SettingRecord};
-pub use reading::{MotorSide, ReadingRecord};
-pub use trust::{
-    ConsistencyRecord, HeldOutRecord, PrecisionRecord, PruningRecord, PruningStep, WhitenessRecord,
-};
 
 use std::path::Path;
 
@@ -30,12 +17,27 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
 use crate::Error;
+pub use crate::agreement::{FileFit, FitValues};
 use crate::caution::Caution;
+pub use crate::check::CheckResult;
 use crate::effort_scale::EffortScale;
+pub use crate::input_record::{InputRecord, short_name};
+use crate::joint_stiffness::JointStiffness;
 use crate::log_agreement::LogAgreement;
 use crate::overlap::Overlaps;
-use crate::pipeline::OwnDelay;
-use crate::stiffness::JointStiffness;
+use crate::own_delay::OwnDelay;
+pub use counts::{BaseCounts, ParameterCounts, ShapeCounts, StandardCounts};
+pub use exported::{EXPORT_LOSS_LIMIT, ExportedJoint, ExportedLog, ExportedRecord, FrictionProjection};
+pub use friction::{FrictionTrial, PassivityRecord};
+pub use instruments::{EffectRecord, ExogeneityRecord, InstrumentRecord};
+pub use log_fit::log_fit;
+pub(crate) use log_fit::{by_motion, pool};
+pub use loops::{ClosureRecord, FrameRecord, LoopsRecord};
+pub use model::{CouplingRecord, JointRecord, LinkRecord, ModelRecord, SettingRecord};
+pub use reading::{MotorSide, ReadingRecord};
+pub use trust::{
+    ConsistencyRecord, HeldOutRecord, PrecisionRecord, PruningRecord, PruningStep, WhitenessRecord,
+};
 
 /// Version of the file's layout.
 pub const SCHEMA: u32 = 1;
@@ -152,8 +154,8 @@ pub struct FindingRecord {
     pub evidence: String,
 }
 
-impl From<&crate::preflight::Finding> for FindingRecord {
-    fn from(of: &crate::preflight::Finding) -> Self {
+impl From<&crate::finding::Finding> for FindingRecord {
+    fn from(of: &crate::finding::Finding) -> Self {
         FindingRecord {
             id: of.id.to_owned(),
             severity: of.severity.word().to_owned(),
@@ -317,35 +319,6 @@ pub struct ShapeValue {
     pub reason: Option<String>,
 }
 
-/// Per-joint agreement, in the effort's unit.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct FitValues {
-    /// Root mean square error per joint.
-    pub rms: Vec<Option<f64>>,
-    /// RMS over the range of the measured effort, per joint.
-    pub nrmse: Vec<Option<f64>>,
-    /// Coefficient of determination per joint.
-    pub r2: Vec<Option<f64>>,
-    /// `100 ‖residual‖ / ‖effort‖` per joint, percent.
-    pub relative_error_per_joint: Vec<Option<f64>>,
-    /// `100 ‖residual‖ / ‖effort‖` over all joints, percent.
-    pub relative_error: Option<f64>,
-}
-
-impl FitValues {
-    /// Figures of so many joints of which nothing is known.
-    pub fn unknown(joints: usize) -> Self {
-        let none = || vec![None; joints];
-        FitValues {
-            rms: none(),
-            nrmse: none(),
-            r2: none(),
-            relative_error_per_joint: none(),
-            relative_error: None,
-        }
-    }
-}
-
 /// Agreement in motion and at rest apart, on equally filtered effort.
 ///
 /// A joint moves where `|v| ≥ max(4 σ_v, 3 % of its rms speed)`, `σ_v` the noise of its speed: below, the sign of the speed is chance.
@@ -415,23 +388,6 @@ pub struct Verdict {
     pub checks: Vec<CheckResult>,
     /// Warnings.
     pub warnings: Vec<String>,
-}
-
-/// One check.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct CheckResult {
-    /// `ok`, `warn` or `fail`.
-    pub status: String,
-    /// Name.
-    pub name: String,
-    /// Value.
-    pub value: Option<f64>,
-    /// Unit.
-    pub unit: String,
-    /// What is expected.
-    pub limit: String,
-    /// What it means.
-    pub meaning: String,
 }
 
 /// One choice of the conditioning.
@@ -512,17 +468,6 @@ impl Default for Provenance {
             seed: 0,
         }
     }
-}
-
-/// An input file.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct InputRecord {
-    /// Path as given.
-    pub path: String,
-    /// `robot`, `urdf` (the one that a robot file refers to), `log`, `validation`, `trajectory` or `friction`.
-    pub kind: String,
-    /// SHA-256 of its bytes as they were read, of a log also of those behind the last row used.
-    pub sha256: String,
 }
 
 impl Estimate {

@@ -4,23 +4,17 @@ use dynid_estimate::covariance::{
     BlockLength, BlockLengthSettings, BlockLengthStatus, MIN_BLOCKS, ResidualSignal, block_length,
     output_inflation, variance_inflation,
 };
-use dynid_estimate::identifiability::VisibleSpace;
-use dynid_estimate::linear::{
-    LinearEstimate, LinearMethod, LinearSettings, TlsNoise, VarianceSharing, estimate,
-};
+use dynid_estimate::linear::{LinearEstimate, LinearMethod, LinearSettings, VarianceSharing, estimate};
 use dynid_estimate::whiteness::{InBandSettings, InBandWhiteness, raw_in_band_whiteness};
 use dynid_factor::Factor;
 use dynid_factor::rows::{GroupResiduals, RowSource, reduce_rows, row_residuals};
 use dynid_linalg::Mat;
-use dynid_model::{BaseParameters, EffortModel, RobotModel};
 use dynid_rows::conditioning::{Conditioning, LogRows, PreparedLog, ReducedGroup, textbook_rows};
 
 use crate::Error;
 use crate::agreement::Agreement;
-use crate::bounds;
-use crate::pipeline::Problem;
-use crate::prior::Prior;
-use crate::settings::{EstimatorConfig, Method, Settings, Variances};
+use crate::problem::Problem;
+use crate::settings::{Settings, Variances};
 
 /// Joints whose variance inflation differs by more than this are deflated one by one.
 const UNEQUAL: f64 = 2.0;
@@ -268,45 +262,4 @@ impl Fitted {
 pub(crate) fn conditioning_fault(source: &dyn RowSource, e: dynid_factor::rows::RowsError) -> Error {
     let output = source.groups()[e.group].output;
     Error::Conditioning(dynid_rows::conditioning::ConditioningError::Rows { output, source: e.source })
-}
-
-/// The linear estimator that a run asks for.
-///
-/// # Errors
-/// [`Error::UnknownParameter`], [`Error::Setting`].
-pub(crate) fn method(
-    config: &EstimatorConfig,
-    model: &RobotModel,
-    base: &BaseParameters,
-    prior: &Prior,
-    space: &VisibleSpace,
-) -> Result<LinearMethod, Error> {
-    Ok(match config.method {
-        Method::Ols => LinearMethod::Ols,
-        // Instruments start from weighted least squares.
-        Method::Wls | Method::Iv => LinearMethod::Wls,
-        Method::Huber => LinearMethod::Huber,
-        Method::Tukey => LinearMethod::Tukey,
-        Method::Ridge => LinearMethod::Ridge {
-            prior: base.values(&prior.values),
-            scale: space.base_std().to_vec(),
-            kappa: config.ridge_weight.unwrap_or(1.0),
-        },
-        Method::Tls => {
-            let mut columns = vec![0.0; base.len()];
-            for (name, noise) in &config.column_noise {
-                let column = bounds::parameter(name, model)?;
-                let kept = base.kept.binary_search(&column).map_err(|_| Error::Setting {
-                    name: format!("column_noise.{name}"),
-                    expected: "the name of a base parameter".to_owned(),
-                    found: format!(
-                        "{}, which acts only together with others or not at all",
-                        model.parameters().linear[column].name
-                    ),
-                })?;
-                columns[kept] = *noise;
-            }
-            LinearMethod::Tls(TlsNoise { columns, effort: config.effort_noise.unwrap_or(1.0) })
-        }
-    })
 }

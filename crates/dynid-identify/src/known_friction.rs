@@ -8,7 +8,7 @@ use dynid_motion::temperature::PLAUSIBLE;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::settings::{FrictionErrors, PerJoint};
+use crate::per_joint::PerJoint;
 
 /// Largest coefficient.
 const LARGEST: f64 = 1e30;
@@ -311,6 +311,17 @@ impl KnownLaws {
         }
         Ok(out)
     }
+}
+
+/// Sign of the errors of known friction.
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum FrictionErrors {
+    /// Any: known friction may be too large or too small.
+    #[default]
+    Free,
+    /// Not negative, as coefficients of friction.
+    Nonnegative,
 }
 
 #[cfg(test)]

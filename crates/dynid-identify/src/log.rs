@@ -10,16 +10,15 @@ use dynid_motion::temperature::{self, TemperatureDoubt};
 use dynid_motion::{Channel, JointSignals};
 use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, prepare};
 
-mod axes;
+use crate::Error;
+use crate::input_record::InputRecord;
+pub use crate::log_axis::{LogAxis, as_logged, axes, names};
+use crate::per_joint::PerJoint;
+use crate::robot::Robot;
+use crate::settings::LogSettings;
+
 pub(crate) mod poses;
 pub mod turns;
-
-pub use axes::{LogAxis, as_logged, axes, names};
-
-use crate::Error;
-use crate::estimate::InputRecord;
-use crate::robot::Robot;
-use crate::settings::{LogSettings, PerJoint};
 
 /// A log of a robot: signals in SI units (rad, m, N m, N, °C) by joint, and what an identification has to know beside them.
 ///

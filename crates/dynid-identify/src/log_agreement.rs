@@ -5,8 +5,9 @@ use dynid_model::{EffortModel, RobotModel};
 use serde::{Deserialize, Serialize};
 
 use crate::fitting::Fitted;
-use crate::pipeline::{Problem, Structure};
+use crate::problem::Problem;
 use crate::settings::Own;
+use crate::structure::Structure;
 
 /// Deviations count from this share of the residual on; smaller ones do no harm, however certain they are.
 const RELEVANT: f64 = 0.25;

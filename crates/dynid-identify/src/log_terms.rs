@@ -10,10 +10,7 @@ use dynid_model::element::{
 use dynid_model::{Inertia, KnownElement, Mat3, Mechanism, Vec3};
 use dynid_motion::Log;
 
-use crate::Error;
-use crate::pipeline::TrainingLog;
-use crate::robot::Robot;
-use crate::settings::{LogSettings, Own, PayloadConfig, Route, Settings};
+use crate::settings::{LogSettings, Own, PayloadConfig};
 
 /// Elements that a plan has beside those of its joints, each in some logs only.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -23,7 +20,7 @@ pub struct LogTerms {
     /// Deviations: log, and what deviates there.
     pub deviations: Vec<(String, Own)>,
     /// Logs with a factor on friction, and where a search of it starts.
-    scales: Vec<(String, f64)>,
+    pub(crate) scales: Vec<(String, f64)>,
 }
 
 /// A payload on a body.
@@ -38,36 +35,6 @@ pub struct PayloadTerm {
 }
 
 impl LogTerms {
-    /// Terms of a run. Logs with something of their own deviate from those without; where all have it, from the first.
-    ///
-    /// # Errors
-    /// [`Error::Setting`], [`Error::Unsupported`].
-    pub fn of(settings: &Settings, logs: &[TrainingLog], robot: &Robot) -> Result<Self, Error> {
-        let mut terms = LogTerms::default();
-        for payload in &settings.payload {
-            let body = carrier(payload, robot)?;
-            let known = known_inertia(payload);
-            if let Some(fault) = known.and_then(|inertia| inertia.physical_fault()) {
-                let key = format!("payload.{}.inertia", payload.name);
-                return Err(Error::setting(&key, "an inertia that a body can have", fault));
-            }
-            terms.payloads.push(PayloadTerm { config: payload.clone(), body, known });
-        }
-        terms.deviations = deviations(logs);
-        let scaled = terms.deviations.iter().filter(|(_, own)| *own == Own::FrictionScale);
-        terms.scales = scaled.map(|(log, _)| (log.clone(), 1.0)).collect();
-        let no_factor = match settings.conditioning.route {
-            _ if terms.scales.is_empty() => None,
-            Route::Textbook => Some("on the textbook route: it searches no shape parameters"),
-            _ if settings.elements.known.is_some() => Some("beside known friction, which it does not scale"),
-            Route::Compact => None,
-        };
-        match no_factor {
-            Some(why) => Err(Error::Unsupported(format!("`own = [\"friction_scale\"]` {why}"))),
-            None => Ok(terms),
-        }
-    }
-
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.payloads.is_empty() && self.deviations.is_empty()
@@ -150,58 +117,9 @@ impl LogTerms {
     }
 }
 
-/// Deviations of all logs, log by log.
-fn deviations(logs: &[TrainingLog]) -> Vec<(String, Own)> {
-    let mut out = Vec::new();
-    for (k, log) in logs.iter().enumerate() {
-        for own in [Own::Offset, Own::Friction, Own::FrictionScale] {
-            let all = logs.iter().all(|l| l.settings.own.contains(&own));
-            if log.settings.own.contains(&own) && !(all && k == 0) {
-                out.push((log.label.clone(), own));
-            }
-        }
-    }
-    out
-}
-
 /// Inertia about the joint frame of a payload that is known altogether.
 pub fn known_inertia(payload: &PayloadConfig) -> Option<Inertia> {
     let (mass, com, i) = (payload.mass?, payload.com?, payload.inertia?);
     let about_com = Mat3::from_rows([[i[0], i[1], i[2]], [i[1], i[3], i[4]], [i[2], i[4], i[5]]]);
     Some(Inertia::from_com(mass, Vec3(com), &about_com))
-}
-
-fn carrier(payload: &PayloadConfig, robot: &Robot) -> Result<usize, Error> {
-    let mechanism = &robot.mechanism;
-    let bodies = mechanism.bodies();
-    let unsupported = |why: &str| Err(Error::Unsupported(format!("payload `{}`: {why}", payload.name)));
-    if robot.closed.is_some() {
-        return unsupported("it has no form for mechanisms with loops");
-    }
-    if mechanism.follows().is_some() {
-        return unsupported("it has no form for joints that follow others: do not couple mimic joints");
-    }
-    if bodies.is_empty() {
-        return unsupported("where sensors measure the load of every joint no body acts on the drives");
-    }
-    let names: Vec<&str> = bodies.iter().map(|b| b.name.as_str()).collect();
-    if names.contains(&payload.name.as_str()) {
-        return Err(Error::setting("payload.name", "a name that no link has", &payload.name));
-    }
-    let Some(link) = &payload.link else {
-        let ends: Vec<usize> =
-            (0..bodies.len()).filter(|b| bodies.iter().all(|c| c.parent != Some(*b))).collect();
-        return match ends[..] {
-            [end] => Ok(end),
-            _ => Err(Error::setting(
-                &format!("payload.{}.link", payload.name),
-                &format!("one of the links `{}`, since the robot has several ends", names.join("`, `")),
-                "none",
-            )),
-        };
-    };
-    names.iter().position(|n| n == link).ok_or_else(|| {
-        let expected = format!("a moving link: `{}`", names.join("`, `"));
-        Error::setting(&format!("payload.{}.link", payload.name), &expected, link)
-    })
 }

@@ -4,7 +4,8 @@ use dynid_model::{EffortModel, FrictionPassivity, Passivity};
 
 use crate::caution::{self, Caution};
 use crate::estimate::PassivityRecord;
-use crate::pipeline::{Identification, TrainedLog};
+use crate::identification::Identification;
+use crate::trained_log::TrainedLog;
 
 /// [`PassivityRecord::passivity`] of a law that is passive on all of the range.
 pub const PASSIVE: &str = "passive";

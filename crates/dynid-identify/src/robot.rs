@@ -1,5 +1,8 @@
 //! From a robot file to a mechanism.
 
+mod clearance;
+mod elements;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -10,9 +13,11 @@ use dynid_model::{Description, EffortModel, JointKind, Mechanism, MechanismWarni
 
 use crate::Error;
 use crate::caution::{self, Caution};
-use crate::elements::{ElasticFault, ElementPlan};
-use crate::log::{self, LogAxis};
+use crate::elements::ElementPlan;
+use crate::error::ElasticFault;
+use crate::log_axis::{self, LogAxis};
 use crate::prior::Prior;
+pub use clearance::refuse_clearance;
 
 /// How a robot file is to be read.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -102,7 +107,7 @@ impl Robot {
         elements.elastic.retain(|e| !is_fixed(&file.description, &e.joint));
         elements.clearance.retain(|c| !is_fixed(&file.description, &c.joint));
         let bare = ElementPlan::bare(&mechanism, &elements)?.with_loops(closed.clone());
-        let axes = log::axes(&bare.model(&mechanism)?);
+        let axes = log_axis::axes(&bare.model(&mechanism)?);
         let inside = mechanism.rate_names();
         let is_joint = |joint: &String| axes.iter().any(|a| a.name == *joint) || inside.contains(joint);
         elements.per_joint.retain(|(joint, _)| is_joint(joint));
@@ -193,7 +198,7 @@ impl Robot {
     pub fn rate_names(&self) -> Vec<String> {
         match self.closed {
             Some(_) => self.mechanism.rate_names(),
-            None => crate::log::names(&self.axes),
+            None => crate::log_axis::names(&self.axes),
         }
     }
 
@@ -282,7 +287,7 @@ fn held(locked: &[(String, f64)]) -> Vec<String> {
 /// Coordinates of a model as a states table names them.
 pub fn model_state_joints(model: &RobotModel) -> Vec<dynid_io::StateJoint> {
     let closed = model.closed().map(|closed| closed.machine().as_ref());
-    state_joints(model.mechanism(), closed, &crate::log::axes(model))
+    state_joints(model.mechanism(), closed, &crate::log_axis::axes(model))
 }
 
 /// Joints of a mechanism, then the axes behind them; of one with loops the independent joints alone.

@@ -10,7 +10,7 @@ use dynid_rows::conditioning::{Conditioning, refine};
 
 use crate::Error;
 use crate::elements::ElementPlan;
-use crate::pipeline::Problem;
+use crate::problem::Problem;
 
 /// Shape parameters found from logs.
 #[derive(Debug)]

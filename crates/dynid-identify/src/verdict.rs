@@ -3,21 +3,20 @@
 mod inputs;
 mod instruments;
 mod logs;
-mod names;
 mod remedy;
 
 use dynid_estimate::consistent::Status as ConsistentStatus;
 use dynid_estimate::whiteness::InBandWhiteness;
 
-pub(crate) use instruments::in_words as closed_loop_bias_in_words;
-pub use names::CheckName;
-
 use crate::agreement::Agreement;
 use crate::caution::{self, Caution};
+pub use crate::check::CheckName;
+use crate::check::CheckResult;
 use crate::consistency::UNCONSTRAINED;
-use crate::estimate::{BaseCounts, CheckResult, Verdict};
-use crate::pipeline::Identification;
-use crate::stiffness::JointStiffness;
+use crate::estimate::{BaseCounts, Verdict};
+use crate::identification::Identification;
+use crate::joint_stiffness::JointStiffness;
+pub(crate) use instruments::in_words as closed_loop_bias_in_words;
 
 /// How bad a check came out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -15,6 +15,9 @@ pub mod mesh;
 pub mod mjcf;
 pub mod output;
 pub mod robot;
+mod robot_error;
+mod robot_numbers;
+mod signal;
 mod source;
 pub mod states;
 pub mod stream;
@@ -29,7 +32,7 @@ pub use excerpt::closest;
 pub use log::{LogHeader, LogOptions, LogText, ReadingNote};
 pub use mesh::{Mesh, MeshError};
 pub use output::OutputError;
-pub use robot::{Place, RobotFileError};
+pub use robot_error::{Place, RobotFileError};
 pub use states::{StateJoint, States, StatesError};
 pub use toml_robot::{
     ClearanceSpec, CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, RobotFile,

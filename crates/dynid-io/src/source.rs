@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::digest::{SourceFile, sha256};
 use crate::input;
-use crate::robot::RobotFileError;
+use crate::robot_error::RobotFileError;
 
 /// Largest robot file that is read, bytes (64 MiB).
 pub(crate) const MAX_ROBOT_FILE_BYTES: u64 = 64 << 20;

@@ -8,6 +8,13 @@ use faer::linalg::solvers::{Llt, Solve};
 #[derive(Debug, Clone)]
 pub struct Cholesky(Llt<f64>);
 
+impl Mat {
+    /// `A = L Lᵀ` from the lower half of a symmetric matrix; `None` unless it is positive definite to rounding.
+    pub fn cholesky(&self) -> Option<Cholesky> {
+        Cholesky::new(self)
+    }
+}
+
 impl Cholesky {
     pub(crate) fn new(a: &Mat) -> Option<Self> {
         a.0.llt(Side::Lower).ok().map(Cholesky)

@@ -12,6 +12,13 @@ pub struct SymmetricEigen {
     pub vectors: Mat,
 }
 
+impl Mat {
+    /// Eigenvalues and eigenvectors from the lower half of a symmetric matrix; `None` if the iteration fails.
+    pub fn symmetric_eigen(&self) -> Option<SymmetricEigen> {
+        SymmetricEigen::new(self)
+    }
+}
+
 impl SymmetricEigen {
     pub(crate) fn new(a: &Mat) -> Option<Self> {
         let found = a.0.self_adjoint_eigen(Side::Lower).ok()?;

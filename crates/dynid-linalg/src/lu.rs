@@ -13,6 +13,18 @@ enum Kind {
     Full(FullPivLu<f64>),
 }
 
+impl Mat {
+    /// `A = L U` of a square matrix, rows exchanged.
+    pub fn lu(&self) -> Lu {
+        Lu::new(self)
+    }
+
+    /// `A = L U` of a square matrix, rows and columns exchanged.
+    pub fn full_lu(&self) -> Lu {
+        Lu::full(self)
+    }
+}
+
 impl Lu {
     pub(crate) fn new(a: &Mat) -> Self {
         Lu(Kind::Rows(a.0.partial_piv_lu()))

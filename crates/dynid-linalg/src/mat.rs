@@ -2,7 +2,7 @@
 
 use std::ops::{Index, IndexMut, Range};
 
-use crate::{AsView, Cholesky, Lu, PivotedQr, Qr, Svd, SymmetricEigen, View};
+use crate::{AsView, View};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, ColRef, MatMut, MatRef, Par};
 
@@ -127,50 +127,12 @@ impl Mat {
     pub fn norm_l2(&self) -> f64 {
         self.0.norm_l2()
     }
+}
 
-    /// `A = L Lᵀ` from the lower half of a symmetric matrix; `None` unless it is positive definite to rounding.
-    pub fn cholesky(&self) -> Option<Cholesky> {
-        Cholesky::new(self)
-    }
-
-    /// `A = Q R`.
-    pub fn qr(&self) -> Qr {
-        Qr::new(self)
-    }
-
-    /// `A P = Q R`, columns in the order of the length they have left.
-    pub fn pivoted_qr(&self) -> PivotedQr {
-        PivotedQr::new(self)
-    }
-
-    /// `A = L U` of a square matrix, rows exchanged.
-    pub fn lu(&self) -> Lu {
-        Lu::new(self)
-    }
-
-    /// `A = L U` of a square matrix, rows and columns exchanged.
-    pub fn full_lu(&self) -> Lu {
-        Lu::full(self)
-    }
-
-    /// `A = U S Vᵀ` with square `U` and `V`; `None` if the iteration fails, which takes entries that are not finite.
-    pub fn svd(&self) -> Option<Svd> {
-        Svd::full(self)
-    }
-
-    /// As [`Self::svd`], with no more columns of `U` and `V` than there are singular values.
-    pub fn thin_svd(&self) -> Option<Svd> {
-        Svd::thin(self)
-    }
-
-    /// Singular values, descending; `None` if the iteration fails.
-    pub fn singular_values(&self) -> Option<Vec<f64>> {
-        self.0.singular_values().ok()
-    }
-
-    /// Eigenvalues and eigenvectors from the lower half of a symmetric matrix; `None` if the iteration fails.
-    pub fn symmetric_eigen(&self) -> Option<SymmetricEigen> {
-        SymmetricEigen::new(self)
+impl View<'_> {
+    /// A copy of its own.
+    pub fn to_mat(self) -> Mat {
+        Mat(self.0.to_owned())
     }
 }
 

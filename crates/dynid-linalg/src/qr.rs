@@ -13,6 +13,18 @@ pub(crate) const PANEL: usize = 16;
 #[derive(Debug, Clone)]
 pub struct Qr(Whole<f64>);
 
+impl Mat {
+    /// `A = Q R`.
+    pub fn qr(&self) -> Qr {
+        Qr::new(self)
+    }
+
+    /// `A P = Q R`, columns in the order of the length they have left.
+    pub fn pivoted_qr(&self) -> PivotedQr {
+        PivotedQr::new(self)
+    }
+}
+
 impl Qr {
     pub(crate) fn new(a: &Mat) -> Self {
         Qr(a.0.qr())

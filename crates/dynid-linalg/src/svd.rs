@@ -17,6 +17,23 @@ pub struct Svd {
     pub v: Mat,
 }
 
+impl Mat {
+    /// `A = U S Vᵀ` with square `U` and `V`; `None` if the iteration fails, which takes entries that are not finite.
+    pub fn svd(&self) -> Option<Svd> {
+        Svd::full(self)
+    }
+
+    /// As [`Self::svd`], with no more columns of `U` and `V` than there are singular values.
+    pub fn thin_svd(&self) -> Option<Svd> {
+        Svd::thin(self)
+    }
+
+    /// Singular values, descending; `None` if the iteration fails.
+    pub fn singular_values(&self) -> Option<Vec<f64>> {
+        self.0.singular_values().ok()
+    }
+}
+
 impl Svd {
     pub(crate) fn full(a: &Mat) -> Option<Self> {
         a.0.svd().ok().map(Svd::of)

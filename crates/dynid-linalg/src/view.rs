@@ -2,10 +2,9 @@
 
 use std::ops::{Index, Range};
 
-use crate::Mat;
 use faer::MatRef;
 
-/// A part of a [`Mat`] or its transpose, without a copy.
+/// A part of a [`Mat`](crate::Mat) or its transpose, without a copy.
 #[derive(Clone, Copy)]
 pub struct View<'a>(pub(crate) MatRef<'a, f64>);
 
@@ -56,11 +55,6 @@ impl<'a> View<'a> {
     /// Largest absolute value of an entry.
     pub fn norm_max(self) -> f64 {
         self.0.norm_max()
-    }
-
-    /// A copy of its own.
-    pub fn to_mat(self) -> Mat {
-        Mat(self.0.to_owned())
     }
 }
 

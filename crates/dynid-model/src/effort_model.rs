@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::dynamics::{MotionAdjoint, MotionBlock};
+use crate::mechanism::Mechanism;
 use crate::parameter::ParameterTable;
 use crate::random_motion::RandomMotion;
 
@@ -318,4 +319,20 @@ pub trait EffortModel: Send + Sync {
         weights: &RegressorBlock,
         out: &mut MotionAdjoint,
     );
+}
+
+impl RandomMotion {
+    /// For all that a model of a mechanism reads: motion of its joints and its channels as [`RandomMotion::new`], then its
+    /// signals in ±1, then positions in ±π (±1 m), rates in ±2 and accelerations in ±5, each times the ratio of the gear
+    /// ([`EffortModel::travels`]), for coordinates without bodies. Deformations of elastic transmissions are thus of the
+    /// size of joint positions: far too large for a spring, but of one size in all powers and columns.
+    pub fn of(model: &dyn EffortModel, mechanism: &Mechanism, samples: usize, seed: u64) -> Self {
+        let channels = model.channels().iter().chain(model.signals());
+        Self::new(mechanism, channels, samples, seed).with_coordinates(model, seed)
+    }
+
+    /// Returns the motion with that of a model's coordinates without bodies, as [`RandomMotion::of`] says.
+    pub fn with_coordinates(self, model: &dyn EffortModel, seed: u64) -> Self {
+        self.with_travels(model.travels(), seed)
+    }
 }

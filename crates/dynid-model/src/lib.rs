@@ -17,6 +17,7 @@ pub mod effort_model;
 pub mod element;
 pub mod inertia;
 pub mod mechanism;
+mod motion_block;
 pub mod parameter;
 mod per_output;
 mod random_motion;

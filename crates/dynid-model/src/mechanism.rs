@@ -346,3 +346,15 @@ impl Mechanism {
         if lengths.is_empty() { 1.0 } else { lengths.iter().sum::<f64>() / lengths.len() as f64 }
     }
 }
+
+/// Rates of the joints between a body and the base, the body's own first.
+pub(crate) fn ancestor_rates(mechanism: &Mechanism, body: usize) -> Vec<usize> {
+    let mut rates = Vec::new();
+    let mut next = Some(body);
+    while let Some(b) = next {
+        let body: &Body = &mechanism.bodies()[b];
+        rates.extend(body.rate..body.rate + body.joint.rates());
+        next = body.parent;
+    }
+    rates
+}

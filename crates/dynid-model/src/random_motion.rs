@@ -5,7 +5,6 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::description::JointKind;
 use crate::dynamics::MotionBlock;
-use crate::effort_model::EffortModel;
 use crate::element::is_temperature;
 use crate::mechanism::Mechanism;
 
@@ -59,20 +58,11 @@ impl RandomMotion {
         RandomMotion { samples, q, dq, ddq, channels }
     }
 
-    /// For all that a model of a mechanism reads: motion of its joints and its channels as [`RandomMotion::new`], then its
-    /// signals in ±1, then positions in ±π (±1 m), rates in ±2 and accelerations in ±5, each times the ratio of the gear
-    /// ([`EffortModel::travels`]), for coordinates without bodies. Deformations of elastic transmissions are thus of the
-    /// size of joint positions: far too large for a spring, but of one size in all powers and columns.
-    pub fn of(model: &dyn EffortModel, mechanism: &Mechanism, samples: usize, seed: u64) -> Self {
-        let channels = model.channels().iter().chain(model.signals());
-        Self::new(mechanism, channels, samples, seed).with_coordinates(model, seed)
-    }
-
-    /// Returns the motion with that of a model's coordinates without bodies, as [`RandomMotion::of`] says.
-    pub fn with_coordinates(mut self, model: &dyn EffortModel, seed: u64) -> Self {
+    /// Returns the motion with coordinates that no body moves with, of these travels ([`EffortModel::travels`](crate::EffortModel::travels)).
+    pub(crate) fn with_travels(mut self, travels: &[f64], seed: u64) -> Self {
         let samples = self.samples;
         let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(0x636f_6f72_6469));
-        for travel in model.travels() {
+        for travel in travels {
             let mut uniform = |range: f64| -> Vec<f64> {
                 let range = range * travel.abs();
                 (0..samples).map(|_| rng.random_range(-range..=range)).collect()

@@ -20,7 +20,7 @@ use crate::dynamics::{Dynamics, MotionAdjoint, MotionBlock, Slots};
 use crate::effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
 use crate::element::{ElementColumns, JointElement, JointInfo};
 use crate::inertia::{PARAMETER_NAMES, PARAMETER_UNITS};
-use crate::mechanism::{Body, Mechanism};
+use crate::mechanism::{Mechanism, ancestor_rates};
 use crate::parameter::{Owner, Parameter, ParameterTable};
 use crate::random_motion::RandomMotion;
 pub use known::KnownElement;
@@ -455,18 +455,6 @@ fn travels(elements: &[Box<dyn JointElement>], first_rate: usize, count: usize) 
         }
     }
     travels
-}
-
-/// Rates of the joints between a body and the base, the body's own first.
-pub(crate) fn ancestor_rates(mechanism: &Mechanism, body: usize) -> Vec<usize> {
-    let mut rates = Vec::new();
-    let mut next = Some(body);
-    while let Some(b) = next {
-        let body: &Body = &mechanism.bodies()[b];
-        rates.extend(body.rate..body.rate + body.joint.rates());
-        next = body.parent;
-    }
-    rates
 }
 
 /// For every coordinate, the bodies that it moves, in file order.

@@ -3,7 +3,6 @@
 use dynid_model::RobotModel;
 
 use crate::error::{SimError, demand, demand_length};
-use crate::machine::{Nominal, Reference};
 
 /// Settings of the controller.
 #[derive(Debug, Clone, PartialEq)]
@@ -174,4 +173,25 @@ impl<'a> Controller<'a> {
         self.seen = Some(seen);
         Ok(effort)
     }
+}
+
+/// Wanted motion of all drives at a time, s.
+pub(crate) type Reference<'a> = &'a dyn Fn(f64) -> Vec<Wanted>;
+
+/// What a controller believes its machine to be.
+pub(crate) trait Nominal {
+    fn drives(&self) -> usize;
+    /// Names of channels that elements read.
+    fn channels(&self) -> &[String];
+    /// For every drive, whether it slides.
+    fn slides(&self) -> Vec<bool>;
+    /// For every drive, whether there is in fact none.
+    fn passive(&self, settings: &ControlSettings) -> Vec<bool>;
+    fn effort_limits(&self) -> Vec<f64>;
+    /// Goes along the reference to a time and gives what is wanted there.
+    fn follow(&mut self, reference: Reference<'_>, time: f64) -> Result<Vec<Wanted>, SimError>;
+    /// Efforts of the drives for what was wanted last.
+    fn effort(&mut self, wanted: &[Wanted], channels: &[f64]) -> Result<Vec<f64>, SimError>;
+    /// For every drive the largest inertia that it moves alone, at some times.
+    fn largest_inertia(&mut self, reference: Reference<'_>, times: &[f64]) -> Result<Vec<f64>, SimError>;
 }

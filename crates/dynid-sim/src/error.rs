@@ -3,7 +3,9 @@
 use dynid_model::NotPositive;
 use dynid_model::closed::{ClosedError, PoseError};
 
-use crate::closed::ForwardError;
+mod forward;
+
+pub use forward::ForwardError;
 
 /// Why an experiment was refused or had to stop.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

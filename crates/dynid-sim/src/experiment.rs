@@ -1,21 +1,25 @@
 //! The experiment: a controlled plant in motion, and what its sensors made of it.
 
+mod recorder;
+mod schedule;
+
 use std::collections::VecDeque;
 
 use rand::RngExt;
 
 use crate::closed::{ClosedMotion, ClosedNominal, ClosedPlant};
-use crate::controller::{ControlSettings, Controller, Wanted};
+use crate::controller::{ControlSettings, Controller, Nominal, Reference, Wanted};
 use crate::encoder::Encoders;
 use crate::error::{SimError, demand_length};
 use crate::imperfections::Imperfections;
-use crate::integrator::IntegrationCount;
-use crate::machine::{Instant, Motion, Nominal, PlantMotion, PlantNominal, Reference};
+use crate::machine::{Instant, Motion, PlantMotion, PlantNominal};
 use crate::plant::{Plant, PlantEnergy, Ripple};
 use crate::profile::Profile;
-use crate::recorder::{Recording, VirtualLog};
-use crate::schedule::Schedule;
+use crate::rosenbrock::IntegrationCount;
 use crate::streams::{Cause, generator, normal};
+use recorder::Recording;
+pub use recorder::{Truth, VirtualLog};
+use schedule::Schedule;
 
 /// Settings of an experiment.
 #[derive(Debug, Clone, PartialEq)]

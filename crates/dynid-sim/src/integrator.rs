@@ -18,7 +18,7 @@ use dynid_model::History;
 use crate::error::{SimError, demand};
 use crate::lu::{Lu, add_product};
 use crate::plant::{Plant, PlantWorkspace};
-use crate::rosenbrock::{ALPHA, EMBEDDED, GAMMA, GAMMAS, STAGES, StepControl, WEIGHTS};
+use crate::rosenbrock::{ALPHA, EMBEDDED, GAMMA, GAMMAS, IntegrationCount, STAGES, StepControl, WEIGHTS};
 
 /// State of a plant, and work done since the start.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -33,17 +33,6 @@ pub struct PlantState {
     pub drive_work: f64,
     /// Work taken by the elements at zero acceleration (friction's losses, springs' store), J.
     pub element_work: f64,
-}
-
-/// How much work the integrator had.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct IntegrationCount {
-    /// Steps that were kept.
-    pub accepted: usize,
-    /// Steps that were repeated with a smaller size.
-    pub rejected: usize,
-    /// Accelerations evaluated.
-    pub evaluations: usize,
 }
 
 /// Integrates a plant.

@@ -31,18 +31,18 @@ mod machine;
 mod plant;
 pub mod presliding;
 mod profile;
-mod recorder;
 mod rosenbrock;
-mod schedule;
 pub mod streams;
 
-pub use closed::{ClosedIntegrator, ClosedPlant, ClosedWorkspace, ForwardError, Stepping};
+pub use closed::{ClosedIntegrator, ClosedPlant, ClosedWorkspace, Stepping};
 pub use controller::{ControlSettings, Wanted};
 pub use elastic::{ElasticInverse, ElasticMotion, LinkMotion, fourier_link};
-pub use error::SimError;
-pub use experiment::{EnergyBalance, ExperimentResult, ExperimentSettings, run, run_closed, wrong_model};
+pub use error::{ForwardError, SimError};
+pub use experiment::{
+    EnergyBalance, ExperimentResult, ExperimentSettings, Truth, VirtualLog, run, run_closed, wrong_model,
+};
 pub use imperfections::Imperfections;
-pub use integrator::{IntegrationCount, Integrator, PlantState};
+pub use integrator::{Integrator, PlantState};
 pub use plant::{Plant, PlantEnergy, PlantWorkspace, Ripple};
 pub use profile::Profile;
-pub use recorder::{Truth, VirtualLog};
+pub use rosenbrock::IntegrationCount;

@@ -2,13 +2,11 @@
 
 use dynid_model::EffortModel;
 
-use crate::controller::{ControlSettings, Wanted};
+use crate::controller::{ControlSettings, Nominal, Reference, Wanted};
 use crate::error::{SimError, demand_length};
-use crate::integrator::{IntegrationCount, Integrator, PlantState};
+use crate::integrator::{Integrator, PlantState};
 use crate::plant::{Plant, PlantEnergy, PlantWorkspace};
-
-/// Wanted motion of all drives at a time, s.
-pub(crate) type Reference<'a> = &'a dyn Fn(f64) -> Vec<Wanted>;
+use crate::rosenbrock::IntegrationCount;
 
 /// True motion and effort of the drives at an instant.
 pub(crate) struct Instant {
@@ -29,24 +27,6 @@ pub(crate) trait Motion {
     /// Work of the drives, and that taken by the elements, J.
     fn work(&self) -> [f64; 2];
     fn count(&self) -> IntegrationCount;
-}
-
-/// What a controller believes its machine to be.
-pub(crate) trait Nominal {
-    fn drives(&self) -> usize;
-    /// Names of channels that elements read.
-    fn channels(&self) -> &[String];
-    /// For every drive, whether it slides.
-    fn slides(&self) -> Vec<bool>;
-    /// For every drive, whether there is in fact none.
-    fn passive(&self, settings: &ControlSettings) -> Vec<bool>;
-    fn effort_limits(&self) -> Vec<f64>;
-    /// Goes along the reference to a time and gives what is wanted there.
-    fn follow(&mut self, reference: Reference<'_>, time: f64) -> Result<Vec<Wanted>, SimError>;
-    /// Efforts of the drives for what was wanted last.
-    fn effort(&mut self, wanted: &[Wanted], channels: &[f64]) -> Result<Vec<f64>, SimError>;
-    /// For every drive the largest inertia that it moves alone, at some times.
-    fn largest_inertia(&mut self, reference: Reference<'_>, times: &[f64]) -> Result<Vec<f64>, SimError>;
 }
 
 /// A plant under way.

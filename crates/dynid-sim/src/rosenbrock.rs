@@ -1,7 +1,6 @@
 //! Coefficients of a Rosenbrock-W method of order three (ROS34PW2, Rang & Angermann 2005), and control of its steps.
 
 use crate::error::SimError;
-use crate::integrator::IntegrationCount;
 
 pub(crate) const GAMMA: f64 = 0.435_866_521_508_459;
 pub(crate) const STAGES: usize = 4;
@@ -104,6 +103,17 @@ impl StepControl {
     pub(crate) fn count(&self, evaluations: usize) -> IntegrationCount {
         IntegrationCount { accepted: self.accepted, rejected: self.rejected, evaluations }
     }
+}
+
+/// How much work the integrator had.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct IntegrationCount {
+    /// Steps that were kept.
+    pub accepted: usize,
+    /// Steps that were repeated with a smaller size.
+    pub rejected: usize,
+    /// Accelerations evaluated.
+    pub evaluations: usize,
 }
 
 #[cfg(test)]

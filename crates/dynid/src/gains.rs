@@ -18,11 +18,11 @@ use crate::config::{Config, Own, PayloadConfig, Route};
 use crate::elements::ElementPlan;
 use crate::estimate::InputRecord;
 use crate::fitting::{self, Fitted};
+use crate::identify::{load_robot, read_training};
 use crate::log::Log;
 use crate::log_terms::{LogTerms, known_inertia};
 use crate::pipeline::{Step, TrainingLog, held_where_not_logged, plan_elements};
 use crate::robot::{Robot, refuse_internal_load};
-use crate::run::{load_robot, read_training};
 use crate::trust::interval_quantile;
 
 /// Drive gains, with the fit that they come from.

@@ -14,7 +14,9 @@ pub mod explain;
 pub mod export;
 pub mod fault;
 pub mod friction;
+pub mod friction_model;
 pub mod gains;
+mod identify;
 pub mod init;
 pub mod inspect;
 pub mod logs;
@@ -39,8 +41,9 @@ pub use dynid_identify::{
 
 pub use config::Config;
 pub use friction::{FrictionConfig, FrictionModel, identify_friction};
+pub use identify::identify;
 pub use report_data::report as report_page;
-pub use run::{Run, identify};
+pub use run::Run;
 
 pub use dynid_excitation as excitation;
 pub use dynid_io as io;

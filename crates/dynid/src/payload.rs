@@ -9,8 +9,9 @@ pub use difference::Difference;
 pub use record::{PayloadFile, PayloadRecord, Quantity};
 
 use crate::config::{Config, PayloadConfig};
+use crate::identify::identify;
 use crate::pipeline::{Identification, Step};
-use crate::run::{Run, identify};
+use crate::run::Run;
 use crate::{Error, trust};
 
 /// An identification with payloads, and what it says about each of them.

@@ -11,9 +11,9 @@ pub use dynid_identify::reduction::{
 use crate::Error;
 use crate::config::{Config, LogConfig, MotorSide};
 use crate::estimate::{Estimate, ReadingRecord};
+use crate::identify::{identify, read_training};
 use crate::logs;
 use crate::pipeline::{Identification, Step};
-use crate::run::{identify, read_training};
 
 /// A recipe that was learned, the factors of the logs behind it, and what came out of these.
 #[derive(Debug)]

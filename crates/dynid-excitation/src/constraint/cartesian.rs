@@ -3,7 +3,7 @@
 use dynid_model::{BodyPoint, Dynamics, Mechanism, MotionBlock, Vec3};
 
 use super::{
-    ConstraintError, ConstraintKind, ConstraintRow, DISTANCE_SCALE, PathConstraint, Plane, at_poses, finite,
+    ConstraintError, ConstraintKind, ConstraintRow, DISTANCE_SCALE, PathConstraint, at_poses, finite,
     fixed_base, positive,
 };
 
@@ -242,6 +242,17 @@ pub(super) fn add_along(jacobian: &[f64], direction: Vec3<f64>, to: &mut [f64]) 
             *t += factor * j;
         }
     }
+}
+
+/// A plane that links stay above: the floor, or what the robot is mounted on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plane {
+    /// What rows are called: [`ConstraintKind::Floor`], [`ConstraintKind::Mounting`].
+    pub kind: ConstraintKind,
+    /// Unit vector into the side of the robot, in base axes.
+    pub normal: Vec3<f64>,
+    /// `normal · x` of its points, m.
+    pub height: f64,
 }
 
 #[cfg(test)]

@@ -14,10 +14,11 @@ mod screening;
 mod segment;
 
 pub use capsule::{Capsule, CapsulePairs, Capsules};
+pub use cartesian::Plane;
 pub use cartesian::{CartesianLimits, FramePoint, Region};
 pub use effort::EffortLimits;
 pub use joints::{JointLimits, JointQuantity, JointRange};
-pub use screening::{Plane, PlaneScreening, Screening, mean_place, screen};
+pub use screening::{PlaneScreening, Screening, mean_place, screen};
 
 use dynid_model::{BodyPoint, Dynamics, MechanismError, MotionBlock, Vec3};
 use thiserror::Error;

@@ -8,9 +8,10 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::capsule::{check_ranges, ends, not_neighbours};
+use super::cartesian::Plane;
 use super::clearance::Clearance;
 use super::segment::{Segment, segment_distance};
-use super::{Capsule, ConstraintError, ConstraintKind, finite};
+use super::{Capsule, ConstraintError, finite};
 
 /// Poses that are drawn.
 const POSES: usize = 2000;
@@ -22,17 +23,6 @@ const LEAST_APART: f64 = 0.05;
 const ROUNDING: f64 = 1e-9;
 /// Poses at which two points that are always at one place are compared.
 const SAME_PLACE_POSES: usize = 3;
-
-/// A plane that links stay above: the floor, or what the robot is mounted on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Plane {
-    /// What rows are called: [`ConstraintKind::Floor`], [`ConstraintKind::Mounting`].
-    pub kind: ConstraintKind,
-    /// Unit vector into the side of the robot, in base axes.
-    pub normal: Vec3<f64>,
-    /// `normal · x` of its points, m.
-    pub height: f64,
-}
 
 /// What can be kept, by index of the capsules.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -1,81 +1,17 @@
 //! Elastic joints: motors behind springs, each with a position of its own.
 
-use std::fmt;
-
 use dynid_io::ElasticSpec;
 use dynid_model::element::{ElasticTransmission, JointElement};
 use dynid_model::{Coordinate, JointKind, Limits, Mechanism};
 
 use super::ElementPlan;
 use crate::Error;
+use crate::error::ElasticFault;
 
 /// Name of the element.
 pub(crate) const ELASTIC: &str = "elastic";
 /// Element that is left out of the default ones of a joint whose rotor turns with its motor.
 pub(super) const ROTOR: &str = "rotor";
-
-/// Why a joint cannot be elastic as it is stated.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ElasticFault {
-    /// The joint floats.
-    Floats,
-    /// The joint does not move.
-    Fixed,
-    /// The joint follows another joint, or others follow it.
-    Follows,
-    /// The motor is one of a coupling of joints.
-    Coupled,
-    /// The joint has a sensor, but bodies act on other joints, which have none.
-    OthersWithoutSensor(Vec<String>),
-    /// `elastic` is among its elements, but nothing states the ratio.
-    NoRatio,
-    /// The position of the joint is logged, that of its motor is not.
-    MotorNotLogged(String),
-}
-
-impl fmt::Display for ElasticFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            ElasticFault::Floats => f.write_str("expected a joint with one coordinate, found a floating one"),
-            ElasticFault::Fixed => f.write_str("expected a joint that moves, found a fixed one"),
-            ElasticFault::Follows => f.write_str(
-                "expected a joint that moves by itself, found one that is coupled to others (mimic)",
-            ),
-            ElasticFault::Coupled => f.write_str(
-                "expected a motor of its own, found one of a `[[coupling]]`, which has stiff gears",
-            ),
-            ElasticFault::OthersWithoutSensor(joints) => {
-                write!(f, "expected a sensor at every joint or at none, found none at {}", joints.join(", "))
-            }
-            ElasticFault::NoRatio => f.write_str("expected a ratio, found none"),
-            ElasticFault::MotorNotLogged(motor) => {
-                write!(f, "expected position and effort of its motor `{motor}` in the log, found none")
-            }
-        }
-    }
-}
-
-impl ElasticFault {
-    /// What to do about it.
-    pub(crate) fn hint(&self) -> &'static str {
-        match self {
-            ElasticFault::Floats | ElasticFault::Fixed | ElasticFault::Follows => {
-                "leave `elastic` out: the joint counts as stiff then"
-            }
-            ElasticFault::Coupled => "leave out the coupling, or `elastic`",
-            ElasticFault::OthersWithoutSensor(_) => {
-                "a measured torque takes the place of the bodies behind it: state `sensor = true` at all joints, lock the others, \
-                 or leave `sensor` out"
-            }
-            ElasticFault::NoRatio => {
-                "state it in the robot file: `[element.<joint>] elastic = { ratio = 100 }`"
-            }
-            ElasticFault::MotorNotLogged(_) => {
-                "without it the deformation is not seen: name its columns under [columns], or leave `elastic` out"
-            }
-        }
-    }
-}
 
 fn fault(joint: &str, fault: ElasticFault) -> Error {
     Error::Elastic { joint: joint.to_owned(), fault }

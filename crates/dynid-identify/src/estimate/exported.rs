@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::agreement::FileFit;
+
 /// Loss of effort, in per cent of the joint's effort, above which an exported file is not the model that was judged.
 pub const EXPORT_LOSS_LIMIT: f64 = 5.0;
 
@@ -42,21 +44,6 @@ pub struct ExportedLog {
     pub mjcf: FileFit,
     /// The URDF alone.
     pub urdf: FileFit,
-}
-
-/// Figures of a file on a log, per joint in joint order.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FileFit {
-    /// RMS of measured minus predicted effort.
-    pub rms: Vec<Option<f64>>,
-    /// `100 ‖measured - predicted‖/‖measured‖` per joint, percent.
-    pub relative_error_per_joint: Vec<Option<f64>>,
-    /// `100 ‖measured - predicted‖/‖measured‖` over all joints, percent.
-    pub relative_error: Option<f64>,
-    /// RMS of the identified model's effort minus the file's, in the effort's unit.
-    pub loss: Vec<f64>,
-    /// Loss in per cent of the RMS of the measured effort.
-    pub loss_percent: Vec<Option<f64>>,
 }
 
 impl ExportedRecord {

@@ -3,7 +3,7 @@
 use dynid_io::{MappingSpec, SourceFile};
 use serde::{Deserialize, Serialize};
 
-use super::InputRecord;
+use crate::input_record::InputRecord;
 use crate::robot::Robot;
 
 /// Transmission between the motors that a log records and the joints: `q_motor = matrix · (q - offset)`,

@@ -24,12 +24,11 @@ use dynid_estimate::instruments::{
 use dynid_estimate::linear::{LinearEstimate, LinearMethod, estimate};
 use dynid_rows::conditioning::{Conditioning, ReducedGroup};
 
-use crate::Error;
-use crate::fitting;
 use crate::friction_power::FrictionPower;
-use crate::pipeline::{ModelFit, Problem};
+use crate::problem::Problem;
 use crate::settings::{ClosedLoop, Method, Settings};
 use crate::shape::ShapeFit;
+use crate::{Error, fitting};
 pub use reference::reference_channel;
 use simulation::Bench;
 
@@ -120,32 +119,25 @@ pub(crate) fn fit(
 ///
 /// No instrument knows anything of the samples that it is tested on: rows of the first half of every log are paired with simulations of
 /// parameters that were estimated on the second halves alone, by least squares and then by instruments until they settled, and the other
-/// way round. Time blocks are those of the fit's standard deviations; the prior size of a base parameter is its prior
+/// way round. Time blocks are those of the fit's standard deviations (`merged_blocks` blocks of rows each); the prior size of a base parameter is its prior
 /// standard deviation.
 ///
 /// # Errors
 /// [`Error::Setting`] without a closed loop or a reference, [`Error::Unsupported`] for what is not simulated in closed loop, and
 /// errors of simulations that settings cause. A simulation that diverges is an outcome.
-pub fn compare(problem: &Problem, fit: &ModelFit) -> Result<Comparison, Error> {
-    let closed = Loop {
-        problem,
-        shapes: fit.shapes.as_ref(),
-        conditioning: fit.conditioning.as_ref(),
-        power: &fit.power,
-    };
-    let settings = &problem.settings;
-    let bench = Bench::new(table(settings)?, &closed)?;
+pub(crate) fn compare(closed: &Loop<'_>, merged_blocks: usize) -> Result<Comparison, Error> {
+    let settings = &closed.problem.settings;
+    let bench = Bench::new(table(settings)?, closed)?;
     let rows = bench.measured()?;
     let sizes = closed.sizes();
     let (front, of_front) = from_half(settings, &bench, &rows, &sizes, false)?;
     let (back, of_back) = from_half(settings, &bench, &rows, &sizes, true)?;
-    let total = problem.structure.base.len();
+    let total = closed.problem.structure.base.len();
     let exogeneity = match (&front, &back) {
         (Some(front), Some(back)) => {
             let paired = crossed(back, front);
             let squares = least_squares(settings, &measured(&paired), total)?;
-            let merged = fit.fitted.merged_blocks;
-            let paired: Vec<ReducedGroup> = paired.iter().map(|g| g.coarsened(merged)).collect();
+            let paired: Vec<ReducedGroup> = paired.iter().map(|g| g.coarsened(merged_blocks)).collect();
             exogeneity(&paired, &squares.weights(), total, &sizes, &ExogeneitySettings::default())
         }
         _ => None,

@@ -14,10 +14,10 @@ use dynid_sim::{ControlSettings, ExperimentSettings, Imperfections, Plant, Profi
 use super::Loop;
 use super::reference::Reference;
 use crate::elements::LOAD;
-use crate::elements::clearance::refuse_clearance;
-use crate::pipeline::{Problem, Structure};
-use crate::robot::{refuse_elastic, refuse_loops};
+use crate::problem::Problem;
+use crate::robot::{refuse_clearance, refuse_elastic, refuse_loops};
 use crate::settings::{ClosedLoop, NominalModel};
+use crate::structure::Structure;
 use crate::{Error, bounds, consistency, fitting, shape};
 
 /// Local error of the integration.

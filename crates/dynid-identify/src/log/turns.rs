@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use dynid_io::Signals;
 use serde::{Deserialize, Serialize};
 
-use super::LogAxis;
+use crate::log_axis::LogAxis;
 
 /// A full turn, rad.
 const TURN: f64 = 2.0 * PI;

@@ -2,8 +2,8 @@
 
 use dynid_model::{EffortModel, Parameter, RobotModel, ShapeParameter};
 
-use super::Identification;
 use crate::Error;
+use crate::identification::Identification;
 
 impl Identification {
     /// The identified model without what belongs to single logs; `None` if nothing does.

@@ -4,11 +4,8 @@ use dynid_model::{EffortModel, MotionBlock, RobotModel};
 use dynid_rows::conditioning::PreparedLog;
 
 use crate::caution::{self, Caution};
-use crate::result::short_name;
-
-/// What helps where a log tells little of a spring.
-pub(crate) const REMEDY: &str = "read encoders on both sides of the gear at the same times, or take the joint as stiff: leave `elastic` out of its \
-                                 `[element.<joint>]` in the robot file";
+use crate::input_record::short_name;
+use crate::joint_stiffness::REMEDY;
 
 /// Springs whose parameters a log tells little of.
 pub(super) fn warnings(model: &RobotModel, logs: &[PreparedLog]) -> Vec<Caution> {

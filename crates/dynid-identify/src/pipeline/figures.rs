@@ -3,10 +3,10 @@
 use dynid_estimate::linear::LinearEstimate;
 use dynid_rows::conditioning::{Conditioning, ReducedGroup};
 
-use super::trained::TrainedLog;
 use crate::advice::FitRows;
 use crate::agreement::Agreement;
 use crate::consistency::{self, Consistent};
+use crate::trained_log::TrainedLog;
 
 /// Share of an effort that a model must explain for its residual to count as noise: of its variance on every log
 /// in which the joint moves, and of its mean square on held-out folds.

@@ -6,11 +6,11 @@ use dynid_rows::conditioning::{
     BasePrior, Conditioning, FrictionChoice, JointFriction, ShapeKind, ShapeTrial, Stage, choose_friction,
 };
 
-use super::problem::Problem;
-use super::structure::Structure;
 use crate::Error;
 use crate::elements::{shape_element, shapes_beside};
+use crate::problem::Problem;
 use crate::shape::ShapeFit;
+use crate::structure::Structure;
 
 /// Chooses shapes for all joints and adds them to the plan; shape parameters start at the values found.
 ///

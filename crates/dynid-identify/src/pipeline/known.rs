@@ -6,8 +6,8 @@ use dynid_rows::conditioning::PreparedLog;
 
 use crate::caution::{self, Caution};
 use crate::elements::ElementPlan;
+use crate::input_record::short_name;
 use crate::known_friction::KnownFriction;
-use crate::result::short_name;
 
 /// What helps where known friction does not reach.
 const REMEDY: &str = "measure the friction of these joints over the temperatures of the logs: `dynid friction friction.toml`, then \

@@ -4,13 +4,13 @@ use dynid_model::RobotModel;
 use dynid_rows::conditioning::{Conditioning, JointFriction, ReducedGroup};
 
 use super::Step;
-use super::problem::Problem;
 use super::shapes::{self, Shaped};
 use crate::Error;
 use crate::consistency::{self, Consistent};
 use crate::fitting::{self, Fitted, RowResiduals};
 use crate::friction_power::{self, FrictionPower};
 use crate::instruments::{self, InstrumentRun, Loop};
+use crate::problem::Problem;
 use crate::settings::{Method, Settings};
 use crate::shape::{self, ShapeFit};
 

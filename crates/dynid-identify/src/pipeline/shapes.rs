@@ -3,9 +3,9 @@
 use dynid_model::EffortModel;
 use dynid_rows::conditioning::{Conditioning, JointFriction};
 
-use super::problem::Problem;
 use super::{Step, friction};
 use crate::Error;
+use crate::problem::Problem;
 use crate::settings::Friction;
 use crate::shape::{self, ShapeFit};
 

@@ -2,7 +2,7 @@
 
 use dynid_model::{JointKind, Mechanism};
 
-use super::finding::{FindingId, Findings, Severity};
+use crate::finding::{FindingId, Findings, Severity};
 use crate::log::LogSource;
 
 /// Warns where columns go to joints by number alone and a log cannot tell another order: branches that are alike fit each other's columns,

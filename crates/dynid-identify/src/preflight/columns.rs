@@ -4,7 +4,7 @@ use dynid_motion::UniformLog;
 use dynid_motion::velocity::compare;
 use dynid_rows::preflight::{Found, Rewiring, Wiring, WiringSearch};
 
-use super::finding::{FindingId, Findings, Fix, Severity};
+use crate::finding::{FindingId, Findings, Fix, Severity};
 
 /// Deviation of a measured velocity's scale from 1 that is a fault of its own.
 const SCALE: f64 = 0.1;

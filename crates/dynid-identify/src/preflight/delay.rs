@@ -4,8 +4,8 @@ use dynid_motion::shift::shift;
 use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, condition};
 
 use super::bench::Bench;
-use super::finding::{FindingId, Findings, Fix, Severity};
 use crate::Error;
+use crate::finding::{FindingId, Findings, Fix, Severity};
 use crate::log::Log;
 use crate::settings::{Route, Settings};
 

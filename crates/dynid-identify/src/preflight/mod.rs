@@ -8,7 +8,7 @@ mod assignment;
 mod bench;
 mod columns;
 mod delay;
-mod finding;
+mod examine;
 mod plausibility;
 mod record;
 
@@ -18,14 +18,14 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::Error;
+pub use crate::finding::{Finding, FindingId, Findings, Fix, Severity};
 use crate::log::Log;
 use crate::overlap::{Overlap, Overlaps};
 use crate::robot::Robot;
 use crate::settings::Settings;
 pub use bench::Bench;
-use bench::Examined;
 pub use delay::Delay;
-pub use finding::{Finding, FindingId, Findings, Fix, Severity};
+use examine::Examined;
 
 /// What was measured of one log, whether or not it is a fault.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -5,9 +5,9 @@ use dynid_model::{EffortModel, Mechanism};
 use dynid_rows::preflight::{AgainstStated, GaussianPrior, Trial, Wiring, against_stated, efforts_at_rest};
 
 use super::bench::Bench;
-use super::finding::{FindingId, Findings, Fix, Severity};
 use crate::Error;
 use crate::effort_scale::{G, GRAVITY_SHARE, states_bodies};
+use crate::finding::{FindingId, Findings, Fix, Severity};
 use crate::prior::Prior;
 
 /// Efforts this many times larger or smaller than expected are worth a word ...

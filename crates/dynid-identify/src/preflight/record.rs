@@ -7,8 +7,8 @@ use dynid_motion::spikes::{self, SpikeSettings};
 use dynid_motion::{ClockReport, JointSignals, Log, UniformLog};
 use rayon::prelude::*;
 
-use super::finding::{FindingId, Findings, Fix, Severity};
 use crate::Error;
+use crate::finding::{FindingId, Findings, Fix, Severity};
 use crate::log::LARGEST_POSITION;
 
 /// Jitter that is worth a word, samples.

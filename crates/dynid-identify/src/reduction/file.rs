@@ -13,8 +13,8 @@
 use dynid_factor::wire::{read_groups, write_groups};
 use serde::{Deserialize, Serialize};
 
-use super::error::FactorFileFault as Fault;
 use super::{LogFacts, Recipe, ReducedLog, Reduction, ReductionError, plain};
+use crate::reduction_error::FactorFileFault as Fault;
 
 /// Version of the factor file.
 pub const VERSION: u32 = 1;

@@ -24,7 +24,6 @@
 //! What is not known without samples is left out: figures on single samples, whiteness of the residuals, the scale of the efforts by the
 //! robot file. Figures of a fit are those of its rows.
 
-mod error;
 mod file;
 mod recipe;
 mod reduce;
@@ -37,13 +36,12 @@ use crate::Error;
 use crate::caution::Caution;
 use crate::estimate::InputRecord;
 use crate::log::Log;
-use crate::pipeline::TrainedLog;
 
-pub use error::{FactorFileFault, ReductionError};
+pub use crate::reduction_error::{FactorFileFault, ReductionError};
+pub use crate::trained_log::{RowFit, TrainedLog};
 pub use file::VERSION;
 pub use recipe::{Blocks, Choices, Column, Output, Recipe};
 pub use reduce::Reducer;
-pub use solve::RowFit;
 
 /// What is left of a log: its factors, and what has to be known of it.
 #[derive(Debug, Clone, PartialEq)]

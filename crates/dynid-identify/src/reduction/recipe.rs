@@ -14,11 +14,14 @@ use super::{ReductionError, plain};
 use crate::Error;
 use crate::estimate::{InputRecord, ModelRecord, ReadingRecord};
 use crate::friction_power::FrictionPower;
+use crate::identification::Identification;
 use crate::passivity::velocities;
-use crate::pipeline::{Identification, Problem, Structure, TrainingLog};
+use crate::problem::Problem;
 use crate::robot::Robot;
 use crate::settings::{ConditioningConfig, EstimatorConfig, Method, Preflight, Route, Settings};
 use crate::shape::{self, ShapeFit};
+use crate::structure::Structure;
+use crate::training_log::TrainingLog;
 
 /// What decides the rows of a log, and how factors of such rows are solved.
 ///

@@ -13,8 +13,10 @@ use crate::caution::{self, Caution};
 use crate::fitting::conditioning_fault;
 use crate::log::{self, Log};
 use crate::overlap::Overlaps;
-use crate::pipeline::{Problem, TrainedLog, log_cautions, preflight};
+use crate::pipeline::{log_cautions, preflight};
+use crate::problem::Problem;
 use crate::settings::{LogSettings, labels};
+use crate::trained_log::TrainedLog;
 
 /// Velocities further out of the range of the recipe than this share of the range are told.
 const FASTER: f64 = 0.25;

@@ -9,20 +9,11 @@ use crate::Error;
 use crate::consistency;
 use crate::estimate::FitValues;
 use crate::fitting::{self, Fitted, RowResiduals};
+use crate::identification::Identification;
 use crate::log::{Log, LogSource};
 use crate::overlap::Overlaps;
-use crate::pipeline::{Beside, EXPLAINED, Identification, ModelFit, Step, TrainedLog, assemble, explained};
-
-/// Figures of a fit on the rows of one log.
-#[derive(Debug, Clone)]
-pub struct RowFit {
-    /// Log.
-    pub log: String,
-    /// Rows of the widest kernel, all outputs together.
-    pub rows: usize,
-    /// Figures, output by output, of outputs that move in the log.
-    pub values: FitValues,
-}
+use crate::pipeline::{Beside, EXPLAINED, ModelFit, Step, assemble, explained};
+use crate::trained_log::{RowFit, TrainedLog};
 
 impl Reduction {
     /// Solves for the parameters of all logs: fit, covariance, bodies that can exist, verdicts, validation logs.

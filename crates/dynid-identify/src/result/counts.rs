@@ -4,7 +4,7 @@ use dynid_estimate::identifiability::Verdict;
 use dynid_model::EffortModel;
 
 use crate::estimate::{BaseCounts, ParameterCounts, ShapeCounts, StandardCounts};
-use crate::pipeline::Identification;
+use crate::identification::Identification;
 use crate::shape;
 
 impl Identification {

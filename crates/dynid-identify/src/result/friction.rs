@@ -5,8 +5,8 @@ use dynid_rows::conditioning::{JointFriction, ShapeTrial};
 
 use crate::elements::shape_element;
 use crate::estimate::FrictionTrial;
+use crate::identification::Identification;
 use crate::known_friction::KnownFriction;
-use crate::pipeline::Identification;
 
 /// All shapes tried, joint after joint, accepted ones first.
 pub(super) fn trials(id: &Identification) -> Vec<FrictionTrial> {

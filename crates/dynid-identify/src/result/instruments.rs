@@ -4,8 +4,8 @@ use dynid_estimate::instruments::{ExogeneityVerdict, IterationEnd};
 use dynid_model::EffortModel;
 
 use crate::estimate::{EffectRecord, ExogeneityRecord, InstrumentRecord};
+use crate::identification::Identification;
 use crate::instruments::InstrumentRun;
-use crate::pipeline::Identification;
 use crate::verdict;
 
 impl Identification {

@@ -8,7 +8,7 @@ use crate::consistency::UNCONSTRAINED;
 use crate::estimate::{
     ConsistencyRecord, HeldOutRecord, PrecisionRecord, PruningRecord, PruningStep, WhitenessRecord,
 };
-use crate::pipeline::Identification;
+use crate::identification::Identification;
 use crate::settings::Consistency;
 
 impl Identification {

@@ -30,17 +30,6 @@ pub enum Friction {
     Power,
 }
 
-/// Sign of the errors of known friction.
-#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
-#[serde(rename_all = "lowercase")]
-pub enum FrictionErrors {
-    /// Any: known friction may be too large or too small.
-    #[default]
-    Free,
-    /// Not negative, as coefficients of friction.
-    Nonnegative,
-}
-
 impl Friction {
     fn elements(self) -> Option<&'static [&'static str]> {
         Some(match self {

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{PerJoint, Settings};
+use super::Settings;
 use crate::Error;
+use crate::per_joint::PerJoint;
 
 /// A body that some logs carry.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, PartialEq)]

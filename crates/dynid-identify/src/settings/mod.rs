@@ -5,30 +5,29 @@ mod conditioning;
 mod effect;
 mod estimator;
 mod friction;
+mod given;
 pub mod lists;
 mod log_terms;
-mod per_joint;
 
 use std::collections::BTreeMap;
 
 use dynid_io::CouplingSpec;
 use serde::Serialize;
 
+use crate::Error;
+use crate::commands::RunFiles;
+pub use crate::known_friction::FrictionErrors;
+use crate::known_friction::KnownLaws;
+pub use crate::per_joint::{PerJoint, known};
 pub use closed_loop::{ClosedLoop, NominalModel};
 pub use conditioning::{ConditioningConfig, Route};
-pub use effect::{Given, check_log_effect, refuse, serde_name};
+pub use effect::{check_log_effect, serde_name};
 pub use estimator::{
     BoundConfig, Consistency, EstimatorConfig, Method, PriorDistance, ShapeConfig, Variances,
 };
-pub use friction::{Friction, FrictionErrors};
-pub use log_terms::{LogSettings, Own, PayloadConfig, RATED_MASS};
-pub use log_terms::{MASSES, labels};
-pub use per_joint::PerJoint;
-pub use per_joint::known;
-
-use crate::Error;
-use crate::commands::RunFiles;
-use crate::known_friction::KnownLaws;
+pub use friction::Friction;
+pub use given::{Given, refuse};
+pub use log_terms::{LogSettings, MASSES, Own, PayloadConfig, RATED_MASS, labels};
 
 /// Settings of an identification. All have defaults: `Settings::default()` is what `dynid identify` does without a configuration.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]

@@ -12,7 +12,7 @@ use dynid_rows::conditioning::PreparedLog;
 
 use super::Spring;
 use crate::Error;
-use crate::pipeline::Identification;
+use crate::identification::Identification;
 
 /// Cut-off of all signals, Hz.
 const CUTOFF_HZ: f64 = 10.0;

@@ -1,10 +1,10 @@
 //! What the logs themselves leave open: their pre-flight, rows that they share, the scale of their efforts.
 
-use super::{CheckName, Status, check};
+use super::{Status, check};
+use crate::check::{CheckName, CheckResult};
 use crate::effort_scale::{EffortScale, ScaleSource};
-use crate::estimate::CheckResult;
-use crate::pipeline::Identification;
-use crate::preflight::Severity;
+use crate::finding::Severity;
+use crate::identification::Identification;
 use crate::settings::Preflight;
 
 /// Masses of the robot file speak for the scale of the efforts within this factor.

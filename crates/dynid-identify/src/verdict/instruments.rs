@@ -4,10 +4,10 @@ use dynid_estimate::instruments::{Exogeneity, ExogeneityVerdict, IterationEnd, S
 use dynid_estimate::linear::LinearMethod;
 use dynid_model::EffortModel;
 
-use super::{CheckName, Status, check};
-use crate::estimate::CheckResult;
+use super::{Status, check};
+use crate::check::{CheckName, CheckResult};
+use crate::identification::Identification;
 use crate::instruments::InstrumentRun;
-use crate::pipeline::Identification;
 
 /// Level of the test that is spoken of.
 const LEVEL: f64 = 0.05;

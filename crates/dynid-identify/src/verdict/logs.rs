@@ -2,9 +2,9 @@
 
 use dynid_model::element::scale_name;
 
-use super::{CheckName, Status, check};
-use crate::estimate::CheckResult;
-use crate::pipeline::Identification;
+use super::{Status, check};
+use crate::check::{CheckName, CheckResult};
+use crate::identification::Identification;
 
 /// Deviations that are shown at most.
 const SHOWN: usize = 6;

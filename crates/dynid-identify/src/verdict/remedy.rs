@@ -1,7 +1,8 @@
 //! What mends a check that did not pass: the command to type, or the line to write and its place.
 
-use super::CheckName;
-use crate::pipeline::Identification;
+use crate::check::CheckName;
+use crate::identification::Identification;
+use crate::joint_stiffness;
 use crate::settings::Preflight;
 
 /// Blocks that standard deviations want.
@@ -55,7 +56,7 @@ pub(super) fn of(id: &Identification, check: CheckName) -> String {
             files.inspect(),
             files.check()
         ),
-        CheckName::Stiffness => crate::pipeline::SPRING_REMEDY.to_owned(),
+        CheckName::Stiffness => joint_stiffness::REMEDY.to_owned(),
         CheckName::Instruments => "compare controller gains and reference in `[instruments]` with those of the robot, or leave the table out"
             .to_owned(),
         CheckName::ClosedLoopBias => "`method = \"iv\"` under `[estimator]`, or a lower `kernel_hz` under `[conditioning]`".to_owned(),

@@ -1,5 +1,6 @@
 //! The unit of a time column, told from the size and the steps of its numbers.
 
+use super::column_values::raw_column;
 use super::{ColumnMapping, ColumnUse, MappingError, TimeSource};
 use crate::csv::Table;
 
@@ -82,7 +83,7 @@ impl ColumnMapping {
     fn raw_time(&self, table: &Table, in_seconds: bool) -> Result<Vec<f64>, MappingError> {
         let mut out = vec![0.0; table.rows];
         for part in self.time_columns() {
-            let (values, _) = super::extract::raw_column(table, "time", part)?;
+            let (values, _) = raw_column(table, "time", part)?;
             let first = values.first().copied().unwrap_or(0.0);
             let factor = if in_seconds { part.factor } else { 1.0 };
             out.iter_mut().zip(values).for_each(|(t, x)| *t += factor * (x - first));
@@ -92,7 +93,7 @@ impl ColumnMapping {
 
     /// The first stamp as it stands in the file.
     fn start_of(&self, table: &Table, part: &ColumnUse) -> Result<f64, MappingError> {
-        let (values, origin) = super::extract::raw_column(table, "time", part)?;
+        let (values, origin) = raw_column(table, "time", part)?;
         Ok(values.first().copied().unwrap_or(0.0) + origin as f64)
     }
 }
@@ -139,10 +140,9 @@ impl Motion {
         let (mut vv, mut dd, mut vd) = (0.0, 0.0, 0.0);
         for (k, column) in mapping.position.iter().enumerate() {
             let Some(column) = column else { continue };
-            let (q, _) = super::extract::raw_column(table, "position", column)?;
+            let (q, _) = raw_column(table, "position", column)?;
             let velocity = mapping.velocity.as_ref().and_then(|v| v[k].as_ref());
-            let velocity =
-                velocity.map(|v| Ok((super::extract::raw_column(table, "velocity", v)?.0, v.factor)));
+            let velocity = velocity.map(|v| Ok((raw_column(table, "velocity", v)?.0, v.factor)));
             let velocity = velocity.transpose()?;
             let mut speeds = Vec::with_capacity(time.len());
             for row in (lag..time.len()).step_by(lag) {

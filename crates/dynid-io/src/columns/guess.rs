@@ -1,12 +1,12 @@
 //! Finding signals by the names of columns.
 
 use super::error::MappingError;
-use super::names::{
-    CURRENT_NAMES, ColumnName, Signal, TIME_NAMES, names, names_joint, number_of, part_of_time,
-};
 use super::units::{Conversion, conversion};
 use super::{ColumnMapping, ColumnUse, TimeColumns, TimeSource};
 use crate::log::{LogHeader, Missing};
+use crate::signal::{
+    CURRENT_NAMES, ColumnName, Signal, TIME_NAMES, names, names_joint, number_of, part_of_time,
+};
 
 /// Settings of [`ColumnMapping::guess`].
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,6 +1,6 @@
 //! Rows in which a signal has no value.
 
-use super::extract::place_of;
+use super::column_values::{place_of, raw_column};
 use super::{ColumnMapping, ColumnUse, MappingError, Signal};
 use crate::csv::Table;
 use crate::log::Missing;
@@ -89,7 +89,7 @@ impl ColumnMapping {
         };
         let mut out = vec![0.0; table.rows];
         for part in self.time_columns() {
-            let (values, _) = super::extract::raw_column(table, "time", part)?;
+            let (values, _) = raw_column(table, "time", part)?;
             out.iter_mut().zip(values).for_each(|(t, x)| *t += part.factor * x);
         }
         Ok(out)

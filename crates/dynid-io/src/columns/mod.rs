@@ -1,23 +1,23 @@
 //! Which column of a log is which signal, in which unit.
 
 mod clock;
+mod column_values;
 mod degrees;
 mod error;
 mod extract;
 mod guess;
 mod missing;
-mod names;
 mod spec;
 mod units;
 mod unnamed;
 
+pub use crate::signal::{Signal, is_time_name};
 pub use clock::TimeReading;
 pub use degrees::{DegreesEvidence, degrees_suspected};
 pub use error::{MappingError, holds_currents};
 pub use extract::Signals;
 pub use guess::GuessOptions;
 pub use missing::Sparse;
-pub use names::{Signal, is_time_name};
 pub use spec::{ChannelSpec, ColumnNames, FullSignal, MappingSpec, PerJoint, SignalSpec, Units};
 pub use unnamed::columns_of_unnamed;
 

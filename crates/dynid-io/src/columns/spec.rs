@@ -6,11 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use super::error::MappingError;
 use super::guess::{Finder, GuessOptions, PerJointColumns, of_logged};
-use super::names::{ColumnName, Signal, part_of_time};
 use super::units::{Conversion, conversion};
 use super::{ColumnMapping, ColumnUse, EffortColumn, TimeColumns, TimeSource};
 use crate::excerpt::nearest;
 use crate::log::{DecimalMark, LogHeader, LogOptions, Missing};
+use crate::signal::{ColumnName, Signal, part_of_time};
 
 /// An explicit mapping; signals that it does not mention are found by name as in [`ColumnMapping::guess`].
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]

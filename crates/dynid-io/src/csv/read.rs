@@ -7,8 +7,8 @@ use super::error::LogFileError;
 use super::input::{Bounds, Input};
 use super::lines::Lines;
 use super::number;
-use crate::columns::is_time_name;
 use crate::excerpt::excerpt_bytes;
+use crate::signal::is_time_name;
 
 /// Most columns of a log.
 pub(crate) const MAX_COLUMNS: usize = 65_536;

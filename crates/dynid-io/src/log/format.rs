@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::columns::Signal;
+use crate::signal::Signal;
 
 /// A tool whose logs are recognised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

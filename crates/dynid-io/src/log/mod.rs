@@ -5,6 +5,7 @@
 //! and only those that are used are read ([`LogText::read`]).
 
 mod cell;
+mod fault;
 mod format;
 mod header;
 mod layout;

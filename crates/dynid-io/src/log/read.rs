@@ -3,9 +3,10 @@
 use std::collections::VecDeque;
 use std::path::Path;
 
+use super::fault::Fault;
 use super::header::LogHeader;
 use super::layout::{Form, Holds, Layout, Line};
-use super::row::{Cells, Fault, LineParser, Take};
+use super::row::{Cells, LineParser, Take};
 use super::{LogOptions, Missing, ReadingNote};
 use crate::csv::input::{Bounds, Input};
 use crate::csv::lines::Lines;

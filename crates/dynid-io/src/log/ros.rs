@@ -1,7 +1,7 @@
 //! Joint states as the tools of ROS print them.
 
+use super::fault::Fault;
 use super::header::LogHeader;
-use super::row::Fault;
 use crate::excerpt::excerpt_bytes;
 
 /// Nanoseconds of a second.

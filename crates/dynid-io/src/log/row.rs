@@ -1,21 +1,10 @@
 //! From lines to numbers.
 
 use super::cell::{is_missing, list};
+use super::fault::Fault;
 use super::ros::Echo;
 use crate::csv::{Delimiter, number, split};
 use crate::excerpt::excerpt_bytes;
-
-/// What is wrong with a row; numbers are those of cells.
-pub(super) enum Fault {
-    FieldCount(usize),
-    NotANumber(usize, String),
-    NotFinite(usize, String),
-    TooBig(usize, String),
-    ListLength(usize, usize),
-    OtherName(usize, String),
-    OtherJoints(String),
-    NoMessage(String),
-}
 
 /// What is read of a cell.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use dynid_model::{
 use super::JointParameters;
 use super::quaternion::rotation;
 use crate::excerpt::excerpt;
-use crate::robot::RobotFileError;
+use crate::robot_error::RobotFileError;
 use crate::urdf::xml::{Attribute, Tag, Tags};
 
 /// What MJCF text holds.

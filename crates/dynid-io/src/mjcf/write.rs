@@ -9,7 +9,7 @@ use quick_xml::escape::escape;
 
 use super::JointParameters;
 use super::quaternion::quaternion;
-use crate::robot::RobotFileError;
+use crate::robot_error::RobotFileError;
 use crate::urdf::inertial::Inertial;
 
 /// Name of the body that every MJCF has.

@@ -1,10 +1,8 @@
 //! From lines to rows of numbers.
 
-use thiserror::Error;
-
+use super::bad_line::BadLine;
 use super::json::JsonFields;
 use crate::csv::{LogFileError, RowFault, RowParser};
-use crate::excerpt::excerpt_bytes;
 
 /// How a line holds a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,56 +11,6 @@ pub enum LineFormat {
     Csv,
     /// One JSON object per line: numbers, or lists of numbers `"q": [..]` that stand for `q1`, `q2`, ...
     Json,
-}
-
-/// Why a line is skipped.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum BadLine {
-    /// Another number of fields than the header has.
-    #[error("expected {expected} fields, found {found}")]
-    FieldCount {
-        /// Columns of the header.
-        expected: usize,
-        /// Fields of the line.
-        found: usize,
-    },
-    /// A field that is no number.
-    #[error("column `{column}`: expected a number, found `{found}`")]
-    NotANumber {
-        /// Column.
-        column: String,
-        /// The field.
-        found: String,
-    },
-    /// NaN, an infinity or nothing.
-    #[error("column `{column}`: expected a finite number, found `{found}`")]
-    NotFinite {
-        /// Column.
-        column: String,
-        /// The field.
-        found: String,
-    },
-    /// A number that no signal reaches.
-    #[error("column `{column}`: expected at most 1e12 in magnitude, found `{found}`")]
-    TooBig {
-        /// Column.
-        column: String,
-        /// The field.
-        found: String,
-    },
-    /// No JSON object.
-    #[error("expected a JSON object, found {found}")]
-    NotJson {
-        /// What it is instead.
-        found: String,
-    },
-    /// A field that the first line had is missing.
-    #[error("expected a field `{column}`, found none")]
-    Missing {
-        /// Column.
-        column: String,
-    },
 }
 
 /// Rows of a stream. The first line that is neither blank nor a comment (`#`) names the columns; of JSON objects it is a row as
@@ -157,21 +105,6 @@ fn csv_row<'a>(parser: &'a mut RowParser, line: &[u8]) -> Result<&'a [f64], BadL
         });
     }
     Ok(parser.values())
-}
-
-/// Largest magnitude of a number outside time columns, as in logs.
-const MAX_MAGNITUDE: f64 = 1e12;
-
-/// A number that may enter a row of a column.
-pub(super) fn checked(column: &str, x: f64, is_time: bool) -> Result<f64, BadLine> {
-    let found = || excerpt_bytes(x.to_string().as_bytes());
-    if !x.is_finite() {
-        return Err(BadLine::NotFinite { column: column.to_owned(), found: found() });
-    }
-    if x.abs() > MAX_MAGNITUDE && !is_time {
-        return Err(BadLine::TooBig { column: column.to_owned(), found: found() });
-    }
-    Ok(x)
 }
 
 #[cfg(test)]

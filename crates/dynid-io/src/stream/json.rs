@@ -4,9 +4,10 @@ use std::collections::HashMap;
 
 use serde_json::{Map, Value};
 
-use super::fields::{BadLine, checked};
-use crate::columns::is_time_name;
+use super::bad_line::{BadLine, checked};
+
 use crate::excerpt::excerpt_bytes;
+use crate::signal::is_time_name;
 
 /// Columns that the first object named.
 pub(super) struct JsonFields {

@@ -7,7 +7,7 @@ use super::Source;
 use super::dh::limits;
 use super::schema::{Body, BodyKind};
 use crate::excerpt::excerpt;
-use crate::robot::RobotFileError;
+use crate::robot_error::RobotFileError;
 
 /// Name of the root link of a body tree.
 const GROUND: &str = "ground";

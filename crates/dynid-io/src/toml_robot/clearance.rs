@@ -10,9 +10,9 @@ use toml::{Table, Value};
 
 use super::Source;
 use super::elastic::ELASTIC;
-use super::elements::number;
+use super::number::number;
 use super::schema::RobotToml;
-use crate::robot::RobotFileError;
+use crate::robot_error::RobotFileError;
 
 /// Key of a joint with clearance among its elements.
 pub(super) const CLEARANCE: &str = "clearance";

@@ -6,7 +6,8 @@ use toml::Spanned;
 use super::Source;
 use super::schema::{Dh, Frame, LimitsToml, RobotToml, Row, RowKind};
 use crate::excerpt::excerpt;
-use crate::robot::{LEAST_LIMIT, RobotFileError};
+use crate::robot_error::RobotFileError;
+use crate::robot_numbers::LEAST_LIMIT;
 
 const X: [f64; 3] = [1.0, 0.0, 0.0];
 const Z: [f64; 3] = [0.0, 0.0, 1.0];

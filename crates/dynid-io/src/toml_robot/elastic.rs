@@ -3,9 +3,9 @@
 use toml::{Table, Value};
 
 use super::Source;
-use super::elements::number;
+use super::number::number;
 use super::schema::RobotToml;
-use crate::robot::RobotFileError;
+use crate::robot_error::RobotFileError;
 
 /// Key of an elastic joint among its elements.
 pub(super) const ELASTIC: &str = "elastic";

@@ -4,15 +4,15 @@
 
 use dynid_model::Description;
 use dynid_model::element::ElementRegistry;
-use serde::Deserialize;
 use toml::Value;
 
 use super::Source;
 use super::clearance::{self, ClearanceSpec};
 use super::elastic::{self, ElasticSpec};
-use super::schema::RobotToml;
+use super::number::number;
+use super::schema::{CouplingForm, RobotToml};
 use crate::excerpt::excerpt;
-use crate::robot::RobotFileError;
+use crate::robot_error::RobotFileError;
 
 /// Elements, their settings, and transmissions that couple joints.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -75,17 +75,6 @@ pub struct CouplingSpec {
     pub form: CouplingForm,
 }
 
-/// Parameters of a coupling.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum CouplingForm {
-    /// One inertia, viscous and Coulomb parameter per motor, carried through the matrix.
-    #[default]
-    Strict,
-    /// Three extra columns beside the direct terms of the joints, as in the literature on the TX40.
-    Columns,
-}
-
 pub(super) fn build(
     source: &Source<'_>,
     robot: &RobotToml,
@@ -146,11 +135,6 @@ pub(super) fn build(
 
 fn texts(list: &[Value]) -> Option<Vec<String>> {
     list.iter().map(|v| v.as_str().map(str::to_owned)).collect()
-}
-
-pub(super) fn number(value: &Value) -> Option<f64> {
-    let x = value.as_float().or_else(|| value.as_integer().map(|i| i as f64))?;
-    crate::robot::is_in_range(x).then_some(x)
 }
 
 /// Flattens nested tables of settings.

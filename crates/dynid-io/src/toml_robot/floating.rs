@@ -5,7 +5,7 @@ use toml::Spanned;
 
 use super::Source;
 use crate::excerpt::excerpt;
-use crate::robot::RobotFileError;
+use crate::robot_error::RobotFileError;
 
 const KEY: &str = "floating";
 

@@ -8,7 +8,7 @@ use toml::Spanned;
 
 use super::Source;
 use super::number::Position;
-use crate::robot::RobotFileError;
+use crate::robot_error::RobotFileError;
 
 const KEY: &str = "home";
 

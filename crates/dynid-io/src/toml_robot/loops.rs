@@ -8,7 +8,7 @@ use super::Source;
 use super::number::{Angle, Number};
 use super::schema::{LoopKind, LoopToml};
 use crate::excerpt::excerpt;
-use crate::robot::RobotFileError;
+use crate::robot_error::RobotFileError;
 
 pub(super) fn build(
     source: &Source<'_>,

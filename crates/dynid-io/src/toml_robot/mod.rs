@@ -19,7 +19,8 @@ use dynid_model::{Description, Inertia, Mat3, Vec3};
 
 pub use clearance::ClearanceSpec;
 pub use elastic::ElasticSpec;
-pub use elements::{CouplingForm, CouplingSpec, ElementSetting, ElementSpec, SettingValue};
+pub use elements::{CouplingSpec, ElementSetting, ElementSpec, SettingValue};
+pub use schema::CouplingForm;
 
 use toml::Spanned;
 
@@ -27,7 +28,7 @@ pub use write::Loops;
 
 use crate::digest::SourceFile;
 use crate::excerpt::{closest, excerpt};
-use crate::robot::{Place, RobotFileError};
+use crate::robot_error::{Place, RobotFileError};
 use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
 use crate::urdf;
 use schema::{BodyInertia, RobotToml};

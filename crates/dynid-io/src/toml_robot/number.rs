@@ -1,10 +1,12 @@
 //! Finite numbers and angles in TOML.
 
+use toml::Value;
+
 use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Unexpected, Visitor};
 
-use crate::robot::is_in_range;
+use crate::robot_numbers::is_in_range;
 
 /// A finite number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -115,4 +117,9 @@ impl<'de> Deserialize<'de> for Position {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(PositionVisitor)
     }
+}
+
+pub(super) fn number(value: &Value) -> Option<f64> {
+    let x = value.as_float().or_else(|| value.as_integer().map(|i| i as f64))?;
+    crate::robot_numbers::is_in_range(x).then_some(x)
 }

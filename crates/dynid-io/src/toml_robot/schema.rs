@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::elements::CouplingForm;
 use super::number::{Angle, Number, Position};
 
 #[derive(Deserialize)]
@@ -297,4 +296,15 @@ impl Body {
     pub(super) fn stated_inertia(&self) -> BodyInertia {
         BodyInertia { phi: self.phi, mass: self.mass, com: self.com, inertia_com: self.inertia_com }
     }
+}
+
+/// Parameters of a coupling.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CouplingForm {
+    /// One inertia, viscous and Coulomb parameter per motor, carried through the matrix.
+    #[default]
+    Strict,
+    /// Three extra columns beside the direct terms of the joints, as in the literature on the TX40.
+    Columns,
 }

@@ -3,7 +3,7 @@
 use super::edit::JointDynamics;
 use super::xml::{Tag, Tags};
 use crate::excerpt::excerpt;
-use crate::robot::RobotFileError;
+use crate::robot_error::RobotFileError;
 
 /// What the joints of URDF text state in `<dynamics>`, in file order; joints without the element are left out, an
 /// attribute that is absent is 0, as URDF says. `source_name` stands in messages.

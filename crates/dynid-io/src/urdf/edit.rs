@@ -10,7 +10,7 @@ use quick_xml::escape::escape;
 use super::inertial::Inertial;
 use super::xml::{Attribute, Tag, Tags};
 use crate::excerpt::closest;
-use crate::robot::{Place, RobotFileError};
+use crate::robot_error::{Place, RobotFileError};
 
 /// Dissipation of a joint as `<dynamics>` states it.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use dynid_model::Inertia;
 
-use crate::robot::is_in_range;
+use crate::robot_numbers::is_in_range;
 
 /// Centre of mass (m) and tensor about it (kg m²) in link axes, as URDF and MJCF state a body.
 pub(crate) struct Inertial {

@@ -10,7 +10,8 @@ use dynid_model::{
 use super::xml::{Attribute, Tag, Tags};
 use crate::digest::SourceFile;
 use crate::excerpt::excerpt;
-use crate::robot::{LEAST_LIMIT, Place, RobotFileError, is_in_range};
+use crate::robot_error::{Place, RobotFileError};
+use crate::robot_numbers::{LEAST_LIMIT, is_in_range};
 use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
 
 /// Reads a URDF file of at most 64 MiB. See [`parse`].

@@ -7,7 +7,7 @@ use dynid_model::Placement;
 use super::read::{Element, Reader};
 use crate::digest::SourceFile;
 use crate::excerpt::excerpt;
-use crate::robot::RobotFileError;
+use crate::robot_error::RobotFileError;
 use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
 
 /// What a shape is meant for.

@@ -6,7 +6,7 @@ use dynid_model::{Description, JointDescription, JointKind, LinkDescription};
 use quick_xml::escape::escape;
 
 use super::inertial::Inertial;
-use crate::robot::RobotFileError;
+use crate::robot_error::RobotFileError;
 
 /// Writes links and joints as URDF, numbers in the shortest form that reads back to the same `f64`.
 ///

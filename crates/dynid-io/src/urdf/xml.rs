@@ -9,7 +9,7 @@ use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
 
 use crate::excerpt::excerpt;
-use crate::robot::{Place, RobotFileError};
+use crate::robot_error::{Place, RobotFileError};
 
 /// Deepest nesting of elements.
 const MAX_DEPTH: usize = 256;

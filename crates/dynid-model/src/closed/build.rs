@@ -15,6 +15,8 @@ use crate::description::JointKind;
 use crate::dynamics::tree::Tree;
 use crate::mechanism::Mechanism;
 
+/// Measure of singularity below which poses are refused (see [`ClosedMechanism::with_least_measure`]).
+const LEAST_MEASURE: f64 = 1e-4;
 /// Singular values below this share of the largest count as zero.
 const RANK: f64 = 1e-9;
 /// Closed configurations that the mobility is taken at, and how far they are from home (rad or lengths `L_c`).
@@ -152,6 +154,32 @@ fn home_positions(mechanism: &Mechanism, home: &[(String, Vec<f64>)]) -> Result<
 }
 
 impl ClosedMechanism {
+    /// Closes the loops of a mechanism.
+    ///
+    /// `driven`: names of the joints that drives act on; `None`: as many as needed are chosen. They are also the
+    /// independent coordinates if there are as many of them as free motions; otherwise some of them are. `home`: positions of
+    /// joints near a closed pose (seven numbers for a floating joint), 0 where nothing is said. With the independent joints
+    /// held there, the others are solved for.
+    ///
+    /// # Errors
+    /// [`ClosedError`].
+    pub fn new(
+        mechanism: Mechanism,
+        closures: Vec<ClosureDescription>,
+        driven: Option<&[String]>,
+        home: &[(String, Vec<f64>)],
+    ) -> Result<ClosedMechanism, ClosedError> {
+        build(mechanism, closures, driven, home, LEAST_MEASURE)
+    }
+
+    /// Returns the mechanism with other independent coordinates: a pose of the platform, say, in place of the drives.
+    ///
+    /// # Errors
+    /// [`ClosedError::IndependentCount`], [`ClosedError::Dependent`], [`ClosedError::SingularHome`], and those of names.
+    pub fn with_independent(self, joints: &[String]) -> Result<ClosedMechanism, ClosedError> {
+        with_independent(self, joints)
+    }
+
     fn rates_named(&self, joints: &[String], role: &'static str) -> Result<Vec<usize>, ClosedError> {
         let mut rates = Vec::with_capacity(joints.len());
         for joint in joints {

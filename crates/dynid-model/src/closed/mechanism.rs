@@ -1,8 +1,7 @@
 //! A mechanism with closures, and which of its coordinates are driven and independent.
 
-use super::build;
 use super::closure::ClosureDescription;
-use super::error::{ClosedError, ClosedWarning};
+use super::error::ClosedWarning;
 use super::rows::Rows;
 use crate::dynamics::tree::Tree;
 use crate::mechanism::Mechanism;
@@ -38,36 +37,7 @@ pub struct ClosedMechanism {
     pub(super) least_measure: f64,
 }
 
-/// Measure of singularity below which poses are refused (see [`ClosedMechanism::with_least_measure`]).
-const LEAST_MEASURE: f64 = 1e-4;
-
 impl ClosedMechanism {
-    /// Closes the loops of a mechanism.
-    ///
-    /// `driven`: names of the joints that drives act on; `None`: as many as needed are chosen. They are also the
-    /// independent coordinates if there are as many of them as free motions; otherwise some of them are. `home`: positions of
-    /// joints near a closed pose (seven numbers for a floating joint), 0 where nothing is said. With the independent joints
-    /// held there, the others are solved for.
-    ///
-    /// # Errors
-    /// [`ClosedError`].
-    pub fn new(
-        mechanism: Mechanism,
-        closures: Vec<ClosureDescription>,
-        driven: Option<&[String]>,
-        home: &[(String, Vec<f64>)],
-    ) -> Result<ClosedMechanism, ClosedError> {
-        build::build(mechanism, closures, driven, home, LEAST_MEASURE)
-    }
-
-    /// Returns the mechanism with other independent coordinates: a pose of the platform, say, in place of the drives.
-    ///
-    /// # Errors
-    /// [`ClosedError::IndependentCount`], [`ClosedError::Dependent`], [`ClosedError::SingularHome`], and those of names.
-    pub fn with_independent(self, joints: &[String]) -> Result<ClosedMechanism, ClosedError> {
-        build::with_independent(self, joints)
-    }
-
     /// Refuses poses whose [measure of singularity](super::Singularity) is below `least`. Default: 1e-4.
     pub fn with_least_measure(mut self, least: f64) -> Self {
         self.least_measure = least;

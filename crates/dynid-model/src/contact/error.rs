@@ -1,6 +1,6 @@
 //! What can be wrong with the numbers of a contact.
 
-use super::surface::roughness_of_dimension;
+use super::roughness::roughness_of_dimension;
 
 /// A number from which no contact law can be made.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

@@ -10,6 +10,7 @@ mod error;
 mod friction;
 mod law;
 mod material;
+mod roughness;
 mod surface;
 mod validity;
 

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use super::error::{ContactError, checked};
 use super::material::Material;
+use super::roughness::dimension;
 
 /// The factor `K_p` of mean pressure of elastic-plastic asperities.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -135,16 +136,6 @@ pub struct Asperity {
     pub stiffness: f64,
     /// Work `∫ P dω` at constant radius, J.
     pub work: f64,
-}
-
-/// Dimension of a roughness in µm.
-fn dimension(roughness_um: f64) -> f64 {
-    1.54 * roughness_um.powf(-0.045) + 1.0
-}
-
-/// Roughness in µm of a dimension.
-pub(super) fn roughness_of_dimension(dimension: f64) -> f64 {
-    (1.54 / (dimension - 1.0)).powf(1.0 / 0.045)
 }
 
 /// Root of the equation of `φ`, divided by `3 - D` so that it keeps its digits where both sides vanish.

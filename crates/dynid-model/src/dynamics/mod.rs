@@ -17,8 +17,8 @@ mod points;
 pub(crate) mod regressor;
 pub(crate) mod tree;
 
+pub use crate::motion_block::MotionBlock;
 pub use adjoint_block::MotionAdjoint;
-pub use block::MotionBlock;
 pub(crate) use block::Slots;
 pub use energy::Energy;
 pub use forward_dynamics::{AddedInertia, ForwardDynamicsWorkspace, LoadedState, NotPositive};

@@ -4,58 +4,6 @@
 //! place (`1e-16` absolute where a value is the difference of two). No product is fused with a sum, so that every
 //! processor gives the same bits; AVX2 only makes the lanes wider.
 
-use super::dispatch::{FusedTask, run_fused};
-
-/// A function of one number, to be applied to columns.
-///
-/// `at` and everything that it calls must be `#[inline(always)]`, so that it is compiled once more for wide registers.
-pub(crate) trait Curve {
-    /// The function.
-    fn at(&self, x: f64) -> f64;
-}
-
-/// Replaces all values by the curve's.
-pub(crate) fn map_curve(curve: &impl Curve, values: &mut [f64]) {
-    run_fused(MapTask { curve, values });
-}
-
-/// Replaces all values by `e^-x`; none may be negative.
-pub(crate) fn map_decay(values: &mut [f64]) {
-    struct Decay;
-    impl Curve for Decay {
-        #[inline(always)]
-        fn at(&self, x: f64) -> f64 {
-            decay(x)
-        }
-    }
-    map_curve(&Decay, values);
-}
-
-struct MapTask<'a, C> {
-    curve: &'a C,
-    values: &'a mut [f64],
-}
-
-impl<C: Curve> MapTask<'_, C> {
-    #[inline(always)]
-    fn run(self) {
-        for x in self.values {
-            *x = self.curve.at(*x);
-        }
-    }
-}
-
-impl<C: Curve> FusedTask for MapTask<'_, C> {
-    #[inline(always)]
-    fn fused(self) {
-        self.run();
-    }
-    #[inline(always)]
-    fn plain(self) {
-        self.run();
-    }
-}
-
 const ARCTANGENT: [f64; 11] = [
     3.333_333_333_333_293e-1,
     -1.999_999_999_987_648_3e-1,
@@ -231,6 +179,7 @@ pub(crate) fn logistic_slope(x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::curve::{Curve, map_curve};
     use super::*;
 
     struct Of(fn(f64) -> f64);

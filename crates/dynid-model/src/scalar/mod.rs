@@ -1,6 +1,7 @@
 //! Number types that the dynamics recursion and the laws of elements run on.
 
 mod cross;
+pub(crate) mod curve;
 mod dispatch;
 mod dual;
 pub(crate) mod elementary;

@@ -69,8 +69,8 @@ pub(super) fn check(data: &ReportData, judged: &Judged) -> Result<(), ReportErro
     };
     among("first screen, logs", judged.log, data.logs.len())?;
     among("first screen, joints", judged.joint, data.joints.len())?;
-    super::checks::time("first screen", &judged.time_s)?;
+    super::lengths::time("first screen", &judged.time_s)?;
     let samples = judged.time_s.len();
-    super::checks::length("first screen, measured effort", judged.measured.len(), samples)?;
-    super::checks::length("first screen, predicted effort", judged.predicted.len(), samples)
+    super::lengths::length("first screen, measured effort", judged.measured.len(), samples)?;
+    super::lengths::length("first screen, predicted effort", judged.predicted.len(), samples)
 }

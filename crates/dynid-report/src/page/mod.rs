@@ -7,6 +7,7 @@ mod design;
 mod environment;
 mod first;
 mod friction_test;
+mod lengths;
 mod log_page;
 mod picture;
 mod prose;

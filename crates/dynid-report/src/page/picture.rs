@@ -97,7 +97,7 @@ fn marks(points: &[PointKind]) -> Vec<usize> {
 pub(super) fn check(data: &RobotPicture) -> Result<(), ReportError> {
     let points = data.points.len();
     for (k, pose) in data.poses.iter().enumerate() {
-        super::checks::length(&format!("picture of the robot, pose {k}"), pose.points_m.len(), points)?;
+        super::lengths::length(&format!("picture of the robot, pose {k}"), pose.points_m.len(), points)?;
     }
     let named = data.lines.iter().flat_map(|line| line.ends).chain(data.trail).max();
     let among = |place: &str, index: usize, count: usize| {

@@ -11,7 +11,6 @@
 mod branch;
 mod energy;
 mod explicit;
-mod passage;
 mod record;
 mod run;
 mod settings;

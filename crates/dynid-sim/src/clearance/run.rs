@@ -1,17 +1,21 @@
 //! Running a mechanism with clearance from sample to sample.
 
+mod passage;
+
 use dynid_model::{EffortModel, JournalPath};
 
 use super::branch::Branch;
 use super::energy::{Powers, stored};
-use super::passage::{FIRST_STEP, Passage};
-use super::record::{ClearanceRecord, JournalRecord};
+use super::record::{ClearanceRecord, ContactEvent, ContactEventKind, JournalRecord};
 use super::settings::{ClearanceSettings, ClearanceStart, Controller, Driving, Method, check};
 use super::system::{Drive, System};
 use crate::collocation::{Attempt, Collocation, Motion, STAGES};
 use crate::error::SimError;
 use crate::plant::Plant;
+use passage::Passage;
 
+/// First step after a contact begins or ends, s.
+const FIRST_STEP: f64 = 1e-6;
 /// Steps between two samples before a simulation gives up.
 const MOST_STEPS: usize = 2_000_000;
 /// Within how many steps of the surface of its bearing a journal is near it.
@@ -295,6 +299,11 @@ impl<'p, 'd> Run<'p, 'd> {
             let found = self.system.contact(c);
             self.system.is_closed(c) && found.penetration < NEAR_STEPS * h * found.penetration_rate.abs()
         })
+    }
+
+    pub(super) fn event(&mut self, joint: usize, kind: ContactEventKind) {
+        self.step = FIRST_STEP;
+        self.record.events.push(ContactEvent { time: self.t, joint, kind });
     }
 
     fn accept(&mut self, h: f64, end: f64) {

@@ -3,8 +3,8 @@
 use dynid_model::closed::{ClosedDynamics, ClosedEffort};
 use dynid_model::{DynamicsWorkspace, State, Vec3};
 
-use super::error::ForwardError;
 use super::plant::{ClosedPlant, ClosedWorkspace};
+use crate::error::ForwardError;
 use crate::lu::add_product;
 
 /// Share of the largest diagonal entry of the Jacobian's factors below which a motion is no longer held.

@@ -9,9 +9,9 @@ use dynid_model::History;
 
 use super::plant::{ClosedPlant, ClosedWorkspace};
 use crate::error::{SimError, demand};
-use crate::integrator::{IntegrationCount, PlantState};
+use crate::integrator::PlantState;
 use crate::lu::Lu;
-use crate::rosenbrock::{STAGES, StepControl};
+use crate::rosenbrock::{IntegrationCount, STAGES, StepControl};
 
 /// How a [`ClosedIntegrator`] chooses its steps.
 #[derive(Debug, Clone, Copy, PartialEq)]

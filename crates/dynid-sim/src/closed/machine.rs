@@ -5,11 +5,12 @@ use dynid_model::closed::{ClosedDynamics, PoseError};
 
 use super::integrator::{ClosedIntegrator, Stepping};
 use super::plant::{ClosedPlant, ClosedWorkspace};
-use crate::controller::{ControlSettings, Wanted};
+use crate::controller::{ControlSettings, Nominal, Reference, Wanted};
 use crate::error::{SimError, demand_length};
-use crate::integrator::{IntegrationCount, PlantState};
-use crate::machine::{Instant, Motion, Nominal, Reference};
+use crate::integrator::PlantState;
+use crate::machine::{Instant, Motion};
 use crate::plant::PlantEnergy;
+use crate::rosenbrock::IntegrationCount;
 
 /// Difference of wanted and possible positions of a drive, rad or m.
 const TOGETHER: f64 = 1e-6;

@@ -5,8 +5,8 @@
 //! control, with conditions that repeat each other, and with carriers without mass. A [`ClosedIntegrator`] moves it and takes
 //! every step back to the closed poses. [`run_closed`](crate::run_closed) lets a controller move it by its drives.
 
+mod balance;
 mod dynamics;
-mod error;
 mod integrator;
 mod loads;
 mod machine;
@@ -14,7 +14,6 @@ mod plant;
 mod settle;
 mod step;
 
-pub use error::ForwardError;
 pub use integrator::{ClosedIntegrator, Stepping};
 pub use plant::{ClosedPlant, ClosedWorkspace};
 

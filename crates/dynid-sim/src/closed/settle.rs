@@ -1,7 +1,7 @@
 //! Back to the closed poses, and to rates that the loops allow.
 
-use super::error::ForwardError;
 use super::plant::{ClosedPlant, ClosedWorkspace};
+use crate::error::ForwardError;
 
 /// Gap at which a pose counts as closed, m.
 const CLOSED: f64 = 1e-13;

@@ -1,7 +1,7 @@
 //! Stages of a step.
 
-use super::error::ForwardError;
 use super::integrator::ClosedIntegrator;
+use crate::error::ForwardError;
 use crate::integrator::{PlantState, mean};
 use crate::lu::add_product;
 use crate::rosenbrock::{ALPHA, EMBEDDED, GAMMA, GAMMAS, WEIGHTS};

@@ -5,9 +5,9 @@ use dynid::estimators::separable::{JoinedProblem, SeparableSettings, SteadyFrict
 use dynid::model::element::{ExponentialViscous, JointElement, LuGre, Offset, RotorInertia, ShapeSetting};
 use dynid::model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
 
+use super::fault;
 use super::identification::{Constraints, Identified, feasible};
-use super::robot::{Indy7, ripple};
-use super::{JOINTS, fault};
+use super::robot::{Cycles, Indy7, ripple};
 use crate::StudyError;
 
 /// Friction of one joint: start values and bounds of what is free in it.
@@ -37,9 +37,6 @@ fn model(arm: &Indy7, friction: &[FrictionStart], cycles: &Cycles) -> RobotModel
     }
     RobotModel::new(arm.mechanism.clone(), elements)
 }
-
-/// Per joint, repetitions per turn of the torque ripple that is modelled.
-pub(super) type Cycles = [Vec<u32>; JOINTS];
 
 /// All friction and all inertias, and ripple of known order. `points`: of the friction experiment.
 pub(super) fn one_shot(

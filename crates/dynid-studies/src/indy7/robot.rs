@@ -9,7 +9,6 @@ use dynid::model::{BaseParameters, BaseSettings, EffortModel, Mechanism, RobotMo
 use dynid::sim::Plant;
 use dynid::{Robot, RobotOptions};
 
-use super::one_shot::Cycles;
 use super::settings::{Friction, Settings};
 use super::{JOINTS, fault};
 use crate::StudyError;
@@ -205,3 +204,6 @@ impl Friction {
         self.coulomb + (self.fixed - self.coulomb) * falling + viscous
     }
 }
+
+/// Per joint, repetitions per turn of the torque ripple that is modelled.
+pub(super) type Cycles = [Vec<u32>; JOINTS];

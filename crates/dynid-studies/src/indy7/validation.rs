@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use super::experiment::{Experiment, constant, trajectory};
 use super::friction::{JointFriction, experiment};
 use super::identification::{Identified, OURS, PAPER, regression, regression_of};
-use super::one_shot::{Cycles, one_shot};
-use super::robot::Indy7;
+use super::one_shot::one_shot;
+use super::robot::{Cycles, Indy7};
 use super::settings::{PerJoint, Settings};
 use crate::{RunSettings, StudyError};
 

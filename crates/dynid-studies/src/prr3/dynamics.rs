@@ -14,7 +14,7 @@ use serde_json::json;
 use super::machine::{Machine, SLIDERS};
 use super::reference::{self, StateReference, Tolerance};
 use super::settings::Settings;
-use super::{excitation, fault, worst};
+use super::{fault, problem, worst};
 use crate::{Row, RunSettings, StudyError};
 
 /// Where the tree's coordinates stand among the reference's twelve.
@@ -193,7 +193,7 @@ fn states(
     count: usize,
     seed: u64,
 ) -> Result<Vec<[[f64; SLIDERS]; 3]>, StudyError> {
-    let limits = excitation::joints(machine, settings)?;
+    let limits = problem::joints(machine, settings)?;
     let own = &settings.limits;
     let ranges = [own.x, own.y, (-own.angle, own.angle)];
     let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -10,6 +10,7 @@ mod fits;
 mod friction;
 mod knowable;
 mod machine;
+mod problem;
 mod rank;
 mod reference;
 mod report;

@@ -8,10 +8,9 @@ use dynid::motion::signal::rms;
 use dynid::motion::trajectory::{Form, FourierTrajectory, Quintic, RowOrder, Sampled};
 use serde_json::json;
 
-use super::excitation;
 use super::machine::{Machine, Plane, SLIDERS};
 use super::settings::{Circle, Settings};
-use super::{fault, reference, worst};
+use super::{fault, problem, reference, worst};
 use crate::{Row, StudyError};
 
 /// Samples of the period on which limits are checked.
@@ -146,7 +145,7 @@ pub(super) fn row(machine: &Machine, settings: &Settings) -> Result<Row, StudyEr
             boundary = boundary.max(at.velocity.abs()).max(at.acceleration.abs());
         }
     }
-    let problem = excitation::problem(machine, settings, settings.limits.angle)?;
+    let problem = problem::problem(machine, settings, settings.limits.angle)?;
     let rows = trajectory.to_rows(Form::Plain, &RowOrder::default())?;
     let broken = limit_points(&problem, &rows, GRID, GRID_TOLERANCE);
     let between = limit_points(&problem, &rows, FINE, 0.0);

@@ -9,9 +9,9 @@ use dynid::model::{EffortModel, RobotModel};
 use dynid::sim::Plant;
 use serde::Deserialize;
 
-use super::fault;
-use super::pointing::{JOINTS, description};
+use super::pointing::description;
 use super::tree::{NAMES, translations};
+use super::{JOINTS, fault};
 use crate::StudyError;
 
 /// Both bearings are alike. SI units but for the roughness.

@@ -7,10 +7,10 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 
-use super::fault;
 use super::parameters::{BASE_COLUMNS, INERTIA_1, MASS_2, MOMENT_1, PARAMETERS, Parameters};
-use super::pointing::{JOINTS, Pointing};
+use super::pointing::Pointing;
 use super::tree::{RATES, with_clearance};
+use super::{JOINTS, fault};
 use crate::StudyError;
 
 /// Root of the mean square.

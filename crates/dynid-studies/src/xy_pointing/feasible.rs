@@ -11,10 +11,10 @@ use dynid::model::inertia::PARAMETERS_PER_BODY;
 use serde_json::json;
 
 use super::data::{Data, factor};
-use super::fault;
 use super::parameters::STANDARD;
-use super::pointing::{JOINTS, Pointing};
+use super::pointing::Pointing;
 use super::search::{Searched, Searches};
+use super::{JOINTS, fault};
 use crate::{Row, StudyError};
 
 /// How much heavier than the system the prior bodies are: feasibility must come from the data, not from the truth.

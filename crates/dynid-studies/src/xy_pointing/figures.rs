@@ -3,7 +3,8 @@
 use dynid::model::Limits;
 use dynid::report::{Chart, ChartCurve, CurveStyle};
 
-use super::pointing::{JOINTS, Pointing};
+use super::JOINTS;
+use super::pointing::Pointing;
 use super::settings::Settings;
 use super::trajectory::Motion;
 use crate::StudyError;

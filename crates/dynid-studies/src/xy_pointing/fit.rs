@@ -5,9 +5,9 @@ use dynid::estimators::linear::{LinearSolution, ols};
 use serde_json::json;
 
 use super::data::{Data, Knowledge, factor, rms};
-use super::fault;
 use super::parameters::{BASE, Parameters};
-use super::pointing::{JOINTS, Pointing};
+use super::pointing::Pointing;
+use super::{JOINTS, fault};
 use crate::{Row, StudyError};
 
 /// Level of the intervals.

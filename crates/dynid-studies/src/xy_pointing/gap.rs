@@ -13,21 +13,15 @@ use rayon::prelude::*;
 use serde_json::json;
 
 use super::data::{Data, Knowledge, factor, rms};
-use super::fault;
-use super::knowable::{Knowable, NAMES, PARAMETERS, Start, fast};
+use super::knowable::{Knowable, NAMES, PARAMETERS, PROBE_NOISE, RATE_HZ, SLOW, Start, TORQUE_NOISE, fast};
 use super::parameters::Parameters;
-use super::pointing::{JOINTS, Pointing};
+use super::pointing::Pointing;
 use super::settings::Settings;
 use super::tree::{RATES, translations, with_clearance};
+use super::{JOINTS, fault};
 use crate::page::{table, text};
 use crate::{Row, RunSettings, StudyError};
 
-/// Rate of the fast record, Hz; every tenth of its samples makes the slow one.
-pub(super) const RATE_HZ: f64 = 1000.0;
-pub(super) const SLOW: usize = 10;
-/// Noise of the probes, m, and of the torque, share of its rms.
-pub(super) const PROBE_NOISE: f64 = 1e-6;
-pub(super) const TORQUE_NOISE: f64 = 0.01;
 /// By how much masses are overrated where a load is computed.
 const MASS_ERROR: f64 = 1.05;
 /// Quantile of normal deviates for 95 % of them.

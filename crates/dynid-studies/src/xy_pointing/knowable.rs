@@ -7,11 +7,10 @@ use serde_json::json;
 
 use super::bearing::Bearing;
 use super::data::{Data, Knowledge, factor, rms};
-use super::fault;
-use super::gap::{PROBE_NOISE, RATE_HZ, SLOW, TORQUE_NOISE};
-use super::pointing::{JOINTS, Pointing};
+use super::pointing::Pointing;
 use super::settings::Settings;
 use super::trajectory::trajectory;
+use super::{JOINTS, fault};
 use crate::{Row, StudyError};
 
 /// Parameters of a contact, relative: clearance, stiffness, damping, friction.
@@ -178,3 +177,13 @@ impl Knowable {
         )
     }
 }
+
+/// Rate of the fast record, Hz; every tenth of its samples makes the slow one.
+pub(super) const RATE_HZ: f64 = 1000.0;
+
+pub(super) const SLOW: usize = 10;
+
+/// Noise of the probes, m, and of the torque, share of its rms.
+pub(super) const PROBE_NOISE: f64 = 1e-6;
+
+pub(super) const TORQUE_NOISE: f64 = 0.01;

@@ -15,6 +15,7 @@ mod noise;
 mod parameters;
 mod plots;
 mod pointing;
+mod problem;
 mod rank;
 mod reference;
 mod report;
@@ -137,3 +138,6 @@ pub fn run(run: &RunSettings, progress: &mut dyn FnMut(Progress)) -> Result<Stud
     .report(&record)?;
     Ok(StudyRun { record, report })
 }
+
+/// Joints, and links that move.
+pub(super) const JOINTS: usize = 2;

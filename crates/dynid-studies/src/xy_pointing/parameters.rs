@@ -3,8 +3,7 @@
 use dynid::model::inertia::PARAMETERS_PER_BODY;
 use dynid::model::{Inertia, Mat3, Mechanism, Vec3};
 
-use super::fault;
-use super::pointing::JOINTS;
+use super::{JOINTS, fault};
 use crate::StudyError;
 
 /// Parameters of the paper.

@@ -5,9 +5,9 @@ use std::borrow::Borrow;
 use dynid::estimators::search::SearchResult;
 use dynid::report::{Chart, ChartCurve, CurveStyle};
 
+use super::JOINTS;
 use super::data::{Data, Knowledge};
 use super::parameters::{PARAMETERS, Parameters};
-use super::pointing::JOINTS;
 use super::search::{Pair, Searches};
 use super::simulation::Closeup;
 use super::sweep::{Sweeps, Variant};

@@ -7,12 +7,10 @@ use dynid::model::inertia::PARAMETERS_PER_BODY;
 use dynid::model::{Description, EffortModel, Inertia, Mechanism, MotionBlock, RegressorBlock, RobotModel};
 use dynid::{Robot, RobotOptions};
 
-use super::fault;
 use super::parameters::{PARAMETERS, Parameters, STANDARD, THETA};
+use super::{JOINTS, fault};
 use crate::StudyError;
-
-/// Joints, and links that move.
-pub(super) const JOINTS: usize = 2;
+use dynid::model::BaseParameters;
 
 /// A tree with two links that turn.
 #[derive(Debug, Clone)]
@@ -123,4 +121,16 @@ impl Pointing {
         builder.push_block(&columns, rows, &vec![0.0; rows]).map_err(fault)?;
         Ok(builder.finish())
     }
+}
+
+/// Whether a base parameter holds any of the combinations `θ` of the paper's parameters.
+pub(super) fn acting(pointing: &Pointing, base: &BaseParameters) -> Vec<bool> {
+    let mut acts = vec![false; base.len()];
+    for standard in THETA {
+        let mut links = [0.0; STANDARD];
+        standard.iter().for_each(|k| links[*k] = 1.0);
+        let values = base.values(&pointing.linear(&links));
+        acts.iter_mut().zip(values).for_each(|(acts, value)| *acts |= value != 0.0);
+    }
+    acts
 }

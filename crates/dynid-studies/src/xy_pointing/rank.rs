@@ -4,8 +4,8 @@ use dynid::estimators::rank::{RankReport, numerical_rank};
 use dynid::model::{BaseParameters, BaseSettings, EffortModel, MotionBlock, RandomMotion};
 use serde_json::json;
 
-use super::parameters::{BASE, KEPT, NAMES, PARAMETERS, Parameters, STANDARD, THETA};
-use super::pointing::Pointing;
+use super::parameters::{BASE, KEPT, NAMES, PARAMETERS, Parameters};
+use super::pointing::{Pointing, acting};
 use super::reference;
 use super::settings::Settings;
 use super::trajectory::Motion;
@@ -134,18 +134,6 @@ fn entries(pointing: &Pointing, base: &BaseParameters, system: &Parameters) -> V
             acts: acting[k],
         })
         .collect()
-}
-
-/// Whether a base parameter holds any of the combinations `θ` of the paper's parameters.
-pub(super) fn acting(pointing: &Pointing, base: &BaseParameters) -> Vec<bool> {
-    let mut acts = vec![false; base.len()];
-    for standard in THETA {
-        let mut links = [0.0; STANDARD];
-        standard.iter().for_each(|k| links[*k] = 1.0);
-        let values = base.values(&pointing.linear(&links));
-        acts.iter_mut().zip(values).for_each(|(acts, value)| *acts |= value != 0.0);
-    }
-    acts
 }
 
 /// Parameters that add nothing to the rank: removed one at a time, the rank stays.

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
+use super::JOINTS;
 use super::parameters::PARAMETERS;
-use super::pointing::JOINTS;
 use crate::StudyError;
 use crate::reference::parse;
 

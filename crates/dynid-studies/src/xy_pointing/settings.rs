@@ -2,8 +2,8 @@
 
 use serde::Deserialize;
 
+use super::JOINTS;
 use super::bearing::Bearing;
-use super::pointing::JOINTS;
 use crate::StudyError;
 
 const FILE: &str = "xy_pointing/settings.toml";

@@ -9,11 +9,9 @@ use serde_json::json;
 
 use super::bearing::Bearing;
 use super::data::{Data, rms};
-use super::fault;
-use super::pointing::JOINTS;
-use super::reference;
 use super::settings::Settings;
 use super::trajectory::trajectory;
+use super::{JOINTS, fault, reference};
 use crate::{Row, RunSettings, StudyError};
 
 /// Local error of the study's simulations, in units of the clearance.

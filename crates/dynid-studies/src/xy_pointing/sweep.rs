@@ -4,11 +4,12 @@ use dynid::sim::clearance::ContactEventKind;
 use rayon::prelude::*;
 use serde_json::json;
 
+use super::JOINTS;
 use super::bearing::Bearing;
 use super::data::{Data, Knowledge, rms};
 use super::fit::Fitted;
 use super::parameters::{BASE, Parameters};
-use super::pointing::{JOINTS, Pointing};
+use super::pointing::Pointing;
 use super::settings::Settings;
 use super::simulation::published;
 use crate::{Row, RunSettings, StudyError};

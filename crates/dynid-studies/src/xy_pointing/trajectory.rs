@@ -6,10 +6,10 @@ use dynid::model::MotionBlock;
 use dynid::motion::trajectory::{Form, FourierTrajectory, Point, RowOrder, Sampled};
 use serde_json::json;
 
-use super::excitation::{FINE, conditions, problem};
-use super::pointing::{JOINTS, Pointing};
-use super::reference;
+use super::pointing::Pointing;
+use super::problem::{FINE, conditions, problem};
 use super::settings::Settings;
+use super::{JOINTS, reference};
 use crate::{Row, StudyError};
 
 /// An angular frequency at which joint 2 is too fast, rad/s.

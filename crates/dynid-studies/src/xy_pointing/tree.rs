@@ -2,8 +2,8 @@
 
 use dynid::model::JournalPath;
 
-use super::fault;
-use super::pointing::{JOINTS, Pointing, description};
+use super::pointing::{Pointing, description};
+use super::{JOINTS, fault};
 use crate::StudyError;
 
 /// Names of the joints.

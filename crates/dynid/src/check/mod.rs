@@ -8,15 +8,14 @@ mod report;
 
 use serde::Serialize;
 
-use crate::Error;
 use crate::config::Config;
 use crate::estimate::InputRecord;
+use crate::identify::load_robot;
 use crate::log::Log;
-use crate::logs;
 use crate::overlap::Overlaps;
 use crate::preflight::{Bench, CheckedLog, Findings, examine, late, repeated};
 pub use crate::preflight::{Finding, FindingId, Severity};
-use crate::run::load_robot;
+use crate::{Error, logs};
 
 /// Outcome of [`check`].
 #[derive(Debug, Clone, Serialize)]

@@ -20,8 +20,8 @@ use crate::Error;
 use crate::agreement::{Alignment, compare as against};
 use crate::config::{Config, Route};
 use crate::estimate::InputRecord;
+use crate::identify::open;
 use crate::pipeline::{ModelFit, Problem, Step};
-use crate::run::open;
 use estimators::{Contestant, contestants};
 pub use record::{CompareStatus, ComparedEstimator, Comparison, JointError};
 

@@ -5,7 +5,7 @@ use dynid_io::CouplingSpec;
 use super::{Config, CouplingConfig, InstrumentsConfig, LogConfig};
 use crate::Error;
 use crate::commands::RunFiles;
-use crate::friction::known_laws;
+use crate::friction_model::known_laws;
 use crate::settings::{Elements, LogSettings, Settings, check_log_effect, labels};
 
 impl Config {
@@ -16,7 +16,8 @@ impl Config {
     pub fn settings(&self) -> Result<Settings, Error> {
         let mut settings = self.plain_settings();
         if let Some(file) = &self.elements.known_friction {
-            settings.elements.known = Some(known_laws(file, &self.elements)?);
+            settings.elements.known =
+                Some(known_laws(file, self.elements.friction_errors, self.elements.temperature.clone())?);
         }
         Ok(settings)
     }

@@ -43,6 +43,9 @@ use dynid_model::{Description, EffortModel, Inertia, JointKind};
 use crate::Error;
 use crate::run::Run;
 
+/// Largest difference that passes: text, centres of mass and frames cost a few digits of sixteen, an error far more.
+pub const READ_BACK_LIMIT: f64 = 1e-9;
+
 use bodies::Shares;
 pub use error::{ExportError, LinkFault};
 use identified::inertias;
@@ -51,8 +54,8 @@ use joints::{Format, JointValues};
 pub use json::{ElasticJson, JointJson, LinkJson, OtherJson, ROBOT_JSON_SCHEMA, RobotJson, json};
 pub(crate) use judged::exported;
 pub use projection::FrictionProjection;
+pub use read_back::CheckStates;
 pub(crate) use read_back::with_slipping_bristles;
-pub use read_back::{CheckStates, READ_BACK_LIMIT};
 
 /// Text that is ready to be written.
 #[derive(Debug, Clone, PartialEq)]

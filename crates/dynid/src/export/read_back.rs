@@ -11,6 +11,7 @@ use dynid_model::{
 use dynid_motion::Channel;
 use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, States};
 
+use super::READ_BACK_LIMIT;
 use super::error::ExportError;
 use crate::Error;
 use crate::config::{LogConfig, MotorSide};
@@ -241,9 +242,6 @@ pub(crate) fn with_slipping_bristles(
         .collect();
     work(&MotionBlock { channels: &channels, ..*motion });
 }
-
-/// Largest difference that passes: text, centres of mass and frames cost a few digits of sixteen, an error far more.
-pub const READ_BACK_LIMIT: f64 = 1e-9;
 
 /// Accepts a difference or says what is wrong.
 pub(super) fn judge(format: &'static str, difference: f64) -> Result<f64, ExportError> {

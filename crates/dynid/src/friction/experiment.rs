@@ -6,12 +6,11 @@ use dynid_motion::clock::{ClockSettings, UniformLog, uniform};
 use dynid_motion::constant_speed::{Pairing, Pass, Segment, at_rest, pair, segments, speed};
 
 use super::config::{FrictionConfig, FrictionLog, LoggedSignal, ThermalLines};
-use super::error::FrictionError;
-use crate::Error;
 use crate::estimate::InputRecord;
+use crate::friction_model::FrictionError;
 use crate::log::Log;
-use crate::logs;
 use crate::robot::Robot;
+use crate::{Error, logs};
 
 /// Samples of one pass at constant speed.
 #[derive(Debug, Clone, PartialEq)]

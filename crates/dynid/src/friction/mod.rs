@@ -12,24 +12,18 @@
 //! direction alone Coulomb friction and offset are the same column.
 
 pub mod config;
-mod error;
 mod experiment;
-mod known;
-pub mod model;
 mod presliding;
 mod record;
 mod report;
 
+pub use crate::friction_model::{self as model, FrictionError, FrictionModel, known_friction};
 pub use crate::known_friction::KnownFriction;
 pub use config::{
     BristlePrior, ConstantSpeedConfig, FrictionConfig, FrictionLog, HoldName, LawName, LoggedSignal,
     PairsConfig, PreslidingLog, ThermalLines,
 };
-pub use error::FrictionError;
 pub use experiment::{JointExperiment, PassSamples};
-pub use known::known_friction;
-pub(crate) use known::known_laws;
-pub use model::FrictionModel;
 pub use presliding::{PreslidingFit, PreslidingTest, fit_presliding};
 
 use dynid_friction::steady_friction::{SteadyError, SteadyFriction, analyse};

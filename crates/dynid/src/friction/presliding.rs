@@ -8,12 +8,11 @@ use dynid_search::{Algorithm, Bounds, PointObjective, SearchError, Settings, cov
 use dynid_sim::presliding::{EffortHold, PreslidingJoint, SteadyTable, presliding};
 
 use super::config::{FrictionConfig, HoldName, PreslidingLog};
-use super::error::FrictionError;
 use super::experiment::{on_grid, temperature};
-use crate::Error;
 use crate::estimate::InputRecord;
-use crate::logs;
+use crate::friction_model::FrictionError;
 use crate::robot::Robot;
+use crate::{Error, logs};
 
 /// Positions coarser than this share of the motion do not show its shape.
 const COARSE: f64 = 0.02;

@@ -7,13 +7,13 @@ use dynid_friction::steady_friction::{LevelFit, SteadyFriction};
 use dynid_sim::presliding::EffortHold;
 
 use super::config::FrictionConfig;
-use super::model::{
-    FrictionModel, FrictionVerdict, JointFrictionModel, LawRecord, LevelRecord, LineRecord, PointRecord,
-    PreslidingRecord, SCHEMA, UnpairedRecord,
-};
 use super::{FrictionIdentification, IdentifiedJoint, PreslidingFit};
 use crate::Error;
 use crate::estimate::{InputRecord, Provenance};
+use crate::friction_model::{
+    FrictionModel, FrictionVerdict, JointFrictionModel, LawRecord, LevelRecord, LineRecord, PointRecord,
+    PreslidingRecord, SCHEMA, UnpairedRecord,
+};
 use crate::known_friction::{BristleModel, ViscousModel};
 
 /// Names of coefficients in the file, by symbol.

@@ -4,9 +4,9 @@ use dynid_friction::steady_friction::{SteadyFriction, ThermalLine};
 use dynid_report as report;
 use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, Fact, StudyTable, Value};
 
-use super::model::{FrictionModel, JointFrictionModel};
 use super::{FrictionIdentification, IdentifiedJoint, PreslidingFit};
 use crate::Error;
+use crate::friction_model::{FrictionModel, JointFrictionModel};
 use crate::known_friction::ViscousModel;
 use crate::report_data::settings_table;
 

@@ -48,11 +48,11 @@ pub(super) fn names(columns: &[Option<ColumnUse>], mapping: &ColumnMapping) -> S
     let whole: Option<Vec<&str>> = columns.iter().map(|c| c.as_ref().map(|c| c.name.as_str())).collect();
     let pattern = whole.and_then(|names| by_joint(&names, joints).or_else(|| by_number(&names)));
     match pattern {
-        Some(pattern) => super::text::quoted(&pattern),
+        Some(pattern) => super::toml_text::quoted(&pattern),
         None => {
             let list: Vec<String> = columns
                 .iter()
-                .map(|c| super::text::quoted(c.as_ref().map_or("", |c| c.name.as_str())))
+                .map(|c| super::toml_text::quoted(c.as_ref().map_or("", |c| c.name.as_str())))
                 .collect();
             format!("[{}]", list.join(", "))
         }

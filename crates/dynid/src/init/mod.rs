@@ -4,16 +4,16 @@
 mod columns;
 mod question;
 mod text;
+mod toml_text;
 
 use std::path::{Path, PathBuf};
 
 use dynid_io::MappingSpec;
 
-use crate::Error;
 use crate::config::{Config, LogConfig};
 use crate::log::Log;
-use crate::logs;
 use crate::robot::{Robot, RobotOptions};
+use crate::{Error, logs};
 
 pub use question::Question;
 

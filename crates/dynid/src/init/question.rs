@@ -93,7 +93,7 @@ impl Question {
                     "time",
                     format!("{source}. Unit of `{column}`: s, ms, us or ns?"),
                     "s, ms, us or ns",
-                    format!("time = {{ columns = {}, unit = \"..\" }}", super::text::quoted(column)),
+                    format!("time = {{ columns = {}, unit = \"..\" }}", super::toml_text::quoted(column)),
                     Kind::Unit(column.clone()),
                 ),
                 MappingError::Unnamed { columns, reason, .. } => question(

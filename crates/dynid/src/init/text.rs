@@ -6,6 +6,7 @@ use dynid_io::columns::{ColumnUse, TimeSource};
 use dynid_io::log::{DecimalMark, Missing};
 
 use super::columns::names;
+use super::toml_text::quoted;
 use super::{DraftSettings, Reading, SHORTEST_TO_SPLIT, TRAINING_SHARE};
 use crate::elements::DEFAULTS;
 use crate::log::{Log, LogAxis};
@@ -14,11 +15,6 @@ use crate::robot::Robot;
 
 /// Columns named in comments.
 const SHOWN: usize = 8;
-
-/// A text between quotes, as TOML has it.
-pub(super) fn quoted(text: &str) -> String {
-    toml::Value::String(text.to_owned()).to_string()
-}
 
 /// Lines of a text.
 struct Page(String);

@@ -18,13 +18,12 @@ use super::samples::Sample;
 use super::usual::Innovations;
 use crate::config::Config;
 use crate::elements::ElementPlan;
+use crate::identify::load_robot;
 use crate::log::{self, LogAxis};
 use crate::pipeline::stated_values;
 use crate::prior::{self, Prior};
 use crate::robot::refuse_loops;
-use crate::run::load_robot;
-use crate::stiffness;
-use crate::{Error, advice, bounds};
+use crate::{Error, advice, bounds, stiffness};
 
 /// Rows per base parameter that a stretch must give.
 const ROWS_PER_PARAMETER: usize = 3;

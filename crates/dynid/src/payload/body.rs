@@ -80,6 +80,23 @@ fn jacobian(inertia: &Inertia) -> [[f64; 10]; 10] {
     out
 }
 
+/// A URDF link with the inertia of a payload and the fixed joint to the link that carries it. `values`: mass, centre of mass,
+/// inertia about it.
+pub(super) fn urdf(name: &str, link: &str, values: &[f64; 10]) -> String {
+    let [m, x, y, z, xx, xy, xz, yy, yz, zz] = values;
+    let [name, link] = [name, link].map(escaped);
+    format!(
+        "<link name=\"{name}\">\n  <inertial>\n    <origin xyz=\"{x} {y} {z}\" rpy=\"0 0 0\"/>\n    <mass value=\"{m}\"/>\n    \
+         <inertia ixx=\"{xx}\" ixy=\"{xy}\" ixz=\"{xz}\" iyy=\"{yy}\" iyz=\"{yz}\" izz=\"{zz}\"/>\n  </inertial>\n</link>\n\
+         <joint name=\"{link}_to_{name}\" type=\"fixed\">\n  <parent link=\"{link}\"/>\n  <child link=\"{name}\"/>\n  \
+         <origin xyz=\"0 0 0\" rpy=\"0 0 0\"/>\n</joint>\n"
+    )
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,7 +6,7 @@ use dynid_linalg::Mat;
 use dynid_model::Inertia;
 use serde::{Deserialize, Serialize};
 
-use super::body::{Body, NAMES, about_com};
+use super::body::{Body, NAMES, about_com, urdf};
 use super::difference::{Difference, difference};
 use super::{PayloadIdentification, quantile};
 use crate::advice;
@@ -158,7 +158,7 @@ pub(super) fn of(id: &Identification, stated: &PayloadConfig) -> PayloadRecord {
     parameters.iter_mut().zip(&std).for_each(|(p, s)| p.std = p.std.or(Some(*s)));
     PayloadRecord {
         sentence: sentence(&stated.name, &quantities, stated),
-        urdf: super::report::urdf(&stated.name, &link, &body.values),
+        urdf: urdf(&stated.name, &link, &body.values),
         name: stated.name.clone(),
         link,
         mass: quantities[0].clone(),

@@ -8,7 +8,7 @@ use crate::element::{
     ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting, ShapeTerm, sign,
 };
 use crate::parameter::{Parameter, ShapeParameter};
-use crate::scalar::elementary::{Curve, map_curve, map_decay};
+use crate::scalar::curve::{Curve, map_curve, map_decay};
 use crate::scalar::{Cross, Dual, Scalar};
 
 /// Bristles with deflection `z`, `ż = v - σ0 |v| z / g(v)` with `g = F_c + (F_s - F_c) E`, `E = exp(-|v/v_s|^δ)`, and effort

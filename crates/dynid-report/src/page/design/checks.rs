@@ -2,7 +2,7 @@
 
 use crate::data::DesignReport;
 use crate::error::ReportError;
-use crate::page::checks::{length, per_joint, time};
+use crate::page::lengths::{length, per_joint, time};
 
 pub(in crate::page) fn check(data: &DesignReport) -> Result<(), ReportError> {
     if let Some(picture) = &data.picture {

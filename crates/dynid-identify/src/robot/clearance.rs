@@ -6,8 +6,8 @@ use dynid_model::element::{ClearanceContact, JointElement};
 use dynid_model::mechanism::translation_names;
 use dynid_model::{Mechanism, RobotModel};
 
+use super::Robot;
 use crate::Error;
-use crate::robot::Robot;
 
 impl Robot {
     /// The robot's bodies with journals that move in their bearings, and the contacts of these as its only elements.

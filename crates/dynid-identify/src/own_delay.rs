@@ -5,9 +5,9 @@ use dynid_motion::shift;
 use dynid_rows::conditioning::{PreparedLog, condition};
 use serde::{Deserialize, Serialize};
 
-use super::problem::TrainingLog;
 use crate::Error;
 use crate::settings::{Own, Route, Settings};
+use crate::training_log::TrainingLog;
 
 /// A log with a delay of its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,10 +1,12 @@
-//! What is known of a training log without its samples.
+//! What is known of a training log without its samples, and how well its rows are explained.
 
 use dynid_rows::conditioning::PreparedLog;
 use serde::{Deserialize, Serialize};
 
+use crate::agreement::FitValues;
+
 /// Positions are compared over this time, s: spikes and noise count little then.
-pub(super) const SPEED_SPAN_S: f64 = 0.05;
+pub(crate) const SPEED_SPAN_S: f64 = 0.05;
 
 /// A training log without its samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -52,6 +54,17 @@ impl TrainedLog {
             channels: channels.filter(|(_, low, high)| low <= high).collect(),
         }
     }
+}
+
+/// Figures of a fit on the rows of one log.
+#[derive(Debug, Clone)]
+pub struct RowFit {
+    /// Log.
+    pub log: String,
+    /// Rows of the widest kernel, all outputs together.
+    pub rows: usize,
+    /// Figures, output by output; R² of outputs that move in the log alone.
+    pub values: FitValues,
 }
 
 /// Least and greatest mean velocity of an output over [`SPEED_SPAN_S`], with rest; `None` if it does not move.

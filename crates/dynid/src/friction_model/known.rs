@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::model::{FrictionModel, JointFrictionModel};
+use super::{FrictionModel, JointFrictionModel};
 use crate::Error;
-use crate::config::ElementsConfig;
 use crate::known_friction::{KnownFriction, KnownLaws};
+use crate::settings::{FrictionErrors, PerJoint};
 
 /// Friction of a joint of a friction file; `None` without a law that may be used.
 pub fn known_friction(law: &JointFrictionModel) -> Option<KnownFriction> {
@@ -23,17 +23,21 @@ pub fn known_friction(law: &JointFrictionModel) -> Option<KnownFriction> {
     })
 }
 
-/// Laws of a friction file, with what a configuration says of them.
+/// Laws of a friction file, with what a configuration says of them: whether their errors count, and the temperature.
 ///
 /// # Errors
 /// Fails as [`FrictionModel::load`] does.
-pub(crate) fn known_laws(file: &Path, stated: &ElementsConfig) -> Result<KnownLaws, Error> {
+pub(crate) fn known_laws(
+    file: &Path,
+    errors: FrictionErrors,
+    temperature: PerJoint,
+) -> Result<KnownLaws, Error> {
     let (model, source) = FrictionModel::load_source(file)?;
     Ok(KnownLaws {
         laws: model.joints.iter().filter_map(known_friction).collect(),
         stated: model.joints.iter().map(|j| j.joint.clone()).collect(),
         source,
-        errors: stated.friction_errors,
-        temperature: stated.temperature.clone(),
+        errors,
+        temperature,
     })
 }

@@ -2,7 +2,7 @@
 
 use rand::RngExt;
 
-use crate::experiment::ExperimentSettings;
+use super::ExperimentSettings;
 use crate::streams::{Cause, generator, normal};
 
 /// True motion and effort at the instants at which the rows' motion was sampled; per joint, one number per row.

@@ -1,23 +1,13 @@
 //! Robot files of any kind: the door that looks at the file and picks the reader.
 
-mod error;
-
 use std::path::Path;
 
-pub use error::{Place, RobotFileError};
+pub use crate::robot_error::{Place, RobotFileError};
 
 use crate::digest::SourceFile;
 use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
 use crate::toml_robot::{self, ElementSpec, RobotFile};
 use crate::urdf;
-
-/// Least limit of a velocity or an effort, rad/s, m/s, N m or N: what is smaller is a slip.
-pub(crate) const LEAST_LIMIT: f64 = 1e-9;
-
-/// Whether a robot file may state a number: finite, of moderate size, and no denormal, of which there is no quotient.
-pub(crate) fn is_in_range(x: f64) -> bool {
-    x == 0.0 || (x.is_normal() && x.abs() <= 1e30)
-}
 
 /// Reads a robot file: `.urdf` and `.xml` as URDF, `.toml` as TOML, anything else by its first character.
 ///

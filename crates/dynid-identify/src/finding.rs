@@ -2,8 +2,7 @@
 
 use serde::Serialize;
 
-use crate::caution::Caution;
-use crate::estimate::short_name;
+use crate::input_record::short_name;
 
 /// How much a finding matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -59,14 +58,6 @@ impl Finding {
     /// Whether an identification has to tell of it: not what it says anyway or takes care of.
     pub(crate) fn counts(&self) -> bool {
         self.severity != Severity::Info && SAID_ANYWAY.iter().all(|id| id.name() != self.id)
-    }
-
-    /// The finding as a caution of an identification; `None` unless it counts.
-    pub(crate) fn caution(&self) -> Option<Caution> {
-        let message = self.warning()?;
-        let status = if self.severity == Severity::Error { "fail" } else { "warn" };
-        let caution = Caution::warn(&self.id.replace('_', " "), message, &*self.remedy);
-        Some(Caution { status: status.to_owned(), ..caution })
     }
 
     /// The finding as a warning of an identification; `None` unless it counts.

@@ -1,7 +1,7 @@
 //! Ticks of the controller and rows of the log.
 
+use super::ExperimentSettings;
 use crate::error::{SimError, demand};
-use crate::experiment::ExperimentSettings;
 
 /// Largest number of controller ticks of one experiment.
 const MOST_TICKS: f64 = 1e8;

@@ -33,10 +33,10 @@ impl fmt::Display for Signal {
 }
 
 /// Names of time columns.
-pub(super) const TIME_NAMES: [&str; 5] = ["t", "time", "timestamp", "stamp", "header.stamp"];
+pub(crate) const TIME_NAMES: [&str; 5] = ["t", "time", "timestamp", "stamp", "header.stamp"];
 
 /// Names of a signal in groups; a group is looked at only if the ones before it matched nothing.
-pub(super) fn names(signal: Signal) -> &'static [&'static [&'static str]] {
+pub(crate) fn names(signal: Signal) -> &'static [&'static [&'static str]] {
     match signal {
         Signal::Time => &[&TIME_NAMES],
         Signal::Position => &[
@@ -68,11 +68,11 @@ pub(super) fn names(signal: Signal) -> &'static [&'static [&'static str]] {
 }
 
 /// Names of motor currents, used for effort if drive gains are given.
-pub(super) const CURRENT_NAMES: [&str; 4] = ["i", "im", "current", "motor_current"];
+pub(crate) const CURRENT_NAMES: [&str; 4] = ["i", "im", "current", "motor_current"];
 
 /// A column name taken apart: `Q1 [deg]` has stem `q1` and unit `deg`.
-pub(super) struct ColumnName<'a> {
-    pub(super) raw: &'a str,
+pub(crate) struct ColumnName<'a> {
+    pub(crate) raw: &'a str,
     /// Possible readings: the whole name, and for `time_ms` also without the unit.
     readings: Vec<(String, Option<&'a str>)>,
     /// Ends of a path such as `/joint_states/j1/position`: `joint_states/j1/position`, `j1/position`, `position`.
@@ -86,7 +86,7 @@ const SUFFIX_UNITS: [&str; 20] = [
 ];
 
 impl<'a> ColumnName<'a> {
-    pub(super) fn new(raw: &'a str) -> Self {
+    pub(crate) fn new(raw: &'a str) -> Self {
         let name = raw.trim();
         let bracketed = name
             .strip_suffix(']')
@@ -111,18 +111,18 @@ impl<'a> ColumnName<'a> {
     }
 
     /// The unit of the first reading that `accept` takes; `Some(None)`: taken, no unit.
-    pub(super) fn reading(&self, accept: impl Fn(&str) -> bool) -> Option<Option<&'a str>> {
+    pub(crate) fn reading(&self, accept: impl Fn(&str) -> bool) -> Option<Option<&'a str>> {
         self.readings.iter().find(|(stem, _)| accept(stem)).map(|(_, unit)| *unit)
     }
 
     /// As [`ColumnName::reading`], also for the end of a path.
-    pub(super) fn reading_of_path(&self, accept: impl Fn(&str) -> bool) -> Option<Option<&'a str>> {
+    pub(crate) fn reading_of_path(&self, accept: impl Fn(&str) -> bool) -> Option<Option<&'a str>> {
         self.reading(&accept).or_else(|| self.ends.iter().any(|end| accept(end)).then_some(None))
     }
 }
 
 /// The unit of a part of a time, by names such as `header.stamp.sec` and `stamp_nanosec`, and what stands before it.
-pub(super) fn part_of_time(column: &str) -> Option<(&str, &'static str)> {
+pub(crate) fn part_of_time(column: &str) -> Option<(&str, &'static str)> {
     let column = column.trim();
     let at = column.rfind(['.', '/', '_']).map_or(0, |k| k + 1);
     let (before, part) = column.split_at(at);
@@ -140,7 +140,7 @@ pub fn is_time_name(column: &str) -> bool {
 }
 
 /// True if `stem` means `name` of the joint: `q_arm`, `arm_q`, `arm.q`, `q.arm`, ...
-pub(super) fn names_joint(stem: &str, name: &str, joint: &str) -> bool {
+pub(crate) fn names_joint(stem: &str, name: &str, joint: &str) -> bool {
     let joint = joint.to_lowercase();
     let separated = |first: &str, second: &str| {
         stem.strip_prefix(first)
@@ -151,7 +151,7 @@ pub(super) fn names_joint(stem: &str, name: &str, joint: &str) -> bool {
 }
 
 /// The number in `q3`, `q_3`, `q[3]`, `q(3)`, `q.3`.
-pub(super) fn number_of(stem: &str, name: &str) -> Option<usize> {
+pub(crate) fn number_of(stem: &str, name: &str) -> Option<usize> {
     let rest = stem.strip_prefix(name)?;
     let digits = rest
         .strip_prefix('[')

@@ -7,23 +7,12 @@ use dynid_model::element::scale_name;
 use dynid_model::{EffortModel, RobotModel};
 use dynid_rows::conditioning::{Conditioning, ConditioningSettings, PreparedLog, Stage, condition, refine};
 
-use super::structure::Structure;
 use crate::Error;
 use crate::elements::ElementPlan;
-use crate::log::LogReference;
 use crate::robot::Robot;
-use crate::settings::{LogSettings, Route, Settings};
-
-/// What has to be known of a training log beside its prepared signals.
-#[derive(Debug, Clone)]
-pub struct TrainingLog {
-    /// Name in parameters and messages.
-    pub label: String,
-    /// Name, payload, what the log has of its own, period.
-    pub settings: LogSettings,
-    /// What the controller wanted where a trajectory file says so.
-    pub reference: Option<LogReference>,
-}
+use crate::settings::{Route, Settings};
+use crate::structure::Structure;
+use crate::training_log::TrainingLog;
 
 /// Everything that a fit depends on.
 #[derive(Debug)]

@@ -1,5 +1,7 @@
 //! Names of the checks behind a verdict.
 
+use serde::{Deserialize, Serialize};
+
 crate::names! {
     /// Checks behind the verdict of an identification.
     CheckName {
@@ -46,4 +48,21 @@ crate::names! {
         /// Colour of the residuals.
         Whiteness = "whiteness of the residuals",
     }
+}
+
+/// One check.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct CheckResult {
+    /// `ok`, `warn` or `fail`.
+    pub status: String,
+    /// Name.
+    pub name: String,
+    /// Value.
+    pub value: Option<f64>,
+    /// Unit.
+    pub unit: String,
+    /// What is expected.
+    pub limit: String,
+    /// What it means.
+    pub meaning: String,
 }

@@ -1,13 +1,11 @@
 //! Where contacts leave the smooth branches of their laws, and where they go.
 
-use super::branch::{Branch, Sliding};
-use super::record::{ContactEvent, ContactEventKind};
-use super::run::Run;
+use super::Run;
+use crate::clearance::branch::{Branch, Sliding};
+use crate::clearance::record::ContactEventKind;
 use crate::collocation::Path;
 use crate::error::SimError;
 
-/// First step after a contact begins or ends, s.
-pub(super) const FIRST_STEP: f64 = 1e-6;
 /// Instants of a step at which branches are looked at.
 const LOOKS: u32 = 12;
 
@@ -181,10 +179,5 @@ impl Run<'_, '_> {
             self.collocation.restart();
         }
         self.refresh()
-    }
-
-    pub(super) fn event(&mut self, joint: usize, kind: ContactEventKind) {
-        self.step = FIRST_STEP;
-        self.record.events.push(ContactEvent { time: self.t, joint, kind });
     }
 }

@@ -1,14 +1,20 @@
 //! The friction model of a robot as a file, `friction.json`: keys are added, never renamed.
 
+mod error;
+mod known;
+
 use dynid_io::SourceFile;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::error::FrictionError;
 use crate::Error;
 use crate::estimate::Provenance;
+pub use error::FrictionError;
+pub use known::known_friction;
+pub(crate) use known::known_laws;
+
 pub use crate::known_friction::{BristleModel, ExponentialModel, ViscousModel};
 
 /// Schema of `friction.json`.
