@@ -14,11 +14,10 @@ use dynid_model::{
 use dynid_rows::conditioning::{LogRows, condition};
 
 use crate::Error;
-use crate::config::{Config, Own, PayloadConfig, Route};
+use crate::config::{Config, LogConfig, Own, PayloadConfig, Route};
 use crate::elements::ElementPlan;
-use crate::estimate::InputRecord;
+use crate::estimate::{InputRecord, Provenance};
 use crate::fitting::{self, Fitted};
-use crate::identify::{load_robot, read_training};
 use crate::log::Log;
 use crate::log_terms::{LogTerms, known_inertia};
 use crate::pipeline::{Step, TrainingLog, held_where_not_logged, plan_elements};
@@ -37,7 +36,7 @@ pub struct GainIdentification {
     /// Warnings, in words.
     pub warnings: Vec<String>,
     robot: String,
-    inputs: Vec<InputRecord>,
+    provenance: Provenance,
 }
 
 /// Finds the drive gains from logs with and without a payload of known mass.
@@ -54,7 +53,7 @@ pub struct GainIdentification {
 pub fn identify_gains(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<GainIdentification, Error> {
     config.check()?;
     config.demand_inputs()?;
-    let payload = known_payload(config)?;
+    let payload = known_payload(&config.payload, &config.log)?;
     if config.motor_side.is_some() {
         let why = "drive gains behind a transmission matrix: give currents and positions of the joints";
         return Err(Error::Unsupported(why.to_owned()));
@@ -68,9 +67,9 @@ pub fn identify_gains(config: &Config, progress: &mut dyn FnMut(Step)) -> Result
         return Err(Error::Unsupported(why));
     }
     progress(Step::Read(config.robot.display().to_string()));
-    let robot = load_robot(config)?;
+    let robot = config.read_robot()?;
     refuse_internal_load(&robot, "identified")?;
-    let mut loaded = read_training(config, &robot, progress)?;
+    let mut loaded = config.read_training(&robot, progress)?;
     let robot = held_where_not_logged(robot, &loaded)?;
     let asked = config.settings()?;
     let settings = asked.conditioning_settings();
@@ -111,18 +110,25 @@ pub fn identify_gains(config: &Config, progress: &mut dyn FnMut(Step)) -> Result
     let mut inputs = InputRecord::of_robot(&robot);
     inputs.extend(loaded.iter().flat_map(|log| log.source.inputs.iter().cloned()));
     inputs.extend(plan.known_source.iter().map(|source| InputRecord::of("friction", source)));
-    Ok(GainIdentification { fitted, joints, payload: payload.clone(), warnings, robot: name, inputs })
+    Ok(GainIdentification {
+        fitted,
+        joints,
+        payload: payload.clone(),
+        warnings,
+        robot: name,
+        provenance: config.provenance(inputs),
+    })
 }
 
-fn known_payload(config: &Config) -> Result<&PayloadConfig, Error> {
-    let [payload] = &config.payload[..] else {
-        return Err(Error::setting("payload", "one `[[payload]]`", config.payload.len()));
+fn known_payload<'a>(stated: &'a [PayloadConfig], logs: &[LogConfig]) -> Result<&'a PayloadConfig, Error> {
+    let [payload] = stated else {
+        return Err(Error::setting("payload", "one `[[payload]]`", stated.len()));
     };
     let key = |key: &str| format!("payload.{}{key}", payload.name);
     if payload.mass.is_none() {
         return Err(Error::setting(&key(".mass"), "the known mass, kg", "none"));
     }
-    if config.log.iter().all(|log| log.payload.is_some()) {
+    if logs.iter().all(|log| log.payload.is_some()) {
         let expected = "a `[[log]]` without it beside those that carry it";
         return Err(Error::setting(&key(""), expected, "it in every log"));
     }

@@ -14,7 +14,7 @@ pub use reading::table;
 pub(crate) use reading::{header, map_columns};
 
 use crate::Error;
-use crate::config::{Config, LogConfig, MotorSide};
+use crate::config::{InstrumentsConfig, LogConfig, MotorSide};
 use crate::estimate::InputRecord;
 use crate::log::{Log, LogAxis, LogReference, LogSource, assemble, check, names, turns, understood};
 
@@ -204,8 +204,11 @@ fn left_out(
 ///
 /// # Errors
 /// [`Error::TrajectoryFile`].
-pub(crate) fn reference(config: &Config, log: &LogConfig) -> Result<Option<LogReference>, Error> {
-    let Some(table) = &config.instruments else { return Ok(None) };
+pub(crate) fn reference(
+    table: Option<&InstrumentsConfig>,
+    log: &LogConfig,
+) -> Result<Option<LogReference>, Error> {
+    let Some(table) = table else { return Ok(None) };
     let own = table.trajectory.as_ref();
     let Some(path) = own.or(log.trajectory.as_ref()) else { return Ok(None) };
     Ok(Some(LogReference {

@@ -5,56 +5,53 @@ use serde_json::json;
 use crate::config::{Config, LogConfig};
 use crate::estimate::{InputRecord, Provenance};
 
-/// Inputs as they were read, and the settings of a run.
-pub(crate) fn provenance(config: &Config, inputs: Vec<InputRecord>) -> Provenance {
-    Provenance {
-        inputs,
-        settings: settings_of(config),
-        seed: config.seed.unwrap_or(1),
-        ..Provenance::default()
+impl Config {
+    /// Inputs as they were read, and the settings of a run.
+    pub(crate) fn provenance(&self, inputs: Vec<InputRecord>) -> Provenance {
+        Provenance { inputs, settings: self.stated(), seed: self.seed.unwrap_or(1), ..Provenance::default() }
     }
-}
 
-/// Settings of a run as its configuration states them.
-pub(crate) fn settings_of(config: &Config) -> serde_json::Value {
-    let rows = |l: &LogConfig| {
-        let mut value = json!({ "path": l.path, "rows": l.rows, "part": l.part });
-        if l.trajectory.is_some() || l.period_s.is_some() {
-            value["trajectory"] = json!(l.trajectory);
-            value["period_s"] = json!(l.period_s);
-        }
-        for (key, own) in [("name", &l.name), ("payload", &l.payload), ("like", &l.like)] {
-            if let Some(own) = own {
-                value[key] = json!(own);
+    /// Settings of a run as its configuration states them.
+    pub(crate) fn stated(&self) -> serde_json::Value {
+        let rows = |l: &LogConfig| {
+            let mut value = json!({ "path": l.path, "rows": l.rows, "part": l.part });
+            if l.trajectory.is_some() || l.period_s.is_some() {
+                value["trajectory"] = json!(l.trajectory);
+                value["period_s"] = json!(l.period_s);
             }
+            for (key, own) in [("name", &l.name), ("payload", &l.payload), ("like", &l.like)] {
+                if let Some(own) = own {
+                    value[key] = json!(own);
+                }
+            }
+            if !l.own.is_empty() {
+                value["own"] = json!(l.own);
+            }
+            value
+        };
+        let elements = &self.elements;
+        let training = self.training_logs();
+        let mut settings = json!({
+            "gravity": self.gravity,
+            "couple_mimics": self.couple_mimics.unwrap_or(false),
+            "locked": self.locked,
+            "elements": elements,
+            "conditioning": self.conditioning,
+            "estimator": self.estimator,
+            "bound": self.bound,
+            "preferred": self.preferred,
+            "preflight": self.preflight,
+            "log": training.iter().map(rows).collect::<Vec<_>>(),
+            "validation": self.validation.iter().map(rows).collect::<Vec<_>>(),
+        });
+        if let Some(table) = &self.instruments {
+            settings["instruments"] = json!(table);
         }
-        if !l.own.is_empty() {
-            value["own"] = json!(l.own);
+        if !self.payload.is_empty() {
+            settings["payload"] = json!(self.payload);
         }
-        value
-    };
-    let elements = &config.elements;
-    let training = config.training_logs();
-    let mut settings = json!({
-        "gravity": config.gravity,
-        "couple_mimics": config.couple_mimics.unwrap_or(false),
-        "locked": config.locked,
-        "elements": elements,
-        "conditioning": config.conditioning,
-        "estimator": config.estimator,
-        "bound": config.bound,
-        "preferred": config.preferred,
-        "preflight": config.preflight,
-        "log": training.iter().map(rows).collect::<Vec<_>>(),
-        "validation": config.validation.iter().map(rows).collect::<Vec<_>>(),
-    });
-    if let Some(table) = &config.instruments {
-        settings["instruments"] = json!(table);
+        settings
     }
-    if !config.payload.is_empty() {
-        settings["payload"] = json!(config.payload);
-    }
-    settings
 }
 
 /// An input as pages show it.

@@ -11,7 +11,7 @@ pub use dynid_identify::reduction::{
 use crate::Error;
 use crate::config::{Config, LogConfig, MotorSide};
 use crate::estimate::{Estimate, ReadingRecord};
-use crate::identify::{identify, read_training};
+use crate::identify::identify;
 use crate::logs;
 use crate::pipeline::{Identification, Step};
 
@@ -36,7 +36,7 @@ pub fn learn(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Learned,
     // Samples go before they are read once more.
     drop(run);
     let reducer = recipe.reducer()?;
-    let logs = read_training(config, reducer.robot(), progress)?;
+    let logs = config.read_training(reducer.robot(), progress)?;
     Ok(Learned { reduction: Reduction::of(&reducer, logs)?, estimate })
 }
 

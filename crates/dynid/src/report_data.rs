@@ -361,7 +361,7 @@ fn status(word: &str) -> Status {
 
 /// Settings of an identification beside those of a configuration that says nothing.
 pub(crate) fn run_settings(of: &Provenance) -> Vec<report::Chosen> {
-    settings_table(&of.settings, &crate::provenance::settings_of(&Config::default()))
+    settings_table(&of.settings, &Config::default().stated())
 }
 
 fn verdict(estimate: &Estimate) -> report::Verdict {

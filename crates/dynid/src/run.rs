@@ -6,7 +6,6 @@ use crate::Error;
 use crate::config::Config;
 use crate::estimate::{Estimate, ExportedRecord, InputRecord, Provenance, ReadingRecord};
 use crate::pipeline::Identification;
-use crate::provenance::settings_of;
 use crate::report_data::report as report_page;
 
 /// An identification from files: the result, and where it comes from.
@@ -49,7 +48,7 @@ impl Run {
             provenance: Provenance {
                 inputs: self.inputs.clone(),
                 reading: Some(self.reading.clone()),
-                settings: settings_of(&self.config),
+                settings: self.config.stated(),
                 ..estimate.provenance.clone()
             },
             ..estimate

@@ -12,7 +12,7 @@ pub(crate) fn run(args: &GainsArgs) -> Result<u8, Failure> {
     let config = Config::read(&args.input)?;
     let progress = Progress::new(args.print.quiet);
     let found = identify_gains(&config, &mut |step| progress.step(step))?;
-    let file = found.file(&config);
+    let file = found.file();
     drop(progress);
     Notes::new(args.print.quiet).warnings(&file.warnings);
     match args.print.json {

@@ -10,7 +10,6 @@ use serde::Serialize;
 
 use crate::config::Config;
 use crate::estimate::InputRecord;
-use crate::identify::load_robot;
 use crate::log::Log;
 use crate::overlap::Overlaps;
 use crate::preflight::{Bench, CheckedLog, Findings, examine, late, repeated};
@@ -60,7 +59,7 @@ impl Check {
 pub fn check(config: &Config, progress: &mut dyn FnMut(&str)) -> Result<Check, Error> {
     config.check()?;
     config.demand_inputs()?;
-    let robot = load_robot(config)?;
+    let robot = config.read_robot()?;
     let settings = config.settings()?;
     let mut out = Check {
         robot: config.robot.display().to_string(),

@@ -20,7 +20,6 @@ use crate::Error;
 use crate::agreement::{Alignment, compare as against};
 use crate::config::{Config, Route};
 use crate::estimate::InputRecord;
-use crate::identify::open;
 use crate::pipeline::{ModelFit, Problem, Step};
 use estimators::{Contestant, contestants};
 pub use record::{CompareStatus, ComparedEstimator, Comparison, JointError};
@@ -45,16 +44,14 @@ struct FoldScore {
 /// Fails as [`crate::identify()`] does. An estimator that fails is in the table with its reason, and no error.
 pub fn compare(config: &Config, progress: &mut dyn FnMut(usize, usize, &str)) -> Result<Comparison, Error> {
     progress(0, 1, "reading");
-    let mut opened = open(
-        &Config {
-            conditioning: crate::config::ConditioningConfig {
-                route: Route::Compact,
-                ..config.conditioning.clone()
-            },
-            ..config.clone()
+    let compact = Config {
+        conditioning: crate::config::ConditioningConfig {
+            route: Route::Compact,
+            ..config.conditioning.clone()
         },
-        &mut |_: Step| {},
-    )?;
+        ..config.clone()
+    };
+    let mut opened = compact.open(&mut |_: Step| {})?;
     progress(0, 1, "conditioning");
     let conditioning = opened.problem.condition(&mut |_| {})?;
     let conditioning = conditioning.unwrap_or_else(|| unreachable!("the route is the compact one"));
@@ -80,7 +77,7 @@ pub fn compare(config: &Config, progress: &mut dyn FnMut(usize, usize, &str)) ->
         .collect();
     let mut inputs = InputRecord::of_robot(&opened.problem.robot);
     inputs.extend(opened.inputs().cloned());
-    Ok(record::ranked(config, &opened.problem, inputs, &conditioning, &list, scores))
+    Ok(record::ranked(&opened.problem, inputs, &conditioning, &list, scores))
 }
 
 struct Bench<'a> {

@@ -6,7 +6,6 @@ use serde::Serialize;
 
 use super::estimators::Contestant;
 use super::{FOLDS, FoldScore};
-use crate::config::Config;
 use crate::estimate::InputRecord;
 use crate::pipeline::Problem;
 
@@ -137,7 +136,6 @@ fn mean_and_error(values: &[f64]) -> (f64, f64) {
 
 /// The table, ranked.
 pub(super) fn ranked(
-    config: &Config,
     problem: &Problem,
     inputs: Vec<InputRecord>,
     conditioning: &Conditioning,
@@ -169,7 +167,7 @@ pub(super) fn ranked(
     }
     Comparison {
         inputs,
-        robot: config.robot.display().to_string(),
+        robot: problem.robot.path.display().to_string(),
         logs: problem.logs.iter().map(|l| l.name.clone()).collect(),
         joints: problem.model.outputs().iter().map(|o| o.name.clone()).collect(),
         folds: FOLDS,

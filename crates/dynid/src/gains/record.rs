@@ -3,9 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::GainIdentification;
-use crate::config::Config;
 use crate::estimate::{Provenance, SCHEMA};
-use crate::provenance::provenance;
 
 /// t-value of `1/g` above which a gain is determined.
 pub(super) const LEAST_T: f64 = 5.0;
@@ -105,7 +103,7 @@ pub struct GainsFile {
 
 impl GainIdentification {
     /// The result in full.
-    pub fn file(&self, config: &Config) -> GainsFile {
+    pub fn file(&self) -> GainsFile {
         let p = &self.payload;
         let known = match (p.com, p.inertia) {
             (Some(_), Some(_)) => "mass, centre of mass and inertia",
@@ -124,7 +122,7 @@ impl GainIdentification {
             variance_inflation: self.fitted.inflation,
             status: if determined { "ok" } else { "fail" }.to_owned(),
             warnings: self.warnings.clone(),
-            provenance: provenance(config, self.inputs.clone()),
+            provenance: self.provenance.clone(),
         }
     }
 }

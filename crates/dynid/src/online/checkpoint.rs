@@ -6,13 +6,12 @@ use dynid_model::EffortModel;
 use dynid_motion::live::LiveSettings;
 use dynid_words::Transfer;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
+use super::asked::Asked;
 use super::learning::{Learned, Structure};
 use super::running::Running;
 use super::samples::Samples;
 use super::usual::Innovations;
-use crate::config::Config;
 use crate::{Error, sealed};
 use dynid_rows::conditioning::LiveRowSettings;
 
@@ -49,7 +48,7 @@ impl Place {
 
 impl Checkpoint {
     pub(super) fn of(
-        config: &Config,
+        asked: &Asked,
         samples: &mut Samples,
         running: &mut Running,
         mut place: Place,
@@ -64,13 +63,13 @@ impl Checkpoint {
         for word in &words {
             state.push_str(&format!("{word:016x}"));
         }
-        Ok(Checkpoint { schema: SCHEMA.to_owned(), fingerprint: fingerprint(config, samples)?, state })
+        Ok(Checkpoint { schema: SCHEMA.to_owned(), fingerprint: fingerprint(asked, samples), state })
     }
 
     /// `file` stands in messages. `replay`: the stream's clock begins again.
     pub(super) fn restore(
         &self,
-        config: &Config,
+        asked: &Asked,
         structure: &Structure,
         samples: &mut Samples,
         file: &str,
@@ -80,7 +79,7 @@ impl Checkpoint {
         if self.schema != SCHEMA {
             return Err(fault(&format!("expected schema `{SCHEMA}`, found `{}`", self.schema)));
         }
-        if self.fingerprint != fingerprint(config, samples)? {
+        if self.fingerprint != fingerprint(asked, samples) {
             return Err(fault(
                 "it belongs to another robot, configuration or stream; delete it to begin anew",
             ));
@@ -109,7 +108,7 @@ impl Checkpoint {
         if !learned.fits(structure) {
             return Err(damaged());
         }
-        let mut running = Running::new(config, structure, learned)?;
+        let mut running = Running::new(asked, structure, learned)?;
         running.transfer(&mut load);
         if !load.complete() {
             return Err(damaged());
@@ -145,21 +144,9 @@ impl Checkpoint {
 }
 
 /// Differs between runs whose states differ.
-fn fingerprint(config: &Config, samples: &Samples) -> Result<String, Error> {
-    let mut config = config.clone();
-    let robot = crate::logs::sha256(&config.robot)?;
-    let friction = match config.elements.known_friction.take() {
-        Some(file) => crate::logs::sha256(&file)?,
-        None => String::new(),
-    };
-    config.robot = std::path::PathBuf::new();
-    config.out = None;
-    config.log.clear();
-    config.validation.clear();
-    (config.online.checkpoint, config.online.checkpoint_s) = (None, 1.0);
-    let header = samples.header();
-    let text = format!("{} {robot} {friction} {header:?} {config:?}", crate::VERSION);
-    Ok(Sha256::digest(text.as_bytes()).iter().map(|b| format!("{b:02x}")).collect())
+fn fingerprint(asked: &Asked, samples: &Samples) -> String {
+    let text = format!("{} {} {:?}", crate::VERSION, asked.identity, samples.header());
+    dynid_io::digest::sha256(text.as_bytes())
 }
 
 fn transfer_clock(samples: &mut Samples, transfer: &mut Transfer<'_>) {

@@ -14,15 +14,13 @@ use dynid_rows::conditioning::{
     ConditioningError, LiveRow, LiveRowSettings, LiveRows, PreparedLog, States, condition, prepare,
 };
 
+use super::asked::Asked;
 use super::samples::Sample;
 use super::usual::Innovations;
-use crate::config::Config;
 use crate::elements::ElementPlan;
-use crate::identify::load_robot;
 use crate::log::{self, LogAxis};
 use crate::pipeline::stated_values;
 use crate::prior::{self, Prior};
-use crate::robot::refuse_loops;
 use crate::{Error, advice, bounds, stiffness};
 
 /// Rows per base parameter that a stretch must give.
@@ -44,23 +42,16 @@ pub(super) struct Structure {
 
 impl Structure {
     /// `still`: joints without columns.
-    pub(super) fn new(config: &Config, still: &[String]) -> Result<Structure, Error> {
-        let mut robot = load_robot(config)?;
-        refuse_loops(&robot, "identified on line")?;
-        if robot.mechanism.positions() != robot.mechanism.rates() {
-            return Err(Error::Unsupported(
-                "a floating base cannot be identified from joint logs: lock the base or leave it out"
-                    .to_owned(),
-            ));
-        }
+    pub(super) fn new(asked: &Asked, still: &[String]) -> Result<Structure, Error> {
+        let mut robot = asked.robot.clone();
         if !still.is_empty() {
             let still: Vec<(String, f64)> = still.iter().map(|name| (name.clone(), 0.0)).collect();
             robot = robot.locked(&still)?;
         }
-        let plan = ElementPlan::of_run(&config.settings()?, &robot, |_| true)?;
+        let plan = ElementPlan::of_run(&asked.settings, &robot, |_| true)?;
         let model = plan.model(&robot.mechanism)?;
         let shape = model.parameters().shape_start();
-        let settings = BaseSettings { seed: config.seed.unwrap_or(1), ..BaseSettings::default() };
+        let settings = BaseSettings { seed: asked.settings.seed.unwrap_or(1), ..BaseSettings::default() };
         let base = BaseParameters::of_model(&model, &shape, &settings);
         if base.is_empty() {
             return Err(Error::Unsupported("no parameter of this robot acts on any effort".to_owned()));
@@ -71,7 +62,7 @@ impl Structure {
         warnings.extend(stiffness::of_rows_alone(&plan));
         Ok(Structure {
             regrouping: advice::regrouping(&base),
-            bounds: bounds::rows(&config.bound, &model)?,
+            bounds: bounds::rows(&asked.settings.bound, &model)?,
             stated: stated_values(&model, &plan),
             model: Arc::new(model),
             shape,
@@ -109,19 +100,18 @@ pub(super) struct Learned {
 impl Learned {
     /// Learns from samples. The inner error says why the stretch does not suffice.
     pub(super) fn from_samples(
-        config: &Config,
+        asked: &Asked,
         structure: &Structure,
         name: &str,
         samples: &[Sample],
     ) -> Result<Result<Learned, String>, Error> {
         let model = &*structure.model;
-        let asked = config.settings()?;
-        let settings = asked.conditioning_settings();
+        let settings = asked.settings.conditioning_settings();
         let prepared = match prepare(&log(name, model, samples)?, model, &settings) {
             Ok(prepared) => prepared,
             Err(reason) => return insufficient(reason),
         };
-        asked.check_cutoffs(name, prepared.rate_hz)?;
+        asked.settings.check_cutoffs(name, prepared.rate_hz)?;
         let logs = [prepared];
         let found = condition(model, &structure.shape, &structure.base.kept, &logs, &settings, &mut |_| {});
         let choices = match found {
@@ -146,7 +136,7 @@ impl Learned {
             least_speed,
         };
         let efforts = effort_sizes(&prepared);
-        let prior = structure.prior(&efforts, &config.robot)?;
+        let prior = structure.prior(&efforts, &asked.robot.path)?;
         let (start, prior_std) = structure.base_prior(&prior);
         let live = live_rows(structure, &rows, samples)?;
         let enough = ROWS_PER_PARAMETER * structure.base.len();

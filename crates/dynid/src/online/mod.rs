@@ -6,6 +6,7 @@
 //! ([`dynid_estimate::online::Estimator`]). What there is to say comes as [`Event`]s. The state goes to a checkpoint and back without a
 //! change of bits.
 
+mod asked;
 mod checkpoint;
 mod event;
 mod ground;

@@ -2,8 +2,9 @@
 
 use dynid_estimate::online::{DetectionSettings, FalseAlarms, Forgetting, Settings, Whiteness};
 
+use super::asked::Asked;
 use super::learning::Learned;
-use crate::config::{Config, ForgettingRule};
+use crate::config::ForgettingRule;
 
 /// Published forgetting (Sun et al., Eq. 44 and below).
 const ALPHA: f64 = 0.05;
@@ -23,13 +24,13 @@ const WANDERING: f64 = 0.1;
 
 /// Settings for `rows` outputs, rows `spacing_s` apart; `armed`: with change detection.
 pub(super) fn settings(
-    config: &Config,
+    asked: &Asked,
     learned: &Learned,
     rows: usize,
     spacing_s: f64,
     armed: bool,
 ) -> Settings {
-    let online = &config.online;
+    let online = &asked.online;
     let lambda = (-spacing_s / online.memory_s).exp();
     let largest = learned.efforts.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let samples = ((online.memory_s / spacing_s / BLOCKS as f64).ceil().max(1.0)) as usize * BLOCKS;

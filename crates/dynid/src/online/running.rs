@@ -10,6 +10,7 @@ use dynid_motion::live::LiveGrid;
 use dynid_rows::conditioning::{LiveRow, LiveRows};
 use dynid_words::Transfer;
 
+use super::asked::Asked;
 use super::event::{Counts, Event, ParameterValue, PlainValue};
 use super::ground::Ground;
 use super::learning::{Learned, Structure};
@@ -18,7 +19,7 @@ use super::rules::settings;
 use super::samples::Sample;
 use super::usual::UsualInnovations;
 use crate::Error;
-use crate::config::{Config, ForgettingRule};
+use crate::config::ForgettingRule;
 use crate::consistency;
 use crate::prior::Prior;
 
@@ -69,19 +70,18 @@ pub(super) struct Running {
 }
 
 impl Running {
-    pub(super) fn new(config: &Config, structure: &Structure, learned: Learned) -> Result<Running, Error> {
+    pub(super) fn new(asked: &Asked, structure: &Structure, learned: Learned) -> Result<Running, Error> {
         let outputs = structure.model.outputs().len();
         let rows = learned.live_rows(structure)?;
         let in_rows = |seconds: f64| (seconds / rows.spacing_s()).ceil().max(1.0) as u64;
-        let (settling, block) =
-            (in_rows(SETTLING * config.online.learn_s), in_rows(config.online.reaction_s));
+        let (settling, block) = (in_rows(SETTLING * asked.online.learn_s), in_rows(asked.online.reaction_s));
         let names = &structure.model.parameters().linear;
         let speed_of = |joint: &str| {
             let name = format!("{joint}.fv");
             structure.base.kept.iter().position(|column| names[*column].name == name)
         };
         let speeds = structure.model.outputs().iter().map(|output| speed_of(&output.name)).collect();
-        let settings = settings(config, &learned, outputs, rows.spacing_s(), true);
+        let settings = settings(asked, &learned, outputs, rows.spacing_s(), true);
         let window = Settings {
             prior_std: learned.prior_std.iter().map(|s| NO_PRIOR * s).collect(),
             start: vec![0.0; learned.start.len()],
@@ -90,7 +90,7 @@ impl Running {
             detection: None,
             ..settings.clone()
         };
-        let prior = structure.prior(&learned.efforts, &config.robot)?;
+        let prior = structure.prior(&learned.efforts, &asked.robot.path)?;
         let estimator = Estimator::new(settings)?;
         let since = Estimator::new(window)?;
         Ok(Running {
@@ -147,9 +147,9 @@ impl Running {
     }
 
     /// Takes the learned stretch itself: no alarms yet, for what is usual is learned from it too.
-    pub(super) fn absorb(&mut self, config: &Config, samples: &[Sample]) -> Result<(), Error> {
+    pub(super) fn absorb(&mut self, asked: &Asked, samples: &[Sample]) -> Result<(), Error> {
         let outputs = self.errors.len();
-        let calm = settings(config, &self.learned, outputs, self.rows.spacing_s(), false);
+        let calm = settings(asked, &self.learned, outputs, self.rows.spacing_s(), false);
         self.estimator = Estimator::new(calm)?;
         samples.iter().for_each(|sample| self.sample(sample));
         let Running { rows, waiting, .. } = self;
@@ -164,9 +164,9 @@ impl Running {
             usual.push(&used, self.estimator.innovation().whitened());
             taken.push((used, effort, self.regressor.clone()));
         }
-        let block = (config.online.reaction_s / self.rows.spacing_s()).ceil().max(1.0) as usize;
+        let block = (asked.online.reaction_s / self.rows.spacing_s()).ceil().max(1.0) as usize;
         self.learned.innovations = usual.learned(block);
-        let armed = settings(config, &self.learned, outputs, self.rows.spacing_s(), true);
+        let armed = settings(asked, &self.learned, outputs, self.rows.spacing_s(), true);
         self.estimator = Estimator::new(armed)?;
         for (used, effort, regressor) in taken {
             let noise = self.noise(&used);
@@ -210,7 +210,7 @@ impl Running {
     /// Takes the rows that have come.
     pub(super) fn drain(
         &mut self,
-        config: &Config,
+        asked: &Asked,
         structure: &Structure,
         emit: &mut dyn FnMut(Event),
     ) -> Result<(), Error> {
@@ -220,34 +220,34 @@ impl Running {
         (self.counts.backward, self.counts.gaps, self.counts.set_back) =
             (clock.backward, clock.gaps, clock.set_back);
         for row in std::mem::take(&mut self.waiting) {
-            self.row(config, structure, &row, emit)?;
+            self.row(asked, structure, &row, emit)?;
         }
         Ok(())
     }
 
     fn row(
         &mut self,
-        config: &Config,
+        asked: &Asked,
         structure: &Structure,
         row: &LiveRow,
         emit: &mut dyn FnMut(Event),
     ) -> Result<(), Error> {
         if let Some((used, effort)) = self.load(row) {
             let noise = self.noise(&used);
-            self.update(config, structure, &used, &effort, &noise, emit)?;
+            self.update(asked, structure, &used, &effort, &noise, emit)?;
         }
-        let due = *self.next_report.get_or_insert(row.time + config.online.report_s);
+        let due = *self.next_report.get_or_insert(row.time + asked.online.report_s);
         if row.time >= due {
-            let missed = ((row.time - due) / config.online.report_s).floor();
-            self.next_report = Some(due + (1.0 + missed) * config.online.report_s);
-            emit(self.report(config, structure)?);
+            let missed = ((row.time - due) / asked.online.report_s).floor();
+            self.next_report = Some(due + (1.0 + missed) * asked.online.report_s);
+            emit(self.report(asked, structure)?);
         }
         Ok(())
     }
 
     fn update(
         &mut self,
-        config: &Config,
+        asked: &Asked,
         structure: &Structure,
         used: &[usize],
         effort: &[f64],
@@ -283,7 +283,7 @@ impl Running {
             |innovation| ground.watches(innovation, inflation, is_new),
         )?;
         ground.learn(used, self.estimator.innovation().whitened(), &mut self.learned.innovations);
-        if config.online.alarms && was_known != self.ground.is_known() {
+        if asked.online.alarms && was_known != self.ground.is_known() {
             let leverage = inflation * self.estimator.innovation().leverage();
             emit(match was_known {
                 true => Event::Withheld { time: self.newest, leverage },
@@ -297,8 +297,8 @@ impl Running {
             self.counts.alarms += 1;
             let threshold = self.estimator.detection().map_or(0.0, |d| d.threshold());
             emit(Event::Alarm { time: self.newest, threshold });
-            if config.online.forgetting != ForgettingRule::Window {
-                let samples = (config.online.reaction_s / self.rows.spacing_s()).ceil().max(1.0) as u64;
+            if asked.online.forgetting != ForgettingRule::Window {
+                let samples = (asked.online.reaction_s / self.rows.spacing_s()).ceil().max(1.0) as u64;
                 self.hold = Some(Hold { alarm: self.newest, left: samples });
             } else {
                 self.counts.changes += 1;
@@ -326,7 +326,7 @@ impl Running {
     }
 
     /// The estimate as it is.
-    pub(super) fn report(&mut self, config: &Config, structure: &Structure) -> Result<Event, Error> {
+    pub(super) fn report(&mut self, asked: &Asked, structure: &Structure) -> Result<Event, Error> {
         let coloured = self.learned.innovations.inflation.sqrt();
         self.estimator.std(&mut self.std);
         let names = &structure.model.parameters().linear;
@@ -349,7 +349,7 @@ impl Running {
         self.errors.fill((0.0, 0));
         Ok(Event::Estimate {
             time: self.newest,
-            standard: self.standard(config, structure)?,
+            standard: self.standard(asked, structure)?,
             determined: determined as f64 / parameters.len() as f64,
             parameters,
             residual_rms,
@@ -362,10 +362,10 @@ impl Running {
     }
 
     /// Standard parameters of bodies that can exist.
-    fn standard(&self, config: &Config, structure: &Structure) -> Result<Vec<PlainValue>, Error> {
+    fn standard(&self, asked: &Asked, structure: &Structure) -> Result<Vec<PlainValue>, Error> {
         let bodies = structure.model.mechanism().bodies().len();
-        let Some(form) = consistency::form(config.estimator.consistency)
-            .filter(|_| config.online.consistent && bodies > 0)
+        let Some(form) = consistency::form(asked.settings.estimator.consistency)
+            .filter(|_| asked.online.consistent && bodies > 0)
         else {
             return Ok(Vec::new());
         };
@@ -390,15 +390,15 @@ impl Running {
     /// Whether something is waiting for more samples that the end of the stream would lose.
     pub(super) fn finish(
         &mut self,
-        config: &Config,
+        asked: &Asked,
         structure: &Structure,
         emit: &mut dyn FnMut(Event),
     ) -> Result<(), Error> {
-        self.drain(config, structure, emit)?;
+        self.drain(asked, structure, emit)?;
         if let Some(hold) = self.hold.take() {
             emit(self.judge(structure, hold.alarm)?);
         }
-        emit(self.report(config, structure)?);
+        emit(self.report(asked, structure)?);
         Ok(())
     }
 

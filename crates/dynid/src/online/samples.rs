@@ -4,8 +4,8 @@ use dynid_io::columns::TimeSource;
 use dynid_io::{ColumnMapping, LogHeader, MappingError, MappingSpec, Table};
 use dynid_model::element::temperature_channel;
 
+use super::asked::Asked;
 use crate::Error;
-use crate::config::Config;
 use crate::log::LogAxis;
 use crate::logs;
 
@@ -92,9 +92,9 @@ impl Samples {
     }
 
     /// Samples of the rows taken, in SI. `channels`: names of the model's.
-    pub(super) fn drain(&mut self, config: &Config, channels: &[String]) -> Result<Vec<Sample>, Error> {
+    pub(super) fn drain(&mut self, asked: &Asked, channels: &[String]) -> Result<Vec<Sample>, Error> {
         let rows = self.rows.rows;
-        if rows == 0 || !self.settled(config)? {
+        if rows == 0 || !self.settled(asked)? {
             return Ok(Vec::new());
         }
         let named = |source| Error::Columns { file: self.name.clone(), source: Box::new(source) };
@@ -109,7 +109,7 @@ impl Samples {
             }
         };
         self.taken += rows as u64;
-        if let Some(transmission) = &config.motor_side {
+        if let Some(transmission) = &asked.motor_side {
             logs::to_joint_side(&mut signals, transmission)?;
         }
         let effort = signals.effort.as_deref().unwrap_or(&[]);
@@ -141,7 +141,7 @@ impl Samples {
     }
 
     /// Finds the unit of the time; false: some more rows are needed for that.
-    fn settled(&mut self, config: &Config) -> Result<bool, Error> {
+    fn settled(&mut self, asked: &Asked) -> Result<bool, Error> {
         let more = self.rows.rows < BATCH;
         let stated = |mapping: &ColumnMapping| match &mapping.time {
             TimeSource::Columns(time) => time.unit_stated,
@@ -150,7 +150,7 @@ impl Samples {
         if stated(&self.mapping) {
             return Ok(true);
         }
-        match self.mapping.settle_time(&self.rows, self.motors || config.motor_side.is_some()) {
+        match self.mapping.settle_time(&self.rows, self.motors || asked.motor_side.is_some()) {
             Ok(_) => Ok(stated(&self.mapping) || !more),
             Err(MappingError::TimeUnit { .. } | MappingError::TimeStep { .. }) if more => Ok(false),
             Err(source) => Err(Error::Columns { file: self.name.clone(), source: Box::new(source) }),

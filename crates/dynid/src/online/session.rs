@@ -3,6 +3,7 @@
 use dynid_io::{LogHeader, MappingSpec};
 use dynid_model::EffortModel;
 
+use super::asked::Asked;
 use super::checkpoint::{Checkpoint, Place};
 use super::event::{Counts, Event};
 use super::learning::{Learned, Structure};
@@ -36,7 +37,7 @@ enum Phase {
 /// at hand, and [`Session::finish`] at the end. Events do not depend on when `flush` is called, but for when they come.
 #[derive(Debug)]
 pub struct Session {
-    config: Config,
+    asked: Asked,
     structure: Structure,
     samples: Samples,
     phase: Phase,
@@ -63,19 +64,13 @@ impl Session {
         header: impl Into<LogHeader>,
         columns: Option<&MappingSpec>,
     ) -> Result<Session, Error> {
-        config.check()?;
-        config.online.check_effect()?;
-        if config.log.iter().any(|log| log.payload.is_some() || !log.own.is_empty()) {
-            return Err(Error::Unsupported(
-                "on-line identification of logs with a payload or terms of their own: it follows the robot alone".to_owned(),
-            ));
-        }
-        let axes = Structure::new(config, &[])?.axes();
-        let samples = Samples::new(name, &header.into(), &axes, columns.unwrap_or(&config.columns))?;
-        let structure = Structure::new(config, &samples.not_logged())?;
+        let asked = Asked::of(config)?;
+        let axes = Structure::new(&asked, &[])?.axes();
+        let samples = Samples::new(name, &header.into(), &axes, columns.unwrap_or(&asked.columns))?;
+        let structure = Structure::new(&asked, &samples.not_logged())?;
         Ok(Session {
-            phase: Phase::Learning { samples: Vec::new(), wanted_s: config.online.learn_s },
-            config: config.clone(),
+            phase: Phase::Learning { samples: Vec::new(), wanted_s: asked.online.learn_s },
+            asked,
             structure,
             samples,
             offset: 0.0,
@@ -100,8 +95,8 @@ impl Session {
     ) -> Result<(), Error> {
         self.flush(emit)?;
         let still = self.samples.not_logged();
-        let axes = Structure::new(&self.config, &[])?.axes();
-        let samples = Samples::new(name, &header.into(), &axes, columns.unwrap_or(&self.config.columns))?;
+        let axes = Structure::new(&self.asked, &[])?.axes();
+        let samples = Samples::new(name, &header.into(), &axes, columns.unwrap_or(&self.asked.columns))?;
         if samples.not_logged() != still {
             return Err(Error::Unsupported(format!(
                 "{name}: expected columns of the same joints as before, not logged: {still:?}, found {:?}",
@@ -135,7 +130,7 @@ impl Session {
     /// # Errors
     /// Fails as [`Session::row`] does.
     pub fn flush(&mut self, emit: &mut dyn FnMut(Event)) -> Result<(), Error> {
-        let samples = self.samples.drain(&self.config, self.structure.model.channels())?;
+        let samples = self.samples.drain(&self.asked, self.structure.model.channels())?;
         for mut sample in samples {
             self.rows += 1;
             if self.rows <= self.seen {
@@ -154,7 +149,7 @@ impl Session {
             self.sample(sample, emit)?;
         }
         if let Phase::Running(running) = &mut self.phase {
-            running.drain(&self.config, &self.structure, emit)?;
+            running.drain(&self.asked, &self.structure, emit)?;
         }
         Ok(())
     }
@@ -178,9 +173,9 @@ impl Session {
     fn learn(&mut self, emit: &mut dyn FnMut(Event)) -> Result<(), Error> {
         let Phase::Learning { samples, wanted_s } = &mut self.phase else { return Ok(()) };
         let time = samples.last().map_or(0.0, |s| s.time);
-        match Learned::from_samples(&self.config, &self.structure, "the first stretch", samples)? {
+        match Learned::from_samples(&self.asked, &self.structure, "the first stretch", samples)? {
             Err(reason) => {
-                if *wanted_s >= LONGEST * self.config.online.learn_s {
+                if *wanted_s >= LONGEST * self.asked.online.learn_s {
                     let half = samples.len() / 2;
                     samples.drain(..half);
                 } else {
@@ -189,8 +184,8 @@ impl Session {
                 emit(Event::Learning { time, reason });
             }
             Ok(learned) => {
-                let mut running = Running::new(&self.config, &self.structure, learned)?;
-                running.absorb(&self.config, samples)?;
+                let mut running = Running::new(&self.asked, &self.structure, learned)?;
+                running.absorb(&self.asked, samples)?;
                 emit(running.introduction(&self.structure, time));
                 self.phase = Phase::Running(Box::new(running));
             }
@@ -206,7 +201,7 @@ impl Session {
         self.flush(emit)?;
         if let Phase::Learning { samples, .. } = &self.phase {
             let length = samples.last().map_or(0.0, |s| s.time - samples[0].time);
-            let least = SHORTEST * self.config.online.learn_s;
+            let least = SHORTEST * self.asked.online.learn_s;
             let mut reason = format!("expected at least {least:.2} s, found {length:.2} s");
             if length >= least {
                 self.learn(&mut |event| match event {
@@ -222,7 +217,7 @@ impl Session {
             }
         }
         if let Phase::Running(running) = &mut self.phase {
-            running.finish(&self.config, &self.structure, emit)?;
+            running.finish(&self.asked, &self.structure, emit)?;
         }
         emit(Event::End { counts: self.counts() });
         Ok(())
@@ -248,7 +243,7 @@ impl Session {
     pub fn checkpoint(&mut self) -> Result<Option<Checkpoint>, Error> {
         let (Phase::Running(running), Some(latest)) = (&mut self.phase, self.latest) else { return Ok(None) };
         let place = Place { offset: self.offset, latest, rows: self.rows.max(self.seen) };
-        Checkpoint::of(&self.config, &mut self.samples, running, place).map(Some)
+        Checkpoint::of(&self.asked, &mut self.samples, running, place).map(Some)
     }
 
     /// Goes on from a checkpoint, before any row.
@@ -260,7 +255,7 @@ impl Session {
     /// [`Error::Checkpoint`]: of another configuration, robot or stream, or damaged.
     pub fn resume(&mut self, checkpoint: &Checkpoint, file: &str, replay: bool) -> Result<(), Error> {
         let (running, place) =
-            checkpoint.restore(&self.config, &self.structure, &mut self.samples, file, replay)?;
+            checkpoint.restore(&self.asked, &self.structure, &mut self.samples, file, replay)?;
         self.phase = Phase::Running(Box::new(running));
         (self.offset, self.latest) = (place.offset, Some(place.latest));
         (self.rows, self.seen) = if replay { (0, place.rows) } else { (place.rows, place.rows) };

@@ -236,7 +236,7 @@ fn simulated_gains_are_found_where_plain_least_squares_are_off() {
         // Beyond four standard deviations chance puts less than one in ten thousand.
         assert!(joint.gain.is_none_or(|g| (g - truth).abs() < 4.0 * joint.std.unwrap()), "{joint:?}");
     }
-    assert_eq!(found.file(&config).status, "ok");
+    assert_eq!(found.file().status, "ok");
 }
 
 #[test]

@@ -1,0 +1,69 @@
+//! What a session is asked for, translated once from a configuration.
+
+use crate::Error;
+use crate::config::{Config, MotorSide, OnlineConfig};
+use crate::robot::{Robot, refuse_loops};
+use crate::settings::Settings;
+
+/// What a session is asked for.
+#[derive(Debug)]
+pub(super) struct Asked {
+    /// The robot, before joints without columns are held.
+    pub(super) robot: Robot,
+    /// Settings of the identification.
+    pub(super) settings: Settings,
+    /// Settings of the session.
+    pub(super) online: OnlineConfig,
+    /// Columns of sources that say nothing else.
+    pub(super) columns: dynid_io::MappingSpec,
+    /// Transmission between logged motors and joints.
+    pub(super) motor_side: Option<MotorSide>,
+    /// Files and settings that the state of a session depends on, as text.
+    pub(super) identity: String,
+}
+
+impl Asked {
+    /// # Errors
+    /// [`Error`]: bad configuration or robot.
+    pub(super) fn of(config: &Config) -> Result<Asked, Error> {
+        config.check()?;
+        config.online.check_effect()?;
+        if config.log.iter().any(|log| log.payload.is_some() || !log.own.is_empty()) {
+            return Err(Error::Unsupported(
+                "on-line identification of logs with a payload or terms of their own: it follows the robot alone".to_owned(),
+            ));
+        }
+        let robot = config.read_robot()?;
+        refuse_loops(&robot, "identified on line")?;
+        if robot.mechanism.positions() != robot.mechanism.rates() {
+            return Err(Error::Unsupported(
+                "a floating base cannot be identified from joint logs: lock the base or leave it out"
+                    .to_owned(),
+            ));
+        }
+        Ok(Asked {
+            robot,
+            settings: config.settings()?,
+            online: config.online.clone(),
+            columns: config.columns.clone(),
+            motor_side: config.motor_side.clone(),
+            identity: identity(config)?,
+        })
+    }
+}
+
+/// Differs between configurations whose states differ.
+fn identity(config: &Config) -> Result<String, Error> {
+    let mut config = config.clone();
+    let robot = crate::logs::sha256(&config.robot)?;
+    let friction = match config.elements.known_friction.take() {
+        Some(file) => crate::logs::sha256(&file)?,
+        None => String::new(),
+    };
+    config.robot = std::path::PathBuf::new();
+    config.out = None;
+    config.log.clear();
+    config.validation.clear();
+    (config.online.checkpoint, config.online.checkpoint_s) = (None, 1.0);
+    Ok(format!("{robot} {friction} {config:?}"))
+}
