@@ -1,7 +1,7 @@
 //! What a robot file says, before it is checked and compiled into a [`Mechanism`](crate::Mechanism).
 
-use crate::inertia::Inertia;
-use crate::spatial::Placement;
+use dynid_algebra::inertia::Inertia;
+use dynid_algebra::spatial::Placement;
 
 /// Kind of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,8 +9,8 @@ pub use fault::{MechanismError, MechanismWarning};
 
 use crate::description::{JointKind, Limits, Mimic};
 use crate::dynamics::MotionBlock;
-use crate::inertia::Inertia;
-use crate::spatial::{Placement, Vec3};
+use dynid_algebra::inertia::Inertia;
+use dynid_algebra::spatial::{Placement, Vec3};
 
 /// Largest number of moving joints of one mechanism. Regressors grow with joints times depth; beyond this a file is
 /// more likely broken than a robot.

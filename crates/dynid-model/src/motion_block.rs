@@ -1,6 +1,6 @@
 //! Motion of a mechanism over a run of samples.
 
-use crate::scalar::function::sign;
+use dynid_algebra::scalar::sign;
 
 /// A run of consecutive samples of motion, channel after channel.
 ///

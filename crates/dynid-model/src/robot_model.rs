@@ -11,8 +11,8 @@ use crate::element::{ClearanceContact, ElasticTransmission, JetMotion, JointElem
 use crate::mechanism::Mechanism;
 use crate::parameter::{Parameter, ParameterTable};
 use crate::random_motion::RandomMotion;
-use crate::scalar::Jet;
 use crate::tree_model::{FrictionPassivity, KnownElement, TreeModel};
+use dynid_algebra::scalar::Jet;
 
 /// Rigid bodies and joint elements of a robot: a tree, or a tree whose loops are closed.
 ///

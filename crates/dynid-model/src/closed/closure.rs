@@ -1,6 +1,6 @@
 //! What closes a loop of a mechanism: joints that are cut, so that a tree remains.
 
-use crate::spatial::Placement;
+use dynid_algebra::spatial::Placement;
 
 /// A frame on a link, where a joint has been cut.
 #[derive(Clone, Debug, PartialEq)]

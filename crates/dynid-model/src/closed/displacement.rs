@@ -2,7 +2,7 @@
 
 use super::bend::float;
 use super::mechanism::ClosedMechanism;
-use crate::spatial::Vec3;
+use dynid_algebra::spatial::Vec3;
 
 impl ClosedMechanism {
     /// Moves positions by a displacement, one entry per rate, whether loops stay closed or not.
@@ -64,7 +64,7 @@ fn coefficients(a: f64) -> (f64, f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spatial::Mat3;
+    use dynid_algebra::spatial::Mat3;
 
     fn rotation(turn: Vec3<f64>) -> Mat3<f64> {
         Mat3::rotation(turn.scale(1.0 / turn.norm()), turn.norm())

@@ -7,7 +7,7 @@ use super::factor::Factor;
 use super::mechanism::ClosedMechanism;
 use super::pose::PoseWorkspace;
 use crate::dynamics::{Dynamics, DynamicsWorkspace, State};
-use crate::spatial::Vec3;
+use dynid_algebra::spatial::Vec3;
 
 /// Efforts of the drives and multipliers of the closures.
 #[derive(Clone, Debug, Default, PartialEq)]

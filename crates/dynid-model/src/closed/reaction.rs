@@ -6,7 +6,7 @@ use super::pose::PoseWorkspace;
 use super::sweep::World;
 use crate::dynamics::motion::{BodyMotion, placement, step};
 use crate::dynamics::regressor::{TensorRows, general_row};
-use crate::spatial::Vec3;
+use dynid_algebra::spatial::Vec3;
 
 /// A wrench on a body in terms of standard parameters and multipliers: `wrench = W φ - C λ`, force (N) then moment about
 /// the joint frame's origin (N m), axes of the joint frame.

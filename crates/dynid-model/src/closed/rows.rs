@@ -5,8 +5,8 @@ use super::error::ClosedError;
 use super::sweep::{World, WorldBody};
 use crate::dynamics::tree::Tree;
 use crate::mechanism::Mechanism;
-use crate::scalar::Scalar;
-use crate::spatial::{Mat3, Vec3};
+use dynid_algebra::scalar::Scalar;
+use dynid_algebra::spatial::{Mat3, Vec3};
 
 /// What one row demands.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 use super::mechanism::ClosedMechanism;
 use super::pose::PoseWorkspace;
 use super::sweep::World;
-use crate::scalar::Dual;
+use dynid_algebra::scalar::Dual;
 
 /// Directions per pass.
 const WIDTH: usize = 6;

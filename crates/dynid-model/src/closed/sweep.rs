@@ -2,8 +2,8 @@
 
 use crate::dynamics::motion::{Turns, placement};
 use crate::dynamics::tree::{Motion, Tree};
-use crate::scalar::Scalar;
-use crate::spatial::{Mat3, Vec3};
+use dynid_algebra::scalar::Scalar;
+use dynid_algebra::spatial::{Mat3, Vec3};
 
 /// A body in base axes; internal axes of its node are the columns of `rotation`.
 #[derive(Clone, Copy, Debug)]

@@ -8,7 +8,7 @@ use crate::closed::PoseWorkspace;
 use crate::dynamics::MotionBlock;
 use crate::dynamics::motion::BodyMotion;
 use crate::effort_model::{EffortModel, RegressorBlock, RegressorLayout};
-use crate::spatial::Vec3;
+use dynid_algebra::spatial::Vec3;
 
 /// A component of a force or couple that the mechanism carries inside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -14,8 +14,8 @@
 use super::motion::{BodyMotion, Turns, placement, step};
 use super::regressor::{TensorRows, own_axis};
 use super::tree::{Motion, Node, Tree};
-use crate::scalar::Scalar;
-use crate::spatial::{Mat3, Vec3};
+use dynid_algebra::scalar::Scalar;
+use dynid_algebra::spatial::{Mat3, Vec3};
 
 /// Adjoint of the motion of a body: derivative of the scalar with respect to each quantity.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,7 @@ use super::block::{load_all, load_gravity};
 use super::groups::{GroupTask, groups, run};
 use super::tree::Node;
 use super::{Dynamics, MotionBlock, Slots};
-use crate::scalar::{LANES, Scalar};
+use dynid_algebra::scalar::{LANES, Scalar};
 
 /// Derivatives of a scalar with respect to the motion of a block.
 ///

@@ -6,8 +6,8 @@
 
 use super::motion::{BodyMotion, Turns, gradient, placement, step};
 use super::tree::{Motion, Node, Tree};
-use crate::scalar::Scalar;
-use crate::spatial::{Mat3, Vec3};
+use dynid_algebra::scalar::Scalar;
+use dynid_algebra::spatial::{Mat3, Vec3};
 
 /// A pair of an angular and a linear vector.
 type Pair<S> = (Vec3<S>, Vec3<S>);

@@ -2,8 +2,8 @@
 
 use super::{Dynamics, State, inverse_dynamics, regressor};
 use crate::motion_block::MotionBlock;
-use crate::scalar::{LANES, LaneTask, Scalar, run_on_lanes};
-use crate::spatial::Vec3;
+use dynid_algebra::scalar::{LANES, LaneTask, Scalar, run_on_lanes};
+use dynid_algebra::spatial::Vec3;
 
 /// Where the entries of a regressor block go: slot `k` holds one entry of all samples.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! Kinetic and potential energy.
 
 use super::{Dynamics, DynamicsWorkspace, State};
-use crate::inertia::Inertia;
+use dynid_algebra::inertia::Inertia;
 
 /// Energies in J; the potential is zero at the base origin.
 #[derive(Clone, Copy, Debug, PartialEq)]

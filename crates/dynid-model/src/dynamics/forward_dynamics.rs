@@ -2,8 +2,8 @@
 
 use super::articulated_body::{self, ArticulatedWorkspace};
 use super::{Dynamics, DynamicsWorkspace, State, fuse_all};
-use crate::scalar::{FusedTask, Scalar, run_fused};
-use crate::spatial::Vec3;
+use dynid_algebra::scalar::{FusedTask, Scalar, run_fused};
+use dynid_algebra::spatial::Vec3;
 
 /// State of motion, and the efforts that act on it.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! Blocks of any length: lanes where there are enough samples, one after the other where not.
 
-use crate::scalar::{FusedTask, LANES, LaneTask, Lanes, Scalar, run_fused, run_on_lanes};
+use dynid_algebra::scalar::{FusedTask, LANES, LaneTask, Lanes, Scalar, run_fused, run_on_lanes};
 
 /// Work on groups of `width` consecutive samples, each group read as one number.
 pub(super) trait GroupTask {

@@ -2,8 +2,8 @@
 
 use super::motion::{BodyMotion, Turns, placement, step};
 use super::tree::{Motion, Tree};
-use crate::scalar::Scalar;
-use crate::spatial::{Mat3, Vec3};
+use dynid_algebra::scalar::Scalar;
+use dynid_algebra::spatial::{Mat3, Vec3};
 
 /// Reusable memory of the two sweeps.
 #[derive(Clone, Debug, Default)]

@@ -3,8 +3,8 @@
 use super::motion::{Turns, placement};
 use super::tree::Tree;
 use super::{Dynamics, DynamicsWorkspace};
-use crate::scalar::Scalar;
-use crate::spatial::{Mat3, Placement, Vec3};
+use dynid_algebra::scalar::Scalar;
+use dynid_algebra::spatial::{Mat3, Placement, Vec3};
 
 /// Reusable memory of forward kinematics.
 #[derive(Clone, Debug)]

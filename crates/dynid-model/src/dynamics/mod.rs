@@ -25,8 +25,8 @@ pub use forward_dynamics::{AddedInertia, ForwardDynamicsWorkspace, LoadedState, 
 pub use points::BodyPoint;
 
 use crate::mechanism::{Follow, Mechanism};
-use crate::scalar::{FusedTask, Scalar, run_fused};
-use crate::spatial::Vec3;
+use dynid_algebra::scalar::{FusedTask, Scalar, run_fused};
+use dynid_algebra::spatial::Vec3;
 use inverse_dynamics::InverseDynamicsWorkspace;
 use kinematics::KinematicsWorkspace;
 use regressor::RegressorWorkspace;

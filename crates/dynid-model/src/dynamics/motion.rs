@@ -1,8 +1,8 @@
 //! The outward recursion: rotations, velocities and accelerations of all bodies.
 
 use super::tree::{Motion, Node, Tree};
-use crate::scalar::Scalar;
-use crate::spatial::{Mat3, Vec3};
+use dynid_algebra::scalar::Scalar;
+use dynid_algebra::spatial::{Mat3, Vec3};
 
 /// Motion of a body in its own axes.
 #[derive(Clone, Copy, Debug)]

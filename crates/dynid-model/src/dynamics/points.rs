@@ -5,8 +5,8 @@ use super::groups::{GroupTask, groups, run};
 use super::kinematics::KinematicsWorkspace;
 use super::tree::Motion;
 use super::{Dynamics, DynamicsWorkspace, MotionBlock};
-use crate::scalar::Scalar;
-use crate::spatial::{Mat3, Vec3};
+use dynid_algebra::scalar::Scalar;
+use dynid_algebra::spatial::{Mat3, Vec3};
 
 /// A point that moves with a body.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,8 +5,8 @@
 
 use super::motion::{BodyMotion, Turns, placement, step};
 use super::tree::{Motion, Node, Tree};
-use crate::scalar::Scalar;
-use crate::spatial::Vec3;
+use dynid_algebra::scalar::Scalar;
+use dynid_algebra::spatial::Vec3;
 
 /// Reusable memory of the outward sweep.
 #[derive(Clone, Debug, Default)]

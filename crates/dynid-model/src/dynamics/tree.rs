@@ -5,7 +5,7 @@
 
 use crate::description::JointKind;
 use crate::mechanism::Mechanism;
-use crate::spatial::{Mat3, Vec3};
+use dynid_algebra::spatial::{Mat3, Vec3};
 
 /// How a body moves relative to its parent, in internal axes.
 #[derive(Clone, Copy, Debug, PartialEq)]

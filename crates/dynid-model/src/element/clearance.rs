@@ -1,9 +1,9 @@
 //! A journal in its bearing: contact and friction of a joint with clearance.
 
 use super::{ElementColumns, ElementWeights, JointElement, JointInfo};
-use crate::contact::{ContactLaw, SlidingFriction};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::{Owner, Parameter};
+use dynid_contact::{ContactLaw, SlidingFriction};
 
 /// Name of the signal that holds the normal speed at the start of the contact of a joint, m/s.
 pub fn impact_speed_signal(joint: &str) -> String {

@@ -4,7 +4,7 @@ use super::friction::EFFORT;
 use super::{ElementColumns, ElementWeights, JetMotion, JointElement, JointInfo};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::Parameter;
-use crate::scalar::{Jet, Scalar};
+use dynid_algebra::scalar::{Jet, Scalar};
 
 /// Linear spring `k (q - q₀) = k q - (k q₀)`, two columns `[q, -1]` for `k` and `k q₀`.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,7 @@
 use super::{ElementColumns, ElementWeights, JetMotion, JointElement, JointInfo};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::Parameter;
-use crate::scalar::Jet;
+use dynid_algebra::scalar::Jet;
 
 /// Name of the channel that holds the external load of a joint, N m or N.
 pub fn load_channel(joint: &str) -> String {

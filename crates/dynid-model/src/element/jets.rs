@@ -1,7 +1,7 @@
 //! Elements over signals that carry their time derivatives.
 
-use crate::scalar::function::SmoothSign;
-use crate::scalar::{Jet, Scalar};
+use dynid_algebra::scalar::SmoothSign;
+use dynid_algebra::scalar::{Jet, Scalar};
 
 /// Motion at one instant with time derivatives of every signal.
 #[derive(Clone, Copy, Debug)]

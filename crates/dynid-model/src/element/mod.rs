@@ -52,8 +52,8 @@ use crate::description::JointKind;
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::mechanism::Mechanism;
 use crate::parameter::{Owner, Parameter, ShapeParameter};
-use crate::scalar::Jet;
-pub use crate::scalar::function::sign;
+use dynid_algebra::scalar::Jet;
+pub use dynid_algebra::scalar::sign;
 
 /// An output as elements see it.
 #[derive(Debug, Clone, PartialEq)]

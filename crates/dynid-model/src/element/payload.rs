@@ -3,9 +3,9 @@
 use super::gated::{gate, payload_channel};
 use super::{ElementColumns, ElementWeights, JointElement, JointInfo};
 use crate::dynamics::{Dynamics, MotionAdjoint, MotionBlock, Slots};
-use crate::inertia::{Inertia, PARAMETER_NAMES, PARAMETER_UNITS};
 use crate::mechanism::{Mechanism, ancestor_rates};
 use crate::parameter::{Owner, Parameter};
+use dynid_algebra::inertia::{Inertia, PARAMETER_NAMES, PARAMETER_UNITS};
 
 /// A body of unknown inertia fixed to a link wherever the channel [`payload_channel`] is 1: the columns of that link's
 /// standard parameters once more, times the channel.

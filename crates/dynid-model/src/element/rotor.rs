@@ -3,7 +3,7 @@
 use super::{ElementColumns, ElementWeights, JetMotion, JointElement, JointInfo};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::Parameter;
-use crate::scalar::Jet;
+use dynid_algebra::scalar::Jet;
 
 /// Reflected rotor inertia `I_a q̈` on its own joint, `I_a = n² J` (gyroscopic coupling neglected), one column.
 ///

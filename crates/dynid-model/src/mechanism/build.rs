@@ -7,8 +7,8 @@ use super::{
     ROOT_JOINT,
 };
 use crate::description::{Description, JointDescription, JointKind, Limits};
-use crate::inertia::Inertia;
-use crate::spatial::{Placement, Vec3};
+use dynid_algebra::inertia::Inertia;
+use dynid_algebra::spatial::{Placement, Vec3};
 
 impl Description {
     /// Holds joints at fixed positions (rad or m): they become fixed joints and their links are merged.

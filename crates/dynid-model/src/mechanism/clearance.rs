@@ -3,7 +3,7 @@
 use super::MechanismError;
 use super::build::unit_axis;
 use crate::description::{Description, JointDescription, JointKind, Limits, LinkDescription};
-use crate::spatial::{Placement, Vec3};
+use dynid_algebra::spatial::{Placement, Vec3};
 
 /// Names of the translations that a joint with clearance has besides its rotation.
 pub fn translation_names(joint: &str) -> [String; 2] {

@@ -3,7 +3,7 @@
 use super::{PlacedElement, TreeModel};
 use crate::effort_model::EffortModel;
 use crate::element::{ElasticTransmission, JetMotion};
-use crate::scalar::Jet;
+use dynid_algebra::scalar::Jet;
 
 impl TreeModel {
     fn elastic_elements(&self) -> impl Iterator<Item = &ElasticTransmission> {

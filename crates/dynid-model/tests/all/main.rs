@@ -3,7 +3,6 @@
 mod adjoint;
 mod clearance;
 mod closed;
-mod contact;
 mod elastic;
 mod forward_dynamics;
 mod friction;

@@ -5,8 +5,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::description::{Description, JointDescription, JointKind, Limits, LinkDescription};
-use crate::scalar::Jet;
-use crate::spatial::Placement;
+use dynid_algebra::scalar::Jet;
+use dynid_algebra::spatial::Placement;
 
 fn numbers<const N: usize>(rng: &mut impl Rng) -> [f64; N] {
     std::array::from_fn(|_| rng.random_range(-1.0..=1.0))

@@ -1,6 +1,6 @@
 //! The spring of a harmonic drive.
 
-use crate::scalar::Jet;
+use dynid_algebra::scalar::Jet;
 
 /// Spring with torque `T = k1 Δ + k2 Δ³` over the deformation `Δ` (rad, N m; or m, N).
 ///

@@ -8,8 +8,8 @@ use crate::element::{
     ElementColumns, ElementWeights, JointElement, JointInfo, ShapeSetting, ShapeTerm, sign,
 };
 use crate::parameter::{Parameter, ShapeParameter};
-use crate::scalar::curve::{Curve, map_curve, map_decay};
-use crate::scalar::{Cross, Dual, Scalar};
+use dynid_algebra::scalar::{Cross, Dual, Scalar};
+use dynid_algebra::scalar::{Curve, map_curve, map_decay};
 
 /// Bristles with deflection `z`, `ż = v - σ0 |v| z / g(v)` with `g = F_c + (F_s - F_c) E`, `E = exp(-|v/v_s|^δ)`, and effort
 /// `σ0 z + σ1 ż` (Canudas de Wit, Olsson, Åström & Lischinsky 1995), in a form that is linear in `F_c` and `σ1`: with

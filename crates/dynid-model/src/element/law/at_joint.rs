@@ -8,7 +8,7 @@ use crate::element::{
     temperature_of,
 };
 use crate::parameter::{Parameter, ShapeParameter};
-use crate::scalar::{Cross, Dual, FusedTask, Jet, Scalar, run_fused};
+use dynid_algebra::scalar::{Cross, Dual, FusedTask, Jet, Scalar, run_fused};
 
 /// A [`VelocityLaw`] at a rate, with start, bounds or value of each of its shape parameters.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,8 +9,8 @@ pub use terms::{LinearTerm, ShapeScale, ShapeTerm, units};
 
 use std::fmt::Debug;
 
-use crate::scalar::Scalar;
-use crate::scalar::function::SmoothSign;
+use dynid_algebra::scalar::Scalar;
+use dynid_algebra::scalar::SmoothSign;
 
 /// The velocity of a joint, as a law reads it.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 //! Arctangent friction.
 
 use crate::element::{LinearTerm, ShapeTerm, Velocity, VelocityLaw};
-use crate::scalar::Scalar;
+use dynid_algebra::scalar::Scalar;
 
 /// Friction `F_a atan(f_b v)`: `fa`; shape `fb` (s/rad, s/m), 1 .. 100 over the largest speed.
 ///

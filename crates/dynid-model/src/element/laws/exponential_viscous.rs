@@ -2,7 +2,7 @@
 
 use crate::element::law::units::{NUMBER, PER_SPEED};
 use crate::element::{LinearTerm, ShapeTerm, Velocity, VelocityLaw};
-use crate::scalar::Scalar;
+use dynid_algebra::scalar::Scalar;
 
 const EFFORT_PER_KELVIN: [&str; 2] = ["N m/K", "N/K"];
 const PER_SPEED_PER_KELVIN: [&str; 2] = ["s/(rad K)", "s/(m K)"];

@@ -1,7 +1,7 @@
 //! Friction that is linear in its parameters, and the constant offset.
 
 use crate::element::{LinearTerm, ShapeTerm, Velocity, VelocityLaw};
-use crate::scalar::Scalar;
+use dynid_algebra::scalar::Scalar;
 
 /// Coulomb friction `F_c s(v)`: `fc`.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

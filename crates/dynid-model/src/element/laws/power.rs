@@ -2,7 +2,7 @@
 
 use crate::element::law::units::NUMBER;
 use crate::element::{LinearTerm, ShapeTerm, Velocity, VelocityLaw};
-use crate::scalar::Scalar;
+use dynid_algebra::scalar::Scalar;
 
 const COEFFICIENT: [&str; 2] = ["N m (s/rad)^p", "N (s/m)^p"];
 

@@ -2,7 +2,7 @@
 
 use crate::element::law::units::{PER_SPEED, SPEED};
 use crate::element::{LinearTerm, ShapeTerm, Velocity, VelocityLaw};
-use crate::scalar::Scalar;
+use dynid_algebra::scalar::Scalar;
 
 /// Friction `F_g [S(φ₂ (v + φ₃)) - S(φ₂ φ₃)]` with `S(x) = 1/(1 + e^-x)`, zero at rest: `fg`; shape `phi2` (s/rad, s/m),
 /// 1 .. 1000, and `phi3` (rad/s, m/s), ±0.1.

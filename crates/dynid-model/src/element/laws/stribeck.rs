@@ -2,7 +2,7 @@
 
 use crate::element::law::units::NUMBER;
 use crate::element::{LinearTerm, ShapeTerm, Velocity, VelocityLaw};
-use crate::scalar::Scalar;
+use dynid_algebra::scalar::Scalar;
 
 /// `E = exp(-|v/v_s|^δ)`: 1 at rest, 0 far above `v_s`.
 #[inline(always)]

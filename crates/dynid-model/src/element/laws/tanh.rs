@@ -1,7 +1,7 @@
 //! Coulomb friction with a smooth passage through rest.
 
 use crate::element::{LinearTerm, ShapeTerm, Velocity, VelocityLaw};
-use crate::scalar::Scalar;
+use dynid_algebra::scalar::Scalar;
 
 /// Friction `F_t tanh(v/w)`: `ft`; shape `w` (rad/s, m/s), 0.001 .. 0.3 of the largest speed.
 ///
