@@ -14,6 +14,8 @@
 //! | whether residuals are white | [`whiteness`] |
 //! | standard parameters of bodies that can exist, with a proven gap | [`consistent`] |
 //! | which parameters the data determine, and which the prior | [`identifiability`] |
+//! | what is known of a model without logs | [`prior`] |
+//! | the motions that would reveal what logs do not | [`advice`] |
 //! | estimates while the machine runs, alarms on changes | [`online`] |
 //! | misfit of an effort model as what a search minimises | [`effort_objective`] |
 //! | how well a prediction matches a measurement | [`metrics`] |
@@ -21,6 +23,7 @@
 //! Notation: `W` is the regressor (rows × `p` columns), `y` the effort, `x` the parameters,
 //! `(R, z, ρ, N)` a factor. Results do not depend on the number of threads.
 
+pub mod advice;
 pub mod consistent;
 pub mod covariance;
 pub mod distribution;
@@ -37,6 +40,7 @@ pub mod log_deviations;
 pub mod metrics;
 mod oblique;
 pub mod online;
+pub mod prior;
 pub mod separable;
 mod whitened;
 pub mod whiteness;

@@ -19,7 +19,6 @@
 #[macro_use]
 mod names;
 
-pub mod advice;
 pub mod agreement;
 pub mod bounds;
 pub mod caution;
@@ -49,7 +48,6 @@ pub mod passivity;
 mod per_joint;
 pub mod pipeline;
 pub mod preflight;
-pub mod prior;
 mod problem;
 pub mod reduction;
 mod reduction_error;
@@ -64,6 +62,7 @@ mod training_log;
 pub mod trust;
 pub mod verdict;
 
+pub use dynid_estimate::{advice, prior};
 pub use error::{Error, Fault};
 pub use estimate::Estimate;
 pub use identification::Identification;

@@ -7,7 +7,7 @@ mod scalars;
 
 pub use bodies::{BodyPrior, Origin};
 pub use payload::{PAYLOAD_SIZE, PayloadPrior};
-pub(crate) use scalars::{speed_limit, typical_channels};
+pub use scalars::{speed_limit, typical_channels};
 
 use dynid_model::{EffortModel, Mechanism, RobotModel};
 use thiserror::Error;

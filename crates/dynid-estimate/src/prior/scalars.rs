@@ -29,13 +29,13 @@ const SPEEDS: [f64; 6] = [1.0, 0.25, 0.0625, 0.015625, 0.00390625, 1e-9];
 
 /// Channels that a model reads for motions without a log: currents of one ampere, the temperature of a warm joint, 35 °C,
 /// every payload and every log's own terms.
-pub(crate) fn typical_channels(model: &RobotModel, samples: usize) -> Vec<(String, Vec<f64>)> {
+pub fn typical_channels(model: &RobotModel, samples: usize) -> Vec<(String, Vec<f64>)> {
     let value = |name: &str| if is_temperature(name) { 35.0 } else { 1.0 };
     model.channels().iter().map(|name| (name.clone(), vec![value(name); samples])).collect()
 }
 
 /// Speed limit of a joint for priors and motions: as stated, at most 4π rad/s (2 m/s); 2 rad/s (0.5 m/s) by default.
-pub(crate) fn speed_limit(slides: bool, stated: Option<f64>) -> f64 {
+pub fn speed_limit(slides: bool, stated: Option<f64>) -> f64 {
     let (default, most) = if slides { (0.5, 2.0) } else { (2.0, 4.0 * std::f64::consts::PI) };
     stated.filter(|v| v.is_finite() && *v > 0.0).map_or(default, |v| v.min(most))
 }

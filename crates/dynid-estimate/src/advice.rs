@@ -9,7 +9,7 @@ mod rows;
 pub use motions::{Motion, MotionKind, MotionSettings};
 pub use rows::FitRows;
 
-use dynid_estimate::identifiability::{Identifiability, Verdict, VisibleSpace};
+use crate::identifiability::{Identifiability, Verdict, VisibleSpace};
 use dynid_factor::Factor;
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
 use rayon::prelude::*;
