@@ -5,6 +5,7 @@ use std::ops::Deref;
 use crate::Error;
 use crate::config::Config;
 use crate::estimate::{Estimate, ExportedRecord, InputRecord, Provenance, ReadingRecord};
+use crate::export::{CheckStates, Exported, Identified, RobotExport, Source};
 use crate::pipeline::Identification;
 use crate::report_data::report as report_page;
 
@@ -53,5 +54,39 @@ impl Run {
             },
             ..estimate
         }
+    }
+
+    /// The identified robot alone, for [`RobotExport`](RobotExport) and [`json`](crate::export::json()).
+    pub fn identified(&self) -> Identified<'_> {
+        Identified::of(&self.identification)
+    }
+
+    /// URDF of the robot with identified inertias and friction, checked on the training logs; links that no body could
+    /// be are written as they are and named in the notes.
+    ///
+    /// # Errors
+    /// Fails as [`Source::read`], [`RobotExport::new`] and [`RobotExport::urdf`] do.
+    pub fn urdf(&self) -> Result<Exported, Error> {
+        let source = Source::read(&self.robot.path)?;
+        let export =
+            RobotExport::new(self.identified(), &source)?.with_projections(&self.exported.projections);
+        let states = CheckStates::logs(&self.logs, self.state_hz, &self.conditioning_settings)?;
+        let mut exported = export.urdf(&states)?;
+        exported.notes.extend(
+            export
+                .faults()
+                .iter()
+                .map(|f| format!("link `{}` {}: simulators refuse such a robot", f.link, f.fault)),
+        );
+        Ok(exported)
+    }
+
+    /// The loops beside the URDF of a mechanism that has some, as [`RobotExport::loops`].
+    ///
+    /// # Errors
+    /// Fails as [`Source::read`] and [`RobotExport::new`] do.
+    pub fn loops(&self, urdf: &str) -> Result<Option<String>, Error> {
+        let source = Source::read(&self.robot.path)?;
+        Ok(RobotExport::new(self.identified(), &source)?.loops(urdf))
     }
 }

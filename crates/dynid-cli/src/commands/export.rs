@@ -247,5 +247,5 @@ fn states(
     apply_log_args(&mut columns, &args.columns);
     let logs: Vec<LogConfig> =
         args.log.iter().map(|path| LogConfig { rows: args.rows, ..plain(path) }).collect();
-    Ok(CheckStates::read(model, estimate.model.state_hz, &logs, &columns, motor_side.as_ref())?)
+    Ok(dynid::export::read_states(model, estimate.model.state_hz, &logs, &columns, motor_side.as_ref())?)
 }

@@ -349,13 +349,14 @@ impl Recipe {
         if !numbers
             || !per_output
             || scales_hz.is_empty()
-            || !(delay_samples.abs() <= 1e6)
+            || !delay_samples.is_finite()
+            || delay_samples.abs() > 1e6
             || rung.iter().any(|r| *r > ladder)
         {
             return contradiction("choices that no conditioning makes");
         }
         let Blocks { most, merged, wanted_s } = self.blocks;
-        if most == 0 || merged == 0 || !(wanted_s >= 0.0) {
+        if most == 0 || merged == 0 || !wanted_s.is_finite() || wanted_s < 0.0 {
             return contradiction("time blocks of no length");
         }
         Ok(())

@@ -7,13 +7,13 @@ use dynid_model::{Description, Inertia, JointDescription, JointKind, Mechanism, 
 use super::error::LinkFault;
 
 /// Inertias of links, and what is to be said about them.
-pub(super) struct Shares {
+pub(crate) struct Shares {
     /// Links whose inertia changes.
-    pub(super) links: Vec<(String, Inertia)>,
+    pub(crate) links: Vec<(String, Inertia)>,
     /// Links that no body could be.
-    pub(super) faults: Vec<LinkFault>,
+    pub(crate) faults: Vec<LinkFault>,
     /// In words.
-    pub(super) notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
 }
 
 /// Shares every identified body out to the links that it is made of.
@@ -24,7 +24,7 @@ pub(super) struct Shares {
 /// Links on fixed joints keep the inertia of the robot file and the moving link gets the rest, if that is a possible
 /// body. Else the moving link carries everything and they state no mass; links behind held joints keep theirs all the
 /// same, since the exported robot moves them.
-pub(super) fn share(
+pub(crate) fn share(
     mechanism: &Mechanism,
     description: &Description,
     held: &[(String, f64)],
@@ -104,7 +104,7 @@ fn minus(a: &Inertia, b: &Inertia) -> Inertia {
 }
 
 /// Position at which a joint of the robot file has been held: its motion from the file's placement to the recorded one.
-pub(super) fn held_position(joint: &JointDescription, recorded: &JointDescription) -> f64 {
+pub(crate) fn held_position(joint: &JointDescription, recorded: &JointDescription) -> f64 {
     let motion = joint.placement.inverse().then(&recorded.placement);
     let norm = Vec3(joint.axis).norm();
     let axis = Vec3(joint.axis).scale(1.0 / norm);

@@ -1,8 +1,8 @@
 //! Friction in the two terms that robot files have: least squares over the states of a log.
 
-pub use crate::estimate::FrictionProjection;
 use dynid_estimate::linear::ols;
 use dynid_factor::factor::{Factor, FactorBuilder};
+pub use dynid_identify::estimate::FrictionProjection;
 use dynid_model::element::sign;
 use dynid_model::{EffortModel, RegressorBlock, RobotModel};
 
@@ -39,7 +39,7 @@ fn needs_projection(model: &RobotModel, values: &[f64], known: bool, output: usi
 }
 
 /// The projections of all joints whose friction needs one. `known`: whether a joint has known friction.
-pub(super) fn project(
+pub(crate) fn project(
     model: &RobotModel,
     values: &[f64],
     known: impl Fn(&str) -> bool,
@@ -134,7 +134,7 @@ fn least_squares(factor: &Factor, coupled: bool) -> [f64; 3] {
 }
 
 /// Whether recorded projections are those of a model: same joints, same parameters.
-pub(super) fn fits(
+pub(crate) fn fits(
     recorded: &[FrictionProjection],
     model: &RobotModel,
     values: &[f64],

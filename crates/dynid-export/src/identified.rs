@@ -5,11 +5,10 @@ use std::path::{Path, PathBuf};
 use dynid_io::RobotFile;
 use dynid_model::{Description, Inertia, RobotModel};
 
-use crate::Error;
-use crate::estimate::{Estimate, Split};
-use crate::known_friction::KnownFriction;
-use crate::pipeline::Identification;
-use crate::run::Run;
+use dynid_identify::Error;
+use dynid_identify::estimate::{Estimate, Split};
+use dynid_identify::known_friction::KnownFriction;
+use dynid_identify::pipeline::Identification;
 
 /// A robot with identified parameters, whatever they come from.
 #[derive(Debug, Clone, Copy)]
@@ -74,10 +73,10 @@ impl IdentifiedRobot {
 /// A robot file that identified parameters go into.
 #[derive(Debug, Clone)]
 pub struct Source {
-    pub(super) path: PathBuf,
-    pub(super) file: RobotFile,
+    pub(crate) path: PathBuf,
+    pub(crate) file: RobotFile,
     /// Text of the URDF that holds the tree, if one does.
-    pub(super) urdf: Option<String>,
+    pub(crate) urdf: Option<String>,
 }
 
 impl Source {
@@ -110,14 +109,7 @@ impl<'a> Identified<'a> {
     }
 }
 
-impl Run {
-    /// The identified robot alone, for [`RobotExport`](super::RobotExport) and [`json`](super::json()).
-    pub fn identified(&self) -> Identified<'_> {
-        Identified::of(&self.identification)
-    }
-}
-
 /// Inertias of the bodies at the head of a parameter vector.
-pub(super) fn inertias(values: &[f64]) -> impl Iterator<Item = Inertia> {
+pub(crate) fn inertias(values: &[f64]) -> impl Iterator<Item = Inertia> {
     values.chunks_exact(10).map(|ten| Inertia(std::array::from_fn(|k| ten[k])))
 }

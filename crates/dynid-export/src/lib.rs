@@ -11,7 +11,7 @@
 //! | gravity | no place | `<option gravity>` |
 //!
 //! What is left out is named in [`Exported::notes`]; what that costs is judged on the logs of the identification
-//! ([`ExportedRecord`](crate::estimate::ExportedRecord)). A rotor is not folded into its link: that would turn with the link and
+//! ([`ExportedRecord`](dynid_identify::estimate::ExportedRecord)). A rotor is not folded into its link: that would turn with the link and
 //! add to the efforts of other joints, and would count twice once the simulator is given an armature. The JSON holds everything: all parameters, shape parameters, and what
 //! friction of the load refers to.
 //!
@@ -40,8 +40,7 @@ use dynid_io::urdf::{self, JointDynamics};
 use dynid_model::mechanism::ROOT_JOINT;
 use dynid_model::{Description, EffortModel, Inertia, JointKind};
 
-use crate::Error;
-use crate::run::Run;
+use dynid_identify::Error;
 
 /// Largest difference that passes: text, centres of mass and frames cost a few digits of sixteen, an error far more.
 pub const READ_BACK_LIMIT: f64 = 1e-9;
@@ -52,10 +51,10 @@ use identified::inertias;
 pub use identified::{Identified, IdentifiedRobot, Source};
 use joints::{Format, JointValues};
 pub use json::{ElasticJson, JointJson, LinkJson, OtherJson, ROBOT_JSON_SCHEMA, RobotJson, json};
-pub(crate) use judged::exported;
+pub use judged::exported;
 pub use projection::FrictionProjection;
 pub use read_back::CheckStates;
-pub(crate) use read_back::with_slipping_bristles;
+pub use read_back::with_slipping_bristles;
 
 /// Text that is ready to be written.
 #[derive(Debug, Clone, PartialEq)]
@@ -302,7 +301,7 @@ impl<'a> RobotExport<'a> {
 }
 
 /// Joints of a robot file that were held for the identification, and where; `Err` names a joint that is not the same.
-pub(crate) fn held_joints(file: &Description, recorded: &Description) -> Result<Vec<(String, f64)>, String> {
+pub fn held_joints(file: &Description, recorded: &Description) -> Result<Vec<(String, f64)>, String> {
     let mut held = Vec::new();
     for joint in file.joints.iter().filter(|j| j.kind != JointKind::Fixed) {
         match recorded.joints.iter().find(|j| j.name == joint.name) {
@@ -314,35 +313,4 @@ pub(crate) fn held_joints(file: &Description, recorded: &Description) -> Result<
         }
     }
     Ok(held)
-}
-
-impl Run {
-    /// URDF of the robot with identified inertias and friction, checked on the training logs; links that no body could
-    /// be are written as they are and named in the notes.
-    ///
-    /// # Errors
-    /// Fails as [`Source::read`], [`RobotExport::new`] and [`RobotExport::urdf`] do.
-    pub fn urdf(&self) -> Result<Exported, Error> {
-        let source = Source::read(&self.robot.path)?;
-        let export =
-            RobotExport::new(self.identified(), &source)?.with_projections(&self.exported.projections);
-        let states = CheckStates::logs(&self.logs, self.state_hz, &self.conditioning_settings)?;
-        let mut exported = export.urdf(&states)?;
-        exported.notes.extend(
-            export
-                .faults()
-                .iter()
-                .map(|f| format!("link `{}` {}: simulators refuse such a robot", f.link, f.fault)),
-        );
-        Ok(exported)
-    }
-
-    /// The loops beside the URDF of a mechanism that has some, as [`RobotExport::loops`].
-    ///
-    /// # Errors
-    /// Fails as [`Source::read`] and [`RobotExport::new`] do.
-    pub fn loops(&self, urdf: &str) -> Result<Option<String>, Error> {
-        let source = Source::read(&self.robot.path)?;
-        Ok(RobotExport::new(self.identified(), &source)?.loops(urdf))
-    }
 }

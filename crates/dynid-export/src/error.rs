@@ -3,7 +3,7 @@
 use thiserror::Error as ThisError;
 
 use super::READ_BACK_LIMIT;
-use crate::{Error, Fault};
+use dynid_identify::{Error, Fault};
 
 /// A link that no body could be, and why.
 #[derive(Debug, Clone, PartialEq)]

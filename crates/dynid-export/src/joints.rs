@@ -8,13 +8,13 @@ use super::projection::FrictionProjection;
 
 /// A file format.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Format {
+pub(crate) enum Format {
     Urdf,
     Mjcf,
 }
 
 impl Format {
-    pub(super) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Format::Urdf => "URDF",
             Format::Mjcf => "MJCF",
@@ -23,11 +23,11 @@ impl Format {
 }
 
 /// What a format states about the joints.
-pub(super) struct JointValues {
+pub(crate) struct JointValues {
     /// Per joint that has friction or a rotor that the format has a place for.
-    pub(super) joints: Vec<JointParameters>,
+    pub(crate) joints: Vec<JointParameters>,
     /// In words.
-    pub(super) notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
 }
 
 /// What a format states of a model's joints.
@@ -35,7 +35,7 @@ pub(super) struct JointValues {
 /// `fc`, `fv` become friction and damping, of asymmetric friction the means of both directions; friction of other forms is
 /// stated as its projection (`projected`). `Ia` is armature in MJCF and has no place in URDF. Negative values, which simulators
 /// refuse, are stated as 0.
-pub(super) fn split(
+pub(crate) fn split(
     identified: &Identified<'_>,
     format: Format,
     projected: &[FrictionProjection],

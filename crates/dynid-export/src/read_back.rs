@@ -1,6 +1,5 @@
 //! Whether a written robot gives the identified effort.
 
-use dynid_io::MappingSpec;
 use dynid_io::mjcf::JointParameters;
 use dynid_model::closed::ClosedMechanism;
 use dynid_model::element::{Coulomb, JointElement, LuGre, RotorInertia, Viscous, sign};
@@ -13,8 +12,7 @@ use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, States};
 
 use super::READ_BACK_LIMIT;
 use super::error::ExportError;
-use crate::Error;
-use crate::config::{LogConfig, MotorSide};
+use dynid_identify::Error;
 
 /// Random states of a check without logs.
 const STATES: usize = 1000;
@@ -47,7 +45,7 @@ impl CheckStates {
     }
 
     /// Random states as those of [`CheckStates::random`] for two models of one robot, with what either of them reads beside the motion.
-    pub(crate) fn random_of_both(a: &RobotModel, b: &RobotModel) -> Self {
+    pub fn random_of_both(a: &RobotModel, b: &RobotModel) -> Self {
         let others = b.channels().iter().filter(|name| !a.channels().contains(name));
         let channels: Vec<String> = a.channels().iter().chain(others).cloned().collect();
         CheckStates(Kind::Random(match a.closed() {
@@ -66,25 +64,6 @@ impl CheckStates {
         Ok(CheckStates(Kind::Logs(states.collect::<Result<_, Error>>()?)))
     }
 
-    /// States of log files, at the state cut-off of an estimate.
-    ///
-    /// # Errors
-    /// Fails as [`validate`](crate::validate::validate()) does.
-    pub fn read(
-        model: &RobotModel,
-        state_hz: f64,
-        logs: &[LogConfig],
-        columns: &MappingSpec,
-        motor_side: Option<&MotorSide>,
-    ) -> Result<Self, Error> {
-        let settings = ConditioningSettings::default();
-        let prepared = logs.iter().map(|log| {
-            let loaded = crate::logs::load(log, &crate::log::axes(model), columns, motor_side)?;
-            loaded.prepare(model, &settings)
-        });
-        Self::logs(&prepared.collect::<Result<Vec<_>, Error>>()?, state_hz, &settings)
-    }
-
     /// The states in words.
     pub fn describe(&self) -> String {
         match &self.0 {
@@ -98,11 +77,12 @@ impl CheckStates {
     }
 
     /// Samples that a block may have.
-    pub(super) fn room(&self) -> usize {
+    pub(crate) fn room(&self) -> usize {
         if matches!(self.0, Kind::Random(_)) { STATES } else { BLOCK }
     }
 
-    pub(crate) fn for_each_block(&self, mut work: impl FnMut(&MotionBlock<'_>)) {
+    /// Hands over all states, block by block.
+    pub fn for_each_block(&self, mut work: impl FnMut(&MotionBlock<'_>)) {
         match &self.0 {
             Kind::Random(motion) => motion.with_block(work),
             Kind::Logs(logs) => {
@@ -125,7 +105,7 @@ fn starts(samples: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
 /// A model of what was read back, its joints in the order of another model, with the values that the file states.
 ///
 /// `held`: joints of the file that the other model holds still. `Err` says why the two are different robots.
-pub(super) fn compile(
+pub(crate) fn compile(
     mut description: Description,
     joints: &[JointParameters],
     held: &[(String, f64)],
@@ -155,7 +135,7 @@ pub(super) fn compile(
 ///
 /// `values`: ten inertial parameters per body. Returned with the values of the joints behind them. `Err` says which loop
 /// cannot be closed.
-pub(super) fn with_joints(
+pub(crate) fn with_joints(
     mechanism: Mechanism,
     mut values: Vec<f64>,
     joints: &[JointParameters],
@@ -183,7 +163,7 @@ pub(super) fn with_joints(
 
 /// Largest difference of effort, without that of known elements, between two models of the same coordinates, each with shape and linear parameters, joint by joint relative to the largest effort
 /// of the joint (of all joints, times 1e-6, if that is more: a joint may need no effort at all).
-pub(super) fn largest_difference(
+pub(crate) fn largest_difference(
     (a, a_shape, a_values): (&RobotModel, &[f64], &[f64]),
     (b, b_shape, b_values): (&RobotModel, &[f64], &[f64]),
     states: &CheckStates,
@@ -216,7 +196,7 @@ pub(super) fn largest_difference(
 }
 
 /// The motion for elements that remember, bristles slipping as Coulomb friction does: what files have a place for.
-pub(crate) fn with_slipping_bristles(
+pub fn with_slipping_bristles(
     model: &RobotModel,
     motion: &MotionBlock<'_>,
     work: impl FnOnce(&MotionBlock<'_>),
@@ -244,7 +224,7 @@ pub(crate) fn with_slipping_bristles(
 }
 
 /// Accepts a difference or says what is wrong.
-pub(super) fn judge(format: &'static str, difference: f64) -> Result<f64, ExportError> {
+pub(crate) fn judge(format: &'static str, difference: f64) -> Result<f64, ExportError> {
     if difference <= READ_BACK_LIMIT {
         Ok(difference)
     } else {

@@ -9,16 +9,16 @@ use rayon::prelude::*;
 
 use super::joints::{self, Format};
 use super::{CheckStates, FrictionProjection, Identified, projection, read_back};
-use crate::Error;
-use crate::agreement::Agreement;
-use crate::estimate::{ExportedJoint, ExportedLog, ExportedRecord, FileFit};
-use crate::pipeline::Identification;
+use dynid_identify::Error;
+use dynid_identify::agreement::Agreement;
+use dynid_identify::estimate::{ExportedJoint, ExportedLog, ExportedRecord, FileFit};
+use dynid_identify::pipeline::Identification;
 
 /// What robot files of an identification state and lose, on its training and validation logs.
 ///
 /// # Errors
-/// Fails as [`crate::agreement::compare`] does.
-pub(crate) fn exported(id: &Identification) -> Result<ExportedRecord, Error> {
+/// Fails as [`dynid_identify::agreement::compare`] does.
+pub fn exported(id: &Identification) -> Result<ExportedRecord, Error> {
     let (files, projections) = FileModels::of(id)?;
     let judged = |logs: &[PreparedLog], agreements: &[Agreement]| {
         let pairs = logs.iter().zip(agreements);
@@ -71,7 +71,7 @@ impl FileModels {
     /// Figures on a log; `agreement` is that of the identified model.
     ///
     /// # Errors
-    /// Fails as [`crate::agreement::compare`] does.
+    /// Fails as [`dynid_identify::agreement::compare`] does.
     fn judge(
         &self,
         id: &Identification,

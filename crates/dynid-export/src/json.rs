@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use super::identified::inertias;
 use super::read_back::{CheckStates, judge, largest_difference};
 use super::{Exported, Identified};
-use crate::Error;
-use crate::known_friction::KnownFriction;
+use dynid_identify::Error;
+use dynid_identify::known_friction::KnownFriction;
 
 /// Version of the layout of [`RobotJson`]: keys are added but never renamed.
 pub const ROBOT_JSON_SCHEMA: u32 = 1;
