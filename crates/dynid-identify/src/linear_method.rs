@@ -5,7 +5,7 @@ use dynid_estimate::linear::{LinearMethod, TlsNoise};
 use dynid_model::{BaseParameters, EffortModel, RobotModel};
 
 use crate::prior::Prior;
-use crate::settings::{EstimatorConfig, Method};
+use crate::settings::{Method, Settings};
 use crate::{Error, bounds};
 
 /// The linear estimator that a run asks for.
@@ -13,12 +13,16 @@ use crate::{Error, bounds};
 /// # Errors
 /// [`Error::UnknownParameter`], [`Error::Setting`].
 pub(crate) fn method(
-    config: &EstimatorConfig,
+    settings: &Settings,
     model: &RobotModel,
     base: &BaseParameters,
     prior: &Prior,
     space: &VisibleSpace,
 ) -> Result<LinearMethod, Error> {
+    if let Some(own) = &settings.own_estimator {
+        return Ok(LinearMethod::Own(own.clone()));
+    }
+    let config = &settings.estimator;
     Ok(match config.method {
         Method::Ols => LinearMethod::Ols,
         // Instruments start from weighted least squares.

@@ -71,7 +71,7 @@ impl Structure {
         let prior = prior::of(model, stated, effort_sizes, &robot.path.display().to_string())?;
         let regrouping = advice::regrouping(&base);
         let space = VisibleSpace::new(&regrouping, &prior.std);
-        let method = linear_method::method(&settings.estimator, model, &base, &prior, &space)?;
+        let method = linear_method::method(settings, model, &base, &prior, &space)?;
         let (stated, effort_sizes) = (stated.to_vec(), effort_sizes.to_vec());
         Ok(Structure { base, shape, stated, effort_sizes, prior, regrouping, space, bounds, method })
     }

@@ -10,7 +10,7 @@ mod trust;
 use std::ops::Deref;
 use std::sync::Arc;
 
-use dynid_estimate::linear::LinearMethod;
+use dynid_estimate::linear::{LinearMethod, OwnEstimator};
 use dynid_report as report;
 use dynid_report::{Fact, Status, Value};
 
@@ -73,6 +73,7 @@ impl Shown<'_> {
     fn report_data(&self, estimate: &Estimate) -> Result<report::ReportData, Error> {
         use dynid_model::EffortModel;
         let mechanism = self.model.mechanism();
+        let own = self.settings.own_estimator.as_ref().map(OwnEstimator::name);
         Ok(report::ReportData {
             title: format!("Identification of {}", estimate.robot),
             verdict: verdict(estimate),
@@ -112,7 +113,7 @@ impl Shown<'_> {
             estimation: vec![
                 Fact::new(
                     "estimator",
-                    match self.settings.estimator.method {
+                    own.unwrap_or(match self.settings.estimator.method {
                         Method::Ols => "ordinary least squares",
                         Method::Wls => "weighted least squares, residual variances found along the way",
                         Method::Huber => "Huber's loss, scales found along the way",
@@ -123,7 +124,7 @@ impl Shown<'_> {
                             "instrumental variables from simulations, residual variances found along the way"
                         }
                         Method::Iv => "weighted least squares, since no instruments came about",
-                    },
+                    }),
                     "",
                 ),
                 Fact::new("passes", self.fit().passes, ""),

@@ -75,6 +75,25 @@ pub fn jackknife_by(
     })
 }
 
+/// Jackknife of an estimator that takes more than one merged factor: solved again without each block, of which `blocks` tells the places.
+///
+/// `without`: the estimate without a block, `None` where there is none: such a block counts as indispensable and as no change, so the
+/// covariance understates.
+pub(crate) fn jackknife_of<T: Copy + Sync>(
+    blocks: &[T],
+    x: &[f64],
+    without: impl Fn(T) -> Option<Vec<f64>> + Sync,
+) -> Option<Jackknife> {
+    if blocks.len() < 2 {
+        return None;
+    }
+    let change = |block: &T| match without(*block) {
+        Some(without) => (without.iter().zip(x).map(|(w, x)| w - x).collect(), false),
+        None => (vec![0.0; x.len()], true),
+    };
+    Some(of_changes(blocks.par_iter().map(change).collect(), x.len()))
+}
+
 fn leave_out(
     blocks: &[Factor],
     fixed: Option<&Factor>,
@@ -90,12 +109,17 @@ fn leave_out(
     after.reverse();
     let outcomes: Vec<(Vec<f64>, bool)> =
         (0..count).into_par_iter().map(|b| change(&Factor::merge(&[&before[b], &after[b]]))).collect();
+    Some(of_changes(outcomes, parameters))
+}
+
+fn of_changes(outcomes: Vec<(Vec<f64>, bool)>, parameters: usize) -> Jackknife {
+    let count = outcomes.len();
     let indispensable = (0..count).filter(|&b| outcomes[b].1).collect();
     let changes: Vec<Vec<f64>> = outcomes.into_iter().map(|(change, _)| change).collect();
     let correction = (count - 1) as f64 / count as f64;
     let covariance =
         symmetric_from(parameters, |i, j| correction * changes.iter().map(|d| d[i] * d[j]).sum::<f64>());
-    Some(Jackknife { covariance, changes, indispensable })
+    Jackknife { covariance, changes, indispensable }
 }
 
 /// Merges of the factors before each one: entry `b` holds the fixed rows and factors `0..b`.

@@ -16,7 +16,7 @@ pub use bootstrap::{Bootstrap, BootstrapSettings, bootstrap};
 pub use hac::{hac_bartlett, hac_bartlett_logs, hac_lag};
 pub use inflation::output_inflation;
 pub use jackknife::{Jackknife, MIN_BLOCKS, jackknife, jackknife_by, jackknife_with};
-pub(crate) use jackknife::{change_without, running_merges};
+pub(crate) use jackknife::{change_without, jackknife_of, running_merges};
 pub use sandwich::{block_sandwich, block_sandwich_with};
 
 use dynid_linalg::Mat;

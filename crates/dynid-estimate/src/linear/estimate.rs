@@ -49,6 +49,7 @@ pub fn estimate(
             Ok(squared(groups, total, method, start, prior))
         }
         LinearMethod::Tls(noise) => total_least_squares(groups, &factors, total, noise, start, settings),
+        LinearMethod::Own(own) => super::own::estimate(own, groups, total, start),
         LinearMethod::Instrumental => Err(LinearError::NeedsInstruments),
         LinearMethod::Huber | LinearMethod::Tukey => {
             let source = rows.ok_or(LinearError::NeedsRows)?;

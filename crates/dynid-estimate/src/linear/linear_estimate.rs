@@ -42,7 +42,7 @@ pub struct GroupFit {
 /// Estimate of any [`LinearMethod`].
 ///
 /// Ordinary least squares on [`Self::factor`] (with the prior rows of a ridge) gives `x` back, and the scores of
-/// [`Self::blocks`] are those of the estimator. Covariance, bootstrap, elimination, folds and constrained estimators
+/// [`Self::blocks`] are those of the estimator, but for an own one. Covariance, bootstrap, elimination, folds and constrained estimators
 /// therefore need not know the method.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearEstimate {
@@ -162,8 +162,11 @@ impl LinearEstimate {
     /// Delete-a-block jackknife with weights fixed; `None` with fewer than two blocks. Total least squares is solved
     /// again without each block where the noisy columns act on all groups; elsewhere, and in the block sandwich and the
     /// bootstrap, the linear step is taken, which understates the spread by the share of noise in the columns. Instrumental
-    /// variables are solved again without each block.
+    /// variables and own estimators are solved again without each block.
     pub fn jackknife(&self) -> Option<Jackknife> {
+        if let LinearMethod::Own(own) = &self.method {
+            return super::own::jackknife(own, self);
+        }
         if !self.paired.is_empty() {
             let total = self.x.len();
             let columns = paired_columns(&self.solution.kept, total);
@@ -183,8 +186,12 @@ impl LinearEstimate {
         jackknife_with(&self.kept_blocks(), self.kept_prior().as_ref(), &self.kept_x())
     }
 
-    /// Sandwich covariance from block scores, as a second opinion; `None` with fewer than two blocks.
+    /// Sandwich covariance from block scores, as a second opinion; `None` with fewer than two blocks, and for own estimators, whose scores
+    /// are not known.
     pub fn block_sandwich(&self) -> Option<Mat> {
+        if matches!(self.method, LinearMethod::Own(_)) {
+            return None;
+        }
         block_sandwich_with(&self.kept_blocks(), self.kept_prior().as_ref(), &self.kept_x())
     }
 }

@@ -32,6 +32,8 @@ pub enum LinearMethod {
     /// Instrumental variables, weighted as [`LinearMethod::Wls`]: [`crate::instruments::instrumental`] makes such estimates from
     /// paired rows, [`super::estimate`] does not.
     Instrumental,
+    /// A program's own.
+    Own(super::own::OwnEstimator),
 }
 
 impl LinearMethod {
@@ -155,6 +157,12 @@ pub enum LinearError {
         expected: &'static str,
         /// What was given.
         found: f64,
+    },
+    /// An own estimator has no fit.
+    #[error("the estimator `{name}` found no fit")]
+    NoOwnFit {
+        /// Its name.
+        name: String,
     },
     /// Rows could not be used.
     #[error(transparent)]

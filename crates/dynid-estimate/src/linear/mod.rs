@@ -5,6 +5,7 @@ mod estimate;
 mod irls;
 mod linear_estimate;
 mod method;
+mod own;
 mod row_scores;
 
 pub use difference::{DifferenceFit, explain_difference};
@@ -13,6 +14,7 @@ pub use estimate::estimate;
 pub(crate) use irls::robust_scales;
 pub use linear_estimate::{GroupFit, LinearEstimate};
 pub use method::{IrlsSettings, LinearError, LinearMethod, LinearSettings, VarianceSharing};
+pub use own::{OwnEstimator, OwnFit};
 pub use row_scores::{RowScores, row_scores};
 
 pub use crate::least_squares::{

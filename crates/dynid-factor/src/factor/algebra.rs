@@ -73,6 +73,19 @@ impl Factor {
         factor
     }
 
+    /// Factor of the same regressor whose least squares are `x`, with the residual sum of squares that `x` has.
+    ///
+    /// Panics unless `x` has `p` entries.
+    pub fn around(&self, x: &[f64]) -> Factor {
+        let rho = self.rss(x).sqrt();
+        let residual = self.reduced_residual(x);
+        let mut factor = self.clone();
+        for (i, value) in residual.into_iter().enumerate() {
+            factor.triangle[(i, self.columns)] -= value;
+        }
+        Factor { rho, ..factor }
+    }
+
     /// Factor of `[W, W x + share (y - W x)]`: every residual at `x` multiplied by `share`, scores likewise.
     ///
     /// Panics unless `x` has `p` entries and `share` is finite.

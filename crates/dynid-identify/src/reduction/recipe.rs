@@ -198,6 +198,12 @@ impl Identification {
             }
             Method::Ols | Method::Wls | Method::Ridge | Method::Tls => {}
         }
+        if self.settings.own_estimator.is_some() {
+            return Err(not_reduced(
+                "the choice of an own estimator",
+                "learn by weighted least squares, and solve as you like",
+            ));
+        }
         if self.settings.closed_loop.is_some() {
             return Err(not_reduced("`[instruments]`", "leave the table out"));
         }

@@ -14,6 +14,12 @@ impl Settings {
     /// [`Error::Setting`].
     pub fn check_effect(&self) -> Result<(), Error> {
         self.conditioning.check_effect()?;
+        if let Some(own) = &self.own_estimator
+            && self.estimator.method != Method::Wls
+        {
+            let found = format!("`{}` beside `{}`", serde_name(&self.estimator.method), own.name());
+            return Err(Error::setting("estimator.method", "none beside an own estimator", found));
+        }
         self.check_estimator_effect()?;
         self.closed_loop.iter().try_for_each(ClosedLoop::check_effect)
     }

@@ -14,6 +14,8 @@ use std::collections::BTreeMap;
 use dynid_io::CouplingSpec;
 use serde::Serialize;
 
+use dynid_estimate::linear::OwnEstimator;
+
 use crate::Error;
 use crate::commands::RunFiles;
 pub use crate::known_friction::FrictionErrors;
@@ -52,6 +54,9 @@ pub struct Settings {
     pub preflight: Preflight,
     /// Estimator.
     pub estimator: EstimatorConfig,
+    /// A linear estimator of the program's own, in place of `estimator.method`. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "name_of_own")]
+    pub own_estimator: Option<OwnEstimator>,
     /// Closed loop of the logs, for instrumental variables and the test of least squares against them. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub closed_loop: Option<ClosedLoop>,
@@ -65,6 +70,11 @@ pub struct Settings {
     /// Files behind robot, logs and settings, named in the commands that remedies give.
     #[serde(skip)]
     pub files: RunFiles,
+}
+
+/// An own estimator as settings record it: by its name.
+fn name_of_own<S: serde::Serializer>(own: &Option<OwnEstimator>, to: S) -> Result<S::Ok, S::Error> {
+    own.as_ref().map(OwnEstimator::name).serialize(to)
 }
 
 /// Elements at joints.
