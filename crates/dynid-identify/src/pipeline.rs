@@ -474,13 +474,21 @@ pub fn open(
     effort_scale::mass_columns(&settings.known_mass, &model)?;
     let of_validation = validation.iter().map(|log| &log.settings);
     log::check_stated_temperatures(of_training.iter().copied().chain(of_validation), &model)?;
-    let findings = preflight(&settings, &robot, &loaded, &overlaps, progress);
-    // Signals as they were read go as soon as they are prepared: a log may be most of the memory.
     let conditioned = settings.conditioning_settings();
+    if settings.preflight != Preflight::Off {
+        progress(Step::Preflight);
+    }
+    // Neither keeps both cores busy.
+    let (findings, first) = rayon::join(
+        || preflight(&settings, &robot, &loaded, &overlaps),
+        || loaded[0].prepare(&model, &conditioned),
+    );
+    // Signals as they were read go as soon as they are prepared: a log may be most of the memory.
+    let mut first = Some(first);
     let mut read = Vec::with_capacity(loaded.len());
     let mut prepared = Vec::with_capacity(loaded.len());
     for log in loaded {
-        prepared.push(log.prepare(&model, &conditioned)?);
+        prepared.push(first.take().unwrap_or_else(|| log.prepare(&model, &conditioned))?);
         let nearest = model.closed().and_then(|closed| log::poses::nearest_singularity(closed, &log.log));
         let warnings = nearest.into_iter().chain(log.warnings()).collect();
         read.push(ReadLog { warnings, source: log.source });
@@ -524,12 +532,10 @@ pub(crate) fn preflight(
     robot: &Robot,
     loaded: &[Log],
     overlaps: &Overlaps,
-    progress: &mut dyn FnMut(Step),
 ) -> Result<Vec<Finding>, Error> {
     if settings.preflight == Preflight::Off {
         return Ok(Vec::new());
     }
-    progress(Step::Preflight);
     let findings = before::of_logs(settings, robot, loaded, overlaps)?;
     match findings.iter().find(|f| f.severity == Severity::Error) {
         Some(fault) if settings.preflight == Preflight::Refuse => {

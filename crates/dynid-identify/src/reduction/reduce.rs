@@ -65,7 +65,7 @@ impl Reducer {
         }
         log::check_stated_temperatures(std::iter::once(&log.settings), model)?;
         let logs = [log];
-        let findings = preflight(settings, robot, &logs, &Overlaps::default(), &mut |_| {})?;
+        let findings = preflight(settings, robot, &logs, &Overlaps::default())?;
         let [log] = logs;
         let conditioned = ConditioningSettings {
             most_blocks: Some(self.recipe.blocks.most),

@@ -2,6 +2,7 @@
 
 use dynid_motion::cutoff::{KernelLimit, kernel_candidates, kernel_limit};
 use dynid_motion::median::median;
+use rayon::prelude::*;
 
 use super::trial::{Choice, PROBES, Trial};
 use super::{ConditioningError, ConditioningSettings, PreparedLog};
@@ -112,7 +113,7 @@ pub(crate) fn delay(
         let rests = trial.delay_rests(&choice, None);
         let folds = trial.folds() as f64;
         let without: Vec<Vec<f64>> =
-            (0..trial.folds()).map(|b| trial.delay_rests(&choice, Some(b))).collect();
+            (0..trial.folds()).into_par_iter().map(|b| trial.delay_rests(&choice, Some(b))).collect();
         let per_output: Vec<(f64, f64)> = (0..outputs)
             .map(|j| {
                 let mean = without.iter().map(|w| w[j]).sum::<f64>() / folds;
@@ -162,6 +163,7 @@ fn losses(
     reference: &[f64],
 ) -> Vec<f64> {
     (0..trial.folds())
+        .into_par_iter()
         .filter_map(|fold| {
             let x = trial.fit(choice, Some(fold));
             let scores = scorer.0.score(scorer.1, &x, rows_at, fold);
