@@ -19,11 +19,13 @@ pub struct ReducedGroup {
 
 impl ReducedGroup {
     /// All time blocks merged, in all `total` base columns.
+    #[must_use]
     pub fn merged(&self, total: usize) -> Factor {
         Factor::merge(&self.blocks.iter().collect::<Vec<_>>()).embed(total, &self.columns)
     }
 
     /// Returns the rows without base columns that are not among `columns`: their parameters are held at zero.
+    #[must_use]
     pub fn within(&self, columns: &[usize]) -> ReducedGroup {
         let places: Vec<usize> =
             (0..self.columns.len()).filter(|k| columns.contains(&self.columns[*k])).collect();
@@ -43,6 +45,7 @@ impl ReducedGroup {
     /// beyond a block.
     ///
     /// A rest of less than half a block joins the one before. Panics if `factor` is zero.
+    #[must_use]
     pub fn coarsened(&self, factor: usize) -> ReducedGroup {
         assert!(factor > 0, "blocks are merged by a positive factor");
         let count = ((self.blocks.len() + factor / 2) / factor).max(1);

@@ -133,6 +133,7 @@ impl BlockReducer {
     }
 
     /// Factors of all time blocks of a group; blocks without rows are empty.
+    #[must_use]
     pub fn finish(mut self, shape: &GroupShape) -> ReducedGroup {
         self.finish_until(shape.blocks);
         ReducedGroup {

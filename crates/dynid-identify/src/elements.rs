@@ -149,6 +149,7 @@ impl ElementPlan {
     }
 
     /// Returns the plan for a mechanism whose loops are closed.
+    #[must_use]
     pub fn with_loops(self, closed: Option<Arc<ClosedMechanism>>) -> Self {
         ElementPlan { closed, ..self }
     }
@@ -170,6 +171,7 @@ impl ElementPlan {
 
     /// Returns the plan with bounds of shape parameters for the speeds that a log reaches, per rate; `None`: not known. Settings that
     /// state a speed stand.
+    #[must_use]
     pub fn with_speeds(mut self, mechanism: &Mechanism, speeds: &[Option<f64>]) -> Self {
         let names = self.names(mechanism);
         for ((joint, list), speed) in names.iter().zip(&self.per_rate).zip(speeds) {

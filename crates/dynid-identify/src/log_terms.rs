@@ -41,6 +41,7 @@ impl LogTerms {
     }
 
     /// What does not belong to payloads.
+    #[must_use]
     pub fn without_payloads(self) -> Self {
         LogTerms { payloads: Vec::new(), ..self }
     }
@@ -56,6 +57,7 @@ impl LogTerms {
     }
 
     /// A log with its gates. `label`: the training log whose own terms it has; `payload`: what it carries.
+    #[must_use]
     pub fn with_gates(&self, log: Log, label: Option<&str>, payload: Option<&str>) -> Log {
         let of = |is: bool| if is { 1.0 } else { 0.0 };
         let mut log = log;

@@ -156,6 +156,7 @@ impl Robot {
     }
 
     /// Returns the robot with kinds of elements of a program's own among those that its joints may have.
+    #[must_use]
     pub fn with_registry(mut self, registry: ElementRegistry) -> Self {
         self.file.elements.registry = registry.clone();
         self.elements.registry = registry;

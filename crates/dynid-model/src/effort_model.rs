@@ -332,6 +332,7 @@ impl RandomMotion {
     }
 
     /// Returns the motion with that of a model's coordinates without bodies, as [`RandomMotion::of`] says.
+    #[must_use]
     pub fn with_coordinates(self, model: &dyn EffortModel, seed: u64) -> Self {
         self.with_travels(model.travels(), seed)
     }

@@ -149,6 +149,7 @@ impl Mechanism {
     }
 
     /// Returns the mechanism under another gravity (m/s², base axes).
+    #[must_use]
     pub fn with_gravity(mut self, gravity: [f64; 3]) -> Self {
         self.gravity = Vec3(gravity);
         self
@@ -158,6 +159,7 @@ impl Mechanism {
     ///
     /// # Panics
     /// If there is not one inertia per body.
+    #[must_use]
     pub fn with_inertias(mut self, inertias: &[Inertia]) -> Self {
         assert_eq!(inertias.len(), self.bodies.len(), "one inertia per body");
         for (body, inertia) in self.bodies.iter_mut().zip(inertias) {

@@ -116,6 +116,7 @@ impl RobotModel {
     ///
     /// # Panics
     /// If there is not one value per shape parameter.
+    #[must_use]
     pub fn with_shape(self, values: &[f64]) -> Self {
         self.map_tree(|tree| tree.with_shape(values))
     }
@@ -124,11 +125,13 @@ impl RobotModel {
     ///
     /// # Panics
     /// Panics as [`TreeModel::with_known`] does.
+    #[must_use]
     pub fn with_known(self, known: Vec<KnownElement>) -> Self {
         self.map_tree(|tree| tree.with_known(known))
     }
 
     /// Returns the model with linear parameters of any sign where `is_free` says so; see [`TreeModel::with_free_sign`].
+    #[must_use]
     pub fn with_free_sign(self, is_free: impl Fn(&Parameter) -> bool) -> Self {
         self.map_tree(|tree| tree.with_free_sign(is_free))
     }

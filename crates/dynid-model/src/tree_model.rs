@@ -216,6 +216,7 @@ impl TreeModel {
     ///
     /// # Panics
     /// If there is not one value per shape parameter.
+    #[must_use]
     pub fn with_shape(mut self, values: &[f64]) -> Self {
         assert_eq!(values.len(), self.parameters.shape.len(), "length of shape");
         for (parameter, value) in self.parameters.shape.iter_mut().zip(values) {

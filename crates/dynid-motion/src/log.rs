@@ -193,6 +193,7 @@ impl Log {
     }
 
     /// Returns the log with a further channel that never changes.
+    #[must_use]
     pub fn with_constant(mut self, channel: String, value: f64) -> Self {
         self.channels.push(Channel { name: channel, values: vec![value; self.time.len()] });
         self

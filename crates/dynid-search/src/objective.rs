@@ -31,6 +31,7 @@ impl<F: Fn(&[f64]) -> f64 + Sync> PointObjective<F> {
     }
 
     /// Candidates of a group are evaluated in parallel: worth it from some 10 µs per candidate on. Same results.
+    #[must_use]
     pub fn in_parallel(self) -> Self {
         PointObjective { parallel: true, ..self }
     }

@@ -80,6 +80,7 @@ impl LinearEstimate {
     /// Returns the estimate with time blocks `factor` times as long, for residuals that stay correlated beyond a block.
     ///
     /// Panics if `factor` is zero.
+    #[must_use]
     pub fn with_longer_blocks(mut self, factor: usize) -> LinearEstimate {
         if factor == 1 {
             return self;

@@ -7,6 +7,7 @@ impl Factor {
     /// Merges factors of disjoint rows with the same columns, always in the order given.
     ///
     /// Equals the factor of all rows stacked (up to rounding). Panics on an empty list or unequal columns.
+    #[must_use]
     pub fn merge(factors: &[&Factor]) -> Factor {
         assert!(!factors.is_empty(), "nothing to merge");
         let stacked: usize = factors.iter().map(|f| f.height()).sum();
@@ -19,6 +20,7 @@ impl Factor {
     }
 
     /// Factor of the rows multiplied by `|weight|`. Panics unless `weight` is finite.
+    #[must_use]
     pub fn scaled(&self, weight: f64) -> Factor {
         assert!(weight.is_finite(), "weights are finite");
         let weight = weight.abs();
@@ -32,6 +34,7 @@ impl Factor {
     /// Factor of the chosen columns of `W` in the order given (same rows, same effort).
     ///
     /// Panics if an index is not below `p`.
+    #[must_use]
     pub fn select(&self, columns: &[usize]) -> Factor {
         assert!(columns.iter().all(|&c| c < self.columns), "selected columns exist");
         let mut builder = FactorBuilder::with_chunk_rows(columns.len(), self.height());
@@ -43,6 +46,7 @@ impl Factor {
     /// Factor in a larger set of `total` columns: column `c` goes to `positions[c]`, all others are zero.
     ///
     /// Panics unless `positions` holds one distinct index below `total` per column.
+    #[must_use]
     pub fn embed(&self, total: usize, positions: &[usize]) -> Factor {
         assert_eq!(positions.len(), self.columns, "one position per column");
         let mut source = vec![None; total];
@@ -64,6 +68,7 @@ impl Factor {
     }
 
     /// Factor of `[W, y - W x]`: parameters counted from `x`. Panics unless `x` has `p` entries.
+    #[must_use]
     pub fn centred(&self, x: &[f64]) -> Factor {
         let residual = self.reduced_residual(x);
         let mut factor = self.clone();
@@ -76,6 +81,7 @@ impl Factor {
     /// Factor of the same regressor whose least squares are `x`, with the residual sum of squares that `x` has.
     ///
     /// Panics unless `x` has `p` entries.
+    #[must_use]
     pub fn around(&self, x: &[f64]) -> Factor {
         let rho = self.rss(x).sqrt();
         let residual = self.reduced_residual(x);
@@ -89,6 +95,7 @@ impl Factor {
     /// Factor of `[W, W x + share (y - W x)]`: every residual at `x` multiplied by `share`, scores likewise.
     ///
     /// Panics unless `x` has `p` entries and `share` is finite.
+    #[must_use]
     pub fn with_residual_scaled(&self, x: &[f64], share: f64) -> Factor {
         assert!(share.is_finite(), "shares are finite");
         let mut factor = self.centred(x);
@@ -102,6 +109,7 @@ impl Factor {
     /// Factor of `[W + r gᵀ, y + r gᵀx]` with the residuals `r = y - W x`, which stay the residuals at `x`.
     ///
     /// Panics unless `x` and `g` have `p` entries.
+    #[must_use]
     pub fn with_residual_in_columns(&self, x: &[f64], g: &[f64]) -> Factor {
         assert_eq!(g.len(), self.columns, "one share of the residual per column");
         let mut residual = self.reduced_residual(x);
@@ -123,6 +131,7 @@ impl Factor {
     /// Factor of `[W A, y + W b]`: other combinations of the same rows.
     ///
     /// `a`: `p × q`, `b`: `p` entries. Panics unless the shapes agree.
+    #[must_use]
     pub fn combined(&self, a: &Mat, b: &[f64]) -> Factor {
         assert!(
             a.nrows() == self.columns && b.len() == self.columns,
@@ -143,6 +152,7 @@ impl Factor {
     /// explained by the others and by the effort, which stands in its place.
     ///
     /// Panics if there is no such column.
+    #[must_use]
     pub fn with_effort_exchanged(&self, column: usize) -> Factor {
         assert!(column < self.columns, "column {column} of {}", self.columns);
         let height = self.height();
@@ -165,6 +175,7 @@ impl Factor {
     /// Factor of `W` and `y` with the rows `D x ≈ D x0` added below, `D = diag(weights)`.
     ///
     /// The added rows do not count as samples. Panics unless both slices have `p` finite entries.
+    #[must_use]
     pub fn with_prior_rows(&self, weights: &[f64], x0: &[f64]) -> Factor {
         assert!(weights.len() == self.columns && x0.len() == self.columns, "one prior row per column");
         assert!(weights.iter().chain(x0).all(|v| v.is_finite()), "prior rows are finite");

@@ -184,6 +184,7 @@ impl FactorBuilder {
     }
 
     /// The factor of all rows.
+    #[must_use]
     pub fn finish(mut self) -> Factor {
         self.take()
     }

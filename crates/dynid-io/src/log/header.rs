@@ -55,6 +55,7 @@ impl LogHeader {
     }
 
     /// The header without some of its columns, and the places that the others had.
+    #[must_use]
     pub fn without(&self, ignored: &[String]) -> Self {
         let is_ignored = |k: &usize| {
             ignored.contains(&self.names[*k])

@@ -39,6 +39,7 @@ pub struct ClosedMechanism {
 
 impl ClosedMechanism {
     /// Refuses poses whose [measure of singularity](super::Singularity) is below `least`. Default: 1e-4.
+    #[must_use]
     pub fn with_least_measure(mut self, least: f64) -> Self {
         self.least_measure = least;
         self
@@ -58,6 +59,7 @@ impl ClosedMechanism {
     ///
     /// # Panics
     /// If the joints differ.
+    #[must_use]
     pub fn with_mechanism(mut self, mechanism: Mechanism) -> Self {
         let joints = |m: &Mechanism| -> Vec<_> { m.bodies().iter().map(|b| b.joint.clone()).collect() };
         assert_eq!(joints(&mechanism), joints(&self.mechanism), "joints of another mechanism");

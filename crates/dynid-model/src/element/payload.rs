@@ -52,6 +52,7 @@ impl Payload {
     }
 
     /// Returns the payload with another largest mass thought possible, kg (5 by default): for priors, it bounds nothing.
+    #[must_use]
     pub fn with_rated_mass(self, rated_mass: f64) -> Self {
         Payload { rated_mass, ..self }
     }

@@ -32,6 +32,7 @@ impl TreeModel {
     /// # Panics
     /// If an element names a rate that the mechanism does not have, a vector has another length than the element has
     /// parameters, or two elements at a joint remember the same signals.
+    #[must_use]
     pub fn with_known(mut self, known: Vec<KnownElement>) -> Self {
         for KnownElement { element, linear, shape } in known {
             let entries = element.entries();
@@ -60,6 +61,7 @@ impl TreeModel {
 
     /// Returns the model with linear parameters of any sign where `is_free` says so: errors of known elements, say, have no
     /// reason to be positive.
+    #[must_use]
     pub fn with_free_sign(mut self, is_free: impl Fn(&Parameter) -> bool) -> Self {
         for parameter in self.parameters.linear.iter_mut().filter(|p| is_free(p)) {
             if parameter.lower == Some(0.0) {

@@ -49,6 +49,7 @@ impl Moving {
 impl States {
     /// The same with zero velocity wherever a joint stands: its sign there is that of noise, and friction may have any value up to static
     /// friction. A prediction along such states is the middle of what it may be, and does not jump.
+    #[must_use]
     pub fn resting(mut self, moving: &Moving) -> States {
         self.moves = Some(moving.samples.clone());
         self

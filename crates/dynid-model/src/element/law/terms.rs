@@ -49,16 +49,19 @@ impl LinearTerm {
     }
 
     /// Returns the term as a coefficient of friction that is not negative.
+    #[must_use]
     pub const fn friction(self) -> Self {
         LinearTerm { lower: Some(0.0), ..self.coefficient() }
     }
 
     /// Returns the term as a coefficient of friction of any sign, whose law is passive where it is positive.
+    #[must_use]
     pub const fn coefficient(self) -> Self {
         LinearTerm { coefficient: true, ..self }
     }
 
     /// Returns the term with a smallest value.
+    #[must_use]
     pub const fn at_least(self, lower: f64) -> Self {
         LinearTerm { lower: Some(lower), ..self }
     }
@@ -126,11 +129,13 @@ impl ShapeTerm {
     }
 
     /// Returns the term with a start of its own.
+    #[must_use]
     pub const fn from(self, start: f64) -> Self {
         ShapeTerm { start: Some(start), ..self }
     }
 
     /// Returns the term, known at a value unless a setting frees it.
+    #[must_use]
     pub const fn held_at(self, value: f64) -> Self {
         ShapeTerm { start: Some(value), held: true, ..self }
     }

@@ -194,16 +194,19 @@ impl ElementKind {
     }
 
     /// Returns the kind with its equation.
+    #[must_use]
     pub fn equation(self, equation: &'static str) -> Self {
         ElementKind { equation, ..self }
     }
 
     /// Returns the kind with words on what it is.
+    #[must_use]
     pub fn help(self, help: &'static str) -> Self {
         ElementKind { help, ..self }
     }
 
     /// Returns the kind with author and year of its source.
+    #[must_use]
     pub fn reference(self, reference: &'static str) -> Self {
         ElementKind { reference: Some(reference), ..self }
     }
@@ -212,6 +215,7 @@ impl ElementKind {
     ///
     /// # Panics
     /// If there are more keys than coefficients.
+    #[must_use]
     pub fn keys(mut self, keys: &[&'static str]) -> Self {
         assert!(
             keys.len() <= self.linear.len(),
@@ -225,12 +229,14 @@ impl ElementKind {
     }
 
     /// Returns the kind with an element that says the same beside it whatever the motion, and why.
+    #[must_use]
     pub fn excludes(mut self, name: &'static str, why: &'static str) -> Self {
         self.excludes.push((name, why));
         self
     }
 
     /// Returns the kind with an element that only a suitable motion tells from it: what it takes.
+    #[must_use]
     pub fn alike(mut self, name: &'static str, needs: &'static str) -> Self {
         self.alike.push((name, needs));
         self
