@@ -3,6 +3,7 @@
 use super::irls::{Irls, Loss, Start, irls};
 use super::linear_estimate::{GroupFit, LinearEstimate};
 use super::method::{LinearError, LinearMethod, LinearSettings};
+use super::own::{OwnEstimator, OwnFit};
 use crate::least_squares::{ColumnErrors, TlsNoise, tls_groups};
 use crate::least_squares::{LinearSolution, ols};
 use crate::least_squares::{PriorRows, WlsEstimate, floors, wls_with};
@@ -49,7 +50,7 @@ pub fn estimate(
             Ok(squared(groups, total, method, start, prior))
         }
         LinearMethod::Tls(noise) => total_least_squares(groups, &factors, total, noise, start, settings),
-        LinearMethod::Own(own) => super::own::estimate(own, groups, total, start),
+        LinearMethod::Own(own) => by_own(own, groups, total, start),
         LinearMethod::Instrumental => Err(LinearError::NeedsInstruments),
         LinearMethod::Huber | LinearMethod::Tukey => {
             let source = rows.ok_or(LinearError::NeedsRows)?;
@@ -113,6 +114,78 @@ fn squared(
         loss: None,
         given_blocks: Vec::new(),
         paired: Vec::new(),
+    }
+}
+
+/// The estimate of all groups; `start`: weighted least squares, for the leverages.
+fn by_own(
+    own: &OwnEstimator,
+    groups: &[ReducedGroup],
+    total: usize,
+    start: WlsEstimate,
+) -> Result<LinearEstimate, LinearError> {
+    let OwnFit { mut x, variances } =
+        own.fit(groups, total).ok_or_else(|| LinearError::NoOwnFit { name: own.name().to_owned() })?;
+    check_own("parameters of an own estimator", &x, total, "finite numbers", f64::is_finite)?;
+    let positive = |v: f64| v.is_finite() && v > 0.0;
+    check_own("variances of an own estimator", &variances, groups.len(), "positive numbers", positive)?;
+    let weights: Vec<f64> = variances.iter().map(|v| 1.0 / v.sqrt()).collect();
+    let blocks = time_blocks(groups, &weights, total);
+    let weighted = match blocks.is_empty() {
+        true => Factor::empty(total),
+        false => Factor::merge(&blocks.iter().collect::<Vec<_>>()),
+    };
+    let rank = ols(&weighted);
+    rank.dropped.iter().for_each(|c| x[*c] = 0.0);
+    let factor = weighted.around(&x);
+    let mut solution = ols(&factor);
+    solution.x.clone_from(&x);
+    let fits = groups.iter().zip(&start.groups).zip(variances.iter().zip(&weights));
+    let fits = fits.map(|((group, of_start), (variance, weight))| GroupFit {
+        log: group.log,
+        output: group.output,
+        scale: group.scale,
+        variance: *variance,
+        weight: *weight,
+        leverage: of_start.leverage,
+        rss: group.merged(total).rss(&x),
+        rows: of_start.rows,
+        at_floor: false,
+        down_weighted: 0.0,
+        rejected: 0.0,
+        curvature: 1.0,
+    });
+    Ok(LinearEstimate {
+        method: LinearMethod::Own(own.clone()),
+        groups: fits.collect(),
+        x,
+        solution,
+        reduced: groups.to_vec(),
+        factor,
+        blocks,
+        passes: 1,
+        converged: true,
+        losses: Vec::new(),
+        prior: None,
+        loss: None,
+        given_blocks: Vec::new(),
+        paired: Vec::new(),
+    })
+}
+
+fn check_own(
+    name: &'static str,
+    values: &[f64],
+    count: usize,
+    expected: &'static str,
+    fits: impl Fn(f64) -> bool,
+) -> Result<(), LinearError> {
+    if values.len() != count {
+        return Err(LinearError::Length { name, expected: count, found: values.len() });
+    }
+    match values.iter().find(|v| !fits(**v)) {
+        Some(&found) => Err(LinearError::Setting { name, expected, found }),
+        None => Ok(()),
     }
 }
 

@@ -166,7 +166,7 @@ impl LinearEstimate {
     /// variables and own estimators are solved again without each block.
     pub fn jackknife(&self) -> Option<Jackknife> {
         if let LinearMethod::Own(own) = &self.method {
-            return super::own::jackknife(own, self);
+            return super::own::jackknife(own, &self.reduced, &self.solution.kept, &self.x);
         }
         if !self.paired.is_empty() {
             let total = self.x.len();

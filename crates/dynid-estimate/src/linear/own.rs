@@ -2,12 +2,9 @@
 
 use std::sync::Arc;
 
-use super::linear_estimate::{GroupFit, LinearEstimate};
-use super::method::{LinearError, LinearMethod};
 use crate::covariance::{Jackknife, jackknife_of};
-use crate::least_squares::{WlsEstimate, ols};
 use dynid_factor::factor::Factor;
-use dynid_factor::groups::{ReducedGroup, time_blocks};
+use dynid_factor::groups::ReducedGroup;
 
 /// What an own estimator makes of rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +38,11 @@ impl OwnEstimator {
         OwnEstimator { name: name.to_owned(), fit: Arc::new(fit) }
     }
 
+    /// What it makes of groups; `columns`: parameters.
+    pub(super) fn fit(&self, groups: &[ReducedGroup], columns: usize) -> Option<OwnFit> {
+        (self.fit)(groups, columns)
+    }
+
     /// Its name.
     pub fn name(&self) -> &str {
         &self.name
@@ -60,81 +62,13 @@ impl PartialEq for OwnEstimator {
     }
 }
 
-/// The estimate of all groups; `start`: weighted least squares, for the leverages.
-pub(super) fn estimate(
+/// The estimator solved again without each time block; a block without which it has no fit counts as no change.
+pub(super) fn jackknife(
     own: &OwnEstimator,
     groups: &[ReducedGroup],
-    total: usize,
-    start: WlsEstimate,
-) -> Result<LinearEstimate, LinearError> {
-    let OwnFit { mut x, variances } =
-        (own.fit)(groups, total).ok_or_else(|| LinearError::NoOwnFit { name: own.name.clone() })?;
-    check("parameters of an own estimator", &x, total, "finite numbers", f64::is_finite)?;
-    let positive = |v: f64| v.is_finite() && v > 0.0;
-    check("variances of an own estimator", &variances, groups.len(), "positive numbers", positive)?;
-    let weights: Vec<f64> = variances.iter().map(|v| 1.0 / v.sqrt()).collect();
-    let blocks = time_blocks(groups, &weights, total);
-    let weighted = match blocks.is_empty() {
-        true => Factor::empty(total),
-        false => Factor::merge(&blocks.iter().collect::<Vec<_>>()),
-    };
-    let rank = ols(&weighted);
-    rank.dropped.iter().for_each(|c| x[*c] = 0.0);
-    let factor = weighted.around(&x);
-    let mut solution = ols(&factor);
-    solution.x.clone_from(&x);
-    let fits = groups.iter().zip(&start.groups).zip(variances.iter().zip(&weights));
-    let fits = fits.map(|((group, of_start), (variance, weight))| GroupFit {
-        log: group.log,
-        output: group.output,
-        scale: group.scale,
-        variance: *variance,
-        weight: *weight,
-        leverage: of_start.leverage,
-        rss: group.merged(total).rss(&x),
-        rows: of_start.rows,
-        at_floor: false,
-        down_weighted: 0.0,
-        rejected: 0.0,
-        curvature: 1.0,
-    });
-    Ok(LinearEstimate {
-        method: LinearMethod::Own(own.clone()),
-        groups: fits.collect(),
-        x,
-        solution,
-        reduced: groups.to_vec(),
-        factor,
-        blocks,
-        passes: 1,
-        converged: true,
-        losses: Vec::new(),
-        prior: None,
-        loss: None,
-        given_blocks: Vec::new(),
-        paired: Vec::new(),
-    })
-}
-
-fn check(
-    name: &'static str,
-    values: &[f64],
-    count: usize,
-    expected: &'static str,
-    fits: impl Fn(f64) -> bool,
-) -> Result<(), LinearError> {
-    if values.len() != count {
-        return Err(LinearError::Length { name, expected: count, found: values.len() });
-    }
-    match values.iter().find(|v| !fits(**v)) {
-        Some(&found) => Err(LinearError::Setting { name, expected, found }),
-        None => Ok(()),
-    }
-}
-
-/// The estimator solved again without each time block; a block without which it has no fit counts as no change.
-pub(super) fn jackknife(own: &OwnEstimator, estimate: &LinearEstimate) -> Option<Jackknife> {
-    let groups = &estimate.reduced;
+    kept: &[usize],
+    x: &[f64],
+) -> Option<Jackknife> {
     let logs = groups.iter().map(|g| g.log + 1).max().unwrap_or(0);
     let has_rows = |log: usize, b: usize| {
         groups.iter().any(|g| g.log == log && g.blocks.get(b).is_some_and(|f| f.rows() > 0))
@@ -158,10 +92,10 @@ pub(super) fn jackknife(own: &OwnEstimator, estimate: &LinearEstimate) -> Option
                 group
             })
             .collect();
-        let x = (own.fit)(&rest, estimate.x.len())?.x;
-        let kept: Vec<f64> =
-            estimate.solution.kept.iter().map(|c| x.get(*c).copied()).collect::<Option<_>>()?;
-        kept.iter().all(|v| v.is_finite()).then_some(kept)
+        let x = own.fit(&rest, x.len())?.x;
+        let of_kept: Vec<f64> = kept.iter().map(|c| x.get(*c).copied()).collect::<Option<_>>()?;
+        of_kept.iter().all(|v| v.is_finite()).then_some(of_kept)
     };
-    jackknife_of(&places, &estimate.kept_x(), without)
+    let at: Vec<f64> = kept.iter().map(|c| x[*c]).collect();
+    jackknife_of(&places, &at, without)
 }
