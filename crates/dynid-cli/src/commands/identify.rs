@@ -37,8 +37,10 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     estimate.provenance.command_line =
         std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
     estimate.provenance.revision = option_env!("DYNID_REVISION").map(str::to_owned);
-    let report = identification.report(&estimate)?;
-    let urdf = match identification.urdf() {
+    // Drawing and reading back know nothing of each other.
+    let (report, urdf) = rayon::join(|| identification.report(&estimate), || identification.urdf());
+    let report = report?;
+    let urdf = match urdf {
         Ok(exported) => Ok(exported),
         // What a URDF cannot state is no reason to lose the identification.
         Err(reason) if matches!(reason, Error::RobotFile(_)) || reason.job::<ExportError>().is_some() => {

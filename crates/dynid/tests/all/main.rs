@@ -24,6 +24,7 @@ mod instruments;
 mod least_squares;
 mod mutations;
 mod online;
+mod own_estimator;
 mod own_law;
 mod payload;
 mod periodic;
