@@ -39,6 +39,7 @@ fn run(command: &Command) -> Result<u8, Failure> {
         Command::Predict(args) => commands::predict::run(args),
         Command::Reduce(args) => commands::reduce::run(args),
         Command::Regressor(args) => commands::regressor::run(args),
+        Command::Schema(args) => commands::schema::run(args),
         Command::Simulate(args) => commands::simulate::run(args),
         Command::Solve(args) => commands::reduce::solve(args),
         Command::Study(args) => commands::study::run(args),

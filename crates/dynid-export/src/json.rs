@@ -14,7 +14,7 @@ use dynid_identify::known_friction::KnownFriction;
 pub const ROBOT_JSON_SCHEMA: u32 = 1;
 
 /// The identified robot for programs that do not want the whole `estimate.json`. SI units, rad.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct RobotJson {
     /// `dynid-robot`.
     pub format: String,
@@ -42,7 +42,7 @@ pub struct RobotJson {
 }
 
 /// A moving link together with all that is welded to it, in the axes of its joint frame (the URDF link frame).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct LinkJson {
     /// Link.
     pub name: String,
@@ -67,7 +67,7 @@ pub struct LinkJson {
 }
 
 /// A joint. Coefficients that the model has no element for are absent.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct JointJson {
     /// Joint.
     pub name: String,
@@ -84,7 +84,7 @@ pub struct JointJson {
 }
 
 /// A joint that its motor drives through a spring, `k1 Δ + k2 Δ³ + d Δ̇` with `Δ = motor/ratio - joint`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ElasticJson {
     /// Joint; `<joint>.k1` and so on are its parameters.
     pub joint: String,
@@ -95,7 +95,7 @@ pub struct ElasticJson {
 }
 
 /// A parameter of another element, by the name it has in `estimate.json`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct OtherJson {
     /// Name, `<joint>.<symbol>` or `<motor>.<symbol>`.
     pub name: String,

@@ -351,7 +351,7 @@ impl From<&Fit> for FitValues {
 }
 
 /// Per-joint agreement, in the effort's unit.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FitValues {
     /// Root mean square error per joint.
     pub rms: Vec<Option<f64>>,
@@ -366,7 +366,7 @@ pub struct FitValues {
 }
 
 /// Figures of a file on a log, per joint in joint order.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FileFit {
     /// RMS of measured minus predicted effort.
     pub rms: Vec<Option<f64>>,

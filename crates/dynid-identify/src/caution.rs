@@ -6,7 +6,7 @@ use crate::check::{CheckName, CheckResult};
 use crate::finding::{Finding, FindingId, Severity};
 
 /// Something to look at before a result is used.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Caution {
     /// `fail`: the result is not to be used before this is mended; `warn`: usable, with a reservation.
     pub status: String,

@@ -51,7 +51,7 @@ crate::names! {
 }
 
 /// One check.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CheckResult {
     /// `ok`, `warn` or `fail`.
     pub status: String,

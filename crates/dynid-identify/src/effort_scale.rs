@@ -22,7 +22,7 @@ pub(crate) const G: f64 = 9.81;
 const POSTURES: usize = 500;
 
 /// Where knowledge of the scale comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ScaleSource {
     /// Masses that were weighed (`known_mass`).
@@ -36,7 +36,7 @@ pub enum ScaleSource {
 }
 
 /// A known mass beside the identified one.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct WeighedMass {
     /// Payload or link.
     pub name: String,
@@ -49,7 +49,7 @@ pub struct WeighedMass {
 }
 
 /// What speaks for the scale of the efforts.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct EffortScale {
     /// Where knowledge of it comes from.
     pub source: ScaleSource,

@@ -43,7 +43,7 @@ pub use trust::{
 pub const SCHEMA: u32 = 1;
 
 /// An identified model: what `identify` writes and `predict`, `validate` read.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Estimate {
     /// Layout version.
     pub schema: u32,
@@ -140,7 +140,7 @@ pub struct Estimate {
 }
 
 /// A finding of the pre-flight ([`crate::preflight`]).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FindingRecord {
     /// Name of the fault.
     pub id: String,
@@ -167,7 +167,7 @@ impl From<&crate::finding::Finding> for FindingRecord {
 }
 
 /// A log with a factor of its own on the friction of all joints.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct LogScale {
     /// Log.
     pub log: String,
@@ -195,7 +195,7 @@ pub enum Split {
 }
 
 /// Rank of the log.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct RankStatus {
     /// Columns that some motion of this robot can tell apart: base parameters, and one column per shape parameter.
     pub structural: usize,
@@ -210,7 +210,7 @@ pub struct RankStatus {
 }
 
 /// One standard parameter.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ParameterValue {
     /// Name, `<link>.Izz` or `<joint>.fc`.
     pub name: String,
@@ -262,7 +262,7 @@ pub struct ParameterValue {
 }
 
 /// One base parameter.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct BaseValue {
     /// Name of the kept parameter.
     pub name: String,
@@ -293,7 +293,7 @@ pub struct BaseValue {
 }
 
 /// One shape parameter: a Stribeck velocity, the slope of an arctangent.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ShapeValue {
     /// Name, `<joint>.vs`.
     pub name: String,
@@ -322,7 +322,7 @@ pub struct ShapeValue {
 /// Agreement in motion and at rest apart, on equally filtered effort.
 ///
 /// A joint moves where `|v| ≥ max(4 σ_v, 3 % of its rms speed)`, `σ_v` the noise of its speed: below, the sign of the speed is chance.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ByMotion {
     /// On samples in which the joint moves.
     pub moving: FitValues,
@@ -335,7 +335,7 @@ pub struct ByMotion {
 }
 
 /// Fit on training logs.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FitSummary {
     /// On raw effort.
     #[serde(flatten)]
@@ -350,7 +350,7 @@ pub struct FitSummary {
 }
 
 /// Fit on one log.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct LogFit {
     /// Log file.
     pub log: String,
@@ -369,7 +369,7 @@ pub struct LogFit {
 }
 
 /// Verdict of a run.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Verdict {
     /// `ok`, `warn` or `fail`.
     pub status: String,
@@ -391,7 +391,7 @@ pub struct Verdict {
 }
 
 /// One choice of the conditioning.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Choice {
     /// Setting.
     pub name: String,
@@ -406,7 +406,7 @@ pub struct Choice {
 }
 
 /// Choices and the evidence for them.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ConditioningRecord {
     /// `compact` or `textbook`.
     pub route: String,
@@ -434,7 +434,7 @@ pub struct ConditioningRecord {
 }
 
 /// Where a result comes from.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Provenance {
     /// Version of the program.
     pub version: String,

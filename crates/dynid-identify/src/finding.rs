@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::input_record::short_name;
 
 /// How much a finding matters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
     /// Good to know; identification takes care of it.
@@ -28,7 +28,7 @@ impl Severity {
 }
 
 /// One fault of a log.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Finding {
     /// Which fault: the name of a [`FindingId`].
     pub id: &'static str,

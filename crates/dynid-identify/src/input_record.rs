@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// An input file.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct InputRecord {
     /// Path as given.
     pub path: String,

@@ -4,7 +4,7 @@ use dynid_clearance::deformation::Verdict;
 use serde::{Deserialize, Serialize};
 
 /// What the deformation tells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StiffnessVerdict {
     /// The compliance is ten standard deviations or more.
@@ -37,7 +37,7 @@ impl From<Verdict> for StiffnessVerdict {
 }
 
 /// Stiffness of one joint as its deformation tells it. Angles in rad (m of joints that slide), efforts in N m (N).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct JointStiffness {
     /// Joint.
     pub joint: String,

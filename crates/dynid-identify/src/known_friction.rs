@@ -17,7 +17,7 @@ const LARGEST: f64 = 1e30;
 ///
 /// With bristles it is LuGre friction, else Stribeck friction where the static friction is known, else Coulomb friction;
 /// viscous friction stands beside it. Temperatures beyond the range count as its nearer end.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct KnownFriction {
     /// Joint.
     pub joint: String,
@@ -208,7 +208,7 @@ fn known(element: impl dynid_model::element::JointElement + 'static, linear: Vec
 }
 
 /// Viscous friction.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(untagged)]
 pub enum ViscousModel {
     /// `s(v) σ2(T) (1 - exp(-|σ3(T) v|^σ4(T)))` with `σ_j(T) = σ_j + σ_j_slope (T - T_ref)`.
@@ -241,7 +241,7 @@ impl ViscousModel {
 }
 
 /// Coefficients of exponential viscous friction.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ExponentialModel {
     /// `T_ref`, °C.
     pub reference_temperature: f64,
@@ -260,7 +260,7 @@ pub struct ExponentialModel {
 }
 
 /// Bristles of LuGre friction: `ż = v - σ0 |v| z/g(v)`, effort `σ0 z + σ1 ż`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct BristleModel {
     /// Stiffness, N m/rad or N/m.
     pub sigma0: f64,
@@ -272,7 +272,7 @@ pub struct BristleModel {
 }
 
 /// Friction that is taken as known.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct KnownLaws {
     /// Laws by joint; those of joints that the robot does not move are left out.
     pub laws: Vec<KnownFriction>,
@@ -314,7 +314,7 @@ impl KnownLaws {
 }
 
 /// Sign of the errors of known friction.
-#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum FrictionErrors {
     /// Any: known friction may be too large or too small.

@@ -15,7 +15,7 @@ const RELEVANT: f64 = 0.25;
 const BETTER_ALONE: f64 = 0.2;
 
 /// What one log has more than the first, though the fit holds it the same.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct LogDeviation {
     /// Log.
     pub log: String,
@@ -40,7 +40,7 @@ pub struct LogDeviation {
 }
 
 /// Whether the logs are of one robot, beside offsets and friction.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct OneRobot {
     /// Chow's F over that of white residuals; around 1 where all logs share their parameters.
     pub f: f64,
@@ -51,7 +51,7 @@ pub struct OneRobot {
 }
 
 /// A log that a fit of its own describes better, in the rows of one joint.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct BetterAlone {
     /// Log.
     pub log: String,
@@ -66,7 +66,7 @@ pub struct BetterAlone {
 }
 
 /// Agreement of the training logs of an identification.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct LogAgreement {
     /// Deviations in offset and friction that the fit does not hold, of all logs but the first.
     pub deviations: Vec<LogDeviation>,

@@ -11,7 +11,7 @@ pub(crate) const REPEATS: f64 = 0.05;
 const SOME: f64 = 0.01;
 
 /// Rows of a log that another one holds too.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Overlap {
     /// Log.
     pub log: String,
@@ -43,7 +43,7 @@ impl Overlap {
 }
 
 /// Rows that logs of a run share.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Overlaps {
     /// Training logs that repeat earlier ones: their rows count more than once.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

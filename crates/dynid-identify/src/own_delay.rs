@@ -10,7 +10,7 @@ use crate::settings::{Own, Route, Settings};
 use crate::training_log::TrainingLog;
 
 /// A log with a delay of its own.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct OwnDelay {
     /// Log.
     pub log: String,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::Error;
 
 /// One number for all joints, or numbers for some.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, schemars::JsonSchema)]
 #[serde(untagged, expecting = "expected a number, or numbers by joint such as `{ j1 = 2.0 }`")]
 pub enum PerJoint {
     /// One value for all joints.

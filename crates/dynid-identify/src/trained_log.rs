@@ -9,7 +9,7 @@ use crate::agreement::FitValues;
 pub(crate) const SPEED_SPAN_S: f64 = 0.05;
 
 /// A training log without its samples.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct TrainedLog {
     /// Name.
     pub name: String,

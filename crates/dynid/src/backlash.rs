@@ -18,7 +18,7 @@ use crate::estimate::{Estimate, Split};
 use crate::logs;
 
 /// What a log says about the gap of a drive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BacklashVerdict {
     /// The residual holds the trace of a gap, beyond what else looks like one.
@@ -45,7 +45,7 @@ impl From<Found> for BacklashVerdict {
 }
 
 /// Backlash of one joint by one log.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct JointBacklash {
     /// Joint.
     pub joint: String,
@@ -73,7 +73,7 @@ pub struct JointBacklash {
 }
 
 /// Backlash of all joints by one log.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct LogBacklash {
     /// Log file.
     pub log: String,

@@ -23,7 +23,7 @@ pub fn journal_channels(joint: &str) -> [String; 2] {
 }
 
 /// A value with its standard deviation.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Valued {
     /// Value.
     pub value: f64,
@@ -38,7 +38,7 @@ impl From<dynid_clearance::Estimate> for Valued {
 }
 
 /// What probes at a journal tell.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct ProbedClearance {
     /// Radial clearance, m.
     pub gap: Valued,
@@ -57,7 +57,7 @@ pub struct ProbedClearance {
 }
 
 /// What the swing of a journal in the effort of its drive tells.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct SwingClearance {
     /// Whether noise alone would show such a line in fewer than one of a thousand logs.
     pub found: bool,
@@ -72,7 +72,7 @@ pub struct SwingClearance {
 }
 
 /// The clearance of one joint.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct JointClearance {
     /// Joint.
     pub joint: String,

@@ -21,7 +21,7 @@ pub use crate::known_friction::{BristleModel, ExponentialModel, ViscousModel};
 pub const SCHEMA: u32 = 1;
 
 /// Friction of a robot's joints. Units are SI, temperatures °C.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FrictionModel {
     /// Schema, 1.
     pub schema: u32,
@@ -38,7 +38,7 @@ pub struct FrictionModel {
 }
 
 /// The result in words.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FrictionVerdict {
     /// `pass`, `warn` or `fail`.
     pub status: String,
@@ -48,7 +48,7 @@ pub struct FrictionVerdict {
 
 /// Friction of one joint:
 /// `s(v) (F_c + (F_s - F_c) exp(-|v/v_s|^δ)) + viscous + offset`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct JointFrictionModel {
     /// Joint.
     pub joint: String,
@@ -101,7 +101,7 @@ pub struct JointFrictionModel {
 }
 
 /// Friction at one speed and temperature.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PointRecord {
     /// Speed, rad/s or m/s.
     pub speed: f64,
@@ -120,7 +120,7 @@ pub struct PointRecord {
 }
 
 /// Coefficients of one temperature.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct LevelRecord {
     /// Mean temperature, °C.
     pub temperature: f64,
@@ -141,7 +141,7 @@ pub struct LevelRecord {
 }
 
 /// A line through the coefficients of the levels.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct LineRecord {
     /// Value at `T_ref`.
     pub intercept: f64,
@@ -158,7 +158,7 @@ pub struct LineRecord {
 }
 
 /// A law that was tried.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct LawRecord {
     /// In words.
     pub law: String,
@@ -173,7 +173,7 @@ pub struct LawRecord {
 }
 
 /// A pass that went into no point.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct UnpairedRecord {
     /// Log.
     pub log: String,
@@ -192,7 +192,7 @@ pub struct UnpairedRecord {
 }
 
 /// What became of a pre-sliding log.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PreslidingRecord {
     /// Log.
     pub log: String,

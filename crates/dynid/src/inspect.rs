@@ -13,7 +13,7 @@ pub use clearance::{ClearanceRow, RestingJournal};
 pub use loops::{ClosureRow, LoopsInspection};
 
 /// Structure of a robot.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct Inspection {
     /// Robot name.
     pub robot: String,
@@ -47,7 +47,7 @@ pub struct Inspection {
 }
 
 /// One moving joint.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct JointRow {
     /// Number that symbols carry.
     pub number: usize,
@@ -70,7 +70,7 @@ pub struct JointRow {
 }
 
 /// A motor that drives its joint through a spring.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct MotorRow {
     /// Number that symbols carry.
     pub number: usize,
@@ -91,7 +91,7 @@ pub struct MotorRow {
 }
 
 /// One base parameter.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct BaseRow {
     /// Kept parameter.
     pub name: String,

@@ -28,6 +28,7 @@ mod provenance;
 pub mod reduce;
 mod report_data;
 mod run;
+pub mod schema;
 mod sealed;
 pub mod simulate;
 pub mod validate;

@@ -222,6 +222,11 @@ const ENDINGS: &[Ending] = &[
         ],
     },
     Ending {
+        command: "schema",
+        negative: "",
+        examples: &[("What there is", "schema"), ("What `estimate.json` holds", "schema estimate")],
+    },
+    Ending {
         command: "simulate",
         negative: "",
         examples: &[

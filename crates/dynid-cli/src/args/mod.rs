@@ -23,7 +23,9 @@ pub(crate) use identify::{
     CheckArgs, CompareArgs, ConsistencyArg, FrictionArg, IdentifyArgs, MethodArg, RouteArg,
 };
 pub(crate) use logs::{InitArgs, LogArgs, MissingArg, ReadingArgs};
-pub(crate) use model::{DiffArgs, ExportArgs, InspectArgs, PredictArgs, RegressorArgs, ValidateArgs};
+pub(crate) use model::{
+    DiffArgs, ExportArgs, InspectArgs, PredictArgs, RegressorArgs, SchemaArgs, ValidateArgs,
+};
 pub(crate) use online::{OnlineArgs, StreamArg};
 pub(crate) use reduce::{MergeArgs, ReduceArgs, SolveArgs};
 pub(crate) use robot::RobotArgs;
@@ -92,6 +94,8 @@ pub(crate) enum Command {
     Reduce(Box<ReduceArgs>),
     /// Effort and regressor rows of a robot file at given states.
     Regressor(RegressorArgs),
+    /// Print the JSON Schema of a result.
+    Schema(SchemaArgs),
     /// Make a virtual log: by inverse dynamics, or of a controlled robot.
     Simulate(SimulateArgs),
     /// Estimate from factors of logs: writes estimate.json and report.html.

@@ -41,6 +41,15 @@ pub(crate) struct RegressorArgs {
     pub(crate) quiet: bool,
 }
 
+#[derive(Debug, Args)]
+pub(crate) struct SchemaArgs {
+    /// Result: `estimate`, `design`, ..; without one all are listed.
+    pub(crate) name: Option<String>,
+    /// Print nothing but the result and errors.
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
+}
+
 /// Which of an estimate's parameters.
 #[derive(Debug, Args)]
 pub(crate) struct SplitArgs {

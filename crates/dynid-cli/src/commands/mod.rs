@@ -21,6 +21,7 @@ pub(crate) mod predict;
 pub(crate) mod reduce;
 pub(crate) mod regressor;
 mod run;
+pub(crate) mod schema;
 pub(crate) mod simulate;
 pub(crate) mod study;
 mod table;

@@ -22,5 +22,6 @@ mod other_libraries;
 mod payload;
 mod provenance;
 mod round_trip;
+mod schemas;
 mod study;
 mod support;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// friction, rotor). *Base parameters* are the combinations of them that the effort depends on, which is all that any log can
 /// reveal. *Shape parameters* enter the effort nonlinearly, such as a Stribeck velocity. What belongs to single logs (payloads,
 /// offsets of a log) is not counted.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ParameterCounts {
     /// Base parameters.
     pub base: BaseCounts,
@@ -19,7 +19,7 @@ pub struct ParameterCounts {
 }
 
 /// Base parameters; each count holds the next.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct BaseCounts {
     /// Combinations that some motion of the robot reveals.
     pub all: usize,
@@ -30,7 +30,7 @@ pub struct BaseCounts {
 }
 
 /// Standard parameters by verdict; the three verdicts add up to all.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct StandardCounts {
     /// All of them.
     pub all: usize,
@@ -43,7 +43,7 @@ pub struct StandardCounts {
 }
 
 /// Shape parameters.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ShapeCounts {
     /// All of them.
     pub all: usize,

@@ -8,7 +8,7 @@ use crate::agreement::FileFit;
 pub const EXPORT_LOSS_LIMIT: f64 = 5.0;
 
 /// Robot files beside the identified model.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ExportedRecord {
     /// What files state of the joints.
     pub joints: Vec<ExportedJoint>,
@@ -21,7 +21,7 @@ pub struct ExportedRecord {
 }
 
 /// What files state of a joint.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ExportedJoint {
     /// Joint.
     pub joint: String,
@@ -34,7 +34,7 @@ pub struct ExportedJoint {
 }
 
 /// What files predict on a log.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ExportedLog {
     /// Log file.
     pub log: String,
@@ -59,7 +59,7 @@ impl ExportedRecord {
 /// of the training logs in which the joint moves; neither coefficient is negative, since simulators refuse that. The constant keeps
 /// sensor offsets and loads out of both and has no place in a file. Rotor inertia is not part of it, but where motors are coupled: their
 /// rotors and that of the joint only make sense together, and `+ rotor_inertia · q̈` stands for all of them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FrictionProjection {
     /// Joint.
     pub joint: String,

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// A friction shape that was tried on held-out blocks.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FrictionTrial {
     /// Joint.
     pub joint: String,
@@ -21,7 +21,7 @@ pub struct FrictionTrial {
 }
 
 /// Whether the identified friction of a joint is passive, `v (e(v) - e(0)) >= 0`, at the velocities of the training logs.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PassivityRecord {
     /// Joint.
     pub joint: String,

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Least squares against instrumental variables on the training logs.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ExogeneityRecord {
     /// By the size of the differences: `exogenous` (regressors equal instruments), `harmless`, `material`; or `weak` instruments, `diverged`
     /// simulation, `undetermined` (nothing to compare).
@@ -32,7 +32,7 @@ pub struct ExogeneityRecord {
 }
 
 /// One base parameter by least squares and by instruments.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct EffectRecord {
     /// Name of the kept parameter.
     pub name: String,
@@ -55,7 +55,7 @@ pub struct EffectRecord {
 }
 
 /// How the instruments of a fit came about.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct InstrumentRecord {
     /// Simulations made.
     pub rounds: usize,

@@ -5,7 +5,7 @@ use dynid_model::{Mat3, Mechanism, Placement, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// Cut joints, and what chooses among the poses of a closed mechanism.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct LoopsRecord {
     /// Cut joints.
     pub closures: Vec<ClosureRecord>,
@@ -16,7 +16,7 @@ pub struct LoopsRecord {
 }
 
 /// A cut joint, or a coupling of coordinates.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ClosureRecord {
     /// Name.
     pub name: String,
@@ -37,7 +37,7 @@ pub struct ClosureRecord {
 }
 
 /// A frame on a link.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FrameRecord {
     /// Link.
     pub link: String,

@@ -16,7 +16,7 @@ use crate::elements::ElementPlan;
 use crate::known_friction::KnownFriction;
 
 /// Robot, elements and settings that predictions need.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ModelRecord {
     /// Gravity, m/s².
     pub gravity: [f64; 3],
@@ -57,7 +57,7 @@ pub struct ModelRecord {
 }
 
 /// A joint that its motor drives through a spring.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ElasticRecord {
     /// Joint.
     pub joint: String,
@@ -96,7 +96,7 @@ impl ElasticRecord {
 }
 
 /// Value of an element's setting.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(untagged)]
 pub enum SettingRecord {
     /// A number.
@@ -106,7 +106,7 @@ pub enum SettingRecord {
 }
 
 /// A link.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct LinkRecord {
     /// Name.
     pub name: String,
@@ -115,7 +115,7 @@ pub struct LinkRecord {
 }
 
 /// A joint.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct JointRecord {
     /// Name.
     pub name: String,
@@ -142,7 +142,7 @@ pub struct JointRecord {
 }
 
 /// A coupling.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CouplingRecord {
     /// Motors.
     pub motors: Vec<String>,

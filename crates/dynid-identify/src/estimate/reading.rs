@@ -8,7 +8,7 @@ use crate::robot::Robot;
 
 /// Transmission between the motors that a log records and the joints: `q_motor = matrix · (q - offset)`,
 /// `effort_joint = matrixᵀ · effort_motor`.
-#[derive(Debug, Clone, Default, Deserialize, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, Deserialize, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MotorSide {
     /// Transmission matrix, one row per motor, one column per joint.
@@ -18,7 +18,7 @@ pub struct MotorSide {
 }
 
 /// How the training logs were read, for logs of the same kind to be read alike.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default)]
 pub struct ReadingRecord {
     /// Columns as the run stated them, drive gains included; what it does not state is found by name. Where all training

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::LogFit;
 
 /// Physical consistency.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ConsistencyRecord {
     /// `pseudo-inertia` or `spatial-inertia`.
     pub form: String,
@@ -35,7 +35,7 @@ pub struct ConsistencyRecord {
 }
 
 /// Errors on held-out folds of time of the training logs, rows as the fit sees them.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct HeldOutRecord {
     /// Number of folds.
     pub folds: usize,
@@ -52,7 +52,7 @@ pub struct HeldOutRecord {
 }
 
 /// What the residuals say about the standard deviations.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PrecisionRecord {
     /// By how much coloured residuals inflate the variances that white ones would give (median over base parameters).
     pub variance_inflation: f64,
@@ -72,7 +72,7 @@ pub struct PrecisionRecord {
 }
 
 /// Cumulative periodogram test.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct WhitenessRecord {
     /// Largest distance from a straight line.
     pub distance: f64,
@@ -85,7 +85,7 @@ pub struct WhitenessRecord {
 }
 
 /// Backward elimination of base parameters.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PruningRecord {
     /// All models, from the whole one down to one parameter.
     pub path: Vec<PruningStep>,
@@ -102,7 +102,7 @@ pub struct PruningRecord {
 }
 
 /// One model of a backward elimination.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PruningStep {
     /// Number of parameters.
     pub parameters: usize,

@@ -15,7 +15,7 @@ const WITHIN: f64 = 1.001 * TURN;
 const BESIDE: f64 = 1.0;
 
 /// A position that was unwrapped.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Unwrapped {
     /// Joint, or motor.
     pub joint: String,

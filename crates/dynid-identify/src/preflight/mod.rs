@@ -28,7 +28,7 @@ pub use delay::Delay;
 use examine::Examined;
 
 /// What was measured of one log, whether or not it is a fault.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct CheckedLog {
     /// Log file.
     pub log: String,

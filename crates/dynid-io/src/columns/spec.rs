@@ -13,7 +13,7 @@ use crate::log::{DecimalMark, LogHeader, LogOptions, Missing};
 use crate::signal::{ColumnName, Signal, part_of_time};
 
 /// An explicit mapping; signals that it does not mention are found by name as in [`ColumnMapping::guess`].
-#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MappingSpec {
     /// Time column, or columns that are added up, such as whole seconds and nanoseconds. Without a unit, seconds, ms, us
@@ -101,7 +101,7 @@ impl MappingSpec {
 }
 
 /// Columns of one signal: their names alone, or with unit, scale and offset.
-#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(
     untagged,
     expecting = "a pattern such as \"q{}\", a list of columns, a table joint -> column, or { columns, unit, scale, offset }"
@@ -114,7 +114,7 @@ pub enum SignalSpec {
 }
 
 /// Columns with unit, scale and offset.
-#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FullSignal {
     /// Columns.
@@ -131,7 +131,7 @@ pub struct FullSignal {
 }
 
 /// Names of a signal's columns.
-#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(untagged)]
 pub enum ColumnNames {
     /// A pattern: `{}` is the number of the joint (from 1; from 0 if that column exists), `{joint}` its name.
@@ -143,7 +143,7 @@ pub enum ColumnNames {
 }
 
 /// One unit for all columns or one per joint.
-#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(untagged)]
 pub enum Units {
     /// One unit for all joints.
@@ -153,7 +153,7 @@ pub enum Units {
 }
 
 /// One number for all joints or one per joint.
-#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(untagged)]
 pub enum PerJoint {
     /// One number for all joints.
@@ -165,7 +165,7 @@ pub enum PerJoint {
 }
 
 /// A column besides the joints' signals: `value = scale · raw + offset`.
-#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelSpec {
     /// Column.

@@ -22,7 +22,7 @@ pub use read::{LogText, Wanted};
 use crate::csv::ReadOptions;
 
 /// What stands between the whole part and the fraction of a number.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 pub enum DecimalMark {
     /// `0.5`
     #[serde(rename = ".")]
@@ -33,7 +33,7 @@ pub enum DecimalMark {
 }
 
 /// What becomes of rows in which a signal has no value: an empty cell, NaN, or a word such as `null`.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Missing {
     /// The log is refused.
@@ -57,7 +57,7 @@ pub struct LogOptions {
 }
 
 /// A setting of the reading that was found, with its reason.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ReadingNote {
     /// What was found out: `format`, `header`, `decimal`, `time`, ...
     pub setting: String,

@@ -63,7 +63,7 @@ pub enum SettingValue {
 }
 
 /// A transmission: `q_motor = matrix · q_joint`, `effort_joint = matrixᵀ · effort_motor`.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, schemars::JsonSchema)]
 pub struct CouplingSpec {
     /// Names of the motors, one per row.
     pub motors: Vec<String>,

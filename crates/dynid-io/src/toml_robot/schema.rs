@@ -299,7 +299,7 @@ impl Body {
 }
 
 /// Parameters of a coupling.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CouplingForm {
     /// One inertia, viscous and Coulomb parameter per motor, carried through the matrix.

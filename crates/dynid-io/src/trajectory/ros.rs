@@ -10,27 +10,27 @@ use super::csv::check_shape;
 use crate::output::{OutputError, write_atomically};
 
 /// `trajectory_msgs/msg/JointTrajectory`; `serde` and [`Self::to_yaml`] give the form of `ros2 topic pub` and `echo`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct JointTrajectory {
     header: Header,
     joint_names: Vec<String>,
     points: Vec<JointTrajectoryPoint>,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 struct Header {
     stamp: Time,
     frame_id: String,
 }
 
 /// `builtin_interfaces/msg/Time` and `Duration`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 struct Time {
     sec: i32,
     nanosec: u32,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 struct JointTrajectoryPoint {
     positions: Vec<f64>,
     velocities: Vec<f64>,

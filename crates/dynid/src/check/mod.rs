@@ -17,7 +17,7 @@ pub use crate::preflight::{Finding, FindingId, Severity};
 use crate::{Error, logs};
 
 /// Outcome of [`check`].
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct Check {
     /// Robot file.
     pub robot: String,

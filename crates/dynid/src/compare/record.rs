@@ -10,7 +10,7 @@ use crate::estimate::InputRecord;
 use crate::pipeline::Problem;
 
 /// Error of an estimator on one joint.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct JointError {
     /// Root mean square of the held-out error, N m or N.
     pub rms: f64,
@@ -25,7 +25,7 @@ pub struct JointError {
 }
 
 /// An estimator with its errors on time that it did not see.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct ComparedEstimator {
     /// Name.
     pub name: String,
@@ -64,7 +64,7 @@ pub enum CompareStatus {
 }
 
 /// Outcome of [`super::compare()`].
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Comparison {
     /// Robot file.
     pub robot: String,

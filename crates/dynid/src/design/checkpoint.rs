@@ -11,7 +11,7 @@ use crate::{Error, sealed};
 
 const SCHEMA: &str = "dynid-design-checkpoint/2";
 
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize, schemars::JsonSchema)]
 struct Checkpoint {
     schema: String,
     /// What the starts depend on.
@@ -19,7 +19,7 @@ struct Checkpoint {
     starts: Vec<StartRecord>,
 }
 
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize, schemars::JsonSchema)]
 struct StartRecord {
     seed: u64,
     unknowns: Vec<f64>,

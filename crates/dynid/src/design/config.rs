@@ -243,7 +243,7 @@ pub struct CapsuleConfig {
 }
 
 /// What makes one trajectory better than another.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CriterionName {
     /// Mean square of the relative standard deviations of the base parameters.

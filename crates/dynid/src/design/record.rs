@@ -18,7 +18,7 @@ pub(super) const NEAR_BEST: f64 = 0.05;
 const POORLY_SEEN: f64 = 0.3;
 
 /// `design.json`: keys are added, never renamed.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct DesignRecord {
     /// Schema and version.
     pub schema: &'static str,
@@ -65,7 +65,7 @@ pub struct DesignRecord {
 }
 
 /// The result in words.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct DesignVerdict {
     /// `pass`, `warn` or `fail`.
     pub status: &'static str,
@@ -76,7 +76,7 @@ pub struct DesignVerdict {
 }
 
 /// The criterion and its value.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct CriterionRecord {
     /// Name, as in the configuration.
     pub name: CriterionName,
@@ -89,7 +89,7 @@ pub struct CriterionRecord {
 }
 
 /// Form of the trajectory.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct TrajectoryRecord {
     /// Period, s.
     pub period_s: f64,
@@ -108,7 +108,7 @@ pub struct TrajectoryRecord {
 }
 
 /// Forecast of one base parameter.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct ParameterForecast {
     /// Name.
     pub name: String,
@@ -123,7 +123,7 @@ pub struct ParameterForecast {
 }
 
 /// A confounded pair.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct PairRecord {
     /// Names.
     pub names: [String; 2],
@@ -132,7 +132,7 @@ pub struct PairRecord {
 }
 
 /// A name and a share.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct ShareRecord {
     /// Name.
     pub name: String,
@@ -141,7 +141,7 @@ pub struct ShareRecord {
 }
 
 /// A limit at its instant of largest use.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct LimitRecord {
     /// What is limited.
     pub kind: String,
@@ -154,7 +154,7 @@ pub struct LimitRecord {
 }
 
 /// Against random motion.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct RandomRecord {
     /// Random trajectories.
     pub trajectories: usize,
@@ -167,7 +167,7 @@ pub struct RandomRecord {
 }
 
 /// One start.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct StartRecord {
     /// Seed.
     pub seed: u64,
@@ -180,7 +180,7 @@ pub struct StartRecord {
 }
 
 /// Why there is no trajectory.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct InfeasibleRecord {
     /// The start pose itself is outside.
     pub at_start: bool,

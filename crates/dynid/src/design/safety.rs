@@ -33,7 +33,7 @@ pub(super) struct Safety {
 }
 
 /// What is checked by default, and what is not.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct SafetyRecord {
     /// Least distance between links and from planes, m.
     pub margin_m: f64,
@@ -50,7 +50,7 @@ pub struct SafetyRecord {
 }
 
 /// A plane that links stay above.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct PlaneRecord {
     /// `floor` or `mounting plane`.
     pub name: &'static str,
@@ -65,7 +65,7 @@ pub struct PlaneRecord {
 }
 
 /// A pair of links that is not kept apart.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct ExemptRecord {
     /// The links.
     pub links: [String; 2],
@@ -74,7 +74,7 @@ pub struct ExemptRecord {
 }
 
 /// A capsule about a link.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct CapsuleRecord {
     /// Link.
     pub link: String,

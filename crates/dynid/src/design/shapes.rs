@@ -19,7 +19,7 @@ use dynid_excitation::constraint::ConstraintError;
 const LARGEST_SHARE: f64 = 3.0;
 
 /// Where a capsule comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CapsuleSource {
     /// `<collision>` of the URDF: it holds boxes, cylinders, spheres and all corners of meshes.

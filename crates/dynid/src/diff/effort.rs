@@ -10,7 +10,7 @@ use crate::export::{CheckStates, with_slipping_bristles};
 use crate::predict::{efforts, known_efforts};
 
 /// Efforts of one joint by two models, in its unit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct JointEffort {
     /// Joint.
     pub joint: String,

@@ -109,7 +109,7 @@ fn quantile(estimate: &Estimate) -> f64 {
 }
 
 /// A parameter, or a combination of some, that both models tell.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct ParameterDiff {
     /// Name of a parameter; of a combination that of the parameter that stands for it.
     pub name: String,

@@ -11,7 +11,7 @@ const SCHEMA: &str = "dynid-diff/1";
 const LISTED: usize = 5;
 
 /// Two models of one robot compared.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct ModelDiff {
     /// Schema and version.
     pub schema: &'static str,
@@ -40,7 +40,7 @@ pub struct ModelDiff {
 }
 
 /// A parameter that cannot be compared.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct NotCompared {
     /// Name.
     pub name: String,
@@ -49,7 +49,7 @@ pub struct NotCompared {
 }
 
 /// Difference of the effort.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct EffortDiff {
     /// Where efforts were compared, in words.
     pub states: String,

@@ -16,7 +16,7 @@ use crate::check::FindingId;
 use crate::verdict::CheckName;
 
 /// What sort of word is explained.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// What the pre-flight of a log may find.
@@ -28,7 +28,7 @@ pub enum Kind {
 }
 
 /// What a word of a result means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 pub struct Explanation {
     /// The word as printed.
     pub id: &'static str,

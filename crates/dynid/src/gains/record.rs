@@ -11,7 +11,7 @@ pub(super) const LEAST_T: f64 = 5.0;
 pub(super) const LEAST_SHARE: f64 = 0.01;
 
 /// The gain of one drive.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct JointGain {
     /// Joint.
     pub joint: String,
@@ -75,7 +75,7 @@ impl JointGain {
 }
 
 /// The output of `dynid gains --json`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct GainsFile {
     /// Layout version.
     pub schema: u32,

@@ -8,7 +8,7 @@ use crate::Error;
 use crate::robot::Robot;
 
 /// A joint with clearance, and its journal at rest under gravity with all joints at zero.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct ClearanceRow {
     /// Joint.
     pub joint: String,
@@ -27,7 +27,7 @@ pub struct ClearanceRow {
 }
 
 /// A journal at rest in its bearing.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct RestingJournal {
     /// Reaction of the bearing, N.
     pub load: f64,

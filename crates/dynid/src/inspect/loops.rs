@@ -4,7 +4,7 @@ use dynid_model::{BaseParameters, BaseSettings, ClosedModel, EffortModel, Reacti
 use serde::Serialize;
 
 /// Loops of a mechanism.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct LoopsInspection {
     /// Number of free motions.
     pub mobility: usize,
@@ -19,7 +19,7 @@ pub struct LoopsInspection {
 }
 
 /// A closure.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct ClosureRow {
     /// Name.
     pub name: String,

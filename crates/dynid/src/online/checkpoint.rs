@@ -18,7 +18,7 @@ use dynid_rows::conditioning::LiveRowSettings;
 const SCHEMA: &str = "dynid-online-checkpoint/2";
 
 /// State of a session after whole rows. Goes on with the same bits as a session that was never interrupted.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Checkpoint {
     schema: String,
     /// What the state depends on: program, robot, configuration, columns.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 /// A base parameter with its deviation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct ParameterValue {
     /// Name of the column that stands for it.
     pub name: String,
@@ -14,7 +14,7 @@ pub struct ParameterValue {
 }
 
 /// A value without deviation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct PlainValue {
     /// Name.
     pub name: String,
@@ -23,7 +23,7 @@ pub struct PlainValue {
 }
 
 /// What a base parameter is.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct LearnedParameter {
     /// Name of the column that stands for it.
     pub name: String,
@@ -34,7 +34,7 @@ pub struct LearnedParameter {
 }
 
 /// A jump of one parameter.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct MovedParameter {
     /// Name: a standard parameter.
     pub name: String,
@@ -45,7 +45,7 @@ pub struct MovedParameter {
 }
 
 /// Something whose change would explain what the samples after an alarm show.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Moved {
     /// What: a link, a joint's friction, a single parameter.
     pub what: String,
@@ -56,7 +56,7 @@ pub struct Moved {
 }
 
 /// Rows and samples so far.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 pub struct Counts {
     /// Samples taken.
     pub samples: u64,
@@ -77,7 +77,7 @@ pub struct Counts {
 }
 
 /// An event, in JSON an object whose `event` names it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
     /// The first stretch has been learned.

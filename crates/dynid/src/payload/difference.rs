@@ -12,7 +12,7 @@ use crate::pipeline::Identification;
 /// A payload from the difference of two fits of the robot, one to the logs that carry it and one to those that carry
 /// nothing: a check only, since its variance is larger and nothing keeps the body possible
 /// ([`explain_difference`], with the columns of the regrouping that belong to the link).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Difference {
     /// Mass, kg.
     pub mass: f64,

@@ -25,7 +25,7 @@ const INPUTS: [&str; 2] = [CheckName::Preflight.name(), CheckName::OwnLogs.name(
 const SEEN: f64 = 0.9;
 
 /// A value with its uncertainty.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Quantity {
     /// Name.
     pub name: String,
@@ -48,7 +48,7 @@ pub struct Quantity {
 }
 
 /// A payload as identified.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PayloadRecord {
     /// Name.
     pub name: String,
@@ -75,7 +75,7 @@ pub struct PayloadRecord {
 }
 
 /// The file `payload.json`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PayloadFile {
     /// Layout version.
     pub schema: u32,
