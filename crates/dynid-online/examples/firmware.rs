@@ -2,11 +2,9 @@
 //!
 //! `cargo run --release -p dynid-online --example firmware`
 #![no_std]
+#![expect(clippy::print_stdout, reason = "the result of a program")]
 extern crate alloc;
-#[allow(
-    unused_extern_crates,
-    reason = "a hosted program has its entry point, and somewhere to print, from it"
-)]
+// A hosted program has its entry point from it, and somewhere to print.
 extern crate std;
 
 use alloc::vec;

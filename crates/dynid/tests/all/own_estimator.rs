@@ -1,7 +1,5 @@
 //! A linear estimator of a program's own, with everything that stands behind the others.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
-
 use std::path::Path;
 
 use dynid::config::LogConfig;
