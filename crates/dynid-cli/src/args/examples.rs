@@ -243,10 +243,7 @@ const ENDINGS: &[Ending] = &[
         negative: "a check failed",
         examples: &[
             ("Estimate from factors that several machines made", "solve a.factors b.factors --out dynid-out"),
-            (
-                "Put the result into the robot file",
-                "export dynid-out/estimate.json --urdf arm_identified.urdf",
-            ),
+            ("Judge the result on a log", "solve all.factors --validate other.csv"),
         ],
     },
     Ending {

@@ -42,7 +42,7 @@ fn flags() -> BTreeSet<String> {
 }
 
 /// Flags of which another test, or nothing, can show the effect.
-const ELSEWHERE: [(&str, &str); 25] = [
+const ELSEWHERE: [(&str, &str); 30] = [
     ("init ", "writes a configuration: `logs_of_tools`"),
     ("backlash --missing", "columns are read alike by all commands: `logs_of_tools`"),
     ("backlash --names", "columns are read alike by all commands: `logs_of_tools`"),
@@ -54,6 +54,11 @@ const ELSEWHERE: [(&str, &str); 25] = [
     ("export --names", "columns are read alike by all commands: `logs_of_tools`"),
     ("identify --missing", "`logs_of_tools`"),
     ("identify --names", "`logs_of_tools`"),
+    ("reduce --names", "columns are read alike by all commands: `logs_of_tools`"),
+    ("reduce --missing", "columns are read alike by all commands: `logs_of_tools`"),
+    ("solve --names", "columns are read alike by all commands: `logs_of_tools`"),
+    ("solve --missing", "columns are read alike by all commands: `logs_of_tools`"),
+    ("schema --quiet", "is there for all commands alike"),
     ("validate --names", "columns are read alike by all commands: `logs_of_tools`"),
     ("validate --missing", "columns are read alike by all commands: `logs_of_tools`"),
     ("study ", "studies are run by another program, whose tests are its own"),
@@ -170,6 +175,8 @@ fn prepared() -> tempfile::TempDir {
     write("no-time.csv", &columns(&|name| name != "t", &same));
     run(at, &["identify", "arm.urdf", "--log", "log.csv", "--out", "out", "--quiet"], 0);
     std::fs::copy(at.join("out/estimate.json"), at.join("estimate.json")).unwrap();
+    run(at, &["reduce", "arm.urdf", "--log", "log.csv", "--out", "cell.factors", "--quiet"], 0);
+    run(at, &["reduce", "cell.factors", "--log", "other.csv", "--out", "other.factors", "--quiet"], 0);
     write(
         "bounded.toml",
         "robot = \"arm.urdf\"\nout = \"out\"\n[[bound]]\nparameter = \"shoulder.fc\"\nrange = [8, 9]\n[[log]]\npath = \"log.csv\"\n",
@@ -272,6 +279,24 @@ fn cases() -> Vec<Case> {
                 "--quiet",
             ],
         ),
+        ("reduce", "reduce arm.urdf --log log.csv --out f.factors", &["--rows 1:600", "--json", "--quiet"]),
+        ("reduce", "reduce cell.factors --log no-time.csv --out f.factors", &["--rate-hz 100"]),
+        ("reduce", "reduce arm.urdf --log currents.csv --out f.factors", &["--gains 2,3"]),
+        ("reduce", "reduce arm.urdf --log no-elbow.csv --out f.factors", &["--allow-unlogged"]),
+        ("reduce", "reduce cell.factors --log other.csv --out f.factors", &["--config turned.toml"]),
+        ("reduce", "reduce cell.factors --log other.csv --out report.html", &["--force"]),
+        ("merge", "merge cell.factors other.factors --out f.factors", &["--json", "--quiet"]),
+        ("merge", "merge cell.factors other.factors --out report.html", &["--force"]),
+        (
+            "solve",
+            "solve cell.factors other.factors",
+            &["--validate other.csv", "--out elsewhere", "--json", "--quiet"],
+        ),
+        ("solve", "solve cell.factors --validate other.csv", &["--rows 1:500", "--config turned.toml"]),
+        ("solve", "solve cell.factors --validate no-time.csv", &["--rate-hz 100"]),
+        ("solve", "solve cell.factors --validate currents.csv", &["--gains 2,3"]),
+        ("solve", "solve cell.factors --validate no-elbow.csv", &["--allow-unlogged"]),
+        ("solve", "solve cell.factors --out .", &["--force"]),
         ("predict", "predict estimate.json --states clean.csv", &["--out p.csv", "--rows 3:5", "--json"]),
         ("predict", "predict estimate.json --states clean.csv --out p.csv", &["--quiet"]),
         (
@@ -516,6 +541,22 @@ fn cases() -> Vec<Case> {
             "clearance",
         ),
         case("simulate --out", "simulate arm.urdf --out s.csv", "simulate arm.urdf --out z.csv"),
+        case(
+            "reduce --log",
+            "reduce cell.factors --log log.csv --out f.factors",
+            "reduce cell.factors --log other.csv --out f.factors",
+        ),
+        case(
+            "reduce --out",
+            "reduce cell.factors --log log.csv --out f.factors",
+            "reduce cell.factors --log log.csv --out g.factors",
+        ),
+        refused(
+            "reduce --config",
+            "reduce arm.urdf --log log.csv --config turned.toml --out f.factors",
+            "--config",
+        ),
+        case("merge --out", "merge cell.factors --out f.factors", "merge cell.factors --out g.factors"),
         case(
             "validate --log",
             "validate estimate.json --log other.csv",

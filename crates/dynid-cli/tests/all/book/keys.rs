@@ -30,6 +30,8 @@ const PAGES: [Keys; 5] = [
             "crates/dynid/src/config.rs",
             "crates/dynid/src/config",
             SETTINGS,
+            PER_JOINT,
+            KNOWN_FRICTION,
             MOTOR_SIDE,
             COLUMNS,
             COUPLING,
@@ -45,6 +47,8 @@ const PAGES: [Keys; 5] = [
             "crates/dynid/src/config.rs",
             "crates/dynid/src/config",
             SETTINGS,
+            PER_JOINT,
+            KNOWN_FRICTION,
             "crates/dynid-excitation/src/criterion/mod.rs",
             COUPLING,
         ],
@@ -77,7 +81,9 @@ const PAGES: [Keys; 5] = [
 const SETTINGS: &str = "crates/dynid-identify/src/settings";
 const MOTOR_SIDE: &str = "crates/dynid-identify/src/estimate/reading.rs";
 const COLUMNS: &str = "crates/dynid-io/src/columns";
-const COUPLING: &str = "crates/dynid-io/src/toml_robot/elements.rs";
+const COUPLING: &str = "crates/dynid-io/src/toml_robot/schema.rs";
+const PER_JOINT: &str = "crates/dynid-identify/src/per_joint.rs";
+const KNOWN_FRICTION: &str = "crates/dynid-identify/src/known_friction.rs";
 
 /// `DYNID_WRITE_KEYS=1 cargo test -p dynid-cli --test all keys_of_files` writes the pages anew.
 #[test]
