@@ -19,10 +19,11 @@ pub struct Caution {
 }
 
 /// Kinds of cautions from those that matter most, since nothing holds beside them, to those that are good to know.
-const ORDER: [&str; 31] = [
+const ORDER: [&str; 32] = [
     CheckName::Preflight.name(),
     FINDING,
     CheckName::OwnLogs.name(),
+    CheckName::Recipe.name(),
     CheckName::EffortScale.name(),
     CheckName::ValidationFit.name(),
     CheckName::TrainingFit.name(),

@@ -31,6 +31,8 @@ crate::names! {
         PriceOfConsistency = "price of physical consistency",
         /// How clearly the structure separates what can be identified.
         RankGap = "structural rank gap",
+        /// Doubts of the identification that taught the recipe of factors.
+        Recipe = "recipe of the factors",
         /// What is left over against sensor noise.
         Residual = "residual against sensor noise",
         /// Dependence on rows near reversal.

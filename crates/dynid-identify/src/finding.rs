@@ -1,11 +1,13 @@
 //! What a pre-flight says.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::input_record::short_name;
 
 /// How much a finding matters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, schemars::JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
     /// Good to know; identification takes care of it.

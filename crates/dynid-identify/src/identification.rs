@@ -13,6 +13,7 @@ use dynid_rows::conditioning::{Conditioning, ConditioningSettings, JointFriction
 use crate::Error;
 use crate::agreement::{self, Agreement, Alignment};
 use crate::caution::Caution;
+use crate::check::CheckResult;
 use crate::consistency::Consistent;
 use crate::effort_scale::{self, EffortScale, WeighedMass};
 use crate::elements::ElementPlan;
@@ -101,6 +102,8 @@ pub struct Identification {
     pub training: Vec<Agreement>,
     /// Figures on the rows of the training logs, where these are all that is left of them; else empty.
     pub row_fits: Vec<RowFit>,
+    /// What the identification that taught the recipe was in doubt of, where factors are solved; else empty.
+    pub recipe_doubts: Vec<CheckResult>,
     /// Agreement on the validation logs.
     pub validation: Vec<Agreement>,
     /// Figures of the unconstrained parameters on the training logs, where they predict differently.

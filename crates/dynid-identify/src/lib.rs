@@ -2,10 +2,9 @@
 //!
 //! ```no_run
 //! use dynid_identify::{Log, Robot, RobotOptions, Settings, identify};
-//! # fn arrays() -> dynid_motion::Log { unimplemented!() }
-//! # fn main() -> Result<(), dynid_identify::Error> {
+//! # fn of(arrays: dynid_motion::Log) -> Result<(), dynid_identify::Error> {
 //! let robot = Robot::load("arm.urdf".as_ref(), &RobotOptions::default())?;
-//! let log = Log::new(&robot, arrays())?;
+//! let log = Log::new(&robot, arrays)?;
 //! let found = identify(&robot, [log], &Settings::default(), &mut |_| {})?;
 //! println!("{}", found.estimate().verdict.headline);
 //! # Ok(())

@@ -275,6 +275,7 @@ pub(crate) fn assemble(
         trained,
         training: Vec::new(),
         row_fits: Vec::new(),
+        recipe_doubts: Vec::new(),
         validation: Vec::new(),
         validation_logs: Vec::new(),
         training_unconstrained: Vec::new(),

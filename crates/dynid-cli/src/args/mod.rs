@@ -27,7 +27,7 @@ pub(crate) use model::{
     DiffArgs, ExportArgs, InspectArgs, PredictArgs, RegressorArgs, SchemaArgs, ValidateArgs,
 };
 pub(crate) use online::{OnlineArgs, StreamArg};
-pub(crate) use reduce::{MergeArgs, ReduceArgs, SolveArgs};
+pub(crate) use reduce::{FactorsArgs, MergeArgs, ReduceArgs, SolveArgs};
 pub(crate) use robot::RobotArgs;
 pub(crate) use simulate::SimulateArgs;
 

@@ -6,16 +6,9 @@ use clap::{Args, ValueHint};
 
 use super::{ForceArgs, PrintArgs, ReadingArgs};
 
+/// Where factors go.
 #[derive(Debug, Args)]
-pub(crate) struct ReduceArgs {
-    /// Configuration or robot file, whose logs teach the recipe; or a factor file, whose recipe is followed.
-    #[arg(value_hint = ValueHint::FilePath)]
-    pub(crate) input: PathBuf,
-    /// Log to reduce; repeat for several (default: those of the configuration).
-    #[arg(long, value_name = "LOG", value_hint = ValueHint::FilePath)]
-    pub(crate) log: Vec<PathBuf>,
-    #[command(flatten)]
-    pub(crate) reading: ReadingArgs,
+pub(crate) struct FactorsArgs {
     /// Factor file to write; `-`: standard output.
     #[arg(long, value_name = "FILE.factors", value_hint = ValueHint::AnyPath)]
     pub(crate) out: PathBuf,
@@ -26,17 +19,26 @@ pub(crate) struct ReduceArgs {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct ReduceArgs {
+    /// Configuration or robot file, whose logs teach the recipe; or a factor file, whose recipe is followed.
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub(crate) input: PathBuf,
+    /// Log to reduce; repeat for several (default: those of the configuration).
+    #[arg(long, value_name = "LOG", value_hint = ValueHint::FilePath)]
+    pub(crate) log: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
+    #[command(flatten)]
+    pub(crate) to: FactorsArgs,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct MergeArgs {
     /// Factor files; one of them may be `-`: standard input.
     #[arg(required = true, value_name = "FACTORS", value_hint = ValueHint::FilePath)]
     pub(crate) factors: Vec<PathBuf>,
-    /// Factor file to write; `-`: standard output.
-    #[arg(long, value_name = "FILE.factors", value_hint = ValueHint::AnyPath)]
-    pub(crate) out: PathBuf,
     #[command(flatten)]
-    pub(crate) force: ForceArgs,
-    #[command(flatten)]
-    pub(crate) print: PrintArgs,
+    pub(crate) to: FactorsArgs,
 }
 
 #[derive(Debug, Args)]

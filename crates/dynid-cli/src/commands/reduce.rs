@@ -5,6 +5,7 @@ use std::path::Path;
 
 use dynid::config::Config;
 use dynid::estimate::{Estimate, Verdict};
+use dynid::preflight::Severity;
 use dynid::reduce::{self, Learned, Reduction};
 use dynid_terminal::message::{Failure, Notes, data, json};
 use dynid_terminal::outputs::{self, Outputs};
@@ -14,10 +15,10 @@ use serde_json::json;
 use super::identify::summary;
 use super::run::{GivenLogs, configuration};
 use super::{Reading, apply_log_args_to, demand_stdout};
-use crate::args::{ForceArgs, MergeArgs, PrintArgs, ReduceArgs, SolveArgs};
+use crate::args::{FactorsArgs, MergeArgs, PrintArgs, ReduceArgs, SolveArgs};
 
 pub(crate) fn run(args: &ReduceArgs) -> Result<u8, Failure> {
-    let notes = Notes::new(args.print.quiet);
+    let notes = Notes::new(args.to.print.quiet);
     let follows = reduce::is_factor_file(&args.input);
     if follows && args.log.is_empty() {
         return Err(Failure::Usage(
@@ -38,8 +39,8 @@ pub(crate) fn run(args: &ReduceArgs) -> Result<u8, Failure> {
         ));
     }
     let inputs: Vec<&Path> = args.log.iter().chain([&args.input]).map(AsRef::as_ref).collect();
-    let set = prepared(&args.out, &inputs, args.force, args.print)?;
-    let progress = Progress::new(args.print.quiet);
+    let set = prepared(&args.to, &inputs)?;
+    let progress = Progress::new(args.to.print.quiet);
     let (reduction, verdict) = if follows {
         let recipe = reduce::read(&args.input)?.recipe().clone();
         let reading = Reading::recorded(&args.reading, Some(&recipe.reading), &args.input)?;
@@ -57,15 +58,15 @@ pub(crate) fn run(args: &ReduceArgs) -> Result<u8, Failure> {
     };
     drop(progress);
     let code = u8::from(verdict.as_ref().is_some_and(|v| v.status == "fail"));
-    written(&reduction, verdict.as_ref(), set, args.print)?;
+    written(&reduction, verdict.as_ref(), set, args.to.print)?;
     Ok(code)
 }
 
 pub(crate) fn merge(args: &MergeArgs) -> Result<u8, Failure> {
     let inputs: Vec<&Path> = args.factors.iter().map(AsRef::as_ref).collect();
-    let set = prepared(&args.out, &inputs, args.force, args.print)?;
+    let set = prepared(&args.to, &inputs)?;
     let merged = reduce::read_all(inputs.iter().copied())?;
-    written(&merged, None, set, args.print)?;
+    written(&merged, None, set, args.to.print)?;
     Ok(0)
 }
 
@@ -101,9 +102,9 @@ pub(crate) fn solve(args: &SolveArgs) -> Result<u8, Failure> {
 }
 
 /// The factor file that a command is about to write.
-fn prepared(out: &Path, inputs: &[&Path], force: ForceArgs, print: PrintArgs) -> Result<Outputs, Failure> {
-    let set = outputs::prepare_files(&[("--out", out)], inputs, force)?;
-    demand_stdout(print, &set)?;
+fn prepared(to: &FactorsArgs, inputs: &[&Path]) -> Result<Outputs, Failure> {
+    let set = outputs::prepare_files(&[("--out", &to.out)], inputs, to.force)?;
+    demand_stdout(to.print, &set)?;
     Ok(set)
 }
 
@@ -120,8 +121,10 @@ fn written(
     let files = set.publish()?;
     let recipe = reduction.recipe();
     let logs = reduction.logs();
-    for caution in logs.iter().flat_map(|log| &log.facts.cautions) {
-        notes.tell(&format!("warning: {}", caution.message));
+    for log in logs {
+        let findings = log.facts.findings.iter().filter(|finding| finding.severity != Severity::Info);
+        findings.for_each(|f| notes.tell(&format!("warning: {}: {}", log.facts.name, f.evidence)));
+        log.facts.cautions.iter().for_each(|caution| notes.tell(&format!("warning: {}", caution.message)));
     }
     if print.json {
         let rows = |groups: &[dynid::estimators::groups::ReducedGroup]| {
@@ -133,7 +136,7 @@ fn written(
                 let facts = &log.facts;
                 json!({
                     "log": facts.name, "key": log.key, "samples": facts.log.samples, "duration_s": facts.log.duration_s,
-                    "rows": rows(&log.groups), "cautions": facts.cautions, "inputs": facts.inputs,
+                    "rows": rows(&log.groups), "findings": facts.findings, "cautions": facts.cautions, "inputs": facts.inputs,
                 })
             })
             .collect();

@@ -3,8 +3,7 @@
 //! ```no_run
 //! use dynid_identify::reduction::Reduction;
 //! use dynid_identify::{Log, Robot, Settings, identify};
-//! # fn main() -> Result<(), dynid_identify::Error> {
-//! # let (robot, logs, more): (Robot, Vec<Log>, Vec<Log>) = unimplemented!();
+//! # fn cells(robot: Robot, logs: Vec<Log>, more: Vec<Log>) -> Result<(), dynid_identify::Error> {
 //! let learned = identify(&robot, logs.clone(), &Settings::default(), &mut |_| {})?;
 //! let reducer = learned.recipe()?.reducer()?;
 //! let here = Reduction::of(&reducer, logs)?;
@@ -35,6 +34,7 @@ use serde::{Deserialize, Serialize};
 use crate::Error;
 use crate::caution::Caution;
 use crate::estimate::InputRecord;
+use crate::finding::{Finding, FindingId, Severity};
 use crate::log::Log;
 
 pub use crate::reduction_error::{FactorFileFault, ReductionError};
@@ -63,10 +63,27 @@ pub struct LogFacts {
     pub log: TrainedLog,
     /// Per output: what its efforts are like, in the rows of the widest kernel.
     pub efforts: Vec<RowSums>,
-    /// What the pre-flight and the reading of the log gave cause for.
+    /// What the pre-flight found.
+    pub findings: Vec<ReducedFinding>,
+    /// What the reading of the log and its motion gave cause for.
     pub cautions: Vec<Caution>,
     /// Files that were read.
     pub inputs: Vec<InputRecord>,
+}
+
+/// A finding of the pre-flight of a log.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ReducedFinding {
+    /// Which fault: the name of a [`FindingId`](crate::preflight::FindingId).
+    pub id: String,
+    /// How much it matters.
+    pub severity: Severity,
+    /// Joint, if it is a joint's own.
+    pub joint: Option<String>,
+    /// What was measured.
+    pub evidence: String,
+    /// What to do.
+    pub remedy: String,
 }
 
 /// Sums over the efforts of rows.
@@ -82,6 +99,29 @@ pub struct RowSums {
     pub least: f64,
     /// Greatest effort; 0 without rows.
     pub greatest: f64,
+}
+
+impl ReducedFinding {
+    fn of(finding: &Finding) -> Self {
+        let Finding { id, severity, joint, evidence, remedy, .. } = finding.clone();
+        ReducedFinding { id: id.to_owned(), severity, joint, evidence, remedy }
+    }
+
+    /// The finding of log `number`; `None` if this version knows no such fault.
+    fn finding(&self, log: &str, number: usize) -> Option<Finding> {
+        let ReducedFinding { id, severity, joint, evidence, remedy } = self.clone();
+        let id = FindingId::ALL.iter().find(|known| known.name() == id)?.name();
+        Some(Finding {
+            id,
+            severity,
+            joint,
+            log: log.to_owned(),
+            evidence,
+            remedy,
+            number,
+            fixes: Vec::new(),
+        })
+    }
 }
 
 /// Logs by one recipe, in the order of their keys.

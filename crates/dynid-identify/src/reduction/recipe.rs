@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ReductionError, plain};
 use crate::Error;
+use crate::check::{CheckName, CheckResult};
 use crate::estimate::{InputRecord, ModelRecord, ReadingRecord};
 use crate::friction_power::FrictionPower;
 use crate::identification::Identification;
@@ -22,6 +23,7 @@ use crate::settings::{ConditioningConfig, EstimatorConfig, Method, Preflight, Ro
 use crate::shape::{self, ShapeFit};
 use crate::structure::Structure;
 use crate::training_log::TrainingLog;
+use crate::verdict::{self, Status};
 
 /// What decides the rows of a log, and how factors of such rows are solved.
 ///
@@ -64,6 +66,8 @@ pub struct Recipe {
     pub inputs: Vec<InputRecord>,
     /// How logs are read.
     pub reading: ReadingRecord,
+    /// Checks of the identification behind it that did not pass and that factors cannot repeat.
+    pub doubts: Vec<CheckResult>,
 }
 
 /// Largest speed and effort of a joint.
@@ -257,9 +261,26 @@ impl Identification {
                 .chain(self.plan.known_source.iter().map(|source| InputRecord::of("friction", source)))
                 .collect(),
             reading: ReadingRecord::default(),
+            doubts: doubts(self),
             model,
         })
     }
+}
+
+/// Checks that look at samples, or at choices that a recipe keeps, and that did not pass.
+fn doubts(id: &Identification) -> Vec<CheckResult> {
+    let kept = [
+        CheckName::Delay,
+        CheckName::ReversalMask,
+        CheckName::OwnLogs,
+        CheckName::TrainingFit,
+        CheckName::ValidationFit,
+    ];
+    let (_, verdict) = verdict::judge(id);
+    let is_doubt = |c: &CheckResult| {
+        c.status != Status::Ok.word() && CheckName::of_name(&c.name).is_some_and(|name| kept.contains(&name))
+    };
+    verdict.checks.into_iter().filter(is_doubt).collect()
 }
 
 fn not_reduced(what: &str, instead: &str) -> Error {
@@ -267,11 +288,12 @@ fn not_reduced(what: &str, instead: &str) -> Error {
 }
 
 impl Recipe {
-    /// SHA-256 of everything in it but where files lie, hexadecimal: factors of the same rows go together.
+    /// SHA-256 of everything that decides rows and their solution, hexadecimal; not of where files lie: factors of the same rows go together.
     pub fn hash(&self) -> String {
         let without_paths = Recipe {
             inputs: self.inputs.iter().map(|i| InputRecord { path: String::new(), ..i.clone() }).collect(),
             reading: ReadingRecord::default(),
+            doubts: Vec::new(),
             ..self.clone()
         };
         dynid_io::digest::sha256(plain(&without_paths).as_bytes())

@@ -7,7 +7,7 @@ use dynid_factor::wire::write_groups;
 use dynid_rows::conditioning::{ConditioningSettings, LogRows};
 
 use super::file::key;
-use super::{LogFacts, Recipe, ReducedLog, ReductionError, RowSums};
+use super::{LogFacts, Recipe, ReducedFinding, ReducedLog, ReductionError, RowSums};
 use crate::Error;
 use crate::caution::{self, Caution};
 use crate::fitting::conditioning_fault;
@@ -87,20 +87,18 @@ impl Reducer {
             return Err(ReductionError::NoRows { log: prepared.name, seconds }.into());
         }
         let trained = TrainedLog::of(&prepared);
-        let mut cautions: Vec<Caution> = findings.iter().filter_map(|finding| finding.caution()).collect();
-        cautions.extend(log.warnings().into_iter().map(|message| {
-            Caution::warn(
-                caution::LOG,
-                message,
-                "columns and units are stated under `[columns]`, before the log is reduced",
-            )
-        }));
+        let of_reading = log.warnings().into_iter().map(|message| {
+            let remedy = "columns and units are stated under `[columns]`, before the log is reduced";
+            Caution::warn(caution::LOG, message, remedy)
+        });
+        let mut cautions: Vec<Caution> = of_reading.collect();
         cautions.extend(log_cautions(model, logs));
         cautions.extend(self.beyond(&name, &prepared));
         cautions.extend(self.faster(&name, &trained));
         let mut bytes = Vec::new();
         write_groups(&groups, &mut bytes);
-        let facts = LogFacts { name, log: trained, efforts, cautions, inputs: log.source.inputs };
+        let findings = findings.iter().map(ReducedFinding::of).collect();
+        let facts = LogFacts { name, log: trained, efforts, findings, cautions, inputs: log.source.inputs };
         Ok(ReducedLog { key: key(&self.hash, &bytes), facts, groups })
     }
 

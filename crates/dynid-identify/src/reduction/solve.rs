@@ -8,6 +8,7 @@ use super::{LogFacts, Reduction, ReductionError};
 use crate::Error;
 use crate::consistency;
 use crate::estimate::FitValues;
+use crate::finding::Finding;
 use crate::fitting::{self, Fitted, RowResiduals};
 use crate::identification::Identification;
 use crate::log::{Log, LogSource};
@@ -66,10 +67,15 @@ impl Reduction {
         let source = |facts: &LogFacts| LogSource { inputs: facts.inputs.clone(), ..LogSource::default() };
         let named = |facts: &LogFacts| TrainedLog { name: facts.name.clone(), ..facts.log.clone() };
         let facts = || self.logs.iter().map(|log| &log.facts);
+        // Reading has seen that all are known.
+        let of_log = |(k, facts): (usize, &LogFacts)| -> Vec<Finding> {
+            facts.findings.iter().filter_map(|f| f.finding(&facts.name, k)).collect()
+        };
+        let findings = facts().enumerate().flat_map(of_log).collect();
         let beside = Beside {
             training: facts().map(named).collect(),
             sources: facts().map(source).collect(),
-            findings: Vec::new(),
+            findings,
             overlaps: Overlaps::default(),
             own_delays: Vec::new(),
             warnings: facts().flat_map(|facts| facts.cautions.iter().cloned()).collect(),
@@ -86,6 +92,7 @@ impl Reduction {
             |j: usize| row_fits.iter().filter_map(move |fit| fit.values.r2[j]).all(|r2| r2 >= EXPLAINED);
         let samples = explained(out.validation.iter(), self.recipe.outputs.len(), &out.consistent);
         out.explained = samples.into_iter().enumerate().map(|(j, held)| held && rows(j)).collect();
+        out.recipe_doubts.clone_from(&self.recipe.doubts);
         out.row_fits = row_fits;
         out.judge(&left)?;
         Ok(out)

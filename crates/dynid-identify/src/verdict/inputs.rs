@@ -16,7 +16,7 @@ const FAR_OFF: f64 = 0.1;
 
 /// Checks of the logs.
 pub(super) fn checks(id: &Identification) -> Vec<(Status, CheckResult)> {
-    [Some(preflight(id)), repeated(id), seen_before(id), Some(scale(&id.effort_scale))]
+    [Some(preflight(id)), recipe(id), repeated(id), seen_before(id), Some(scale(&id.effort_scale))]
         .into_iter()
         .flatten()
         .collect()
@@ -48,6 +48,28 @@ fn preflight(id: &Identification) -> (Status, CheckResult) {
         (Status::Ok, "columns, signs, units, clock and gravity are what the logs say".to_owned())
     };
     check(status, CheckName::Preflight, examined.then_some(count), "", "no error, no warning", meaning)
+}
+
+/// What cannot be looked at again without the samples of the logs that taught a recipe.
+fn recipe(id: &Identification) -> Option<(Status, CheckResult)> {
+    if id.row_fits.is_empty() {
+        return None;
+    }
+    let failed = id.recipe_doubts.iter().any(|doubt| doubt.status == Status::Fail.word());
+    let words: Vec<String> = id
+        .recipe_doubts
+        .iter()
+        .map(|doubt| format!("[{}] {}: {}", doubt.status, doubt.name, doubt.meaning))
+        .collect();
+    let meaning = match &words[..] {
+        [] => "the logs that taught it left no doubt about delay, mask and fit".to_owned(),
+        words => {
+            format!("the logs that taught it left doubts, which no factor can clear: {}", words.join("; "))
+        }
+    };
+    let count = words.len() as f64;
+    let status = Status::of(words.is_empty(), !failed);
+    Some(check(status, CheckName::Recipe, Some(count), "", "no doubt", meaning))
 }
 
 fn repeated(id: &Identification) -> Option<(Status, CheckResult)> {

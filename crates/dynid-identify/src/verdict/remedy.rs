@@ -60,6 +60,8 @@ pub(super) fn of(id: &Identification, check: CheckName) -> String {
         CheckName::Instruments => "compare controller gains and reference in `[instruments]` with those of the robot, or leave the table out"
             .to_owned(),
         CheckName::ClosedLoopBias => "`method = \"iv\"` under `[estimator]`, or a lower `kernel_hz` under `[conditioning]`".to_owned(),
+        CheckName::Recipe => "mend what the doubts name, and learn again: `dynid reduce CONFIG --out NEW.factors`; then reduce all logs by it"
+            .to_owned(),
         CheckName::Residual => format!(
             "`{}` tells whether another estimator does better; friction is measured by `dynid friction friction.toml`, and then \
              `known_friction = \"friction.json\"` under `[elements]`; a joint behind a soft gear: `elastic` in the robot file",

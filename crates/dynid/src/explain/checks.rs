@@ -86,6 +86,12 @@ pub(super) fn text(name: Name) -> Text {
             "Let friction shapes be found, add elements, compare estimators. A model may be good enough for its use all the same: see the errors per joint.",
             "dynid identify ROBOT --log LOG --friction auto",
         ),
+        Name::Recipe => Text(
+            "Factors hold no samples: what the logs that taught their recipe left in doubt about the delay, the reversal mask and the fit cannot be \
+             looked at again when they are solved. The check passes these doubts on.",
+            "Mend what they name in the configuration, learn the recipe again, and reduce all logs by it.",
+            "dynid reduce dynid.toml --out cell.factors",
+        ),
         Name::ReversalMask => Text(
             "Rows near reversal, where friction is least like its law, may be left out. The check says whether the result depends on how many are.",
             "Choose another friction law, or state the mask.",

@@ -11,7 +11,9 @@ use dynid::estimate::Estimate;
 use dynid::io::MappingSpec;
 use dynid::io::digest::sha256_bytes;
 use dynid::log::Log;
+use dynid::motion::Log as Recording;
 use dynid::reduce::{FactorFileFault, Learned, Reduction, ReductionError, learn, reduce};
+use dynid::settings::Preflight;
 use dynid::settings::{LogSettings, Own};
 
 fn example(name: &str) -> PathBuf {
@@ -155,6 +157,63 @@ fn what_no_recipe_knows_is_refused() {
     assert!(robust.contains("method = \"wls\""), "{robust}");
     let single = refused(&|c| c.log[1].own = vec![Own::Offset]);
     assert!(single.contains("terms of single logs"), "{single}");
+}
+
+#[test]
+fn what_a_pre_flight_found_and_a_recipe_doubts_is_not_lost_with_the_samples() {
+    let [first, second, third] = parts();
+    let mut config = Config { robot: example("robot.toml"), log: vec![first, second], ..Config::default() };
+    config.preflight = Preflight::Warn;
+    let learned = learn(&config, &mut |_| {}).unwrap();
+    let recipe = learned.reduction.recipe().clone();
+    assert!(recipe.doubts.is_empty(), "{:?}", recipe.doubts);
+    let check = |estimate: &Estimate, name: &str| {
+        estimate.verdict.checks.iter().find(|c| c.name == name).unwrap().status.clone()
+    };
+    let sound = learned.reduction.solve([], &mut |_| {}).unwrap().estimate();
+    for name in ["pre-flight of the logs", "recipe of the factors"] {
+        assert_eq!(check(&sound, name), "ok", "{name}");
+    }
+
+    // A log whose efforts have the wrong sign, with a pre-flight that only warns.
+    let reducer = recipe.reducer().unwrap();
+    let (time, mut joints, channels) = load(&third).log.into_parts();
+    joints.iter_mut().for_each(|joint| joint.effort.iter_mut().for_each(|e| *e = -*e));
+    let turned = Recording::new("turned", time, joints, channels).unwrap();
+    let turned = Reduction::of(&reducer, [Log::new(reducer.robot(), turned).unwrap()]).unwrap();
+    let turned = Reduction::from_bytes(&turned.to_bytes(), "turned").unwrap();
+    let both = Reduction::merge([learned.reduction, turned]).unwrap();
+    let found = both.solve([], &mut |_| {}).unwrap().estimate();
+    assert_eq!(check(&found, "pre-flight of the logs"), "fail");
+    assert!(
+        found.preflight.iter().any(|f| f.log == "turned" && f.severity == "error"),
+        "{:?}",
+        found.preflight
+    );
+    assert_eq!(found.verdict.status, "fail");
+    // The default pre-flight refuses such a log.
+    let strict = self::learned().reduction.recipe().clone().reducer().unwrap();
+    let (time, mut joints, channels) = load(&third).log.into_parts();
+    joints.iter_mut().for_each(|joint| joint.effort.iter_mut().for_each(|e| *e = -*e));
+    let turned = Recording::new("turned", time, joints, channels).unwrap();
+    let refused = strict.reduce(Log::new(strict.robot(), turned).unwrap()).unwrap_err();
+    assert!(matches!(refused, Error::PreflightFault(_)), "{refused}");
+}
+
+#[test]
+fn doubts_of_a_recipe_are_doubts_of_what_is_solved_by_it() {
+    // Friction without its jump at rest: delay and mask, which factors keep, are in doubt.
+    let [first, second, _] = parts();
+    let mut config = Config { robot: example("robot.toml"), log: vec![first, second], ..Config::default() };
+    config.elements.default = Some(vec!["viscous".to_owned()]);
+    config.elements.friction = dynid::config::Friction::Given;
+    let learned = learn(&config, &mut |_| {}).unwrap();
+    let open: Vec<_> = learned.estimate.verdict.checks.iter().filter(|c| c.status != "ok").collect();
+    let doubts = &learned.reduction.recipe().doubts;
+    assert!(!doubts.is_empty() && doubts.iter().all(|d| open.iter().any(|c| c.name == d.name)), "{open:?}");
+    let solved = learned.reduction.solve([], &mut |_| {}).unwrap().estimate();
+    let check = solved.verdict.checks.iter().find(|c| c.name == "recipe of the factors").unwrap();
+    assert!(check.status != "ok" && check.meaning.contains(&doubts[0].name), "{check:?}");
 }
 
 #[test]
