@@ -74,7 +74,7 @@ pub struct LogFacts {
 /// A finding of the pre-flight of a log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReducedFinding {
-    /// Which fault: the name of a [`FindingId`](crate::preflight::FindingId).
+    /// Which fault: the name of a [`FindingId`].
     pub id: String,
     /// How much it matters.
     pub severity: Severity,
