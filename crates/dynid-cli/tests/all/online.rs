@@ -1,6 +1,6 @@
 //! `dynid online`: streams with faults, checkpoints, and what becomes of a run that is killed.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests outside of test functions")]
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -209,15 +209,25 @@ fn run_piped(folder: &Path, args: &[&str], text: &str) -> Vec<Value> {
     events(&output.stdout)
 }
 
-/// Killed a hundred times: the checkpoint is never torn, and the last run ends where an uninterrupted one does.
+/// The checkpoint is never torn, and the last run ends where an uninterrupted one does.
 #[test]
+fn killed_a_dozen_times_it_ends_where_an_uninterrupted_run_does() {
+    ends_where_an_uninterrupted_run_does(12);
+}
+
+#[test]
+#[ignore = "15 s; the ordinary run kills a dozen times"]
 fn killed_a_hundred_times_it_ends_where_an_uninterrupted_run_does() {
+    ends_where_an_uninterrupted_run_does(100);
+}
+
+fn ends_where_an_uninterrupted_run_does(kills: usize) {
     let folder = folder();
     let whole = events(&run(folder.path(), &["online", "run.toml"], 0).stdout);
     let state = folder.path().join("state.json");
     let mut random = 1u64;
     let (mut torn, mut resumed) = (0, 0);
-    for _ in 0..100 {
+    for _ in 0..kills {
         let mut child = Process::new(env!("CARGO_BIN_EXE_dynid"))
             .current_dir(folder.path())
             .args(["online", "kept.toml", "--checkpoint", "state.json", "-q"])

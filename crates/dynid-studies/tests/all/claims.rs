@@ -61,11 +61,19 @@ fn holds_every_claim_but(may_miss: &[&str], name: &str, [stdout, json, report]: 
 }
 
 #[test]
-fn er16_holds_every_claim_and_repeats_bit_by_bit() {
+fn er16_holds_every_claim() {
     let folder = tempfile::tempdir().unwrap();
-    let first = quick("er16", folder.path(), "one", "1");
-    holds_every_claim("er16", &first);
-    assert!(quick("er16", folder.path(), "two", "2") == first, "two threads give other bits than one");
+    holds_every_claim("er16", &quick("er16", folder.path(), "out", "2"));
+}
+
+#[test]
+#[ignore = "half a minute; that rooms give the same bits for any number of threads, their own tests say"]
+fn er16_and_hit_joint_repeat_bit_by_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    for study in ["er16", "hit-joint"] {
+        let [one, two] = ["1", "2"].map(|threads| quick(study, folder.path(), threads, threads));
+        assert!(one == two, "two threads give other bits than one");
+    }
 }
 
 /// What is measured in every row of a quick run with a seed, and whether the row is said to depend on it.
@@ -91,12 +99,10 @@ fn rows_that_depend_on_the_seed_are_marked() {
 }
 
 #[test]
-fn hit_joint_holds_every_claim_and_repeats_bit_by_bit() {
+fn hit_joint_holds_every_claim() {
     let folder = tempfile::tempdir().unwrap();
-    let first = quick("hit-joint", folder.path(), "one", "1");
-    let ids = holds_every_claim("hit-joint", &first);
+    let ids = holds_every_claim("hit-joint", &quick("hit-joint", folder.path(), "out", "2"));
     assert!((1..=11).all(|row| ids.contains(&row.to_string())), "{ids:?}");
-    assert!(quick("hit-joint", folder.path(), "two", "2") == first, "two threads give other bits than one");
 }
 
 #[test]

@@ -250,7 +250,8 @@ fn exchanges(pairs: &[(usize, usize, &'static str)]) -> Vec<Case> {
 }
 
 #[test]
-fn units_and_gains() {
+#[ignore = "ten seconds; the ordinary run takes a case of each kind"]
+fn other_units_and_gains() {
     let mut cases = vec![
         case("all positions in degrees", "degrees", None, true, |r| {
             for j in 1..=JOINTS {
@@ -291,6 +292,25 @@ fn units_and_gains() {
         ));
     }
     run(cases);
+}
+
+#[test]
+fn units_and_gains() {
+    run(vec![
+        case("velocities in degrees", "velocity_mismatch", Some("j3"), true, |r| {
+            (1..=JOINTS).for_each(|j| r.velocity(j).iter_mut().for_each(|x| *x = x.to_degrees()));
+        }),
+        case("j2 in degrees", "degrees", Some("j2"), true, |r| {
+            r.position(2).iter_mut().for_each(|x| *x = x.to_degrees());
+            r.velocity(2).iter_mut().for_each(|x| *x = x.to_degrees());
+        }),
+        case("efforts times 1000", "drive_gain", None, true, |r| {
+            (1..=JOINTS).for_each(|j| r.effort(j).iter_mut().for_each(|x| *x *= 1e3));
+        }),
+        case("effort of j3 times 10", "drive_gain", Some("j3"), true, |r| {
+            r.effort(3).iter_mut().for_each(|x| *x *= 10.0);
+        }),
+    ]);
 }
 
 #[test]
@@ -339,6 +359,18 @@ fn clocks() {
 
 #[test]
 fn faults_of_signals() {
+    faulty_signals(&[200], &[0.8], &[(3, 1.0)], &[0.02]);
+}
+
+#[test]
+#[ignore = "ten seconds; the ordinary run takes one size of each fault"]
+fn faults_of_signals_of_other_sizes() {
+    faulty_signals(&[40, 600], &[0.5, 0.95], &[(30, 0.3), (55, 2.0)], &[0.005, 0.3]);
+}
+
+/// Signals that stand still for some samples, are cut off at a share of their peak, have spikes (count, share) in effort and
+/// spikes of some radians in position.
+fn faulty_signals(frozen: &[usize], cut: &[f64], spikes: &[(usize, f64)], position_spikes: &[f64]) {
     let mut cases = vec![
         case("an effort that never changes", "frozen_signal", Some("j4"), false, |r| r.effort(4).fill(1.25)),
         case("a joint at rest", "idle_joint", Some("j6"), false, |r| r.position(6).fill(0.3)),
@@ -347,7 +379,7 @@ fn faults_of_signals() {
             r.position(2).iter_mut().for_each(|q| *q = 4e9 + 1e8 * *q);
         }),
     ];
-    for length in [40, 200, 600] {
+    for length in frozen.iter().copied() {
         cases.push(case(
             format!("position frozen for {length}"),
             "frozen_signal",
@@ -370,13 +402,13 @@ fn faults_of_signals() {
             },
         ));
     }
-    for share in [0.5, 0.8, 0.95] {
+    for share in cut.iter().copied() {
         cases.push(case(format!("effort cut off at {share}"), "saturation", Some("j2"), true, move |r| {
             let limit = share * r.effort(2).iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             r.effort(2).iter_mut().for_each(|x| *x = x.clamp(-limit, limit));
         }));
     }
-    for (count, size) in [(3, 1.0), (30, 0.3), (55, 2.0)] {
+    for (count, size) in spikes.iter().copied() {
         cases.push(case(format!("{count} spikes of {size}"), "spikes", Some("j5"), false, move |r| {
             let peak = r.effort(5).iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             for k in 0..count {
@@ -384,7 +416,7 @@ fn faults_of_signals() {
             }
         }));
     }
-    for size in [0.005, 0.02, 0.3] {
+    for size in position_spikes.iter().copied() {
         cases.push(case(format!("position spikes of {size}"), "spikes", Some("j1"), true, move |r| {
             (0..5).for_each(|k| r.position(1)[300 + 700 * k] += size);
         }));
