@@ -4,7 +4,7 @@ use super::lu::Lu;
 
 /// `A P = Q R` by Householder reflections with column exchanges, or for a square matrix `P A = L U`; reusable.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Factor {
+pub(crate) struct Factor {
     rows: usize,
     columns: usize,
     /// Column after column: reflectors on and below the diagonal, `R` above it.
@@ -20,7 +20,7 @@ pub(super) struct Factor {
 
 impl Factor {
     /// Factors a matrix with at least as many rows as columns.
-    pub(super) fn factor(&mut self, rows: usize, columns: usize, matrix: impl Fn(usize, usize) -> f64) {
+    pub(crate) fn factor(&mut self, rows: usize, columns: usize, matrix: impl Fn(usize, usize) -> f64) {
         if rows == columns {
             (self.rows, self.columns, self.square) = (rows, columns, true);
             self.lu.factor(rows, matrix);
@@ -167,7 +167,7 @@ impl Factor {
     }
 
     /// Solves for `count` right-hand sides, which lie row after row, as do the solutions.
-    pub(super) fn solve_many(&self, count: usize, b: &[f64], x: &mut [f64]) {
+    pub(crate) fn solve_many(&self, count: usize, b: &[f64], x: &mut [f64]) {
         if self.square {
             return self.lu.solve_many(count, b, x);
         }

@@ -17,7 +17,7 @@ mod closure;
 mod displacement;
 mod dynamics;
 mod error;
-mod factor;
+pub(crate) mod factor;
 mod free;
 mod lu;
 mod mechanism;

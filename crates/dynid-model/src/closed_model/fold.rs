@@ -32,7 +32,8 @@ pub(super) struct Fold {
 }
 
 impl Fold {
-    pub(super) fn new(tree: &TreeModel, machine: &ClosedMechanism) -> Fold {
+    /// `further`: columns per output that get their values elsewhere, zero here.
+    pub(super) fn new(tree: &TreeModel, machine: &ClosedMechanism, further: &[Vec<usize>]) -> Fold {
         let independent = machine.drives_are_independent();
         let rates: Vec<Vec<usize>> = machine
             .driven()
@@ -45,9 +46,10 @@ impl Fold {
         let layout = tree.layout();
         let mut columns: Vec<Vec<usize>> = Vec::with_capacity(rates.len());
         let mut terms = Vec::with_capacity(rates.len());
-        for rates in &rates {
+        for (output, rates) in rates.iter().enumerate() {
             let mut acting: Vec<usize> =
                 rates.iter().flat_map(|r| layout.columns(*r).iter().copied()).collect();
+            acting.extend(further.get(output).into_iter().flatten());
             acting.sort_unstable();
             acting.dedup();
             let mut own: Vec<Vec<Term>> = vec![Vec::new(); acting.len()];

@@ -2,7 +2,9 @@
 
 use super::ClosedModel;
 use super::expand::Expanded;
+use super::fold::Fold;
 use super::reactions::{Reaction, ReactionShares, Reactions};
+use crate::closed::factor::Factor;
 use crate::dynamics::MotionBlock;
 use crate::effort_model::{EffortModel, RegressorBlock};
 use crate::element::{reaction_channel, weight_channel};
@@ -38,9 +40,8 @@ pub struct LoadReference {
     /// Shape parameters.
     pub shape: Vec<f64>,
     /// Whether the regressor tells how friction changes with the loads' own parameters (Gauss-Newton): its columns are
-    /// then the derivatives of the effort at the reference, its offset what makes up for that there; of friction that acts on
-    /// its own loads (in joints without drive) only the first round counts, which leaves a few per cent of its share.
-    /// Otherwise loads are frozen.
+    /// then the derivatives of the effort at the reference, its offset what makes up for that there. Otherwise loads are
+    /// frozen.
     pub linearised: bool,
 }
 
@@ -70,6 +71,9 @@ pub enum LoadError {
 
 /// Relative change of loads at which friction that acts on its own loads is settled.
 const SETTLED: f64 = 1e-12;
+/// Largest such change, per sample, of what counts as a number: friction of which more comes back as load than it was does
+/// not settle, it locks.
+const LOCKED: f64 = 1e-9;
 const ROUNDS: usize = 50;
 
 #[derive(Debug)]
@@ -111,7 +115,7 @@ impl Loads {
             if joints[..k].iter().any(|other| other.rate == load.rate) {
                 return Err(fault(load.rate, "expected one load, found two"));
             }
-            let Some(friction) = tree.reaction_frictions().find(|f| f.element.law.rate == load.rate) else {
+            let Some(friction) = tree.reaction_frictions().find(|f| f.rate() == load.rate) else {
                 return Err(fault(load.rate, "a load, but no friction that follows a reaction"));
             };
             coefficients.push(friction.columns);
@@ -125,11 +129,8 @@ impl Loads {
             }
         }
         for friction in tree.reaction_frictions() {
-            if joints.iter().all(|load| load.rate != friction.element.law.rate) {
-                return Err(fault(
-                    friction.element.law.rate,
-                    "friction that follows a reaction, but no load",
-                ));
+            if joints.iter().all(|load| load.rate != friction.rate()) {
+                return Err(fault(friction.rate(), "friction that follows a reaction, but no load"));
             }
         }
         let list: Vec<Reaction> =
@@ -155,13 +156,30 @@ impl Loads {
     pub(super) fn is_linearised(&self) -> bool {
         self.reference.linearised
     }
+
+    /// Columns that act on friction through loads, of the loads on some rates; of all loads where they act on each other.
+    fn columns(&self, feels: impl Fn(usize) -> bool) -> Vec<usize> {
+        let mut out = Vec::new();
+        let mut first = 0;
+        for load in &self.joints {
+            let count: usize = load.reactions.iter().map(|g| g.components.len()).sum();
+            if self.acts_on_itself || feels(load.rate) {
+                (first..first + count)
+                    .for_each(|k| out.extend_from_slice(self.reactions.layout().columns(k)));
+                out.extend(load.weight.iter().map(|w| w.0));
+            }
+            first += count;
+        }
+        out
+    }
 }
 
 impl ClosedModel {
     /// Feeds friction that follows reactions with the loads on its joints, taken at given parameters.
     ///
     /// Every [`ReactionFriction`](crate::element::ReactionFriction) of the tree needs its load. Friction in joints without
-    /// drive changes the reactions that it follows; it is then found by iteration for every block.
+    /// drive changes the reactions that it follows; it is then found by iteration for every block. Where that does not settle
+    /// (friction locks the joint) forces, and efforts, are not numbers.
     ///
     /// # Errors
     /// [`LoadError`].
@@ -177,6 +195,15 @@ impl ClosedModel {
     pub(super) fn feed(&mut self, loads: Loads) {
         let own = |name: &String| loads.channels.iter().flatten().any(|c| c == name);
         self.channels = self.tree.channels().iter().filter(|c| !own(c)).cloned().collect();
+        let further = |output: usize| match loads.is_linearised() {
+            true => {
+                let felt: Vec<usize> = self.fold.rates(output).collect();
+                loads.columns(|rate| felt.contains(&rate))
+            }
+            false => Vec::new(),
+        };
+        let further: Vec<Vec<usize>> = (0..self.outputs.len()).map(further).collect();
+        self.fold = Fold::new(&self.tree, &self.machine, &further);
         self.loads = Some(loads);
     }
 
@@ -230,17 +257,19 @@ impl ClosedModel {
             vec![(j.constant + steady).max(0.0); n]
         };
         let forces = loads.joints.iter().map(|j| [vec![0.0; n], weight(j)]).collect();
-        let mut pressed = Pressed { loads: Some(loads), forces, gradients: Vec::new(), change: 0.0 };
+        let nothing = Gradients::default();
+        let mut pressed =
+            Pressed { loads: Some(loads), forces, slopes: Vec::new(), gradients: nothing, change: 0.0 };
         let mut tree = vec![0.0; self.machine.mechanism().rates() * n];
         let mut values = vec![vec![0.0; n]; loads.reactions.list().len()];
-        for _ in 0..ROUNDS {
+        for round in 1..=ROUNDS {
             expanded.with_block(motion, &pressed.channels(), |block| {
                 self.tree.efforts(block, shape, linear, n, &mut tree);
             });
             for (k, to) in values.iter_mut().enumerate() {
                 shares.values(k, &tree, linear, to);
             }
-            pressed.change = pressed.take(&values);
+            pressed.change = pressed.take(&values, round == ROUNDS);
             if !loads.acts_on_itself || pressed.change <= SETTLED {
                 break;
             }
@@ -252,9 +281,27 @@ impl ClosedModel {
                 self.tree.regressor(block, shape, &mut regressor);
             });
             shares.regressor(&regressor, &mut rows);
-            pressed.gradients = gradients(loads, &values, &rows);
+            pressed.slopes = self.slopes(loads, motion, expanded);
+            pressed.gradients = Gradients::of(loads, &values, &rows, (shares, &pressed.slopes));
         }
         pressed
+    }
+}
+
+impl ClosedModel {
+    /// Friction per unit of `F` and of `F_w` of every load, per sample.
+    fn slopes(&self, loads: &Loads, motion: &MotionBlock<'_>, expanded: &Expanded) -> Vec<Vec<[f64; 2]>> {
+        let LoadReference { linear, shape, .. } = &loads.reference;
+        let of = |(load, columns): (&JointLoad, &Vec<usize>)| {
+            let Some(friction) = self.tree.reaction_frictions().find(|f| f.rate() == load.rate) else {
+                unreachable!("every load has its friction");
+            };
+            let mu: Vec<f64> = columns.iter().map(|c| linear[*c]).collect();
+            let speeds = &expanded.dq[load.rate * motion.samples..][..motion.samples];
+            let shape = friction.shape(shape);
+            speeds.iter().map(|v| friction.element.law.per_force(motion, *v, shape, &mu)).collect()
+        };
+        loads.joints.iter().zip(&loads.coefficients).map(of).collect()
     }
 }
 
@@ -263,14 +310,16 @@ pub(super) struct Pressed<'a> {
     loads: Option<&'a Loads>,
     /// `F` and `F_w` of every joint.
     forces: Vec<[Vec<f64>; 2]>,
-    /// `∂F/∂parameter` of every joint, and its columns; empty unless linearised.
-    gradients: Vec<Vec<(usize, Vec<f64>)>>,
+    /// Friction per unit of them; empty unless linearised.
+    slopes: Vec<Vec<[f64; 2]>>,
+    gradients: Gradients,
     change: f64,
 }
 
 impl Pressed<'_> {
     fn nothing() -> Self {
-        Pressed { loads: None, forces: Vec::new(), gradients: Vec::new(), change: 0.0 }
+        let (slopes, gradients) = (Vec::new(), Gradients::default());
+        Pressed { loads: None, forces: Vec::new(), slopes, gradients, change: 0.0 }
     }
 
     /// Channels that elements read.
@@ -280,8 +329,9 @@ impl Pressed<'_> {
         names.zip(forces).map(|(name, force)| (name.as_str(), force.as_slice())).collect()
     }
 
-    /// Takes values of all components; largest change relative to the largest force.
-    fn take(&mut self, values: &[Vec<f64>]) -> f64 {
+    /// Takes values of all components; largest change relative to the largest force. In the `last` round what has not settled
+    /// becomes no number.
+    fn take(&mut self, values: &[Vec<f64>], last: bool) -> f64 {
         let Some(loads) = self.loads else { return 0.0 };
         let (mut change, mut largest) = (0.0_f64, 0.0_f64);
         let mut first = 0;
@@ -293,11 +343,12 @@ impl Pressed<'_> {
                     sum += group.factor * length(values, (at, group.components.len()), s);
                     at += group.components.len();
                 }
+                let moved = (sum - *force).abs();
                 if sum.is_finite() {
-                    change = change.max((sum - *force).abs());
+                    change = change.max(moved);
                     largest = largest.max(sum);
                 }
-                *force = sum;
+                *force = if last && loads.acts_on_itself && moved > LOCKED * sum { f64::NAN } else { sum };
             }
             first += joint.reactions.iter().map(|g| g.components.len()).sum::<usize>();
         }
@@ -313,38 +364,32 @@ impl Pressed<'_> {
         out: &mut RegressorBlock,
     ) {
         let Some(loads) = self.loads else { return };
-        let LoadReference { linear, shape, linearised } = &loads.reference;
-        if !linearised {
+        if !loads.is_linearised() {
             return;
         }
-        let n = motion.samples;
+        let (n, linear) = (motion.samples, &loads.reference.linear);
+        let mut change = vec![0.0; n];
         for (k, load) in loads.joints.iter().enumerate() {
-            let Some(friction) = model.tree.reaction_frictions().find(|f| f.element.law.rate == load.rate)
-            else {
-                continue;
-            };
-            let shape = &shape[friction.shape.clone()];
-            let mu: Vec<f64> = loads.coefficients[k].iter().map(|c| linear[*c]).collect();
-            let speeds = &expanded.dq[load.rate * n..][..n];
-            let per_force: Vec<[f64; 2]> =
-                speeds.iter().map(|v| friction.element.per_force(motion, *v, shape, &mu)).collect();
+            let slopes = &self.slopes[k];
             let mut add = |column: usize, values: &dyn Fn(usize) -> f64| {
                 for output in 0..model.outputs.len() {
-                    let share = expanded.share(output, load.rate);
                     let Ok(place) = model.fold.layout.columns(output).binary_search(&column) else {
+                        // Loads on other drives alone.
                         continue;
                     };
-                    let change: Vec<f64> = (0..n).map(|s| share[s] * values(s)).collect();
+                    let share = expanded.share(output, load.rate);
+                    change.iter_mut().enumerate().for_each(|(s, x)| *x = share[s] * values(s));
                     let factor = linear[column];
                     out.column_mut(output, place).iter_mut().zip(&change).for_each(|(t, x)| *t += x);
                     out.offset_mut(output).iter_mut().zip(&change).for_each(|(t, x)| *t -= factor * x);
                 }
             };
-            for (column, gradient) in &self.gradients[k] {
-                add(*column, &|s| per_force[s][0] * gradient[s]);
+            for (c, column) in self.gradients.columns.iter().enumerate() {
+                let gradient = self.gradients.of_load(k, c, n);
+                add(*column, &|s| slopes[s][0] * gradient[s]);
             }
             for (column, factor) in &load.weight {
-                add(*column, &|s| per_force[s][1] * factor);
+                add(*column, &|s| slopes[s][1] * factor);
             }
         }
     }
@@ -357,33 +402,88 @@ fn length(values: &[Vec<f64>], (first, count): (usize, usize), sample: usize) ->
     }
 }
 
-/// `∂F/∂parameter = Σ factor Σ_c (ρ_c/‖ρ‖) ∂ρ_c/∂parameter`, per joint and column.
-fn gradients(loads: &Loads, values: &[Vec<f64>], rows: &RegressorBlock) -> Vec<Vec<(usize, Vec<f64>)>> {
-    let mut first = 0;
-    let mut out = Vec::with_capacity(loads.joints.len());
-    for joint in &loads.joints {
-        let mut columns: Vec<(usize, Vec<f64>)> = Vec::new();
-        for group in &joint.reactions {
-            let count = group.components.len();
-            for k in first..first + count {
-                for (c, column) in rows.layout().columns(k).iter().enumerate() {
-                    let place = match columns.iter().position(|(own, _)| own == column) {
-                        Some(place) => place,
-                        None => {
-                            columns.push((*column, vec![0.0; rows.samples()]));
-                            columns.len() - 1
+/// How forces `F` on joints change with the parameters.
+#[derive(Default)]
+struct Gradients {
+    /// Columns that some force depends on.
+    columns: Vec<usize>,
+    /// `∂F/∂parameter`, `[(load * columns + column) * samples + s]`.
+    data: Vec<f64>,
+}
+
+impl Gradients {
+    /// `∂F_i/∂π = A_iπ + Σ_j B_ij ∂F_j/∂π`, so `∂F/∂π = (1 - B)⁻¹ A`. `A` follows from the reactions at given friction,
+    /// `ρ/‖ρ‖ · ∂ρ/∂π`, that of friction by steady forces included; `B_ij` is the part of a unit of `F_j` that comes back through
+    /// its friction as load on `i`.
+    fn of(
+        loads: &Loads,
+        values: &[Vec<f64>],
+        rows: &RegressorBlock,
+        (shares, slopes): (&ReactionShares<'_>, &[Vec<[f64; 2]>]),
+    ) -> Gradients {
+        let (n, count) = (rows.samples(), loads.joints.len());
+        let mut columns = loads.columns(|_| true);
+        columns.sort_unstable();
+        columns.dedup();
+        let place = |column: &usize| columns.partition_point(|own| own < column);
+        let width = columns.len();
+        let mut data = vec![0.0; count * width * n];
+        let mut back = vec![0.0; count * count * n];
+        let mut direction = vec![0.0; n];
+        let mut first = 0;
+        for (i, joint) in loads.joints.iter().enumerate() {
+            for group in &joint.reactions {
+                let components = group.components.len();
+                for k in first..first + components {
+                    for (s, to) in direction.iter_mut().enumerate() {
+                        let whole = length(values, (first, components), s);
+                        *to = if whole > 0.0 { group.factor * values[k][s] / whole } else { 0.0 };
+                    }
+                    for (c, column) in rows.layout().columns(k).iter().enumerate() {
+                        let to = data[(i * width + place(column)) * n..][..n].iter_mut();
+                        to.zip(&direction).zip(rows.column(k, c)).for_each(|((to, d), x)| *to += d * x);
+                    }
+                    if !loads.acts_on_itself {
+                        continue;
+                    }
+                    for (j, other) in loads.joints.iter().enumerate() {
+                        let share = shares.share(k, other.rate);
+                        for (s, to) in back[(i * count + j) * n..][..n].iter_mut().enumerate() {
+                            *to += direction[s] * share[s] * slopes[j][s][0];
                         }
-                    };
-                    for (s, (to, entry)) in columns[place].1.iter_mut().zip(rows.column(k, c)).enumerate() {
-                        let whole = length(values, (first, count), s);
-                        let direction = if whole > 0.0 { values[k][s] / whole } else { 0.0 };
-                        *to += group.factor * direction * entry;
+                        for (column, factor) in &other.weight {
+                            let to = &mut data[(i * width + place(column)) * n..][..n];
+                            for (s, to) in to.iter_mut().enumerate() {
+                                *to += direction[s] * share[s] * slopes[j][s][1] * factor;
+                            }
+                        }
                     }
                 }
+                first += components;
             }
-            first += count;
         }
-        out.push(columns);
+        let mut out = Gradients { columns, data };
+        if loads.acts_on_itself {
+            out.take_back(count, n, &back);
+        }
+        out
     }
-    out
+
+    /// Solves `(1 - B) x = A` in place, sample by sample.
+    fn take_back(&mut self, count: usize, samples: usize, back: &[f64]) {
+        let width = self.columns.len();
+        let (mut factor, mut right) = (Factor::default(), vec![0.0; count * width]);
+        let mut solution = right.clone();
+        for s in 0..samples {
+            let one = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
+            factor.factor(count, count, |i, j| one(i, j) - back[(i * count + j) * samples + s]);
+            right.iter_mut().zip(self.data.iter().skip(s).step_by(samples)).for_each(|(to, x)| *to = *x);
+            factor.solve_many(width, &right, &mut solution);
+            self.data.iter_mut().skip(s).step_by(samples).zip(&solution).for_each(|(to, x)| *to = *x);
+        }
+    }
+
+    fn of_load(&self, load: usize, column: usize, samples: usize) -> &[f64] {
+        &self.data[(load * self.columns.len() + column) * samples..][..samples]
+    }
 }

@@ -79,7 +79,7 @@ impl ClosedModel {
         });
         ClosedModel {
             drives: Drives::new(&machine),
-            fold: Fold::new(&tree, &machine),
+            fold: Fold::new(&tree, &machine, &[]),
             channels: tree.channels().to_vec(),
             joints: joints.collect(),
             loads: None,

@@ -250,7 +250,7 @@ impl ReactionShares<'_> {
         }
     }
 
-    fn share(&self, k: usize, rate: usize) -> &[f64] {
+    pub(super) fn share(&self, k: usize, rate: usize) -> &[f64] {
         &self.shares[(k * self.rates + rate) * self.samples..][..self.samples]
     }
 

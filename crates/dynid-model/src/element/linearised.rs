@@ -1,6 +1,8 @@
 //! Elements linearised about values of their shape parameters.
 
-use super::{ElasticTransmission, ElementColumns, ElementWeights, JointElement, JointInfo};
+use super::{
+    ElasticTransmission, ElementColumns, ElementWeights, FollowingFriction, JointElement, JointInfo,
+};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::parameter::{Owner, Parameter};
 
@@ -119,6 +121,10 @@ impl JointElement for Linearised {
     }
     fn opposes_motion(&self) -> bool {
         self.element.opposes_motion()
+    }
+    fn reaction_friction(&self) -> Option<FollowingFriction<'_>> {
+        let following = self.element.reaction_friction()?;
+        Some(FollowingFriction { held: Some(&self.shape), ..following })
     }
     fn fill(&self, joints: &[JointInfo], motion: &MotionBlock<'_>, _: &[f64], out: &mut ElementColumns<'_>) {
         let own = self.own_entries();

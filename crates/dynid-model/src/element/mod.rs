@@ -30,9 +30,9 @@ pub use drive::DriveGain;
 pub use elastic::{CubicFit, CubicSpring, ElasticDoubt, ElasticTransmission, PiecewiseFit, PiecewiseSpring};
 pub use external_load::{ExternalLoad, load_channel};
 pub use friction::{
-    Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, LoadFriction, LuGre, Offset, PowerLaw,
-    ReactionFriction, Sigmoid, SigmoidOffset, Stribeck, StribeckViscous, TanhFriction, Viscous,
-    ViscousMagnitude, reaction_channel, weight_channel,
+    Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, FollowingFriction, LoadFriction, LuGre,
+    Offset, PowerLaw, ReactionFriction, Sigmoid, SigmoidOffset, Stribeck, StribeckViscous, TanhFriction,
+    Viscous, ViscousMagnitude, reaction_channel, weight_channel,
 };
 pub use gated::{Gated, is_gate, log_channel, payload_channel};
 pub use jets::JetMotion;
@@ -233,7 +233,7 @@ pub trait JointElement: std::fmt::Debug + Send + Sync {
         None
     }
     /// The friction that follows a reaction, if it is one; none by default.
-    fn reaction_friction(&self) -> Option<&ReactionFriction> {
+    fn reaction_friction(&self) -> Option<FollowingFriction<'_>> {
         None
     }
     /// The contact of a joint with clearance that it is, if it is one; none by default.

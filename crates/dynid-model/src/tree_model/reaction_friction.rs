@@ -3,15 +3,27 @@
 use std::ops::Range;
 
 use super::TreeModel;
-use crate::element::ReactionFriction;
+use crate::element::FollowingFriction;
 
 /// Such friction, and where its parameters are.
 pub(crate) struct PlacedReactionFriction<'a> {
-    pub(crate) element: &'a ReactionFriction,
+    pub(crate) element: FollowingFriction<'a>,
     /// Columns of its coefficients.
     pub(crate) columns: Vec<usize>,
     /// Shape parameters of the element.
-    pub(crate) shape: Range<usize>,
+    shape: Range<usize>,
+}
+
+impl PlacedReactionFriction<'_> {
+    /// Rate that it acts on.
+    pub(crate) fn rate(&self) -> usize {
+        self.element.law.law.rate
+    }
+
+    /// Its shape parameters, of those of the model where it does not hold them.
+    pub(crate) fn shape<'s>(&'s self, model: &'s [f64]) -> &'s [f64] {
+        self.element.held.unwrap_or_else(|| &model[self.shape.clone()])
+    }
 }
 
 impl TreeModel {

@@ -11,7 +11,7 @@ pub use placed::{
     Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, Offset, PowerLaw, Sigmoid, SigmoidOffset,
     Stribeck, StribeckViscous, TanhFriction, Viscous, ViscousMagnitude,
 };
-pub use reaction::{ReactionFriction, reaction_channel, weight_channel};
+pub use reaction::{FollowingFriction, ReactionFriction, reaction_channel, weight_channel};
 
 pub(super) use super::law::units::{EFFORT, VISCOUS};
-use super::law::units::{NUMBER, PER_ANGLE};
+use super::law::units::{NUMBER, PER_ANGLE, PER_SPEED};

@@ -1,7 +1,7 @@
 //! Friction that follows the forces which press on a joint.
 
-use super::NUMBER;
 use super::placed::Stribeck;
+use super::{NUMBER, PER_SPEED};
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::element::laws::falling;
 use crate::element::shape::values;
@@ -24,11 +24,12 @@ pub fn weight_channel(joint: &str) -> String {
 /// Friction of a joint that follows the reaction `F` which presses on it and a steady force `F_w` (a weight):
 ///
 /// ```text
-/// e = [μ_c + (μ_s - μ_c) E] F s(v) + μ_c F_w s(v),   E = exp(-|v/v_s|^δ)
+/// e = [μ_c + (μ_s - μ_c) E] F s(v) + μ_c F_w s(v) + μ_v (F + F_w) v,   E = exp(-|v/v_s|^δ)
 /// ```
 ///
 /// Columns `F s (1 - E) + F_w s` and `F s E` for `mu_c`, `mu_s` (numbers without unit); without the Stribeck effect (`E = 0`)
-/// one column `(F + F_w) s` for `mu_c`. `F`, `F_w` come from channels ([`reaction_channel`], [`weight_channel`]), which a
+/// one column `(F + F_w) s` for `mu_c`. A last column `(F + F_w) v` for `mu_v` (s/rad or s/m) where friction grows with speed.
+/// `F`, `F_w` come from channels ([`reaction_channel`], [`weight_channel`]), which a
 /// [`ClosedModel`](crate::ClosedModel) computes itself. Source: Rosyid & El-Khasawneh 2020, equations 23 and 39;
 /// the steady force has no Stribeck effect there.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,9 +38,25 @@ pub struct ReactionFriction {
     pub law: Stribeck,
     /// Whether friction falls with speed; without, shape parameters are not used.
     pub falls: bool,
+    /// Whether friction grows with speed (`mu_v`).
+    pub viscous: bool,
+}
+
+/// Friction that follows a reaction, as an element shows it.
+#[derive(Debug, Clone, Copy)]
+pub struct FollowingFriction<'a> {
+    /// The law.
+    pub law: &'a ReactionFriction,
+    /// Values of its shape parameters where the element holds them; `None`: they are parameters of the model.
+    pub held: Option<&'a [f64]>,
 }
 
 impl ReactionFriction {
+    /// Number of coefficients.
+    fn coefficients(&self) -> usize {
+        1 + usize::from(self.falls) + usize::from(self.viscous)
+    }
+
     fn forces<'a>(&self, joints: &[JointInfo], motion: &MotionBlock<'a>) -> [&'a [f64]; 2] {
         let joint = &joints[self.law.rate].name;
         [reaction_channel(joint), weight_channel(joint)].map(|name| {
@@ -58,8 +75,9 @@ impl ReactionFriction {
     pub(crate) fn per_force(&self, motion: &MotionBlock<'_>, v: f64, shape: &[f64], mu: &[f64]) -> [f64; 2] {
         let sign = motion.sign(v);
         let falling = if self.falls { self.falling(v, shape) } else { 0.0 };
-        let fixed = mu.get(1).copied().unwrap_or(mu[0]);
-        [sign * (mu[0] + (fixed - mu[0]) * falling), sign * mu[0]]
+        let fixed = if self.falls { mu[1] } else { mu[0] };
+        let growing = if self.viscous { mu[self.coefficients() - 1] * v } else { 0.0 };
+        [sign * (mu[0] + (fixed - mu[0]) * falling) + growing, sign * mu[0] + growing]
     }
 }
 
@@ -68,22 +86,27 @@ impl JointElement for ReactionFriction {
         vec![self.law.rate]
     }
     fn parameters(&self, joints: &[JointInfo]) -> Vec<Parameter> {
-        let coefficient = |symbol| joints[self.law.rate].parameter(symbol, NUMBER, Some(0.0));
-        let symbols: &[&str] = if self.falls { &["mu_c", "mu_s"] } else { &["mu_c"] };
-        symbols.iter().map(|s| coefficient(s)).collect()
+        let coefficient = |symbol, unit| joints[self.law.rate].parameter(symbol, unit, Some(0.0));
+        let mut out = vec![coefficient("mu_c", NUMBER)];
+        out.extend(self.falls.then(|| coefficient("mu_s", NUMBER)));
+        out.extend(self.viscous.then(|| coefficient("mu_v", PER_SPEED)));
+        out
     }
     fn shape(&self, joints: &[JointInfo]) -> Vec<ShapeParameter> {
         if self.falls { self.law.shape(joints) } else { Vec::new() }
     }
     fn entries(&self) -> Vec<(usize, usize)> {
-        (0..1 + usize::from(self.falls)).map(|k| (self.law.rate, k)).collect()
+        (0..self.coefficients()).map(|k| (self.law.rate, k)).collect()
+    }
+    fn opposes_motion(&self) -> bool {
+        true
     }
     fn channels(&self, joints: &[JointInfo]) -> Vec<String> {
         let joint = &joints[self.law.rate].name;
         vec![reaction_channel(joint), weight_channel(joint)]
     }
-    fn reaction_friction(&self) -> Option<&ReactionFriction> {
-        Some(self)
+    fn reaction_friction(&self) -> Option<FollowingFriction<'_>> {
+        Some(FollowingFriction { law: self, held: None })
     }
     fn fill(
         &self,
@@ -105,6 +128,11 @@ impl JointElement for ReactionFriction {
         }
         for ((c, w), v) in out.column(0).iter_mut().zip(weight).zip(speeds) {
             *c += w * motion.sign(*v);
+        }
+        if self.viscous {
+            let forces = force.iter().zip(weight);
+            let column = out.column(self.coefficients() - 1);
+            column.iter_mut().zip(forces).zip(speeds).for_each(|((c, (f, w)), v)| *c = (f + w) * v);
         }
     }
     fn shape_entries(&self) -> Vec<(usize, usize)> {
@@ -157,6 +185,11 @@ impl JointElement for ReactionFriction {
         for (s, v) in speeds.iter().enumerate() {
             let pressed = weight[s] + if self.falls { 0.0 } else { force[s] };
             out.dq[rate * samples + s] += own[s] * pressed * motion.sign_slope(*v);
+        }
+        if self.viscous {
+            let own = weights.column(self.coefficients() - 1);
+            let to = out.dq[rate * samples..][..samples].iter_mut();
+            to.zip(own).zip(force.iter().zip(weight)).for_each(|((to, x), (f, w))| *to += x * (f + w));
         }
         if self.falls {
             let (data, slots) = self.times_force(joints, motion, weights, 2);

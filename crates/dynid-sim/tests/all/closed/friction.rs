@@ -18,10 +18,10 @@ fn pins(machine: ClosedMechanism, radius: f64, falls: bool, width: f64) -> Close
             vs: ShapeSetting { start: 0.5, lower: 0.1, upper: 2.0, held: false },
             ..Stribeck::new(rate)
         };
-        elements.push(Box::new(ReactionFriction { law, falls }));
+        elements.push(Box::new(ReactionFriction { law, falls, viscous: falls }));
         linear.push(0.3);
         if falls {
-            linear.push(0.45);
+            linear.extend([0.45, 0.02]);
         }
         let component =
             |component| Reaction::Joint { body: machine.mechanism().rate_bodies()[rate], component };
