@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::closed_model::ClosedModel;
+use crate::closed_model::{ClosedModel, LoadError, LoadReference};
 use crate::coordinate::Coordinate;
 use crate::description::Limits;
 use crate::dynamics::{MotionAdjoint, MotionBlock};
@@ -22,7 +22,7 @@ use dynid_algebra::scalar::Jet;
 pub enum RobotModel {
     /// A tree.
     Tree(TreeModel),
-    /// A tree with closed loops.
+    /// A tree with closed loops, or one whose joints have friction that follows reactions.
     Closed(ClosedModel),
 }
 
@@ -69,10 +69,31 @@ impl RobotModel {
 
     /// The model with its loops, if it has some.
     pub fn closed(&self) -> Option<&ClosedModel> {
+        self.with_reactions().filter(|closed| closed.machine().conditions() > 0)
+    }
+
+    /// The model that knows the reactions inside the mechanism: with loops, or with friction that follows reactions.
+    pub fn with_reactions(&self) -> Option<&ClosedModel> {
         match self {
             RobotModel::Tree(_) => None,
             RobotModel::Closed(closed) => Some(closed),
         }
+    }
+
+    /// Returns the model with the loads of its friction at other parameters; as it is where no friction follows a reaction.
+    ///
+    /// # Errors
+    /// [`LoadError::Value`] for a wrong length.
+    pub fn with_load_reference(self, reference: LoadReference) -> Result<Self, LoadError> {
+        match self {
+            RobotModel::Tree(tree) => Ok(RobotModel::Tree(tree)),
+            RobotModel::Closed(closed) => closed.with_load_reference(reference).map(RobotModel::Closed),
+        }
+    }
+
+    /// Whether friction follows reactions, so that efforts are not linear in the parameters.
+    pub fn has_loads(&self) -> bool {
+        self.with_reactions().is_some_and(|closed| !closed.loads().is_empty())
     }
 
     fn map_tree(self, change: impl FnOnce(TreeModel) -> TreeModel) -> Self {

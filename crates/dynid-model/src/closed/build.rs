@@ -37,9 +37,6 @@ pub(super) fn build(
     home: &[(String, Vec<f64>)],
     least_measure: f64,
 ) -> Result<ClosedMechanism, ClosedError> {
-    if closures.is_empty() {
-        return Err(ClosedError::NoClosures);
-    }
     if mechanism.follows().is_some()
         && let Some(body) = mechanism.bodies().iter().find(|b| b.joint.mimic.is_some())
     {
@@ -83,6 +80,15 @@ pub(super) fn build(
         floats,
         least_measure,
     };
+    if machine.closures.is_empty() {
+        if let Some(body) = machine.mechanism.bodies().iter().find(|b| b.joint.kind == JointKind::Floating) {
+            return Err(ClosedError::Floating { joint: body.joint.name.clone(), role: "driven" });
+        }
+        machine.driven = (0..n).collect();
+        machine.independent.clone_from(&machine.driven);
+        let home = machine.home.clone();
+        return machine.settle(&[home], "driven");
+    }
     let poses = machine.generic_poses()?;
     let rank = poses.iter().map(|q| machine.rank_at(q)).max().unwrap_or(0);
     if rank == n {
@@ -169,7 +175,19 @@ impl ClosedMechanism {
         driven: Option<&[String]>,
         home: &[(String, Vec<f64>)],
     ) -> Result<ClosedMechanism, ClosedError> {
+        if closures.is_empty() {
+            return Err(ClosedError::NoClosures);
+        }
         build(mechanism, closures, driven, home, LEAST_MEASURE)
+    }
+
+    /// A tree as a mechanism without closures, whose joints are all driven and independent: what is known of forces inside
+    /// mechanisms with loops is then known of it too.
+    ///
+    /// # Errors
+    /// [`ClosedError::Mimic`] for joints that follow others, [`ClosedError::Floating`] for joints that float.
+    pub fn open(mechanism: Mechanism) -> Result<ClosedMechanism, ClosedError> {
+        build(mechanism, Vec::new(), None, &[], LEAST_MEASURE)
     }
 
     /// Returns the mechanism with other independent coordinates: a pose of the platform, say, in place of the drives.

@@ -98,9 +98,6 @@ impl JointElement for ReactionFriction {
     fn entries(&self) -> Vec<(usize, usize)> {
         (0..self.coefficients()).map(|k| (self.law.rate, k)).collect()
     }
-    fn opposes_motion(&self) -> bool {
-        true
-    }
     fn channels(&self, joints: &[JointInfo]) -> Vec<String> {
         let joint = &joints[self.law.rate].name;
         vec![reaction_channel(joint), weight_channel(joint)]

@@ -9,6 +9,7 @@ mod free;
 mod golden;
 mod loads;
 mod model;
+mod open;
 mod pinocchio;
 mod poses;
 mod random;
