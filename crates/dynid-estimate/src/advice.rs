@@ -43,7 +43,7 @@ pub enum NoAdvice {
     FloatingJoint,
     /// Motors stand behind springs: the motions are those of stiff joints.
     ElasticJoints,
-    /// Loops are closed: the motions are those of arms.
+    /// Loops are closed, or friction follows reactions: the motions are those of arms.
     ClosedLoops,
 }
 
@@ -100,7 +100,7 @@ pub fn advise(
         advice.unavailable = Some(NoAdvice::ElasticJoints);
         return advice;
     }
-    if model.closed().is_some() {
+    if model.with_reactions().is_some() {
         advice.unavailable = Some(NoAdvice::ClosedLoops);
         return advice;
     }

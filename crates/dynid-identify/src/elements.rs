@@ -3,6 +3,7 @@
 mod elastic;
 mod model;
 mod pairs;
+mod reactions;
 mod settings;
 
 use std::sync::Arc;
@@ -24,6 +25,7 @@ use crate::known_friction::KnownFriction;
 use crate::log_terms::LogTerms;
 pub(crate) use elastic::{ELASTIC, stated_springs};
 pub use pairs::AlikeElements;
+pub use reactions::{LoadValues, REACTION_FRICTION};
 
 /// Friction that grows with the load of the gear.
 pub const LOAD: &str = "load";
@@ -48,6 +50,8 @@ pub struct ElementPlan {
     /// Ten standard parameters per body whose rigid effort loads the gears of `load` elements; `None`: those of the robot
     /// file.
     pub load_reference: Option<Vec<f64>>,
+    /// Parameters at which the loads of `reaction_friction` are taken; `None`: those of the robot file, frozen.
+    pub load_values: Option<LoadValues>,
     /// Friction whose effort is known, at most one law per joint. Coefficients of friction among the elements of these
     /// joints are errors of the laws.
     pub known: Vec<KnownFriction>,
@@ -85,6 +89,7 @@ impl ElementPlan {
             couplings: spec.couplings.clone(),
             spec: spec.clone(),
             load_reference: None,
+            load_values: None,
             known: Vec::new(),
             known_source: None,
             free_errors: true,
@@ -285,6 +290,7 @@ impl ElementPlan {
     ) -> Result<Box<dyn JointElement>, Error> {
         let joints = JointInfo::of(mechanism, &self.coordinates);
         let refused = match friction.is_empty() {
+            _ if self.has_reactions() => Some("beside `reaction_friction`, which it has no form for"),
             true => Some("where no joint has friction"),
             false => (friction.iter().any(|e| !e.signals(&joints).is_empty()))
                 .then_some("beside `lugre`: friction with memory has no form for it"),

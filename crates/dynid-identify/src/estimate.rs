@@ -12,7 +12,7 @@ mod trust;
 
 use std::path::Path;
 
-use dynid_model::{EffortModel, RobotModel, ShapeParameter};
+use dynid_model::{EffortModel, LoadReference, RobotModel, ShapeParameter};
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
@@ -536,8 +536,10 @@ impl Estimate {
         if expected != self.parameters.len() {
             return Err(fault(format!("{} parameters, the model has {expected}", self.parameters.len())));
         }
-        let shape = self.shape(split, &table.shape).map_err(fault)?;
-        Ok(model.with_shape(&shape))
+        let shape = self.shape(split, &table.shape).map_err(&fault)?;
+        let reference = LoadReference { linear: self.values(split), shape, linearised: false };
+        let model = model.with_shape(&reference.shape).with_load_reference(reference);
+        model.map_err(|e| fault(e.to_string()))
     }
 
     /// Values of the shape parameters that go with a split; `Err` says what is wrong with them.

@@ -27,6 +27,7 @@ use crate::log::LogSource;
 use crate::log_agreement::LogAgreement;
 use crate::overlap::Overlaps;
 use crate::own_delay::OwnDelay;
+use crate::pipeline::LoadRounds;
 use crate::prior::Prior;
 use crate::robot::Robot;
 use crate::settings::{LogSettings, Settings};
@@ -143,6 +144,8 @@ pub struct Identification {
     /// Least squares against instruments; `None` if the configuration says nothing about the closed loop, or what was identified is not
     /// simulated in closed loop, which is then a warning.
     pub comparison: Option<Comparison>,
+    /// How the loads of friction came to rest, where friction follows reactions.
+    pub loads: Option<LoadRounds>,
 }
 
 impl Identification {
@@ -214,11 +217,7 @@ impl Identification {
     /// The nonlinear model and its linear parameters that parameters of the fit stand for; `None` if the fit's model is not
     /// linearised.
     pub(crate) fn unfolded(&self, values: &[f64]) -> Result<Option<(RobotModel, Vec<f64>)>, Error> {
-        let Some(found) = &self.shapes else { return Ok(None) };
-        let unfolded = shape::unfold(&found.model, &self.model, values);
-        let mechanism = self.model.mechanism();
-        let model = self.plan.model(mechanism)?;
-        Ok(Some((model.with_shape(&unfolded.shape), unfolded.linear)))
+        shape::nonlinear(&self.plan, &self.model, self.shapes.as_ref(), values)
     }
 
     /// The identified model and its linear parameters: [`Identification::values`], or what they stand for where the fit's

@@ -6,6 +6,7 @@ mod elastic;
 mod figures;
 mod friction;
 pub mod known;
+mod loads;
 mod model_fit;
 mod shapes;
 
@@ -41,6 +42,7 @@ pub use crate::training_log::TrainingLog;
 use crate::trust::{Evidence, Trust};
 use crate::{Error, own_delay, preflight as before, stiffness};
 pub(crate) use figures::{EXPLAINED, explained};
+pub use loads::LoadRounds;
 pub use model_fit::ModelFit;
 
 /// What is being worked on, for progress displays.
@@ -220,6 +222,7 @@ pub(crate) fn assemble(
         groups,
         consistent,
         power,
+        loads,
     } = fit;
     let Problem { robot, plan, model, structure, logs: prepared, training, settings } = problem;
     warnings.extend(effect::warnings(&settings, shapes.is_some()));
@@ -300,6 +303,7 @@ pub(crate) fn assemble(
         alone: None,
         instruments,
         comparison,
+        loads,
     };
     out.nonlinear = out.unfolded(out.values())?;
     out.alone = out.without_logs()?;

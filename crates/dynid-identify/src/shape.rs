@@ -5,7 +5,7 @@ use dynid_estimate::separable::{
     Bound, SeparableEstimate, SeparableSettings, ShapeFinding, ShapeVerdict, StartReport,
 };
 use dynid_model::element::{JointElement, Linearised, change_name};
-use dynid_model::{EffortModel, RobotModel};
+use dynid_model::{EffortModel, LoadReference, RobotModel};
 use dynid_rows::conditioning::{Conditioning, refine};
 
 use crate::Error;
@@ -119,6 +119,31 @@ pub fn unfold(model: &RobotModel, linearised: &RobotModel, values: &[f64]) -> Un
         shape: shape.iter().map(|s| (s.start + change(&s.name)).clamp(s.lower, s.upper)).collect(),
         linear: kept_columns(model, linearised).map(|c| values[c]).collect(),
     }
+}
+
+/// The nonlinear model of a plan and its linear parameters that `values` of the fit's model stand for; `None` if that is not
+/// linearised. Loads of friction are those at these parameters.
+pub(crate) fn nonlinear(
+    plan: &ElementPlan,
+    linearised: &RobotModel,
+    found: Option<&ShapeFit>,
+    values: &[f64],
+) -> Result<Option<(RobotModel, Vec<f64>)>, Error> {
+    let unfolded = match found {
+        Some(found) => unfold(&found.model, linearised, values),
+        None if plan.has_reactions() => {
+            let shape = linearised.parameters().shape_start();
+            Unfolded { linear: values.to_vec(), shape }
+        }
+        None => return Ok(None),
+    };
+    let Unfolded { linear, shape } = unfolded;
+    let model = plan.model(linearised.mechanism())?.with_shape(&shape);
+    let reference = LoadReference { linear: linear.clone(), shape, linearised: false };
+    let model = model
+        .with_load_reference(reference)
+        .unwrap_or_else(|e| unreachable!("parameters of the plan's model: {e}"));
+    Ok(Some((model, linear)))
 }
 
 /// Columns of the linearised model that the nonlinear one has too, in its order.

@@ -35,7 +35,7 @@ pub use output::OutputError;
 pub use robot_error::{Place, RobotFileError};
 pub use states::{StateJoint, States, StatesError};
 pub use toml_robot::{
-    ClearanceSpec, CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, RobotFile,
-    SettingValue,
+    ClearanceSpec, CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, ReactionLoad,
+    ReactionSpec, RobotFile, SettingValue,
 };
 pub use trajectory::{TrajectoryFile, TrajectoryFileError};

@@ -76,11 +76,13 @@ pub enum SimError {
         /// Which joint.
         source: NotPositive,
     },
-    /// A robot with loops where one without is needed.
-    #[error("expected a robot without loops, found one with loops: it is a plant of its own kind")]
+    /// A robot with loops, or with friction that follows reactions, where one without is needed.
+    #[error(
+        "expected a robot without loops and friction that follows reactions, found one with: it is a plant of its own kind"
+    )]
     ClosedMechanism,
-    /// A robot without loops where one with loops is needed.
-    #[error("expected a robot with loops, found one without")]
+    /// A robot without loops and without friction that follows reactions where one with either is needed.
+    #[error("expected a robot with loops or with friction that follows reactions, found one without")]
     NoLoops,
     /// Loops of a mechanism do not go with its drives.
     #[error(transparent)]

@@ -91,7 +91,7 @@ impl Plant {
         sign_width: f64,
     ) -> Result<Plant, SimError> {
         let model = model.into();
-        if model.closed().is_some() {
+        if model.with_reactions().is_some() {
             return Err(SimError::ClosedMechanism);
         }
         let (positions, n) = model.dimensions();

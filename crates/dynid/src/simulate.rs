@@ -7,14 +7,16 @@ mod elastic;
 mod settings;
 mod trajectory;
 
-use dynid_model::{ClosedModel, EffortModel, History, Mechanism, MotionBlock, RegressorBlock, RobotModel};
+use dynid_model::{
+    ClosedModel, EffortModel, History, LoadReference, Mechanism, MotionBlock, RegressorBlock, RobotModel,
+};
 use dynid_sim::Profile;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::Error;
-use crate::elements::{ElementPlan, LOAD};
+use crate::elements::{ElementPlan, LOAD, REACTION_FRICTION};
 use crate::nominal::{nominal_parameters, with_nominal_shape};
 use crate::robot::refuse_clearance;
 use crate::robot::{Robot, refuse_elastic, refuse_internal_load, refuse_loops};
@@ -122,6 +124,11 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
         Some(_) => {
             refuse_elastic(robot, "simulated beside joints with clearance")?;
             refuse_loops(robot, "simulated beside joints with clearance")?;
+            if plan.has_reactions() {
+                return Err(Error::Unsupported(format!(
+                    "`{REACTION_FRICTION}` has no form beside joints with clearance: state other friction, or leave out `clearance`"
+                )));
+            }
             if mechanism.follows().is_some() {
                 return Err(Error::Unsupported(
                     "joints that follow others are not simulated beside joints with clearance: do not couple mimic joints"
@@ -141,6 +148,7 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
     };
     settings.check()?;
     let values = nominal_parameters(&model, &plan, &settings.values)?;
+    let model = at_own_loads(model, &values);
     match settings.mode {
         SimulateMode::InverseDynamics => {
             let load = plan.is_measured().then_some(mechanism);
@@ -154,6 +162,15 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
         }
         SimulateMode::ClosedLoop => closed_loop::experiment(model, &reference, values, profiles, settings),
     }
+}
+
+/// The model with the loads of its friction at parameters of its own.
+fn at_own_loads(model: RobotModel, values: &[f64]) -> RobotModel {
+    let shape = model.parameters().shape_start();
+    let reference = LoadReference { linear: values.to_vec(), shape, linearised: false };
+    model
+        .with_load_reference(reference)
+        .unwrap_or_else(|e| unreachable!("parameters of the model itself: {e}"))
 }
 
 fn by_inverse_dynamics(

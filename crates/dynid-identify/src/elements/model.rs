@@ -1,7 +1,7 @@
 //! From a plan to an effort model, known friction included.
 
 use dynid_model::element::JointElement;
-use dynid_model::{ClosedModel, Mechanism, RobotModel, TreeModel};
+use dynid_model::{Mechanism, RobotModel, TreeModel};
 
 use super::ElementPlan;
 use crate::Error;
@@ -50,10 +50,7 @@ impl ElementPlan {
             true => tree.with_free_sign(|p| self.is_friction_error(&p.name)),
             false => tree,
         };
-        Ok(match &self.closed {
-            None => tree.into(),
-            Some(closed) => ClosedModel::new(tree, closed.clone()).into(),
-        })
+        self.pressed(mechanism, tree)
     }
 
     /// Known friction of a joint.

@@ -4,6 +4,7 @@ use dynid_model::RobotModel;
 use dynid_rows::conditioning::{Conditioning, JointFriction, ReducedGroup};
 
 use super::Step;
+use super::loads::{self, LoadRounds};
 use super::shapes::{self, Shaped};
 use crate::Error;
 use crate::consistency::{self, Consistent};
@@ -34,6 +35,8 @@ pub struct ModelFit {
     pub consistent: Consistent,
     /// What friction had to obey.
     pub(crate) power: FrictionPower,
+    /// How the loads of friction came to rest, where friction follows reactions.
+    pub loads: Option<LoadRounds>,
 }
 
 impl Problem {
@@ -42,12 +45,25 @@ impl Problem {
     /// # Errors
     /// Settings that do not fit the model, too few rows, what the estimators refuse.
     pub fn fit(
-        mut self,
+        self,
         conditioning: Option<Conditioning>,
         progress: &mut dyn FnMut(Step),
     ) -> Result<(Problem, ModelFit), Error> {
+        match self.plan.has_reactions() {
+            false => self.fit_at_loads(conditioning, None, progress),
+            true => loads::settle(self, conditioning, progress),
+        }
+    }
+
+    /// One fit with the loads of the plan. `friction`: its shapes where they were chosen before.
+    pub(super) fn fit_at_loads(
+        mut self,
+        conditioning: Option<Conditioning>,
+        friction: Option<Vec<JointFriction>>,
+        progress: &mut dyn FnMut(Step),
+    ) -> Result<(Problem, ModelFit), Error> {
         let Shaped { conditioning, friction, found: shapes } =
-            shapes::search(&mut self, conditioning, progress)?;
+            shapes::search(&mut self, conditioning, friction, progress)?;
         let state_hz = state_hz(&self.settings, conditioning.as_ref());
         let settings = self.conditioning_settings();
         let power = friction_power::limits(&self.model, &self.plan, &self.logs, state_hz, &settings)?;
@@ -88,6 +104,7 @@ impl Problem {
             groups,
             consistent,
             power,
+            loads: None,
         };
         Ok((self, fit))
     }
@@ -107,9 +124,14 @@ impl ModelFit {
     /// # Errors
     /// Fails as the plan of the problem does.
     pub fn unfolded(&self, problem: &Problem) -> Result<Option<(RobotModel, Vec<f64>)>, Error> {
-        let Some(found) = &self.shapes else { return Ok(None) };
-        let unfolded = shape::unfold(&found.model, &problem.model, &self.consistent.values);
-        let model = problem.plan.model(problem.model.mechanism())?;
-        Ok(Some((model.with_shape(&unfolded.shape), unfolded.linear)))
+        shape::nonlinear(&problem.plan, &problem.model, self.shapes.as_ref(), &self.consistent.values)
+    }
+
+    /// [`ModelFit::unfolded`], of a linear model the model of the plan.
+    pub(super) fn nonlinear(&self, problem: &Problem) -> Result<(RobotModel, Vec<f64>), Error> {
+        match self.unfolded(problem)? {
+            Some(found) => Ok(found),
+            None => Ok((problem.plan.model(problem.model.mechanism())?, self.consistent.values.clone())),
+        }
     }
 }

@@ -20,19 +20,21 @@ pub(super) struct Shaped {
 }
 
 /// Adds shapes of friction to the plan if they are to be chosen, finds the shape parameters and linearises the model about
-/// them. On the textbook route the model stays as it is.
+/// them. On the textbook route the model stays as it is. `friction`: the shapes, where they were chosen before.
 ///
 /// # Errors
 /// Fails as choice and search do: [`Error::Conditioning`], or settings that do not fit the model.
 pub(super) fn search(
     problem: &mut Problem,
     conditioning: Option<Conditioning>,
+    friction: Option<Vec<JointFriction>>,
     progress: &mut dyn FnMut(Step),
 ) -> Result<Shaped, Error> {
-    let mut out = Shaped { conditioning, friction: Vec::new(), found: None };
+    let chosen = friction.is_some();
+    let mut out = Shaped { conditioning, friction: friction.unwrap_or_default(), found: None };
     let Some(choices) = &mut out.conditioning else { return Ok(out) };
     let all_known = problem.plan.known.len() == problem.plan.per_rate.len();
-    if problem.settings.elements.friction == Friction::Auto && !all_known {
+    if problem.settings.elements.friction == Friction::Auto && !all_known && !chosen {
         let chosen = friction::choose(problem, choices, &mut |stage| progress(Step::Conditioning(stage)))?;
         problem.rebuild()?;
         out.friction = chosen.per_output;

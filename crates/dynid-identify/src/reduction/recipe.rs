@@ -217,6 +217,13 @@ impl Identification {
         if !self.plan.elastic.is_empty() || self.taken_as_stiff {
             return Err(not_reduced("elastic joints", "use the robot file without `elastic`"));
         }
+        if self.loads.is_some() {
+            let instead = "identify from the logs, or state other friction";
+            return Err(not_reduced(
+                "friction that follows reactions, whose columns go with the estimate,",
+                instead,
+            ));
+        }
         let table = self.model.parameters();
         let mut model = ModelRecord::new(&self.robot.file.description, &self.robot.mechanism, &self.plan);
         (model.state_hz, model.kernel_hz) = (self.state_hz, self.kernel_hz);

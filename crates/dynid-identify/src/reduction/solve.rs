@@ -60,6 +60,7 @@ impl Reduction {
             groups,
             consistent,
             power,
+            loads: None,
         };
         let row_fits: Vec<RowFit> = (self.logs.iter())
             .map(|log| row_fit(&log.facts, &log.groups, &base, self.recipe.outputs.len()))

@@ -10,6 +10,7 @@ use super::Source;
 use super::clearance::{self, ClearanceSpec};
 use super::elastic::{self, ElasticSpec};
 use super::number::number;
+use super::reaction::{self, ReactionSpec};
 use super::schema::{CouplingForm, RobotToml};
 use crate::excerpt::excerpt;
 use crate::robot_error::RobotFileError;
@@ -29,6 +30,8 @@ pub struct ElementSpec {
     pub elastic: Vec<ElasticSpec>,
     /// Joints with clearance: `[element.<joint>] clearance = { .. }`, in joint order.
     pub clearance: Vec<ClearanceSpec>,
+    /// What presses on joints whose friction follows it: `[element.<joint>] reaction_friction = { loads = [..] }`, in joint order.
+    pub reactions: Vec<ReactionSpec>,
     /// The kinds of elements that these names and settings are of. A file knows those that come with the library; a program
     /// may put others in their place.
     pub registry: ElementRegistry,
@@ -84,6 +87,7 @@ pub(super) fn build(
     let mut spec = ElementSpec { defaults: robot.defaults.elements.clone(), ..ElementSpec::default() };
     spec.elastic = elastic::build(source, robot, joints)?;
     spec.clearance = clearance::build(source, robot, description)?;
+    spec.reactions = reaction::build(source, robot, description, &mut spec.settings)?;
     let motors = spec.elastic.iter().map(|e| e.motor.as_str());
     let owners: Vec<&str> = joints.iter().copied().chain(motors).collect();
     for (joint, table) in &robot.element {
@@ -98,7 +102,14 @@ pub(super) fn build(
                 let owner = format!("element.{joint}");
                 return Err(source.value(offset, &owner, element, "a joint that turns", "a motor"));
             }
-            if element == "elements" {
+            if element == reaction::REACTION_FRICTION
+                && let (true, Some(table)) = (is_joint, value.as_table())
+            {
+                let plain = table.iter().filter(|(key, _)| !reaction::is_own(key));
+                let plain = plain.map(|(key, value)| (key.clone(), value.clone())).collect();
+                let mut path = Path { source, offset, joint, element, out: &mut spec.settings };
+                path.flatten("", &Value::Table(plain))?;
+            } else if element == "elements" {
                 let list = value.as_array().and_then(|a| texts(a));
                 let list = list.ok_or_else(|| {
                     let owner = format!("element.{joint}");

@@ -9,6 +9,7 @@ mod floating;
 mod home;
 mod loops;
 mod number;
+mod reaction;
 mod schema;
 mod write;
 
@@ -20,6 +21,7 @@ use dynid_model::{Description, Inertia, Mat3, Vec3};
 pub use clearance::ClearanceSpec;
 pub use elastic::ElasticSpec;
 pub use elements::{CouplingSpec, ElementSetting, ElementSpec, SettingValue};
+pub use reaction::{ReactionLoad, ReactionSpec};
 pub use schema::CouplingForm;
 
 use toml::Spanned;
@@ -84,7 +86,9 @@ pub fn read(path: impl AsRef<Path>) -> Result<RobotFile, RobotFileError> {
 /// `floating_base`, `couple_mimics`, `floating`, `loop`, `actuated`, `home`, `[defaults]`, `[element.<joint>]`,
 /// `[[coupling]]`. Unknown keys are errors. `[element.<joint>] elastic = { ratio = .. }` ([`ElasticSpec`]) puts a motor
 /// behind a spring; `[element.<motor>]` is then as for joints. `clearance = { journal_radius = .., gap = .. }`
-/// ([`ClearanceSpec`]) gives the joint's journal room in its bearing.
+/// ([`ClearanceSpec`]) gives the joint's journal room in its bearing. `reaction_friction = { loads = [..] }` ([`ReactionSpec`])
+/// says what presses on a joint whose friction follows it: `loads` (tables of `force` or `moment`: names of axes, `"axial"`
+/// or `"radial"`; `radius` or `arm`, m; `joint`, by default its own), `weight` (shares of the weight of links), `preload`.
 ///
 /// `floating = [..]` names links or joints: the joint that carries the link, or the joint itself, becomes a floating one,
 /// whatever its kind. `home = { joint = .. }`: a number or an angle, of a floating joint `[x, y, z, qx, qy, qz, qw]` with a

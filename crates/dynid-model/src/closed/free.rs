@@ -162,7 +162,7 @@ impl ClosedMechanism {
     pub fn condition_wrenches(&self, free: &FreeMotions, body: usize) -> Vec<f64> {
         let (hanging, conditions) = (self.hanging(body), self.rows.len());
         let mut out = vec![0.0; 6 * conditions];
-        for (component, row) in out.chunks_exact_mut(conditions).enumerate() {
+        for (component, row) in out.chunks_exact_mut(conditions.max(1)).enumerate() {
             self.closure_entries_at(&free.world, &hanging, component, row);
         }
         out

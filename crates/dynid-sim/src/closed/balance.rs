@@ -30,7 +30,7 @@ impl ClosedPlant {
             for body in &loads.bodies {
                 let mut wrench = self.dynamics.joint_wrench(*body, &work.dynamics);
                 let carried = self.machine.condition_wrenches(&work.free, *body);
-                for (w, row) in wrench.iter_mut().zip(carried.chunks_exact(multipliers.len())) {
+                for (w, row) in wrench.iter_mut().zip(carried.chunks_exact(multipliers.len().max(1))) {
                     *w -= row.iter().zip(multipliers).map(|(c, l)| c * l).sum::<f64>();
                 }
                 wrenches.push(wrench);

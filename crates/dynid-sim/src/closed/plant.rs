@@ -77,7 +77,7 @@ impl ClosedPlant {
     ) -> Result<ClosedPlant, SimError> {
         let model = model.into();
         check_parameters(model.tree(), &linear, &shape, sign_width)?;
-        let closed = model.closed().ok_or(SimError::NoLoops)?;
+        let closed = model.with_reactions().ok_or(SimError::NoLoops)?;
         let machine = followed_by_drives(closed.machine())?;
         let dynamics = Dynamics::new(machine.mechanism());
         let mut plant = ClosedPlant {
@@ -121,9 +121,9 @@ impl ClosedPlant {
 
     /// The model.
     pub fn model(&self) -> &ClosedModel {
-        match self.model.closed() {
+        match self.model.with_reactions() {
             Some(closed) => closed,
-            None => unreachable!("a plant of a model without loops"),
+            None => unreachable!("a plant of a plain tree"),
         }
     }
 

@@ -41,7 +41,7 @@ pub(super) fn experiment(
         channels,
         seed: settings.seed,
     };
-    let result = if model.closed().is_some() {
+    let result = if model.with_reactions().is_some() {
         let plant = |values| ClosedPlant::new(model.clone(), values, shape.clone(), plant_table.sign_width);
         run_closed(&mut plant(values.clone())?, &plant(believed)?, &wanted, &experiment)?
     } else {

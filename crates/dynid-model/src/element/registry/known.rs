@@ -1,10 +1,10 @@
 //! The kinds of elements that come with the crate.
 
 use super::kind::{Build, Candidate, ElementKind, OptionTerm, Placement};
-use crate::element::law::units::{NUMBER, VISCOUS};
+use crate::element::law::units::{NUMBER, PER_SPEED, VISCOUS};
 use crate::element::{
-    AtJoint, CyclicTorque, DriveGain, ExternalLoad, JointElement, LinearTerm, LuGre, RotorInertia, Spring,
-    laws,
+    AtJoint, CyclicTorque, DriveGain, ExternalLoad, JointElement, LinearTerm, LuGre, ReactionFriction,
+    RotorInertia, Spring, Stribeck, VelocityLaw, laws,
 };
 
 /// What tells elements apart that differ next to rest alone.
@@ -17,6 +17,7 @@ pub(super) fn kinds() -> Vec<ElementKind> {
     out.extend(others());
     out.extend(shaped());
     out.extend([load(), exponential_viscous(), lugre(), stribeck_viscous(), external_load(), elastic()]);
+    out.push(reaction_friction());
     out
 }
 
@@ -259,6 +260,26 @@ fn external_load() -> ElementKind {
             "or `load T(t) sign(q̇)` with `external_load = { brake = true }`, `T` the channel `load_<joint>` of the log",
         )
         .keys(&["factor"])
+}
+
+fn reaction_friction() -> ElementKind {
+    let number = |symbol| LinearTerm::new(symbol, NUMBER).at_least(0.0);
+    let linear = [number("mu_c"), number("mu_s"), LinearTerm::new("mu_v", PER_SPEED).at_least(0.0)];
+    let kind = of("reaction_friction", &linear, |p| {
+        let law = Stribeck { vs: p.shape[0], delta: p.shape[1], ..Stribeck::new(p.rate) };
+        Ok(Box::new(ReactionFriction { law, falls: p.flag("stribeck"), viscous: p.flag("viscous") }))
+    });
+    let options = ["stribeck", "viscous"].map(|key| OptionTerm::Flag { key }).to_vec();
+    ElementKind { shape: laws::Stribeck.shape().to_vec(), options, ..kind }
+        .equation("[mu_c + (mu_s - mu_c) exp(-abs(q̇/vs)^delta)] F sign(q̇) + mu_c F_w sign(q̇) + mu_v (F + F_w) q̇")
+        .help(
+            "friction that follows the reaction `F` in a joint and a steady force `F_w`: [Friction that follows loads](../questions/loads.md)",
+        )
+        .reference("Rosyid and El-Khasawneh 2020")
+        .keys(&["mu_c", "mu_s", "mu_v"])
+        .excludes("load", "both follow the load of the joint")
+        .alike("coulomb", "reactions that vary")
+        .alike("stribeck", "reactions that vary")
 }
 
 fn elastic() -> ElementKind {
