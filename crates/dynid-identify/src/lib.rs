@@ -16,7 +16,6 @@
 //! is passive. No file is opened but those of robots and estimates; `dynid` reads logs and configurations.
 
 #[macro_use]
-mod names;
 
 pub mod agreement;
 pub mod bounds;

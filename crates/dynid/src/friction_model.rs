@@ -7,6 +7,7 @@ use dynid_io::SourceFile;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use dynid_record::Outcome;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
@@ -40,8 +41,8 @@ pub struct FrictionModel {
 /// The result in words.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FrictionVerdict {
-    /// `pass`, `warn` or `fail`.
-    pub status: String,
+    /// Whether the file may be used.
+    pub status: Outcome,
     /// One sentence.
     pub headline: String,
 }

@@ -276,10 +276,8 @@ fn doubts(id: &Identification) -> Vec<CheckResult> {
         CheckName::TrainingFit,
         CheckName::ValidationFit,
     ];
-    let (_, verdict) = verdict::judge(id);
-    let is_doubt = |c: &CheckResult| {
-        c.status != Status::Ok.word() && CheckName::of_name(&c.name).is_some_and(|name| kept.contains(&name))
-    };
+    let verdict = verdict::judge(id);
+    let is_doubt = |c: &CheckResult| c.status != Status::Ok && kept.contains(&c.name);
     verdict.checks.into_iter().filter(is_doubt).collect()
 }
 

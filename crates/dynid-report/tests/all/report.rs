@@ -87,7 +87,6 @@ fn hollow(text: &str) -> ReportData {
             owner: text(),
             name: text(),
             unit: text(),
-            reason: text(),
             combination: text(),
             advice: text(),
             ..Default::default()
@@ -119,7 +118,6 @@ fn hollow(text: &str) -> ReportData {
         }],
         motions: vec![text()],
         consistency: Some(Consistency {
-            form: text(),
             limits: vec![Limit { owner: text(), text: text(), ..Default::default() }],
             validation: vec![ValidationPrice { log: text(), ..Default::default() }],
             ..Default::default()
@@ -446,5 +444,5 @@ fn the_data_serialises_to_plain_json() {
     let json = serde_json::to_value(synthetic::report(1, 3)).unwrap();
     assert_eq!(json["verdict"]["status"], "warn");
     assert_eq!(json["conditioning"][0]["value"], 15.0);
-    assert_eq!(json["standard_parameters"][0]["verdict"], "not_identifiable");
+    assert_eq!(json["standard_parameters"][0]["verdict"], "not identifiable");
 }

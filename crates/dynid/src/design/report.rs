@@ -42,11 +42,7 @@ impl DesignRun {
         Ok(report::DesignReport {
             title: format!("Excitation for {name}"),
             verdict: report::Verdict {
-                status: match record.verdict.status {
-                    "pass" => report::Status::Ok,
-                    "warn" => report::Status::Warn,
-                    _ => report::Status::Fail,
-                },
+                status: record.verdict.status.into(),
                 headline: sentence(&record.verdict.headline),
                 sentences: sentences(record),
                 checks: Vec::new(),

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use dynid_estimate::distribution::f_quantile;
 use dynid_friction::steady_friction::{LevelFit, SteadyFriction};
+use dynid_record::Outcome;
 use dynid_sim::presliding::EffortHold;
 
 use super::config::FrictionConfig;
@@ -371,11 +372,11 @@ fn verdict(joints: &[JointFrictionModel], warnings: &[String]) -> FrictionVerdic
     }
     let simple = joints.iter().any(|j| j.status == "simplified");
     let status = match () {
-        () if laws == 0 || invalid.0 > 0 => "fail",
-        () if one.0 + without.0 > 0 || simple || !warnings.is_empty() => "warn",
-        () => "pass",
+        () if laws == 0 || invalid.0 > 0 => Outcome::Fail,
+        () if one.0 + without.0 > 0 || simple || !warnings.is_empty() => Outcome::Warn,
+        () => Outcome::Pass,
     };
-    FrictionVerdict { status: status.to_owned(), headline: parts.join("; ") }
+    FrictionVerdict { status, headline: parts.join("; ") }
 }
 
 /// Settings of an identification of friction that states nothing.

@@ -27,11 +27,7 @@ impl FrictionIdentification {
         crate::fault::page(report::render_friction(&report::FrictionReport {
             title: format!("Friction of {}", model.robot),
             verdict: report::Verdict {
-                status: match model.verdict.status.as_str() {
-                    "pass" => report::Status::Ok,
-                    "warn" => report::Status::Warn,
-                    _ => report::Status::Fail,
-                },
+                status: model.verdict.status.into(),
                 headline: model.verdict.headline.clone(),
                 ..report::Verdict::default()
             },

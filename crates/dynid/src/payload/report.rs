@@ -19,11 +19,7 @@ impl PayloadFile {
         let page = report::StudyReport {
             title: format!("Payload of {}", self.robot),
             verdict: report::Verdict {
-                status: match self.status.as_str() {
-                    "ok" => report::Status::Ok,
-                    "warn" => report::Status::Warn,
-                    _ => report::Status::Fail,
-                },
+                status: self.status,
                 headline: sentences.join("; "),
                 sentences: vec![format!("Robot and payload together: {}", self.verdict.headline)],
                 ..report::Verdict::default()

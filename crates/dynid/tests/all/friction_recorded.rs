@@ -26,7 +26,7 @@ fn one_direction_of_the_gen3() {
     }
     let model = model(&text);
     println!("{:?}\n{:?}", model.verdict, model.warnings);
-    assert_eq!((model.verdict.status.as_str(), model.joints.len()), ("fail", 7), "{:?}", model.warnings);
+    assert_eq!((model.verdict.status.word(), model.joints.len()), ("fail", 7), "{:?}", model.warnings);
     for joint in &model.joints {
         let pass = &joint.unpaired[0];
         println!(

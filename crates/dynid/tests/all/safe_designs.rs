@@ -119,7 +119,7 @@ fn measured(record: &DesignRecord, robot: &Path) -> (f64, f64) {
 #[track_caller]
 fn check(config: &DesignConfig) -> DesignRecord {
     let (_, record) = run(config);
-    assert_eq!(record.verdict.status, "pass", "{}", record.verdict.headline);
+    assert_eq!(record.verdict.status.word(), "pass", "{}", record.verdict.headline);
     let (nearest, lowest) = measured(&record, &config.robot);
     let margin = config.safety.margin_m;
     println!(
