@@ -25,19 +25,20 @@ use crate::caution::Caution;
 pub use crate::check::CheckResult;
 use crate::effort_scale::EffortScale;
 use crate::finding::{FindingId, Severity};
-pub use crate::input_record::{InputRecord, short_name};
+pub use crate::input_record::{InputKind, InputRecord, short_name};
 use crate::joint_stiffness::JointStiffness;
 use crate::log_agreement::LogAgreement;
 use crate::overlap::Overlaps;
 use crate::own_delay::OwnDelay;
+use crate::settings::Route;
 pub use counts::{BaseCounts, ParameterCounts, ShapeCounts, StandardCounts};
 pub use exported::{EXPORT_LOSS_LIMIT, ExportedJoint, ExportedLog, ExportedRecord, FrictionProjection};
-pub use friction::{FrictionTrial, PassivityRecord};
-pub use instruments::{EffectRecord, ExogeneityRecord, InstrumentRecord};
+pub use friction::{FrictionPassivity, FrictionTrial, PassivityRecord};
+pub use instruments::{BiasVerdict, EffectRecord, ExogeneityRecord, InstrumentEnd, InstrumentRecord};
 pub use log_fit::log_fit;
 pub(crate) use log_fit::{by_motion, pool};
-pub use loops::{ClosureRecord, FrameRecord, LoopsRecord};
-pub use model::{CouplingRecord, JointRecord, LinkRecord, ModelRecord, SettingRecord};
+pub use loops::{ClosureKind, ClosureRecord, FrameRecord, LoopsRecord};
+pub use model::{CouplingRecord, JointRecord, JointType, LinkRecord, ModelRecord, SettingRecord};
 pub use reading::{MotorSide, ReadingRecord};
 pub use trust::{
     ConsistencyRecord, HeldOutRecord, PrecisionRecord, PruningRecord, PruningStep, WhitenessRecord,
@@ -412,8 +413,8 @@ pub struct Choice {
 /// Choices and the evidence for them.
 #[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ConditioningRecord {
-    /// `compact` or `textbook`.
-    pub route: String,
+    /// Which way from samples to rows.
+    pub route: Route,
     /// Choices.
     pub choices: Vec<Choice>,
     /// Delay of the motion behind the logged effort, samples.
@@ -508,7 +509,7 @@ impl Estimate {
 
     /// The robot file that was identified, if the estimate names it.
     pub fn robot_file(&self) -> Option<&InputRecord> {
-        self.provenance.inputs.iter().find(|i| i.kind == "robot")
+        self.provenance.inputs.iter().find(|i| i.kind == InputKind::Robot)
     }
 
     /// Rebuilds the effort model with the shape parameters that go with the linear ones of `split`; `file` stands in

@@ -17,9 +17,8 @@ use crate::estimate::{
     log_fit, pool,
 };
 use crate::identification::Identification;
-use crate::input_record::{InputRecord, short_name};
+use crate::input_record::{InputKind, InputRecord, short_name};
 use crate::log::LogSource;
-use crate::settings::Route;
 use crate::trust::{ParameterTrust, recorded};
 use crate::{shape, verdict};
 
@@ -99,12 +98,12 @@ impl Identification {
         let mut out = InputRecord::of_robot(&self.robot);
         for (k, source) in self.sources.iter().enumerate() {
             let validates = k >= self.trained.len();
-            out.extend(source.inputs.iter().map(|input| match input.kind.as_str() {
-                "log" if validates => InputRecord { kind: "validation".to_owned(), ..input.clone() },
+            out.extend(source.inputs.iter().map(|input| match input.kind {
+                InputKind::Log if validates => InputRecord { kind: InputKind::Validation, ..input.clone() },
                 _ => input.clone(),
             }));
         }
-        out.extend(self.plan.known_source.iter().map(|source| InputRecord::of("friction", source)));
+        out.extend(self.plan.known_source.iter().map(|source| InputRecord::of(InputKind::Friction, source)));
         out
     }
 
@@ -305,10 +304,7 @@ impl Identification {
     fn conditioning_record(&self) -> ConditioningRecord {
         let delay = self.conditioning.as_ref().map(|c| &c.delay);
         ConditioningRecord {
-            route: match self.settings.conditioning.route {
-                Route::Compact => "compact".to_owned(),
-                Route::Textbook => "textbook".to_owned(),
-            },
+            route: self.settings.conditioning.route,
             choices: self.choices(),
             delay_samples: self.delay_samples,
             delay_rate_hz: self.delay_rate_hz,

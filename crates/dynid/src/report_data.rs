@@ -183,7 +183,7 @@ impl Shown<'_> {
                     .iter()
                     .map(|i| report::InputFile {
                         path: i.path.clone(),
-                        kind: i.kind.clone(),
+                        kind: i.kind.word().to_owned(),
                         sha256: Some(i.sha256.clone()),
                     })
                     .collect(),

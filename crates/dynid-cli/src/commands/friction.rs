@@ -66,7 +66,7 @@ fn row(joint: &JointFrictionModel) -> Vec<String> {
     let points = if joint.samples > 0 { joint.samples } else { joint.points.len() };
     vec![
         joint.joint.clone(),
-        joint.status.clone(),
+        joint.status.to_string(),
         points.to_string(),
         table::number(joint.coulomb),
         table::number(joint.static_),

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::{ReductionError, plain};
 use crate::Error;
 use crate::check::{CheckName, CheckResult};
-use crate::estimate::{InputRecord, ModelRecord, ReadingRecord};
+use crate::estimate::{InputKind, InputRecord, ModelRecord, ReadingRecord};
 use crate::friction_power::FrictionPower;
 use crate::identification::Identification;
 use crate::passivity::velocities;
@@ -258,7 +258,9 @@ impl Identification {
             settings: Asked::of(&self.settings),
             inputs: InputRecord::of_robot(&self.robot)
                 .into_iter()
-                .chain(self.plan.known_source.iter().map(|source| InputRecord::of("friction", source)))
+                .chain(
+                    self.plan.known_source.iter().map(|source| InputRecord::of(InputKind::Friction, source)),
+                )
                 .collect(),
             reading: ReadingRecord::default(),
             doubts: doubts(self),

@@ -9,7 +9,7 @@ use super::config::{CriterionName, DesignConfig};
 use super::safety::SafetyRecord;
 use super::{DesignRun, DesignedTrajectory};
 use crate::Error;
-use crate::estimate::{InputRecord, Provenance};
+use crate::estimate::{InputKind, InputRecord, Provenance};
 
 /// Schema of `design.json`.
 pub(super) const SCHEMA: &str = "dynid-design/1";
@@ -233,8 +233,8 @@ impl From<&LimitPoint> for LimitRecord {
 impl DesignRun {
     fn inputs(&self) -> Vec<InputRecord> {
         let mut inputs = InputRecord::of_robot(&self.robot);
-        inputs.extend(self.set.safety.meshes.iter().map(|source| InputRecord::of("mesh", source)));
-        inputs.extend(self.set.earlier.iter().map(|source| InputRecord::of("trajectory", source)));
+        inputs.extend(self.set.safety.meshes.iter().map(|source| InputRecord::of(InputKind::Mesh, source)));
+        inputs.extend(self.set.earlier.iter().map(|source| InputRecord::of(InputKind::Trajectory, source)));
         inputs
     }
 

@@ -90,6 +90,7 @@ mod tests {
 
     use super::*;
     use crate::check::Severity;
+    use crate::friction_model::FrictionStatus;
 
     #[test]
     fn ids_are_unique_and_texts_are_whole() {
@@ -104,17 +105,14 @@ mod tests {
 
     #[test]
     fn words_of_result_files_are_explained() {
-        let words = |all: &[&'static str]| {
-            for word in all {
-                assert!(find(word).is_some(), "{word}");
-            }
-        };
-        words(&Status::ALL.iter().map(|w| w.word()).collect::<Vec<_>>());
-        words(&Outcome::ALL.iter().map(|w| w.word()).collect::<Vec<_>>());
-        words(&ParameterVerdict::ALL.iter().map(|w| w.word()).collect::<Vec<_>>());
-        words(&CarriedReason::ALL.iter().map(|w| w.word()).collect::<Vec<_>>());
-        words(&ShapeVerdict::ALL.iter().map(|w| w.word()).collect::<Vec<_>>());
-        words(&Severity::ALL.iter().map(|w| w.word()).collect::<Vec<_>>());
+        let words = Status::ALL.iter().map(|w| w.word()).chain(Outcome::ALL.iter().map(|w| w.word()));
+        let words = words.chain(ParameterVerdict::ALL.iter().map(|w| w.word()));
+        let words = words.chain(CarriedReason::ALL.iter().map(|w| w.word()));
+        let words = words.chain(ShapeVerdict::ALL.iter().map(|w| w.word()));
+        let words = words.chain(FrictionStatus::ALL.iter().map(|w| w.word()));
+        for word in words.chain(Severity::ALL.iter().map(|w| w.word())) {
+            assert!(find(word).is_some(), "{word}");
+        }
     }
 
     #[test]

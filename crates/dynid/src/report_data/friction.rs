@@ -4,7 +4,7 @@ use dynid_model::EffortModel;
 use dynid_report as report;
 
 use super::Shown;
-use crate::estimate::{Estimate, PassivityRecord};
+use crate::estimate::{Estimate, FrictionPassivity, PassivityRecord};
 use crate::passivity;
 
 /// Velocities drawn on each side of rest.
@@ -45,7 +45,7 @@ impl Shown<'_> {
             points: points.clone(),
             style: report::CurveStyle::Line,
         }];
-        if record.passivity != passivity::PASSIVE {
+        if record.passivity != FrictionPassivity::Passive {
             let drives = |[v, e]: [f64; 2]| [v, if v * e < 0.0 { e } else { f64::NAN }];
             curves.push(report::ChartCurve {
                 name: "drives the motion".to_owned(),

@@ -82,7 +82,7 @@ fn an_own_law_goes_the_whole_way() {
         assert_eq!(p.verdict.word(), "seen in the data");
         assert!((p.value - truth).abs() <= 4.0 * p.std.unwrap(), "{p:?}");
     }
-    assert_eq!(estimate.friction_passivity[0].passivity, "passive");
+    assert_eq!(estimate.friction_passivity[0].passivity.word(), "passive");
 
     // Read back, by those who know the law and by those who do not.
     let file = path("estimate.json");
