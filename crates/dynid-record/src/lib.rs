@@ -82,7 +82,7 @@ words! {
 }
 
 words! {
-    /// [`Status`] in files that say `pass`: `design.json`, `friction.json`.
+    /// How a whole result came out, in files that say `pass` where others say `ok`.
     Outcome {
         /// All is as it should be.
         Pass = "pass",
