@@ -1,5 +1,6 @@
 //! What to look at before a result is used, the worst first, each with what mends it.
 
+use dynid_record::Status;
 use serde::{Deserialize, Serialize};
 
 use crate::check::{CheckName, CheckResult};
@@ -9,7 +10,7 @@ use crate::finding::{Finding, FindingId, Severity};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Caution {
     /// `fail`: the result is not to be used before this is mended; `warn`: usable, with a reservation.
-    pub status: String,
+    pub status: Status,
     /// What it is about: the name of a check, of a finding, or of a part of the input. All cautions of a kind share it.
     pub name: String,
     /// What was found, with its place and number.
@@ -20,29 +21,29 @@ pub struct Caution {
 
 /// Kinds of cautions from those that matter most, since nothing holds beside them, to those that are good to know.
 const ORDER: [&str; 32] = [
-    CheckName::Preflight.name(),
+    CheckName::Preflight.word(),
     FINDING,
-    CheckName::OwnLogs.name(),
-    CheckName::Recipe.name(),
-    CheckName::EffortScale.name(),
-    CheckName::ValidationFit.name(),
-    CheckName::TrainingFit.name(),
-    CheckName::OwnValidation.name(),
-    CheckName::Excitation.name(),
-    CheckName::RankGap.name(),
-    CheckName::Explained.name(),
-    CheckName::AgreementOfLogs.name(),
-    CheckName::PriceOfConsistency.name(),
-    CheckName::Stiffness.name(),
-    CheckName::Instruments.name(),
-    CheckName::ClosedLoopBias.name(),
-    CheckName::Residual.name(),
-    CheckName::Delay.name(),
-    CheckName::ReversalMask.name(),
-    CheckName::TimeBlocks.name(),
-    CheckName::Whiteness.name(),
-    CheckName::Condition.name(),
-    CheckName::TermsOfLogs.name(),
+    CheckName::OwnLogs.word(),
+    CheckName::Recipe.word(),
+    CheckName::EffortScale.word(),
+    CheckName::ValidationFit.word(),
+    CheckName::TrainingFit.word(),
+    CheckName::OwnValidation.word(),
+    CheckName::Excitation.word(),
+    CheckName::RankGap.word(),
+    CheckName::Explained.word(),
+    CheckName::AgreementOfLogs.word(),
+    CheckName::PriceOfConsistency.word(),
+    CheckName::Stiffness.word(),
+    CheckName::Instruments.word(),
+    CheckName::ClosedLoopBias.word(),
+    CheckName::Residual.word(),
+    CheckName::Delay.word(),
+    CheckName::ReversalMask.word(),
+    CheckName::TimeBlocks.word(),
+    CheckName::Whiteness.word(),
+    CheckName::Condition.word(),
+    CheckName::TermsOfLogs.word(),
     FRICTION,
     KNOWN_FRICTION,
     BODY,
@@ -79,7 +80,7 @@ impl Caution {
     /// A reservation.
     pub(crate) fn warn(name: &str, message: impl Into<String>, remedy: impl Into<String>) -> Self {
         Caution {
-            status: "warn".to_owned(),
+            status: Status::Warn,
             name: name.to_owned(),
             message: message.into(),
             remedy: remedy.into(),
@@ -89,8 +90,8 @@ impl Caution {
     /// A check that did not come out as it should, with what mends it.
     pub(crate) fn of(check: &CheckResult, remedy: String) -> Self {
         Caution {
-            status: check.status.clone(),
-            name: check.name.clone(),
+            status: check.status,
+            name: check.name.word().to_owned(),
             message: check.meaning.clone(),
             remedy,
         }
@@ -102,9 +103,9 @@ impl Caution {
     }
 
     fn rank(&self) -> (bool, usize) {
-        let finding = FindingId::ALL.iter().any(|id| id.name().replace('_', " ") == self.name);
+        let finding = FindingId::ALL.iter().any(|id| id.plain() == self.name);
         let name = if finding { FINDING } else { self.name.as_str() };
-        (self.status != "fail", ORDER.iter().position(|known| *known == name).unwrap_or(ORDER.len()))
+        (self.status != Status::Fail, ORDER.iter().position(|known| *known == name).unwrap_or(ORDER.len()))
     }
 }
 
@@ -112,9 +113,9 @@ impl Finding {
     /// The finding as a caution of an identification; `None` unless it counts.
     pub(crate) fn caution(&self) -> Option<Caution> {
         let message = self.warning()?;
-        let status = if self.severity == Severity::Error { "fail" } else { "warn" };
-        let caution = Caution::warn(&self.id.replace('_', " "), message, &*self.remedy);
-        Some(Caution { status: status.to_owned(), ..caution })
+        let status = if self.severity == Severity::Error { Status::Fail } else { Status::Warn };
+        let caution = Caution::warn(&self.id.plain(), message, &*self.remedy);
+        Some(Caution { status, ..caution })
     }
 }
 
@@ -130,22 +131,21 @@ mod tests {
 
     #[test]
     fn failures_come_first_then_what_puts_more_in_doubt() {
-        let of =
-            |status: &str, name: &str| Caution { status: status.to_owned(), ..Caution::warn(name, "", "") };
+        let of = |status: Status, name: &str| Caution { status, ..Caution::warn(name, "", "") };
         let sorted = ranked(vec![
-            of("warn", ROBOT_FILE),
-            of("warn", CheckName::Condition.name()),
-            of("fail", CheckName::TrainingFit.name()),
-            of("warn", "joint permutation"),
-            of("warn", "never heard of"),
+            of(Status::Warn, ROBOT_FILE),
+            of(Status::Warn, CheckName::Condition.word()),
+            of(Status::Fail, CheckName::TrainingFit.word()),
+            of(Status::Warn, "joint permutation"),
+            of(Status::Warn, "never heard of"),
         ]);
         let names: Vec<&str> = sorted.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(
             names,
             [
-                CheckName::TrainingFit.name(),
+                CheckName::TrainingFit.word(),
                 "joint permutation",
-                CheckName::Condition.name(),
+                CheckName::Condition.word(),
                 ROBOT_FILE,
                 "never heard of"
             ]

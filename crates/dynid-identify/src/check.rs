@@ -1,8 +1,9 @@
 //! Names of the checks behind a verdict.
 
+use dynid_record::Status;
 use serde::{Deserialize, Serialize};
 
-crate::names! {
+dynid_record::words! {
     /// Checks behind the verdict of an identification.
     CheckName {
         /// Whether the training logs agree in what the fit holds the same.
@@ -55,10 +56,10 @@ crate::names! {
 /// One check.
 #[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CheckResult {
-    /// `ok`, `warn` or `fail`.
-    pub status: String,
-    /// Name.
-    pub name: String,
+    /// How it came out.
+    pub status: Status,
+    /// What was checked.
+    pub name: CheckName,
     /// Value.
     pub value: Option<f64>,
     /// Unit.

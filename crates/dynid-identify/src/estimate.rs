@@ -13,6 +13,9 @@ mod trust;
 use std::path::Path;
 
 use dynid_model::{EffortModel, LoadReference, RobotModel, ShapeParameter};
+pub use dynid_record::{
+    CarriedReason, ConsistencyForm, ConsistencyStatus, Origin, ParameterVerdict, ShapeVerdict, Status,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
@@ -21,19 +24,21 @@ pub use crate::agreement::{FileFit, FitValues};
 use crate::caution::Caution;
 pub use crate::check::CheckResult;
 use crate::effort_scale::EffortScale;
-pub use crate::input_record::{InputRecord, short_name};
+use crate::finding::{FindingId, Severity};
+pub use crate::input_record::{InputKind, InputRecord, short_name};
 use crate::joint_stiffness::JointStiffness;
 use crate::log_agreement::LogAgreement;
 use crate::overlap::Overlaps;
 use crate::own_delay::OwnDelay;
+use crate::settings::Route;
 pub use counts::{BaseCounts, ParameterCounts, ShapeCounts, StandardCounts};
 pub use exported::{EXPORT_LOSS_LIMIT, ExportedJoint, ExportedLog, ExportedRecord, FrictionProjection};
-pub use friction::{FrictionTrial, PassivityRecord};
-pub use instruments::{EffectRecord, ExogeneityRecord, InstrumentRecord};
+pub use friction::{FrictionPassivity, FrictionTrial, PassivityRecord};
+pub use instruments::{BiasVerdict, EffectRecord, ExogeneityRecord, InstrumentEnd, InstrumentRecord};
 pub use log_fit::log_fit;
 pub(crate) use log_fit::{by_motion, pool};
-pub use loops::{ClosureRecord, FrameRecord, LoopsRecord};
-pub use model::{CouplingRecord, JointRecord, LinkRecord, ModelRecord, SettingRecord};
+pub use loops::{ClosureKind, ClosureRecord, FrameRecord, LoopsRecord};
+pub use model::{CouplingRecord, JointRecord, JointType, LinkRecord, ModelRecord, SettingRecord};
 pub use reading::{MotorSide, ReadingRecord};
 pub use trust::{
     ConsistencyRecord, HeldOutRecord, PrecisionRecord, PruningRecord, PruningStep, WhitenessRecord,
@@ -142,10 +147,10 @@ pub struct Estimate {
 /// A finding of the pre-flight ([`crate::preflight`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FindingRecord {
-    /// Name of the fault.
-    pub id: String,
-    /// `info`, `warning` or `error`.
-    pub severity: String,
+    /// Which fault.
+    pub id: FindingId,
+    /// How much it matters.
+    pub severity: Severity,
     /// Joint, if it is a joint's own.
     pub joint: Option<String>,
     /// Log file.
@@ -157,8 +162,8 @@ pub struct FindingRecord {
 impl From<&crate::finding::Finding> for FindingRecord {
     fn from(of: &crate::finding::Finding) -> Self {
         FindingRecord {
-            id: of.id.to_owned(),
-            severity: of.severity.word().to_owned(),
+            id: of.id,
+            severity: of.severity,
             joint: of.joint.clone(),
             log: of.log.clone(),
             evidence: of.evidence.clone(),
@@ -178,7 +183,7 @@ pub struct LogScale {
     /// 95 % interval of the factor, where the logs show it.
     pub interval: Option<(f64, f64)>,
     /// What the logs say of it.
-    pub verdict: String,
+    pub verdict: ShapeVerdict,
     /// Why.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
@@ -240,11 +245,11 @@ pub struct ParameterValue {
     /// A constraint moved the value by more than a standard deviation.
     #[serde(default)]
     pub at_boundary: bool,
-    /// `seen in the data`, `carried by the prior` or `not identifiable`.
-    pub verdict: String,
-    /// For what is carried by the prior: `only in combination`, `not excited` or `too noisy`.
+    /// Where the value comes from.
+    pub verdict: ParameterVerdict,
+    /// For what is carried by the prior: why.
     #[serde(default)]
-    pub reason: Option<String>,
+    pub reason: Option<CarriedReason>,
     /// Share of the prior variance that the logs remove, 0 to 1.
     #[serde(default)]
     pub share: Option<f64>,
@@ -280,7 +285,7 @@ pub struct BaseValue {
     pub half_width: Option<f64>,
     /// `seen in the data` or `carried by the prior`.
     #[serde(default)]
-    pub verdict: Option<String>,
+    pub verdict: Option<ParameterVerdict>,
     /// Share of the prior variance that the logs remove, 0 to 1.
     #[serde(default)]
     pub share: Option<f64>,
@@ -312,8 +317,8 @@ pub struct ShapeValue {
     /// 95 % interval around the unconstrained value; one-sided ones end at a bound.
     #[serde(default)]
     pub interval: Option<(f64, f64)>,
-    /// `seen in the data`, `bounded on one side`, `not seen` or `given`.
-    pub verdict: String,
+    /// What the logs say of it.
+    pub verdict: ShapeVerdict,
     /// Why, in words.
     #[serde(default)]
     pub reason: Option<String>,
@@ -371,8 +376,8 @@ pub struct LogFit {
 /// Verdict of a run.
 #[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Verdict {
-    /// `ok`, `warn` or `fail`.
-    pub status: String,
+    /// The worst of the checks.
+    pub status: Status,
     /// One sentence on the result, one on what it is worth.
     pub headline: String,
     /// The first of them alone: what the logs show, and how well the model predicts.
@@ -399,8 +404,8 @@ pub struct Choice {
     pub value: Json,
     /// Unit.
     pub unit: String,
-    /// `found`, `given` or `default`.
-    pub origin: String,
+    /// Where it comes from.
+    pub origin: Origin,
     /// Why.
     pub reason: String,
 }
@@ -408,8 +413,8 @@ pub struct Choice {
 /// Choices and the evidence for them.
 #[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ConditioningRecord {
-    /// `compact` or `textbook`.
-    pub route: String,
+    /// Which way from samples to rows.
+    pub route: Route,
     /// Choices.
     pub choices: Vec<Choice>,
     /// Delay of the motion behind the logged effort, samples.
@@ -504,7 +509,7 @@ impl Estimate {
 
     /// The robot file that was identified, if the estimate names it.
     pub fn robot_file(&self) -> Option<&InputRecord> {
-        self.provenance.inputs.iter().find(|i| i.kind == "robot")
+        self.provenance.inputs.iter().find(|i| i.kind == InputKind::Robot)
     }
 
     /// Rebuilds the effort model with the shape parameters that go with the linear ones of `split`; `file` stands in

@@ -1,39 +1,26 @@
 //! What a pre-flight says.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::input_record::short_name;
 
-/// How much a finding matters.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, schemars::JsonSchema,
-)]
-#[serde(rename_all = "lowercase")]
-pub enum Severity {
-    /// Good to know; identification takes care of it.
-    Info,
-    /// Makes the result worse, or leaves something open.
-    Warning,
-    /// Makes nonsense of the result.
-    Error,
-}
-
-impl Severity {
-    /// `info`, `warning` or `error`.
-    pub fn word(self) -> &'static str {
-        match self {
-            Severity::Info => "info",
-            Severity::Warning => "warning",
-            Severity::Error => "error",
-        }
+dynid_record::words! {
+    /// How much a finding matters.
+    Severity {
+        /// Good to know; identification takes care of it.
+        Info = "info",
+        /// Makes the result worse, or leaves something open.
+        Warning = "warning",
+        /// Makes nonsense of the result.
+        Error = "error",
     }
 }
 
 /// One fault of a log.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Finding {
-    /// Which fault: the name of a [`FindingId`].
-    pub id: &'static str,
+    /// Which fault.
+    pub id: FindingId,
     /// How much it matters.
     pub severity: Severity,
     /// Joint; `None` if it is none's own.
@@ -59,7 +46,7 @@ const SAID_ANYWAY: [FindingId; 4] =
 impl Finding {
     /// Whether an identification has to tell of it: not what it says anyway or takes care of.
     pub(crate) fn counts(&self) -> bool {
-        self.severity != Severity::Info && SAID_ANYWAY.iter().all(|id| id.name() != self.id)
+        self.severity != Severity::Info && !SAID_ANYWAY.contains(&self.id)
     }
 
     /// The finding as a warning of an identification; `None` unless it counts.
@@ -68,11 +55,11 @@ impl Finding {
             return None;
         }
         let joint = self.joint.as_ref().map_or_else(String::new, |j| format!(" of {j}"));
-        Some(format!("{}: {}{joint}: {}", short_name(&self.log), self.id.replace('_', " "), self.evidence))
+        Some(format!("{}: {}{joint}: {}", short_name(&self.log), self.id.plain(), self.evidence))
     }
 }
 
-crate::names! {
+dynid_record::words! {
     /// Faults that are looked for.
     FindingId {
         /// Gravity does not point where it is stated to.
@@ -132,6 +119,13 @@ crate::names! {
     }
 }
 
+impl FindingId {
+    /// The word in plain letters.
+    pub fn plain(self) -> String {
+        self.word().replace('_', " ")
+    }
+}
+
 /// A change of the configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fix {
@@ -180,7 +174,7 @@ impl Findings<'_> {
         remedy: &str,
     ) -> &mut Finding {
         self.list.push(Finding {
-            id: id.name(),
+            id,
             severity,
             joint: joint.map(str::to_owned),
             log: self.log.to_owned(),

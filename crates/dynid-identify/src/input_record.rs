@@ -2,13 +2,35 @@
 
 use serde::{Deserialize, Serialize};
 
+dynid_record::words! {
+    /// What a run read a file as.
+    InputKind {
+        /// The robot file.
+        Robot = "robot",
+        /// The URDF that a robot file refers to.
+        Urdf = "urdf",
+        /// A mesh of a link.
+        Mesh = "mesh",
+        /// A log that the result rests on.
+        Log = "log",
+        /// A log that the result is judged on.
+        Validation = "validation",
+        /// A log of motion within friction.
+        Presliding = "presliding",
+        /// A trajectory.
+        Trajectory = "trajectory",
+        /// Known friction.
+        Friction = "friction",
+    }
+}
+
 /// An input file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct InputRecord {
     /// Path as given.
     pub path: String,
-    /// `robot`, `urdf` (the one that a robot file refers to), `log`, `validation`, `trajectory` or `friction`.
-    pub kind: String,
+    /// What it was read as.
+    pub kind: InputKind,
     /// SHA-256 of its bytes as they were read, of a log also of those behind the last row used.
     pub sha256: String,
 }

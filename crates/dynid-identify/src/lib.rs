@@ -15,9 +15,6 @@
 //! conditioned fit, bodies that can exist and what they cost, verdicts, intervals and advice, agreement of logs, pre-flight, friction that
 //! is passive. No file is opened but those of robots and estimates; `dynid` reads logs and configurations.
 
-#[macro_use]
-mod names;
-
 pub mod agreement;
 pub mod bounds;
 pub mod caution;

@@ -1,18 +1,11 @@
 //! Whether the identified friction takes energy out of the motion.
 
-use dynid_model::{EffortModel, FrictionPassivity, Passivity};
+use dynid_model::{EffortModel, FrictionPassivity as Found, Passivity};
 
 use crate::caution::{self, Caution};
-use crate::estimate::PassivityRecord;
+use crate::estimate::{FrictionPassivity, PassivityRecord};
 use crate::identification::Identification;
 use crate::trained_log::TrainedLog;
-
-/// [`PassivityRecord::passivity`] of a law that is passive on all of the range.
-pub const PASSIVE: &str = "passive";
-/// Of one that is passive on parts of it.
-pub(crate) const PASSIVE_ON: &str = "passive on";
-/// Of one that is passive nowhere.
-pub(crate) const NOT_PASSIVE: &str = "not passive";
 
 /// Least and greatest velocity of an output over all training logs; `None` if none moves it.
 pub(crate) fn velocities(logs: &[TrainedLog], output: usize) -> Option<(f64, f64)> {
@@ -22,7 +15,7 @@ pub(crate) fn velocities(logs: &[TrainedLog], output: usize) -> Option<(f64, f64
 }
 
 /// Largest power that friction feeds in, W.
-fn fed(found: &FrictionPassivity) -> f64 {
+fn fed(found: &Found) -> f64 {
     found.worst.map_or(0.0, |(_, power)| power)
 }
 
@@ -66,14 +59,14 @@ impl Identification {
                     .map(|held| model.friction_passivity(rate, &shape, linear, (low, high), held))
                     .max_by(|a, b| fed(a).total_cmp(&fed(b)))?;
                 let (passivity, intervals) = match found.passivity {
-                    Passivity::Passive => (PASSIVE, Vec::new()),
-                    Passivity::PassiveOn(intervals) => (PASSIVE_ON, intervals),
-                    Passivity::NotPassive => (NOT_PASSIVE, Vec::new()),
+                    Passivity::Passive => (FrictionPassivity::Passive, Vec::new()),
+                    Passivity::PassiveOn(intervals) => (FrictionPassivity::PassiveOn, intervals),
+                    Passivity::NotPassive => (FrictionPassivity::NotPassive, Vec::new()),
                 };
                 Some(PassivityRecord {
                     joint: output.name.clone(),
                     velocity_range: (low, high),
-                    passivity: passivity.to_owned(),
+                    passivity,
                     intervals,
                     worst_velocity: found.worst.map(|(v, _)| v),
                     worst_power: found.worst.map(|(_, power)| power),
@@ -89,7 +82,7 @@ impl Identification {
         let records = self.friction_passivity();
         let mut out: Vec<Caution> = records
             .iter()
-            .filter(|r| r.passivity != PASSIVE)
+            .filter(|r| r.passivity != FrictionPassivity::Passive)
             .map(|r| {
                 let remedy = match self.plan.known_friction(&r.joint) {
                     Some(_) => "The errors of its known friction outweigh it: look at both with doubt, or keep them positive \
@@ -167,16 +160,18 @@ pub(crate) fn in_words(record: &PassivityRecord, unit: &str) -> String {
         }
         _ => "it drives the motion".to_owned(),
     };
-    match record.passivity.as_str() {
-        PASSIVE => format!("passive {all}, all that the training logs reach"),
-        PASSIVE_ON => {
+    match record.passivity {
+        FrictionPassivity::Passive => format!("passive {all}, all that the training logs reach"),
+        FrictionPassivity::PassiveOn => {
             let parts: Vec<String> = record.intervals.iter().copied().map(range).collect();
             format!(
                 "passive {} alone; elsewhere {all}, the range of the training logs, {worst}",
                 parts.join(" and ")
             )
         }
-        _ => format!("nowhere passive {all}, the range of the training logs: {worst}"),
+        FrictionPassivity::NotPassive => {
+            format!("nowhere passive {all}, the range of the training logs: {worst}")
+        }
     }
 }
 

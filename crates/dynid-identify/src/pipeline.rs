@@ -248,7 +248,7 @@ pub(crate) fn assemble(
     warnings.extend(log_agreement.iter().flat_map(LogAgreement::warnings).map(|message| {
         let remedy = "give the log terms of its own in its `[[log]]`: `own = [\"offset\"]`, `own = [\"friction\"]`, \
                       `own = [\"friction_scale\"]` or `own = [\"delay\"]`; what it carries: `payload = \"tool\"`";
-        Caution::warn(CheckName::AgreementOfLogs.name(), message, remedy)
+        Caution::warn(CheckName::AgreementOfLogs.word(), message, remedy)
     }));
     let rows: usize = groups.iter().map(ReducedGroup::rows).sum();
     let mut out = Identification {
@@ -371,7 +371,7 @@ fn compared(
         Ok(found) => Ok((Some(found), None)),
         Err(Error::Unsupported(why)) => {
             let message = format!("least squares was not compared with instruments: {why}");
-            let name = CheckName::Instruments.name();
+            let name = CheckName::Instruments.word();
             Ok((None, Some(Caution::warn(name, message, "leave out `[instruments]`"))))
         }
         Err(other) => Err(other),

@@ -7,6 +7,7 @@ mod trust;
 
 use dynid_model::element::{change_name, scale_name};
 use dynid_model::{EffortModel, Inertia, Owner};
+use dynid_record::{Origin, ShapeVerdict};
 use serde_json::json;
 
 use crate::agreement::{Agreement, FitValues};
@@ -16,10 +17,9 @@ use crate::estimate::{
     log_fit, pool,
 };
 use crate::identification::Identification;
-use crate::input_record::{InputRecord, short_name};
+use crate::input_record::{InputKind, InputRecord, short_name};
 use crate::log::LogSource;
-use crate::settings::Route;
-use crate::trust::ParameterTrust;
+use crate::trust::{ParameterTrust, recorded};
 use crate::{shape, verdict};
 
 impl Identification {
@@ -27,7 +27,7 @@ impl Identification {
     pub fn estimate(&self) -> Estimate {
         let solution = &self.fit().solution;
         let finite = |x: f64| x.is_finite().then_some(x);
-        let (_, verdict) = verdict::judge(self);
+        let verdict = verdict::judge(self);
         let mut model = ModelRecord::new(&self.robot.file.description, &self.robot.mechanism, &self.plan);
         model.state_hz = self.state_hz;
         model.kernel_hz = self.kernel_hz;
@@ -98,12 +98,12 @@ impl Identification {
         let mut out = InputRecord::of_robot(&self.robot);
         for (k, source) in self.sources.iter().enumerate() {
             let validates = k >= self.trained.len();
-            out.extend(source.inputs.iter().map(|input| match input.kind.as_str() {
-                "log" if validates => InputRecord { kind: "validation".to_owned(), ..input.clone() },
+            out.extend(source.inputs.iter().map(|input| match input.kind {
+                InputKind::Log if validates => InputRecord { kind: InputKind::Validation, ..input.clone() },
                 _ => input.clone(),
             }));
         }
-        out.extend(self.plan.known_source.iter().map(|source| InputRecord::of("friction", source)));
+        out.extend(self.plan.known_source.iter().map(|source| InputRecord::of(InputKind::Friction, source)));
         out
     }
 
@@ -151,6 +151,7 @@ impl Identification {
                     Owner::Joint(name) => (None, Some(name.clone())),
                 };
                 let value = self.values()[c];
+                let (verdict, reason) = recorded(trust.assessment.verdict);
                 ParameterValue {
                     name: p.name.clone(),
                     link,
@@ -163,8 +164,8 @@ impl Identification {
                     interval: trust.interval,
                     wide: trust.wide,
                     at_boundary: trust.at_boundary,
-                    verdict: trust.assessment.verdict.words().to_owned(),
-                    reason: trust.assessment.verdict.reason().map(str::to_owned),
+                    verdict,
+                    reason,
                     share: Some(trust.assessment.achieved),
                     possible_share: Some(trust.assessment.structural_limit),
                     combination: trust.combination.clone(),
@@ -224,7 +225,7 @@ impl Identification {
                     value,
                     consistent_value: Some(consistent[k]),
                     half_width: self.trust.base_half_width[k],
-                    verdict: Some(self.trust.base[k].verdict.words().to_owned()),
+                    verdict: Some(recorded(self.trust.base[k].verdict).0),
                     share: Some(self.trust.base[k].achieved),
                     std,
                     std_white: white,
@@ -250,7 +251,7 @@ impl Identification {
                 let finding = self.shapes.as_ref().map(|found| &found.findings[k]);
                 let trust = columns.column(&change_name(&p.name)).map(|c| &self.trust.parameters[c]);
                 let (verdict, one_sided) = shape::verdict(finding.map(|f| f.verdict));
-                let seen = verdict == shape::SEEN;
+                let seen = verdict == ShapeVerdict::SeenInData;
                 let std = trust.and_then(|t| t.std).filter(|_| seen);
                 let at =
                     self.shapes.as_ref().map_or(p.start, |found| found.model.parameters().shape[k].start);
@@ -265,7 +266,7 @@ impl Identification {
                     range: (p.lower, p.upper),
                     std,
                     interval: around.or(one_sided),
-                    verdict: verdict.to_owned(),
+                    verdict,
                     reason: shape::reason(finding, self.conditioning.is_some())
                         .or_else(|| trust.filter(|t| seen && t.std.is_none()).map(without_interval)),
                 }
@@ -303,10 +304,7 @@ impl Identification {
     fn conditioning_record(&self) -> ConditioningRecord {
         let delay = self.conditioning.as_ref().map(|c| &c.delay);
         ConditioningRecord {
-            route: match self.settings.conditioning.route {
-                Route::Compact => "compact".to_owned(),
-                Route::Textbook => "textbook".to_owned(),
-            },
+            route: self.settings.conditioning.route,
             choices: self.choices(),
             delay_samples: self.delay_samples,
             delay_rate_hz: self.delay_rate_hz,
@@ -327,16 +325,10 @@ impl Identification {
     /// Every choice of the conditioning with its reason.
     pub fn choices(&self) -> Vec<Choice> {
         let mut out = Vec::new();
-        let mut add = |name: &str, value: serde_json::Value, unit: &str, origin: &str, reason: String| {
-            out.push(Choice {
-                name: name.to_owned(),
-                value,
-                unit: unit.to_owned(),
-                origin: origin.to_owned(),
-                reason,
-            });
+        let mut add = |name: &str, value: serde_json::Value, unit: &str, origin: Origin, reason: String| {
+            out.push(Choice { name: name.to_owned(), value, unit: unit.to_owned(), origin, reason });
         };
-        let given = |set: bool| if set { "given" } else { "found" };
+        let given = |set: bool| if set { Origin::Given } else { Origin::Found };
         for (log, source) in self.logs.iter().zip(self.training_sources()) {
             let name = short_name(&log.name);
             let resampled = if log.clock.resampled { "resampled on a uniform grid" } else { "used as it is" };
@@ -356,7 +348,7 @@ impl Identification {
                 &format!("spikes removed from {name}"),
                 json!(spikes),
                 "samples",
-                "found",
+                Origin::Found,
                 "isolated runs far outside the running median; chatter and steps at reversal stay".to_owned(),
             );
         }
@@ -367,7 +359,7 @@ impl Identification {
                     &format!("{} of {name}", note.setting),
                     json!(note.value),
                     "",
-                    "found",
+                    Origin::Found,
                     note.reason.clone(),
                 );
             }
@@ -386,7 +378,7 @@ impl Identification {
         }
         for law in &self.plan.known {
             let name = format!("known friction of {}", law.joint);
-            add(&name, json!(law.in_words()), "", "given", friction::of_known(self, law));
+            add(&name, json!(law.in_words()), "", Origin::Given, friction::of_known(self, law));
         }
         for log in self.logs.iter() {
             if let Some(motion) = &log.periodic {
@@ -394,7 +386,7 @@ impl Identification {
                     &format!("period of {}", short_name(&log.name)),
                     json!(motion.period_s),
                     "s",
-                    "found",
+                    Origin::Found,
                     format!(
                         "states from Fourier series over {} periods, harmonics per joint {:?}; the stated period is corrected by the positions",
                         motion.periods, motion.harmonics
@@ -438,7 +430,7 @@ impl Identification {
             "kernels used together",
             json!(c.scales_hz),
             "Hz",
-            "found",
+            Origin::Found,
             "narrower kernels fill what the widest cannot reach between reversals".to_owned(),
         );
         add(
@@ -476,7 +468,7 @@ impl Identification {
         }
         for (output, joint) in self.model.outputs().iter().zip(&self.friction) {
             let (shapes, reason) = friction::in_words(joint);
-            add(&format!("friction shapes of {}", output.name), json!(shapes), "", "found", reason);
+            add(&format!("friction shapes of {}", output.name), json!(shapes), "", Origin::Found, reason);
         }
         out
     }
@@ -484,9 +476,9 @@ impl Identification {
 
 /// Why a shape parameter that the search finds in the data has no interval.
 fn without_interval(trust: &ParameterTrust) -> String {
-    let verdict = &trust.assessment.verdict;
-    let reason = verdict.reason().map_or_else(String::new, |r| format!(" ({r})"));
-    format!("no interval: beside all other parameters it is {}{reason}", verdict.words())
+    let (verdict, reason) = recorded(trust.assessment.verdict);
+    let reason = reason.map_or_else(String::new, |r| format!(" ({r})"));
+    format!("no interval: beside all other parameters it is {verdict}{reason}")
 }
 
 fn relative(value: Option<f64>, std: Option<f64>) -> Option<f64> {

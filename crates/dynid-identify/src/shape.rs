@@ -6,6 +6,7 @@ use dynid_estimate::separable::{
 };
 use dynid_model::element::{JointElement, Linearised, change_name};
 use dynid_model::{EffortModel, LoadReference, RobotModel};
+use dynid_record::ShapeVerdict as Recorded;
 use dynid_rows::conditioning::{Conditioning, refine};
 
 use crate::Error;
@@ -161,21 +162,13 @@ pub(crate) fn of_change(name: &str) -> Option<&str> {
     name.strip_suffix(change_name("").as_str())
 }
 
-/// Verdict of a shape parameter that the logs show.
-pub const SEEN: &str = "seen in the data";
-
-/// Verdict of one that they bound on one side.
-pub const ONE_SIDED: &str = "bounded on one side";
-/// Verdict of one of which any value fits.
-pub const NOT_SEEN: &str = "not seen";
-
-/// Verdict in words, and the interval of one that is bounded on one side.
-pub(crate) fn verdict(found: Option<ShapeVerdict>) -> (&'static str, Option<(f64, f64)>) {
+/// Verdict as recorded, and the interval of one that is bounded on one side.
+pub(crate) fn verdict(found: Option<ShapeVerdict>) -> (Recorded, Option<(f64, f64)>) {
     match found {
-        Some(ShapeVerdict::Seen) => (SEEN, None),
-        Some(ShapeVerdict::OneSided { lower, upper }) => (ONE_SIDED, Some((lower, upper))),
-        Some(ShapeVerdict::NotSeen) => (NOT_SEEN, None),
-        Some(ShapeVerdict::Held | ShapeVerdict::NotJudged) | None => ("given", None),
+        Some(ShapeVerdict::Seen) => (Recorded::SeenInData, None),
+        Some(ShapeVerdict::OneSided { lower, upper }) => (Recorded::OneSided, Some((lower, upper))),
+        Some(ShapeVerdict::NotSeen) => (Recorded::NotSeen, None),
+        Some(ShapeVerdict::Held | ShapeVerdict::NotJudged) | None => (Recorded::Given, None),
     }
 }
 

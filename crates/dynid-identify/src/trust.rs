@@ -8,6 +8,7 @@ use dynid_estimate::identifiability::{
 };
 use dynid_linalg::Mat;
 use dynid_model::{BaseParameters, EffortModel, Owner, RobotModel};
+use dynid_record::{CarriedReason, ParameterVerdict};
 
 use crate::advice::{Advice, FitRows, MotionSettings, Present, advise};
 use crate::consistency::Consistent;
@@ -17,6 +18,22 @@ use crate::prior::{Prior, link_lengths};
 
 /// Confidence of the intervals.
 pub const CONFIDENCE: f64 = 0.95;
+
+/// What a result file says of a verdict: where the value comes from, and why the prior carries it.
+pub fn recorded(verdict: Verdict) -> (ParameterVerdict, Option<CarriedReason>) {
+    match verdict {
+        Verdict::Seen => (ParameterVerdict::SeenInData, None),
+        Verdict::CarriedByPrior(why) => {
+            let reason = match why {
+                Carried::OnlyInCombination => CarriedReason::OnlyInCombination,
+                Carried::NotExcited => CarriedReason::NotExcited,
+                Carried::TooNoisy => CarriedReason::TooNoisy,
+            };
+            (ParameterVerdict::CarriedByPrior, Some(reason))
+        }
+        Verdict::NotIdentifiable => (ParameterVerdict::NotIdentifiable, None),
+    }
+}
 
 /// What is known about one standard parameter.
 #[derive(Debug, Clone)]

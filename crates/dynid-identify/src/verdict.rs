@@ -16,35 +16,15 @@ use crate::consistency::UNCONSTRAINED;
 use crate::estimate::{BaseCounts, Verdict};
 use crate::identification::Identification;
 use crate::joint_stiffness::JointStiffness;
+pub use dynid_record::Status;
 pub(crate) use instruments::in_words as closed_loop_bias_in_words;
 
-/// How bad a check came out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Status {
-    /// All is as it should be.
-    Ok,
-    /// Usable, with a reservation.
-    Warn,
-    /// Not to be trusted.
-    Fail,
-}
-
-impl Status {
-    /// `ok`, `warn` or `fail`.
-    pub fn word(self) -> &'static str {
-        match self {
-            Status::Ok => "ok",
-            Status::Warn => "warn",
-            Status::Fail => "fail",
-        }
-    }
-
-    fn of(good: bool, tolerable: bool) -> Self {
-        match (good, tolerable) {
-            (true, _) => Status::Ok,
-            (false, true) => Status::Warn,
-            (false, false) => Status::Fail,
-        }
+/// All is as it should be, tolerable, or neither.
+fn graded(good: bool, tolerable: bool) -> Status {
+    match (good, tolerable) {
+        (true, _) => Status::Ok,
+        (false, true) => Status::Warn,
+        (false, false) => Status::Fail,
     }
 }
 
@@ -55,23 +35,22 @@ fn check(
     unit: &str,
     limit: &str,
     meaning: impl Into<String>,
-) -> (Status, CheckResult) {
-    let result = CheckResult {
-        status: status.word().to_owned(),
-        name: name.name().to_owned(),
+) -> CheckResult {
+    CheckResult {
+        status,
+        name,
         value,
         unit: unit.to_owned(),
         limit: limit.to_owned(),
         meaning: meaning.into(),
-    };
-    (status, result)
+    }
 }
 
 /// Judges an identification.
 ///
 /// A failure is: rank doubtful, most parameters not excited, or a prediction that explains less than half of the effort
 /// on some joint that moves. A warning is anything that should make a user look.
-pub fn judge(id: &Identification) -> (Status, Verdict) {
+pub fn judge(id: &Identification) -> Verdict {
     let mut checks = vec![excitation(id), rank_gap(id), condition(id), training_fit(id)];
     if !id.unseen().is_empty() {
         checks.push(validation_fit(id));
@@ -88,7 +67,7 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
     checks.extend(instruments::closed_loop_bias(id));
     checks.extend(logs::checks(id));
     checks.extend(inputs::checks(id));
-    let status = checks.iter().map(|(s, _)| *s).max().unwrap_or(Status::Ok);
+    let status = checks.iter().map(|c| c.status).max().unwrap_or(Status::Ok);
     let relative =
         |a: &[&Agreement]| a.iter().filter_map(|v| v.filtered.relative_error).fold(f64::NAN, f64::max);
     let of_rows = || id.row_fits.iter().filter_map(|f| f.values.relative_error).fold(f64::NAN, f64::max);
@@ -101,7 +80,7 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
         (relative(&unseen), "predicts logs it has not seen")
     };
     let named = |level: Status| {
-        let names = checks.iter().filter(|(s, _)| *s == level).map(|(_, c)| c.name.as_str());
+        let names = checks.iter().filter(|c| c.status == level).map(|c| c.name.word());
         names.collect::<Vec<_>>().join(", ")
     };
     let assumptions: Vec<String> = id.effort_scale.assumption().into_iter().collect();
@@ -119,29 +98,26 @@ pub fn judge(id: &Identification) -> (Status, Verdict) {
         format!("{}; the model {agrees} within {error:.1} % of the effort", id.counts().base_in_words());
     let warnings: Vec<Caution> =
         id.warnings.iter().cloned().chain(unphysical(id)).chain(id.friction_warnings()).collect();
-    let verdict = Verdict {
-        status: status.word().to_owned(),
+    Verdict {
+        status,
         headline: format!("{line}. {reservation}"),
         line,
         assumptions,
         cautions: cautions(id, &checks, &warnings),
-        checks: checks.into_iter().map(|(_, c)| c).collect(),
+        checks,
         warnings: warnings.into_iter().map(|w| w.message).collect(),
-    };
-    (status, verdict)
+    }
 }
 
 /// Checks that did not pass and warnings, the worst first. A check that only sums up warnings, which stand for themselves, is
 /// left out.
-fn cautions(id: &Identification, checks: &[(Status, CheckResult)], warnings: &[Caution]) -> Vec<Caution> {
+fn cautions(id: &Identification, checks: &[CheckResult], warnings: &[Caution]) -> Vec<Caution> {
     let told = |name: CheckName| match name {
         CheckName::Preflight => id.findings.iter().any(|f| f.warning().is_some()),
-        _ => warnings.iter().any(|w| w.name == name.name()),
+        _ => warnings.iter().any(|w| w.name == name.word()),
     };
-    let open = checks.iter().filter(|(status, _)| *status != Status::Ok).filter_map(|(_, c)| {
-        let name = CheckName::of_name(&c.name).filter(|name| !told(*name))?;
-        Some(Caution::of(c, remedy::of(id, name)))
-    });
+    let open = checks.iter().filter(|c| c.status != Status::Ok && !told(c.name));
+    let open = open.map(|c| Caution::of(c, remedy::of(id, c.name)));
     caution::ranked(open.chain(warnings.iter().cloned()).collect())
 }
 
@@ -166,11 +142,11 @@ fn unphysical(id: &Identification) -> impl Iterator<Item = Caution> {
 }
 
 /// Stiffness that no log tells is no fault of the model, whose joints are stiff ones then.
-fn stiffness(id: &Identification) -> Option<(Status, CheckResult)> {
+fn stiffness(id: &Identification) -> Option<CheckResult> {
     let told = id.stiffness.iter().filter(|s| s.stiffness.is_some()).count();
     let all = id.stiffness.len();
     let words: Vec<String> = id.stiffness.iter().map(JointStiffness::words).collect();
-    let status = Status::of(id.stiffness.iter().all(JointStiffness::is_borne_out), true);
+    let status = graded(id.stiffness.iter().all(JointStiffness::is_borne_out), true);
     let meaning = match status {
         Status::Ok => {
             format!("the deformation of the joints bears the stiffness of the fit out: {}", words.join("; "))
@@ -187,10 +163,10 @@ fn stiffness(id: &Identification) -> Option<(Status, CheckResult)> {
     })
 }
 
-fn excitation(id: &Identification) -> (Status, CheckResult) {
+fn excitation(id: &Identification) -> CheckResult {
     let BaseCounts { all, excited: kept, .. } = id.counts().base;
     check(
-        Status::of(kept == all, 2 * kept > all),
+        graded(kept == all, 2 * kept > all),
         CheckName::Excitation,
         Some(kept as f64),
         "",
@@ -206,11 +182,11 @@ fn excitation(id: &Identification) -> (Status, CheckResult) {
     )
 }
 
-fn rank_gap(id: &Identification) -> (Status, CheckResult) {
+fn rank_gap(id: &Identification) -> CheckResult {
     // Beyond the reciprocal of machine epsilon a gap says nothing more.
     let gap = id.base.gap.ratio().min(1.0 / f64::EPSILON);
     check(
-        Status::of(gap >= 1e4, gap >= 1e2),
+        graded(gap >= 1e4, gap >= 1e2),
         CheckName::RankGap,
         gap.is_finite().then_some(gap),
         "",
@@ -219,11 +195,11 @@ fn rank_gap(id: &Identification) -> (Status, CheckResult) {
     )
 }
 
-fn condition(id: &Identification) -> (Status, CheckResult) {
+fn condition(id: &Identification) -> CheckResult {
     let condition = id.condition_without_shapes();
     // It amplifies errors, and standard deviations know of it: no reason to throw a model away.
     check(
-        Status::of(condition < 100.0, true),
+        graded(condition < 100.0, true),
         CheckName::Condition,
         condition.is_finite().then_some(condition),
         "",
@@ -243,11 +219,11 @@ fn worst_r2(agreements: &[&Agreement]) -> Option<f64> {
         .fold(None, |m: Option<f64>, x| Some(m.map_or(x, |m| m.min(x))))
 }
 
-fn fit_check(name: CheckName, agreements: &[&Agreement], where_: &str) -> (Status, CheckResult) {
+fn fit_check(name: CheckName, agreements: &[&Agreement], where_: &str) -> CheckResult {
     let worst = worst_r2(agreements);
     let r2 = worst.unwrap_or(f64::NAN);
     check(
-        Status::of(r2 >= 0.9, r2 >= 0.5),
+        graded(r2 >= 0.9, r2 >= 0.5),
         name,
         worst,
         "",
@@ -275,7 +251,7 @@ fn standing_apart(agreements: &[&Agreement]) -> String {
     })
 }
 
-fn training_fit(id: &Identification) -> (Status, CheckResult) {
+fn training_fit(id: &Identification) -> CheckResult {
     if !id.row_fits.is_empty() {
         return row_fit(id);
     }
@@ -284,7 +260,7 @@ fn training_fit(id: &Identification) -> (Status, CheckResult) {
 }
 
 /// How well the rows of the training logs are explained, where these are all that is left of them.
-fn row_fit(id: &Identification) -> (Status, CheckResult) {
+fn row_fit(id: &Identification) -> CheckResult {
     let all = id.row_fits.iter().flat_map(|fit| {
         let joints = fit.values.r2.iter().zip(dynid_model::EffortModel::outputs(&id.model));
         joints.filter_map(|(r2, output)| Some(((*r2)?, &fit.log, &output.name)))
@@ -293,7 +269,7 @@ fn row_fit(id: &Identification) -> (Status, CheckResult) {
     let r2 = worst.map_or(f64::NAN, |(r2, ..)| r2);
     let place = worst.map_or_else(String::new, |(_, log, joint)| format!(": `{joint}` in `{log}`"));
     check(
-        Status::of(r2 >= 0.9, r2 >= 0.5),
+        graded(r2 >= 0.9, r2 >= 0.5),
         CheckName::TrainingFit,
         worst.map(|(r2, ..)| r2),
         "",
@@ -305,11 +281,11 @@ fn row_fit(id: &Identification) -> (Status, CheckResult) {
     )
 }
 
-fn validation_fit(id: &Identification) -> (Status, CheckResult) {
+fn validation_fit(id: &Identification) -> CheckResult {
     fit_check(CheckName::ValidationFit, &id.unseen(), "logs it has not seen")
 }
 
-fn explained(id: &Identification) -> Option<(Status, CheckResult)> {
+fn explained(id: &Identification) -> Option<CheckResult> {
     let outputs = dynid_model::EffortModel::outputs(&id.model);
     let poor: Vec<&str> =
         outputs.iter().zip(&id.explained).filter(|(_, e)| !**e).map(|(o, _)| o.name.as_str()).collect();
@@ -329,7 +305,7 @@ fn explained(id: &Identification) -> Option<(Status, CheckResult)> {
     })
 }
 
-fn residual(id: &Identification) -> Option<(Status, CheckResult)> {
+fn residual(id: &Identification) -> Option<CheckResult> {
     let worst = id
         .residual_ratio
         .iter()
@@ -337,7 +313,7 @@ fn residual(id: &Identification) -> Option<(Status, CheckResult)> {
         .copied()
         .fold(None, |m: Option<f64>, x| Some(m.map_or(x, |m| m.max(x))))?;
     Some(check(
-        Status::of(worst < 2.0, true),
+        graded(worst < 2.0, true),
         CheckName::Residual,
         Some(worst),
         "",
@@ -351,14 +327,14 @@ fn residual(id: &Identification) -> Option<(Status, CheckResult)> {
     ))
 }
 
-fn delay(id: &Identification) -> Option<(Status, CheckResult)> {
+fn delay(id: &Identification) -> Option<CheckResult> {
     let delay = &id.conditioning.as_ref()?.delay;
     if delay.given {
         return None;
     }
     let chi = delay.chi_squared.unwrap_or(0.0);
     Some(check(
-        Status::of(!delay.at_limit && chi < 3.0, true),
+        graded(!delay.at_limit && chi < 3.0, true),
         CheckName::Delay,
         Some(delay.samples),
         "samples",
@@ -375,7 +351,7 @@ fn delay(id: &Identification) -> Option<(Status, CheckResult)> {
     ))
 }
 
-fn mask(id: &Identification) -> Option<(Status, CheckResult)> {
+fn mask(id: &Identification) -> Option<CheckResult> {
     let trials = &id.conditioning.as_ref()?.mask_trials;
     let masked = || trials.iter().filter(|t| t.level.is_some());
     let least = masked().map(|t| t.loss).fold(f64::INFINITY, f64::min);
@@ -389,7 +365,7 @@ fn mask(id: &Identification) -> Option<(Status, CheckResult)> {
     // A ladder that scatters by half its loss tells nothing, chance or not.
     let good = spread <= 50.0 && most - least <= (0.05 * least).max(chance);
     Some(check(
-        Status::of(good, true),
+        graded(good, true),
         CheckName::ReversalMask,
         Some(spread),
         "%",
@@ -407,12 +383,12 @@ fn mask(id: &Identification) -> Option<(Status, CheckResult)> {
     ))
 }
 
-fn blocks(id: &Identification) -> (Status, CheckResult) {
+fn blocks(id: &Identification) -> CheckResult {
     let fitted = &id.fitted;
     let wanted = fitted.block_length.seconds;
     let short = wanted > 1.01 * fitted.block_s;
     check(
-        Status::of(id.blocks() >= 20 && !short, true),
+        graded(id.blocks() >= 20 && !short, true),
         CheckName::TimeBlocks,
         Some(id.blocks() as f64),
         "",
@@ -440,7 +416,7 @@ const CHEAP: f64 = 2.0;
 /// Beyond this the robot file or the model contradicts the data, percent.
 const DEAR: f64 = 10.0;
 
-fn consistency(id: &Identification) -> Option<(Status, CheckResult)> {
+fn consistency(id: &Identification) -> Option<CheckResult> {
     let found = id.consistent.estimate.as_ref()?;
     let held_out = &id.consistent.held_out;
     let rise = |free: Option<f64>, consistent: Option<f64>| match (free, consistent) {
@@ -466,7 +442,7 @@ fn consistency(id: &Identification) -> Option<(Status, CheckResult)> {
         names.join(", ")
     };
     Some(check(
-        Status::of(cost <= CHEAP && found.status != ConsistentStatus::Stalled, cost <= DEAR),
+        graded(cost <= CHEAP && found.status != ConsistentStatus::Stalled, cost <= DEAR),
         CheckName::PriceOfConsistency,
         rise,
         "%",
@@ -492,7 +468,7 @@ fn consistency(id: &Identification) -> Option<(Status, CheckResult)> {
     ))
 }
 
-fn whiteness(id: &Identification) -> Option<(Status, CheckResult)> {
+fn whiteness(id: &Identification) -> Option<CheckResult> {
     let tested: Vec<(usize, &InBandWhiteness)> = id
         .whiteness
         .iter()
@@ -502,7 +478,7 @@ fn whiteness(id: &Identification) -> Option<(Status, CheckResult)> {
     let (joint, worst) = tested.into_iter().max_by(|a, b| ratio(a.1).total_cmp(&ratio(b.1)))?;
     let robust = id.fitted.jackknife.is_some();
     Some(check(
-        Status::of(!worst.rejected() || robust, true),
+        graded(!worst.rejected() || robust, true),
         CheckName::Whiteness,
         Some(ratio(worst)),
         "",

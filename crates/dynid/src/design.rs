@@ -28,7 +28,7 @@ pub use config::{
 pub use motion::{DesignedMotion, LegFault, MotionPaths};
 use problem::RobotProblem;
 pub use record::{DesignRecord, DesignVerdict};
-pub use safety::{CapsuleRecord, ExemptRecord, PlaneRecord, SafetyRecord};
+pub use safety::{CapsuleRecord, ExemptRecord, PlaneName, PlaneRecord, SafetyRecord};
 pub use shapes::{CapsuleSource, LinkCapsule};
 
 /// Samples of a period on which criterion and forecast are taken, with exact signs; at least 20 per harmonic.

@@ -7,6 +7,7 @@ use dynid_io::SourceFile;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use dynid_record::Outcome;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
@@ -40,10 +41,46 @@ pub struct FrictionModel {
 /// The result in words.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FrictionVerdict {
-    /// `pass`, `warn` or `fail`.
-    pub status: String,
+    /// Whether the file may be used.
+    pub status: Outcome,
     /// One sentence.
     pub headline: String,
+}
+
+dynid_record::words! {
+    /// What the tests of a joint came to.
+    FrictionStatus {
+        /// A whole law.
+        Identified = "identified",
+        /// A law of fewer terms: the points carry less than was hoped for.
+        Simplified = "simplified",
+        /// A law that is not to be used.
+        Invalid = "invalid",
+        /// No law: the joint was moved in one direction alone.
+        OneDirection = "one_direction",
+        /// No law.
+        NotIdentified = "not_identified",
+    }
+}
+
+dynid_record::words! {
+    /// What became of a pre-sliding log.
+    PreslidingStatus {
+        /// It tells the bristles.
+        Identified = "identified",
+        /// It does not.
+        NotIdentifiable = "not_identifiable",
+    }
+}
+
+dynid_record::words! {
+    /// The effort between its samples.
+    EffortBetween {
+        /// Held until the next sample.
+        Held = "held",
+        /// Straight from one sample to the next.
+        Linear = "linear",
+    }
 }
 
 /// Friction of one joint:
@@ -52,9 +89,8 @@ pub struct FrictionVerdict {
 pub struct JointFrictionModel {
     /// Joint.
     pub joint: String,
-    /// `identified`, `simplified` (the points carry less than was hoped for), `invalid` (not to be used), `one_direction` or
-    /// `not_identified` (no law).
-    pub status: String,
+    /// What its tests came to.
+    pub status: FrictionStatus,
     /// Coulomb friction `F_c`, N m or N; `None` without a law.
     pub coulomb: Option<f64>,
     /// Static friction `F_s`, N m or N; `None`: not estimable, equal to Coulomb friction.
@@ -196,8 +232,8 @@ pub struct UnpairedRecord {
 pub struct PreslidingRecord {
     /// Log.
     pub log: String,
-    /// `identified` or `not_identifiable`.
-    pub status: String,
+    /// Whether it tells the bristles.
+    pub status: PreslidingStatus,
     /// Why, in words.
     pub reason: String,
     /// Values found, where identified, with standard deviations.
@@ -210,8 +246,8 @@ pub struct PreslidingRecord {
     pub resolution: f64,
     /// Residual of the positions, rad or m.
     pub residual_rms: Option<f64>,
-    /// The effort between its samples: `held` or `linear`.
-    pub effort_hold: Option<String>,
+    /// The effort between its samples.
+    pub effort_hold: Option<EffortBetween>,
     /// Simulations run.
     pub simulations: u64,
 }
@@ -245,6 +281,8 @@ impl FrictionModel {
 
     /// Friction of a joint, if it has a law that may be used.
     pub fn joint(&self, name: &str) -> Option<&JointFrictionModel> {
-        self.joints.iter().find(|j| j.joint == name && j.coulomb.is_some() && j.status != "invalid")
+        self.joints
+            .iter()
+            .find(|j| j.joint == name && j.coulomb.is_some() && j.status != FrictionStatus::Invalid)
     }
 }

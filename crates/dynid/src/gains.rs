@@ -16,7 +16,7 @@ use dynid_rows::conditioning::{LogRows, condition};
 use crate::Error;
 use crate::config::{Config, LogConfig, Own, PayloadConfig, Route};
 use crate::elements::ElementPlan;
-use crate::estimate::{InputRecord, Provenance};
+use crate::estimate::{InputKind, InputRecord, Provenance};
 use crate::fitting::{self, Fitted};
 use crate::log::Log;
 use crate::log_terms::{LogTerms, known_inertia};
@@ -109,7 +109,7 @@ pub fn identify_gains(config: &Config, progress: &mut dyn FnMut(Step)) -> Result
     let name = model.mechanism().name().to_owned();
     let mut inputs = InputRecord::of_robot(&robot);
     inputs.extend(loaded.iter().flat_map(|log| log.source.inputs.iter().cloned()));
-    inputs.extend(plan.known_source.iter().map(|source| InputRecord::of("friction", source)));
+    inputs.extend(plan.known_source.iter().map(|source| InputRecord::of(InputKind::Friction, source)));
     Ok(GainIdentification {
         fitted,
         joints,

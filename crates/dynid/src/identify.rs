@@ -4,7 +4,7 @@ use dynid_io::{MappingSpec, TrajectoryFile};
 
 use crate::Error;
 use crate::config::{Config, LogConfig};
-use crate::estimate::{InputRecord, ReadingRecord};
+use crate::estimate::{InputKind, InputRecord, ReadingRecord};
 use crate::export::exported;
 use crate::log::{Log, names};
 use crate::logs;
@@ -27,7 +27,7 @@ pub fn identify(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Run, 
     let logs = config.read_all(&robot, progress)?;
     let found = pipeline::identify(&robot, logs, &config.settings()?, progress)?;
     let mut inputs = found.inputs();
-    inputs.extend(trajectory.map(|(_, source)| InputRecord::of("trajectory", &source)));
+    inputs.extend(trajectory.map(|(_, source)| InputRecord::of(InputKind::Trajectory, &source)));
     let exported = exported(&found)?;
     let reading = config.reading(&found);
     Ok(Run { identification: found, config: config.clone(), inputs, reading, exported })

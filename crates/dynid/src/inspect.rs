@@ -8,8 +8,9 @@ use serde::Serialize;
 
 use crate::Error;
 use crate::elements::ElementPlan;
+use crate::estimate::JointType;
 use crate::robot::Robot;
-pub use clearance::{ClearanceRow, RestingJournal};
+pub use clearance::{ClearanceRow, ContactLawName, RestingJournal};
 pub use loops::{ClosureRow, LoopsInspection};
 
 /// Structure of a robot.
@@ -54,7 +55,7 @@ pub struct JointRow {
     /// Joint.
     pub name: String,
     /// Kind.
-    pub kind: String,
+    pub kind: JointType,
     /// Moving link.
     pub link: String,
     /// Link it hangs on.
@@ -123,7 +124,7 @@ pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection,
         .map(|(k, body)| JointRow {
             number: k + 1,
             name: body.joint.name.clone(),
-            kind: format!("{:?}", body.joint.kind).split(' ').next().unwrap_or_default().to_lowercase(),
+            kind: body.joint.kind.into(),
             link: body.name.clone(),
             parent: body
                 .parent

@@ -1,7 +1,7 @@
 //! Dynamic identification of robots and mechanisms: the pipeline from a robot file and a log to a model.
 //!
 //! [`identify()`] runs it; [`Estimate`] is what it leaves behind. The rooms below are re-exported as [`model`], [`motion`],
-//! [`estimators`], [`io`] and [`report`].
+//! [`estimators`], [`io`] and [`report`], the words of results as [`record`].
 
 pub mod backlash;
 pub mod check;
@@ -50,6 +50,7 @@ pub use dynid_excitation as excitation;
 pub use dynid_io as io;
 pub use dynid_model as model;
 pub use dynid_motion as motion;
+pub use dynid_record as record;
 pub use dynid_report as report;
 pub use dynid_sim as sim;
 

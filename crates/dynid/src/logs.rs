@@ -15,7 +15,7 @@ pub(crate) use reading::{header, map_columns};
 
 use crate::Error;
 use crate::config::{InstrumentsConfig, LogConfig, MotorSide};
-use crate::estimate::InputRecord;
+use crate::estimate::{InputKind, InputRecord};
 use crate::log::{Log, LogAxis, LogReference, LogSource, assemble, check, names, turns, understood};
 
 /// Reads a log of a robot ([`Robot::axes`](crate::robot::Robot)).
@@ -125,7 +125,7 @@ fn finish(config: &LogConfig, file: &str, read: Read, axes: &[LogAxis]) -> Resul
     let whole = assemble(file, signals)?;
     let times = whole.time().to_vec();
     let log = left_out(whole, config, &numbers)?;
-    let mut inputs = vec![InputRecord::of("log", &source)];
+    let mut inputs = vec![InputRecord::of(InputKind::Log, &source)];
     let log = match config.part {
         None => log,
         Some((from, to)) => {
@@ -137,7 +137,7 @@ fn finish(config: &LogConfig, file: &str, read: Read, axes: &[LogAxis]) -> Resul
         Some(path) => {
             let cut = config.part.is_none() && config.rows.is_none();
             let (log, period_s, source) = known_motion::record(log, path, &joints, cut)?;
-            inputs.push(InputRecord::of("trajectory", &source));
+            inputs.push(InputRecord::of(InputKind::Trajectory, &source));
             (log, Some(period_s))
         }
         None => (log, config.period_s),

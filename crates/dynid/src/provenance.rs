@@ -57,5 +57,5 @@ impl Config {
 /// An input as pages show it.
 pub(crate) fn shown(input: &InputRecord) -> dynid_report::InputFile {
     let InputRecord { path, kind, sha256 } = input.clone();
-    dynid_report::InputFile { path, kind, sha256: Some(sha256) }
+    dynid_report::InputFile { path, kind: kind.word().to_owned(), sha256: Some(sha256) }
 }

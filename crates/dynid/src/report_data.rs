@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use dynid_estimate::linear::{LinearMethod, OwnEstimator};
 use dynid_report as report;
-use dynid_report::{Fact, Status, Value};
+use dynid_report::{Fact, Value};
 
 use crate::Error;
 use crate::agreement::Agreement;
@@ -183,7 +183,7 @@ impl Shown<'_> {
                     .iter()
                     .map(|i| report::InputFile {
                         path: i.path.clone(),
-                        kind: i.kind.clone(),
+                        kind: i.kind.word().to_owned(),
                         sha256: Some(i.sha256.clone()),
                     })
                     .collect(),
@@ -352,14 +352,6 @@ impl Shown<'_> {
     }
 }
 
-fn status(word: &str) -> Status {
-    match word {
-        "ok" => Status::Ok,
-        "warn" => Status::Warn,
-        _ => Status::Fail,
-    }
-}
-
 /// Settings of an identification beside those of a configuration that says nothing.
 pub(crate) fn run_settings(of: &Provenance) -> Vec<report::Chosen> {
     settings_table(&of.settings, &Config::default().stated())
@@ -369,15 +361,15 @@ fn verdict(estimate: &Estimate) -> report::Verdict {
     let v = &estimate.verdict;
     let sentences = v.assumptions.iter().map(|a| format!("Taken for granted: {a}.")).collect();
     report::Verdict {
-        status: status(&v.status),
+        status: v.status,
         headline: v.line.clone(),
         sentences,
         checks: v
             .checks
             .iter()
             .map(|c| report::Check {
-                status: status(&c.status),
-                name: c.name.clone(),
+                status: c.status,
+                name: c.name.word().to_owned(),
                 value: c.value.map_or(Value::Undefined, Value::Number),
                 unit: c.unit.clone(),
                 limit: c.limit.clone(),
@@ -392,11 +384,7 @@ fn chosen(choice: &Choice) -> report::Chosen {
         name: choice.name.clone(),
         value: settings::plain(&choice.value),
         unit: choice.unit.clone(),
-        origin: match choice.origin.as_str() {
-            "given" => report::Origin::User,
-            "found" => report::Origin::Automatic,
-            _ => report::Origin::Default,
-        },
+        origin: choice.origin,
         reason: choice.reason.clone(),
     }
 }

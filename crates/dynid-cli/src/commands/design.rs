@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use dynid::config::PerJoint;
 use dynid::design::{ColumnsName, CriterionName, DesignConfig, DesignRecord, MotionPaths, design};
+use dynid::record::Outcome;
 use dynid_terminal::message::{Failure, Notes, data};
 use dynid_terminal::outputs;
 use dynid_terminal::progress::Progress;
@@ -62,7 +63,7 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
     notes.warnings(&record.verdict.warnings);
     data(&if args.print.json { text } else { summary(&record) })?;
     notes.written(&written);
-    Ok(u8::from(record.verdict.status == "fail"))
+    Ok(u8::from(record.verdict.status == Outcome::Fail))
 }
 
 /// The configuration file, or one made of a robot file, with flags over it.

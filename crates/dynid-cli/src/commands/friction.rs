@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use dynid::friction::model::{FrictionModel, JointFrictionModel, ViscousModel};
 use dynid::friction::{FrictionConfig, identify_friction};
+use dynid::record::Outcome;
 use dynid_terminal::message::{Failure, Notes, data};
 use dynid_terminal::outputs;
 use dynid_terminal::progress::Progress;
@@ -38,7 +39,7 @@ pub(crate) fn run(args: &FrictionTestArgs) -> Result<u8, Failure> {
     notes.warnings(&model.warnings);
     data(&if args.print.json { text } else { summary(&model) })?;
     notes.written(&written);
-    Ok(u8::from(model.verdict.status == "fail"))
+    Ok(u8::from(model.verdict.status == Outcome::Fail))
 }
 
 fn summary(model: &FrictionModel) -> String {
@@ -65,7 +66,7 @@ fn row(joint: &JointFrictionModel) -> Vec<String> {
     let points = if joint.samples > 0 { joint.samples } else { joint.points.len() };
     vec![
         joint.joint.clone(),
-        joint.status.clone(),
+        joint.status.to_string(),
         points.to_string(),
         table::number(joint.coulomb),
         table::number(joint.static_),

@@ -2,6 +2,7 @@
 
 use dynid::Config;
 use dynid::gains::{GainsFile, JointGain, identify_gains};
+use dynid::record::Status;
 use dynid_terminal::message::{Failure, Notes, data, json};
 use dynid_terminal::progress::Progress;
 
@@ -19,7 +20,7 @@ pub(crate) fn run(args: &GainsArgs) -> Result<u8, Failure> {
         true => json(&file)?,
         false => data(&summary(&file))?,
     }
-    Ok(u8::from(file.status == "fail"))
+    Ok(u8::from(file.status == Status::Fail))
 }
 
 fn summary(file: &GainsFile) -> String {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use dynid::config::{Config, Consistency, Friction, Method, Route};
 use dynid::export::ExportError;
+use dynid::record::Status;
 use dynid::{Error, identify};
 
 use super::run::{GivenLogs, configuration as run_configuration, plain};
@@ -63,10 +64,10 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     data(&if args.print.json { json } else { summary(&estimate) })?;
     notes.written(&written);
     export::tell(&files[2], &urdf, &estimate, notes);
-    if estimate.verdict.status != "ok" {
+    if estimate.verdict.status != Status::Ok {
         notes.tell("`dynid explain NAME` says what a check means and what to do");
     }
-    Ok(u8::from(estimate.verdict.status == "fail"))
+    Ok(u8::from(estimate.verdict.status == Status::Fail))
 }
 
 /// The configuration file with flags over it, or one made of flags alone.

@@ -42,7 +42,7 @@ fn text(i: &Inspection) -> String {
             vec![
                 j.number.to_string(),
                 j.name.clone(),
-                j.kind.clone(),
+                j.kind.to_string(),
                 j.parent.clone(),
                 j.link.clone(),
                 table::number(j.mass),
@@ -103,7 +103,7 @@ fn loops(found: &LoopsInspection) -> String {
         .map(|c| {
             let forces = if c.determined { "determined" } else { "shared out" };
             let conditions = c.conditions.to_string();
-            vec![c.name.clone(), c.kind.clone(), c.between.join(" - "), conditions, forces.to_owned()]
+            vec![c.name.clone(), c.kind.to_string(), c.between.join(" - "), conditions, forces.to_owned()]
         })
         .collect();
     out.push_str(&table::aligned(&["loop", "kind", "between", "conditions", "forces"], &rows));
@@ -140,7 +140,7 @@ fn clearances(rows: &[ClearanceRow]) -> String {
                 size(c.gap, 1e6),
                 size(c.journal_radius, 1e3),
                 size(c.bearing_radius, 1e3),
-                c.law.to_owned(),
+                c.law.to_string(),
                 c.friction.to_string(),
             ];
             row.extend(match &c.at_rest {

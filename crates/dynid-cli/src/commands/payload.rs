@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use dynid::Config;
 use dynid::payload::{PayloadFile, PayloadRecord, Quantity, identify_payloads};
+use dynid::record::Status;
 use dynid_terminal::message::{Failure, Notes, data};
 use dynid_terminal::outputs::{self, marked_xml};
 use dynid_terminal::progress::Progress;
@@ -40,7 +41,7 @@ pub(crate) fn run(args: &PayloadArgs) -> Result<u8, Failure> {
     notes.warnings(&file.verdict.warnings);
     data(&if args.print.json { text } else { summary(&file) })?;
     notes.written(&written);
-    Ok(u8::from(file.status == "fail"))
+    Ok(u8::from(file.status == Status::Fail))
 }
 
 /// A name without what separates folders.
@@ -91,6 +92,6 @@ fn row(q: &Quantity) -> Vec<String> {
         table::number(q.interval.map(|i| i.0)),
         table::number(q.interval.map(|i| i.1)),
         format!("{:.0}", 100.0 * q.share),
-        if q.at_boundary { format!("{}, at the boundary", q.verdict) } else { q.verdict.clone() },
+        if q.at_boundary { format!("{}, at the boundary", q.verdict) } else { q.verdict.to_string() },
     ]
 }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use dynid::config::Config;
-use dynid::estimate::{Estimate, Verdict};
+use dynid::estimate::{Estimate, Status, Verdict};
 use dynid::preflight::Severity;
 use dynid::reduce::{self, Learned, Reduction};
 use dynid_terminal::message::{Failure, Notes, data, json};
@@ -57,7 +57,7 @@ pub(crate) fn run(args: &ReduceArgs) -> Result<u8, Failure> {
         (reduction, Some(estimate.verdict))
     };
     drop(progress);
-    let code = u8::from(verdict.as_ref().is_some_and(|v| v.status == "fail"));
+    let code = u8::from(verdict.as_ref().is_some_and(|v| v.status == Status::Fail));
     written(&reduction, verdict.as_ref(), set, args.to.print)?;
     Ok(code)
 }
@@ -98,7 +98,7 @@ pub(crate) fn solve(args: &SolveArgs) -> Result<u8, Failure> {
     data(&if args.print.json { text } else { summary(&estimate) })?;
     notes.written(&written);
     notes.tell("`dynid export` puts the result into a robot file, `dynid validate` compares it with a log");
-    Ok(u8::from(estimate.verdict.status == "fail"))
+    Ok(u8::from(estimate.verdict.status == Status::Fail))
 }
 
 /// The factor file that a command is about to write.

@@ -74,7 +74,7 @@ fn files_that_change_after_they_were_read_keep_the_hash_of_what_was_read() {
         fs::write(at(name), "something else").unwrap();
     }
     let inputs = found.estimate().provenance.inputs;
-    let kinds: Vec<&str> = inputs.iter().map(|i| i.kind.as_str()).collect();
+    let kinds: Vec<&str> = inputs.iter().map(|i| i.kind.word()).collect();
     assert_eq!(kinds, ["robot", "urdf", "log", "validation"]);
     let hashes: Vec<&String> = inputs.iter().map(|i| &i.sha256).collect();
     assert_eq!(hashes, before.iter().collect::<Vec<_>>());

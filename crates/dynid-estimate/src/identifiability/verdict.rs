@@ -1,4 +1,4 @@
-//! From shares to words.
+//! From shares to verdicts.
 
 /// Least achieved share of what is seen in the data.
 const SEEN: f64 = 0.90;
@@ -43,27 +43,6 @@ pub fn verdict(achieved: f64, log_limit: f64, structural_limit: f64) -> Verdict 
         Verdict::CarriedByPrior(Carried::TooNoisy)
     } else {
         Verdict::CarriedByPrior(Carried::NotExcited)
-    }
-}
-
-impl Verdict {
-    /// `seen in the data`, `carried by the prior` or `not identifiable`.
-    pub fn words(self) -> &'static str {
-        match self {
-            Verdict::Seen => "seen in the data",
-            Verdict::CarriedByPrior(_) => "carried by the prior",
-            Verdict::NotIdentifiable => "not identifiable",
-        }
-    }
-
-    /// `only in combination`, `not excited` or `too noisy`, where the prior carries the value.
-    pub fn reason(self) -> Option<&'static str> {
-        match self {
-            Verdict::CarriedByPrior(Carried::OnlyInCombination) => Some("only in combination"),
-            Verdict::CarriedByPrior(Carried::NotExcited) => Some("not excited"),
-            Verdict::CarriedByPrior(Carried::TooNoisy) => Some("too noisy"),
-            Verdict::Seen | Verdict::NotIdentifiable => None,
-        }
     }
 }
 

@@ -20,6 +20,18 @@ pub struct FrictionTrial {
     pub accepted: bool,
 }
 
+dynid_record::words! {
+    /// Where the friction of a joint takes energy out of the motion.
+    FrictionPassivity {
+        /// At all velocities that the logs reach.
+        Passive = "passive",
+        /// On some intervals of them.
+        PassiveOn = "passive on",
+        /// Nowhere.
+        NotPassive = "not passive",
+    }
+}
+
 /// Whether the identified friction of a joint is passive, `v (e(v) - e(0)) >= 0`, at the velocities of the training logs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PassivityRecord {
@@ -27,8 +39,8 @@ pub struct PassivityRecord {
     pub joint: String,
     /// Velocities that the training logs reach, rad/s or m/s; rest lies within.
     pub velocity_range: (f64, f64),
-    /// `passive`, `passive on` (the intervals) or `not passive`.
-    pub passivity: String,
+    /// Where it is.
+    pub passivity: FrictionPassivity,
     /// Intervals of velocity `(from, to)` on which alone it is passive, ascending; empty unless `passive on`.
     #[serde(default)]
     pub intervals: Vec<(f64, f64)>,

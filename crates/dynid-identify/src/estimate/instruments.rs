@@ -2,12 +2,41 @@
 
 use serde::{Deserialize, Serialize};
 
+dynid_record::words! {
+    /// What instruments say of least squares, by the size of the differences.
+    BiasVerdict {
+        /// Regressors equal instruments.
+        Exogenous = "exogenous",
+        /// Differences are small.
+        Harmless = "harmless",
+        /// Differences matter.
+        Material = "material",
+        /// Instruments say too little of the regressors.
+        Weak = "weak",
+        /// The simulation that instruments come from diverged.
+        Diverged = "diverged",
+        /// There is nothing to compare.
+        Undetermined = "undetermined",
+    }
+}
+
+dynid_record::words! {
+    /// How the rounds of instruments ended.
+    InstrumentEnd {
+        /// Parameters no longer changed.
+        Settled = "settled",
+        /// Rounds ran out.
+        Limit = "limit",
+        /// The simulation diverged: the fit is that of weighted least squares.
+        Diverged = "diverged",
+    }
+}
+
 /// Least squares against instrumental variables on the training logs.
 #[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ExogeneityRecord {
-    /// By the size of the differences: `exogenous` (regressors equal instruments), `harmless`, `material`; or `weak` instruments, `diverged`
-    /// simulation, `undetermined` (nothing to compare).
-    pub verdict: String,
+    /// By the size of the differences.
+    pub verdict: BiasVerdict,
     /// The verdict in words.
     pub summary: String,
     /// Probability of differences as large by chance, by the jackknife over time blocks; absent without a test.
@@ -59,8 +88,8 @@ pub struct EffectRecord {
 pub struct InstrumentRecord {
     /// Simulations made.
     pub rounds: usize,
-    /// `settled`, `limit` (of rounds) or `diverged` (the fit is that of weighted least squares).
-    pub end: String,
+    /// How the rounds ended.
+    pub end: InstrumentEnd,
     /// Largest change of a parameter in the last round.
     pub last_change: Option<f64>,
     /// Smallest singular value of `Q_ZᵀQ_W`.

@@ -15,13 +15,56 @@ pub struct LoopsRecord {
     pub home: Vec<(String, Vec<f64>)>,
 }
 
+dynid_record::words! {
+    /// Kind of a closure, as in robot files.
+    ClosureKind {
+        /// A ball joint.
+        Spherical = "spherical",
+        /// A pivot in a plane.
+        PlanarRevolute = "planar_revolute",
+        /// A pivot.
+        Revolute = "revolute",
+        /// Two crossed pivots.
+        Universal = "universal",
+        /// Rotation about an axis and translation along it.
+        Cylindrical = "cylindrical",
+        /// A slide.
+        Prismatic = "prismatic",
+        /// A slide in a plane.
+        PlanarPrismatic = "planar_prismatic",
+        /// No motion.
+        Fixed = "fixed",
+        /// A rod between two points.
+        Distance = "distance",
+        /// Coordinates of joints that are coupled.
+        Coordinate = "coordinate",
+    }
+}
+
+impl From<&Condition> for ClosureKind {
+    fn from(condition: &Condition) -> Self {
+        let Condition::Joint { kind, .. } = condition else { return ClosureKind::Coordinate };
+        match kind {
+            CutKind::Spherical => ClosureKind::Spherical,
+            CutKind::PlanarRevolute => ClosureKind::PlanarRevolute,
+            CutKind::Revolute => ClosureKind::Revolute,
+            CutKind::Universal => ClosureKind::Universal,
+            CutKind::Cylindrical => ClosureKind::Cylindrical,
+            CutKind::Prismatic => ClosureKind::Prismatic,
+            CutKind::PlanarPrismatic => ClosureKind::PlanarPrismatic,
+            CutKind::Fixed => ClosureKind::Fixed,
+            CutKind::Distance { .. } => ClosureKind::Distance,
+        }
+    }
+}
+
 /// A cut joint, or a coupling of coordinates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ClosureRecord {
     /// Name.
     pub name: String,
     /// Kind, as in robot files.
-    pub kind: String,
+    pub kind: ClosureKind,
     /// Frames on both links; absent for a coupling.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frames: Option<[FrameRecord; 2]>,
@@ -47,8 +90,6 @@ pub struct FrameRecord {
     pub translation: [f64; 3],
 }
 
-const COUPLING: &str = "coordinate";
-
 impl LoopsRecord {
     pub(super) fn new(closed: &ClosedMechanism) -> Self {
         LoopsRecord {
@@ -72,13 +113,13 @@ impl LoopsRecord {
 
 impl ClosureRecord {
     fn new(closure: &ClosureDescription) -> Self {
-        let name = closure.name.clone();
+        let (name, kind) = (closure.name.clone(), ClosureKind::from(&closure.condition));
         match &closure.condition {
-            Condition::Joint { kind, a, b } => ClosureRecord {
+            Condition::Joint { kind: cut, a, b } => ClosureRecord {
                 name,
-                kind: kind.name().to_owned(),
+                kind,
                 frames: Some([a, b].map(FrameRecord::new)),
-                length: match kind {
+                length: match cut {
                     CutKind::Distance { length } => Some(*length),
                     _ => None,
                 },
@@ -87,7 +128,7 @@ impl ClosureRecord {
             },
             Condition::Coordinates { terms, constant } => ClosureRecord {
                 name,
-                kind: COUPLING.to_owned(),
+                kind,
                 frames: None,
                 length: None,
                 terms: terms.clone(),
@@ -98,19 +139,25 @@ impl ClosureRecord {
 
     fn description(&self) -> Result<ClosureDescription, String> {
         let name = self.name.clone();
-        if self.kind == COUPLING {
-            let constant = self.constant.unwrap_or(0.0);
-            let condition = Condition::Coordinates { terms: self.terms.clone(), constant };
-            return Ok(ClosureDescription { name, condition });
-        }
-        let kind = match (CutKind::named(&self.kind), self.length) {
-            (Some(CutKind::Distance { .. }), Some(length)) => CutKind::Distance { length },
-            (Some(CutKind::Distance { .. }), None) => return Err(format!("loop `{name}`: no length")),
-            (Some(kind), _) => kind,
-            (None, _) => return Err(format!("loop `{name}`: unknown kind `{}`", self.kind)),
+        let cut = match (self.kind, self.length) {
+            (ClosureKind::Coordinate, _) => {
+                let constant = self.constant.unwrap_or(0.0);
+                let condition = Condition::Coordinates { terms: self.terms.clone(), constant };
+                return Ok(ClosureDescription { name, condition });
+            }
+            (ClosureKind::Distance, Some(length)) => CutKind::Distance { length },
+            (ClosureKind::Distance, None) => return Err(format!("loop `{name}`: no length")),
+            (ClosureKind::Spherical, _) => CutKind::Spherical,
+            (ClosureKind::PlanarRevolute, _) => CutKind::PlanarRevolute,
+            (ClosureKind::Revolute, _) => CutKind::Revolute,
+            (ClosureKind::Universal, _) => CutKind::Universal,
+            (ClosureKind::Cylindrical, _) => CutKind::Cylindrical,
+            (ClosureKind::Prismatic, _) => CutKind::Prismatic,
+            (ClosureKind::PlanarPrismatic, _) => CutKind::PlanarPrismatic,
+            (ClosureKind::Fixed, _) => CutKind::Fixed,
         };
         let Some([a, b]) = &self.frames else { return Err(format!("loop `{name}`: no frames")) };
-        let condition = Condition::Joint { kind, a: a.frame(), b: b.frame() };
+        let condition = Condition::Joint { kind: cut, a: a.frame(), b: b.frame() };
         Ok(ClosureDescription { name, condition })
     }
 }
@@ -127,5 +174,19 @@ impl FrameRecord {
     fn frame(&self) -> LinkFrame {
         let (rotation, translation) = (Mat3::from_rows(self.rotation), Vec3(self.translation));
         LinkFrame { link: self.link.clone(), placement: Placement { rotation, translation } }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kinds_of_cuts_have_the_words_of_robot_files() {
+        let at = || LinkFrame { link: String::new(), placement: Placement::identity() };
+        for word in ClosureKind::ALL.iter().filter(|kind| **kind != ClosureKind::Coordinate) {
+            let kind = CutKind::named(word.word()).unwrap();
+            assert_eq!(ClosureKind::from(&Condition::Joint { kind, a: at(), b: at() }), *word);
+        }
     }
 }

@@ -162,6 +162,37 @@ pub struct LinkRecord {
     pub phi: Option<[f64; 10]>,
 }
 
+dynid_record::words! {
+    /// Kind of a joint.
+    JointType {
+        /// Rotation about the axis within limits.
+        Revolute = "revolute",
+        /// Rotation about the axis without limits.
+        Continuous = "continuous",
+        /// Translation along the axis.
+        Prismatic = "prismatic",
+        /// Rotation about the axis and translation along it together.
+        Helical = "helical",
+        /// Six degrees of freedom.
+        Floating = "floating",
+        /// No motion.
+        Fixed = "fixed",
+    }
+}
+
+impl From<JointKind> for JointType {
+    fn from(kind: JointKind) -> Self {
+        match kind {
+            JointKind::Revolute => JointType::Revolute,
+            JointKind::Continuous => JointType::Continuous,
+            JointKind::Prismatic => JointType::Prismatic,
+            JointKind::Helical { .. } => JointType::Helical,
+            JointKind::Floating => JointType::Floating,
+            JointKind::Fixed => JointType::Fixed,
+        }
+    }
+}
+
 /// A joint.
 #[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct JointRecord {
@@ -172,7 +203,7 @@ pub struct JointRecord {
     /// Child link.
     pub child: String,
     /// Kind.
-    pub kind: String,
+    pub kind: JointType,
     /// Pitch of a helical joint, m/rad.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pitch: Option<f64>,
@@ -198,8 +229,8 @@ pub struct CouplingRecord {
     pub joints: Vec<String>,
     /// Matrix.
     pub matrix: Vec<Vec<f64>>,
-    /// `strict` or `columns`.
-    pub form: String,
+    /// Which parameters it brings.
+    pub form: CouplingForm,
 }
 
 impl ModelRecord {
@@ -218,10 +249,7 @@ impl ModelRecord {
                 motors: c.motors.clone(),
                 joints: c.joints.clone(),
                 matrix: c.matrix.clone(),
-                form: match c.form {
-                    CouplingForm::Strict => "strict".to_owned(),
-                    CouplingForm::Columns => "columns".to_owned(),
-                },
+                form: c.form,
             })
             .collect();
         let element_settings = plan
@@ -300,7 +328,7 @@ impl ModelRecord {
                 motors: c.motors.clone(),
                 joints: c.joints.clone(),
                 matrix: c.matrix.clone(),
-                form: if c.form == "columns" { CouplingForm::Columns } else { CouplingForm::Strict },
+                form: c.form,
             })
             .collect();
         let settings = self
@@ -344,19 +372,15 @@ fn repeated(mechanism: &Mechanism, elastic: &[ElasticSpec]) -> Option<String> {
 }
 
 fn joint_record(j: &JointDescription) -> JointRecord {
-    let (kind, pitch) = match j.kind {
-        JointKind::Revolute => ("revolute", None),
-        JointKind::Continuous => ("continuous", None),
-        JointKind::Prismatic => ("prismatic", None),
-        JointKind::Helical { pitch } => ("helical", Some(pitch)),
-        JointKind::Floating => ("floating", None),
-        JointKind::Fixed => ("fixed", None),
+    let pitch = match j.kind {
+        JointKind::Helical { pitch } => Some(pitch),
+        _ => None,
     };
     JointRecord {
         name: j.name.clone(),
         parent: j.parent.clone(),
         child: j.child.clone(),
-        kind: kind.to_owned(),
+        kind: j.kind.into(),
         pitch,
         rotation: j.placement.rotation.rows(),
         translation: j.placement.translation.0,
@@ -367,14 +391,14 @@ fn joint_record(j: &JointDescription) -> JointRecord {
 }
 
 fn joint_description(j: &JointRecord) -> Result<JointDescription, String> {
-    let kind = match (j.kind.as_str(), j.pitch) {
-        ("revolute", _) => JointKind::Revolute,
-        ("continuous", _) => JointKind::Continuous,
-        ("prismatic", _) => JointKind::Prismatic,
-        ("helical", Some(pitch)) => JointKind::Helical { pitch },
-        ("floating", _) => JointKind::Floating,
-        ("fixed", _) => JointKind::Fixed,
-        (other, _) => return Err(format!("joint `{}`: unknown kind `{other}`", j.name)),
+    let kind = match (j.kind, j.pitch) {
+        (JointType::Revolute, _) => JointKind::Revolute,
+        (JointType::Continuous, _) => JointKind::Continuous,
+        (JointType::Prismatic, _) => JointKind::Prismatic,
+        (JointType::Helical, Some(pitch)) => JointKind::Helical { pitch },
+        (JointType::Helical, None) => return Err(format!("joint `{}`: no pitch", j.name)),
+        (JointType::Floating, _) => JointKind::Floating,
+        (JointType::Fixed, _) => JointKind::Fixed,
     };
     Ok(JointDescription {
         name: j.name.clone(),

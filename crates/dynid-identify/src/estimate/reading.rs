@@ -3,7 +3,7 @@
 use dynid_io::{MappingSpec, SourceFile};
 use serde::{Deserialize, Serialize};
 
-use crate::input_record::InputRecord;
+use crate::input_record::{InputKind, InputRecord};
 use crate::robot::Robot;
 
 /// Transmission between the motors that a log records and the joints: `q_motor = matrix · (q - offset)`,
@@ -40,14 +40,14 @@ impl ReadingRecord {
 
 impl InputRecord {
     /// A file that was read.
-    pub fn of(kind: &str, source: &SourceFile) -> Self {
+    pub fn of(kind: InputKind, source: &SourceFile) -> Self {
         let SourceFile { path, sha256 } = source.clone();
-        InputRecord { path, kind: kind.to_owned(), sha256 }
+        InputRecord { path, kind, sha256 }
     }
 
     /// A robot file, and the URDF that it refers to.
     pub fn of_robot(robot: &Robot) -> Vec<Self> {
-        let kinds = ["robot", "urdf"];
+        let kinds = [InputKind::Robot, InputKind::Urdf];
         robot.file.sources.iter().zip(kinds).map(|(source, kind)| InputRecord::of(kind, source)).collect()
     }
 }

@@ -1,5 +1,6 @@
 //! What the result file says about consistency, precision and essential parameters.
 
+use dynid_record::{ConsistencyForm, ConsistencyStatus};
 use serde::{Deserialize, Serialize};
 
 use super::LogFit;
@@ -7,10 +8,10 @@ use super::LogFit;
 /// Physical consistency.
 #[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ConsistencyRecord {
-    /// `pseudo-inertia` or `spatial-inertia`.
-    pub form: String,
-    /// `unconstrained` (no constraint matters), `optimal` or `stalled` (consistent, but the gap is above the tolerance).
-    pub status: String,
+    /// Which bodies count as such that can exist.
+    pub form: ConsistencyForm,
+    /// How the search ended.
+    pub status: ConsistencyStatus,
     /// What consistency costs in fit: increase of the weighted sum of squares, in residual variances.
     pub price: f64,
     /// Increase of the weighted sum of squares over what the same number of parameters would take up by chance, `price / (variance inflation ·

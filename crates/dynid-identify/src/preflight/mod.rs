@@ -101,7 +101,7 @@ pub fn late(
     checked: &CheckedLog,
     out: &mut Findings<'_>,
 ) -> Result<Option<delay::Delay>, Error> {
-    let spoilt = out.list.iter().any(|f| f.severity == Severity::Error && f.id != FindingId::Delay.name());
+    let spoilt = out.list.iter().any(|f| f.severity == Severity::Error && f.id != FindingId::Delay);
     if spoilt || checked.unexplained.is_none_or(|share| share > bench::UNEXPLAINED) {
         return Ok(None);
     }

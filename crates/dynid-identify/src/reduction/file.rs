@@ -124,9 +124,6 @@ fn read(bytes: &[u8]) -> Result<Reduction, Fault> {
         {
             return wrong("factors of an effort or kernel that the recipe does not have");
         }
-        if facts.findings.iter().any(|f| f.finding(&facts.name, 0).is_none()) {
-            return wrong("a finding of the pre-flight that this version does not know");
-        }
         if !facts.fit(outputs) {
             return wrong(
                 "facts of another number of efforts than the recipe has, or numbers that cannot be",

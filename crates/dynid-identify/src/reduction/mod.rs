@@ -74,8 +74,8 @@ pub struct LogFacts {
 /// A finding of the pre-flight of a log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReducedFinding {
-    /// Which fault: the name of a [`FindingId`].
-    pub id: String,
+    /// Which fault.
+    pub id: FindingId,
     /// How much it matters.
     pub severity: Severity,
     /// Joint, if it is a joint's own.
@@ -104,23 +104,13 @@ pub struct RowSums {
 impl ReducedFinding {
     fn of(finding: &Finding) -> Self {
         let Finding { id, severity, joint, evidence, remedy, .. } = finding.clone();
-        ReducedFinding { id: id.to_owned(), severity, joint, evidence, remedy }
+        ReducedFinding { id, severity, joint, evidence, remedy }
     }
 
-    /// The finding of log `number`; `None` if this version knows no such fault.
-    fn finding(&self, log: &str, number: usize) -> Option<Finding> {
+    /// The finding of log `number`.
+    fn finding(&self, log: &str, number: usize) -> Finding {
         let ReducedFinding { id, severity, joint, evidence, remedy } = self.clone();
-        let id = FindingId::ALL.iter().find(|known| known.name() == id)?.name();
-        Some(Finding {
-            id,
-            severity,
-            joint,
-            log: log.to_owned(),
-            evidence,
-            remedy,
-            number,
-            fixes: Vec::new(),
-        })
+        Finding { id, severity, joint, log: log.to_owned(), evidence, remedy, number, fixes: Vec::new() }
     }
 }
 

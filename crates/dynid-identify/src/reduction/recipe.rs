@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::{ReductionError, plain};
 use crate::Error;
 use crate::check::{CheckName, CheckResult};
-use crate::estimate::{InputRecord, ModelRecord, ReadingRecord};
+use crate::estimate::{InputKind, InputRecord, ModelRecord, ReadingRecord};
 use crate::friction_power::FrictionPower;
 use crate::identification::Identification;
 use crate::passivity::velocities;
@@ -265,7 +265,9 @@ impl Identification {
             settings: Asked::of(&self.settings),
             inputs: InputRecord::of_robot(&self.robot)
                 .into_iter()
-                .chain(self.plan.known_source.iter().map(|source| InputRecord::of("friction", source)))
+                .chain(
+                    self.plan.known_source.iter().map(|source| InputRecord::of(InputKind::Friction, source)),
+                )
                 .collect(),
             reading: ReadingRecord::default(),
             doubts: doubts(self),
@@ -283,10 +285,8 @@ fn doubts(id: &Identification) -> Vec<CheckResult> {
         CheckName::TrainingFit,
         CheckName::ValidationFit,
     ];
-    let (_, verdict) = verdict::judge(id);
-    let is_doubt = |c: &CheckResult| {
-        c.status != Status::Ok.word() && CheckName::of_name(&c.name).is_some_and(|name| kept.contains(&name))
-    };
+    let verdict = verdict::judge(id);
+    let is_doubt = |c: &CheckResult| c.status != Status::Ok && kept.contains(&c.name);
     verdict.checks.into_iter().filter(is_doubt).collect()
 }
 

@@ -68,9 +68,8 @@ impl Reduction {
         let source = |facts: &LogFacts| LogSource { inputs: facts.inputs.clone(), ..LogSource::default() };
         let named = |facts: &LogFacts| TrainedLog { name: facts.name.clone(), ..facts.log.clone() };
         let facts = || self.logs.iter().map(|log| &log.facts);
-        // Reading has seen that all are known.
         let of_log = |(k, facts): (usize, &LogFacts)| -> Vec<Finding> {
-            facts.findings.iter().filter_map(|f| f.finding(&facts.name, k)).collect()
+            facts.findings.iter().map(|f| f.finding(&facts.name, k)).collect()
         };
         let findings = facts().enumerate().flat_map(of_log).collect();
         let beside = Beside {

@@ -2,6 +2,7 @@
 
 use dynid_estimate::identifiability::Verdict;
 use dynid_model::EffortModel;
+use dynid_record::{ParameterVerdict, ShapeVerdict};
 
 use crate::estimate::{BaseCounts, ParameterCounts, ShapeCounts, StandardCounts};
 use crate::identification::Identification;
@@ -21,19 +22,19 @@ impl Identification {
             all: all.count(),
         };
         let parameters = self.robot_parameters();
-        let of = |verdict: Verdict| parameters.iter().filter(|p| p.verdict == verdict.words()).count();
+        let of = |verdict: ParameterVerdict| parameters.iter().filter(|p| p.verdict == verdict).count();
         let shapes = self.robot_shapes();
         ParameterCounts {
             base,
             standard: StandardCounts {
                 all: parameters.len(),
-                seen: of(Verdict::Seen),
-                not_identifiable: of(Verdict::NotIdentifiable),
-                carried: parameters.len() - of(Verdict::Seen) - of(Verdict::NotIdentifiable),
+                seen: of(ParameterVerdict::SeenInData),
+                not_identifiable: of(ParameterVerdict::NotIdentifiable),
+                carried: of(ParameterVerdict::CarriedByPrior),
             },
             shape: ShapeCounts {
                 all: shapes.len(),
-                seen: shapes.iter().filter(|s| s.verdict == shape::SEEN).count(),
+                seen: shapes.iter().filter(|s| s.verdict == ShapeVerdict::SeenInData).count(),
             },
         }
     }

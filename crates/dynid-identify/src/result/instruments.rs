@@ -3,7 +3,7 @@
 use dynid_estimate::instruments::{ExogeneityVerdict, IterationEnd};
 use dynid_model::EffortModel;
 
-use crate::estimate::{EffectRecord, ExogeneityRecord, InstrumentRecord};
+use crate::estimate::{BiasVerdict, EffectRecord, ExogeneityRecord, InstrumentEnd, InstrumentRecord};
 use crate::identification::Identification;
 use crate::instruments::InstrumentRun;
 use crate::verdict;
@@ -14,16 +14,16 @@ impl Identification {
         let found = comparison.exogeneity.as_ref();
         let parameter = |column: usize| &self.model.parameters().linear[self.base.kept[column]];
         let verdict = match (found.map(|f| f.verdict), comparison.diverged()) {
-            (_, Some(_)) => "diverged",
-            (None, None) => "undetermined",
-            (Some(ExogeneityVerdict::Exogenous), None) => "exogenous",
-            (Some(ExogeneityVerdict::Harmless), None) => "harmless",
-            (Some(ExogeneityVerdict::Material), None) => "material",
-            (Some(ExogeneityVerdict::Weak), None) => "weak",
+            (_, Some(_)) => BiasVerdict::Diverged,
+            (None, None) => BiasVerdict::Undetermined,
+            (Some(ExogeneityVerdict::Exogenous), None) => BiasVerdict::Exogenous,
+            (Some(ExogeneityVerdict::Harmless), None) => BiasVerdict::Harmless,
+            (Some(ExogeneityVerdict::Material), None) => BiasVerdict::Material,
+            (Some(ExogeneityVerdict::Weak), None) => BiasVerdict::Weak,
         };
         let effects = found.iter().flat_map(|f| f.effects.iter().zip(&f.unexplained));
         Some(ExogeneityRecord {
-            verdict: verdict.to_owned(),
+            verdict,
             summary: verdict::closed_loop_bias_in_words(self)?,
             p_value: found.and_then(|f| f.robust).map(|t| t.p_value),
             p_value_independent: found.and_then(|f| f.naive).map(|t| t.p_value),
@@ -48,11 +48,10 @@ impl Identification {
             fit: self.instruments.as_ref().map(|run| InstrumentRecord {
                 rounds: run.rounds,
                 end: match run.end {
-                    IterationEnd::Settled => "settled",
-                    IterationEnd::Limit => "limit",
-                    IterationEnd::Diverged { .. } => "diverged",
-                }
-                .to_owned(),
+                    IterationEnd::Settled => InstrumentEnd::Settled,
+                    IterationEnd::Limit => InstrumentEnd::Limit,
+                    IterationEnd::Diverged { .. } => InstrumentEnd::Diverged,
+                },
                 last_change: run.last_change,
                 strength: run.strength.map(|(_, cosine)| cosine),
             }),

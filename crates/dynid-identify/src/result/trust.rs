@@ -3,6 +3,7 @@
 use dynid_estimate::consistent::Status;
 use dynid_estimate::whiteness::InBandWhiteness;
 use dynid_model::EffortModel;
+use dynid_record::{ConsistencyForm, ConsistencyStatus};
 
 use crate::consistency::UNCONSTRAINED;
 use crate::estimate::{
@@ -17,13 +18,13 @@ impl Identification {
         let chance = self.fitted.inflation * self.fit().solution.kept.len() as f64;
         Some(ConsistencyRecord {
             form: match self.settings.estimator.consistency {
-                Consistency::SpatialInertia => "spatial-inertia".to_owned(),
-                _ => "pseudo-inertia".to_owned(),
+                Consistency::SpatialInertia => ConsistencyForm::SpatialInertia,
+                _ => ConsistencyForm::PseudoInertia,
             },
             status: match found.status {
-                Status::Unconstrained => "unconstrained".to_owned(),
-                Status::Optimal => "optimal".to_owned(),
-                Status::Stalled => "stalled".to_owned(),
+                Status::Unconstrained => ConsistencyStatus::Unconstrained,
+                Status::Optimal => ConsistencyStatus::Optimal,
+                Status::Stalled => ConsistencyStatus::Stalled,
             },
             price: found.price(),
             price_over_chance: (chance > 0.0).then(|| found.price() / chance),

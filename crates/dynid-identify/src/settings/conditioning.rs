@@ -7,7 +7,7 @@ use super::{Method, Settings};
 use crate::Error;
 
 /// Which way from samples to rows.
-#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize, PartialEq, Eq, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Route {
     /// States at a high cut-off, then one compact kernel over columns and effort; everything found from the data.

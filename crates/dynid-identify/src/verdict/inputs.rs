@@ -1,6 +1,6 @@
 //! What the logs themselves leave open: their pre-flight, rows that they share, the scale of their efforts.
 
-use super::{Status, check};
+use super::{Status, check, graded};
 use crate::check::{CheckName, CheckResult};
 use crate::effort_scale::{EffortScale, ScaleSource};
 use crate::finding::Severity;
@@ -15,20 +15,20 @@ const WEIGHED: f64 = 0.03;
 const FAR_OFF: f64 = 0.1;
 
 /// Checks of the logs.
-pub(super) fn checks(id: &Identification) -> Vec<(Status, CheckResult)> {
+pub(super) fn checks(id: &Identification) -> Vec<CheckResult> {
     [Some(preflight(id)), recipe(id), repeated(id), seen_before(id), Some(scale(&id.effort_scale))]
         .into_iter()
         .flatten()
         .collect()
 }
 
-fn preflight(id: &Identification) -> (Status, CheckResult) {
+fn preflight(id: &Identification) -> CheckResult {
     let named = |severity: Severity| {
         let of = id
             .findings
             .iter()
             .filter(|f| f.severity == severity && (severity == Severity::Error || f.counts()));
-        let mut names: Vec<String> = of.map(|f| f.id.replace('_', " ")).collect();
+        let mut names: Vec<String> = of.map(|f| f.id.plain()).collect();
         names.sort();
         names.dedup();
         names
@@ -51,11 +51,11 @@ fn preflight(id: &Identification) -> (Status, CheckResult) {
 }
 
 /// What cannot be looked at again without the samples of the logs that taught a recipe.
-fn recipe(id: &Identification) -> Option<(Status, CheckResult)> {
+fn recipe(id: &Identification) -> Option<CheckResult> {
     if id.row_fits.is_empty() {
         return None;
     }
-    let failed = id.recipe_doubts.iter().any(|doubt| doubt.status == Status::Fail.word());
+    let failed = id.recipe_doubts.iter().any(|doubt| doubt.status == Status::Fail);
     let words: Vec<String> = id
         .recipe_doubts
         .iter()
@@ -68,16 +68,16 @@ fn recipe(id: &Identification) -> Option<(Status, CheckResult)> {
         }
     };
     let count = words.len() as f64;
-    let status = Status::of(words.is_empty(), !failed);
+    let status = graded(words.is_empty(), !failed);
     Some(check(status, CheckName::Recipe, Some(count), "", "no doubt", meaning))
 }
 
-fn repeated(id: &Identification) -> Option<(Status, CheckResult)> {
+fn repeated(id: &Identification) -> Option<CheckResult> {
     let found = &id.overlaps.training;
     let most = found.iter().map(|o| o.share).reduce(f64::max)?;
     let words: Vec<String> = found.iter().map(|o| o.words()).collect();
     Some(check(
-        Status::of(false, !found.iter().any(|o| o.repeats())),
+        graded(false, !found.iter().any(|o| o.repeats())),
         CheckName::OwnLogs,
         Some(100.0 * most),
         "%",
@@ -86,7 +86,7 @@ fn repeated(id: &Identification) -> Option<(Status, CheckResult)> {
     ))
 }
 
-fn seen_before(id: &Identification) -> Option<(Status, CheckResult)> {
+fn seen_before(id: &Identification) -> Option<CheckResult> {
     let found = &id.overlaps.validation;
     let most = found.iter().map(|o| o.share).reduce(f64::max)?;
     let words: Vec<String> = found.iter().map(|o| o.words()).collect();
@@ -100,7 +100,7 @@ fn seen_before(id: &Identification) -> Option<(Status, CheckResult)> {
     ))
 }
 
-fn scale(found: &EffortScale) -> (Status, CheckResult) {
+fn scale(found: &EffortScale) -> CheckResult {
     let name = CheckName::EffortScale;
     let assumption = found.assumption().unwrap_or_default();
     match found.source {
@@ -125,7 +125,7 @@ fn scale(found: &EffortScale) -> (Status, CheckResult) {
                 ),
             };
             let limit = format!("within a factor of {FILE_AGREES} of the robot file's masses");
-            check(Status::of(agrees, true), name, Some(ratio), "", &limit, meaning)
+            check(graded(agrees, true), name, Some(ratio), "", &limit, meaning)
         }
         ScaleSource::None => {
             let meaning =
@@ -136,7 +136,7 @@ fn scale(found: &EffortScale) -> (Status, CheckResult) {
 }
 
 /// Against masses that were weighed.
-fn weighed(found: &EffortScale) -> (Status, CheckResult) {
+fn weighed(found: &EffortScale) -> CheckResult {
     let (name, limit) = (CheckName::EffortScale, "1 within the interval");
     let each: Vec<String> = found
         .masses
@@ -164,5 +164,5 @@ fn weighed(found: &EffortScale) -> (Status, CheckResult) {
             1.0 / ratio
         ),
     };
-    check(Status::of(right, off < FAR_OFF), name, Some(ratio), "", limit, meaning)
+    check(graded(right, off < FAR_OFF), name, Some(ratio), "", limit, meaning)
 }

@@ -13,7 +13,7 @@ use crate::instruments::InstrumentRun;
 const LEVEL: f64 = 0.05;
 
 /// How the instruments of an instrumental-variable fit came about.
-pub(super) fn instruments(id: &Identification) -> Option<(Status, CheckResult)> {
+pub(super) fn instruments(id: &Identification) -> Option<CheckResult> {
     let run = id.instruments.as_ref()?;
     let cosine = run.strength.map(|(_, cosine)| cosine);
     let (status, meaning) = match (&run.end, run.strength) {
@@ -49,7 +49,7 @@ pub(super) fn instruments(id: &Identification) -> Option<(Status, CheckResult)> 
 }
 
 /// Size of the difference between least squares and instruments.
-pub(super) fn closed_loop_bias(id: &Identification) -> Option<(Status, CheckResult)> {
+pub(super) fn closed_loop_bias(id: &Identification) -> Option<CheckResult> {
     let comparison = id.comparison.as_ref()?;
     let found = comparison.exogeneity.as_ref();
     let by_instruments = id.fit().method == LinearMethod::Instrumental;

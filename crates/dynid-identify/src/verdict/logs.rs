@@ -2,7 +2,7 @@
 
 use dynid_model::element::scale_name;
 
-use super::{Status, check};
+use super::{Status, check, graded};
 use crate::check::{CheckName, CheckResult};
 use crate::identification::Identification;
 
@@ -10,17 +10,17 @@ use crate::identification::Identification;
 const SHOWN: usize = 6;
 
 /// Checks of a run with several logs; none with one.
-pub(super) fn checks(id: &Identification) -> Vec<(Status, CheckResult)> {
+pub(super) fn checks(id: &Identification) -> Vec<CheckResult> {
     agreement(id).into_iter().chain(own(id)).collect()
 }
 
-fn agreement(id: &Identification) -> Option<(Status, CheckResult)> {
+fn agreement(id: &Identification) -> Option<CheckResult> {
     let found = id.log_agreement.as_ref()?;
     let most =
         found.deviations.iter().filter(|d| d.disagrees).map(|d| d.effect / d.residual).reduce(f64::max);
     let contradicts = found.contradicts();
     Some(check(
-        Status::of(!contradicts, true),
+        graded(!contradicts, true),
         CheckName::AgreementOfLogs,
         most.or(found.one_robot.as_ref().map(|r| r.f).filter(|_| contradicts)),
         "",
@@ -56,7 +56,7 @@ impl Own {
     }
 }
 
-fn own(id: &Identification) -> Option<(Status, CheckResult)> {
+fn own(id: &Identification) -> Option<CheckResult> {
     let columns = id.model.log_columns();
     let deviations = id.parameter_values(columns).into_iter().filter(|p| p.joint.is_some());
     let deviations = deviations.filter_map(|p| {

@@ -36,16 +36,6 @@ impl ClearanceSpec {
     pub fn gap(&self) -> f64 {
         self.law.clearance()
     }
-
-    /// Name of the law in files.
-    pub fn law_name(&self) -> &'static str {
-        match self.law {
-            ContactLaw::Fractal(_) => "rough",
-            ContactLaw::LankaraniNikravesh(_) => "lankarani_nikravesh",
-            ContactLaw::Hertz(_) => "hertz",
-            ContactLaw::KelvinVoigt(_) => "kelvin_voigt",
-        }
-    }
 }
 
 /// Keys that all laws have.

@@ -1,8 +1,9 @@
 //! What the made-up identification says about its parameters.
 
 use dynid_report::{
-    Consistency, ConsistencyStatus, Counts, HeldOut, HeldOutJoint, Limit, LogWhiteness, OwnerKind,
-    ParameterVerdict, Precision, Pruning, PruningStep, StandardParameter, ValidationPrice, Whiteness,
+    CarriedReason, Consistency, ConsistencyForm, ConsistencyStatus, Counts, HeldOut, HeldOutJoint, Limit,
+    LogWhiteness, OwnerKind, ParameterVerdict, Precision, Pruning, PruningStep, StandardParameter,
+    ValidationPrice, Whiteness,
 };
 
 /// Of 13 standard parameters per joint nine of the first link are not identifiable, and three of every other link are carried;
@@ -41,10 +42,10 @@ pub(super) fn standard_parameters(joints: usize) -> Vec<StandardParameter> {
     let parameter = |n: usize, k: usize, (name, unit, value): (&str, &str, f64)| {
         let value = value / n as f64;
         let (verdict, reason, share) = match (n, k) {
-            (1, 0..=8) => (ParameterVerdict::NotIdentifiable, "", 0.0),
-            (_, 0 | 3) => (ParameterVerdict::CarriedByPrior, "only in combination", 0.37),
-            (_, 7) => (ParameterVerdict::CarriedByPrior, "not excited", 0.12),
-            _ => (ParameterVerdict::SeenInData, "", 0.96),
+            (1, 0..=8) => (ParameterVerdict::NotIdentifiable, None, 0.0),
+            (_, 0 | 3) => (ParameterVerdict::CarriedByPrior, Some(CarriedReason::OnlyInCombination), 0.37),
+            (_, 7) => (ParameterVerdict::CarriedByPrior, Some(CarriedReason::NotExcited), 0.12),
+            _ => (ParameterVerdict::SeenInData, None, 0.96),
         };
         let seen = verdict == ParameterVerdict::SeenInData;
         let half = 0.04 * value.abs();
@@ -61,12 +62,12 @@ pub(super) fn standard_parameters(joints: usize) -> Vec<StandardParameter> {
             interval: seen.then_some([unconstrained - half, unconstrained + half]),
             prior: (k < 10).then_some(1.1 * value),
             verdict: Some(verdict),
-            reason: reason.into(),
+            reason,
             share: Some(share),
-            possible_share: Some(if reason == "only in combination" { 0.41 } else { 1.0 }),
+            possible_share: Some(if reason == Some(CarriedReason::OnlyInCombination) { 0.41 } else { 1.0 }),
             wide: (n, name) == (3, "Ixy"),
             at_boundary: held,
-            combination: if reason == "only in combination" {
+            combination: if reason == Some(CarriedReason::OnlyInCombination) {
                 format!(
                     "the data see mx{n} + 0.45·m{} = 3.87 ± 0.02 kg m; the split follows the prior",
                     n + 1
@@ -74,7 +75,7 @@ pub(super) fn standard_parameters(joints: usize) -> Vec<StandardParameter> {
             } else {
                 String::new()
             },
-            advice: if reason == "not excited" {
+            advice: if reason == Some(CarriedReason::NotExcited) {
                 format!("fast motion of joint joint_{n} would raise Iyy{n} from 12 % to 94 %")
             } else {
                 String::new()
@@ -100,7 +101,7 @@ pub(super) fn consistency() -> Consistency {
     let limit =
         |owner: &str, owner_kind, text: &str| Limit { owner: owner.into(), owner_kind, text: text.into() };
     Consistency {
-        form: "pseudo-inertia".into(),
+        form: Some(ConsistencyForm::PseudoInertia),
         status: Some(ConsistencyStatus::Optimal),
         price: Some(41.8),
         price_over_chance: Some(0.42),

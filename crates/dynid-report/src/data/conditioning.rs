@@ -1,21 +1,9 @@
 //! How the logs were conditioned and how well posed the estimate is.
 
+pub use dynid_record::Origin;
 use serde::Serialize;
 
 use super::Value;
-
-/// Who decided a setting.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Origin {
-    /// Decided from the data, by the rule given as reason.
-    #[default]
-    Automatic,
-    /// Given by the user.
-    User,
-    /// Neither: the documented default.
-    Default,
-}
 
 /// A setting as it was used.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -39,7 +27,7 @@ impl Chosen {
             name: name.into(),
             value: value.into(),
             unit: unit.into(),
-            origin: Origin::User,
+            origin: Origin::Given,
             reason: String::new(),
         }
     }

@@ -1,26 +1,15 @@
 //! Physical consistency and its price, errors on held-out parts of the training logs.
 
+pub use dynid_record::{ConsistencyForm, ConsistencyStatus};
 use serde::Serialize;
 
 use super::OwnerKind;
 
-/// How the search for consistent parameters ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ConsistencyStatus {
-    /// No constraint matters: the best fit is consistent by itself.
-    Unconstrained,
-    /// The best consistent parameters were found, up to the gap.
-    Optimal,
-    /// Consistent, but the gap is above the tolerance of the search.
-    Stalled,
-}
-
 /// Physical consistency of the standard parameters.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Consistency {
-    /// What was asked for, e.g. `pseudo-inertia`.
-    pub form: String,
+    /// What was asked for.
+    pub form: Option<ConsistencyForm>,
     /// How the search ended.
     pub status: Option<ConsistencyStatus>,
     /// Increase of the weighted sum of squares over the unconstrained fit, in residual variances.

@@ -1,21 +1,7 @@
 //! Friction laws that are not linear in their parameters, and how they were chosen.
 
+pub use dynid_record::ShapeVerdict;
 use serde::Serialize;
-
-/// What the logs say about a shape parameter.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ShapeVerdict {
-    /// Determined by the logs.
-    SeenInData,
-    /// Bounded by them on one side.
-    OneSided,
-    /// Any value of its range fits alike.
-    NotSeen,
-    /// Not searched.
-    #[default]
-    Given,
-}
 
 /// A parameter that enters the effort nonlinearly, such as a Stribeck velocity.
 #[derive(Clone, Debug, Default, Serialize)]

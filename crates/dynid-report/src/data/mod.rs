@@ -30,7 +30,9 @@ mod verdict;
 
 pub use caution::{Caution, Counts};
 pub use conditioning::{Chosen, JointDelay, Ladder, Observation, Origin, Rung, UnidentifiableColumn};
-pub use consistency::{Consistency, ConsistencyStatus, HeldOut, HeldOutJoint, Limit, ValidationPrice};
+pub use consistency::{
+    Consistency, ConsistencyForm, ConsistencyStatus, HeldOut, HeldOutJoint, Limit, ValidationPrice,
+};
 pub use design::{
     ConfoundedPair, DesignJoint, DesignParameter, DesignQuality, DesignReport, DesignStart, FramePath,
     JointMotion, LimitUse, Obstacle, ParameterShare, RandomMotion, Shape, Starts, Trajectory,
@@ -41,7 +43,7 @@ pub use friction::{FrictionTrial, ShapeParameter, ShapeVerdict};
 pub use friction_test::{CurvesByTemperature, FrictionReport, FrictionTest, Surface, TemperatureLevel};
 pub use log::{JointQuality, JointSeries, LogReport, LogRole, LogSeries, Quality};
 pub use log_page::{FindingRow, LogPage};
-pub use parameters::{BaseParameter, OwnerKind, ParameterVerdict, StandardParameter};
+pub use parameters::{BaseParameter, CarriedReason, OwnerKind, ParameterVerdict, StandardParameter};
 pub use picture::{LineKind, PictureLine, PointKind, Pose, RobotPicture};
 pub use precision::{LogWhiteness, Precision, Whiteness};
 pub use provenance::{InputFile, Provenance};

@@ -1,18 +1,7 @@
 //! Estimated parameters.
 
+pub use dynid_record::{CarriedReason, ParameterVerdict};
 use serde::Serialize;
-
-/// Where a parameter's value comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ParameterVerdict {
-    /// Determined by the logs.
-    SeenInData,
-    /// Determined mostly by the prior.
-    CarriedByPrior,
-    /// No motion of this mechanism determines it.
-    NotIdentifiable,
-}
 
 /// A minimal identifiable combination of standard parameters.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -71,8 +60,8 @@ pub struct StandardParameter {
     pub prior: Option<f64>,
     /// Where the value comes from.
     pub verdict: Option<ParameterVerdict>,
-    /// Why, in a few words, e.g. `only in combination`; may be empty.
-    pub reason: String,
+    /// Why the prior carries it.
+    pub reason: Option<CarriedReason>,
     /// Share of the prior variance that the logs remove, 0 to 1.
     pub share: Option<f64>,
     /// Share that any motion of the mechanism could remove, 0 to 1.

@@ -1,21 +1,9 @@
 //! The result in plain words.
 
+pub use dynid_record::Status;
 use serde::Serialize;
 
 use super::Value;
-
-/// Outcome of a check, or of the whole run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Status {
-    /// All is as it should be.
-    Ok,
-    /// Usable, with the caution given.
-    Warn,
-    /// Not to be relied on; the default, so that a verdict nobody filled in never reads as passed.
-    #[default]
-    Fail,
-}
 
 /// The result in plain words, for a reader who stops after the first screen.
 #[derive(Clone, Debug, Default, Serialize)]

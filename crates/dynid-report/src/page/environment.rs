@@ -5,6 +5,7 @@ use minijinja::value::{Value, ValueKind};
 use minijinja::{Environment, UndefinedBehavior};
 
 use super::prose::{prose, sentence};
+use super::words;
 use crate::drawing::{interval_svg, meter_svg, pair_svg};
 use crate::number::{self, UNDEFINED};
 
@@ -95,6 +96,7 @@ pub(super) fn environment() -> Result<Environment<'static>, minijinja::Error> {
     environment.add_filter("pair", |upper: &Value, lower: &Value| {
         picture(real(upper).zip(real(lower)), |(upper, lower)| pair_svg(upper, lower))
     });
+    words::add(&mut environment);
     Ok(environment)
 }
 

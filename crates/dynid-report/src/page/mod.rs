@@ -15,6 +15,7 @@ mod pruning;
 mod script_data;
 mod study;
 mod trust;
+mod words;
 
 use crate::data::{DesignReport, FrictionReport, LogPage, ReportData, StudyReport, StudyTable};
 use crate::error::ReportError;

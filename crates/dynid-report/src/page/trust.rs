@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::words::look;
 use crate::data::{Consistency, OwnerKind, ParameterVerdict, ReportData, StandardParameter};
 use crate::drawing::counts_svg;
 
@@ -51,9 +52,9 @@ pub(super) fn trust(data: &ReportData) -> TrustView<'_> {
         bar: counts_svg(
             &format!("{seen} seen in the data, {carried} carried by the prior, {none} not identifiable"),
             &[
-                ("seen_in_data", seen),
-                ("carried_by_prior", carried),
-                ("not_identifiable", none),
+                (look(ParameterVerdict::SeenInData), seen),
+                (look(ParameterVerdict::CarriedByPrior), carried),
+                (look(ParameterVerdict::NotIdentifiable), none),
                 ("unknown", parameters.len() - seen - carried - none),
             ],
         ),

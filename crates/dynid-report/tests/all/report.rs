@@ -6,12 +6,12 @@ pub(crate) mod synthetic;
 use std::sync::Arc;
 
 use dynid_report::{
-    BaseParameter, Caution, Chart, ChartAxis, ChartCurve, Check, Chosen, Consistency, Counts, Fact,
-    FileJoint, FileJudgement, FrictionTrial, HeldOut, HeldOutJoint, InputFile, Joint, JointDelay,
-    JointQuality, JointSeries, Judged, Ladder, Limit, LineKind, LogReport, LogSeries, LogWhiteness,
-    PictureLine, PointKind, Pose, Precision, Pruning, PruningStep, ReportData, ReportError, RobotPicture,
-    Rung, ShapeParameter, ShapeVerdict, StandardParameter, UnidentifiableColumn, ValidationPrice, Verdict,
-    render,
+    BaseParameter, CarriedReason, Caution, Chart, ChartAxis, ChartCurve, Check, Chosen, Consistency,
+    ConsistencyForm, Counts, Fact, FileJoint, FileJudgement, FrictionTrial, HeldOut, HeldOutJoint, InputFile,
+    Joint, JointDelay, JointQuality, JointSeries, Judged, Ladder, Limit, LineKind, LogReport, LogSeries,
+    LogWhiteness, PictureLine, PointKind, Pose, Precision, Pruning, PruningStep, ReportData, ReportError,
+    RobotPicture, Rung, ShapeParameter, ShapeVerdict, StandardParameter, UnidentifiableColumn,
+    ValidationPrice, Verdict, render,
 };
 
 const HOSTILE: &str = "</script><script>alert('x')</script><img src=\"https://example.org/x.png\">&";
@@ -87,7 +87,7 @@ fn hollow(text: &str) -> ReportData {
             owner: text(),
             name: text(),
             unit: text(),
-            reason: text(),
+            reason: Some(CarriedReason::NotExcited),
             combination: text(),
             advice: text(),
             ..Default::default()
@@ -119,7 +119,7 @@ fn hollow(text: &str) -> ReportData {
         }],
         motions: vec![text()],
         consistency: Some(Consistency {
-            form: text(),
+            form: Some(ConsistencyForm::PseudoInertia),
             limits: vec![Limit { owner: text(), text: text(), ..Default::default() }],
             validation: vec![ValidationPrice { log: text(), ..Default::default() }],
             ..Default::default()
@@ -446,5 +446,5 @@ fn the_data_serialises_to_plain_json() {
     let json = serde_json::to_value(synthetic::report(1, 3)).unwrap();
     assert_eq!(json["verdict"]["status"], "warn");
     assert_eq!(json["conditioning"][0]["value"], 15.0);
-    assert_eq!(json["standard_parameters"][0]["verdict"], "not_identifiable");
+    assert_eq!(json["standard_parameters"][0]["verdict"], "not identifiable");
 }

@@ -55,7 +55,7 @@ impl Check {
         let untried: Vec<String> = self
             .findings
             .iter()
-            .filter(|f| f.id == FindingId::NotExamined.name())
+            .filter(|f| f.id == FindingId::NotExamined)
             .map(|f| short_name(&f.log))
             .collect();
         let untried = match untried.is_empty() {
@@ -97,7 +97,7 @@ impl Check {
                 Severity::Warning => report::Status::Warn,
                 Severity::Info => report::Status::Ok,
             },
-            name: f.id.replace('_', " "),
+            name: f.id.plain(),
             log: short_name(&f.log),
             joint: f.joint.clone().unwrap_or_default(),
             evidence: f.evidence.clone(),

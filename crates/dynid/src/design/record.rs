@@ -2,13 +2,14 @@
 
 use dynid_excitation::constraint::{ConstraintKind, DISTANCE_SCALE};
 use dynid_excitation::{Infeasible, LimitKind, LimitPoint, StartOutcome};
+use dynid_record::Outcome;
 use serde::Serialize;
 
 use super::config::{CriterionName, DesignConfig};
 use super::safety::SafetyRecord;
 use super::{DesignRun, DesignedTrajectory};
 use crate::Error;
-use crate::estimate::{InputRecord, Provenance};
+use crate::estimate::{InputKind, InputRecord, Provenance};
 
 /// Schema of `design.json`.
 pub(super) const SCHEMA: &str = "dynid-design/1";
@@ -67,8 +68,8 @@ pub struct DesignRecord {
 /// The result in words.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct DesignVerdict {
-    /// `pass`, `warn` or `fail`.
-    pub status: &'static str,
+    /// Whether the motion may be run.
+    pub status: Outcome,
     /// One sentence.
     pub headline: String,
     /// What to know before the motion is run.
@@ -232,8 +233,8 @@ impl From<&LimitPoint> for LimitRecord {
 impl DesignRun {
     fn inputs(&self) -> Vec<InputRecord> {
         let mut inputs = InputRecord::of_robot(&self.robot);
-        inputs.extend(self.set.safety.meshes.iter().map(|source| InputRecord::of("mesh", source)));
-        inputs.extend(self.set.earlier.iter().map(|source| InputRecord::of("trajectory", source)));
+        inputs.extend(self.set.safety.meshes.iter().map(|source| InputRecord::of(InputKind::Mesh, source)));
+        inputs.extend(self.set.earlier.iter().map(|source| InputRecord::of(InputKind::Trajectory, source)));
         inputs
     }
 
@@ -320,7 +321,7 @@ impl DesignRun {
         warnings.extend(self.set.assumptions.iter().cloned());
         match &self.outcome {
             Err(infeasible) => {
-                DesignVerdict { status: "fail", headline: infeasible_headline(infeasible), warnings }
+                DesignVerdict { status: Outcome::Fail, headline: infeasible_headline(infeasible), warnings }
             }
             Ok(designed) => self.found_verdict(designed, warnings),
         }
@@ -360,7 +361,7 @@ impl DesignRun {
         }
         if let Some(worst) = designed.broken.first() {
             return DesignVerdict {
-                status: "fail",
+                status: Outcome::Fail,
                 headline: format!(
                     "{} of {} is broken by {:.1e} of its limit: do not run this motion",
                     worst.kind, worst.subject, worst.excess
@@ -369,7 +370,7 @@ impl DesignRun {
             };
         }
         let near = self.near_best(designed);
-        let status = if designed.motion.leg_faults.is_empty() { "pass" } else { "warn" };
+        let status = if designed.motion.leg_faults.is_empty() { Outcome::Pass } else { Outcome::Warn };
         let headline = format!(
             "all limits hold at every instant of the period: {}; not checked: {}; {near} of {} starts ended within {:.0} % of \
              the best",

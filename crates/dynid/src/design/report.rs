@@ -42,11 +42,7 @@ impl DesignRun {
         Ok(report::DesignReport {
             title: format!("Excitation for {name}"),
             verdict: report::Verdict {
-                status: match record.verdict.status {
-                    "pass" => report::Status::Ok,
-                    "warn" => report::Status::Warn,
-                    _ => report::Status::Fail,
-                },
+                status: record.verdict.status.into(),
                 headline: sentence(&record.verdict.headline),
                 sentences: sentences(record),
                 checks: Vec::new(),
@@ -120,7 +116,7 @@ impl DesignRun {
                     .iter()
                     .map(|i| report::InputFile {
                         path: i.path.clone(),
-                        kind: i.kind.clone(),
+                        kind: i.kind.word().to_owned(),
                         sha256: Some(i.sha256.clone()),
                     })
                     .collect(),
@@ -351,7 +347,7 @@ fn facts(config: &DesignConfig, record: &DesignRecord) -> Vec<Fact> {
 
 fn obstacles(config: &DesignConfig, record: &DesignRecord) -> Vec<report::Obstacle> {
     let plane = |p: &super::PlaneRecord| report::Obstacle {
-        name: p.name.to_owned(),
+        name: p.name.word().to_owned(),
         frames: p.links.clone(),
         shape: report::Shape::HalfSpace { normal: p.normal, offset_m: p.height_m },
     };

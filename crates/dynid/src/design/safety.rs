@@ -49,11 +49,21 @@ pub struct SafetyRecord {
     pub not_checked: Vec<String>,
 }
 
+dynid_record::words! {
+    /// Planes that links stay above.
+    PlaneName {
+        /// The floor.
+        Floor = "floor",
+        /// The plane that the robot is mounted on.
+        Mounting = "mounting plane",
+    }
+}
+
 /// A plane that links stay above.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct PlaneRecord {
-    /// `floor` or `mounting plane`.
-    pub name: &'static str,
+    /// Which plane.
+    pub name: PlaneName,
     /// Unit vector into the side of the robot, base axes.
     pub normal: [f64; 3],
     /// Distance from the origin of the base along the normal, m.
@@ -251,7 +261,8 @@ impl Safety {
         };
         let points: Vec<_> = ends.kept.iter().map(point).collect();
         let names = |ends: &[(usize, usize)]| distinct(ends.iter().map(|(c, _)| capsules[*c].frame.clone()));
-        let name = if plane.kind == ConstraintKind::Floor { "floor" } else { "mounting plane" };
+        let is_floor = plane.kind == ConstraintKind::Floor;
+        let name = if is_floor { PlaneName::Floor } else { PlaneName::Mounting };
         let always_low = names(&ends.always_low);
         if !always_low.is_empty() {
             let millimetres = 1e3 * margin;

@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 
 use dynid_estimate::distribution::chi_squared_quantile;
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
+use dynid_record::{CarriedReason, ParameterVerdict, ShapeVerdict};
 use serde::Serialize;
 
 use crate::estimate::{BaseValue, Estimate};
 
 /// Chance at which parameters that are the same are told to differ.
 const LEVEL: f64 = 0.05;
-/// Verdict of values that the data tell.
-const SEEN: &str = "seen in the data";
 
 /// A value that a model tells, with the half width of its 95 % interval; 0 where it is exact.
 #[derive(Debug, Clone, Copy)]
@@ -41,21 +40,25 @@ impl Told {
     pub(super) fn of_estimate(estimate: &Estimate) -> Self {
         let quantile = quantile(estimate);
         let single = estimate.parameters.iter().map(|p| {
-            let seen = p.std.filter(|_| p.verdict == SEEN).zip(p.unconstrained);
+            let seen = p.std.filter(|_| p.verdict == ParameterVerdict::SeenInData).zip(p.unconstrained);
             let value = seen.map(|(std, value)| Value { value, half_width: quantile * std });
-            let why = p.reason.as_ref().map_or_else(|| p.verdict.clone(), |r| format!("{}, {r}", p.verdict));
+            let why =
+                p.reason.as_ref().map_or_else(|| p.verdict.to_string(), |r| format!("{}, {r}", p.verdict));
             (p.name.clone(), Entry { unit: p.unit.clone(), value: value.ok_or(why) })
         });
         let shapes = estimate.shape_parameters.iter().map(|s| {
-            let seen = s.std.filter(|_| s.verdict == SEEN);
+            let seen = s.std.filter(|_| s.verdict == ShapeVerdict::SeenInData);
             let value = s.unconstrained.unwrap_or(s.value);
             let value = seen.map(|std| Value { value, half_width: quantile * std });
-            (s.name.clone(), Entry { unit: s.unit.clone(), value: value.ok_or_else(|| s.verdict.clone()) })
+            (
+                s.name.clone(),
+                Entry { unit: s.unit.clone(), value: value.ok_or_else(|| s.verdict.to_string()) },
+            )
         });
         let combined = estimate.base_parameters.iter().map(|b| {
             let value = b.value.zip(b.half_width);
             let value = value.map(|(value, half_width)| Value { value, half_width });
-            let value = value.ok_or_else(|| "not excited".to_owned());
+            let value = value.ok_or_else(|| CarriedReason::NotExcited.to_string());
             (b.expression.clone(), b.name.clone(), Entry { unit: b.unit.clone(), value })
         });
         Told { single: single.chain(shapes).collect(), combined: combined.collect(), is_file: false }

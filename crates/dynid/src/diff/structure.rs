@@ -1,7 +1,7 @@
 //! Whether two models are of one robot.
 
 use super::Side;
-use crate::estimate::{Estimate, JointRecord, ModelRecord};
+use crate::estimate::{Estimate, JointRecord, JointType, ModelRecord};
 
 /// Lengths, m, and cosines that differ by less are the same: files state them with some ten digits.
 const SAME: f64 = 1e-6;
@@ -41,7 +41,11 @@ pub(super) fn same_robot(of_a: &ModelRecord, of_b: &ModelRecord) -> Result<(), S
 fn joints(a: &JointRecord, b: &JointRecord) -> Result<(), String> {
     let named = |what: String| format!("joint `{}`: {what}", a.name);
     if a.kind != b.kind {
-        let hint = if a.kind == "fixed" || b.kind == "fixed" { " (held in one of the two)" } else { "" };
+        let hint = if a.kind == JointType::Fixed || b.kind == JointType::Fixed {
+            " (held in one of the two)"
+        } else {
+            ""
+        };
         return Err(named(format!("{} and {}{hint}", a.kind, b.kind)));
     }
     if (&a.parent, &a.child) != (&b.parent, &b.child) {
@@ -51,7 +55,7 @@ fn joints(a: &JointRecord, b: &JointRecord) -> Result<(), String> {
         )));
     }
     let far = |a: &[f64], b: &[f64]| a.iter().zip(b).any(|(x, y)| (x - y).abs() > SAME);
-    if a.kind != "fixed" && far(&a.axis, &b.axis) {
+    if a.kind != JointType::Fixed && far(&a.axis, &b.axis) {
         return Err(named(format!("axis {:?} and {:?}", a.axis, b.axis)));
     }
     if far(&a.translation, &b.translation) {

@@ -53,9 +53,9 @@ impl Text {
 
 /// Every explanation: findings, checks, words, each sort in the order of its names.
 pub fn all() -> Vec<Explanation> {
-    let findings = FindingId::ALL.iter().map(|id| findings::text(*id).of(id.name(), Kind::Finding));
-    let checks = CheckName::ALL.iter().map(|name| checks::text(*name).of(name.name(), Kind::Check));
-    let words = Word::ALL.iter().map(|word| words::text(*word).of(word.name(), Kind::Word));
+    let findings = FindingId::ALL.iter().map(|id| findings::text(*id).of(id.word(), Kind::Finding));
+    let checks = CheckName::ALL.iter().map(|name| checks::text(*name).of(name.word(), Kind::Check));
+    let words = Word::ALL.iter().map(|word| words::text(*word).of(word.word(), Kind::Word));
     let mut all: Vec<Explanation> = findings.chain(checks).chain(words).collect();
     all.sort_by_key(|e| (e.kind as u8, e.id));
     all
@@ -86,9 +86,11 @@ fn plain(id: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use dynid_estimate::identifiability::{Carried, Verdict};
+    use dynid_record::{CarriedReason, Outcome, ParameterVerdict, ShapeVerdict, Status};
 
     use super::*;
+    use crate::check::Severity;
+    use crate::friction_model::FrictionStatus;
 
     #[test]
     fn ids_are_unique_and_texts_are_whole() {
@@ -102,16 +104,13 @@ mod tests {
     }
 
     #[test]
-    fn words_of_parameters_are_those_of_the_estimator() {
-        let carried = [Carried::OnlyInCombination, Carried::NotExcited, Carried::TooNoisy];
-        let verdicts =
-            carried.map(Verdict::CarriedByPrior).into_iter().chain([Verdict::Seen, Verdict::NotIdentifiable]);
-        for verdict in verdicts {
-            for word in [Some(verdict.words()), verdict.reason()].into_iter().flatten() {
-                assert!(find(word).is_some(), "{word}");
-            }
-        }
-        for word in [crate::shape::ONE_SIDED, crate::shape::NOT_SEEN] {
+    fn words_of_result_files_are_explained() {
+        let words = Status::ALL.iter().map(|w| w.word()).chain(Outcome::ALL.iter().map(|w| w.word()));
+        let words = words.chain(ParameterVerdict::ALL.iter().map(|w| w.word()));
+        let words = words.chain(CarriedReason::ALL.iter().map(|w| w.word()));
+        let words = words.chain(ShapeVerdict::ALL.iter().map(|w| w.word()));
+        let words = words.chain(FrictionStatus::ALL.iter().map(|w| w.word()));
+        for word in words.chain(Severity::ALL.iter().map(|w| w.word())) {
             assert!(find(word).is_some(), "{word}");
         }
     }

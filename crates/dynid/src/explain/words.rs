@@ -2,7 +2,7 @@
 
 use super::Text;
 
-dynid_identify::names! {
+dynid_record::words! {
     /// Words of results that are neither findings nor checks.
     Word {
         /// A limit moved the value.

@@ -9,7 +9,7 @@ use dynid_sim::presliding::{EffortHold, PreslidingJoint, SteadyTable, presliding
 
 use super::config::{FrictionConfig, HoldName, PreslidingLog};
 use super::experiment::{on_grid, temperature};
-use crate::estimate::InputRecord;
+use crate::estimate::{InputKind, InputRecord};
 use crate::friction_model::FrictionError;
 use crate::robot::Robot;
 use crate::{Error, logs};
@@ -91,7 +91,7 @@ pub(super) fn find(
         ..crate::config::LogConfig::default()
     };
     let loaded = logs::load(&plain, &robot.axes, &config.columns, None)?;
-    let presliding = |input: &InputRecord| InputRecord { kind: "presliding".to_owned(), ..input.clone() };
+    let presliding = |input: &InputRecord| InputRecord { kind: InputKind::Presliding, ..input.clone() };
     inputs.extend(loaded.source.inputs.iter().map(presliding));
     warnings.extend(crate::log::temperature_warnings(&loaded.log));
     let grid = on_grid(&loaded)?;

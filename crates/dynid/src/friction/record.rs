@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use dynid_estimate::distribution::f_quantile;
 use dynid_friction::steady_friction::{LevelFit, SteadyFriction};
+use dynid_record::Outcome;
 use dynid_sim::presliding::EffortHold;
 
 use super::config::FrictionConfig;
@@ -11,8 +12,8 @@ use super::{FrictionIdentification, IdentifiedJoint, PreslidingFit};
 use crate::Error;
 use crate::estimate::{InputRecord, Provenance};
 use crate::friction_model::{
-    FrictionModel, FrictionVerdict, JointFrictionModel, LawRecord, LevelRecord, LineRecord, PointRecord,
-    PreslidingRecord, SCHEMA, UnpairedRecord,
+    EffortBetween, FrictionModel, FrictionStatus, FrictionVerdict, JointFrictionModel, LawRecord,
+    LevelRecord, LineRecord, PointRecord, PreslidingRecord, PreslidingStatus, SCHEMA, UnpairedRecord,
 };
 use crate::known_friction::{BristleModel, ViscousModel};
 
@@ -57,7 +58,7 @@ impl FrictionIdentification {
 fn record(joint: &IdentifiedJoint, config: &FrictionConfig) -> JointFrictionModel {
     let mut out = JointFrictionModel {
         joint: joint.experiment.joint.clone(),
-        status: "not_identified".to_owned(),
+        status: FrictionStatus::NotIdentified,
         coulomb: None,
         static_: None,
         stribeck_speed: None,
@@ -85,7 +86,7 @@ fn record(joint: &IdentifiedJoint, config: &FrictionConfig) -> JointFrictionMode
         Ok(found) => law(&mut out, found, joint, config),
         Err(reason) => {
             if joint.experiment.pairing.one_direction() {
-                out.status = "one_direction".to_owned();
+                out.status = FrictionStatus::OneDirection;
                 out.notes.push(one_direction_note(joint));
             }
             out.notes.insert(0, reason.clone());
@@ -214,9 +215,9 @@ fn law(
     out.notes.insert(0, format!("law: {}", law.form));
     out.notes.extend(found.notes.iter().cloned());
     let simple = law.value("fs").is_none() || law.value("sigma2").is_none() || !law.form.thermal;
-    out.status = if simple { "simplified" } else { "identified" }.to_owned();
+    out.status = if simple { FrictionStatus::Simplified } else { FrictionStatus::Identified };
     if let Some(share) = unexplained(found, speeds.iter().map(|p| p.friction)) {
-        out.status = "not_identified".to_owned();
+        out.status = FrictionStatus::NotIdentified;
         (out.coulomb, out.static_, out.stribeck_speed, out.stribeck_exponent) = (None, None, None, None);
         (out.offset, out.viscous) = (None, None);
         out.std.clear();
@@ -255,7 +256,7 @@ fn check_range(out: &mut JointFrictionModel, found: &SteadyFriction, experiment:
     let Some(zero) = found.law.vanishes_at() else { return };
     let inside = |[a, b]: [f64; 2]| (a..=b).contains(&zero);
     if experiment.is_some_and(inside) {
-        out.status = "invalid".to_owned();
+        out.status = FrictionStatus::Invalid;
         out.notes.insert(
             0,
             format!(
@@ -307,14 +308,20 @@ fn presliding(fit: &PreslidingFit) -> PreslidingRecord {
     let values = fit.outcome.as_ref().ok();
     PreslidingRecord {
         log: fit.log.clone(),
-        status: if values.is_some() { "identified" } else { "not_identifiable" }.to_owned(),
+        status: match values {
+            Some(_) => PreslidingStatus::Identified,
+            None => PreslidingStatus::NotIdentifiable,
+        },
         reason: fit.outcome.as_ref().err().cloned().unwrap_or_default(),
         sigma0: values.map(|v| [v[0].0, v[0].1]),
         sigma1: values.map(|v| [v[1].0, v[1].1]),
         motion: fit.motion,
         resolution: fit.resolution,
         residual_rms: fit.residual_rms,
-        effort_hold: fit.hold.map(|h| if h == EffortHold::Held { "held" } else { "linear" }.to_owned()),
+        effort_hold: fit.hold.map(|h| match h {
+            EffortHold::Held => EffortBetween::Held,
+            EffortHold::Linear => EffortBetween::Linear,
+        }),
         simulations: fit.simulations,
     }
 }
@@ -345,12 +352,13 @@ fn bristle(out: &mut JointFrictionModel, joint: &IdentifiedJoint, config: &Frict
 }
 
 fn verdict(joints: &[JointFrictionModel], warnings: &[String]) -> FrictionVerdict {
-    let of = |status: &str| {
+    let of = |status: FrictionStatus| {
         let list: Vec<&str> =
             joints.iter().filter(|j| j.status == status).map(|j| j.joint.as_str()).collect();
         (list.len(), list.join(", "))
     };
-    let (invalid, one, without) = (of("invalid"), of("one_direction"), of("not_identified"));
+    let (invalid, one, without) =
+        (of(FrictionStatus::Invalid), of(FrictionStatus::OneDirection), of(FrictionStatus::NotIdentified));
     let mut parts = Vec::new();
     let laws = joints.len() - invalid.0 - one.0 - without.0;
     if laws > 0 {
@@ -369,13 +377,13 @@ fn verdict(joints: &[JointFrictionModel], warnings: &[String]) -> FrictionVerdic
             parts.push(format!("{names}: {what}"));
         }
     }
-    let simple = joints.iter().any(|j| j.status == "simplified");
+    let simple = joints.iter().any(|j| j.status == FrictionStatus::Simplified);
     let status = match () {
-        () if laws == 0 || invalid.0 > 0 => "fail",
-        () if one.0 + without.0 > 0 || simple || !warnings.is_empty() => "warn",
-        () => "pass",
+        () if laws == 0 || invalid.0 > 0 => Outcome::Fail,
+        () if one.0 + without.0 > 0 || simple || !warnings.is_empty() => Outcome::Warn,
+        () => Outcome::Pass,
     };
-    FrictionVerdict { status: status.to_owned(), headline: parts.join("; ") }
+    FrictionVerdict { status, headline: parts.join("; ") }
 }
 
 /// Settings of an identification of friction that states nothing.

@@ -6,7 +6,7 @@ use dynid_report::{Chart, ChartAxis, ChartCurve, CurveStyle, Fact, StudyTable, V
 
 use super::{FrictionIdentification, IdentifiedJoint, PreslidingFit};
 use crate::Error;
-use crate::friction_model::{FrictionModel, JointFrictionModel};
+use crate::friction_model::{FrictionModel, FrictionStatus, JointFrictionModel};
 use crate::known_friction::ViscousModel;
 use crate::report_data::settings_table;
 
@@ -27,11 +27,7 @@ impl FrictionIdentification {
         crate::fault::page(report::render_friction(&report::FrictionReport {
             title: format!("Friction of {}", model.robot),
             verdict: report::Verdict {
-                status: match model.verdict.status.as_str() {
-                    "pass" => report::Status::Ok,
-                    "warn" => report::Status::Warn,
-                    _ => report::Status::Fail,
-                },
+                status: model.verdict.status.into(),
                 headline: model.verdict.headline.clone(),
                 ..report::Verdict::default()
             },
@@ -54,7 +50,7 @@ impl FrictionIdentification {
                     .iter()
                     .map(|i| report::InputFile {
                         path: i.path.clone(),
-                        kind: i.kind.clone(),
+                        kind: i.kind.word().to_owned(),
                         sha256: Some(i.sha256.clone()),
                     })
                     .collect(),
@@ -73,17 +69,19 @@ impl FrictionIdentification {
         charts.extend(joint.presliding.iter().filter(|p| !p.curves.is_empty()).map(|p| motion(p, &units)));
         report::FrictionTest {
             name: record.joint.clone(),
-            status: match record.status.as_str() {
-                "identified" => report::Status::Ok,
-                "simplified" => report::Status::Warn,
-                _ => report::Status::Fail,
+            status: match record.status {
+                FrictionStatus::Identified => report::Status::Ok,
+                FrictionStatus::Simplified => report::Status::Warn,
+                FrictionStatus::Invalid | FrictionStatus::OneDirection | FrictionStatus::NotIdentified => {
+                    report::Status::Fail
+                }
             },
-            state: match record.status.as_str() {
-                "identified" => "identified",
-                "simplified" => "identified, simplified",
-                "invalid" => "not to be used",
-                "one_direction" => "one direction only",
-                _ => "not identified",
+            state: match record.status {
+                FrictionStatus::Identified => "identified",
+                FrictionStatus::Simplified => "identified, simplified",
+                FrictionStatus::Invalid => "not to be used",
+                FrictionStatus::OneDirection => "one direction only",
+                FrictionStatus::NotIdentified => "not identified",
             }
             .to_owned(),
             facts: facts(record, &units),

@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use super::{FrictionModel, JointFrictionModel};
+use super::{FrictionModel, FrictionStatus, JointFrictionModel};
 use crate::Error;
 use crate::known_friction::{KnownFriction, KnownLaws};
 use crate::settings::{FrictionErrors, PerJoint};
 
 /// Friction of a joint of a friction file; `None` without a law that may be used.
 pub fn known_friction(law: &JointFrictionModel) -> Option<KnownFriction> {
-    (law.status != "invalid").then_some(())?;
+    (law.status != FrictionStatus::Invalid).then_some(())?;
     Some(KnownFriction {
         joint: law.joint.clone(),
         coulomb: law.coulomb?,

@@ -1,5 +1,6 @@
 //! What is found of drive gains, and its file.
 
+use dynid_record::Status;
 use serde::{Deserialize, Serialize};
 
 use super::GainIdentification;
@@ -94,7 +95,7 @@ pub struct GainsFile {
     /// Variance inflation by coloured residuals.
     pub variance_inflation: f64,
     /// `ok` if a drive at least is determined, else `fail`.
-    pub status: String,
+    pub status: Status,
     /// Warnings.
     pub warnings: Vec<String>,
     /// Inputs and settings.
@@ -120,7 +121,7 @@ impl GainIdentification {
             joints: self.joints.clone(),
             blocks: self.fitted.estimate.blocks.len(),
             variance_inflation: self.fitted.inflation,
-            status: if determined { "ok" } else { "fail" }.to_owned(),
+            status: if determined { Status::Ok } else { Status::Fail },
             warnings: self.warnings.clone(),
             provenance: self.provenance.clone(),
         }

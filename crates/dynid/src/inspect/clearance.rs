@@ -1,11 +1,37 @@
 //! What joints with clearance do at rest.
 
+use dynid_model::contact::ContactLaw;
 use dynid_model::{EffortModel, RobotModel};
 use dynid_sim::{Plant, SimError};
 use serde::Serialize;
 
 use crate::Error;
 use crate::robot::Robot;
+
+dynid_record::words! {
+    /// Law of the normal force in a bearing, as in robot files.
+    ContactLawName {
+        /// Rough surfaces.
+        Rough = "rough",
+        /// Lankarani and Nikravesh.
+        LankaraniNikravesh = "lankarani_nikravesh",
+        /// Hertz.
+        Hertz = "hertz",
+        /// Kelvin and Voigt.
+        KelvinVoigt = "kelvin_voigt",
+    }
+}
+
+impl From<&ContactLaw> for ContactLawName {
+    fn from(law: &ContactLaw) -> Self {
+        match law {
+            ContactLaw::Fractal(_) => ContactLawName::Rough,
+            ContactLaw::LankaraniNikravesh(_) => ContactLawName::LankaraniNikravesh,
+            ContactLaw::Hertz(_) => ContactLawName::Hertz,
+            ContactLaw::KelvinVoigt(_) => ContactLawName::KelvinVoigt,
+        }
+    }
+}
 
 /// A joint with clearance, and its journal at rest under gravity with all joints at zero.
 #[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
@@ -19,7 +45,7 @@ pub struct ClearanceRow {
     /// Radius of the bearing, m.
     pub bearing_radius: f64,
     /// Law of the normal force.
-    pub law: &'static str,
+    pub law: ContactLawName,
     /// Coefficient of sliding friction.
     pub friction: f64,
     /// The journal at rest; `None` where no load presses it against its bearing.
@@ -67,7 +93,7 @@ pub(super) fn rows(robot: &Robot) -> Result<Vec<ClearanceRow>, Error> {
             gap: spec.gap(),
             journal_radius: spec.journal_radius,
             bearing_radius: spec.journal_radius + spec.gap(),
-            law: spec.law_name(),
+            law: (&spec.law).into(),
             friction: spec.friction.coefficient,
             at_rest: loads.next().flatten().map(|(load, compliance)| {
                 let law = &spec.law;

@@ -3,6 +3,8 @@
 use dynid_model::{BaseParameters, BaseSettings, ClosedModel, EffortModel, Reaction};
 use serde::Serialize;
 
+use crate::estimate::ClosureKind;
+
 /// Loops of a mechanism.
 #[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct LoopsInspection {
@@ -24,7 +26,7 @@ pub struct ClosureRow {
     /// Name.
     pub name: String,
     /// Kind, as in robot files.
-    pub kind: String,
+    pub kind: ClosureKind,
     /// Links that it joins, or joints that it couples.
     pub between: Vec<String>,
     /// Number of conditions.
@@ -39,15 +41,13 @@ pub(super) fn of(model: &ClosedModel) -> LoopsInspection {
     let (owners, determined) = (machine.condition_closures(), machine.is_determined());
     let closures = machine.closures().iter().enumerate().map(|(k, closure)| {
         let own = || owners.iter().zip(&determined).filter(move |(owner, _)| **owner == k);
-        let (kind, between) = match &closure.condition {
-            Condition::Joint { kind, a, b } => (kind.name(), vec![a.link.clone(), b.link.clone()]),
-            Condition::Coordinates { terms, .. } => {
-                ("coordinate", terms.iter().map(|(joint, _)| joint.clone()).collect())
-            }
+        let between = match &closure.condition {
+            Condition::Joint { a, b, .. } => vec![a.link.clone(), b.link.clone()],
+            Condition::Coordinates { terms, .. } => terms.iter().map(|(joint, _)| joint.clone()).collect(),
         };
         ClosureRow {
             name: closure.name.clone(),
-            kind: kind.to_owned(),
+            kind: (&closure.condition).into(),
             between,
             conditions: own().count(),
             determined: own().all(|(_, determined)| *determined),

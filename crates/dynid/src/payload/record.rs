@@ -1,9 +1,9 @@
 //! What is found of a payload, and the file `payload.json`.
 
-use dynid_estimate::identifiability;
 use dynid_estimate::identifiability::{excited_regrouping, posterior};
 use dynid_linalg::Mat;
 use dynid_model::Inertia;
+use dynid_record::{ParameterVerdict, Status};
 use serde::{Deserialize, Serialize};
 
 use super::body::{Body, NAMES, about_com, urdf};
@@ -19,7 +19,7 @@ use crate::prior::PAYLOAD_SIZE;
 use crate::verdict::CheckName;
 
 /// Checks of an identification that say what its logs are worth. The scale of the efforts is told by the stated mass.
-const INPUTS: [&str; 2] = [CheckName::Preflight.name(), CheckName::OwnLogs.name()];
+const INPUTS: [CheckName; 2] = [CheckName::Preflight, CheckName::OwnLogs];
 
 /// Share of the prior variance that the logs must remove for a value to count as seen.
 const SEEN: f64 = 0.9;
@@ -42,7 +42,7 @@ pub struct Quantity {
     /// Share of the prior variance that the logs remove, 0 to 1.
     pub share: f64,
     /// `seen in the data` or `carried by the prior`.
-    pub verdict: String,
+    pub verdict: ParameterVerdict,
     /// Physical consistency moved the value by more than a standard deviation.
     pub at_boundary: bool,
 }
@@ -83,7 +83,7 @@ pub struct PayloadFile {
     pub robot: String,
     /// `ok`: mass and centre of mass of every payload are seen in the data, stated masses within their intervals; `warn`: masses
     /// are seen; `fail`: not even these, or not told from none, or the model behind them is not to be trusted.
-    pub status: String,
+    pub status: Status,
     /// What it comes down to, in words.
     #[serde(default)]
     pub headline: String,
@@ -136,8 +136,8 @@ pub(super) fn of(id: &Identification, stated: &PayloadConfig) -> PayloadRecord {
                 interval: unconstrained.filter(|_| seen).map(|u| (u - t * body.std[k], u + t * body.std[k])),
                 share,
                 verdict: match seen {
-                    true => identifiability::Verdict::Seen.words().to_owned(),
-                    false => "carried by the prior".to_owned(),
+                    true => ParameterVerdict::SeenInData,
+                    false => ParameterVerdict::CarriedByPrior,
                 },
                 at_boundary: moved > body.std[k].max(1e-9 * prior),
             }
@@ -240,20 +240,20 @@ impl PayloadIdentification {
             _ => true,
         };
         // What makes the logs doubtful makes their difference doubtful too.
-        let doubted = |c: &CheckResult| c.status == "warn" && INPUTS.contains(&c.name.as_str());
+        let doubted = |c: &CheckResult| c.status == Status::Warn && INPUTS.contains(&c.name);
         let doubtful = estimate.verdict.checks.iter().any(doubted);
-        let status = match (estimate.verdict.status.as_str(), mass, centre && all(&agrees) && !doubtful) {
-            ("fail", _, _) | (_, false, _) => "fail",
-            (_, true, true) => "ok",
-            (_, true, false) => "warn",
+        let status = match (estimate.verdict.status, mass, centre && all(&agrees) && !doubtful) {
+            (Status::Fail, _, _) | (_, false, _) => Status::Fail,
+            (_, true, true) => Status::Ok,
+            (_, true, false) => Status::Warn,
         };
         let of_payload = |p: &ParameterValue| p.link.is_some();
         let sentences: Vec<&str> = self.payloads.iter().map(|p| p.sentence.as_str()).collect();
-        let headline = match (estimate.verdict.status.as_str(), status) {
-            ("fail", _) => {
+        let headline = match estimate.verdict.status {
+            Status::Fail => {
                 format!("what stands behind it is not to be trusted: {}", estimate.verdict.headline)
             }
-            (of_robot, _) => format!(
+            of_robot => format!(
                 "{}. Robot and payloads together ({of_robot}): {}",
                 sentences.join("; "),
                 estimate.verdict.headline
@@ -262,7 +262,7 @@ impl PayloadIdentification {
         PayloadFile {
             schema: SCHEMA,
             robot: estimate.robot,
-            status: status.to_owned(),
+            status,
             headline,
             payloads: self.payloads.clone(),
             log_parameters: estimate.log_parameters.into_iter().filter(|p| !of_payload(p)).collect(),

@@ -19,11 +19,7 @@ impl PayloadFile {
         let page = report::StudyReport {
             title: format!("Payload of {}", self.robot),
             verdict: report::Verdict {
-                status: match self.status.as_str() {
-                    "ok" => report::Status::Ok,
-                    "warn" => report::Status::Warn,
-                    _ => report::Status::Fail,
-                },
+                status: self.status,
                 headline: sentences.join("; "),
                 sentences: vec![format!("Robot and payload together: {}", self.verdict.headline)],
                 ..report::Verdict::default()
@@ -48,7 +44,7 @@ impl PayloadFile {
                     .iter()
                     .map(|i| report::InputFile {
                         path: i.path.clone(),
-                        kind: i.kind.clone(),
+                        kind: i.kind.word().to_owned(),
                         sha256: Some(i.sha256.clone()),
                     })
                     .collect(),

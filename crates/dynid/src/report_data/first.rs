@@ -16,9 +16,9 @@ const BRIEFLY: &str = " Where the joint stands, friction of velocity is left out
 /// Cautions of the result file with the numbers of their checks.
 pub(super) fn cautions(estimate: &Estimate) -> Vec<report::Caution> {
     let of = |caution: &crate::caution::Caution| {
-        let check = estimate.verdict.checks.iter().find(|c| c.name == caution.name);
+        let check = estimate.verdict.checks.iter().find(|c| c.name.word() == caution.name);
         report::Caution {
-            status: super::status(&caution.status),
+            status: caution.status,
             name: caution.name.clone(),
             value: check.and_then(|c| c.value).map_or(Value::Undefined, Value::Number),
             unit: check.map(|c| c.unit.clone()).unwrap_or_default(),

@@ -4,9 +4,8 @@ use dynid_model::EffortModel;
 use dynid_report as report;
 
 use super::Shown;
-use crate::estimate::{Estimate, PassivityRecord};
+use crate::estimate::{Estimate, FrictionPassivity, PassivityRecord};
 use crate::passivity;
-use crate::shape::{self, NOT_SEEN, ONE_SIDED};
 
 /// Velocities drawn on each side of rest.
 const POINTS: usize = 200;
@@ -46,7 +45,7 @@ impl Shown<'_> {
             points: points.clone(),
             style: report::CurveStyle::Line,
         }];
-        if record.passivity != passivity::PASSIVE {
+        if record.passivity != FrictionPassivity::Passive {
             let drives = |[v, e]: [f64; 2]| [v, if v * e < 0.0 { e } else { f64::NAN }];
             curves.push(report::ChartCurve {
                 name: "drives the motion".to_owned(),
@@ -102,12 +101,6 @@ impl Shown<'_> {
 }
 
 pub(super) fn shape_parameters(estimate: &Estimate) -> Vec<report::ShapeParameter> {
-    let verdict = |words: &str| match words {
-        shape::SEEN => report::ShapeVerdict::SeenInData,
-        ONE_SIDED => report::ShapeVerdict::OneSided,
-        NOT_SEEN => report::ShapeVerdict::NotSeen,
-        _ => report::ShapeVerdict::Given,
-    };
     estimate
         .shape_parameters
         .iter()
@@ -118,7 +111,7 @@ pub(super) fn shape_parameters(estimate: &Estimate) -> Vec<report::ShapeParamete
             std: p.std,
             interval: p.interval.map(|(low, high)| [low, high]),
             range: Some([p.range.0, p.range.1]),
-            verdict: verdict(&p.verdict),
+            verdict: p.verdict,
             reason: p.reason.clone().unwrap_or_default(),
         })
         .collect()

@@ -31,7 +31,7 @@ fn walk(name: &str, value: &Json, default: Option<&Json>, rows: &mut Vec<Chosen>
             name: name.to_owned(),
             value: plain(value),
             unit: String::new(),
-            origin: if default == Some(value) { Origin::Default } else { Origin::User },
+            origin: if default == Some(value) { Origin::Default } else { Origin::Given },
             reason: String::new(),
         }),
     }
@@ -111,13 +111,13 @@ mod tests {
         assert_eq!(
             found,
             [
-                row("bound.parameter", "j1.fc", Origin::User),
-                row("bound.range", "0, 20.5", Origin::User),
-                row("estimator.method", "iv", Origin::User),
+                row("bound.parameter", "j1.fc", Origin::Given),
+                row("bound.range", "0, 20.5", Origin::Given),
+                row("estimator.method", "iv", Origin::Given),
                 row("estimator.shape.starts", "20", Origin::Default),
-                row("log 1.path", "a.csv", Origin::User),
-                row("log 1.rows", "1, 3000", Origin::User),
-                row("log 2.path", "b.csv", Origin::User),
+                row("log 1.path", "a.csv", Origin::Given),
+                row("log 1.rows", "1, 3000", Origin::Given),
+                row("log 2.path", "b.csv", Origin::Given),
                 row("seed", "1", Origin::Default),
             ]
         );

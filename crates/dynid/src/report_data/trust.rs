@@ -13,13 +13,8 @@ impl Shown<'_> {
         let record = estimate.consistency.as_ref()?;
         let active = self.consistent.estimate.as_ref().map_or(&[][..], |e| &e.active);
         Some(report::Consistency {
-            form: record.form.clone(),
-            status: match record.status.as_str() {
-                "unconstrained" => Some(report::ConsistencyStatus::Unconstrained),
-                "optimal" => Some(report::ConsistencyStatus::Optimal),
-                "stalled" => Some(report::ConsistencyStatus::Stalled),
-                _ => None,
-            },
+            form: Some(record.form),
+            status: Some(record.status),
             price: Some(record.price),
             price_over_chance: record.price_over_chance,
             prior_weight: Some(record.prior_weight),
@@ -80,8 +75,8 @@ impl Shown<'_> {
             unconstrained: p.unconstrained,
             interval: p.interval.map(|(low, high)| [low, high]),
             prior: p.prior,
-            verdict: Some(parameter_verdict(&p.verdict)),
-            reason: p.reason.clone().unwrap_or_default(),
+            verdict: Some(p.verdict),
+            reason: p.reason,
             share: p.share,
             possible_share: p.possible_share,
             wide: p.wide,
@@ -135,14 +130,6 @@ fn validation_prices(estimate: &Estimate, record: &ConsistencyRecord) -> Vec<rep
     .collect()
 }
 
-pub(super) fn parameter_verdict(words: &str) -> report::ParameterVerdict {
-    match words {
-        "seen in the data" => report::ParameterVerdict::SeenInData,
-        "not identifiable" => report::ParameterVerdict::NotIdentifiable,
-        _ => report::ParameterVerdict::CarriedByPrior,
-    }
-}
-
 pub(super) fn base_parameters(estimate: &Estimate) -> Vec<report::BaseParameter> {
     estimate
         .base_parameters
@@ -156,7 +143,7 @@ pub(super) fn base_parameters(estimate: &Estimate) -> Vec<report::BaseParameter>
             half_width: b.half_width,
             relative_std_percent: b.rel_std,
             consistent_value: b.consistent_value,
-            verdict: b.verdict.as_deref().map(parameter_verdict),
+            verdict: b.verdict,
             share: b.share,
         })
         .collect()

@@ -116,9 +116,9 @@ impl Record {
         match identify(&config, &mut |_| {}) {
             Err(refused) => format!("refused: {refused}"),
             Ok(found) => {
-                let (status, verdict) = judge(&found);
-                let names = verdict.checks.iter().filter(|c| c.status != "ok").map(|c| c.name.as_str());
-                format!("{}: {}", status.word(), names.collect::<Vec<_>>().join(", "))
+                let verdict = judge(&found);
+                let names = verdict.checks.iter().filter(|c| c.status.word() != "ok").map(|c| c.name.word());
+                format!("{}: {}", verdict.status, names.collect::<Vec<_>>().join(", "))
             }
         }
     }
@@ -333,8 +333,8 @@ fn a_weighed_mass_tells_the_scale_of_the_efforts() {
         assert!(low < factor && factor < high, "{low} to {high}");
         assert!(high - low < 0.2 * factor, "{low} to {high}");
         assert_eq!(found.effort_scale.assumption(), None);
-        let (_, verdict) = judge(&found);
-        let check = verdict.checks.iter().find(|c| c.name == "scale of the efforts").unwrap();
-        assert_eq!(check.status == "ok", right, "{}", check.meaning);
+        let verdict = judge(&found);
+        let check = verdict.checks.iter().find(|c| c.name.word() == "scale of the efforts").unwrap();
+        assert_eq!(check.status.word() == "ok", right, "{}", check.meaning);
     }
 }

@@ -61,7 +61,7 @@ const NUMBERS: [&str; 4] = ["1", "2", "3", "4"];
 #[test]
 fn numbered_columns_of_two_arms_that_are_alike_are_not_taken_in_silence() {
     let found = checked(&["right", "left"], &NUMBERS, "");
-    let finding = found.findings.iter().find(|f| f.id == "column_order").unwrap();
+    let finding = found.findings.iter().find(|f| f.id.word() == "column_order").unwrap();
     assert_eq!(finding.severity, Severity::Warning);
     // The assignment is listed, and the line to write with it.
     for part in ["`right_shoulder` and `left_shoulder` are alike", "q1 = right_shoulder", "q4 = left_elbow"] {
@@ -72,7 +72,7 @@ fn numbered_columns_of_two_arms_that_are_alike_are_not_taken_in_silence() {
 
 #[test]
 fn columns_with_names_or_an_order_that_was_stated_raise_no_doubt() {
-    let none = |found: &Check| assert!(found.findings.iter().all(|f| f.id != "column_order"));
+    let none = |found: &Check| assert!(found.findings.iter().all(|f| f.id.word() != "column_order"));
     none(&checked(&["right"], &NUMBERS[..2], ""));
     let names = ["_right_shoulder", "_right_elbow", "_left_shoulder", "_left_elbow"];
     none(&checked(&["right", "left"], &names, ""));

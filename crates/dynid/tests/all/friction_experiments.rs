@@ -197,9 +197,9 @@ fn sweeps_over_temperatures_give_the_law_and_presliding_the_bristles() {
     for joint in &model.joints {
         println!("{}: {} {:?}", joint.joint, joint.status, joint.notes);
     }
-    assert_eq!((model.verdict.status.as_str(), model.joints.len()), ("pass", 2), "{:?}", model.verdict);
+    assert_eq!((model.verdict.status.word(), model.joints.len()), ("pass", 2), "{:?}", model.verdict);
     for (truth, (joint, inside)) in [&J1, &J3].into_iter().zip(model.joints.iter().zip(&found.joints)) {
-        assert_eq!((joint.joint.as_str(), joint.status.as_str()), (truth.joint, "identified"));
+        assert_eq!((joint.joint.as_str(), joint.status.word()), (truth.joint, "identified"));
         assert_eq!(
             (joint.points.len(), joint.levels.len(), joint.lines.len()),
             (112, 7, 3),
@@ -254,14 +254,14 @@ fn one_direction_alone_is_a_result_that_says_so() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.csv"), J1.sweep(30.0, &[0.4, 0.8], &[1.0], 1)).unwrap();
     let model = model(&config(folder.path(), "[[log]]\npath = \"a.csv\"\n"));
-    assert_eq!(model.verdict.status, "fail");
+    assert_eq!(model.verdict.status.word(), "fail");
     assert!(
         model.verdict.headline.contains("Coulomb friction and offset cannot be told apart"),
         "{}",
         model.verdict.headline
     );
     let joint = &model.joints[0];
-    assert_eq!((joint.status.as_str(), joint.coulomb, joint.unpaired.len()), ("one_direction", None, 2));
+    assert_eq!((joint.status.word(), joint.coulomb, joint.unpaired.len()), ("one_direction", None, 2));
     assert!(
         joint.notes.iter().any(|n| n.contains("friction, gravity and offset together")),
         "{:?}",
@@ -275,7 +275,7 @@ fn without_temperature_what_is_lost_is_said_and_required_lines_are_refused() {
     let log = J1.sweep(30.0, &speeds(0.01, 2.4, 16), &[1.0, -1.0], 1).replace("temp_", "extra_");
     std::fs::write(folder.path().join("a.csv"), log).unwrap();
     let found = model(&config(folder.path(), "[[log]]\npath = \"a.csv\"\n"));
-    assert_eq!((found.joints[0].status.as_str(), found.joints[0].temperature_range), ("simplified", None));
+    assert_eq!((found.joints[0].status.word(), found.joints[0].temperature_range), ("simplified", None));
     assert!(
         found.joints[0].notes.iter().any(|n| n.contains("no temperature is logged")),
         "{:?}",
@@ -333,7 +333,7 @@ fn a_vanishing_sigma2_is_flagged() {
     }
     let found = model(&config(folder.path(), &text));
     assert_eq!(
-        (found.verdict.status.as_str(), found.joints[0].status.as_str()),
+        (found.verdict.status.word(), found.joints[0].status.word()),
         ("fail", "invalid"),
         "{:?}",
         found.joints[0].notes
@@ -353,7 +353,7 @@ fn a_coarse_encoder_keeps_the_prior() {
     let found = model(&config(folder.path(), text));
     let joint = &found.joints[0];
     assert!(joint.bristle.is_some_and(|b| b.prior && b.sigma0 == 15000.0), "{:?}", joint.presliding);
-    assert_eq!(joint.presliding[0].status, "not_identifiable");
+    assert_eq!(joint.presliding[0].status.word(), "not_identifiable");
     assert!(
         joint.notes.iter().any(|n| n.contains("too coarse") && n.contains("prior is kept")),
         "{:?}",

@@ -180,7 +180,7 @@ fn every_law_is_found_recorded_and_exported() {
         for ShapeValue { name, value, interval, std, verdict, .. } in &read.shape_parameters {
             let (low, high) = interval.unwrap();
             let truth = truth(&log, name);
-            assert_eq!(verdict, "seen in the data", "{name}");
+            assert_eq!(verdict.word(), "seen in the data", "{name}");
             assert!(low <= *value && *value <= high, "{name} = {value} in {low} to {high}");
             // Four standard deviations: a dozen parameters are looked at.
             assert!((value - truth).abs() <= 4.0 * std.unwrap(), "{name} = {value}, truly {truth} ({std:?})");
@@ -247,7 +247,8 @@ fn what_the_log_does_not_show_is_held_and_named() {
         "rate_hz = 250\nseed = 3",
     );
     let (found, read) = bench.identify("[elements]\nfriction = \"stribeck\"");
-    let unseen: Vec<&ShapeValue> = read.shape_parameters.iter().filter(|s| s.verdict == "not seen").collect();
+    let unseen: Vec<&ShapeValue> =
+        read.shape_parameters.iter().filter(|s| s.verdict.word() == "not seen").collect();
     assert!(!unseen.is_empty(), "{:?}", read.shape_parameters);
     for s in unseen {
         let (lower, upper) = s.range;
@@ -271,7 +272,7 @@ fn shape_at_a_bound_names_the_neighbouring_law() {
     );
     let (found, read) = bench.identify("[elements]\nfriction = \"tanh\"");
     for s in &read.shape_parameters {
-        assert_eq!(s.verdict, "bounded on one side", "{s:?}");
+        assert_eq!(s.verdict.word(), "bounded on one side", "{s:?}");
         assert_eq!(s.std, None);
         let (low, high) = s.interval.unwrap();
         assert!(low <= s.value && s.value <= high && low == s.range.0 && high < s.range.1, "{s:?}");
@@ -291,7 +292,7 @@ fn textbook_route_locked_joints_and_several_logs() {
     let (found, read) =
         bench.identify("[elements]\nfriction = \"stribeck\"\n[conditioning]\nroute = \"textbook\"");
     for s in &read.shape_parameters {
-        assert_eq!((s.verdict.as_str(), s.std, s.interval), ("given", None, None));
+        assert_eq!((s.verdict.word(), s.std, s.interval), ("given", None, None));
         assert!(s.reason.as_ref().unwrap().contains("textbook route does not search it"), "{s:?}");
     }
     same_predictions(&bench, &found, &read);

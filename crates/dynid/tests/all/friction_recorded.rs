@@ -26,7 +26,7 @@ fn one_direction_of_the_gen3() {
     }
     let model = model(&text);
     println!("{:?}\n{:?}", model.verdict, model.warnings);
-    assert_eq!((model.verdict.status.as_str(), model.joints.len()), ("fail", 7), "{:?}", model.warnings);
+    assert_eq!((model.verdict.status.word(), model.joints.len()), ("fail", 7), "{:?}", model.warnings);
     for joint in &model.joints {
         let pass = &joint.unpaired[0];
         println!(
@@ -38,7 +38,7 @@ fn one_direction_of_the_gen3() {
             pass.effort,
             pass.spread
         );
-        assert_eq!((joint.status.as_str(), joint.coulomb, joint.bristle), ("one_direction", None, None));
+        assert_eq!((joint.status.word(), joint.coulomb, joint.bristle), ("one_direction", None, None));
         assert!(pass.speed > 0.3 && pass.speed < 0.6 && pass.temperature.unwrap() > 30.0);
         let said = joint.notes.join("\n");
         for words in [

@@ -70,7 +70,7 @@ fn a_law_that_drives_the_motion_is_told_with_a_remedy() {
         "[estimator]\nconsistency = \"none\"\n",
     );
     let record = only(&estimate);
-    assert_eq!(record.passivity, "passive on");
+    assert_eq!(record.passivity.word(), "passive on");
     let (_, last) = *record.intervals.last().unwrap();
     assert!((last / 1.496 - 1.0).abs() < 0.02, "{record:?}");
     let (low, high) = record.velocity_range;
@@ -96,7 +96,7 @@ fn static_friction_below_coulomb_friction_is_told() {
     let (estimate, page) =
         identified(law, "[\"stribeck\", \"viscous\", \"offset\"]\nfriction = \"given\"", "");
     let record = only(&estimate);
-    assert!(record.passivity == "passive" && record.static_below_coulomb, "{record:?}");
+    assert!(record.passivity.word() == "passive" && record.static_below_coulomb, "{record:?}");
     assert_eq!((record.intervals.len(), record.worst_velocity, record.worst_power), (0, None, None));
     let [warning] = about_friction(&estimate)[..] else { panic!("{:?}", estimate.verdict.warnings) };
     assert!(warning.contains("below Coulomb friction") && warning.contains("`j1.fs`"), "{warning}");
@@ -110,7 +110,7 @@ fn linear_friction_leaves_tables_and_pictures_out() {
     let (estimate, page) =
         identified(law, "[\"coulomb\", \"viscous\", \"offset\"]\nfriction = \"given\"", "");
     let record = only(&estimate);
-    assert!(record.passivity == "passive" && !record.static_below_coulomb, "{record:?}");
+    assert!(record.passivity.word() == "passive" && !record.static_below_coulomb, "{record:?}");
     assert_eq!(about_friction(&estimate), [] as [&String; 0]);
     assert!(estimate.shape_parameters.is_empty() && estimate.conditioning.friction_trials.is_empty());
     for absent in ["Nonlinear friction", "enter nonlinearly", "Friction shapes tried", "<svg class=\"chart\""]

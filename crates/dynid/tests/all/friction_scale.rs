@@ -100,7 +100,7 @@ fn the_factor_of_a_cold_log_is_found_and_the_robot_alone_is_that_of_the_warm_one
     let (found, read) = bench.identify(COLD);
     let [scale] = &read.log_scales[..] else { panic!("{:?}", read.log_scales) };
     println!("{scale:?}");
-    assert_eq!((scale.log.as_str(), scale.verdict.as_str()), ("cold", "seen in the data"));
+    assert_eq!((scale.log.as_str(), scale.verdict.word()), ("cold", "seen in the data"));
     assert!((scale.value - 1.6).abs() < 4.0 * scale.std.unwrap(), "{scale:?}");
     assert!(scale.std.unwrap() < 0.02, "{scale:?}");
     let value = |name: &str| read.parameters.iter().find(|p| p.name == name).unwrap();
@@ -113,7 +113,7 @@ fn the_factor_of_a_cold_log_is_found_and_the_robot_alone_is_that_of_the_warm_one
     }
     assert!(read.shape_parameters.iter().all(|s| s.name.ends_with(".vs")), "{:?}", read.shape_parameters);
     assert!(read.log_parameters.is_empty(), "{:?}", read.log_parameters);
-    let listed = read.verdict.checks.iter().find(|c| c.name == "terms of single logs").unwrap();
+    let listed = read.verdict.checks.iter().find(|c| c.name.word() == "terms of single logs").unwrap();
     assert!(listed.meaning.contains("friction_scale[cold] = 1."), "{}", listed.meaning);
     // A log of the cold robot is predicted with its factor.
     let errors = &read.validation[0].filtered.nrmse;

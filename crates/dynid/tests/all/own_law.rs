@@ -75,14 +75,14 @@ fn an_own_law_goes_the_whole_way() {
     let found = identify(&config, &mut |_| {}).unwrap();
     let estimate = found.estimate();
     let [shape] = &estimate.shape_parameters[..] else { panic!("{:?}", estimate.shape_parameters) };
-    assert_eq!((shape.name.as_str(), shape.verdict.as_str()), ("j1.hv", "seen in the data"));
+    assert_eq!((shape.name.as_str(), shape.verdict.word()), ("j1.hv", "seen in the data"));
     assert!((shape.value - 0.25).abs() <= 4.0 * shape.std.unwrap(), "{shape:?}");
     for (name, truth) in [("j1.hc", 2.0), ("j1.hs", 4.0)] {
         let p = estimate.parameters.iter().find(|p| p.name == name).unwrap();
-        assert_eq!(p.verdict, "seen in the data");
+        assert_eq!(p.verdict.word(), "seen in the data");
         assert!((p.value - truth).abs() <= 4.0 * p.std.unwrap(), "{p:?}");
     }
-    assert_eq!(estimate.friction_passivity[0].passivity, "passive");
+    assert_eq!(estimate.friction_passivity[0].passivity.word(), "passive");
 
     // Read back, by those who know the law and by those who do not.
     let file = path("estimate.json");

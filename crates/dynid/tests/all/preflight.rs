@@ -134,7 +134,7 @@ fn run(cases: Vec<Case>) {
         record.write(&path);
         let config = config(&path);
         let found = examine(&config);
-        let ours: Vec<_> = found.findings.iter().filter(|f| f.id == case.id).collect();
+        let ours: Vec<_> = found.findings.iter().filter(|f| f.id.word() == case.id).collect();
         let all: Vec<String> =
             found.findings.iter().map(|f| format!("{} {:?}: {}", f.id, f.joint, f.evidence)).collect();
         assert!(!ours.is_empty(), "{}: no `{}` in {all:#?}", case.name, case.id);
@@ -143,7 +143,7 @@ fn run(cases: Vec<Case>) {
         let others: Vec<&String> = all
             .iter()
             .zip(&found.findings)
-            .filter(|(_, f)| f.id != case.id && f.severity != Severity::Info)
+            .filter(|(_, f)| f.id.word() != case.id && f.severity != Severity::Info)
             .map(|(text, _)| text)
             .collect();
         println!("{}: {}; beside it {}", case.name, ours[0].evidence, others.len());
@@ -157,7 +157,7 @@ fn run(cases: Vec<Case>) {
         let left: Vec<String> = again
             .findings
             .iter()
-            .filter(|f| f.id == case.id || f.severity == Severity::Error)
+            .filter(|f| f.id.word() == case.id || f.severity == Severity::Error)
             .map(|f| format!("{} {:?}: {}", f.id, f.joint, f.evidence))
             .collect();
         assert!(left.is_empty(), "{}: after the remedy {left:#?}", case.name);
@@ -451,7 +451,7 @@ fn delays_and_the_base() {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let tilted = Config { gravity: Some([9.81 * sin, 0.0, -9.81 * cos]), ..config(&path) };
         let found = examine(&tilted);
-        let tilt = found.findings.iter().find(|f| f.id == "base_tilt");
+        let tilt = found.findings.iter().find(|f| f.id.word() == "base_tilt");
         assert!(tilt.is_some(), "{degrees}: {:#?}", found.findings);
         let measured = found.logs[0].tilt_deg.unwrap();
         println!("tilt of {degrees}: {measured:?}");
@@ -527,8 +527,12 @@ fn rows_are_those_of_the_file() {
         cut(Some((11, 5500)), Some((0.25, 0.95)), vec![(20, 40), (3000, 3010)]),
     ] {
         let found = examine(&config);
-        let evidence: Vec<&str> =
-            found.findings.iter().filter(|f| f.id == "position_range").map(|f| f.evidence.as_str()).collect();
+        let evidence: Vec<&str> = found
+            .findings
+            .iter()
+            .filter(|f| f.id.word() == "position_range")
+            .map(|f| f.evidence.as_str())
+            .collect();
         assert_eq!(evidence.len(), 2, "{:#?}", found.findings);
         assert!(evidence[0].contains("row 3500") && evidence[1].contains("row 4500"), "{evidence:?}");
         let text = found.corrected(&config, None).unwrap();
@@ -558,7 +562,7 @@ fn single_joint_runs_of_a_gen3_raise_no_error() {
     assert!(errors.is_empty(), "{errors:#?}");
     let idle = |k: usize| {
         let log = format!("joint_{k}_trapez.csv.gz");
-        found.findings.iter().filter(|f| f.id == "idle_joint" && f.log.ends_with(&log)).count()
+        found.findings.iter().filter(|f| f.id.word() == "idle_joint" && f.log.ends_with(&log)).count()
     };
     assert_eq!((1..=7).map(idle).collect::<Vec<_>>(), [6; 7]);
 }

@@ -181,12 +181,13 @@ fn spoil(name: &str, clean: &Record) -> Vec<&'static str> {
         let config = record.write(folder.path(), "spoilt");
         let found = check(&config, &mut |_| {}).unwrap();
         let of_record = ["clock_gap", "weak_excitation"];
-        let worse = |f: &&dynid::check::Finding| f.severity != Severity::Info && !of_record.contains(&f.id);
+        let worse =
+            |f: &&dynid::check::Finding| f.severity != Severity::Info && !of_record.contains(&f.id.word());
         let first = found.findings.iter().find(worse);
         // A clock in another unit is read as what it is.
         let at_the_door =
             first.is_none() && id == "clock_rate" && reads_as(clean, &config, record.time.len()).is_ok();
-        let right = at_the_door || first.is_some_and(|f| f.id == id);
+        let right = at_the_door || first.is_some_and(|f| f.id.word() == id);
         if !right {
             missed.push(cause);
             println!("{name}, {cause}: {:?}", first.map(|f| (f.id, &f.joint, &f.evidence)));

@@ -168,7 +168,7 @@ fn what_a_pre_flight_found_and_a_recipe_doubts_is_not_lost_with_the_samples() {
     let recipe = learned.reduction.recipe().clone();
     assert!(recipe.doubts.is_empty(), "{:?}", recipe.doubts);
     let check = |estimate: &Estimate, name: &str| {
-        estimate.verdict.checks.iter().find(|c| c.name == name).unwrap().status.clone()
+        estimate.verdict.checks.iter().find(|c| c.name.word() == name).unwrap().status.word()
     };
     let sound = learned.reduction.solve([], &mut |_| {}).unwrap().estimate();
     for name in ["pre-flight of the logs", "recipe of the factors"] {
@@ -186,11 +186,11 @@ fn what_a_pre_flight_found_and_a_recipe_doubts_is_not_lost_with_the_samples() {
     let found = both.solve([], &mut |_| {}).unwrap().estimate();
     assert_eq!(check(&found, "pre-flight of the logs"), "fail");
     assert!(
-        found.preflight.iter().any(|f| f.log == "turned" && f.severity == "error"),
+        found.preflight.iter().any(|f| f.log == "turned" && f.severity.word() == "error"),
         "{:?}",
         found.preflight
     );
-    assert_eq!(found.verdict.status, "fail");
+    assert_eq!(found.verdict.status.word(), "fail");
     // The default pre-flight refuses such a log.
     let strict = self::learned().reduction.recipe().clone().reducer().unwrap();
     let (time, mut joints, channels) = load(&third).log.into_parts();
@@ -208,12 +208,12 @@ fn doubts_of_a_recipe_are_doubts_of_what_is_solved_by_it() {
     config.elements.default = Some(vec!["viscous".to_owned()]);
     config.elements.friction = dynid::config::Friction::Given;
     let learned = learn(&config, &mut |_| {}).unwrap();
-    let open: Vec<_> = learned.estimate.verdict.checks.iter().filter(|c| c.status != "ok").collect();
+    let open: Vec<_> = learned.estimate.verdict.checks.iter().filter(|c| c.status.word() != "ok").collect();
     let doubts = &learned.reduction.recipe().doubts;
     assert!(!doubts.is_empty() && doubts.iter().all(|d| open.iter().any(|c| c.name == d.name)), "{open:?}");
     let solved = learned.reduction.solve([], &mut |_| {}).unwrap().estimate();
-    let check = solved.verdict.checks.iter().find(|c| c.name == "recipe of the factors").unwrap();
-    assert!(check.status != "ok" && check.meaning.contains(&doubts[0].name), "{check:?}");
+    let check = solved.verdict.checks.iter().find(|c| c.name.word() == "recipe of the factors").unwrap();
+    assert!(check.status.word() != "ok" && check.meaning.contains(doubts[0].name.word()), "{check:?}");
 }
 
 #[test]

@@ -38,7 +38,7 @@ fn cautions_have_remedies(estimate: &Estimate, page: &str) {
     for caution in &verdict.cautions {
         assert!(!caution.remedy.trim().is_empty() && !caution.message.is_empty(), "{caution:?}");
     }
-    let fails: Vec<bool> = verdict.cautions.iter().map(|c| c.status == "fail").collect();
+    let fails: Vec<bool> = verdict.cautions.iter().map(|c| c.status.word() == "fail").collect();
     assert!(fails.windows(2).all(|p| p[0] >= p[1]), "failures come first: {:?}", verdict.cautions);
     assert_eq!(page.matches("<p class=\"remedy\">").count(), verdict.cautions.len());
     let said = match verdict.cautions.len() {
@@ -46,7 +46,7 @@ fn cautions_have_remedies(estimate: &Estimate, page: &str) {
         n => format!("<p class=\"note\">{n} in all"),
     };
     assert!(page.contains(&said), "{said}");
-    let passed = verdict.checks.iter().filter(|c| c.status == "ok").count();
+    let passed = verdict.checks.iter().filter(|c| c.status.word() == "ok").count();
     assert!(page.contains(&format!("{passed} of {} checks passed", verdict.checks.len())));
 }
 
@@ -54,7 +54,7 @@ fn cautions_have_remedies(estimate: &Estimate, page: &str) {
 fn counts_agree(id: &Run, estimate: &Estimate, page: &str) {
     let counts = &estimate.counts;
     assert_eq!(*counts, id.counts());
-    let seen = |verdict: &str| estimate.parameters.iter().filter(|p| p.verdict == verdict).count();
+    let seen = |verdict: &str| estimate.parameters.iter().filter(|p| p.verdict.word() == verdict).count();
     assert_eq!(counts.standard.all, estimate.parameters.len());
     assert_eq!(counts.standard.seen, seen("seen in the data"));
     assert_eq!(counts.standard.carried, seen("carried by the prior"));
@@ -62,7 +62,7 @@ fn counts_agree(id: &Run, estimate: &Estimate, page: &str) {
     assert_eq!(counts.base.all, estimate.base_parameters.len());
     assert_eq!(counts.base.excited, estimate.base_parameters.iter().filter(|b| b.value.is_some()).count());
     let base_seen =
-        estimate.base_parameters.iter().filter(|b| b.verdict.as_deref() == Some("seen in the data"));
+        estimate.base_parameters.iter().filter(|b| b.verdict.is_some_and(|v| v.word() == "seen in the data"));
     assert_eq!(counts.base.seen, base_seen.count());
     assert_eq!(counts.shape.all, estimate.shape_parameters.len());
     // The fit has a column for each of both kinds.
@@ -75,7 +75,7 @@ fn counts_agree(id: &Run, estimate: &Estimate, page: &str) {
     assert!(estimate.verdict.headline.starts_with(&estimate.verdict.line), "{}", estimate.verdict.headline);
     assert!(estimate.verdict.line.starts_with(&words), "{}", estimate.verdict.line);
     assert!(page.contains(&words), "{words}");
-    let excitation = estimate.verdict.checks.iter().find(|c| c.name == "excitation").unwrap();
+    let excitation = estimate.verdict.checks.iter().find(|c| c.name.word() == "excitation").unwrap();
     assert_eq!(excitation.value, Some(counts.base.excited as f64));
     assert_eq!(excitation.limit, format!("all {} base parameters", counts.base.all));
     assert!(page.contains(&format!(">all {}</button>", counts.standard.all)));

@@ -119,7 +119,7 @@ fn measured(record: &DesignRecord, robot: &Path) -> (f64, f64) {
 #[track_caller]
 fn check(config: &DesignConfig) -> DesignRecord {
     let (_, record) = run(config);
-    assert_eq!(record.verdict.status, "pass", "{}", record.verdict.headline);
+    assert_eq!(record.verdict.status.word(), "pass", "{}", record.verdict.headline);
     let (nearest, lowest) = measured(&record, &config.robot);
     let margin = config.safety.margin_m;
     println!(
@@ -223,18 +223,18 @@ fn a_robot_under_the_ceiling_stays_below_it() {
     config.gravity = Some([0.0, 0.0, 9.81]);
     let (_, record) = run(&config);
     let plane = &record.safety.planes[0];
-    assert_eq!((plane.name, plane.normal), ("mounting plane", [0.0, 0.0, 1.0]));
+    assert_eq!((plane.name.word(), plane.normal), ("mounting plane", [0.0, 0.0, 1.0]));
     let headline = &record.verdict.headline;
     assert!(headline.contains("mounting plane (20 mm)"), "{headline}");
     assert!(headline.contains("not checked: ") && headline.contains("not upright"), "{headline}");
     config.safety.floor_height_m = Some(-1.2);
     let (_, record) = run(&config);
-    assert_eq!(record.safety.planes[0].name, "floor");
+    assert_eq!(record.safety.planes[0].name.word(), "floor");
     assert_eq!(record.safety.planes[0].normal, [0.0, 0.0, -1.0]);
     config.gravity = Some([9.81, 0.0, 0.0]);
     config.safety.floor_height_m = None;
     let (_, record) = run(&config);
-    assert_eq!((record.safety.planes.len(), record.safety.planes[0].name), (1, "mounting plane"));
+    assert_eq!((record.safety.planes.len(), record.safety.planes[0].name.word()), (1, "mounting plane"));
     config.gravity = Some([0.0; 3]);
     let (_, record) = run(&config);
     assert!(record.safety.planes.is_empty());

@@ -112,8 +112,8 @@ fn link_rows_of_a_kr300_do_not_make_a_stiffness_of_five() {
     assert!(
         estimate.model.elastic.is_empty() && !estimate.parameters.iter().any(|p| p.name.ends_with(".k1"))
     );
-    let check = estimate.verdict.checks.iter().find(|c| c.name.contains("stiffness")).unwrap();
-    assert_eq!((check.status.as_str(), check.value), ("warn", Some(2.0)));
+    let check = estimate.verdict.checks.iter().find(|c| c.name.word().contains("stiffness")).unwrap();
+    assert_eq!((check.status.word(), check.value), ("warn", Some(2.0)));
     let file = folder.path().join("estimate.json");
     std::fs::write(&file, estimate.to_json()).unwrap();
     let read = Estimate::read(&file).unwrap();

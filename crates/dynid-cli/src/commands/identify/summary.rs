@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use dynid::estimate::{Choice, Estimate, LogScale, ShapeValue};
+use dynid::estimate::{Choice, Estimate, LogScale, ShapeValue, ShapeVerdict};
 use serde_json::Value;
 
 use crate::commands::table;
@@ -84,17 +84,17 @@ fn parameters(estimate: &Estimate) -> String {
 /// A parameter that enters nonlinearly: value, interval, verdict with its reason.
 fn shape_parameter(shape: &ShapeValue) -> String {
     let of = format!("{} = {} {}", shape.name, table::number(Some(shape.value)), shape.unit);
-    judged(&of, shape.interval, &shape.verdict, shape.reason.as_deref())
+    judged(&of, shape.interval, shape.verdict, shape.reason.as_deref())
 }
 
 /// Friction of a log over that of the others.
 fn log_scale(scale: &LogScale) -> String {
     let of =
         format!("friction in {} = {} of that in the others", scale.log, table::number(Some(scale.value)));
-    judged(&of, scale.interval, &scale.verdict, scale.reason.as_deref())
+    judged(&of, scale.interval, scale.verdict, scale.reason.as_deref())
 }
 
-fn judged(of: &str, interval: Option<(f64, f64)>, verdict: &str, reason: Option<&str>) -> String {
+fn judged(of: &str, interval: Option<(f64, f64)>, verdict: ShapeVerdict, reason: Option<&str>) -> String {
     let number = |x: f64| table::number(Some(x));
     let interval = interval
         .map_or_else(String::new, |(low, high)| format!(" (95 %: {} to {})", number(low), number(high)));
