@@ -1,13 +1,15 @@
 //! Friction that follows reactions: loads are taken at the parameters that come out.
 
 use dynid_model::{ClosedModel, EffortModel, RobotModel};
-use dynid_rows::conditioning::{Conditioning, JointFriction};
+use dynid_rows::conditioning::Conditioning;
 
 use super::Step;
 use super::model_fit::ModelFit;
+use super::shapes::Before;
 use crate::Error;
 use crate::elements::LoadValues;
 use crate::problem::Problem;
+use crate::shape::ShapeFit;
 
 /// Change of the loads, relative to their size, at which rounds end.
 pub(crate) const SETTLED: f64 = 1e-6;
@@ -26,33 +28,36 @@ pub struct LoadRounds {
     pub change: f64,
 }
 
-/// Fits with loads frozen at the robot file's parameters, then, round by round, with columns that tell how friction changes
-/// with its loads (Gauss-Newton about the parameters of the round before), until the loads stay.
+/// Fits with the loads of the plan, frozen, then, round by round, with columns that tell how friction changes with its loads
+/// and its shapes (Gauss-Newton about the parameters of the round before), until the loads stay. The plan of the problem then
+/// has the loads that came out.
 ///
 /// # Errors
 /// Fails as [`Problem::fit`] does.
-pub(super) fn settle(
+pub(crate) fn settle(
     problem: Problem,
     conditioning: Option<Conditioning>,
+    before: Before,
     progress: &mut dyn FnMut(Step),
 ) -> Result<(Problem, ModelFit), Error> {
-    let (mut problem, mut fit) = problem.fit_at_loads(conditioning, None, progress)?;
-    let mut before = forces(&problem.model);
+    let mut last = forces(&problem.model);
+    let (mut problem, mut fit) = problem.fit_at_loads(conditioning, before, progress)?;
     let mut out = LoadRounds { rounds: 0, change: f64::INFINITY };
     loop {
         let (model, linear) = fit.nonlinear(&problem)?;
         let now = forces(&model);
-        out.change = change(&before, &now);
+        out.change = change(&last, &now);
         if out.rounds == ROUNDS || !out.change.is_finite() || (out.rounds > 0 && out.change <= SETTLED) {
             problem.plan.load_values = Some(LoadValues::of(&model, &linear, false));
             fit.loads = Some(out);
             return Ok((problem, fit));
         }
-        before = now;
+        last = now;
         problem.plan.load_values = Some(LoadValues::of(&model, &linear, true));
         problem.rebuild()?;
-        let friction: Vec<JointFriction> = std::mem::take(&mut fit.friction);
-        (problem, fit) = problem.fit_at_loads(fit.conditioning.take(), Some(friction), progress)?;
+        let shapes = fit.shapes.take().map(|found| ShapeFit { model, linear, ..found });
+        let found = Before::Found(std::mem::take(&mut fit.friction), shapes);
+        (problem, fit) = problem.fit_at_loads(fit.conditioning.take(), found, progress)?;
         out.rounds += 1;
     }
 }
@@ -72,4 +77,17 @@ fn change(before: &[f64], now: &[f64]) -> f64 {
     let moved: f64 = before.iter().zip(now).map(|(a, b)| square(a - b)).sum();
     let size: f64 = now.iter().map(|x| square(*x)).sum();
     if size > 0.0 { (moved / size).sqrt() } else { moved.sqrt() }
+}
+
+impl Problem {
+    /// The loads that a first look finds, with friction as it is stated: conditioning that took friction with loads of the robot
+    /// file would take their errors for noise.
+    ///
+    /// # Errors
+    /// Fails as [`Problem::fit`] does.
+    pub(crate) fn first_loads(&self, conditioning: &Conditioning) -> Result<Option<LoadValues>, Error> {
+        let copy = self.on(self.logs.clone(), self.settings.clone())?;
+        let (found, _) = settle(copy, Some(conditioning.clone()), Before::AsStated, &mut |_| {})?;
+        Ok(found.plan.load_values)
+    }
 }

@@ -5,7 +5,7 @@ use dynid_rows::conditioning::{Conditioning, JointFriction, ReducedGroup};
 
 use super::Step;
 use super::loads::{self, LoadRounds};
-use super::shapes::{self, Shaped};
+use super::shapes::{self, Before, Shaped};
 use crate::Error;
 use crate::consistency::{self, Consistent};
 use crate::fitting::{self, Fitted, RowResiduals};
@@ -50,20 +50,20 @@ impl Problem {
         progress: &mut dyn FnMut(Step),
     ) -> Result<(Problem, ModelFit), Error> {
         match self.plan.has_reactions() {
-            false => self.fit_at_loads(conditioning, None, progress),
-            true => loads::settle(self, conditioning, progress),
+            false => self.fit_at_loads(conditioning, Before::Nothing, progress),
+            true => loads::settle(self, conditioning, Before::Nothing, progress),
         }
     }
 
-    /// One fit with the loads of the plan. `friction`: its shapes where they were chosen before.
+    /// One fit with the loads of the plan.
     pub(super) fn fit_at_loads(
         mut self,
         conditioning: Option<Conditioning>,
-        friction: Option<Vec<JointFriction>>,
+        before: Before,
         progress: &mut dyn FnMut(Step),
     ) -> Result<(Problem, ModelFit), Error> {
         let Shaped { conditioning, friction, found: shapes } =
-            shapes::search(&mut self, conditioning, friction, progress)?;
+            shapes::search(&mut self, conditioning, before, progress)?;
         let state_hz = state_hz(&self.settings, conditioning.as_ref());
         let settings = self.conditioning_settings();
         let power = friction_power::limits(&self.model, &self.plan, &self.logs, state_hz, &settings)?;

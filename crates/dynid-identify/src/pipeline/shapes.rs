@@ -19,22 +19,52 @@ pub(super) struct Shaped {
     pub(super) found: Option<ShapeFit>,
 }
 
+/// What is known of shapes before a fit.
+#[derive(Debug)]
+pub(super) enum Before {
+    /// Nothing: they are chosen and searched.
+    Nothing,
+    /// Friction stays as the plan states it; shape parameters are searched.
+    AsStated,
+    /// What a fit found with other loads: the model is linearised about it.
+    Found(Vec<JointFriction>, Option<ShapeFit>),
+}
+
+impl Problem {
+    /// Linearises the model about shape parameters.
+    fn linearise(&mut self, found: &ShapeFit) -> Result<(), Error> {
+        let free: Vec<bool> = found.findings.iter().map(shape::is_free).collect();
+        self.model = shape::linearised(&self.plan, &found.model, &found.linear, &free)?;
+        self.restructure()
+    }
+}
+
 /// Adds shapes of friction to the plan if they are to be chosen, finds the shape parameters and linearises the model about
-/// them. On the textbook route the model stays as it is. `friction`: the shapes, where they were chosen before.
+/// them. On the textbook route the model stays as it is.
 ///
 /// # Errors
 /// Fails as choice and search do: [`Error::Conditioning`], or settings that do not fit the model.
 pub(super) fn search(
     problem: &mut Problem,
     conditioning: Option<Conditioning>,
-    friction: Option<Vec<JointFriction>>,
+    before: Before,
     progress: &mut dyn FnMut(Step),
 ) -> Result<Shaped, Error> {
-    let chosen = friction.is_some();
-    let mut out = Shaped { conditioning, friction: friction.unwrap_or_default(), found: None };
+    let mut out = Shaped { conditioning, friction: Vec::new(), found: None };
+    let choose = match before {
+        Before::Nothing => true,
+        Before::AsStated => false,
+        Before::Found(friction, found) => {
+            (out.friction, out.found) = (friction, found);
+            if let Some(found) = &out.found {
+                problem.linearise(found)?;
+            }
+            return Ok(out);
+        }
+    };
     let Some(choices) = &mut out.conditioning else { return Ok(out) };
     let all_known = problem.plan.known.len() == problem.plan.per_rate.len();
-    if problem.settings.elements.friction == Friction::Auto && !all_known && !chosen {
+    if problem.settings.elements.friction == Friction::Auto && !all_known && choose {
         let chosen = friction::choose(problem, choices, &mut |stage| progress(Step::Conditioning(stage)))?;
         problem.rebuild()?;
         out.friction = chosen.per_output;
@@ -47,9 +77,7 @@ pub(super) fn search(
             problem.rebuild()?;
             continue;
         }
-        let free: Vec<bool> = found.findings.iter().map(shape::is_free).collect();
-        problem.model = shape::linearised(&problem.plan, &found.model, &found.linear, &free)?;
-        problem.restructure()?;
+        problem.linearise(&found)?;
         out.found = Some(found);
     }
     Ok(out)

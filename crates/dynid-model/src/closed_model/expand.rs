@@ -5,6 +5,7 @@ use crate::closed::{PoseError, PoseWorkspace};
 use crate::dynamics::MotionBlock;
 
 /// Motion of the tree over a block, packed without gaps, and how its efforts project onto the drives.
+#[derive(Debug)]
 pub(super) struct Expanded {
     pub(super) samples: usize,
     rates: usize,
@@ -39,6 +40,11 @@ impl Expanded {
             channels: &channels,
             sign_width: motion.sign_width,
         })
+    }
+
+    /// How many numbers it holds.
+    pub(super) fn numbers(&self) -> usize {
+        self.q.len() + self.dq.len() + self.ddq.len() + self.shares.len()
     }
 
     /// Part of the effort of a rate that an output feels, one number per sample.

@@ -1,8 +1,11 @@
 //! Friction that follows reactions: the forces that press on joints, and how they change with the parameters.
 
+use std::sync::Arc;
+
 use super::ClosedModel;
 use super::expand::Expanded;
 use super::fold::Fold;
+use super::paths::Path;
 use super::reactions::{Reaction, ReactionShares, Reactions};
 use crate::closed::factor::Factor;
 use crate::dynamics::MotionBlock;
@@ -80,7 +83,7 @@ const ROUNDS: usize = 50;
 pub(super) struct Loads {
     joints: Vec<JointLoad>,
     reference: LoadReference,
-    reactions: Reactions,
+    reactions: Arc<Reactions>,
     /// Columns of the coefficients of every joint's friction.
     coefficients: Vec<Vec<usize>>,
     channels: Vec<[String; 2]>,
@@ -144,7 +147,7 @@ impl Loads {
         Ok(Loads {
             acts_on_itself: joints.iter().any(|j| !j.reactions.is_empty() && !absorbed(&j.rate)),
             channels: channels.collect(),
-            reactions: model.reactions(&list),
+            reactions: Arc::new(model.reactions(&list)),
             coefficients,
             reference,
             joints,
@@ -188,6 +191,7 @@ impl ClosedModel {
     /// If a reaction or a column does not exist.
     pub fn with_loads(mut self, joints: Vec<JointLoad>, reference: LoadReference) -> Result<Self, LoadError> {
         let loads = Loads::new(&self, joints, reference)?;
+        self.paths = Arc::default();
         self.feed(loads);
         Ok(self)
     }
@@ -214,7 +218,12 @@ impl ClosedModel {
     pub fn with_load_reference(mut self, reference: LoadReference) -> Result<Self, LoadError> {
         match self.loads.take() {
             None => Ok(self),
-            Some(loads) => self.with_loads(loads.joints, reference),
+            Some(loads) => {
+                // The same reactions: what is known of motions stays.
+                let loads = Loads::new(&self, loads.joints, reference)?;
+                self.feed(loads);
+                Ok(self)
+            }
         }
     }
 
@@ -231,11 +240,19 @@ impl ClosedModel {
     }
 
     /// Motion of all joints, and the forces on them.
-    pub(super) fn prepared(&self, motion: &MotionBlock<'_>) -> (Expanded, Pressed<'_>) {
-        let Some(loads) = &self.loads else { return (self.expand(motion), Pressed::nothing()) };
-        let (expanded, shares) = self.expand_reactions(motion, &loads.reactions);
-        let pressed = self.press(loads, motion, &expanded, &shares);
-        (expanded, pressed)
+    pub(super) fn prepared(&self, motion: &MotionBlock<'_>) -> (Arc<Path>, Pressed<'_>) {
+        let path = self.paths.of(motion, self.machine.mobility(), || match &self.loads {
+            None => Path { expanded: self.expand(motion), shares: None },
+            Some(loads) => {
+                let (expanded, shares) = self.expand_reactions(motion, &loads.reactions);
+                Path { expanded, shares: Some(shares) }
+            }
+        });
+        let pressed = match (&self.loads, &path.shares) {
+            (Some(loads), Some(shares)) => self.press(loads, motion, &path.expanded, shares),
+            _ => Pressed::nothing(),
+        };
+        (path, pressed)
     }
 
     /// The forces alone.
@@ -248,7 +265,7 @@ impl ClosedModel {
         loads: &'a Loads,
         motion: &MotionBlock<'_>,
         expanded: &Expanded,
-        shares: &ReactionShares<'_>,
+        shares: &ReactionShares,
     ) -> Pressed<'a> {
         let n = motion.samples;
         let LoadReference { linear, shape, linearised } = &loads.reference;
@@ -419,7 +436,7 @@ impl Gradients {
         loads: &Loads,
         values: &[Vec<f64>],
         rows: &RegressorBlock,
-        (shares, slopes): (&ReactionShares<'_>, &[Vec<[f64; 2]>]),
+        (shares, slopes): (&ReactionShares, &[Vec<[f64; 2]>]),
     ) -> Gradients {
         let (n, count) = (rows.samples(), loads.joints.len());
         let mut columns = loads.columns(|_| true);

@@ -5,6 +5,7 @@ mod expand;
 mod fold;
 mod joint_motion;
 mod loads;
+mod paths;
 mod random_motion;
 mod reactions;
 
@@ -21,6 +22,7 @@ use fold::Fold;
 pub use joint_motion::JointMotion;
 use loads::Loads;
 pub use loads::{JointLoad, LoadError, LoadGroup, LoadReference};
+use paths::Paths;
 pub use reactions::{Reaction, Reactions};
 
 /// Rigid bodies and joint elements of a tree whose loops are closed.
@@ -46,6 +48,7 @@ pub struct ClosedModel {
     /// Channels that a motion must bring.
     channels: Vec<String>,
     loads: Option<Loads>,
+    paths: Arc<Paths>,
 }
 
 /// The sample of a motion at which poses cannot be followed, and why.
@@ -83,6 +86,7 @@ impl ClosedModel {
             channels: tree.channels().to_vec(),
             joints: joints.collect(),
             loads: None,
+            paths: Arc::default(),
             outputs,
             machine,
             tree,
@@ -106,8 +110,10 @@ impl ClosedModel {
 
     /// Returns the closures and loads around a changed model of the tree, whose elements keep their columns.
     pub(crate) fn map_tree(self, change: impl FnOnce(TreeModel) -> TreeModel) -> Self {
-        let loads = self.loads;
+        let (loads, paths) = (self.loads, self.paths);
         let mut out = ClosedModel::new(change(self.tree), self.machine);
+        // Elements move no joint.
+        out.paths = paths;
         if let Some(loads) = loads {
             out.feed(loads);
         }
@@ -145,7 +151,8 @@ impl EffortModel for ClosedModel {
         stride: usize,
         out: &mut [f64],
     ) {
-        let (expanded, pressed) = self.prepared(motion);
+        let (path, pressed) = self.prepared(motion);
+        let expanded = &path.expanded;
         expanded.with_block(motion, &pressed.channels(), |block| {
             self.tree.remember(block, step_s, shape, history, stride, out);
         });
@@ -172,12 +179,13 @@ impl EffortModel for ClosedModel {
     }
 
     fn regressor(&self, motion: &MotionBlock<'_>, shape: &[f64], out: &mut RegressorBlock) {
-        let (expanded, pressed) = self.prepared(motion);
+        let (path, pressed) = self.prepared(motion);
+        let expanded = &path.expanded;
         let mut tree = RegressorBlock::new(self.tree.layout().clone(), motion.samples);
         expanded
             .with_block(motion, &pressed.channels(), |block| self.tree.regressor(block, shape, &mut tree));
-        self.fold.regressor(&expanded, &tree, out);
-        pressed.linearise(self, motion, &expanded, out);
+        self.fold.regressor(expanded, &tree, out);
+        pressed.linearise(self, motion, expanded, out);
     }
 
     fn shaped_columns(&self) -> &[(usize, usize)] {
@@ -197,15 +205,16 @@ impl EffortModel for ClosedModel {
         derivatives: &mut [f64],
     ) {
         let n = motion.samples;
-        let (expanded, pressed) = self.prepared(motion);
+        let (path, pressed) = self.prepared(motion);
+        let expanded = &path.expanded;
         let wanted = |slice: &[f64], columns: usize| if slice.is_empty() { 0 } else { columns * n };
         let mut tree_values = vec![0.0; wanted(values, self.tree.shaped_columns().len())];
         let mut tree_derivatives = vec![0.0; wanted(derivatives, self.tree.shape_dependence().len())];
         expanded.with_block(motion, &pressed.channels(), |block| {
             self.tree.shaped(block, shape, n, &mut tree_values, &mut tree_derivatives);
         });
-        self.fold.shaped_values(&expanded, &tree_values, stride, values);
-        self.fold.shaped_derivatives(&expanded, &tree_derivatives, stride, derivatives);
+        self.fold.shaped_values(expanded, &tree_values, stride, values);
+        self.fold.shaped_derivatives(expanded, &tree_derivatives, stride, derivatives);
     }
 
     fn efforts(
@@ -225,7 +234,8 @@ impl EffortModel for ClosedModel {
             }
             return;
         }
-        let (expanded, pressed) = self.prepared(motion);
+        let (path, pressed) = self.prepared(motion);
+        let expanded = &path.expanded;
         let rates = self.machine.mechanism().rates();
         let mut tree = vec![0.0; rates * n];
         expanded.with_block(motion, &pressed.channels(), |block| {

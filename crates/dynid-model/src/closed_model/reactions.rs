@@ -51,8 +51,9 @@ impl Reactions {
 }
 
 /// How reactions over a block follow from efforts of the tree and from inertias.
-pub(super) struct ReactionShares<'a> {
-    reactions: &'a Reactions,
+#[derive(Debug)]
+pub(super) struct ReactionShares {
+    reactions: Arc<Reactions>,
     samples: usize,
     rates: usize,
     /// `shares[(k * rates + r) * samples + s]`: part of the effort of rate `r` in reaction `k`.
@@ -116,7 +117,7 @@ impl ClosedModel {
         effort: &mut RegressorBlock,
         out: &mut RegressorBlock,
     ) {
-        let (expanded, shares) = self.expand_reactions(motion, reactions);
+        let (expanded, shares) = self.expand_reactions(motion, &Arc::new(reactions.clone()));
         let pressed = self.pressed(motion);
         let mut tree = RegressorBlock::new(self.tree.layout().clone(), motion.samples);
         expanded
@@ -126,11 +127,11 @@ impl ClosedModel {
         shares.regressor(&tree, out);
     }
 
-    pub(super) fn expand_reactions<'a>(
+    pub(super) fn expand_reactions(
         &self,
         motion: &MotionBlock<'_>,
-        reactions: &'a Reactions,
-    ) -> (Expanded, ReactionShares<'a>) {
+        reactions: &Arc<Reactions>,
+    ) -> (Expanded, ReactionShares) {
         let machine = &self.machine;
         let (samples, rates) = (motion.samples, machine.mechanism().rates());
         let mut shares = ReactionShares {
@@ -138,7 +139,7 @@ impl ClosedModel {
             rates,
             shares: vec![0.0; reactions.list.len() * rates * samples],
             inertial: reactions.hanging.iter().map(|h| vec![0.0; 10 * h.len() * samples]).collect(),
-            reactions,
+            reactions: reactions.clone(),
         };
         let mut memory = Memory::new(self, reactions.list.len());
         let expanded = self.expand_with(motion, |sample, expanded, pose, fault| {
@@ -183,7 +184,12 @@ impl Memory {
     }
 }
 
-impl ReactionShares<'_> {
+impl ReactionShares {
+    /// How many numbers it holds.
+    pub(super) fn numbers(&self) -> usize {
+        self.shares.len() + self.inertial.iter().map(Vec::len).sum::<usize>()
+    }
+
     fn take(
         &mut self,
         model: &ClosedModel,
