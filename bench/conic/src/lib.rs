@@ -6,8 +6,9 @@
 use clarabel::algebra::CscMatrix;
 pub use clarabel::solver::SolverStatus;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SupportedConeT};
-use dynid_estimate::Mat;
+
 use dynid_estimate::consistent::{Form, Margin, Problem, Settings};
+use dynid_linalg::Mat;
 use dynid_model::Inertia;
 use dynid_model::symmetric::{Square, cholesky, congruence, identity, lower_inverse, trace};
 
@@ -35,7 +36,7 @@ pub struct Conic {
     b: Vec<f64>,
     cones: Vec<SupportedConeT<f64>>,
     /// `x = T ξ`.
-    unwhiten: Mat<f64>,
+    unwhiten: Mat,
 }
 
 /// What the conic solver says.
@@ -87,7 +88,7 @@ impl Rows {
     }
 
     /// `s = (t, R ξ - q, ρ)` with `‖(R ξ - q, ρ)‖² = ‖r T ξ - z‖² + pull² ‖ξ - prior‖²` by QR of the stack.
-    fn push_objective(&mut self, problem: &Problem, pull: f64, unwhiten: &Mat<f64>, prior: &[f64]) {
+    fn push_objective(&mut self, problem: &Problem, pull: f64, unwhiten: &Mat, prior: &[f64]) {
         let (m, p) = (problem.z.len(), problem.columns());
         let whitened = &problem.r * unwhiten;
         let stack = Mat::from_fn(m + p, p, |i, j| match i.checked_sub(m) {
@@ -97,7 +98,7 @@ impl Rows {
         });
         let side = Mat::from_fn(m + p, 1, |i, _| if i < m { problem.z[i] } else { pull * prior[i - m] });
         let qr = stack.qr();
-        let (q, r) = (qr.compute_thin_Q(), qr.thin_R());
+        let (q, r) = (qr.q(), qr.r());
         let seen = q.transpose() * &side;
         self.push([(0, -1.0)], 0.0);
         for i in 0..p {

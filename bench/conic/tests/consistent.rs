@@ -8,15 +8,17 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use dynid_conic::{Answer, Conic, SolverStatus};
-use dynid_estimate::Mat;
+
 use dynid_estimate::consistent::{
     Bound, ConsistentEstimate, Form, LinkPrior, Margin, Problem, ProblemError, ScalarPrior, Settings, Status,
     certificate, entropic, estimate,
 };
+use dynid_linalg::Mat;
 use dynid_model::Inertia;
 use dynid_model::symmetric::{cholesky, congruence, least_eigenvalue, lower_inverse};
 use random_problem::random_problem;
 use rayon::prelude::*;
+use serde_json::{Value, json};
 
 /// Tolerance of the conic solver for gap and feasibility.
 const TIGHT: f64 = 1e-11;
@@ -177,9 +179,8 @@ fn bound(name: &str, terms: &[(usize, f64)], upper: f64) -> Bound {
     Bound { name: name.to_owned(), terms: terms.to_vec(), upper }
 }
 
-#[test]
-fn both_solvers_refuse_bounds_that_no_body_meets() {
-    let settings = Settings::default();
+/// A problem of three links with bounds that bodies meet, and with two sets of bounds that none meets.
+fn bounded() -> (u64, [Problem; 3], Vec<f64>) {
     let (seed, mut problem, truth) = moderate(60).find(|(_, p, _)| p.links.len() == 3).unwrap();
     let [xx, yy, zz] = [4, 7, 9].map(|k| truth[k]);
     let total: f64 = (0..3).map(|i| truth[10 * i]).sum();
@@ -195,8 +196,15 @@ fn both_solvers_refuse_bounds_that_no_body_meets() {
     let (possible, thick) = (shape(0.99 * zz), shape(1.02 * 1.01 * (xx + yy)));
     problem.bounds = (0..3).map(|i| bound(&format!("m{i}"), &[(10 * i, -1.0)], -0.4 * total)).collect();
     problem.bounds.push(bound("total", &[(0, 1.0), (10, 1.0), (20, 1.0)], total));
+    (seed, [possible, thick, problem], truth)
+}
+
+#[test]
+fn both_solvers_refuse_bounds_that_no_body_meets() {
+    let settings = Settings::default();
+    let (seed, [possible, thick, heavy], truth) = bounded();
     Pair::new(&possible, &settings, &truth, TIGHT).check(&possible, &format!("possible, seed {seed}"));
-    for impossible in [&thick, &problem] {
+    for impossible in [&thick, &heavy] {
         let ours = estimate(impossible, &settings).unwrap_err();
         let ProblemError::Infeasible { conflict, violation } = ours else { panic!("{ours}") };
         for bound in &impossible.bounds {
@@ -204,28 +212,30 @@ fn both_solvers_refuse_bounds_that_no_body_meets() {
         }
         assert!(violation > 1e-3, "{violation}");
         // Data do not matter here, and with them it gives up ("insufficient progress") on the second problem.
-        let bare = Problem { r: Mat::zeros(0, problem.columns()), z: Vec::new(), ..impossible.clone() };
+        let bare = Problem { r: Mat::zeros(0, impossible.columns()), z: Vec::new(), ..impossible.clone() };
         let theirs = Conic::new(&bare, &Settings { prior_weight: 1.0, ..settings.clone() }).solve(TIGHT);
         assert_eq!(theirs.status, SolverStatus::PrimalInfeasible);
     }
 }
 
+struct Case {
+    name: String,
+    problem: Problem,
+    settings: Settings,
+    objective: f64,
+}
+
 /// Two links with friction and offsets from the reference data, whose optima were found by yet another programme.
-#[test]
-fn both_solvers_meet_the_reference_numbers() {
+fn reference_cases() -> Option<Vec<Case>> {
     let path =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/golden/estimation_consistent.json");
-    let Ok(text) = std::fs::read_to_string(path) else {
-        println!("skipped: ../shared not present");
-        return;
-    };
-    let g: serde_json::Value = serde_json::from_str(&text).unwrap();
-    let vector = |v: &serde_json::Value| -> Vec<f64> {
-        v.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
-    };
+    let text = std::fs::read_to_string(path).ok()?;
+    let g: Value = serde_json::from_str(&text).unwrap();
+    let vector =
+        |v: &Value| -> Vec<f64> { v.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect() };
     let rows: Vec<Vec<f64>> = g["R"].as_array().unwrap().iter().map(vector).collect();
     let [prior, scale, nonnegative] = ["prior", "scale", "kind_nonneg"].map(|key| vector(&g[key]));
-    let mut checked = 0;
+    let mut cases = Vec::new();
     for case in g["cases"].as_array().unwrap() {
         let number = |key: &str| case[key].as_f64().unwrap();
         if number("gamma") != 0.0 {
@@ -258,15 +268,109 @@ fn both_solvers_meet_the_reference_numbers() {
             margin: Margin::Relative(number("eps")),
             ..Settings::default()
         };
+        let name = case["name"].as_str().unwrap().to_owned();
+        cases.push(Case { name, problem, settings, objective: number("objective") });
+    }
+    Some(cases)
+}
+
+#[test]
+fn both_solvers_meet_the_reference_numbers() {
+    let Some(cases) = reference_cases() else {
+        println!("skipped: ../shared not present");
+        return;
+    };
+    assert!(!cases.is_empty());
+    for Case { name, problem, settings, objective: expected } in cases {
         let ours = estimate(&problem, &settings).unwrap();
         let theirs = Conic::new(&problem, &settings).solve(TIGHT);
-        let expected = number("objective");
         for found in [ours.objective, objective(&problem, &settings, &theirs.x)] {
-            assert!((found / expected - 1.0).abs() < 1e-6, "{}: {found} {expected}", case["name"]);
+            assert!((found / expected - 1.0).abs() < 1e-6, "{name}: {found} {expected}");
         }
-        checked += 1;
     }
-    assert!(checked > 0);
+}
+
+/// Answers as entries of the table, a line each.
+fn entries(form: Form, count: usize, tolerance: f64) -> Vec<Value> {
+    let settings = Settings { form, ..Settings::default() };
+    let entry = |(seed, problem, _): (u64, Problem, Vec<f64>)| {
+        let theirs = Conic::new(&problem, &settings).solve(tolerance);
+        json!({
+            "seed": seed, "links": problem.links.len(), "form": format!("{form:?}"), "tolerance": tolerance,
+            "status": format!("{:?}", theirs.status), "objective": objective(&problem, &settings, &theirs.x),
+            "x": theirs.x,
+        })
+    };
+    moderate(count).map(entry).collect()
+}
+
+/// `cargo test --release the_table -- --ignored` writes what `dynid-estimate` compares itself with.
+#[test]
+#[ignore = "writes a file"]
+fn the_table_of_solved_problems() {
+    let settings = Settings::default();
+    let mut problems = entries(Form::PseudoInertia, 40, TIGHT);
+    problems.extend(entries(Form::SpatialInertia, 12, TIGHT));
+    let rough = [1e-3, 1e-2].into_iter().flat_map(|tolerance| entries(Form::PseudoInertia, 30, tolerance));
+
+    let (seed, [possible, thick, heavy], _) = bounded();
+    let theirs = Conic::new(&possible, &settings).solve(TIGHT);
+    let possible = json!({
+        "seed": seed, "status": format!("{:?}", theirs.status),
+        "objective": objective(&possible, &settings, &theirs.x), "x": theirs.x,
+    });
+    let refused = [&thick, &heavy].map(|problem| {
+        let bare = Problem { r: Mat::zeros(0, problem.columns()), z: Vec::new(), ..problem.clone() };
+        let theirs = Conic::new(&bare, &Settings { prior_weight: 1.0, ..settings.clone() }).solve(TIGHT);
+        json!(format!("{:?}", theirs.status))
+    });
+    let reference = reference_cases().expect("the reference numbers").into_iter().map(|case| {
+        let theirs = Conic::new(&case.problem, &case.settings).solve(TIGHT);
+        json!({
+            "name": case.name, "status": format!("{:?}", theirs.status),
+            "objective": objective(&case.problem, &case.settings, &theirs.x), "x": theirs.x,
+        })
+    });
+    let survey = |seed: u64| {
+        let (problem, truth) = random_problem(seed, Some(1 + seed as usize % 7));
+        let pair = Pair::new(&problem, &settings, &truth, TIGHT);
+        json!([seed, format!("{:?}", pair.theirs.status), pair.objectives[1]])
+    };
+    let survey: Vec<Value> = (0..1000).into_par_iter().map(survey).collect();
+
+    let lines = |values: Vec<Value>| {
+        let lines: Vec<String> = values.iter().map(Value::to_string).collect();
+        format!("[\n{}\n]", lines.join(",\n"))
+    };
+    let about = json!({
+        "solver": "Clarabel.rs 0.11.1, features sdp and serde (Goulart and Chen 2024, arXiv:2405.12762)",
+        "dense_routines": "plain loops in place of BLAS and LAPACK (bench/conic/blas-src)",
+        "settings": "tol_gap_abs = tol_gap_rel = tol_feas = tolerance, 1e-11 where none is said; \
+            chordal decomposition off; all others as they come",
+        "posed_as": "min t such that |(R xi - q, rho)| <= t, links positive semidefinite, scalars and bounds on \
+            half-lines, xi whitened by the priors; the objective is t^2",
+        "made_by": "the last revision that holds bench/conic, `git log -- bench/conic`: in it \
+            `cargo test --release the_table -- --ignored`",
+        "problems": "random_problem(seed, links): the first of |z|^2 < 1e7 with links = 1 + seed mod 7; x as the \
+            solver left it, consistent up to its tolerance; objective from its definition at that x",
+        "rough": "as problems, at loose tolerances",
+        "bounded": "the first problem of three links with the bounds of the test; refused: status with bounds that \
+            no body meets, without data",
+        "reference": "cases of estimation_consistent.json without entropic weight",
+        "survey": "seed, status, objective from its definition at the nearest consistent point on the way to the \
+            truth; problems of any noise, links = 1 + seed mod 7",
+    });
+    let bounded = json!({ "possible": possible, "refused": refused });
+    let text = format!(
+        "{{\n\"about\": {about:#},\n\"problems\": {},\n\"rough\": {},\n\"bounded\": {bounded},\n\"reference\": {},\n\
+        \"survey\": {}\n}}\n",
+        lines(problems),
+        lines(rough.collect()),
+        lines(reference.collect()),
+        lines(survey),
+    );
+    let path = "../../crates/dynid-estimate/tests/data/solved_problems.json";
+    std::fs::write(Path::new(env!("CARGO_MANIFEST_DIR")).join(path), text).unwrap();
 }
 
 fn figures(mut values: Vec<f64>) -> String {
