@@ -52,21 +52,27 @@ fn problem(g: &Value) -> Problem {
     }
 }
 
+/// A case of `estimation_consistent.json`.
+pub(crate) fn case(g: &Value, case: &Value) -> (Problem, Settings) {
+    let mut problem = problem(g);
+    for b in case["bounds"].as_array().into_iter().flatten() {
+        problem.bounds.push(bound("given", &vector(&b["row"]), number(&b["upper"])));
+    }
+    let settings = Settings {
+        prior_weight: number(&case["delta"]),
+        entropic_weight: number(&case["gamma"]),
+        margin: Margin::Relative(number(&case["eps"])),
+        ..Settings::default()
+    };
+    (problem, settings)
+}
+
 #[test]
 fn consistent_estimates_match_the_conic_solver() {
     let Some(g) = load("estimation_consistent.json") else { return };
     for case in g["cases"].as_array().unwrap() {
         let name = case["name"].as_str().unwrap();
-        let mut problem = problem(&g);
-        for b in case["bounds"].as_array().into_iter().flatten() {
-            problem.bounds.push(bound("given", &vector(&b["row"]), number(&b["upper"])));
-        }
-        let settings = Settings {
-            prior_weight: number(&case["delta"]),
-            entropic_weight: number(&case["gamma"]),
-            margin: Margin::Relative(number(&case["eps"])),
-            ..Settings::default()
-        };
+        let (problem, settings) = self::case(&g, case);
         let found = estimate(&problem, &settings).unwrap();
         assert_eq!(found.status, Status::Optimal, "{name}");
         let expected = number(&case["objective"]);

@@ -34,4 +34,5 @@ mod second_opinions;
 mod separable;
 mod separable_arm;
 mod simulated;
+mod solved_problems;
 mod whiteness_power;
