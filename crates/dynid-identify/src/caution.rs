@@ -20,7 +20,7 @@ pub struct Caution {
 }
 
 /// Kinds of cautions from those that matter most, since nothing holds beside them, to those that are good to know.
-const ORDER: [&str; 32] = [
+const ORDER: [&str; 33] = [
     CheckName::Preflight.word(),
     FINDING,
     CheckName::OwnLogs.word(),
@@ -29,6 +29,7 @@ const ORDER: [&str; 32] = [
     CheckName::ValidationFit.word(),
     CheckName::TrainingFit.word(),
     CheckName::OwnValidation.word(),
+    CheckName::Loads.word(),
     CheckName::Excitation.word(),
     CheckName::RankGap.word(),
     CheckName::Explained.word(),

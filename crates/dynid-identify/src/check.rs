@@ -24,6 +24,8 @@ dynid_record::words! {
         Instruments = "instruments",
         /// Training logs that share rows.
         OwnLogs = "training logs of their own",
+        /// Whether the loads that friction follows came to rest.
+        Loads = "loads that friction follows",
         /// Validation logs that share rows with training logs.
         OwnValidation = "validation logs of their own",
         /// What the pre-flight found.

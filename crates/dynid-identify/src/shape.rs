@@ -26,17 +26,34 @@ pub struct ShapeFit {
     pub starts: StartReport,
 }
 
+/// Where a search of shape parameters starts.
+#[derive(Debug)]
+pub(crate) enum Start {
+    /// Where the elements say.
+    Stated,
+    /// From values.
+    From(Vec<f64>),
+    /// From values, and from nowhere else, without a look at what the logs say about each.
+    Near(Vec<f64>),
+}
+
 /// Finds the shape parameters of a problem's model on its conditioned logs.
-pub(crate) fn find(problem: &Problem, choices: &Conditioning) -> Result<ShapeFit, Error> {
+pub(crate) fn find(problem: &Problem, choices: &Conditioning, start: &Start) -> Result<ShapeFit, Error> {
     let Problem { model, structure, logs, settings, .. } = problem;
-    let shape = model.parameters().shape_start();
+    let shape = match start {
+        Start::Stated => model.parameters().shape_start(),
+        Start::From(values) | Start::Near(values) => values.clone(),
+    };
     let defaults = SeparableSettings::default();
     let seed = settings.seed.unwrap_or(1);
-    let separable = SeparableSettings {
-        seed,
-        search: settings.estimator.shape.search(seed)?,
-        starts: settings.estimator.shape.starts.unwrap_or(defaults.starts),
-        ..defaults
+    let separable = match start {
+        Start::Near(_) => SeparableSettings { seed, starts: 1, profile_points: 0, ..defaults },
+        Start::Stated | Start::From(_) => SeparableSettings {
+            seed,
+            search: settings.estimator.shape.search(seed)?,
+            starts: settings.estimator.shape.starts.unwrap_or(defaults.starts),
+            ..defaults
+        },
     };
     let (base, conditioning) = (&structure.base, settings.conditioning_settings());
     let found: SeparableEstimate =

@@ -16,6 +16,7 @@ use crate::consistency::UNCONSTRAINED;
 use crate::estimate::{BaseCounts, Verdict};
 use crate::identification::Identification;
 use crate::joint_stiffness::JointStiffness;
+use crate::pipeline::LoadRounds;
 pub use dynid_record::Status;
 pub(crate) use instruments::in_words as closed_loop_bias_in_words;
 
@@ -57,6 +58,7 @@ pub fn judge(id: &Identification) -> Verdict {
     }
     checks.extend(explained(id));
     checks.extend(residual(id));
+    checks.extend(loads(id));
     checks.extend(delay(id));
     checks.extend(mask(id));
     checks.push(blocks(id));
@@ -324,6 +326,31 @@ fn residual(id: &Identification) -> Option<CheckResult> {
             "the residual is larger than sensor noise: something acts that the model does not hold (friction shape, \
              elasticity, ripple); standard deviations do not cover it"
         },
+    ))
+}
+
+/// Whether the loads that friction follows came to rest.
+fn loads(id: &Identification) -> Option<CheckResult> {
+    let found = id.loads?;
+    let settled = found.change <= LoadRounds::SETTLED;
+    let meaning = match settled {
+        true => format!(
+            "friction follows reactions, and reactions the parameters: {} rounds brought both together",
+            found.rounds
+        ),
+        false => format!(
+            "friction follows reactions, and reactions the parameters: {} rounds did not bring them together, so columns and intervals are those \
+             of other loads than the model predicts with",
+            found.rounds
+        ),
+    };
+    Some(check(
+        graded(settled, found.change <= 1e-3),
+        CheckName::Loads,
+        Some(found.change).filter(|x| x.is_finite()),
+        "",
+        "relative change in the last round at most 1e-6",
+        meaning,
     ))
 }
 

@@ -9,10 +9,9 @@ use super::shapes::Before;
 use crate::Error;
 use crate::elements::LoadValues;
 use crate::problem::Problem;
-use crate::shape::ShapeFit;
 
-/// Change of the loads, relative to their size, at which rounds end.
-pub(crate) const SETTLED: f64 = 1e-6;
+/// Change below which a round looks at all that logs say.
+const NEAR: f64 = 1e-3;
 /// Most rounds.
 const ROUNDS: usize = 12;
 /// Random states that loads are compared on.
@@ -26,6 +25,11 @@ pub struct LoadRounds {
     pub rounds: usize,
     /// Root mean square change of the loads in the last round over random states, relative to that of the loads.
     pub change: f64,
+}
+
+impl LoadRounds {
+    /// Change at which rounds end.
+    pub const SETTLED: f64 = 1e-6;
 }
 
 /// Fits with the loads of the plan, frozen, then, round by round, with columns that tell how friction changes with its loads
@@ -46,8 +50,12 @@ pub(crate) fn settle(
     loop {
         let (model, linear) = fit.nonlinear(&problem)?;
         let now = forces(&model);
-        out.change = change(&last, &now);
-        if out.rounds == ROUNDS || !out.change.is_finite() || (out.rounds > 0 && out.change <= SETTLED) {
+        let change = change(&last, &now);
+        // What logs say about shape parameters is worked out once loads are nearly at rest.
+        let near = change <= NEAR || out.rounds + 1 == ROUNDS;
+        let ended = out.rounds > 0 && out.change <= NEAR && change <= LoadRounds::SETTLED;
+        out.change = change;
+        if ended || out.rounds == ROUNDS || !change.is_finite() {
             problem.plan.load_values = Some(LoadValues::of(&model, &linear, false));
             fit.loads = Some(out);
             return Ok((problem, fit));
@@ -55,9 +63,9 @@ pub(crate) fn settle(
         last = now;
         problem.plan.load_values = Some(LoadValues::of(&model, &linear, true));
         problem.rebuild()?;
-        let shapes = fit.shapes.take().map(|found| ShapeFit { model, linear, ..found });
-        let found = Before::Found(std::mem::take(&mut fit.friction), shapes);
-        (problem, fit) = problem.fit_at_loads(fit.conditioning.take(), found, progress)?;
+        let shape = model.parameters().shape_start();
+        let before = Before::Found { friction: std::mem::take(&mut fit.friction), shape, roughly: !near };
+        (problem, fit) = problem.fit_at_loads(fit.conditioning.take(), before, progress)?;
         out.rounds += 1;
     }
 }

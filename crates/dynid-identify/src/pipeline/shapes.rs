@@ -7,7 +7,7 @@ use super::{Step, friction};
 use crate::Error;
 use crate::problem::Problem;
 use crate::settings::Friction;
-use crate::shape::{self, ShapeFit};
+use crate::shape::{self, ShapeFit, Start};
 
 /// What was found on the way to a linear model.
 pub(super) struct Shaped {
@@ -26,17 +26,16 @@ pub(super) enum Before {
     Nothing,
     /// Friction stays as the plan states it; shape parameters are searched.
     AsStated,
-    /// What a fit found with other loads: the model is linearised about it.
-    Found(Vec<JointFriction>, Option<ShapeFit>),
-}
-
-impl Problem {
-    /// Linearises the model about shape parameters.
-    fn linearise(&mut self, found: &ShapeFit) -> Result<(), Error> {
-        let free: Vec<bool> = found.findings.iter().map(shape::is_free).collect();
-        self.model = shape::linearised(&self.plan, &found.model, &found.linear, &free)?;
-        self.restructure()
-    }
+    /// What a fit found with other loads: shapes of friction, and values of shape parameters that a search starts from. `roughly`: by one
+    /// start, without what logs say about each.
+    Found {
+        /// Shapes of friction.
+        friction: Vec<JointFriction>,
+        /// Values of shape parameters.
+        shape: Vec<f64>,
+        /// No more than the values.
+        roughly: bool,
+    },
 }
 
 /// Adds shapes of friction to the plan if they are to be chosen, finds the shape parameters and linearises the model about
@@ -51,17 +50,12 @@ pub(super) fn search(
     progress: &mut dyn FnMut(Step),
 ) -> Result<Shaped, Error> {
     let mut out = Shaped { conditioning, friction: Vec::new(), found: None };
-    let choose = match before {
-        Before::Nothing => true,
-        Before::AsStated => false,
-        Before::Found(friction, found) => {
-            (out.friction, out.found) = (friction, found);
-            if let Some(found) = &out.found {
-                problem.linearise(found)?;
-            }
-            return Ok(out);
-        }
-    };
+    let choose = matches!(before, Before::Nothing);
+    let mut start = Start::Stated;
+    if let Before::Found { friction, shape, roughly } = before {
+        out.friction = friction;
+        start = if roughly { Start::Near(shape) } else { Start::From(shape) };
+    }
     let Some(choices) = &mut out.conditioning else { return Ok(out) };
     let all_known = problem.plan.known.len() == problem.plan.per_rate.len();
     if problem.settings.elements.friction == Friction::Auto && !all_known && choose {
@@ -72,12 +66,15 @@ pub(super) fn search(
     }
     while !problem.model.parameters().shape.is_empty() {
         progress(Step::Shapes);
-        let found = shape::find(problem, choices)?;
+        let found = shape::find(problem, choices, &start)?;
         if friction::drop_refuted(problem, &found, &mut out.friction) {
             problem.rebuild()?;
+            start = Start::Stated;
             continue;
         }
-        problem.linearise(&found)?;
+        let free: Vec<bool> = found.findings.iter().map(shape::is_free).collect();
+        problem.model = shape::linearised(&problem.plan, &found.model, &found.linear, &free)?;
+        problem.restructure()?;
         out.found = Some(found);
     }
     Ok(out)

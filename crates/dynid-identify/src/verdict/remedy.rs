@@ -62,6 +62,9 @@ pub(super) fn of(id: &Identification, check: CheckName) -> String {
         CheckName::ClosedLoopBias => "`method = \"iv\"` under `[estimator]`, or a lower `kernel_hz` under `[conditioning]`".to_owned(),
         CheckName::Recipe => "mend what the doubts name, and learn again: `dynid reduce CONFIG --out NEW.factors`; then reduce all logs by it"
             .to_owned(),
+        CheckName::Loads => "state coefficients near those of the joint (`mu_c = 0.1` beside `loads` of `reaction_friction`), bodies near those of the \
+             robot, or friction that no load changes (`elements = [\"coulomb\", \"viscous\"]` of the joint)"
+            .to_owned(),
         CheckName::Residual => format!(
             "`{}` tells whether another estimator does better; friction is measured by `dynid friction friction.toml`, and then \
              `known_friction = \"friction.json\"` under `[elements]`; a joint behind a soft gear: `elastic` in the robot file",

@@ -235,12 +235,21 @@ impl ClosedModel {
     /// Forces `F` and `F_w` of every load over a block, at the parameters of the reference, and the largest relative change
     /// in the last round of an iteration (0 without one).
     pub fn load_forces(&self, motion: &MotionBlock<'_>) -> (Vec<[Vec<f64>; 2]>, f64) {
-        let pressed = self.pressed(motion);
+        let pressed = self.prepared(motion).1;
         (pressed.forces, pressed.change)
     }
 
     /// Motion of all joints, and the forces on them.
     pub(super) fn prepared(&self, motion: &MotionBlock<'_>) -> (Arc<Path>, Pressed<'_>) {
+        self.prepared_with(motion, false)
+    }
+
+    /// Motion of all joints, the forces on them, and how they change with the parameters if the model tells.
+    pub(super) fn prepared_linearised(&self, motion: &MotionBlock<'_>) -> (Arc<Path>, Pressed<'_>) {
+        self.prepared_with(motion, true)
+    }
+
+    fn prepared_with(&self, motion: &MotionBlock<'_>, changes: bool) -> (Arc<Path>, Pressed<'_>) {
         let path = self.paths.of(motion, self.machine.mobility(), || match &self.loads {
             None => Path { expanded: self.expand(motion), shares: None },
             Some(loads) => {
@@ -249,7 +258,7 @@ impl ClosedModel {
             }
         });
         let pressed = match (&self.loads, &path.shares) {
-            (Some(loads), Some(shares)) => self.press(loads, motion, &path.expanded, shares),
+            (Some(loads), Some(shares)) => self.press(loads, motion, (&path.expanded, shares), changes),
             _ => Pressed::nothing(),
         };
         (path, pressed)
@@ -257,15 +266,15 @@ impl ClosedModel {
 
     /// The forces alone.
     pub(super) fn pressed(&self, motion: &MotionBlock<'_>) -> Pressed<'_> {
-        if self.loads.is_some() { self.prepared(motion).1 } else { Pressed::nothing() }
+        if self.loads.is_some() { self.prepared_linearised(motion).1 } else { Pressed::nothing() }
     }
 
     fn press<'a>(
         &self,
         loads: &'a Loads,
         motion: &MotionBlock<'_>,
-        expanded: &Expanded,
-        shares: &ReactionShares,
+        (expanded, shares): (&Expanded, &ReactionShares),
+        changes: bool,
     ) -> Pressed<'a> {
         let n = motion.samples;
         let LoadReference { linear, shape, linearised } = &loads.reference;
@@ -291,7 +300,7 @@ impl ClosedModel {
                 break;
             }
         }
-        if *linearised {
+        if *linearised && changes {
             let mut regressor = RegressorBlock::new(self.tree.layout().clone(), n);
             let mut rows = RegressorBlock::new(loads.reactions.layout().clone(), n);
             expanded.with_block(motion, &pressed.channels(), |block| {

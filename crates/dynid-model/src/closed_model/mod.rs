@@ -179,7 +179,7 @@ impl EffortModel for ClosedModel {
     }
 
     fn regressor(&self, motion: &MotionBlock<'_>, shape: &[f64], out: &mut RegressorBlock) {
-        let (path, pressed) = self.prepared(motion);
+        let (path, pressed) = self.prepared_linearised(motion);
         let expanded = &path.expanded;
         let mut tree = RegressorBlock::new(self.tree.layout().clone(), motion.samples);
         expanded

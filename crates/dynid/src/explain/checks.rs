@@ -92,6 +92,13 @@ pub(super) fn text(name: Name) -> Text {
             "Mend what they name in the configuration, learn the recipe again, and reduce all logs by it.",
             "dynid reduce dynid.toml --out cell.factors",
         ),
+        Name::Loads => Text(
+            "Friction that follows a reaction (`reaction_friction`) makes efforts depend on products of parameters. The fit takes the loads at the \
+             parameters that it finds, round by round, until both agree. Where they do not, friction may be so large that it locks the joint, or the logs \
+             say too little about what presses on it.",
+            "State coefficients and bodies near those of the machine, or friction that no load changes, and compare both on a log that neither has seen.",
+            "dynid identify ROBOT --log LOG --validate OTHER",
+        ),
         Name::ReversalMask => Text(
             "Rows near reversal, where friction is least like its law, may be left out. The check says whether the result depends on how many are.",
             "Choose another friction law, or state the mask.",

@@ -30,6 +30,7 @@ mod payload;
 mod periodic;
 mod preflight;
 mod preflight_causes;
+mod reaction_friction;
 mod recorded_logs;
 mod reduce;
 mod report_page;

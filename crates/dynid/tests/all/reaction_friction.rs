@@ -1,0 +1,237 @@
+//! Friction that follows reactions, from robot files: simulated, identified, predicted, read again, refused.
+
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
+
+use std::path::{Path, PathBuf};
+
+use dynid::estimate::Split;
+use dynid::model::{EffortModel, MotionBlock};
+use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
+use dynid::{Config, Robot, RobotOptions, Run, identify};
+
+/// A carriage on a guideway, driven along it, with an arm of two joints: the force on the guideway and the moment about it change.
+/// Friction of the first joint of the arm follows the forces across its axis.
+const GANTRY: &str = r#"
+name = "gantry"
+body = [
+  { name = "carriage", parent = "ground", joint = { kind = "prismatic", axis = [1, 0, 0], limits = { position = [-0.6, 0.6], velocity = 1, effort = 900 } }, mass = 9, com = [0, 0, 0.02], inertia_com = [0.06, 0.07, 0.08, 0, 0, 0] },
+  { name = "upper", parent = "carriage", joint = { xyz = [0, 0, 0.1], axis = [0, 1, 0], limits = { position = [-2.5, 2.5], velocity = 3, effort = 300 } }, mass = 6, com = [0.02, 0.01, 0.3], inertia_com = [0.2, 0.2, 0.02, 0, 0, 0] },
+  { name = "fore", parent = "upper", joint = { xyz = [0, 0, 0.6], axis = [0, 1, 0], limits = { position = [-2.5, 2.5], velocity = 4, effort = 100 } }, mass = 4, com = [0.01, 0, 0.25], inertia_com = [0.1, 0.1, 0.01, 0, 0, 0] },
+]
+[element.carriage]
+elements = ["viscous", "reaction_friction"]
+viscous = { coefficient = 30 }
+reaction_friction = { loads = [{ force = "radial" }, { moment = ["y", "z"], arm = 0.15 }], preload = 20, mu_c = 0.12 }
+[element.upper]
+elements = ["viscous", "reaction_friction", "rotor"]
+viscous = { coefficient = 1 }
+rotor = { inertia = 0.3 }
+reaction_friction = { loads = [{ force = "radial", radius = 0.03 }], mu_c = 0.2, mu_v = 0.02 }
+[element.fore]
+elements = ["viscous", "coulomb"]
+"#;
+
+fn folder(test: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("dynid-loads-{test}-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn write(log: &SimulatedLog, path: &Path) {
+    let mut text = String::from("t");
+    for signal in ["q", "tau"] {
+        log.joints.iter().for_each(|joint| text.push_str(&format!(",{signal}_{joint}")));
+    }
+    for (s, t) in log.time.iter().enumerate() {
+        text.push_str(&format!("\n{t}"));
+        log.position.iter().chain(&log.effort).for_each(|c| text.push_str(&format!(",{}", c[s])));
+    }
+    std::fs::write(path, text).unwrap();
+}
+
+struct Bench {
+    folder: PathBuf,
+    truth: Vec<(String, f64)>,
+    /// Noise of the efforts of the held-out log.
+    noise: Vec<f64>,
+    /// Its true motion and efforts.
+    clean: [Vec<Vec<f64>>; 4],
+}
+
+fn rms(x: &[f64]) -> f64 {
+    (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt()
+}
+
+impl Bench {
+    /// A log to learn from and another one.
+    fn new(test: &str, robot: &str, settings: &SimulateSettings) -> Self {
+        let folder = folder(test);
+        std::fs::write(folder.join("robot.toml"), robot).unwrap();
+        let robot = Robot::load(&folder.join("robot.toml"), &RobotOptions::default()).unwrap();
+        let log = |seed| simulate(&robot, &SimulateSettings { seed, ..settings.clone() }).unwrap();
+        let (train, held) = (log(1), log(2));
+        write(&train, &folder.join("train.csv"));
+        write(&held, &folder.join("held.csv"));
+        let noise = held.clean[3].iter().map(|e| settings.effort_noise * rms(e)).collect();
+        Bench { folder, truth: train.truth, noise, clean: held.clean }
+    }
+
+    fn identify(&self, more: &str) -> Run {
+        let text = format!(
+            "robot = {:?}\n{more}\n[[log]]\npath = {:?}\n[[validation]]\npath = {:?}\n",
+            self.folder.join("robot.toml"),
+            self.folder.join("train.csv"),
+            self.folder.join("held.csv"),
+        );
+        let config = Config::parse(&text, &self.folder.join("run.toml").display().to_string()).unwrap();
+        identify(&config, &mut |_| ()).unwrap()
+    }
+
+    /// Error of what the model says along the true motion of the log that was held out, with the noise of its efforts, over that noise.
+    fn against_noise(&self, id: &Run) -> Vec<f64> {
+        let [q, dq, ddq, clean] = &self.clean;
+        let (model, linear) = id.identified_model();
+        let n = q[0].len();
+        let [q, dq, ddq] = [q, dq, ddq].map(|signal| signal.concat());
+        let mut effort = vec![0.0; clean.len() * n];
+        let motion = MotionBlock::plain(n, &q, &dq, &ddq);
+        model.efforts(&motion, &model.parameters().shape_start(), linear, n, &mut effort);
+        let of = |(k, clean): (usize, &Vec<f64>)| {
+            let off: Vec<f64> = effort[k * n..][..n].iter().zip(clean).map(|(a, b)| a - b).collect();
+            (1.0 + (rms(&off) / self.noise[k]).powi(2)).sqrt()
+        };
+        clean.iter().enumerate().map(of).collect()
+    }
+
+    fn truth(&self, name: &str) -> f64 {
+        self.truth.iter().find(|(n, _)| n == name).unwrap().1
+    }
+
+    /// Estimates of some parameters with their deviations from the truth, in standard deviations.
+    fn check(&self, id: &Run, names: &[&str]) {
+        let estimate = id.estimate();
+        for name in names {
+            let found = estimate.parameters.iter().find(|p| p.name == *name).unwrap();
+            let (truth, std) = (self.truth(name), found.std.unwrap());
+            println!("{name}: {} ± {std:.1e}, truth {truth}", found.value);
+            assert!((found.value - truth).abs() < 3.0 * std + 1e-9 * truth.abs(), "{name}");
+        }
+    }
+}
+
+/// What is written predicts as what was identified.
+fn predicts_when_read_again(id: &Run) {
+    let estimate =
+        dynid::estimate::Estimate::parse(id.estimate().to_json().as_bytes(), "estimate.json").unwrap();
+    let read = estimate.effort_model(Path::new("estimate.json"), Split::Consistent).unwrap();
+    let (model, linear) = id.identified_model();
+    let efforts = |model: &dyn EffortModel, linear: &[f64], motion: &MotionBlock<'_>| {
+        let mut out = vec![0.0; model.outputs().len() * motion.samples];
+        model.efforts(motion, &model.parameters().shape_start(), linear, motion.samples, &mut out);
+        out
+    };
+    model.random_motion(100, 5).with_block(|motion| {
+        let ours = efforts(model, linear, motion);
+        let theirs = efforts(&read, &estimate.values(Split::Consistent), motion);
+        let size = ours.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        for (a, b) in ours.iter().zip(&theirs) {
+            assert!((a - b).abs() <= 1e-9 * size, "{a} {b}");
+        }
+    });
+}
+
+#[test]
+fn guideway_and_journal_of_an_open_tree() {
+    let settings = SimulateSettings {
+        duration_s: 60.0,
+        rate_hz: 250.0,
+        effort_noise: 0.01,
+        encoder_bits: 20,
+        delay_samples: Some(0.0),
+        ..SimulateSettings::default()
+    };
+    let bench = Bench::new("gantry", GANTRY, &settings);
+    let id = bench.identify("");
+    let rounds = id.loads.unwrap();
+    println!("{rounds:?}");
+    assert!(rounds.change <= 1e-6, "{rounds:?}");
+    let (ours, plain) = (
+        bench.against_noise(&id),
+        bench.against_noise(
+            &bench.identify("[elements.joint]\ncarriage = [\"viscous\", \"coulomb\"]\nupper = [\"viscous\", \"coulomb\", \"rotor\"]"),
+        ),
+    );
+    println!("errors over noise: {ours:.2?}, with friction that no load changes {plain:.2?}");
+    assert!(ours.iter().all(|r| *r < 1.2), "{ours:?}");
+    assert!(plain[0] > 3.0, "{plain:?}");
+    bench.check(&id, &["carriage.mu_c", "carriage.fv", "upper.mu_c", "upper.fv"]);
+    predicts_when_read_again(&id);
+}
+
+#[test]
+fn sliders_of_a_parallel_machine() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/prr3/robot.toml");
+    let settings = SimulateSettings {
+        duration_s: 60.0,
+        // Slow enough for some samples at speeds like that of the Stribeck effect.
+        acceleration: 0.5,
+        rate_hz: 250.0,
+        effort_noise: 0.005,
+        encoder_bits: 20,
+        delay_samples: Some(0.0),
+        ..SimulateSettings::default()
+    };
+    let bench = Bench::new("prr3", &std::fs::read_to_string(path).unwrap(), &settings);
+    let id = bench.identify("[elements]\nfriction = \"given\"");
+    println!("{:?}", id.loads.unwrap());
+    assert!(id.loads.unwrap().change <= 1e-6);
+    let ours = bench.against_noise(&id);
+    let plain = bench.against_noise(&bench.identify("[elements]\nfriction = \"given\"\ndefault = [\"stribeck\", \"viscous\"]\n[elements.joint]\nslider1 = [\"stribeck\", \"viscous\"]\nslider2 = [\"stribeck\", \"viscous\"]\nslider3 = [\"stribeck\", \"viscous\"]"));
+    println!("errors over noise: {ours:.2?}, with friction that no load changes {plain:.2?}");
+    assert!(ours.iter().all(|r| *r < 1.2), "{ours:?}");
+    assert!(plain.iter().all(|r| *r > 3.0), "{plain:?}");
+    bench.check(
+        &id,
+        &["slider1.mu_c", "slider2.mu_c", "slider3.mu_c", "slider1.fv", "slider2.fv", "slider3.fv"],
+    );
+    predicts_when_read_again(&id);
+}
+
+#[test]
+fn what_presses_on_no_joint_is_refused() {
+    let parse = |from: &str, to: &str| {
+        assert!(GANTRY.contains(from), "{from}");
+        let robot =
+            Robot::parse(&GANTRY.replacen(from, to, 1), Path::new("robot.toml"), &RobotOptions::default());
+        let fault =
+            robot.map(|robot| simulate(&robot, &SimulateSettings::default()).err().map(|e| e.to_string()));
+        fault.map_or_else(|e| e.to_string(), |late| late.unwrap_or_else(|| "accepted".to_owned()))
+    };
+    let loads = "loads = [{ force = \"radial\" }, { moment = [\"y\", \"z\"], arm = 0.15 }], preload = 20, mu_c = 0.12";
+    for (from, to, expected) in [
+        (loads, "mu_c = 0.12", "`loads`, `weight` or `preload`"),
+        (loads, "loads = [{ force = \"across\" }]", "`\"axial\"` or `\"radial\"`"),
+        (loads, "loads = [{ force = [\"x\", \"x\"] }]", "each once"),
+        (loads, "loads = [{ force = [\"x\"], arm = 0.1 }]", "`radius` beside `force`"),
+        (loads, "loads = [{ force = [\"x\"], joint = \"elbow\" }]", "a joint of the robot"),
+        (loads, "loads = [{ force = [\"x\"], radius = 0 }]", "a length above 0"),
+        (loads, "loads = [{ moment = [\"x\"], axis = 1 }]", "`joint`, `force`"),
+        (loads, "weight = { wrist = 1 }", "a link of the robot"),
+        (loads, "preload = -1", "not negative"),
+        (loads, "preload = 1, stribeck = false, vs = 0.1", "no such value"),
+        (loads, "preload = 1, mu = 0.1", "expected one of"),
+        (
+            "axis = [0, 1, 0], limits = { position = [-2.5, 2.5], velocity = 3",
+            "axis = [0, 0.6, 0.8], limits = { position = [-2.5, 2.5], velocity = 3",
+            "components by name",
+        ),
+        (
+            "reaction_friction = { loads = [{ force = \"radial\", radius = 0.03 }], mu_c = 0.2, mu_v = 0.02 }",
+            "",
+            "what presses on the joint",
+        ),
+    ] {
+        let found = parse(from, to);
+        assert!(found.contains(expected), "{to}: expected {expected}, found {found}");
+    }
+}
