@@ -28,6 +28,7 @@ pub use crate::identification::Identification;
 use crate::input_record::{InputRecord, short_name};
 use crate::instruments::{self, Comparison, Loop};
 use crate::joint_stiffness::{self, JointStiffness};
+pub use crate::load_rounds::LoadRounds;
 use crate::log::{self, Log, LogSource};
 use crate::log_agreement::{self, LogAgreement};
 use crate::log_terms::LogTerms;
@@ -42,7 +43,6 @@ pub use crate::training_log::TrainingLog;
 use crate::trust::{Evidence, Trust};
 use crate::{Error, own_delay, preflight as before, stiffness};
 pub(crate) use figures::{EXPLAINED, explained};
-pub use loads::LoadRounds;
 pub use model_fit::ModelFit;
 
 /// What is being worked on, for progress displays.

@@ -16,7 +16,7 @@ use crate::consistency::UNCONSTRAINED;
 use crate::estimate::{BaseCounts, Verdict};
 use crate::identification::Identification;
 use crate::joint_stiffness::JointStiffness;
-use crate::pipeline::LoadRounds;
+use crate::load_rounds::LoadRounds;
 pub use dynid_record::Status;
 pub(crate) use instruments::in_words as closed_loop_bias_in_words;
 

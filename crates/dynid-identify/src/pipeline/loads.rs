@@ -8,6 +8,7 @@ use super::model_fit::ModelFit;
 use super::shapes::Before;
 use crate::Error;
 use crate::elements::LoadValues;
+use crate::load_rounds::LoadRounds;
 use crate::problem::Problem;
 
 /// Change below which a round looks at all that logs say.
@@ -17,20 +18,6 @@ const ROUNDS: usize = 12;
 /// Random states that loads are compared on.
 const STATES: usize = 200;
 const SEED: u64 = 11;
-
-/// How the loads of friction came to rest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LoadRounds {
-    /// Rounds after the first fit.
-    pub rounds: usize,
-    /// Root mean square change of the loads in the last round over random states, relative to that of the loads.
-    pub change: f64,
-}
-
-impl LoadRounds {
-    /// Change at which rounds end.
-    pub const SETTLED: f64 = 1e-6;
-}
 
 /// Fits with the loads of the plan, frozen, then, round by round, with columns that tell how friction changes with its loads
 /// and its shapes (Gauss-Newton about the parameters of the round before), until the loads stay. The plan of the problem then
@@ -88,6 +75,21 @@ fn change(before: &[f64], now: &[f64]) -> f64 {
 }
 
 impl Problem {
+    /// Fits the model to the logs as the settings ask for.
+    ///
+    /// # Errors
+    /// Settings that do not fit the model, too few rows, what the estimators refuse.
+    pub fn fit(
+        self,
+        conditioning: Option<Conditioning>,
+        progress: &mut dyn FnMut(Step),
+    ) -> Result<(Problem, ModelFit), Error> {
+        match self.plan.has_reactions() {
+            false => self.fit_at_loads(conditioning, Before::Nothing, progress),
+            true => settle(self, conditioning, Before::Nothing, progress),
+        }
+    }
+
     /// The loads that a first look finds, with friction as it is stated: conditioning that took friction with loads of the robot
     /// file would take their errors for noise.
     ///

@@ -4,13 +4,13 @@ use dynid_model::RobotModel;
 use dynid_rows::conditioning::{Conditioning, JointFriction, ReducedGroup};
 
 use super::Step;
-use super::loads::{self, LoadRounds};
 use super::shapes::{self, Before, Shaped};
 use crate::Error;
 use crate::consistency::{self, Consistent};
 use crate::fitting::{self, Fitted, RowResiduals};
 use crate::friction_power::{self, FrictionPower};
 use crate::instruments::{self, InstrumentRun, Loop};
+use crate::load_rounds::LoadRounds;
 use crate::problem::Problem;
 use crate::settings::{Method, Settings};
 use crate::shape::{self, ShapeFit};
@@ -40,22 +40,10 @@ pub struct ModelFit {
 }
 
 impl Problem {
-    /// Fits the model to the logs as the settings ask for.
+    /// One fit with the loads of the plan.
     ///
     /// # Errors
-    /// Settings that do not fit the model, too few rows, what the estimators refuse.
-    pub fn fit(
-        self,
-        conditioning: Option<Conditioning>,
-        progress: &mut dyn FnMut(Step),
-    ) -> Result<(Problem, ModelFit), Error> {
-        match self.plan.has_reactions() {
-            false => self.fit_at_loads(conditioning, Before::Nothing, progress),
-            true => loads::settle(self, conditioning, Before::Nothing, progress),
-        }
-    }
-
-    /// One fit with the loads of the plan.
+    /// As [`Problem::fit`].
     pub(super) fn fit_at_loads(
         mut self,
         conditioning: Option<Conditioning>,

@@ -87,7 +87,14 @@ pub(super) fn build(
     let mut spec = ElementSpec { defaults: robot.defaults.elements.clone(), ..ElementSpec::default() };
     spec.elastic = elastic::build(source, robot, joints)?;
     spec.clearance = clearance::build(source, robot, description)?;
-    spec.reactions = reaction::build(source, robot, description, &mut spec.settings)?;
+    let (reactions, flags) = reaction::build(source, robot, description)?;
+    spec.reactions = reactions;
+    spec.settings.extend(flags.into_iter().map(|(joint, key, flag)| ElementSetting {
+        joint,
+        element: reaction::REACTION_FRICTION.to_owned(),
+        key: key.to_owned(),
+        value: SettingValue::Flag(flag),
+    }));
     let motors = spec.elastic.iter().map(|e| e.motor.as_str());
     let owners: Vec<&str> = joints.iter().copied().chain(motors).collect();
     for (joint, table) in &robot.element {

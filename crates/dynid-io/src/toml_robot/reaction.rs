@@ -4,7 +4,6 @@ use dynid_model::{Description, JointDescription};
 use toml::{Table, Value};
 
 use super::Source;
-use super::elements::{ElementSetting, SettingValue};
 use super::number::number;
 use super::schema::RobotToml;
 use crate::robot_error::RobotFileError;
@@ -38,15 +37,16 @@ pub struct ReactionLoad {
     pub factor: f64,
 }
 
-/// Loads in the order of the joints. Settings of the element that are plain values go to `settings`; what stands for itself in a file
-/// (`stribeck`, `viscous`) is there in any case.
+/// Flags that follow from what else is stated: joint, key, value.
+pub(super) type Flag = (String, &'static str, bool);
+
+/// Loads in the order of the joints, and flags (`stribeck`, `viscous`) that the file leaves to what else it states.
 pub(super) fn build(
     source: &Source<'_>,
     robot: &RobotToml,
     description: &Description,
-    settings: &mut Vec<ElementSetting>,
-) -> Result<Vec<ReactionSpec>, RobotFileError> {
-    let mut out = Vec::new();
+) -> Result<(Vec<ReactionSpec>, Vec<Flag>), RobotFileError> {
+    let (mut out, mut flags) = (Vec::new(), Vec::new());
     for joint in &description.joints {
         let Some(element) = robot.element.get(&joint.name) else { continue };
         let Some(value) = element.get_ref().get(REACTION_FRICTION) else { continue };
@@ -60,9 +60,9 @@ pub(super) fn build(
             return Err(keys.fault("", "a table with `loads`", &value.to_string()));
         };
         out.push(keys.spec(joint, table)?);
-        settings.extend(keys.flags(joint, table)?);
+        flags.extend(keys.flags(joint, table)?);
     }
-    Ok(out)
+    Ok((out, flags))
 }
 
 /// Keys that are about loads; the others are settings as all elements have them.
@@ -202,7 +202,7 @@ impl Keys<'_> {
     }
 
     /// Whether friction falls and grows with speed: as said, else if a value of such friction is stated.
-    fn flags(&self, joint: &JointDescription, table: &Table) -> Result<Vec<ElementSetting>, RobotFileError> {
+    fn flags(&self, joint: &JointDescription, table: &Table) -> Result<Vec<Flag>, RobotFileError> {
         let mut out = Vec::new();
         for (flag, values) in [("stribeck", &["mu_s", "vs", "delta"][..]), ("viscous", &["mu_v"])] {
             let stated = values.iter().find(|key| table.contains_key(**key));
@@ -215,12 +215,7 @@ impl Keys<'_> {
                     ));
                 }
                 (Some(_), _) => {}
-                (None, stated) => out.push(ElementSetting {
-                    joint: joint.name.clone(),
-                    element: REACTION_FRICTION.to_owned(),
-                    key: flag.to_owned(),
-                    value: SettingValue::Flag(stated.is_some()),
-                }),
+                (None, stated) => out.push((joint.name.clone(), flag, stated.is_some())),
             }
         }
         Ok(out)

@@ -12,6 +12,7 @@ mod compare;
 mod design;
 mod elastic;
 mod elements;
+mod explain;
 mod export;
 mod exported_files;
 mod friction_experiments;
