@@ -68,11 +68,6 @@ impl JournalBearing {
         (0.5 * depth / (self.clearance + depth)).sqrt()
     }
 
-    /// Half contact angle `ε`, rad.
-    pub fn contact_angle(&self, penetration: f64) -> f64 {
-        2.0 * self.half_sine(penetration).asin()
-    }
-
     /// Length of contact `l`, m.
     pub fn contact_length(&self, penetration: f64) -> f64 {
         2.0 * self.journal_radius * self.half_sine(penetration)

@@ -475,6 +475,16 @@ impl Default for Provenance {
     }
 }
 
+/// Whose entry a fault is in, as far as the lines before it tell: the last name.
+fn of_what(text: &[u8], fault: &serde_json::Error) -> String {
+    let text = String::from_utf8_lossy(text);
+    let before: Vec<&str> = text.lines().take(fault.line()).collect();
+    let named = |line: &&str| line.trim().strip_prefix("\"name\": \"").map(str::to_owned);
+    let name = before.iter().rev().find_map(named).filter(|_| fault.is_data());
+    let name = name.and_then(|rest| rest.split('"').next().map(str::to_owned));
+    name.map_or_else(String::new, |name| format!(", after the name `{name}`"))
+}
+
 impl Estimate {
     /// Reads an estimate file.
     ///
@@ -492,7 +502,8 @@ impl Estimate {
     /// [`Error::EstimateFile`].
     pub fn parse(text: &[u8], file: &str) -> Result<Self, Error> {
         let fault = |message: String| Error::EstimateFile { file: file.to_owned(), message };
-        let estimate: Estimate = serde_json::from_slice(text).map_err(|e| fault(e.to_string()))?;
+        let estimate: Estimate =
+            serde_json::from_slice(text).map_err(|e| fault(format!("{e}{}", of_what(text, &e))))?;
         if estimate.schema != SCHEMA {
             return Err(fault(format!("expected schema {SCHEMA}, found {}", estimate.schema)));
         }

@@ -140,21 +140,7 @@ pub fn read(
     from_table(&csv::read(path, options)?, joints)
 }
 
-/// Reads a table of states with columns of channels that a model reads, each by its name (`temperature_<joint>`, °C); see
-/// [`read`].
-///
-/// # Errors
-/// [`StatesError`].
-pub fn read_with_channels(
-    path: impl AsRef<Path>,
-    joints: &[StateJoint],
-    channels: &[String],
-    options: &ReadOptions,
-) -> Result<States, StatesError> {
-    from_table_with_channels(&csv::read(path, options)?, joints, channels)
-}
-
-/// Picks the states out of a table, and channels by their names; see [`read_with_channels`].
+/// Picks the states out of a table, and channels by their names; see [`read`].
 ///
 /// # Errors
 /// [`StatesError`].

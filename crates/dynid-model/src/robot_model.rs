@@ -91,11 +91,6 @@ impl RobotModel {
         }
     }
 
-    /// Whether friction follows reactions, so that efforts are not linear in the parameters.
-    pub fn has_loads(&self) -> bool {
-        self.with_reactions().is_some_and(|closed| !closed.loads().is_empty())
-    }
-
     fn map_tree(self, change: impl FnOnce(TreeModel) -> TreeModel) -> Self {
         match self {
             RobotModel::Tree(tree) => RobotModel::Tree(change(tree)),

@@ -196,11 +196,6 @@ impl Plant {
         }
     }
 
-    /// Whether elements remember the motion before.
-    pub fn remembers(&self) -> bool {
-        self.elements().remember()
-    }
-
     /// Values of the model's signals at velocities `dq`, a time `step` (s) after what `history` remembers, with velocities
     /// `between` on the way; at that instant itself without a step.
     pub fn signals(&self, history: &History, step: Option<(f64, &[f64])>, dq: &[f64]) -> Vec<f64> {

@@ -82,11 +82,6 @@ impl ClosedMechanism {
         &self.rows.owner
     }
 
-    /// For every condition: whether it is about directions, so that its multiplier is a couple in N m, not a force in N.
-    pub fn is_couple(&self) -> &[bool] {
-        &self.rows.angular
-    }
-
     /// For every condition: whether poses and efforts determine its multiplier. Where conditions repeat each other,
     /// some multipliers are those of least norm.
     pub fn is_determined(&self) -> Vec<bool> {

@@ -49,11 +49,6 @@ impl PoseWorkspace {
         &self.map
     }
 
-    /// `c` in `q̈ = G q̈_i + c`; valid after [`ClosedMechanism::drift`].
-    pub fn acceleration_drift(&self) -> &[f64] {
-        &self.drift
-    }
-
     /// Jacobian `J` of the closures by all rates, row-major, SI units.
     pub fn jacobian(&self) -> &[f64] {
         &self.jacobian
@@ -198,8 +193,8 @@ impl ClosedMechanism {
         }
     }
 
-    /// Rates `dq` of all coordinates and what remains of their accelerations; after [`ClosedMechanism::map`]. See
-    /// [`PoseWorkspace::acceleration_drift`].
+    /// Rates `dq` of all coordinates and what remains of their accelerations, `c` in `q̈ = G q̈_i + c`; after
+    /// [`ClosedMechanism::map`].
     ///
     /// # Panics
     /// If a slice has the wrong length.

@@ -39,8 +39,14 @@ fn fault(elements: &str) -> String {
 fn every_name_builds_an_element_with_parameters_of_its_own() {
     for kind in ElementRegistry::default().kinds() {
         let name = kind.name;
-        // A transmission has no ratio that could be a default.
-        let stated = if name == "elastic" { "\nelastic = { ratio = 100 }" } else { "" };
+        // A transmission has no ratio that could be a default, a joint no load.
+        let stated = match name {
+            "elastic" => "\nelastic = { ratio = 100 }",
+            "reaction_friction" => {
+                "\nreaction_friction = { loads = [{ force = [\"x\"] }], stribeck = true, viscous = true }"
+            }
+            _ => "",
+        };
         let (mechanism, plan) = plan(&format!("elements = [\"{name}\"]{stated}"));
         let model = plan.model(&mechanism).unwrap();
         // The registry says what the element is.

@@ -93,11 +93,6 @@ impl ElasticTransmission {
         theta.iter().zip(q).map(|(theta, q)| theta / self.ratio - q).collect()
     }
 
-    /// Position, rate and acceleration of the motor for those of the link and of the deformation: `N (q + Δ)` and so on.
-    pub fn motor_motion(&self, link: [f64; 3], deformation: [f64; 3]) -> [f64; 3] {
-        std::array::from_fn(|k| self.ratio * (link[k] + deformation[k]))
-    }
-
     /// The spring with given parameters, in the order of the element's own; the rest count as 0.
     pub fn spring(&self, linear: &[f64]) -> CubicSpring {
         let at = |k: usize| linear.get(k).copied().unwrap_or(0.0);
