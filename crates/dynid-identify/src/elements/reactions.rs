@@ -67,6 +67,10 @@ impl ElementPlan {
             let why = "it has no form beside elastic joints: leave out `elastic`";
             return Err(fault(*first, why.to_owned()));
         }
+        if !self.log_terms.payloads.is_empty() {
+            let why = "payloads of logs are no part of the reactions that it follows: leave out `payload`";
+            return Err(fault(*first, why.to_owned()));
+        }
         let loads = rates.iter().map(|rate| {
             let of_joint = self.spec.reactions.iter().find(|spec| spec.joint == names[*rate]);
             let spec = of_joint.ok_or_else(|| {
@@ -121,11 +125,18 @@ fn joint_load(mechanism: &Mechanism, rate: usize, spec: &ReactionSpec) -> Result
         let body = body(&load.joint).ok_or_else(|| {
             format!("its load is the reaction in joint `{}`, which does not move here", load.joint)
         })?;
+        // Result files may say anything.
+        if let Some(component) = load.components.iter().find(|c| **c > 5) {
+            return Err(format!("component {component} of a wrench: expected 0 to 5"));
+        }
         let components =
             load.components.iter().map(|component| Reaction::Joint { body, component: *component });
         Ok(LoadGroup { components: components.collect(), factor: load.factor })
     };
     let size = mechanism.gravity().0.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if size == 0.0 && !spec.weight.is_empty() {
+        return Err("the weight of links rests on it, and there is no gravity: state `preload`".to_owned());
+    }
     let weight = |(link, share): &(String, f64)| {
         let body = mechanism.bodies().iter().position(|b| b.name == *link).ok_or_else(|| {
             format!("the weight of link `{link}` rests on it, which no moving joint of its own carries here")

@@ -1,8 +1,8 @@
 //! The model in the result file, from which efforts can be predicted again.
 
 use dynid_io::{
-    CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, ReactionLoad, ReactionSpec,
-    RobotFile, SettingValue,
+    CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, ReactionSpec, RobotFile,
+    SettingValue,
 };
 use dynid_model::element::ElementRegistry;
 use dynid_model::{
@@ -41,7 +41,7 @@ pub struct ModelRecord {
     pub elastic: Vec<ElasticRecord>,
     /// What presses on joints whose friction follows it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub reactions: Vec<ReactionRecord>,
+    pub reactions: Vec<ReactionSpec>,
     /// Settings of elements that are numbers or flags: joint, element, key, value.
     pub element_settings: Vec<(String, String, String, SettingRecord)>,
     /// Standard parameters of all bodies whose rigid effort loads the gears of `load` elements; absent: those of the links.
@@ -96,50 +96,6 @@ impl ElasticRecord {
         let (k1, k2, d) = (None, None, None);
         let ElasticRecord { joint, motor, ratio, cubic, damping, sensor } = self.clone();
         Ok(ElasticSpec { joint, motor, ratio, cubic, damping, sensor, k1, k2, d })
-    }
-}
-
-/// What presses on a joint whose friction follows it: `F = Σ factor ‖components‖`, and the steady force
-/// `F_w = preload + |g| Σ share · mass`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct ReactionRecord {
-    /// Joint.
-    pub joint: String,
-    /// Reactions.
-    pub loads: Vec<ReactionLoadRecord>,
-    /// Links, and the share of their weight that rests on the joint.
-    pub weight: Vec<(String, f64)>,
-    /// Steady force beside them, N (N m where loads act on a radius).
-    pub preload: f64,
-}
-
-/// Some components of the wrench in a joint, whose Euclidean length counts.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct ReactionLoadRecord {
-    /// Joint.
-    pub joint: String,
-    /// 0 to 2: force along x, y, z of the joint's frame; 3 to 5: moment about them.
-    pub components: Vec<usize>,
-    /// Factor: 1, a radius in m, or the inverse of an arm in 1/m.
-    pub factor: f64,
-}
-
-impl ReactionRecord {
-    fn new(spec: &ReactionSpec) -> Self {
-        let ReactionSpec { joint, loads, weight, preload } = spec.clone();
-        let load =
-            |ReactionLoad { joint, components, factor }| ReactionLoadRecord { joint, components, factor };
-        ReactionRecord { joint, loads: loads.into_iter().map(load).collect(), weight, preload }
-    }
-
-    fn spec(&self) -> Result<ReactionSpec, Error> {
-        let ReactionRecord { joint, loads, weight, preload } = self.clone();
-        if let Some(component) = loads.iter().flat_map(|l| &l.components).find(|c| **c > 5) {
-            return Err(Error::setting("reactions.components", "0 to 5", component));
-        }
-        let load =
-            |ReactionLoadRecord { joint, components, factor }| ReactionLoad { joint, components, factor };
-        Ok(ReactionSpec { joint, loads: loads.into_iter().map(load).collect(), weight, preload })
     }
 }
 
@@ -275,7 +231,7 @@ impl ModelRecord {
             couplings,
             elastic: plan.elastic.iter().map(ElasticRecord::new).collect(),
             reactions: match plan.has_reactions() {
-                true => plan.reactions().iter().map(ReactionRecord::new).collect(),
+                true => plan.reactions().to_vec(),
                 false => Vec::new(),
             },
             element_settings,
@@ -349,7 +305,7 @@ impl ModelRecord {
             return Err(Error::setting("elastic", "names that occur once", joint));
         }
         let registry = self.registry.clone();
-        let reactions = self.reactions.iter().map(ReactionRecord::spec).collect::<Result<Vec<_>, _>>()?;
+        let reactions = self.reactions.clone();
         let spec = ElementSpec { settings, elastic, reactions, registry, ..ElementSpec::default() };
         let mut plan = ElementPlan::recorded(mechanism, self.elements.clone(), couplings, spec)?;
         plan.load_reference.clone_from(&self.load_reference);

@@ -13,7 +13,7 @@ use dynid_sim::{ControlSettings, ExperimentSettings, Imperfections, Plant, Profi
 
 use super::Loop;
 use super::reference::Reference;
-use crate::elements::LOAD;
+use crate::elements::{LOAD, REACTION_FRICTION};
 use crate::problem::Problem;
 use crate::robot::{refuse_clearance, refuse_elastic, refuse_loops};
 use crate::settings::{ClosedLoop, NominalModel};
@@ -48,6 +48,11 @@ impl<'a> Bench<'a> {
         refuse_elastic(robot, what)?;
         refuse_clearance(robot, what)?;
         refuse_loops(robot, what)?;
+        if plan.has_reactions() {
+            return Err(Error::Unsupported(format!(
+                "`{REACTION_FRICTION}` is not {what}: state other friction (`elements.friction`) or leave out `[instruments]`"
+            )));
+        }
         if plan.per_rate.iter().flatten().any(|name| name == LOAD) {
             return Err(Error::Unsupported(format!(
                 "`{LOAD}` friction depends on accelerations through its load, for which the equation of motion has no form: \

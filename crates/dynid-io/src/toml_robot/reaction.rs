@@ -1,6 +1,7 @@
 //! Friction that follows reactions, of a robot file.
 
 use dynid_model::{Description, JointDescription};
+use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 use super::Source;
@@ -14,7 +15,7 @@ pub(super) const REACTION_FRICTION: &str = "reaction_friction";
 /// What presses on a joint with friction: `F = Σ factor ‖components‖` and the steady force
 /// `F_w = preload + |g| Σ share · mass`:
 /// `[element.slider1] reaction_friction = { loads = [{ force = ["y"] }], weight = { slider1 = 1, platform = 0.7 } }`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ReactionSpec {
     /// The joint.
     pub joint: String,
@@ -27,7 +28,7 @@ pub struct ReactionSpec {
 }
 
 /// Some components of the wrench in a joint, whose Euclidean length counts.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ReactionLoad {
     /// The joint whose wrench it is.
     pub joint: String,

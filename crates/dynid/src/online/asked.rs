@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::config::{Config, MotorSide, OnlineConfig};
+use crate::elements::{ElementPlan, REACTION_FRICTION};
 use crate::robot::{Robot, refuse_loops};
 use crate::settings::Settings;
 
@@ -41,9 +42,15 @@ impl Asked {
                     .to_owned(),
             ));
         }
+        let settings = config.settings()?;
+        if ElementPlan::of_run(&settings, &robot, |_| true)?.has_reactions() {
+            return Err(Error::Unsupported(format!(
+                "`{REACTION_FRICTION}` is not followed on line, since its columns go with the estimate: state other friction"
+            )));
+        }
         Ok(Asked {
             robot,
-            settings: config.settings()?,
+            settings,
             online: config.online.clone(),
             columns: config.columns.clone(),
             motor_side: config.motor_side.clone(),

@@ -146,9 +146,9 @@ fn the_linearised_regressor_of_a_tree_is_the_derivative_of_the_effort() {
 }
 
 #[test]
-fn joints_that_float_or_follow_are_refused() {
+fn joints_that_float_are_refused() {
     let mut description = tree(3, 1);
     description.floating_base = true;
     let refused = ClosedMechanism::open(description.build().unwrap());
-    assert!(matches!(refused, Err(ClosedError::Floating { .. } | ClosedError::Mimic { .. })), "{refused:?}");
+    assert!(matches!(refused, Err(ClosedError::Floating { .. })), "{refused:?}");
 }
