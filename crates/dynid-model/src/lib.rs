@@ -21,6 +21,7 @@ pub mod parameter;
 mod per_output;
 mod random_motion;
 mod robot_model;
+pub mod ties;
 mod tree_model;
 
 pub use base_parameters::{BaseParameters, BaseSettings};
@@ -41,4 +42,5 @@ pub use parameter::{Owner, Parameter, ParameterTable, ShapeParameter};
 pub use per_output::PerOutput;
 pub use random_motion::RandomMotion;
 pub use robot_model::RobotModel;
+pub use ties::Ties;
 pub use tree_model::{FrictionPassivity, KnownElement, Passivity, TreeModel};

@@ -1,5 +1,8 @@
-//! The effort model of a robot, open or closed.
+//! The effort model of a robot, open or closed, its parameters tied or not.
 
+mod tied;
+
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::closed_model::{ClosedModel, LoadError, LoadReference};
@@ -11,15 +14,26 @@ use crate::element::{ClearanceContact, ElasticTransmission, JetMotion, JointElem
 use crate::mechanism::Mechanism;
 use crate::parameter::{Parameter, ParameterTable};
 use crate::random_motion::RandomMotion;
+use crate::ties::{TieError, Ties};
 use crate::tree_model::{FrictionPassivity, KnownElement, TreeModel};
 use dynid_algebra::scalar::Jet;
+use tied::Tied;
 
 /// Rigid bodies and joint elements of a robot: a tree, or a tree whose loops are closed.
 ///
 /// Outputs are all rates of a tree, the drives of a closed mechanism. What is said of *rates* here counts outputs.
+///
+/// With [ties](RobotModel::with_ties) parameters that follow from others stay in the table and in every vector of parameters, but
+/// have no column: efforts take them from the free ones, whatever stands in their place.
+#[derive(Debug)]
+pub struct RobotModel {
+    kind: Kind,
+    tied: Option<Box<Tied>>,
+}
+
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "a program has few models")]
-pub enum RobotModel {
+enum Kind {
     /// A tree.
     Tree(TreeModel),
     /// A tree with closed loops, or one whose joints have friction that follows reactions.
@@ -28,13 +42,13 @@ pub enum RobotModel {
 
 impl From<TreeModel> for RobotModel {
     fn from(tree: TreeModel) -> Self {
-        RobotModel::Tree(tree)
+        RobotModel { kind: Kind::Tree(tree), tied: None }
     }
 }
 
 impl From<ClosedModel> for RobotModel {
     fn from(closed: ClosedModel) -> Self {
-        RobotModel::Closed(closed)
+        RobotModel { kind: Kind::Closed(closed), tied: None }
     }
 }
 
@@ -61,9 +75,9 @@ impl RobotModel {
 
     /// The model of the tree, loops left open.
     pub fn tree(&self) -> &TreeModel {
-        match self {
-            RobotModel::Tree(tree) => tree,
-            RobotModel::Closed(closed) => closed.tree(),
+        match &self.kind {
+            Kind::Tree(tree) => tree,
+            Kind::Closed(closed) => closed.tree(),
         }
     }
 
@@ -74,9 +88,9 @@ impl RobotModel {
 
     /// The model that knows the reactions inside the mechanism: with loops, or with friction that follows reactions.
     pub fn with_reactions(&self) -> Option<&ClosedModel> {
-        match self {
-            RobotModel::Tree(_) => None,
-            RobotModel::Closed(closed) => Some(closed),
+        match &self.kind {
+            Kind::Tree(_) => None,
+            Kind::Closed(closed) => Some(closed),
         }
     }
 
@@ -84,18 +98,81 @@ impl RobotModel {
     ///
     /// # Errors
     /// [`LoadError::Value`] for a wrong length.
-    pub fn with_load_reference(self, reference: LoadReference) -> Result<Self, LoadError> {
-        match self {
-            RobotModel::Tree(tree) => Ok(RobotModel::Tree(tree)),
-            RobotModel::Closed(closed) => closed.with_load_reference(reference).map(RobotModel::Closed),
+    pub fn with_load_reference(self, mut reference: LoadReference) -> Result<Self, LoadError> {
+        if let Some(ties) = self.ties()
+            && reference.linear.len() == self.parameters().linear.len()
+            && reference.shape.len() == self.parameters().shape.len()
+        {
+            ties.complete(&mut reference.linear);
+            ties.complete_shape(&mut reference.shape);
+        }
+        let kind = match self.kind {
+            Kind::Tree(tree) => Kind::Tree(tree),
+            Kind::Closed(closed) => Kind::Closed(closed.with_load_reference(reference)?),
+        };
+        Ok(RobotModel { kind, ..self })
+    }
+
+    /// Returns the model with parameters that follow from others. Shape parameters that follow have bounds that coincide, so that no
+    /// search moves them.
+    ///
+    /// # Errors
+    /// [`TieError::KnownShaped`].
+    ///
+    /// # Panics
+    /// If a tie names a place that is not in the table.
+    pub fn with_ties(mut self, ties: Ties) -> Result<Self, TieError> {
+        self.tied = match ties.is_empty() {
+            true => None,
+            false => Some(Box::new(Tied::new(self.model(), ties)?)),
+        };
+        let start = self.parameters().shape_start();
+        Ok(self.with_shape(&start))
+    }
+
+    /// Ties of the parameters, if there are some.
+    pub fn ties(&self) -> Option<&Ties> {
+        self.tied.as_ref().map(|tied| &tied.ties)
+    }
+
+    /// Sets all linear parameters that follow from others.
+    ///
+    /// # Panics
+    /// If `linear` is too short.
+    pub fn complete(&self, linear: &mut [f64]) {
+        self.ties().into_iter().for_each(|ties| ties.complete(linear));
+    }
+
+    /// All linear parameters, those that follow from others as they do.
+    fn completed<'a>(&self, linear: &'a [f64]) -> Cow<'a, [f64]> {
+        match self.ties() {
+            Some(ties) if !ties.linear().is_empty() => {
+                let mut own = linear.to_vec();
+                ties.complete(&mut own);
+                Cow::Owned(own)
+            }
+            _ => Cow::Borrowed(linear),
+        }
+    }
+
+    /// All shape parameters, those that follow from others as they do.
+    fn whole_shape<'a>(&self, shape: &'a [f64]) -> Cow<'a, [f64]> {
+        match self.ties() {
+            Some(ties) if !ties.shape().is_empty() => {
+                let mut own = shape.to_vec();
+                ties.complete_shape(&mut own);
+                Cow::Owned(own)
+            }
+            _ => Cow::Borrowed(shape),
         }
     }
 
     fn map_tree(self, change: impl FnOnce(TreeModel) -> TreeModel) -> Self {
-        match self {
-            RobotModel::Tree(tree) => RobotModel::Tree(change(tree)),
-            RobotModel::Closed(closed) => RobotModel::Closed(closed.map_tree(change)),
-        }
+        let kind = match self.kind {
+            Kind::Tree(tree) => Kind::Tree(change(tree)),
+            Kind::Closed(closed) => Kind::Closed(closed.map_tree(change)),
+        };
+        RobotModel { kind, ..self }
     }
 
     /// Rate of the tree that an output is the effort of.
@@ -103,9 +180,9 @@ impl RobotModel {
     /// # Panics
     /// If there is no such output.
     pub fn tree_rate(&self, output: usize) -> usize {
-        match self {
-            RobotModel::Tree(_) => output,
-            RobotModel::Closed(closed) => closed.machine().driven()[output],
+        match &self.kind {
+            Kind::Tree(_) => output,
+            Kind::Closed(closed) => closed.machine().driven()[output],
         }
     }
 
@@ -134,7 +211,10 @@ impl RobotModel {
     /// If there is not one value per shape parameter.
     #[must_use]
     pub fn with_shape(self, values: &[f64]) -> Self {
-        self.map_tree(|tree| tree.with_shape(values))
+        let values = self.whole_shape(values).into_owned();
+        let held: Vec<usize> =
+            self.ties().map_or_else(Vec::new, |ties| ties.shape().iter().map(|d| d.index).collect());
+        self.map_tree(|tree| tree.with_shape(&values).with_held_shapes(&held))
     }
 
     /// Returns the model with known elements; see [`TreeModel::with_known`].
@@ -154,9 +234,9 @@ impl RobotModel {
 
     /// Joints (and coordinates without bodies) of the outputs.
     pub fn joints(&self) -> &[JointInfo] {
-        match self {
-            RobotModel::Tree(tree) => tree.joints(),
-            RobotModel::Closed(closed) => closed.joints(),
+        match &self.kind {
+            Kind::Tree(tree) => tree.joints(),
+            Kind::Closed(closed) => closed.joints(),
         }
     }
 
@@ -175,7 +255,7 @@ impl RobotModel {
     /// # Panics
     /// Panics as the function of [`TreeModel`] does.
     pub fn clearance_contacts(&self, linear: &[f64]) -> Vec<(&ClearanceContact, [f64; 3])> {
-        self.tree().clearance_contacts(linear)
+        self.tree().clearance_contacts(&self.completed(linear))
     }
 
     /// See [`TreeModel::payloads`].
@@ -203,7 +283,7 @@ impl RobotModel {
     /// # Panics
     /// Panics as the function of [`TreeModel`] does.
     pub fn elastic_transmissions(&self, linear: &[f64]) -> Vec<(&ElasticTransmission, Vec<f64>)> {
-        self.tree().elastic_transmissions(linear)
+        self.tree().elastic_transmissions(&self.completed(linear))
     }
 
     /// See [`TreeModel::element_jets`].
@@ -221,7 +301,8 @@ impl RobotModel {
         wanted: impl Fn(usize) -> bool,
         effort: &mut [Jet],
     ) -> Result<(), String> {
-        self.tree().element_jets(motion, shape, linear, wanted, effort)
+        let (shape, linear) = (self.whole_shape(shape), self.completed(linear));
+        self.tree().element_jets(motion, &shape, &linear, wanted, effort)
     }
 
     /// Passivity of the friction of an output's joint; see [`TreeModel::friction_passivity`].
@@ -236,7 +317,8 @@ impl RobotModel {
         range: (f64, f64),
         held: &[(&str, f64)],
     ) -> FrictionPassivity {
-        self.tree().friction_passivity(self.tree_rate(rate), shape, linear, range, held)
+        let (shape, linear) = (self.whole_shape(shape), self.completed(linear));
+        self.tree().friction_passivity(self.tree_rate(rate), &shape, &linear, range, held)
     }
 
     /// Columns of the friction of an output's joint over a motion of the tree; see [`TreeModel::friction_columns`].
@@ -249,7 +331,7 @@ impl RobotModel {
         shape: &[f64],
         motion: &MotionBlock<'_>,
     ) -> Vec<(usize, Vec<f64>)> {
-        self.tree().friction_columns(self.tree_rate(rate), shape, motion)
+        self.tree().friction_columns(self.tree_rate(rate), &self.whole_shape(shape), motion)
     }
 
     /// Friction of an output's joint over velocities; see [`TreeModel::friction_effort`].
@@ -264,13 +346,14 @@ impl RobotModel {
         velocities: &[f64],
         held: &[(&str, f64)],
     ) -> Vec<f64> {
-        self.tree().friction_effort(self.tree_rate(rate), shape, linear, velocities, held)
+        let (shape, linear) = (self.whole_shape(shape), self.completed(linear));
+        self.tree().friction_effort(self.tree_rate(rate), &shape, &linear, velocities, held)
     }
 
     fn model(&self) -> &dyn EffortModel {
-        match self {
-            RobotModel::Tree(tree) => tree,
-            RobotModel::Closed(closed) => closed,
+        match &self.kind {
+            Kind::Tree(tree) => tree,
+            Kind::Closed(closed) => closed,
         }
     }
 }
@@ -285,7 +368,7 @@ impl EffortModel for RobotModel {
     }
 
     fn layout(&self) -> &Arc<RegressorLayout> {
-        self.model().layout()
+        self.tied.as_ref().map_or_else(|| self.model().layout(), |tied| &tied.layout)
     }
 
     fn channels(&self) -> &[String] {
@@ -305,7 +388,7 @@ impl EffortModel for RobotModel {
         stride: usize,
         out: &mut [f64],
     ) {
-        self.model().remember(motion, step_s, shape, history, stride, out);
+        self.model().remember(motion, step_s, &self.whole_shape(shape), history, stride, out);
     }
 
     fn random_motion(&self, samples: usize, seed: u64) -> RandomMotion {
@@ -329,15 +412,18 @@ impl EffortModel for RobotModel {
     }
 
     fn regressor(&self, motion: &MotionBlock<'_>, shape: &[f64], out: &mut RegressorBlock) {
-        self.model().regressor(motion, shape, out);
+        match &self.tied {
+            None => self.model().regressor(motion, shape, out),
+            Some(tied) => tied.regressor(self.model(), motion, &self.whole_shape(shape), out),
+        }
     }
 
     fn shaped_columns(&self) -> &[(usize, usize)] {
-        self.model().shaped_columns()
+        self.tied.as_ref().map_or_else(|| self.model().shaped_columns(), |tied| &tied.shaped)
     }
 
     fn shape_dependence(&self) -> &[(usize, usize)] {
-        self.model().shape_dependence()
+        self.tied.as_ref().map_or_else(|| self.model().shape_dependence(), |tied| &tied.dependence)
     }
 
     fn shaped(
@@ -348,7 +434,12 @@ impl EffortModel for RobotModel {
         values: &mut [f64],
         derivatives: &mut [f64],
     ) {
-        self.model().shaped(motion, shape, stride, values, derivatives);
+        match &self.tied {
+            None => self.model().shaped(motion, shape, stride, values, derivatives),
+            Some(tied) => {
+                tied.shaped(self.model(), motion, &self.whole_shape(shape), stride, values, derivatives);
+            }
+        }
     }
 
     fn efforts(
@@ -359,7 +450,8 @@ impl EffortModel for RobotModel {
         stride: usize,
         effort: &mut [f64],
     ) {
-        self.model().efforts(motion, shape, linear, stride, effort);
+        let (shape, linear) = (self.whole_shape(shape), self.completed(linear));
+        self.model().efforts(motion, &shape, &linear, stride, effort);
     }
 
     fn effort_adjoint(
@@ -371,7 +463,8 @@ impl EffortModel for RobotModel {
         weights: &[f64],
         out: &mut MotionAdjoint,
     ) {
-        self.model().effort_adjoint(motion, shape, linear, stride, weights, out);
+        let (shape, linear) = (self.whole_shape(shape), self.completed(linear));
+        self.model().effort_adjoint(motion, &shape, &linear, stride, weights, out);
     }
 
     fn regressor_adjoint(
@@ -381,6 +474,12 @@ impl EffortModel for RobotModel {
         weights: &RegressorBlock,
         out: &mut MotionAdjoint,
     ) {
-        self.model().regressor_adjoint(motion, shape, weights, out);
+        match &self.tied {
+            None => self.model().regressor_adjoint(motion, shape, weights, out),
+            Some(tied) => {
+                let weights = tied.spread(self.model(), weights);
+                self.model().regressor_adjoint(motion, &self.whole_shape(shape), &weights, out);
+            }
+        }
     }
 }

@@ -225,6 +225,16 @@ impl TreeModel {
         self
     }
 
+    /// Returns the model with shape parameters that no search moves: both bounds are the value.
+    #[must_use]
+    pub(crate) fn with_held_shapes(mut self, held: &[usize]) -> Self {
+        for k in held {
+            let parameter = &mut self.parameters.shape[*k];
+            (parameter.lower, parameter.upper) = (parameter.start, parameter.start);
+        }
+        self
+    }
+
     /// Joints and coordinates as elements see them, one per rate.
     pub fn joints(&self) -> &[JointInfo] {
         &self.joints

@@ -16,6 +16,7 @@ mod payload;
 mod points;
 mod random_tree;
 mod structure;
+mod ties;
 
 #[path = "../robots/mod.rs"]
 mod robots;
