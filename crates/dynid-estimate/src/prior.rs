@@ -61,7 +61,7 @@ pub struct Prior {
     pub bodies: Vec<BodyPrior>,
     /// One entry per payload that is estimated.
     pub payloads: Vec<PayloadPrior>,
-    /// Repairs and inventions, in words, each naming its link.
+    /// Repairs and inventions, in words, each naming its link; none of bodies that follow from others.
     pub warnings: Vec<String>,
 }
 
@@ -97,7 +97,9 @@ pub fn of(
     for payload in &payloads {
         payload.fill(&mut values, &mut std);
     }
-    let warnings = bodies.iter().filter_map(BodyPrior::warning).collect();
+    let follows = |body: usize| model.ties().is_some_and(|ties| ties.body_follows(body));
+    let own = bodies.iter().enumerate().filter(|(b, _)| !follows(*b));
+    let warnings = own.filter_map(|(_, body)| body.warning()).collect();
     Ok(Prior { values, std, bodies, payloads, warnings })
 }
 

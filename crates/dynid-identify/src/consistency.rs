@@ -1,7 +1,7 @@
 //! Physically consistent standard parameters of a robot, and what consistency costs.
 
 use dynid_estimate::consistent::{
-    self as bodies, Bound, ConsistentEstimate, Form, LinkPrior, ScalarPrior, estimate,
+    self as bodies, Bound, ConsistentEstimate, Equality, Form, LinkPrior, ScalarPrior, estimate,
 };
 use dynid_estimate::folds::FoldSettings;
 use dynid_estimate::held_out::{Comparison, Estimator, compare};
@@ -9,7 +9,9 @@ use dynid_estimate::identifiability::{excited_regrouping, posterior};
 use dynid_estimate::linear::ols;
 use dynid_factor::Factor;
 use dynid_linalg::Mat;
-use dynid_model::{EffortModel, RobotModel};
+use dynid_model::inertia::PARAMETERS_PER_BODY;
+use dynid_model::ties::Dependent;
+use dynid_model::{EffortModel, RobotModel, Ties};
 use dynid_rows::conditioning::ReducedGroup;
 
 use crate::fitting::Fitted;
@@ -87,8 +89,9 @@ pub(crate) fn consistent(
         let change = ols(&training.centred(&prior_base)).x;
         change.iter().zip(&prior_base).map(|(d, b)| d + b).collect()
     };
-    let unconstrained = unconstrained(regrouping, prior, fitted)
+    let mut unconstrained = unconstrained(regrouping, prior, fitted)
         .unwrap_or_else(|| base.nearest(&linear(&fitted.estimate.factor), &prior.values, &prior.std));
+    model.complete(&mut unconstrained);
     let weights = fitted.estimate.weights();
     let training = &fitted.estimate.reduced;
     let groups: Vec<ReducedGroup> = groups.iter().map(|g| g.coarsened(fitted.merged_blocks)).collect();
@@ -141,7 +144,9 @@ pub(crate) fn consistent(
     let losses: Vec<Option<f64>> = (0..trials.len()).map(|k| held_out.loss(1 + k, UNCONSTRAINED)).collect();
     let least = losses.iter().flatten().copied().fold(f64::INFINITY, f64::min);
     let chosen = losses.iter().position(|l| l.is_none_or(|l| l <= (1.0 + TOLERANCE) * least)).unwrap_or(0);
-    let found = if chosen == 0 { first } else { estimate(&whole, &settings[chosen])? };
+    let mut found = if chosen == 0 { first } else { estimate(&whole, &settings[chosen])? };
+    // The equalities hold to rounding; what goes out holds them to the bit.
+    model.complete(&mut found.x);
     Ok(Consistent {
         values: found.x.clone(),
         estimate: Some(found),
@@ -191,10 +196,14 @@ pub fn problem(
     let of_payload = |column: usize| {
         prior.payloads.iter().any(|p| (p.first_column..p.first_column + 10).contains(&column))
     };
+    let ties = model.ties();
+    let own_body: Vec<bool> =
+        (0..bodies.len()).map(|b| !ties.is_some_and(|ties| ties.body_follows(b))).collect();
     let links = bodies
         .iter()
         .zip(&prior.bodies)
         .enumerate()
+        .filter(|(b, _)| own_body[*b])
         .map(|(b, (body, prior))| LinkPrior {
             name: body.name.clone(),
             first_column: 10 * b,
@@ -208,14 +217,25 @@ pub fn problem(
     let mut bounds = bounds.to_vec();
     let mut scalars = Vec::new();
     let table = &model.parameters().linear;
-    for (column, p) in table.iter().enumerate().skip(10 * bodies.len()).filter(|(c, _)| !of_payload(*c)) {
+    let of_body = |column: usize| own_body.get(column / PARAMETERS_PER_BODY).copied().unwrap_or(false);
+    for (column, p) in table.iter().enumerate().filter(|(c, _)| !of_payload(*c) && !of_body(*c)) {
+        let dependent = ties.and_then(|ties| ties.of_column(column));
+        // What a parameter follows from keeps it where it belongs.
+        let kept = dependent.is_some_and(|d| match d.terms[..] {
+            [] => d.constant >= 0.0,
+            [(_, factor)] => factor > 0.0 && d.constant >= 0.0,
+            _ => column < PARAMETERS_PER_BODY * bodies.len(),
+        });
         scalars.push(ScalarPrior {
             name: p.name.clone(),
             column,
             prior: prior.values[column],
             scale: prior.std[column],
-            nonnegative: p.lower == Some(0.0) && above_zero[column],
+            nonnegative: p.lower == Some(0.0) && above_zero[column] && !kept,
         });
+        if dependent.is_some_and(|d| d.terms.len() < 2) {
+            continue;
+        }
         let limit = |side: &str, factor: f64, value: f64| Bound {
             name: match shape::of_change(&p.name) {
                 Some(name) => {
@@ -235,6 +255,23 @@ pub fn problem(
         links,
         scalars,
         bounds,
-        prior_std: prior.std.clone(),
+        equalities: equalities(model),
+        prior_std: (prior.std.iter().enumerate())
+            .map(|(column, std)| match ties.and_then(|ties| ties.of_column(column)) {
+                // What is known of it is what is known of the one that it follows from.
+                Some(d) if d.terms.len() < 2 => f64::INFINITY,
+                _ => *std,
+            })
+            .collect(),
     }
+}
+
+/// Ties of the model as the solver of consistent estimates has them.
+fn equalities(model: &RobotModel) -> Vec<Equality> {
+    let of = |d: &Dependent| Equality {
+        name: Ties::words(d, model.parameters()),
+        terms: std::iter::once((d.index, 1.0)).chain(d.terms.iter().map(|(k, f)| (*k, -f))).collect(),
+        value: d.constant,
+    };
+    model.ties().into_iter().flat_map(|ties| ties.linear()).map(of).collect()
 }

@@ -5,6 +5,7 @@ mod model;
 mod pairs;
 mod reactions;
 mod settings;
+mod ties;
 
 use std::sync::Arc;
 

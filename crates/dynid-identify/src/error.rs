@@ -239,6 +239,14 @@ pub enum Error {
         /// A name that looks like it.
         meant: Option<String>,
     },
+    /// A tie does not fit the model.
+    #[error("tie {{ {tie} }}: {fault}")]
+    Tie {
+        /// The tie, as the file says it.
+        tie: String,
+        /// Why, in words.
+        fault: String,
+    },
     /// The linear estimator has no estimate.
     #[error("estimator: {0}")]
     Linear(#[from] dynid_estimate::linear::LinearError),
@@ -518,6 +526,11 @@ impl Error {
             Error::UnknownParameter { .. } => {
                 Some("`dynid inspect ROBOT` lists links and joints; parameters are `<link>.Izz`, `<joint>.fc`".to_owned())
             }
+            Error::Tie { .. } => Some(
+                "`[[tie]]` has `equal = [\"j1\", \"j2\"]`, `ratio = { \"j1.fc\" = 1, \"j2.fc\" = 2 }`, `sum = { \"a.m\" = 1, \"b.m\" = 1 }` with `value`, \
+                 `known = { \"a.m\" = 2.5 }` or `massless = [\"a\"]`"
+                    .to_owned(),
+            ),
             Error::Consistency(P::Contradiction { .. } | P::Infeasible { .. }) => {
                 Some("drop or widen one of the bounds under [[bound]]; limits are in kg, m and the parameter's unit".to_owned())
             }

@@ -262,6 +262,9 @@ pub struct ParameterValue {
     /// The motion that would help.
     #[serde(default)]
     pub advice: Option<String>,
+    /// How it follows from others, `j2.fc = j1.fc`; absent: it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tie: Option<String>,
     /// Value of the robot file.
     pub prior: Option<f64>,
 }
@@ -311,6 +314,9 @@ pub struct ShapeValue {
     pub unconstrained: Option<f64>,
     /// Range that was searched.
     pub range: (f64, f64),
+    /// How it follows from another, `j2.vs = j1.vs`; absent: it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tie: Option<String>,
     /// Standard deviation of the unconstrained value; absent if it was not estimated.
     #[serde(default)]
     pub std: Option<f64>,

@@ -122,7 +122,7 @@ fn run(
     let Opened { mut problem, read, validation, own_delays, findings, overlaps } =
         open(robot, logs, settings, progress)?;
     let conditioning = problem.condition(&mut |stage| progress(Step::Conditioning(stage)))?;
-    let mut warnings = problem.robot.cautions(&problem.structure.prior);
+    let mut warnings = problem.robot.cautions(&problem.structure.prior, problem.model.ties());
     warnings.extend(problem.robot.clearance_warnings().map(|message| {
         let remedy = "`dynid clearance ROBOT dynid-out/estimate.json --log LOG`, with your files, tells the gap and its friction from the effort";
         Caution::warn(caution::CLEARANCE, message, remedy)
@@ -135,6 +135,15 @@ fn run(
         Caution::warn(caution::ELEMENTS, pair.to_string(), remedy)
     }));
     let (problem, fit) = problem.fit(conditioning, progress)?;
+    warnings.extend(problem.plan.idle_ties(&problem.model).map(|tie| {
+        let message =
+            format!("the tie {{ {} }} ties nothing: what it names has no part in the model", tie.words());
+        Caution::warn(
+            caution::ELEMENTS,
+            message,
+            "leave the tie out, or log the joints and give them the elements that it names",
+        )
+    }));
     let (comparison, not_compared) = compared(&problem, &fit, progress)?;
     let of_reading = read.iter().flat_map(|log| log.warnings.iter().cloned());
     let of_reading = of_reading.chain(validation.iter().flat_map(Log::warnings));
@@ -471,7 +480,7 @@ pub fn open(
             log.log = plan.log_terms.with_gates(log.log.clone(), Some(label), settings.payload.as_deref());
         }
     }
-    let model = plan.model(&robot.mechanism)?;
+    let model = plan.tied_model(&robot.mechanism)?;
     let of_training: Vec<&LogSettings> = training.iter().map(|log| &log.settings).collect();
     let sources = loaded.iter().chain(&validation).map(|log| &log.source);
     let stated: Vec<String> = sources.flat_map(|source| source.stated_channels.iter().cloned()).collect();

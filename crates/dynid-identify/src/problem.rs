@@ -45,7 +45,7 @@ impl Problem {
     /// Settings that do not fit the model.
     pub fn on(&self, logs: Arc<[PreparedLog]>, settings: Settings) -> Result<Problem, Error> {
         let (robot, plan) = (self.robot.clone(), self.plan.clone());
-        let model = plan.model(&robot.mechanism)?;
+        let model = plan.tied_model(&robot.mechanism)?;
         let structure = Structure::of(&settings, &robot, &model, &plan, &logs)?;
         Ok(Problem { robot, plan, model, structure, logs, training: self.training.clone(), settings })
     }
@@ -57,7 +57,7 @@ impl Problem {
 
     /// Forms the model of the plan and its structure.
     pub(super) fn rebuild(&mut self) -> Result<(), Error> {
-        self.model = self.plan.model(&self.robot.mechanism)?;
+        self.model = self.plan.tied_model(&self.robot.mechanism)?;
         self.restructure()
     }
 
@@ -101,7 +101,7 @@ impl Problem {
             let place = self.model.parameters().shape.iter().position(|s| s.name == name);
             self.plan.log_terms.set_scale(&log, place.map_or(1.0, |k| found.shape[k]));
         }
-        self.model = self.plan.model(&self.robot.mechanism)?;
+        self.model = self.plan.tied_model(&self.robot.mechanism)?;
         let start = self.model.parameters().shape_start();
         Ok(Some(condition(&self.model, &start, kept, &self.logs, &settings, progress)?))
     }

@@ -6,8 +6,9 @@ mod instruments;
 mod trust;
 
 use dynid_model::element::{change_name, scale_name};
-use dynid_model::{EffortModel, Inertia, Owner};
-use dynid_record::{Origin, ShapeVerdict};
+use dynid_model::ties::Dependent;
+use dynid_model::{EffortModel, Inertia, Owner, Ties};
+use dynid_record::{Origin, ParameterVerdict, ShapeVerdict};
 use serde_json::json;
 
 use crate::agreement::{Agreement, FitValues};
@@ -36,6 +37,8 @@ impl Identification {
             // The change of a shape parameter stands for the parameter itself.
             columns.iter().map(name).map(|n| shape::of_change(&n).unwrap_or(&n).to_owned()).collect()
         };
+        let follows = |c: &usize| self.model.ties().is_some_and(|ties| ties.of_column(*c).is_some());
+        let never_seen: Vec<usize> = self.base.zero.iter().copied().filter(|c| !follows(c)).collect();
         let not_excited: Vec<usize> = solution.dropped.iter().map(|c| self.base.kept[*c]).collect();
         Estimate {
             schema: SCHEMA,
@@ -51,7 +54,7 @@ impl Identification {
                 excited: solution.kept.len(),
                 structural_gap: finite(self.base.gap.ratio()),
                 not_excited: names(&not_excited),
-                never_seen: names(&self.base.zero),
+                never_seen: names(&never_seen),
             },
             counts: self.counts(),
             parameters: self.robot_parameters(),
@@ -112,14 +115,21 @@ impl Identification {
         self.sources.iter().take(self.trained.len())
     }
 
-    /// Links whose identified inertia no body could have, with the reason.
+    /// Links whose identified inertia no body could have, with the reason; not those that are without mass by a tie.
     pub fn unphysical_bodies(&self) -> Vec<(String, &'static str)> {
         self.model
             .mechanism()
             .bodies()
             .iter()
             .zip(self.inertias())
-            .filter_map(|(body, inertia)| inertia.physical_fault().map(|fault| (body.name.clone(), fault)))
+            .enumerate()
+            .filter(|(b, (_, inertia))| {
+                let massless = inertia.0.iter().all(|x| *x == 0.0);
+                !(massless && self.model.ties().is_some_and(|ties| ties.body_follows(*b)))
+            })
+            .filter_map(|(_, (body, inertia))| {
+                inertia.physical_fault().map(|fault| (body.name.clone(), fault))
+            })
             .collect()
     }
 
@@ -152,6 +162,7 @@ impl Identification {
                 };
                 let value = self.values()[c];
                 let (verdict, reason) = recorded(trust.assessment.verdict);
+                let asked = verdict != ParameterVerdict::Given;
                 ParameterValue {
                     name: p.name.clone(),
                     link,
@@ -166,10 +177,11 @@ impl Identification {
                     at_boundary: trust.at_boundary,
                     verdict,
                     reason,
-                    share: Some(trust.assessment.achieved),
-                    possible_share: Some(trust.assessment.structural_limit),
+                    share: asked.then_some(trust.assessment.achieved),
+                    possible_share: asked.then_some(trust.assessment.structural_limit),
                     combination: trust.combination.clone(),
                     advice: trust.advice.clone(),
+                    tie: trust.tie.clone(),
                     prior: self.stated[c],
                 }
             })
@@ -237,6 +249,8 @@ impl Identification {
 
     fn shape_values(&self) -> Vec<ShapeValue> {
         let (model, _) = self.identified_model();
+        // What is identified obeys the ties and knows nothing of them.
+        let tied = self.shapes.as_ref().map_or(&self.model, |found| &found.model);
         let columns = self.model.parameters();
         let free = self
             .shapes
@@ -248,22 +262,33 @@ impl Identification {
             .iter()
             .enumerate()
             .map(|(k, p)| {
-                let finding = self.shapes.as_ref().map(|found| &found.findings[k]);
+                let finding = self.shapes.as_ref().map(|found| found.finding(k));
+                let tie = tied.ties().and_then(|ties| ties.of_shape(k));
+                let (lower, upper) = match tie.and_then(Dependent::multiple) {
+                    Some((free, factor)) => {
+                        let of = &tied.parameters().shape[free];
+                        let (a, b) = (factor * of.lower, factor * of.upper);
+                        (a.min(b), a.max(b))
+                    }
+                    None => (p.lower, p.upper),
+                };
                 let trust = columns.column(&change_name(&p.name)).map(|c| &self.trust.parameters[c]);
                 let (verdict, one_sided) = shape::verdict(finding.map(|f| f.verdict));
                 let seen = verdict == ShapeVerdict::SeenInData;
                 let std = trust.and_then(|t| t.std).filter(|_| seen);
                 let at =
                     self.shapes.as_ref().map_or(p.start, |found| found.model.parameters().shape[k].start);
-                let around = trust.and_then(|t| t.interval).filter(|_| seen).map(|(low, high)| {
-                    ((at + low).clamp(p.lower, p.upper), (at + high).clamp(p.lower, p.upper))
-                });
+                let around = trust
+                    .and_then(|t| t.interval)
+                    .filter(|_| seen)
+                    .map(|(low, high)| ((at + low).clamp(lower, upper), (at + high).clamp(lower, upper)));
                 ShapeValue {
                     name: p.name.clone(),
                     unit: p.unit.to_owned(),
                     value: p.start,
                     unconstrained: free.as_ref().map(|free| free.shape[k]),
-                    range: (p.lower, p.upper),
+                    range: (lower, upper),
+                    tie: tie.map(|d| Ties::shape_words(d, model.parameters())),
                     std,
                     interval: around.or(one_sided),
                     verdict,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use dynid_io::{ElementSpec, RobotFile};
 use dynid_model::closed::ClosedMechanism;
 use dynid_model::element::ElementRegistry;
-use dynid_model::{Description, EffortModel, JointKind, Mechanism, MechanismWarning, RobotModel};
+use dynid_model::{Description, EffortModel, JointKind, Mechanism, MechanismWarning, RobotModel, Ties};
 
 use crate::Error;
 use crate::caution::{self, Caution};
@@ -114,10 +114,13 @@ impl Robot {
         Ok(Robot { path: path.to_owned(), mechanism, closed, axes, elements, file, warnings })
     }
 
-    /// Oddities of the file, each with what mends it; without those of bodies of which the prior tells.
-    pub(crate) fn cautions(&self, prior: &Prior) -> Vec<Caution> {
+    /// Oddities of the file, each with what mends it; without those of bodies of which the prior tells, or which follow from others.
+    pub(crate) fn cautions(&self, prior: &Prior, ties: Option<&Ties>) -> Vec<Caution> {
         let told = |name: &String| {
-            prior.bodies.iter().any(|body| body.links.contains(name) && body.warning().is_some())
+            let own = prior.bodies.iter().position(|body| body.links.contains(name));
+            own.is_some_and(|b| {
+                prior.bodies[b].warning().is_some() || ties.is_some_and(|ties| ties.body_follows(b))
+            })
         };
         let of =
             |message: &String| {

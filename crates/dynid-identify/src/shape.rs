@@ -58,9 +58,24 @@ pub(crate) fn find(problem: &Problem, choices: &Conditioning, start: &Start) -> 
     let (base, conditioning) = (&structure.base, settings.conditioning_settings());
     let found: SeparableEstimate =
         refine(model, &shape, &base.kept, logs, choices, &conditioning, &separable)?;
-    let linear = base.expanded(&found.linear);
-    let model = problem.plan.model(&problem.robot.mechanism)?.with_shape(&found.shape);
+    let mut linear = base.expanded(&found.linear);
+    let fitted = model;
+    fitted.complete(&mut linear);
+    let model = problem.plan.tied_model(&problem.robot.mechanism)?.with_shape(&found.shape);
     Ok(ShapeFit { model, linear, findings: found.findings, starts: found.starts })
+}
+
+impl ShapeFit {
+    /// What the data say about a shape parameter, one that follows from another as about that.
+    pub(crate) fn finding(&self, shape: usize) -> &ShapeFinding {
+        let tied = self.model.ties().and_then(|ties| ties.of_shape(shape)?.multiple());
+        &self.findings[tied.map_or(shape, |(k, _)| k)]
+    }
+
+    /// Which shape parameters a linearised model may change.
+    pub(crate) fn free(&self) -> Vec<bool> {
+        (0..self.findings.len()).map(|k| is_free(self.finding(k))).collect()
+    }
 }
 
 /// Whether a linearised model may change a shape parameter: not if the logs do not see it or it lies at a bound, since a
@@ -106,7 +121,7 @@ pub fn linearised(
             )),
         });
     }
-    plan.complete(mechanism, elements)
+    plan.tied(plan.complete(mechanism, elements)?)
 }
 
 fn take<'a, T>(rest: &mut &'a [T], count: usize) -> &'a [T] {
@@ -133,14 +148,16 @@ pub fn unfold(model: &RobotModel, linearised: &RobotModel, values: &[f64]) -> Un
     assert_eq!(values.len(), table.linear.len(), "length of values");
     let shape = &model.parameters().shape;
     let change = |name: &str| table.column(&change_name(name)).map_or(0.0, |c| values[c]);
-    Unfolded {
-        shape: shape.iter().map(|s| (s.start + change(&s.name)).clamp(s.lower, s.upper)).collect(),
-        linear: kept_columns(model, linearised).map(|c| values[c]).collect(),
+    let mut shape: Vec<f64> =
+        shape.iter().map(|s| (s.start + change(&s.name)).clamp(s.lower, s.upper)).collect();
+    if let Some(ties) = model.ties() {
+        ties.complete_shape(&mut shape);
     }
+    Unfolded { shape, linear: kept_columns(model, linearised).map(|c| values[c]).collect() }
 }
 
 /// The nonlinear model of a plan and its linear parameters that `values` of the fit's model stand for; `None` if that is not
-/// linearised. Loads of friction are those at these parameters.
+/// linearised, nor its parameters tied. Loads of friction are those at these parameters.
 pub(crate) fn nonlinear(
     plan: &ElementPlan,
     linearised: &RobotModel,
@@ -149,7 +166,7 @@ pub(crate) fn nonlinear(
 ) -> Result<Option<(RobotModel, Vec<f64>)>, Error> {
     let unfolded = match found {
         Some(found) => unfold(&found.model, linearised, values),
-        None if plan.has_reactions() => {
+        None if plan.has_reactions() || linearised.ties().is_some() => {
             let shape = linearised.parameters().shape_start();
             Unfolded { linear: values.to_vec(), shape }
         }

@@ -68,7 +68,8 @@ impl Structure {
         if base.is_empty() {
             return Err(Error::Unsupported("no parameter of this robot acts on any effort".to_owned()));
         }
-        let prior = prior::of(model, stated, effort_sizes, &robot.path.display().to_string())?;
+        let mut prior = prior::of(model, stated, effort_sizes, &robot.path.display().to_string())?;
+        model.complete(&mut prior.values);
         let regrouping = advice::regrouping(&base);
         let space = VisibleSpace::new(&regrouping, &prior.std);
         let method = linear_method::method(settings, model, &base, &prior, &space)?;

@@ -3,11 +3,12 @@
 use dynid_estimate::consistent::ActiveConstraint;
 use dynid_estimate::distribution::t_quantile;
 use dynid_estimate::identifiability::{
-    Assessment, Carried, Identifiability, Verdict, VisibleSpace, excited_regrouping, posterior,
+    Assessment, Carried, Identifiability, Posterior, Verdict, VisibleSpace, excited_regrouping, posterior,
     visible_combinations,
 };
 use dynid_linalg::Mat;
-use dynid_model::{BaseParameters, EffortModel, Owner, RobotModel};
+use dynid_model::ties::Dependent;
+use dynid_model::{BaseParameters, EffortModel, Owner, RobotModel, Ties};
 use dynid_record::{CarriedReason, ParameterVerdict};
 
 use crate::advice::{Advice, FitRows, MotionSettings, Present, advise};
@@ -32,6 +33,7 @@ pub fn recorded(verdict: Verdict) -> (ParameterVerdict, Option<CarriedReason>) {
             (ParameterVerdict::CarriedByPrior, Some(reason))
         }
         Verdict::NotIdentifiable => (ParameterVerdict::NotIdentifiable, None),
+        Verdict::Given => (ParameterVerdict::Given, None),
     }
 }
 
@@ -54,6 +56,8 @@ pub struct ParameterTrust {
     pub combination: Option<String>,
     /// The motion that would help.
     pub advice: Option<String>,
+    /// How it follows from others, `j2.fc = j1.fc`, where it does: verdict, deviation and interval are then theirs.
+    pub tie: Option<String>,
 }
 
 /// What is known about all parameters.
@@ -148,37 +152,103 @@ impl Evidence<'_> {
         let table = self.model.parameters();
         // Motions are proposed for the robot alone.
         let of_logs = self.model.log_columns();
-        (0..table.linear.len())
+        let mut out: Vec<ParameterTrust> = (0..table.linear.len())
             .map(|j| {
                 let assessment = assessed.parameters[j].clone();
                 let seen = assessment.verdict == Verdict::Seen;
                 let unconstrained = self.consistent.unconstrained[j];
                 let std = after.as_ref().map(|a| a.std[j]).filter(|_| seen);
-                let lower = table.linear[j].lower.unwrap_or(f64::NEG_INFINITY);
-                let interval = std.map(|s| {
-                    let (low, high) = (unconstrained - quantile * s, unconstrained + quantile * s);
-                    (low.max(lower), high.max(lower))
-                });
-                let value = self.consistent.values[j];
                 // Of what no motion separates from others, "no motion would" says nothing new.
                 let in_combination = assessment.verdict
                     == Verdict::CarriedByPrior(Carried::OnlyInCombination)
                     && !advice.suggestions.iter().any(|s| s.parameter == j);
-                let moved = (value - unconstrained).abs();
                 ParameterTrust {
-                    wide: std.is_some_and(|s| assessment.is_wide(value, quantile * s)),
-                    at_boundary: self.constrained(j) && std.is_some_and(|s| moved > s),
                     combination: self.combination(j, &assessment, symbols, trust, &lengths),
                     advice: advice
                         .sentence(j, joints, symbols[j])
                         .filter(|_| !in_combination && !of_logs.contains(&j)),
-                    assessment,
-                    unconstrained,
-                    std,
-                    interval,
+                    ..self.judged(j, assessment, unconstrained, std, quantile)
                 }
             })
-            .collect()
+            .collect();
+        for dependent in self.model.ties().into_iter().flat_map(|ties| ties.linear()) {
+            out[dependent.index] = self.dependent(dependent, &out, after.as_ref(), quantile);
+        }
+        out
+    }
+
+    /// What is known about a parameter from its value and deviation.
+    fn judged(
+        &self,
+        column: usize,
+        assessment: Assessment,
+        unconstrained: f64,
+        std: Option<f64>,
+        quantile: f64,
+    ) -> ParameterTrust {
+        let lower = self.model.parameters().linear[column].lower.unwrap_or(f64::NEG_INFINITY);
+        let interval = std.map(|s| {
+            let (low, high) = (unconstrained - quantile * s, unconstrained + quantile * s);
+            (low.max(lower), high.max(lower))
+        });
+        let value = self.consistent.values[column];
+        let moved = (value - unconstrained).abs();
+        ParameterTrust {
+            wide: std.is_some_and(|s| assessment.is_wide(value, quantile * s)),
+            at_boundary: self.constrained(column) && std.is_some_and(|s| moved > s),
+            combination: None,
+            advice: None,
+            tie: None,
+            assessment,
+            unconstrained,
+            std,
+            interval,
+        }
+    }
+
+    /// What is known about a parameter that follows from free ones.
+    fn dependent(
+        &self,
+        dependent: &Dependent,
+        free: &[ParameterTrust],
+        after: Option<&Posterior>,
+        quantile: f64,
+    ) -> ParameterTrust {
+        let of = |(k, factor): &(usize, f64)| (&free[*k].assessment, *factor);
+        let least = |of_term: fn(&Assessment) -> f64| {
+            dependent.terms.iter().map(|term| of_term(of(term).0)).fold(1.0, f64::min)
+        };
+        let root = |of_term: fn(&Assessment) -> f64| {
+            dependent.terms.iter().map(|term| (of(term).1 * of_term(of(term).0)).powi(2)).sum::<f64>().sqrt()
+        };
+        // A sum is seen no better than the worst of its terms, and carried for the same reason.
+        let worst = dependent.terms.iter().min_by(|a, b| of(a).0.achieved.total_cmp(&of(b).0.achieved));
+        let assessment = Assessment {
+            achieved: least(|a| a.achieved),
+            log_limit: least(|a| a.log_limit),
+            structural_limit: least(|a| a.structural_limit),
+            hidden: worst.map_or(0.0, |term| of(term).0.hidden),
+            prior_std: root(|a| a.prior_std),
+            posterior_std: root(|a| a.posterior_std),
+            verdict: worst.map_or(Verdict::Given, |term| of(term).0.verdict),
+        };
+        let unconstrained = self.consistent.unconstrained[dependent.index];
+        let variance = after.map(|after| {
+            let row = |(i, f): &(usize, f64)| {
+                dependent.terms.iter().map(|(j, g)| f * g * after.covariance[(*i, *j)]).sum::<f64>()
+            };
+            dependent.terms.iter().map(row).sum::<f64>()
+        });
+        let std = variance.map(|v| v.max(0.0).sqrt()).filter(|_| assessment.verdict == Verdict::Seen);
+        let combination = match dependent.terms[..] {
+            [(k, _)] => free[k].combination.clone(),
+            _ => None,
+        };
+        ParameterTrust {
+            tie: Some(Ties::words(dependent, self.model.parameters())),
+            combination,
+            ..self.judged(dependent.index, assessment, unconstrained, std, quantile)
+        }
     }
 
     /// Whether a constraint acts on the parameter or on its link.

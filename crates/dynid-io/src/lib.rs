@@ -21,6 +21,7 @@ mod signal;
 mod source;
 pub mod states;
 pub mod stream;
+mod tie;
 pub mod toml_robot;
 pub mod trajectory;
 pub mod urdf;
@@ -34,6 +35,7 @@ pub use mesh::{Mesh, MeshError};
 pub use output::OutputError;
 pub use robot_error::{Place, RobotFileError};
 pub use states::{StateJoint, States, StatesError};
+pub use tie::{MirrorAxis, TieFault, TieSpec};
 pub use toml_robot::{
     ClearanceSpec, CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, ReactionLoad,
     ReactionSpec, RobotFile, SettingValue,

@@ -1,6 +1,7 @@
 //! Ties: parameters that are known, or known multiples and sums of others.
 
 use crate::parameter::ParameterTable;
+use dynid_algebra::inertia::PARAMETERS_PER_BODY;
 
 /// A linear relation among parameters, `Σ factor · parameter = value`.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,6 +129,19 @@ impl Ties {
     /// The shape parameter of a place, if it follows from others.
     pub fn of_shape(&self, shape: usize) -> Option<&Dependent> {
         find(&self.shape, shape)
+    }
+
+    /// Whether a body, by its place, is another one, or the mirror image of one, or known: then it exists if that one does.
+    pub fn body_follows(&self, body: usize) -> bool {
+        let first = PARAMETERS_PER_BODY * body;
+        let own: Option<Vec<&Dependent>> =
+            (first..first + PARAMETERS_PER_BODY).map(|column| self.of_column(column)).collect();
+        let Some(own) = own else { return false };
+        let other = own[0].multiple().map(|(column, _)| column);
+        let twin = |(k, d): (usize, &&Dependent)| {
+            d.multiple().is_some_and(|(column, f)| Some(column) == other.map(|o| o + k) && f.abs() == 1.0)
+        };
+        own.iter().all(|d| d.terms.is_empty()) || own.iter().enumerate().all(twin)
     }
 
     /// Sets all linear parameters that follow from others.

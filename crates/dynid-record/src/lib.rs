@@ -112,6 +112,8 @@ words! {
         CarriedByPrior = "carried by the prior",
         /// No motion of the mechanism determines it.
         NotIdentifiable = "not identifiable",
+        /// Known by a tie: no log is asked.
+        Given = "given",
     }
 }
 

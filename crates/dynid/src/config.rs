@@ -20,7 +20,7 @@ pub use crate::settings::{
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use dynid_io::{CouplingForm, MappingSpec};
+use dynid_io::{CouplingForm, MappingSpec, TieSpec};
 use dynid_model::element::ElementRegistry;
 use serde::{Deserialize, Serialize};
 
@@ -54,6 +54,8 @@ pub struct Config {
     pub elements: ElementsConfig,
     /// Couplings of joints, besides those of the robot file.
     pub coupling: Vec<CouplingConfig>,
+    /// Parameters that are known, or multiples or sums of others, besides those of the robot file; a list of names says that they are equal.
+    pub tie: Vec<TieSpec>,
     /// Columns of all logs; a log may bring its own.
     pub columns: MappingSpec,
     /// Logs hold motor positions and motor efforts behind a transmission matrix.

@@ -3,7 +3,7 @@
 mod clearance;
 mod loops;
 
-use dynid_model::{BaseParameters, BaseSettings, EffortModel};
+use dynid_model::{BaseParameters, BaseSettings, EffortModel, Ties};
 use serde::Serialize;
 
 use crate::Error;
@@ -39,6 +39,9 @@ pub struct Inspection {
     pub base_parameter_count: usize,
     /// Base parameters: name and regrouping.
     pub base_parameters: Vec<BaseRow>,
+    /// Parameters that follow from others, or are known.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub ties: Vec<String>,
     /// Parameters that never act.
     pub never_seen: Vec<String>,
     /// Gap of the singular values at the rank decision: last counted, first not counted.
@@ -112,11 +115,12 @@ pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection,
     let default = elements.or(if robot.elements.defaults.is_empty() { Some(none) } else { None });
     let plan = ElementPlan::new(mechanism, &robot.elements, default, |rate| robot.is_driven(rate))?
         .with_loops(robot.closed.clone());
-    let model = plan.model(mechanism)?;
+    let model = plan.tied_model(mechanism)?;
     let base = BaseParameters::of_model(&model, &model.parameters().shape_start(), &BaseSettings::default());
     let table = model.parameters();
     let expressions = base.expressions(table);
     let names = plan.names(mechanism);
+    let free = |column: &&usize| model.ties().is_none_or(|ties| ties.of_column(**column).is_none());
     let joints = mechanism
         .bodies()
         .iter()
@@ -176,7 +180,11 @@ pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection,
                 unit: table.linear[*c].unit.to_owned(),
             })
             .collect(),
-        never_seen: base.zero.iter().map(|c| table.linear[*c].name.clone()).collect(),
+        ties: model.ties().map_or_else(Vec::new, |ties| {
+            let linear = ties.linear().iter().map(|d| Ties::words(d, table));
+            linear.chain(ties.shape().iter().map(|d| Ties::shape_words(d, table))).collect()
+        }),
+        never_seen: base.zero.iter().filter(|c| free(c)).map(|c| table.linear[*c].name.clone()).collect(),
         rank_gap: (base.gap.kept, base.gap.dropped),
         warnings: robot
             .warnings

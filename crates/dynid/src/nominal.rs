@@ -18,7 +18,8 @@ const LIMIT_SHARE: f64 = 0.03;
 /// Values of all linear parameters of `model`: link inertias and element values of the robot file, `given` values by name
 /// over them. Friction about which neither says anything is typical for the joint: Coulomb `e` (static `1.3 e`, sigmoids
 /// from `-e` to `e`) and viscous `e` at the speed limit, with `e` 10 % of the largest rigid effort over random states, but
-/// at most 3 % of the effort limit. Offsets, rotors and what else elements may have are zero then.
+/// at most 3 % of the effort limit. Offsets, rotors and what else elements may have are zero then. Parameters that ties let follow from
+/// others do, unless they are given.
 ///
 /// # Errors
 /// [`Error::Setting`] if a given name is no parameter, linear or shape, or its value not finite.
@@ -52,6 +53,7 @@ pub fn nominal_parameters(
             values[column] = value;
         }
     }
+    let tied = plan.tied_model(model.mechanism())?;
     for (name, value) in given {
         if !value.is_finite() {
             return Err(Error::setting(&format!("values.{name}"), "a finite number", value));
@@ -62,14 +64,25 @@ pub fn nominal_parameters(
             None => return Err(Error::setting("values", "names of parameters such as `j1.fc`", name)),
         }
     }
+    // A value that is given stands, whatever the ties say.
+    for dependent in tied.ties().into_iter().flat_map(|ties| ties.linear()) {
+        if !given.contains_key(&table.linear[dependent.index].name) {
+            values[dependent.index] = dependent.value(&values);
+        }
+    }
     Ok(values)
 }
 
-/// The model with `given` values by name of its shape parameters.
+/// The model with `given` values by name of its shape parameters. Those that ties let follow from others do, unless they are given.
 ///
 /// # Errors
-/// [`Error::Setting`] if a value does not lie within the bounds of its parameter.
-pub fn with_nominal_shape(model: RobotModel, given: &BTreeMap<String, f64>) -> Result<RobotModel, Error> {
+/// [`Error::Setting`] if a value does not lie within the bounds of its parameter; [`Error::Tie`].
+pub fn with_nominal_shape(
+    model: RobotModel,
+    plan: &ElementPlan,
+    given: &BTreeMap<String, f64>,
+) -> Result<RobotModel, Error> {
+    let tied = plan.tied_model(model.mechanism())?;
     let mut shape = model.parameters().shape_start();
     for (parameter, value) in model.parameters().shape.iter().zip(&mut shape) {
         let Some(stated) = given.get(&parameter.name) else { continue };
@@ -78,6 +91,11 @@ pub fn with_nominal_shape(model: RobotModel, given: &BTreeMap<String, f64>) -> R
             return Err(Error::setting(&format!("values.{}", parameter.name), &expected, stated));
         }
         *value = *stated;
+    }
+    for dependent in tied.ties().into_iter().flat_map(|ties| ties.shape()) {
+        if !given.contains_key(&model.parameters().shape[dependent.index].name) {
+            shape[dependent.index] = dependent.value(&shape);
+        }
     }
     Ok(model.with_shape(&shape))
 }

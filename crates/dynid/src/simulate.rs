@@ -138,7 +138,7 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
         }
     }
     let model = plan.model(mechanism)?;
-    let model = with_nominal_shape(model, &settings.values)?;
+    let model = with_nominal_shape(model, &plan, &settings.values)?;
     let profiles = channels::profiles(model.channels(), &settings.channels)?;
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
     let reference = Reference::new(&model, settings, &mut rng)?;

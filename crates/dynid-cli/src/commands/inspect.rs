@@ -83,6 +83,9 @@ fn text(i: &Inspection) -> String {
         let pad = " ".repeat(width - b.name.chars().count());
         let _ = writeln!(out, "{:4}  {}{pad}  {}  [{}]", k + 1, b.name, b.expression, b.unit);
     }
+    if !i.ties.is_empty() {
+        let _ = writeln!(out, "\ntied: {}", i.ties.join(", "));
+    }
     if !i.never_seen.is_empty() {
         let _ = writeln!(out, "\nnever seen in any effort: {}", i.never_seen.join(", "));
     }

@@ -5,6 +5,7 @@ use dynid_model::symmetric::trace;
 
 use super::cone::{LINK, Ray};
 use super::interior;
+use super::manifold::Manifold;
 use super::problem::{Bound, Problem, ProblemError};
 use super::program::Program;
 
@@ -18,6 +19,8 @@ const LIFTED: f64 = 0.1;
 const SWEEPS: usize = 100;
 /// Pull towards the prior while a start is sought.
 const PULL: f64 = 1e-8;
+/// Weights of a distance from the plane of the equalities beside one nat of distance from the prior, while a start is sought.
+const FORCES: [f64; 4] = [1e2, 1e4, 1e6, 1e8];
 
 /// A strictly consistent start.
 pub(super) struct Start {
@@ -28,12 +31,15 @@ pub(super) struct Start {
 /// The prior, or where it breaks a bound a point found by minimising the largest violation.
 pub(super) fn start<const N: usize>(program: &Program<N>, problem: &Problem) -> Result<Start, ProblemError> {
     contradiction(&problem.bounds)?;
-    let xi = inside(program);
+    let (xi, before) = match &program.plane {
+        None => (inside(program), 0),
+        Some(plane) => in_plane(program, plane, problem)?,
+    };
     let bounds = &program.rays[program.lower.len()..];
     let worst = bounds.iter().map(|r| -r.slack(&xi)).fold(f64::NEG_INFINITY, f64::max);
     // A start that barely meets a bound is as bad as one that does not.
     if worst < -0.05 {
-        return Ok(Start { xi, iterations: 0 });
+        return Ok(Start { xi, iterations: before });
     }
     let n = program.unknowns();
     // However far the bounds are, the pull must not outweigh a violation.
@@ -51,7 +57,58 @@ pub(super) fn start<const N: usize>(program: &Program<N>, problem: &Problem) -> 
     if violation > -ROOM {
         return Err(ProblemError::Infeasible { conflict: conflict(program, problem, &ended), violation });
     }
-    Ok(Start { xi: ended.xi[..n].to_vec(), iterations: ended.iterations })
+    Ok(Start { xi: ended.xi[..n].to_vec(), iterations: before + ended.iterations })
+}
+
+/// A point of the plane inside the links' and scalars' own limits, and the iterations to it.
+///
+/// First the prior, brought into the plane. Where that is outside, the point whose distance from the plane is least beside the
+/// entropic distance from the prior, which keeps it inside the cones, brought into the plane.
+fn in_plane<const N: usize>(
+    program: &Program<N>,
+    plane: &Manifold,
+    problem: &Problem,
+) -> Result<(Vec<f64>, usize), ProblemError> {
+    let own = |xi: &[f64]| {
+        let within = program.rays[..program.lower.len()].iter().all(|r| r.slack(xi) > ROOM);
+        within && program.cones.iter().all(|c| dynid_model::symmetric::least_eigenvalue(&c.slack(xi)) > ROOM)
+    };
+    let first = inside(program);
+    let near = plane.project(&first);
+    if own(&near) {
+        return Ok((near, 0));
+    }
+    let n = program.unknowns();
+    let zero = plane.residual(&vec![0.0; n]);
+    let (mut xi, mut iterations) = (first, 0);
+    // A plane that barely meets the cones asks for a greater force, which a start nearby can bear.
+    for force in FORCES {
+        let search = Program {
+            a: Mat::from_fn(zero.len(), n, |i, k| force * plane.rows()[(i, k)]),
+            b: zero.iter().map(|z| -force * z).collect(),
+            data_rows: zero.len(),
+            weight: vec![PULL; n],
+            centre: program.centre.clone(),
+            entropy: 1.0,
+            cones: program.cones.clone(),
+            rays: program.rays[..program.lower.len()].to_vec(),
+            lower: program.lower.clone(),
+            scalars: program.scalars.clone(),
+            plane: None,
+        };
+        let tolerance = |objective: f64| (1e-4 * objective).max(1e-9);
+        let ended = interior::solve(&search, &xi, &tolerance);
+        iterations += ended.iterations;
+        let near = plane.project(&ended.xi);
+        if own(&near) {
+            return Ok((near, iterations));
+        }
+        xi = ended.xi;
+    }
+    let residual = plane.residual(&xi);
+    let violation = residual.iter().map(|r| r.abs()).fold(0.0, f64::max);
+    let named = problem.equalities.iter().zip(&residual).filter(|(_, r)| r.abs() > SHARE * violation);
+    Err(ProblemError::Infeasible { conflict: named.map(|(e, _)| e.name.clone()).collect(), violation })
 }
 
 /// The prior, moved inside the links' and scalars' own limits.
@@ -122,6 +179,7 @@ fn relaxed<const N: usize>(program: &Program<N>, pull: f64) -> Program<N> {
         rays: rays.collect(),
         lower: program.lower.clone(),
         scalars,
+        plane: program.plane.as_ref().map(Manifold::with_one_more),
     }
 }
 

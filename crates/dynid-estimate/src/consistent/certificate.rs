@@ -12,12 +12,13 @@ use super::program::Program;
 /// The box is this many times the size of the point.
 const BOX: f64 = 10.0;
 
-/// Gap at `xi` with multipliers `bounds` of the bounds, and `links` of the matrix inequalities, which only the 6 × 6
-/// form needs. `None` if the point is not consistent.
+/// Gap at `xi` with multipliers `bounds` of the bounds, `equalities` of the equalities, any numbers, and `links` of the matrix
+/// inequalities, which only the 6 × 6 form needs. `None` if the point is not consistent.
 pub(super) fn gap<const N: usize>(
     program: &Program<N>,
     xi: &[f64],
     bounds: &[f64],
+    equalities: &[f64],
     links: Option<&[Square<N>]>,
 ) -> Option<f64> {
     let gradient = program.gradient(xi)?;
@@ -29,6 +30,9 @@ pub(super) fn gap<const N: usize>(
         }
         ray.terms.iter().for_each(|(k, f)| cost[*k] += y * f);
         gap += y * ray.upper;
+    }
+    if let Some(plane) = &program.plane {
+        gap += plane.charge(equalities, &mut cost);
     }
     for (i, cone) in program.cones.iter().enumerate() {
         let slack = cone.slack(xi);

@@ -120,7 +120,21 @@ impl<const N: usize> Iterate<N> {
     fn gap(&self, program: &Program<N>) -> f64 {
         let bounds = &self.rays[program.lower.len()..];
         let links = (N != 4).then_some(self.links.as_slice());
-        certificate::gap(program, &self.xi, bounds, links).unwrap_or(f64::INFINITY)
+        let equalities = self.equalities(program).unwrap_or_default();
+        certificate::gap(program, &self.xi, bounds, &equalities, links).unwrap_or(f64::INFINITY)
+    }
+
+    /// Multipliers of the equalities that go with those of the cones.
+    fn equalities(&self, program: &Program<N>) -> Option<Vec<f64>> {
+        let plane = program.plane.as_ref()?;
+        let mut cost = program.gradient(&self.xi)?;
+        for (ray, y) in program.rays.iter().zip(&self.rays) {
+            ray.terms.iter().for_each(|(k, f)| cost[*k] += y * f);
+        }
+        for (cone, s) in program.cones.iter().zip(&self.links) {
+            cost[cone.first..].iter_mut().zip(cone.adjoint(s)).for_each(|(c, a)| *c -= a);
+        }
+        Some(plane.multipliers(&cost))
     }
 
     fn outcome(&self, gap: f64, iterations: usize, converged: bool) -> Outcome {

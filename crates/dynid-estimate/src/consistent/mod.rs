@@ -2,7 +2,7 @@
 //!
 //! `min ‖R x - z‖² + δ ‖ξ - ξ0‖² + w Σ ((x_j - x0_j)/σ0_j)² + γ Σ_i D(P_i | P0_i)` over standard parameters `x` such that every link's
 //! pseudo-inertia `P_i ⪰ ε P0_i` (or its weaker 6 × 6 form), friction and rotor inertias stay above `ε`, and linear
-//! bounds hold. `ξ` are whitened parameters: `svec(L⁻¹ P L⁻ᵀ)` of each link with `P0 = L Lᵀ`, scalars divided by their
+//! bounds and equalities hold. `ξ` are whitened parameters: `svec(L⁻¹ P L⁻ᵀ)` of each link with `P0 = L Lᵀ`, scalars divided by their
 //! scale. The problem is convex; [`estimate`] solves it by a primal-dual interior-point method and returns, with the
 //! estimate, a proven bound on how far from the optimum it can be ([`certificate`]).
 //!
@@ -17,12 +17,13 @@ mod certificate;
 mod cone;
 pub mod entropic;
 mod interior;
+mod manifold;
 mod problem;
 mod program;
 mod whitening;
 
 pub use active::ActiveConstraint;
-pub use problem::{Bound, Form, LinkPrior, Margin, Problem, ProblemError, ScalarPrior, Settings};
+pub use problem::{Bound, Equality, Form, LinkPrior, Margin, Problem, ProblemError, ScalarPrior, Settings};
 
 use program::Program;
 use whitening::Whitening;
@@ -162,5 +163,6 @@ pub fn certificate(
     let whitening = Whitening::new(problem)?;
     let program: Program<4> = whitening.program(problem, settings);
     let xi = whitening.whitened(estimate);
-    Ok(certificate::gap(&program, &xi, &vec![0.0; program.bounds()], None))
+    let free = program.plane.as_ref().and_then(|plane| Some(plane.multipliers(&program.gradient(&xi)?)));
+    Ok(certificate::gap(&program, &xi, &vec![0.0; program.bounds()], &free.unwrap_or_default(), None))
 }

@@ -90,7 +90,18 @@ pub struct Bound {
     pub upper: f64,
 }
 
-/// Data, priors and bounds. Every column belongs to one link or one scalar.
+/// An equality `Σ factor · x[column] = value`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Equality {
+    /// What it says, for messages.
+    pub name: String,
+    /// `(column, factor)`.
+    pub terms: Vec<(usize, f64)>,
+    /// Right-hand side.
+    pub value: f64,
+}
+
+/// Data, priors, bounds and equalities. Every column belongs to one link or one scalar.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
     /// Weighted regressor or its triangular factor: any number of rows, one column per standard parameter.
@@ -103,7 +114,9 @@ pub struct Problem {
     pub scalars: Vec<ScalarPrior>,
     /// Bounds.
     pub bounds: Vec<Bound>,
-    /// Prior standard deviations, one per column, positive; needed with a [`Settings::gaussian_weight`] only.
+    /// Equalities that hold exactly, independent of each other.
+    pub equalities: Vec<Equality>,
+    /// Prior standard deviations, one per column, positive; needed with a [`Settings::gaussian_weight`] only. Infinite: nothing is known.
     pub prior_std: Vec<f64>,
 }
 
@@ -193,7 +206,7 @@ impl Problem {
         }
         for (j, s) in self.prior_std.iter().enumerate() {
             let what = format!("prior standard deviation of column {j}");
-            number(&what, "a positive number", *s, s.is_finite() && *s > 0.0)?;
+            number(&what, "a positive number", *s, *s > 0.0)?;
         }
         let (Margin::Relative(margin) | Margin::Absolute(margin)) = settings.margin;
         number("margin", "a number in [0, 1)", margin, (0.0..1.0).contains(&margin))?;
@@ -220,18 +233,20 @@ impl Problem {
             let what = format!("scale of `{}`", scalar.name);
             number(&what, "a positive number", scalar.scale, scalar.scale.is_finite() && scalar.scale > 0.0)?;
         }
-        for bound in &self.bounds {
-            finite(&format!("right-hand side of `{}`", bound.name), bound.upper)?;
+        let bounds = self.bounds.iter().map(|b| (&b.name, &b.terms, b.upper));
+        for (name, terms, right) in bounds.chain(self.equalities.iter().map(|e| (&e.name, &e.terms, e.value)))
+        {
+            finite(&format!("right-hand side of `{name}`"), right)?;
             let mut size = 0.0_f64;
-            for (column, factor) in &bound.terms {
-                finite(&format!("factor of `{}`", bound.name), *factor)?;
+            for (column, factor) in terms {
+                finite(&format!("factor of `{name}`"), *factor)?;
                 size = size.max(factor.abs());
                 if *column >= self.columns() {
-                    let what = format!("column in `{}`", bound.name);
+                    let what = format!("column in `{name}`");
                     return Err(ProblemError::Shape { what, expected: self.columns() - 1, found: *column });
                 }
             }
-            number(&format!("factors of `{}`", bound.name), "one that is not zero", size, size > 0.0)?;
+            number(&format!("factors of `{name}`"), "one that is not zero", size, size > 0.0)?;
         }
         Ok(())
     }

@@ -4,8 +4,9 @@ use dynid_linalg::{Mat, PivotedQr};
 use dynid_model::symmetric::{cholesky, lower_inverse, product, transpose};
 
 use super::cone::{Lmi, Ray};
+use super::manifold::Manifold;
 
-/// `min F(ξ) = ‖A ξ - b‖² + Σ w (ξ - ξ0)² + γ Σ_i D(X_i | 1)` over matrix inequalities and half-lines.
+/// `min F(ξ) = ‖A ξ - b‖² + Σ w (ξ - ξ0)² + γ Σ_i D(X_i | 1)` over matrix inequalities and half-lines, in a plane.
 #[derive(Debug)]
 pub(super) struct Program<const N: usize> {
     pub a: Mat,
@@ -25,6 +26,8 @@ pub(super) struct Program<const N: usize> {
     pub lower: Vec<(usize, f64)>,
     /// Unknowns that belong to no link.
     pub scalars: Vec<usize>,
+    /// Where the equalities hold, if there are some.
+    pub plane: Option<Manifold>,
 }
 
 impl<const N: usize> Program<N> {
@@ -110,29 +113,63 @@ impl<const N: usize> Program<N> {
         h
     }
 
-    /// Minimum of the quadratic part without constraints, by QR of `[A; √w 1]`.
+    /// A matrix that acts on directions in the plane: `M N`, or `M` without equalities.
+    pub(super) fn in_plane(&self, matrix: Mat) -> Mat {
+        match &self.plane {
+            None => matrix,
+            Some(plane) => &matrix * plane.directions(),
+        }
+    }
+
+    /// The whole change of a change in the plane.
+    pub(super) fn out_of_plane(&self, change: Mat) -> Mat {
+        match &self.plane {
+            None => change,
+            Some(plane) => plane.directions() * &change,
+        }
+    }
+
+    /// The point of the plane that is nearest to `ξ0`.
+    fn origin(&self) -> Vec<f64> {
+        self.plane.as_ref().map_or_else(|| self.centre.clone(), |plane| plane.project(&self.centre))
+    }
+
+    /// Minimum of the quadratic part without inequalities, by QR of `[A; √w 1]`.
     pub(super) fn unconstrained(&self) -> Vec<f64> {
         let (rows, n) = (self.a.nrows(), self.unknowns());
         // Counted from ξ0, so that unseen directions are exactly the prior's.
-        let residual = self.residual(&self.centre);
+        let origin = self.origin();
+        let residual = self.residual(&origin);
         let stack = Mat::from_fn(rows + n, n, |i, j| match i.checked_sub(rows) {
             None => self.a[(i, j)],
             Some(k) if k == j => self.weight[k].sqrt(),
             Some(_) => 0.0,
         });
-        let rhs = Mat::from_fn(rows + n, 1, |i, _| if i < rows { -residual[i] } else { 0.0 });
-        let change = stack.qr().solve_least_squares(&rhs);
-        self.centre.iter().enumerate().map(|(k, c)| c + change[(k, 0)]).collect()
+        let pull = |k: usize| self.weight[k].sqrt() * (self.centre[k] - origin[k]);
+        let rhs = Mat::from_fn(rows + n, 1, |i, _| match i.checked_sub(rows) {
+            None => -residual[i],
+            Some(k) => pull(k),
+        });
+        let change = self.out_of_plane(self.in_plane(stack).qr().solve_least_squares(&rhs));
+        origin.iter().enumerate().map(|(k, c)| c + change[(k, 0)]).collect()
     }
 
-    /// `min ‖A ξ - b‖²` of the data over all `ξ`, by column-pivoted QR.
+    /// `min ‖A ξ - b‖²` of the data over all `ξ` of the plane, by column-pivoted QR.
     pub(super) fn least_fit(&self) -> f64 {
-        let qr = PivotedQr::new(&self.a.rows(0..self.data_rows));
+        let (data, b) = match &self.plane {
+            None => (self.a.rows(0..self.data_rows).to_mat(), self.b[..self.data_rows].to_vec()),
+            Some(_) => {
+                let left = self.residual(&self.origin());
+                let left = left[..self.data_rows].iter().map(|r| -r).collect();
+                (self.in_plane(self.a.rows(0..self.data_rows).to_mat()), left)
+            }
+        };
+        let qr = PivotedQr::new(&data);
         let r = qr.r();
         let size = r.nrows().min(r.ncols());
         let threshold = self.data_rows.max(self.unknowns()) as f64 * f64::EPSILON * r.norm_max();
         let rank = (0..size).take_while(|k| r[(*k, *k)].abs() > threshold).count();
-        let b = Mat::from_fn(self.data_rows, 1, |i, _| self.b[i]);
+        let b = Mat::column(&b);
         let q = qr.thin_q();
         let seen = q.columns(0..rank);
         let left = &b - seen * (seen.transpose() * &b);

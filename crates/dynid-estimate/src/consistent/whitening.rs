@@ -6,6 +6,7 @@ use dynid_model::Inertia;
 use dynid_model::symmetric::{Square, cholesky, congruence, lower_inverse, product, transpose};
 
 use super::cone::{LINK, Lmi, Ray};
+use super::manifold::Manifold;
 use super::problem::{LinkPrior, Margin, Problem, ProblemError, Settings};
 use super::program::Program;
 
@@ -220,7 +221,10 @@ impl Whitening {
             let terms = terms.into_iter().map(|(k, f)| (k, f / length)).collect();
             rays.push(Ray { terms, upper: bound.upper / length });
         }
+        let equalities: Vec<_> =
+            problem.equalities.iter().map(|e| (self.pulled_back(&e.terms), e.value)).collect();
         Program {
+            plane: Manifold::new(self.columns, &equalities),
             a: self.whitened_columns(rows),
             b,
             data_rows,

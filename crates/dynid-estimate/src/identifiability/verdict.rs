@@ -14,6 +14,8 @@ pub enum Verdict {
     CarriedByPrior(Carried),
     /// No motion of this robot could remove 10 % of the prior variance.
     NotIdentifiable,
+    /// The value is known: no log is asked.
+    Given,
 }
 
 /// Why a value is carried by the prior.

@@ -48,6 +48,7 @@ fn problem(g: &Value) -> Problem {
         links,
         scalars,
         bounds: Vec::new(),
+        equalities: Vec::new(),
         prior_std: Vec::new(),
     }
 }
@@ -188,6 +189,7 @@ fn indy7_projections_onto_feasible_bodies() {
             links: links.clone(),
             scalars: scalars.clone(),
             bounds: Vec::new(),
+            equalities: Vec::new(),
             prior_std: Vec::new(),
         };
         for (form, key) in [(Form::SpatialInertia, "bl"), (Form::PseudoInertia, "pseudo_inertia")] {

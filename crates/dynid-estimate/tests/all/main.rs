@@ -2,6 +2,7 @@
 
 mod blocks_and_choice;
 mod bootstrap;
+mod consistent_equalities;
 mod consistent_golden;
 mod consistent_random;
 mod determinism;

@@ -18,6 +18,15 @@ impl ElementPlan {
         self.complete(&bodies, self.build(&bodies)?)
     }
 
+    /// The effort model of the plan with its ties: what is fitted. What has been found obeys them already, and goes with [`ElementPlan::model`],
+    /// in which every parameter acts where it belongs.
+    ///
+    /// # Errors
+    /// Fails as [`ElementPlan::build`] does; [`Error::Tie`].
+    pub fn tied_model(&self, mechanism: &Mechanism) -> Result<RobotModel, Error> {
+        self.tied(self.model(mechanism)?)
+    }
+
     /// A model of elements that stand for those of the plan, completed by known friction.
     ///
     /// # Errors

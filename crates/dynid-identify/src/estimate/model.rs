@@ -2,7 +2,7 @@
 
 use dynid_io::{
     CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, ReactionSpec, RobotFile,
-    SettingValue,
+    SettingValue, TieSpec,
 };
 use dynid_model::element::ElementRegistry;
 use dynid_model::{
@@ -42,6 +42,9 @@ pub struct ModelRecord {
     /// What presses on joints whose friction follows it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reactions: Vec<ReactionSpec>,
+    /// Parameters that are known, or multiples or sums of others.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ties: Vec<TieSpec>,
     /// Settings of elements that are numbers or flags: joint, element, key, value.
     pub element_settings: Vec<(String, String, String, SettingRecord)>,
     /// Standard parameters of all bodies whose rigid effort loads the gears of `load` elements; absent: those of the links.
@@ -234,6 +237,7 @@ impl ModelRecord {
                 true => plan.reactions().to_vec(),
                 false => Vec::new(),
             },
+            ties: plan.ties().to_vec(),
             element_settings,
             load_reference: plan.load_reference.clone(),
             known_friction: plan.known.clone(),
@@ -306,7 +310,8 @@ impl ModelRecord {
         }
         let registry = self.registry.clone();
         let reactions = self.reactions.clone();
-        let spec = ElementSpec { settings, elastic, reactions, registry, ..ElementSpec::default() };
+        let ties = self.ties.clone();
+        let spec = ElementSpec { settings, elastic, reactions, ties, registry, ..ElementSpec::default() };
         let mut plan = ElementPlan::recorded(mechanism, self.elements.clone(), couplings, spec)?;
         plan.load_reference.clone_from(&self.load_reference);
         plan.known.clone_from(&self.known_friction);

@@ -202,7 +202,9 @@ impl<'a> Bench<'a> {
         let form = consistency::form(settings.estimator.consistency).unwrap_or(bodies::Form::PseudoInertia);
         let settings =
             bodies::Settings { form, gaussian_weight: PRIOR_WEIGHT, ..bodies::Settings::default() };
-        Ok(bodies::estimate(&problem, &settings)?.x)
+        let mut found = bodies::estimate(&problem, &settings)?.x;
+        model.complete(&mut found);
+        Ok(found)
     }
 
     /// The nonlinear model and its parameters that those of the fit stand for.

@@ -7,7 +7,7 @@ use dynid_rows::conditioning::{
 };
 
 use crate::Error;
-use crate::elements::{shape_element, shapes_beside};
+use crate::elements::{ElementPlan, shape_element, shapes_beside};
 use crate::problem::Problem;
 use crate::shape::ShapeFit;
 use crate::structure::Structure;
@@ -49,6 +49,9 @@ pub(super) fn choose(
         &settings,
         progress,
     )?;
+    let mut found = found;
+    let joints: Vec<&str> = model.outputs().iter().map(|o| o.name.as_str()).collect();
+    share(plan, &joints, &mut found.per_output);
     for (rate, joint) in found.per_output.iter().enumerate() {
         for accepted in &joint.accepted {
             plan.add_shape(model.tree_rate(rate), &model.outputs()[rate].name, &accepted.shape);
@@ -60,6 +63,29 @@ pub(super) fn choose(
     Ok(found)
 }
 
+/// Gives joints all of whose parameters are equal the shapes of one another.
+fn share(plan: &ElementPlan, joints: &[&str], chosen: &mut [JointFriction]) {
+    for (rate, joint) in joints.iter().enumerate() {
+        for other in plan.equal_joints(joint) {
+            let Some(from) = joints.iter().position(|name| name == other) else { continue };
+            for trial in chosen[from].accepted.clone() {
+                let own = &mut chosen[rate];
+                if own.accepted.iter().all(|t| t.shape.kind != trial.shape.kind) {
+                    own.rejected.retain(|t| t.shape.kind != trial.shape.kind);
+                    own.accepted.push(trial);
+                }
+            }
+        }
+    }
+    // One order of elements for all: equal joints have equal parameters one by one.
+    for (name, joint) in joints.iter().zip(chosen) {
+        if plan.equal_joints(name).next().is_none() {
+            continue;
+        }
+        joint.accepted.sort_by_key(|t| ShapeKind::ALL.iter().position(|k| *k == t.shape.kind));
+    }
+}
+
 /// Drops chosen shapes whose shape parameter the logs do not see after all, and falls from rest that came out as rises (`fs` below
 /// `fc`); tells whether there were any.
 pub(super) fn drop_refuted(problem: &mut Problem, found: &ShapeFit, chosen: &mut [JointFriction]) -> bool {
@@ -69,7 +95,7 @@ pub(super) fn drop_refuted(problem: &mut Problem, found: &ShapeFit, chosen: &mut
         let (_, Some(symbol)) = shape_element(trial.shape.kind) else { return false };
         let name = format!("{joint}.{symbol}");
         let place = table.shape.iter().position(|s| s.name == name);
-        place.is_some_and(|k| found.findings[k].verdict == ShapeVerdict::NotSeen)
+        place.is_some_and(|k| found.finding(k).verdict == ShapeVerdict::NotSeen)
     };
     let rises = |joint: &str, trial: &ShapeTrial| {
         let value = |symbol: &str| table.column(&format!("{joint}.{symbol}")).map(|c| found.linear[c]);

@@ -72,7 +72,7 @@ pub(super) fn search(
             start = Start::Stated;
             continue;
         }
-        let free: Vec<bool> = found.findings.iter().map(shape::is_free).collect();
+        let free = found.free();
         problem.model = shape::linearised(&problem.plan, &found.model, &found.linear, &free)?;
         problem.restructure()?;
         out.found = Some(found);

@@ -334,7 +334,7 @@ impl Recipe {
                 "elements for another number of efforts than the robot has".to_owned(),
             ));
         }
-        let nonlinear = plan.model(&robot.mechanism)?;
+        let nonlinear = plan.tied_model(&robot.mechanism)?;
         let (shapes, model) = match &self.shapes {
             None => (None, nonlinear),
             Some(shapes) => {
@@ -487,10 +487,10 @@ impl Shapes {
             limit: None,
         };
         let findings: Vec<ShapeFinding> = self.findings.iter().map(finding).collect();
-        let free: Vec<bool> = findings.iter().map(shape::is_free).collect();
-        let linearised = shape::linearised(plan, &model, &self.linear, &free)?;
         let starts = StartReport { outcomes: Vec::new(), reached: 0, distinct: 0 };
-        Ok((ShapeFit { model, linear: self.linear.clone(), findings, starts }, linearised))
+        let found = ShapeFit { model, linear: self.linear.clone(), findings, starts };
+        let linearised = shape::linearised(plan, &found.model, &found.linear, &found.free())?;
+        Ok((found, linearised))
     }
 }
 

@@ -1,5 +1,7 @@
 //! Elements of a robot in a run.
 
+use dynid_io::{TieSpec, closest};
+
 use super::Robot;
 use crate::Error;
 use crate::elements::ElementPlan;
@@ -25,6 +27,10 @@ impl ElementPlan {
             spec.per_joint.push((joint.clone(), list.clone()));
         }
         spec.couplings.extend(settings.couplings.iter().cloned());
+        for tie in &settings.tie {
+            robot.check_tie(tie)?;
+            spec.ties.push(tie.clone());
+        }
         let mut plan =
             ElementPlan::new(&robot.mechanism, &spec, settings.elements.default.as_deref(), moves)?
                 .with_loops(robot.closed.clone());
@@ -46,6 +52,26 @@ impl ElementPlan {
             plan.free_errors = known.errors == FrictionErrors::Free;
         }
         Ok(plan)
+    }
+}
+
+impl Robot {
+    /// Refuses a tie that names nothing of the robot.
+    fn check_tie(&self, tie: &TieSpec) -> Result<(), Error> {
+        let d = &self.file.description;
+        let joints = d.joints.iter().map(|j| j.name.as_str());
+        let motors = self.file.elements.elastic.iter().map(|e| e.motor.as_str());
+        let coupled = self.file.elements.couplings.iter().flat_map(|c| c.motors.iter().map(String::as_str));
+        let links = d.links.iter().map(|l| l.name.as_str());
+        let owners: Vec<&str> = joints.chain(motors).chain(coupled).chain(links).collect();
+        tie.unknown(&owners).map_or(Ok(()), |name| {
+            let owner = name.rsplit_once('.').map_or(name.as_str(), |(owner, _)| owner);
+            let known: Vec<String> = owners.iter().map(|o| (*o).to_owned()).collect();
+            Err(Error::UnknownParameter {
+                name: name.clone(),
+                meant: closest(owner, &known).map(str::to_owned),
+            })
+        })
     }
 }
 

@@ -11,7 +11,7 @@ mod log_terms;
 
 use std::collections::BTreeMap;
 
-use dynid_io::CouplingSpec;
+use dynid_io::{CouplingSpec, TieFault, TieSpec};
 use serde::Serialize;
 
 use dynid_estimate::linear::OwnEstimator;
@@ -42,6 +42,9 @@ pub struct Settings {
     /// Couplings of joints, besides those of the robot.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub couplings: Vec<CouplingSpec>,
+    /// Parameters that are known, or multiples or sums of others, besides those of the robot.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tie: Vec<TieSpec>,
     /// Conditioning.
     pub conditioning: ConditioningConfig,
     /// The size of the efforts is right, whatever the robot file, its effort limits and other arms say of it: the pre-flight then
@@ -126,6 +129,10 @@ impl Settings {
                     fault: format!("expected finite numbers in the matrix, found {:?}", coupling.matrix),
                 });
             }
+        }
+        for tie in &self.tie {
+            let key = |e: &TieFault| format!("tie{}{}", if e.key.is_empty() { "" } else { "." }, e.key);
+            tie.check().map_err(|e| Error::setting(&key(&e), e.expected, &e.found))?;
         }
         self.check_payloads()?;
         self.check_estimator()?;

@@ -14,6 +14,7 @@ use super::reaction::{self, ReactionSpec};
 use super::schema::{CouplingForm, RobotToml};
 use crate::excerpt::excerpt;
 use crate::robot_error::RobotFileError;
+use crate::tie::TieSpec;
 
 /// Elements, their settings, and transmissions that couple joints.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,6 +33,8 @@ pub struct ElementSpec {
     pub clearance: Vec<ClearanceSpec>,
     /// What presses on joints whose friction follows it: `[element.<joint>] reaction_friction = { loads = [..] }`, in joint order.
     pub reactions: Vec<ReactionSpec>,
+    /// Parameters that are known, or multiples or sums of others: `[[tie]]`.
+    pub ties: Vec<TieSpec>,
     /// The kinds of elements that these names and settings are of. A file knows those that come with the library; a program
     /// may put others in their place.
     pub registry: ElementRegistry,
@@ -147,6 +150,17 @@ pub(super) fn build(
             matrix: c.matrix.iter().map(|r| r.iter().map(|x| x.0).collect()).collect(),
             form: c.form,
         });
+    }
+    let motors = robot.coupling.iter().flat_map(|c| c.get_ref().motors.iter().map(String::as_str));
+    let links = description.links.iter().map(|link| link.name.as_str());
+    let owners: Vec<&str> = owners.into_iter().chain(motors).chain(links).collect();
+    for tie in &robot.tie {
+        let (offset, tie) = (tie.span().start, tie.get_ref());
+        tie.check().map_err(|e| source.value(offset, "tie", e.key, e.expected, &e.found))?;
+        if let Some(name) = tie.unknown(&owners) {
+            source.known(offset, "tie", "joint, link or parameter of one", name, &owners)?;
+        }
+        spec.ties.push(tie.clone());
     }
     Ok(spec)
 }

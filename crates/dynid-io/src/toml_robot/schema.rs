@@ -6,6 +6,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::number::{Angle, Number, Position};
+use crate::tie::TieSpec;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -54,6 +55,9 @@ pub(super) struct RobotToml {
     /// Joints that share motors.
     #[serde(default)]
     pub(super) coupling: Vec<Spanned<Coupling>>,
+    /// Parameters that are known, or multiples or sums of others; a list of names says that they are equal.
+    #[serde(default)]
+    pub(super) tie: Vec<Spanned<TieSpec>>,
 }
 
 /// The version of the schema: 1.

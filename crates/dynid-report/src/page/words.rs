@@ -12,6 +12,7 @@ pub(super) fn add(environment: &mut Environment<'_>) {
         seen => ParameterVerdict::SeenInData.word(),
         carried => ParameterVerdict::CarriedByPrior.word(),
         not_identifiable => ParameterVerdict::NotIdentifiable.word(),
+        given => ParameterVerdict::Given.word(),
     };
     environment.add_global("verdicts", verdicts);
     environment.add_filter("look", |value: &Value| say(value, ParameterVerdict::of_word, look, ""));
@@ -52,6 +53,7 @@ pub(super) fn look(verdict: ParameterVerdict) -> &'static str {
         ParameterVerdict::SeenInData => "seen_in_data",
         ParameterVerdict::CarriedByPrior => "carried_by_prior",
         ParameterVerdict::NotIdentifiable => "not_identifiable",
+        ParameterVerdict::Given => "given",
     }
 }
 
@@ -60,6 +62,7 @@ fn briefly(verdict: ParameterVerdict) -> &'static str {
         ParameterVerdict::SeenInData => "seen",
         ParameterVerdict::CarriedByPrior => "carried",
         ParameterVerdict::NotIdentifiable => ParameterVerdict::NotIdentifiable.word(),
+        ParameterVerdict::Given => ParameterVerdict::Given.word(),
     }
 }
 
@@ -68,7 +71,7 @@ fn shape_look(verdict: ShapeVerdict) -> &'static str {
         ShapeVerdict::SeenInData => look(ParameterVerdict::SeenInData),
         ShapeVerdict::OneSided => look(ParameterVerdict::CarriedByPrior),
         ShapeVerdict::NotSeen => look(ParameterVerdict::NotIdentifiable),
-        ShapeVerdict::Given => "given",
+        ShapeVerdict::Given => look(ParameterVerdict::Given),
     }
 }
 

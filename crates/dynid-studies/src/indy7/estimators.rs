@@ -126,6 +126,7 @@ fn nearest(arm: &Indy7, target: &[f64], form: Form) -> Result<Vec<f64>, StudyErr
         links: links.collect(),
         scalars: scalars.collect(),
         bounds: Vec::new(),
+        equalities: Vec::new(),
         prior_std: vec![1.0; columns],
     };
     let settings =

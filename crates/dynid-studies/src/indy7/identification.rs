@@ -237,6 +237,7 @@ pub(super) fn feasible(
         links: links(arm),
         scalars: scalars.collect(),
         bounds: Vec::new(),
+        equalities: Vec::new(),
         prior_std: vec![1.0; columns],
     };
     let margin = match constraints.form {

@@ -54,6 +54,7 @@ fn nearest(
         links: links.collect(),
         scalars: scalars.collect(),
         bounds: Vec::new(),
+        equalities: Vec::new(),
         prior_std: vec![1.0; columns.len()],
     };
     let found = estimate(&problem, &Consistency::default()).map_err(fault)?;

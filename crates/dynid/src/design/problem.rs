@@ -90,8 +90,8 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
         ));
     }
     let plan = ElementPlan::new(mechanism, &elements, config.elements.default.as_deref(), |_| true)?;
-    let model = plan.model(mechanism)?;
-    let model = Arc::new(with_nominal_shape(model, &config.values)?);
+    let model = plan.tied_model(mechanism)?;
+    let model = Arc::new(with_nominal_shape(model, &plan, &config.values)?);
     if !model.channels().is_empty() {
         return Err(Error::Unsupported(
             "elements that read channels such as currents say nothing about motion: leave them out of a design"

@@ -49,7 +49,7 @@ impl Structure {
             robot = robot.locked(&still)?;
         }
         let plan = ElementPlan::of_run(&asked.settings, &robot, |_| true)?;
-        let model = plan.model(&robot.mechanism)?;
+        let model = plan.tied_model(&robot.mechanism)?;
         let shape = model.parameters().shape_start();
         let settings = BaseSettings { seed: asked.settings.seed.unwrap_or(1), ..BaseSettings::default() };
         let base = BaseParameters::of_model(&model, &shape, &settings);

@@ -382,7 +382,8 @@ impl Running {
             gaussian_weight: PRIOR_SHARE * self.learned.innovations.inflation,
             ..ConsistentSettings::default()
         };
-        let found = estimate(&problem, &settings)?;
+        let mut found = estimate(&problem, &settings)?;
+        structure.model.complete(&mut found.x);
         let names = structure.model.parameters().linear.iter();
         Ok(names.zip(found.x).map(|(p, value)| PlainValue { name: p.name.clone(), value }).collect())
     }

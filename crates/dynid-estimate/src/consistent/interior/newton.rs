@@ -13,7 +13,8 @@ pub(super) struct Target<const N: usize> {
     pub rays: Vec<f64>,
 }
 
-/// Factorised `2 AᵀA + 2 diag w + BᵀB + γ B_LᵀB_L`, `B` the scaled cones, `B_L` the entropic distance.
+/// Factorised `2 AᵀA + 2 diag w + BᵀB + γ B_LᵀB_L`, `B` the scaled cones, `B_L` the entropic distance; with equalities on the
+/// directions in their plane.
 pub(super) enum Newton {
     /// Normal equations with the matrix, for refinement, and `∇F`.
     Normal(Box<Cholesky>, Mat, Vec<f64>),
@@ -59,7 +60,8 @@ impl Newton {
     ) -> Option<Self> {
         let entropic = entropic(program, xi)?;
         if orthogonal {
-            return Some(Newton::Stack(Box::new(stack(program, scalings, &entropic).qr())));
+            let stack = program.in_plane(stack(program, scalings, &entropic));
+            return Some(Newton::Stack(Box::new(stack.qr())));
         }
         let mut h = quadratic.clone();
         for (i, (cone, scaling)) in program.cones.iter().zip(&scalings.links).enumerate() {
@@ -75,6 +77,9 @@ impl Newton {
                 }
             }
         }
+        if let Some(plane) = &program.plane {
+            h = plane.directions().transpose() * program.in_plane(h);
+        }
         let factor = h.cholesky()?;
         Some(Newton::Normal(Box::new(factor), h, program.gradient(xi)?))
     }
@@ -89,7 +94,10 @@ impl Newton {
     ) -> Option<Vec<f64>> {
         let change = match self {
             Newton::Normal(factor, h, gradient) => {
-                let rhs = normal_side(program, gradient, scalings, target);
+                let mut rhs = normal_side(program, gradient, scalings, target);
+                if let Some(plane) = &program.plane {
+                    rhs = plane.directions().transpose() * &rhs;
+                }
                 let mut change = factor.solve(&rhs);
                 let left = &rhs - h * &change;
                 change += factor.solve(&left);
@@ -97,6 +105,7 @@ impl Newton {
             }
             Newton::Stack(factor) => factor.solve_least_squares(&stack_side(program, xi, target)?),
         };
+        let change = program.out_of_plane(change);
         let change: Vec<f64> = (0..program.unknowns()).map(|k| change[(k, 0)]).collect();
         change.iter().all(|x| x.is_finite()).then_some(change)
     }

@@ -104,5 +104,5 @@ pub(crate) fn random_problem(seed: u64, links: Option<usize>) -> (Problem, Vec<f
         bounds.push(Bound { name: "least total".to_owned(), terms: least, upper: -0.98 * total });
         bounds.push(Bound { name: "mass 0".to_owned(), terms: vec![(0, 1.0)], upper: 1.3 * truth[0].mass() });
     }
-    (Problem { r, z, links: priors, scalars, bounds, prior_std: Vec::new() }, x)
+    (Problem { r, z, links: priors, scalars, bounds, equalities: Vec::new(), prior_std: Vec::new() }, x)
 }
