@@ -46,6 +46,8 @@ dynid_record::words! {
         TermsOfLogs = "terms of single logs",
         /// Time blocks behind standard deviations.
         TimeBlocks = "time blocks behind the standard deviations",
+        /// Whether the logs bear out what ties say.
+        Ties = "ties of the parameters",
         /// Fit on the training logs.
         TrainingFit = "fit on training logs",
         /// Prediction of validation logs.

@@ -31,6 +31,7 @@ use crate::log_agreement::LogAgreement;
 use crate::overlap::Overlaps;
 use crate::own_delay::OwnDelay;
 use crate::settings::Route;
+use crate::tie_test::TieTest;
 pub use counts::{BaseCounts, ParameterCounts, ShapeCounts, StandardCounts};
 pub use exported::{EXPORT_LOSS_LIMIT, ExportedJoint, ExportedLog, ExportedRecord, FrictionProjection};
 pub use friction::{FrictionPassivity, FrictionTrial, PassivityRecord};
@@ -81,6 +82,9 @@ pub struct Estimate {
     /// Whether the training logs agree in what the fit holds the same; absent with one log.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub log_agreement: Option<LogAgreement>,
+    /// Whether the logs bear the ties out; absent without ties that the logs would show.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ties: Option<TieTest>,
     /// Delays of single logs, taken off their efforts.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub log_delays: Vec<OwnDelay>,

@@ -63,6 +63,15 @@ impl Fitted {
         if equal && explained.iter().all(|e| *e) {
             return estimate.factor.scaled(1.0 / self.inflation.sqrt());
         }
+        self.deflated(&estimate.reduced, estimate.x.len(), explained)
+    }
+
+    /// Weighted factor of groups of rows as the fit had them, in whatever columns, deflated as [`Fitted::information`] says.
+    pub(crate) fn deflated(&self, groups: &[ReducedGroup], total: usize, explained: &[bool]) -> Factor {
+        let known: Vec<f64> = self.inflation_per_output.iter().flatten().copied().collect();
+        let least = known.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = known.iter().copied().fold(1.0, f64::max);
+        let equal = known.len() < 2 || most <= UNEQUAL * least;
         // Joint by joint, scaled so that together they make up the inflation found for all.
         let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
         let inflation = |output: usize| -> f64 {
@@ -74,11 +83,9 @@ impl Fitted {
                 None => self.inflation,
             }
         };
-        let total = estimate.x.len();
-        let parts: Vec<Factor> = estimate
-            .reduced
+        let parts: Vec<Factor> = groups
             .iter()
-            .zip(estimate.weights())
+            .zip(self.estimate.weights())
             .map(|(group, weight)| group.merged(total).scaled(weight / inflation(group.output).sqrt()))
             .collect();
         Factor::merge(&parts.iter().collect::<Vec<_>>())

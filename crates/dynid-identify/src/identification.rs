@@ -32,6 +32,7 @@ use crate::prior::Prior;
 use crate::robot::Robot;
 use crate::settings::{LogSettings, Settings};
 use crate::shape::{self, ShapeFit};
+use crate::tie_test::TieTest;
 use crate::trained_log::{RowFit, TrainedLog};
 use crate::trust::Trust;
 
@@ -146,6 +147,8 @@ pub struct Identification {
     pub comparison: Option<Comparison>,
     /// How the loads of friction came to rest, where friction follows reactions.
     pub loads: Option<LoadRounds>,
+    /// Whether the logs bear the ties out, where there are some.
+    pub tie_test: Option<TieTest>,
 }
 
 impl Identification {

@@ -54,6 +54,7 @@ pub mod settings;
 pub mod shape;
 pub mod stiffness;
 mod structure;
+pub mod tie_test;
 mod trained_log;
 mod training_log;
 pub mod trust;

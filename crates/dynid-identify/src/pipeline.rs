@@ -41,7 +41,7 @@ pub use crate::structure::{Structure, effort_sizes, stated_values};
 use crate::trained_log::{SPEED_SPAN_S, TrainedLog};
 pub use crate::training_log::TrainingLog;
 use crate::trust::{Evidence, Trust};
-use crate::{Error, own_delay, preflight as before, stiffness};
+use crate::{Error, own_delay, preflight as before, stiffness, tie_test};
 pub(crate) use figures::{EXPLAINED, explained};
 pub use model_fit::ModelFit;
 
@@ -144,6 +144,7 @@ fn run(
             "leave the tie out, or log the joints and give them the elements that it names",
         )
     }));
+    let tie_test = tie_test::test(&problem, &fit)?;
     let (comparison, not_compared) = compared(&problem, &fit, progress)?;
     let of_reading = read.iter().flat_map(|log| log.warnings.iter().cloned());
     let of_reading = of_reading.chain(validation.iter().flat_map(Log::warnings));
@@ -169,6 +170,7 @@ fn run(
         }
         out.training.push(agreement);
     }
+    out.tie_test = tie_test;
     out.warnings.extend(not_compared);
     for log in validation {
         progress(Step::Validate(log.log.name().to_owned()));
@@ -313,6 +315,7 @@ pub(crate) fn assemble(
         instruments,
         comparison,
         loads,
+        tie_test: None,
     };
     out.nonlinear = out.unfolded(out.values())?;
     out.alone = out.without_logs()?;

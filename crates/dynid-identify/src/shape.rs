@@ -99,6 +99,16 @@ pub fn linearised(
     linear: &[f64],
     free: &[bool],
 ) -> Result<RobotModel, Error> {
+    plan.tied(linearised_whole(plan, model, linear, free)?)
+}
+
+/// [`linearised`] without the ties of the plan.
+pub(crate) fn linearised_whole(
+    plan: &ElementPlan,
+    model: &RobotModel,
+    linear: &[f64],
+    free: &[bool],
+) -> Result<RobotModel, Error> {
     assert_eq!(free.len(), model.parameters().shape.len(), "length of free");
     assert_eq!(linear.len(), model.parameters().linear.len(), "length of linear");
     let (mechanism, joints) = (model.mechanism(), model.tree().joints());
@@ -121,7 +131,7 @@ pub fn linearised(
             )),
         });
     }
-    plan.tied(plan.complete(mechanism, elements)?)
+    plan.complete(mechanism, elements)
 }
 
 fn take<'a, T>(rest: &mut &'a [T], count: usize) -> &'a [T] {

@@ -69,6 +69,8 @@ pub fn judge(id: &Identification) -> Verdict {
     checks.extend(instruments::closed_loop_bias(id));
     checks.extend(logs::checks(id));
     checks.extend(inputs::checks(id));
+    let ties = ties(id, &checks);
+    checks.extend(ties);
     let status = checks.iter().map(|c| c.status).max().unwrap_or(Status::Ok);
     let relative =
         |a: &[&Agreement]| a.iter().filter_map(|v| v.filtered.relative_error).fold(f64::NAN, f64::max);
@@ -326,6 +328,49 @@ fn residual(id: &Identification) -> Option<CheckResult> {
             "the residual is larger than sensor noise: something acts that the model does not hold (friction shape, \
              elasticity, ripple); standard deviations do not cover it"
         },
+    ))
+}
+
+/// Checks that tell whether the residual is noise: where one does not pass, what the model leaves out may speak against ties that
+/// are right.
+const OF_RESIDUAL: [CheckName; 4] =
+    [CheckName::Residual, CheckName::Delay, CheckName::ReversalMask, CheckName::Whiteness];
+
+/// Whether the logs bear out what ties say. `checks`: the others.
+fn ties(id: &Identification, checks: &[CheckResult]) -> Option<CheckResult> {
+    let found = id.tie_test.as_ref()?;
+    let open = checks.iter().filter(|c| OF_RESIDUAL.contains(&c.name) && c.status != Status::Ok);
+    let open: Vec<&str> = open.map(|c| c.name.word()).collect();
+    let far: Vec<String> = (found.deviations.iter().take(3))
+        .map(|d| format!("`{}` misses by {:.3e} ± {:.1e} {}", d.tie, d.value, d.std, d.unit))
+        .collect();
+    let meaning = match (found.is_borne_out(), far.is_empty()) {
+        (true, _) => format!(
+            "with all parameters free the residual falls no further than chance has it ({:.2} % of it), so the logs bear the ties out",
+            100.0 * found.relief
+        ),
+        (false, empty) => format!(
+            "with all parameters free {:.1} % of the residual goes, which is beyond chance: {}, and no interval covers that{}{}",
+            100.0 * found.relief,
+            // What goes with the ties for the most part is theirs.
+            match open.is_empty() || found.relief > 0.5 {
+                true => "the parts that are tied are not as the ties say".to_owned(),
+                false => format!(
+                    "the parts that are tied are not as the ties say, or what else the model leaves out ({}) passes for that",
+                    open.join(", ")
+                ),
+            },
+            if empty { "" } else { "; " },
+            far.join("; ")
+        ),
+    };
+    Some(check(
+        graded(found.is_borne_out(), true),
+        CheckName::Ties,
+        Some(found.f / found.limit).filter(|x| x.is_finite()),
+        "",
+        "fall of the residual without the ties below its 1 % threshold (1)",
+        meaning,
     ))
 }
 

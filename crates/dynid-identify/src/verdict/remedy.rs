@@ -65,6 +65,9 @@ pub(super) fn of(id: &Identification, check: CheckName) -> String {
         CheckName::Loads => "state coefficients near those of the joint (`mu_c = 0.1` beside `loads` of `reaction_friction`), bodies near those of the \
              robot, or friction that no load changes (`elements = [\"coulomb\", \"viscous\"]` of the joint)"
             .to_owned(),
+        CheckName::Ties => "leave out the tie that is contradicted, or tie less: single parameters (`equal = [\"j1.fc\", \"j2.fc\"]`) in place of \
+             whole joints or links"
+            .to_owned(),
         CheckName::Residual => format!(
             "`{}` tells whether another estimator does better; friction is measured by `dynid friction friction.toml`, and then \
              `known_friction = \"friction.json\"` under `[elements]`; a joint behind a soft gear: `elastic` in the robot file",

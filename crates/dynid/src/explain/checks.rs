@@ -99,6 +99,13 @@ pub(super) fn text(name: Name) -> Text {
             "State coefficients and bodies near those of the machine, or friction that no load changes, and compare both on a log that neither has seen.",
             "dynid identify ROBOT --log LOG --validate OTHER",
         ),
+        Name::Ties => Text(
+            "Ties say that parameters are equal, in proportion, known or add up. The fit is made again with all of them free; where the residual falls \
+             further than chance has it (F test at 1 %, colour of the residuals counted), the machine is not as the ties say. Values are then a compromise, \
+             and no interval covers that.",
+            "Leave out the tie that is named, or tie single parameters in place of whole joints or links.",
+            "dynid identify dynid.toml",
+        ),
         Name::ReversalMask => Text(
             "Rows near reversal, where friction is least like its law, may be left out. The check says whether the result depends on how many are.",
             "Choose another friction law, or state the mask.",

@@ -39,6 +39,7 @@ mod safe_designs;
 mod settings;
 mod stiffness;
 mod support;
+mod ties;
 mod trust;
 mod two_step;
 mod virtual_experiment;
