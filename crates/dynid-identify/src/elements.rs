@@ -176,12 +176,19 @@ impl ElementPlan {
     }
 
     /// Returns the plan with bounds of shape parameters for the speeds that a log reaches, per rate; `None`: not known. Settings that
-    /// state a speed stand.
+    /// state a speed stand; joints that ties make equal have the greatest of theirs.
     #[must_use]
     pub fn with_speeds(mut self, mechanism: &Mechanism, speeds: &[Option<f64>]) -> Self {
         let names = self.names(mechanism);
+        // Equal joints have equal bounds.
+        let of_name = |name: &String| names.iter().position(|n| n == name).and_then(|k| speeds[k]);
+        let shared = |joint: &str, own: Option<f64>| {
+            let others = self.equal_joints(joint).filter_map(of_name);
+            own.into_iter().chain(others).filter(|v| v.is_finite() && *v > 0.0).reduce(f64::max)
+        };
+        let speeds: Vec<Option<f64>> = names.iter().zip(speeds).map(|(n, own)| shared(n, *own)).collect();
         for ((joint, list), speed) in names.iter().zip(&self.per_rate).zip(speeds) {
-            let Some(speed) = speed.filter(|v| v.is_finite() && *v > 0.0) else { continue };
+            let Some(speed) = speed else { continue };
             let scales = |name: &&String| self.spec.registry.kind(name).is_some_and(ElementKind::scales);
             for element in list.iter().filter(scales) {
                 let is_speed = |s: &ElementSetting| {

@@ -114,19 +114,24 @@ impl RobotModel {
     }
 
     /// Returns the model with parameters that follow from others. Shape parameters that follow have bounds that coincide, so that no
-    /// search moves them.
+    /// search moves them; those that they follow have the bounds that all allow.
     ///
     /// # Errors
-    /// [`TieError::KnownShaped`].
+    /// [`TieError::KnownShaped`], [`TieError::ShapeRange`].
     ///
     /// # Panics
     /// If a tie names a place that is not in the table.
     pub fn with_ties(mut self, ties: Ties) -> Result<Self, TieError> {
-        self.tied = match ties.is_empty() {
-            true => None,
-            false => Some(Box::new(Tied::new(self.model(), ties)?)),
-        };
-        let start = self.parameters().shape_start();
+        if ties.is_empty() {
+            return Ok(RobotModel { tied: None, ..self });
+        }
+        let ranges = shape_ranges(self.parameters(), &ties)?;
+        let start: Vec<f64> = (self.parameters().shape_start().iter())
+            .zip(&ranges)
+            .map(|(x, (lower, upper))| x.clamp(*lower, *upper))
+            .collect();
+        self = self.map_tree(|tree| tree.with_shape_ranges(&ranges));
+        self.tied = Some(Box::new(Tied::new(self.model(), ties)?));
         Ok(self.with_shape(&start))
     }
 
@@ -482,4 +487,31 @@ impl EffortModel for RobotModel {
             }
         }
     }
+}
+
+/// Bounds of shape parameters, those of free ones with what follows from them within its own.
+fn shape_ranges(table: &ParameterTable, ties: &Ties) -> Result<Vec<(f64, f64)>, TieError> {
+    let mut ranges: Vec<(f64, f64)> = table.shape.iter().map(|s| (s.lower, s.upper)).collect();
+    for dependent in ties.shape() {
+        let own = &table.shape[dependent.index];
+        let fault =
+            |(lower, upper): (f64, f64)| TieError::ShapeRange { parameter: own.name.clone(), lower, upper };
+        match dependent.multiple() {
+            None => {
+                let left = (own.lower.max(dependent.constant), own.upper.min(dependent.constant));
+                if left.0 > left.1 {
+                    return Err(fault(left));
+                }
+            }
+            Some((free, factor)) => {
+                let (a, b) = (own.lower / factor, own.upper / factor);
+                let range = &mut ranges[free];
+                *range = (range.0.max(a.min(b)), range.1.min(a.max(b)));
+                if range.0 > range.1 {
+                    return Err(fault(*range));
+                }
+            }
+        }
+    }
+    Ok(ranges)
 }

@@ -64,6 +64,18 @@ pub enum TieError {
         /// The relation.
         words: String,
     },
+    /// Shape parameters have no value in common that the bounds of each allow.
+    #[error(
+        "`{parameter}` would have to lie between {lower} and {upper}, which its own bounds and those of what it is tied to leave"
+    )]
+    ShapeRange {
+        /// The parameter that follows.
+        parameter: String,
+        /// Lower end.
+        lower: f64,
+        /// Upper end, below the lower one.
+        upper: f64,
+    },
     /// A known part of an effort whose form is searched.
     #[error(
         "`{parameter}` is known to be {constant}, but how it acts depends on `{shape}`, which is not: state that too"

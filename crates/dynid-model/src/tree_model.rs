@@ -225,6 +225,15 @@ impl TreeModel {
         self
     }
 
+    /// Returns the model with other bounds of its shape parameters, one pair each.
+    #[must_use]
+    pub(crate) fn with_shape_ranges(mut self, ranges: &[(f64, f64)]) -> Self {
+        for (parameter, range) in self.parameters.shape.iter_mut().zip(ranges) {
+            (parameter.lower, parameter.upper) = *range;
+        }
+        self
+    }
+
     /// Returns the model with shape parameters that no search moves: both bounds are the value.
     #[must_use]
     pub(crate) fn with_held_shapes(mut self, held: &[usize]) -> Self {

@@ -29,7 +29,7 @@ pub struct BaseCounts {
     pub seen: usize,
 }
 
-/// Standard parameters by verdict; the three verdicts add up to all.
+/// Standard parameters by verdict; the verdicts add up to all.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct StandardCounts {
     /// All of them.
@@ -40,6 +40,13 @@ pub struct StandardCounts {
     pub carried: usize,
     /// Verdict `not identifiable`.
     pub not_identifiable: usize,
+    /// Verdict `given`.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub given: usize,
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// Shape parameters.
@@ -60,10 +67,11 @@ impl ParameterCounts {
 
     /// Standard parameters in words.
     pub fn standard_in_words(&self) -> String {
-        let StandardCounts { all, seen, carried, not_identifiable } = self.standard;
+        let StandardCounts { all, seen, carried, not_identifiable, given } = self.standard;
+        let given = if given > 0 { format!(", {given} given by ties") } else { String::new() };
         format!(
             "{seen} of {all} standard parameters seen in the data, {carried} carried by the prior, {not_identifiable} not \
-             identifiable"
+             identifiable{given}"
         )
     }
 }

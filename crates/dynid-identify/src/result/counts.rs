@@ -31,6 +31,7 @@ impl Identification {
                 seen: of(ParameterVerdict::SeenInData),
                 not_identifiable: of(ParameterVerdict::NotIdentifiable),
                 carried: of(ParameterVerdict::CarriedByPrior),
+                given: of(ParameterVerdict::Given),
             },
             shape: ShapeCounts {
                 all: shapes.len(),

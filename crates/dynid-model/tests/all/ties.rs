@@ -216,7 +216,7 @@ fn a_known_part_of_unknown_form_is_refused() {
     let fs = table.column(&format!("{joint}.fs")).unwrap();
     let known = |shapes: &[usize]| {
         let shape: Vec<Relation> = (shapes.iter())
-            .map(|k| Relation { terms: vec![(*k, 1.0)], value: 0.1, words: String::new() })
+            .map(|k| Relation { terms: vec![(*k, 1.0)], value: table.shape[*k].start, words: String::new() })
             .collect();
         let linear = [Relation { terms: vec![(fs, 1.0)], value: 0.3, words: String::new() }];
         model(1).with_ties(Ties::new(&linear, &shape).unwrap())
@@ -226,4 +226,13 @@ fn a_known_part_of_unknown_form_is_refused() {
         matches!(&refused, TieError::KnownShaped { parameter, constant: 0.3, .. } if parameter.ends_with(".fs"))
     );
     assert!(known(&[0, 1]).is_ok());
+    // Values that no bound allows.
+    let of = |a: usize, value: f64| Relation { terms: vec![(a, 1.0)], value, words: String::new() };
+    let beyond = [of(0, 10.0 * table.shape[0].upper)];
+    let refused = model(1).with_ties(Ties::new(&[], &beyond).unwrap()).unwrap_err();
+    assert!(matches!(refused, TieError::ShapeRange { .. }), "{refused}");
+    let ratio = [Relation { terms: vec![(0, 1.5), (2, -1.0)], value: 0.0, words: String::new() }];
+    let tied = model(1).with_ties(Ties::new(&[], &ratio).unwrap()).unwrap();
+    let (free, own) = (&tied.parameters().shape[0], &table.shape[2]);
+    assert!((free.upper - own.upper / 1.5).abs() < 1e-15 && free.lower == table.shape[0].lower, "{free:?}");
 }

@@ -18,6 +18,7 @@ pub(super) fn counts(joints: usize) -> Counts {
         standard_seen: 13 * n - 9 - 3 * (n - 1),
         standard_carried: 3 * (n - 1),
         standard_not_identifiable: 9,
+        standard_given: 0,
         shape: 2,
         shape_seen: 1,
     }
@@ -75,6 +76,7 @@ pub(super) fn standard_parameters(joints: usize) -> Vec<StandardParameter> {
             } else {
                 String::new()
             },
+            tie: String::new(),
             advice: if reason == Some(CarriedReason::NotExcited) {
                 format!("fast motion of joint joint_{n} would raise Iyy{n} from 12 % to 94 %")
             } else {

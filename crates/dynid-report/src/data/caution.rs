@@ -40,6 +40,8 @@ pub struct Counts {
     pub standard_carried: u64,
     /// Standard parameters that no log can show.
     pub standard_not_identifiable: u64,
+    /// Standard parameters that are given.
+    pub standard_given: u64,
     /// Shape parameters of friction.
     pub shape: u64,
     /// Shape parameters that the logs determine.

@@ -74,4 +74,6 @@ pub struct StandardParameter {
     pub combination: String,
     /// The motion that would help, one sentence; may be empty.
     pub advice: String,
+    /// How the parameter follows from others, `j2.fc = j1.fc`; may be empty.
+    pub tie: String,
 }

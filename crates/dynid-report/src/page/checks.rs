@@ -54,6 +54,7 @@ fn counts(data: &ReportData) -> Result<(), ReportError> {
             c.standard_not_identifiable,
             standard(ParameterVerdict::NotIdentifiable),
         ),
+        ("standard parameters that are given", c.standard_given, standard(ParameterVerdict::Given)),
         ("shape parameters", c.shape, data.shape_parameters.len()),
         ("shape parameters seen in the data", c.shape_seen, shape_seen),
     ] {

@@ -12,6 +12,7 @@ pub(super) struct TrustView<'a> {
     seen: usize,
     carried: usize,
     not_identifiable: usize,
+    given: usize,
     /// The counts as one bar.
     bar: String,
     groups: Vec<Group<'a>>,
@@ -49,6 +50,7 @@ pub(super) fn trust(data: &ReportData) -> TrustView<'_> {
         seen,
         carried,
         not_identifiable: none,
+        given: count(ParameterVerdict::Given),
         bar: counts_svg(
             &format!("{seen} seen in the data, {carried} carried by the prior, {none} not identifiable"),
             &[

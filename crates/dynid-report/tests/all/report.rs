@@ -90,6 +90,7 @@ fn hollow(text: &str) -> ReportData {
             reason: Some(CarriedReason::NotExcited),
             combination: text(),
             advice: text(),
+            tie: text(),
             ..Default::default()
         }],
         shape_parameters: vec![ShapeParameter {

@@ -17,7 +17,7 @@ dynid_record::words! {
         Error = "error",
         /// A status.
         Fail = "fail",
-        /// Not searched for.
+        /// Not searched for, or stated by a tie.
         Given = "given",
         /// A whole friction law.
         Identified = "identified",

@@ -41,6 +41,7 @@ pub(super) fn counts(estimate: &Estimate) -> report::Counts {
         standard_seen: of.standard.seen as u64,
         standard_carried: of.standard.carried as u64,
         standard_not_identifiable: of.standard.not_identifiable as u64,
+        standard_given: of.standard.given as u64,
         shape: of.shape.all as u64,
         shape_seen: of.shape.seen as u64,
     }

@@ -83,6 +83,7 @@ impl Shown<'_> {
             at_boundary: self.held(p),
             combination: p.combination.clone().unwrap_or_default(),
             advice: p.advice.clone().unwrap_or_default(),
+            tie: p.tie.clone().unwrap_or_default(),
         };
         estimate.parameters.iter().map(row).collect()
     }
