@@ -104,6 +104,20 @@ impl<T: Trajectory + ?Sized> Trajectory for Box<T> {
     }
 }
 
+impl<T: Trajectory + ?Sized> Trajectory for std::sync::Arc<T> {
+    fn coordinates(&self) -> usize {
+        (**self).coordinates()
+    }
+
+    fn duration(&self) -> f64 {
+        (**self).duration()
+    }
+
+    fn at(&self, time: f64, out: &mut [Point]) {
+        (**self).at(time, out);
+    }
+}
+
 /// The time within `[0, duration]`, and whether it was outside: what every trajectory holds there.
 fn held(time: f64, duration: f64) -> (f64, bool) {
     let inside = time.clamp(0.0, duration);

@@ -52,11 +52,7 @@ pub fn sweeps(settings: &SweepSettings) -> Result<Vec<PaulBlend>, TrajectoryErro
     check("largest position of a sweep", high, false)?;
     if low >= high {
         let expected = "more than the least";
-        return Err(TrajectoryError::Value {
-            name: "largest position of a sweep",
-            expected,
-            found: high,
-        });
+        return Err(TrajectoryError::Value { name: "largest position of a sweep", expected, found: high });
     }
     for (name, x) in [
         ("acceleration of a sweep", s.acceleration),

@@ -182,10 +182,8 @@ fn tracks_that_cannot_be_are_refused() {
 
 #[test]
 fn tones_rise_from_rest_and_end_there() {
-    let tones = vec![
-        Tone { frequency_hz: 3.0, amplitude: 1e-3 },
-        Tone { frequency_hz: 6.9, amplitude: 5e-4 },
-    ];
+    let tones =
+        vec![Tone { frequency_hz: 3.0, amplitude: 1e-3 }, Tone { frequency_hz: 6.9, amplitude: 5e-4 }];
     let tones = FadedTones::new(0.7, tones, 4.0, 0.5).unwrap();
     for time in [-1.0, 0.0, 4.0, 5.0] {
         assert_eq!(tones.at(time), Point::rest(0.7));
@@ -236,7 +234,8 @@ fn the_spline_of_samples_is_the_motion_where_its_borders_lie_on_samples() {
             assert!((a.acceleration - b.acceleration).abs() < 1e-11);
         }
     }
-    let (from, to) = (Point::rest(0.2), Point { position: 1.0, velocity: 0.5, acceleration: -1.0, jerk: 0.0 });
+    let (from, to) =
+        (Point::rest(0.2), Point { position: 1.0, velocity: 0.5, acceleration: -1.0, jerk: 0.0 });
     let quintic = QuinticSegment::new(&[from], &[to], 1.5).unwrap();
     let spline = QuinticSpline::new(Sampled::at_rate(&quintic, 8.0).unwrap()).unwrap();
     for quantity in Quantity::ALL {
@@ -269,14 +268,15 @@ fn ranges_of_a_spline_hold_what_lies_between_samples() {
     let tones = FadedTones::new(0.0, vec![Tone { frequency_hz: 2.0, amplitude: 0.1 }], 3.0, 0.5).unwrap();
     let motion = Alone::new(vec![0.0], 0, tones).unwrap();
     let spline = QuinticSpline::new(Sampled::at_rate(&motion, 17.0).unwrap()).unwrap();
-    for (order, quantity) in [Quantity::Position, Quantity::Velocity, Quantity::Acceleration].iter().enumerate() {
+    for (order, quantity) in
+        [Quantity::Position, Quantity::Velocity, Quantity::Acceleration].iter().enumerate()
+    {
         let (low, high) = spline.range(0, *quantity);
         let values = (0..=20_000).map(|k| {
             let p = at(&spline, spline.duration() * f64::from(k) / 20_000.0)[0];
             [p.position, p.velocity, p.acceleration][order]
         });
-        let (least, most) =
-            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
         let slack = 1e-9 * (high - low);
         assert!(low <= least + slack && most <= high + slack);
         assert!(least - low < 1e-5 * (high - low) && high - most < 1e-5 * (high - low));
