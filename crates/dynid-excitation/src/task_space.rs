@@ -5,7 +5,7 @@
 //! their velocities and accelerations by the exact Jacobian of the closures. Trees and mechanisms with loops are the same to it.
 
 use dynid_model::closed::{
-    ClosedError, ClosedMechanism, ClosureDescription, Condition, CutKind, LinkFrame, PoseError,
+    ClosedError, ClosedMechanism, ClosureDescription, Condition, CutKind, LinkFrame, NamedMotion, PoseError,
 };
 use dynid_model::dynamics::Dynamics;
 use dynid_model::{
@@ -67,9 +67,15 @@ pub enum TaskSpaceError {
     },
     /// The point cannot be moved in the plane from the start pose.
     #[error("the point cannot move in the plane of the circle from the start pose: {0}")]
-    Start(#[from] ClosedError),
+    Start(ClosedError),
+    /// The start pose is next to a singular one.
+    #[error("the start pose is singular: with the point held, {motion} is free")]
+    SingularStart {
+        /// The motion that is free there.
+        motion: NamedMotion,
+    },
     /// More joints than the circle asks for, or fewer.
-    #[error("expected {expected} free motions of the mechanism with its point in the plane, found {found}")]
+    #[error("expected just {expected} free motions, those of the point, found {found}")]
     Mobility {
         /// Coordinates of the carriage.
         expected: usize,
@@ -173,7 +179,8 @@ impl PointCircle {
             },
         });
         start.extend(carriage.iter().cloned().zip(offset.0.map(|x| vec![x])));
-        let machine = ClosedMechanism::new(description.build()?, closures, Some(&carriage), &start)?;
+        let machine = ClosedMechanism::new(description.build()?, closures, Some(&carriage), &start)
+            .map_err(|fault| at_start(fault, slides))?;
         if machine.mobility() != slides {
             return Err(TaskSpaceError::Mobility { expected: slides, found: machine.mobility() });
         }
@@ -245,6 +252,16 @@ impl PointCircle {
             }
         }
         Ok(out)
+    }
+}
+
+/// A fault of the mechanism with its carriage, in the words of circles.
+fn at_start(fault: ClosedError, expected: usize) -> TaskSpaceError {
+    match fault {
+        ClosedError::UnderActuated { mobility, .. } => TaskSpaceError::Mobility { expected, found: mobility },
+        ClosedError::Immobile { .. } => TaskSpaceError::Mobility { expected, found: 0 },
+        ClosedError::SingularHome { motion, .. } => TaskSpaceError::SingularStart { motion },
+        other => TaskSpaceError::Start(other),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Why a motion cannot be made.
 
 use dynid_excitation::TaskSpaceError;
-use dynid_model::closed::{ClosedError, PoseError};
+use dynid_model::closed::PoseError;
 use dynid_motion::trajectory::{Quantity, TrajectoryError};
 
 use crate::{Error, Fault};
@@ -11,7 +11,7 @@ use crate::{Error, Fault};
 #[non_exhaustive]
 pub enum MotionFault {
     /// A part breaks a limit of a joint.
-    #[error("{part}: {quantity} of joint `{joint}`: expected {low} to {high}, found {found}")]
+    #[error("{part}: {quantity} of joint `{joint}`: expected {low:.6} to {high:.6}, found {found:.6}")]
     Limit {
         /// The part.
         part: String,
@@ -55,7 +55,9 @@ pub enum MotionFault {
         fault: Box<PoseError>,
     },
     /// A joint inside of a mechanism with loops leaves its range.
-    #[error("{part}, at {time_s:.3} s: position of joint `{joint}`: expected {low} to {high}, found {found}")]
+    #[error(
+        "{part}, at {time_s:.3} s: position of joint `{joint}`: expected {low:.6} to {high:.6}, found {found:.6}"
+    )]
     Inside {
         /// The part, or the way to it.
         part: String,
@@ -90,13 +92,16 @@ impl Fault for MotionFault {
             }
             MotionFault::Trajectory { .. } => "correct the numbers of the part",
             MotionFault::Circle { source, .. } => match &**source {
-                TaskSpaceError::Mobility { expected, found } if found > expected => FREE,
-                TaskSpaceError::Start(ClosedError::UnderActuated { .. }) => FREE,
-                TaskSpaceError::Start(ClosedError::Immobile { .. }) | TaskSpaceError::Mobility { .. } => {
-                    "the joints are too few: `hold_orientation = false` leaves the orientation of the link free; hold fewer joints"
+                TaskSpaceError::Mobility { expected, found } if found > expected => {
+                    "more joints than the circle needs: `hold_orientation = true` keeps the orientation of the link, \
+                     `hold = [\"joint\", ..]` keeps joints where they are"
                 }
-                TaskSpaceError::Start(_) => {
-                    "the start pose is next to a singular one: state another under [start]"
+                TaskSpaceError::Mobility { .. } => {
+                    "the joints are too few: `hold_orientation = false` leaves the orientation of the link free; hold fewer joints, or \
+                     turn `normal` into the plane of the mechanism"
+                }
+                TaskSpaceError::SingularStart { .. } | TaskSpaceError::Start(_) => {
+                    "state another pose under [start], with bent joints"
                 }
                 TaskSpaceError::Unreachable { .. } => {
                     "state a smaller radius, another centre, or another pose under [start]"
@@ -111,9 +116,6 @@ impl Fault for MotionFault {
         Some(hint.to_owned())
     }
 }
-
-const FREE: &str = "more joints than the circle needs: `hold_orientation = true` keeps the orientation of the link, \
-                    `hold = [\"joint\", ..]` keeps joints where they are";
 
 impl From<MotionFault> for Error {
     fn from(fault: MotionFault) -> Self {

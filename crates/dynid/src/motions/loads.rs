@@ -36,10 +36,11 @@ pub(super) fn loads(
         let is_read = model.channels().contains(&column);
         if is_read && load.brake != is_brake(robot, &load.joint) {
             let expected = match load.brake {
-                true => "`external_load = { brake = true }` at the joint in the robot file",
-                false => "`external_load` without `brake = true` at the joint in the robot file",
+                true => "`brake = true` in `external_load` of the robot file as well",
+                false => "no `brake = true` in `external_load` of the robot file either",
             };
-            return Err(Error::setting(&format!("load {}: brake", k + 1), expected, "the other"));
+            let found = format!("brake = {}", !load.brake);
+            return Err(Error::setting(&format!("load {}: brake", k + 1), expected, found));
         }
         let profile = Profile::new(points(load, parts, config.sample_rate_hz))?;
         let values: Vec<f64> = time.iter().map(|t| profile.at(*t)).collect();
@@ -81,9 +82,9 @@ pub(super) fn unread(load: &LoadRecord) -> Option<String> {
     let brake = if load.brake { ", brake = true" } else { "" };
     (!load.is_read).then(|| {
         format!(
-            "no element of the robot file reads `{}`: state `[element.{}] external_load = {{ factor = 1{brake} }}` there before \
-             `dynid simulate` follows the file",
-            load.column, load.joint
+            "no element of the robot file reads `{}`: before `dynid simulate` follows the file, put `external_load` among the elements of \
+             `{}` there, with `external_load = {{ factor = 1{brake} }}` under `[element.{}]`",
+            load.column, load.joint, load.joint
         )
     })
 }

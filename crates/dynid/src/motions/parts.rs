@@ -72,6 +72,12 @@ pub(super) fn part(
     current: &[f64],
 ) -> Result<Part, Error> {
     let mut slowed = 1.0;
+    if let Some(fast) = too_fast(bench, part)? {
+        if !config.slower {
+            return Err(fast.fault(bench, part.title(number), false));
+        }
+        slowed = fast.factor;
+    }
     for _ in 0..ATTEMPTS {
         let pieces = pieces(bench, (number, part), current, slowed)?;
         let ranges = ranges(bench, &pieces).map_err(|source| trajectory(number, part, source))?;
@@ -139,6 +145,16 @@ impl Worst {
         let (joint, quantity, found) = (bench.joints[self.coordinate].clone(), self.quantity, self.found);
         MotionFault::Limit { part, joint, quantity, low, high, found, slowed }.into()
     }
+}
+
+/// A speed of a sweep beyond the limit, which says more than what the range has no room for.
+fn too_fast(bench: &Bench<'_>, part: &PartConfig) -> Result<Option<Worst>, Error> {
+    let Some(config) = &part.sweep else { return Ok(None) };
+    let coordinate = bench.coordinate(&config.joint)?;
+    let found = config.speeds.iter().copied().fold(0.0, f64::max);
+    let factor = found / bench.limits[coordinate].velocity;
+    let fast = Worst { coordinate, quantity: Quantity::Velocity, found, factor };
+    Ok((factor > 1.0 + ROUNDING).then_some(fast))
 }
 
 fn worst(bench: &Bench<'_>, ranges: &Ranges) -> Option<Worst> {
@@ -302,7 +318,11 @@ fn track(
         Some(blend) => blend * slowed,
         None => shortest_blend(bench, &points, &times(1.0 / bench.rate_hz)?),
     };
-    let blend = bench.on_grid(blend);
+    let mut blend = bench.on_grid(blend);
+    if config.blend_s.is_none() && config.times_s.is_some() {
+        // Stated times may leave no room for the blend that a limit asks for: it is then told as broken.
+        blend = times(blend)?.into_iter().fold(blend, f64::min);
+    }
     let times = times(blend)?.iter().map(|t| bench.on_grid(*t)).collect();
     let motion = PaulTrack::new(points, times, blend)?;
     Ok(vec![Piece::new(motion)])

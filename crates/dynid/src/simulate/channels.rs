@@ -36,7 +36,7 @@ pub(super) fn profiles(
         return Err(Error::setting(&format!("channels.{name}"), &expected, name));
     }
     if let Some(name) = followed.keys().find(|name| !channels.contains(name)) {
-        let expected = "an element that reads this column of the trajectory, such as `external_load = { factor = 1 }` at the joint of a load";
+        let expected = "an element that reads this column of the trajectory (of loads `external_load`, with `external_load = { factor = 1 }` under `[element.<joint>]`)";
         return Err(Error::setting(&format!("follow: {name}"), expected, "none"));
     }
     let twice = |name: &&String| followed.keys().any(|f| f == *name || of_all(f, name));
