@@ -32,7 +32,7 @@ pub(crate) struct MotionArgs {
         long,
         value_name = "LEAST,LARGEST",
         value_delimiter = ',',
-        allow_negative_numbers = true,
+        allow_hyphen_values = true,
         requires = "sweep"
     )]
     pub(crate) range: Vec<f64>,

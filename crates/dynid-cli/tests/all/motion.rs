@@ -296,7 +296,10 @@ fn what_breaks_a_limit_is_refused_or_slower_on_demand() {
         ),
     ];
     for (part, said) in parts {
-        let folder = folder(&[("motion.toml", &format!("robot = \"arm.urdf\"\n[[part]]\n{part}\n"))]);
+        let folder = folder(&[(
+            "motion.toml",
+            &format!("robot = \"arm.urdf\"\nlimits.acceleration = 20\n[[part]]\n{part}\n"),
+        )]);
         let at = folder.path();
         let refused = run(at, &["motion", "motion.toml", "--out", "out"], 2);
         let message = stderr(&refused);

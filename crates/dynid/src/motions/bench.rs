@@ -84,8 +84,12 @@ impl<'a> Bench<'a> {
         (duration_s * self.rate_hz - 1e-6).ceil().max(1.0) / self.rate_hz
     }
 
-    /// Refuses poses that loops cannot take, and ranges of passive joints that they break; `title`: of the part at a time.
-    pub(super) fn check_inside(&self, sampled: &Sampled, title: &dyn Fn(f64) -> String) -> Result<(), Error> {
+    /// Refuses poses that loops cannot take, and ranges of passive joints that they break; `title`: of the part at a sample.
+    pub(super) fn check_inside(
+        &self,
+        sampled: &Sampled,
+        title: &dyn Fn(usize) -> String,
+    ) -> Result<(), Error> {
         let Some(closed) = &self.robot.closed else { return Ok(()) };
         let ranges: Vec<(usize, &str, (f64, f64))> = (self.robot.mechanism.bodies().iter())
             .filter(|body| body.joint.positions() == 1 && !self.joints.contains(&body.joint.name))
@@ -102,14 +106,14 @@ impl<'a> Bench<'a> {
                 *x = block.q[k * block.stride + sample];
             }
             closed.reach(&mut pose, &q).map_err(|fault| MotionFault::Pose {
-                part: title(time_s),
+                part: title(sample),
                 time_s,
                 fault: Box::new(fault),
             })?;
             for (position, joint, (low, high)) in &ranges {
                 let found = pose.positions()[*position];
                 if !(found >= *low && found <= *high) {
-                    let (part, joint) = (title(time_s), (*joint).to_owned());
+                    let (part, joint) = (title(sample), (*joint).to_owned());
                     let fault = MotionFault::Inside { part, time_s, joint, low: *low, high: *high, found };
                     return Err(fault.into());
                 }

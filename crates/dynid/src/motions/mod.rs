@@ -16,7 +16,7 @@ mod record;
 use std::path::PathBuf;
 
 use dynid_io::OutputError;
-use dynid_motion::trajectory::{Phase, Sampled, Sequence, Trajectory};
+use dynid_motion::trajectory::{Phase, Point, Sampled, Sequence, Trajectory};
 
 use crate::Error;
 use crate::estimate::{InputRecord, Provenance};
@@ -80,31 +80,27 @@ pub fn motion(config: &MotionConfig) -> Result<MotionRun, Error> {
             part.number, part.name, part.slowed
         ));
     }
-    let owners: Vec<(f64, usize)> = pieces.iter().map(|(from, number, _)| (*from, *number)).collect();
-    let first = owners.iter().position(|(_, number)| *number > 0).unwrap_or_default();
-    let last = owners.iter().rposition(|(_, number)| *number > 0).unwrap_or_default();
+    let first = pieces.iter().position(|(_, number, _)| *number > 0).unwrap_or_default();
+    let last = pieces.iter().rposition(|(_, number, _)| *number > 0).unwrap_or_default();
     let phase = |k: usize| match (k < first, k > last) {
         (true, _) => Phase::Approach,
         (false, false) => Phase::Record,
         (false, true) => Phase::Return,
     };
-    let segments = pieces.into_iter().enumerate().map(|(k, (_, _, piece))| {
-        let segment: Box<dyn Trajectory> = Box::new(piece.trajectory);
-        (phase(k), segment)
-    });
-    let sequence = Sequence::new(segments.collect())?;
-    let sampled = Sampled::at_rate(&sequence, bench.rate_hz)?;
-    let phases = sampled.time.iter().map(|t| sequence.phase(*t)).collect();
-    let number_at = |time: f64| {
-        // A sample on a border belongs to what begins there.
-        let after = owners.partition_point(|(from, _)| *from <= time + 1e-9);
-        owners[after.saturating_sub(1)].1
+    // Position, velocity and acceleration of a piece begin where those of the one before end.
+    let segment = |(k, (_, _, piece)): (usize, &(usize, usize, Piece))| -> (Phase, Box<dyn Trajectory>) {
+        (phase(k), Box::new(piece.trajectory.clone()))
     };
-    let part = sampled.time.iter().map(|t| number_at(*t) as f64).collect();
-    bench.check_inside(&sampled, &|time| match number_at(time) {
+    Sequence::new(pieces.iter().enumerate().map(segment).collect())?;
+    let sampled = sampled(&pieces, bench.joints.len(), bench.rate_hz);
+    let owner = |sample: usize| pieces.partition_point(|(from, _, _)| *from <= sample).saturating_sub(1);
+    let phases = (0..sampled.samples()).map(|sample| phase(owner(sample))).collect();
+    let part = (0..sampled.samples()).map(|sample| pieces[owner(sample)].1 as f64).collect();
+    bench.check_inside(&sampled, &|sample| match pieces[owner(sample)].1 {
         0 => "way between parts".to_owned(),
         number => config.part[number - 1].title(number),
     })?;
+    let duration_s = sampled.time[sampled.samples() - 1];
     let loads = loads::loads(&robot, config, &parts, &sampled.time)?;
     warnings.extend(loads.iter().filter_map(|(load, _)| loads::unread(load)));
     let channels = loads.iter().map(|(load, values)| (load.column.clone(), values.clone())).collect();
@@ -113,8 +109,8 @@ pub fn motion(config: &MotionConfig) -> Result<MotionRun, Error> {
     let record = MotionRecord {
         schema: record::SCHEMA,
         robot: config.robot.display().to_string(),
-        headline: headline(&parts, sequence.duration(), bench.joints.len()),
-        duration_s: sequence.duration(),
+        headline: headline(&parts, duration_s, bench.joints.len()),
+        duration_s,
         sample_rate_hz: bench.rate_hz,
         samples: sampled.samples(),
         start: bench.start.clone(),
@@ -152,10 +148,40 @@ impl MotionRun {
     }
 }
 
+/// Samples of pieces that begin on samples; the last one is that of the end.
+fn sampled(pieces: &[(usize, usize, Piece)], joints: usize, rate_hz: f64) -> Sampled {
+    let of = |(from, _, piece): &(usize, usize, Piece)| from + samples_of(piece, rate_hz);
+    let samples = 1 + pieces.last().map_or(0, of);
+    let zero = || vec![0.0; joints * samples];
+    let time = (0..samples).map(|k| k as f64 / rate_hz).collect();
+    let mut out = Sampled { time, q: zero(), dq: zero(), ddq: zero() };
+    let mut points = vec![Point::default(); joints];
+    for (from, _, piece) in pieces {
+        let count = samples_of(piece, rate_hz);
+        for k in 0..=count {
+            // The end itself, which sums of durations may miss by rounding.
+            let time = if k == count { piece.trajectory.duration() } else { k as f64 / rate_hz };
+            piece.trajectory.at(time, &mut points);
+            for (coordinate, point) in points.iter().enumerate() {
+                let place = coordinate * samples + from + k;
+                out.q[place] = point.position;
+                out.dq[place] = point.velocity;
+                out.ddq[place] = point.acceleration;
+            }
+        }
+    }
+    out
+}
+
+/// Samples from the beginning of a piece to its end, which lies on one.
+fn samples_of(piece: &Piece, rate_hz: f64) -> usize {
+    (piece.trajectory.duration() * rate_hz).round() as usize
+}
+
 /// All pieces in order.
 struct Assembly {
-    /// Begin, s, number of the part (0: a way between), and what moves.
-    pieces: Vec<(f64, usize, Piece)>,
+    /// Sample at which it begins, number of the part (0: a way between), and what moves.
+    pieces: Vec<(usize, usize, Piece)>,
     parts: Vec<PartRecord>,
     ranges: Ranges,
 }
@@ -167,7 +193,8 @@ impl Assembly {
             parts: Vec::with_capacity(config.part.len()),
             ranges: vec![[(f64::INFINITY, f64::NEG_INFINITY); 4]; bench.joints.len()],
         };
-        let mut at = (0.0, bench.start.clone());
+        let mut at = (0, bench.start.clone());
+        let time = |sample: usize| sample as f64 / bench.rate_hz;
         for (k, stated) in config.part.iter().enumerate() {
             let (number, whole) = (k + 1, parts::part(bench, config, (k + 1, stated), &at.1)?);
             out.widen(&whole.ranges);
@@ -189,15 +216,19 @@ impl Assembly {
                 if let Some(first) = whole.pieces.first() {
                     out.go(bench, &mut at, &first.first())?;
                 }
-                record.from_s = if record.from_s.is_nan() { at.0 } else { record.from_s };
+                record.from_s = if record.from_s.is_nan() { time(at.0) } else { record.from_s };
                 for piece in &whole.pieces {
                     if let Some((speed, from, to)) = piece.cruise {
-                        record.passes.push(PassRecord { speed, from_s: at.0 + from, to_s: at.0 + to });
+                        record.passes.push(PassRecord {
+                            speed,
+                            from_s: time(at.0) + from,
+                            to_s: time(at.0) + to,
+                        });
                     }
                     out.push(bench, &mut at, number, piece.clone())?;
                 }
             }
-            record.to_s = at.0;
+            record.to_s = time(at.0);
             out.parts.push(record);
         }
         out.go(bench, &mut at, &bench.start)?;
@@ -211,7 +242,7 @@ impl Assembly {
     }
 
     /// Goes to a pose, if it is another than the present one.
-    fn go(&mut self, bench: &Bench<'_>, at: &mut (f64, Vec<f64>), to: &[f64]) -> Result<(), Error> {
+    fn go(&mut self, bench: &Bench<'_>, at: &mut (usize, Vec<f64>), to: &[f64]) -> Result<(), Error> {
         let Some(way) = parts::way(bench, &at.1, to)? else { return Ok(()) };
         self.widen(&parts::ranges(bench, std::slice::from_ref(&way))?);
         self.push(bench, at, 0, way)
@@ -220,13 +251,13 @@ impl Assembly {
     fn push(
         &mut self,
         bench: &Bench<'_>,
-        at: &mut (f64, Vec<f64>),
+        at: &mut (usize, Vec<f64>),
         number: usize,
         piece: Piece,
     ) -> Result<(), Error> {
         let from = at.0;
-        *at = (from + piece.trajectory.duration(), piece.last());
-        if at.0 * bench.rate_hz > MOST_SAMPLES {
+        *at = (from + samples_of(&piece, bench.rate_hz), piece.last());
+        if at.0 as f64 > MOST_SAMPLES {
             let expected = format!("at most {MOST_SAMPLES:e} samples of the whole motion");
             return Err(Error::setting("sample_rate_hz", &expected, bench.rate_hz));
         }
