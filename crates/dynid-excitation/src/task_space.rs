@@ -260,7 +260,9 @@ fn at_start(fault: ClosedError, expected: usize) -> TaskSpaceError {
     match fault {
         ClosedError::UnderActuated { mobility, .. } => TaskSpaceError::Mobility { expected, found: mobility },
         ClosedError::Immobile { .. } => TaskSpaceError::Mobility { expected, found: 0 },
-        ClosedError::SingularHome { motion, .. } => TaskSpaceError::SingularStart { motion },
+        ClosedError::SingularHome { motion, .. } | ClosedError::Dependent { motion, .. } => {
+            TaskSpaceError::SingularStart { motion }
+        }
         other => TaskSpaceError::Start(other),
     }
 }
