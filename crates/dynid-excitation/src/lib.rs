@@ -1,4 +1,4 @@
-//! Optimal excitation trajectories within all limits.
+//! Optimal excitation trajectories within all limits, and circles of a point in task space.
 
 mod closed;
 pub mod constraint;
@@ -19,6 +19,7 @@ mod restoration;
 mod robot;
 mod search;
 mod start;
+mod task_space;
 
 pub use closed::{ClosedExcitation, TiedColumn};
 pub use design::{Design, Outcome, Settings, StartOutcome, design};
@@ -32,3 +33,4 @@ pub use parametrisation::{Parametrisation, StartConditions};
 pub use problem::{DEFAULT_SAMPLES_PER_HARMONIC, DEFAULT_SIGN_WIDTH, Problem, ProblemError};
 pub use random::random_trajectory;
 pub use robot::RobotExcitation;
+pub use task_space::{CircleSettings, PointCircle, TaskSpaceError};

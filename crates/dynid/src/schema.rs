@@ -31,6 +31,7 @@ pub fn all() -> Vec<ResultSchema> {
         schema::<crate::gains::GainsFile>("gains", "`dynid gains --json`"),
         schema::<crate::inspect::Inspection>("inspect", "`dynid inspect --json`"),
         schema::<crate::export::RobotJson>("model", "`dynid export --model`"),
+        schema::<crate::motions::MotionRecord>("motion", "`motion.json`"),
         schema::<crate::online::Event>("online", "a line of `dynid online`"),
         schema::<crate::payload::PayloadFile>("payload", "`payload.json`"),
         schema::<Vec<LogFit>>("validate", "`dynid validate --json`"),

@@ -173,6 +173,20 @@ const ENDINGS: &[Ending] = &[
         examples: &[("All factors of a folder as one file", "merge cells/*.factors --out all.factors")],
     },
     Ending {
+        command: "motion",
+        negative: "",
+        examples: &[
+            (
+                "Constant speeds of two joints, one after the other, for `friction`",
+                "motion arm.urdf --sweep shoulder --sweep elbow --speeds 0.05,0.1,0.2,0.4",
+            ),
+            (
+                "By a motion file, slower where a limit asks for it",
+                "motion motion.toml --slower --out motion",
+            ),
+        ],
+    },
+    Ending {
         command: "online",
         negative: "something changed",
         examples: &[

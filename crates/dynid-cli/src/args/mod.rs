@@ -8,6 +8,7 @@ mod experiments;
 mod identify;
 mod logs;
 mod model;
+mod motion;
 mod online;
 mod reduce;
 mod robot;
@@ -26,6 +27,7 @@ pub(crate) use logs::{InitArgs, LogArgs, MissingArg, ReadingArgs};
 pub(crate) use model::{
     DiffArgs, ExportArgs, InspectArgs, PredictArgs, RegressorArgs, SchemaArgs, ValidateArgs,
 };
+pub(crate) use motion::MotionArgs;
 pub(crate) use online::{OnlineArgs, StreamArg};
 pub(crate) use reduce::{FactorsArgs, MergeArgs, ReduceArgs, SolveArgs};
 pub(crate) use robot::RobotArgs;
@@ -83,6 +85,9 @@ pub(crate) enum Command {
     Man(ManArgs),
     /// Merge factors of logs, in any order with the same bytes.
     Merge(MergeArgs),
+    /// Make test motions within the limits: sweeps, tracks, circles, small sinusoids, pauses, loads; writes trajectory files,
+    /// motion.json and report.html.
+    Motion(Box<MotionArgs>),
     /// Follow a stream or logs: estimates as JSON lines, alarms when something changes.
     Online(OnlineArgs),
     /// Payloads from logs with and without them: mass, centre of mass, inertia; writes payload.json, payload.html and a URDF

@@ -16,8 +16,9 @@ pub(crate) struct SimulateArgs {
     /// Let a controller move the robot, with all imperfections (default: inverse dynamics of the trajectory).
     #[arg(long)]
     pub(crate) closed_loop: bool,
-    /// Follow a trajectory file, approach and return included (`dynid design` writes them).
-    #[arg(long, value_name = "TRAJECTORY.json", value_hint = ValueHint::FilePath)]
+    /// Follow a trajectory file, approach and return included: coefficients (`dynid design` writes them) or a table with loads,
+    /// `.csv` or `.csv.gz` (`dynid motion` writes them).
+    #[arg(long, value_name = "TRAJECTORY", value_hint = ValueHint::FilePath)]
     pub(crate) follow: Option<PathBuf>,
     /// Length, s.
     #[arg(long, value_name = "S", allow_negative_numbers = true, conflicts_with = "follow")]

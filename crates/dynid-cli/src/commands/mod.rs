@@ -15,6 +15,7 @@ pub(crate) mod identify;
 pub(crate) mod init;
 pub(crate) mod inspect;
 pub(crate) mod man;
+pub(crate) mod motion;
 pub(crate) mod online;
 pub(crate) mod payload;
 pub(crate) mod predict;

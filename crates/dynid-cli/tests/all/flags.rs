@@ -329,6 +329,20 @@ fn cases() -> Vec<Case> {
             ],
         ),
         (
+            "motion",
+            "motion arm.urdf --sweep shoulder --speeds 0.5,1",
+            &[
+                "--out elsewhere",
+                "--range -1,1",
+                "--rate-hz 100",
+                "--acceleration 2",
+                "--share 0.5",
+                "--lock elbow=0.3",
+                "--json",
+                "--quiet",
+            ],
+        ),
+        (
             "simulate",
             "simulate arm.urdf --out s.csv",
             &[
@@ -454,6 +468,26 @@ fn cases() -> Vec<Case> {
             "identify --force",
             "identify stribeck.toml --log stribeck.csv --out .",
             "identify stribeck.toml --log stribeck.csv --out . --force",
+        ),
+        case(
+            "motion --force",
+            "motion arm.urdf --sweep elbow --speeds 1 --out .",
+            "motion arm.urdf --sweep elbow --speeds 1 --out . --force",
+        ),
+        case(
+            "motion --sweep",
+            "motion arm.urdf --sweep elbow --speeds 1",
+            "motion arm.urdf --sweep elbow --speeds 1 --sweep shoulder",
+        ),
+        case(
+            "motion --speeds",
+            "motion arm.urdf --sweep elbow --speeds 1",
+            "motion arm.urdf --sweep elbow --speeds 0.5",
+        ),
+        case(
+            "motion --slower",
+            "motion arm.urdf --sweep elbow --speeds 3.2 --acceleration 40",
+            "motion arm.urdf --sweep elbow --speeds 3.2 --acceleration 40 --slower",
         ),
         case("design --force", "design small.toml --out .", "design small.toml --out . --force"),
         case("payload --force", "payload payload.toml --out .", "payload payload.toml --out . --force"),

@@ -17,6 +17,7 @@ mod friction;
 mod logs_of_tools;
 #[cfg(target_os = "linux")]
 mod memory;
+mod motion;
 mod online;
 mod other_libraries;
 mod payload;

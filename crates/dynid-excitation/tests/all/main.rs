@@ -9,6 +9,7 @@ mod gradients;
 mod infeasible;
 mod parametrisation;
 mod plain_urdf;
+mod point_circle;
 mod problems;
 mod published;
 mod refusals;

@@ -20,16 +20,35 @@ pub fn write_csv(
     sampled: &Sampled,
     phases: Option<&[Phase]>,
 ) -> Result<(), OutputError> {
+    write_csv_with_channels(path, joints, sampled, &[], phases)
+}
+
+/// Writes what [`write_csv`] does, with a column per channel before the phase: loads, temperatures, a value per sample each. The table
+/// reads back as [`TrajectorySamples`](super::TrajectorySamples).
+///
+/// # Errors
+/// Fails as [`write_csv`] does; also for channels of another length.
+pub fn write_csv_with_channels(
+    path: impl AsRef<Path>,
+    joints: &[String],
+    sampled: &Sampled,
+    channels: &[(String, Vec<f64>)],
+    phases: Option<&[Phase]>,
+) -> Result<(), OutputError> {
     let path = path.as_ref();
     let n = sampled.samples();
     check_shape(path, "joint names", sampled.coordinates(), joints.len())?;
     if let Some(phases) = phases {
         check_shape(path, "phases", n, phases.len())?;
     }
+    for (name, values) in channels {
+        check_shape(path, &format!("values of `{name}`"), n, values.len())?;
+    }
     let mut header = vec!["t".to_owned()];
     for prefix in ["q", "dq", "ddq"] {
         header.extend(joints.iter().map(|j| format!("{prefix}_{j}")));
     }
+    header.extend(channels.iter().map(|(name, _)| name.clone()));
     header.extend(phases.map(|_| "phase".to_owned()));
     let mut writer = RowWriter::create(path, &header)?;
     let mut row = Vec::with_capacity(header.len());
@@ -39,6 +58,7 @@ pub fn write_csv(
         for signal in [&sampled.q, &sampled.dq, &sampled.ddq] {
             row.extend((0..joints.len()).map(|c| signal[c * n + s]));
         }
+        row.extend(channels.iter().map(|(_, values)| values[s]));
         row.extend(phases.map(|p| f64::from(p[s].number())));
         writer.row(&row)?;
     }

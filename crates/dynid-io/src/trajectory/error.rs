@@ -3,6 +3,7 @@
 use dynid_motion::trajectory::TrajectoryError;
 use thiserror::Error;
 
+use crate::csv::LogFileError;
 use crate::source::TextFault;
 
 /// Why a trajectory file was refused.
@@ -45,6 +46,9 @@ pub enum TrajectoryFileError {
         /// What was expected and found.
         message: String,
     },
+    /// Not a table of numbers.
+    #[error(transparent)]
+    Table(#[from] LogFileError),
     /// A field has a value that makes no sense.
     #[error("{file}: {field}: expected {expected}, found {found}")]
     Field {
@@ -80,6 +84,10 @@ impl TrajectoryFileError {
                 "unknown keys are errors so that a misspelt one cannot be ignored"
             }
             E::Syntax { .. } => "a trajectory file is JSON as `dynid design` writes it",
+            E::Table(error) => return error.hint(),
+            E::Field { expected, .. } if expected.starts_with("a column") => {
+                "a table of a trajectory has the columns `t`, and `q_<joint>`, `dq_<joint>`, `ddq_<joint>` of every joint, as `dynid motion` writes it"
+            }
             E::Field { field, .. } if field == "schema" => {
                 "the file is no trajectory, or one of another version of the program"
             }
@@ -87,7 +95,7 @@ impl TrajectoryFileError {
             E::Trajectory { source: TrajectoryError::Order { .. }, .. } => {
                 "name the parts of a row in their order, for example `a1..a5,b1..b5,q0`"
             }
-            E::Trajectory { .. } => "correct the coefficients",
+            E::Trajectory { .. } => "correct the coefficients or samples",
         };
         Some(hint.to_owned())
     }

@@ -1,12 +1,14 @@
-//! Trajectories in files: coefficients (JSON, read and written), samples (CSV, ROS 2 messages; written).
+//! Trajectories in files: coefficients (JSON) and samples (CSV), read and written; ROS 2 messages, written.
 
 mod coefficients;
 mod csv;
 mod error;
 mod ros;
+mod samples;
 mod schema;
 
 pub use coefficients::{Leg, TrajectoryFile, TrajectoryJoint};
-pub use csv::write_csv;
+pub use csv::{write_csv, write_csv_with_channels};
 pub use error::TrajectoryFileError;
 pub use ros::{JointTrajectory, write_ros_json, write_ros_yaml};
+pub use samples::TrajectorySamples;

@@ -11,3 +11,4 @@ mod mjcf;
 mod oracles;
 mod robot_files;
 mod trajectory_files;
+mod trajectory_tables;

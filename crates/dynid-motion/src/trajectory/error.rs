@@ -128,6 +128,22 @@ pub enum TrajectoryError {
         /// The value there.
         found: f64,
     },
+    /// A range of positions leaves too little time at a speed.
+    #[error(
+        "speed {speed}: expected at least {least} s at constant speed, found {cruise:.3} s within {} to {}",
+        range.0,
+        range.1
+    )]
+    ShortSweep {
+        /// The speed.
+        speed: f64,
+        /// Least and largest position.
+        range: (f64, f64),
+        /// Time at the speed, s.
+        cruise: f64,
+        /// Least time, s.
+        least: f64,
+    },
     /// A segment does not start where the one before it ends.
     #[error(
         "{quantity} of coordinate {coordinate} jumps at {time} s where segment {segment} begins: expected {expected}, found {found}"

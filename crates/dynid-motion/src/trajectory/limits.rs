@@ -97,7 +97,7 @@ impl MotionLimits {
 
     /// How far a range of values reaches beyond its limits, in parts of the limit (of half the range for positions); not
     /// positive inside.
-    pub(super) fn excess(&self, quantity: Quantity, (least, most): (f64, f64)) -> f64 {
+    pub fn excess(&self, quantity: Quantity, (least, most): (f64, f64)) -> f64 {
         let (low, high) = self.of(quantity);
         let over = (most - high).max(low - least);
         if over == f64::NEG_INFINITY {

@@ -1,10 +1,13 @@
 //! Excitation trajectories with exact derivatives.
 //!
-//! Profiles move one coordinate ([`Quintic`], [`PaulBlend`], [`Trapezoid`]); a [`Trajectory`] moves all of them at once:
-//! [`FourierTrajectory`], [`QuinticSegment`], [`BSpline`], [`PerCoordinate`] profiles, and [`Sequence`], which joins
-//! approach, record and return. [`Sampled`] holds a trajectory on a grid of times.
+//! Profiles move one coordinate ([`Quintic`], [`PaulBlend`], [`Trapezoid`], [`FadedTones`]); a [`Trajectory`] moves all of them at
+//! once: [`FourierTrajectory`], [`QuinticSegment`], [`BSpline`], [`PaulTrack`], [`Circle`], [`Rest`], [`PerCoordinate`] profiles or
+//! one [`Alone`], and [`Sequence`], which joins approach, record and return. [`sweeps()`] are constant-speed tests. [`Sampled`] holds a
+//! trajectory on a grid of times, [`QuinticSpline`] makes a trajectory of such samples.
 
+pub mod alone;
 pub mod bspline;
+pub mod circle;
 pub mod error;
 pub mod fourier;
 pub mod fourier_basis;
@@ -15,12 +18,19 @@ mod polynomial;
 pub mod profile;
 pub mod quintic;
 pub mod quintic_segment;
+pub mod rest;
 pub mod row_order;
 pub mod sampled;
 pub mod sequence;
+pub mod spline;
+pub mod sweep;
+pub mod tones;
+pub mod track;
 pub mod trapezoid;
 
+pub use alone::Alone;
 pub use bspline::BSpline;
+pub use circle::Circle;
 pub use error::{Quantity, TrajectoryError};
 pub use fourier::{Extreme, Extremes, Form, Fourier};
 pub use fourier_basis::FourierBasis;
@@ -30,9 +40,14 @@ pub use paul::PaulBlend;
 pub use profile::{PerCoordinate, Profile};
 pub use quintic::Quintic;
 pub use quintic_segment::QuinticSegment;
+pub use rest::Rest;
 pub use row_order::RowOrder;
 pub use sampled::Sampled;
 pub use sequence::{Phase, Sequence};
+pub use spline::QuinticSpline;
+pub use sweep::{SweepSettings, sweeps};
+pub use tones::{FadedTones, Tone};
+pub use track::PaulTrack;
 pub use trapezoid::Trapezoid;
 
 use error::check;
@@ -76,6 +91,20 @@ pub trait Trajectory: Send + Sync {
 }
 
 impl<T: Trajectory + ?Sized> Trajectory for Box<T> {
+    fn coordinates(&self) -> usize {
+        (**self).coordinates()
+    }
+
+    fn duration(&self) -> f64 {
+        (**self).duration()
+    }
+
+    fn at(&self, time: f64, out: &mut [Point]) {
+        (**self).at(time, out);
+    }
+}
+
+impl<T: Trajectory + ?Sized> Trajectory for std::sync::Arc<T> {
     fn coordinates(&self) -> usize {
         (**self).coordinates()
     }

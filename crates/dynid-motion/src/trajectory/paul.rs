@@ -51,6 +51,11 @@ impl PaulBlend {
         Self::constant_velocity(from, speed.copysign(distance), blend, cruise)
     }
 
+    /// Speed of the cruise, signed, per s.
+    pub fn speed(&self) -> f64 {
+        self.speed
+    }
+
     /// Start and end of the cruise, s.
     pub fn cruise(&self) -> (f64, f64) {
         (self.blend, self.blend + self.cruise)

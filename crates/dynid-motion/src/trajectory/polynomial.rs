@@ -21,6 +21,24 @@ impl Polynomial {
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
     }
 
+    /// Numbers between which all values on `[0, 1]` lie: the least and greatest coefficient of Bernstein,
+    /// `b_i = Σ_k C(i, k) / C(n, k) c_k`, which are cheap and not always attained.
+    pub(super) fn hull(&self) -> (f64, f64) {
+        let degree = self.0.len().saturating_sub(1);
+        let of = |i: usize| {
+            // C(i, k) / C(n, k), from one k to the next.
+            let mut ratio = 1.0;
+            let mut sum = 0.0;
+            for (k, c) in self.0.iter().enumerate().take(i + 1) {
+                sum += ratio * c;
+                ratio *= (i - k) as f64 / (degree - k).max(1) as f64;
+            }
+            sum
+        };
+        let values = (0..=degree).map(of);
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+    }
+
     /// Sign changes inside `(0, 1)`, ascending: between two neighbouring roots of the derivative lies one at most.
     fn roots(&self) -> Vec<f64> {
         if self.0.len() < 2 {
@@ -79,5 +97,10 @@ mod tests {
         let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         assert!(low <= least && least - low < 1e-8 && high >= most && high - most < 1e-8);
         assert_eq!(Polynomial(vec![4.0]).range(), (4.0, 4.0));
+        let (least_of_hull, most_of_hull) = p.hull();
+        assert!(least_of_hull <= least && most <= most_of_hull);
+        // Of straight lines the hull is attained.
+        assert_eq!(Polynomial(vec![1.0, -3.0]).hull(), (-2.0, 1.0));
+        assert_eq!(Polynomial(vec![4.0]).hull(), (4.0, 4.0));
     }
 }

@@ -133,7 +133,7 @@ impl QuinticSegment {
 }
 
 /// Position as a polynomial in `s = t / duration`.
-fn polynomial(from: &Point, to: &Point, duration: f64) -> Polynomial {
+pub(super) fn polynomial(from: &Point, to: &Point, duration: f64) -> Polynomial {
     let (v0, v1) = (from.velocity * duration, to.velocity * duration);
     let (a0, a1) = (from.acceleration * duration.powi(2), to.acceleration * duration.powi(2));
     let distance = to.position - from.position;

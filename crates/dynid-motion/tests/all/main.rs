@@ -5,6 +5,7 @@ mod noise;
 mod periodic_signals;
 mod recorded;
 mod scipy;
+mod test_motions;
 mod textbook;
 mod trajectories;
 mod trajectory_golden;

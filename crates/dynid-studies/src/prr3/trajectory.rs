@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use dynid::estimators::load_friction::{Prediction, Problem, Settings as Law};
 use dynid::excitation::{information, limit_points};
 use dynid::motion::signal::rms;
-use dynid::motion::trajectory::{Form, FourierTrajectory, Quintic, RowOrder, Sampled};
+use dynid::motion::trajectory::{self, Form, FourierTrajectory, Quintic, RowOrder, Sampled};
 use serde_json::json;
 
 use super::machine::{Machine, Plane, SLIDERS};
@@ -58,20 +58,12 @@ pub(super) fn designed_motion(
 /// A full circle from rest to rest, the angle held.
 pub(super) fn circle(circle: &Circle, samples: usize) -> Result<Sampled, StudyError> {
     let turn = Quintic::new(0.0, TAU, circle.duration)?;
-    let time: Vec<f64> = (0..samples).map(|k| circle.duration * k as f64 / samples as f64).collect();
-    let mut out =
-        Sampled { q: vec![0.0; 3 * samples], dq: vec![0.0; 3 * samples], ddq: vec![0.0; 3 * samples], time };
-    for (s, t) in out.time.iter().enumerate() {
-        let at = turn.at(*t);
-        let ((sine, cosine), r) = (at.position.sin_cos(), circle.radius);
-        for (k, [along, across]) in [[cosine, -sine], [sine, cosine]].into_iter().enumerate() {
-            let place = k * samples + s;
-            out.q[place] = circle.centre[k] + r * along;
-            out.dq[place] = r * at.velocity * across;
-            out.ddq[place] = r * (at.acceleration * across - at.velocity * at.velocity * along);
-        }
-        out.q[2 * samples + s] = circle.angle;
-    }
+    let path = trajectory::Circle::new(circle.centre, circle.radius, turn)?;
+    let time = (0..samples).map(|k| circle.duration * k as f64 / samples as f64).collect();
+    let mut out = Sampled::at_times(&path, time);
+    out.q.resize(3 * samples, circle.angle);
+    out.dq.resize(3 * samples, 0.0);
+    out.ddq.resize(3 * samples, 0.0);
     Ok(out)
 }
 

@@ -6,15 +6,12 @@ use dynid_excitation::MotionLimits;
 use dynid_excitation::constraint::{CartesianLimits, EffortLimits, FramePoint, PathConstraint, Region};
 use dynid_model::{EffortModel, RobotModel, Vec3};
 
-use super::config::DesignConfig;
+use super::config::{DesignConfig, LimitsConfig};
 use super::safety::{Safety, given_capsules, safety};
 use crate::Error;
 use crate::fault::DesignError;
+use crate::joint_limits::StatedLimits;
 use crate::robot::Robot;
-use crate::settings::known;
-
-/// Time to full speed where no acceleration limit is given, s.
-const TIME_TO_SPEED: f64 = 0.5;
 
 pub(super) fn joint_limits(
     robot: &Robot,
@@ -22,72 +19,9 @@ pub(super) fn joint_limits(
     joints: &[String],
     assumptions: &mut Vec<String>,
 ) -> Result<Vec<MotionLimits>, Error> {
-    let l = &config.limits;
-    for joint in l.position.keys() {
-        known(joint, joints)?;
-    }
-    let velocity = l.velocity.positive("limits.velocity", joints)?;
-    let acceleration = l.acceleration.positive("limits.acceleration", joints)?;
-    let jerk = l.jerk.positive("limits.jerk", joints)?;
-    let owners = robot.mechanism.rate_bodies();
-    let mut unlimited = Vec::new();
-    let mut assumed = Vec::new();
-    let mut out = Vec::with_capacity(joints.len());
-    for (k, joint) in joints.iter().enumerate() {
-        let described = &robot.mechanism.bodies()[owners[k]].joint;
-        let slides = described.effort_unit() == "N";
-        let stated = described.limits.position.filter(|(a, b)| a < b && a.is_finite() && b.is_finite());
-        let position = match (l.position.get(joint), stated) {
-            (Some([low, high]), _) => (*low, *high),
-            (None, Some((low, high))) => {
-                let cut = 0.5 * (1.0 - l.share) * (high - low);
-                (low + cut, high - cut)
-            }
-            (None, None) if !slides => {
-                unlimited.push(joint.as_str());
-                (-std::f64::consts::PI, std::f64::consts::PI)
-            }
-            (None, None) => {
-                let expected = "a range, m: the robot file states none";
-                return Err(Error::setting(&format!("limits.position.{joint}"), expected, "none"));
-            }
-        };
-        if !(position.0 < position.1 && position.0.is_finite() && position.1.is_finite()) {
-            let found = format!("{} to {}", position.0, position.1);
-            return Err(Error::setting(
-                &format!("limits.position.{joint}"),
-                "least below largest, finite",
-                found,
-            ));
-        }
-        let stated = described.limits.velocity.filter(|v| *v > 0.0 && v.is_finite()).map(|v| l.share * v);
-        let Some(speed) = velocity[k].or(stated) else {
-            let expected = "a speed: the robot file states none";
-            return Err(Error::setting(&format!("limits.velocity.{joint}"), expected, "none"));
-        };
-        if acceleration[k].is_none() {
-            assumed.push(joint.as_str());
-        }
-        out.push(MotionLimits {
-            position,
-            velocity: speed,
-            acceleration: acceleration[k].unwrap_or(speed / TIME_TO_SPEED),
-            jerk: jerk[k].unwrap_or(f64::INFINITY),
-        });
-    }
-    if !unlimited.is_empty() {
-        assumptions.push(format!(
-            "no position limits are stated for {}: half a turn to both sides is used",
-            unlimited.join(", ")
-        ));
-    }
-    if !assumed.is_empty() {
-        assumptions.push(format!(
-            "no acceleration limits are stated for {}: full speed in {TIME_TO_SPEED} s is used",
-            assumed.join(", ")
-        ));
-    }
-    Ok(out)
+    let LimitsConfig { position, velocity, acceleration, jerk, share, .. } = &config.limits;
+    let stated = StatedLimits { position, velocity, acceleration, jerk, share: *share };
+    crate::joint_limits::joint_limits(robot, &robot.mechanism.rate_bodies(), joints, &stated, assumptions)
 }
 
 pub(super) fn effort_limits(

@@ -14,12 +14,15 @@ type Points = Vec<[f64; 2]>;
 /// A stated channel has the name that an element reads (`temperature_j1`), or its beginning (`temperature`), which stands for
 /// that of every joint about which nothing else is said.
 ///
+/// `followed`: channels of the trajectory file, by their full names.
+///
 /// # Errors
-/// [`Error::Setting`] for a channel that no element reads, one that elements read and nothing states, and points without
+/// [`Error::Setting`] for a channel that no element reads, one that both the settings and the trajectory file state, one that elements read and nothing states, and points without
 /// order.
 pub(super) fn profiles(
     channels: &[String],
     stated: &BTreeMap<String, Points>,
+    followed: &BTreeMap<String, Points>,
 ) -> Result<Vec<Profile>, Error> {
     let of_all =
         |channel: &str, name: &str| channel.strip_prefix(name).is_some_and(|rest| rest.starts_with('_'));
@@ -32,6 +35,15 @@ pub(super) fn profiles(
         };
         return Err(Error::setting(&format!("channels.{name}"), &expected, name));
     }
+    if let Some(name) = followed.keys().find(|name| !channels.contains(name)) {
+        let expected = "an element that reads this column of the trajectory (of loads `external_load`, with `external_load = { factor = 1 }` under `[element.<joint>]`)";
+        return Err(Error::setting(&format!("follow: {name}"), expected, "none"));
+    }
+    let twice = |name: &&String| followed.keys().any(|f| f == *name || of_all(f, name));
+    if let Some(name) = stated.keys().find(twice) {
+        let expected = "no value beside `follow`, whose file states this channel";
+        return Err(Error::setting(&format!("channels.{name}"), expected, "one"));
+    }
     let missing = |channel: &String| {
         let expected = "points `[time in s, value]`, as an element reads this channel";
         Error::setting(&format!("channels.{channel}"), expected, "none")
@@ -40,7 +52,8 @@ pub(super) fn profiles(
         .iter()
         .map(|channel| {
             let all = || stated.iter().find(|(name, _)| of_all(channel, name)).map(|(_, points)| points);
-            let points = stated.get(channel).or_else(all).ok_or_else(|| missing(channel))?;
+            let points = followed.get(channel).or_else(|| stated.get(channel)).or_else(all);
+            let points = points.ok_or_else(|| missing(channel))?;
             Ok(Profile::new(points.iter().map(|[t, x]| (*t, *x)).collect())?)
         })
         .collect()

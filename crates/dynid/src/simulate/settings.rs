@@ -40,8 +40,9 @@ pub struct SimulateSettings {
     pub seed: u64,
     /// Trajectories of joints by name, in place of random ones; the period is `period_s`.
     pub trajectory: BTreeMap<String, SeriesSettings>,
-    /// Trajectory file (`dynid design` writes them) to follow, approach and return included, in place of all settings of a
-    /// trajectory and of the duration; relative to the settings' file.
+    /// Trajectory file to follow, approach and return included, in place of all settings of a trajectory and of the duration:
+    /// coefficients (`dynid design` writes them) or a table of samples, `.csv` or `.csv.gz` (`dynid motion` writes them), whose
+    /// channels such as `load_<joint>` are followed too. Relative to the settings' file.
     pub follow: Option<PathBuf>,
     /// Only of robots with clearance on a periodic trajectory: time that is simulated before the log begins, s. Default 0.5.
     pub settle_s: Option<f64>,

@@ -1,8 +1,11 @@
 //! Wanted motion of a virtual robot.
 
+use std::collections::BTreeMap;
+
 use dynid_io::TrajectoryFile;
+use dynid_io::trajectory::TrajectorySamples;
 use dynid_model::{ClosedModel, MotionBlock, RobotModel};
-use dynid_motion::trajectory::{Form, Fourier, Point, Sequence, Trajectory};
+use dynid_motion::trajectory::{Form, Fourier, Point, Trajectory};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -14,33 +17,48 @@ pub(super) enum Reference {
     /// One periodic series per joint.
     Series(Vec<Fourier>),
     /// A trajectory file; coordinate of every joint.
-    File(Sequence, Vec<usize>),
+    File(Box<dyn Trajectory>, Vec<usize>),
 }
 
+/// Channels by name: points `[time in s, value]`.
+pub(super) type Channels = BTreeMap<String, Vec<[f64; 2]>>;
+
 impl Reference {
-    /// From the trajectory file that the settings name, else series.
+    /// From the trajectory file that the settings name, else series; with the channels that the file has.
     pub(super) fn new(
         model: &RobotModel,
         settings: &SimulateSettings,
         rng: &mut ChaCha8Rng,
-    ) -> Result<Self, Error> {
+    ) -> Result<(Self, Channels), Error> {
         let Some(path) = &settings.follow else {
-            return Ok(Reference::Series(series(model, settings, rng)?));
+            return Ok((Reference::Series(series(model, settings, rng)?), Channels::new()));
         };
-        let file = TrajectoryFile::read(path)?;
         let joints: Vec<String> = model.joints().iter().map(|j| j.name.clone()).collect();
-        let order = file.order_of(&joints).map_err(|joint| Error::InFile {
+        let missing = |joint: String| Error::InFile {
             file: path.display().to_string(),
             source: Box::new(Error::setting("joints", &format!("a trajectory of joint `{joint}`"), "none")),
-        })?;
-        Ok(Reference::File(file.sequence()?, order))
+        };
+        if TrajectorySamples::is_table(path) {
+            let TrajectorySamples { joints: found, motion, channels } = TrajectorySamples::read(path)?;
+            let place = |joint: &String| found.iter().position(|f| f == joint);
+            let order = joints.iter().map(|joint| place(joint).ok_or_else(|| missing(joint.clone())));
+            let order = order.collect::<Result<_, _>>()?;
+            let points = |values: Vec<f64>| {
+                motion.knots().time.iter().zip(values).map(|(t, x)| [*t, x]).collect::<Vec<_>>()
+            };
+            let channels = channels.into_iter().map(|(name, values)| (name, points(values))).collect();
+            return Ok((Reference::File(Box::new(motion), order), channels));
+        }
+        let file = TrajectoryFile::read(path)?;
+        let order = file.order_of(&joints).map_err(missing)?;
+        Ok((Reference::File(Box::new(file.sequence()?), order), Channels::new()))
     }
 
     /// Duration of a trajectory file, s.
     pub(super) fn duration(&self) -> Option<f64> {
         match self {
             Reference::Series(_) => None,
-            Reference::File(sequence, _) => Some(sequence.duration()),
+            Reference::File(motion, _) => Some(motion.duration()),
         }
     }
 
@@ -49,9 +67,9 @@ impl Reference {
         let wanted = |p: Point| [p.position, p.velocity, p.acceleration];
         match self {
             Reference::Series(series) => series.iter().map(|s| wanted(s.at(time))).collect(),
-            Reference::File(sequence, order) => {
-                let mut points = vec![Point::default(); sequence.coordinates()];
-                sequence.at(time, &mut points);
+            Reference::File(motion, order) => {
+                let mut points = vec![Point::default(); motion.coordinates()];
+                motion.at(time, &mut points);
                 order.iter().map(|c| wanted(points[*c])).collect()
             }
         }

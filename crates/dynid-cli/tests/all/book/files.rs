@@ -31,11 +31,12 @@ fn toml(block: &Block) -> Result<(), String> {
         Some("run") if part => dynid::Config::parse(&completed_run(text)?, name).map(drop).map_err(said),
         Some("run") => dynid::Config::parse(text, name).map(drop).map_err(said),
         Some("design") => dynid::design::DesignConfig::parse(text, name).map(drop).map_err(said),
+        Some("motion") => dynid::motions::MotionConfig::parse(text, name).map(drop).map_err(said),
         Some("friction") => dynid::FrictionConfig::parse(text, name).map(drop).map_err(said),
         Some("simulate") => dynid::simulate::SimulateSettings::parse(text, name).map(drop).map_err(said),
         Some("robot") if part => robot(&completed_robot(text)?),
         Some("robot") => robot(text),
-        _ => Err("`toml` needs a kind: run, design, friction, simulate or robot".to_owned()),
+        _ => Err("`toml` needs a kind: run, design, motion, friction, simulate or robot".to_owned()),
     }
 }
 

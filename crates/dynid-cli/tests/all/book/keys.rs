@@ -19,7 +19,7 @@ struct Keys {
     sources: &'static [&'static str],
 }
 
-const PAGES: [Keys; 5] = [
+const PAGES: [Keys; 6] = [
     Keys {
         page: "run",
         title: "Keys of a run configuration",
@@ -52,6 +52,13 @@ const PAGES: [Keys; 5] = [
             "crates/dynid-excitation/src/criterion/mod.rs",
             COUPLING,
         ],
+    },
+    Keys {
+        page: "motion",
+        title: "Keys of a motion file",
+        opening: "Read by `motion`. An example with comments: [motion](../commands/motion.md).",
+        top: "MotionConfig",
+        sources: &["crates/dynid/src/motions", PER_JOINT],
     },
     Keys {
         page: "friction",

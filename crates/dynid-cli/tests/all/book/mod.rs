@@ -6,7 +6,7 @@
 //!   `examples` and `robots`. What follows a command is compared with what it prints (both streams), see [`shown`]. `exit=1` is the exit
 //!   code of the block's last command (0 without it), `digits=2` the digits to which numbers agree (3), `slow` leaves the block to the
 //!   tests that take long.
-//! - `toml run`, `toml design`, `toml friction`, `toml simulate`, `toml robot`: a file of that kind, which must parse; `part`: an
+//! - `toml run`, `toml design`, `toml motion`, `toml friction`, `toml simulate`, `toml robot`: a file of that kind, which must parse; `part`: an
 //!   excerpt of one. `file=NAME` (any block) writes the text into the folder of the page.
 //! - `json` must parse, `sh` holds commands that other tests run, `rust` is a doc test, `text` is anything.
 //!

@@ -6,6 +6,7 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 mod identification;
+mod motion;
 mod others;
 
 use std::collections::{BTreeMap, BTreeSet};
