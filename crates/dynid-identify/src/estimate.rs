@@ -30,6 +30,7 @@ use crate::joint_stiffness::JointStiffness;
 use crate::log_agreement::LogAgreement;
 use crate::overlap::Overlaps;
 use crate::own_delay::OwnDelay;
+use crate::searches::Searches;
 use crate::settings::Route;
 use crate::tie_test::TieTest;
 pub use counts::{BaseCounts, ParameterCounts, ShapeCounts, StandardCounts};
@@ -85,6 +86,9 @@ pub struct Estimate {
     /// Whether the logs bear the ties out; absent without ties that the logs would show.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ties: Option<TieTest>,
+    /// Searches over all parameters; absent unless they were asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub searches: Option<Searches>,
     /// Delays of single logs, taken off their efforts.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub log_delays: Vec<OwnDelay>,

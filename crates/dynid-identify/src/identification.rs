@@ -30,6 +30,7 @@ use crate::overlap::Overlaps;
 use crate::own_delay::OwnDelay;
 use crate::prior::Prior;
 use crate::robot::Robot;
+use crate::searches::Searches;
 use crate::settings::{LogSettings, Settings};
 use crate::shape::{self, ShapeFit};
 use crate::tie_test::TieTest;
@@ -149,6 +150,8 @@ pub struct Identification {
     pub loads: Option<LoadRounds>,
     /// Whether the logs bear the ties out, where there are some.
     pub tie_test: Option<TieTest>,
+    /// Searches over all parameters, where they were asked for.
+    pub searches: Option<Searches>,
 }
 
 impl Identification {

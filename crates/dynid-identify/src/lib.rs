@@ -50,6 +50,7 @@ pub mod reduction;
 mod reduction_error;
 mod result;
 pub mod robot;
+pub mod searches;
 pub mod settings;
 pub mod shape;
 pub mod stiffness;

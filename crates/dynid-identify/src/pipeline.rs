@@ -41,9 +41,10 @@ pub use crate::structure::{Structure, effort_sizes, stated_values};
 use crate::trained_log::{SPEED_SPAN_S, TrainedLog};
 pub use crate::training_log::TrainingLog;
 use crate::trust::{Evidence, Trust};
-use crate::{Error, own_delay, preflight as before, stiffness, tie_test};
+use crate::{Error, own_delay, preflight as before, searches, stiffness, tie_test};
 pub(crate) use figures::{EXPLAINED, explained};
 pub use model_fit::ModelFit;
+pub(crate) use model_fit::state_hz;
 
 /// What is being worked on, for progress displays.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,6 +61,8 @@ pub enum Step {
     Shapes,
     /// Final fit with its covariance.
     Fit,
+    /// Searches over all parameters.
+    Searches,
     /// Simulations of the closed loop for instruments.
     Instruments,
     /// Physically consistent standard parameters.
@@ -145,6 +148,10 @@ fn run(
         )
     }));
     let tie_test = tie_test::test(&problem, &fit)?;
+    if problem.settings.estimator.search.is_some() {
+        progress(Step::Searches);
+    }
+    let searches = searches::run(&problem, &fit)?;
     let (comparison, not_compared) = compared(&problem, &fit, progress)?;
     let of_reading = read.iter().flat_map(|log| log.warnings.iter().cloned());
     let of_reading = of_reading.chain(validation.iter().flat_map(Log::warnings));
@@ -170,7 +177,7 @@ fn run(
         }
         out.training.push(agreement);
     }
-    out.tie_test = tie_test;
+    (out.tie_test, out.searches) = (tie_test, searches);
     out.warnings.extend(not_compared);
     for log in validation {
         progress(Step::Validate(log.log.name().to_owned()));
@@ -316,6 +323,7 @@ pub(crate) fn assemble(
         comparison,
         loads,
         tie_test: None,
+        searches: None,
     };
     out.nonlinear = out.unfolded(out.values())?;
     out.alone = out.without_logs()?;

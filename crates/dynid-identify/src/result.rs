@@ -60,6 +60,7 @@ impl Identification {
             parameters: self.robot_parameters(),
             log_agreement: self.log_agreement.clone(),
             ties: self.tie_test.clone(),
+            searches: self.searches.clone(),
             log_delays: self.own_delays.clone(),
             log_parameters: self.parameter_values(self.model.log_columns()),
             base_parameters: self.base_values(),

@@ -78,7 +78,8 @@ impl Structure {
     }
 }
 
-fn preferred_columns(preferred: &[String], model: &RobotModel) -> Result<Vec<usize>, Error> {
+/// Columns to keep as base parameters where there is a choice.
+pub(crate) fn preferred_columns(preferred: &[String], model: &RobotModel) -> Result<Vec<usize>, Error> {
     preferred
         .iter()
         .map(|name| {

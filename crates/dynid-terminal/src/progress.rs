@@ -58,6 +58,7 @@ impl Progress {
             Step::Conditioning(Stage::Mask) => "choosing the reversal mask".to_owned(),
             Step::Conditioning(Stage::Friction) => "choosing friction shapes".to_owned(),
             Step::Conditioning(Stage::Delay) => "estimating the delay".to_owned(),
+            Step::Searches => "searching over all parameters".to_owned(),
             Step::Instruments => "simulating the closed loop".to_owned(),
             Step::Shapes => "searching shape parameters".to_owned(),
             Step::Fit => "fitting".to_owned(),

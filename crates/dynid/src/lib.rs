@@ -39,7 +39,7 @@ pub use dynid_identify::{Error, Estimate, Fault, Identification, Robot, RobotOpt
 pub use dynid_identify::{
     advice, agreement, bounds, caution, commands, consistency, effort_scale, elements, estimate, fitting,
     instruments, known_friction, log, log_agreement, log_terms, overlap, passivity, pipeline, preflight,
-    prior, robot, settings, shape, stiffness, trust, verdict,
+    prior, robot, searches, settings, shape, stiffness, trust, verdict,
 };
 
 pub use config::Config;

@@ -4,6 +4,7 @@ mod files;
 mod first;
 mod friction;
 mod picture;
+mod searches;
 mod settings;
 mod trust;
 
@@ -150,6 +151,7 @@ impl Shown<'_> {
             consistency: self.consistency_report(estimate),
             held_out: trust::held_out(estimate),
             precision: Some(self.precision_report(estimate)),
+            searches: self.searches.as_ref().map(searches::section),
             pruning: trust::pruning(estimate),
             observation: report::Observation {
                 rows: Some(estimate.rows as u64),

@@ -115,8 +115,17 @@ impl ModelFit {
         shape::nonlinear(&problem.plan, &problem.model, self.shapes.as_ref(), &self.consistent.values)
     }
 
+    /// Values without constraints of the nonlinear model's linear parameters.
+    pub(crate) fn unconstrained_values(&self, problem: &Problem) -> Vec<f64> {
+        let values = &self.consistent.unconstrained;
+        match &self.shapes {
+            Some(found) => shape::unfold(&found.model, &problem.model, values).linear,
+            None => values.clone(),
+        }
+    }
+
     /// [`ModelFit::unfolded`], of a linear model the model of the plan.
-    pub(super) fn nonlinear(&self, problem: &Problem) -> Result<(RobotModel, Vec<f64>), Error> {
+    pub(crate) fn nonlinear(&self, problem: &Problem) -> Result<(RobotModel, Vec<f64>), Error> {
         match self.unfolded(problem)? {
             Some(found) => Ok(found),
             None => Ok((problem.plan.model(problem.model.mechanism())?, self.consistent.values.clone())),

@@ -6,7 +6,7 @@ use dynid_estimate::separable::ShapeSearch;
 use dynid_search::{self as search, Algorithm};
 use serde::{Deserialize, Serialize};
 
-use super::Settings;
+use super::{SearchConfig, Settings};
 use crate::Error;
 
 /// Limits beyond this are a slip or were meant to be infinite, whatever the unit.
@@ -130,6 +130,9 @@ pub struct EstimatorConfig {
     pub prior: PriorDistance,
     /// Search of shape parameters.
     pub shape: ShapeConfig,
+    /// Searches over all parameters within bounds, beside the least-squares answer. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub search: Option<SearchConfig>,
     /// Weight of that distance, residual variances per squared deviation or per nat. Default: as large as held-out folds
     /// allow, at most that of a Gaussian prior.
     pub prior_weight: Option<f64>,
@@ -186,6 +189,7 @@ impl Settings {
             }
         }
         e.shape.search(1)?;
+        e.search.iter().try_for_each(SearchConfig::check)?;
         if e.method == Method::Tls && e.effort_noise.is_none() {
             return Err(Error::setting(
                 "effort_noise",

@@ -8,6 +8,7 @@ mod friction;
 mod given;
 pub mod lists;
 mod log_terms;
+mod search;
 
 use std::collections::BTreeMap;
 
@@ -30,6 +31,7 @@ pub use estimator::{
 pub use friction::Friction;
 pub use given::{Given, refuse};
 pub use log_terms::{LogSettings, MASSES, Own, PayloadConfig, RATED_MASS, labels};
+pub use search::{SearchConfig, SearchLoss, SearchOver};
 
 /// Settings of an identification. All have defaults: `Settings::default()` is what `dynid identify` does without a configuration.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]

@@ -54,6 +54,7 @@ pub(crate) fn report(joints: usize, samples: usize) -> ReportData {
         consistency: Some(trust::consistency()),
         held_out: trust::held_out(joints),
         precision: Some(trust::precision(joints)),
+        searches: None,
         pruning: Some(trust::pruning(joints)),
         observation: Observation {
             rows: Some((joints * samples) as u64 * 9 / 10),

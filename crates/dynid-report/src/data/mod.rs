@@ -99,6 +99,8 @@ pub struct ReportData {
     pub held_out: HeldOut,
     /// How the residuals bear on the precision.
     pub precision: Option<Precision>,
+    /// Searches over all parameters; `None` if none was asked for.
+    pub searches: Option<StudySection>,
     /// Models with fewer base parameters.
     pub pruning: Option<Pruning>,
     /// Size, rank and condition of the observation matrix.

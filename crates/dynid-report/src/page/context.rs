@@ -9,6 +9,7 @@ use super::first::first;
 use super::picture::picture;
 use super::pruning::pruning;
 use super::script_data::script_json;
+use super::study::section;
 use super::trust::{limits_by_owner, trust};
 use crate::data::{Fact, JointQuality, LogReport, LogRole, LogSeries, ReportData};
 use crate::drawing::{autocorrelation_svg, histogram_svg};
@@ -42,6 +43,7 @@ pub(super) fn context(data: &ReportData) -> Result<Value, ReportError> {
         limits_by_owner => Serde(limits_by_owner(data.consistency.as_ref())),
         held_out => Serde(&data.held_out),
         precision => Serde(&data.precision),
+        searches => Serde(data.searches.as_ref().map(section)),
         pruning => Serde(data.pruning.as_ref().map(pruning)),
         observation => Serde(&data.observation),
         unidentifiable => Serde(&data.unidentifiable),

@@ -16,7 +16,7 @@ pub(super) const LOG_PAGE: &str = "log/page.html";
 pub(super) const STUDY_PAGE: &str = "study/page.html";
 
 /// Every name ends in `.html`, which switches automatic escaping on.
-const TEMPLATES: [(&str, &str); 32] = [
+const TEMPLATES: [(&str, &str); 33] = [
     ("shell.html", include_str!("../../template/shell.html")),
     (PAGE, include_str!("../../template/page.html")),
     ("macros.html", include_str!("../../template/macros.html")),
@@ -29,6 +29,7 @@ const TEMPLATES: [(&str, &str); 32] = [
     ("files.html", include_str!("../../template/files.html")),
     ("consistency.html", include_str!("../../template/consistency.html")),
     ("precision.html", include_str!("../../template/precision.html")),
+    ("searches.html", include_str!("../../template/searches.html")),
     ("essential.html", include_str!("../../template/essential.html")),
     ("system.html", include_str!("../../template/system.html")),
     ("quality.html", include_str!("../../template/quality.html")),

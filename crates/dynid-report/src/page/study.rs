@@ -75,7 +75,7 @@ fn ranking(data: &Ranking) -> RankingView<'_> {
     }
 }
 
-fn section(section: &StudySection) -> SectionView<'_> {
+pub(super) fn section(section: &StudySection) -> SectionView<'_> {
     SectionView {
         title: &section.title,
         text: &section.text,

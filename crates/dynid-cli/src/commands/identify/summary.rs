@@ -43,6 +43,28 @@ pub(in crate::commands) fn summary(estimate: &Estimate) -> String {
         );
     }
     out += &parameters(estimate);
+    if let Some(searches) = &estimate.searches {
+        let _ = writeln!(
+            out,
+            "\nsearches over {} unknowns on {} samples: least squares has {}",
+            searches.unknowns.len(),
+            searches.samples,
+            table::number(Some(searches.least_squares))
+        );
+        for by in &searches.found {
+            let evaluations: u64 = by.runs.iter().map(|r| r.evaluations).sum();
+            let number = |x: f64| table::number(Some(x));
+            let _ = writeln!(
+                out,
+                "  {}: {} (median {} of {}, {evaluations} evaluations, {} s)",
+                by.algorithm,
+                number(by.value),
+                number(by.median),
+                by.runs.len(),
+                number(by.seconds)
+            );
+        }
+    }
     if !estimate.verdict.cautions.is_empty() {
         out += "\nwhat mends it, the worst first (`dynid explain NAME` says more):\n";
         for caution in &estimate.verdict.cautions {

@@ -464,6 +464,28 @@ fn cases() -> Vec<Case> {
             "[elements]\nfriction = \"stribeck\"\n[estimator.shape]\nsearch = \"pso\"\nstarts = 3",
             Refused("search"),
         ),
+        table("estimator.search.algorithms", QUICK_SEARCH, Changes),
+        table(
+            "estimator.search.algorithms",
+            "[estimator.search]\nruns = 2",
+            Refused("at least one algorithm"),
+        ),
+        table("estimator.search.algorithms", "[estimator.search]\nalgorithms = [\"sa\"]", Refused("cma-es")),
+        searched("over = \"standard\"", Changes),
+        searched("loss = \"squared\"", Changes),
+        searched("weights = { j1 = 3 }", Changes),
+        searched("weights = { j9 = 3 }", Refused("j9")),
+        searched("iterations = 3", Changes),
+        searched("evaluations = 70", Changes),
+        searched("population = 20", Changes),
+        searched("runs = 2", Changes),
+        searched("range = 2", Changes),
+        searched("range = 0", Refused("a positive number")),
+        searched("bounds = { \"j1.fc\" = [0, 2] }", Changes),
+        searched("bounds = { \"j1.fc\" = [2, 0] }", Refused("in this order")),
+        searched("bounds = { \"j9.fc\" = [0, 2] }", Refused("one of the unknowns")),
+        searched("samples = 100", Changes),
+        searched("samples = 0", Refused("at least 1")),
         table("instruments.reference", LOOP, Changes),
         table("instruments.reference_scale", "[instruments]\nreference_scale = 2.0", Refused("reference")),
         loops(
@@ -546,6 +568,8 @@ fn cases() -> Vec<Case> {
             "[instruments]\nreference = \"qref_{joint}\"\ndivergence = 0.001",
             Changes,
         ),
+        table("tie", "[[tie]]\nequal = [\"j1.fc\", \"j2.fc\"]", Changes),
+        table("tie", "[[tie]]\nequal = [\"j1.fc\", \"j9.fc\"]", Refused("j9.fc")),
         table("bound.links", "[[bound]]\nlinks = [\"link9\"]\nmass = [0, 1]", Refused("link9")),
         table("bound.mass", "[[bound]]\nlinks = [\"link2\"]\nmass = [0, 1]", Changes),
         table("bound.com_x", "[[bound]]\nlinks = [\"link2\"]\ncom_x = [0.3, 0.4]", Changes),
@@ -640,6 +664,16 @@ fn cases() -> Vec<Case> {
         ),
         valid("validation.like", "like = \"a\"", Refused("own")),
     ]
+}
+
+const QUICK_SEARCH: &str = "[estimator.search]\nalgorithms = [\"de\"]\nevaluations = 60";
+
+/// A line of a search against the search without it.
+fn searched(line: &'static str, expect: Expect) -> Case {
+    let (name, _) = line.split_once(' ').unwrap_or((line, ""));
+    let plain = QUICK_SEARCH.replace(if name == "evaluations" { "\nevaluations = 60" } else { "none" }, "");
+    let key = format!("estimator.search.{name}");
+    beside(key.leak(), QUICK_SEARCH, format!("{plain}\n{line}").leak(), expect)
 }
 
 const TEXTBOOK: &str = "[conditioning]\nroute = \"textbook\"\n";
