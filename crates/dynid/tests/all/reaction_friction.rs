@@ -180,8 +180,8 @@ fn sliders_of_a_parallel_machine() {
     of_sliders("prr3", 0.5);
 }
 
-/// Fast motion has few such samples: each slider by itself has static coefficient and Stribeck speed on a ridge, which the tie of the robot
-/// file, whose sliders are of one make, does away with.
+/// Fast motion has few such samples: each slider by itself has static coefficient and Stribeck speed on a ridge, which a tie
+/// of the sliders, which are of one make, does away with.
 #[test]
 fn sliders_of_a_fast_parallel_machine() {
     of_sliders("prr3-fast", SimulateSettings::default().acceleration);
@@ -199,7 +199,9 @@ fn of_sliders(test: &str, acceleration: f64) {
         ..SimulateSettings::default()
     };
     let bench = Bench::new(test, &std::fs::read_to_string(path).unwrap(), &settings);
-    let id = bench.identify("[elements]\nfriction = \"given\"");
+    // Sliders are of one make.
+    let id =
+        bench.identify("tie = [[\"slider1\", \"slider2\", \"slider3\"]]\n[elements]\nfriction = \"given\"");
     println!("{:?}", id.loads.unwrap());
     assert!(id.loads.unwrap().change <= 1e-6);
     let ours = bench.against_noise(&id);
