@@ -8,7 +8,7 @@ use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
 use dynid::{Config, Robot, RobotOptions, identify};
 use tempfile::TempDir;
 
-use super::{Case, Changes, Refused, Text, beside, keys, log, table, top, valid, walk};
+use super::{Case, Changes, Expect, Refused, Text, beside, keys, log, table, top, valid, walk};
 
 /// Two links in the vertical plane; the second has a brother that may follow it.
 pub(super) const ARM: &str = r#"
@@ -568,8 +568,26 @@ fn cases() -> Vec<Case> {
             "[instruments]\nreference = \"qref_{joint}\"\ndivergence = 0.001",
             Changes,
         ),
-        table("tie", "[[tie]]\nequal = [\"j1.fc\", \"j2.fc\"]", Changes),
-        table("tie", "[[tie]]\nequal = [\"j1.fc\", \"j9.fc\"]", Refused("j9.fc")),
+        table("tie.equal", "[[tie]]\nequal = [\"j1.fc\", \"j2.fc\"]", Changes),
+        table("tie.equal", "[[tie]]\nequal = [\"j1.fc\", \"j9.fc\"]", Refused("j9.fc")),
+        beside(
+            "tie.mirror",
+            "[[tie]]\nequal = [\"link1\", \"link2\"]",
+            "[[tie]]\nequal = [\"link1\", \"link2\"]\nmirror = \"x\"",
+            Changes,
+        ),
+        table("tie.mirror", "[[tie]]\nmirror = \"x\"\nknown = { \"j1.fc\" = 1 }", Refused("equal")),
+        table("tie.ratio", "[[tie]]\nratio = { \"j1.fc\" = 1, \"j2.fc\" = 2 }", Changes),
+        table("tie.sum", "[[tie]]\nsum = { \"j1.fc\" = 1, \"j2.fc\" = 1 }\nvalue = 3", Changes),
+        table("tie.sum", "[[tie]]\nsum = { \"j1.fc\" = 1, \"j2.fc\" = 1 }", Refused("what the sum is")),
+        beside(
+            "tie.value",
+            "[[tie]]\nsum = { \"j1.fc\" = 1, \"j2.fc\" = 1 }\nvalue = 3",
+            "[[tie]]\nsum = { \"j1.fc\" = 1, \"j2.fc\" = 1 }\nvalue = 4",
+            Changes,
+        ),
+        table("tie.known", "[[tie]]\nknown = { \"j1.fc\" = 1 }", Changes),
+        table("tie.massless", "[[tie]]\nmassless = [\"link2\"]", Changes),
         table("bound.links", "[[bound]]\nlinks = [\"link9\"]\nmass = [0, 1]", Refused("link9")),
         table("bound.mass", "[[bound]]\nlinks = [\"link2\"]\nmass = [0, 1]", Changes),
         table("bound.com_x", "[[bound]]\nlinks = [\"link2\"]\ncom_x = [0.3, 0.4]", Changes),
@@ -671,7 +689,8 @@ const QUICK_SEARCH: &str = "[estimator.search]\nalgorithms = [\"de\"]\nevaluatio
 /// A line of a search against the search without it.
 fn searched(line: &'static str, expect: Expect) -> Case {
     let (name, _) = line.split_once(' ').unwrap_or((line, ""));
-    let plain = QUICK_SEARCH.replace(if name == "evaluations" { "\nevaluations = 60" } else { "none" }, "");
+    let budget = ["evaluations", "iterations"].contains(&name);
+    let plain = QUICK_SEARCH.replace(if budget { "\nevaluations = 60" } else { "none" }, "");
     let key = format!("estimator.search.{name}");
     beside(key.leak(), QUICK_SEARCH, format!("{plain}\n{line}").leak(), expect)
 }
