@@ -20,6 +20,7 @@ mod memory;
 mod motion;
 mod online;
 mod other_libraries;
+mod papers;
 mod payload;
 mod provenance;
 mod round_trip;

@@ -211,6 +211,12 @@ impl Identification {
         if self.settings.closed_loop.is_some() {
             return Err(not_reduced("`[instruments]`", "leave the table out"));
         }
+        if self.settings.estimator.search.is_some() {
+            return Err(not_reduced(
+                "`[estimator.search]`, whose losses are those of samples,",
+                "leave the table out",
+            ));
+        }
         if !self.plan.log_terms.is_empty() || !self.own_delays.is_empty() {
             return Err(not_reduced("terms of single logs", "leave out `payload` and `own`"));
         }

@@ -48,6 +48,11 @@ impl Asked {
                 "`{REACTION_FRICTION}` is not followed on line, since its columns go with the estimate: state other friction"
             )));
         }
+        if settings.estimator.search.is_some() {
+            return Err(Error::Unsupported(
+                "`[estimator.search]` beside on-line identification, which has no search: leave the table out".to_owned(),
+            ));
+        }
         Ok(Asked {
             robot,
             settings,

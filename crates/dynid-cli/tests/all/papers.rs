@@ -1,0 +1,75 @@
+//! Published machines from files and commands: the scripts of `examples/` run, and what they find is what the papers are about.
+
+#![cfg(unix)]
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use dynid::Estimate;
+use dynid::io::csv::{ReadOptions, read};
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Runs the script of an example in a folder of its own.
+fn run(example: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let sources = ["examples", "robots"].map(|name| root.join(name));
+    assert!(Command::new("cp").arg("-r").args(sources).arg(folder.path()).status().unwrap().success());
+    let program = PathBuf::from(assert_cmd::cargo::cargo_bin("dynid"));
+    let script = folder.path().join("examples").join(example).join("run.sh");
+    let output = Command::new("bash").arg(script).arg(program).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    folder
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// Parameters that are seen, against the truth, in standard deviations.
+fn off(estimate: &Estimate, truth: &Value) -> Vec<(String, f64)> {
+    let seen = estimate.parameters.iter().filter(|p| p.tie.is_none());
+    seen.filter_map(|p| Some((p.name.clone(), (p.value - truth[&p.name].as_f64()?) / p.std?))).collect()
+}
+
+#[test]
+fn searches_of_the_er16_rank_as_in_the_paper_and_least_squares_is_below_all() {
+    let folder = run("er16");
+    let out = folder.path().join("er16-run");
+    let estimate = Estimate::read(&out.join("result/estimate.json")).unwrap();
+    let searches = estimate.searches.as_ref().unwrap();
+    assert_eq!(searches.unknowns.len(), 30);
+    let median = |name: &str| searches.found.iter().find(|f| f.algorithm == name).unwrap().median;
+    let [ics, cs, pso] = ["ics", "cs", "pso"].map(median);
+    println!("ics {ics:.2}, cs {cs:.2}, pso {pso:.2}, least squares {:.2}", searches.least_squares);
+    assert!(ics < cs && cs < pso && searches.least_squares < 0.5 * searches.found[0].value);
+    assert!(searches.outside.is_empty(), "{:?}", searches.outside);
+    let off = off(&estimate, &json(&out.join("truth.json")));
+    println!("{off:.1?}");
+    assert!(off.len() > 15 && off.iter().all(|(_, z)| z.abs() < 3.5), "{off:.1?}");
+    assert!(estimate.validation[0].filtered.relative_error.unwrap() < 1.0);
+    assert!(out.join("er16.xml").is_file());
+}
+
+#[test]
+fn friction_that_follows_the_load_predicts_the_circle_of_the_3prr() {
+    let folder = run("prr3");
+    let out = folder.path().join("prr3-run");
+    let column = |file: &str, name: &str| {
+        let table = read(out.join(file), &ReadOptions::default()).unwrap();
+        table.column(name).unwrap().to_vec()
+    };
+    let error = |model: &str, slider: &str| {
+        let predicted = column(&format!("{model}/circle.csv"), &format!("effort_{slider}"));
+        let truth = column("circle-true.csv", &format!("tau_{slider}"));
+        let square: f64 = predicted.iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum();
+        (square / truth.len() as f64).sqrt()
+    };
+    for slider in ["slider1", "slider2", "slider3"] {
+        let [varying, constant] = ["varying", "constant"].map(|model| error(model, slider));
+        println!("{slider}: {varying:.3} N, with friction that no load changes {constant:.3} N");
+        assert!(varying < 0.2 && constant > 10.0 * varying, "{slider}: {varying} {constant}");
+    }
+}
