@@ -73,3 +73,27 @@ fn friction_that_follows_the_load_predicts_the_circle_of_the_3prr() {
         assert!(varying < 0.2 && constant > 10.0 * varying, "{slider}: {varying} {constant}");
     }
 }
+
+#[test]
+fn two_steps_with_temperatures_predict_a_hot_indy7_from_a_cold_log() {
+    let folder = run("indy7/two-step");
+    let out = folder.path().join("two-step-run");
+    let error = |model: &str| {
+        let estimate = Estimate::read(&out.join(model).join("estimate.json")).unwrap();
+        estimate.validation[0].filtered.relative_error.unwrap()
+    };
+    let (two, one) = (error("two-step"), error("one-step"));
+    println!("error on the hot log: {two:.2} % in two steps, {one:.2} % in one");
+    assert!(two < 0.5 && one > 10.0 * two, "{two} {one}");
+    let friction = json(&out.join("friction/friction.json"));
+    let truth = json(&out.join("truth.json"));
+    for law in friction["joints"].as_array().unwrap() {
+        let joint = law["joint"].as_str().unwrap();
+        assert_eq!(law["status"], "identified", "{joint}");
+        for (key, name) in [("coulomb", "fc"), ("static", "fs")] {
+            let [found, known] = [&law[key], &truth[format!("{joint}.{name}")]].map(|v| v.as_f64().unwrap());
+            println!("{joint}.{name}: {found:.4}, truth {known:.4}");
+            assert!((found / known - 1.0).abs() < 0.01, "{joint}.{name}: {found} {known}");
+        }
+    }
+}
