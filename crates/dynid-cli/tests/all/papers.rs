@@ -97,3 +97,26 @@ fn two_steps_with_temperatures_predict_a_hot_indy7_from_a_cold_log() {
         }
     }
 }
+
+#[test]
+fn stiffness_of_the_flexible_joint_is_found_and_its_wear_is_named() {
+    let folder = run("hit-joint");
+    let out = folder.path().join("hit-run");
+    let estimate = Estimate::read(&out.join("result/estimate.json")).unwrap();
+    let truth = json(&out.join("truth.json"));
+    let k1 = estimate.parameters.iter().find(|p| p.name == "joint.k1").unwrap();
+    let known = truth["joint.k1"].as_f64().unwrap();
+    println!("k1 {} ± {:?}, truth {known}", k1.value, k1.std);
+    assert!((k1.value / known - 1.0).abs() < 0.002, "{}", k1.value);
+    let off = off(&estimate, &truth);
+    assert!(off.len() > 6 && off.iter().all(|(_, z)| z.abs() < 3.5), "{off:.1?}");
+    let events = std::fs::read_to_string(out.join("events.jsonl")).unwrap();
+    let events: Vec<Value> = events.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let changes: Vec<&Value> = events.iter().filter(|e| e["event"] == "change").collect();
+    assert_eq!(changes.len(), 1, "{changes:?}");
+    // The worn joint follows the new one after a minute.
+    let (time, change) = (changes[0]["time"].as_f64().unwrap(), changes[0].to_string());
+    println!("{time} s: {change}");
+    assert!((60.0..66.0).contains(&time) && changes[0]["confirmed"] == true);
+    assert!(change.contains("joint_motor"), "{change}");
+}
