@@ -1,9 +1,9 @@
 //! Published machines from files and commands: the scripts of `examples/` run, and what they find is what the papers are about.
 
 #![cfg(unix)]
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
+#![expect(clippy::unwrap_used, reason = "a test may stop, and says what it measured")]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use dynid::Estimate;
@@ -17,7 +17,7 @@ fn run(example: &str) -> TempDir {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let sources = ["examples", "robots"].map(|name| root.join(name));
     assert!(Command::new("cp").arg("-r").args(sources).arg(folder.path()).status().unwrap().success());
-    let program = PathBuf::from(assert_cmd::cargo::cargo_bin("dynid"));
+    let program = assert_cmd::cargo::cargo_bin("dynid");
     let script = folder.path().join("examples").join(example).join("run.sh");
     let output = Command::new("bash").arg(script).arg(program).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

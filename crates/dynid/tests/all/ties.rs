@@ -1,6 +1,6 @@
 //! Ties from robot file and configuration to results: exact, judged, in every estimator, told when the machine is not like that.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
+#![expect(clippy::unwrap_used, reason = "a test may stop, and says what it measured")]
 
 use std::path::{Path, PathBuf};
 
