@@ -8,7 +8,9 @@ mod friction;
 pub mod known;
 mod loads;
 mod model_fit;
+mod searches;
 mod shapes;
+mod ties;
 
 use dynid_estimate::elimination::{PruneSettings, prune};
 use dynid_estimate::identifiability::VisibleSpace;
@@ -41,10 +43,9 @@ pub use crate::structure::{Structure, effort_sizes, stated_values};
 use crate::trained_log::{SPEED_SPAN_S, TrainedLog};
 pub use crate::training_log::TrainingLog;
 use crate::trust::{Evidence, Trust};
-use crate::{Error, own_delay, preflight as before, searches, stiffness, tie_test};
+use crate::{Error, own_delay, preflight as before, stiffness};
 pub(crate) use figures::{EXPLAINED, explained};
 pub use model_fit::ModelFit;
-pub(crate) use model_fit::state_hz;
 
 /// What is being worked on, for progress displays.
 #[derive(Debug, Clone, PartialEq)]
@@ -147,7 +148,7 @@ fn run(
             "leave the tie out, or log the joints and give them the elements that it names",
         )
     }));
-    let tie_test = tie_test::test(&problem, &fit)?;
+    let tie_test = ties::test(&problem, &fit)?;
     if problem.settings.estimator.search.is_some() {
         progress(Step::Searches);
     }

@@ -1,5 +1,4 @@
 //! Consistent estimates with equalities: they hold, the optimum is proven, and it is that of problems without.
-#![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use crate::random_problem::random_problem;
 use dynid_estimate::consistent::{
