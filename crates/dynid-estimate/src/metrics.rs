@@ -180,10 +180,12 @@ impl ChannelSums {
             rms,
             nrmse: rms.filter(|_| varies).map(|r| r / self.range),
             r2: varies.then(|| 1.0 - self.error_energy / self.variation),
-            correlation: (varies && self.predicted_range > 0.0 && self.predicted_variation > 0.0).then(|| {
-                // Rounding may lead beyond the ends by some units in the last place.
-                (self.common / (self.variation.sqrt() * self.predicted_variation.sqrt())).clamp(-1.0, 1.0)
-            }),
+            correlation: (varies && self.predicted_range > 0.0 && self.predicted_variation > 0.0).then(
+                || {
+                    // Rounding may lead beyond the ends by some units in the last place.
+                    (self.common / (self.variation.sqrt() * self.predicted_variation.sqrt())).clamp(-1.0, 1.0)
+                },
+            ),
             relative_error: percent(self.error_energy, self.energy),
         }
     }

@@ -82,7 +82,8 @@ pub(super) fn agreement(
             row
         })
         .collect();
-    let mut head = vec!["joint", "rms raw", "rms filtered", "nrmse %", "R²", "correlation", "relative error %"];
+    let mut head =
+        vec!["joint", "rms raw", "rms filtered", "nrmse %", "R²", "correlation", "relative error %"];
     if stands {
         head.extend(["stands, %", "rms moving", "R² moving", "rms standing"]);
     }
