@@ -9,6 +9,10 @@ pub struct ChannelFit {
     pub nrmse: Option<f64>,
     /// `R² = 1 - Σ(τ - τ̂)²/Σ(τ - τ̄)²`; `None` for a constant or empty signal.
     pub r2: Option<f64>,
+    /// Correlation coefficient `Σ(τ - τ̄)(τ̂ - m)/√(Σ(τ - τ̄)² Σ(τ̂ - m)²)` with `m` the mean of `τ̂`, -1 to 1 (Pearson 1895). It is blind
+    /// to scale and offset of the prediction, so that `r2` far below its square tells of one of these. `None` if either signal is
+    /// constant or empty.
+    pub correlation: Option<f64>,
     /// `100 ‖τ - τ̂‖/‖τ‖` in percent; `None` for a zero or empty signal.
     pub relative_error: Option<f64>,
 }
@@ -118,6 +122,10 @@ pub struct ChannelSums {
     energy: f64,
     variation: f64,
     range: f64,
+    /// `Σ(τ - τ̄)(τ̂ - τ̂̄)`.
+    common: f64,
+    predicted_variation: f64,
+    predicted_range: f64,
 }
 
 impl ChannelSums {
@@ -128,6 +136,7 @@ impl ChannelSums {
     pub fn of(channel: usize, pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Result<Self, MetricsError> {
         let (mut samples, mut sum, mut error_energy, mut energy) = (0, 0.0, 0.0, 0.0);
         let (mut highest, mut lowest) = (f64::NEG_INFINITY, f64::INFINITY);
+        let (mut most, mut least, mut predicted_sum) = (f64::NEG_INFINITY, f64::INFINITY, 0.0);
         for (measured, predicted) in pairs.clone() {
             if !measured.is_finite() || !predicted.is_finite() {
                 return Err(MetricsError::NotFinite { channel, sample: samples, measured, predicted });
@@ -138,10 +147,29 @@ impl ChannelSums {
             energy += measured * measured;
             highest = highest.max(measured);
             lowest = lowest.min(measured);
+            most = most.max(predicted);
+            least = least.min(predicted);
+            predicted_sum += predicted;
         }
         let mean = sum / samples.max(1) as f64;
-        let variation = pairs.map(|(measured, _)| (measured - mean).powi(2)).sum();
-        Ok(Self { samples, error_energy, energy, variation, range: highest - lowest })
+        let predicted_mean = predicted_sum / samples.max(1) as f64;
+        let (mut variation, mut common, mut predicted_variation) = (0.0, 0.0, 0.0);
+        for (measured, predicted) in pairs {
+            let (m, p) = (measured - mean, predicted - predicted_mean);
+            variation += m.powi(2);
+            common += m * p;
+            predicted_variation += p.powi(2);
+        }
+        Ok(Self {
+            samples,
+            error_energy,
+            energy,
+            variation,
+            range: highest - lowest,
+            common,
+            predicted_variation,
+            predicted_range: most - least,
+        })
     }
 
     fn fit(&self) -> ChannelFit {
@@ -152,6 +180,12 @@ impl ChannelSums {
             rms,
             nrmse: rms.filter(|_| varies).map(|r| r / self.range),
             r2: varies.then(|| 1.0 - self.error_energy / self.variation),
+            correlation: (varies && self.predicted_range > 0.0 && self.predicted_variation > 0.0).then(
+                || {
+                    // Rounding may lead beyond the ends by some units in the last place.
+                    (self.common / (self.variation.sqrt() * self.predicted_variation.sqrt())).clamp(-1.0, 1.0)
+                },
+            ),
             relative_error: percent(self.error_energy, self.energy),
         }
     }
@@ -174,14 +208,31 @@ mod tests {
         assert_eq!(first.nrmse, Some(0.5_f64.sqrt() / 6.0));
         assert_eq!(first.r2, Some(1.0 - 2.0 / 20.0));
         assert_eq!(first.relative_error, Some(100.0 * (2.0_f64 / 36.0).sqrt()));
+        // About the mean 2 of both: -1, 1, 3, -3 and -1, 0, 3, -2.
+        assert!((first.correlation.unwrap() - 16.0 / 280.0_f64.sqrt()).abs() < 4.0 * f64::EPSILON);
+        assert_eq!(fit.channels[1].correlation, None);
         assert_eq!(fit.relative_error, Some(100.0 * (14.0_f64 / 40.0).sqrt()));
+    }
+
+    #[test]
+    fn correlation_is_blind_to_scale_and_offset() {
+        let measured: Vec<f64> = (0..50).map(|k| (0.3 * f64::from(k)).sin()).collect();
+        let of = |scale: f64, offset: f64| {
+            let predicted: Vec<f64> = measured.iter().map(|x| scale * x + offset).collect();
+            fit(&[&measured], &[&predicted]).unwrap().channels[0]
+        };
+        let rounding = 50.0 * f64::EPSILON;
+        for (scale, sign) in [(0.5, 1.0), (3.0, 1.0), (-2.0, -1.0)] {
+            let found = of(scale, 7.0);
+            assert!((found.correlation.unwrap() - sign).abs() < rounding && found.r2.unwrap() < 0.0);
+        }
     }
 
     #[test]
     fn constant_zero_and_empty_signals_have_no_ratio() {
         let constant = fit(&[[0.1; 7]], &[[0.2; 7]]).unwrap().channels[0];
         assert!(constant.rms.is_some() && constant.relative_error.is_some());
-        assert_eq!((constant.nrmse, constant.r2), (None, None));
+        assert_eq!((constant.nrmse, constant.r2, constant.correlation), (None, None, None));
         let zero = fit(&[[0.0; 3]], &[[1.0; 3]]).unwrap();
         assert_eq!((zero.channels[0].rms, zero.relative_error), (Some(1.0), None));
         let empty = fit(&[[]], &[[]]).unwrap().channels[0];

@@ -332,6 +332,7 @@ impl FitValues {
             rms: none(),
             nrmse: none(),
             r2: none(),
+            correlation: none(),
             relative_error_per_joint: none(),
             relative_error: None,
         }
@@ -344,6 +345,7 @@ impl From<&Fit> for FitValues {
             rms: fit.channels.iter().map(|c| c.rms).collect(),
             nrmse: fit.channels.iter().map(|c| c.nrmse).collect(),
             r2: fit.channels.iter().map(|c| c.r2).collect(),
+            correlation: fit.channels.iter().map(|c| c.correlation).collect(),
             relative_error_per_joint: fit.channels.iter().map(|c| c.relative_error).collect(),
             relative_error: fit.relative_error,
         }
@@ -359,6 +361,10 @@ pub struct FitValues {
     pub nrmse: Vec<Option<f64>>,
     /// Coefficient of determination per joint.
     pub r2: Vec<Option<f64>>,
+    /// Correlation coefficient between measured and predicted effort per joint, -1 to 1, blind to scale and offset of the
+    /// prediction. Unknown for rows of factor files, which do not hold it; empty in files of earlier programs.
+    #[serde(default)]
+    pub correlation: Vec<Option<f64>>,
     /// `100 ‖residual‖ / ‖effort‖` per joint, percent.
     pub relative_error_per_joint: Vec<Option<f64>>,
     /// `100 ‖residual‖ / ‖effort‖` over all joints, percent.

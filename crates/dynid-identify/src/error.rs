@@ -442,6 +442,16 @@ impl Error {
                 "record at least one whole period, or leave out `trajectory` and `period_s`: any motion will do then"
                     .to_owned(),
             ),
+            Error::Conditioning(C::FewPeriods { .. }) => Some(
+                "record two periods or more, or leave out `average_periods`: Fourier series need one".to_owned(),
+            ),
+            Error::Conditioning(C::PeriodOffGrid { .. }) => Some(
+                "leave out `average_periods` and take `smoothing = \"frequency\"`, which needs no whole number of samples"
+                    .to_owned(),
+            ),
+            Error::Conditioning(C::NoPeriod { .. }) => {
+                Some("state `period_s` or `trajectory` of the log, or take another `smoothing`".to_owned())
+            }
             Error::Conditioning(C::OtherPeriod { .. }) => {
                 Some("check that the log belongs to the trajectory; `part` can leave out what does not repeat".to_owned())
             }

@@ -162,7 +162,8 @@ impl Log {
         turns.chain(guessed).chain(temperature_warnings(&self.log)).collect()
     }
 
-    /// Conditions the log's signals; states of a motion with a stated period come from its Fourier series.
+    /// Conditions the log's signals; states of a motion with a stated period come from its Fourier series, after an average over
+    /// its periods where settings ask for it.
     ///
     /// # Errors
     /// [`Error::Conditioning`]; [`Error::Pose`] for mechanisms with loops.
@@ -172,6 +173,9 @@ impl Log {
         }
         let prepared = prepare(&self.log, model, settings)?;
         match self.settings.period_s {
+            Some(period_s) if settings.average_periods => {
+                Ok(prepared.averaged(period_s, &settings.noise)?.with_period(period_s)?)
+            }
             Some(period_s) => Ok(prepared.with_period(period_s)?),
             None => Ok(prepared),
         }

@@ -549,6 +549,7 @@ fn check_settings(
     let labels: Vec<String> = training.iter().map(|log| log.label.clone()).collect();
     let files: Vec<&str> = logs.iter().map(|log| log.log.name()).collect();
     settings.check_logs(&of_training, &of_validation, &labels)?;
+    settings.check_periods(&of_training, &files)?;
     check_log_effect(&of_training, &of_validation, &labels, &files)
 }
 

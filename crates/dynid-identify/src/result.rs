@@ -3,6 +3,7 @@
 mod counts;
 mod friction;
 mod instruments;
+mod smoothing;
 mod trust;
 
 use dynid_model::element::{change_name, scale_name};
@@ -414,26 +415,22 @@ impl Identification {
                     json!(motion.period_s),
                     "s",
                     Origin::Found,
-                    format!(
-                        "states from Fourier series over {} periods, harmonics per joint {:?}; the stated period is corrected by the positions",
-                        motion.periods, motion.harmonics
-                    ),
+                    smoothing::period(&self.settings, motion),
                 );
+            }
+            if let Some((name, value, unit, set, reason)) = smoothing::averaged(log) {
+                add(&name, value, unit, given(set), reason);
             }
         }
         let Some(c) = &self.conditioning else {
             let route = self.settings.textbook_route();
-            add(
-                "filter cut-off",
-                json!(route.cutoff_hz),
-                "Hz",
-                given(self.settings.conditioning.kernel_hz.is_some()),
-                "textbook route: zero-phase Butterworth on positions and efforts".to_owned(),
-            );
+            for (name, value, unit, set, reason) in smoothing::choices(&self.settings, &self.logs) {
+                add(&name, value, unit, given(set), reason);
+            }
             for log in self.logs.iter() {
                 add(
                     "decimation",
-                    json!(route.factor(log.rate_hz)),
+                    json!(route.factor(log)),
                     "",
                     given(route.decimation.is_some()),
                     "about five rows per period of the cut-off".to_owned(),

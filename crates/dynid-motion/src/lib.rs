@@ -6,7 +6,8 @@
 //! samples may be used. [`textbook`] is the plain route (zero-phase Butterworth, central differences, decimation),
 //! [`velocity`] judges a measured velocity, [`constant_speed`] finds constant-speed passes and pairs both directions,
 //! [`trajectory`] holds the excitation trajectories. For motions that repeat:
-//! [`periods`] averages records, [`frequency`] differentiates them by their [`harmonics`], [`smoothing`] fits cubics.
+//! [`periods`] averages records, [`frequency`] differentiates them by their [`harmonics`], [`smoothing`] fits cubics,
+//! [`savitzky_golay`] polynomials over any window.
 //! [`faults`] finds what is wrong with a record. [`live`] forms states of a stream, sample by sample.
 //!
 //! Units: s, Hz, rad (or m), rad/s, N m (or N). Signals are slices of `f64` on a uniform grid of `rate_hz`.
@@ -27,6 +28,7 @@ pub mod log;
 pub mod mask;
 pub mod median;
 pub mod periods;
+pub mod savitzky_golay;
 pub mod shift;
 pub mod signal;
 pub mod smoothing;

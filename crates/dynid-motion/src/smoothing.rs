@@ -1,4 +1,4 @@
-//! Smoothing by polynomials.
+//! Smoothing by cubics over five samples.
 
 use crate::signal::{SignalError, check_signal};
 
@@ -27,6 +27,36 @@ pub fn five_point_cubic(signal: &[f64], passes: usize) -> Result<Vec<f64>, Signa
     Ok(smooth)
 }
 
+/// Frequency at which the amplitude of so many passes of [`five_point_cubic`] falls to one half for the first time, in parts of the
+/// sample rate; `None` without a pass.
+pub fn five_point_half_amplitude(passes: usize) -> Option<f64> {
+    half_amplitude(&MIDDLE.map(|w| w / 35.0), passes)
+}
+
+/// Steps over which the first crossing is looked for.
+const STEPS: usize = 1 << 14;
+
+/// Frequency at which the response of symmetric weights, to the power of `passes`, falls to one half, in parts of the sample rate.
+pub(crate) fn half_amplitude(weights: &[f64], passes: usize) -> Option<f64> {
+    let middle = (weights.len() / 2) as f64;
+    let passes = i32::try_from(passes).unwrap_or(i32::MAX);
+    let response = |f: f64| {
+        let shifted = weights.iter().enumerate();
+        let one =
+            shifted.map(|(k, w)| w * (std::f64::consts::TAU * f * (k as f64 - middle)).cos()).sum::<f64>();
+        one.powi(passes)
+    };
+    let at = |step: usize| 0.5 * step as f64 / STEPS as f64;
+    // From an amplitude of 1 the first crossing lies far from the lobes, so that a coarse scan suffices to bracket it.
+    let first = (1..=STEPS).find(|step| response(at(*step)) <= 0.5)?;
+    let (mut low, mut high) = (at(first - 1), at(first));
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        if response(middle) > 0.5 { low = middle } else { high = middle }
+    }
+    Some(0.5 * (low + high))
+}
+
 fn pass(y: &[f64]) -> Vec<f64> {
     let weighted =
         |weights: &[f64; 5], five: &[f64]| weights.iter().zip(five).map(|(w, y)| w * y).sum::<f64>();
@@ -41,4 +71,19 @@ fn pass(y: &[f64]) -> Vec<f64> {
     out.push(mirrored(&SECOND, tail) / 35.0);
     out.push(mirrored(&FIRST, tail) / 70.0);
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passes_lower_the_half_amplitude() {
+        // (17 + 24 cos w - 6 cos 2w)/35 = 1/2 with c = cos w: 12 c² - 24 c - 5.5 = 0.
+        let c = (24.0 - (576.0_f64 + 264.0).sqrt()) / 24.0;
+        let one = five_point_half_amplitude(1).unwrap();
+        assert!((one - c.acos() / std::f64::consts::TAU).abs() < 1e-12);
+        assert!(five_point_half_amplitude(3).unwrap() < one);
+        assert_eq!(five_point_half_amplitude(0), None);
+    }
 }

@@ -201,6 +201,7 @@ impl Shown<'_> {
             rms: f.rms,
             nrmse_percent: percent(f.nrmse),
             r2: f.r2,
+            correlation: f.correlation,
             relative_error_percent: f.relative_error,
         };
         let samples = a.counted.len();

@@ -70,6 +70,7 @@ pub(super) fn agreement(
                 number(filtered.rms[j]),
                 number(percent(filtered.nrmse[j])),
                 number(filtered.r2[j]),
+                number(filtered.correlation.get(j).copied().flatten()),
                 number(filtered.relative_error_per_joint[j]),
             ];
             if stands {
@@ -81,7 +82,8 @@ pub(super) fn agreement(
             row
         })
         .collect();
-    let mut head = vec!["joint", "rms raw", "rms filtered", "nrmse %", "R²", "relative error %"];
+    let mut head =
+        vec!["joint", "rms raw", "rms filtered", "nrmse %", "R²", "correlation", "relative error %"];
     if stands {
         head.extend(["stands, %", "rms moving", "R² moving", "rms standing"]);
     }

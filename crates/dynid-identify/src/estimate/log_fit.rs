@@ -37,6 +37,7 @@ pub(crate) fn by_motion(all: &[Agreement]) -> ByMotion {
             rms: of(&|f, j| f.rms[j].map(|r| r * r)).into_iter().map(|m| m.map(f64::sqrt)).collect(),
             nrmse: of(&|f, j| f.nrmse[j]),
             r2: of(&|f, j| f.r2[j]),
+            correlation: of(&|f, j| f.correlation[j]),
             relative_error_per_joint: of(&|f, j| f.relative_error_per_joint[j]),
             relative_error: None,
         }
@@ -68,6 +69,7 @@ pub(crate) fn pool(all: &[(FitValues, usize)]) -> FitValues {
             rms: (0..joints).map(mean_square).collect(),
             nrmse: (0..joints).map(|j| weighted(&|f| f.nrmse[j])).collect(),
             r2: (0..joints).map(|j| weighted(&|f| f.r2[j])).collect(),
+            correlation: (0..joints).map(|j| weighted(&|f| f.correlation[j])).collect(),
             relative_error_per_joint: (0..joints)
                 .map(|j| weighted(&|f| f.relative_error_per_joint[j]))
                 .collect(),

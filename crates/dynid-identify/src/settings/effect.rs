@@ -3,7 +3,7 @@
 use super::given::{Given, refuse};
 use super::{
     ClosedLoop, ConditioningConfig, Consistency, LogSettings, Method, PriorDistance, Route, Settings,
-    Variances,
+    SmoothingKind, Variances,
 };
 use crate::Error;
 
@@ -133,6 +133,13 @@ impl ConditioningConfig {
                     needs("parallel_filter", self.parallel_filter.is_some()),
                     needs("filter_effort", self.filter_effort.is_some()),
                     needs("trim_s", self.trim_s.is_some()),
+                    needs("smoothing", self.smoothing.is_some()),
+                    needs("effort_smoothing", self.effort_smoothing.is_some()),
+                    needs("passes", self.passes.is_some()),
+                    needs("window", self.window.is_some()),
+                    needs("order", self.order.is_some()),
+                    needs("harmonics", self.harmonics.is_some()),
+                    needs("average_periods", self.average_periods.is_some()),
                 ],
             ),
             Route::Textbook => (
@@ -147,7 +154,60 @@ impl ConditioningConfig {
         };
         let keys: Vec<Given<'_>> =
             keys.into_iter().map(|(key, given)| Given { key, given, needs: wanted }).collect();
-        refuse(found, &keys)
+        refuse(found, &keys)?;
+        match self.route {
+            Route::Compact => Ok(()),
+            Route::Textbook => self.check_smoothing_effect(),
+        }
+    }
+
+    /// Refuses keys of one smoothing beside others alone.
+    fn check_smoothing_effect(&self) -> Result<(), Error> {
+        let positions = self.smoothing.unwrap_or(SmoothingKind::Butterworth);
+        let found = match self.effort_smoothing {
+            None => format!("`smoothing = \"{}\"`", serde_name(&positions)),
+            Some(effort) => {
+                format!("`{}` with `effort_smoothing = \"{}\"`", serde_name(&positions), serde_name(&effort))
+            }
+        };
+        let of = |kind| self.smooths(kind);
+        let polynomials = of(SmoothingKind::SavitzkyGolay);
+        let refused = |key, given, has: bool, needs| Given { key, given: given && !has, needs };
+        let cut =
+            of(SmoothingKind::Butterworth) || (of(SmoothingKind::Frequency) && self.harmonics.is_none());
+        let cut_needs = match of(SmoothingKind::Frequency) {
+            true => "the one or the other, `harmonics` or `kernel_hz`,",
+            false => "`smoothing = \"butterworth\"` or `\"frequency\"`",
+        };
+        refuse(
+            &found,
+            &[
+                refused(
+                    "passes",
+                    self.passes.is_some(),
+                    of(SmoothingKind::FivePoint),
+                    "`smoothing = \"five-point\"`",
+                ),
+                refused("window", self.window.is_some(), polynomials, "`smoothing = \"savitzky-golay\"`"),
+                refused("order", self.order.is_some(), polynomials, "`smoothing = \"savitzky-golay\"`"),
+                refused(
+                    "harmonics",
+                    self.harmonics.is_some(),
+                    of(SmoothingKind::Frequency),
+                    "`smoothing = \"frequency\"`",
+                ),
+                refused("kernel_hz", self.kernel_hz.is_some(), cut, cut_needs),
+            ],
+        )?;
+        if self.effort_smoothing.is_some() && self.filter_effort == Some(false) {
+            let expected = "`filter_effort = true` beside it";
+            return Err(Error::setting("effort_smoothing", expected, "`filter_effort = false`"));
+        }
+        if polynomials && self.window.is_none() {
+            let expected = "an odd number of samples beside `\"savitzky-golay\"`";
+            return Err(Error::setting("window", expected, "none"));
+        }
+        Ok(())
     }
 }
 

@@ -23,7 +23,7 @@ pub use crate::known_friction::FrictionErrors;
 use crate::known_friction::KnownLaws;
 pub use crate::per_joint::{PerJoint, known};
 pub use closed_loop::{ClosedLoop, NominalModel};
-pub use conditioning::{ConditioningConfig, Route};
+pub use conditioning::{ConditioningConfig, Route, SmoothingKind};
 pub use effect::{check_log_effect, serde_name};
 pub use estimator::{
     BoundConfig, Consistency, EstimatorConfig, Method, PriorDistance, ShapeConfig, Variances,

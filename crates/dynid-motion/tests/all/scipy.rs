@@ -1,8 +1,9 @@
-//! Fixtures from SciPy 1.17 (`butter`, `cheby1`, `sosfiltfilt`, `decimate`, `welch`), all on the signal of [`source`].
+//! Fixtures from SciPy 1.17 (`butter`, `cheby1`, `sosfiltfilt`, `decimate`, `welch`, `savgol_filter`, `savgol_coeffs`), all on the signal of [`source`].
 
 use dynid_motion::filter::{
     Alignment, Sections, anti_alias, butterworth, chebyshev, decimate, forward_backward, pick,
 };
+use dynid_motion::savitzky_golay::SavitzkyGolay;
 use dynid_motion::spectrum::{velocity_noise, welch};
 
 fn source(samples: usize) -> Vec<f64> {
@@ -227,4 +228,140 @@ fn velocity_noise_in_closed_form() {
     assert_eq!(velocity_noise(0.0, 4, cutoff, 1000.0).unwrap(), 0.0);
     assert!(velocity_noise(floor, 4, 600.0, 1000.0).is_err());
     assert!(velocity_noise(-1.0, 4, cutoff, 1000.0).is_err());
+}
+
+/// `savgol_filter(x, window, order, deriv, delta=1/50)`: sums of some ten products, whose rounding the derivatives magnify by the rate.
+#[test]
+fn savitzky_golay_filters() {
+    let source = source(24);
+    let cases: [(usize, usize, usize, &[f64]); 3] = [
+        (
+            7,
+            3,
+            0,
+            &[
+                0.324918731197457,
+                0.19106745486998142,
+                0.05172205272675151,
+                -0.03640814321309899,
+                0.024569064468129953,
+                0.2470761144244344,
+                0.5070513935645234,
+                0.6516116483641997,
+                0.6146602694360104,
+                0.46681856661484133,
+                0.36189326428799035,
+                0.420392768468582,
+                0.6382449870393985,
+                0.8897974464635079,
+                1.022829480308113,
+                0.9736733572259326,
+                0.815323164909179,
+                0.7021237896907283,
+                0.7528984456583417,
+                0.9609616775254085,
+                1.1991183625169173,
+                1.359971332689117,
+                1.3396931880042233,
+                1.038350606040253,
+            ],
+        ),
+        (
+            9,
+            4,
+            1,
+            &[
+                3.0883646440174983,
+                -8.443874807686324,
+                -8.642770807871093,
+                -1.9339729900947549,
+                7.256869012084664,
+                12.435823324770865,
+                10.40905651283314,
+                2.6847852428520937,
+                -4.921518774985498,
+                -6.688086595461974,
+                -1.3168863960392958,
+                7.084149076577253,
+                12.110031877517851,
+                9.906004151977452,
+                2.0848701773665126,
+                -5.493403888909382,
+                -7.156248320326869,
+                -1.71122123890947,
+                6.651740024423221,
+                11.531353056449149,
+                10.908221534823198,
+                5.095637628295818,
+                -6.783674149184432,
+                -25.606989283669012,
+            ],
+        ),
+        (
+            11,
+            3,
+            2,
+            &[
+                605.7421369916668,
+                486.77281758912824,
+                367.80349818658954,
+                248.8341787840509,
+                129.86485938151228,
+                10.895539978973515,
+                -39.2747211815318,
+                -61.108572060698805,
+                -38.304778678718705,
+                11.661033112088028,
+                50.76212817927426,
+                49.19907103796885,
+                7.951865685258689,
+                -41.961184776364064,
+                -62.95701973280204,
+                -39.329456801679726,
+                10.8651399896208,
+                49.472995165671136,
+                47.1173571045702,
+                -10.426018754930919,
+                -67.96939461443219,
+                -125.51277047393351,
+                -183.05614633343487,
+                -240.59952219293612,
+            ],
+        ),
+    ];
+    for (window, order, derivative, expected) in cases {
+        let filter = SavitzkyGolay::new(window, order).unwrap();
+        let found = filter.filter(&source, derivative, 50.0).unwrap();
+        assert_eq!(found.len(), expected.len());
+        let scale = expected.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        for (n, (found, expected)) in found.iter().zip(expected).enumerate() {
+            let tolerance = 1e-12 * scale;
+            assert!((found - expected).abs() <= tolerance, "{n}: {found} instead of {expected}");
+        }
+    }
+}
+
+/// `savgol_coeffs(13, 5, deriv=2, use="dot")`.
+#[test]
+fn savitzky_golay_weights() {
+    let found = SavitzkyGolay::new(13, 5).unwrap().weights(6, 2);
+    check(
+        &found,
+        &[
+            -0.03789592760181031,
+            0.05090497737556623,
+            0.06005758946935465,
+            0.02766351295763021,
+            -0.016642671054437078,
+            -0.05169340463458307,
+            -0.06478815302344931,
+            -0.05169340463458298,
+            -0.01664267105443699,
+            0.02766351295763027,
+            0.06005758946935462,
+            0.05090497737556623,
+            -0.0378959276018103,
+        ],
+        1e-11,
+    );
 }

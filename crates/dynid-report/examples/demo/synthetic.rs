@@ -306,6 +306,8 @@ fn quality(series: &JointSeries) -> JointQuality {
         rms: Some(factor * (errors / samples).sqrt()),
         nrmse_percent: Some(100.0 * factor * (errors / spread).sqrt()),
         r2: Some(1.0 - factor * factor * errors / spread),
+        // Errors that are independent of the prediction.
+        correlation: Some((1.0 - factor * factor * errors / spread).max(0.0).sqrt()),
         relative_error_percent: Some(100.0 * factor * (errors / energy).sqrt()),
     };
     JointQuality { raw: scaled(1.4), filtered: scaled(1.0), ..JointQuality::default() }

@@ -68,6 +68,8 @@ pub struct Quality {
     pub nrmse_percent: Option<f64>,
     /// Coefficient of determination, `1 - sum e^2 / sum (measured - mean)^2`.
     pub r2: Option<f64>,
+    /// Correlation coefficient between measured and predicted effort, -1 to 1.
+    pub correlation: Option<f64>,
     /// `|e| / |measured|` in the Euclidean norm, %.
     pub relative_error_percent: Option<f64>,
 }

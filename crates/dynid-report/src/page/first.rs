@@ -31,6 +31,7 @@ struct Row<'a> {
     rms: Option<f64>,
     percent: Option<f64>,
     r2: Option<f64>,
+    correlation: Option<f64>,
 }
 
 pub(super) fn first(data: &ReportData) -> Option<FirstView<'_>> {
@@ -44,6 +45,7 @@ pub(super) fn first(data: &ReportData) -> Option<FirstView<'_>> {
         rms: quality.filtered.rms,
         percent: quality.filtered.relative_error_percent,
         r2: quality.filtered.r2,
+        correlation: quality.filtered.correlation,
     });
     Some(FirstView {
         log: &log.name,

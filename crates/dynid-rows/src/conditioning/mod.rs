@@ -4,6 +4,7 @@
 //! and a row counts only if nothing unusable lies under it. Kernel, reversal mask and delay are chosen on held-out
 //! time blocks.
 
+mod averaged;
 mod base_prior;
 mod choose;
 mod friction;
@@ -19,11 +20,13 @@ mod reduce;
 mod rows;
 mod settings;
 mod shaped_rows;
+mod smoothing;
 mod states;
 mod textbook;
 mod trial;
 mod windows;
 
+pub use averaged::PeriodsAveraged;
 pub use base_prior::BasePrior;
 pub use choose::{DelayEstimate, KernelTrial, MaskTrial};
 pub use dynid_factor::groups::ReducedGroup;
@@ -38,6 +41,7 @@ pub use reduce::reduce;
 pub(crate) use rows::KeptColumns;
 pub use settings::{ConditioningSettings, FrictionSettings};
 pub use shaped_rows::{RefineError, ShapedRows, refine};
+pub use smoothing::Smoothing;
 pub use states::{StateBlock, States};
 pub use textbook::{TextbookRoute, paired_textbook_rows, reduce_textbook, textbook_rows};
 pub use trial::state_hz_of;
@@ -111,6 +115,36 @@ pub enum ConditioningError {
         expected: f64,
         /// Where the search left the stated period by more than 1 %, s.
         found: f64,
+    },
+    /// A log to be averaged over its periods with fewer than two.
+    #[error("{log}: expected two whole periods of {period_s} s or more to average, found {found:.3}")]
+    FewPeriods {
+        /// Log.
+        log: String,
+        /// Period, s.
+        period_s: f64,
+        /// Periods that the log lasts.
+        found: f64,
+    },
+    /// A log to be averaged over a period that is no whole number of samples.
+    #[error(
+        "{log}: expected a period of a whole number of samples to average, found {found:.4} samples ({period_s} s at {rate_hz} Hz)"
+    )]
+    PeriodOffGrid {
+        /// Log.
+        log: String,
+        /// Period, s.
+        period_s: f64,
+        /// Sample rate, Hz.
+        rate_hz: f64,
+        /// Samples of the period.
+        found: f64,
+    },
+    /// A log without a period whose Fourier series is asked for.
+    #[error("{log}: expected a period, of which Fourier series are formed, found none")]
+    NoPeriod {
+        /// Log.
+        log: String,
     },
     /// No row is left.
     #[error(

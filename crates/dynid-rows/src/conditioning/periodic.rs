@@ -25,13 +25,14 @@ impl PreparedLog {
     /// The period is corrected by up to 1 % from the positions themselves, since controller and logger may keep different
     /// clocks: one Gauss-Newton unknown, weighted over joints by their noise. Samples beyond the last whole period become
     /// unusable. Since the states hold next to no noise, it no longer limits the kernel: see
-    /// [`super::ConditioningSettings::periodic_kernel_hz`].
+    /// [`super::ConditioningSettings::periodic_kernel_hz`]. A log that was averaged ([`PreparedLog::averaged`]) is one period, which stands.
     ///
     /// # Errors
     /// [`ConditioningError::ShorterThanPeriod`] without a whole period, [`ConditioningError::OtherPeriod`] if the positions
     /// repeat after another time.
     pub fn with_period(mut self, period_s: f64) -> Result<Self, ConditioningError> {
         let duration = self.duration();
+        let period_s = if self.averaged.is_some() { duration } else { period_s };
         let whole = |period_s: f64| (duration / period_s * (1.0 + 1e-9)) as usize;
         if !(period_s.is_finite() && period_s * self.rate_hz >= 8.0 && whole(period_s) > 0) {
             return Err(ConditioningError::ShorterThanPeriod {
@@ -45,7 +46,10 @@ impl PreparedLog {
             let end = (periods * period_s * log.rate_hz).round() as usize;
             log.usable.iter().enumerate().map(|(n, u)| *u && n < end).collect()
         };
-        let period_s = self.corrected_period(period_s, &fitted(&self, period_s))?;
+        let period_s = match self.averaged {
+            Some(_) => period_s,
+            None => self.corrected_period(period_s, &fitted(&self, period_s))?,
+        };
         let usable = fitted(&self, period_s);
         let periods = whole(period_s).max(1);
         let step = std::f64::consts::TAU / (period_s * self.rate_hz);

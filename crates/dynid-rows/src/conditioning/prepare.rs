@@ -8,7 +8,7 @@ use dynid_motion::spectrum::{EffortNoise, PositionNoise, effort_noise, position_
 use dynid_motion::{Channel, Log, spikes};
 use rayon::prelude::*;
 
-use super::{ConditioningError, ConditioningSettings};
+use super::{ConditioningError, ConditioningSettings, PeriodsAveraged};
 
 /// A log on a uniform grid without spikes, joints in the order of the model's outputs.
 #[derive(Debug, Clone)]
@@ -39,6 +39,8 @@ pub struct PreparedLog {
     pub clock: ClockReport,
     /// Motion of a known period, if one was stated; states then come from it.
     pub periodic: Option<PeriodicMotion>,
+    /// What was averaged, if the log is the mean of its periods ([`PreparedLog::averaged`]).
+    pub averaged: Option<PeriodsAveraged>,
 }
 
 /// Periodic motion found in a log; see [`PreparedLog::with_period`].
@@ -135,6 +137,7 @@ pub fn prepare(
         moves: Vec::new(),
         clock: uniform.report,
         periodic: None,
+        averaged: None,
     };
     for (joint, moves, counts, position, effort) in done {
         out.position.push(joint.position);

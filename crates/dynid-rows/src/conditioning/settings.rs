@@ -5,6 +5,8 @@ use dynid_motion::cutoff::CutoffSettings;
 use dynid_motion::spectrum::NoiseSettings;
 use dynid_motion::spikes::SpikeSettings;
 
+use super::Smoothing;
+
 /// How a log is brought from samples to regression rows. `None` means: found from the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConditioningSettings {
@@ -41,6 +43,10 @@ pub struct ConditioningSettings {
     pub friction: FrictionSettings,
     /// Remove spikes. Default true.
     pub remove_spikes: bool,
+    /// How positions become states. Default: Butterworth; the others belong to the textbook route.
+    pub smoothing: Smoothing,
+    /// Average logs with a stated period over their whole periods before everything else. Default false.
+    pub average_periods: bool,
     /// Order of the state filter (Butterworth, run forward and backward). Default 4.
     pub state_order: usize,
     /// Length of the time blocks behind standard deviations, s; longer where there would be more than `most_blocks`. Default 1.
@@ -77,6 +83,8 @@ impl Default for ConditioningSettings {
             delay_prior: (0.5, 1.0),
             friction: FrictionSettings::default(),
             remove_spikes: true,
+            smoothing: Smoothing::default(),
+            average_periods: false,
             state_order: 4,
             block_s: 1.0,
             most_blocks: None,

@@ -27,8 +27,8 @@ pub struct States {
     pub cutoff_hz: f64,
     /// Per output: positions.
     q: Vec<Vec<f64>>,
-    /// Per output: velocities and accelerations of a periodic motion, exact ones of its series.
-    periodic: Option<[Vec<Vec<f64>>; 2]>,
+    /// Per output: velocities and accelerations where they are those of a series or polynomials, not central differences.
+    rates: Option<[Vec<Vec<f64>>; 2]>,
     /// Per output and sample: the joint moves. Elsewhere its velocity is zero.
     pub(super) moves: Option<Vec<Vec<bool>>>,
     /// Per output: effort through the state filter; empty where no effort was asked for.
@@ -50,7 +50,8 @@ pub struct StateBlock {
 
 impl States {
     /// States of a prepared log: zero-phase Butterworth at `cutoff_hz`, central differences. Those of a periodic log are the
-    /// exact ones of its series; efforts pass the filter either way.
+    /// exact ones of its series; efforts pass the filter either way. The textbook route may smooth otherwise
+    /// ([`ConditioningSettings::smoothing`]).
     pub fn new(
         log: &PreparedLog,
         cutoff_hz: f64,
@@ -69,13 +70,15 @@ impl States {
         cutoff_hz: f64,
         settings: &ConditioningSettings,
     ) -> Result<States, ConditioningError> {
-        let filter = butterworth(settings.state_order, cutoff_hz, log.rate_hz)?;
-        let (q, velocity_sigma, periodic) = match &log.periodic {
-            Some(motion) => {
+        let smooth = settings.smoothing.motion(log, cutoff_hz)?;
+        let (q, velocity_sigma, rates) = match (smooth, &log.periodic) {
+            (Some(motion), _) => (motion.q, motion.velocity_sigma, motion.rates),
+            (None, Some(motion)) => {
                 let rates = [motion.dq.clone(), motion.ddq.clone()];
                 (motion.q.clone(), motion.velocity_sigma.clone(), Some(rates))
             }
-            None => {
+            (None, None) => {
+                let filter = butterworth(settings.state_order, cutoff_hz, log.rate_hz)?;
                 let sigma = |noise: &PositionNoise| {
                     velocity_noise(noise.floor_psd, settings.state_order, cutoff_hz, log.rate_hz)
                 };
@@ -88,7 +91,7 @@ impl States {
             rate_hz: log.rate_hz,
             cutoff_hz,
             q,
-            periodic,
+            rates,
             moves: None,
             effort: Vec::new(),
             velocity_sigma,
@@ -126,10 +129,16 @@ impl States {
         for position in position {
             assert_eq!(position.len(), self.samples, "the motion is on the grid of the log");
         }
-        let filter = butterworth(settings.state_order, self.cutoff_hz, self.rate_hz)?;
+        let (q, rates) = match settings.smoothing.along(position, self.rate_hz)? {
+            Some(motion) => (motion.q, motion.rates),
+            None => {
+                let filter = butterworth(settings.state_order, self.cutoff_hz, self.rate_hz)?;
+                (positions(&filter, position, self.rate_hz)?, None)
+            }
+        };
         Ok(States {
-            q: positions(&filter, position, self.rate_hz)?,
-            periodic: None,
+            q,
+            rates,
             moves: None,
             effort: Vec::new(),
             velocity_sigma: vec![0.0; position.len()],
@@ -167,7 +176,7 @@ impl States {
     }
 
     fn fill_velocity(&self, output: usize, range: Range<usize>, out: &mut [f64]) {
-        match &self.periodic {
+        match &self.rates {
             Some([dq, _]) => out.copy_from_slice(&dq[output][range.clone()]),
             None => central_part(&self.q[output], self.rate_hz, range.clone(), out),
         }
@@ -185,7 +194,7 @@ impl States {
 
     /// Velocity and acceleration of a run of samples.
     fn fill_rates(&self, output: usize, range: Range<usize>, dq: &mut [f64], ddq: &mut [f64]) {
-        if let Some([_, exact]) = &self.periodic {
+        if let Some([_, exact]) = &self.rates {
             self.fill_velocity(output, range.clone(), dq);
             ddq.copy_from_slice(&exact[output][range]);
             return;

@@ -1,13 +1,13 @@
-//! The textbook route: zero-phase Butterworth, central differences, decimation; for comparison with papers.
+//! The textbook route: zero-phase Butterworth and central differences, or another smoothing of the papers, and decimation.
 
 use dynid_model::{EffortModel, RegressorBlock};
-use dynid_motion::filter::{anti_alias, butterworth, forward_backward, pick};
+use dynid_motion::filter::{anti_alias, pick};
 
 use super::log_rows::most_blocks;
 use super::reduce::unusable_row;
 use super::rows::KeptColumns;
 use super::states::States;
-use super::{ConditioningError, ConditioningSettings, PreparedLog};
+use super::{ConditioningError, ConditioningSettings, PreparedLog, Smoothing};
 use dynid_estimate::instruments::paired_columns;
 use dynid_factor::groups::ReducedGroup;
 use dynid_factor::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
@@ -15,16 +15,20 @@ use dynid_factor::rows::{GroupShape, MemoryRows, Rows, reduce_rows};
 /// Settings of the textbook route.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TextbookRoute {
-    /// Cut-off of the zero-phase filter on positions and efforts, Hz. Default 10.
+    /// How positions become states. Default: zero-phase Butterworth.
+    pub smoothing: Smoothing,
+    /// How efforts are smoothed. Default: like positions.
+    pub effort_smoothing: Option<Smoothing>,
+    /// Cut-off of the zero-phase filter, or of the Fourier series, on positions and efforts, Hz. Default 10.
     pub cutoff_hz: f64,
     /// Order of the filter. Default 4.
     pub order: usize,
-    /// Keep every n-th row; default: about five times the cut-off.
+    /// Keep every n-th row; default: about five rows per period of the positions' cut-off ([`Smoothing::cutoff_hz`]).
     pub decimation: Option<usize>,
     /// Pass columns and effort through an anti-alias filter before rows are dropped, as MATLAB's `decimate` does.
     /// Default false.
     pub parallel_filter: bool,
-    /// Filter the effort by the Butterworth filter too. Default true.
+    /// Smooth the effort too. Default true.
     pub filter_effort: bool,
     /// Cut from both ends, s. Default 0.2.
     pub trim_s: f64,
@@ -33,6 +37,8 @@ pub struct TextbookRoute {
 impl Default for TextbookRoute {
     fn default() -> Self {
         TextbookRoute {
+            smoothing: Smoothing::default(),
+            effort_smoothing: None,
             cutoff_hz: 10.0,
             order: 4,
             decimation: None,
@@ -45,8 +51,9 @@ impl Default for TextbookRoute {
 
 impl TextbookRoute {
     /// Rows dropped between kept ones.
-    pub fn factor(&self, rate_hz: f64) -> usize {
-        self.decimation.unwrap_or_else(|| (rate_hz / (5.0 * self.cutoff_hz)).floor() as usize).max(1)
+    pub fn factor(&self, log: &PreparedLog) -> usize {
+        let found = || (log.rate_hz / (5.0 * self.smoothing.cutoff_hz(self.cutoff_hz, log))).floor() as usize;
+        self.decimation.unwrap_or_else(found).max(1)
     }
 }
 
@@ -109,13 +116,16 @@ fn rows_of<'a>(
     settings: &ConditioningSettings,
 ) -> Result<MemoryRows, ConditioningError> {
     let columns = KeptColumns::new(model, kept);
-    let settings = ConditioningSettings { state_order: route.order, ..settings.clone() };
+    let settings =
+        ConditioningSettings { smoothing: route.smoothing, state_order: route.order, ..settings.clone() };
     let mut out = MemoryRows::new();
     let most = settings.most_blocks.unwrap_or_else(|| most_blocks(logs.len()));
     for (l, log, motion) in logs {
-        let cutoff = route.cutoff_hz.min(settings.cutoff.state_rate * log.rate_hz);
-        let states = States::new(log, cutoff, &settings)?;
-        let filter = butterworth(route.order, cutoff, log.rate_hz)?;
+        let effort_smoothing = route.effort_smoothing.unwrap_or(route.smoothing);
+        route.smoothing.check(log)?;
+        let most_hz = settings.cutoff.state_rate * log.rate_hz;
+        let cutoff = |smoothing: Smoothing| smoothing.cutoff_hz(route.cutoff_hz, log).min(most_hz);
+        let states = States::of_motion_at(log, cutoff(route.smoothing), &settings)?;
         let samples = log.samples();
         let filled = |states: &States| {
             let mut regressor = RegressorBlock::new(model.layout().clone(), samples);
@@ -130,7 +140,7 @@ fn rows_of<'a>(
             motion.map(|m| Ok::<_, ConditioningError>(filled(&states.along(m, &settings)?))).transpose()?;
         let trim = (route.trim_s * log.rate_hz).round() as usize;
         let inside = trim.min(samples)..samples.saturating_sub(trim).max(trim.min(samples));
-        let factor = route.factor(log.rate_hz);
+        let factor = route.factor(log);
         let thin = |signal: &[f64]| -> Result<Vec<f64>, ConditioningError> {
             let signal = &signal[inside.clone()];
             Ok(if route.parallel_filter && factor > 1 {
@@ -142,7 +152,7 @@ fn rows_of<'a>(
         let usable = pick(&log.usable[inside.clone()], factor, 0);
         for (output, local) in columns.local.iter().enumerate() {
             let effort = if route.filter_effort {
-                forward_backward(&filter, &log.effort[output])?
+                effort_smoothing.effort(log, &log.effort[output], cutoff(effort_smoothing), route.order)?
             } else {
                 log.effort[output].to_vec()
             };

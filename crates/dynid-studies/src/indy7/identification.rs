@@ -107,7 +107,7 @@ impl Identified {
         let predicted =
             predict(&self.model, &[], &self.values, log, 4.0 * cutoff, 0.0, &conditioning).map_err(fault)?;
         let filter = butterworth(4, cutoff, log.rate_hz).map_err(fault)?;
-        let step = route(settings, log.rate_hz).factor(log.rate_hz);
+        let step = route(settings, log.rate_hz).factor(log);
         let cut = log.rate_hz as usize;
         let thin = |signal: &[f64]| -> Result<Vec<f64>, StudyError> {
             let smooth = forward_backward(&filter, signal).map_err(fault)?;

@@ -376,6 +376,183 @@ fn cases() -> Vec<Case> {
             Changes,
         ),
         beside(
+            "conditioning.smoothing",
+            TEXTBOOK,
+            "[conditioning]\nroute = \"textbook\"\nsmoothing = \"five-point\"",
+            Changes,
+        ),
+        beside("conditioning.smoothing", TEXTBOOK, POLYNOMIALS, Changes),
+        with(
+            "conditioning.smoothing",
+            text("period_s = 3", "", "", TEXTBOOK),
+            text("period_s = 3", "", "", FREQUENCY),
+            Changes,
+        ),
+        table("conditioning.smoothing", "[conditioning]\nsmoothing = \"butterworth\"", Refused("textbook")),
+        table("conditioning.smoothing", FREQUENCY, Refused("log.period_s")),
+        beside(
+            "conditioning.effort_smoothing",
+            TEXTBOOK,
+            "[conditioning]\nroute = \"textbook\"\neffort_smoothing = \"five-point\"",
+            Changes,
+        ),
+        table(
+            "conditioning.effort_smoothing",
+            "[conditioning]\nroute = \"textbook\"\neffort_smoothing = \"five-point\"\nfilter_effort = false",
+            Refused("filter_effort = true"),
+        ),
+        table(
+            "conditioning.effort_smoothing",
+            "[conditioning]\neffort_smoothing = \"five-point\"",
+            Refused("textbook"),
+        ),
+        beside(
+            "conditioning.passes",
+            "[conditioning]\nroute = \"textbook\"\nsmoothing = \"five-point\"",
+            "[conditioning]\nroute = \"textbook\"\nsmoothing = \"five-point\"\npasses = 5",
+            Changes,
+        ),
+        table(
+            "conditioning.passes",
+            "[conditioning]\nroute = \"textbook\"\nsmoothing = \"five-point\"\npasses = 0",
+            Refused("1 or more"),
+        ),
+        table(
+            "conditioning.passes",
+            "[conditioning]\nroute = \"textbook\"\npasses = 3",
+            Refused("smoothing = \"five-point\""),
+        ),
+        table("conditioning.passes", "[conditioning]\npasses = 3", Refused("textbook")),
+        beside(
+            "conditioning.window",
+            POLYNOMIALS,
+            "[conditioning]\nroute = \"textbook\"\nsmoothing = \"savitzky-golay\"\nwindow = 15",
+            Changes,
+        ),
+        table(
+            "conditioning.window",
+            "[conditioning]\nroute = \"textbook\"\nsmoothing = \"savitzky-golay\"\nwindow = 10",
+            Refused("an odd number of samples, 3 to 100001, found 10"),
+        ),
+        table(
+            "conditioning.window",
+            "[conditioning]\nroute = \"textbook\"\nsmoothing = \"savitzky-golay\"",
+            Refused("found none"),
+        ),
+        table(
+            "conditioning.window",
+            "[conditioning]\nroute = \"textbook\"\nsmoothing = \"savitzky-golay\"\nwindow = 9001",
+            Refused("expected at least 9001 samples"),
+        ),
+        table(
+            "conditioning.window",
+            "[conditioning]\nroute = \"textbook\"\nsmoothing = \"five-point\"\nwindow = 11",
+            Refused("smoothing = \"savitzky-golay\""),
+        ),
+        table("conditioning.window", "[conditioning]\nwindow = 11", Refused("textbook")),
+        beside(
+            "conditioning.order",
+            POLYNOMIALS,
+            "[conditioning]\nroute = \"textbook\"\nsmoothing = \"savitzky-golay\"\nwindow = 11\norder = 4",
+            Changes,
+        ),
+        table(
+            "conditioning.order",
+            "[conditioning]\nroute = \"textbook\"\nsmoothing = \"savitzky-golay\"\nwindow = 11\norder = 11",
+            Refused("less than `window`, 11 samples, found 11"),
+        ),
+        table(
+            "conditioning.order",
+            "[conditioning]\nroute = \"textbook\"\nsmoothing = \"savitzky-golay\"\nwindow = 11\norder = 1",
+            Refused("2 or more"),
+        ),
+        table(
+            "conditioning.order",
+            "[conditioning]\nroute = \"textbook\"\norder = 4",
+            Refused("smoothing = \"savitzky-golay\""),
+        ),
+        table("conditioning.order", "[conditioning]\norder = 4", Refused("textbook")),
+        with(
+            "conditioning.harmonics",
+            text("period_s = 3", "", "", FREQUENCY),
+            text(
+                "period_s = 3",
+                "",
+                "",
+                "[conditioning]\nroute = \"textbook\"\nsmoothing = \"frequency\"\nharmonics = 12",
+            ),
+            Changes,
+        ),
+        with(
+            "conditioning.harmonics",
+            Text::default(),
+            text(
+                "period_s = 3",
+                "",
+                "",
+                "[conditioning]\nroute = \"textbook\"\nsmoothing = \"frequency\"\nharmonics = 0",
+            ),
+            Refused("1 or more"),
+        ),
+        with(
+            "conditioning.harmonics",
+            Text::default(),
+            text(
+                "period_s = 3",
+                "",
+                "",
+                "[conditioning]\nroute = \"textbook\"\nsmoothing = \"frequency\"\nharmonics = 150",
+            ),
+            Refused("less than half the samples of a period, found 150"),
+        ),
+        table(
+            "conditioning.harmonics",
+            "[conditioning]\nroute = \"textbook\"\nsmoothing = \"frequency\"\nharmonics = 9\nkernel_hz = 9",
+            Refused("the one or the other"),
+        ),
+        table(
+            "conditioning.harmonics",
+            "[conditioning]\nroute = \"textbook\"\nharmonics = 9",
+            Refused("smoothing = \"frequency\""),
+        ),
+        table("conditioning.harmonics", "[conditioning]\nharmonics = 9", Refused("textbook")),
+        with(
+            "conditioning.kernel_hz",
+            text("period_s = 3", "", "", FREQUENCY),
+            text(
+                "period_s = 3",
+                "",
+                "",
+                "[conditioning]\nroute = \"textbook\"\nsmoothing = \"frequency\"\nkernel_hz = 6",
+            ),
+            Changes,
+        ),
+        table(
+            "conditioning.kernel_hz",
+            "[conditioning]\nroute = \"textbook\"\nsmoothing = \"five-point\"\nkernel_hz = 6",
+            Refused("smoothing = \"butterworth\""),
+        ),
+        with(
+            "conditioning.average_periods",
+            text("period_s = 3", "", "", TEXTBOOK),
+            text("period_s = 3", "", "", AVERAGED),
+            Changes,
+        ),
+        table("conditioning.average_periods", AVERAGED, Refused("log.period_s")),
+        with(
+            "conditioning.average_periods",
+            Text::default(),
+            text("period_s = 4", "", "", AVERAGED),
+            Refused("expected two whole periods of 4 s"),
+        ),
+        with(
+            "conditioning.average_periods",
+            Text::default(),
+            text("period_s = 2.996", "", "", AVERAGED),
+            Refused("a whole number of samples to average, found 299.6"),
+        ),
+        table("conditioning.average_periods", "[conditioning]\naverage_periods = true", Refused("textbook")),
+        beside(
             "conditioning.trim_s",
             TEXTBOOK,
             "[conditioning]\nroute = \"textbook\"\ntrim_s = 0.4",
@@ -696,6 +873,9 @@ fn searched(line: &'static str, expect: Expect) -> Case {
 }
 
 const TEXTBOOK: &str = "[conditioning]\nroute = \"textbook\"\n";
+const POLYNOMIALS: &str = "[conditioning]\nroute = \"textbook\"\nsmoothing = \"savitzky-golay\"\nwindow = 11";
+const FREQUENCY: &str = "[conditioning]\nroute = \"textbook\"\nsmoothing = \"frequency\"";
+const AVERAGED: &str = "[conditioning]\nroute = \"textbook\"\naverage_periods = true";
 
 #[test]
 fn every_key_of_an_identification_takes_effect_or_is_refused() {
