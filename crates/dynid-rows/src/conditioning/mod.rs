@@ -4,7 +4,6 @@
 //! and a row counts only if nothing unusable lies under it. Kernel, reversal mask and delay are chosen on held-out
 //! time blocks.
 
-mod averaged;
 mod base_prior;
 mod choose;
 mod friction;
@@ -26,7 +25,6 @@ mod textbook;
 mod trial;
 mod windows;
 
-pub use averaged::PeriodsAveraged;
 pub use base_prior::BasePrior;
 pub use choose::{DelayEstimate, KernelTrial, MaskTrial};
 pub use dynid_factor::groups::ReducedGroup;
@@ -36,12 +34,11 @@ pub use live_rows::{LiveRow, LiveRowSettings, LiveRows};
 pub use log_rows::{LogRows, most_blocks};
 pub use moving::Moving;
 pub use predict::{predict, predict_along};
-pub use prepare::{PeriodicMotion, PreparedLog, prepare};
+pub use prepare::{PeriodicMotion, PeriodsAveraged, PreparedLog, prepare};
 pub use reduce::reduce;
 pub(crate) use rows::KeptColumns;
-pub use settings::{ConditioningSettings, FrictionSettings};
+pub use settings::{ConditioningSettings, FrictionSettings, Smoothing};
 pub use shaped_rows::{RefineError, ShapedRows, refine};
-pub use smoothing::Smoothing;
 pub use states::{StateBlock, States};
 pub use textbook::{TextbookRoute, paired_textbook_rows, reduce_textbook, textbook_rows};
 pub use trial::state_hz_of;

@@ -1,5 +1,9 @@
 //! From a log to clean uniform signals with known noise.
 
+mod averaged;
+
+pub use averaged::PeriodsAveraged;
+
 use std::sync::Arc;
 
 use dynid_model::EffortModel;
@@ -8,7 +12,7 @@ use dynid_motion::spectrum::{EffortNoise, PositionNoise, effort_noise, position_
 use dynid_motion::{Channel, Log, spikes};
 use rayon::prelude::*;
 
-use super::{ConditioningError, ConditioningSettings, PeriodsAveraged};
+use super::{ConditioningError, ConditioningSettings};
 
 /// A log on a uniform grid without spikes, joints in the order of the model's outputs.
 #[derive(Debug, Clone)]

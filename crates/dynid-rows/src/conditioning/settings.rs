@@ -2,10 +2,31 @@
 
 use dynid_motion::clock::ClockSettings;
 use dynid_motion::cutoff::CutoffSettings;
+use dynid_motion::savitzky_golay::SavitzkyGolay;
 use dynid_motion::spectrum::NoiseSettings;
 use dynid_motion::spikes::SpikeSettings;
 
-use super::Smoothing;
+/// How positions become position, velocity and acceleration.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Smoothing {
+    /// Zero-phase Butterworth, then central differences twice (Gautier 1997). Of a log with a stated period the states are those
+    /// of its Fourier series ([`super::PreparedLog::with_period`]).
+    #[default]
+    Butterworth,
+    /// Cubics over five samples, so many passes ([`dynid_motion::smoothing::five_point_cubic`]), then central differences twice.
+    FivePoint {
+        /// Passes.
+        passes: usize,
+    },
+    /// Polynomials over a window and their own derivatives (Savitzky & Golay 1964).
+    SavitzkyGolay(SavitzkyGolay),
+    /// Fourier series up to a harmonic, differentiated exactly (Swevers et al. 1997): an ideal low-pass over whole periods. Logs
+    /// without a period, which only predictions may be of, pass the Butterworth at the same cut-off.
+    Frequency {
+        /// Last harmonic; `None`: the last one at or below the cut-off.
+        harmonics: Option<usize>,
+    },
+}
 
 /// How a log is brought from samples to regression rows. `None` means: found from the data.
 #[derive(Debug, Clone, PartialEq)]

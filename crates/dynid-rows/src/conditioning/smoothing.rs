@@ -11,29 +11,7 @@ use dynid_motion::signal::check_signal;
 use dynid_motion::smoothing::{five_point_cubic, five_point_half_amplitude};
 use rayon::prelude::*;
 
-use super::{ConditioningError, PeriodicMotion, PreparedLog};
-
-/// How positions become position, velocity and acceleration.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Smoothing {
-    /// Zero-phase Butterworth, then central differences twice (Gautier 1997). Of a log with a stated period the states are those
-    /// of its Fourier series ([`PreparedLog::with_period`]).
-    #[default]
-    Butterworth,
-    /// Cubics over five samples, so many passes ([`five_point_cubic`]), then central differences twice.
-    FivePoint {
-        /// Passes.
-        passes: usize,
-    },
-    /// Polynomials over a window and their own derivatives (Savitzky & Golay 1964).
-    SavitzkyGolay(SavitzkyGolay),
-    /// Fourier series up to a harmonic, differentiated exactly (Swevers et al. 1997): an ideal low-pass over whole periods. Logs
-    /// without a period, which only predictions may be of, pass the Butterworth at the same cut-off.
-    Frequency {
-        /// Last harmonic; `None`: the last one at or below the cut-off.
-        harmonics: Option<usize>,
-    },
-}
+use super::{ConditioningError, PeriodicMotion, PreparedLog, Smoothing};
 
 /// States of all outputs of a log.
 #[derive(Debug)]

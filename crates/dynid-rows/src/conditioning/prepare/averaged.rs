@@ -6,7 +6,8 @@ use dynid_motion::Channel;
 use dynid_motion::periods::average_periods;
 use dynid_motion::spectrum::{NoiseSettings, effort_noise, position_noise};
 
-use super::{ConditioningError, PreparedLog};
+use super::PreparedLog;
+use crate::conditioning::ConditioningError;
 
 /// Parts of a sample by which the last period averaged may have drifted from the first.
 const DRIFT: f64 = 0.05;
