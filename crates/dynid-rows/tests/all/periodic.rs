@@ -2,9 +2,14 @@
 #![expect(clippy::unwrap_used, reason = "in tests a panic is the report")]
 
 use crate::arm::{JOINTS, RATE_HZ, model};
+use dynid_model::{BaseParameters, BaseSettings};
+use dynid_motion::savitzky_golay::SavitzkyGolay;
 use dynid_motion::trajectory::{Fourier, Point};
-use dynid_motion::{JointSignals, Log};
-use dynid_rows::conditioning::{ConditioningError, ConditioningSettings, PreparedLog, States, prepare};
+use dynid_motion::{JointSignals, Log, SignalError};
+use dynid_rows::conditioning::{
+    ConditioningError, ConditioningSettings, PreparedLog, Smoothing, States, TextbookRoute, prepare,
+    textbook_rows,
+};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -113,4 +118,86 @@ fn other_periods_are_refused() {
     }
     let error = log.with_period(1.02 * PERIOD).unwrap_err();
     assert!(matches!(error, ConditioningError::OtherPeriod { .. }), "{error}");
+}
+
+#[test]
+fn every_smoothing_has_the_velocity_noise_that_it_says() {
+    let (log, truth) = (prepared(24.0).with_period(PERIOD).unwrap(), truth(24.0));
+    let smoothings = [
+        Smoothing::FivePoint { passes: 1 },
+        Smoothing::FivePoint { passes: 6 },
+        Smoothing::SavitzkyGolay(SavitzkyGolay::new(5, 3).unwrap()),
+        Smoothing::SavitzkyGolay(SavitzkyGolay::new(15, 4).unwrap()),
+    ];
+    for smoothing in smoothings {
+        let settings = ConditioningSettings { smoothing, ..ConditioningSettings::default() };
+        let states = States::of_motion(&log, 10.0, &settings).unwrap();
+        let (velocity, _) = errors(&states, &truth[0]);
+        let ratio = velocity / states.velocity_sigma[0];
+        // Slow motion leaves noise alone. The noise found has a few per cent of error, and errors of 5000 neighbouring velocities that
+        // share their noise the like.
+        assert!((ratio - 1.0).abs() < 0.1, "{smoothing:?}: {ratio}");
+    }
+    let exact = Smoothing::Frequency { harmonics: Some(9) };
+    let settings = ConditioningSettings { smoothing: exact, ..ConditioningSettings::default() };
+    let states = States::of_motion(&log, 10.0, &settings).unwrap();
+    let (velocity, _) = errors(&states, &truth[0]);
+    let ratio = velocity / states.velocity_sigma[0];
+    // 18 amplitudes decide: their mean square has a relative deviation of √(2/18), most of it in the last few.
+    assert!(ratio > 0.3 && ratio < 2.0, "{ratio}");
+}
+
+#[test]
+fn series_end_at_the_harmonic_or_cut_off_that_is_asked_for() {
+    let log = prepared(24.0).with_period(PERIOD).unwrap();
+    let states = |harmonics, cutoff_hz| {
+        let smoothing = Smoothing::Frequency { harmonics };
+        let settings = ConditioningSettings { smoothing, ..ConditioningSettings::default() };
+        States::of_motion(&log, cutoff_hz, &settings)
+    };
+    let asked = states(Some(4), 10.0).unwrap();
+    // The corrected period differs from 8 s by far less than 1 in 1000.
+    let cut = states(None, 4.01 / PERIOD).unwrap();
+    assert_eq!(asked.velocity(0), cut.velocity(0));
+    let more = states(Some(9), 10.0).unwrap();
+    assert_ne!(asked.velocity(0), more.velocity(0));
+    let fault = states(None, 0.5 / PERIOD).unwrap_err();
+    assert!(
+        matches!(fault, ConditioningError::Signal(SignalError::Setting { name: "harmonics", .. })),
+        "{fault}"
+    );
+    let none = prepared(24.0);
+    let smoothing = Smoothing::Frequency { harmonics: Some(4) };
+    let route = TextbookRoute { smoothing, ..TextbookRoute::default() };
+    let model = model();
+    let base = BaseParameters::of(&model, model.mechanism(), &[], &BaseSettings::default());
+    let settings = ConditioningSettings::default();
+    let rows = |log: &PreparedLog| {
+        textbook_rows(&model, &[], &base.kept, std::slice::from_ref(log), &route, &settings)
+    };
+    assert!(matches!(rows(&none), Err(ConditioningError::NoPeriod { .. })));
+    assert!(rows(&log).is_ok());
+}
+
+#[test]
+fn averages_have_less_noise_and_tell_it() {
+    let log = prepared(26.0);
+    let mean = log.clone().averaged(PERIOD, &ConditioningSettings::default().noise).unwrap();
+    let told = mean.averaged.as_ref().unwrap();
+    assert_eq!((told.periods, mean.samples()), (3, (PERIOD * RATE_HZ) as usize));
+    for (deviation, noise) in told.position_deviation.iter().zip(&mean.position_noise) {
+        // 4000 degrees of freedom: a deviation of 1.1 %. The floor of the spectrum has a few per cent.
+        assert!((deviation / NOISE - 1.0).abs() < 0.05, "{deviation}");
+        assert!((noise.sigma * 3.0_f64.sqrt() / NOISE - 1.0).abs() < 0.15, "{}", noise.sigma);
+    }
+    let periodic = mean.with_period(PERIOD).unwrap();
+    // Whole samples of a rate that is the median of rounded steps of the time.
+    assert!((periodic.periodic.unwrap().period_s / PERIOD - 1.0).abs() < 1e-12);
+
+    let noise = ConditioningSettings::default().noise;
+    let fault = |period: f64| log.clone().averaged(period, &noise).unwrap_err();
+    for period in [13.1, 30.0, 0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(fault(period), ConditioningError::FewPeriods { .. }), "{period}: {}", fault(period));
+    }
+    assert!(matches!(fault(PERIOD + 0.1 / RATE_HZ), ConditioningError::PeriodOffGrid { .. }));
 }
