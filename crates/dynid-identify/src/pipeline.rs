@@ -139,9 +139,9 @@ fn run(
         Caution::warn(caution::ELEMENTS, pair.to_string(), remedy)
     }));
     let (problem, fit) = problem.fit(conditioning, progress)?;
-    warnings.extend(problem.plan.idle_ties(&problem.model).map(|tie| {
+    warnings.extend(problem.plan.idle_ties(&problem.model).map(|(tie, idle)| {
         let message =
-            format!("the tie {{ {} }} ties nothing: what it names has no part in the model", tie.words());
+            format!("the tie {{ {} }} does not tie {idle}: no part of the model has it", tie.words());
         Caution::warn(
             caution::ELEMENTS,
             message,
@@ -642,6 +642,20 @@ pub(crate) fn log_cautions(model: &RobotModel, logs: &[PreparedLog]) -> Vec<Caut
                 "record without losing rows, or take a stretch without gaps: `part = [0.0, 0.5]` in the `[[log]]`"
                     .to_owned(),
             );
+        }
+        // Of a mean over periods that differ, the motion is none that the robot made, nor the effort that of it.
+        for (output, ratio) in log.averaged.iter().flat_map(|m| m.scatter_ratio.iter().enumerate()) {
+            if let Some(ratio) = ratio.filter(|r| *r > REPEATS) {
+                add(
+                    format!(
+                        "{name}: periods of joint `{}` were averaged that differ by {ratio:.1} times the noise of its positions: the mean is no motion \
+                         of the robot, and its efforts are not those of the mean",
+                        model.outputs()[output].name
+                    ),
+                    "cut approach and return off by `part` or `rows` of the `[[log]]`, state the right `period_s`, or leave out `average_periods`"
+                        .to_owned(),
+                );
+            }
         }
         for (output, ratio) in log.periodic.iter().flat_map(|m| m.residual_ratio.iter().enumerate()) {
             if let Some(ratio) = ratio.filter(|r| *r > REPEATS) {

@@ -107,7 +107,8 @@ fn in_plane<const N: usize>(
     }
     let residual = plane.residual(&xi);
     let violation = residual.iter().map(|r| r.abs()).fold(0.0, f64::max);
-    let named = problem.equalities.iter().zip(&residual).filter(|(_, r)| r.abs() > SHARE * violation);
+    // Where the plane is met, but on the boundary of the cones, no single equality is at fault.
+    let named = problem.equalities.iter().zip(&residual).filter(|(_, r)| r.abs() >= SHARE * violation);
     Err(ProblemError::Infeasible { conflict: named.map(|(e, _)| e.name.clone()).collect(), violation })
 }
 

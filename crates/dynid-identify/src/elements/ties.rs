@@ -51,12 +51,16 @@ impl ElementPlan {
         &self.spec.ties
     }
 
-    /// Ties that tie nothing in a model of the plan, since what they name has no part in it.
-    pub(crate) fn idle_ties<'a>(&'a self, model: &'a RobotModel) -> impl Iterator<Item = &'a TieSpec> {
-        self.spec.ties.iter().filter(|tie| {
-            let mut own = Relations::default();
-            // A tie that does not fit has been refused.
-            relations(tie, model, &mut own).is_ok() && own.linear.is_empty() && own.shape.is_empty()
+    /// Ties with names that have no part in a model of the plan, and these names: joints that stand still, links that are welded, parameters
+    /// of elements that a joint does not have.
+    pub(crate) fn idle_ties<'a>(
+        &'a self,
+        model: &'a RobotModel,
+    ) -> impl Iterator<Item = (&'a TieSpec, String)> {
+        self.spec.ties.iter().filter_map(|tie| {
+            let idle = tie.names().filter(|name| parameters(model, name).is_empty());
+            let idle: Vec<String> = idle.map(|name| format!("`{name}`")).collect();
+            (!idle.is_empty()).then(|| (tie, idle.join(", ")))
         })
     }
 
@@ -107,6 +111,11 @@ fn equal(tie: &TieSpec, model: &RobotModel, out: &mut Relations) -> Result<(), S
         .equal
         .iter()
         .map(|name| (name, parameters(model, name)))
+        // A mirror image is that of a link, whatever joint has its name.
+        .map(|(name, own)| match (tie.mirror, body(model, name)) {
+            (Some(_), Some(_)) => (name, own.into_iter().take(PARAMETERS_PER_BODY).collect()),
+            _ => (name, own),
+        })
         .filter(|(_, own)| !own.is_empty())
         .collect();
     let Some((first, of_first)) = members.first() else { return Ok(()) };
@@ -195,7 +204,11 @@ fn of_joint(model: &RobotModel, joint: &str) -> Vec<(String, Place)> {
     let table = model.parameters();
     let bodies = model.mechanism().inertial_parameters();
     let of_logs = model.log_columns();
-    let symbol = |name: &str| Some(name.strip_prefix(joint)?.strip_prefix('.')?.to_owned());
+    // A name may hold points: `arm.elbow.fc` is no parameter of `arm`.
+    let symbol = |name: &str| {
+        let symbol = name.strip_prefix(joint)?.strip_prefix('.')?;
+        (!symbol.contains('.')).then(|| symbol.to_owned())
+    };
     let linear = (bodies..table.linear.len()).filter(|c| !of_logs.contains(c));
     let linear = linear.filter_map(|c| Some((symbol(&table.linear[c].name)?, Place::Linear(c))));
     let shape = table.shape.iter().enumerate().filter_map(|(k, s)| Some((symbol(&s.name)?, Place::Shape(k))));

@@ -170,7 +170,11 @@ impl Unknowns {
         let names = columns.iter().map(|c| table.linear[*c].name.clone());
         let names: Vec<String> = names.chain(table.shape.iter().map(|s| s.name.clone())).collect();
         for (name, range) in &config.bounds {
-            let Some(k) = names.iter().position(|own| own == name) else {
+            let follows = |k: usize| {
+                let shape = k.checked_sub(first_shape);
+                shape.is_some_and(|s| model.ties().is_some_and(|ties| ties.of_shape(s).is_some()))
+            };
+            let Some(k) = names.iter().position(|own| own == name).filter(|k| !follows(*k)) else {
                 let expected = format!("one of the unknowns {}", names.join(", "));
                 return Err(Error::setting("estimator.search.bounds", &expected, name));
             };
@@ -300,7 +304,9 @@ fn samples(problem: &Problem, fit: &ModelFit, most: usize) -> Result<Samples, Er
             to.extend(used.iter().map(|s| led[*s]));
         }
         for (name, to) in &mut channels {
-            let Some(channel) = log.channels.iter().find(|c| c.name == *name) else { continue };
+            let Some(channel) = log.channels.iter().find(|c| c.name == *name) else {
+                return Err(Error::Unsupported(format!("search: {} has no channel `{name}`", log.name)));
+            };
             to.extend(used.iter().map(|s| channel.values[*s]));
         }
     }

@@ -67,10 +67,14 @@ pub(crate) fn test(problem: &Problem, fit: &ModelFit) -> Result<Option<TieTest>,
 
 /// The model of the fit with every parameter free.
 fn free_model(problem: &Problem, fit: &ModelFit) -> Result<RobotModel, Error> {
-    let Problem { plan, robot, .. } = problem;
+    let mut plan = problem.plan.clone();
+    // Columns of the fit tell how friction changes with its loads: those without ties have to do so as well, to hold the tied ones.
+    if let Some(loads) = &mut plan.load_values {
+        loads.linearised = true;
+    }
     match &fit.shapes {
-        None => plan.model(&robot.mechanism),
-        Some(found) => shape::linearised_whole(plan, &found.model, &found.linear, &found.free()),
+        None => plan.model(&problem.robot.mechanism),
+        Some(found) => shape::linearised_whole(&plan, &found.model, &found.linear, &found.free()),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Elements of a robot in a run.
 
-use dynid_io::{TieSpec, closest};
+use dynid_io::{CouplingSpec, TieSpec, closest};
 
 use super::Robot;
 use crate::Error;
@@ -28,7 +28,7 @@ impl ElementPlan {
         }
         spec.couplings.extend(settings.couplings.iter().cloned());
         for tie in &settings.tie {
-            robot.check_tie(tie)?;
+            robot.check_tie(tie, &spec.couplings)?;
             spec.ties.push(tie.clone());
         }
         let mut plan =
@@ -57,11 +57,11 @@ impl ElementPlan {
 
 impl Robot {
     /// Refuses a tie that names nothing of the robot.
-    fn check_tie(&self, tie: &TieSpec) -> Result<(), Error> {
+    fn check_tie(&self, tie: &TieSpec, couplings: &[CouplingSpec]) -> Result<(), Error> {
         let d = &self.file.description;
         let joints = d.joints.iter().map(|j| j.name.as_str());
         let motors = self.file.elements.elastic.iter().map(|e| e.motor.as_str());
-        let coupled = self.file.elements.couplings.iter().flat_map(|c| c.motors.iter().map(String::as_str));
+        let coupled = couplings.iter().flat_map(|c| c.motors.iter().map(String::as_str));
         let links = d.links.iter().map(|l| l.name.as_str());
         let owners: Vec<&str> = joints.chain(motors).chain(coupled).chain(links).collect();
         tie.unknown(&owners).map_or(Ok(()), |name| {

@@ -190,6 +190,15 @@ fn averages_have_less_noise_and_tell_it() {
         assert!((deviation / NOISE - 1.0).abs() < 0.05, "{deviation}");
         assert!((noise.sigma * 3.0_f64.sqrt() / NOISE - 1.0).abs() < 0.15, "{}", noise.sigma);
     }
+    for ratio in &told.scatter_ratio {
+        assert!((ratio.unwrap() - 1.0).abs() < 0.15, "{ratio:?}");
+    }
+    // Of a motion that does not repeat so the scatter says that the mean is no motion of the robot.
+    let wrong = log.clone().averaged(PERIOD + 1.0, &ConditioningSettings::default().noise).unwrap();
+    let ratios = wrong.averaged.unwrap().scatter_ratio;
+    // The last joint stands, which repeats whatever the period.
+    let (still, moving) = ratios.split_last().unwrap();
+    assert!(moving.iter().all(|ratio| ratio.unwrap() > 1000.0) && still.unwrap() < 1.2, "{ratios:?}");
     let periodic = mean.with_period(PERIOD).unwrap();
     // Whole samples of a rate that is the median of rounded steps of the time.
     assert!((periodic.periodic.unwrap().period_s / PERIOD - 1.0).abs() < 1e-12);

@@ -7,9 +7,11 @@ use std::path::{Path, PathBuf};
 use dynid::estimators::distribution::t_quantile;
 use dynid::model::EffortModel;
 use dynid::model::closed::ClosedDynamics;
-use dynid::simulate::{SimulateMode, SimulateSettings, SimulatedLog, simulate};
+use dynid::simulate::{SimulateMode, SimulateSettings, simulate};
 use dynid::{Config, Robot, RobotOptions};
 use dynid::{Run, identify};
+
+use crate::support::write_log;
 
 fn robot_file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots").join(format!("{name}.toml"))
@@ -24,22 +26,6 @@ fn folder(test: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("dynid-closed-{test}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     folder
-}
-
-fn write(log: &SimulatedLog, path: &Path) {
-    let mut text = String::from("t");
-    for signal in ["q", "tau"] {
-        for joint in &log.joints {
-            text.push_str(&format!(",{signal}_{joint}"));
-        }
-    }
-    for (s, t) in log.time.iter().enumerate() {
-        text.push_str(&format!("\n{t}"));
-        for column in log.position.iter().chain(&log.effort) {
-            text.push_str(&format!(",{}", column[s]));
-        }
-    }
-    std::fs::write(path, text).unwrap();
 }
 
 /// Identifies a robot from logs of fast random motions, one per seed; truth in the order of the parameters.
@@ -59,7 +45,7 @@ fn identified(name: &str, test: &str, elements: &str, seeds: &[u64]) -> (Run, Ve
         };
         let log = simulate(&robot, &settings).unwrap();
         let path = folder.join(format!("{seed}.csv"));
-        write(&log, &path);
+        write_log(&log, &path);
         text.push_str(&format!("[[log]]\npath = {path:?}\n"));
         truth = log.truth;
     }
@@ -132,7 +118,7 @@ fn rows_that_the_mechanism_cannot_follow_are_named() {
     let (robot, log) = (load("fivebar"), folder.join("log.csv"));
     let mut made = simulate(&robot, &SimulateSettings::default()).unwrap();
     made.position[0][700] += 3.0;
-    write(&made, &log);
+    write_log(&made, &log);
     let text = format!("robot = {:?}\n[[log]]\npath = {log:?}\n", robot_file("fivebar"));
     let config = Config::parse(&text, "run.toml").unwrap();
     let error = identify(&config, &mut |_| ()).unwrap_err();
@@ -153,7 +139,7 @@ fn a_controlled_delta_is_identified_and_comes_back_as_urdf_and_loops() {
         ..SimulateSettings::default()
     };
     let path = folder.join("log.csv");
-    write(&simulate(&robot, &settings).unwrap(), &path);
+    write_log(&simulate(&robot, &settings).unwrap(), &path);
     let text = format!("robot = {:?}\n[[log]]\npath = {path:?}\n", robot_file("delta"));
     let id = identify(&Config::parse(&text, "run.toml").unwrap(), &mut |_| ()).unwrap();
     let urdf = id.urdf().unwrap();

@@ -12,7 +12,7 @@ use dynid::model::EffortModel;
 use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
 use dynid::{Config, Robot, RobotOptions, Run, identify};
 
-use crate::support::{data, emps_robot};
+use crate::support::{data, emps_robot, write_log};
 
 /// An elbow arm of three joints.
 const ARM: &str = r#"
@@ -79,16 +79,6 @@ fn log_of(folder: &Path, seed: u64, encoder_noise: f64) -> SimulatedLog {
     simulate(&robot, &SimulateSettings::parse(&text, "test").unwrap()).unwrap()
 }
 
-fn write(log: &SimulatedLog, path: &Path) {
-    let mut header = vec!["t".to_owned()];
-    let mut columns: Vec<&[f64]> = vec![&log.time];
-    for (prefix, signals) in [("q", &log.position), ("tau", &log.effort)] {
-        header.extend(log.joints.iter().map(|j| format!("{prefix}_{j}")));
-        columns.extend(signals.iter().map(Vec::as_slice));
-    }
-    csv::write(path, &header, &columns).unwrap();
-}
-
 /// A kernel that lets noise of the positions through; a command held over a sample leads the motion by half of it.
 fn config(folder: &Path, method: &str, instruments: &str) -> Config {
     let text = format!(
@@ -121,7 +111,7 @@ fn bias_of_an_arm_in_closed_loop_falls_to_a_fifth() {
     let mut names = Vec::new();
     for seed in 1..=SEEDS {
         let log = log_of(folder.path(), seed, 3e-4);
-        write(&log, &folder.path().join("log.csv"));
+        write_log(&log, &folder.path().join("log.csv"));
         let config = config(folder.path(), "iv", &instruments(folder.path()));
         let id = identify(&config, &mut |_| {}).unwrap();
         let truth = truth_of(&id, &log);

@@ -4,24 +4,16 @@
 
 use std::path::{Path, PathBuf};
 
-use dynid::io::{States, csv};
+use dynid::io::States;
 use dynid::model::EffortModel;
 use dynid::predict::efforts;
 use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
 use dynid::{Config, Robot, RobotOptions, identify};
 
+use crate::support::write_log;
+
 fn robot_file() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/indy7.toml").canonicalize().unwrap()
-}
-
-fn write(log: &SimulatedLog, path: &Path) {
-    let mut header = vec!["t".to_owned()];
-    let mut columns: Vec<&[f64]> = vec![&log.time];
-    for (prefix, signals) in [("q", &log.position), ("tau", &log.effort)] {
-        header.extend(log.joints.iter().map(|j| format!("{prefix}_{j}")));
-        columns.extend(signals.iter().map(Vec::as_slice));
-    }
-    csv::write(path, &header, &columns).unwrap();
 }
 
 /// Errors of an identification.
@@ -33,7 +25,7 @@ struct Errors {
 }
 
 fn errors_of(log: &SimulatedLog, held_out: &SimulatedLog, path: &Path, more: &str) -> Errors {
-    write(log, path);
+    write_log(log, path);
     let text = format!(
         "robot = {:?}\n{more}\n[estimator]\nconsistency = \"none\"\n[[log]]\npath = {path:?}\n",
         robot_file()
@@ -172,4 +164,32 @@ fn a_trajectory_file_does_what_its_period_does() {
     let by_file = errors_of(&log, &log, &path, &format!("trajectory = {file:?}")).effort;
     let by_period = errors_of(&log, &log, &path, "period_s = 10").effort;
     assert!((by_file / by_period - 1.0).abs() < 1e-6, "{by_file} {by_period}");
+}
+
+/// The mean over periods that differ is no motion of the robot: a wrong period, or an approach among the periods, is told.
+#[test]
+fn averages_of_what_does_not_repeat_are_told() {
+    let robot = Robot::load(&robot_file(), &RobotOptions::default()).unwrap();
+    let settings = SimulateSettings {
+        duration_s: 21.0,
+        rate_hz: 200.0,
+        period_s: Some(10.0),
+        seed: 4,
+        ..SimulateSettings::default()
+    };
+    let path = std::env::temp_dir().join(format!("dynid-averages-{}.csv", std::process::id()));
+    write_log(&simulate(&robot, &settings).unwrap(), &path);
+    for (period, told) in [(10.0, false), (9.0, true)] {
+        let text = format!(
+            "robot = {:?}\n[elements]\nfriction = \"given\"\n[conditioning]\nroute = \"textbook\"\naverage_periods = true\n\
+             [[log]]\npath = {path:?}\nperiod_s = {period}\n",
+            robot_file()
+        );
+        let id = identify(&Config::parse(&text, "test").unwrap(), &mut |_| {}).unwrap();
+        let warned: Vec<&str> =
+            id.warnings.iter().map(|w| w.message.as_str()).filter(|m| m.contains("averaged")).collect();
+        println!("{period} s: {warned:?}");
+        assert_eq!(!warned.is_empty(), told, "{period} s: {warned:?}");
+    }
+    std::fs::remove_file(path).unwrap();
 }

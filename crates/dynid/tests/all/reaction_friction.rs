@@ -7,8 +7,10 @@ use std::path::{Path, PathBuf};
 use dynid::estimate::Split;
 use dynid::model::{EffortModel, MotionBlock};
 use dynid::online::Session;
-use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
+use dynid::simulate::{SimulateSettings, simulate};
 use dynid::{Config, Robot, RobotOptions, Run, identify};
+
+use crate::support::write_log;
 
 /// A carriage on a guideway, driven along it, with an arm of two joints: the force on the guideway and the moment about it change.
 /// Friction of the first joint of the arm follows the forces across its axis.
@@ -38,18 +40,6 @@ fn folder(test: &str) -> PathBuf {
     folder
 }
 
-fn write(log: &SimulatedLog, path: &Path) {
-    let mut text = String::from("t");
-    for signal in ["q", "tau"] {
-        log.joints.iter().for_each(|joint| text.push_str(&format!(",{signal}_{joint}")));
-    }
-    for (s, t) in log.time.iter().enumerate() {
-        text.push_str(&format!("\n{t}"));
-        log.position.iter().chain(&log.effort).for_each(|c| text.push_str(&format!(",{}", c[s])));
-    }
-    std::fs::write(path, text).unwrap();
-}
-
 struct Bench {
     folder: PathBuf,
     truth: Vec<(String, f64)>,
@@ -71,8 +61,8 @@ impl Bench {
         let robot = Robot::load(&folder.join("robot.toml"), &RobotOptions::default()).unwrap();
         let log = |seed| simulate(&robot, &SimulateSettings { seed, ..settings.clone() }).unwrap();
         let (train, held) = (log(1), log(2));
-        write(&train, &folder.join("train.csv"));
-        write(&held, &folder.join("held.csv"));
+        write_log(&train, &folder.join("train.csv"));
+        write_log(&held, &folder.join("held.csv"));
         let noise = held.clean[3].iter().map(|e| settings.effort_noise * rms(e)).collect();
         Bench { folder, truth: train.truth, noise, clean: held.clean }
     }

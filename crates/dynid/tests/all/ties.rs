@@ -12,6 +12,8 @@ use dynid::simulate::{SimulateSettings, simulate};
 use dynid::verdict::CheckName;
 use dynid::{Config, Robot, RobotOptions, Run, identify};
 
+use crate::support::write_log;
+
 /// Two arms on one column, mirror images of each other but for the drives of the left one, which has a gear twice as stiff.
 const TORSO: &str = r#"
 name = "torso"
@@ -100,15 +102,7 @@ impl Bench {
         let mut truth = Vec::new();
         for (seed, file) in [(seed, "train.csv"), (seed + 100, "held.csv")] {
             let log = simulate(&robot, &SimulateSettings { seed, ..settings.clone() }).unwrap();
-            let mut text = String::from("t");
-            for signal in ["q", "tau"] {
-                log.joints.iter().for_each(|joint| text.push_str(&format!(",{signal}_{joint}")));
-            }
-            for (s, t) in log.time.iter().enumerate() {
-                text.push_str(&format!("\n{t}"));
-                log.position.iter().chain(&log.effort).for_each(|c| text.push_str(&format!(",{}", c[s])));
-            }
-            std::fs::write(folder.join(file), text).unwrap();
+            write_log(&log, &folder.join(file));
             truth = log.truth;
         }
         Bench { folder, truth }
@@ -315,7 +309,7 @@ fn ties_that_cannot_hold_are_refused() {
     // What is tied of a robot without it does nothing, and says so.
     let idle = bench.identify("tie = [[\"waist.fs\", \"left_elbow.fs\"]]");
     let warned = idle.estimate().verdict.warnings;
-    assert!(warned.iter().any(|w| w.contains("ties nothing")), "{warned:?}");
+    assert!(warned.iter().any(|w| w.contains("does not tie `waist.fs`, `left_elbow.fs`")), "{warned:?}");
 }
 
 #[test]

@@ -21,6 +21,9 @@ pub struct PeriodsAveraged {
     pub position_deviation: Vec<f64>,
     /// Per output: standard deviation of the effort between periods, N m or N.
     pub effort_deviation: Vec<f64>,
+    /// Per output: standard deviation of the position between periods in parts of its noise before the average: about 1 where the motion
+    /// repeats. `None` without noise.
+    pub scatter_ratio: Vec<Option<f64>>,
 }
 
 impl PreparedLog {
@@ -54,10 +57,13 @@ impl PreparedLog {
             periods,
             position_deviation: Vec::with_capacity(self.position.len()),
             effort_deviation: Vec::with_capacity(self.effort.len()),
+            scatter_ratio: Vec::with_capacity(self.position.len()),
         };
         for (j, position) in self.position.iter_mut().enumerate() {
             let mean = average_periods(position, period, 0)?;
-            means.position_deviation.push(mean.deviation.unwrap_or(0.0));
+            let (scatter, sigma) = (mean.deviation.unwrap_or(0.0), self.position_noise[j].sigma);
+            means.position_deviation.push(scatter);
+            means.scatter_ratio.push((sigma > 0.0).then(|| scatter / sigma));
             *position = mean.mean;
             self.position_noise[j] = position_noise(position, self.rate_hz, noise)?;
         }

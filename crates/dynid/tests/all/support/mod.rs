@@ -2,11 +2,13 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use dynid::Config;
 use dynid::agreement::{Agreement, Alignment, compare};
 use dynid::estimators::conditioning::prepare;
+use dynid::io::csv;
+use dynid::simulate::SimulatedLog;
 use dynid::{Run, identify};
 
 /// Panda with torque sensors, later 30 % kept back.
@@ -125,4 +127,15 @@ body = [{ name = "carriage", parent = "ground", joint = { name = "x", kind = "pr
 "#;
     std::fs::write(file.path(), text).unwrap();
     file
+}
+
+/// Writes positions and efforts of a virtual log, columns `t`, `q_<joint>` and `tau_<joint>`.
+pub(crate) fn write_log(log: &SimulatedLog, path: &Path) {
+    let mut header = vec!["t".to_owned()];
+    let mut columns: Vec<&[f64]> = vec![&log.time];
+    for (prefix, signals) in [("q", &log.position), ("tau", &log.effort)] {
+        header.extend(log.joints.iter().map(|j| format!("{prefix}_{j}")));
+        columns.extend(signals.iter().map(Vec::as_slice));
+    }
+    csv::write(path, &header, &columns).unwrap();
 }
