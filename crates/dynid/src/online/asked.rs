@@ -53,6 +53,14 @@ impl Asked {
                 "`[estimator.search]` beside on-line identification, which has no search: leave the table out".to_owned(),
             ));
         }
+        let c = &settings.conditioning;
+        if c.smoothing.is_some() || c.effort_smoothing.is_some() || c.average_periods.is_some() {
+            return Err(Error::Unsupported(
+                "smoothings and averages of the textbook route on line, where samples are conditioned as they come: leave out `smoothing`, \
+                 `effort_smoothing` and `average_periods`"
+                    .to_owned(),
+            ));
+        }
         Ok(Asked {
             robot,
             settings,
