@@ -1,6 +1,7 @@
 //! Joint elements by name.
 
 mod elastic;
+mod journals;
 mod model;
 mod pairs;
 mod reactions;
@@ -25,6 +26,7 @@ pub use crate::error::ElasticFault;
 use crate::known_friction::KnownFriction;
 use crate::log_terms::LogTerms;
 pub(crate) use elastic::{ELASTIC, stated_springs};
+pub(crate) use journals::contacts;
 pub use pairs::AlikeElements;
 pub use reactions::{LoadValues, REACTION_FRICTION};
 
@@ -51,7 +53,7 @@ pub struct ElementPlan {
     /// Ten standard parameters per body whose rigid effort loads the gears of `load` elements; `None`: those of the robot
     /// file.
     pub load_reference: Option<Vec<f64>>,
-    /// Parameters at which the loads of `reaction_friction` are taken; `None`: those of the robot file, frozen.
+    /// Parameters at which the loads of `reaction_friction` and of journals are taken; `None`: those of the robot file, frozen.
     pub load_values: Option<LoadValues>,
     /// Friction whose effort is known, at most one law per joint. Coefficients of friction among the elements of these
     /// joints are errors of the laws.
@@ -62,13 +64,16 @@ pub struct ElementPlan {
     pub free_errors: bool,
     /// The mechanism with its loops closed, if it has some.
     pub closed: Option<Arc<ClosedMechanism>>,
+    /// The mechanism with translations of the journals that have clearance; `None`: all joints are ideal.
+    moving: Option<Arc<Mechanism>>,
     /// Elements that act in some logs only; none in the model that a result file records.
     pub log_terms: LogTerms,
 }
 
 impl ElementPlan {
     /// Elements as the robot file (or the configuration) says; joints and motors about which nothing is said get
-    /// [`DEFAULTS`] if they move, joints behind a spring without `rotor`: theirs turns with the motor.
+    /// [`DEFAULTS`] if they move, joints behind a spring without `rotor`: theirs turns with the motor; joints with clearance without
+    /// `coulomb`: the friction of their bearings has a law of its own.
     ///
     /// `moves`: whether the logs move the joint of each rate.
     ///
@@ -95,6 +100,7 @@ impl ElementPlan {
             known_source: None,
             free_errors: true,
             closed: None,
+            moving: None,
             log_terms: LogTerms::default(),
         };
         let names = plan.names(mechanism);
@@ -121,7 +127,10 @@ impl ElementPlan {
                 Some((_, list)) => list.clone(),
                 None if moves(rate) => {
                     let behind = spec.elastic.iter().any(|e| e.joint == *name);
-                    defaults.iter().filter(|d| !(behind && *d == elastic::ROTOR)).cloned().collect()
+                    let rubs = spec.clearance.iter().any(|c| c.joint == *name);
+                    let left_out =
+                        |d: &str| (behind && d == elastic::ROTOR) || (rubs && d == journals::COULOMB);
+                    defaults.iter().filter(|d| !left_out(d)).cloned().collect()
                 }
                 None => Vec::new(),
             };
@@ -272,6 +281,7 @@ impl ElementPlan {
                 out.extend(settings::place(kind, rate, &names[rate], speed, &self.spec.settings)?);
             }
         }
+        out.extend(self.journal_friction(&names)?);
         let load = self.load(mechanism, &names)?;
         match self.log_terms.scaled() {
             logs if logs.is_empty() => out.extend(load),
@@ -299,6 +309,9 @@ impl ElementPlan {
         let joints = JointInfo::of(mechanism, &self.coordinates);
         let refused = match friction.is_empty() {
             _ if self.has_reactions() => Some("beside `reaction_friction`, which it has no form for"),
+            _ if self.has_journals() => {
+                Some("beside joints with clearance, whose friction it has no form for")
+            }
             true => Some("where no joint has friction"),
             false => (friction.iter().any(|e| !e.signals(&joints).is_empty()))
                 .then_some("beside `lugre`: friction with memory has no form for it"),
@@ -355,6 +368,7 @@ impl ElementPlan {
                 }
             })
             .chain(stated_springs(&self.elastic))
+            .chain(self.stated_journals())
             .filter(|(name, _)| !self.is_friction_error(name))
             .collect()
     }

@@ -49,6 +49,19 @@ impl Fitted {
         self.jackknife.as_ref().unwrap_or(&self.white)
     }
 
+    /// Adds covariances between base parameters that come from elsewhere than the rows: `(base parameter, base parameter, covariance)`. Of
+    /// those whose column was dropped nothing is known anyway.
+    pub(crate) fn add_covariances(&mut self, entries: &[(usize, usize, f64)]) {
+        let kept = self.estimate.solution.kept.clone();
+        let to = self.jackknife.as_mut().unwrap_or(&mut self.white);
+        for (a, b, covariance) in entries {
+            let places = [a, b].map(|base| kept.iter().position(|k| k == base));
+            if let [Some(i), Some(j)] = places {
+                to[(i, j)] += covariance;
+            }
+        }
+    }
+
     /// Weighted factor of all base columns with every joint's rows deflated by `κ`, joint by joint where joints differ.
     ///
     /// Rows of an output that the model does not explain (`explained[output]` is false) count for nothing: whatever its

@@ -34,6 +34,7 @@ pub mod instruments;
 mod joint_stiffness;
 pub mod known_friction;
 mod linear_method;
+mod load_doubt;
 mod load_rounds;
 pub mod log;
 pub mod log_agreement;

@@ -18,6 +18,7 @@ use crate::robot::Robot;
 use crate::settings::LogSettings;
 
 pub(crate) mod poses;
+mod probes;
 pub mod turns;
 
 /// A log of a robot: signals in SI units (rad, m, N m, N, °C) by joint, and what an identification has to know beside them.
@@ -163,7 +164,7 @@ impl Log {
     }
 
     /// Conditions the log's signals; states of a motion with a stated period come from its Fourier series, after an average over
-    /// its periods where settings ask for it.
+    /// its periods where settings ask for it. Of journals whose offsets are logged, the derivatives become channels.
     ///
     /// # Errors
     /// [`Error::Conditioning`]; [`Error::Pose`] for mechanisms with loops.
@@ -171,7 +172,10 @@ impl Log {
         if let Some(closed) = model.closed() {
             poses::follow(closed, &self.log)?;
         }
-        let prepared = prepare(&self.log, model, settings)?;
+        let mut prepared = prepare(&self.log, model, settings)?;
+        if let Some(journals) = model.journals() {
+            probes::derive(&mut prepared, journals, settings)?;
+        }
         match self.settings.period_s {
             Some(period_s) if settings.average_periods => {
                 Ok(prepared.averaged(period_s, &settings.noise)?.with_period(period_s)?)

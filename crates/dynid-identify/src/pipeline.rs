@@ -30,6 +30,7 @@ pub use crate::identification::Identification;
 use crate::input_record::{InputRecord, short_name};
 use crate::instruments::{self, Comparison, Loop};
 use crate::joint_stiffness::{self, JointStiffness};
+use crate::load_doubt::LoadDoubt;
 pub use crate::load_rounds::LoadRounds;
 use crate::log::{self, Log, LogSource};
 use crate::log_agreement::{self, LogAgreement};
@@ -42,7 +43,7 @@ use crate::settings::{LogSettings, Preflight, Settings, check_log_effect, labels
 pub use crate::structure::{Structure, effort_sizes, stated_values};
 use crate::trained_log::{SPEED_SPAN_S, TrainedLog};
 pub use crate::training_log::TrainingLog;
-use crate::trust::{Evidence, Trust};
+use crate::trust::{self, Evidence, Trust};
 use crate::{Error, own_delay, preflight as before, stiffness};
 pub(crate) use figures::{EXPLAINED, explained};
 pub use model_fit::ModelFit;
@@ -127,10 +128,13 @@ fn run(
         open(robot, logs, settings, progress)?;
     let conditioning = problem.condition(&mut |stage| progress(Step::Conditioning(stage)))?;
     let mut warnings = problem.robot.cautions(&problem.structure.prior, problem.model.ties());
-    warnings.extend(problem.robot.clearance_warnings().map(|message| {
-        let remedy = "`dynid clearance ROBOT dynid-out/estimate.json --log LOG`, with your files, tells the gap and its friction from the effort";
-        Caution::warn(caution::CLEARANCE, message, remedy)
-    }));
+    if !problem.plan.has_journals() {
+        warnings.extend(problem.robot.clearance_warnings().map(|message| {
+            let remedy = "`dynid clearance ROBOT dynid-out/estimate.json --log LOG`, with your files, tells the gap and its friction from the \
+                          effort; without `clearance = \"ideal\"` under `[elements]` the journals move";
+            Caution::warn(caution::CLEARANCE, message, remedy)
+        }));
+    }
     warnings.extend(problem.plan.alike(&problem.robot.mechanism).iter().map(|pair| {
         let remedy = format!(
             "leave one of them out: `{} = [..]` under `[elements.joint]` lists those to keep",
@@ -335,6 +339,7 @@ impl Identification {
     /// Pruning, verdicts of the parameters and the scale of the efforts, once it is known which efforts the model explains.
     pub(crate) fn judge(&mut self, left: &Left) -> Result<(), Error> {
         self.pruning = prune(&self.fit().kept_blocks(), &self.fit().solution.kept, &PruneSettings::default());
+        let doubts = self.doubt_loads(&left.regrouping)?;
         self.trust = Evidence {
             model: &self.model,
             base: &self.base,
@@ -346,10 +351,26 @@ impl Identification {
             rows: &figures::fit_rows(self.fit(), self.conditioning.as_ref(), self.kernel_hz),
             explained: &self.explained,
             power: &self.power,
+            doubts: &doubts,
         }
         .trust();
         self.effort_scale = self.scale_of_efforts()?;
         Ok(())
+    }
+
+    /// Variances of friction coefficients that come from the masses behind the loads of journals, added to the covariance of the fit.
+    fn doubt_loads(&mut self, regrouping: &Mat) -> Result<Vec<(usize, f64)>, Error> {
+        let doubt = LoadDoubt::of(&self.model, &self.logs, self.state_hz, &self.conditioning_settings)?;
+        if doubt.is_empty() {
+            return Ok(Vec::new());
+        }
+        let Some(after) = trust::after(&self.fitted, regrouping, &self.prior) else { return Ok(Vec::new()) };
+        let covariances = doubt.covariances(&after, &self.consistent.values);
+        let base = |column: usize| self.base.kept.iter().position(|kept| *kept == column);
+        let of_base: Vec<(usize, usize, f64)> =
+            covariances.iter().filter_map(|(a, b, c)| Some((base(*a)?, base(*b)?, *c))).collect();
+        self.fitted.add_covariances(&of_base);
+        Ok(covariances.into_iter().filter(|(a, b, _)| a == b).map(|(a, _, c)| (a, c)).collect())
     }
 
     /// Predicts a validation log and compares.

@@ -71,7 +71,7 @@ impl Problem {
     ///
     /// Where some logs have a factor on friction, they are conditioned with the factors equal to 1, the factors are fitted, and everything is
     /// chosen again beside these: what is left of a log's friction would otherwise count as noise, and the kernel and the shapes of friction
-    /// be chosen too coarse. The plan starts later searches from the factors found. So it is with friction that follows reactions: it is
+    /// be chosen too coarse. The plan starts later searches from the factors found. So it is with friction that follows reactions, and with journals in bearings: they are
     /// conditioned with the loads of the robot file first, then with those that a first fit finds.
     ///
     /// # Errors
@@ -84,7 +84,7 @@ impl Problem {
         let kept = &self.structure.base.kept;
         let start = self.model.parameters().shape_start();
         let choices = condition(&self.model, &start, kept, &self.logs, &settings, progress)?;
-        if self.plan.has_reactions() {
+        if self.plan.follows_loads() {
             self.plan.load_values = self.first_loads(&choices)?;
             self.rebuild()?;
             let (start, kept) = (self.model.parameters().shape_start(), &self.structure.base.kept);

@@ -176,7 +176,7 @@ pub(crate) fn nonlinear(
 ) -> Result<Option<(RobotModel, Vec<f64>)>, Error> {
     let unfolded = match found {
         Some(found) => unfold(&found.model, linearised, values),
-        None if plan.has_reactions() || linearised.ties().is_some() => {
+        None if plan.follows_loads() || linearised.ties().is_some() => {
             let shape = linearised.parameters().shape_start();
             Unfolded { linear: values.to_vec(), shape }
         }

@@ -4,7 +4,7 @@ use dynid_estimate::consistent::ActiveConstraint;
 use dynid_estimate::distribution::t_quantile;
 use dynid_estimate::identifiability::{
     Assessment, Carried, Identifiability, Posterior, Verdict, VisibleSpace, excited_regrouping, posterior,
-    visible_combinations,
+    visible_combinations, with_half_width,
 };
 use dynid_linalg::Mat;
 use dynid_model::ties::Dependent;
@@ -15,6 +15,7 @@ use crate::advice::{Advice, FitRows, MotionSettings, Present, advise};
 use crate::consistency::Consistent;
 use crate::fitting::Fitted;
 use crate::friction_power::{self, FrictionPower};
+use crate::load_doubt::doubted;
 use crate::prior::{Prior, link_lengths};
 
 /// Confidence of the intervals.
@@ -86,6 +87,8 @@ pub(crate) struct Evidence<'a> {
     /// Per output: whether the model explains its effort.
     pub explained: &'a [bool],
     pub power: &'a FrictionPower,
+    /// Variances of linear parameters that come from the loads of their friction.
+    pub doubts: &'a [(usize, f64)],
 }
 
 /// Half width of intervals of [`CONFIDENCE`] in standard deviations.
@@ -98,11 +101,31 @@ pub fn interval_quantile(fitted: &Fitted) -> f64 {
     t_quantile(0.5 + 0.5 * CONFIDENCE, freedom.max(1.0)).unwrap_or(f64::INFINITY)
 }
 
+/// Standard parameters of a fit put together with the prior.
+pub(crate) fn after(fitted: &Fitted, regrouping: &Mat, prior: &Prior) -> Option<Posterior> {
+    let fit = &fitted.estimate;
+    posterior(
+        &excited_regrouping(&fit.factor, &fit.solution.kept, regrouping),
+        &fit.kept_x(),
+        &fitted.white,
+        0.0,
+        fitted.covariance(),
+        &prior.values,
+        &prior.std,
+    )
+}
+
 impl Evidence<'_> {
     /// Verdicts of all parameters.
     pub(crate) fn trust(&self) -> Trust {
         let information = &self.fitted.information(self.explained);
-        let assessed = self.space.assess(information, 1.0);
+        let mut assessed = self.space.assess(information, 1.0);
+        for (column, variance) in self.doubts {
+            doubted(&mut assessed.parameters[*column], *variance);
+            if let Some(base) = self.base.kept.iter().position(|k| k == column) {
+                doubted(&mut assessed.base[base], *variance);
+            }
+        }
         let present = Present { space: self.space, information, inflation: 1.0, assessed: &assessed };
         let advice = advise(self.model, self.base, &present, self.rows, &MotionSettings::default());
         let quantile = interval_quantile(self.fitted);
@@ -138,16 +161,7 @@ impl Evidence<'_> {
         quantile: f64,
         trust: &Trust,
     ) -> Vec<ParameterTrust> {
-        let fit = &self.fitted.estimate;
-        let after = posterior(
-            &excited_regrouping(&fit.factor, &fit.solution.kept, self.regrouping),
-            &fit.kept_x(),
-            &self.fitted.white,
-            0.0,
-            self.fitted.covariance(),
-            &self.prior.values,
-            &self.prior.std,
-        );
+        let after = after(self.fitted, self.regrouping, self.prior);
         let lengths = link_lengths(self.model.mechanism());
         let table = self.model.parameters();
         // Motions are proposed for the robot alone.
@@ -163,7 +177,8 @@ impl Evidence<'_> {
                     == Verdict::CarriedByPrior(Carried::OnlyInCombination)
                     && !advice.suggestions.iter().any(|s| s.parameter == j);
                 ParameterTrust {
-                    combination: self.combination(j, &assessment, symbols, trust, &lengths),
+                    combination: (self.moment(j, symbols[j], quantile))
+                        .or_else(|| self.combination(j, &assessment, symbols, trust, &lengths)),
                     advice: advice
                         .sentence(j, joints, symbols[j])
                         .filter(|_| !in_combination && !of_logs.contains(&j)),
@@ -264,6 +279,18 @@ impl Evidence<'_> {
             (on_link, Owner::Link(link)) => on_link.name() == link,
             _ => false,
         })
+    }
+
+    /// What the data see of a coefficient of friction whose load goes with masses, in words.
+    fn moment(&self, column: usize, symbol: &str, quantile: f64) -> Option<String> {
+        let (_, variance) = self.doubts.iter().find(|(doubted, _)| *doubted == column)?;
+        let base = self.base.kept.iter().position(|kept| *kept == column)?;
+        let place = self.fitted.estimate.solution.kept.iter().position(|kept| *kept == base)?;
+        let own = (self.fitted.covariance()[(place, place)] - variance).max(0.0).sqrt();
+        let seen = with_half_width(self.fitted.estimate.x[base], quantile * own);
+        Some(format!(
+            "the data see its product with the load: {symbol} = {seen} where the masses that press are as found here"
+        ))
     }
 
     /// The base parameter that a parameter is best seen in, in words with its value.

@@ -37,7 +37,7 @@ pub use robot_error::{Place, RobotFileError};
 pub use states::{StateJoint, States, StatesError};
 pub use tie::{MirrorAxis, TieFault, TieSpec};
 pub use toml_robot::{
-    ClearanceSpec, CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, ReactionLoad,
-    ReactionSpec, RobotFile, SettingValue,
+    ClearanceSpec, ClearanceValue, CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec,
+    ReactionLoad, ReactionSpec, RobotFile, SettingValue,
 };
 pub use trajectory::{TrajectoryFile, TrajectoryFileError};

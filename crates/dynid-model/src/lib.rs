@@ -15,6 +15,7 @@ pub mod description;
 pub mod dynamics;
 pub mod effort_model;
 pub mod element;
+mod journal_model;
 pub mod mechanism;
 mod motion_block;
 pub mod parameter;
@@ -37,6 +38,7 @@ pub use dynamics::{
 pub use dynid_algebra::{Inertia, Mat3, Placement, Scalar, Vec3, inertia, scalar, spatial, symmetric};
 pub use dynid_contact as contact;
 pub use effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
+pub use journal_model::{JournalModel, LoadSums, derivative_channels, journal_channels};
 pub use mechanism::{Body, Frame, Joint, JournalPath, Mechanism, MechanismError, MechanismWarning};
 pub use parameter::{Owner, Parameter, ParameterTable, ShapeParameter};
 pub use per_output::PerOutput;

@@ -1,4 +1,4 @@
-//! The effort model of a robot, open or closed, its parameters tied or not.
+//! The effort model of a robot, open or closed, with ideal joints or journals in bearings, its parameters tied or not.
 
 mod tied;
 
@@ -11,6 +11,7 @@ use crate::description::Limits;
 use crate::dynamics::{MotionAdjoint, MotionBlock};
 use crate::effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
 use crate::element::{ClearanceContact, ElasticTransmission, JetMotion, JointElement, JointInfo, Payload};
+use crate::journal_model::JournalModel;
 use crate::mechanism::Mechanism;
 use crate::parameter::{Parameter, ParameterTable};
 use crate::random_motion::RandomMotion;
@@ -38,6 +39,8 @@ enum Kind {
     Tree(TreeModel),
     /// A tree with closed loops, or one whose joints have friction that follows reactions.
     Closed(ClosedModel),
+    /// A tree whose journals move in their bearings.
+    Journals(JournalModel),
 }
 
 impl From<TreeModel> for RobotModel {
@@ -49,6 +52,12 @@ impl From<TreeModel> for RobotModel {
 impl From<ClosedModel> for RobotModel {
     fn from(closed: ClosedModel) -> Self {
         RobotModel { kind: Kind::Closed(closed), tied: None }
+    }
+}
+
+impl From<JournalModel> for RobotModel {
+    fn from(journals: JournalModel) -> Self {
+        RobotModel { kind: Kind::Journals(journals), tied: None }
     }
 }
 
@@ -73,11 +82,12 @@ impl RobotModel {
         TreeModel::with_coordinates(mechanism, coordinates, elements).into()
     }
 
-    /// The model of the tree, loops left open.
+    /// The model of the tree, loops left open, journals centred in their bearings.
     pub fn tree(&self) -> &TreeModel {
         match &self.kind {
             Kind::Tree(tree) => tree,
             Kind::Closed(closed) => closed.tree(),
+            Kind::Journals(journals) => journals.ideal(),
         }
     }
 
@@ -89,12 +99,34 @@ impl RobotModel {
     /// The model that knows the reactions inside the mechanism: with loops, or with friction that follows reactions.
     pub fn with_reactions(&self) -> Option<&ClosedModel> {
         match &self.kind {
-            Kind::Tree(_) => None,
+            Kind::Tree(_) | Kind::Journals(_) => None,
             Kind::Closed(closed) => Some(closed),
         }
     }
 
-    /// Returns the model with the loads of its friction at other parameters; as it is where no friction follows a reaction.
+    /// The model whose journals move in their bearings, if it is one.
+    pub fn journals(&self) -> Option<&JournalModel> {
+        match &self.kind {
+            Kind::Tree(_) | Kind::Closed(_) => None,
+            Kind::Journals(journals) => Some(journals),
+        }
+    }
+
+    /// Loads over a block, taken at the reference, N or N m: those that friction follows, or forces on journals; none where no load
+    /// matters.
+    ///
+    /// # Panics
+    /// Panics as [`EffortModel::efforts`] does.
+    pub fn loads(&self, motion: &MotionBlock<'_>) -> Vec<Vec<f64>> {
+        match &self.kind {
+            Kind::Tree(_) => Vec::new(),
+            Kind::Closed(closed) => closed.load_forces(motion).0.into_iter().flatten().collect(),
+            Kind::Journals(journals) => journals.forces(motion),
+        }
+    }
+
+    /// Returns the model with its loads at other parameters: those that its friction follows, or those on its journals; as it is where
+    /// no load matters.
     ///
     /// # Errors
     /// [`LoadError::Value`] for a wrong length.
@@ -109,6 +141,7 @@ impl RobotModel {
         let kind = match self.kind {
             Kind::Tree(tree) => Kind::Tree(tree),
             Kind::Closed(closed) => Kind::Closed(closed.with_load_reference(reference)?),
+            Kind::Journals(journals) => Kind::Journals(journals.with_reference(reference)?),
         };
         Ok(RobotModel { kind, ..self })
     }
@@ -176,6 +209,7 @@ impl RobotModel {
         let kind = match self.kind {
             Kind::Tree(tree) => Kind::Tree(change(tree)),
             Kind::Closed(closed) => Kind::Closed(closed.map_tree(change)),
+            Kind::Journals(journals) => Kind::Journals(journals.map_ideal(change)),
         };
         RobotModel { kind, ..self }
     }
@@ -186,7 +220,7 @@ impl RobotModel {
     /// If there is no such output.
     pub fn tree_rate(&self, output: usize) -> usize {
         match &self.kind {
-            Kind::Tree(_) => output,
+            Kind::Tree(_) | Kind::Journals(_) => output,
             Kind::Closed(closed) => closed.machine().driven()[output],
         }
     }
@@ -242,6 +276,7 @@ impl RobotModel {
         match &self.kind {
             Kind::Tree(tree) => tree.joints(),
             Kind::Closed(closed) => closed.joints(),
+            Kind::Journals(journals) => journals.ideal().joints(),
         }
     }
 
@@ -359,6 +394,7 @@ impl RobotModel {
         match &self.kind {
             Kind::Tree(tree) => tree,
             Kind::Closed(closed) => closed,
+            Kind::Journals(journals) => journals,
         }
     }
 }

@@ -4,9 +4,8 @@ use std::path::Path;
 
 use dynid_clearance::orbit::{self, OrbitSample, OrbitSettings};
 use dynid_clearance::swing::{self, SwingSettings};
-use dynid_io::columns::ChannelSpec;
 use dynid_io::{ClearanceSpec, MappingSpec};
-use dynid_model::{EffortModel, JournalPath, MotionBlock, RobotModel};
+use dynid_model::{EffortModel, JournalPath, MotionBlock, RobotModel, journal_channels};
 use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, States};
 use serde::Serialize;
 
@@ -16,11 +15,6 @@ use crate::config::{LogConfig, MotorSide};
 use crate::estimate::{Estimate, Split};
 use crate::logs;
 use crate::robot::Robot;
-
-/// Names of the channels that hold the offset of a journal in axes that turn with its link, m.
-pub fn journal_channels(joint: &str) -> [String; 2] {
-    ["x", "y"].map(|axis| format!("journal_{joint}_{axis}"))
-}
 
 /// A value with its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
@@ -121,18 +115,9 @@ pub fn clearance(
             model.mechanism().rate_names().join(", ")
         )));
     }
-    let mut columns = log.columns.as_ref().unwrap_or(columns).clone();
-    let header = logs::header(log, &columns)?.names;
-    for name in robot.elements.clearance.iter().flat_map(|c| journal_channels(&c.joint)) {
-        if header.contains(&name) && !columns.channels.contains_key(&name) {
-            let spec = ChannelSpec { column: name.clone(), scale: 1.0, offset: 0.0 };
-            columns.channels.insert(name, spec);
-        }
-    }
-    let log = LogConfig { columns: None, ..log.clone() };
     let settings = ConditioningSettings::default();
     let prepared =
-        logs::load(&log, &crate::log::axes(&model), &columns, motor_side)?.prepare(&model, &settings)?;
+        logs::load(log, &crate::log::axes(&model), columns, motor_side)?.prepare(&model, &settings)?;
     let values = estimate.values(Split::Consistent);
     let alignment = Alignment {
         state_hz: estimate.model.state_hz,

@@ -12,9 +12,9 @@ pub use online::{ForgettingRule, OnlineConfig};
 
 pub use crate::estimate::MotorSide;
 pub use crate::settings::{
-    BoundConfig, ConditioningConfig, Consistency, EstimatorConfig, Friction, FrictionErrors, Method,
-    NominalModel, Own, PayloadConfig, PerJoint, Preflight, PriorDistance, RATED_MASS, Route, ShapeConfig,
-    Variances,
+    BoundConfig, Clearance, ConditioningConfig, Consistency, EstimatorConfig, Friction, FrictionErrors,
+    Method, NominalModel, Own, PayloadConfig, PerJoint, Preflight, PriorDistance, RATED_MASS, Route,
+    ShapeConfig, Variances,
 };
 
 use std::collections::BTreeMap;
@@ -113,6 +113,10 @@ pub struct ElementsConfig {
     /// Constant temperature of joints with known friction in place of the logged one, °C. Default: none.
     #[serde(skip_serializing_if = "is_default")]
     pub temperature: PerJoint,
+    /// Joints whose robot file states clearance: `journals` move in their bearings, as probes say or as their loads press them; `ideal`
+    /// joints have friction elements in place of the bearings'. Default `journals`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clearance: Option<Clearance>,
 }
 
 /// Motor-side inertia and friction of joints that share motors; see the robot file's `[[coupling]]`.

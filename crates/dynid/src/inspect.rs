@@ -113,7 +113,8 @@ pub fn inspect(robot: &Robot, elements: Option<&[String]>) -> Result<Inspection,
     let mechanism = &robot.mechanism;
     let none: &[String] = &[];
     let default = elements.or(if robot.elements.defaults.is_empty() { Some(none) } else { None });
-    let plan = ElementPlan::new(mechanism, &robot.elements, default, |rate| robot.is_driven(rate))?
+    let elements = robot.elements.with_ideal_bearings();
+    let plan = ElementPlan::new(mechanism, &elements, default, |rate| robot.is_driven(rate))?
         .with_loops(robot.closed.clone());
     let model = plan.tied_model(mechanism)?;
     let base = BaseParameters::of_model(&model, &model.parameters().shape_start(), &BaseSettings::default());

@@ -10,8 +10,8 @@ use sha2::{Digest, Sha256};
 mod known_motion;
 mod reading;
 
+pub(crate) use reading::map_columns;
 pub use reading::table;
-pub(crate) use reading::{header, map_columns};
 
 use crate::Error;
 use crate::config::{InstrumentsConfig, LogConfig, MotorSide};

@@ -115,7 +115,7 @@ impl Combination {
 }
 
 /// `4.81 ± 0.02`: the half width with one significant digit (two if the first is a 1), the value with as many decimals.
-fn with_half_width(value: f64, half_width: f64) -> String {
+pub fn with_half_width(value: f64, half_width: f64) -> String {
     if !(half_width.is_finite() && half_width > 0.0) {
         return significant(value, 6);
     }

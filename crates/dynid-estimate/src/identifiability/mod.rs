@@ -19,7 +19,7 @@ mod posterior;
 mod space;
 mod verdict;
 
-pub use combination::{Combination, visible_combinations};
+pub use combination::{Combination, visible_combinations, with_half_width};
 pub use posterior::{Posterior, excited_regrouping, posterior};
 pub use space::VisibleSpace;
 pub use verdict::{Carried, Verdict, verdict};

@@ -1,4 +1,4 @@
-//! Friction that follows reactions: what presses on which joint, and the parameters at which it is taken.
+//! Friction that follows reactions: what presses on which joint, and the parameters at which loads are taken.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use crate::Error;
 /// Friction that follows the reaction in a joint.
 pub const REACTION_FRICTION: &str = "reaction_friction";
 
-/// Parameters at which the loads of friction are taken.
+/// Parameters at which the loads of friction and journals are taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadValues {
     /// Linear and shape parameters by name; of others the values of the robot file count.
@@ -36,6 +36,11 @@ impl LoadValues {
 }
 
 impl ElementPlan {
+    /// Whether loads that go with the parameters act on efforts: on friction that follows reactions, on journals in their bearings.
+    pub fn follows_loads(&self) -> bool {
+        self.has_reactions() || self.has_journals()
+    }
+
     /// Whether the friction of some joint follows reactions.
     pub fn has_reactions(&self) -> bool {
         self.per_rate.iter().flatten().any(|name| name == REACTION_FRICTION)
@@ -46,8 +51,11 @@ impl ElementPlan {
         &self.spec.reactions
     }
 
-    /// A model of a tree, with its loops and what presses on its joints.
+    /// A model of a tree, with its loops and what presses on its joints and journals.
     pub(super) fn pressed(&self, mechanism: &Mechanism, tree: TreeModel) -> Result<RobotModel, Error> {
+        if let Some(moving) = &self.moving {
+            return self.journaled(tree, moving);
+        }
         let rates: Vec<usize> = (0..self.per_rate.len())
             .filter(|rate| self.per_rate[*rate].iter().any(|name| name == REACTION_FRICTION))
             .collect();
@@ -94,7 +102,7 @@ impl ElementPlan {
     }
 
     /// Values of the plan, else those of the robot file.
-    fn load_reference_of(&self, mechanism: &Mechanism, table: &ParameterTable) -> LoadReference {
+    pub(super) fn load_reference_of(&self, mechanism: &Mechanism, table: &ParameterTable) -> LoadReference {
         let stated = self.stated_values();
         let found = self.load_values.as_ref();
         let of = |name: &String| {

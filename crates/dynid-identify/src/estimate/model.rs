@@ -1,8 +1,11 @@
 //! The model in the result file, from which efforts can be predicted again.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use dynid_io::{
-    CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec, ReactionSpec, RobotFile,
-    SettingValue, TieSpec,
+    ClearanceSpec, ClearanceValue, CouplingForm, CouplingSpec, ElasticSpec, ElementSetting, ElementSpec,
+    ReactionSpec, RobotFile, SettingValue, TieSpec,
 };
 use dynid_model::element::ElementRegistry;
 use dynid_model::{
@@ -42,6 +45,9 @@ pub struct ModelRecord {
     /// What presses on joints whose friction follows it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reactions: Vec<ReactionSpec>,
+    /// Joints with clearance whose journals move in their bearings.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub clearance: Vec<ClearanceRecord>,
     /// Parameters that are known, or multiples or sums of others.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ties: Vec<TieSpec>,
@@ -61,6 +67,15 @@ pub struct ModelRecord {
     /// asks for the model of an estimate that was read.
     #[serde(skip)]
     pub registry: ElementRegistry,
+}
+
+/// A joint with clearance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ClearanceRecord {
+    /// Joint.
+    pub joint: String,
+    /// What its robot file states under `clearance`.
+    pub keys: BTreeMap<String, ClearanceValue>,
 }
 
 /// A joint that its motor drives through a spring.
@@ -237,6 +252,9 @@ impl ModelRecord {
                 true => plan.reactions().to_vec(),
                 false => Vec::new(),
             },
+            clearance: (plan.clearances().iter())
+                .map(|c| ClearanceRecord { joint: c.joint.clone(), keys: c.stated.clone() })
+                .collect(),
             ties: plan.ties().to_vec(),
             element_settings,
             load_reference: plan.load_reference.clone(),
@@ -311,11 +329,37 @@ impl ModelRecord {
         let registry = self.registry.clone();
         let reactions = self.reactions.clone();
         let ties = self.ties.clone();
-        let spec = ElementSpec { settings, elastic, reactions, ties, registry, ..ElementSpec::default() };
-        let mut plan = ElementPlan::recorded(mechanism, self.elements.clone(), couplings, spec)?;
+        let clearance = self.clearances()?;
+        let journals = self.journals(&clearance)?;
+        let spec =
+            ElementSpec { settings, elastic, clearance, reactions, ties, registry, ..ElementSpec::default() };
+        let plan = ElementPlan::recorded(mechanism, self.elements.clone(), couplings, spec)?;
+        let mut plan = plan.with_journals(journals);
         plan.load_reference.clone_from(&self.load_reference);
         plan.known.clone_from(&self.known_friction);
         Ok(plan)
+    }
+}
+
+impl ModelRecord {
+    fn clearances(&self) -> Result<Vec<ClearanceSpec>, Error> {
+        let of = |record: &ClearanceRecord| {
+            ClearanceSpec::of("model.clearance", &record.joint, &record.keys)
+                .map_err(|e| Error::setting("model.clearance", "the keys of a robot file", e))
+        };
+        self.clearance.iter().map(of).collect()
+    }
+
+    /// The mechanism with translations of the journals, if there are some.
+    fn journals(&self, clearance: &[ClearanceSpec]) -> Result<Option<Arc<Mechanism>>, Error> {
+        if clearance.is_empty() {
+            return Ok(None);
+        }
+        let fault = |e: String| Error::setting("model.clearance", "joints that turn", e);
+        let joints: Vec<&str> = clearance.iter().map(|c| c.joint.as_str()).collect();
+        let description = self.description("").map_err(fault)?;
+        let moving = description.with_clearance(&joints).and_then(|d| d.build());
+        Ok(Some(Arc::new(moving.map_err(|e| fault(e.to_string()))?)))
     }
 }
 

@@ -15,7 +15,7 @@ use super::Loop;
 use super::reference::Reference;
 use crate::elements::{LOAD, REACTION_FRICTION};
 use crate::problem::Problem;
-use crate::robot::{refuse_clearance, refuse_elastic, refuse_loops};
+use crate::robot::{refuse_elastic, refuse_loops};
 use crate::settings::{ClosedLoop, NominalModel};
 use crate::structure::Structure;
 use crate::{Error, bounds, consistency, fitting, shape};
@@ -46,7 +46,12 @@ impl<'a> Bench<'a> {
         let what = "simulated for instruments";
         let Problem { robot, plan, model, logs, training, settings, .. } = closed.problem;
         refuse_elastic(robot, what)?;
-        refuse_clearance(robot, what)?;
+        if plan.has_journals() {
+            return Err(Error::Unsupported(format!(
+                "joints with clearance are not {what}: `clearance = \"ideal\"` under `[elements]` takes them as ideal, or leave out \
+                 `[instruments]`"
+            )));
+        }
         refuse_loops(robot, what)?;
         if plan.has_reactions() {
             return Err(Error::Unsupported(format!(

@@ -1,6 +1,6 @@
-//! Friction that follows reactions: loads are taken at the parameters that come out.
+//! Loads that friction follows, and those on journals: they are taken at the parameters that come out.
 
-use dynid_model::{ClosedModel, EffortModel, RobotModel};
+use dynid_model::{EffortModel, RobotModel};
 use dynid_rows::conditioning::Conditioning;
 
 use super::Step;
@@ -59,12 +59,7 @@ pub(crate) fn settle(
 
 /// Loads over random states, at the parameters of the model's reference.
 fn forces(model: &RobotModel) -> Vec<f64> {
-    let of = |closed: &ClosedModel| {
-        closed
-            .random_motion(STATES, SEED)
-            .with_block(|motion| closed.load_forces(motion).0.into_iter().flatten())
-    };
-    model.with_reactions().into_iter().flat_map(of).flatten().collect()
+    model.random_motion(STATES, SEED).with_block(|motion| model.loads(motion)).concat()
 }
 
 fn change(before: &[f64], now: &[f64]) -> f64 {
@@ -84,7 +79,7 @@ impl Problem {
         conditioning: Option<Conditioning>,
         progress: &mut dyn FnMut(Step),
     ) -> Result<(Problem, ModelFit), Error> {
-        match self.plan.has_reactions() {
+        match self.plan.follows_loads() {
             false => self.fit_at_loads(conditioning, Before::Nothing, progress),
             true => settle(self, conditioning, Before::Nothing, progress),
         }

@@ -224,9 +224,9 @@ impl Identification {
             return Err(not_reduced("elastic joints", "use the robot file without `elastic`"));
         }
         if self.loads.is_some() {
-            let instead = "identify from the logs, or state other friction";
+            let instead = "identify from the logs, or state other friction and `clearance = \"ideal\"` under `[elements]`";
             return Err(not_reduced(
-                "friction that follows reactions, whose columns go with the estimate,",
+                "friction that follows reactions, and journals in bearings, whose rows go with the estimate,",
                 instead,
             ));
         }

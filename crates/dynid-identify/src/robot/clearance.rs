@@ -1,13 +1,13 @@
 //! Joints with clearance: bodies whose journals move in their bearings.
-//!
-//! Only simulation and inspection know them; all else takes joints as ideal.
 
-use dynid_model::element::{ClearanceContact, JointElement};
-use dynid_model::mechanism::translation_names;
+use std::sync::Arc;
+
+use dynid_model::element::JointElement;
 use dynid_model::{Mechanism, RobotModel};
 
 use super::Robot;
 use crate::Error;
+use crate::elements::contacts;
 
 impl Robot {
     /// The robot's bodies with journals that move in their bearings, and the contacts of these as its only elements.
@@ -15,39 +15,32 @@ impl Robot {
     /// Rates are those of the robot's mechanism, then two translations per joint with clearance. `None` if no joint has any.
     ///
     /// # Errors
-    /// [`Error::Mechanism`], [`Error::UnknownJoint`].
+    /// [`Error::Mechanism`], [`Error::UnknownJoint`]; [`Error::Unsupported`] for mechanisms with loops.
     pub fn with_clearance(&self) -> Result<Option<RobotModel>, Error> {
-        if !self.elements.clearance.is_empty() {
-            crate::robot::refuse_loops(self, "simulated with clearance")?;
-        }
+        let Some(mechanism) = self.moving()? else { return Ok(None) };
+        crate::robot::refuse_loops(self, "simulated with clearance")?;
+        let contacts = contacts(&self.elements.clearance, &mechanism.rate_names())?.into_iter();
+        let contacts = contacts.map(|contact| Box::new(contact) as Box<dyn JointElement>);
+        Ok(Some(RobotModel::new(mechanism, contacts.collect())))
+    }
+
+    /// The mechanism with translations of the journals of joints with clearance, the last of its rates; `None` if no joint has any.
+    ///
+    /// # Errors
+    /// [`Error::Mechanism`].
+    fn moving(&self) -> Result<Option<Mechanism>, Error> {
         if self.elements.clearance.is_empty() {
             return Ok(None);
         }
         let named = |source| Error::Mechanism { file: self.path.display().to_string(), source };
         let joints: Vec<&str> = self.elements.clearance.iter().map(|c| c.joint.as_str()).collect();
         let description = self.file.description.with_clearance(&joints).map_err(named)?;
-        let mechanism = description.build().map_err(named)?;
-        let contacts = self.contacts(&mechanism)?;
-        Ok(Some(RobotModel::new(mechanism, contacts)))
+        Ok(Some(description.build().map_err(named)?))
     }
 
-    fn contacts(&self, mechanism: &Mechanism) -> Result<Vec<Box<dyn JointElement>>, Error> {
-        let names = mechanism.rate_names();
-        let rate = |name: &str| {
-            let unknown = || Error::UnknownJoint { name: name.to_owned(), known: names.clone() };
-            names.iter().position(|n| n == name).ok_or_else(unknown)
-        };
-        let contact = |spec: &dynid_io::ClearanceSpec| {
-            let [x, y] = translation_names(&spec.joint);
-            Ok(Box::new(ClearanceContact {
-                rotation: rate(&spec.joint)?,
-                translations: [rate(&x)?, rate(&y)?],
-                law: spec.law.clone(),
-                friction: spec.friction,
-                journal_radius: spec.journal_radius,
-            }) as Box<dyn JointElement>)
-        };
-        self.elements.clearance.iter().map(contact).collect()
+    /// [`Robot::moving`] for a plan of elements.
+    pub(super) fn journals(&self) -> Result<Option<Arc<Mechanism>>, Error> {
+        Ok(self.moving()?.map(Arc::new))
     }
 
     /// What a fit leaves out because joints have clearance, in words.

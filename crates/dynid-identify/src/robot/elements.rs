@@ -7,7 +7,7 @@ use crate::Error;
 use crate::elements::ElementPlan;
 use crate::known_friction::{FrictionErrors, KnownFriction};
 use crate::per_joint::PerJoint;
-use crate::settings::{Settings, serde_name};
+use crate::settings::{Clearance, Settings, serde_name};
 
 impl ElementPlan {
     /// The plan of a run: elements of the robot file, then of the configuration, known friction with them.
@@ -31,9 +31,21 @@ impl ElementPlan {
             robot.check_tie(tie, &spec.couplings)?;
             spec.ties.push(tie.clone());
         }
+        let journals = match settings.elements.clearance {
+            Some(_) if spec.clearance.is_empty() => {
+                let expected = "a robot file with `clearance` at a joint";
+                return Err(Error::setting("elements.clearance", expected, "none"));
+            }
+            Some(Clearance::Ideal) => {
+                spec = spec.with_ideal_bearings();
+                None
+            }
+            Some(Clearance::Journals) | None => robot.journals()?,
+        };
         let mut plan =
             ElementPlan::new(&robot.mechanism, &spec, settings.elements.default.as_deref(), moves)?
-                .with_loops(robot.closed.clone());
+                .with_loops(robot.closed.clone())
+                .with_journals(journals);
         let names = plan.names(&robot.mechanism);
         let law = settings.elements.friction;
         if !law.replaces_any(plan.registry(), &plan.per_rate) {

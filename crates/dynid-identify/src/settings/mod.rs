@@ -95,6 +95,19 @@ pub struct Elements {
     /// joints are errors of the laws. Shapes are then found at other joints alone. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known: Option<KnownLaws>,
+    /// Joints with clearance. Default: their journals move in their bearings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clearance: Option<Clearance>,
+}
+
+/// Joints whose robot file states clearance.
+#[derive(Debug, Clone, Copy, serde::Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum Clearance {
+    /// Journals move in their bearings, as probes say or as their loads press them, and rub there ([`dynid_model::JournalModel`]).
+    Journals,
+    /// Joints are ideal; their friction elements carry that of the bearings.
+    Ideal,
 }
 
 /// What an identification does about what its pre-flight finds ([`crate::preflight`]).

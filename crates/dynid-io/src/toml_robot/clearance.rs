@@ -1,11 +1,14 @@
 //! Joints with clearance of a robot file.
 
+use std::collections::BTreeMap;
+
 use dynid_model::contact::{
     ContactError, ContactLaw, FractalLankaraniNikravesh, FractalSettings, FractalSurface, Hertz,
     HertzStiffness, JournalBearing, KelvinVoigt, LankaraniNikravesh, Material, PressureFactor,
     SlidingFriction, SurfaceSettings,
 };
 use dynid_model::{Description, MechanismError};
+use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 use super::Source;
@@ -29,9 +32,43 @@ pub struct ClearanceSpec {
     pub law: ContactLaw,
     /// Sliding friction.
     pub friction: SlidingFriction,
+    /// Keys of the table that this is of, the `mass` that the file states of the moving link among them where the law needs it.
+    pub stated: BTreeMap<String, ClearanceValue>,
+}
+
+/// Value of a key of a joint with clearance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(untagged)]
+pub enum ClearanceValue {
+    /// A number.
+    Number(f64),
+    /// One for the journal, one for its bearing.
+    Pair([f64; 2]),
+    /// A word.
+    Text(String),
 }
 
 impl ClearanceSpec {
+    /// The clearance of a joint that these keys state ([`ClearanceSpec::stated`]). `file`: where they stand, for messages.
+    ///
+    /// # Errors
+    /// Fails as the reading of a robot file does.
+    pub fn of(
+        file: &str,
+        joint: &str,
+        stated: &BTreeMap<String, ClearanceValue>,
+    ) -> Result<ClearanceSpec, RobotFileError> {
+        let value = |value: &ClearanceValue| match value {
+            ClearanceValue::Number(x) => Value::Float(*x),
+            ClearanceValue::Pair(pair) => Value::Array(pair.iter().map(|x| Value::Float(*x)).collect()),
+            ClearanceValue::Text(text) => Value::String(text.clone()),
+        };
+        let table: Table = stated.iter().map(|(key, of)| (key.clone(), value(of))).collect();
+        let source = Source { text: "", file };
+        let owner = format!("element.{joint}");
+        Keys { source: &source, offset: 0, owner: &owner, table: &table }.spec(joint, (joint, None))
+    }
+
     /// Radial clearance, m.
     pub fn gap(&self) -> f64 {
         self.law.clearance()
@@ -155,6 +192,7 @@ impl Keys<'_> {
         )
         .map_err(told)?;
         let (_, uses) = law;
+        let stated = self.stated(mass.1.filter(|_| uses.contains(&"mass")));
         let width = match self.number("width")? {
             Some(width) => width,
             None if uses.contains(&"width") => return Err(self.missing("`width` of the contact in m")),
@@ -193,7 +231,25 @@ impl Keys<'_> {
                     .into()
             }
         };
-        Ok(ClearanceSpec { joint: joint.to_owned(), journal_radius, law, friction })
+        Ok(ClearanceSpec { joint: joint.to_owned(), journal_radius, law, friction, stated })
+    }
+
+    /// Keys and values; `mass` where the table leaves it to the link.
+    fn stated(&self, mass: Option<f64>) -> BTreeMap<String, ClearanceValue> {
+        let of = |value: &Value| match (number(value), value) {
+            (Some(x), _) => ClearanceValue::Number(x),
+            (None, Value::Array(list)) => {
+                let number = |k: usize| list.get(k).and_then(number).unwrap_or(f64::NAN);
+                ClearanceValue::Pair([number(0), number(1)])
+            }
+            (None, value) => ClearanceValue::Text(value.as_str().unwrap_or_default().to_owned()),
+        };
+        let mut out: BTreeMap<_, _> =
+            self.table.iter().map(|(key, value)| (key.clone(), of(value))).collect();
+        if let Some(mass) = mass {
+            out.entry("mass".to_owned()).or_insert(ClearanceValue::Number(mass));
+        }
+        out
     }
 
     /// The law, and that the table has no keys that it does not use.

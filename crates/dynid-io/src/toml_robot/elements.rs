@@ -40,6 +40,14 @@ pub struct ElementSpec {
     pub registry: ElementRegistry,
 }
 
+impl ElementSpec {
+    /// The elements with journals that sit in the centres of their bearings: no joint has clearance.
+    #[must_use]
+    pub fn with_ideal_bearings(&self) -> ElementSpec {
+        ElementSpec { clearance: Vec::new(), ..self.clone() }
+    }
+}
+
 /// One setting: `[element.j1] stribeck = { vs = { start = 0.04 } }` has element `stribeck`, key `vs.start`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ElementSetting {

@@ -18,7 +18,7 @@ use std::path::Path;
 use dynid_model::closed::ClosureDescription;
 use dynid_model::{Description, Inertia, Mat3, Vec3};
 
-pub use clearance::ClearanceSpec;
+pub use clearance::{ClearanceSpec, ClearanceValue};
 pub use elastic::ElasticSpec;
 pub use elements::{CouplingSpec, ElementSetting, ElementSpec, SettingValue};
 pub use reaction::{ReactionLoad, ReactionSpec};

@@ -30,9 +30,10 @@ pub use drive::DriveGain;
 pub use elastic::{CubicFit, CubicSpring, ElasticDoubt, ElasticTransmission, PiecewiseFit, PiecewiseSpring};
 pub use external_load::{ExternalLoad, load_channel};
 pub use friction::{
-    Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, FollowingFriction, LoadFriction, LuGre,
-    Offset, PowerLaw, ReactionFriction, Sigmoid, SigmoidOffset, Stribeck, StribeckViscous, TanhFriction,
-    Viscous, ViscousMagnitude, reaction_channel, weight_channel,
+    Arctangent, AsymmetricFriction, Coulomb, ExponentialViscous, FollowingFriction, JournalFriction,
+    LoadFriction, LuGre, Offset, PowerLaw, ReactionFriction, Sigmoid, SigmoidOffset, Stribeck,
+    StribeckViscous, TanhFriction, Viscous, ViscousMagnitude, journal_moment_channel, reaction_channel,
+    weight_channel,
 };
 pub use gated::{Gated, is_gate, log_channel, payload_channel};
 pub use jets::JetMotion;

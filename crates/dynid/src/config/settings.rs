@@ -31,6 +31,7 @@ impl Config {
                 joint: self.elements.joint.clone(),
                 friction: self.elements.friction,
                 known: None,
+                clearance: self.elements.clearance,
             };
             settings.couplings = self.coupling.iter().map(coupling).collect();
             settings.conditioning = self.conditioning.clone();

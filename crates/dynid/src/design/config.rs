@@ -394,6 +394,11 @@ impl DesignConfig {
             ("elements.friction_errors", e.friction_errors != usual.friction_errors, logs),
             ("elements.temperature", !e.temperature.is_none(), logs),
             (
+                "elements.clearance",
+                e.clearance.is_some(),
+                "no value: a design takes joints as ideal, whether they have clearance or not",
+            ),
+            (
                 "criterion.mix",
                 self.criterion.mix != mix && self.criterion.name != Some(CriterionName::Mix),
                 "`name = \"mix\"` beside it",

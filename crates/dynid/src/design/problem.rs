@@ -76,7 +76,7 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
     }
     refuse_elastic(robot, "designed for")?;
     let joints = mechanism.rate_names();
-    let mut elements = robot.elements.clone();
+    let mut elements = robot.elements.with_ideal_bearings();
     for (joint, list) in &config.elements.joint {
         known(joint, &joints)?;
         elements.per_joint.retain(|(j, _)| j != joint);

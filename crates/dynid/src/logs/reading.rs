@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
-use dynid_io::columns::{EffortColumn, columns_of_unnamed, is_time_name};
+use dynid_io::columns::{ChannelSpec, EffortColumn, columns_of_unnamed, is_time_name};
 use dynid_io::log::{Missing, Wanted};
 use dynid_io::{ColumnMapping, LogHeader, LogText, MappingError, MappingSpec, ReadingNote, Signals, Table};
+
+use dynid_model::journal_channels;
 
 use super::{LogAxis, names};
 use crate::Error;
@@ -29,10 +31,11 @@ pub(crate) fn understand(
     let named = |source| columns_error(&log.path, source);
     let text = LogText::open(&log.path, &spec.options(log.rows))?;
     let header = text.header();
-    let (spec, text, unnamed) = match of_unnamed(log, &header, axes, spec)? {
+    let (mut spec, text, unnamed) = match of_unnamed(log, &header, axes, spec)? {
         Some((found, note)) => (found, text, Some(note)),
         None => (spec.clone(), text, None),
     };
+    add_probes(&mut spec, &header, axes);
     let mapping = map_columns(&header, axes, &spec).map_err(named)?;
     if spec.position.is_none() {
         super::check_surplus(&mapping, &names(axes), &header.names, &log.path.display().to_string())?;
@@ -44,6 +47,16 @@ pub(crate) fn understand(
     let mut understood = Understood { table, mapping, notes };
     understood.settle(motors || axes.iter().any(|a| a.motor)).map_err(named)?;
     Ok(understood)
+}
+
+/// Offsets of journals are known by the names of their channels ([`journal_channels`]).
+fn add_probes(spec: &mut MappingSpec, header: &LogHeader, axes: &[LogAxis]) {
+    for name in axes.iter().flat_map(|axis| journal_channels(&axis.name)) {
+        if header.names.contains(&name) {
+            let own = ChannelSpec { column: name.clone(), scale: 1.0, offset: 0.0 };
+            spec.channels.entry(name).or_insert(own);
+        }
+    }
 }
 
 impl Understood {
@@ -140,14 +153,6 @@ pub fn table(log: &LogConfig, spec: &MappingSpec) -> Result<(Table, LogHeader), 
     let texts: Vec<String> =
         (0..header.names.len()).filter(|k| header.text[*k]).map(|k| header.names[k].clone()).collect();
     Ok((table, header.without(&texts)))
-}
-
-/// Names of the columns of a log.
-///
-/// # Errors
-/// [`Error::LogFile`].
-pub(crate) fn header(log: &LogConfig, spec: &MappingSpec) -> Result<LogHeader, Error> {
-    Ok(LogText::open(&log.path, &spec.options(log.rows))?.header())
 }
 
 /// Columns of a robot's signals. The sign of torque sensors is that of efforts from here on.

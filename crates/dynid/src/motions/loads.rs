@@ -26,8 +26,10 @@ pub(super) fn loads(
         return Ok(Vec::new());
     }
     let mechanism = &robot.mechanism;
-    let plan = ElementPlan::new(mechanism, &robot.elements, None, |rate| robot.is_driven(rate))?
-        .with_loops(robot.closed.clone());
+    let plan = ElementPlan::new(mechanism, &robot.elements.with_ideal_bearings(), None, |rate| {
+        robot.is_driven(rate)
+    })?
+    .with_loops(robot.closed.clone());
     let model = plan.model(mechanism)?;
     let joints = robot.rate_names();
     let of_load = |(k, load): (usize, &LoadConfig)| {

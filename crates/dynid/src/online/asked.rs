@@ -4,7 +4,7 @@ use crate::Error;
 use crate::config::{Config, MotorSide, OnlineConfig};
 use crate::elements::{ElementPlan, REACTION_FRICTION};
 use crate::robot::{Robot, refuse_loops};
-use crate::settings::Settings;
+use crate::settings::{Clearance, Settings};
 
 /// What a session is asked for.
 #[derive(Debug)]
@@ -42,7 +42,15 @@ impl Asked {
                     .to_owned(),
             ));
         }
-        let settings = config.settings()?;
+        let mut settings = config.settings()?;
+        if settings.elements.clearance == Some(Clearance::Journals) {
+            return Err(Error::Unsupported(
+                "journals that move in their bearings are not followed on line, since what they do goes with the estimate: \
+                 leave out `clearance` under `[elements]`"
+                    .to_owned(),
+            ));
+        }
+        settings.elements.clearance = (!robot.elements.clearance.is_empty()).then_some(Clearance::Ideal);
         if ElementPlan::of_run(&settings, &robot, |_| true)?.has_reactions() {
             return Err(Error::Unsupported(format!(
                 "`{REACTION_FRICTION}` is not followed on line, since its columns go with the estimate: state other friction"

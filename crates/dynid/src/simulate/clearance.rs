@@ -1,6 +1,6 @@
 //! Virtual logs of robots whose joints have clearance.
 
-use dynid_model::{EffortModel, RobotModel};
+use dynid_model::{EffortModel, RobotModel, journal_channels};
 use dynid_motion::signal::rms;
 use dynid_sim::clearance::{
     ClearanceEnergy, ClearanceRecord, ClearanceSettings, ClearanceStart, ContactEvent, ContactEventKind,
@@ -13,7 +13,6 @@ use super::efforts;
 use super::settings::SimulateSettings;
 use super::trajectory::Reference;
 use crate::Error;
-use crate::clearance::journal_channels;
 
 /// Time that is simulated before a log of a periodic motion begins, s.
 const SETTLE: f64 = 0.5;

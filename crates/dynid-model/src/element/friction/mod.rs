@@ -1,10 +1,12 @@
 //! Friction at a joint: laws of velocity, bristles, friction that follows loads.
 
+mod journal;
 mod load;
 mod lugre;
 mod placed;
 mod reaction;
 
+pub use journal::{JournalFriction, journal_moment_channel};
 pub use load::LoadFriction;
 pub use lugre::LuGre;
 pub use placed::{
