@@ -30,7 +30,7 @@ pub use crate::identification::Identification;
 use crate::input_record::{InputRecord, short_name};
 use crate::instruments::{self, Comparison, Loop};
 use crate::joint_stiffness::{self, JointStiffness};
-use crate::load_doubt::LoadDoubt;
+use crate::load_doubt::{Doubted, LoadDoubt};
 pub use crate::load_rounds::LoadRounds;
 use crate::log::{self, Log, LogSource};
 use crate::log_agreement::{self, LogAgreement};
@@ -358,19 +358,22 @@ impl Identification {
         Ok(())
     }
 
-    /// Variances of friction coefficients that come from the masses behind the loads of journals, added to the covariance of the fit.
-    fn doubt_loads(&mut self, regrouping: &Mat) -> Result<Vec<(usize, f64)>, Error> {
-        let doubt = LoadDoubt::of(&self.model, &self.logs, self.state_hz, &self.conditioning_settings)?;
+    /// What the loads of journals say of their friction coefficients, added to the covariance of the fit.
+    fn doubt_loads(&mut self, regrouping: &Mat) -> Result<Vec<Doubted>, Error> {
+        let values = &self.consistent.unconstrained;
+        let doubt =
+            LoadDoubt::of(&self.model, values, &self.logs, self.state_hz, &self.conditioning_settings)?;
         if doubt.is_empty() {
             return Ok(Vec::new());
         }
         let Some(after) = trust::after(&self.fitted, regrouping, &self.prior) else { return Ok(Vec::new()) };
-        let covariances = doubt.covariances(&after, &self.consistent.values);
+        let covariances = doubt.covariances(&after, values);
         let base = |column: usize| self.base.kept.iter().position(|kept| *kept == column);
         let of_base: Vec<(usize, usize, f64)> =
             covariances.iter().filter_map(|(a, b, c)| Some((base(*a)?, base(*b)?, *c))).collect();
+        let doubted = doubt.doubted(&covariances, values);
         self.fitted.add_covariances(&of_base);
-        Ok(covariances.into_iter().filter(|(a, b, _)| a == b).map(|(a, _, c)| (a, c)).collect())
+        Ok(doubted)
     }
 
     /// Predicts a validation log and compares.

@@ -232,7 +232,11 @@ impl Identification {
             .filter(|(k, _)| shape::of_change(&table.linear[self.base.kept[*k]].name).is_none())
             .map(|(k, (std, white))| {
                 let p = &table.linear[self.base.kept[k]];
-                let value = std.map(|_| self.fit().x[k]);
+                // The interval of a coefficient of friction is about its value at unconstrained loads.
+                let column = self.base.kept[k];
+                let own = self.model.journals().is_some_and(|j| j.coefficients().any(|mu| mu == column));
+                let found = if own { self.trust.parameters[column].unconstrained } else { self.fit().x[k] };
+                let value = std.map(|_| found);
                 BaseValue {
                     name: p.name.clone(),
                     expression: expressions[k].clone(),

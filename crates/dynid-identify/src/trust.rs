@@ -15,7 +15,7 @@ use crate::advice::{Advice, FitRows, MotionSettings, Present, advise};
 use crate::consistency::Consistent;
 use crate::fitting::Fitted;
 use crate::friction_power::{self, FrictionPower};
-use crate::load_doubt::doubted;
+use crate::load_doubt::{Doubted, lessen};
 use crate::prior::{Prior, link_lengths};
 
 /// Confidence of the intervals.
@@ -87,8 +87,8 @@ pub(crate) struct Evidence<'a> {
     /// Per output: whether the model explains its effort.
     pub explained: &'a [bool],
     pub power: &'a FrictionPower,
-    /// Variances of linear parameters that come from the loads of their friction.
-    pub doubts: &'a [(usize, f64)],
+    /// What loads say of coefficients of friction.
+    pub doubts: &'a [Doubted],
 }
 
 /// Half width of intervals of [`CONFIDENCE`] in standard deviations.
@@ -120,10 +120,10 @@ impl Evidence<'_> {
     pub(crate) fn trust(&self) -> Trust {
         let information = &self.fitted.information(self.explained);
         let mut assessed = self.space.assess(information, 1.0);
-        for (column, variance) in self.doubts {
-            doubted(&mut assessed.parameters[*column], *variance);
+        for Doubted { column, variance, .. } in self.doubts {
+            lessen(&mut assessed.parameters[*column], *variance);
             if let Some(base) = self.base.kept.iter().position(|k| k == column) {
-                doubted(&mut assessed.base[base], *variance);
+                lessen(&mut assessed.base[base], *variance);
             }
         }
         let present = Present { space: self.space, information, inflation: 1.0, assessed: &assessed };
@@ -170,7 +170,8 @@ impl Evidence<'_> {
             .map(|j| {
                 let assessment = assessed.parameters[j].clone();
                 let seen = assessment.verdict == Verdict::Seen;
-                let unconstrained = self.consistent.unconstrained[j];
+                let own = self.doubts.iter().find(|doubt| doubt.column == j);
+                let unconstrained = own.map_or(self.consistent.unconstrained[j], |doubt| doubt.value);
                 let std = after.as_ref().map(|a| a.std[j]).filter(|_| seen);
                 // Of what no motion separates from others, "no motion would" says nothing new.
                 let in_combination = assessment.verdict
@@ -283,10 +284,10 @@ impl Evidence<'_> {
 
     /// What the data see of a coefficient of friction whose load goes with masses, in words.
     fn moment(&self, column: usize, symbol: &str, quantile: f64) -> Option<String> {
-        let (_, variance) = self.doubts.iter().find(|(doubted, _)| *doubted == column)?;
+        let doubt = self.doubts.iter().find(|doubt| doubt.column == column)?;
         let base = self.base.kept.iter().position(|kept| *kept == column)?;
         let place = self.fitted.estimate.solution.kept.iter().position(|kept| *kept == base)?;
-        let own = (self.fitted.covariance()[(place, place)] - variance).max(0.0).sqrt();
+        let own = (self.fitted.covariance()[(place, place)] - doubt.variance).max(0.0).sqrt();
         let seen = with_half_width(self.fitted.estimate.x[base], quantile * own);
         Some(format!(
             "the data see its product with the load: {symbol} = {seen} where the masses that press are as found here"

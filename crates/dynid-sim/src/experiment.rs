@@ -7,6 +7,7 @@ use std::collections::VecDeque;
 
 use rand::RngExt;
 
+use crate::clearance::{self, ClearanceMotion, ClearanceRecord};
 use crate::closed::{ClosedMotion, ClosedNominal, ClosedPlant};
 use crate::controller::{ControlSettings, Controller, Nominal, Reference, Wanted};
 use crate::encoder::Encoders;
@@ -168,10 +169,11 @@ impl Run<'_> {
     }
 
     fn sample(&mut self, row: usize, time: f64, reading: &[f64], channels: &[f64]) -> Result<(), SimError> {
-        let Instant { q, dq, ddq, effort } = self.motion.instant(&self.in_force, channels, time)?;
+        let Instant { q, dq, ddq, effort, sensors } = self.motion.instant(&self.in_force, channels, time)?;
         let between = (self.schedule.motion_part > 0.0).then(|| self.encoders.between_ticks(&q));
         let truth = [&q[..], &dq, &ddq, &effort];
-        self.recording.motion(row, between.as_deref().unwrap_or(reading), truth, channels);
+        let channels: Vec<f64> = channels.iter().copied().chain(sensors).collect();
+        self.recording.motion(row, between.as_deref().unwrap_or(reading), truth, &channels);
         Ok(())
     }
 }
@@ -225,12 +227,41 @@ pub fn run_closed(
     prepared.run(&mut motion, &mut believed, reference, settings)
 }
 
+/// Runs an experiment with a machine whose joints have clearance: as [`run`], with the [sensors](clearance::sensors) of its journals as
+/// channels behind those of the model.
+///
+/// `plant`: bodies with translations of the journals, its contacts among its elements. `nominal`: the robot without clearance. Journals
+/// begin at rest against their bearings. Contacts are integrated as [`clearance::simulate`] does, with a tolerance of its own.
+///
+/// # Errors
+/// Fails as [`run`] and [`clearance::simulate`] do.
+pub fn run_with_clearance(
+    plant: Plant,
+    nominal: &Plant,
+    reference: &dyn Fn(f64) -> Vec<Wanted>,
+    settings: &ExperimentSettings,
+) -> Result<(ExperimentResult, ClearanceRecord), SimError> {
+    let mut believed = PlantNominal::new(nominal);
+    let mut prepared = Prepared::new(&mut believed, reference, settings)?;
+    let mut plant = plant.without_contacts();
+    let mut ripple = prepared.ripple.clone();
+    ripple.resize(plant.joints(), Ripple::default());
+    plant.set_ripple(ripple);
+    prepared.sensors = clearance::sensors(&plant).len();
+    let channels: Vec<f64> = settings.channels.iter().map(|p| p.at(0.0)).collect();
+    let mut motion = ClearanceMotion::new(&plant, &prepared.start, &channels)?;
+    let result = prepared.run(&mut motion, &mut believed, reference, settings)?;
+    Ok((result, motion.finish()))
+}
+
 /// What an experiment fixes before anything moves.
 struct Prepared {
     schedule: Schedule,
     start: Vec<Wanted>,
     inertia: Vec<f64>,
     ripple: Vec<Ripple>,
+    /// Sensors of the machine besides encoders and drives.
+    sensors: usize,
 }
 
 impl Prepared {
@@ -258,6 +289,7 @@ impl Prepared {
                 Some(given) => given.clone(),
                 None => ripple(nominal, reference, settings)?,
             },
+            sensors: 0,
         })
     }
 
@@ -270,7 +302,8 @@ impl Prepared {
     ) -> Result<ExperimentResult, SimError> {
         let before = motion.energy();
         let encoders = Encoders::new(&nominal.slides(), &settings.imperfections, settings.seed);
-        let recording = Recording::new(nominal.drives(), settings.channels.len(), self.schedule.rows);
+        let channels = settings.channels.len() + self.sensors;
+        let recording = Recording::new(nominal.drives(), channels, self.schedule.rows);
         let mut controller = Controller::new(nominal, &settings.control, &self.inertia);
         let ticks = self.schedule.ticks();
         let mut run = Run {

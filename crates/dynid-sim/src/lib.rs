@@ -39,7 +39,8 @@ pub use controller::{ControlSettings, Wanted};
 pub use elastic::{ElasticInverse, ElasticMotion, LinkMotion, fourier_link};
 pub use error::{ForwardError, SimError};
 pub use experiment::{
-    EnergyBalance, ExperimentResult, ExperimentSettings, Truth, VirtualLog, run, run_closed, wrong_model,
+    EnergyBalance, ExperimentResult, ExperimentSettings, Truth, VirtualLog, run, run_closed,
+    run_with_clearance, wrong_model,
 };
 pub use imperfections::Imperfections;
 pub use integrator::{Integrator, PlantState};

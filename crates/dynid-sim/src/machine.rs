@@ -14,6 +14,8 @@ pub(crate) struct Instant {
     pub(crate) dq: Vec<f64>,
     pub(crate) ddq: Vec<f64>,
     pub(crate) effort: Vec<f64>,
+    /// What sensors besides encoders and drives say, in the order of the machine.
+    pub(crate) sensors: Vec<f64>,
 }
 
 /// A machine under way. Its drives are all that encoders and logs see.
@@ -25,7 +27,7 @@ pub(crate) trait Motion {
     fn instant(&mut self, drive: &[f64], channels: &[f64], time: f64) -> Result<Instant, SimError>;
     fn energy(&mut self) -> PlantEnergy;
     /// Work of the drives, and that taken by the elements, J.
-    fn work(&self) -> [f64; 2];
+    fn work(&mut self) -> [f64; 2];
     fn count(&self) -> IntegrationCount;
 }
 
@@ -63,14 +65,15 @@ impl Motion for PlantMotion<'_> {
         self.plant
             .acceleration((q, dq), drive, &all, self.integrator.workspace(), &mut ddq)
             .map_err(|source| SimError::Inertia { time, source })?;
-        Ok(Instant { q: q.clone(), dq: dq.clone(), ddq, effort: self.plant.delivered(q, drive) })
+        let effort = self.plant.delivered(q, drive);
+        Ok(Instant { q: q.clone(), dq: dq.clone(), ddq, effort, sensors: Vec::new() })
     }
 
     fn energy(&mut self) -> PlantEnergy {
         self.plant.energy(&self.state.q, &self.state.dq, self.integrator.workspace())
     }
 
-    fn work(&self) -> [f64; 2] {
+    fn work(&mut self) -> [f64; 2] {
         [self.state.drive_work, self.state.element_work]
     }
 

@@ -25,6 +25,8 @@ pub enum Cause {
     Clock = 8,
     /// Phases of the torque ripple.
     Ripple = 9,
+    /// Noise of probes at journals.
+    Journals = 10,
 }
 
 /// Generator of a cause: ChaCha8 of the seed, on the cause's own stream.
@@ -34,6 +36,7 @@ pub fn generator(seed: u64, cause: Cause) -> ChaCha8Rng {
     rng
 }
 
-pub(crate) fn normal(rng: &mut ChaCha8Rng) -> f64 {
+/// A normally distributed number of deviation 1.
+pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }

@@ -6,6 +6,7 @@ use dynid_clearance::orbit::{self, OrbitSample, OrbitSettings};
 use dynid_clearance::swing::{self, SwingSettings};
 use dynid_io::{ClearanceSpec, MappingSpec};
 use dynid_model::{EffortModel, JournalPath, MotionBlock, RobotModel, journal_channels};
+use dynid_motion::Channel;
 use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, States};
 use serde::Serialize;
 
@@ -78,8 +79,8 @@ pub struct JointClearance {
     pub probed: Option<ProbedClearance>,
     /// From the effort; `None` where the log is too slow for the stated clearance, since a line could be an alias.
     pub swing: Option<SwingClearance>,
-    /// Coulomb friction of the fit over load and journal radius: a friction coefficient, if all of that friction is the
-    /// bearing's.
+    /// Friction coefficient of the fit where its journals move; else its Coulomb friction over load and journal radius: a friction
+    /// coefficient, if all of that friction is the bearing's.
     pub friction_of_fit: Option<f64>,
     /// What could not be done, and why.
     pub remarks: Vec<String>,
@@ -125,7 +126,11 @@ pub fn clearance(
         delay_rate_hz: estimate.conditioning.delay_rate_hz,
         filter_hz: estimate.model.kernel_hz,
     };
-    let agreement = compare(&model, &values, &prepared, &alignment, &settings)?;
+    // A model that followed the probes would leave no swing in the residual.
+    let read = |c: &&Channel| model.channels().contains(&c.name);
+    let channels = prepared.channels.iter().filter(read).cloned().collect();
+    let unprobed = PreparedLog { channels, ..prepared.clone() };
+    let agreement = compare(&model, &values, &unprobed, &alignment, &settings)?;
     let cutoff = alignment.state_hz.min(settings.cutoff.state_rate * prepared.rate_hz);
     let states = States::new(&prepared, cutoff, &settings)?;
     let counted = longest_run(&agreement.counted);
@@ -259,9 +264,12 @@ impl Record<'_> {
             }
         };
         let swing = self.swing(spec, &residual(output), &sizes, load, output, &mut remarks)?;
-        let coulomb = self.model.parameters().column(&format!("{}.fc", spec.joint)).map(|k| self.values[k]);
-        let friction_of_fit =
-            coulomb.map(|fc| fc / (load * contact.journal_radius)).filter(|f| f.is_finite());
+        let fitted = |symbol: &str| {
+            let column = self.model.parameters().column(&format!("{}.{symbol}", spec.joint))?;
+            Some(self.values[column])
+        };
+        let coulomb = || fitted("fc").map(|fc| fc / (load * contact.journal_radius));
+        let friction_of_fit = fitted("mu").or_else(coulomb).filter(|f| f.is_finite());
         Ok(JointClearance {
             joint: spec.joint.clone(),
             stated_gap: spec.gap(),

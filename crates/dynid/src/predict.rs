@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dynid_io::{LogHeader, MappingSpec, ReadOptions, States, StatesError, Table, states};
 use dynid_model::element::temperature_channel;
-use dynid_model::{BaseParameters, EffortModel, MotionBlock, RegressorBlock, RobotModel};
+use dynid_model::{BaseParameters, EffortModel, JournalModel, MotionBlock, RegressorBlock, RobotModel};
 
 use crate::Error;
 use crate::estimate::ReadingRecord;
@@ -23,16 +23,27 @@ pub fn read_states(
     reading: Option<&ReadingRecord>,
 ) -> Result<States, Error> {
     let table = dynid_io::csv::read(path, options).map_err(StatesError::File)?;
-    let (joints, channels) = (model_state_joints(model), model.channels());
-    let named = states::from_table_with_channels(&table, &joints, channels);
+    let joints = model_state_joints(model);
+    let named = states::from_table_with_channels(&table, &joints, &wanted_channels(model, &table));
     let recorded = reading.filter(|r| r.columns.position.is_some() && r.motor_side.is_none());
     match (named, recorded) {
         (Err(StatesError::Missing { .. } | StatesError::MissingChannel { .. }), Some(reading)) => {
             let table = with_recorded_columns(table, model, &reading.columns)?;
-            Ok(states::from_table_with_channels(&table, &joints, channels)?)
+            Ok(states::from_table_with_channels(&table, &joints, &wanted_channels(model, &table))?)
         }
         (named, _) => Ok(named?),
     }
+}
+
+/// Channels of a model, with those of journals of which the table has some: half of what says where a journal is would be left out
+/// unseen.
+fn wanted_channels(model: &RobotModel, table: &Table) -> Vec<String> {
+    let offsets = model.journals().into_iter().flat_map(JournalModel::offset_channels);
+    let some = offsets
+        .filter(|own| own.iter().flatten().any(|name| table.column(name).is_some()))
+        .flatten()
+        .flatten();
+    model.channels().iter().chain(some).cloned().collect()
 }
 
 /// The table with columns of states beside those that a mapping takes for the same.

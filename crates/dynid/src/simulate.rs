@@ -18,7 +18,6 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::Error;
 use crate::elements::{ElementPlan, LOAD, REACTION_FRICTION};
 use crate::nominal::{nominal_parameters, with_nominal_shape};
-use crate::robot::refuse_clearance;
 use crate::robot::{Robot, refuse_elastic, refuse_internal_load, refuse_loops};
 pub use clearance::{ClearanceSummary, JournalSummary};
 pub use settings::{
@@ -110,7 +109,6 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
         .with_loops(robot.closed.clone());
     if settings.mode == SimulateMode::ClosedLoop {
         refuse_elastic(robot, "simulated in closed loop")?;
-        refuse_clearance(robot, "simulated in closed loop")?;
     }
     if settings.mode == SimulateMode::ClosedLoop && plan.per_rate.iter().flatten().any(|name| name == LOAD) {
         return Err(Error::Unsupported(format!(
@@ -160,7 +158,14 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
                 &mut rng,
             )
         }
-        SimulateMode::ClosedLoop => closed_loop::experiment(model, &reference, values, profiles, settings),
+        SimulateMode::ClosedLoop => {
+            let with_clearance = with_clearance.map(|contacts| {
+                let elements = plan.build(mechanism)?;
+                Ok::<_, Error>(clearance::with_elements(&contacts, elements))
+            });
+            let models = (model, with_clearance.transpose()?);
+            closed_loop::experiment(models, &reference, values, profiles, settings)
+        }
     }
 }
 

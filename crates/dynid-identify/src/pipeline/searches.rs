@@ -48,19 +48,21 @@ pub(crate) fn run(problem: &Problem, fit: &ModelFit) -> Result<Option<Searches>,
     let algorithms = config.algorithms()?;
     // The nonlinear model with its ties: what a search moves has to obey them.
     let (_, consistent) = fit.nonlinear(problem)?;
-    let own = fit.shapes.as_ref().map(|found| &found.model);
-    let model = own.unwrap_or(&problem.model);
-    let refused = match (model.signals().is_empty(), problem.plan.has_reactions()) {
-        (false, _) => {
-            Some("friction with memory, whose signals depend on its shape, has no form in a search")
+    let own = fit.shapes.as_ref().map_or(&problem.model, |found| &found.model);
+    // Loads stay those of the least-squares answer, whatever a search moves.
+    let held = match problem.plan.follows_loads() {
+        true => {
+            let model = problem.plan.tied_model(&problem.robot.mechanism)?;
+            Some(model.with_shape(&own.parameters().shape_start()))
         }
-        (_, true) => {
-            Some("friction that follows reactions takes its loads at the estimate, which a search moves")
-        }
-        _ => None,
+        false => None,
     };
-    if let Some(why) = refused {
-        return Err(Error::Unsupported(format!("{why}: leave out `[estimator.search]`")));
+    let model = held.as_ref().unwrap_or(own);
+    if !model.signals().is_empty() {
+        return Err(Error::Unsupported(
+            "friction with memory, whose signals depend on its shape, has no form in a search: leave out `[estimator.search]`"
+                .to_owned(),
+        ));
     }
     let unknowns = Unknowns::new(problem, fit, model, &consistent, config)?;
     let samples = samples(problem, fit, config.samples.unwrap_or(SAMPLES))?;
@@ -278,9 +280,11 @@ fn samples(problem: &Problem, fit: &ModelFit, most: usize) -> Result<Samples, Er
     let every = total.div_ceil(most).max(1);
     let outputs = problem.model.outputs().len();
     let names = problem.model.channels();
+    let offsets = offset_channels(problem)?;
     let mut parts: [Vec<Vec<f64>>; 3] = std::array::from_fn(|_| Vec::new());
     let mut effort = vec![Vec::new(); outputs];
-    let mut channels: Vec<(String, Vec<f64>)> = names.iter().map(|n| (n.clone(), Vec::new())).collect();
+    let mut channels: Vec<(String, Vec<f64>)> =
+        names.iter().chain(&offsets).map(|n| (n.clone(), Vec::new())).collect();
     for log in problem.logs.iter() {
         let states = States::of_motion(log, state_hz, &settings)?;
         let hz = state_hz.min(settings.cutoff.state_rate * log.rate_hz);
@@ -307,7 +311,14 @@ fn samples(problem: &Problem, fit: &ModelFit, most: usize) -> Result<Samples, Er
             let Some(channel) = log.channels.iter().find(|c| c.name == *name) else {
                 return Err(Error::Unsupported(format!("search: {} has no channel `{name}`", log.name)));
             };
-            to.extend(used.iter().map(|s| channel.values[*s]));
+            match offsets.contains(name) {
+                false => to.extend(used.iter().map(|s| channel.values[*s])),
+                // Journals swing faster than the filter of the efforts passes.
+                true => {
+                    let slow = forward_backward(&filter, &channel.values).map_err(signal)?;
+                    to.extend(used.iter().map(|s| slow[*s]));
+                }
+            }
         }
     }
     let count = effort.first().map_or(0, Vec::len);
@@ -316,6 +327,24 @@ fn samples(problem: &Problem, fit: &ModelFit, most: usize) -> Result<Samples, Er
     }
     let [q, dq, ddq] = parts.map(|signal| signal.concat());
     Ok(Samples { count, q, dq, ddq, effort, channels })
+}
+
+/// Channels of the offsets of journals that the logs have: all of them or none.
+fn offset_channels(problem: &Problem) -> Result<Vec<String>, Error> {
+    let Some(journals) = problem.model.journals() else { return Ok(Vec::new()) };
+    let has = |log: &PreparedLog, name: &String| log.channels.iter().any(|c| c.name == *name);
+    let named: Vec<String> = journals.offset_channels().flatten().flatten().cloned().collect();
+    let some: Vec<String> =
+        named.into_iter().filter(|name| problem.logs.iter().any(|log| has(log, name))).collect();
+    for log in problem.logs.iter() {
+        if let Some(name) = some.iter().find(|name| !has(log, name)) {
+            return Err(Error::Unsupported(format!(
+                "search: {} has no channel `{name}`, which another log has: search on logs that all have probes, or none",
+                log.name
+            )));
+        }
+    }
+    Ok(some)
 }
 
 fn signal(e: dynid_motion::SignalError) -> Error {

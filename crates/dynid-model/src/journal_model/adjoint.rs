@@ -20,7 +20,14 @@ impl JournalModel {
         let own: Vec<f64> =
             (0..outputs).flat_map(|output| &weights[output * stride..][..n]).copied().collect();
         let against: Vec<f64> = own.iter().map(|w| -w).collect();
-        self.still.effort_adjoint(motion, &[], &self.bodies_of(&self.still), n, &against, out);
+        self.still.effort_adjoint(
+            motion,
+            &[],
+            &self.bodies_of(&self.still, &self.reference),
+            n,
+            &against,
+            out,
+        );
 
         let (positions, rates) = self.moving.dimensions();
         let mut all = own;
@@ -29,7 +36,7 @@ impl JournalModel {
         self.moving.effort_adjoint(
             &journals.motion.block(),
             &[],
-            &self.bodies_of(&self.moving),
+            &self.bodies_of(&self.moving, &self.reference),
             n,
             &all,
             &mut moved,

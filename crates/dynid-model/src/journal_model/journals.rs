@@ -37,24 +37,29 @@ impl Moving {
 
 impl JournalModel {
     pub(super) fn journals(&self, motion: &MotionBlock<'_>) -> Journals {
+        self.journals_at(motion, &self.reference)
+    }
+
+    /// Journals with bodies and friction at these linear parameters.
+    pub(super) fn journals_at(&self, motion: &MotionBlock<'_>, reference: &[f64]) -> Journals {
         let n = motion.samples;
         let mut moving = self.centred(motion);
         let probed: Vec<bool> =
             self.journals.iter().map(|journal| journal.follow(motion, &mut moving.states)).collect();
         if probed.contains(&false) {
-            let effort = self.bodies(&self.moving, &moving.block());
+            let effort = self.bodies(&self.moving, &moving.block(), reference);
             for (journal, _) in self.journals.iter().zip(&probed).filter(|(_, probed)| !**probed) {
-                journal.rest(n, &effort, self.reference[journal.mu], &mut moving.states);
+                journal.rest(n, &effort, reference[journal.mu], &mut moving.states);
             }
         }
-        let effort = self.bodies(&self.moving, &moving.block());
+        let effort = self.bodies(&self.moving, &moving.block(), reference);
         let forces = self.journals.iter().flat_map(|journal| journal.contact.translations);
         let forces: Vec<Vec<f64>> = forces.map(|rate| effort[rate * n..][..n].to_vec()).collect();
         let moments = self.journals.iter().zip(forces.chunks_exact(2));
         let moments = moments
-            .map(|(journal, force)| journal.moments(n, force, self.reference[journal.mu], &moving.states))
+            .map(|(journal, force)| journal.moments(n, force, reference[journal.mu], &moving.states))
             .collect();
-        let mut added = self.bodies(&self.still, motion);
+        let mut added = self.bodies(&self.still, motion, reference);
         added.iter_mut().zip(&effort).for_each(|(still, moving)| *still = moving - *still);
         Journals { motion: moving, probed, forces, moments, added }
     }
@@ -77,18 +82,18 @@ impl JournalModel {
         Moving { samples: n, states, gravity: motion.gravity.map(|gravity| fill(gravity, 3, 3)) }
     }
 
-    /// Efforts of the bodies at the reference, `[rate * samples + s]`.
-    fn bodies(&self, model: &TreeModel, motion: &MotionBlock<'_>) -> Vec<f64> {
+    /// Efforts of the bodies at these linear parameters, `[rate * samples + s]`.
+    fn bodies(&self, model: &TreeModel, motion: &MotionBlock<'_>, reference: &[f64]) -> Vec<f64> {
         let n = motion.samples;
         let mut effort = vec![0.0; model.outputs().len() * n];
-        model.efforts(motion, &[], &self.bodies_of(model), n, &mut effort);
+        model.efforts(motion, &[], &self.bodies_of(model, reference), n, &mut effort);
         effort
     }
 
-    /// Inertial parameters of the reference for a model of bodies alone: carriers of journals come last and have no mass.
-    pub(super) fn bodies_of(&self, model: &TreeModel) -> Vec<f64> {
+    /// Inertial parameters for a model of bodies alone: carriers of journals come last and have no mass.
+    pub(super) fn bodies_of(&self, model: &TreeModel, reference: &[f64]) -> Vec<f64> {
         let own = self.still.parameters().linear.len();
-        let mut linear = self.reference[..own].to_vec();
+        let mut linear = reference[..own].to_vec();
         linear.resize(model.parameters().linear.len(), 0.0);
         linear
     }

@@ -27,9 +27,6 @@ pub fn derivative_channels(channel: &str) -> [String; 2] {
     [format!("{channel}_rate"), format!("{channel}_acceleration")]
 }
 
-/// Channels of one journal: offset, its rate and its acceleration, along x and y.
-type OffsetChannels = [[String; 2]; 3];
-
 /// A robot whose journals move in their bearings, as an ideal robot sees it: the same outputs, rates and parameters, and beside them
 ///
 /// ```text
@@ -66,10 +63,12 @@ pub struct JournalModel {
 pub struct LoadSums {
     /// Column of the coefficient of friction.
     pub mu: usize,
-    /// `Σ M ∂M/∂φ_k`, per inertial parameter.
+    /// `Σ M ∂M/∂φ_k`, per inertial parameter; over `Σ M²` the relative change of the coefficient that a change of the parameter asks for.
     pub change: Vec<f64>,
     /// `Σ M²`, (N m)².
     pub square: f64,
+    /// `Σ M M_0` with the moments of the model's own reference; over `Σ M²` the coefficient that makes up for the other loads.
+    pub product: f64,
 }
 
 #[derive(Debug)]
@@ -79,7 +78,8 @@ struct Journal {
     rotation: usize,
     translations: [usize; 2],
     moment: String,
-    offsets: OffsetChannels,
+    /// Channels of the offset, its rate and its acceleration.
+    offsets: [[String; 2]; 3],
     /// Column of the friction coefficient.
     mu: usize,
 }
@@ -166,9 +166,15 @@ impl JournalModel {
         self.journals.iter().map(|journal| self.moving.joints()[journal.contact.rotation].name.as_str())
     }
 
-    /// Channels that are read where a motion has them: offsets of the journals and their derivatives.
-    pub fn optional_channels(&self) -> impl Iterator<Item = &String> {
-        self.journals.iter().flat_map(|journal| journal.offsets.iter().flatten())
+    /// Columns of the friction coefficients of the journals.
+    pub fn coefficients(&self) -> impl Iterator<Item = usize> {
+        self.journals.iter().map(|journal| journal.mu)
+    }
+
+    /// Channels that are read where a motion has them, all six of a journal or none: its offset along x and y, the rates, the
+    /// accelerations.
+    pub fn offset_channels(&self) -> impl Iterator<Item = &[[String; 2]; 3]> {
+        self.journals.iter().map(|journal| &journal.offsets)
     }
 
     /// Forces on the journals in bearing axes over a block, N: x and y of each journal.
@@ -188,20 +194,21 @@ impl JournalModel {
         self.journals(motion).added.chunks_exact(n).map(<[f64]>::to_vec).collect()
     }
 
-    /// How the moments of friction over a block go with the inertial parameters at the reference: per journal the sums `Σ M ∂M/∂φ_k` and
-    /// `Σ M²` over the samples, directions of friction held. Their ratio is the relative change of the coefficient `mu` that a change of a
-    /// parameter asks for.
+    /// How the moments of friction over a block go with the inertial parameters at other values, `reference` (all linear parameters):
+    /// per journal sums over the samples, directions of friction held.
     ///
     /// # Panics
-    /// Panics as [`EffortModel::efforts`] does.
-    pub fn load_sums(&self, motion: &MotionBlock<'_>) -> Vec<LoadSums> {
-        let journals = self.journals(motion);
+    /// If `reference` is too short; else as [`EffortModel::efforts`] does.
+    pub fn load_sums(&self, motion: &MotionBlock<'_>, reference: &[f64]) -> Vec<LoadSums> {
+        let own = self.journals(motion).moments;
+        let journals = self.journals_at(motion, reference);
         let mut rows = RegressorBlock::new(self.moving.layout().clone(), motion.samples);
         self.moving.regressor(&journals.motion.block(), &[], &mut rows);
-        let own = self.still.parameters().linear.len();
-        let each = self.journals.iter().zip(&journals.moments).zip(journals.forces.chunks_exact(2));
-        each.map(|((journal, moments), force)| {
-            let mut change = vec![0.0; own];
+        let bodies = self.still.parameters().linear.len();
+        let each =
+            self.journals.iter().zip(own).zip(journals.moments.iter().zip(journals.forces.chunks_exact(2)));
+        each.map(|((journal, own), (moments, force))| {
+            let mut change = vec![0.0; bodies];
             for (rate, along) in journal.contact.translations.into_iter().zip(force) {
                 for (k, parameter) in rows.layout().columns(rate).iter().enumerate() {
                     // Carriers of journals have no mass.
@@ -215,7 +222,12 @@ impl JournalModel {
                     }
                 }
             }
-            LoadSums { mu: journal.mu, change, square: moments.iter().map(|m| m * m).sum() }
+            LoadSums {
+                mu: journal.mu,
+                change,
+                square: moments.iter().map(|m| m * m).sum(),
+                product: moments.iter().zip(own).map(|(m, own)| m * own).sum(),
+            }
         })
         .collect()
     }

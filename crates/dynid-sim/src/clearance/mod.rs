@@ -11,12 +11,15 @@
 mod branch;
 mod energy;
 mod explicit;
+mod motion;
 mod record;
 mod run;
 mod settings;
 mod system;
 
 pub use energy::ClearanceEnergy;
+pub(crate) use motion::ClearanceMotion;
+pub use motion::sensors;
 pub use record::{ClearanceRecord, ContactEvent, ContactEventKind, JournalRecord, RunCount};
 pub use run::simulate;
 pub use settings::{ClearanceSettings, ClearanceStart, Controller, Driving, Method, PrescribedMotion};

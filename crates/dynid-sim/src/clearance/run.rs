@@ -37,7 +37,7 @@ pub fn simulate(
     settings: &ClearanceSettings,
 ) -> Result<ClearanceRecord, SimError> {
     let plant = plant.without_contacts();
-    Run::new(&plant, start, driving, times, settings)?.all(times)
+    Run::new(&plant, start, Some(driving), times, settings)?.all(times)
 }
 
 pub(super) struct Run<'p, 'd> {
@@ -59,21 +59,23 @@ pub(super) struct Run<'p, 'd> {
 }
 
 impl<'p, 'd> Run<'p, 'd> {
-    fn new(
+    /// `driving`: `None` for efforts that are held until others are given ([`Run::hold`]).
+    pub(super) fn new(
         plant: &'p Plant,
         start: &ClearanceStart,
-        driving: Driving<'d>,
+        driving: Option<Driving<'d>>,
         times: &[f64],
         settings: &ClearanceSettings,
     ) -> Result<Self, SimError> {
-        check(plant, start, &driving, times, settings)?;
+        check(plant, start, driving.as_ref(), times, settings)?;
         let model = plant.model();
         let driven = (0..plant.joints()).filter(|rate| !model.is_undriven(*rate)).count();
         let (drive, controller) = match driving {
-            Driving::Prescribed(motion) => (Drive::Prescribed(motion), None),
-            Driving::Controlled { period, controller } => {
+            Some(Driving::Prescribed(motion)) => (Drive::Prescribed(motion), None),
+            Some(Driving::Controlled { period, controller }) => {
                 (Drive::Effort(vec![0.0; driven]), Some((period, controller)))
             }
+            None => (Drive::Effort(vec![0.0; driven]), None),
         };
         let gravity = model.mechanism().gravity().norm();
         let mut system = System::new(plant, drive, settings.channels.clone(), gravity);
@@ -139,15 +141,24 @@ impl<'p, 'd> Run<'p, 'd> {
     fn all(mut self, times: &[f64]) -> Result<ClearanceRecord, SimError> {
         self.control();
         self.refresh()?;
-        self.system.place(self.t, &self.x, &self.v);
-        let [bodies, contacts] = stored(&mut self.system);
+        let before = self.stored();
         self.sample();
         for until in &times[1..] {
             self.advance(*until)?;
             self.sample();
         }
+        Ok(self.finish(before, times[0]))
+    }
+
+    /// Energy of the bodies, elastic energy of the contacts.
+    pub(super) fn stored(&mut self) -> [f64; 2] {
         self.system.place(self.t, &self.x, &self.v);
-        let [bodies_end, contacts_end] = stored(&mut self.system);
+        stored(&mut self.system)
+    }
+
+    /// The record of a run from a time with this stored energy on.
+    pub(super) fn finish(mut self, [bodies, contacts]: [f64; 2], from: f64) -> ClearanceRecord {
+        let [bodies_end, contacts_end] = self.stored();
         if !self.system.laws {
             self.record.energy.bodies = bodies_end - bodies;
             self.record.energy.contacts = contacts_end - contacts;
@@ -156,11 +167,20 @@ impl<'p, 'd> Run<'p, 'd> {
         let (evaluations, jacobians) = self.collocation.counts();
         self.record.count.evaluations = evaluations + self.evaluations;
         self.record.count.jacobians = jacobians;
-        let span = (self.t - times[0]).max(f64::MIN_POSITIVE);
+        let span = (self.t - from).max(f64::MIN_POSITIVE);
         for (journal, closed) in self.record.journals.iter_mut().zip(&self.closed_time) {
             journal.contact_share = closed / span;
         }
-        Ok(self.record)
+        self.record
+    }
+
+    /// Holds other efforts and channels from now on.
+    pub(super) fn hold(&mut self, effort: &[f64], channels: &[f64]) -> Result<(), SimError> {
+        if self.system.hold(effort, channels) {
+            self.collocation.restart();
+            self.refresh()?;
+        }
+        Ok(())
     }
 
     /// Forms efforts if a control instant has come.
@@ -175,7 +195,8 @@ impl<'p, 'd> Run<'p, 'd> {
             driven.iter().map(|rate| (self.system.q[*rate], self.system.dq[*rate])).unzip();
         let mut effort = vec![0.0; driven.len()];
         controller(self.t, &q, &dq, &mut effort);
-        self.system.hold(&effort);
+        let channels = self.system.channels.clone();
+        self.system.hold(&effort, &channels);
         self.next_control += *period;
     }
 
@@ -192,7 +213,7 @@ impl<'p, 'd> Run<'p, 'd> {
         }
     }
 
-    fn advance(&mut self, until: f64) -> Result<(), SimError> {
+    pub(super) fn advance(&mut self, until: f64) -> Result<(), SimError> {
         let mut steps = 0;
         while self.t < until {
             let held = if self.controller.is_some() { self.next_control } else { f64::INFINITY };
@@ -336,7 +357,7 @@ impl<'p, 'd> Run<'p, 'd> {
         }
     }
 
-    fn sample(&mut self) {
+    pub(super) fn sample(&mut self) {
         let mut a = vec![0.0; self.x.len()];
         // A true right-hand side, where collocation has converged to one.
         self.system.acceleration(self.t, &self.x, &self.v, &mut a);

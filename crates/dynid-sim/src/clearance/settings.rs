@@ -71,11 +71,11 @@ pub enum Driving<'a> {
     },
 }
 
-/// Refuses what cannot be simulated.
+/// Refuses what cannot be simulated. `driving`: `None` where efforts are held until others are given.
 pub(super) fn check(
     plant: &Plant,
     start: &ClearanceStart,
-    driving: &Driving<'_>,
+    driving: Option<&Driving<'_>>,
     times: &[f64],
     settings: &ClearanceSettings,
 ) -> Result<(), SimError> {
@@ -103,13 +103,13 @@ pub(super) fn check(
     }
     let driven = (0..plant.joints()).filter(|rate| !model.is_undriven(*rate)).count();
     match driving {
-        Driving::Prescribed(_) => {}
-        Driving::Controlled { period, .. } => {
+        Some(Driving::Prescribed(_)) => return Ok(()),
+        Some(Driving::Controlled { period, .. }) => {
             demand(positive(*period), "period", "a positive time", *period)?;
-            let (q, dq) = start.driven.as_ref().map_or((0, 0), |(q, dq)| (q.len(), dq.len()));
-            demand_length("positions of the driven joints", driven, q)?;
-            demand_length("rates of the driven joints", driven, dq)?;
         }
+        None => {}
     }
-    Ok(())
+    let (q, dq) = start.driven.as_ref().map_or((0, 0), |(q, dq)| (q.len(), dq.len()));
+    demand_length("positions of the driven joints", driven, q)?;
+    demand_length("rates of the driven joints", driven, dq)
 }

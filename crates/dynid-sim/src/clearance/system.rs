@@ -53,7 +53,7 @@ pub(super) struct System<'p, 'd> {
     pub(super) dq: Vec<f64>,
     pub(super) ddq: Vec<f64>,
     prescribed: [Vec<f64>; 3],
-    channels: Vec<f64>,
+    pub(super) channels: Vec<f64>,
     /// Efforts of the contacts at all rates.
     contact: Vec<f64>,
 }
@@ -240,11 +240,13 @@ impl<'p, 'd> System<'p, 'd> {
         mass.valid.then_some(k)
     }
 
-    /// The effort as it is held from now on.
-    pub(super) fn hold(&mut self, effort: &[f64]) {
-        if let Drive::Effort(held) = &mut self.drive {
-            held.copy_from_slice(effort);
-        }
+    /// Efforts and channels as they are held from now on; whether they are others than before.
+    pub(super) fn hold(&mut self, effort: &[f64], channels: &[f64]) -> bool {
+        let Drive::Effort(held) = &mut self.drive else { return false };
+        let changes = held != effort || self.channels != channels;
+        held.copy_from_slice(effort);
+        self.channels.copy_from_slice(channels);
+        changes
     }
 }
 

@@ -49,14 +49,15 @@ impl Motion for ClosedMotion<'_> {
             .acceleration((q, dq), drive, &all, self.integrator.workspace(), &mut ddq)
             .map_err(|source| SimError::Forward { time, source })?;
         let of = |rates: &[f64]| self.plant.machine.driven().iter().map(|r| rates[*r]).collect();
-        Ok(Instant { q: self.positions(), dq: of(dq), ddq: of(&ddq), effort: self.plant.delivered(q, drive) })
+        let effort = self.plant.delivered(q, drive);
+        Ok(Instant { q: self.positions(), dq: of(dq), ddq: of(&ddq), effort, sensors: Vec::new() })
     }
 
     fn energy(&mut self) -> PlantEnergy {
         self.plant.energy(&self.state.q, &self.state.dq, self.integrator.workspace())
     }
 
-    fn work(&self) -> [f64; 2] {
+    fn work(&mut self) -> [f64; 2] {
         [self.state.drive_work, self.state.element_work]
     }
 

@@ -1,5 +1,6 @@
 //! Virtual logs of robots whose joints have clearance.
 
+use dynid_model::element::JointElement;
 use dynid_model::{EffortModel, RobotModel, journal_channels};
 use dynid_motion::signal::rms;
 use dynid_sim::clearance::{
@@ -116,15 +117,8 @@ pub(super) fn along(
     times.sort_by(f64::total_cmp);
     times.dedup();
 
-    let table = with_clearance.parameters();
-    let mut linear = table.prior();
-    for (parameter, value) in model.parameters().linear.iter().zip(values) {
-        if let Some(column) = table.column(&parameter.name) {
-            linear[column] = *value;
-        }
-    }
-    let own = table.linear.iter().zip(&linear).skip(with_clearance.mechanism().inertial_parameters());
-    let parameters = own.map(|(p, value)| (p.name.clone(), *value)).collect();
+    let linear = linear(&with_clearance, model, values);
+    let parameters = contact_parameters(&with_clearance, &linear);
     let motion = |time: f64, q: &mut [f64], dq: &mut [f64], ddq: &mut [f64]| {
         for (k, [x, v, a]) in reference.at(time).into_iter().enumerate() {
             (q[k], dq[k], ddq[k]) = (x, v, a);
@@ -156,14 +150,58 @@ pub(super) fn along(
     };
     let (effort, led) = (effort(&now, at[0], 0.0), effort(&led, at[1], shift));
     let (offsets, contacts) = contacts(&record, &now);
-    Ok(Journals { effort, led, offsets, contacts, parameters, summary: summary(record, settle_s, &now) })
+    Ok(Journals {
+        effort,
+        led,
+        offsets,
+        contacts,
+        parameters,
+        summary: summary(record, settle_s, Some(&now)),
+    })
 }
 
+/// Bodies with translations of journals and their contacts, with the elements of the ideal robot, whose rates come first.
+pub(super) fn with_elements(contacts: &RobotModel, mut elements: Vec<Box<dyn JointElement>>) -> RobotModel {
+    elements.extend(contacts.clearances().map(|c| Box::new(c.clone()) as Box<dyn JointElement>));
+    RobotModel::new(contacts.mechanism().clone(), elements)
+}
+
+/// Linear parameters of a model with clearance: those of the ideal one where it has them, others as stated.
+pub(super) fn linear(with_clearance: &RobotModel, ideal: &RobotModel, values: &[f64]) -> Vec<f64> {
+    let table = with_clearance.parameters();
+    let mut linear = table.prior();
+    for (parameter, value) in ideal.parameters().linear.iter().zip(values) {
+        if let Some(column) = table.column(&parameter.name) {
+            linear[column] = *value;
+        }
+    }
+    linear
+}
+
+/// Parameters of the contacts.
+pub(super) fn contact_parameters(with_clearance: &RobotModel, linear: &[f64]) -> Vec<Named> {
+    let joints = with_clearance.joints();
+    let of_contacts = with_clearance.clearances().zip(with_clearance.clearance_contacts(linear));
+    let named = of_contacts.flat_map(|(contact, (_, values))| {
+        let parameters = contact.parameters(joints);
+        parameters.into_iter().zip(values).map(|(p, value)| (p.name, value)).collect::<Vec<_>>()
+    });
+    named.collect()
+}
+
+/// Whether a channel is the offset of a journal of a robot.
+pub(super) fn is_offset(channel: &str, model: &RobotModel) -> bool {
+    model.joints().iter().flat_map(|joint| journal_channels(&joint.name)).any(|name| name == channel)
+}
+
+/// A name and its number.
+type Named = (String, f64);
+
 /// A channel of a log.
-type Named = (String, Vec<f64>);
+type Channel = (String, Vec<f64>);
 
 /// Offsets of the journals; forces and penetrations.
-fn contacts(record: &ClearanceRecord, rows: &[usize]) -> (Vec<Named>, Vec<Named>) {
+fn contacts(record: &ClearanceRecord, rows: &[usize]) -> (Vec<Channel>, Vec<Channel>) {
     let (mut offsets, mut contacts) = (Vec::new(), Vec::new());
     for journal in &record.journals {
         let joint = &journal.joint;
@@ -178,7 +216,8 @@ fn contacts(record: &ClearanceRecord, rows: &[usize]) -> (Vec<Named>, Vec<Named>
     (offsets, contacts)
 }
 
-fn summary(record: ClearanceRecord, settle_s: f64, rows: &[usize]) -> ClearanceSummary {
+/// `rows`: samples of the log; `None`: all.
+pub(super) fn summary(record: ClearanceRecord, settle_s: f64, rows: Option<&[usize]>) -> ClearanceSummary {
     let counted = |joint: usize, onset: bool| {
         let is =
             |e: &&ContactEvent| e.joint == joint && matches!(e.kind, ContactEventKind::Onset(_)) == onset;
@@ -191,7 +230,10 @@ fn summary(record: ClearanceRecord, settle_s: f64, rows: &[usize]) -> ClearanceS
         losses: counted(k, false),
         largest_penetration: j.largest_penetration,
         largest_normal_force: j.largest_normal_force,
-        friction_moment_rms: rms(&rows.iter().map(|row| j.friction_moment[*row]).collect::<Vec<_>>()),
+        friction_moment_rms: match rows {
+            Some(rows) => rms(&rows.iter().map(|row| j.friction_moment[*row]).collect::<Vec<_>>()),
+            None => rms(&j.friction_moment),
+        },
     });
     ClearanceSummary {
         settle_s,

@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use dynid_model::{EffortModel, RobotModel};
+use dynid_sim::streams::{Cause, generator, normal};
 use dynid_sim::{
     ClosedPlant, ControlSettings, ExperimentSettings, Imperfections, Plant, Profile, Wanted, run, run_closed,
-    wrong_model,
+    run_with_clearance, wrong_model,
 };
 
+use super::clearance;
 use super::settings::SimulateSettings;
 use super::trajectory::Reference;
 use super::{ExperimentSummary, SimulatedLog, named};
@@ -16,8 +18,9 @@ use crate::Error;
 /// Least control rate that is chosen where none is stated, Hz.
 const LEAST_CONTROL_RATE: f64 = 1000.0;
 
+/// `with_clearance`: bodies with translations of the journals, all elements and contacts, for robots whose joints have clearance.
 pub(super) fn experiment(
-    model: RobotModel,
+    (model, with_clearance): (RobotModel, Option<RobotModel>),
     reference: &Reference,
     values: Vec<f64>,
     channels: Vec<Profile>,
@@ -41,7 +44,18 @@ pub(super) fn experiment(
         channels,
         seed: settings.seed,
     };
-    let result = if model.with_reactions().is_some() {
+    let (mut sensors, mut journals, mut parameters) = (Vec::new(), None, Vec::new());
+    let result = if let Some(contacts) = with_clearance {
+        let linear = clearance::linear(&contacts, &model, &values);
+        parameters = clearance::contact_parameters(&contacts, &linear);
+        let width = plant_table.sign_width;
+        let plant = Plant::new(contacts, linear, shape.clone(), width)?;
+        let nominal = Plant::new(model.clone(), believed, shape, width)?;
+        sensors = dynid_sim::clearance::sensors(&plant);
+        let (result, record) = run_with_clearance(plant, &nominal, &wanted, &experiment)?;
+        journals = Some(record);
+        result
+    } else if model.with_reactions().is_some() {
         let plant = |values| ClosedPlant::new(model.clone(), values, shape.clone(), plant_table.sign_width);
         run_closed(&mut plant(values.clone())?, &plant(believed)?, &wanted, &experiment)?
     } else {
@@ -49,7 +63,23 @@ pub(super) fn experiment(
         run(&mut plant(values.clone())?, &plant(believed)?, &wanted, &experiment)?
     };
     let log = result.log;
-    let channels: Vec<(String, Vec<f64>)> = model.channels().iter().cloned().zip(log.channels).collect();
+    let names_of_channels = model.channels().iter().chain(&sensors).cloned();
+    let clean_channels: Vec<(String, Vec<f64>)> = names_of_channels.zip(log.channels).collect();
+    let mut noise = generator(settings.seed, Cause::Journals);
+    let channels: Vec<(String, Vec<f64>)> = clean_channels
+        .iter()
+        .map(|(name, values)| match clearance::is_offset(name, &model) {
+            true => {
+                let noisy = |x: &f64| x + settings.journal_noise * normal(&mut noise);
+                (name.clone(), values.iter().map(noisy).collect())
+            }
+            false => (name.clone(), values.clone()),
+        })
+        .collect();
+    let journals = journals.map(|record| clearance::summary(record, 0.0, None));
+    let warnings = journals.iter().flat_map(|s| s.warnings(settings.rate_hz)).collect();
+    let mut truth = named(&model, values);
+    truth.extend(parameters);
     Ok(SimulatedLog {
         joints,
         undriven: vec![false; model.outputs().len()],
@@ -57,10 +87,10 @@ pub(super) fn experiment(
         position: log.position,
         velocity: settings.log_velocity.then_some(log.velocity),
         effort: log.effort,
-        channels: channels.clone(),
-        clean_channels: channels,
+        channels,
+        clean_channels,
         clean: [log.truth.q, log.truth.dq, log.truth.ddq, log.truth.effort],
-        truth: named(&model, values),
+        truth,
         experiment: Some(ExperimentSummary {
             imperfections: result.imperfections,
             ripple: result.ripple,
@@ -71,8 +101,8 @@ pub(super) fn experiment(
             dropped_rows: log.dropped_rows,
             sign_width: plant_table.sign_width,
         }),
-        clearance: None,
-        warnings: Vec::new(),
+        clearance: journals,
+        warnings,
     })
 }
 

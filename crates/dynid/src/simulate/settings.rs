@@ -266,6 +266,10 @@ impl SimulateSettings {
         if let (Some(settle), Some(_)) = (s.settle_s, &s.follow) {
             return Err(Error::setting("settle_s", "no value beside `follow`, which has a start", settle));
         }
+        if let (Some(settle), SimulateMode::ClosedLoop) = (s.settle_s, s.mode) {
+            let expected = "no value in closed loop, where journals begin at rest against their bearings";
+            return Err(Error::setting("settle_s", expected, settle));
+        }
         s.check_mode()
     }
 
