@@ -20,7 +20,7 @@ pub struct Caution {
 }
 
 /// Kinds of cautions from those that matter most, since nothing holds beside them, to those that are good to know.
-const ORDER: [&str; 34] = [
+const ORDER: [&str; 35] = [
     CheckName::Preflight.word(),
     FINDING,
     CheckName::OwnLogs.word(),
@@ -30,6 +30,7 @@ const ORDER: [&str; 34] = [
     CheckName::TrainingFit.word(),
     CheckName::OwnValidation.word(),
     CheckName::Loads.word(),
+    CheckName::Clearance.word(),
     CheckName::Ties.word(),
     CheckName::Excitation.word(),
     CheckName::RankGap.word(),

@@ -8,6 +8,8 @@ dynid_record::words! {
     CheckName {
         /// Whether the training logs agree in what the fit holds the same.
         AgreementOfLogs = "agreement of the training logs",
+        /// What the logs tell of joints with clearance.
+        Clearance = "clearance of the joints",
         /// Least squares against instrumental variables.
         ClosedLoopBias = "closed-loop bias",
         /// Amplification of errors.

@@ -23,6 +23,7 @@ use crate::fitting::Fitted;
 use crate::friction_power::FrictionPower;
 use crate::instruments::{Comparison, InstrumentRun};
 use crate::joint_stiffness::JointStiffness;
+use crate::journal_doubt::JournalSeen;
 use crate::load_rounds::LoadRounds;
 use crate::log::LogSource;
 use crate::log_agreement::LogAgreement;
@@ -152,6 +153,8 @@ pub struct Identification {
     pub tie_test: Option<TieTest>,
     /// Searches over all parameters, where they were asked for.
     pub searches: Option<Searches>,
+    /// Journals of joints with clearance over the training logs.
+    pub(crate) journals: Vec<JournalSeen>,
 }
 
 impl Identification {

@@ -32,6 +32,7 @@ mod identification;
 mod input_record;
 pub mod instruments;
 mod joint_stiffness;
+mod journal_doubt;
 pub mod known_friction;
 mod linear_method;
 mod load_doubt;

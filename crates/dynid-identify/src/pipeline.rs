@@ -30,6 +30,7 @@ pub use crate::identification::Identification;
 use crate::input_record::{InputRecord, short_name};
 use crate::instruments::{self, Comparison, Loop};
 use crate::joint_stiffness::{self, JointStiffness};
+use crate::journal_doubt;
 use crate::load_doubt::{Doubted, LoadDoubt};
 pub use crate::load_rounds::LoadRounds;
 use crate::log::{self, Log, LogSource};
@@ -183,6 +184,7 @@ fn run(
         out.training.push(agreement);
     }
     (out.tie_test, out.searches) = (tie_test, searches);
+    out.journals = journal_doubt::look(&out.model, &out.logs, out.state_hz, &out.conditioning_settings)?;
     out.warnings.extend(not_compared);
     for log in validation {
         progress(Step::Validate(log.log.name().to_owned()));
@@ -329,6 +331,7 @@ pub(crate) fn assemble(
         loads,
         tie_test: None,
         searches: None,
+        journals: Vec::new(),
     };
     out.nonlinear = out.unfolded(out.values())?;
     out.alone = out.without_logs()?;

@@ -6,6 +6,7 @@ mod logs;
 mod remedy;
 
 use dynid_estimate::consistent::Status as ConsistentStatus;
+use dynid_estimate::identifiability::Verdict as TrustVerdict;
 use dynid_estimate::whiteness::InBandWhiteness;
 
 use crate::agreement::Agreement;
@@ -16,6 +17,7 @@ use crate::consistency::UNCONSTRAINED;
 use crate::estimate::{BaseCounts, Verdict};
 use crate::identification::Identification;
 use crate::joint_stiffness::JointStiffness;
+use crate::journal_doubt;
 use crate::load_rounds::LoadRounds;
 pub use dynid_record::Status;
 pub(crate) use instruments::in_words as closed_loop_bias_in_words;
@@ -59,6 +61,7 @@ pub fn judge(id: &Identification) -> Verdict {
     checks.extend(explained(id));
     checks.extend(residual(id));
     checks.extend(loads(id));
+    checks.extend(clearance(id));
     checks.extend(delay(id));
     checks.extend(mask(id));
     checks.push(blocks(id));
@@ -380,11 +383,11 @@ fn loads(id: &Identification) -> Option<CheckResult> {
     let settled = found.change <= LoadRounds::SETTLED;
     let meaning = match settled {
         true => format!(
-            "friction follows reactions, and reactions the parameters: {} rounds brought both together",
+            "friction follows loads, and loads the parameters: {} rounds brought both together",
             found.rounds
         ),
         false => format!(
-            "friction follows reactions, and reactions the parameters: {} rounds did not bring them together, so columns and intervals are those \
+            "friction follows loads, and loads the parameters: {} rounds did not bring them together, so columns and intervals are those \
              of other loads than the model predicts with",
             found.rounds
         ),
@@ -397,6 +400,16 @@ fn loads(id: &Identification) -> Option<CheckResult> {
         "relative change in the last round at most 1e-6",
         meaning,
     ))
+}
+
+/// What the logs tell of joints with clearance.
+fn clearance(id: &Identification) -> Option<CheckResult> {
+    let journals = id.model.journals()?;
+    let moments = journals.journal_joints().zip(journals.coefficients()).filter(|(_, column)| {
+        id.trust.parameters.get(*column).is_some_and(|p| p.assessment.verdict != TrustVerdict::Seen || p.wide)
+    });
+    let moments: Vec<String> = moments.map(|(joint, _)| joint.to_owned()).collect();
+    journal_doubt::check(&id.journals, &moments)
 }
 
 fn delay(id: &Identification) -> Option<CheckResult> {

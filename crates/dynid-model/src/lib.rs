@@ -38,7 +38,7 @@ pub use dynamics::{
 pub use dynid_algebra::{Inertia, Mat3, Placement, Scalar, Vec3, inertia, scalar, spatial, symmetric};
 pub use dynid_contact as contact;
 pub use effort_model::{EffortModel, History, Output, RegressorBlock, RegressorLayout};
-pub use journal_model::{JournalModel, LoadSums, derivative_channels, journal_channels};
+pub use journal_model::{JournalLook, JournalModel, LoadSums, derivative_channels, journal_channels};
 pub use mechanism::{Body, Frame, Joint, JournalPath, Mechanism, MechanismError, MechanismWarning};
 pub use parameter::{Owner, Parameter, ParameterTable, ShapeParameter};
 pub use per_output::PerOutput;

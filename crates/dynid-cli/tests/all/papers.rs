@@ -120,3 +120,38 @@ fn stiffness_of_the_flexible_joint_is_found_and_its_wear_is_named() {
     assert!((60.0..66.0).contains(&time) && changes[0]["confirmed"] == true);
     assert!(change.contains("joint_motor"), "{change}");
 }
+
+#[test]
+fn probes_at_the_journals_of_the_xy_mechanism_are_worth_ten_times_an_ideal_model() {
+    let folder = run("xy-pointing");
+    let out = folder.path().join("xy-run");
+    let read = |model: &str| Estimate::read(&out.join(model).join("estimate.json")).unwrap();
+    let [own, weighed, ideal] = ["identify", "weighed", "ideal"].map(read);
+    let truth = json(&out.join("truth.json"));
+    // The paper's objective is a mean over samples and both joints.
+    let searches = own.searches.as_ref().unwrap();
+    println!(
+        "bee colony {:.5} N m, least squares {:.5}",
+        0.5 * searches.found[0].value,
+        0.5 * searches.least_squares
+    );
+    assert!(0.5 * searches.found[0].median < 0.002 && searches.least_squares < searches.found[0].value);
+    assert!(searches.outside.is_empty(), "{:?}", searches.outside);
+    let held_out = |model: &str| {
+        let validated = json(&out.join(format!("{model}.json")));
+        validated[0]["filtered"]["relative_error"].as_f64().unwrap()
+    };
+    let errors = ["identify", "weighed", "ideal"].map(held_out);
+    println!("error on another motion: {errors:.3?} %");
+    assert!(errors[0] < 0.3 && errors[1] < 0.3 && errors[2] > 10.0 * errors[0], "{errors:?}");
+    for estimate in [&own, &weighed] {
+        let off = off(estimate, &truth);
+        println!("{off:.2?}");
+        assert!(off.len() > 5 && off.iter().all(|(_, z)| z.abs() < 3.5), "{off:.2?}");
+    }
+    // Only weighed links tell a coefficient of friction.
+    let mu = |of: &Estimate| of.parameters.iter().find(|p| p.name == "j2.mu").unwrap().clone();
+    assert!(mu(&own).std.is_none_or(|std| std > 0.01), "{:?}", mu(&own).std);
+    assert!(mu(&weighed).std.unwrap() < 2e-4 && (mu(&weighed).value - 0.1).abs() < 5e-4);
+    assert!(out.join("pointing.xml").is_file() && ideal.model.clearance.is_empty());
+}

@@ -20,13 +20,13 @@ const STENCIL: (usize, usize) = (5, 4);
 /// of joints have one.
 ///
 /// # Errors
-/// [`ConditioningError::MissingChannel`] for one offset without the other.
+/// [`ConditioningError::MissingChannel`] for one offset without the other; [`Error::Setting`] for offsets beyond the journal's radius.
 pub(super) fn derive(
     log: &mut PreparedLog,
     model: &JournalModel,
     settings: &ConditioningSettings,
 ) -> Result<(), Error> {
-    for joint in model.journal_joints() {
+    for (joint, contact) in model.journal_joints().zip(model.contacts()) {
         let names = journal_channels(joint);
         let places = names.each_ref().map(|name| log.channels.iter().position(|c| c.name == *name));
         let missing = |channel: &String| ConditioningError::MissingChannel {
@@ -37,6 +37,7 @@ pub(super) fn derive(
             [None, None] => {}
             [Some(x), Some(y)] => {
                 for place in [x, y] {
+                    check(&log.channels[place], contact.journal_radius)?;
                     let [rate, acceleration] = derivative_channels(&log.channels[place].name);
                     let [offset, first, second] =
                         derivatives(&log.channels[place].values, log.rate_hz, settings)
@@ -51,6 +52,19 @@ pub(super) fn derive(
         }
     }
     Ok(())
+}
+
+/// Refuses offsets that no journal has.
+fn check(offset: &Channel, radius: f64) -> Result<(), Error> {
+    let largest = offset.values.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    if largest <= radius {
+        return Ok(());
+    }
+    let expected = format!(
+        "offsets of the journal in m, below its radius of {radius} m: give the unit, `{} = {{ column = \"{}\", scale = 1e-6 }}` for µm",
+        offset.name, offset.name
+    );
+    Err(Error::setting(&format!("columns.channels.{}", offset.name), &expected, format!("{largest} m")))
 }
 
 /// A signal through its filter, with both derivatives.

@@ -65,6 +65,9 @@ pub(super) fn of(id: &Identification, check: CheckName) -> String {
         CheckName::Loads => "state coefficients near those of the joint (`mu_c = 0.1` beside `loads` of `reaction_friction`), bodies near those of the \
              robot, or friction that no load changes (`elements = [\"coulomb\", \"viscous\"]` of the joint)"
             .to_owned(),
+        CheckName::Clearance => "give probes their unit (`[columns.channels] journal_j1_x = { column = \"px\", scale = 1e-6 }` for µm), measure from the \
+             centre of the bearing, state the clearance that there is; or take joints as ideal: `clearance = \"ideal\"` under `[elements]`"
+            .to_owned(),
         CheckName::Ties => "leave out the tie that is contradicted, or tie less: single parameters (`equal = [\"j1.fc\", \"j2.fc\"]`) in place of \
              whole joints or links"
             .to_owned(),

@@ -58,6 +58,19 @@ pub struct JournalModel {
     reference: Vec<f64>,
 }
 
+/// What a journal does over a block of samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JournalLook {
+    /// Whether its offset comes from the motion; else it rests in its bearing.
+    pub probed: bool,
+    /// Length of its offset, m.
+    pub offset: Vec<f64>,
+    /// Force on it, N.
+    pub load: Vec<f64>,
+    /// What the offsets of all journals add to the effort of its joint, N m.
+    pub added: Vec<f64>,
+}
+
 /// How moments of friction go with inertial parameters ([`JournalModel::load_sums`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadSums {
@@ -185,13 +198,25 @@ impl JournalModel {
         self.journals(motion).forces
     }
 
-    /// What the offsets of the journals add to the efforts over a block at the reference, per output.
+    /// What journals do over a block at the reference, one by one.
     ///
     /// # Panics
     /// Panics as [`EffortModel::efforts`] does.
-    pub fn offset_efforts(&self, motion: &MotionBlock<'_>) -> Vec<Vec<f64>> {
-        let n = motion.samples.max(1);
-        self.journals(motion).added.chunks_exact(n).map(<[f64]>::to_vec).collect()
+    pub fn look(&self, motion: &MotionBlock<'_>) -> Vec<JournalLook> {
+        let n = motion.samples;
+        let all = self.journals(motion);
+        let lengths = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x.hypot(*y)).collect();
+        let each = self.journals.iter().zip(all.forces.chunks_exact(2)).zip(&all.probed);
+        each.map(|((journal, force), probed)| {
+            let [x, y] = journal.translations.map(|k| &all.motion.states[0][k * n..][..n]);
+            JournalLook {
+                probed: *probed,
+                offset: lengths(x, y),
+                load: lengths(&force[0], &force[1]),
+                added: all.added[journal.contact.rotation * n..][..n].to_vec(),
+            }
+        })
+        .collect()
     }
 
     /// How the moments of friction over a block go with the inertial parameters at other values, `reference` (all linear parameters):

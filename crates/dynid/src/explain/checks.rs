@@ -92,8 +92,17 @@ pub(super) fn text(name: Name) -> Text {
             "Mend what they name in the configuration, learn the recipe again, and reduce all logs by it.",
             "dynid reduce dynid.toml --out cell.factors",
         ),
+        Name::Clearance => Text(
+            "Journals that move in their bearings change the geometry, and their friction follows the load. Probes at the journals (columns \
+             `journal_j1_x`, `journal_j1_y`) say where they are; without them they count as resting where their load presses them. The check says \
+             how much that adds to the effort, and doubts probes that are far off the stated clearance and loads that may leave a journal free. Efforts \
+             see the product of friction and load: a coefficient is known no better than the masses.",
+            "Give the probes' unit and zero, state the clearance that there is, weigh the links; or take joints as ideal \
+             (`clearance = \"ideal\"` under `[elements]`).",
+            "dynid clearance ROBOT ESTIMATE --log LOG",
+        ),
         Name::Loads => Text(
-            "Friction that follows a reaction (`reaction_friction`) makes efforts depend on products of parameters. The fit takes the loads at the \
+            "Friction that follows a load (`reaction_friction`, bearings with `clearance`) makes efforts depend on products of parameters. The fit takes the loads at the \
              parameters that it finds, round by round, until both agree. Where they do not, friction may be so large that it locks the joint, or the logs \
              say too little about what presses on it.",
             "State coefficients and bodies near those of the machine, or friction that no load changes, and compare both on a log that neither has seen.",
