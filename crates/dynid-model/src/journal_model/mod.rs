@@ -220,7 +220,7 @@ impl JournalModel {
     }
 
     /// How the moments of friction over a block go with the inertial parameters at other values, `reference` (all linear parameters):
-    /// per journal sums over the samples, directions of friction held.
+    /// per journal sums over the samples, directions of friction and resting places held.
     ///
     /// # Panics
     /// If `reference` is too short; else as [`EffortModel::efforts`] does.

@@ -3,7 +3,9 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use dynid_model::contact::{HertzStiffness, LankaraniNikravesh, SlidingFriction};
-use dynid_model::element::{ClearanceContact, JointElement, JournalMotion, impact_speed_signal};
+use dynid_model::element::{
+    ClearanceContact, JointElement, JournalFriction, JournalMotion, impact_speed_signal,
+};
 use dynid_model::*;
 use dynid_testing::golden;
 use serde_json::Value;
@@ -335,4 +337,140 @@ fn the_speed_of_an_impact_is_remembered_until_contact_ends() {
     model.remember(&motion, 1e-3, &[], &mut History::default(), n, &mut out);
     // A slow one has the floor of the law.
     assert_eq!(out, [0.0, 0.05, 0.05, 0.05, 0.0, 0.01]);
+}
+
+/// The pointing mechanism with journals and a reference near its inertias.
+fn with_journals(mu: f64) -> JournalModel {
+    let description =
+        pointing(0.1, 9.81, inertias(&[4e-3, 1e-4, 2e-4, 5e-3, -1e-4, 2e-3, 0.9, 0.03, 0.02, 0.05, 2.0]));
+    let ideal = description.build().unwrap();
+    let reference = [ideal.inertia_vector(), vec![mu, 2.0 * mu]].concat();
+    let moving = description.with_clearance(&["a", "b"]).unwrap().build().unwrap();
+    let law = LankaraniNikravesh::new(HertzStiffness::given(1e9, CLEARANCE).unwrap(), 0.9).unwrap();
+    let contact = |rotation: usize| ClearanceContact {
+        rotation,
+        translations: [2 + 2 * rotation, 3 + 2 * rotation],
+        law: law.into(),
+        friction: SlidingFriction::new(mu, 1e-5, 1e-4).unwrap(),
+        journal_radius: 0.01,
+    };
+    let elements: Vec<Box<dyn JointElement>> =
+        (0..2).map(|rate| Box::new(JournalFriction { rate }) as Box<dyn JointElement>).collect();
+    let reference = LoadReference { linear: reference, shape: Vec::new(), linearised: false };
+    let ideal = TreeModel::new(ideal, elements);
+    JournalModel::new(ideal, moving, (0..2).map(contact).collect(), reference).unwrap()
+}
+
+/// Channels of offsets of some micrometres for a number of samples.
+fn offsets(model: &JournalModel, samples: usize) -> Vec<(String, Vec<f64>)> {
+    let sizes = [5e-5, 1e-2, 2.0];
+    let named = model.offset_channels().flat_map(|own| own.iter().zip(sizes));
+    let named = named.flat_map(|(pair, size)| pair.iter().map(move |name| (name.clone(), size)));
+    let values = |(k, (name, size)): (usize, (String, f64))| {
+        (name, (0..samples).map(|s| size * ((7 * k + 3 * s) as f64).sin()).collect())
+    };
+    named.enumerate().map(values).collect()
+}
+
+fn with_channels<T>(
+    motion: &MotionBlock<'_>,
+    channels: &[(String, Vec<f64>)],
+    work: impl FnOnce(&MotionBlock<'_>) -> T,
+) -> T {
+    let channels: Vec<(&str, &[f64])> = channels.iter().map(|(n, v)| (n.as_str(), v.as_slice())).collect();
+    work(&MotionBlock { channels: &channels, ..*motion })
+}
+
+#[test]
+fn adjoint_with_journals_is_the_derivative_but_for_the_friction_moment() {
+    // Without friction nothing is held.
+    let model = with_journals(0.0);
+    let samples = 5;
+    let channels = offsets(&model, samples);
+    let mut linear = model.ideal().mechanism().inertia_vector();
+    linear.iter_mut().enumerate().for_each(|(k, x)| *x += 0.01 * (k as f64).cos());
+    linear.extend([0.0; 2]);
+    let weights: Vec<f64> = (0..2 * samples).map(|k| (k as f64 + 0.5).sin()).collect();
+    model.random_motion(samples, 3).with_block(|block| {
+        let value = |states: &[Vec<f64>; 3]| {
+            let [q, dq, ddq] = states;
+            let motion = MotionBlock { q, dq, ddq, ..*block };
+            let mut effort = vec![0.0; 2 * samples];
+            with_channels(&motion, &channels, |m| model.efforts(m, &[], &linear, samples, &mut effort));
+            effort.iter().zip(&weights).map(|(e, w)| e * w).sum::<f64>()
+        };
+        let mut out = MotionAdjoint::new(2, 2, samples);
+        with_channels(block, &channels, |m| {
+            model.effort_adjoint(m, &[], &linear, samples, &weights, &mut out);
+        });
+        let at = [block.q.to_vec(), block.dq.to_vec(), block.ddq.to_vec()];
+        for (k, found) in [&out.q, &out.dq, &out.ddq].into_iter().enumerate() {
+            for (place, found) in found.iter().enumerate() {
+                let moved = |by: f64| {
+                    let mut states = at.clone();
+                    states[k][place] += by;
+                    value(&states)
+                };
+                let h = 1e-5;
+                let expected = (moved(h) - moved(-h)) / (2.0 * h);
+                assert!((found - expected).abs() < 1e-7, "{k} {place}: {found} {expected}");
+            }
+        }
+    });
+}
+
+#[test]
+fn journals_rest_where_contact_and_friction_balance_their_load() {
+    let model = with_journals(0.1);
+    let samples = 40;
+    model.random_motion(samples, 5).with_block(|block| {
+        let (forces, looks) = (model.forces(block), model.look(block));
+        for (joint, look) in looks.iter().enumerate() {
+            assert!(!look.probed && look.offset.iter().all(|e| (e - CLEARANCE).abs() < 1e-18));
+            for s in 0..samples {
+                let force = forces[2 * joint][s].hypot(forces[2 * joint + 1][s]);
+                assert!((look.load[s] - force).abs() < 1e-12 * force);
+            }
+        }
+        // M mu = F_t R2 with F_t = mu c_d F_n and F = F_n √(1 + (mu c_d)²).
+        let mut rows = RegressorBlock::new(model.layout().clone(), samples);
+        model.regressor(block, &[], &mut rows);
+        for (joint, (mu, column)) in [(0.1_f64, 20), (0.2, 21)].into_iter().enumerate() {
+            let place = model.layout().columns(joint).iter().position(|c| *c == column).unwrap();
+            for s in 0..samples {
+                let moment = mu * rows.column(joint, place)[s];
+                let normal = looks[joint].load[s] / mu.hypot(1.0);
+                let expected = mu * normal * 0.01 * block.rate(joint)[s].signum();
+                assert!((moment - expected).abs() < 1e-12 * expected.abs(), "{moment} {expected}");
+            }
+        }
+    });
+}
+
+#[test]
+fn sums_of_loads_are_derivatives_of_the_moments() {
+    let model = with_journals(0.1);
+    let samples = 30;
+    let reference = [model.ideal().mechanism().inertia_vector(), vec![0.1, 0.2]].concat();
+    // Probes hold the journals where they are.
+    let channels = offsets(&model, samples);
+    model.random_motion(samples, 6).with_block(|block| {
+        let sums_at = |at: &[f64]| with_channels(block, &channels, |motion| model.load_sums(motion, at));
+        let sums = sums_at(&reference);
+        for (joint, sum) in sums.iter().enumerate() {
+            assert_eq!(sum.mu, 20 + joint);
+            assert!((sum.product - sum.square).abs() < 1e-12 * sum.square);
+            for (k, found) in sum.change.iter().enumerate() {
+                // The sum of squares changes by twice that of the products.
+                let moved = |by: f64| {
+                    let mut other = reference.clone();
+                    other[k] += by;
+                    sums_at(&other)[joint].square
+                };
+                let h = 1e-6;
+                let expected = (moved(h) - moved(-h)) / (4.0 * h);
+                assert!((found - expected).abs() < 1e-6 * sum.square.max(1e-3), "{k}: {found} {expected}");
+            }
+        }
+    });
 }

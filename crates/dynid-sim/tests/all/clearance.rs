@@ -5,10 +5,11 @@
 use dynid_model::contact::{
     ContactLaw, Hertz, HertzStiffness, KelvinVoigt, LankaraniNikravesh, SlidingFriction,
 };
-use dynid_model::element::{ClearanceContact, JointElement};
+use dynid_model::element::{ClearanceContact, JointElement, JournalFriction};
 use dynid_model::{
-    Description, EffortModel, Inertia, JointDescription, JointKind, Limits, LinkDescription, Mat3, Placement,
-    RobotModel, Vec3,
+    Description, EffortModel, Inertia, JointDescription, JointKind, JournalModel, Limits, LinkDescription,
+    LoadReference, Mat3, MotionBlock, Placement, RegressorBlock, RobotModel, TreeModel, Vec3,
+    derivative_channels, journal_channels,
 };
 use dynid_sim::clearance::{
     ClearanceRecord, ClearanceSettings, ClearanceStart, ContactEventKind, Driving, Method, simulate,
@@ -91,6 +92,57 @@ fn the_classical_method_tells_the_same_through_both_impacts() {
         let gap = rms((0..times.len()).filter(late).map(|k| ours.effort[k][joint] - other.effort[k][joint]));
         // It sees an onset up to a step late.
         assert!(gap < 1e-6, "{gap}");
+    }
+}
+
+#[test]
+fn a_model_with_journals_needs_the_efforts_of_the_simulation() {
+    let times: Vec<f64> = (0..=400).map(|k| 0.5 + 2.5e-3 * f64::from(k)).collect();
+    let record = prescribed(&[&[0.0], &times[..]].concat(), Method::default());
+    let n = times.len();
+    let plant = pointing::plant();
+    let ideal = pointing::description().build().unwrap();
+    let frictions: Vec<Box<dyn JointElement>> =
+        (0..2).map(|rate| Box::new(JournalFriction { rate }) as Box<dyn JointElement>).collect();
+    let ideal = TreeModel::new(ideal, frictions);
+    let truth = [&plant.linear()[..20], &[0.1, 0.1]].concat();
+    let reference = LoadReference { linear: truth.clone(), shape: Vec::new(), linearised: false };
+    let contacts = plant.model().clearances().cloned().collect();
+    let model = JournalModel::new(ideal, plant.model().mechanism().clone(), contacts, reference).unwrap();
+    let column = |of: &[Vec<f64>], rate: usize| (1..=n).map(move |k| of[k][rate]).collect::<Vec<f64>>();
+    let flat = |of: &[Vec<f64>]| [column(of, 0), column(of, 1)].concat();
+    let (q, dq, ddq) = (flat(&record.q), flat(&record.dq), flat(&record.ddq));
+    let mut channels: Vec<(String, Vec<f64>)> = Vec::new();
+    for journal in &record.journals {
+        for (axis, name) in journal_channels(&journal.joint).into_iter().enumerate() {
+            let [rate, acceleration] = derivative_channels(&name);
+            let of = |of: &[[f64; 2]]| of[1..].iter().map(|pair| pair[axis]).collect::<Vec<f64>>();
+            channels.push((name, of(&journal.offset)));
+            channels.push((rate, of(&journal.offset_rate)));
+            channels.push((acceleration, of(&journal.offset_acceleration)));
+        }
+    }
+    let error = |channels: &[(&str, &[f64])]| {
+        let motion = MotionBlock { channels, ..MotionBlock::plain(n, &q, &dq, &ddq) };
+        let mut effort = vec![0.0; 2 * n];
+        model.efforts(&motion, &[], &truth, n, &mut effort);
+        // The regressor says the same.
+        let mut rows = RegressorBlock::new(model.layout().clone(), n);
+        model.regressor(&motion, &[], &mut rows);
+        [0, 1].map(|joint| {
+            let (own, again) = (&effort[joint * n..][..n], rows.effort(joint, &truth));
+            assert!(own.iter().zip(&again).all(|(a, b)| (a - b).abs() < 1e-12));
+            own.iter().zip(column(&record.effort, joint)).map(|(a, b)| a - b).collect::<Vec<f64>>()
+        })
+    };
+    let told: Vec<(&str, &[f64])> = channels.iter().map(|(n, v)| (n.as_str(), v.as_slice())).collect();
+    for error in error(&told) {
+        assert!(error.iter().all(|e| e.abs() < 1e-9), "{:?}", error.iter().copied().fold(0.0, f64::max));
+    }
+    // Without probes the swing is missing, and nothing else.
+    for (error, swing) in error(&[]).iter().zip([0.02, 0.002]) {
+        let mean = error.iter().sum::<f64>() / n as f64;
+        assert!(rms(error.iter().copied()) < swing && mean.abs() < 0.02 * swing, "{mean}");
     }
 }
 

@@ -5,8 +5,16 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use dynid::agreement::{Agreement, Alignment, compare};
+use dynid::estimate::{Estimate, Split};
+use dynid::estimators::conditioning::ConditioningSettings;
 use dynid::inspect::inspect;
+use dynid::io::TieSpec;
+use dynid::log::Log;
+use dynid::motion::{Channel, JointSignals};
+use dynid::pipeline::identify;
 use dynid::robot::{Robot, RobotOptions};
+use dynid::settings::Settings;
 use dynid::simulate::{SeriesSettings, SimulateMode, SimulateSettings, SimulatedLog, simulate};
 
 /// The two-axis mechanism of `robots/xy-pointing.toml`.
@@ -19,11 +27,11 @@ fn robot(text: &str) -> Robot {
     Robot::parse(text, Path::new("xy.toml"), &RobotOptions::default()).unwrap()
 }
 
-/// The robot without clearance.
+/// The robot without clearance, its other elements the same: bearings with clearance have a friction of their own in place of `coulomb`.
 fn ideal() -> Robot {
     let text: Vec<String> =
         pointing().lines().filter(|line| !line.starts_with("clearance")).map(str::to_owned).collect();
-    robot(&text.join("\n"))
+    robot(&(text.join("\n") + "\n[defaults]\nelements = [\"viscous\", \"offset\", \"rotor\"]\n"))
 }
 
 /// The published motion, a period of it, exact sensors.
@@ -193,6 +201,120 @@ fn inspection_shows_journals_at_rest() {
     assert!(remarks.iter().any(|r| r.contains("of the clearance")), "{remarks:?}");
 }
 
+/// The mechanism without other friction than that of its bearings.
+fn bearings_alone() -> Robot {
+    robot(&pointing().replace("\nclearance", "\nelements = []\nclearance"))
+}
+
+/// A log with probes, as arrays.
+fn probed(log: &SimulatedLog, probes: &[&str]) -> Log {
+    let joints = log.joints.iter().zip(&log.position).zip(&log.effort);
+    let joints = joints.map(|((name, position), effort)| JointSignals {
+        name: name.clone(),
+        position: position.clone(),
+        velocity: None,
+        effort: effort.clone(),
+    });
+    let channels = log.channels.iter().filter(|(name, _)| probes.contains(&name.as_str()));
+    let channels = channels.map(|(name, values)| Channel { name: name.clone(), values: values.clone() });
+    let signals =
+        dynid::motion::Log::new("probes", log.time.clone(), joints.collect(), channels.collect()).unwrap();
+    Log::new(&bearings_alone(), signals).unwrap()
+}
+
+const PROBES: [&str; 4] = ["journal_j1_x", "journal_j1_y", "journal_j2_x", "journal_j2_y"];
+
+#[test]
+fn closed_loops_start_with_journals_at_rest_and_balance_their_energy() {
+    let settings = SimulateSettings {
+        mode: SimulateMode::ClosedLoop,
+        duration_s: 3.0,
+        rate_hz: 1000.0,
+        journal_noise: 1e-8,
+        perfect: true,
+        ..SimulateSettings::default()
+    };
+    let log = simulate(&bearings_alone(), &settings).unwrap();
+    let (summary, experiment) = (log.clearance.as_ref().unwrap(), log.experiment.as_ref().unwrap());
+    assert!(summary.events.is_empty() && summary.journals.iter().all(|j| j.contact_share > 0.999_999));
+    let exchanged = experiment.energy.drive_work.abs();
+    assert!(experiment.energy.residual().abs() < 1e-7 * exchanged, "{:?}", experiment.energy);
+    // The controller makes up for bearings that it does not know.
+    for joint in 0..2 {
+        let wanted = &log.clean[0][joint];
+        assert!(rms(wanted.windows(2).map(|w| w[1] - w[0])) > 0.0);
+        let friction = summary.journals[joint].friction_moment_rms;
+        assert!(friction > 1e-3 && rms(log.effort[joint].iter().copied()) > friction);
+    }
+    let noise = channel(&log, PROBES[0]).iter().zip(&log.clean_channels[0].1).map(|(a, b)| a - b);
+    assert!((rms(noise) / 1e-8 - 1.0).abs() < 0.1);
+    let again = simulate(&bearings_alone(), &settings).unwrap();
+    assert!(log.effort == again.effort && log.channels == again.channels);
+}
+
+#[test]
+fn probes_tell_parameters_and_friction_of_the_bearings() {
+    let simulated = |seed| {
+        let settings = SimulateSettings {
+            duration_s: 20.0,
+            rate_hz: 1000.0,
+            effort_noise: 0.002,
+            journal_noise: 1e-8,
+            seed,
+            ..SimulateSettings::default()
+        };
+        simulate(&bearings_alone(), &settings).unwrap()
+    };
+    let (log, other) = (simulated(1), simulated(2));
+    let weighed = TieSpec {
+        known: BTreeMap::from([("link1.m".to_owned(), 2.1391), ("link2.m".to_owned(), 0.8596)]),
+        ..TieSpec::default()
+    };
+    let identified = |probes: &[&str]| {
+        let settings = Settings::default().with(|s| s.tie = vec![weighed.clone()]);
+        identify(&bearings_alone(), [probed(&log, probes)], &settings, &mut |_| {}).unwrap()
+    };
+    let (with, without) = (identified(&PROBES), identified(&[]));
+    let estimate = with.estimate();
+    let parameter = |name: &str| estimate.parameters.iter().find(|p| p.name == name).unwrap();
+    for name in ["j1.mu", "j2.mu"] {
+        let (value, std) = (parameter(name).value, parameter(name).std.unwrap());
+        assert!((value - 0.1).abs() < 4.0 * std && std < 3e-4, "{name}: {value} ± {std}");
+    }
+    for (name, truth) in
+        [("link1.mx", 0.103_126_011), ("link2.mx", 0.029_389_724), ("link2.Izz", 0.002_814_835)]
+    {
+        let (value, std) = (parameter(name).value, parameter(name).std.unwrap());
+        assert!((value - truth).abs() < 4.0 * std, "{name}: {value} ± {std}, truth {truth}");
+    }
+    // The swing is in the raw effort, and probes explain it.
+    let error = |of: &Agreement| {
+        let counted = (0..of.measured[0].len()).filter(|k| of.counted[*k]);
+        rms(counted.map(|k| of.measured[0][k] - of.predicted[0][k]))
+    };
+    let [told, untold] = [&with, &without].map(|of| error(&of.training[0]));
+    assert!(told < 0.2 * untold, "{told} {untold}");
+
+    // An estimate that was read again predicts what the one in memory does, with probes among the states.
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("estimate.json");
+    std::fs::write(&file, estimate.to_json()).unwrap();
+    let read = Estimate::read(&file).unwrap();
+    assert_eq!(read.model.clearance.len(), 2);
+    let model = read.effort_model(&file, Split::Consistent).unwrap();
+    let settings = ConditioningSettings::default();
+    let prepared = probed(&other, &PROBES).prepare(&model, &settings).unwrap();
+    let alignment = Alignment {
+        state_hz: read.model.state_hz,
+        delay_samples: read.conditioning.delay_samples,
+        delay_rate_hz: read.conditioning.delay_rate_hz,
+        filter_hz: read.model.kernel_hz,
+    };
+    let values = read.values(Split::Consistent);
+    let found = compare(&model, &values, &prepared, &alignment, &settings).unwrap();
+    assert!(error(&found) < 1.5 * told, "{} {told}", error(&found));
+}
+
 #[test]
 fn locked_joints_have_no_clearance() {
     let xy = robot(&pointing()).locked(&[("j2".to_owned(), 0.3)]).unwrap();
@@ -202,14 +324,40 @@ fn locked_joints_have_no_clearance() {
 }
 
 #[test]
+fn what_an_identification_has_no_form_for_says_so() {
+    let log = simulate(&bearings_alone(), &SimulateSettings { duration_s: 6.0, ..published(500.0) }).unwrap();
+    let told = |text: &str, log: Log, settings: &Settings| {
+        identify(&robot(text), [log], settings, &mut |_| {}).unwrap_err().to_string()
+    };
+    let default = Settings::default();
+    let text = pointing().replace("\nclearance", "\nelements = []\nclearance");
+    let half = told(&text, probed(&log, &PROBES[..3]), &default);
+    assert!(half.contains("journal_j2_y"), "{half}");
+    let mut micro = log.clone();
+    micro.channels.iter_mut().for_each(|(_, values)| values.iter_mut().for_each(|x| *x *= 1e6));
+    let micro = told(&text, probed(&micro, &PROBES), &default);
+    assert!(micro.contains("below its radius of 0.01 m") && micro.contains("scale = 1e-6"), "{micro}");
+    let pressed = text.replacen(
+        "elements = []",
+        "elements = [\"reaction_friction\"]\nreaction_friction = { preload = 3 }",
+        1,
+    );
+    let pressed = told(&pressed, probed(&log, &PROBES), &default);
+    assert!(
+        pressed.contains("`reaction_friction`") && pressed.contains("clearance = \"ideal\""),
+        "{pressed}"
+    );
+}
+
+#[test]
 fn what_has_no_form_with_clearance_says_so() {
     let told =
         |robot: &Robot, settings: SimulateSettings| simulate(robot, &settings).unwrap_err().to_string();
     let default = SimulateSettings::default;
     let xy = robot(&pointing());
-    let closed = SimulateSettings { mode: SimulateMode::ClosedLoop, ..default() };
+    let closed = SimulateSettings { mode: SimulateMode::ClosedLoop, settle_s: Some(0.5), ..default() };
     let message = told(&xy, closed);
-    assert!(message.contains("`j1` has clearance") && message.contains("closed loop"), "{message}");
+    assert!(message.contains("`settle_s`") && message.contains("closed loop"), "{message}");
     let message = told(&ideal(), SimulateSettings { journal_noise: 1e-6, ..default() });
     assert!(message.contains("`journal_noise`") && message.contains("clearance"), "{message}");
     let message = told(&ideal(), SimulateSettings { settle_s: Some(1.0), ..default() });

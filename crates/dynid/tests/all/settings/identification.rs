@@ -89,6 +89,8 @@ pub(super) fn folder() -> &'static TempDir {
         let stribeck = Robot::parse(&stribeck, Path::new("arm.toml"), &RobotOptions::default()).unwrap();
         write("stribeck.csv", &csv(&simulate(&stribeck, &settings).unwrap()));
         write("arm.toml", ARM);
+        let bearing = "clearance = { journal_radius = 0.02, gap = 1e-4, width = 0.03 }";
+        write("loose.toml", &format!("{ARM}\n[element.j1]\n{bearing}\n"));
         write("longer.toml", &ARM.replace("a = 0.4", "a = 0.5"));
         let heavy =
             ARM.replace("phi = [3, 0.6, ", "phi = [60, 12, ").replace("phi = [1.5, 0.25, ", "phi = [30, 5, ");
@@ -212,6 +214,13 @@ fn cases() -> Vec<Case> {
             Refused("known_friction"),
         ),
         table("elements.temperature", "[elements]\ntemperature = 30.0", Refused("known_friction")),
+        table("elements.clearance", "[elements]\nclearance = \"ideal\"", Refused("`clearance` at a joint")),
+        with(
+            "elements.clearance",
+            text("robot = \"loose.toml\"", "", "", ""),
+            text("robot = \"loose.toml\"", "", "", "[elements]\nclearance = \"ideal\""),
+            Changes,
+        ),
         table("coupling.motors", COUPLING, Changes),
         table(
             "coupling.joints",

@@ -257,6 +257,7 @@ fn every_key_of_a_design_takes_effect_or_is_refused() {
             Refused("a design has no logs"),
         ),
         table("elements.temperature", "[elements]\ntemperature = 30.0", Refused("a design has no logs")),
+        table("elements.clearance", "[elements]\nclearance = \"ideal\"", Refused("joints as ideal")),
         top("values", "values = { \"j1.fc\" = 30.0 }", Changes),
         table("trajectory.period_s", "[trajectory]\nperiod_s = 5", Changes),
         table("trajectory.harmonics", "[trajectory]\nharmonics = 2", Changes),
