@@ -27,11 +27,11 @@ fn robot(text: &str) -> Robot {
     Robot::parse(text, Path::new("xy.toml"), &RobotOptions::default()).unwrap()
 }
 
-/// The robot without clearance, its other elements the same: bearings with clearance have a friction of their own in place of `coulomb`.
+/// The robot without clearance.
 fn ideal() -> Robot {
     let text: Vec<String> =
         pointing().lines().filter(|line| !line.starts_with("clearance")).map(str::to_owned).collect();
-    robot(&(text.join("\n") + "\n[defaults]\nelements = [\"viscous\", \"offset\", \"rotor\"]\n"))
+    robot(&text.join("\n"))
 }
 
 /// The published motion, a period of it, exact sensors.
@@ -76,7 +76,10 @@ fn rms(x: impl Iterator<Item = f64>) -> f64 {
 fn the_log_shows_the_friction_of_the_bearings() {
     let settings = SimulateSettings { delay_samples: Some(0.0), ..published(500.0) };
     let log = simulate(&robot(&pointing()), &settings).unwrap();
-    let without = simulate(&ideal(), &settings).unwrap();
+    // The bearings have a friction of their own in place of `coulomb`.
+    let without =
+        pointing().replace("\nclearance", "\nelements = [\"viscous\", \"offset\", \"rotor\"]\n# clearance");
+    let without = simulate(&robot(&without), &settings).unwrap();
     assert_eq!(log.joints, ["j1", "j2"]);
     let names: Vec<&str> = log.channels.iter().map(|(n, _)| n.as_str()).collect();
     let expected = ["journal_j1_x", "journal_j1_y", "journal_j2_x", "journal_j2_y"];
