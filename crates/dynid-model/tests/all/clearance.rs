@@ -427,10 +427,8 @@ fn journals_rest_where_contact_and_friction_balance_their_load() {
         let (forces, looks) = (model.forces(block), model.look(block));
         for (joint, look) in looks.iter().enumerate() {
             assert!(!look.probed && look.offset.iter().all(|e| (e - CLEARANCE).abs() < 1e-18));
-            for s in 0..samples {
-                let force = forces[2 * joint][s].hypot(forces[2 * joint + 1][s]);
-                assert!((look.load[s] - force).abs() < 1e-12 * force);
-            }
+            let force = forces[2 * joint].iter().zip(&forces[2 * joint + 1]).map(|(x, y)| x.hypot(*y));
+            assert!(look.load.iter().zip(force).all(|(load, force)| (load - force).abs() < 1e-12 * force));
         }
         // M mu = F_t R2 with F_t = mu c_d F_n and F = F_n √(1 + (mu c_d)²).
         let mut rows = RegressorBlock::new(model.layout().clone(), samples);

@@ -22,4 +22,6 @@ pub(crate) use motion::ClearanceMotion;
 pub use motion::sensors;
 pub use record::{ClearanceRecord, ContactEvent, ContactEventKind, JournalRecord, RunCount};
 pub use run::simulate;
-pub use settings::{ClearanceSettings, ClearanceStart, Controller, Driving, Method, PrescribedMotion};
+pub use settings::{
+    ClearanceSettings, ClearanceStart, Controller, Driving, Method, Offset, PrescribedMotion,
+};

@@ -4,7 +4,7 @@ use dynid_model::{EffortModel, JournalPath, journal_channels};
 
 use super::record::ClearanceRecord;
 use super::run::Run;
-use super::settings::{ClearanceSettings, ClearanceStart};
+use super::settings::{ClearanceSettings, ClearanceStart, Offset};
 use crate::controller::Wanted;
 use crate::error::{SimError, demand_length};
 use crate::machine::{Instant, Motion};
@@ -44,7 +44,7 @@ impl<'a> ClearanceMotion<'a> {
 }
 
 /// Offsets of the journals in axes that turn with their links, and their rates.
-fn at_rest(plant: &Plant, start: &[Wanted], channels: &[f64]) -> Result<Vec<([f64; 2], [f64; 2])>, SimError> {
+fn at_rest(plant: &Plant, start: &[Wanted], channels: &[f64]) -> Result<Vec<Offset>, SimError> {
     let (model, n) = (plant.model(), plant.joints());
     let driven: Vec<usize> = (0..n).filter(|rate| !model.is_undriven(*rate)).collect();
     demand_length("joints of the reference", driven.len(), start.len())?;

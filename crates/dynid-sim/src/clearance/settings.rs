@@ -42,12 +42,15 @@ pub struct ClearanceSettings {
     pub channels: Vec<f64>,
 }
 
+/// Offset of a journal's centre, m, and its rate, m/s, in axes that turn with its link.
+pub type Offset = ([f64; 2], [f64; 2]);
+
 /// A state to start from.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ClearanceStart {
     /// Per joint with clearance, in the order of the model's contacts: offset of the journal's centre (m) and its rate (m/s)
     /// in axes that turn with its link. Default: all centred and at rest there.
-    pub journals: Vec<([f64; 2], [f64; 2])>,
+    pub journals: Vec<Offset>,
     /// Positions and rates of the driven joints, unless they are prescribed.
     pub driven: Option<(Vec<f64>, Vec<f64>)>,
 }
