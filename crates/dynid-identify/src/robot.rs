@@ -13,7 +13,7 @@ use dynid_model::{Description, EffortModel, JointKind, Mechanism, MechanismWarni
 
 use crate::Error;
 use crate::caution::{self, Caution};
-use crate::elements::ElementPlan;
+use crate::elements::{ElementPlan, REACTION_FRICTION};
 use crate::error::ElasticFault;
 use crate::log_axis::{self, LogAxis};
 use crate::prior::Prior;
@@ -111,6 +111,7 @@ impl Robot {
         let inside = mechanism.rate_names();
         let is_joint = |joint: &String| axes.iter().any(|a| a.name == *joint) || inside.contains(joint);
         elements.per_joint.retain(|(joint, _)| is_joint(joint));
+        warnings.extend(unlisted(&elements));
         Ok(Robot { path: path.to_owned(), mechanism, closed, axes, elements, file, warnings })
     }
 
@@ -320,6 +321,23 @@ fn state_joints(
         })
         .chain(others)
         .collect()
+}
+
+/// Friction that follows loads where the file states it, but not among the elements of its joint.
+fn unlisted(elements: &ElementSpec) -> Vec<String> {
+    let lists = |joint: &str| {
+        let own = elements.per_joint.iter().find(|(j, _)| j == joint).map(|(_, list)| list);
+        own.unwrap_or(&elements.defaults).iter().any(|name| name == REACTION_FRICTION)
+    };
+    let idle = elements.reactions.iter().filter(|r| !lists(&r.joint));
+    idle.map(|r| {
+        format!(
+            "joint `{0}`: `{REACTION_FRICTION}` is stated and does nothing, since it is not among the joint's elements: \
+             `elements = [\"{REACTION_FRICTION}\"]` under `[element.{0}]`",
+            r.joint
+        )
+    })
+    .collect()
 }
 
 /// Refuses mechanisms with loops, for work that knows trees alone. `what`: what they are not.

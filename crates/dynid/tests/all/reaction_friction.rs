@@ -271,3 +271,17 @@ fn work_that_knows_no_loads_is_refused() {
     let refused = Session::new(&bench.config("", ""), "log", &columns[..], None).unwrap_err().to_string();
     assert!(refused.contains("not followed on line"), "{refused}");
 }
+
+#[test]
+fn friction_that_is_stated_and_not_listed_is_told() {
+    let text = "schema = 1\nname = \"axis\"\n[[body]]\nname = \"table\"\nparent = \"ground\"\n\
+        joint = { kind = \"prismatic\", name = \"slide\", axis = [1, 0, 0] }\nphi = [3, 0, 0, 0, 0.1, 0, 0, 0.1, 0, 0.1]\n";
+    let friction = "[element.slide]\nreaction_friction = { loads = [{ force = [\"z\"] }] }\n";
+    let warnings = |text: &str| {
+        Robot::parse(text, std::path::Path::new("axis.toml"), &RobotOptions::default()).unwrap().warnings
+    };
+    let told = warnings(&format!("{text}{friction}"));
+    assert!(told.iter().any(|w| w.contains("does nothing") && w.contains("[element.slide]")), "{told:?}");
+    let listed = friction.replace("reaction", "elements = [\"reaction_friction\"]\nreaction");
+    assert!(warnings(&format!("{text}{listed}")).iter().all(|w| !w.contains("does nothing")));
+}
