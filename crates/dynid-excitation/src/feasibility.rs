@@ -41,6 +41,7 @@ impl std::fmt::Display for LimitKind {
             LimitKind::Path(ConstraintKind::JointPosition) => f.write_str("position"),
             LimitKind::Path(ConstraintKind::JointRate) => f.write_str("velocity"),
             LimitKind::Path(ConstraintKind::JointAcceleration) => f.write_str("acceleration"),
+            LimitKind::Path(ConstraintKind::Singularity) => f.write_str("distance from singular poses"),
         }
     }
 }
@@ -56,6 +57,8 @@ pub struct LimitPoint {
     pub time: f64,
     /// Value over the limit: excess in units of the limit; at most 0 if it holds.
     pub excess: f64,
+    /// What one such unit is: size and unit; of coordinates their limit itself.
+    pub scale: Option<(f64, &'static str)>,
 }
 
 /// A limit without which all others can be met.
@@ -119,7 +122,14 @@ pub(crate) fn worst_points(
             continue;
         }
         let (kind, subject) = describe(problem, limit.id);
-        let point = LimitPoint { kind, subject, time: grid.basis.times()[sample], excess };
+        let scale = match limit.id {
+            LimitId::Coordinate { .. } => None,
+            LimitId::Path { constraint, row } => {
+                let row = &problem.constraints[constraint].rows()[row];
+                Some((row.scale, row.unit))
+            }
+        };
+        let point = LimitPoint { kind, subject, time: grid.basis.times()[sample], excess, scale };
         // Several rows may be of one limit: parts of the same two links.
         match points.iter_mut().find(|p| p.kind == point.kind && p.subject == point.subject) {
             Some(known) if known.excess < excess => *known = point,

@@ -3,6 +3,7 @@
 mod checkpoint;
 mod config;
 mod limits;
+mod loops;
 mod motion;
 mod problem;
 mod record;

@@ -2,13 +2,10 @@
 
 use std::sync::Arc;
 
-use dynid_model::{ClosedModel, MotionAdjoint, MotionBlock};
+use dynid_model::{ClosedModel, JointMotion, MotionAdjoint, MotionBlock};
 
-use super::gathered::Gathered;
-use super::{ConstraintError, ConstraintKind, ConstraintRow, PathConstraint, by_sample, finite, positive};
-
-/// Rows whose gradients run side by side.
-const BATCH: usize = 256;
+use super::closed::carried;
+use super::{ConstraintError, ConstraintKind, ConstraintRow, PathConstraint, finite, positive};
 
 /// What of joints is limited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,13 +110,7 @@ impl PathConstraint for JointLimits {
     }
 
     fn gradients(&self, motion: &MotionBlock<'_>, wanted: &[(usize, usize)], out: &mut [f64]) {
-        let d = self.model.machine().mobility();
-        let rates = self.model.machine().mechanism().rates();
-        assert_eq!(out.len(), 3 * d * wanted.len(), "length of the gradients");
-        // Poses are followed from one to the next: those of one sample side by side.
-        for places in by_sample(wanted).chunks(BATCH) {
-            let n = places.len();
-            let mut weights = MotionAdjoint::new(rates, rates, n);
+        let fill = |places: &[usize], joints: &JointMotion, weights: &mut MotionAdjoint| {
             for (k, place) in places.iter().enumerate() {
                 let range = &self.ranges[wanted[*place].0];
                 let to = match range.quantity {
@@ -128,20 +119,10 @@ impl PathConstraint for JointLimits {
                     JointQuantity::Acceleration => &mut weights.ddq,
                 };
                 for (rate, factor) in &range.terms {
-                    to[rate * n + k] += factor / range.scale;
+                    to[rate * joints.samples + k] += factor / range.scale;
                 }
             }
-            let mut adjoint = MotionAdjoint::new(d, d, n);
-            Gathered::new(motion, places.iter().map(|p| wanted[*p].1)).with_block(motion, |block| {
-                self.model.joint_motion_adjoint(block, &weights, &mut adjoint);
-            });
-            for (kind, from) in [&adjoint.q, &adjoint.dq, &adjoint.ddq].into_iter().enumerate() {
-                for (c, from) in from.chunks_exact(n).enumerate() {
-                    for (place, value) in places.iter().zip(from) {
-                        out[3 * d * place + d * kind + c] = *value;
-                    }
-                }
-            }
-        }
+        };
+        carried(&self.model, motion, wanted, fill, out);
     }
 }

@@ -7,6 +7,7 @@
 mod capsule;
 mod cartesian;
 mod clearance;
+mod closed;
 mod effort;
 mod gathered;
 mod joints;
@@ -16,6 +17,7 @@ mod segment;
 pub use capsule::{Capsule, CapsulePairs, Capsules};
 pub use cartesian::Plane;
 pub use cartesian::{CartesianLimits, FramePoint, Region};
+pub use closed::{OfAllJoints, SingularityLimit};
 pub use effort::EffortLimits;
 pub use joints::{JointLimits, JointQuantity, JointRange};
 pub use screening::{PlaneScreening, Screening, mean_place, screen};
@@ -161,6 +163,8 @@ pub enum ConstraintKind {
     JointRate,
     /// Acceleration of such joints.
     JointAcceleration,
+    /// Distance of a mechanism with loops from singular poses.
+    Singularity,
 }
 
 /// One row of a path constraint.
@@ -176,7 +180,7 @@ pub struct ConstraintRow {
     pub upper: f64,
     /// Factor from the normalised value to [`ConstraintRow::unit`].
     pub scale: f64,
-    /// Unit of the value times `scale`: `N m`, `N`, `m`, of joints also `rad` and their derivatives.
+    /// Unit of the value times `scale`: `N m`, `N`, `m`, of joints also `rad` and their derivatives; empty for a ratio.
     pub unit: &'static str,
 }
 

@@ -3,7 +3,7 @@
 //! A limit that (nearly) every pose breaks can be kept by no motion; one that no pose comes near costs time for nothing.
 //! Poses drawn from the joint ranges tell the first; that a limit cannot be broken is proven (see `clearance`).
 
-use dynid_model::{BodyPoint, Dynamics, Mechanism, MotionBlock, Vec3};
+use dynid_model::{BodyPoint, ClosedModel, Dynamics, EffortModel, Mechanism, MotionBlock, Vec3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -15,6 +15,7 @@ use super::{Capsule, ConstraintError, finite};
 
 /// Poses that are drawn.
 const POSES: usize = 2000;
+const SEED: u64 = 2;
 /// Distance below which no proof is tried that capsules stay apart: it would hardly succeed, m.
 const WORTH_A_PROOF: f64 = 0.02;
 /// Share of poses that must have two links apart for a motion to be able to keep them so.
@@ -48,7 +49,8 @@ pub struct PlaneScreening {
 }
 
 /// Screens all pairs of capsules on bodies that are neither one nor joined by one joint, and the ends of capsules on moving
-/// bodies against planes. `ranges`: as for [`Capsules::new`](super::Capsules::new).
+/// bodies against planes. `ranges`: as for [`Capsules::new`](super::Capsules::new); `closed`: the mechanism with its loops, whose poses
+/// are drawn instead of any within the ranges.
 ///
 /// Fails as [`Capsules::new`](super::Capsules::new).
 pub fn screen(
@@ -57,13 +59,14 @@ pub fn screen(
     planes: &[Plane],
     margin: f64,
     ranges: &[(f64, f64)],
+    closed: Option<&ClosedModel>,
 ) -> Result<Screening, ConstraintError> {
     check_ranges(mechanism, ranges)?;
     finite("margin", "own links", &[margin])?;
     let points = ends(mechanism, capsules)?;
     let dynamics = Dynamics::new(mechanism);
     let clearance = Clearance::new(mechanism, &dynamics, ranges);
-    let poses = Poses::new(&dynamics, &clearance, &points);
+    let poses = Poses::new(&dynamics, &clearance, &points, closed);
     let mut out = Screening::default();
     for pairs in by_links(not_neighbours(mechanism, &points), capsules) {
         let radii = |(a, b): (usize, usize)| capsules[a].radius + capsules[b].radius + margin;
@@ -150,18 +153,19 @@ fn outermost(poses: &Poses, points: &[BodyPoint], capsules: &[Capsule]) -> Vec<u
     out
 }
 
-/// Mean place of points over poses drawn from the ranges, and the farthest that one of them gets from the base, m.
+/// Mean place of points over poses drawn as for [`screen`], and the farthest that one of them gets from the base, m.
 ///
 /// Fails as [`Capsules::new`](super::Capsules::new).
 pub fn mean_place(
     mechanism: &Mechanism,
     points: &[BodyPoint],
     ranges: &[(f64, f64)],
+    closed: Option<&ClosedModel>,
 ) -> Result<(Vec3<f64>, f64), ConstraintError> {
     check_ranges(mechanism, ranges)?;
     let dynamics = Dynamics::new(mechanism);
     let clearance = Clearance::new(mechanism, &dynamics, ranges);
-    let poses = Poses::new(&dynamics, &clearance, points);
+    let poses = Poses::new(&dynamics, &clearance, points, closed);
     let (mut sum, mut reach) = (Vec3::zero(), 0.0_f64);
     for (p, s) in (0..points.len()).flat_map(|p| (0..POSES).map(move |s| (p, s))) {
         sum = sum + poses.point(p, s);
@@ -177,15 +181,28 @@ struct Poses {
 }
 
 impl Poses {
-    fn new(dynamics: &Dynamics, clearance: &Clearance<'_>, points: &[BodyPoint]) -> Self {
+    fn new(
+        dynamics: &Dynamics,
+        clearance: &Clearance<'_>,
+        points: &[BodyPoint],
+        closed: Option<&ClosedModel>,
+    ) -> Self {
         let rates = dynamics.rates();
-        let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let mut q = vec![0.0; rates * POSES];
-        for s in 0..POSES {
-            for (k, x) in clearance.random_pose(&mut rng).into_iter().enumerate() {
-                q[k * POSES + s] = x;
+        let q = match closed {
+            Some(closed) => {
+                closed.random_motion(POSES, SEED).with_block(|motion| closed.joint_motion(motion).q)
             }
-        }
+            None => {
+                let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+                let mut q = vec![0.0; rates * POSES];
+                for s in 0..POSES {
+                    for (k, x) in clearance.random_pose(&mut rng).into_iter().enumerate() {
+                        q[k * POSES + s] = x;
+                    }
+                }
+                q
+            }
+        };
         let mut positions = vec![0.0; 3 * points.len() * POSES];
         let still = vec![0.0; rates * POSES];
         dynamics.points(&MotionBlock::plain(POSES, &q, &still, &still), points, POSES, &mut positions);

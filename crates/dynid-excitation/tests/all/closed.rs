@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use crate::task_space::{JOINT, LENGTH, problem as closed_form, workspace};
 use dynid_excitation::constraint::{
-    ConstraintError, ConstraintKind, ConstraintRow, JointLimits, JointQuantity, JointRange, PathConstraint,
+    CartesianLimits, ConstraintError, ConstraintKind, ConstraintRow, FramePoint, JointLimits, JointQuantity,
+    JointRange, OfAllJoints, PathConstraint, Region, SingularityLimit,
 };
 use dynid_excitation::*;
 use dynid_model::closed::{ClosedMechanism, ClosureDescription, Condition, CutKind, LinkFrame};
@@ -189,18 +190,7 @@ fn joints_that_follow_have_the_limits_of_the_closed_form() {
     let (model, form) = (model(), workspace());
     let own = limits(&model);
     let samples = 9;
-    let series = |derivative: i32| -> Vec<f64> {
-        let at = |row: &[f64; 11], t: f64| {
-            (1..=5).fold(if derivative == 0 { row[0] } else { 0.0 }, |sum, k| {
-                let w = std::f64::consts::TAU * 0.25 * f64::from(k);
-                let turned = w * t + f64::from(derivative) * 0.5 * std::f64::consts::PI;
-                let (a, b) = (row[k as usize], row[5 + k as usize]);
-                sum + w.powi(derivative) * (a * turned.sin() + b * turned.cos())
-            })
-        };
-        TRAJECTORY.iter().flat_map(|r| (0..samples).map(move |s| at(r, 0.43 * s as f64))).collect()
-    };
-    let (q, dq, ddq) = (series(0), series(1), series(2));
+    let [q, dq, ddq] = states(samples);
     let motion = MotionBlock::plain(samples, &q, &dq, &ddq);
     let mut wanted = vec![0.0; form.rows().len() * samples];
     form.values(&motion, samples, &mut wanted);
@@ -227,6 +217,81 @@ fn joints_that_follow_have_the_limits_of_the_closed_form() {
             k % 9
         );
     }
+}
+
+/// Samples of the trajectory.
+fn states(samples: usize) -> [Vec<f64>; 3] {
+    let series = |derivative: i32| -> Vec<f64> {
+        let at = |row: &[f64; 11], t: f64| {
+            (1..=5).fold(if derivative == 0 { row[0] } else { 0.0 }, |sum, k| {
+                let w = std::f64::consts::TAU * 0.25 * f64::from(k);
+                let turned = w * t + f64::from(derivative) * 0.5 * std::f64::consts::PI;
+                let (a, b) = (row[k as usize], row[5 + k as usize]);
+                sum + w.powi(derivative) * (a * turned.sin() + b * turned.cos())
+            })
+        };
+        TRAJECTORY.iter().flat_map(|r| (0..samples).map(move |s| at(r, 0.43 * s as f64))).collect()
+    };
+    [series(0), series(1), series(2)]
+}
+
+#[test]
+fn places_of_links_and_singular_poses_have_gradients_by_the_independent_coordinates() {
+    let model = model();
+    let tree = model.machine().mechanism();
+    let points = [
+        (
+            FramePoint { frame: "leg1".into(), position: Vec3([0.6, 0.0, 0.0]) },
+            Region::HalfSpace { normal: Vec3([0.0, 1.0, 0.0]), offset: -0.3 },
+        ),
+        (
+            FramePoint { frame: "leg3".into(), position: Vec3([0.3, 0.1, 0.0]) },
+            Region::OutsideCylinder { center: [0.2, 0.1], radius: 0.05 },
+        ),
+    ];
+    let places = Box::new(CartesianLimits::new(tree, &points).unwrap());
+    let least = 0.3 * model.machine().singularity(&model.machine().workspace()).measure;
+    let samples = 6;
+    let at = states(samples);
+    let constraints: [Box<dyn PathConstraint>; 2] = [
+        Box::new(OfAllJoints::new(model.clone(), places).unwrap()),
+        Box::new(SingularityLimit::new(model.clone(), least).unwrap()),
+    ];
+    for constraint in constraints {
+        let rows = constraint.rows().len();
+        let value = |states: &[Vec<f64>; 3], row: usize, sample: usize| {
+            let [q, dq, ddq] = states;
+            let mut values = vec![0.0; rows * samples];
+            constraint.values(&MotionBlock::plain(samples, q, dq, ddq), samples, &mut values);
+            values[row * samples + sample]
+        };
+        let wanted: Vec<(usize, usize)> =
+            (0..rows).rev().flat_map(|row| [3, 0, 5].map(|s| (row, s))).collect();
+        let mut found = vec![0.0; 9 * wanted.len()];
+        let [q, dq, ddq] = &at;
+        constraint.gradients(&MotionBlock::plain(samples, q, dq, ddq), &wanted, &mut found);
+        for ((row, sample), found) in wanted.iter().zip(found.chunks_exact(9)) {
+            for (k, found) in found.iter().enumerate() {
+                let moved = |by: f64| {
+                    let mut states = at.clone();
+                    states[k / 3][(k % 3) * samples + sample] += by;
+                    value(&states, *row, *sample)
+                };
+                let h = 1e-4;
+                let expected = (moved(h) - moved(-h)) / (2.0 * h);
+                assert!(
+                    (found - expected).abs() < 1e-5 * expected.abs().max(1.0),
+                    "{row} {k}: {found} {expected}"
+                );
+            }
+        }
+        // Where there is no pose, nothing is a number.
+        let mut far = at.clone();
+        far[0][samples] = 2.0;
+        assert!(value(&far, 0, 0).is_nan() && value(&far, 0, 1).is_finite());
+    }
+    let refused = SingularityLimit::new(model.clone(), 0.0).unwrap_err().to_string();
+    assert!(refused.contains("least measure"), "{refused}");
 }
 
 #[test]

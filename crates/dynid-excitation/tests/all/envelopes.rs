@@ -133,7 +133,7 @@ fn screening_gives_up_what_is_nearly_always_near() {
     let ranges = vec![(-2.0, 2.0); mechanism.rates()];
     let up = Plane { kind: ConstraintKind::Floor, normal: Vec3([0.0, 0.0, 1.0]), height: 0.0 };
     let margin = 0.02;
-    let screened = screen(&mechanism, &capsules, &[up], margin, &ranges).unwrap();
+    let screened = screen(&mechanism, &capsules, &[up], margin, &ranges, None).unwrap();
     assert!(!screened.pairs.is_empty() && !screened.always_near.is_empty(), "{screened:?}");
     let dynamics = dynid_model::Dynamics::new(&mechanism);
     let mut work = dynamics.workspace();

@@ -4,6 +4,9 @@ use super::{ClosedModel, PathError};
 use crate::closed::{PoseError, PoseWorkspace};
 use crate::dynamics::MotionBlock;
 
+/// Poses of a motion that are tried on the way to its first one.
+const LATER: usize = 64;
+
 /// Motion of the tree over a block, packed without gaps, and how its efforts project onto the drives.
 #[derive(Debug)]
 pub(super) struct Expanded {
@@ -94,7 +97,11 @@ impl ClosedModel {
                 dq[k] = motion.dq[k * motion.stride + sample];
                 ddq[k] = motion.ddq[k * motion.stride + sample];
             }
-            if let Err(fault) = self.next_pose(&mut work, &q) {
+            let mut found = self.next_pose(&mut work, &q);
+            if found.is_err() && sample == 0 && self.round_about(&mut work, motion) {
+                found = Ok(());
+            }
+            if let Err(fault) = found {
                 let nan = |values: &mut [f64]| {
                     values.iter_mut().skip(sample).step_by(samples).for_each(|x| *x = f64::NAN);
                 };
@@ -140,8 +147,35 @@ impl ClosedModel {
         self.machine.reach(work, independent)
     }
 
+    /// Takes a workspace to the first pose of a motion where it cannot be reached straight from home: drive by drive in one of their cyclic
+    /// orders, or by way of a later pose that can, from which the motion is followed back. False where neither succeeds.
+    fn round_about(&self, work: &mut PoseWorkspace, motion: &MotionBlock<'_>) -> bool {
+        let d = self.machine.mobility();
+        let at = |sample: usize| (0..d).map(|k| motion.q[k * motion.stride + sample]).collect::<Vec<f64>>();
+        let first = at(0);
+        let home = self.machine.home_independent();
+        let by_drives = |work: &mut PoseWorkspace, from: usize, forward: bool| {
+            self.machine.go_home(work);
+            let mut now = home.clone();
+            (0..d).all(|k| {
+                let drive = (from + if forward { k } else { d - k }) % d;
+                now[drive] = first[drive];
+                self.machine.reach(work, &now).is_ok()
+            })
+        };
+        if (0..d).any(|from| by_drives(work, from, true) || by_drives(work, from, false)) {
+            return true;
+        }
+        let step = motion.samples.div_ceil(LATER).max(1);
+        (step..motion.samples).step_by(step).any(|later| {
+            self.machine.go_home(work);
+            self.machine.reach(work, &at(later)).is_ok()
+                && (0..later).rev().all(|sample| self.machine.reach(work, &at(sample)).is_ok())
+        })
+    }
+
     /// Whether all poses of a motion can be reached, each from the one before or straight from home, as the model itself
-    /// seeks them: states need not follow each other.
+    /// seeks them: states need not follow each other. The first one may also be reached drive by drive, or by way of a later one.
     ///
     /// # Errors
     /// [`PathError`] at the first sample without a pose, where all that the model computes is not a number.

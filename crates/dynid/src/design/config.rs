@@ -113,6 +113,9 @@ pub struct LimitsConfig {
     pub share: f64,
     /// Keep the nominal model's efforts within their limits. Default true.
     pub efforts: bool,
+    /// Of mechanisms with loops: least distance from singular poses, `σ_min/σ_max` of the loops' Jacobian by the joints that follow, as a share
+    /// of that at home. Default 0.3: nearer, friction that follows loads may lock a joint.
+    pub singularity: Option<f64>,
 }
 
 impl Default for LimitsConfig {
@@ -125,6 +128,7 @@ impl Default for LimitsConfig {
             effort: PerJoint::default(),
             share: 1.0,
             efforts: true,
+            singularity: None,
         }
     }
 }
@@ -432,6 +436,9 @@ impl DesignConfig {
             if !(x > 0.0 && x.is_finite()) {
                 return Err(Error::setting(name, "a positive number", x));
             }
+        }
+        if let Some(x) = self.limits.singularity.filter(|x| !(*x > 0.0 && *x < 1.0)) {
+            return Err(Error::setting("limits.singularity", "above 0 and below 1", x));
         }
         if self.limits.share > 1.0 {
             return Err(Error::setting("limits.share", "at most 1", self.limits.share));

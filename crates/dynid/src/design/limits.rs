@@ -3,11 +3,14 @@
 use std::sync::Arc;
 
 use dynid_excitation::MotionLimits;
-use dynid_excitation::constraint::{CartesianLimits, EffortLimits, FramePoint, PathConstraint, Region};
-use dynid_model::{EffortModel, RobotModel, Vec3};
+use dynid_excitation::constraint::{
+    CartesianLimits, EffortLimits, FramePoint, OfAllJoints, PathConstraint, Region,
+};
+use dynid_model::{ClosedModel, EffortModel, RobotModel, Vec3};
 
 use super::config::{DesignConfig, LimitsConfig};
-use super::safety::{Safety, given_capsules, safety};
+use super::loops;
+use super::safety::{Drawn, Safety, given_capsules, safety};
 use crate::Error;
 use crate::fault::DesignError;
 use crate::joint_limits::StatedLimits;
@@ -21,7 +24,9 @@ pub(super) fn joint_limits(
 ) -> Result<Vec<MotionLimits>, Error> {
     let LimitsConfig { position, velocity, acceleration, jerk, share, .. } = &config.limits;
     let stated = StatedLimits { position, velocity, acceleration, jerk, share: *share };
-    crate::joint_limits::joint_limits(robot, &robot.mechanism.rate_bodies(), joints, &stated, assumptions)
+    let owners = robot.mechanism.rate_bodies();
+    let bodies: Vec<usize> = loops::coordinates(robot).into_iter().map(|rate| owners[rate]).collect();
+    crate::joint_limits::joint_limits(robot, &bodies, joints, &stated, assumptions)
 }
 
 pub(super) fn effort_limits(
@@ -30,12 +35,20 @@ pub(super) fn effort_limits(
     joints: &[String],
 ) -> Result<Vec<Option<f64>>, Error> {
     let given = config.limits.effort.positive("limits.effort", joints)?;
-    let owners = robot.mechanism.rate_bodies();
+    let (owners, rates) = (robot.mechanism.rate_bodies(), loops::coordinates(robot));
     let stated = |k: usize| {
-        let limit = robot.mechanism.bodies()[owners[k]].joint.limits.effort;
+        let limit = robot.mechanism.bodies()[owners[rates[k]]].joint.limits.effort;
         limit.filter(|e| *e > 0.0 && e.is_finite()).map(|e| config.limits.share * e)
     };
     Ok(given.into_iter().enumerate().map(|(k, g)| g.or_else(|| stated(k))).collect())
+}
+
+/// What the limits along a path are of.
+pub(super) struct Kept<'a> {
+    pub(super) limits: &'a [MotionLimits],
+    pub(super) effort_limits: &'a [Option<f64>],
+    /// Poses of all joints, of mechanisms with loops.
+    pub(super) poses: Option<&'a Arc<ClosedModel>>,
 }
 
 /// Limits along the path, and what of them is kept by default.
@@ -44,10 +57,10 @@ pub(super) fn constraints(
     config: &DesignConfig,
     model: &Arc<RobotModel>,
     nominal: Option<&[f64]>,
-    limits: &[MotionLimits],
-    effort_limits: &[Option<f64>],
+    kept: &Kept<'_>,
     assumptions: &mut Vec<String>,
 ) -> Result<(Vec<Box<dyn PathConstraint>>, Safety), Error> {
+    let Kept { effort_limits, limits, poses } = *kept;
     let mechanism = model.mechanism();
     let mut out: Vec<Box<dyn PathConstraint>> = Vec::new();
     if config.limits.efforts && effort_limits.iter().any(Option::is_some) {
@@ -64,15 +77,27 @@ pub(super) fn constraints(
             None => assumptions.push("effort limits cannot be kept without inertias".to_owned()),
         }
     }
+    // What follows limits places of links, which all joints tell.
+    let mut places: Vec<Box<dyn PathConstraint>> = Vec::new();
     let regions = regions(config);
     if !regions.is_empty() {
-        out.push(Box::new(CartesianLimits::new(mechanism, &regions).map_err(DesignError::from)?));
+        places.push(Box::new(CartesianLimits::new(mechanism, &regions).map_err(DesignError::from)?));
     }
-    let ranges: Vec<(f64, f64)> = limits.iter().map(|l| l.position).collect();
-    out.extend(given_capsules(config, mechanism, &ranges, assumptions)?);
-    let mut safety = safety(robot, config, mechanism, &ranges)?;
-    out.append(&mut safety.constraints);
+    let ranges = loops::ranges(robot, limits);
+    places.extend(given_capsules(config, mechanism, &ranges, assumptions)?);
+    let closed = poses.map(Arc::as_ref);
+    let mut safety = safety(robot, config, &Drawn { mechanism, ranges: &ranges, closed })?;
+    places.append(&mut safety.constraints);
     assumptions.append(&mut safety.assumptions);
+    match poses {
+        None => out.append(&mut places),
+        Some(poses) => {
+            out.extend(loops::constraints(robot, config, poses)?);
+            for own in places {
+                out.push(Box::new(OfAllJoints::new(poses.clone(), own).map_err(DesignError::from)?));
+            }
+        }
+    }
     Ok((out, safety))
 }
 

@@ -8,6 +8,7 @@ use dynid_model::{BodyPoint, Dynamics, MotionBlock};
 use dynid_motion::trajectory::{Form, FourierTrajectory, Phase, RowOrder, Sampled, Sequence};
 
 use super::config::DesignConfig;
+use super::loops;
 use super::problem::RobotProblem;
 use super::shapes::LinkCapsule;
 use crate::Error;
@@ -31,6 +32,8 @@ pub struct LegFault {
     pub phase: &'static str,
     /// Largest excess, in units of the limit.
     pub excess: f64,
+    /// What one such unit is: size and unit; of coordinates their limit itself.
+    pub scale: Option<(f64, &'static str)>,
 }
 
 /// Approach, periods and return of a design.
@@ -170,7 +173,9 @@ pub(super) fn capsule_poses(
     let sampled = Sampled::at_times(&record, times);
     let block = MotionBlock::plain(count, &sampled.q, &sampled.dq, &sampled.ddq);
     let mut places = vec![0.0; 3 * points.len() * count];
-    Dynamics::new(mechanism).points(&block, &points, count, &mut places);
+    loops::with_all_joints(set.poses.as_ref(), &block, |all| {
+        Dynamics::new(mechanism).points(all, &points, count, &mut places);
+    });
     let at = |p: usize, s: usize| [0, 1, 2].map(|c| places[(3 * p + c) * count + s]);
     let pose = |s| (0..points.len() / 2).map(|k| [at(2 * k, s), at(2 * k + 1, s)]).collect();
     Ok((0..count).map(pose).collect())
@@ -228,6 +233,7 @@ fn broken(constraint: &dyn PathConstraint, block: &MotionBlock<'_>, phase: Phase
                 subject: row.subject.clone(),
                 phase: phase.name(),
                 excess,
+                scale: Some((row.scale, row.unit)),
             })
         })
         .collect()

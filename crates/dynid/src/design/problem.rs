@@ -8,11 +8,12 @@ use dynid_excitation::{
     RobotExcitation, StartConditions, information,
 };
 use dynid_io::{SourceFile, TrajectoryFile};
-use dynid_model::{BaseParameters, BaseSettings, EffortModel, RobotModel};
+use dynid_model::{BaseParameters, BaseSettings, ClosedModel, EffortModel, RobotModel, TreeModel};
 use dynid_motion::trajectory::{Form, RowOrder};
 
 use super::config::{ColumnsName, CriterionName, DesignConfig};
-use super::limits::{constraints, effort_limits, joint_limits};
+use super::limits::{Kept, constraints, effort_limits, joint_limits};
+use super::loops;
 use super::safety::Safety;
 use dynid_excitation::constraint::ConstraintError;
 
@@ -20,7 +21,7 @@ use crate::Error;
 use crate::elements::ElementPlan;
 use crate::fault::DesignError;
 use crate::nominal::{nominal_parameters, typical_efforts, with_nominal_shape};
-use crate::robot::{Robot, refuse_elastic, refuse_loops};
+use crate::robot::{Robot, refuse_elastic};
 use crate::settings::known;
 
 /// A nominal base parameter below this share of the largest of the same unit counts as so large: relative errors of what
@@ -33,6 +34,8 @@ const NOISE_SHARE: f64 = 0.01;
 pub(super) struct RobotProblem {
     pub(super) problem: Problem,
     pub(super) model: Arc<RobotModel>,
+    /// Poses of all joints, of mechanisms with loops.
+    pub(super) poses: Option<Arc<ClosedModel>>,
     /// Nominal values of all parameters; `None` if the robot file states no inertias.
     pub(super) nominal: Option<Vec<f64>>,
     pub(super) criterion: CriterionName,
@@ -61,13 +64,25 @@ pub(super) fn pose(problem: &RobotProblem, config: &DesignConfig) -> Result<Opti
             x,
         )),
         Some(x) => Ok(*x),
-        None => Ok(0.0_f64.clamp(limits.position.0, limits.position.1)),
+        None => Ok(f64::NAN),
     };
-    joints.iter().zip(&problem.problem.limits).map(at).collect::<Result<_, _>>().map(Some)
+    let stated: Vec<f64> = joints.iter().zip(&problem.problem.limits).map(at).collect::<Result<_, _>>()?;
+    let home = problem.poses.as_ref().map_or_else(Vec::new, |poses| poses.machine().home_independent());
+    let or_home = |(k, x): (usize, f64)| match x.is_nan() {
+        true => {
+            let (low, high) = problem.problem.limits[k].position;
+            home.get(k).copied().unwrap_or(0.0).clamp(low, high)
+        }
+        false => x,
+    };
+    Ok(Some(stated.into_iter().enumerate().map(or_home).collect()))
 }
 
 pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProblem, Error> {
-    refuse_loops(robot, "designed for by this command")?;
+    let poses = loops::poses(robot)?;
+    if let (None, Some(x)) = (&poses, config.limits.singularity) {
+        return Err(Error::setting("limits.singularity", "a mechanism with loops, which it is for", x));
+    }
     let mechanism = &robot.mechanism;
     if mechanism.positions() != mechanism.rates() {
         return Err(Error::Unsupported(
@@ -75,10 +90,11 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
         ));
     }
     refuse_elastic(robot, "designed for")?;
-    let joints = mechanism.rate_names();
+    let all = mechanism.rate_names();
+    let joints: Vec<String> = loops::coordinates(robot).into_iter().map(|rate| all[rate].clone()).collect();
     let mut elements = robot.elements.with_ideal_bearings();
     for (joint, list) in &config.elements.joint {
-        known(joint, &joints)?;
+        known(joint, &all)?;
         elements.per_joint.retain(|(j, _)| j != joint);
         elements.per_joint.push((joint.clone(), list.clone()));
     }
@@ -89,7 +105,9 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
             file.display(),
         ));
     }
-    let plan = ElementPlan::new(mechanism, &elements, config.elements.default.as_deref(), |_| true)?;
+    let default = config.elements.default.as_deref();
+    let plan = ElementPlan::new(mechanism, &elements, default, |rate| robot.is_driven(rate))?
+        .with_loops(robot.closed.clone());
     let model = plan.tied_model(mechanism)?;
     let model = Arc::new(with_nominal_shape(model, &plan, &config.values)?);
     if !model.channels().is_empty() {
@@ -115,8 +133,9 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
     };
     let limits = joint_limits(robot, config, &joints, &mut assumptions)?;
     let effort_limits = effort_limits(robot, config, &joints)?;
+    let kept = Kept { limits: &limits, effort_limits: &effort_limits, poses: poses.as_ref() };
     let (constraints, safety) =
-        constraints(robot, config, &model, nominal.as_deref(), &limits, &effort_limits, &mut assumptions)?;
+        constraints(robot, config, &model, nominal.as_deref(), &kept, &mut assumptions)?;
     let typical = nominal.as_ref().map(|n| typical_efforts(&model, n));
     let noise = noise(config, &joints, &effort_limits, typical.as_deref(), &mut assumptions)?;
 
@@ -155,6 +174,7 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
     Ok(RobotProblem {
         problem,
         model,
+        poses,
         nominal,
         criterion: name,
         noise,
@@ -213,7 +233,12 @@ fn columns(config: &DesignConfig, model: &Arc<RobotModel>, nominal: Option<&[f64
     match config.criterion.columns {
         ColumnsName::All => RobotExcitation::new(model.clone(), shape, &base, nominal),
         ColumnsName::Inertial => {
-            let rigid = Arc::new(RobotModel::new(model.mechanism().clone(), Vec::new()));
+            let tree = TreeModel::new(model.mechanism().clone(), Vec::new());
+            let rigid = match model.closed() {
+                Some(closed) => ClosedModel::new(tree, closed.machine().clone()).into(),
+                None => RobotModel::from(tree),
+            };
+            let rigid = Arc::new(rigid);
             let base = BaseParameters::of_model(rigid.as_ref(), &[], &BaseSettings::default());
             let links = rigid.parameters().linear.len();
             RobotExcitation::new(rigid, Vec::new(), &base, nominal.map(|n| &n[..links]))

@@ -335,10 +335,10 @@ impl DesignRun {
                 fault.phase,
                 fault.kind,
                 fault.subject,
-                match fault.kind {
-                    LimitKind::Path(kind) if kind != ConstraintKind::Effort =>
-                        format!("{:.0} mm", (1e3 * fault.excess * DISTANCE_SCALE).max(1.0)),
-                    _ => format!("{:.1} %", 100.0 * fault.excess),
+                match fault.scale.filter(|_| fault.kind != LimitKind::Path(ConstraintKind::Effort)) {
+                    Some((scale, "m")) => format!("{:.0} mm", (1e3 * fault.excess * scale).max(1.0)),
+                    Some((scale, unit)) => format!("{:.3} {unit}", fault.excess * scale),
+                    None => format!("{:.1} %", 100.0 * fault.excess),
                 },
                 way_out(fault.kind, &fault.subject).map_or_else(String::new, |line| format!("; {line}"))
             ));
@@ -403,6 +403,9 @@ impl DesignRun {
             (is_kept(&ConstraintKind::Effort), "efforts"),
             (regions.iter().any(is_kept), "regions of [[keep]]"),
             (is_kept(&ConstraintKind::Capsule), "capsules of [[capsule]]"),
+            (is_kept(&ConstraintKind::Singularity), "distance from singular poses"),
+            (is_kept(&ConstraintKind::JointPosition), "positions of joints that follow"),
+            (is_kept(&ConstraintKind::JointRate), "speeds of joints that follow"),
         ];
         kept.extend(named.iter().filter(|(is_kept, _)| *is_kept).map(|(_, name)| (*name).to_owned()));
         let safety = &self.set.safety.record;
@@ -458,16 +461,18 @@ fn infeasible_headline(infeasible: &Infeasible) -> String {
                 little motion: widen them, or try more starts"
             .to_owned();
     };
-    let size = match v.kind {
-        LimitKind::Path(ConstraintKind::Effort)
-        | LimitKind::Position
-        | LimitKind::Velocity
-        | LimitKind::Acceleration
-        | LimitKind::Jerk => format!("{:.0} % over its limit", 100.0 * v.excess),
-        LimitKind::Path(ConstraintKind::OwnLinks | ConstraintKind::Floor | ConstraintKind::Mounting) => {
-            format!("{:.0} mm short of the margin", (1e3 * v.excess * DISTANCE_SCALE).max(1.0))
+    let size = match (v.kind, v.scale) {
+        _ if v.excess.is_infinite() => "has no pose".to_owned(),
+        (LimitKind::Path(ConstraintKind::Effort), _) | (_, None) => {
+            format!("{:.0} % over its limit", 100.0 * v.excess)
         }
-        LimitKind::Path(_) => format!("{:.3} m on the wrong side", v.excess * DISTANCE_SCALE),
+        (
+            LimitKind::Path(ConstraintKind::OwnLinks | ConstraintKind::Floor | ConstraintKind::Mounting),
+            Some((scale, _)),
+        ) => {
+            format!("{:.0} mm short of the margin", (1e3 * v.excess * scale).max(1.0))
+        }
+        (_, Some((scale, unit))) => format!("{:.3} {unit} on the wrong side", v.excess * scale),
     };
     let worst = format!("{} of {} stays {size}, at {:.2} s", v.kind, v.subject, v.time);
     let said = match (infeasible.at_start, &infeasible.blamed) {

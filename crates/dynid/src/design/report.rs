@@ -1,6 +1,6 @@
 //! The report page of a design.
 
-use dynid_excitation::constraint::{ConstraintKind, DISTANCE_SCALE, Region};
+use dynid_excitation::constraint::{ConstraintKind, Region};
 use dynid_excitation::{LimitKind, LimitPoint};
 use dynid_model::{BodyPoint, Dynamics, EffortModel, MotionBlock, Vec3};
 use dynid_motion::trajectory::{Phase, Sampled};
@@ -9,6 +9,7 @@ use dynid_report::Fact;
 
 use super::config::{ColumnsName, CriterionName, DesignConfig};
 use super::limits::regions;
+use super::loops;
 use super::record::NEAR_BEST;
 use super::{DesignRecord, DesignRun, DesignedTrajectory};
 use crate::Error;
@@ -155,13 +156,14 @@ impl DesignRun {
         points
             .iter()
             .map(|p| {
-                let distance = matches!(p.kind, LimitKind::Path(kind) if kind != ConstraintKind::Effort);
+                // Limits that are none of a size: what is left to them.
+                let left = p.scale.filter(|_| p.kind != LimitKind::Path(ConstraintKind::Effort));
                 report::LimitUse {
                     kind: p.kind.to_string(),
                     subject: p.subject.clone(),
-                    use_percent: (!distance).then_some(100.0 * (1.0 + p.excess)),
-                    margin: distance.then_some(-p.excess * DISTANCE_SCALE),
-                    margin_unit: if distance { "m" } else { "" }.to_owned(),
+                    use_percent: left.is_none().then_some(100.0 * (1.0 + p.excess)),
+                    margin: left.map(|(scale, _)| -p.excess * scale),
+                    margin_unit: left.map_or_else(String::new, |(_, unit)| unit.to_owned()),
                     at_s: Some(p.time),
                     acts: p.excess > ACTS - 1.0,
                 }
@@ -175,7 +177,8 @@ impl DesignRun {
         let n = sampled.samples();
         let position: Vec<&[f64]> = sampled.q.chunks_exact(n.max(1)).collect();
         let caption = "The motion as it is commanded".to_owned();
-        let drawn = picture(self.set.model.mechanism(), None, &sampled.time, &position, caption);
+        let poses = self.set.poses.as_deref();
+        let drawn = picture(self.set.model.mechanism(), poses, &sampled.time, &position, caption);
         Ok(drawn.map(|drawn| report::RobotPicture {
             trail: drawn.points.iter().rposition(|kind| *kind != report::PointKind::Base),
             plays: true,
@@ -243,7 +246,9 @@ impl DesignRun {
             .collect::<Result<Vec<_>, Error>>()?;
         let n = block.samples;
         let mut positions = vec![0.0; 3 * points.len() * n];
-        Dynamics::new(mechanism).points(block, &points, n, &mut positions);
+        loops::with_all_joints(self.set.poses.as_ref(), block, |all| {
+            Dynamics::new(mechanism).points(all, &points, n, &mut positions);
+        });
         Ok(names
             .into_iter()
             .zip(positions.chunks_exact((3 * n).max(1)))

@@ -5,7 +5,7 @@ use dynid_excitation::constraint::{
     PathConstraint, Plane, PlaneScreening, mean_place, screen,
 };
 use dynid_io::SourceFile;
-use dynid_model::{BodyPoint, Mechanism, Vec3};
+use dynid_model::{BodyPoint, ClosedModel, Mechanism, Vec3};
 use serde::Serialize;
 
 use super::config::DesignConfig;
@@ -98,13 +98,17 @@ pub struct CapsuleRecord {
     pub source: CapsuleSource,
 }
 
+/// Where poses of a robot are drawn from.
+pub(super) struct Drawn<'a> {
+    pub(super) mechanism: &'a Mechanism,
+    /// Positions of all joints of the tree.
+    pub(super) ranges: &'a [(f64, f64)],
+    /// Its poses where it has loops.
+    pub(super) closed: Option<&'a ClosedModel>,
+}
+
 /// Floor and own links of a robot, as far as they are wanted.
-pub(super) fn safety(
-    robot: &Robot,
-    config: &DesignConfig,
-    mechanism: &Mechanism,
-    ranges: &[(f64, f64)],
-) -> Result<Safety, Error> {
+pub(super) fn safety(robot: &Robot, config: &DesignConfig, drawn: &Drawn<'_>) -> Result<Safety, Error> {
     let wanted = &config.safety;
     let mut out = Safety {
         constraints: Vec::new(),
@@ -123,9 +127,9 @@ pub(super) fn safety(
         let shapes = link_capsules(robot, config)?;
         out.tell_of_shapes(&shapes, robot);
         out.meshes = shapes.meshes;
-        let planes = if wanted.floor { out.planes(config, mechanism, ranges)? } else { Vec::new() };
+        let planes = if wanted.floor { out.planes(config, drawn)? } else { Vec::new() };
         out.capsules = shapes.capsules;
-        out.keep(config, mechanism, ranges, &planes)?;
+        out.keep(config, drawn, &planes)?;
     }
     out.record.not_checked.push("tools, cables and surroundings".to_owned());
     Ok(out)
@@ -173,13 +177,8 @@ impl Safety {
     }
 
     /// The floor, or what stands for it.
-    fn planes(
-        &mut self,
-        config: &DesignConfig,
-        mechanism: &Mechanism,
-        ranges: &[(f64, f64)],
-    ) -> Result<Vec<Plane>, Error> {
-        let gravity = mechanism.gravity();
+    fn planes(&mut self, config: &DesignConfig, drawn: &Drawn<'_>) -> Result<Vec<Plane>, Error> {
+        let gravity = drawn.mechanism.gravity();
         let stated = config.safety.floor_height_m;
         let not_checked = &mut self.record.not_checked;
         if gravity.norm() == 0.0 {
@@ -192,7 +191,7 @@ impl Safety {
         }
         let up = gravity.scale(-1.0 / gravity.norm());
         let floor = |height| Plane { kind: ConstraintKind::Floor, normal: up, height };
-        let side = (up.0[2] < UPRIGHT).then(|| side_of_links(mechanism, ranges)).transpose()?;
+        let side = (up.0[2] < UPRIGHT).then(|| side_of_links(drawn)).transpose()?;
         // Links on no side, or above: an upright base in other axes.
         let Some(side) = side.flatten().filter(|side| side.dot(up) < SAME_SIDE) else {
             return Ok(vec![floor(stated.unwrap_or(0.0))]);
@@ -220,16 +219,12 @@ impl Safety {
     }
 
     /// Poses the limits, and tells what they leave out.
-    fn keep(
-        &mut self,
-        config: &DesignConfig,
-        mechanism: &Mechanism,
-        ranges: &[(f64, f64)],
-        planes: &[Plane],
-    ) -> Result<(), Error> {
+    fn keep(&mut self, config: &DesignConfig, drawn: &Drawn<'_>, planes: &[Plane]) -> Result<(), Error> {
+        let Drawn { mechanism, ranges, closed } = *drawn;
         let margin = config.safety.margin_m;
         let capsules: Vec<Capsule> = self.capsules.iter().map(|c| c.capsule.clone()).collect();
-        let screened = screen(mechanism, &capsules, planes, margin, ranges).map_err(DesignError::from)?;
+        let screened =
+            screen(mechanism, &capsules, planes, margin, ranges, closed).map_err(DesignError::from)?;
         let record = |c: &LinkCapsule| CapsuleRecord {
             link: c.capsule.frame.clone(),
             from_m: c.capsule.ends[0].0,
@@ -386,10 +381,11 @@ pub(super) fn given_capsules(
 }
 
 /// Unit vector from the base to where the links are on the whole; `None` if they are all around it.
-fn side_of_links(mechanism: &Mechanism, ranges: &[(f64, f64)]) -> Result<Option<Vec3<f64>>, Error> {
+fn side_of_links(drawn: &Drawn<'_>) -> Result<Option<Vec3<f64>>, Error> {
+    let Drawn { mechanism, ranges, closed } = *drawn;
     let origin = |body| BodyPoint { body: Some(body), position: Vec3::zero() };
     let origins: Vec<BodyPoint> = (0..mechanism.bodies().len()).map(origin).collect();
-    let (mean, reach) = mean_place(mechanism, &origins, ranges).map_err(DesignError::from)?;
+    let (mean, reach) = mean_place(mechanism, &origins, ranges, closed).map_err(DesignError::from)?;
     let distance = mean.norm();
     Ok((distance > NO_SIDE * reach).then(|| mean.scale(1.0 / distance)))
 }

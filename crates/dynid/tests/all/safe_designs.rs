@@ -8,7 +8,9 @@
 
 use std::path::{Path, PathBuf};
 
-use dynid::design::{CapsuleSource, DesignConfig, DesignRecord, DesignRun, design};
+use dynid::design::{
+    CapsuleSource, DesignConfig, DesignRecord, DesignRun, HalfSpaceConfig, KeepConfig, design,
+};
 use dynid::model::{Dynamics, Placement, Vec3};
 use dynid::{Robot, RobotOptions};
 use dynid_testing::shared;
@@ -353,4 +355,54 @@ fn poses_of_the_capsules_are_given_for_pictures() {
     assert_eq!(poses[0][0], poses[12][0]);
     assert!(poses[0][last] != poses[12][last]);
     assert_eq!(record.safety.capsules.len(), run.capsules().len());
+}
+
+#[test]
+fn drives_of_a_parallel_machine_stay_away_from_singular_poses_and_limits_of_joints_that_follow() {
+    let text = std::fs::read_to_string(robots().join("prr3.toml")).unwrap();
+    // A leg may turn by a third of a turn about its home, and no faster than 2 rad/s.
+    let name = "joint = { kind = \"revolute\", axis = [0, 0, 1]";
+    let limited =
+        text.replacen(name, &format!("{name}, limits = {{ position = [0.0, 1.5], velocity = 2 }}"), 1);
+    assert_ne!(limited, text);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("prr3.toml");
+    std::fs::write(&file, limited).unwrap();
+    let mut config = quick(&file);
+    config.trajectory.period_s = 5.0;
+    config.trajectory.harmonics = 3;
+    config.limits.singularity = Some(0.4);
+    config.safety.floor = false;
+    config.keep = vec![KeepConfig {
+        frames: vec!["platform".to_owned()],
+        half_space: Some(HalfSpaceConfig { normal: [0.0, 1.0, 0.0], offset: 0.2 }),
+        ..KeepConfig::default()
+    }];
+    let (run, record) = run(&config);
+    assert_eq!(record.verdict.status.to_string(), "pass", "{}", record.verdict.headline);
+    let names: Vec<&str> = record.joints.iter().map(String::as_str).collect();
+    assert_eq!(names, ["slider1", "slider2", "slider3"]);
+    // Checked by the mechanism itself, on a finer grid.
+    let robot = Robot::load(&file, &RobotOptions::default()).unwrap();
+    let machine = robot.closed.clone().unwrap();
+    let home = machine.singularity(&machine.workspace()).measure;
+    let mut work = machine.workspace();
+    let place = |joint: &str| {
+        let rate = robot.mechanism.rate_names().iter().position(|name| name == joint).unwrap();
+        machine.position_of(rate)
+    };
+    let (mut least, mut low, mut high, mut lowest) =
+        (f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY);
+    for k in 0..2000 {
+        machine.reach(&mut work, &positions(&record, 5.0 * f64::from(k) / 2000.0)).unwrap();
+        least = least.min(machine.singularity(&work).measure / home);
+        let q = work.positions();
+        (low, high) = (low.min(q[place("leg1")]), high.max(q[place("leg1")]));
+        lowest = lowest.min(q[place("platform_y")]);
+    }
+    println!(
+        "least distance from singular poses {least:.3} of home, leg1 {low:.3} to {high:.3} rad, platform above {lowest:.3} m"
+    );
+    assert!(least > 0.4 - 1e-4 && low > -1e-4 && high < 1.5 + 1e-4 && lowest > 0.2 - 1e-4);
+    assert!(run.outcome.is_ok());
 }

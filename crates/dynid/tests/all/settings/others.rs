@@ -258,6 +258,8 @@ fn every_key_of_a_design_takes_effect_or_is_refused() {
         ),
         table("elements.temperature", "[elements]\ntemperature = 30.0", Refused("a design has no logs")),
         table("elements.clearance", "[elements]\nclearance = \"ideal\"", Refused("joints as ideal")),
+        table("limits.singularity", "[limits]\nsingularity = 0.2", Refused("a mechanism with loops")),
+        table("limits.singularity", "[limits]\nsingularity = 1.2", Refused("below 1")),
         top("values", "values = { \"j1.fc\" = 30.0 }", Changes),
         table("trajectory.period_s", "[trajectory]\nperiod_s = 5", Changes),
         table("trajectory.harmonics", "[trajectory]\nharmonics = 2", Changes),
