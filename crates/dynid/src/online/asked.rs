@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::config::{Config, MotorSide, OnlineConfig};
 use crate::elements::{ElementPlan, REACTION_FRICTION};
-use crate::robot::{Robot, refuse_loops};
+use crate::robot::{Robot, refuse_internal_load};
 use crate::settings::{Clearance, Settings};
 
 /// What a session is asked for.
@@ -35,8 +35,8 @@ impl Asked {
             ));
         }
         let robot = config.read_robot()?;
-        refuse_loops(&robot, "identified on line")?;
-        if robot.mechanism.positions() != robot.mechanism.rates() {
+        refuse_internal_load(&robot, "identified on line")?;
+        if robot.closed.is_none() && robot.mechanism.positions() != robot.mechanism.rates() {
             return Err(Error::Unsupported(
                 "a floating base cannot be identified from joint logs: lock the base or leave it out"
                     .to_owned(),
@@ -51,7 +51,7 @@ impl Asked {
             ));
         }
         settings.elements.clearance = (!robot.elements.clearance.is_empty()).then_some(Clearance::Ideal);
-        if ElementPlan::of_run(&settings, &robot, |_| true)?.has_reactions() {
+        if ElementPlan::of_run(&settings, &robot, |rate| robot.is_driven(rate))?.has_reactions() {
             return Err(Error::Unsupported(format!(
                 "`{REACTION_FRICTION}` is not followed on line, since its columns go with the estimate: state other friction"
             )));

@@ -48,7 +48,7 @@ impl Structure {
             let still: Vec<(String, f64)> = still.iter().map(|name| (name.clone(), 0.0)).collect();
             robot = robot.locked(&still)?;
         }
-        let plan = ElementPlan::of_run(&asked.settings, &robot, |_| true)?;
+        let plan = ElementPlan::of_run(&asked.settings, &robot, |rate| robot.is_driven(rate))?;
         let model = plan.tied_model(&robot.mechanism)?;
         let shape = model.parameters().shape_start();
         let settings = BaseSettings { seed: asked.settings.seed.unwrap_or(1), ..BaseSettings::default() };

@@ -305,3 +305,56 @@ fn every_kind_of_forgetting_follows_and_resumes_with_the_same_bits() {
         println!("{rule:?}: last residuals {residual_rms:?}");
     }
 }
+
+#[test]
+fn a_parallel_machine_is_followed_and_a_change_of_its_platform_is_told() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(root.join("robots/prr3.toml")).unwrap();
+    let file = folder.path().join("prr3.toml");
+    // A drive has no rotor of its own here.
+    std::fs::write(&file, format!("{text}\n[defaults]\nelements = [\"coulomb\", \"viscous\"]\n")).unwrap();
+    let robot = Robot::load(&file, &RobotOptions::default()).unwrap();
+    let write = |name: &str, values: &[(&str, f64)], seed: u64| {
+        let settings = SimulateSettings {
+            duration_s: 40.0,
+            rate_hz: 250.0,
+            effort_noise: 0.005,
+            encoder_bits: 20,
+            values: values.iter().map(|(name, x)| ((*name).to_owned(), *x)).collect(),
+            seed,
+            ..SimulateSettings::default()
+        };
+        let log = simulate(&robot, &settings).unwrap();
+        crate::support::write_log(&log, &folder.path().join(name));
+    };
+    let friction: Vec<(String, f64)> =
+        (1..=3).flat_map(|k| [(format!("slider{k}.fc"), 8.0), (format!("slider{k}.fv"), 20.0)]).collect();
+    let friction: Vec<(&str, f64)> = friction.iter().map(|(name, x)| (name.as_str(), *x)).collect();
+    write("a.csv", &friction, 1);
+    write("b.csv", &friction, 2);
+    let heavier: Vec<(&str, f64)> = friction.iter().copied().chain([("platform.m", 32.0)]).collect();
+    write("c.csv", &heavier, 3);
+    let config = |logs: &[&str]| {
+        let logs =
+            logs.iter().map(|name| format!("[[log]]\npath = \"{}\"\n", folder.path().join(name).display()));
+        let text = format!(
+            "robot = \"{}\"\n[elements]\nfriction = \"given\"\n{}",
+            file.display(),
+            logs.collect::<String>()
+        );
+        Config::parse(&text, "test").unwrap()
+    };
+    let events = follow(&config(&["a.csv", "b.csv"]));
+    assert!(!events.iter().any(|(_, e)| matches!(e, Event::Alarm { .. })), "nothing changed");
+    let off_line = identify(&config(&["a.csv", "b.csv"]), &mut |_| {}).unwrap();
+    let Event::Estimate { parameters, .. } = last_estimate(&events) else { unreachable!() };
+    assert_eq!(parameters.len(), off_line.base.len());
+    for ((p, x), (std, _)) in parameters.iter().zip(&off_line.fit().x).zip(off_line.standard_deviations()) {
+        let std = std.unwrap().hypot(p.std);
+        assert!((p.value - x).abs() < 4.0 * std, "{}: on line {} ± {std}, off line {x}", p.name, p.value);
+    }
+    let events = follow(&config(&["a.csv", "b.csv", "c.csv"]));
+    let changed = events.iter().find(|(_, e)| matches!(e, Event::Change { .. }));
+    assert!(changed.is_some_and(|(log, _)| *log == 2), "{changed:?}");
+}
