@@ -237,21 +237,27 @@ impl<'a> RobotExport<'a> {
         self.checked(Format::Urdf, text, (read, &found), &joints, notes, states)
     }
 
-    /// MJCF, written anew; see [`dynid_io::mjcf::from_description`].
+    /// MJCF, written anew; see [`dynid_io::mjcf::from_description`], and [`dynid_io::mjcf::from_closed`] for mechanisms with loops.
     ///
     /// # Errors
     /// [`Error::RobotFile`]: MJCF cannot state the robot; [`ExportError`]: see [`ExportError::ReadBack`].
     pub fn mjcf(&self, states: &CheckStates) -> Result<Exported, Error> {
-        if self.identified.model.closed().is_some() {
-            return Err(Error::Unsupported(
-                "loops are not written as MJCF: export a URDF, which comes with a file of its loops"
-                    .to_owned(),
-            ));
-        }
-        let JointValues { joints, notes } = self.joint_values(Format::Mjcf, states);
-        let text = mjcf::from_description(&self.description, &joints)?;
+        let JointValues { joints, mut notes } = self.joint_values(Format::Mjcf, states);
+        let text = match self.identified.model.closed() {
+            Some(closed) => {
+                let machine = closed.machine();
+                let (driven, home) = (machine.driven_names(), machine.home_by_joint());
+                let loops = mjcf::Loops { closures: machine.closures(), driven: &driven, home: &home };
+                notes.push(
+                    "loops are soft constraints (`<equality>`), which give way by micrometres: begin with the key `home`, a closed pose"
+                        .to_owned(),
+                );
+                mjcf::from_closed(&self.description, &joints, &loops)?
+            }
+            None => mjcf::from_description(&self.description, &joints)?,
+        };
         let read = mjcf::parse(&text, "exported MJCF")?;
-        let notes = [self.notes.clone(), notes].concat();
+        notes = [self.notes.clone(), notes].concat();
         self.checked(Format::Mjcf, text, (read.description, &read.joints), &joints, notes, states)
     }
 

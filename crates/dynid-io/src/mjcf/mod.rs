@@ -1,11 +1,13 @@
 //! MJCF, the robot files of MuJoCo: writing, and reading back what is written.
 
+mod loops;
 mod quaternion;
 mod read;
 mod write;
 
+pub use loops::Loops;
 pub use read::{MjcfRobot, parse};
-pub use write::from_description;
+pub use write::{from_closed, from_description};
 
 /// What a joint of MJCF states about dissipation and rotor, all of it on the drive's side of the effort:
 /// `armature · q̈ + damping · q̇ + frictionloss · sign(q̇)`.

@@ -23,7 +23,8 @@ pub struct MjcfRobot {
 /// Reads MJCF as [`from_description`](super::from_description) writes it; `source_name` stands in messages.
 ///
 /// This is a reader for checks, not for MJCF of other origin: bodies with `pos` and `quat`, at most one joint each
-/// (`hinge`, `slide`, `freejoint`), `<inertial>` with `fullinertia`, gravity, and `<equality><joint>`.
+/// (`hinge`, `slide`, `freejoint`), `<inertial>` with `fullinertia`, gravity, and `<equality><joint>`; sites, other equalities and keys are passed
+/// over.
 ///
 /// # Errors
 /// [`RobotFileError`]: the text is not MJCF, a value is no number, or an element of the kinematics is none of these.
@@ -92,6 +93,8 @@ pub fn parse(text: &str, source_name: &str) -> Result<MjcfRobot, RobotFileError>
                 };
                 joint.mimic = Some(Mimic { of, ratio, offset });
             }
+            // What closes loops moves no body of the tree.
+            (_, "worldbody", "site") | (2, "equality", "connect" | "weld") | (2, "keyframe", "key") => {}
             (2, "actuator", "motor") => {}
             _ => return Err(fields.unsupported()),
         }

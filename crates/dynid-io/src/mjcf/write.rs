@@ -8,6 +8,7 @@ use dynid_model::{Description, Inertia, JointDescription, JointKind, Mat3, Place
 use quick_xml::escape::escape;
 
 use super::JointParameters;
+use super::loops::{Constraints, Loops};
 use super::quaternion::quaternion;
 use crate::robot_error::RobotFileError;
 use crate::urdf::inertial::Inertial;
@@ -38,7 +39,35 @@ pub fn from_description(
     description: &Description,
     joints: &[JointParameters],
 ) -> Result<String, RobotFileError> {
+    write(description, joints, None)
+}
+
+/// Writes a mechanism with loops as MJCF: the tree as [`from_description`] does, and what closes its loops as `<equality>` between sites.
+///
+/// - `spherical` and `planar_revolute` cuts are a `<connect>` of two sites `<loop>.a`, `<loop>.b`, `revolute` ones two of them 0.1 m apart on
+///   the axis, `fixed` ones a `<weld>`, couplings of two joints a `<joint>`. MuJoCo holds them by soft constraints: parts give way by
+///   some micrometres under load, and what a planar cut leaves to the plane is held as well.
+/// - Driven joints alone have motors.
+/// - A `<key name="home">` has a closed pose: a simulation must begin with one.
+///
+/// # Errors
+/// Fails as [`from_description`] does; [`RobotFileError::Unwritable`] for cuts of other kinds, and couplings of more than two joints.
+pub fn from_closed(
+    description: &Description,
+    joints: &[JointParameters],
+    loops: &Loops<'_>,
+) -> Result<String, RobotFileError> {
+    write(description, joints, Some(loops))
+}
+
+fn write(
+    description: &Description,
+    joints: &[JointParameters],
+    loops: Option<&Loops<'_>>,
+) -> Result<String, RobotFileError> {
     let writer = Writer {
+        loops,
+        constraints: loops.map(Loops::constraints).transpose()?.unwrap_or_default(),
         description,
         parameters: joints.iter().map(|p| (p.joint.as_str(), p)).collect(),
         by_name: description.joints.iter().map(|j| (j.name.as_str(), j)).collect(),
@@ -49,10 +78,11 @@ pub fn from_description(
     out.push_str("  <compiler angle=\"radian\" balanceinertia=\"false\"/>\n");
     let _ = writeln!(out, "  <option gravity=\"{x:?} {y:?} {z:?}\"/>");
     out.push_str("  <worldbody>\n");
-    writer.bodies(&mut out)?;
+    let order = writer.bodies(&mut out)?;
     out.push_str("  </worldbody>\n");
     writer.equalities(&mut out)?;
     writer.motors(&mut out);
+    writer.home(&order, &mut out)?;
     out.push_str("</mujoco>\n");
     Ok(out)
 }
@@ -64,13 +94,16 @@ enum Pending<'a> {
 }
 
 struct Writer<'a> {
+    loops: Option<&'a Loops<'a>>,
+    constraints: Constraints<'a>,
     description: &'a Description,
     parameters: HashMap<&'a str, &'a JointParameters>,
     by_name: HashMap<&'a str, &'a JointDescription>,
 }
 
 impl<'a> Writer<'a> {
-    fn bodies(&self, out: &mut String) -> Result<(), RobotFileError> {
+    /// Bodies, and the joints in the order in which they are written.
+    fn bodies(&self, out: &mut String) -> Result<Vec<&'a JointDescription>, RobotFileError> {
         let d = self.description;
         let mut children: HashMap<&str, Vec<&JointDescription>> = HashMap::new();
         for joint in &d.joints {
@@ -80,8 +113,9 @@ impl<'a> Writer<'a> {
             d.links.iter().map(|l| (l.name.as_str(), l.inertia)).collect();
         let owned: HashSet<&str> = d.joints.iter().map(|j| j.child.as_str()).collect();
         let Some(root) = d.links.iter().map(|l| l.name.as_str()).find(|l| !owned.contains(l)) else {
-            return Ok(());
+            return Ok(Vec::new());
         };
+        let mut order = Vec::new();
         let root_is_world = root == WORLD && !d.floating_base;
         let on = |link: &str| children.get(link).into_iter().flatten().rev().copied();
         let body = |joint: &'a JointDescription, depth, moves| Pending::Body {
@@ -94,7 +128,9 @@ impl<'a> Writer<'a> {
         let at_world = |j: &JointDescription| root_is_world || j.kind == JointKind::Floating;
         let mut pending: Vec<Pending<'a>> =
             on(root).filter(|j| at_world(j)).map(|j| body(j, 2, false)).collect();
-        if !root_is_world {
+        if root_is_world {
+            self.sites(out, root, 2);
+        } else {
             pending.push(Pending::Body { link: root, joint: None, depth: 2, moves: d.floating_base });
         }
         while let Some(next) = pending.pop() {
@@ -106,12 +142,52 @@ impl<'a> Writer<'a> {
                     self.open_body(out, link, joint, depth)?;
                     self.inertial(out, link, inertia.get(link).copied().flatten(), moves, depth + 1)?;
                     self.joint(out, joint, depth + 1)?;
+                    self.sites(out, link, depth + 1);
+                    order.extend(joint.filter(|j| j.kind != JointKind::Fixed));
                     pending.push(Pending::Close { depth });
                     let inside = on(link).filter(|j| link != root || !at_world(j));
                     pending.extend(inside.map(|j| body(j, depth + 1, moves)));
                 }
             }
         }
+        Ok(order)
+    }
+
+    /// Points of a link that loops hold.
+    fn sites(&self, out: &mut String, link: &str, depth: usize) {
+        for (name, place) in self.constraints.sites.get(link).into_iter().flatten() {
+            let [x, y, z] = place.translation.0;
+            let indent = 2 * depth;
+            let _ = write!(out, "{:indent$}<site name=\"{}\" pos=\"{x:?} {y:?} {z:?}\"", "", escape(name));
+            if place.rotation != Mat3::identity() {
+                let [w, x, y, z] = quaternion(&place.rotation);
+                let _ = write!(out, " quat=\"{w:?} {x:?} {y:?} {z:?}\"");
+            }
+            out.push_str("/>\n");
+        }
+    }
+
+    /// A closed pose.
+    fn home(&self, order: &[&JointDescription], out: &mut String) -> Result<(), RobotFileError> {
+        let Some(loops) = self.loops else { return Ok(()) };
+        let mut qpos: Vec<String> = Vec::new();
+        for joint in order {
+            let known = loops.home.iter().find(|(name, _)| *name == joint.name);
+            let numbers: Vec<f64> = match (known.map(|(_, q)| &q[..]), joint.kind) {
+                // MJCF has the real part first.
+                (Some([x, y, z, i, j, k, w]), JointKind::Floating) => vec![*x, *y, *z, *w, *i, *j, *k],
+                (Some(q), _) => q.to_vec(),
+                (None, JointKind::Floating) => vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+                (None, _) => vec![0.0],
+            };
+            if numbers.iter().any(|x| !x.is_finite()) {
+                return Err(unwritable("joint", &joint.name, "its home position is not finite".to_owned()));
+            }
+            qpos.extend(numbers.iter().map(|x| format!("{x:?}")));
+        }
+        out.push_str("  <keyframe>\n");
+        let _ = writeln!(out, "    <key name=\"home\" qpos=\"{}\"/>", qpos.join(" "));
+        out.push_str("  </keyframe>\n");
         Ok(())
     }
 
@@ -236,10 +312,13 @@ impl<'a> Writer<'a> {
                 .filter(|j| scalar(j.kind))
                 .filter_map(|j| Some((j, j.mimic.as_ref()?)))
         };
-        if followers().next().is_none() {
+        if followers().next().is_none() && self.constraints.lines.is_empty() {
             return Ok(());
         }
         out.push_str("  <equality>\n");
+        for line in &self.constraints.lines {
+            let _ = writeln!(out, "    {line}");
+        }
         for (joint, mimic) in followers() {
             let leader = self.by_name.get(mimic.of.as_str()).filter(|l| scalar(l.kind));
             if leader.is_none() || !mimic.ratio.is_finite() || !mimic.offset.is_finite() {
@@ -261,8 +340,10 @@ impl<'a> Writer<'a> {
 
     fn motors(&self, out: &mut String) {
         let d = self.description;
-        let driven: Vec<_> =
-            d.joints.iter().filter(|j| scalar(j.kind) && !(d.couple_mimics && j.mimic.is_some())).collect();
+        let is_driven = |j: &JointDescription| self.loops.is_none_or(|loops| loops.driven.contains(&j.name));
+        let has_motor =
+            |j: &&JointDescription| scalar(j.kind) && !(d.couple_mimics && j.mimic.is_some()) && is_driven(j);
+        let driven: Vec<_> = d.joints.iter().filter(has_motor).collect();
         if driven.is_empty() {
             return;
         }
@@ -279,7 +360,7 @@ impl<'a> Writer<'a> {
     }
 }
 
-fn unwritable(what: &'static str, name: &str, reason: String) -> RobotFileError {
+pub(super) fn unwritable(what: &'static str, name: &str, reason: String) -> RobotFileError {
     RobotFileError::Unwritable { format: "MJCF", what, name: name.to_owned(), reason }
 }
 
