@@ -84,7 +84,8 @@ pub struct ExperimentSummary {
 ///
 /// By inverse dynamics the robot is on the trajectory exactly; motors behind springs move as their joints ask for
 /// ([`dynid_sim::ElasticInverse`]), with signs of velocities smooth over 1 % of the slowest joint's rms speed. In closed loop a controller makes it follow (see
-/// [`dynid_sim::run`]); signs of velocities are smooth there.
+/// [`dynid_sim::run`]); signs of velocities are smooth there. Motors behind springs are then the drives, with encoders of their own beside those
+/// of the links; their reference follows from that of the links by the springs of the controller's model, damping left out.
 ///
 /// On robots whose joints have clearance, joints are on the trajectory exactly and journals move in their bearings
 /// ([`dynid_sim::clearance`]), from the centre at rest; offsets of the journals, forces and penetrations are channels.
@@ -108,7 +109,7 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
     let plan = ElementPlan::new(mechanism, &robot.elements, None, |rate| robot.is_driven(rate))?
         .with_loops(robot.closed.clone());
     if settings.mode == SimulateMode::ClosedLoop {
-        refuse_elastic(robot, "simulated in closed loop")?;
+        elastic::refuse_sensors(robot)?;
     }
     if settings.mode == SimulateMode::ClosedLoop && plan.per_rate.iter().flatten().any(|name| name == LOAD) {
         return Err(Error::Unsupported(format!(

@@ -97,7 +97,15 @@ fn what_knows_stiff_joints_alone_says_so() {
     std::fs::write(at.join("arm.toml"), ARM).unwrap();
     std::fs::write(at.join("bad.toml"), ARM.replace("ratio = 100", "ratio = 0")).unwrap();
     let told = |args: &[&str]| String::from_utf8(run(at, args, 2).stderr).unwrap();
-    assert!(told(&["simulate", "arm.toml", "--out", "log.csv", "--closed-loop"]).contains("elastic"));
+    let sensed = ARM.replace("ratio = 100,", "ratio = 100, sensor = true,");
+    std::fs::write(at.join("sensed.toml"), sensed).unwrap();
+    assert!(
+        told(&["simulate", "sensed.toml", "--out", "log.csv", "--closed-loop"]).contains("torque sensor")
+    );
+    let design = told(&["design", "arm.toml"]);
+    assert!(design.contains("elastic") && design.contains("torque of its spring"), "{design}");
+    run(at, &["simulate", "arm.toml", "--out", "log.csv", "--closed-loop", "--duration", "2"], 0);
+    assert!(text(at, "log.csv").starts_with("t,q_j1,q_j1_motor,tau_j1_motor\n"));
     let message = told(&["inspect", "bad.toml"]);
     assert!(message.contains("bad.toml:10:1") && message.contains("elastic.ratio"), "{message}");
 }

@@ -33,7 +33,8 @@ pub struct ChangeJudgement {
     /// Fall of the residual sum of squares when the samples before and after get parameters of their own (Chow 1960), in
     /// units of the noise variance.
     pub total_gain: f64,
-    /// Whether that is more than chance would give.
+    /// Whether that is more than chance would give, and what moved explains it: errors of the model, and noise that grows with the
+    /// motion, give gains too, which no jump of parameters accounts for.
     pub confirmed: bool,
     /// What moved, the most telling first; empty unless confirmed.
     pub moved: Vec<JudgedHypothesis>,
@@ -73,6 +74,10 @@ const CANDIDATES: usize = 24;
 /// over them, and a single parameter over the body. Hypotheses are selected one after the other, each beside those before it, while
 /// the Bayes factor grows.
 ///
+/// A change is confirmed if the gain is above the quantile of `χ²_p` at `level`, and if the Bayes factor of what was selected
+/// is above `H/level` for `H` hypotheses: without change the mean of each Bayes factor is 1, so by Markov's inequality one of them comes
+/// as far with a probability of `level` at most.
+///
 /// # Panics
 /// If factors or hypotheses have different numbers of parameters.
 pub fn judge_change(
@@ -107,9 +112,9 @@ pub fn judge_change(
     };
     alone.sort_by(by_evidence);
     let significant = chi_squared_quantile(1.0 - settings.level, p as f64).unwrap_or(f64::INFINITY);
-    let confirmed = total_gain > significant;
+    let significant = total_gain > significant;
     let (mut selected, mut moved) = (nothing, Vec::<JudgedHypothesis>::new());
-    while confirmed && moved.len() < settings.most {
+    while significant && moved.len() < settings.most {
         let reached = moved.last().map_or(0.0, |m| m.evidence);
         let left = alone.iter().take(CANDIDATES).map(|a| a.hypothesis);
         let left = left.filter(|h| moved.iter().all(|m| m.hypothesis != *h));
@@ -122,6 +127,11 @@ pub fn judge_change(
             }
             _ => break,
         }
+    }
+    let least_evidence = (hypotheses.len() as f64 / settings.level).ln();
+    let confirmed = moved.last().is_some_and(|m| m.evidence > least_evidence);
+    if !confirmed {
+        moved.clear();
     }
     let jumps = match moved.is_empty() {
         true => Vec::new(),
@@ -214,12 +224,16 @@ mod tests {
 
     /// Rows of four parameters with unit noise that depends on nothing but the row.
     fn factor(x: &[f64; 4], rows: std::ops::Range<u32>) -> SquareRoot {
+        noisy_factor(x, rows, 1.0)
+    }
+
+    fn noisy_factor(x: &[f64; 4], rows: std::ops::Range<u32>, size: f64) -> SquareRoot {
         let mut root = SquareRoot::new(4);
         for n in rows {
             let t = f64::from(n);
             let phi = [(0.7 * t).sin(), (1.3 * t).cos(), (0.31 * t).sin() * (1.9 * t).cos(), 1.0];
             let noise = (12.9898 * t).sin() * 43758.5453;
-            let noise = ((noise - noise.floor()) - 0.5) * 12f64.sqrt();
+            let noise = size * ((noise - noise.floor()) - 0.5) * 12f64.sqrt();
             let y = phi.iter().zip(x).map(|(a, b)| a * b).sum::<f64>() + noise;
             root.push(&mut [phi[0], phi[1], phi[2], phi[3], y]);
         }
@@ -265,6 +279,24 @@ mod tests {
         let mut named: Vec<usize> = both.moved.iter().map(|m| m.hypothesis).collect();
         named.sort_unstable();
         assert_eq!(named, [3, 4], "{both:?}");
+    }
+
+    /// Noise that is larger than before gains with parameters of its own, and no jump accounts for it.
+    #[test]
+    fn what_no_hypothesis_explains_is_no_change() {
+        let truth = [1.0, 2.0, -1.0, 0.5];
+        let before = factor(&truth, 0..4000);
+        let mut after = noisy_factor(&truth, 5500..5540, 4.0);
+        let judgement = judge(&before, &after);
+        // More than chance would give: χ² of 4 at 1e-6 is 33.4.
+        assert!(judgement.total_gain > 33.4, "{judgement:?}");
+        assert!(
+            !judgement.confirmed && judgement.moved.is_empty() && judgement.jumps.is_empty(),
+            "{judgement:?}"
+        );
+        // Of its true size it is no gain at all.
+        after.discount(1.0 / 16.0);
+        assert!(judge(&before, &after).total_gain < 10.0);
     }
 
     #[test]

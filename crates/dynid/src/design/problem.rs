@@ -21,7 +21,7 @@ use crate::Error;
 use crate::elements::ElementPlan;
 use crate::fault::DesignError;
 use crate::nominal::{nominal_parameters, typical_efforts, with_nominal_shape};
-use crate::robot::{Robot, refuse_elastic};
+use crate::robot::Robot;
 use crate::settings::known;
 
 /// A nominal base parameter below this share of the largest of the same unit counts as so large: relative errors of what
@@ -78,6 +78,19 @@ pub(super) fn pose(problem: &RobotProblem, config: &DesignConfig) -> Result<Opti
     Ok(Some(stated.into_iter().enumerate().map(or_home).collect()))
 }
 
+/// Refuses elastic joints: positions of motors depend on the efforts that the design is to find parameters of.
+fn refuse_springs(robot: &Robot) -> Result<(), Error> {
+    match robot.elements.elastic.first() {
+        None => Ok(()),
+        Some(e) => Err(Error::Unsupported(format!(
+            "joint `{}` is elastic: its motor goes where the torque of its spring puts it, so the motor's acceleration needs the motion of the links \
+             with four time derivatives, and designs have joint trajectories with two: design with the robot file without `elastic`, and \
+             try the motion by `dynid simulate`",
+            e.joint
+        ))),
+    }
+}
+
 pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProblem, Error> {
     let poses = loops::poses(robot)?;
     if let (None, Some(x)) = (&poses, config.limits.singularity) {
@@ -89,7 +102,7 @@ pub(super) fn problem(robot: &Robot, config: &DesignConfig) -> Result<RobotProbl
             "a floating base follows no joint trajectory: design for the arm alone".to_owned(),
         ));
     }
-    refuse_elastic(robot, "designed for")?;
+    refuse_springs(robot)?;
     let all = mechanism.rate_names();
     let joints: Vec<String> = loops::coordinates(robot).into_iter().map(|rate| all[rate].clone()).collect();
     let mut elements = robot.elements.with_ideal_bearings();

@@ -316,6 +316,11 @@ impl Running {
         let moved = judgement.moved.iter().map(|m| &self.hypotheses.list[m.hypothesis]);
         let known = after_change(&self.unchanged, after, moved);
         self.counts.changes += u64::from(judgement.confirmed);
+        if !judgement.confirmed {
+            // Innovations were as large without a change: from now on that is usual.
+            let size = remaining_variance(after);
+            self.learned.innovations.size.iter_mut().for_each(|own| *own *= size);
+        }
         self.estimator.set_information(&known)?;
         let (moved, alternatives) = self.hypotheses.tell(structure, &judgement);
         Ok(Event::Change { time: self.newest, alarm, confirmed: judgement.confirmed, moved, alternatives })
@@ -433,6 +438,12 @@ impl Running {
             transfer.integer(count);
         }
     }
+}
+
+/// Variance of the rows of a stretch about its own fit, in units of what is usual, at least 1.
+fn remaining_variance(stretch: &SquareRoot) -> f64 {
+    let freedom = stretch.weight() - stretch.columns() as f64;
+    if freedom > 0.0 { (stretch.rss() / freedom).max(1.0) } else { 1.0 }
 }
 
 fn transfer_estimator(estimator: &mut Estimator, transfer: &mut Transfer<'_>) {

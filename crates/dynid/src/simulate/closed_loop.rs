@@ -10,6 +10,7 @@ use dynid_sim::{
 };
 
 use super::clearance;
+use super::elastic::{Follower, undamped};
 use super::settings::SimulateSettings;
 use super::trajectory::Reference;
 use super::{ExperimentSummary, SimulatedLog, named};
@@ -34,7 +35,6 @@ pub(super) fn experiment(
     }
     let (shape, joints) = (model.parameters().shape_start(), names(&model));
     let believed = wrong_model(&values, table.model_error, settings.seed);
-    let wanted = |time: f64| -> Vec<Wanted> { reference.at(time) };
     let experiment = ExperimentSettings {
         duration_s: settings.duration_s,
         log_rate_hz: settings.rate_hz,
@@ -44,8 +44,19 @@ pub(super) fn experiment(
         channels,
         seed: settings.seed,
     };
+    let wanted = |time: f64| -> Vec<Wanted> { reference.at(time) };
     let (mut sensors, mut journals, mut parameters) = (Vec::new(), None, Vec::new());
-    let result = if let Some(contacts) = with_clearance {
+    let result = if !model.coordinates().is_empty() {
+        let springs = undamped(&model, &believed);
+        let follower = Follower::new(&model, &springs, &shape, reference, &experiment.channels)?;
+        let plant = |values| Plant::new(model.clone(), values, shape.clone(), plant_table.sign_width);
+        let nominal = plant(believed.clone())?;
+        let ran = run(&mut plant(values.clone())?, &nominal, &|time| follower.at(time), &experiment);
+        match follower.fault() {
+            Some(fault) => return Err(fault.into()),
+            None => ran?,
+        }
+    } else if let Some(contacts) = with_clearance {
         let linear = clearance::linear(&contacts, &model, &values);
         parameters = clearance::contact_parameters(&contacts, &linear);
         let width = plant_table.sign_width;
@@ -82,7 +93,7 @@ pub(super) fn experiment(
     truth.extend(parameters);
     Ok(SimulatedLog {
         joints,
-        undriven: vec![false; model.outputs().len()],
+        undriven: (0..model.outputs().len()).map(|output| model.is_undriven(output)).collect(),
         time: log.time,
         position: log.position,
         velocity: settings.log_velocity.then_some(log.velocity),

@@ -10,7 +10,7 @@ use dynid::estimate::{Estimate, Split};
 use dynid::model::EffortModel;
 use dynid::model::element::CubicSpring;
 use dynid::robot::{Robot, RobotOptions};
-use dynid::simulate::{SimulateSettings, SimulatedLog, simulate};
+use dynid::simulate::{SimulateMode, SimulateSettings, SimulatedLog, simulate};
 use dynid::{Run, identify};
 
 /// Two links, one motor geared down with a hardening spring, one that turns against its joint with a linear one.
@@ -158,6 +158,60 @@ fn an_elastic_arm_is_identified_from_positions_of_motors_and_joints() {
     )
     .unwrap();
     assert!(exported.text.contains("\"motor\": \"m2\"") && exported.difference < 1e-9);
+}
+
+fn in_closed_loop(seed: u64) -> SimulateSettings {
+    let mode = SimulateMode::ClosedLoop;
+    SimulateSettings { mode, duration_s: 30.0, seed, ..SimulateSettings::default() }
+}
+
+/// Sensors as bad as real ones, drives that ripple, a controller that is wrong by 10 %: springs are found again, and all else within its
+/// intervals.
+#[test]
+fn a_controlled_elastic_arm_is_identified() {
+    let log = simulate(&robot(ARM).unwrap(), &in_closed_loop(1)).unwrap();
+    assert_eq!(log.joints, ["j1", "j2", "j1_motor", "m2"]);
+    assert_eq!(log.undriven, [true, true, false, false]);
+    assert!(log.clean[3][..2].iter().flatten().all(|effort| *effort == 0.0), "no drive acts on links");
+    let experiment = log.experiment.as_ref().unwrap();
+    assert!(experiment.energy.residual().abs() < 1e-6 * experiment.energy.drive_work.abs());
+    assert_eq!(experiment.ripple[0].amplitude, 0.0);
+    assert!(experiment.ripple[2].amplitude > 0.0);
+    let config = "robot = \"robot.toml\"\n[[log]]\npath = \"log.csv\"\n";
+    let (_folder, found) = identified(ARM, &[("log.csv", table(&log))], config);
+    let estimate = found.estimate();
+    for (name, value) in &log.truth {
+        let Some(own) = estimate.base_parameters.iter().find(|p| p.name == *name) else { continue };
+        if name.starts_with("link1") || *value == 0.0 {
+            continue;
+        }
+        let off = deviations(&estimate, name, *value);
+        assert!(off.abs() < 3.0, "{name}: {off} deviations off {value}");
+        if name.ends_with(".k1") {
+            assert!((own.value.unwrap() / value - 1.0).abs() < 0.02, "{name}: {own:?}");
+        }
+    }
+}
+
+#[test]
+fn what_a_closed_loop_cannot_do_with_springs_is_told() {
+    let short = SimulateSettings { duration_s: 2.0, ..in_closed_loop(1) };
+    let told = |text: &str| simulate(&robot(text).unwrap(), &short).unwrap_err().to_string();
+    let sensed = ARM
+        .replace("k2 = 4.0e7", "k2 = 4.0e7, sensor = true")
+        .replace("cubic = false", "cubic = false, sensor = true");
+    let message = told(&sensed);
+    assert!(message.contains("torque sensor") && message.contains("leave out `sensor`"), "{message}");
+    let message = told(&ARM.replace("rotor = { inertia = 6e-5 }", ""));
+    assert!(message.contains("`m2`") && message.contains("rotor inertia"), "{message}");
+    let message = told(&ARM.replace("k2 = 4.0e7", "k2 = -2.0e9"));
+    assert!(message.contains("`j1`") && message.contains("softens"), "{message}");
+    let followed = SimulateSettings { follow: Some("motion.csv".into()), ..in_closed_loop(1) };
+    assert!(simulate(&robot(ARM).unwrap(), &followed).is_err());
+    // Damping moves the plant; the reference of motors does without.
+    let damped = robot(&ARM.replace("k2 = 4.0e7", "k2 = 4.0e7, damping = true, d = 5.0")).unwrap();
+    let log = simulate(&damped, &short).unwrap();
+    assert!(log.truth.iter().any(|(name, value)| name == "j1.d" && *value == 5.0));
 }
 
 /// A joint whose sensor measures the load: brake and friction as in the published test programme.
