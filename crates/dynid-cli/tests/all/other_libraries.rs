@@ -146,3 +146,38 @@ fn pinocchio_and_mujoco_give_the_effort_of_the_estimate() {
         check(&python, &format!("{robot} as identified"), &file, |_, identified, _| identified);
     }
 }
+
+#[test]
+fn loops_are_closed_in_mujoco_and_its_drives_need_the_same_efforts() {
+    let Some(python) = python() else { return skip("a Python with the modules pinocchio and mujoco") };
+    let robots = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots");
+    for robot in ["prr3", "fourbar", "fivebar"] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name).display().to_string();
+        // Friction that MJCF has a place for.
+        let text = std::fs::read_to_string(robots.join(format!("{robot}.toml"))).unwrap();
+        let text = match text.contains("[defaults]") {
+            true => text,
+            false => format!("{text}\n[defaults]\nelements = [\"coulomb\", \"viscous\"]\n"),
+        };
+        std::fs::write(path("robot.toml"), text).unwrap();
+        let at = folder.path();
+        let simulate = "simulate robot.toml --out log.csv --clean clean.csv --duration 12 --rate-hz 100 --encoder-bits 0 --effort-noise 0.001";
+        run(at, &simulate.split(' ').collect::<Vec<_>>(), 0);
+        // A short log may fail a verdict: what counts here is the file.
+        dynid().current_dir(at).args(["identify", "robot.toml", "--log", "log.csv"]).output().unwrap();
+        let estimate = "dynid-out/estimate.json";
+        run(at, &["export", estimate, "--mjcf", "robot.xml", "--allow-unphysical"], 0);
+        run(at, &["predict", estimate, "--states", "clean.csv", "--out", "effort.csv"], 0);
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/all/other_libraries/loops.py");
+        let mut command = Command::new(&python);
+        command.arg(script).args([path("robot.xml"), path("clean.csv"), path("effort.csv")]);
+        let said = output(&mut command, 120).unwrap_or_else(|| panic!("{robot}: MuJoCo refuses the file"));
+        let said: Value = serde_json::from_str(said.trim()).unwrap();
+        println!("{robot}: {said}");
+        assert!(
+            said["gap"].as_f64().unwrap() < 1e-9 && said["difference"].as_f64().unwrap() < 0.02,
+            "{robot}: {said}"
+        );
+    }
+}

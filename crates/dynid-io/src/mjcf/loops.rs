@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use dynid_model::closed::{ClosureDescription, Condition, CutKind, LinkFrame};
 use dynid_model::{Placement, Vec3};
+use quick_xml::escape::escape;
 
 use super::write::unwritable;
 use crate::robot_error::RobotFileError;
@@ -40,11 +41,11 @@ impl<'a> Loops<'a> {
             let name = closure.name.as_str();
             match &closure.condition {
                 Condition::Coordinates { terms, constant } => match &terms[..] {
-                    [(first, f), (second, g)] if *f != 0.0 => out.lines.push(format!(
-                        "<joint name=\"{name}\" joint1=\"{first}\" joint2=\"{second}\" polycoef=\"{:?} {:?} 0 0 0\"/>",
-                        constant / f,
-                        -g / f
-                    )),
+                    [(first, f), (second, g)] if *f != 0.0 => {
+                        let names = [("name", name), ("joint1", first.as_str()), ("joint2", second.as_str())];
+                        let polynomial = format!(" polycoef=\"{:?} {:?} 0 0 0\"", constant / f, -g / f);
+                        out.line("joint", &names, &polynomial);
+                    }
                     _ => return Err(refused(name, "couples more than two joints")),
                 },
                 Condition::Joint { kind, a, b } => match kind {
@@ -55,7 +56,11 @@ impl<'a> Loops<'a> {
                     }
                     CutKind::Fixed => {
                         let [one, two] = out.sites(name, (a, b), Vec3::zero());
-                        out.lines.push(format!("<weld name=\"{name}\" site1=\"{one}\" site2=\"{two}\"/>"));
+                        out.line(
+                            "weld",
+                            &[("name", name), ("site1", one.as_str()), ("site2", two.as_str())],
+                            "",
+                        );
                     }
                     _ => {
                         let why = format!("is a `{}` joint, which MJCF has no constraint for", kind.name());
@@ -69,6 +74,11 @@ impl<'a> Loops<'a> {
 }
 
 impl<'a> Constraints<'a> {
+    fn line(&mut self, element: &str, names: &[(&str, &str)], more: &str) {
+        let names: String = names.iter().map(|(key, name)| format!(" {key}=\"{}\"", escape(*name))).collect();
+        self.lines.push(format!("<{element}{names}{more}/>"));
+    }
+
     /// Sites at a point of both frames.
     fn sites(&mut self, name: &str, (a, b): (&'a LinkFrame, &'a LinkFrame), point: Vec3<f64>) -> [String; 2] {
         [(a, "a"), (b, "b")].map(|(frame, side)| {
@@ -82,7 +92,7 @@ impl<'a> Constraints<'a> {
 
     fn connect(&mut self, name: &str, frames: (&'a LinkFrame, &'a LinkFrame), point: Vec3<f64>) {
         let [one, two] = self.sites(name, frames, point);
-        self.lines.push(format!("<connect name=\"{name}\" site1=\"{one}\" site2=\"{two}\"/>"));
+        self.line("connect", &[("name", name), ("site1", one.as_str()), ("site2", two.as_str())], "");
     }
 }
 

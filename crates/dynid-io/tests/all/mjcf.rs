@@ -4,6 +4,7 @@
 
 use dynid_io::mjcf::{self, JointParameters};
 use dynid_io::{robot, urdf};
+use dynid_model::closed::{ClosureDescription, Condition, CutKind, LinkFrame};
 use dynid_model::*;
 use dynid_testing::shared;
 
@@ -152,4 +153,50 @@ fn public_robots_survive() {
         d.floating_base = floating;
         check(&d, &[]);
     }
+}
+
+#[test]
+fn loops_are_equalities_between_sites_and_begin_closed() {
+    let tree = urdf::parse(TREE, "tree").unwrap();
+    let names: Vec<String> =
+        tree.joints.iter().filter(|j| j.kind != JointKind::Fixed).map(|j| j.name.clone()).collect();
+    let (one, two) = (tree.links[1].name.clone(), tree.links[2].name.clone());
+    let frame = |link: &str, x: f64| LinkFrame {
+        link: link.to_owned(),
+        placement: Placement::translate(x, 0.0, 0.0),
+    };
+    let cut = |kind| ClosureDescription {
+        name: "pin".to_owned(),
+        condition: Condition::Joint { kind, a: frame(&one, 0.1), b: frame(&two, 0.2) },
+    };
+    let driven = vec![names[0].clone()];
+    let home = vec![(names[0].clone(), vec![0.25])];
+    let written = |closure: ClosureDescription| {
+        let closures = [closure];
+        let loops = mjcf::Loops { closures: &closures, driven: &driven, home: &home };
+        mjcf::from_closed(&tree, &[], &loops)
+    };
+    let count = |text: &str, what: &str| text.matches(what).count();
+    let text = written(cut(CutKind::Revolute)).unwrap();
+    assert_eq!((count(&text, "<connect"), count(&text, "<site")), (2, 4));
+    assert!(text.contains("name=\"pin.axis.b\" pos=\"0.2 0.0 0.1\""), "{text}");
+    assert_eq!(count(&text, "<motor"), 1);
+    let key = text.lines().find(|line| line.contains("<key ")).unwrap();
+    assert_eq!(key.matches("0.25").count(), 1);
+    assert_eq!(key.split('"').nth(3).unwrap().split(' ').count(), names.len());
+    // The tree is read back as without loops.
+    let plain = mjcf::parse(&mjcf::from_description(&tree, &[]).unwrap(), "x").unwrap();
+    assert_eq!(mjcf::parse(&text, "x").unwrap().description, plain.description);
+    assert_eq!(count(&written(cut(CutKind::Spherical)).unwrap(), "<connect"), 1);
+    assert_eq!(count(&written(cut(CutKind::Fixed)).unwrap(), "<weld"), 1);
+    let refused = written(cut(CutKind::Universal)).unwrap_err().to_string();
+    assert!(refused.contains("`pin`") && refused.contains("universal"), "{refused}");
+    let coupled = |terms: Vec<(String, f64)>| ClosureDescription {
+        name: "gear".to_owned(),
+        condition: Condition::Coordinates { terms, constant: 0.5 },
+    };
+    let [a, b, c] = [0, 1, 2].map(|k| names[k].clone());
+    let text = written(coupled(vec![(a.clone(), 2.0), (b.clone(), -4.0)])).unwrap();
+    assert!(text.contains("polycoef=\"0.25 2.0 0 0 0\""), "{text}");
+    assert!(written(coupled(vec![(a, 1.0), (b, 1.0), (c, 1.0)])).is_err());
 }
