@@ -6,7 +6,7 @@ use dynid_model::closed::{ClosureDescription, Condition, CutKind, LinkFrame};
 use dynid_model::{Placement, Vec3};
 use quick_xml::escape::escape;
 
-use super::write::unwritable;
+use super::unwritable;
 use crate::robot_error::RobotFileError;
 
 /// Distance between the two points that make the axis of a revolute joint, m.

@@ -9,6 +9,8 @@ pub use loops::Loops;
 pub use read::{MjcfRobot, parse};
 pub use write::{from_closed, from_description};
 
+use crate::robot_error::RobotFileError;
+
 /// What a joint of MJCF states about dissipation and rotor, all of it on the drive's side of the effort:
 /// `armature · q̈ + damping · q̇ + frictionloss · sign(q̇)`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -21,4 +23,8 @@ pub struct JointParameters {
     pub friction_loss: f64,
     /// Rotor inertia behind the gear `armature`, kg m² or kg.
     pub armature: f64,
+}
+
+fn unwritable(what: &'static str, name: &str, reason: String) -> RobotFileError {
+    RobotFileError::Unwritable { format: "MJCF", what, name: name.to_owned(), reason }
 }

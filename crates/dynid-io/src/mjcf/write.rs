@@ -7,9 +7,9 @@ use dynid_model::mechanism::ROOT_JOINT;
 use dynid_model::{Description, Inertia, JointDescription, JointKind, Mat3, Placement, Vec3};
 use quick_xml::escape::escape;
 
-use super::JointParameters;
 use super::loops::{Constraints, Loops};
 use super::quaternion::quaternion;
+use super::{JointParameters, unwritable};
 use crate::robot_error::RobotFileError;
 use crate::urdf::inertial::Inertial;
 
@@ -358,10 +358,6 @@ impl<'a> Writer<'a> {
         }
         out.push_str("  </actuator>\n");
     }
-}
-
-pub(super) fn unwritable(what: &'static str, name: &str, reason: String) -> RobotFileError {
-    RobotFileError::Unwritable { format: "MJCF", what, name: name.to_owned(), reason }
 }
 
 fn scalar(kind: JointKind) -> bool {
