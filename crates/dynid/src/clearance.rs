@@ -7,7 +7,7 @@ use dynid_clearance::swing::{self, SwingSettings};
 use dynid_io::{ClearanceSpec, MappingSpec};
 use dynid_model::{EffortModel, JournalPath, MotionBlock, RobotModel, journal_channels};
 use dynid_motion::Channel;
-use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, States};
+use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, States, prepare};
 use serde::Serialize;
 
 use crate::Error;
@@ -117,8 +117,10 @@ pub fn clearance(
         )));
     }
     let settings = ConditioningSettings::default();
-    let prepared =
-        logs::load(log, &crate::log::axes(&model), columns, motor_side)?.prepare(&model, &settings)?;
+    let loaded = logs::load(log, &crate::log::axes(&model), columns, motor_side)?;
+    let mut prepared = loaded.prepare(&model, &settings)?;
+    // Deviations count samples with noise of their own: offsets as the probes gave them, not as a fit filters them.
+    prepared.channels = prepare(&loaded.log, &model, &settings)?.channels;
     let values = estimate.values(Split::Consistent);
     let alignment = Alignment {
         state_hz: estimate.model.state_hz,

@@ -5,8 +5,8 @@
 use std::path::{Path, PathBuf};
 
 use dynid::estimators::distribution::t_quantile;
-use dynid::model::EffortModel;
 use dynid::model::closed::ClosedDynamics;
+use dynid::model::{EffortModel, MotionBlock};
 use dynid::simulate::{SimulateMode, SimulateSettings, simulate};
 use dynid::{Config, Robot, RobotOptions};
 use dynid::{Run, identify};
@@ -199,4 +199,25 @@ fn states_of_a_stewart_platform_are_those_of_its_drives() {
     let error = dynid::predict::efforts(&model, &values, &read(table(30.0))).unwrap_err().to_string();
     assert!(error.contains("states: row 1") && error.contains("ball"), "{error}");
     std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn a_block_may_begin_at_a_pose_that_is_not_straight_from_home() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/prr3.toml");
+    let robot = Robot::load(&file, &RobotOptions::default()).unwrap();
+    let machine = robot.closed.clone().unwrap();
+    let skeleton = robot.skeleton().unwrap();
+    let closed = skeleton.closed().unwrap();
+    let (pose, still) = ([-0.5565, 0.2240, 0.6206], [0.0; 3]);
+    let mut work = machine.workspace();
+    // The straight way passes a singular pose.
+    assert!(machine.reach(&mut work, &pose).is_err());
+    let motion = MotionBlock::plain(1, &pose, &still, &still);
+    closed.reachable(&motion).unwrap();
+    let q = closed.joint_motion(&motion).q;
+    machine.take(&mut work, &q).unwrap();
+    assert!(q.iter().zip(work.positions()).all(|(a, b)| (a - b).abs() < 1e-10));
+    // A pose that does not exist stays none.
+    let far = [0.8, -0.8, 0.8];
+    assert!(closed.reachable(&MotionBlock::plain(1, &far, &still, &still)).is_err());
 }
