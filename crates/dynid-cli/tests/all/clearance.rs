@@ -64,12 +64,20 @@ fn joints_with_clearance_pass_through_the_commands() {
 
     std::fs::write(at.join("run.toml"), "robot = \"xy.toml\"\nout = \"out\"\n[[log]]\npath = \"log.csv\"\n")
         .unwrap();
-    let said = stderr(at, &["identify", "run.toml"], 0);
-    assert!(said.contains("joint `j2` has clearance (gap 50 µm), which is not part of the fit"), "{said}");
+    let said = run(at, &["identify", "run.toml"], 0);
+    let [said, told] = [said.stdout, said.stderr].map(|text| String::from_utf8(text).unwrap());
+    assert!(said.contains("[ok] clearance of the joints"), "{said}");
+    assert!(!said.contains("not part of the fit") && !told.contains("not part of the fit"), "{said}{told}");
     let estimate: Value = serde_json::from_str(&text(at, "out/estimate.json")).unwrap();
     assert_eq!(estimate["joints"], serde_json::json!(["j1", "j2"]));
     let base = estimate["base_parameters"].as_array().unwrap();
     assert!(base.iter().all(|p| !p["name"].as_str().unwrap().contains("contact")));
+    assert!(base.iter().any(|p| p["name"] == "j2.mu"));
+    let ideal = text(at, "run.toml").replace("[[log]]", "[elements]\nclearance = \"ideal\"\n[[log]]");
+    std::fs::write(at.join("ideal.toml"), ideal).unwrap();
+    let said = run(at, &["identify", "ideal.toml", "--out", "ideal"], 0);
+    let said = [said.stdout, said.stderr].map(|text| String::from_utf8(text).unwrap()).concat();
+    assert!(said.contains("joint `j2` has clearance (gap 50 µm), which is not part of the fit"), "{said}");
     let rows = run(at, &["regressor", "xy.toml", "--states", "clean.csv", "--json"], 0).stdout;
     let rows: Value = serde_json::from_slice(&rows).unwrap();
     assert_eq!(rows["joints"], serde_json::json!(["j1", "j2"]));
@@ -84,8 +92,9 @@ fn faults_of_clearance_are_told_with_file_and_field() {
     let line = robot.lines().position(|l| l == "[element.j1]").unwrap() + 1;
     let message = stderr(at, &["inspect", "bad.toml"], 2);
     assert!(message.contains(&format!("bad.toml:{line}:1: element.j1: clearance.gap")), "{message}");
-    let message = stderr(at, &["simulate", "xy.toml", "--out", "log.csv", "--closed-loop"], 2);
-    assert!(message.contains("clearance") && message.contains("closed loop"), "{message}");
+    std::fs::write(at.join("settle.toml"), "mode = \"closed_loop\"\nsettle_s = 1.0\n").unwrap();
+    let message = stderr(at, &["simulate", "xy.toml", "--out", "log.csv", "--config", "settle.toml"], 2);
+    assert!(message.contains("settle_s") && message.contains("closed loop"), "{message}");
 }
 
 /// Every `step`-th row of a log without columns that begin with `left_out`.
