@@ -206,6 +206,115 @@ fn of_sliders(test: &str, acceleration: f64) {
     predicts_when_read_again(&id);
 }
 
+/// A scissor lift that carries a load: the lower foot is driven, each pin and both feet rub by what presses on them.
+/// Two pins are cut: that of the two bars, and that of bar and upper foot. Home: bars at 45 degrees.
+const LIFT: &str = r#"
+name = "lift"
+gravity = [0, -9.81, 0]
+actuated = ["foot"]
+loop = [
+  { name = "middle", kind = "planar_revolute", a = "bar1", b = "bar2", a_xyz = [0.4, 0, 0], b_xyz = [0.4, 0, 0] },
+  { name = "top", kind = "planar_revolute", a = "bar2", b = "upper_foot", a_xyz = [0.8, 0, 0] },
+]
+body = [
+  { name = "foot", parent = "ground", joint = { kind = "prismatic", axis = [1, 0, 0], limits = { position = [0.35, 0.72], velocity = 0.4, effort = 3000 } }, mass = 4, com = [0, 0, 0], inertia_com = [0.02, 0.02, 0.02, 0, 0, 0] },
+  { name = "bar1", parent = "foot", joint = { axis = [0, 0, 1] }, mass = 6, com = [0.4, 0, 0], inertia_com = [0.01, 0.32, 0.32, 0, 0, 0] },
+  { name = "table", parent = "bar1", joint = { xyz = [0.8, 0, 0], axis = [0, 0, 1] }, mass = 30, com = [0.3, 0.1, 0], inertia_com = [0.5, 1, 1, 0, 0, 0] },
+  { name = "upper_foot", parent = "table", joint = { kind = "prismatic", axis = [1, 0, 0] }, mass = 2, com = [0, 0, 0], inertia_com = [0.01, 0.01, 0.01, 0, 0, 0] },
+  { name = "bar2", parent = "ground", joint = { axis = [0, 0, 1] }, mass = 6, com = [0.4, 0, 0], inertia_com = [0.01, 0.32, 0.32, 0, 0, 0] },
+]
+[home]
+foot = 0.5656854249492381
+bar1 = 2.356194490192345
+table = -2.356194490192345
+upper_foot = 0.5656854249492381
+bar2 = 0.7853981633974483
+[element.foot]
+elements = ["viscous", "reaction_friction"]
+viscous = { coefficient = 200 }
+reaction_friction = { loads = [{ force = ["y"] }], mu_c = 0.15 }
+[element.upper_foot]
+elements = ["reaction_friction"]
+reaction_friction = { loads = [{ force = ["y"] }], mu_c = 0.15 }
+[element.bar1]
+elements = ["reaction_friction"]
+reaction_friction = { loads = [{ force = "radial", radius = 0.02 }], mu_c = 0.2 }
+[element.bar2]
+elements = ["reaction_friction"]
+reaction_friction = { loads = [{ force = "radial", radius = 0.02 }], mu_c = 0.2 }
+[element.table]
+elements = ["reaction_friction"]
+reaction_friction = { loads = [{ force = "radial", radius = 0.02 }], mu_c = 0.2 }
+"#;
+
+/// One motion moves five joints: the feet are of one make, and so are the pins. What rubs at which of them stays a guess, what all of
+/// them do to the drive does not.
+#[test]
+fn feet_and_pins_of_a_scissor_lift() {
+    let settings = SimulateSettings {
+        duration_s: 60.0,
+        rate_hz: 250.0,
+        effort_noise: 0.005,
+        encoder_bits: 20,
+        delay_samples: Some(0.0),
+        ..SimulateSettings::default()
+    };
+    let bench = Bench::new("lift", LIFT, &settings);
+    let id = bench.identify("tie = [[\"foot.mu_c\", \"upper_foot.mu_c\"], [\"bar1.mu_c\", \"bar2.mu_c\", \"table.mu_c\"]]\n[elements]\nfriction = \"given\"");
+    println!("{:?}", id.loads.unwrap());
+    assert!(id.loads.unwrap().change <= 1e-6);
+    let ours = bench.against_noise(&id);
+    let joints = ["foot", "upper_foot", "bar1", "bar2", "table"];
+    let plain: String = joints.map(|j| format!("{j} = [\"coulomb\", \"viscous\"]\n")).concat();
+    let plain = bench.against_noise(&bench.identify(&format!("[elements.joint]\n{plain}")));
+    println!("errors over noise: {ours:.2?}, with friction that no load changes {plain:.2?}");
+    assert!(ours.iter().all(|r| *r < 1.2), "{ours:?}");
+    assert!(plain.iter().all(|r| *r > 3.0), "{plain:?}");
+    bench.check(&id, &["foot.fv"]);
+    predicts_when_read_again(&id);
+}
+
+/// Friction of the bearings of the arms, and of the universal joints at the elbows, which nothing drives.
+#[test]
+fn bearings_and_universal_joints_of_a_delta() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/delta.toml");
+    let mut robot = std::fs::read_to_string(path).unwrap();
+    for k in 1..=3 {
+        robot += &format!(
+            "[element.arm{k}]\nelements = [\"viscous\", \"reaction_friction\", \"rotor\"]\nviscous = {{ coefficient = 0.05 }}\n\
+             rotor = {{ inertia = 0.01 }}\nreaction_friction = {{ loads = [{{ force = \"radial\", radius = 0.02 }}], mu_c = 0.3 }}\n\
+             [element.cross{k}]\nelements = [\"reaction_friction\"]\n\
+             reaction_friction = {{ loads = [{{ force = \"radial\", radius = 0.015 }}], mu_c = 0.2 }}\n"
+        );
+    }
+    let settings = SimulateSettings {
+        duration_s: 60.0,
+        rate_hz: 250.0,
+        effort_noise: 0.005,
+        encoder_bits: 20,
+        delay_samples: Some(0.0),
+        ..SimulateSettings::default()
+    };
+    let bench = Bench::new("delta", &robot, &settings);
+    let id = bench.identify(
+        "tie = [[\"cross1.mu_c\", \"cross2.mu_c\", \"cross3.mu_c\"]]\n[elements]\nfriction = \"given\"",
+    );
+    println!("{:?}", id.loads.unwrap());
+    assert!(id.loads.unwrap().change <= 1e-6);
+    let ours = bench.against_noise(&id);
+    let plain: String = (1..=3)
+        .map(|k| {
+            format!("arm{k} = [\"coulomb\", \"viscous\", \"rotor\"]\ncross{k} = [\"coulomb\", \"viscous\"]\n")
+        })
+        .collect();
+    let plain = bench.against_noise(&bench.identify(&format!("[elements.joint]\n{plain}")));
+    println!("errors over noise: {ours:.2?}, with friction that no load changes {plain:.2?}");
+    assert!(ours.iter().all(|r| *r < 1.2), "{ours:?}");
+    assert!(plain.iter().all(|r| *r > 3.0), "{plain:?}");
+    bench.check(&id, &["arm1.mu_c", "arm2.mu_c", "arm3.mu_c"]);
+    predicts_when_read_again(&id);
+}
+
 #[test]
 fn what_presses_on_no_joint_is_refused() {
     let parse = |from: &str, to: &str| {
