@@ -53,9 +53,6 @@ fn carrier(payload: &PayloadConfig, robot: &Robot) -> Result<usize, Error> {
     let mechanism = &robot.mechanism;
     let bodies = mechanism.bodies();
     let unsupported = |why: &str| Err(Error::Unsupported(format!("payload `{}`: {why}", payload.name)));
-    if robot.closed.is_some() {
-        return unsupported("it has no form for mechanisms with loops");
-    }
     if mechanism.follows().is_some() {
         return unsupported("it has no form for joints that follow others: do not couple mimic joints");
     }

@@ -65,6 +65,28 @@ impl JointExperiment {
     }
 }
 
+/// Joints whose motion and effort logs hold.
+pub(super) fn driven(robot: &Robot) -> Vec<String> {
+    let all = robot.mechanism.rate_names();
+    let drive = |name: &String| all.iter().position(|n| n == name).is_some_and(|rate| robot.is_driven(rate));
+    robot.axes.iter().map(|axis| axis.name.clone()).filter(drive).collect()
+}
+
+/// What half the difference of both directions holds beside the friction of the joint itself, or at which loads.
+fn paths(robot: &Robot, joint: &str) -> Option<String> {
+    if robot.elements.reactions.iter().any(|r| r.joint == joint) {
+        return Some(
+            "friction follows loads here (`reaction_friction`): the law holds at the loads of this test alone"
+                .to_owned(),
+        );
+    }
+    robot.closed.as_ref().map(|_| {
+        "the joint is in a loop: the drive also turns passive joints, and their friction, at the poses of this test, is in these numbers; \
+         beside friction elements of passive joints it would count twice"
+            .to_owned()
+    })
+}
+
 /// Reads all logs of steady tests. Joints come in the robot's order, those without a pass or signal left out.
 pub(super) fn read(
     config: &FrictionConfig,
@@ -72,11 +94,13 @@ pub(super) fn read(
     (warnings, inputs): (&mut Vec<String>, &mut Vec<InputRecord>),
     progress: &mut dyn FnMut(String),
 ) -> Result<Vec<JointExperiment>, Error> {
-    let names = robot.mechanism.rate_names();
-    let mut joints: Vec<JointExperiment> = names
-        .iter()
-        .map(|joint| JointExperiment { joint: joint.clone(), ..JointExperiment::default() })
-        .collect();
+    let names = driven(robot);
+    let of = |joint: &String| JointExperiment {
+        joint: joint.clone(),
+        notes: paths(robot, joint).into_iter().collect(),
+        ..JointExperiment::default()
+    };
+    let mut joints: Vec<JointExperiment> = names.iter().map(of).collect();
     for log in &config.log {
         progress(log.path.display().to_string());
         if let Some(name) = log.joint.as_ref().filter(|j| !names.contains(j)) {

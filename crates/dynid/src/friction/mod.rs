@@ -30,7 +30,7 @@ use dynid_friction::steady_friction::{SteadyError, SteadyFriction, analyse};
 
 use crate::Error;
 use crate::estimate::InputRecord;
-use crate::robot::{Robot, RobotOptions, refuse_elastic, refuse_loops};
+use crate::robot::{Robot, RobotOptions, refuse_elastic};
 
 /// What is being worked on.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,11 +79,10 @@ pub fn identify_friction(
     config.check()?;
     let robot = Robot::load(&config.robot, &RobotOptions::default())?;
     refuse_elastic(&robot, "evaluated by friction experiments")?;
-    refuse_loops(&robot, "evaluated by friction experiments")?;
     // What a robot file leaves open about bodies is no matter for friction.
     let mut warnings = Vec::new();
     let mut inputs = InputRecord::of_robot(&robot);
-    let known = robot.mechanism.rate_names();
+    let known = experiment::driven(&robot);
     if let Some(name) = config.prior.keys().find(|j| !known.contains(j)) {
         return Err(Error::UnknownJoint { name: name.clone(), known });
     }

@@ -80,7 +80,7 @@ pub(super) fn find(
     (warnings, inputs): (&mut Vec<String>, &mut Vec<InputRecord>),
 ) -> Result<PreslidingFit, Error> {
     let file = log.path.display().to_string();
-    let known = robot.mechanism.rate_names();
+    let known = super::experiment::driven(robot);
     if !known.contains(&log.joint) {
         return Err(Error::UnknownJoint { name: log.joint.clone(), known });
     }

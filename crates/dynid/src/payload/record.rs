@@ -215,16 +215,19 @@ fn sentence(name: &str, found: &[Quantity], stated: &PayloadConfig) -> String {
              without it exchanged or the same, or is it too light?"
         );
     }
-    let centre: Vec<String> = found[1..4].iter().map(|c| format!("{:.1}", 1e3 * c.value)).collect();
+    let seen = |c: &Quantity| c.interval.map_or("not seen".to_owned(), |_| format!("{:.1}", 1e3 * c.value));
+    let centre = match found[1..4].iter().any(|c| c.interval.is_some()) {
+        true => format!(
+            "its centre of mass at ({}) mm",
+            found[1..4].iter().map(seen).collect::<Vec<_>>().join(", ")
+        ),
+        false => "of its centre of mass the logs show nothing".to_owned(),
+    };
     let beside = stated.mass.map_or_else(String::new, |m| {
         let within = if (low..=high).contains(&m) { "within" } else { "outside of" };
         format!("; the stated {m} kg lie {within} the interval")
     });
-    format!(
-        "`{name}` weighs {:.3} kg (95 % interval {low:.3} to {high:.3} kg), its centre of mass at ({}) mm{beside}",
-        mass.value,
-        centre.join(", ")
-    )
+    format!("`{name}` weighs {:.3} kg (95 % interval {low:.3} to {high:.3} kg); {centre}{beside}", mass.value,)
 }
 
 impl PayloadIdentification {

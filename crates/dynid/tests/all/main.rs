@@ -6,6 +6,7 @@ mod arrays;
 mod backlash;
 mod bristles;
 mod clearance;
+mod closed_experiments;
 mod closed_robots;
 mod column_order;
 mod compare;
