@@ -1,6 +1,6 @@
 //! Experiments on mechanisms with loops: what they carry, friction of their drives.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop, and says what it measured")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
 
 use std::path::Path;
 
