@@ -93,6 +93,22 @@ impl Source {
         let urdf = file.urdf.as_ref().map(text).transpose()?;
         Ok(Source { path: path.to_owned(), file, urdf })
     }
+
+    /// A robot file from its text; `path` stands in messages, and places a URDF that the text refers to.
+    ///
+    /// # Errors
+    /// As [`Source::read`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self, Error> {
+        let file = dynid_io::robot::parse(text, path)?;
+        let own = path.display().to_string();
+        let of = |name: &String| match *name == own {
+            true => Ok(text.to_owned()),
+            false => dynid_io::input::read_text(name.as_ref())
+                .map_err(|source| Error::Read { file: name.into(), source }),
+        };
+        let urdf = file.urdf.as_ref().map(of).transpose()?;
+        Ok(Source { path: path.to_owned(), file, urdf })
+    }
 }
 
 impl<'a> Identified<'a> {

@@ -12,6 +12,8 @@ mod searches;
 mod shapes;
 mod ties;
 
+use std::fmt;
+
 use dynid_estimate::elimination::{PruneSettings, prune};
 use dynid_estimate::identifiability::VisibleSpace;
 use dynid_linalg::Mat;
@@ -74,6 +76,31 @@ pub enum Step {
     Trust,
     /// Predicting a log.
     Validate(String),
+}
+
+impl fmt::Display for Step {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let words = match self {
+            Step::Read(file) => return write!(f, "reading {file}"),
+            Step::Validate(log) => return write!(f, "predicting {log}"),
+            Step::Conditioning(Stage::Kernel(k, n)) => {
+                return write!(f, "summing rows, kernel {} of {n}", k + 1);
+            }
+            Step::Preflight => "examining logs",
+            Step::Structure => "finding base parameters",
+            Step::Conditioning(Stage::Veto) => "choosing the kernel",
+            Step::Conditioning(Stage::Mask) => "choosing the reversal mask",
+            Step::Conditioning(Stage::Friction) => "choosing friction shapes",
+            Step::Conditioning(Stage::Delay) => "estimating the delay",
+            Step::Searches => "searching over all parameters",
+            Step::Instruments => "simulating the closed loop",
+            Step::Shapes => "searching shape parameters",
+            Step::Fit => "fitting",
+            Step::Consistency => "making bodies physical",
+            Step::Trust => "judging parameters",
+        };
+        f.write_str(words)
+    }
 }
 
 /// Identifies a robot from logs, validation logs ([`LogSettings::validation`]) among them: examines them, conditions, fits, judges, validates.

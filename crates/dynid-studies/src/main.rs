@@ -11,7 +11,7 @@ use dynid_terminal::progress::Progress;
 use dynid_terminal::study::{PROGRAM, StudyArgs, VERSION, list};
 
 fn main() -> ExitCode {
-    end(arguments().map(|args| run(&args)))
+    ExitCode::from(end(arguments().map(|args| run(&args))))
 }
 
 /// Arguments are those of `dynid study`.

@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::io::{self, Write};
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Why a command ended early.
 #[derive(Debug)]
@@ -24,26 +23,26 @@ impl<E: Into<dynid::Error>> From<E> for Failure {
     }
 }
 
-/// The end of a program: what became of its command line, and of the command.
+/// The exit code of a program: what became of its command line, and of the command.
 ///
 /// Help and version are asked for and go to stdout; the parser's exit code of misuse is 2.
-pub fn end(outcome: Result<Result<u8, Failure>, clap::Error>) -> ExitCode {
+pub fn end(outcome: Result<Result<u8, Failure>, clap::Error>) -> u8 {
     match outcome {
-        Ok(Ok(code)) => ExitCode::from(code),
+        Ok(Ok(code)) => code,
         Ok(Err(failure)) => failure.report(),
         Err(error) => {
             let code = u8::try_from(error.exit_code()).unwrap_or(2);
             let _ = error.print();
-            ExitCode::from(code)
+            code
         }
     }
 }
 
 impl Failure {
     /// Tells the user and gives the exit code.
-    pub fn report(self) -> ExitCode {
+    pub fn report(self) -> u8 {
         let (text, hint) = match self {
-            Failure::Closed => return ExitCode::SUCCESS,
+            Failure::Closed => return 0,
             Failure::Input(error) => (error.to_string(), error.hint()),
             Failure::Usage(text, hint) => (text, Some(hint.to_owned())),
             Failure::Output(error) => (format!("output: {error}"), None),
@@ -54,7 +53,7 @@ impl Failure {
         if let Some(hint) = hint {
             let _ = writeln!(err, "hint: {}", printable(&hint));
         }
-        ExitCode::from(2)
+        2
     }
 }
 

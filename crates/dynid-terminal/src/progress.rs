@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use dynid::Step;
 use dynid::design::DesignStep;
-use dynid::estimators::conditioning::Stage;
 use dynid::friction::FrictionStep;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -49,23 +48,7 @@ impl Progress {
     /// A step of an identification; what the one before it freed goes back to the system first.
     pub fn step(&self, step: Step) {
         memory::give_back();
-        self.doing(match step {
-            Step::Read(file) => format!("reading {file}"),
-            Step::Preflight => "examining logs".to_owned(),
-            Step::Structure => "finding base parameters".to_owned(),
-            Step::Conditioning(Stage::Kernel(k, n)) => format!("summing rows, kernel {} of {n}", k + 1),
-            Step::Conditioning(Stage::Veto) => "choosing the kernel".to_owned(),
-            Step::Conditioning(Stage::Mask) => "choosing the reversal mask".to_owned(),
-            Step::Conditioning(Stage::Friction) => "choosing friction shapes".to_owned(),
-            Step::Conditioning(Stage::Delay) => "estimating the delay".to_owned(),
-            Step::Searches => "searching over all parameters".to_owned(),
-            Step::Instruments => "simulating the closed loop".to_owned(),
-            Step::Shapes => "searching shape parameters".to_owned(),
-            Step::Fit => "fitting".to_owned(),
-            Step::Consistency => "making bodies physical".to_owned(),
-            Step::Trust => "judging parameters".to_owned(),
-            Step::Validate(log) => format!("predicting {log}"),
-        });
+        self.doing(step.to_string());
     }
 
     /// A step of a friction experiment.

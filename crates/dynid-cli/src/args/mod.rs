@@ -33,6 +33,9 @@ pub(crate) use reduce::{FactorsArgs, MergeArgs, ReduceArgs, SolveArgs};
 pub(crate) use robot::RobotArgs;
 pub(crate) use simulate::SimulateArgs;
 
+use std::ffi::OsString;
+use std::sync::OnceLock;
+
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueHint};
 use dynid_terminal::message::Failure;
 
@@ -111,19 +114,29 @@ pub(crate) enum Command {
     Validate(ValidateArgs),
 }
 
+static COMMAND_LINE: OnceLock<Vec<String>> = OnceLock::new();
+
+/// The command line of this process, as results record it.
+pub(crate) fn command_line() -> Vec<String> {
+    COMMAND_LINE.get().cloned().unwrap_or_default()
+}
+
 /// The command line as the parser, help, completions and manual pages know it.
 pub(crate) fn definition() -> clap::Command {
     examples::with_examples(Cli::command())
 }
 
 impl Cli {
-    /// Parses the arguments of the program.
+    /// Parses arguments, the first of which is the program's name.
     ///
     /// # Errors
     /// What clap says of them; help and version too.
-    pub(crate) fn of_program() -> Result<Result<Self, Failure>, clap::Error> {
+    pub(crate) fn of(arguments: &[OsString]) -> Result<Result<Self, Failure>, clap::Error> {
         let definition = definition();
-        let matches = definition.clone().try_get_matches()?;
+        let matches = definition.clone().try_get_matches_from(arguments)?;
+        let words = arguments.iter().map(|a| a.to_string_lossy().into_owned()).collect();
+        // One command line per process: a second one would stand beside the first in results.
+        let _ = COMMAND_LINE.set(words);
         let cli = Self::from_arg_matches(&matches)?;
         Ok(one_standard_input(&definition, &matches).map(|()| cli))
     }

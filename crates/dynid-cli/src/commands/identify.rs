@@ -11,7 +11,7 @@ use dynid::{Error, identify};
 
 use super::run::{GivenLogs, configuration as run_configuration, plain};
 use super::{apply_log_args_to, element_names, export};
-use crate::args::{ConsistencyArg, FrictionArg, IdentifyArgs, MethodArg, RouteArg};
+use crate::args::{ConsistencyArg, FrictionArg, IdentifyArgs, MethodArg, RouteArg, command_line};
 use dynid_terminal::message::{Failure, Notes, data};
 use dynid_terminal::outputs::{self, marked_toml, marked_xml};
 use dynid_terminal::progress::Progress;
@@ -35,8 +35,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     let progress = Progress::new(args.print.quiet);
     let identification = identify(&config, &mut |step| progress.step(step))?;
     let mut estimate = identification.estimate();
-    estimate.provenance.command_line =
-        std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
+    estimate.provenance.command_line = command_line();
     estimate.provenance.revision = option_env!("DYNID_REVISION").map(str::to_owned);
     // Drawing and reading back know nothing of each other.
     let (report, urdf) = rayon::join(|| identification.report(&estimate), || identification.urdf());

@@ -15,7 +15,7 @@ use serde_json::json;
 use super::identify::summary;
 use super::run::{GivenLogs, configuration};
 use super::{Reading, apply_log_args_to, demand_stdout};
-use crate::args::{FactorsArgs, MergeArgs, PrintArgs, ReduceArgs, SolveArgs};
+use crate::args::{FactorsArgs, MergeArgs, PrintArgs, ReduceArgs, SolveArgs, command_line};
 
 pub(crate) fn run(args: &ReduceArgs) -> Result<u8, Failure> {
     let notes = Notes::new(args.to.print.quiet);
@@ -85,8 +85,7 @@ pub(crate) fn solve(args: &SolveArgs) -> Result<u8, Failure> {
     let solved = reduce::solve(&reduction, &logs, &reading.columns, side, &mut |step| progress.step(step));
     let solved = solved.map_err(|e| reading.named(e))?;
     let mut estimate: Estimate = reduce::estimate(&solved, reduction.recipe());
-    estimate.provenance.command_line =
-        std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
+    estimate.provenance.command_line = command_line();
     estimate.provenance.revision = option_env!("DYNID_REVISION").map(str::to_owned);
     let page = dynid::report_page(&solved, &estimate)?;
     drop(progress);

@@ -1,0 +1,137 @@
+"""Logs, measured and virtual."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _native
+
+
+class Log:
+    """A log of a robot: arrays, or a file that is read once the robot is known.
+
+    Parameters
+    ----------
+    t
+        `(n,)` times, s. The clock need not be uniform.
+    q, tau
+        `(n, joints)` positions (rad or m) and efforts (N m or N) as the drives give them.
+    v
+        `(n, joints)` measured velocities, where there are some.
+    joints
+        Names of the columns. Default: those of `Robot.joints`, in that order. Joints that are left out stand still at zero.
+    channels
+        Other signals by name, `(n,)` each: `temperature_<joint>` in °C, `journal_<joint>_x` in m.
+    name
+        Name in parameters and messages.
+    settings
+        `payload`, `own`, `like`, `temperature`, `period_s`: the keys of `[[log]]` in a configuration.
+
+    Arrays of other types and layouts are converted. What no joint does, angles in degrees for example, is refused with `LogError` when the log
+    meets its robot.
+    """
+
+    def __init__(
+        self,
+        t: ArrayLike,
+        q: ArrayLike,
+        tau: ArrayLike,
+        v: ArrayLike | None = None,
+        *,
+        joints: Sequence[str] | None = None,
+        channels: Mapping[str, ArrayLike] | None = None,
+        name: str = "log",
+        **settings: Any,
+    ) -> None:
+        names = None if joints is None else list(joints)
+        extra = None if channels is None else dict(channels)
+        self._native = _native.Log(t, q, tau, v, joints=names, channels=extra, name=name, settings=json.dumps(settings))
+
+    @classmethod
+    def read(
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        columns: Mapping[str, Any] | None = None,
+        motor_side: Mapping[str, Any] | None = None,
+        **settings: Any,
+    ) -> Log:
+        """A log file, of any format that the command line reads; `columns`, `motor_side` and `settings` (`rows`, `part`, `leave_out`, ...)
+        are those of a configuration. It is read when it meets its robot."""
+        log = cls.__new__(cls)
+        side = None if motor_side is None else json.dumps(dict(motor_side))
+        log._native = _native.Log.read_file(
+            os.fspath(path), columns=json.dumps(dict(columns or {})), motor_side=side, settings=json.dumps(settings)
+        )
+        return log
+
+    @classmethod
+    def from_table(cls, table: Any, **settings: Any) -> Log:
+        """A log of named columns: a dictionary of arrays, a pandas, polars or pyarrow table.
+
+        Columns are `t`, `q_<joint>`, `tau_<joint>`, and `dq_<joint>` where velocities were measured; others, `temperature_<joint>` for
+        example, become channels."""
+        names = [str(name) for name in getattr(table, "column_names", None) or (table if isinstance(table, Mapping) else table.columns)]
+
+        def column(name: str) -> NDArray[np.float64]:
+            values = table[name]
+            return np.asarray(values.to_numpy() if hasattr(values, "to_numpy") else values, dtype=np.float64)
+
+        joints = [name[2:] for name in names if name.startswith("q_")]
+        missing = [name for name in ["t", *(f"tau_{joint}" for joint in joints)] if name not in names]
+        if missing or not joints:
+            raise ValueError(f"columns: expected t, q_<joint> and tau_<joint>, missing {missing or 'q_<joint>'} in {names}")
+
+        def stack(prefix: str) -> NDArray[np.float64]:
+            return np.stack([column(f"{prefix}_{joint}") for joint in joints], axis=1)
+
+        fast = all(f"dq_{joint}" in names for joint in joints)
+        used = {"t"} | {f"{prefix}_{joint}" for prefix in ("q", "tau", *(["dq"] if fast else [])) for joint in joints}
+        channels = {name: column(name) for name in names if name not in used}
+        velocity = stack("dq") if fast else None
+        return cls(column("t"), stack("q"), stack("tau"), velocity, joints=joints, channels=channels, **settings)
+
+    def __repr__(self) -> str:
+        return repr(self._native)
+
+
+class Simulation:
+    """A virtual log with its truth.
+
+    `t` `(n,)`, `q`, `tau` `(n, joints)` as logged; `clean_q`, `clean_v`, `clean_a`, `clean_tau` without noise; `truth`: parameters by name;
+    `log`: a `Log` for `identify`.
+    """
+
+    def __init__(self, made: Mapping[str, Any]) -> None:
+        self.joints: list[str] = made["joints"]
+        self.t: NDArray[np.float64] = made["t"]
+        self.q: NDArray[np.float64] = made["q"]
+        self.v: NDArray[np.float64] | None = made["v"]
+        self.tau: NDArray[np.float64] = made["tau"]
+        self.clean_q: NDArray[np.float64] = made["clean_q"]
+        self.clean_v: NDArray[np.float64] = made["clean_v"]
+        self.clean_a: NDArray[np.float64] = made["clean_a"]
+        self.clean_tau: NDArray[np.float64] = made["clean_tau"]
+        self.channels: dict[str, NDArray[np.float64]] = made["channels"]
+        self.truth: dict[str, float] = made["truth"]
+        self.warnings: list[str] = made["warnings"]
+
+    @property
+    def log(self) -> Log:
+        """What was logged."""
+        return Log(self.t, self.q, self.tau, self.v, joints=self.joints, channels=self.channels, name="virtual")
+
+
+def simulate(robot: _native.Robot, **settings: Any) -> Simulation:
+    """Makes a virtual log; `settings` are the keys of `dynid simulate --config`: `duration_s`, `rate_hz`, `seed`, `effort_noise`,
+    `encoder_bits`, `mode="closed_loop"`, ...
+
+    Raises `SettingError` for a setting that is unknown or out of range.
+    """
+    return Simulation(_native.simulate(robot, json.dumps(settings)))

@@ -1,0 +1,190 @@
+"""From arrays to an estimate, and what is done with it."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import dynid
+import numpy as np
+import pytest
+from conftest import ROOT
+
+# Names of the numbers that stand for an estimate; provenance tells files and arrays apart.
+NUMBERS = ("parameters", "base_parameters", "shape_parameters", "fit", "validation", "conditioning")
+
+
+def same(a: dynid.Estimate, b: dynid.Estimate) -> None:
+    for key in NUMBERS:
+        assert _without_names(a.record[key]) == _without_names(b.record[key]), key
+
+
+def _without_names(value: object) -> object:
+    if isinstance(value, dict):
+        return {k: _without_names(v) for k, v in value.items() if k not in ("log", "choices", "reason")}
+    return [_without_names(v) for v in value] if isinstance(value, list) else value
+
+
+@pytest.mark.parametrize("name", ["indy7", "fivebar", "er16", "delta"])
+def test_arrays_give_the_bits_of_files(name: str, tmp_path: Path) -> None:
+    file = ROOT / "robots" / f"{name}.toml"
+    robot = dynid.Robot.load(file)
+    logs = []
+    for seed in (1, 2):
+        made = dynid.simulate(robot, duration_s=12, rate_hz=200, seed=seed)
+        columns = [made.t, *made.q.T, *made.tau.T]
+        head = ["t", *(f"q_{j}" for j in made.joints), *(f"tau_{j}" for j in made.joints)]
+        rows = [",".join(head), *(",".join(repr(float(x)) for x in row) for row in zip(*columns, strict=True))]
+        (tmp_path / f"{seed}.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+        logs.append(made.log)
+    (tmp_path / "run.toml").write_text(f'robot = "{file}"\n[[log]]\npath = "1.csv"\n[[validation]]\npath = "2.csv"\n', encoding="utf-8")
+    by_arrays = dynid.identify(robot, logs[0], validation=logs[1])
+    by_file = dynid.identify_file(tmp_path / "run.toml")
+    same(by_arrays, by_file)
+    same(dynid.identify(robot, logs[0], validation=logs[1], threads=1), by_arrays)
+    by_reading = dynid.identify(robot, dynid.Log.read(tmp_path / "1.csv"), validation=dynid.Log.read(tmp_path / "2.csv"))
+    same(by_reading, by_file)
+    # The program of the package writes the same.
+    program = [sys.executable, "-c", "from dynid._command_line import main; raise SystemExit(main())", "identify", "run.toml", "--quiet"]
+    ended = subprocess.run([*program, "--out", "out"], cwd=tmp_path, capture_output=True, check=False)
+    assert ended.returncode in (0, 1), ended.stderr
+    written = dynid.Estimate.load(tmp_path / "out" / "estimate.json")
+    same(written, by_file)
+    q, v, a = made.clean_q[:20], made.clean_v[:20], made.clean_a[:20]
+    assert (written.predict(q, v, a) == by_arrays.predict(q, v, a)).all()
+
+
+def test_estimate(found: dynid.Estimate, made: dynid.Simulation, unseen: dynid.Simulation, tmp_path: Path) -> None:
+    q, v, a = unseen.clean_q, unseen.clean_v, unseen.clean_a
+    tau = found.predict(q, v, a)
+    assert np.sqrt(np.mean((tau - unseen.clean_tau) ** 2)) < 0.005 * np.sqrt(np.mean(unseen.clean_tau**2))
+    assert (found.predict(q[3], v[3], a[3]) == tau[3]).all() and (found.feedforward(q[3], v[3], a[3]) == tau[3]).all()
+    assert (found.predict(q.astype(np.float32), v, a) != tau).any()
+    assert (found.predict(np.asfortranarray(q), v, a, threads=2) == tau).all()
+    again = pickle.loads(pickle.dumps(found))
+    assert (again.predict(q, v, a) == tau).all() and again.record == found.record
+    names, covariance = again.covariance
+    assert covariance.shape == (len(names), len(names)) and np.linalg.eigvalsh(covariance)[0] > -1e-12 * np.trace(covariance)
+    table = found.parameters
+    assert table.height == len(found.record["parameters"]) and table["name"][0] == "link1.m"
+    assert found.value("link1.m") == table["value"][0]
+    assert found.headline in found._repr_html_() and "<table>" in found._repr_html_()
+    fit = found.validate(unseen.log)[0]
+    assert fit["filtered"] == found.record["validation"][0]["filtered"]
+    found.save(tmp_path / "estimate.json")
+    read = dynid.Estimate.load(tmp_path / "estimate.json")
+    assert read.to_json() == found.to_json() and [p.name for p in tmp_path.iterdir()] == ["estimate.json"]
+    assert "<html" in found.report(tmp_path / "report.html").lower()
+    with pytest.raises(dynid.UnsupportedError, match="without the samples"):
+        read.report()
+    assert "<robot" in found.to_urdf() and "<mujoco" in found.to_mjcf()
+    assert json.loads(found.to_model_json())
+
+
+def test_factors_travel_and_merge(found: dynid.Estimate, made: dynid.Simulation, unseen: dynid.Simulation) -> None:
+    first = found.reduce(made.log)
+    second = dynid.Factor.from_bytes(first.to_bytes()).reduce(unseen.log)
+    both, turned = first + second, pickle.loads(pickle.dumps(second)) + first
+    assert both.to_bytes() == turned.to_bytes()
+    q, v, a = made.clean_q, made.clean_v, made.clean_a
+    alone = first.solve().predict(q, v, a)
+    assert np.abs(alone - found.predict(q, v, a)).max() < 1e-9 * np.abs(alone).max()
+    assert both.solve(unseen.log).record["samples"] == 2 * found.record["samples"]
+
+
+def test_logs_of_tables(indy7: dynid.Robot, made: dynid.Simulation, found: dynid.Estimate, unseen: dynid.Simulation) -> None:
+    table = {"t": made.t} | {f"q_{j}": made.q[:, k] for k, j in enumerate(made.joints)} | {f"tau_{j}": made.tau[:, k] for k, j in enumerate(made.joints)}
+    same(dynid.identify(indy7, dynid.Log.from_table(table), validation=unseen.log), found)
+    pandas = pytest.importorskip("pandas")
+    same(dynid.identify(indy7, dynid.Log.from_table(pandas.DataFrame(table)), validation=unseen.log), found)
+    assert list(found.parameters.to_pandas().columns)[0] == "name"
+
+
+def test_bad_input_is_told(indy7: dynid.Robot, made: dynid.Simulation) -> None:
+    log = made.log
+    with pytest.raises(dynid.SettingError, match="unknown field `methd`"):
+        dynid.identify(indy7, log, estimator={"methd": "iv"})
+    with pytest.raises(dynid.SettingError, match="`log`"):
+        dynid.identify(indy7, log, log=[])
+    with pytest.raises(dynid.LogError, match="look like degrees") as caught:
+        dynid.identify(indy7, dynid.Log(made.t, np.degrees(made.q), made.tau))
+    assert caught.value.hint and caught.value.hint in str(caught.value)
+    with pytest.raises(dynid.RobotError, match="cannot be read"):
+        dynid.Robot.load("nowhere.urdf")
+    with pytest.raises(dynid.SettingError, match="unknown field `duration`"):
+        dynid.simulate(indy7, duration=3)
+    with pytest.raises(dynid.SettingError, match="those of files"):
+        dynid.Log(made.t, made.q, made.tau, rows=[1, 2])
+    with pytest.raises(dynid.DynidError):
+        dynid.identify(indy7, [])
+    with pytest.raises(dynid.SettingError, match="elbow"):
+        dynid.identify(indy7, dynid.Log(made.t, made.q[:, :1], made.tau[:, :1], joints=["elbow"]))
+    for wrong in ({"q": np.zeros(5)}, {"v": np.zeros((2, 6))}, {"q": np.full(6, np.nan)}):
+        with pytest.raises(ValueError, match=f"^{next(iter(wrong))}"):
+            indy7.inverse_dynamics(**({"q": np.zeros(6), "v": np.zeros(6), "a": np.zeros(6)} | wrong))
+    with pytest.raises(ValueError, match="t: expected"):
+        dynid.Log(np.zeros((2, 2)), made.q, made.tau)
+    with pytest.raises(TypeError):
+        dynid.identify(indy7, 3)  # type: ignore[arg-type]
+
+
+def test_progress_and_interrupt(indy7: dynid.Robot, made: dynid.Simulation) -> None:
+    steps: list[str] = []
+    dynid.identify(indy7, made.log, progress=steps.append)
+    assert "finding base parameters" in steps and "judging parameters" in steps
+
+    def stop(step: str) -> None:
+        raise RuntimeError(step)
+
+    with pytest.raises(RuntimeError, match="examining logs"):
+        dynid.identify(indy7, made.log, progress=stop)
+    long = dynid.simulate(indy7, duration_s=300, rate_hz=1000, seed=3)
+    timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
+    begun = time.perf_counter()
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        dynid.identify(indy7, long.log)
+    assert time.perf_counter() - begun < 1.3
+
+
+def test_threads_do_not_disturb_each_other(indy7: dynid.Robot, made: dynid.Simulation, unseen: dynid.Simulation, found: dynid.Estimate) -> None:
+    results: list[dynid.Estimate] = []
+    work = [threading.Thread(target=lambda: results.append(dynid.identify(indy7, made.log, validation=unseen.log))) for _ in range(2)]
+    for thread in work:
+        thread.start()
+    for thread in work:
+        thread.join()
+    assert len(results) == 2
+    for result in results:
+        same(result, found)
+
+
+def test_many_calls_leak_nothing(indy7: dynid.Robot, made: dynid.Simulation, found: dynid.Estimate) -> None:
+    resource = pytest.importorskip("resource")
+
+    def work(times: int) -> None:
+        for _ in range(times):
+            indy7.regressor(made.clean_q[:200], made.clean_v[:200], made.clean_a[:200])
+            indy7.reduce(made.q[:50], made.q[:50], made.q[:50], made.tau[:50])
+            found.predict(made.q[:50], made.q[:50], made.q[:50])
+            dynid.Log(made.t, made.q, made.tau)
+            dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
+
+    work(100)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    work(1000)
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    # A call that kept its arrays would have kept 600 MB.
+    assert grown < 20_000, f"{grown} kB"
+
+
+def test_the_program_of_the_package() -> None:
+    ended = subprocess.run([sys.executable, "-c", "from dynid._command_line import main; raise SystemExit(main())", "--version"], capture_output=True, check=True)
+    assert ended.stdout.decode().split()[:2] == ["dynid", dynid.__version__]
