@@ -400,7 +400,7 @@ pub(crate) fn identify(
         let logs =
             all.iter().map(|(log, validation)| log.of(&own, *validation)).collect::<Result<Vec<_>, _>>()?;
         drop(all);
-        let found = dynid::pipeline::identify(&own, logs, &settings, tell)?;
+        let found = dynid::pipeline::identify(&own, logs, &settings, &mut |step| tell(step.to_string()))?;
         let record = Record { exported: exported(&found)?, ..found.estimate() };
         Estimate::new(record, Some(found), source)
     })
@@ -417,7 +417,7 @@ pub(crate) fn identify_file(
 ) -> PyResult<Estimate> {
     crate::work::run(py, progress, threads, move |tell| {
         let config = Config::read(&path)?;
-        let run = dynid::identify(&config, tell)?;
+        let run = dynid::identify(&config, &mut |step| tell(step.to_string()))?;
         let record = run.estimate();
         Estimate::new(record, Some(run.identification), None)
     })

@@ -74,7 +74,7 @@ impl Factor {
         crate::work::run(py, progress, threads, move |tell| {
             let reducer = reduction.recipe().clone().reducer()?;
             let logs = logs.iter().map(|log| log.of(reducer.robot(), true)).collect::<Result<Vec<_>, _>>()?;
-            let found = reduction.solve(logs, tell)?;
+            let found = reduction.solve(logs, &mut |step| tell(step.to_string()))?;
             let estimate = dynid::reduce::estimate(&found, reduction.recipe());
             Estimate::new(estimate, Some(found), None)
         })

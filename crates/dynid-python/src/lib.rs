@@ -3,6 +3,7 @@
 #![cfg(feature = "extension")]
 
 mod arrays;
+mod commands;
 mod error;
 mod estimate;
 mod factor;
@@ -17,6 +18,8 @@ use pyo3::prelude::*;
 mod _native {
     #[pymodule_export]
     use super::command_line;
+    #[pymodule_export]
+    use super::commands::{Online, check, design};
     #[pymodule_export]
     use super::error::{DynidError, EstimateError, LogError, RobotError, SettingError, UnsupportedError};
     #[pymodule_export]

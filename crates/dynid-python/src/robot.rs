@@ -26,6 +26,7 @@ pub(crate) struct Robot {
     pub(crate) robot: dynid::Robot,
     /// The text that it was made of, where no file holds it.
     pub(crate) text: Option<Arc<str>>,
+    options: RobotOptions,
     /// Rigid bodies, with springs where joints are elastic.
     model: RobotModel,
     values: Vec<f64>,
@@ -52,10 +53,15 @@ impl Scratch {
 }
 
 impl Robot {
-    pub(crate) fn of(py: Python<'_>, robot: dynid::Robot, text: Option<Arc<str>>) -> PyResult<Self> {
+    fn of(
+        py: Python<'_>,
+        robot: dynid::Robot,
+        text: Option<Arc<str>>,
+        options: RobotOptions,
+    ) -> PyResult<Self> {
         let model = robot.skeleton().map_err(|e| raise(py, &e))?;
         let values = robot.skeleton_values(&model);
-        Ok(Robot { robot, text, model, values, dynamics: OnceLock::new(), base: OnceLock::new() })
+        Ok(Robot { robot, text, options, model, values, dynamics: OnceLock::new(), base: OnceLock::new() })
     }
 
     fn nq_nv(&self) -> (usize, usize) {
@@ -194,7 +200,7 @@ impl Robot {
         let locked = locked.unwrap_or_default().into_iter().collect();
         let options = RobotOptions { gravity, couple_mimics, floating_base, locked };
         let robot = dynid::Robot::load(&path, &options).map_err(|e| raise(py, &e))?;
-        Robot::of(py, robot, None)
+        Robot::of(py, robot, None, options)
     }
 
     /// A robot from the text of a robot file; `name` says by its ending which kind (`.urdf`, `.toml`), and stands in messages.
@@ -212,7 +218,7 @@ impl Robot {
         let locked = locked.unwrap_or_default().into_iter().collect();
         let options = RobotOptions { gravity, couple_mimics, floating_base, locked };
         let robot = dynid::Robot::parse(text, Path::new(name), &options).map_err(|e| raise(py, &e))?;
-        Robot::of(py, robot, Some(text.into()))
+        Robot::of(py, robot, Some(text.into()), options)
     }
 
     /// The robot of a `pinocchio.Model`: joints, bodies, limits, armature, damping and dry friction.
@@ -501,6 +507,22 @@ impl Robot {
         serde_json::to_string(&found).map_err(|e| PyValueError::new_err(e.to_string()))
     }
 
+    /// How the file was read, as keys of a configuration in JSON.
+    #[getter]
+    fn options(&self, py: Python<'_>) -> PyResult<String> {
+        let RobotOptions { gravity, couple_mimics, floating_base, locked } = &self.options;
+        if *floating_base {
+            let hint = "a floating base cannot be identified: leave `floating_base` out";
+            return Err(unsupported(py, "a robot with a floating base", hint));
+        }
+        let locked: BTreeMap<&String, f64> = locked.iter().map(|(joint, q)| (joint, *q)).collect();
+        let mut keys = serde_json::json!({ "couple_mimics": couple_mimics, "locked": locked });
+        if let Some(gravity) = gravity {
+            keys["gravity"] = serde_json::json!(gravity);
+        }
+        Ok(keys.to_string())
+    }
+
     fn __repr__(&self) -> String {
         let (nq, nv) = self.nq_nv();
         format!("<dynid.Robot {}: {nv} efforts, {nq} positions, {} bodies>", self.name(), self.links().len())
@@ -588,5 +610,5 @@ fn described(py: Python<'_>, function: &str, model: &Bound<'_, PyAny>) -> PyResu
     let mut robot = dynid::Robot::parse(&text, Path::new("model.toml"), &RobotOptions::default())
         .map_err(|e| raise(py, &e))?;
     robot.warnings.extend(warnings);
-    Robot::of(py, robot, Some(text.into()))
+    Robot::of(py, robot, Some(text.into()), RobotOptions::default())
 }

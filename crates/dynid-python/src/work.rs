@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
-use dynid::Step;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
@@ -32,12 +31,12 @@ struct Teller<T> {
 }
 
 impl<T> Teller<T> {
-    fn tell(&self, step: &Step) {
+    fn tell(&self, step: String) {
         if self.stop.load(Ordering::Relaxed) {
             resume_unwind(Box::new(Stopped));
         }
         // Nobody listens any longer: the next step ends the work.
-        let _ = self.to.send(News::Progress(step.to_string()));
+        let _ = self.to.send(News::Progress(step));
     }
 }
 
@@ -48,7 +47,7 @@ pub(crate) fn run<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<Bound<'_, PyAny>>,
     threads: usize,
-    work: impl FnOnce(&mut dyn FnMut(Step)) -> Result<T, dynid::Error> + Send + 'static,
+    work: impl FnOnce(&mut dyn FnMut(String)) -> Result<T, dynid::Error> + Send + 'static,
 ) -> PyResult<T> {
     let (to, news) = channel();
     let stop = Arc::new(AtomicBool::new(false));
@@ -59,7 +58,7 @@ pub(crate) fn run<T: Send + 'static>(
     };
     std::thread::spawn(move || {
         let whole = move || {
-            let mut tell = |step: Step| teller.tell(&step);
+            let mut tell = |step: String| teller.tell(step);
             match &pool {
                 Some(pool) => pool.install(|| work(&mut |step| tell(step))),
                 None => work(&mut tell),

@@ -14,6 +14,7 @@ order of `Robot.joints`; one state may be given without the axis of samples, and
 """
 
 from . import examples
+from ._commands import Design, Online, check, design
 from ._estimate import Estimate, Factor, identify, identify_file
 from ._log import Log, Simulation, simulate
 from ._native import (
@@ -29,12 +30,14 @@ from ._native import (
 from ._table import Table
 
 __all__ = [
+    "Design",
     "DynidError",
     "Estimate",
     "EstimateError",
     "Factor",
     "Log",
     "LogError",
+    "Online",
     "Robot",
     "RobotError",
     "SettingError",
@@ -42,6 +45,8 @@ __all__ = [
     "Table",
     "UnsupportedError",
     "__version__",
+    "check",
+    "design",
     "examples",
     "identify",
     "identify_file",

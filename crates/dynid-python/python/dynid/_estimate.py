@@ -24,11 +24,13 @@ _PARAMETERS = ("name", "unit", "value", "std", "low", "high", "verdict", "combin
 _BASE = ("name", "expression", "unit", "value", "std", "half_width", "verdict", "consistent_value")
 
 
-def _native_logs(logs: Log | Iterable[Log]) -> list[_native.Log]:
+def native_logs(logs: Log | Iterable[Log]) -> list[_native.Log]:
+    """One log or several, as what is compiled knows them."""
     return [log._native for log in ([logs] if isinstance(logs, Log) else logs)]
 
 
-def _teller(progress: Progress) -> Callable[[str], object] | None:
+def teller(progress: Progress) -> Callable[[str], object] | None:
+    """The function that is told of progress."""
     if progress is True:
 
         def line(step: str) -> None:
@@ -141,25 +143,25 @@ class Estimate:
 
     def validate(self, logs: Log | Iterable[Log], *, unconstrained: bool = False, filter_hz: float | None = None) -> list[dict[str, Any]]:
         """Predicted against measured efforts of other logs: per log the figures of `validation` in `estimate.json`."""
-        text = self._native.validate(_native_logs(logs), unconstrained=unconstrained, filter_hz=filter_hz)
+        text = self._native.validate(native_logs(logs), unconstrained=unconstrained, filter_hz=filter_hz)
         fits: list[dict[str, Any]] = json.loads(text)
         return fits
 
     def report(self, path: str | os.PathLike[str] | None = None) -> str:
         """The report as one HTML page, written to `path` if that is given."""
-        return _written(path, self._native.report())
+        return written(path, self._native.report())
 
     def to_urdf(self, path: str | os.PathLike[str] | None = None, *, allow_unphysical: bool = False) -> str:
         """URDF with identified inertias and friction. Loops of a mechanism have no place there: see `loops`."""
-        return _written(path, self._native.exported("urdf", allow_unphysical)[0])
+        return written(path, self._native.exported("urdf", allow_unphysical)[0])
 
     def to_mjcf(self, path: str | os.PathLike[str] | None = None, *, allow_unphysical: bool = False) -> str:
         """MJCF with identified inertias, friction and armature."""
-        return _written(path, self._native.exported("mjcf", allow_unphysical)[0])
+        return written(path, self._native.exported("mjcf", allow_unphysical)[0])
 
     def to_model_json(self, path: str | os.PathLike[str] | None = None) -> str:
         """The whole identified model, elements of every law included, as JSON."""
-        return _written(path, self._native.exported("model", True)[0])
+        return written(path, self._native.exported("model", True)[0])
 
     def apply(self, model: Any) -> list[str]:
         """Puts identified inertias, friction and armature into a `mujoco.MjModel` or a `pinocchio.Model`, in place.
@@ -170,7 +172,7 @@ class Estimate:
 
     def reduce(self, logs: Log | Iterable[Log]) -> Factor:
         """Reduces logs by the choices of this identification to a `Factor`."""
-        return Factor(_native.Factor.of(self._native, _native_logs(logs)))
+        return Factor(_native.Factor.of(self._native, native_logs(logs)))
 
     def __repr__(self) -> str:
         return f"{self._native!r}\n{self.headline}"
@@ -220,11 +222,11 @@ class Factor:
 
     def reduce(self, logs: Log | Iterable[Log]) -> Factor:
         """Reduces other logs by the recipe inside."""
-        return Factor(self._native.reduce(_native_logs(logs)))
+        return Factor(self._native.reduce(native_logs(logs)))
 
     def solve(self, validation: Log | Iterable[Log] = (), *, progress: Progress = None, threads: int = 0) -> Estimate:
         """The estimate of all logs inside."""
-        return Estimate(self._native.solve(_native_logs(validation), progress=_teller(progress), threads=threads))
+        return Estimate(self._native.solve(native_logs(validation), progress=teller(progress), threads=threads))
 
     @property
     def logs(self) -> list[str]:
@@ -256,16 +258,17 @@ def identify(
     An interrupt ends the wait at once and leaves nothing behind.
     """
     text = json.dumps(settings)
-    found = _native.identify(robot, _native_logs(logs), _native_logs(validation), text, progress=_teller(progress), threads=threads)
+    found = _native.identify(robot, native_logs(logs), native_logs(validation), text, progress=teller(progress), threads=threads)
     return Estimate(found)
 
 
 def identify_file(path: str | os.PathLike[str], *, progress: Progress = None, threads: int = 0) -> Estimate:
     """Does what a configuration file says, as `dynid identify` does, and writes nothing."""
-    return Estimate(_native.identify_file(os.fspath(path), progress=_teller(progress), threads=threads))
+    return Estimate(_native.identify_file(os.fspath(path), progress=teller(progress), threads=threads))
 
 
-def _written(path: str | os.PathLike[str] | None, text: str) -> str:
+def written(path: str | os.PathLike[str] | None, text: str) -> str:
+    """A text, written to a file if one is named."""
     if path is not None:
         _write(path, text)
     return text

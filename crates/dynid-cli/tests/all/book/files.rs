@@ -17,6 +17,9 @@ pub(super) fn fault(page: &str, block: &Block) -> Option<String> {
         }
         "console" | "sh" | "text" | "csv" | "html" => Ok(()),
         "rust" if page == "README.md" => Ok(()),
+        // The tests of the package run them.
+        "python" if ["README.md", "python.md"].contains(&page) => Ok(()),
+        "python" => Err("the Python of README.md and python.md alone is run".to_owned()),
         "rust" => Err("only the README's Rust is compiled".to_owned()),
         other => Err(format!("`{other}` is no kind of block that is tested")),
     };

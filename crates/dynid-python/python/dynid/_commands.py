@@ -1,0 +1,133 @@
+"""Before and beside identification: pre-flight, designs, robots that run."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _native
+from ._estimate import Progress, native_logs, teller, written
+from ._log import Log
+from ._table import Table
+
+
+@contextmanager
+def _keys(robot: _native.Robot, settings: Mapping[str, Any]) -> Iterator[str]:
+    """Settings with the robot and how it was read. A robot without a file has one meanwhile."""
+    clash = {"robot", "gravity", "locked", "couple_mimics"} & set(settings)
+    if clash:
+        raise TypeError(f"settings: {', '.join(sorted(clash))} belong to the robot, where it is made")
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.abspath(robot.path)
+        if robot.text is not None:
+            path = str(Path(folder) / "robot.toml")
+            if robot.text.lstrip().startswith("<"):
+                path = str(Path(folder) / "robot.urdf")
+            Path(path).write_text(robot.text, encoding="utf-8")
+        yield json.dumps({**settings, **json.loads(robot.options), "robot": path})
+
+
+def check(robot: _native.Robot, logs: Log | Iterable[Log], **settings: Any) -> Table:
+    """What is wrong with logs before anything is identified: a row per finding, none for logs that nothing speaks against.
+
+    Columns: `severity` (`error`: an identification would be nonsense), `id` (`dynid explain ID` says more), `log`, `joint`, `evidence`, `remedy`.
+    """
+    rows: list[dict[str, Any]] = json.loads(_native.check(robot, native_logs(logs), json.dumps(settings)))
+    return Table.of_rows(rows, ("severity", "id", "log", "joint", "evidence", "remedy"))
+
+
+class Design:
+    """A motion that tells the parameters apart, with what a log of it will tell.
+
+    `feasible`; if so `t` `(n,)`, `q`, `v`, `a` `(n, joints)` of approach, periods and return, for `joints`. `record`: the keys of
+    `design.json`, with `parameters` (forecast of standard deviations) and `limits`.
+    """
+
+    def __init__(self, made: Mapping[str, Any]) -> None:
+        self.record: dict[str, Any] = json.loads(made["record"])
+        self._report: str = made["report"]
+        self.feasible: bool = "t" in made
+        empty = np.zeros((0, 0))
+        self.joints: list[str] = made.get("joints", [])
+        self.t: NDArray[np.float64] = made.get("t", np.zeros(0))
+        self.q: NDArray[np.float64] = made.get("q", empty)
+        self.v: NDArray[np.float64] = made.get("v", empty)
+        self.a: NDArray[np.float64] = made.get("a", empty)
+
+    @property
+    def headline(self) -> str:
+        """What it comes down to, in a sentence."""
+        return str(self.record["verdict"]["headline"])
+
+    def report(self, path: str | os.PathLike[str] | None = None) -> str:
+        """The report as one HTML page, written to `path` if that is given."""
+        return written(path, self._report)
+
+    def __repr__(self) -> str:
+        return f"<dynid.Design of {', '.join(self.joints) or 'nothing'}>\n{self.headline}"
+
+
+def design(robot: _native.Robot, *, progress: Progress = None, threads: int = 0, **settings: Any) -> Design:
+    """Designs an excitation trajectory within the limits of robot and surroundings.
+
+    `settings` are the tables of a design file: `trajectory={"period_s": 10, "harmonics": 5}`, `limits={"share": 0.8}`, `keep=[...]`,
+    `search={"starts": 8}`, ... No motion within all limits is an outcome (`feasible`), not an error.
+    """
+    with _keys(robot, settings) as config:
+        return Design(_native.design(config, progress=teller(progress), threads=threads))
+
+
+class Online:
+    """Identification of a robot while it runs: feed rows, read events.
+
+    Parameters
+    ----------
+    joints
+        Names of the columns of `q`. Default: `Robot.joints`.
+    velocity
+        Whether `feed` takes measured velocities.
+    settings
+        `online={"learn_s": 10, ...}` and the other tables of a configuration.
+
+    An event is a dictionary whose `event` names it: `learning`, `learned`, `estimate`, `alarm`, `change` and others, as `dynid online` prints
+    them. The first stretch is learned from; estimates come from then on.
+    """
+
+    def __init__(self, robot: _native.Robot, *, joints: Sequence[str] | None = None, velocity: bool = False, **settings: Any) -> None:
+        self._names = list(robot.joints if joints is None else joints)
+        self._velocity = velocity
+        prefixes = ["q", *(["dq"] if velocity else []), "tau"]
+        header = ["t", *(f"{prefix}_{joint}" for prefix in prefixes for joint in self._names)]
+        with _keys(robot, settings) as config:
+            self._native = _native.Online(config, header)
+
+    @property
+    def joints(self) -> list[str]:
+        """Joints in the order of all figures of events."""
+        return self._native.joints
+
+    def feed(self, t: ArrayLike, q: ArrayLike, tau: ArrayLike, v: ArrayLike | None = None) -> list[dict[str, Any]]:
+        """Takes a row (`t` a number) or a block of rows (`t` `(n,)`, the others `(n, joints)`); gives what came of it."""
+        if (v is None) == self._velocity:
+            raise TypeError("v: the session was made " + ("with" if self._velocity else "without") + " `velocity`")
+        time = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        parts = [np.asarray(x, dtype=np.float64).reshape(len(time), -1) for x in (q, v, tau) if x is not None]
+        rows = np.column_stack([time, *parts])
+        return self._events(self._native.feed(rows))
+
+    def finish(self) -> list[dict[str, Any]]:
+        """Ends the stream; gives the last events."""
+        return self._events(self._native.finish())
+
+    @staticmethod
+    def _events(text: str) -> list[dict[str, Any]]:
+        events: list[dict[str, Any]] = json.loads(text)
+        return events

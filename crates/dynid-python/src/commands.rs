@@ -1,0 +1,155 @@
+//! Work that takes a robot by its file: pre-flight, designs, identification on line.
+
+use std::sync::{Mutex, PoisonError};
+
+use dynid::config::Config;
+use dynid::design::{DesignConfig, DesignStep, design as run_design};
+use dynid::online::{Event, Session};
+use dynid::overlap::Overlaps;
+use dynid::preflight;
+use numpy::PyArrayMethods;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{Batch, demand_finite, vector};
+use crate::error::raise;
+use crate::log::Log;
+use crate::robot::Robot;
+use crate::settings::{parsed, settings};
+use crate::work;
+
+fn as_json(value: &impl serde::Serialize) -> PyResult<String> {
+    serde_json::to_string(value).map_err(|e| PyValueError::new_err(e.to_string()))
+}
+
+/// What is wrong with logs before anything is identified: findings as JSON.
+#[pyfunction]
+pub(crate) fn check(
+    py: Python<'_>,
+    robot: &Robot,
+    logs: Vec<PyRef<'_, Log>>,
+    settings_json: &str,
+) -> PyResult<String> {
+    let settings = settings(py, settings_json)?;
+    let own = robot.robot.clone();
+    let logs: Vec<Log> = logs.iter().map(|l| (**l).clone()).collect();
+    let findings = work::run(py, None, 0, move |_| {
+        let logs = logs.iter().map(|log| log.of(&own, false)).collect::<Result<Vec<_>, _>>()?;
+        let still: Vec<(String, f64)> = match logs.first() {
+            Some(log) => log.not_logged(&own.axes).into_iter().map(|joint| (joint, 0.0)).collect(),
+            None => Vec::new(),
+        };
+        let held = if still.is_empty() { own } else { own.locked(&still)? };
+        preflight::of_logs(&settings, &held, &logs, &Overlaps::of(&logs, &[]))
+    })?;
+    as_json(&findings)
+}
+
+/// Designs a motion: a dictionary with its samples, the coefficients and the record as JSON.
+#[pyfunction]
+#[pyo3(signature = (config, *, progress=None, threads=0))]
+pub(crate) fn design<'py>(
+    py: Python<'py>,
+    config: &str,
+    progress: Option<Bound<'py, PyAny>>,
+    threads: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let config: DesignConfig = parsed(py, config, "settings of a design")?;
+    let (run, record, page) = work::run(py, progress, threads, move |tell| {
+        let run = run_design(&config, &mut |step| tell(words(&step)))?;
+        let record = run.record(&config)?;
+        let page = run.report(&config, &record)?;
+        Ok((run, record, page))
+    })?;
+    let out = PyDict::new(py);
+    out.set_item("record", as_json(&record)?)?;
+    out.set_item("report", page)?;
+    if let Ok(designed) = &run.outcome {
+        let sampled = designed.motion.sampled().map_err(|e| raise(py, &e))?;
+        let rows = sampled.time.len();
+        out.set_item("joints", &designed.motion.joints)?;
+        out.set_item("t", vector(py, &sampled.time))?;
+        for (name, values) in [("q", &sampled.q), ("v", &sampled.dq), ("a", &sampled.ddq)] {
+            // Joint after joint there, row after row here.
+            let columns = values.len() / rows.max(1);
+            let flat: Vec<f64> =
+                (0..rows).flat_map(|s| (0..columns).map(move |c| values[c * rows + s])).collect();
+            out.set_item(name, vector(py, &flat).reshape([rows, columns])?)?;
+        }
+    }
+    Ok(out)
+}
+
+fn words(step: &DesignStep) -> String {
+    match step {
+        DesignStep::Starts { ended, of, best } => {
+            let best =
+                best.map_or_else(|| "none within all limits yet".to_owned(), |b| format!("best {b:.4}"));
+            format!("{ended} of {of} starts, {best}")
+        }
+        DesignStep::Forecast => "predicting what the log will tell".to_owned(),
+        _ => "finding base parameters".to_owned(),
+    }
+}
+
+/// Identification of a robot while it runs.
+#[pyclass(frozen, module = "dynid._native")]
+pub(crate) struct Online {
+    session: Mutex<Session>,
+    columns: usize,
+    joints: Vec<String>,
+}
+
+#[pymethods]
+impl Online {
+    #[new]
+    fn new(py: Python<'_>, config: &str, header: Vec<String>) -> PyResult<Self> {
+        let config: Config = parsed(py, config, "settings")?;
+        let columns = header.len();
+        let session =
+            py.detach(|| Session::new(&config, "stream", &header[..], None)).map_err(|e| raise(py, &e))?;
+        let joints = session.joints();
+        Ok(Online { session: Mutex::new(session), columns, joints })
+    }
+
+    #[getter]
+    fn joints(&self) -> Vec<String> {
+        self.joints.clone()
+    }
+
+    /// Takes rows of the stream; gives the events that came of them, as JSON.
+    fn feed(&self, py: Python<'_>, rows: &Bound<'_, PyAny>) -> PyResult<String> {
+        let batch = Batch::take("rows", rows, self.columns)?;
+        let values = batch.values()?;
+        demand_finite("rows", values, self.columns)?;
+        self.events(py, |session, emit| {
+            for row in values.chunks_exact(self.columns) {
+                session.row(row, emit)?;
+            }
+            session.flush(emit)
+        })
+    }
+
+    /// Ends the stream; gives the last events.
+    fn finish(&self, py: Python<'_>) -> PyResult<String> {
+        self.events(py, |session, emit| session.finish(emit))
+    }
+}
+
+impl Online {
+    fn events(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Session, &mut dyn FnMut(Event)) -> Result<(), dynid::Error> + Send,
+    ) -> PyResult<String> {
+        let mut events = Vec::new();
+        let done = py.detach(|| {
+            // A panic is a fault of the program, told as such; the session behind it is as it was.
+            let mut session = self.session.lock().unwrap_or_else(PoisonError::into_inner);
+            work(&mut session, &mut |event| events.push(event))
+        });
+        done.map_err(|e| raise(py, &e))?;
+        as_json(&events)
+    }
+}

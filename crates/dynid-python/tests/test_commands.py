@@ -1,0 +1,67 @@
+"""Pre-flight, designs, identification on line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import dynid
+import numpy as np
+import pytest
+
+
+def test_preflight(indy7: dynid.Robot, made: dynid.Simulation) -> None:
+    assert all(severity == "info" for severity in dynid.check(indy7, made.log)["severity"])
+    swapped = made.tau.copy()
+    swapped[:, [1, 2]] = swapped[:, [2, 1]]
+    found = dynid.check(indy7, dynid.Log(made.t, made.q, swapped))
+    assert found.rows()[0]["id"] == "joint_permutation" and found["severity"][0] == "error"
+    turned = dynid.check(indy7, dynid.Log(made.t, made.q, -made.tau))
+    assert any("sign" in name for name in turned["id"]), turned
+    twice = dynid.check(indy7, [made.log, made.log])
+    assert "repeated_log" in twice["id"]
+
+
+def test_a_design_is_followed_and_tells_what_it_said() -> None:
+    arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
+    steps: list[str] = []
+    wanted: dict[str, Any] = {"trajectory": {"period_s": 8, "harmonics": 4, "sample_rate_hz": 200}, "limits": {"acceleration": 10}, "search": {"starts": 2}}
+    made = dynid.design(arm, progress=steps.append, **wanted)
+    assert made.feasible and made.joints == arm.joints and made.q.shape == (len(made.t), 2) and any("starts" in s for s in steps)
+    assert np.abs(made.v).max() <= 3 and np.abs(made.q).max() <= 2 and np.abs(made.a).max() <= 10 * (1 + 1e-6)
+    assert np.abs(np.diff(made.q, axis=0) * 200 - made.v[:-1]).max() < 0.06
+    assert "<html" in made.report().lower()
+    again = dynid.design(arm, threads=1, **wanted)
+    assert (again.q == made.q).all()
+    # Efforts along the motion, and back.
+    tau = arm.inverse_dynamics(made.q, made.v, made.a) + 2 * made.v + 3 * np.sign(made.v)
+    noise = 0.01 * np.random.default_rng(1).normal(size=tau.shape) * tau.std(axis=0)
+    found = dynid.identify(arm, dynid.Log(made.t, made.q, tau + noise), elements={"default": ["viscous", "coulomb"]})
+    truth = {"shoulder.fv": 2.0, "shoulder.fc": 3.0, "elbow.fv": 2.0, "elbow.fc": 3.0}
+    for name, value in truth.items():
+        row = next(p for p in found.record["parameters"] if p["name"] == name)
+        assert abs(row["value"] - value) < 4 * row["std"] + 1e-3, row
+    with pytest.raises(TypeError, match="belong to the robot"):
+        dynid.design(arm, gravity=[0, 0, 0])
+    with pytest.raises(dynid.SettingError, match="perid"):
+        dynid.design(arm, trajectory={"perid": 3})
+    none = dynid.design(arm, limits={"effort": 0.1}, search={"starts": 1})
+    assert not none.feasible and none.headline
+
+
+def test_a_robot_that_runs() -> None:
+    arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
+    made = dynid.simulate(arm, duration_s=60, rate_hz=200, seed=1)
+    session = dynid.Online(arm, online={"learn_s": 20})
+    events = []
+    for k in range(0, len(made.t), 500):
+        events += session.feed(made.t[k : k + 500], made.q[k : k + 500], made.tau[k : k + 500])
+    events += session.finish()
+    kinds = [event["event"] for event in events]
+    assert kinds.count("learned") == 1 and kinds.count("estimate") > 10 and "change" not in kinds
+    # Row by row the same comes out.
+    single = dynid.Online(arm, online={"learn_s": 20})
+    rows = [e for t, q, tau in zip(made.t, made.q, made.tau, strict=True) for e in single.feed(t, q, tau)] + single.finish()
+    last = [event for event in events if event["event"] == "estimate"][-1]
+    assert [event for event in rows if event["event"] == "estimate"][-1] == last
+    with pytest.raises(TypeError, match="without `velocity`"):
+        session.feed(made.t[:1], made.q[:1], made.tau[:1], made.q[:1])
