@@ -132,7 +132,7 @@ impl Robot {
 
     /// Rows that a block of the engine takes: all where poses are followed from one to the next.
     fn block(&self, rows: usize) -> usize {
-        if self.model.closed().is_some() { rows } else { CHUNK }
+        if self.model.closed().is_some() { rows } else { CHUNK.min(rows) }
     }
 
     fn scratch(&self) -> Scratch {

@@ -188,3 +188,17 @@ def test_many_calls_leak_nothing(indy7: dynid.Robot, made: dynid.Simulation, fou
 def test_the_program_of_the_package() -> None:
     ended = subprocess.run([sys.executable, "-c", "from dynid._command_line import main; raise SystemExit(main())", "--version"], capture_output=True, check=True)
     assert ended.stdout.decode().split()[:2] == ["dynid", dynid.__version__]
+
+
+def test_no_states_and_one(indy7: dynid.Robot) -> None:
+    none, one = np.zeros((0, 6)), np.full(6, 0.3)
+    assert indy7.inverse_dynamics(none, none, none).shape == (0, 6)
+    assert indy7.regressor(none, none, none).shape == (0, 6, 60)
+    r, z, rho = indy7.reduce(none, none, none, none)
+    assert r.shape == (60, 60) and not r.any() and not z.any() and rho == 0
+    rows, tau = indy7.regressor(one, one, one), indy7.inverse_dynamics(one, one, one)
+    assert rows.shape == (6, 60) and np.abs(rows @ indy7.parameters - tau).max() < 1e-12 * np.abs(tau).max()
+    heavier = indy7.parameters * 2
+    assert np.abs(indy7.inverse_dynamics(one, one, one, parameters=heavier) - 2 * tau).max() < 1e-12 * np.abs(tau).max()
+    r, z, rho = indy7.reduce(one, one, one, tau, base=True)
+    assert abs(np.sum((indy7.regressor(one, one, one, base=True) @ np.ones(len(z)) - tau) ** 2) - np.sum((r @ np.ones(len(z)) - z) ** 2) - rho**2) < 1e-9
