@@ -278,6 +278,12 @@ impl Estimate {
         serde_json::to_string(&fits).map_err(|e| PyValueError::new_err(e.to_string()))
     }
 
+    /// What was found of bodies that some logs carry: records as JSON.
+    fn payloads(&self, py: Python<'_>) -> PyResult<String> {
+        let records = dynid::payload::payload_records(self.found(py, "payloads")?);
+        serde_json::to_string(&records).map_err(|e| PyValueError::new_err(e.to_string()))
+    }
+
     fn report(&self, py: Python<'_>) -> PyResult<String> {
         let found = self.found(py, "report")?.clone();
         py.detach(|| dynid::report_page(&found, &self.record)).map_err(|e| raise(py, &e))

@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import dynid
 import numpy as np
@@ -146,12 +147,15 @@ def test_progress_and_interrupt(indy7: dynid.Robot, made: dynid.Simulation) -> N
     with pytest.raises(RuntimeError, match="examining logs"):
         dynid.identify(indy7, made.log, progress=stop)
     long = dynid.simulate(indy7, duration_s=300, rate_hz=1000, seed=3)
+    # What a shell starts in the background has no interrupt.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
     begun = time.perf_counter()
     timer.start()
     with pytest.raises(KeyboardInterrupt):
         dynid.identify(indy7, long.log)
     assert time.perf_counter() - begun < 1.3
+    signal.signal(signal.SIGINT, before)
 
 
 def test_threads_do_not_disturb_each_other(indy7: dynid.Robot, made: dynid.Simulation, unseen: dynid.Simulation, found: dynid.Estimate) -> None:
@@ -202,3 +206,23 @@ def test_no_states_and_one(indy7: dynid.Robot) -> None:
     assert np.abs(indy7.inverse_dynamics(one, one, one, parameters=heavier) - 2 * tau).max() < 1e-12 * np.abs(tau).max()
     r, z, rho = indy7.reduce(one, one, one, tau, base=True)
     assert abs(np.sum((indy7.regressor(one, one, one, base=True) @ np.ones(len(z)) - tau) ** 2) - np.sum((r @ np.ones(len(z)) - z) ** 2) - rho**2) < 1e-9
+
+
+def test_what_an_arm_carries() -> None:
+    bare = dynid.examples.TWO_LINKS
+    stated = "mass = 2, com = [0, 0.01, 0.15], inertia_com = [0.02, 0.02, 0.004, 0, 0, 0]"
+    assert stated in bare
+    # 1.5 kg at 0.3 m on the axis of the forearm.
+    heavy = bare.replace(stated, "mass = 3.5, com = [0, 0.005714285714285714, 0.21428571428571427], inertia_com = [0.039371428571428574, 0.039285714285714285, 0.004085714285714286, 0, 0.0012857142857142856, 0]")
+    logs = []
+    for seed, text in enumerate((bare, heavy)):
+        made = dynid.simulate(dynid.Robot.parse(text, "arm.toml"), duration_s=40, rate_hz=250, seed=seed + 1)
+        carries: dict[str, Any] = {"payload": "tool"} if seed else {}
+        logs.append(dynid.Log(made.t, made.q, made.tau, name=f"log{seed}", **carries))
+    found = dynid.identify(dynid.Robot.parse(bare, "arm.toml"), logs, payload=[{"name": "tool"}])
+    (tool,) = found.payloads
+    mass, z = tool["mass"], tool["com"][2]
+    assert mass["interval"][0] < 1.5 < mass["interval"][1] and mass["std"] < 0.05, mass
+    assert z["interval"][0] < 0.3 < z["interval"][1] and "`tool` weighs 1.5" in tool["sentence"], tool
+    known = dynid.identify(dynid.Robot.parse(bare, "arm.toml"), logs, payload=[{"name": "tool", "mass": 1.5, "com": [0, 0, 0.3], "inertia": [0, 0, 0, 0, 0, 0]}])
+    assert known.payloads == []

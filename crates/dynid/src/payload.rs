@@ -59,6 +59,13 @@ pub fn identify_payloads(
     Ok(PayloadIdentification { identification, payloads })
 }
 
+/// What an identification found of the bodies that some of its logs carry, in the order of its settings; those that the settings know altogether
+/// are none of it.
+pub fn payload_records(id: &Identification) -> Vec<PayloadRecord> {
+    let found = |name: &String| id.model.payloads().any(|(p, _)| p.name() == name);
+    id.settings.payload.iter().filter(|p| found(&p.name)).map(|p| record::of(id, p)).collect()
+}
+
 /// Half width of the intervals in standard deviations.
 fn quantile(id: &Identification) -> f64 {
     trust::interval_quantile(&id.fitted)

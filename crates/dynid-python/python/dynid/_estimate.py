@@ -107,6 +107,13 @@ class Estimate:
         """Parameters that enter efforts nonlinearly, a Stribeck speed for example."""
         return Table.of_rows(self.record["shape_parameters"], ("name", "unit", "value", "std"))
 
+    @property
+    def payloads(self) -> list[dict[str, Any]]:
+        """What was found of bodies that some logs carry (`payload=[{"name": ...}]`, `Log(..., payload=...)`): mass, centre of mass and inertia, each
+        with interval and verdict, and `sentence`. Those that the settings know altogether are none of it."""
+        records: list[dict[str, Any]] = json.loads(self._native.payloads())
+        return records
+
     def value(self, name: str) -> float:
         """The value of a standard parameter, as `link.m` or `joint.fc`."""
         for p in self.record["parameters"]:
