@@ -1,6 +1,6 @@
 //! Errors of the library as Python exceptions: text and hint of the command line.
 
-use pyo3::exceptions::PyException;
+use pyo3::exceptions::{PyException, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::{PyTypeInfo, create_exception};
 
@@ -25,6 +25,8 @@ create_exception!(
     "An estimate or factor that cannot be read, merged or solved."
 );
 create_exception!(dynid, UnsupportedError, DynidError, "What there is no form for.");
+
+create_exception!(dynid, DynidWarning, PyUserWarning, "What a user should know about a robot.");
 
 /// An error of the library as an exception.
 pub(crate) fn raise(py: Python<'_>, error: &dynid::Error) -> PyErr {

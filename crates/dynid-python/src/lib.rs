@@ -21,7 +21,9 @@ mod _native {
     #[pymodule_export]
     use super::commands::{Online, check, design};
     #[pymodule_export]
-    use super::error::{DynidError, EstimateError, LogError, RobotError, SettingError, UnsupportedError};
+    use super::error::{
+        DynidError, DynidWarning, EstimateError, LogError, RobotError, SettingError, UnsupportedError,
+    };
     #[pymodule_export]
     use super::estimate::{Estimate, identify, identify_file};
     #[pymodule_export]

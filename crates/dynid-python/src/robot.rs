@@ -1,6 +1,7 @@
 //! Robots: what a file says, and the numbers of rigid bodies for batches of states.
 
 use std::collections::BTreeMap;
+use std::ffi::CString;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -14,7 +15,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use crate::arrays::{Batch, CHUNK, Matrix, Vector, by_chunks, demand_finite, filled, transpose, vector};
-use crate::error::{raise, setting, unsupported};
+use crate::error::{DynidWarning, raise, setting, unsupported};
 use crate::work::pool;
 
 /// Standard parameters in the order of this library, by their place in the order of Pinocchio.
@@ -59,6 +60,10 @@ impl Robot {
         text: Option<Arc<str>>,
         options: RobotOptions,
     ) -> PyResult<Self> {
+        for warning in &robot.warnings {
+            let text = CString::new(warning.replace('\0', " "))?;
+            PyErr::warn(py, py.get_type::<DynidWarning>().as_any(), &text, 1)?;
+        }
         let model = robot.skeleton().map_err(|e| raise(py, &e))?;
         let values = robot.skeleton_values(&model);
         Ok(Robot { robot, text, options, model, values, dynamics: OnceLock::new(), base: OnceLock::new() })

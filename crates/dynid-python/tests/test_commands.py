@@ -24,7 +24,11 @@ def test_preflight(indy7: dynid.Robot, made: dynid.Simulation) -> None:
 def test_a_design_is_followed_and_tells_what_it_said() -> None:
     arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
     steps: list[str] = []
-    wanted: dict[str, Any] = {"trajectory": {"period_s": 8, "harmonics": 4, "sample_rate_hz": 200}, "limits": {"acceleration": 10}, "search": {"starts": 2}}
+    wanted: dict[str, Any] = {
+        "trajectory": {"period_s": 8, "harmonics": 4, "sample_rate_hz": 200},
+        "limits": {"acceleration": 10},
+        "search": {"starts": 2},
+    }
     made = dynid.design(arm, progress=steps.append, **wanted)
     assert made.feasible and made.joints == arm.joints and made.q.shape == (len(made.t), 2) and any("starts" in s for s in steps)
     assert np.abs(made.v).max() <= 3 and np.abs(made.q).max() <= 2 and np.abs(made.a).max() <= 10 * (1 + 1e-6)

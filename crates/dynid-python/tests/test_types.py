@@ -14,7 +14,10 @@ from conftest import ROOT
 
 def test_types_hold() -> None:
     api = pytest.importorskip("mypy.api")
-    text, _, status = api.run([str(ROOT / "crates/dynid-python" / part) for part in ("python/dynid", "tests")] + ["--config-file", str(ROOT / "pyproject.toml"), "--no-incremental"])
+    text, _, status = api.run(
+        [str(ROOT / "crates/dynid-python" / part) for part in ("python/dynid", "tests")]
+        + ["--config-file", str(ROOT / "pyproject.toml"), "--no-incremental"]
+    )
     assert status == 0, text
 
 

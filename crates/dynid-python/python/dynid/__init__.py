@@ -19,6 +19,7 @@ from ._estimate import Estimate, Factor, identify, identify_file
 from ._log import Log, Simulation, simulate
 from ._native import (
     DynidError,
+    DynidWarning,
     EstimateError,
     LogError,
     Robot,
@@ -32,6 +33,7 @@ from ._table import Table
 __all__ = [
     "Design",
     "DynidError",
+    "DynidWarning",
     "Estimate",
     "EstimateError",
     "Factor",

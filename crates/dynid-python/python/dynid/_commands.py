@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _native
 from ._estimate import Progress, native_logs, teller, written
 from ._log import Log
+from ._settings import as_json
 from ._table import Table
 
 
@@ -32,7 +33,7 @@ def _keys(robot: _native.Robot, settings: Mapping[str, Any]) -> Iterator[str]:
             if robot.text.lstrip().startswith("<"):
                 path = str(Path(folder) / "robot.urdf")
             Path(path).write_text(robot.text, encoding="utf-8")
-        yield json.dumps({**settings, **json.loads(robot.options), "robot": path})
+        yield as_json({**settings, **json.loads(robot.options), "robot": path})
 
 
 def check(robot: _native.Robot, logs: Log | Iterable[Log], **settings: Any) -> Table:
@@ -40,7 +41,7 @@ def check(robot: _native.Robot, logs: Log | Iterable[Log], **settings: Any) -> T
 
     Columns: `severity` (`error`: an identification would be nonsense), `id` (`dynid explain ID` says more), `log`, `joint`, `evidence`, `remedy`.
     """
-    rows: list[dict[str, Any]] = json.loads(_native.check(robot, native_logs(logs), json.dumps(settings)))
+    rows: list[dict[str, Any]] = json.loads(_native.check(robot, native_logs(logs), as_json(settings)))
     return Table.of_rows(rows, ("severity", "id", "log", "joint", "evidence", "remedy"))
 
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _models, _native
 from ._log import Log
+from ._settings import as_json
 from ._table import Table
 
 Progress = bool | Callable[[str], object] | None
@@ -264,7 +265,7 @@ def identify(
 
     An interrupt ends the wait at once and leaves nothing behind.
     """
-    text = json.dumps(settings)
+    text = as_json(settings)
     found = _native.identify(robot, native_logs(logs), native_logs(validation), text, progress=teller(progress), threads=threads)
     return Estimate(found)
 

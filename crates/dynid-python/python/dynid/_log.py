@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
+from ._settings import as_json
 
 
 class Log:
@@ -51,7 +51,7 @@ class Log:
     ) -> None:
         names = None if joints is None else list(joints)
         extra = None if channels is None else dict(channels)
-        self._native = _native.Log(t, q, tau, v, joints=names, channels=extra, name=name, settings=json.dumps(settings))
+        self._native = _native.Log(t, q, tau, v, joints=names, channels=extra, name=name, settings=as_json(settings))
 
     @classmethod
     def read(
@@ -65,10 +65,8 @@ class Log:
         """A log file, of any format that the command line reads; `columns`, `motor_side` and `settings` (`rows`, `part`, `leave_out`, ...)
         are those of a configuration. It is read when it meets its robot."""
         log = cls.__new__(cls)
-        side = None if motor_side is None else json.dumps(dict(motor_side))
-        log._native = _native.Log.read_file(
-            os.fspath(path), columns=json.dumps(dict(columns or {})), motor_side=side, settings=json.dumps(settings)
-        )
+        side = None if motor_side is None else as_json(dict(motor_side))
+        log._native = _native.Log.read_file(os.fspath(path), columns=as_json(dict(columns or {})), motor_side=side, settings=as_json(settings))
         return log
 
     @classmethod
@@ -134,4 +132,4 @@ def simulate(robot: _native.Robot, **settings: Any) -> Simulation:
 
     Raises `SettingError` for a setting that is unknown or out of range.
     """
-    return Simulation(_native.simulate(robot, json.dumps(settings)))
+    return Simulation(_native.simulate(robot, as_json(settings)))

@@ -130,7 +130,10 @@ def from_pinocchio(model: Any) -> tuple[str, list[str]]:
             text.body(links[i], parent, name, "floating", place, phi=phi)
             continue
         if joint.nv != 1:
-            raise _refuse(f"joint `{name}` ({joint.shortname()}) has {joint.nv} degrees of freedom", "joints turn, slide, screw or float: build the model with those")
+            raise _refuse(
+                f"joint `{name}` ({joint.shortname()}) has {joint.nv} degrees of freedom",
+                "joints turn, slide, screw or float: build the model with those",
+            )
         space = pin.getJointJacobian(model, data, i, pin.LOCAL)[:, joint.idx_v]
         linear, angular = space[:3], space[3:]
         v = joint.idx_v
@@ -205,7 +208,9 @@ def from_mujoco(model: Any) -> tuple[str, list[str]]:
             joint, kind = model.joint(j).name or f"joint{j}", int(model.jnt_type[j])
             if kind not in (2, 3):
                 what = "free" if kind == 0 else "ball"
-                raise _refuse(f"joint `{joint}` of body `{names[b]}` is a {what} joint", "a fixed base, and joints that turn or slide, can be identified")
+                raise _refuse(
+                    f"joint `{joint}` of body `{names[b]}` is a {what} joint", "a fixed base, and joints that turn or slide, can be identified"
+                )
             anchor, axis = np.array(model.jnt_pos[j]), np.array(model.jnt_axis[j])
             zero = float(model.qpos0[model.jnt_qposadr[j]])
             # The frame of the first joint is placed from the parent, others from the joint before.
@@ -222,7 +227,9 @@ def from_mujoco(model: Any) -> tuple[str, list[str]]:
             phi = _phi(mass, com - anchor, about_com) if end else None
             text.body(link, parent, joint, "revolute" if kind == 3 else "prismatic", (turned, at), axis=axis, limits=bounds, phi=phi)
             d = int(model.jnt_dofadr[j])
-            text.joint_values(joint, rotor=float(model.dof_armature[d]), damping=_first(model.dof_damping[d]), friction=_first(model.dof_frictionloss[d]))
+            text.joint_values(
+                joint, rotor=float(model.dof_armature[d]), damping=_first(model.dof_damping[d]), friction=_first(model.dof_frictionloss[d])
+            )
             if model.jnt_stiffness[j].any() if np.ndim(model.jnt_stiffness[j]) else model.jnt_stiffness[j]:
                 text.warnings.append(f"joint `{joint}`: its spring is left out")
             parent, last = link, anchor
@@ -252,7 +259,10 @@ def apply(record: Mapping[str, Any], model: Any) -> list[str]:
         _apply_pinocchio(bodies, joints, model)
     else:
         raise TypeError(f"model: expected a mujoco.MjModel or a pinocchio.Model, found {type(model).__name__}")
-    forms = [f"friction of joint `{p['joint']}` stands as friction loss and damping: " + ", ".join(n for n, _ in p["parameters"]) for p in record["exported"]["projections"]]
+    forms = [
+        f"friction of joint `{p['joint']}` stands as friction loss and damping: " + ", ".join(n for n, _ in p["parameters"])
+        for p in record["exported"]["projections"]
+    ]
     offsets = [p["name"] for p in record["parameters"] if p.get("joint") and p["name"].endswith(".fo") and p["value"] != 0]
     return forms + [f"`{name}` has no place in the model" for name in offsets]
 
@@ -308,17 +318,17 @@ def _quaternion(rotation: Vector) -> Vector:
     """Unit quaternion `w x y z`, by its largest component."""
     m = rotation
     trace = np.array([m.trace(), m[0, 0], m[1, 1], m[2, 2]])
-    k = int(np.argmax(trace))
-    if k == 0:
+    largest = int(np.argmax(trace))
+    if largest == 0:
         q = np.array([1 + trace[0], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
     else:
-        i = k - 1
-        j, l = (i + 1) % 3, (i + 2) % 3
+        i = largest - 1
+        j, k = (i + 1) % 3, (i + 2) % 3
         q = np.zeros(4)
-        q[0] = m[l, j] - m[j, l]
-        q[1 + i] = 1 + m[i, i] - m[j, j] - m[l, l]
+        q[0] = m[k, j] - m[j, k]
+        q[1 + i] = 1 + m[i, i] - m[j, j] - m[k, k]
         q[1 + j] = m[j, i] + m[i, j]
-        q[1 + l] = m[l, i] + m[i, l]
+        q[1 + k] = m[k, i] + m[i, k]
     unit: Vector = q / np.linalg.norm(q)
     return unit
 

@@ -60,7 +60,7 @@ class Table(Mapping[str, list[Any]]):
         return pyarrow.table(self._columns)
 
     def __repr__(self) -> str:
-        lines = [[_text(x) for x in row] for row in zip(*self._columns.values(), strict=True)]
+        lines = [[_short(_text(x)) for x in row] for row in zip(*self._columns.values(), strict=True)]
         names = list(self._columns)
         widths = [max(len(x) for x in column) for column in zip(names, *lines, strict=True)]
         return "\n".join("  ".join(x.ljust(w) for x, w in zip(line, widths, strict=True)).rstrip() for line in [names, *lines])
@@ -70,6 +70,10 @@ class Table(Mapping[str, list[Any]]):
         rows = zip(*self._columns.values(), strict=True)
         body = "".join("<tr>" + "".join(f"<td>{html.escape(_text(x))}</td>" for x in row) + "</tr>" for row in rows)
         return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 60 else f"{text[:59]}…"
 
 
 def _text(value: Any) -> str:

@@ -17,9 +17,9 @@ use crate::support::write_log;
 const GANTRY: &str = r#"
 name = "gantry"
 body = [
-  { name = "carriage", parent = "ground", joint = { kind = "prismatic", axis = [1, 0, 0], limits = { position = [-0.6, 0.6], velocity = 1, effort = 900 } }, mass = 9, com = [0, 0, 0.02], inertia_com = [0.06, 0.07, 0.08, 0, 0, 0] },
-  { name = "upper", parent = "carriage", joint = { xyz = [0, 0, 0.1], axis = [0, 1, 0], limits = { position = [-2.5, 2.5], velocity = 3, effort = 300 } }, mass = 6, com = [0.02, 0.01, 0.3], inertia_com = [0.2, 0.2, 0.02, 0, 0, 0] },
-  { name = "fore", parent = "upper", joint = { xyz = [0, 0, 0.6], axis = [0, 1, 0], limits = { position = [-2.5, 2.5], velocity = 4, effort = 100 } }, mass = 4, com = [0.01, 0, 0.25], inertia_com = [0.1, 0.1, 0.01, 0, 0, 0] },
+  { name = "carriage", parent = "ground", joint = { kind = "prismatic", axis = [1, 0, 0], limits = { position = [-0.6, 0.6], velocity = 1, effort = 900 } }, mass = 9, com = [0, 0, 0.02], inertia_com = [0.06, 0, 0, 0.07, 0, 0.08] },
+  { name = "upper", parent = "carriage", joint = { xyz = [0, 0, 0.1], axis = [0, 1, 0], limits = { position = [-2.5, 2.5], velocity = 3, effort = 300 } }, mass = 6, com = [0.02, 0.01, 0.3], inertia_com = [0.2, 0, 0, 0.2, 0, 0.02] },
+  { name = "fore", parent = "upper", joint = { xyz = [0, 0, 0.6], axis = [0, 1, 0], limits = { position = [-2.5, 2.5], velocity = 4, effort = 100 } }, mass = 4, com = [0.01, 0, 0.25], inertia_com = [0.1, 0, 0, 0.1, 0, 0.01] },
 ]
 [element.carriage]
 elements = ["viscous", "reaction_friction"]
@@ -217,11 +217,11 @@ loop = [
   { name = "top", kind = "planar_revolute", a = "bar2", b = "upper_foot", a_xyz = [0.8, 0, 0] },
 ]
 body = [
-  { name = "foot", parent = "ground", joint = { kind = "prismatic", axis = [1, 0, 0], limits = { position = [0.35, 0.72], velocity = 0.4, effort = 3000 } }, mass = 4, com = [0, 0, 0], inertia_com = [0.02, 0.02, 0.02, 0, 0, 0] },
-  { name = "bar1", parent = "foot", joint = { axis = [0, 0, 1] }, mass = 6, com = [0.4, 0, 0], inertia_com = [0.01, 0.32, 0.32, 0, 0, 0] },
-  { name = "table", parent = "bar1", joint = { xyz = [0.8, 0, 0], axis = [0, 0, 1] }, mass = 30, com = [0.3, 0.1, 0], inertia_com = [0.5, 1, 1, 0, 0, 0] },
-  { name = "upper_foot", parent = "table", joint = { kind = "prismatic", axis = [1, 0, 0] }, mass = 2, com = [0, 0, 0], inertia_com = [0.01, 0.01, 0.01, 0, 0, 0] },
-  { name = "bar2", parent = "ground", joint = { axis = [0, 0, 1] }, mass = 6, com = [0.4, 0, 0], inertia_com = [0.01, 0.32, 0.32, 0, 0, 0] },
+  { name = "foot", parent = "ground", joint = { kind = "prismatic", axis = [1, 0, 0], limits = { position = [0.35, 0.72], velocity = 0.4, effort = 3000 } }, mass = 4, com = [0, 0, 0], inertia_com = [0.02, 0, 0, 0.02, 0, 0.02] },
+  { name = "bar1", parent = "foot", joint = { axis = [0, 0, 1] }, mass = 6, com = [0.4, 0, 0], inertia_com = [0.01, 0, 0, 0.32, 0, 0.32] },
+  { name = "table", parent = "bar1", joint = { xyz = [0.8, 0, 0], axis = [0, 0, 1] }, mass = 30, com = [0.3, 0.1, 0], inertia_com = [0.5, 0, 0, 1, 0, 1] },
+  { name = "upper_foot", parent = "table", joint = { kind = "prismatic", axis = [1, 0, 0] }, mass = 2, com = [0, 0, 0], inertia_com = [0.01, 0, 0, 0.01, 0, 0.01] },
+  { name = "bar2", parent = "ground", joint = { axis = [0, 0, 1] }, mass = 6, com = [0.4, 0, 0], inertia_com = [0.01, 0, 0, 0.32, 0, 0.32] },
 ]
 [home]
 foot = 0.5656854249492381
