@@ -131,9 +131,11 @@ def test_bad_input_is_told(indy7: dynid.Robot, made: dynid.Simulation) -> None:
         dynid.identify(indy7, [])
     with pytest.raises(dynid.SettingError, match="elbow"):
         dynid.identify(indy7, dynid.Log(made.t, made.q[:, :1], made.tau[:, :1], joints=["elbow"]))
-    for wrong in ({"q": np.zeros(5)}, {"v": np.zeros((2, 6))}, {"q": np.full(6, np.nan)}):
+    wrongs: list[dict[str, Any]] = [{"q": np.zeros(5)}, {"v": np.zeros((2, 6))}, {"q": np.full(6, np.nan)}]
+    for wrong in wrongs:
         with pytest.raises(ValueError, match=f"^{next(iter(wrong))}"):
-            indy7.inverse_dynamics(**({"q": np.zeros(6), "v": np.zeros(6), "a": np.zeros(6)} | wrong))
+            arguments: dict[str, Any] = {"q": np.zeros(6), "v": np.zeros(6), "a": np.zeros(6)} | wrong
+            indy7.inverse_dynamics(**arguments)
     with pytest.raises(ValueError, match="t: expected"):
         dynid.Log(np.zeros((2, 2)), made.q, made.tau)
     with pytest.raises(TypeError):

@@ -18,7 +18,9 @@ def test_oracle_robots(name: str, states: States) -> None:
     assert loader.loadReducedModelFromFile(str(path), robot.joints) and kinematics.loadRobotModel(loader.model())
     model = kinematics.model()
     gravity, rest = idyntree.Vector3(), idyntree.Vector6()
-    gravity.zero(), gravity.setVal(2, -9.81), rest.zero()
+    gravity.zero()
+    gravity.setVal(2, -9.81)
+    rest.zero()
     q, v, a = states(robot.nv, 20)
     links = [model.getLinkName(k) for k in range(model.getNrOfLinks())]
     columns = [10 * links.index(link) + k for link in robot.links for k in range(10)]

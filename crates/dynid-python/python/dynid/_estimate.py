@@ -68,9 +68,10 @@ class Estimate:
     @property
     def record(self) -> dict[str, Any]:
         """The result file as dictionaries and lists; its keys are those of `estimate.json`."""
-        if self._record is None:
-            self._record = json.loads(self.to_json())
-        return self._record
+        record = self._record
+        if record is None:
+            record = self._record = dict(json.loads(self.to_json()))
+        return record
 
     @property
     def status(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -111,7 +112,7 @@ def _refuse(what: str, hint: str) -> Exception:
 
 def from_pinocchio(model: Any) -> tuple[str, list[str]]:
     """The robot file of a `pinocchio.Model`, and warnings."""
-    import pinocchio as pin
+    pin: Any = import_module("pinocchio")
 
     text = _Text(model.name or "pinocchio model", np.asarray(model.gravity.linear))
     data = model.createData()
@@ -334,7 +335,7 @@ def _quaternion(rotation: Vector) -> Vector:
 
 
 def _apply_pinocchio(bodies: Mapping[str, Vector], joints: Mapping[str, Any], model: Any) -> None:
-    import pinocchio as pin
+    pin: Any = import_module("pinocchio")
 
     of_link = {frame.name: frame.parentJoint for frame in model.frames if frame.type == pin.FrameType.BODY}
     of_link.update({f"{name}_link": i for i, name in enumerate(model.names) if f"{name}_link" not in of_link})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Iterator, Mapping, Sequence
+from importlib import import_module
 from typing import Any
 
 
@@ -43,21 +44,15 @@ class Table(Mapping[str, list[Any]]):
 
     def to_pandas(self) -> Any:
         """A `pandas.DataFrame`."""
-        import pandas
-
-        return pandas.DataFrame(self._columns)
+        return import_module("pandas").DataFrame(self._columns)
 
     def to_polars(self) -> Any:
         """A `polars.DataFrame`."""
-        import polars
-
-        return polars.DataFrame(self._columns, strict=False)
+        return import_module("polars").DataFrame(self._columns, strict=False)
 
     def to_arrow(self) -> Any:
         """A `pyarrow.Table`."""
-        import pyarrow
-
-        return pyarrow.table(self._columns)
+        return import_module("pyarrow").table(self._columns)
 
     def __repr__(self) -> str:
         lines = [[_short(_text(x)) for x in row] for row in zip(*self._columns.values(), strict=True)]
