@@ -76,7 +76,15 @@ pub struct LogReference {
 }
 
 impl Log {
-    /// A log of a robot from arrays, checked for what no joint does.
+    /// A log of a robot from arrays: [`Log::of_axes`] with the robot's.
+    ///
+    /// # Errors
+    /// As [`Log::of_axes`].
+    pub fn new(robot: &Robot, signals: dynid_motion::Log) -> Result<Log, Error> {
+        Log::of_axes(&robot.axes, signals)
+    }
+
+    /// A log with signals of these axes from arrays, checked for what no joint does.
     ///
     /// `signals`: positions in rad or m, efforts in N m or N as the drives give them, those of a torque sensor as it reads; joints that are
     /// left out stand still at zero, efforts of links behind springs without a sensor do not count. Temperatures are channels called
@@ -85,8 +93,7 @@ impl Log {
     /// # Errors
     /// [`Error::UnknownJoint`], [`Error::Degrees`], [`Error::FarPosition`], [`Error::Temperature`],
     /// [`Error::Log`].
-    pub fn new(robot: &Robot, signals: dynid_motion::Log) -> Result<Log, Error> {
-        let axes = &robot.axes;
+    pub fn of_axes(axes: &[LogAxis], signals: dynid_motion::Log) -> Result<Log, Error> {
         let known = names(axes);
         let name = signals.name().to_owned();
         let rows = signals.rows();

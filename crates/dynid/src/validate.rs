@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dynid_io::MappingSpec;
-use dynid_model::EffortModel;
+use dynid_model::{EffortModel, RobotModel};
 use dynid_rows::conditioning::ConditioningSettings;
 
 use crate::Error;
@@ -11,6 +11,7 @@ use crate::agreement::{Agreement, Alignment, compare};
 use crate::config::{LogConfig, MotorSide};
 pub use crate::estimate::log_fit;
 use crate::estimate::{Estimate, Split};
+use crate::log::Log;
 use crate::logs;
 use crate::pipeline::known::logged_beyond;
 
@@ -40,7 +41,22 @@ pub fn validate(
     filter_hz: Option<f64>,
 ) -> Result<Validation, Error> {
     let model = estimate.effort_model(file, split)?;
-    let values = estimate.values(split);
+    let axes = crate::log::axes(&model);
+    let loaded = logs.iter().map(|log| logs::load(log, &axes, columns, motor_side));
+    validate_logs(estimate, (&model, &estimate.values(split)), loaded, filter_hz)
+}
+
+/// [`validate`] for logs at hand, one after the other. `model`: the estimate's by a split ([`Estimate::effort_model`]), and its parameters; logs
+/// have its axes.
+///
+/// # Errors
+/// What a log comes with; signals that cannot be filtered.
+pub fn validate_logs(
+    estimate: &Estimate,
+    (model, values): (&RobotModel, &[f64]),
+    logs: impl IntoIterator<Item = Result<Log, Error>>,
+    filter_hz: Option<f64>,
+) -> Result<Validation, Error> {
     let settings = ConditioningSettings::default();
     let alignment = Alignment {
         state_hz: estimate.model.state_hz,
@@ -51,10 +67,9 @@ pub fn validate(
     debug_assert_eq!(model.outputs().len(), estimate.joints.len());
     let mut out = Validation { agreements: Vec::new(), warnings: Vec::new() };
     for log in logs {
-        let loaded = logs::load(log, &crate::log::axes(&model), columns, motor_side)?;
-        let prepared = loaded.prepare(&model, &settings)?;
+        let prepared = log?.prepare(model, &settings)?;
         out.warnings.extend(logged_beyond(&estimate.model.known_friction, &prepared));
-        out.agreements.push(compare(&model, &values, &prepared, &alignment, &settings)?);
+        out.agreements.push(compare(model, values, &prepared, &alignment, &settings)?);
     }
     Ok(out)
 }

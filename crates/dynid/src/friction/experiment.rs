@@ -72,19 +72,15 @@ pub(super) fn driven(robot: &Robot) -> Vec<String> {
     robot.axes.iter().map(|axis| axis.name.clone()).filter(drive).collect()
 }
 
-/// What half the difference of both directions holds beside the friction of the joint itself, or at which loads.
-fn paths(robot: &Robot, joint: &str) -> Option<String> {
-    if robot.elements.reactions.iter().any(|r| r.joint == joint) {
-        return Some(
-            "friction follows loads here (`reaction_friction`): the law holds at the loads of this test alone"
-                .to_owned(),
-        );
-    }
-    robot.closed.as_ref().map(|_| {
-        "the joint is in a loop: the drive also turns passive joints, and their friction, at the poses of this test, is in these numbers; \
-         beside friction elements of passive joints it would count twice"
-            .to_owned()
-    })
+/// What half the difference of both directions holds beside the friction of the joint itself, and at which loads.
+fn paths(robot: &Robot, joint: &str) -> Vec<String> {
+    let follows = robot.elements.reactions.iter().any(|r| r.joint == joint);
+    let loads =
+        "friction follows loads here (`reaction_friction`): the law holds at the loads of this test alone";
+    let passive = "the joint is in a loop: the drive also turns passive joints, and their friction, at the poses of this test, is in these \
+                   numbers; beside friction elements of passive joints it would count twice";
+    let notes = [(follows, loads), (robot.closed.is_some(), passive)];
+    notes.into_iter().filter(|(applies, _)| *applies).map(|(_, note)| note.to_owned()).collect()
 }
 
 /// Reads all logs of steady tests. Joints come in the robot's order, those without a pass or signal left out.
@@ -97,7 +93,7 @@ pub(super) fn read(
     let names = driven(robot);
     let of = |joint: &String| JointExperiment {
         joint: joint.clone(),
-        notes: paths(robot, joint).into_iter().collect(),
+        notes: paths(robot, joint),
         ..JointExperiment::default()
     };
     let mut joints: Vec<JointExperiment> = names.iter().map(of).collect();
