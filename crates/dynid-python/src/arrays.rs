@@ -49,6 +49,14 @@ impl<'py> Batch<'py> {
         Ok(Batch { array, rows, columns, single })
     }
 
+    /// Fails unless there are as many states as in `q`.
+    pub(crate) fn demand_rows(&self, name: &str, rows: usize) -> PyResult<()> {
+        if self.rows == rows {
+            return Ok(());
+        }
+        Err(PyValueError::new_err(format!("{name}: expected {rows} states as in q, found {}", self.rows)))
+    }
+
     /// The numbers, row after row.
     pub(crate) fn values(&self) -> PyResult<&[f64]> {
         Ok(self.array.as_slice()?)
@@ -83,6 +91,21 @@ pub(crate) fn as_doubles<'py>(value: &Bound<'py, PyAny>) -> PyResult<PyReadonlyA
     // What has no axis gets one there.
     let array = to_array.bind(py).call((value,), Some(&options))?;
     Ok(array.cast::<PyArrayDyn<f64>>()?.try_readonly()?)
+}
+
+/// Vectors by name.
+pub(crate) fn columns_by_name(given: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<(String, Vec<f64>)>> {
+    let of = |(name, values): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+        let (name, values) = (name.extract::<String>()?, as_doubles(&values)?);
+        if values.ndim() != 1 {
+            return Err(PyValueError::new_err(format!(
+                "{name}: expected a vector, found shape {:?}",
+                values.shape()
+            )));
+        }
+        Ok((name, values.as_slice()?.to_vec()))
+    };
+    given.into_iter().flatten().map(of).collect()
 }
 
 /// An array of zeros that is filled by the caller, with the axis of states left out for a single one.

@@ -6,9 +6,9 @@ use dynid::config::Config;
 use dynid::design::{DesignConfig, DesignStep, design as run_design};
 use dynid::online::{Event, Session};
 use dynid::overlap::Overlaps;
+use dynid::pipeline::held_where_not_logged;
 use dynid::preflight;
 use numpy::PyArrayMethods;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -16,12 +16,8 @@ use crate::arrays::{Batch, demand_finite, vector};
 use crate::error::raise;
 use crate::log::Log;
 use crate::robot::Robot;
-use crate::settings::{parsed, settings};
+use crate::settings::{as_json, parsed, settings};
 use crate::work;
-
-fn as_json(value: &impl serde::Serialize) -> PyResult<String> {
-    serde_json::to_string(value).map_err(|e| PyValueError::new_err(e.to_string()))
-}
 
 /// What is wrong with logs before anything is identified: findings as JSON.
 #[pyfunction]
@@ -35,12 +31,8 @@ pub(crate) fn check(
     let own = robot.robot.clone();
     let logs: Vec<Log> = logs.iter().map(|l| (**l).clone()).collect();
     let findings = work::run(py, None, 0, move |_| {
-        let logs = logs.iter().map(|log| log.of(&own, false)).collect::<Result<Vec<_>, _>>()?;
-        let still: Vec<(String, f64)> = match logs.first() {
-            Some(log) => log.not_logged(&own.axes).into_iter().map(|joint| (joint, 0.0)).collect(),
-            None => Vec::new(),
-        };
-        let held = if still.is_empty() { own } else { own.locked(&still)? };
+        let logs = logs.iter().map(|log| log.of(&own.axes, false)).collect::<Result<Vec<_>, _>>()?;
+        let held = held_where_not_logged(own, &logs)?;
         preflight::of_logs(&settings, &held, &logs, &Overlaps::of(&logs, &[]))
     })?;
     as_json(&findings)

@@ -1,5 +1,7 @@
 //! Errors of the library as Python exceptions: text and hint of the command line.
 
+use std::ffi::CString;
+
 use pyo3::exceptions::{PyException, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::{PyTypeInfo, create_exception};
@@ -26,7 +28,12 @@ create_exception!(
 );
 create_exception!(dynid, UnsupportedError, DynidError, "What there is no form for.");
 
-create_exception!(dynid, DynidWarning, PyUserWarning, "What a user should know about a robot.");
+create_exception!(
+    dynid,
+    DynidWarning,
+    PyUserWarning,
+    "What a user should know about a robot, a log or a file that was made."
+);
 
 /// An error of the library as an exception.
 pub(crate) fn raise(py: Python<'_>, error: &dynid::Error) -> PyErr {
@@ -67,6 +74,12 @@ pub(crate) fn raise(py: Python<'_>, error: &dynid::Error) -> PyErr {
         _ => DynidError::type_object(py),
     };
     with_hint(py, kind, error.to_string(), error.hint())
+}
+
+/// Tells a doubt.
+pub(crate) fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
+    let text = CString::new(text.replace('\0', " "))?;
+    PyErr::warn(py, DynidWarning::type_object(py).as_any(), &text, 1)
 }
 
 /// An exception with its hint.

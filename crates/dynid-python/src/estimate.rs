@@ -3,25 +3,24 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use dynid::agreement::{Alignment, compare};
 use dynid::config::Config;
 use dynid::estimate::{Estimate as Record, Split, log_fit};
-use dynid::estimators::conditioning::ConditioningSettings;
 use dynid::export::{CheckStates, IdentifiedRobot, RobotExport, Source, exported, json};
-use dynid::model::{EffortModel, MotionBlock, RobotModel};
+use dynid::logs::sha256;
+use dynid::model::{EffortModel, RobotModel};
 use dynid::pipeline::Identification;
+use dynid::validate::validate_logs;
 use numpy::{PyArrayDyn, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::arrays::{
-    Batch, CHUNK, Matrix, Vector, as_doubles, by_chunks, demand_finite, filled, transpose, vector,
-};
-use crate::error::{raise, unsupported};
+use crate::arrays::{Matrix, Vector, columns_by_name, vector};
+use crate::error::{raise, unsupported, warn};
 use crate::log::Log;
 use crate::robot::Robot;
-use crate::settings::settings;
+use crate::settings::{as_json, settings};
+use crate::states::{Given, channels_of};
 
 /// A result file with the model that it stands for.
 #[pyclass(frozen, module = "dynid._native")]
@@ -77,22 +76,23 @@ impl Estimate {
         })
     }
 
-    /// Text of a robot file by the identified model.
-    fn export(
-        &self,
-        kind: Kind,
-        allow_unphysical: bool,
-    ) -> Result<(String, Vec<String>, Option<String>), dynid::Error> {
-        let source = match &self.source {
-            Some((path, text)) => Source::parse(text, path)?,
-            None => match self.record.robot_file() {
-                Some(file) => Source::read(file.path.as_ref())?,
-                None => {
-                    let text = "the estimate names no robot file".to_owned();
-                    return Err(dynid::Error::Unsupported(text));
-                }
-            },
+    /// The robot file that was identified, and whether its file has changed since.
+    fn source(&self) -> Result<(Source, Option<String>), dynid::Error> {
+        if let Some((path, text)) = &self.source {
+            return Ok((Source::parse(text, path)?, None));
+        }
+        let Some(file) = self.record.robot_file() else {
+            return Err(dynid::Error::Unsupported("the estimate names no robot file".to_owned()));
         };
+        let path = Path::new(&file.path);
+        let source = Source::read(path)?;
+        let changed = sha256(path)? != file.sha256;
+        Ok((source, changed.then(|| format!("{} has changed since it was identified", file.path))))
+    }
+
+    /// A robot file by the identified model; `name` of a URDF in the file of its loops.
+    fn export(&self, kind: Kind, name: &str, allow_unphysical: bool) -> Result<Made, dynid::Error> {
+        let (source, changed) = self.source()?;
         let identified = IdentifiedRobot::of(&self.record, Path::new("estimate"))?;
         let states = CheckStates::random(identified.identified().model);
         let export = RobotExport::new(identified.identified(), &source)?
@@ -100,17 +100,24 @@ impl Estimate {
         if !allow_unphysical {
             export.require_physical()?;
         }
-        let made = match kind {
-            Kind::Urdf => export.urdf(&states)?,
-            Kind::Mjcf => export.mjcf(&states)?,
-            Kind::Model => json(&identified.identified(), &states)?,
+        let (made, loops) = match kind {
+            Kind::Urdf => (export.urdf(&states)?, export.loops(name)),
+            Kind::Mjcf => (export.mjcf(&states)?, None),
+            Kind::Model => (json(&identified.identified(), &states)?, None),
         };
-        let loops = match kind {
-            Kind::Urdf => export.loops("robot.urdf"),
-            _ => None,
-        };
-        Ok((made.text, made.notes, loops))
+        let faults = export.faults().iter();
+        let refused =
+            faults.map(|f| format!("link `{}` {}: simulators refuse such a robot", f.link, f.fault));
+        let notes = changed.into_iter().chain(made.notes).chain(refused).collect();
+        Ok(Made { text: made.text, notes, loops })
     }
+}
+
+/// A file that was made.
+struct Made {
+    text: String,
+    notes: Vec<String>,
+    loops: Option<String>,
 }
 
 #[derive(Clone, Copy)]
@@ -194,52 +201,10 @@ impl Estimate {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let (model, linear) = self.model(unconstrained);
-        let (nq, nv) = model.dimensions();
-        let batches = [Batch::take("q", q, nq)?, Batch::take("v", v, nv)?, Batch::take("a", a, nv)?];
-        let rows = batches[0].rows;
-        for (name, batch) in ["q", "v", "a"].iter().zip(&batches) {
-            if batch.rows != rows {
-                let text = format!("{name}: expected {rows} states as in q, found {}", batch.rows);
-                return Err(PyValueError::new_err(text));
-            }
-            demand_finite(name, batch.values()?, batch.columns)?;
-        }
-        let extra = extra(py, model, channels, rows)?;
-        let states = [batches[0].values()?, batches[1].values()?, batches[2].values()?];
-        let columns = [nq, nv, nv];
-        let outputs = model.outputs().len();
-        let shape = model.parameters().shape_start();
-        let flat = |from: usize, count: usize| {
-            let mut motion = [Vec::new(), Vec::new(), Vec::new()];
-            for ((values, columns), to) in states.iter().zip(columns).zip(&mut motion) {
-                to.resize(columns * count, 0.0);
-                transpose(values, columns, from, count, to);
-            }
-            motion
-        };
-        let chunk = if model.closed().is_some() { rows } else { CHUNK };
-        if let Some(closed) = model.closed() {
-            let [q, dq, ddq] = flat(0, rows);
-            closed.reachable(&MotionBlock::plain(rows, &q, &dq, &ddq)).map_err(|e| {
-                let file = "states".to_owned();
-                raise(py, &dynid::Error::Pose { file, row: e.sample + 1, fault: Box::new(e.fault) })
-            })?;
-        }
-        filled(py, (rows, batches[0].single), &[outputs], |out| {
-            let work = |from: usize, part: &mut [f64], effort: &mut Vec<f64>| {
-                let count = part.len() / outputs;
-                let [q, dq, ddq] = flat(from, count);
-                let channels: Vec<(&str, &[f64])> =
-                    extra.iter().map(|(name, x)| (name.as_str(), &x[from..from + count])).collect();
-                let motion = MotionBlock { channels: &channels, ..MotionBlock::plain(count, &q, &dq, &ddq) };
-                effort.resize(outputs * count, 0.0);
-                model.efforts(&motion, &shape, linear, count, effort);
-                for (s, row) in part.chunks_exact_mut(outputs).enumerate() {
-                    row.iter_mut().enumerate().for_each(|(o, to)| *to = effort[o * count + s]);
-                }
-            };
-            py.detach(|| by_chunks((threads, chunk), outputs, out, Vec::new, work))
-        })
+        let given = Given::take(model, q, v, a)?;
+        let states = given.of(py, model)?;
+        let channels = channels_of(py, model, columns_by_name(channels)?, states.rows)?;
+        states.efforts(py, linear, &channels, threads)
     }
 
     /// Predicted against measured efforts of logs: the figures of a result file, as JSON.
@@ -251,37 +216,22 @@ impl Estimate {
         unconstrained: bool,
         filter_hz: Option<f64>,
     ) -> PyResult<String> {
-        let robot = self.found.as_ref().map(|found| found.robot.clone());
-        let robot = match robot {
-            Some(robot) => robot,
-            None => self.read_robot().map_err(|e| raise(py, &e))?,
-        };
         let (model, linear) = self.model(unconstrained);
-        let settings = ConditioningSettings::default();
-        let record = &self.record;
-        let alignment = Alignment {
-            state_hz: record.model.state_hz,
-            delay_samples: record.conditioning.delay_samples,
-            delay_rate_hz: record.conditioning.delay_rate_hz,
-            filter_hz: filter_hz.unwrap_or(record.model.kernel_hz),
-        };
+        let axes = dynid::log::axes(model);
         let logs: Vec<Log> = logs.iter().map(|l| (**l).clone()).collect();
-        let fits = py.detach(|| {
-            logs.iter()
-                .map(|log| {
-                    let prepared = log.of(&robot, true)?.prepare(model, &settings)?;
-                    Ok(log_fit(&compare(model, linear, &prepared, &alignment, &settings)?))
-                })
-                .collect::<Result<Vec<_>, dynid::Error>>()
+        let found = py.detach(|| {
+            let loaded = logs.iter().map(|log| log.of(&axes, true));
+            validate_logs(&self.record, (model, linear), loaded, filter_hz)
         });
-        let fits = fits.map_err(|e| raise(py, &e))?;
-        serde_json::to_string(&fits).map_err(|e| PyValueError::new_err(e.to_string()))
+        let found = found.map_err(|e| raise(py, &e))?;
+        found.warnings.iter().try_for_each(|warning| warn(py, warning))?;
+        as_json(&found.agreements.iter().map(log_fit).collect::<Vec<_>>())
     }
 
     /// What was found of bodies that some logs carry: records as JSON.
     fn payloads(&self, py: Python<'_>) -> PyResult<String> {
         let records = dynid::payload::payload_records(self.found(py, "payloads")?);
-        serde_json::to_string(&records).map_err(|e| PyValueError::new_err(e.to_string()))
+        as_json(&records)
     }
 
     fn report(&self, py: Python<'_>) -> PyResult<String> {
@@ -289,25 +239,27 @@ impl Estimate {
         py.detach(|| dynid::report_page(&found, &self.record)).map_err(|e| raise(py, &e))
     }
 
-    /// Text, notes and loops of an export: `urdf`, `mjcf` or `model`.
-    #[pyo3(signature = (kind, allow_unphysical=false))]
+    /// Text of a robot file, `urdf`, `mjcf` or `model`, and of the file of its loops beside a URDF of that name; what is lost is told.
+    #[pyo3(signature = (kind, name, allow_unphysical))]
     fn exported(
         &self,
         py: Python<'_>,
         kind: &str,
+        name: &str,
         allow_unphysical: bool,
-    ) -> PyResult<(String, Vec<String>, Option<String>)> {
+    ) -> PyResult<(String, Option<String>)> {
         let kind = match kind {
             "urdf" => Kind::Urdf,
             "mjcf" => Kind::Mjcf,
             "model" => Kind::Model,
             _ => {
-                return Err(PyValueError::new_err(format!(
-                    "kind: expected urdf, mjcf or model, found {kind}"
-                )));
+                let text = format!("kind: expected urdf, mjcf or model, found {kind}");
+                return Err(PyValueError::new_err(text));
             }
         };
-        py.detach(|| self.export(kind, allow_unphysical)).map_err(|e| raise(py, &e))
+        let made = py.detach(|| self.export(kind, name, allow_unphysical)).map_err(|e| raise(py, &e))?;
+        made.notes.iter().try_for_each(|note| warn(py, note))?;
+        Ok((made.text, made.loops))
     }
 
     fn __repr__(&self) -> String {
@@ -340,48 +292,6 @@ impl Estimate {
     }
 }
 
-impl Estimate {
-    /// The robot of a result that was read.
-    fn read_robot(&self) -> Result<dynid::Robot, dynid::Error> {
-        let options = dynid::RobotOptions::default();
-        match (&self.source, self.record.robot_file()) {
-            (Some((path, text)), _) => dynid::Robot::parse(text, path, &options),
-            (None, Some(file)) => dynid::Robot::load(file.path.as_ref(), &options),
-            (None, None) => Err(dynid::Error::Unsupported("the estimate names no robot file".to_owned())),
-        }
-    }
-}
-
-/// Channels that a model reads, each as long as the states.
-fn extra(
-    py: Python<'_>,
-    model: &RobotModel,
-    given: Option<&Bound<'_, PyDict>>,
-    rows: usize,
-) -> PyResult<Vec<(String, Vec<f64>)>> {
-    let mut out = Vec::new();
-    for (name, values) in given.into_iter().flatten() {
-        let name: String = name.extract()?;
-        if !model.channels().contains(&name) {
-            let known = model.channels().join(", ");
-            let text = format!("channels: expected one of [{known}], found `{name}`");
-            return Err(PyValueError::new_err(text));
-        }
-        let values = as_doubles(&values)?;
-        let values = values.as_slice()?.to_vec();
-        demand_finite(&name, &values, 1)?;
-        if values.len() != rows {
-            let text = format!("channels: {name}: expected {rows} values, found {}", values.len());
-            return Err(PyValueError::new_err(text));
-        }
-        out.push((name, values));
-    }
-    match model.channels().iter().find(|c| !out.iter().any(|(name, _)| name == *c)) {
-        Some(channel) => Err(raise(py, &dynid::Error::StatesChannel { channel: channel.clone() })),
-        None => Ok(out),
-    }
-}
-
 /// Identifies a robot from logs in memory.
 #[pyfunction]
 #[pyo3(signature = (robot, logs, validation, settings_json, *, progress=None, threads=0))]
@@ -403,8 +313,10 @@ pub(crate) fn identify(
         .chain(validation.iter().map(|l| ((**l).clone(), true)))
         .collect();
     crate::work::run(py, progress, threads, move |tell| {
-        let logs =
-            all.iter().map(|(log, validation)| log.of(&own, *validation)).collect::<Result<Vec<_>, _>>()?;
+        let logs = all
+            .iter()
+            .map(|(log, validation)| log.of(&own.axes, *validation))
+            .collect::<Result<Vec<_>, _>>()?;
         drop(all);
         let found = dynid::pipeline::identify(&own, logs, &settings, &mut |step| tell(step.to_string()))?;
         let record = Record { exported: exported(&found)?, ..found.estimate() };

@@ -25,7 +25,7 @@ impl Factor {
         let reduction = crate::work::run(py, None, 0, move |_| {
             let reducer = found.recipe()?.reducer()?;
             let logs =
-                logs.iter().map(|log| log.of(reducer.robot(), false)).collect::<Result<Vec<_>, _>>()?;
+                logs.iter().map(|log| log.of(&reducer.robot().axes, false)).collect::<Result<Vec<_>, _>>()?;
             Reduction::of(&reducer, logs)
         })?;
         Ok(Factor { reduction })
@@ -55,7 +55,7 @@ impl Factor {
         let reduction = crate::work::run(py, None, 0, move |_| {
             let reducer = recipe.reducer()?;
             let logs =
-                logs.iter().map(|log| log.of(reducer.robot(), false)).collect::<Result<Vec<_>, _>>()?;
+                logs.iter().map(|log| log.of(&reducer.robot().axes, false)).collect::<Result<Vec<_>, _>>()?;
             Reduction::of(&reducer, logs)
         })?;
         Ok(Factor { reduction })
@@ -73,7 +73,8 @@ impl Factor {
         let logs: Vec<Log> = validation.iter().map(|l| (**l).clone()).collect();
         crate::work::run(py, progress, threads, move |tell| {
             let reducer = reduction.recipe().clone().reducer()?;
-            let logs = logs.iter().map(|log| log.of(reducer.robot(), true)).collect::<Result<Vec<_>, _>>()?;
+            let logs =
+                logs.iter().map(|log| log.of(&reducer.robot().axes, true)).collect::<Result<Vec<_>, _>>()?;
             let found = reduction.solve(logs, &mut |step| tell(step.to_string()))?;
             let estimate = dynid::reduce::estimate(&found, reduction.recipe());
             Estimate::new(estimate, Some(found), None)

@@ -10,6 +10,7 @@ mod factor;
 mod log;
 mod robot;
 mod settings;
+mod states;
 mod work;
 
 use pyo3::prelude::*;

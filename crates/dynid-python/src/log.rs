@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use dynid::config::LogConfig;
 use dynid::estimate::MotorSide;
 use dynid::io::MappingSpec;
+use dynid::log::LogAxis;
 use dynid::motion::{Channel, JointSignals, Log as Recording};
 use dynid::settings::LogSettings;
 use dynid::simulate::{SimulateSettings, SimulatedLog};
@@ -13,7 +14,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{Matrix, as_doubles, vector};
+use crate::arrays::{Matrix, as_doubles, columns_by_name, vector};
 use crate::error::setting;
 use crate::robot::Robot;
 use crate::settings::parsed;
@@ -118,14 +119,9 @@ impl Log {
                 joints.len()
             )));
         }
-        let mut extra = Vec::new();
-        for (channel, values) in channels.into_iter().flatten() {
-            let channel: String = channel.extract()?;
-            let mut columns = signal(&channel, &values, rows)?;
-            match (columns.pop(), columns.is_empty()) {
-                (Some(column), true) => extra.push((channel, column)),
-                _ => return Err(wrong(format!("{channel}: expected shape ({rows},)"))),
-            }
+        let extra = columns_by_name(channels)?;
+        if let Some((channel, _)) = extra.iter().find(|(_, values)| values.len() != rows) {
+            return Err(wrong(format!("{channel}: expected shape ({rows},)")));
         }
         let source = Source::Arrays {
             name: name.to_owned(),
@@ -183,16 +179,15 @@ impl Log {
 }
 
 impl Log {
-    /// The log of a robot.
-    pub(crate) fn of(&self, robot: &dynid::Robot, validation: bool) -> Result<dynid::log::Log, dynid::Error> {
-        let settings =
-            LogSettings { validation: validation || self.settings.validation, ..self.settings.clone() };
+    /// The log of a robot with these axes.
+    pub(crate) fn of(&self, axes: &[LogAxis], validation: bool) -> Result<dynid::log::Log, dynid::Error> {
+        let settings = LogSettings { validation, ..self.settings.clone() };
         let log = match &self.source {
             Source::File { config, columns, motor_side } => {
-                dynid::logs::load(config, &robot.axes, columns, motor_side.as_ref())?
+                dynid::logs::load(config, axes, columns, motor_side.as_ref())?
             }
             Source::Arrays { name, time, joints, position, velocity, effort, channels } => {
-                let known: Vec<String> = robot.axes.iter().map(|a| a.name.clone()).collect();
+                let known = dynid::log::names(axes);
                 let names = joints.as_ref().unwrap_or(&known);
                 if names.len() != position.len() {
                     return Err(dynid::Error::setting(
@@ -216,7 +211,7 @@ impl Log {
                     (0..names.len()).map(joint).collect(),
                     channels.collect(),
                 )?;
-                dynid::log::Log::new(robot, signals)?
+                dynid::log::Log::of_axes(axes, signals)?
             }
         };
         Ok(log.with_settings(settings))

@@ -1,21 +1,22 @@
 //! Robots: what a file says, and the numbers of rigid bodies for batches of states.
 
 use std::collections::BTreeMap;
-use std::ffi::CString;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use dynid::estimators::{Factor as Triangle, FactorBuilder, FactorError};
 use dynid::model::dynamics::{AddedInertia, Dynamics, LoadedState};
-use dynid::model::{BaseParameters, BaseSettings, EffortModel, MotionBlock, RegressorBlock, RobotModel};
+use dynid::model::{BaseParameters, BaseSettings, EffortModel, RegressorBlock, RobotModel};
 use dynid::{RobotOptions, inspect};
 use numpy::{PyArray2, PyArrayDyn, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::arrays::{Batch, CHUNK, Matrix, Vector, by_chunks, demand_finite, filled, transpose, vector};
-use crate::error::{DynidWarning, raise, setting, unsupported};
+use crate::arrays::{Batch, Matrix, Vector, by_chunks, demand_finite, filled, vector};
+use crate::error::{raise, setting, unsupported, warn};
+use crate::settings::as_json;
+use crate::states::{Given, Scratch, States};
 use crate::work::pool;
 
 /// Standard parameters in the order of this library, by their place in the order of Pinocchio.
@@ -35,24 +36,6 @@ pub(crate) struct Robot {
     base: OnceLock<BaseParameters>,
 }
 
-/// States of a block, one joint after the other.
-struct Scratch {
-    columns: [usize; 3],
-    motion: [Vec<f64>; 3],
-}
-
-impl Scratch {
-    /// Rows of the states from `from` on.
-    fn take(&mut self, states: &[&[f64]; 3], from: usize, count: usize) -> MotionBlock<'_> {
-        for ((values, columns), to) in states.iter().zip(self.columns).zip(&mut self.motion) {
-            to.resize(columns * count, 0.0);
-            transpose(values, columns, from, count, to);
-        }
-        let [q, dq, ddq] = &self.motion;
-        MotionBlock::plain(count, q, dq, ddq)
-    }
-}
-
 impl Robot {
     fn of(
         py: Python<'_>,
@@ -60,13 +43,15 @@ impl Robot {
         text: Option<Arc<str>>,
         options: RobotOptions,
     ) -> PyResult<Self> {
-        for warning in &robot.warnings {
-            let text = CString::new(warning.replace('\0', " "))?;
-            PyErr::warn(py, py.get_type::<DynidWarning>().as_any(), &text, 1)?;
-        }
         let model = robot.skeleton().map_err(|e| raise(py, &e))?;
         let values = robot.skeleton_values(&model);
         Ok(Robot { robot, text, options, model, values, dynamics: OnceLock::new(), base: OnceLock::new() })
+    }
+
+    /// The robot, once its doubts have been told.
+    fn told(self, py: Python<'_>) -> PyResult<Self> {
+        self.robot.warnings.iter().try_for_each(|warning| warn(py, warning))?;
+        Ok(self)
     }
 
     fn nq_nv(&self) -> (usize, usize) {
@@ -116,43 +101,14 @@ impl Robot {
         Ok(values.to_vec())
     }
 
-    fn motion<'py>(
-        &self,
-        q: &Bound<'py, PyAny>,
-        v: &Bound<'py, PyAny>,
-        a: &Bound<'py, PyAny>,
-    ) -> PyResult<[Batch<'py>; 3]> {
-        let (nq, nv) = self.nq_nv();
-        let batches = [Batch::take("q", q, nq)?, Batch::take("v", v, nv)?, Batch::take("a", a, nv)?];
-        for (name, batch) in ["q", "v", "a"].iter().zip(&batches) {
-            if batch.rows != batches[0].rows {
-                let text =
-                    format!("{name}: expected {} states as in q, found {}", batches[0].rows, batch.rows);
-                return Err(PyValueError::new_err(text));
-            }
-            demand_finite(name, batch.values()?, batch.columns)?;
-        }
-        Ok(batches)
-    }
-
-    /// Rows that a block of the engine takes: all where poses are followed from one to the next.
-    fn block(&self, rows: usize) -> usize {
-        if self.model.closed().is_some() { rows } else { CHUNK.min(rows) }
-    }
-
-    fn scratch(&self) -> Scratch {
-        let (nq, nv) = self.nq_nv();
-        Scratch { columns: [nq, nv, nv], motion: [Vec::new(), Vec::new(), Vec::new()] }
-    }
-
-    /// Refuses states that a mechanism with loops cannot be in.
-    fn demand_reachable(&self, py: Python<'_>, states: &[&[f64]; 3], rows: usize) -> PyResult<()> {
-        let Some(closed) = self.model.closed() else { return Ok(()) };
-        let found = py.detach(|| closed.reachable(&self.scratch().take(states, 0, rows)));
-        found.map_err(|e| {
-            let file = "states".to_owned();
-            raise(py, &dynid::Error::Pose { file, row: e.sample + 1, fault: Box::new(e.fault) })
-        })
+    /// Per output: its acting columns by number, and where each goes.
+    fn targets(&self, places: &[Option<usize>]) -> Vec<Vec<(usize, usize)>> {
+        let layout = self.model.layout();
+        let of = |o: usize| {
+            let columns = layout.columns(o).iter().enumerate();
+            columns.filter_map(|(k, c)| Some((k, places[*c]?))).collect()
+        };
+        (0..self.outputs()).map(of).collect()
     }
 
     /// Columns of a regressor in the order asked for: where each goes.
@@ -181,11 +137,6 @@ impl Robot {
     }
 }
 
-/// The numbers of a motion's batches.
-fn numbers<'a>(batches: &'a [Batch<'_>; 3]) -> PyResult<[&'a [f64]; 3]> {
-    Ok([batches[0].values()?, batches[1].values()?, batches[2].values()?])
-}
-
 #[pymethods]
 impl Robot {
     /// Reads a robot file: URDF, or TOML with DH rows or bodies.
@@ -202,10 +153,9 @@ impl Robot {
         floating_base: bool,
         locked: Option<BTreeMap<String, f64>>,
     ) -> PyResult<Self> {
-        let locked = locked.unwrap_or_default().into_iter().collect();
-        let options = RobotOptions { gravity, couple_mimics, floating_base, locked };
+        let options = options(gravity, couple_mimics, floating_base, locked);
         let robot = dynid::Robot::load(&path, &options).map_err(|e| raise(py, &e))?;
-        Robot::of(py, robot, None, options)
+        Robot::of(py, robot, None, options)?.told(py)
     }
 
     /// A robot from the text of a robot file; `name` says by its ending which kind (`.urdf`, `.toml`), and stands in messages.
@@ -220,10 +170,25 @@ impl Robot {
         floating_base: bool,
         locked: Option<BTreeMap<String, f64>>,
     ) -> PyResult<Self> {
-        let locked = locked.unwrap_or_default().into_iter().collect();
-        let options = RobotOptions { gravity, couple_mimics, floating_base, locked };
+        let options = options(gravity, couple_mimics, floating_base, locked);
         let robot = dynid::Robot::parse(text, Path::new(name), &options).map_err(|e| raise(py, &e))?;
-        Robot::of(py, robot, Some(text.into()), options)
+        Robot::of(py, robot, Some(text.into()), options)?.told(py)
+    }
+
+    /// A robot that was pickled; its doubts were told before.
+    #[staticmethod]
+    fn restored(
+        py: Python<'_>,
+        text: &str,
+        name: &str,
+        stated: (Option<[f64; 3]>, bool, bool),
+        locked: BTreeMap<String, f64>,
+        warnings: Vec<String>,
+    ) -> PyResult<Self> {
+        let (gravity, couple_mimics, floating_base) = stated;
+        let options = options(gravity, couple_mimics, floating_base, Some(locked));
+        let robot = dynid::Robot::parse(text, Path::new(name), &options).map_err(|e| raise(py, &e))?;
+        Robot::of(py, dynid::Robot { warnings, ..robot }, Some(text.into()), options)
     }
 
     /// The robot of a `pinocchio.Model`: joints, bodies, limits, armature, damping and dry friction.
@@ -330,23 +295,9 @@ impl Robot {
         parameters: Option<&Bound<'py, PyAny>>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let batches = self.motion(q, v, a)?;
-        let (states, rows) = (numbers(&batches)?, batches[0].rows);
-        let own = self.parameters_or_own(parameters)?;
-        self.demand_reachable(py, &states, rows)?;
-        let (outputs, shape) = (self.outputs(), self.model.parameters().shape_start());
-        filled(py, (rows, batches[0].single), &[outputs], |out| {
-            let scratch = || (self.scratch(), vec![0.0; outputs * self.block(rows)]);
-            let work = |from: usize, part: &mut [f64], (scratch, effort): &mut (Scratch, Vec<f64>)| {
-                let count = part.len() / outputs;
-                let motion = scratch.take(&states, from, count);
-                self.model.efforts(&motion, &shape, &own, count, &mut effort[..outputs * count]);
-                for (s, row) in part.chunks_exact_mut(outputs).enumerate() {
-                    row.iter_mut().enumerate().for_each(|(o, to)| *to = effort[o * count + s]);
-                }
-            };
-            py.detach(|| by_chunks((threads, self.block(rows)), outputs, out, scratch, work))
-        })
+        let given = Given::take(&self.model, q, v, a)?;
+        let linear = self.parameters_or_own(parameters)?;
+        given.of(py, &self.model)?.efforts(py, &linear, &[], threads)
     }
 
     /// Regressor `W` with `effort = W parameters`, `(n, nv, columns)`.
@@ -366,20 +317,13 @@ impl Robot {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let (width, places) = self.places(py, order, base)?;
-        let batches = self.motion(q, v, a)?;
-        let (states, rows) = (numbers(&batches)?, batches[0].rows);
-        self.demand_reachable(py, &states, rows)?;
+        let given = Given::take(&self.model, q, v, a)?;
+        let states = given.of(py, &self.model)?;
         let (outputs, shape) = (self.outputs(), self.model.parameters().shape_start());
-        let layout = self.model.layout();
-        // Per output: where its columns go in a row.
-        let targets: Vec<Vec<(usize, usize)>> = (0..outputs)
-            .map(|o| {
-                let columns = layout.columns(o).iter().enumerate();
-                columns.filter_map(|(k, c)| Some((k, o * width + places[*c]?))).collect()
-            })
-            .collect();
-        filled(py, (rows, batches[0].single), &[outputs, width], |out| {
-            let scratch = || (self.scratch(), RegressorBlock::new(layout.clone(), self.block(rows)));
+        let targets = self.targets(&places);
+        filled(py, (states.rows, states.single), &[outputs, width], |out| {
+            let scratch =
+                || (states.scratch(), RegressorBlock::new(self.model.layout().clone(), states.block()));
             let per_state = outputs * width;
             let work = |from: usize, part: &mut [f64], (scratch, block): &mut (Scratch, RegressorBlock)| {
                 let motion = scratch.take(&states, from, part.len() / per_state);
@@ -387,11 +331,12 @@ impl Robot {
                 for (o, targets) in targets.iter().enumerate() {
                     let (rows, stride) = (block.rows(o), block.stride());
                     for (s, state) in part.chunks_exact_mut(per_state).enumerate() {
-                        targets.iter().for_each(|(k, to)| state[*to] = rows[k * stride + s]);
+                        let row = &mut state[o * width..][..width];
+                        targets.iter().for_each(|(k, to)| row[*to] = rows[k * stride + s]);
                     }
                 }
             };
-            py.detach(|| by_chunks((threads, self.block(rows)), per_state, out, scratch, work))
+            py.detach(|| by_chunks((threads, states.block()), per_state, out, scratch, work))
         })
     }
 
@@ -417,17 +362,13 @@ impl Robot {
         threads: usize,
     ) -> PyResult<(Matrix<'py>, Vector<'py>, f64)> {
         let (width, places) = self.places(py, "dynid", base)?;
-        let batches = self.motion(q, v, a)?;
-        let (states, rows) = (numbers(&batches)?, batches[0].rows);
+        let given = Given::take(&self.model, q, v, a)?;
+        let states = given.of(py, &self.model)?;
         let efforts = Batch::take("tau", tau, self.outputs())?;
-        if efforts.rows != rows {
-            let text = format!("tau: expected {rows} states as in q, found {}", efforts.rows);
-            return Err(PyValueError::new_err(text));
-        }
+        efforts.demand_rows("tau", states.rows)?;
         let measured = efforts.values()?;
         demand_finite("tau", measured, efforts.columns)?;
-        self.demand_reachable(py, &states, rows)?;
-        let reduced = py.detach(|| self.triangle(&states, measured, rows, (width, &places), threads))?;
+        let reduced = py.detach(|| self.triangle(&states, measured, (width, &places), threads))?;
         let reduced = reduced.map_err(|e| PyValueError::new_err(e.to_string()))?;
         let r = PyArray2::zeros(py, [width, width], false);
         {
@@ -480,12 +421,11 @@ impl Robot {
         tau: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let dynamics = self.tree(py, "the forward dynamics")?;
-        let nv = self.nq_nv().1;
-        let batches = self.motion(q, v, tau)?;
-        let ([q, v, tau], rows) = (numbers(&batches)?, batches[0].rows);
+        let (nq, nv) = self.nq_nv();
+        let given = Given::take(&self.model, q, v, tau)?;
+        let States { values: [q, v, tau], rows, single, .. } = given.of(py, &self.model)?;
         let inertias = self.robot.mechanism.inertia_vector();
-        let nq = batches[0].columns;
-        filled(py, (rows, batches[0].single), &[nv], |out| {
+        filled(py, (rows, single), &[nv], |out| {
             let found = py.detach(|| {
                 let mut work = dynamics.forward_workspace();
                 for (s, ddq) in out.chunks_exact_mut(nv.max(1)).enumerate() {
@@ -509,7 +449,7 @@ impl Robot {
     /// What `dynid inspect --json` prints: tree, parameters, base parameters and what is folded into them.
     fn inspect(&self, py: Python<'_>) -> PyResult<String> {
         let found = inspect::inspect(&self.robot, None).map_err(|e| raise(py, &e))?;
-        serde_json::to_string(&found).map_err(|e| PyValueError::new_err(e.to_string()))
+        as_json(&found)
     }
 
     /// How the file was read, as keys of a configuration in JSON.
@@ -533,41 +473,53 @@ impl Robot {
         format!("<dynid.Robot {}: {nv} efforts, {nq} positions, {} bodies>", self.name(), self.links().len())
     }
 
-    fn __reduce__(&self, py: Python<'_>) -> PyResult<(Py<PyAny>, (String, String))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled)> {
         let Some(text) = &self.text else {
             let text = format!("a robot of a file cannot be pickled: {}", self.robot.path.display());
-            return Err(unsupported(
-                py,
-                text,
-                "pickle the path, or make it of a text: `Robot.parse(text, name)`",
-            ));
+            let hint = "pickle the path, or make it of a text: `Robot.parse(text, name)`";
+            return Err(unsupported(py, text, hint));
         };
-        let parse = py.get_type::<Robot>().getattr("parse")?.unbind();
-        Ok((parse, (text.to_string(), self.robot.path.display().to_string())))
+        let RobotOptions { gravity, couple_mimics, floating_base, locked } = &self.options;
+        let state = (
+            text.to_string(),
+            self.robot.path.display().to_string(),
+            (*gravity, *couple_mimics, *floating_base),
+            locked.iter().cloned().collect(),
+            self.robot.warnings.clone(),
+        );
+        Ok((py.get_type::<Robot>().getattr("restored")?, state))
     }
+}
+
+/// What is pickled of a robot: text, name, options, warnings.
+type Pickled = (String, String, (Option<[f64; 3]>, bool, bool), BTreeMap<String, f64>, Vec<String>);
+
+/// How a robot file is to be read.
+fn options(
+    gravity: Option<[f64; 3]>,
+    couple_mimics: bool,
+    floating_base: bool,
+    locked: Option<BTreeMap<String, f64>>,
+) -> RobotOptions {
+    let locked = locked.unwrap_or_default().into_iter().collect();
+    RobotOptions { gravity, couple_mimics, floating_base, locked }
 }
 
 impl Robot {
     /// Rows of every output reduced on their own, then merged: joints near the end have few columns.
     fn triangle(
         &self,
-        states: &[&[f64]; 3],
+        states: &States<'_>,
         measured: &[f64],
-        rows: usize,
         (width, places): (usize, &[Option<usize>]),
         threads: usize,
     ) -> PyResult<Result<Triangle, FactorError>> {
         let (outputs, layout) = (self.outputs(), self.model.layout());
         let shape = self.model.parameters().shape_start();
-        let columns: Vec<Vec<(usize, usize)>> = (0..outputs)
-            .map(|o| {
-                let all = layout.columns(o).iter().enumerate();
-                all.filter_map(|(k, c)| Some((k, places[*c]?))).collect()
-            })
-            .collect();
+        let columns = self.targets(places);
         let mut builders: Vec<FactorBuilder> = columns.iter().map(|c| FactorBuilder::new(c.len())).collect();
-        let chunk = self.block(rows);
-        let (mut scratch, mut block) = (self.scratch(), RegressorBlock::new(layout.clone(), chunk));
+        let (rows, chunk) = (states.rows, states.block());
+        let (mut scratch, mut block) = (states.scratch(), RegressorBlock::new(layout.clone(), chunk));
         let mut run = || {
             let mut from = 0;
             while from < rows {
@@ -615,5 +567,5 @@ fn described(py: Python<'_>, function: &str, model: &Bound<'_, PyAny>) -> PyResu
     let mut robot = dynid::Robot::parse(&text, Path::new("model.toml"), &RobotOptions::default())
         .map_err(|e| raise(py, &e))?;
     robot.warnings.extend(warnings);
-    Robot::of(py, robot, Some(text.into()), RobotOptions::default())
+    Robot::of(py, robot, Some(text.into()), RobotOptions::default())?.told(py)
 }

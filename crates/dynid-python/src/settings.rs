@@ -4,18 +4,22 @@ use std::path::PathBuf;
 
 use dynid::Config;
 use dynid::settings::Settings;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
 
 use crate::error::{raise, setting};
 
 /// Keys of a configuration that arrays have no use for, and what stands in their place.
-const ELSEWHERE: [(&str, &str); 9] = [
+const ELSEWHERE: [(&str, &str); 12] = [
     ("robot", "the robot is the first argument"),
     ("log", "logs are the second argument"),
     ("validation", "logs to validate on are the argument `validation` of `identify`"),
     ("columns", "columns are named where a file is read: `Log.read(path, columns={...})`"),
     ("motor_side", "transform arrays before, or read the file: `identify_file(\"dynid.toml\")`"),
+    ("trajectory", "read the file with its trajectory: `Log.read(path, trajectory=...)`"),
+    ("period_s", "the period of a motion belongs to its log: `Log(t, q, tau, period_s=...)`"),
+    ("online", "settings of a robot that runs: `Online(robot, online={...})`"),
     ("out", "results are values here: `Estimate.save(path)`"),
     ("gravity", "gravity belongs to the robot: `Robot.load(path, gravity=[...])`"),
     ("locked", "locked joints belong to the robot: `Robot.load(path, locked={...})`"),
@@ -37,6 +41,11 @@ pub(crate) fn settings(py: Python<'_>, text: &str) -> PyResult<Settings> {
     let config: Config = parsed(py, text, "settings")?;
     let settings = config.check().and_then(|()| config.settings());
     settings.map_err(|e| raise(py, &e))
+}
+
+/// A value as JSON.
+pub(crate) fn as_json(value: &impl serde::Serialize) -> PyResult<String> {
+    serde_json::to_string(value).map_err(|e| PyValueError::new_err(e.to_string()))
 }
 
 /// A value from JSON, with the library's error for what does not fit.

@@ -32,7 +32,8 @@ def test_a_design_is_followed_and_tells_what_it_said() -> None:
     made = dynid.design(arm, progress=steps.append, **wanted)
     assert made.feasible and made.joints == arm.joints and made.q.shape == (len(made.t), 2) and any("starts" in s for s in steps)
     assert np.abs(made.v).max() <= 3 and np.abs(made.q).max() <= 2 and np.abs(made.a).max() <= 10 * (1 + 1e-6)
-    assert np.abs(np.diff(made.q, axis=0) * 200 - made.v[:-1]).max() < 0.06
+    # A difference over a step is off by half the step times the acceleration at most.
+    assert np.abs(np.diff(made.q, axis=0) * 200 - made.v[:-1]).max() <= 10 * (1 + 1e-6) / 200 / 2
     assert "<html" in made.report().lower()
     again = dynid.design(arm, threads=1, **wanted)
     assert (again.q == made.q).all()
@@ -43,7 +44,7 @@ def test_a_design_is_followed_and_tells_what_it_said() -> None:
     truth = {"shoulder.fv": 2.0, "shoulder.fc": 3.0, "elbow.fv": 2.0, "elbow.fc": 3.0}
     for name, value in truth.items():
         row = next(p for p in found.record["parameters"] if p["name"] == name)
-        assert abs(row["value"] - value) < 4 * row["std"] + 1e-3, row
+        assert abs(row["value"] - value) < 4 * row["std"], row
     with pytest.raises(TypeError, match="belong to the robot"):
         dynid.design(arm, gravity=[0, 0, 0])
     with pytest.raises(dynid.SettingError, match="perid"):
@@ -69,3 +70,5 @@ def test_a_robot_that_runs() -> None:
     assert [event for event in rows if event["event"] == "estimate"][-1] == last
     with pytest.raises(TypeError, match="without `velocity`"):
         session.feed(made.t[:1], made.q[:1], made.tau[:1], made.q[:1])
+    with pytest.raises(ValueError, match="q: expected shape"):
+        dynid.Online(arm).feed(made.t[:500], made.q[:500].T, made.tau[:500].T)

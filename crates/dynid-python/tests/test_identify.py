@@ -252,3 +252,53 @@ def test_settings_may_be_numbers_of_numpy(indy7: dynid.Robot, made: dynid.Simula
     same(dynid.identify(indy7, made.log, validation=unseen.log, seed=np.int64(1)), found)
     with pytest.raises(TypeError, match="found object"):
         dynid.identify(indy7, made.log, seed=object())
+
+
+def test_pickled_robots_are_as_they_were() -> None:
+    robot = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml", gravity=[0.1, 0.2, -3], locked={"elbow": 0.4})
+    again = pickle.loads(pickle.dumps(robot))
+    q, v, a = np.array([0.3]), np.array([1.0]), np.array([-2.0])
+    assert again.joints == ["shoulder"] and again.gravity_vector == robot.gravity_vector == [0.1, 0.2, -3]
+    assert again.inverse_dynamics(q, v, a) == robot.inverse_dynamics(q, v, a)
+
+
+def test_settings_that_arrays_have_no_use_for(indy7: dynid.Robot, made: dynid.Simulation) -> None:
+    for key, value in (("online", {"learn_s": 3}), ("period_s", 5.0), ("trajectory", "x.json")):
+        settings: dict[str, Any] = {key: value}
+        with pytest.raises(dynid.SettingError, match=f"`{key}`"):
+            dynid.identify(indy7, made.log, **settings)
+
+
+def test_files_tell_what_they_lose(tmp_path: Path) -> None:
+    arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
+    made = dynid.simulate(arm, duration_s=20, rate_hz=200, seed=1)
+    found = dynid.identify(arm, made.log, elements={"default": ["viscous", "rotor"], "joint": {"shoulder": ["viscous", "rotor"]}})
+    with pytest.warns(dynid.DynidWarning, match="rotor inertia"):
+        found.to_urdf(tmp_path / "arm.urdf")
+    assert found.to_loops() is None and [p.name for p in tmp_path.iterdir()] == ["arm.urdf"]
+    file = tmp_path / "bar.toml"
+    file.write_text((ROOT / "robots/fivebar.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    bar = dynid.Robot.load(file)
+    linkage = dynid.identify(bar, dynid.simulate(bar, duration_s=20, rate_hz=200, seed=1).log)
+    linkage.to_urdf(tmp_path / "made.urdf")
+    closed = dynid.Robot.load(tmp_path / "made.loops.toml")
+    q = np.array([[2.2, 0.8], [2.25, 0.85]])
+    rest = np.zeros_like(q)
+    offset = {p["joint"]: p["value"] for p in linkage.record["parameters"] if p["name"].endswith(".fo")}
+    bodies = linkage.predict(q, rest, rest) - [offset[joint] for joint in linkage.joints]
+    assert np.abs(closed.gravity(q) - bodies).max() < 1e-9 * np.abs(bodies).max()
+    file.write_text(file.read_text(encoding="utf-8") + "# changed\n", encoding="utf-8")
+    with pytest.warns(dynid.DynidWarning, match="has changed since"):
+        linkage.to_urdf()
+
+
+def test_joints_that_were_held_stay_so_in_other_logs(made: dynid.Simulation) -> None:
+    arm = dynid.Robot.parse(dynid.examples.TWO_LINKS, "arm.toml")
+    one = dynid.simulate(arm, duration_s=20, rate_hz=200, seed=1)
+    log = dynid.Log(one.t, one.q[:, :1], one.tau[:, :1], joints=["shoulder"])
+    found = dynid.identify(arm, log)
+    assert found.joints == ["shoulder"]
+    again = pickle.loads(pickle.dumps(found))
+    assert again.validate(log) == found.validate(log)
+    with pytest.raises(dynid.SettingError, match="elbow"):
+        again.validate(one.log)

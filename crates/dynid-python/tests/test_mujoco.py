@@ -78,6 +78,31 @@ def test_what_cannot_be_identified_is_refused() -> None:
     assert caught.value.hint
 
 
+def test_joints_that_were_held_are_not_counted_twice() -> None:
+    model = mujoco.MjModel.from_xml_string(ARM)
+    robot = dynid.Robot.from_mujoco(model)
+    made = dynid.simulate(robot, duration_s=20, rate_hz=200, seed=6)
+    first = made.joints[:3]
+    found = dynid.identify(robot, dynid.Log(made.t, made.q[:, :3], made.tau[:, :3], joints=first))
+    masses = model.body_mass.copy()
+    with pytest.raises(dynid.UnsupportedError, match="joints roll of the model were held"):
+        found.apply(model)
+    assert (model.body_mass == masses).all()
+
+
+def test_what_is_left_out_is_told() -> None:
+    for change, told in (
+        ('axis="1 0 0" stiffness="3"', "`jnt_stiffness`"),
+        ('axis="1 0 0" damping="0.1 0.2"', "`dof_dampingpoly`"),
+    ):
+        odd = mujoco.MjModel.from_xml_string(ARM.replace('axis="1 0 0"', change, 1))
+        with pytest.warns(dynid.DynidWarning, match=told):
+            assert any(told in w for w in dynid.Robot.from_mujoco(odd).warnings)
+    dense = mujoco.MjModel.from_xml_string(ARM.replace("<option ", '<option density="1.2" '))
+    with pytest.warns(dynid.DynidWarning, match="density"):
+        dynid.Robot.from_mujoco(dense)
+
+
 def test_identified_put_back_and_rolled_out() -> None:
     model = without_contact(mujoco.MjModel.from_xml_string(ARM))
     # The machine is not as its model: other masses, and friction.

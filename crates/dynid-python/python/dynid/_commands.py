@@ -119,9 +119,14 @@ class Online:
         """Takes a row (`t` a number) or a block of rows (`t` `(n,)`, the others `(n, joints)`); gives what came of it."""
         if (v is None) == self._velocity:
             raise TypeError("v: the session was made " + ("with" if self._velocity else "without") + " `velocity`")
-        time = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        parts = [np.asarray(x, dtype=np.float64).reshape(len(time), -1) for x in (q, v, tau) if x is not None]
-        rows = np.column_stack([time, *parts])
+        time = np.asarray(t, dtype=np.float64)
+        shape = (*time.shape, len(self._names))
+        signals = {"q": q, "v": v, "tau": tau}
+        parts = [(name, np.asarray(x, dtype=np.float64)) for name, x in signals.items() if x is not None]
+        for name, part in parts:
+            if time.ndim > 1 or part.shape != shape:
+                raise ValueError(f"{name}: expected shape {shape} as t has, found {part.shape}")
+        rows = np.concatenate([time[..., None], *(part for _, part in parts)], axis=-1)
         return self._events(self._native.feed(rows))
 
     def finish(self) -> list[dict[str, Any]]:

@@ -6,6 +6,7 @@ import html
 import json
 import os
 import sys
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -161,16 +162,30 @@ class Estimate:
         return written(path, self._native.report())
 
     def to_urdf(self, path: str | os.PathLike[str] | None = None, *, allow_unphysical: bool = False) -> str:
-        """URDF with identified inertias and friction. Loops of a mechanism have no place there: see `loops`."""
-        return written(path, self._native.exported("urdf", allow_unphysical)[0])
+        """URDF with identified inertias and friction. What it has no place for is told by a `DynidWarning`.
+
+        Loops of a mechanism are written beside `path`, as `<name>.loops.toml`; without a path see `to_loops`.
+        """
+        name = "robot.urdf" if path is None else Path(path).name
+        text, loops = self._native.exported("urdf", name, allow_unphysical)
+        if path is not None and loops is not None:
+            written(Path(path).with_suffix(".loops.toml"), loops)
+        return written(path, text)
+
+    def to_loops(self, urdf: str = "robot.urdf") -> str | None:
+        """What closes the loops of a URDF of that name: a robot file that refers to it; None for a robot without loops."""
+        with warnings.catch_warnings():
+            # Told where the URDF itself is made.
+            warnings.simplefilter("ignore", _native.DynidWarning)
+            return self._native.exported("urdf", urdf, True)[1]
 
     def to_mjcf(self, path: str | os.PathLike[str] | None = None, *, allow_unphysical: bool = False) -> str:
-        """MJCF with identified inertias, friction and armature."""
-        return written(path, self._native.exported("mjcf", allow_unphysical)[0])
+        """MJCF with identified inertias, friction and armature. What it has no place for is told by a `DynidWarning`."""
+        return written(path, self._native.exported("mjcf", "", allow_unphysical)[0])
 
     def to_model_json(self, path: str | os.PathLike[str] | None = None) -> str:
         """The whole identified model, elements of every law included, as JSON."""
-        return written(path, self._native.exported("model", True)[0])
+        return written(path, self._native.exported("model", "", True)[0])
 
     def apply(self, model: Any) -> list[str]:
         """Puts identified inertias, friction and armature into a `mujoco.MjModel` or a `pinocchio.Model`, in place.

@@ -229,21 +229,21 @@ def from_mujoco(model: Any) -> tuple[str, list[str]]:
             text.body(link, parent, joint, "revolute" if kind == 3 else "prismatic", (turned, at), axis=axis, limits=bounds, phi=phi)
             d = int(model.jnt_dofadr[j])
             text.joint_values(
-                joint, rotor=float(model.dof_armature[d]), damping=_first(model.dof_damping[d]), friction=_first(model.dof_frictionloss[d])
+                joint, rotor=float(model.dof_armature[d]), damping=float(model.dof_damping[d]), friction=float(model.dof_frictionloss[d])
             )
-            if model.jnt_stiffness[j].any() if np.ndim(model.jnt_stiffness[j]) else model.jnt_stiffness[j]:
-                text.warnings.append(f"joint `{joint}`: its spring is left out")
+            # Later versions have polynomials beside the linear terms.
+            for what in ("jnt_stiffness", "jnt_stiffnesspoly", "dof_dampingpoly"):
+                if np.any(getattr(model, what, np.zeros(model.nv))[d if what.startswith("dof") else j]):
+                    text.warnings.append(f"joint `{joint}`: its `{what}` is left out")
             parent, last = link, anchor
         carried[b] = (names[b], -last)
     if model.neq:
         text.warnings.append(f"{model.neq} equality constraints are left out: state loops in a robot file")
+    if model.opt.density > 0 or model.opt.viscosity > 0:
+        text.warnings.append("forces of the medium (`density`, `viscosity`) are left out")
     if np.any(np.asarray(model.body_gravcomp)):
         text.warnings.append("gravity compensation of bodies is left out")
     return text.text(), text.warnings
-
-
-def _first(value: Any) -> float:
-    return float(np.ravel(value)[0])
 
 
 def apply(record: Mapping[str, Any], model: Any) -> list[str]:
@@ -280,6 +280,13 @@ def _central(phi: Vector) -> tuple[float, Vector, Vector]:
     return mass, com, _tensor(phi) - mass * (com @ com * np.eye(3) - np.outer(com, com))
 
 
+def _none_held(known: Sequence[str], joints: Mapping[str, Any]) -> None:
+    held = [name for name in known if name not in joints]
+    if held:
+        # Their links are part of the body that carried them, and would count twice.
+        raise _refuse(f"joints {', '.join(held)} of the model were held in the identification", "log them, or export: `to_urdf`, `to_mjcf`")
+
+
 def _missing(kind: str, known: Sequence[str], wanted: Mapping[str, Any]) -> None:
     unknown = [name for name in wanted if name not in known]
     if unknown:
@@ -292,6 +299,7 @@ def _apply_mujoco(bodies: Mapping[str, Vector], joints: Mapping[str, Any], model
     parts = {f"{names[int(model.jnt_bodyid[j])]}__{name}" for name, j in all_joints.items()}
     _missing("body", [*names, *parts], bodies)
     _missing("joint", list(all_joints), joints)
+    _none_held(list(all_joints), joints)
     for b, name in enumerate(names):
         if name not in bodies:
             if b > 0 and int(model.body_jntnum[b]) == 0 and int(model.body_weldid[b]) != 0:
@@ -313,6 +321,9 @@ def _apply_mujoco(bodies: Mapping[str, Vector], joints: Mapping[str, Any], model
         model.dof_armature[d] = values["rotor_inertia"]
         model.dof_damping[d] = values["damping"]
         model.dof_frictionloss[d] = values["friction_loss"]
+        if hasattr(model, "dof_dampingpoly"):
+            # The damping that was found stands for all of it.
+            model.dof_dampingpoly[d] = 0
 
 
 def _quaternion(rotation: Vector) -> Vector:
@@ -341,6 +352,7 @@ def _apply_pinocchio(bodies: Mapping[str, Vector], joints: Mapping[str, Any], mo
     of_link.update({f"{name}_link": i for i, name in enumerate(model.names) if f"{name}_link" not in of_link})
     _missing("link", list(of_link), bodies)
     _missing("joint", list(model.names), joints)
+    _none_held(list(model.names)[1:], joints)
     for link, phi in bodies.items():
         parameters = np.array([*phi[:6], phi[7], phi[6], phi[8], phi[9]])
         model.inertias[of_link[link]] = pin.Inertia.FromDynamicParameters(parameters)

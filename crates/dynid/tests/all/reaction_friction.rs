@@ -40,6 +40,18 @@ fn folder(test: &str) -> PathBuf {
     folder
 }
 
+/// A log of a minute whose motion is known well.
+fn settings(effort_noise: f64) -> SimulateSettings {
+    SimulateSettings {
+        duration_s: 60.0,
+        rate_hz: 250.0,
+        effort_noise,
+        encoder_bits: 20,
+        delay_samples: Some(0.0),
+        ..SimulateSettings::default()
+    }
+}
+
 struct Bench {
     folder: PathBuf,
     truth: Vec<(String, f64)>,
@@ -138,15 +150,7 @@ fn predicts_when_read_again(id: &Run) {
 
 #[test]
 fn guideway_and_journal_of_an_open_tree() {
-    let settings = SimulateSettings {
-        duration_s: 60.0,
-        rate_hz: 250.0,
-        effort_noise: 0.01,
-        encoder_bits: 20,
-        delay_samples: Some(0.0),
-        ..SimulateSettings::default()
-    };
-    let bench = Bench::new("gantry", GANTRY, &settings);
+    let bench = Bench::new("gantry", GANTRY, &settings(0.01));
     let id = bench.identify("");
     let rounds = id.loads.unwrap();
     println!("{rounds:?}");
@@ -179,15 +183,7 @@ fn sliders_of_a_fast_parallel_machine() {
 
 fn of_sliders(test: &str, acceleration: f64) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/prr3/robot.toml");
-    let settings = SimulateSettings {
-        duration_s: 60.0,
-        acceleration,
-        rate_hz: 250.0,
-        effort_noise: 0.005,
-        encoder_bits: 20,
-        delay_samples: Some(0.0),
-        ..SimulateSettings::default()
-    };
+    let settings = SimulateSettings { acceleration, ..settings(0.005) };
     let bench = Bench::new(test, &std::fs::read_to_string(path).unwrap(), &settings);
     // Sliders are of one make.
     let id =
@@ -251,15 +247,7 @@ reaction_friction = { loads = [{ force = "radial", radius = 0.02 }], mu_c = 0.2 
 /// them do to the drive does not.
 #[test]
 fn feet_and_pins_of_a_scissor_lift() {
-    let settings = SimulateSettings {
-        duration_s: 60.0,
-        rate_hz: 250.0,
-        effort_noise: 0.005,
-        encoder_bits: 20,
-        delay_samples: Some(0.0),
-        ..SimulateSettings::default()
-    };
-    let bench = Bench::new("lift", LIFT, &settings);
+    let bench = Bench::new("lift", LIFT, &settings(0.005));
     let id = bench.identify("tie = [[\"foot.mu_c\", \"upper_foot.mu_c\"], [\"bar1.mu_c\", \"bar2.mu_c\", \"table.mu_c\"]]\n[elements]\nfriction = \"given\"");
     println!("{:?}", id.loads.unwrap());
     assert!(id.loads.unwrap().change <= 1e-6);
@@ -287,15 +275,7 @@ fn bearings_and_universal_joints_of_a_delta() {
              reaction_friction = {{ loads = [{{ force = \"radial\", radius = 0.015 }}], mu_c = 0.2 }}\n"
         );
     }
-    let settings = SimulateSettings {
-        duration_s: 60.0,
-        rate_hz: 250.0,
-        effort_noise: 0.005,
-        encoder_bits: 20,
-        delay_samples: Some(0.0),
-        ..SimulateSettings::default()
-    };
-    let bench = Bench::new("delta", &robot, &settings);
+    let bench = Bench::new("delta", &robot, &settings(0.005));
     let id = bench.identify(
         "tie = [[\"cross1.mu_c\", \"cross2.mu_c\", \"cross3.mu_c\"]]\n[elements]\nfriction = \"given\"",
     );
