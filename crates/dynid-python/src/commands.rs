@@ -49,7 +49,7 @@ pub(crate) fn design<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let config: DesignConfig = parsed(py, config, "settings of a design")?;
     let (run, record, page) = work::run(py, progress, threads, move |tell| {
-        let run = run_design(&config, &mut |step| tell(words(&step)))?;
+        let run = run_design(&config, &mut |step| tell(words(step)))?;
         let record = run.record(&config)?;
         let page = run.report(&config, &record)?;
         Ok((run, record, page))
@@ -73,15 +73,10 @@ pub(crate) fn design<'py>(
     Ok(out)
 }
 
-fn words(step: &DesignStep) -> String {
+fn words(step: DesignStep) -> String {
     match step {
-        DesignStep::Starts { ended, of, best } => {
-            let best =
-                best.map_or_else(|| "none within all limits yet".to_owned(), |b| format!("best {b:.4}"));
-            format!("{ended} of {of} starts, {best}")
-        }
-        DesignStep::Forecast => "predicting what the log will tell".to_owned(),
-        _ => "finding base parameters".to_owned(),
+        DesignStep::Starts { ended, of, .. } => format!("{ended} of {of} {step}"),
+        _ => step.to_string(),
     }
 }
 

@@ -63,13 +63,8 @@ impl Progress {
     /// A step of a design.
     pub fn design(&self, step: DesignStep) {
         match step {
-            DesignStep::Starts { ended, of, best } => {
-                let best =
-                    best.map_or_else(|| "none within all limits yet".to_owned(), |b| format!("best {b:.4}"));
-                self.counted(ended, of, format!("starts, {best}"));
-            }
-            DesignStep::Forecast => self.doing("predicting what the log will tell"),
-            _ => self.doing("finding base parameters"),
+            DesignStep::Starts { ended, of, .. } => self.counted(ended, of, step.to_string()),
+            _ => self.doing(step.to_string()),
         }
     }
 }

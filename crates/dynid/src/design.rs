@@ -11,6 +11,7 @@ mod report;
 mod safety;
 mod shapes;
 
+use std::fmt;
 use std::path::Path;
 
 use dynid_excitation::{
@@ -54,6 +55,18 @@ pub enum DesignStep {
     },
     /// Predicting what the log will tell.
     Forecast,
+}
+
+impl fmt::Display for DesignStep {
+    /// What is being done; of starts how good the best is.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            DesignStep::Structure => f.write_str("finding base parameters"),
+            DesignStep::Starts { best: Some(best), .. } => write!(f, "starts, best {best:.4}"),
+            DesignStep::Starts { best: None, .. } => f.write_str("starts, none within all limits yet"),
+            DesignStep::Forecast => f.write_str("predicting what the log will tell"),
+        }
+    }
 }
 
 /// A design that has been run.

@@ -40,6 +40,7 @@ def check(robot: _native.Robot, logs: Log | Iterable[Log], **settings: Any) -> T
     """What is wrong with logs before anything is identified: a row per finding, none for logs that nothing speaks against.
 
     Columns: `severity` (`error`: an identification would be nonsense), `id` (`dynid explain ID` says more), `log`, `joint`, `evidence`, `remedy`.
+    What no joint does, angles in degrees for example, raises `LogError`, as in `identify`.
     """
     rows: list[dict[str, Any]] = json.loads(_native.check(robot, native_logs(logs), as_json(settings)))
     return Table.of_rows(rows, ("severity", "id", "log", "joint", "evidence", "remedy"))

@@ -227,7 +227,7 @@ fn sentence(name: &str, found: &[Quantity], stated: &PayloadConfig) -> String {
         let within = if (low..=high).contains(&m) { "within" } else { "outside of" };
         format!("; the stated {m} kg lie {within} the interval")
     });
-    format!("`{name}` weighs {:.3} kg (95 % interval {low:.3} to {high:.3} kg), {centre}{beside}", mass.value,)
+    format!("`{name}` weighs {:.3} kg (95 % interval {low:.3} to {high:.3} kg), {centre}{beside}", mass.value)
 }
 
 impl PayloadIdentification {
