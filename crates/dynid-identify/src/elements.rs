@@ -236,9 +236,8 @@ impl ElementPlan {
             Some(other) => *other = name.to_owned(),
             None => list.push(name.to_owned()),
         }
-        for (field, value) in
-            [("start", shape.speed), ("lower", shape.speed / 3.0), ("upper", 3.0 * shape.speed)]
-        {
+        let (lower, upper) = shape.bounds();
+        for (field, value) in [("start", shape.value), ("lower", lower), ("upper", upper)] {
             self.spec.settings.extend(key.map(|key| ElementSetting {
                 joint: joint.to_owned(),
                 element: name.to_owned(),

@@ -461,12 +461,23 @@ impl Identification {
             Origin::Found,
             "narrower kernels fill what the widest cannot reach between reversals".to_owned(),
         );
+        let state_given = given(self.settings.conditioning.state_hz.is_some());
         add(
             "state cut-off",
+            json!(c.state_hz.iter().copied().fold(f64::INFINITY, f64::min)),
+            "Hz",
+            state_given,
+            format!(
+                "states are filtered well above the kernel, so that signs of velocity stay sharp; noise shows in the velocity from {:.2} Hz on",
+                c.limit.velocity_hz
+            ),
+        );
+        add(
+            "state cut-off of predictions",
             json!(self.state_hz),
             "Hz",
-            given(self.settings.conditioning.state_hz.is_some()),
-            "states are filtered well above the kernel, so that signs of velocity stay sharp".to_owned(),
+            state_given,
+            "no kernel takes the noise of accelerations out of predictions".to_owned(),
         );
         add(
             "delay of the effort",

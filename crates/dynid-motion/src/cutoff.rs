@@ -1,7 +1,7 @@
 //! Cut-off frequencies of regression kernel and states, from noise and band alone.
 
 use crate::median::median;
-use crate::spectrum::PositionNoise;
+use crate::spectrum::{PositionNoise, velocity_limit};
 
 /// Limits within which cut-offs are sought.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,11 +16,25 @@ pub struct CutoffSettings {
     pub candidates: usize,
     /// State cut-off at most this part of the sample rate. Default 0.4.
     pub state_rate: f64,
+    /// Noise power that states may have in the velocity, in parts of its signal power. Default 5.6e-5: four standard deviations of
+    /// the noise are 3 % of the rms speed, the first step of masks about reversals.
+    pub velocity_noise_power: f64,
+    /// State cut-off where noise does not show in the velocity: at most this many kernel cut-offs, and this part of the sample
+    /// rate, at which central differences show half of a velocity. Default 6, 0.3.
+    pub quiet_states: (f64, f64),
 }
 
 impl Default for CutoffSettings {
     fn default() -> Self {
-        Self { crossings: 1.5, kernel_rate: 0.2, bands: 4.0, candidates: 6, state_rate: 0.4 }
+        Self {
+            crossings: 1.5,
+            kernel_rate: 0.2,
+            bands: 4.0,
+            candidates: 6,
+            state_rate: 0.4,
+            velocity_noise_power: 5.6e-5,
+            quiet_states: (6.0, 0.3),
+        }
     }
 }
 
@@ -31,6 +45,8 @@ pub struct KernelLimit {
     pub per_joint_hz: Vec<f64>,
     /// Median of the crossing frequencies of the joints that have one, Hz.
     pub crossing_hz: f64,
+    /// Median over those joints of the cut-off below which noise is next to nothing in the velocity ([`velocity_limit`]), Hz.
+    pub velocity_hz: f64,
     /// Median of the excited bands of those joints, Hz.
     pub excited_band_hz: f64,
     /// `min(median noise limit, crossings * crossing, kernel_rate * rate)`, Hz, but never below `bands` excited bands
@@ -56,7 +72,15 @@ pub fn kernel_limit(noise: &[PositionNoise], rate_hz: f64, settings: &CutoffSett
     let excited_band_hz = median(&bands)?;
     let noise_hz = median(&limits)?.min(settings.crossings * crossing_hz);
     let limit_hz = noise_hz.max(settings.bands * excited_band_hz).min(settings.kernel_rate * rate_hz);
-    Some(KernelLimit { per_joint_hz, crossing_hz, excited_band_hz, limit_hz })
+    let velocity = |n: &PositionNoise| {
+        velocity_limit(n.velocity_variance, n.floor_psd, settings.velocity_noise_power).min(rate_hz)
+    };
+    let velocities: Vec<f64> = (noise.iter().zip(&per_joint_hz))
+        .filter(|(n, limit)| **limit > 0.0 && n.crossing_hz.is_some())
+        .map(|(n, _)| velocity(n))
+        .collect();
+    let velocity_hz = median(&velocities)?;
+    Some(KernelLimit { per_joint_hz, crossing_hz, velocity_hz, excited_band_hz, limit_hz })
 }
 
 /// Kernel cut-offs to try, highest first: `hi, hi/2, hi/4 ...` down to `bands` excited bands; always at least `hi`.
@@ -67,11 +91,29 @@ pub fn kernel_candidates(limit: &KernelLimit, settings: &CutoffSettings) -> Vec<
     halves.take(1).chain(rest).take(settings.candidates.max(1)).collect()
 }
 
-/// State cut-off for a kernel cut-off: `min(crossings * crossing, 3 fe)`, at least `2 fe`, at most
-/// `state_rate * rate`, Hz.
-pub fn state_cutoff(kernel_hz: f64, crossing_hz: f64, rate_hz: f64, settings: &CutoffSettings) -> f64 {
-    (settings.crossings * crossing_hz)
+/// What noise lets states show: [`KernelLimit::crossing_hz`] and [`KernelLimit::velocity_hz`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StateLimit {
+    /// Where noise and motion are equal in the positions, Hz.
+    pub crossing_hz: f64,
+    /// Where noise begins to show in the velocity, Hz.
+    pub velocity_hz: f64,
+}
+
+impl KernelLimit {
+    /// What noise lets states show.
+    pub fn states(&self) -> StateLimit {
+        StateLimit { crossing_hz: self.crossing_hz, velocity_hz: self.velocity_hz }
+    }
+}
+
+/// State cut-off for a kernel cut-off, Hz: `min(crossings * crossing, 3 fe)`, or as high as noise does not show in the velocity, up to
+/// `quiet_states`: signs of velocity and friction at low speed are the sharper. At least `2 fe`, at most `state_rate * rate`.
+pub fn state_cutoff(kernel_hz: f64, limit: StateLimit, rate_hz: f64, settings: &CutoffSettings) -> f64 {
+    let (kernels, rates) = settings.quiet_states;
+    (settings.crossings * limit.crossing_hz)
         .min(3.0 * kernel_hz)
+        .max(limit.velocity_hz.min(kernels * kernel_hz).min(rates * rate_hz))
         .max(2.0 * kernel_hz)
         .min(settings.state_rate * rate_hz)
 }
@@ -101,6 +143,7 @@ mod tests {
             excited_band_hz: band,
             noise_limit_hz: limit,
             acceleration_variance: 1.0,
+            velocity_variance: 1.0,
         }
     }
 
@@ -134,8 +177,13 @@ mod tests {
 
     #[test]
     fn candidates_halve_down_to_the_band() {
-        let limit =
-            KernelLimit { per_joint_hz: vec![], crossing_hz: 20.0, excited_band_hz: 0.6, limit_hz: 20.0 };
+        let limit = KernelLimit {
+            per_joint_hz: vec![],
+            crossing_hz: 20.0,
+            velocity_hz: 0.0,
+            excited_band_hz: 0.6,
+            limit_hz: 20.0,
+        };
         let settings = CutoffSettings::default();
         assert_eq!(kernel_candidates(&limit, &settings), [20.0, 10.0, 5.0, 2.5]);
         let tight = KernelLimit { excited_band_hz: 9.0, ..limit.clone() };
@@ -147,10 +195,15 @@ mod tests {
     #[test]
     fn state_cutoff_and_scales_follow_the_kernel() {
         let settings = CutoffSettings::default();
-        assert_eq!(state_cutoff(10.0, 100.0, 500.0, &settings), 30.0);
-        assert_eq!(state_cutoff(10.0, 16.0, 500.0, &settings), 24.0);
-        assert_eq!(state_cutoff(10.0, 2.0, 500.0, &settings), 20.0);
-        assert_eq!(state_cutoff(20.0, 90.0, 100.0, &settings), 40.0);
+        let states = |crossing_hz| StateLimit { crossing_hz, velocity_hz: 0.0 };
+        assert_eq!(state_cutoff(10.0, states(100.0), 500.0, &settings), 30.0);
+        assert_eq!(state_cutoff(10.0, states(16.0), 500.0, &settings), 24.0);
+        assert_eq!(state_cutoff(10.0, states(2.0), 500.0, &settings), 20.0);
+        assert_eq!(state_cutoff(20.0, states(90.0), 100.0, &settings), 40.0);
+        let quiet = |velocity_hz| StateLimit { crossing_hz: 2.0, velocity_hz };
+        assert_eq!(state_cutoff(10.0, quiet(45.0), 500.0, &settings), 45.0);
+        assert_eq!(state_cutoff(10.0, quiet(450.0), 500.0, &settings), 60.0);
+        assert_eq!(state_cutoff(10.0, quiet(450.0), 100.0, &settings), 30.0);
         assert_eq!(kernel_scales(10.0, 30.0, 500.0, &settings), [10.0, 20.0, 40.0]);
         assert_eq!(kernel_scales(10.0, 20.0, 500.0, &settings), [10.0, 20.0]);
         assert_eq!(kernel_scales(10.0, 20.0, 60.0, &settings), [10.0]);

@@ -173,6 +173,8 @@ pub struct PositionNoise {
     /// Variance of the acceleration below that limit (or the crossing, if lower) with the floor's share taken off,
     /// (rad/s^2)^2.
     pub acceleration_variance: f64,
+    /// Variance of the velocity below the same limit, the floor's share taken off, (rad/s)^2.
+    pub velocity_variance: f64,
 }
 
 /// Reads the noise of a position from its second differences, `S_q = S_dd / (2 sin(pi f / fs))^4`, which keeps the
@@ -191,9 +193,9 @@ pub fn position_noise(
         .scaled(|f| if f > 0.0 { (2.0 * (PI * f / rate_hz).sin()).powi(-4) } else { 0.0 });
     let floor_psd = floor(&spectrum, rate_hz, settings);
     let crossing_hz = crossing(&spectrum, floor_psd, rate_hz, settings);
-    let (noise_limit_hz, acceleration_variance) = match crossing_hz {
+    let (noise_limit_hz, [acceleration_variance, velocity_variance]) = match crossing_hz {
         Some(crossing) => limit_from_bend(&bend, rate_hz, floor_psd, crossing, settings.noise_power)?,
-        None => (0.0, 0.0),
+        None => (0.0, [0.0; 2]),
     };
     Ok(PositionNoise {
         floor_psd,
@@ -202,6 +204,7 @@ pub fn position_noise(
         excited_band_hz: excited_band(position, rate_hz, settings.excited_power)?,
         noise_limit_hz,
         acceleration_variance,
+        velocity_variance,
     })
 }
 
@@ -291,7 +294,18 @@ pub fn noise_limit(acceleration_variance: f64, floor_psd: f64, noise_power: f64)
     (noise_power * acceleration_variance * 5.0 / (floor_psd * (2.0 * PI).powi(4))).powf(0.2)
 }
 
-/// The noise limit and the acceleration variance it rests on.
+/// Cut-off at which white position noise of density `floor_psd` (rad^2/Hz) has `noise_power` of the power of a velocity of the given
+/// variance: `(noise_power var(v) 3 / (S_n (2 pi)^2))^(1/3)`, Hz.
+///
+/// 0 for a joint at rest, infinite for one without noise.
+pub fn velocity_limit(velocity_variance: f64, floor_psd: f64, noise_power: f64) -> f64 {
+    if velocity_variance <= 0.0 {
+        return 0.0;
+    }
+    (noise_power * velocity_variance * 3.0 / (floor_psd * (2.0 * PI).powi(2))).cbrt()
+}
+
+/// The noise limit, the acceleration variance it rests on, and the variance of the velocity below it.
 ///
 /// The variance counts only what lies below the limit itself: noise that is not white (a jittering clock raises it
 /// far above the floor at some ten Hz) would otherwise pass for acceleration and lift the limit.
@@ -301,24 +315,32 @@ fn limit_from_bend(
     floor_psd: f64,
     crossing_hz: f64,
     noise_power: f64,
-) -> Result<(f64, f64), SignalError> {
+) -> Result<(f64, [f64; 2]), SignalError> {
     let spectrum = welch(bend, rate_hz, bend.len().clamp(2, LONGEST))?;
     let bin = spectrum.resolution();
-    let mut total = 0.0;
-    let below: Vec<f64> = spectrum
-        .frequency
-        .iter()
-        .zip(&spectrum.density)
+    let acceleration: Vec<f64> = (spectrum.frequency.iter().zip(&spectrum.density))
         .map(|(f, d)| {
             let half_angle = PI * f / rate_hz;
             let transfer = if half_angle > 0.0 { half_angle / half_angle.sin() } else { 1.0 };
-            total += d * transfer.powi(4) * bin * rate_hz.powi(4);
+            d * transfer.powi(4) * bin * rate_hz.powi(4)
+        })
+        .collect();
+    let mut total = 0.0;
+    let below: Vec<f64> = (acceleration.iter())
+        .map(|a| {
+            total += a;
             total
         })
         .collect();
+    let last = |f: f64| ((f / bin) as usize).min(below.len() - 1);
     let variance_below = |f: f64| {
-        let power = below[((f / bin) as usize).min(below.len() - 1)];
+        let power = below[last(f)];
         (power - floor_psd * (2.0 * PI).powi(4) * f.powi(5) / 5.0).max(0.0)
+    };
+    let velocity_below = |f: f64| {
+        let of_bin = |(a, f): (&f64, &f64)| if *f > 0.0 { a / (2.0 * PI * f).powi(2) } else { 0.0 };
+        let power: f64 = acceleration.iter().zip(&spectrum.frequency).take(last(f) + 1).map(of_bin).sum();
+        (power - floor_psd * (2.0 * PI).powi(2) * f.powi(3) / 3.0).max(0.0)
     };
     let mut edge = crossing_hz;
     loop {
@@ -326,7 +348,7 @@ fn limit_from_bend(
         let limit = noise_limit(variance, floor_psd, noise_power);
         // The variance falls with the edge, so the edges descend to the highest fixed point, bin by bin at worst.
         if limit + bin > edge {
-            return Ok((limit, variance));
+            return Ok((limit, [variance, velocity_below(edge)]));
         }
         edge = limit;
     }

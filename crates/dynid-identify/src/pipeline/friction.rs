@@ -130,8 +130,7 @@ mod tests {
             let list: Vec<String> = list.iter().map(|n| (*n).to_owned()).collect();
             shapes_beside(&ElementRegistry::default(), &list, false)
         };
-        let all = [ShapeKind::ViscousMagnitude, ShapeKind::Stribeck, ShapeKind::Tanh, ShapeKind::Load];
-        assert_eq!(kinds(&["coulomb", "viscous", "offset", "rotor"]), all);
+        assert_eq!(kinds(&["coulomb", "viscous", "offset", "rotor"]), ShapeKind::ALL);
         assert_eq!(kinds(&["stribeck", "viscous"]), [ShapeKind::ViscousMagnitude, ShapeKind::Load]);
         assert_eq!(kinds(&["asymmetric"]), [ShapeKind::Tanh]);
         assert_eq!(kinds(&["coulomb", "viscous", "viscous_magnitude", "arctangent"]), [ShapeKind::Load]);

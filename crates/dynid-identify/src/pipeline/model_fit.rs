@@ -101,7 +101,7 @@ impl Problem {
 /// Cut-off of the states behind predictions, Hz.
 pub(crate) fn state_hz(settings: &Settings, conditioning: Option<&Conditioning>) -> f64 {
     match conditioning {
-        Some(c) => c.state_hz.iter().copied().fold(f64::INFINITY, f64::min),
+        Some(c) => c.prediction_hz,
         None => settings.textbook_route().cutoff_hz,
     }
 }

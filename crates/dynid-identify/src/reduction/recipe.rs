@@ -7,7 +7,7 @@ use dynid_estimate::consistent::Bound;
 use dynid_estimate::separable::{self, ShapeFinding, ShapeVerdict, StartReport};
 use dynid_model::{EffortModel, RobotModel};
 use dynid_motion::cutoff::KernelLimit;
-use dynid_rows::conditioning::{Conditioning, DelayEstimate, most_blocks, state_hz_of};
+use dynid_rows::conditioning::{Conditioning, DelayEstimate, most_blocks, prediction_hz_of, state_hz_of};
 use serde::{Deserialize, Serialize};
 
 use super::{ReductionError, plain};
@@ -135,6 +135,9 @@ pub struct Choices {
     limit_hz: f64,
     /// Frequency at which the noise of the positions reaches their spectrum, Hz.
     crossing_hz: f64,
+    /// Cut-off above which noise begins to show in the velocity, Hz; 0 in files of before that was known.
+    #[serde(default)]
+    velocity_hz: f64,
     /// Band of the motion, Hz.
     band_hz: f64,
     /// Delay of the motion behind the logged effort, samples.
@@ -407,18 +410,22 @@ impl Recipe {
     pub(super) fn conditioning(&self, rates_hz: &[f64]) -> Conditioning {
         let c = &self.choices;
         let settings = self.settings.settings().conditioning_settings();
+        let limit = KernelLimit {
+            per_joint_hz: Vec::new(),
+            crossing_hz: c.crossing_hz,
+            velocity_hz: c.velocity_hz,
+            excited_band_hz: c.band_hz,
+            limit_hz: c.limit_hz,
+        };
+        let states = limit.states();
         Conditioning {
-            limit: KernelLimit {
-                per_joint_hz: Vec::new(),
-                crossing_hz: c.crossing_hz,
-                excited_band_hz: c.band_hz,
-                limit_hz: c.limit_hz,
-            },
+            limit,
             kernel_hz: c.kernel_hz,
             scales_hz: c.scales_hz.clone(),
+            prediction_hz: prediction_hz_of(c.kernel_hz, states, rates_hz.iter().copied(), &settings),
             state_hz: rates_hz
                 .iter()
-                .map(|rate| state_hz_of(c.kernel_hz, c.crossing_hz, *rate, &settings))
+                .map(|rate| state_hz_of(c.kernel_hz, states, *rate, &settings))
                 .collect(),
             delay: DelayEstimate {
                 samples: c.delay_samples,
@@ -507,6 +514,7 @@ impl Choices {
             scales_hz: found.scales_hz.clone(),
             limit_hz: found.limit.limit_hz,
             crossing_hz: found.limit.crossing_hz,
+            velocity_hz: found.limit.velocity_hz,
             band_hz: found.limit.excited_band_hz,
             delay_samples: found.delay.samples,
             delay_half_width: found.delay.half_width,

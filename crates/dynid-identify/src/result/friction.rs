@@ -15,7 +15,7 @@ pub(super) fn trials(id: &Identification) -> Vec<FrictionTrial> {
         FrictionTrial {
             joint: joint.to_owned(),
             element: element.to_owned(),
-            speed: speed.map(|_| trial.shape.speed),
+            speed: speed.map(|_| trial.shape.value),
             gain: trial.gain,
             standard_error: trial.standard_error,
             accepted,
@@ -36,7 +36,7 @@ pub(super) fn trials(id: &Identification) -> Vec<FrictionTrial> {
 /// Shapes of a joint, and why these.
 pub(super) fn in_words(joint: &JointFriction) -> (Vec<String>, String) {
     let name = |t: &ShapeTrial| match shape_element(t.shape.kind) {
-        (element, Some(key)) => format!("{element} ({key} {:.3})", t.shape.speed),
+        (element, Some(key)) => format!("{element} ({key} {:.3})", t.shape.value),
         (element, None) => element.to_owned(),
     };
     let gain =

@@ -13,14 +13,21 @@ pub enum ShapeKind {
     Stribeck,
     /// `tanh(v/v_c)`: friction that saturates.
     Tanh,
+    /// `s(v) |v|^p` in place of viscous friction: friction that grows less (or more) than the speed does.
+    Power,
     /// `|τ| s(v)` with the rigid effort `τ` of an earlier fit: friction of loaded gears.
     Load,
 }
 
 impl ShapeKind {
     /// All kinds, in the order in which they are tried.
-    pub const ALL: [ShapeKind; 4] =
-        [ShapeKind::ViscousMagnitude, ShapeKind::Stribeck, ShapeKind::Tanh, ShapeKind::Load];
+    pub const ALL: [ShapeKind; 5] = [
+        ShapeKind::ViscousMagnitude,
+        ShapeKind::Stribeck,
+        ShapeKind::Tanh,
+        ShapeKind::Power,
+        ShapeKind::Load,
+    ];
 
     /// Name of the element that it is one of.
     pub fn element(self) -> &'static str {
@@ -28,8 +35,15 @@ impl ShapeKind {
             ShapeKind::ViscousMagnitude => "viscous_magnitude",
             ShapeKind::Stribeck => "stribeck",
             ShapeKind::Tanh => "tanh",
+            ShapeKind::Power => "power",
             ShapeKind::Load => "load",
         }
+    }
+
+    /// Whether a joint has one of the two at most: both say how friction bends over speed.
+    pub(super) fn excludes(self, other: ShapeKind) -> bool {
+        let bends = |kind| matches!(kind, ShapeKind::Tanh | ShapeKind::Power);
+        self == other || (bends(self) && bends(other))
     }
 }
 
@@ -38,11 +52,19 @@ impl ShapeKind {
 pub struct FrictionShape {
     /// Which law.
     pub kind: ShapeKind,
-    /// `v_s` or `v_c`, rad/s or m/s; 1 and without meaning for the other kinds.
-    pub speed: f64,
+    /// `v_s` or `v_c`, rad/s or m/s, or the exponent `p`; 1 and without meaning for the other kinds.
+    pub value: f64,
 }
 
 impl FrictionShape {
+    /// Where a search of the value is to stay: a factor of 3 to either side, of exponents all that a power may have.
+    pub fn bounds(&self) -> (f64, f64) {
+        match self.kind {
+            ShapeKind::Power => POWER,
+            _ => (self.value / 3.0, 3.0 * self.value),
+        }
+    }
+
     /// The column, one entry per speed. `loads`: rigid efforts at the same samples; read by [`ShapeKind::Load`] alone.
     pub(crate) fn column(&self, speeds: &[f64], loads: &[f64]) -> Vec<f64> {
         let velocities = speeds.iter().map(|v| Velocity::new(*v));
@@ -51,9 +73,10 @@ impl FrictionShape {
                 velocities.map(|v| laws::ViscousMagnitude.columns(v, [])[0]).collect()
             }
             ShapeKind::Stribeck => {
-                velocities.map(|v| laws::Stribeck.columns(v, [self.speed, 2.0])[1]).collect()
+                velocities.map(|v| laws::Stribeck.columns(v, [self.value, 2.0])[1]).collect()
             }
-            ShapeKind::Tanh => velocities.map(|v| laws::Tanh.columns(v, [self.speed])[0]).collect(),
+            ShapeKind::Tanh => velocities.map(|v| laws::Tanh.columns(v, [self.value])[0]).collect(),
+            ShapeKind::Power => velocities.map(|v| laws::Power.columns(v, [self.value])[0]).collect(),
             ShapeKind::Load => speeds.iter().zip(loads).map(|(v, load)| sign(*v) * load.abs()).collect(),
         }
     }
@@ -63,6 +86,9 @@ impl FrictionShape {
 const STRIBECK: usize = 21;
 /// Number of tanh speeds.
 const TANH: usize = 10;
+/// Exponents: their range, and those that are tried. Next to 1 there is nothing to tell them from viscous friction by.
+const POWER: (f64, f64) = (0.2, 2.0);
+const EXPONENTS: [f64; 7] = [0.25, 0.35, 0.45, 0.55, 0.7, 1.4, 1.8];
 /// Least speed in parts of the rms speed, and in standard deviations of velocity noise.
 const LEAST: (f64, f64) = (0.03, 3.0);
 /// Largest `v_c` in parts of the rms speed.
@@ -95,14 +121,15 @@ pub(super) fn of_output(output: usize, kinds: &[ShapeKind], states: &[States]) -
             return Vec::new();
         }
         let ratio = (most / least).powf(1.0 / (count - 1) as f64);
-        (0..count).map(|k| FrictionShape { kind, speed: least * ratio.powi(k as i32) }).collect()
+        (0..count).map(|k| FrictionShape { kind, value: least * ratio.powi(k as i32) }).collect()
     };
     kinds
         .iter()
         .flat_map(|kind| match kind {
-            ShapeKind::ViscousMagnitude | ShapeKind::Load => vec![FrictionShape { kind: *kind, speed: 1.0 }],
+            ShapeKind::ViscousMagnitude | ShapeKind::Load => vec![FrictionShape { kind: *kind, value: 1.0 }],
             ShapeKind::Stribeck => speeds(*kind, rms, STRIBECK),
             ShapeKind::Tanh => speeds(*kind, WIDEST_TANH * rms, TANH),
+            ShapeKind::Power => EXPONENTS.iter().map(|p| FrictionShape { kind: *kind, value: *p }).collect(),
         })
         .collect()
 }

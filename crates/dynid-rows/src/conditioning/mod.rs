@@ -41,7 +41,7 @@ pub use settings::{ConditioningSettings, FrictionSettings, Smoothing};
 pub use shaped_rows::{RefineError, ShapedRows, refine};
 pub use states::{StateBlock, States};
 pub use textbook::{TextbookRoute, paired_textbook_rows, reduce_textbook, textbook_rows};
-pub use trial::state_hz_of;
+pub use trial::{prediction_hz_of, state_hz_of};
 
 use dynid_model::EffortModel;
 use dynid_motion::cutoff::KernelLimit;
@@ -176,6 +176,8 @@ pub struct Conditioning {
     pub scales_hz: Vec<f64>,
     /// Per log: cut-off of the state filter, Hz.
     pub state_hz: Vec<f64>,
+    /// Cut-off of the states behind predictions, Hz: not above what the accelerations of all logs bear, since no kernel follows there.
+    pub prediction_hz: f64,
     /// Delay.
     pub delay: DelayEstimate,
     /// Per output: rung of the mask ladder, 0 = no mask.
@@ -234,7 +236,7 @@ pub fn condition(
             kept,
             logs,
             *kernel_hz,
-            limit.crossing_hz,
+            limit.states(),
             delay_limits,
             TrialShapes::Probes,
             settings,
@@ -269,9 +271,14 @@ pub fn condition(
     let usable = (0..trial.outputs()).map(|j| trial.coverage[j][rung[j]]).collect();
     let mask = rung.iter().map(|r| (*r > 0).then(|| settings.ladder[*r - 1])).collect();
     Ok(Conditioning {
-        limit,
         kernel_hz: trial.kernel_hz,
         scales_hz: trial.scales_hz.clone(),
+        prediction_hz: prediction_hz_of(
+            trial.kernel_hz,
+            limit.states(),
+            logs.iter().map(|log| log.rate_hz),
+            settings,
+        ),
         state_hz: trial.state_hz.clone(),
         delay,
         rung,
@@ -279,6 +286,7 @@ pub fn condition(
         usable,
         kernel_trials,
         mask_trials,
+        limit,
     })
 }
 

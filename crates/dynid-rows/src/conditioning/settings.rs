@@ -121,9 +121,12 @@ impl Default for ConditioningSettings {
 /// When a friction shape is accepted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrictionSettings {
-    /// First shape of a joint: standard errors of the gain over time blocks, share of the joint's held-out loss.
-    /// Default 1.4, 0.01.
-    pub first: (f64, f64),
+    /// Share of the joint's held-out loss that its first shape must gain, less where the kind is expected. Default 0.01.
+    pub first: f64,
+    /// How much a kind of first shape is expected at a joint: of `m` other joints, `n` with the kind, the odds against it are
+    /// `(m - n + a) / (b n + c)`, and the gain must be `sqrt(2 ln(odds))` standard errors over time blocks, at least 0.3.
+    /// Default `a`, `b`, `c` = 1.5, 4, 0.2: 2.0 errors for a joint alone, 2.6 for the first of six, 0.7 for its neighbours.
+    pub expected: (f64, f64, f64),
     /// What a second shape must gain: standard errors over blocks, and share of the mean square. Default 2.5, 0.03.
     pub second: (f64, f64),
     /// Candidates tried on held-out blocks, after all were ranked by the loss on all rows. Default 4.
@@ -138,7 +141,8 @@ pub struct FrictionSettings {
 impl Default for FrictionSettings {
     fn default() -> Self {
         FrictionSettings {
-            first: (1.4, 0.01),
+            first: 0.01,
+            expected: (1.5, 4.0, 0.2),
             second: (2.5, 0.03),
             tried: 4,
             least_blocks: 4,

@@ -6,7 +6,7 @@ use super::rows::{KeptColumns, Kernels, Pass, masks};
 use super::states::States;
 use super::{ConditioningError, ConditioningSettings, PreparedLog};
 use dynid_model::EffortModel;
-use dynid_motion::cutoff::{kernel_scales, state_cutoff};
+use dynid_motion::cutoff::{StateLimit, kernel_scales, state_cutoff};
 use rayon::prelude::*;
 
 /// Sums of one kernel candidate.
@@ -64,7 +64,7 @@ impl TrialShapes<'_> {
                         (ShapeKind::Stribeck, 0.25 * rms),
                         (ShapeKind::Tanh, rms),
                     ]
-                    .map(|(kind, speed)| FrictionShape { kind, speed })
+                    .map(|(kind, value)| FrictionShape { kind, value })
                     .to_vec()
                 })
                 .collect(),
@@ -81,7 +81,7 @@ impl Trial {
         kept: &[usize],
         logs: &[PreparedLog],
         kernel_hz: f64,
-        crossing_hz: f64,
+        limit: StateLimit,
         delay_limits: (f64, f64),
         shapes: TrialShapes<'_>,
         settings: &ConditioningSettings,
@@ -96,12 +96,12 @@ impl Trial {
         let mut coverage: Vec<Vec<f64>> = vec![Vec::new(); outputs];
         let mut state_hz = Vec::new();
         let slowest = logs.iter().map(|l| l.rate_hz).fold(f64::INFINITY, f64::min);
-        let scales_hz = scales(kernel_hz, crossing_hz, slowest, settings);
+        let scales_hz = scales(kernel_hz, limit, slowest, settings);
         let lags = Lags::new(delay_limits.0, delay_limits.1, kernel_hz, slowest);
         let total: f64 = logs.iter().map(|l| l.samples() as f64).sum();
         let mut shape_counts = vec![0; outputs];
         for log in logs {
-            let cutoff = state_hz_of(kernel_hz, crossing_hz, log.rate_hz, settings);
+            let cutoff = state_hz_of(kernel_hz, limit, log.rate_hz, settings);
             state_hz.push(cutoff);
             let states = States::new(log, cutoff, settings)?;
             let masks = masks(log, &states, model, settings);
@@ -339,21 +339,35 @@ pub(crate) struct BlockSums {
     pub(crate) scored: Vec<Gram>,
 }
 
-/// State cut-off of a log for a kernel, Hz. `crossing_hz`: where noise and motion are equal in the positions.
-pub fn state_hz_of(kernel_hz: f64, crossing_hz: f64, rate_hz: f64, settings: &ConditioningSettings) -> f64 {
+/// State cut-off of a log for a kernel, Hz.
+pub fn state_hz_of(kernel_hz: f64, limit: StateLimit, rate_hz: f64, settings: &ConditioningSettings) -> f64 {
     settings
         .state_hz
-        .unwrap_or_else(|| state_cutoff(kernel_hz, crossing_hz, rate_hz, &settings.cutoff))
+        .unwrap_or_else(|| state_cutoff(kernel_hz, limit, rate_hz, &settings.cutoff))
         .min(settings.cutoff.state_rate * rate_hz)
+}
+
+/// Cut-off of the states behind predictions, Hz: the least of what logs have where the noise of their velocity is not looked at.
+///
+/// A kernel takes the noise of accelerations away after the state filter; a prediction has none, and its accelerations would be noise
+/// where the velocities still are not.
+pub fn prediction_hz_of(
+    kernel_hz: f64,
+    limit: StateLimit,
+    rates_hz: impl Iterator<Item = f64>,
+    settings: &ConditioningSettings,
+) -> f64 {
+    let limit = StateLimit { velocity_hz: 0.0, ..limit };
+    rates_hz.map(|rate| state_hz_of(kernel_hz, limit, rate, settings)).fold(f64::INFINITY, f64::min)
 }
 
 /// Kernel cut-offs used together.
 pub(crate) fn scales(
     kernel_hz: f64,
-    crossing_hz: f64,
+    limit: StateLimit,
     rate_hz: f64,
     settings: &ConditioningSettings,
 ) -> Vec<f64> {
-    let state = state_hz_of(kernel_hz, crossing_hz, rate_hz, settings);
+    let state = state_hz_of(kernel_hz, limit, rate_hz, settings);
     kernel_scales(kernel_hz, state, rate_hz, &settings.cutoff)
 }

@@ -105,7 +105,7 @@ fn stribeck_friction_is_found_where_it_is() {
         }
         let [shape] = &choice.accepted[..] else { panic!("joint {}: {:?}", joint + 1, choice.accepted) };
         assert_eq!(shape.shape.kind, ShapeKind::Stribeck);
-        assert!((0.08..0.125).contains(&shape.shape.speed), "{:?}", shape.shape);
+        assert!((0.08..0.125).contains(&shape.shape.value), "{:?}", shape.shape);
         assert!(shape.gain > 3.0 * shape.standard_error);
     }
     let error = |c: &Conditioning| (c.delay.samples).abs();

@@ -4,13 +4,17 @@
 #![expect(clippy::print_stdout, reason = "a test may stop, and says what it measured")]
 
 use crate::support::{PANDA, TX40, UR10, UR10E, data, emps_robot, geometric_mean, on_validation, rms, run};
+use dynid::estimators::conditioning::{JointFriction, ShapeKind};
 use dynid::model::EffortModel;
 
 /// Runs a set and requires the geometric mean over joints of the RMS ratio to the baseline to stay below `limit`.
 /// Prediction and effort are not aligned by the delay here, as in the baseline.
 fn check(name: &str, text: &str, parameters: usize, filter_hz: f64, baseline: &[f64], limit: f64) {
     let Some((config, id)) = run(text) else { return };
-    let shaped: usize = id.friction.iter().map(|joint| joint.accepted.len()).sum();
+    // A power stands in place of viscous friction, the other shapes beside what is there.
+    let adds =
+        |joint: &JointFriction| joint.accepted.iter().filter(|t| t.shape.kind != ShapeKind::Power).count();
+    let shaped: usize = id.friction.iter().map(adds).sum();
     let table = &id.model.parameters().linear;
     let searched = id.base.kept.iter().filter(|c| table[**c].name.ends_with("(change)")).count();
     assert_eq!(id.base.len(), parameters + shaped + searched, "{name}: base parameters");
@@ -30,7 +34,7 @@ fn check(name: &str, text: &str, parameters: usize, filter_hz: f64, baseline: &[
             let errors = taken.gain / taken.standard_error;
             println!(
                 "  {}: {kind:?} {:.3}, held-out mean square falls by {percent:.0} %, {errors:.1} standard errors",
-                output.name, taken.shape.speed
+                output.name, taken.shape.value
             );
         }
     }

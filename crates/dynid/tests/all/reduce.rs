@@ -50,7 +50,9 @@ fn load(log: &LogConfig) -> Log {
     dynid::logs::load(log, &robot.axes, &MappingSpec::default(), None).unwrap()
 }
 
-/// Largest difference of two estimates of the same model: values in standard deviations, and these themselves.
+/// Largest difference of two estimates of the same model: values in standard deviations, and these themselves; values must agree to 1e-12.
+///
+/// In standard deviations rounding shows as the ratio of effort to noise times the root of the rows: of 250 and 170 here, 1e-11.
 fn apart(a: &Estimate, b: &Estimate) -> (f64, f64) {
     assert_eq!(a.base_parameters.len(), b.base_parameters.len());
     let mut out = (0.0_f64, 0.0_f64);
@@ -60,6 +62,7 @@ fn apart(a: &Estimate, b: &Estimate) -> (f64, f64) {
             assert_eq!((x.value, x.std), (y.value, y.std));
             continue;
         };
+        assert!((p - q).abs() <= 1e-12 * (1.0 + p.abs()), "{} {p:e} {q:e}", x.name);
         out = (out.0.max((p - q).abs() / s), out.1.max((s / t - 1.0).abs()));
     }
     out
@@ -69,7 +72,7 @@ fn apart(a: &Estimate, b: &Estimate) -> (f64, f64) {
 fn factors_of_the_logs_of_an_identification_give_its_parameters() {
     let solved = learned().reduction.solve([], &mut |_| {}).unwrap().estimate();
     let (values, deviations) = apart(&learned().estimate, &solved);
-    assert!(values < 1e-12 && deviations < 1e-11, "{values:e} std, {deviations:e}");
+    assert!(values < 1e-11 && deviations < 1e-11, "{values:e} std, {deviations:e}");
     for (a, b) in learned().estimate.parameters.iter().zip(&solved.parameters) {
         assert_eq!((&a.name, &a.verdict), (&b.name, &b.verdict));
         assert!(

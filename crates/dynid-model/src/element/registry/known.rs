@@ -130,6 +130,16 @@ fn shaped() -> Vec<ElementKind> {
         .help("beside `viscous`, other coefficients forward and backward")
         .keys(&["coefficient"]);
     let directed = Candidate { beside: &["viscous"], unless_shaped: false, instead_of: None, speed: None };
+    let power = ElementKind::law("power", laws::Power)
+        .equation("fp sign(q̇) abs(q̇)^p")
+        .keys(&["coefficient"])
+        .alike("exponential_viscous", FAST);
+    let bends = Candidate {
+        beside: &["viscous"],
+        unless_shaped: true,
+        instead_of: Some("viscous"),
+        speed: Some("p"),
+    };
     vec![
         ElementKind { candidate: Some(falls), ..stribeck },
         ElementKind::law("arctangent", laws::Arctangent)
@@ -148,10 +158,7 @@ fn shaped() -> Vec<ElementKind> {
             .equation("fl S(alpha (q̇ + nu))")
             .help("beside `offset`, in place of `coulomb`")
             .keys(&["effort"]),
-        ElementKind::law("power", laws::Power)
-            .equation("fp sign(q̇) abs(q̇)^p")
-            .keys(&["coefficient"])
-            .alike("exponential_viscous", FAST),
+        ElementKind { candidate: Some(bends), ..power },
         ElementKind { candidate: Some(directed), ..magnitude },
     ]
 }

@@ -79,11 +79,11 @@ pub fn choose_friction(
     assert_eq!(kinds.len(), model.outputs().len(), "kinds of shapes per output");
     let settings = &super::with_given_mask(settings);
     progress(Stage::Friction);
-    let crossing_hz = choices.limit.crossing_hz;
+    let state_limit = choices.limit.states();
     let states = logs
         .iter()
         .map(|log| {
-            let cutoff_hz = state_hz_of(choices.kernel_hz, crossing_hz, log.rate_hz, settings);
+            let cutoff_hz = state_hz_of(choices.kernel_hz, state_limit, log.rate_hz, settings);
             States::of_motion_at(log, cutoff_hz, settings)
         })
         .collect::<Result<Vec<_>, _>>()?;
@@ -105,12 +105,13 @@ pub fn choose_friction(
         kept,
         logs,
         choices.kernel_hz,
-        crossing_hz,
+        state_limit,
         limits,
         TrialShapes::Library { shapes: &library, load: &load },
         settings,
     )?;
-    let mut search = Search::new(&trial, &library, prior, choices, settings);
+    let viscous = viscous_columns(model, kept, &trial);
+    let mut search = Search::new(&trial, &library, &viscous, prior, choices, settings);
     let per_output = search.run();
     let (mut rung, chosen) = search.into_parts();
     let mut conditioning = choices.clone();
@@ -132,6 +133,16 @@ pub fn choose_friction(
     let loaded = |joint: &JointFriction| joint.accepted.iter().any(|t| t.shape.kind == ShapeKind::Load);
     let load = if per_output.iter().any(loaded) { load } else { Vec::new() };
     Ok(FrictionChoice { per_output, conditioning, load })
+}
+
+/// Per output: place of the joint's viscous friction among the columns of its rows, if it is one of them.
+fn viscous_columns(model: &dyn EffortModel, kept: &[usize], trial: &Trial) -> Vec<Option<usize>> {
+    let table = &model.parameters().linear;
+    let place = |(output, own): (&dynid_model::Output, &Vec<usize>)| {
+        let name = format!("{}.fv", output.name);
+        own.iter().position(|k| table[kept[*k]].name == name)
+    };
+    model.outputs().iter().zip(&trial.columns.global).map(place).collect()
 }
 
 /// Inertial parameters of a fit without shapes, zeros elsewhere.

@@ -15,6 +15,12 @@ use crate::conditioning::{Conditioning, ConditioningSettings};
 
 /// A candidate that keeps less than this part of its sum of squares beside the other columns is one of them.
 const COLLINEAR: f64 = 1e-6;
+/// Fewest standard errors that a gain must be of, however much its kind is expected.
+const LEAST_SIGMAS: f64 = 0.3;
+/// Standard errors from which on the whole share of the loss must be gained.
+const FULL_SIGMAS: f64 = 1.4;
+/// Rounds in which joints without a shape are asked for one.
+const ROUNDS: usize = 3;
 /// Rounds in which every shape may be replaced by a better one.
 const REPLACEMENTS: usize = 2;
 
@@ -35,6 +41,8 @@ struct Scored {
 pub(super) struct Search<'a> {
     trial: &'a Trial,
     library: &'a [Vec<FrictionShape>],
+    /// Per output: place of the viscous friction among its columns, which [`ShapeKind::Power`] stands in place of.
+    viscous: &'a [Option<usize>],
     prior: Option<&'a BasePrior>,
     settings: &'a ConditioningSettings,
     /// Per output: the rung without mask beyond reversal itself.
@@ -50,6 +58,7 @@ impl<'a> Search<'a> {
     pub(super) fn new(
         trial: &'a Trial,
         library: &'a [Vec<FrictionShape>],
+        viscous: &'a [Option<usize>],
         prior: Option<&'a BasePrior>,
         choices: &Conditioning,
         settings: &'a ConditioningSettings,
@@ -67,7 +76,7 @@ impl<'a> Search<'a> {
             .map(|(j, rung)| ((j, rung), trial.block_sums(j, rung, choices.delay.samples)))
             .collect();
         let fit = Fit { rung: choices.rung.clone(), shapes: vec![Vec::new(); outputs] };
-        Search { trial, library, prior, settings, lowest, before: choices.rung.clone(), sums, fit }
+        Search { trial, library, viscous, prior, settings, lowest, before: choices.rung.clone(), sums, fit }
     }
 
     /// Rungs of all outputs and the chosen places in their libraries.
@@ -78,9 +87,16 @@ impl<'a> Search<'a> {
     pub(super) fn run(&mut self) -> Vec<JointFriction> {
         let outputs = self.trial.outputs();
         for shapes in 1..=2 {
-            for output in 0..outputs {
-                if self.fit.shapes[output].len() < shapes && self.worth_trying(output) {
-                    self.extend(output);
+            // What other joints took lowers the bar, so joints are asked until none takes one more.
+            for _ in 0..ROUNDS {
+                let before = self.fit.shapes.clone();
+                for output in 0..outputs {
+                    if self.fit.shapes[output].len() < shapes && self.worth_trying(output) {
+                        self.extend(output);
+                    }
+                }
+                if self.fit.shapes == before {
+                    break;
                 }
             }
             for _ in 0..REPLACEMENTS {
@@ -106,18 +122,46 @@ impl<'a> Search<'a> {
         !self.library[output].is_empty() && self.blocks(output) >= self.settings.friction.least_blocks
     }
 
-    /// Standard errors and share of the loss that one more shape beside `present` ones must gain.
-    fn bar(&self, present: usize) -> (f64, f64) {
-        if present == 0 { self.settings.friction.first } else { self.settings.friction.second }
+    /// Standard errors and share of the loss that a shape must gain beside the others of an output.
+    ///
+    /// Joints of one machine have drives of one make: a kind that others have is likely, one that none has is one of many that
+    /// were tried. The bar is where a gain of so many standard errors, `exp(z²/2)` in likelihood, meets the odds against it.
+    fn bar(&self, base: &Fit, output: usize, kind: ShapeKind) -> (f64, f64) {
+        let friction = &self.settings.friction;
+        if !base.shapes[output].is_empty() {
+            return friction.second;
+        }
+        let outputs = 0..self.trial.outputs();
+        let others = outputs.filter(|other| *other != output && self.worth_trying(*other)).count() as f64;
+        let with = self.others_with(base, output, kind) as f64;
+        let (a, b, c) = friction.expected;
+        let odds = (others - with + a) / (b * with + c);
+        let sigmas = (2.0 * odds.ln()).max(0.0).sqrt().max(LEAST_SIGMAS);
+        (sigmas, friction.first * (sigmas / FULL_SIGMAS).min(1.0))
     }
 
-    /// The candidate of least loss among those that pass.
+    /// How many other outputs have a kind of shape.
+    fn others_with(&self, base: &Fit, output: usize, kind: ShapeKind) -> usize {
+        let has = |other: &usize| base.shapes[*other].iter().any(|s| self.library[*other][*s].kind == kind);
+        (0..self.trial.outputs()).filter(|other| *other != output && has(other)).count()
+    }
+
+    /// The candidate of least loss among those that pass; one whose kind more of the other joints have, where the loss does not speak
+    /// against it by a standard error.
     fn best(&self, base: &Fit, output: usize, from: &Losses, tried: Vec<Scored>) -> Option<Scored> {
-        let bar = self.bar(base.shapes[output].len());
-        tried
-            .into_iter()
-            .filter(|t| from.falls(&t.losses, bar))
-            .min_by(|a, b| a.losses.mean().total_cmp(&b.losses.mean()))
+        let kind = |t: &Scored| self.library[output][t.place].kind;
+        let passes = |t: &Scored| from.falls(&t.losses, self.bar(base, output, kind(t)));
+        let mut passing: Vec<Scored> = tried.into_iter().filter(passes).collect();
+        passing.sort_by(|a, b| a.losses.mean().total_cmp(&b.losses.mean()));
+        let first = passing.first()?;
+        let others = |t: &Scored| self.others_with(base, output, kind(t));
+        let own = others(first);
+        let common = passing
+            .iter()
+            .enumerate()
+            .filter(|(_, t)| others(t) > own && !t.losses.falls(&first.losses, (1.0, 0.0)));
+        let place = common.rev().max_by_key(|(_, t)| others(t)).map_or(0, |(place, _)| place);
+        Some(passing.swap_remove(place))
     }
 
     /// Adds the best candidate to an output if it passes.
@@ -222,7 +266,15 @@ impl<'a> Search<'a> {
         let library = &self.library[output];
         let present = &base.shapes[output];
         let candidates: Vec<usize> = (0..library.len())
-            .filter(|c| !present.iter().any(|p| library[*p].kind == library[*c].kind))
+            .filter(|c| !present.iter().any(|p| library[*p].kind.excludes(library[*c].kind)))
+            .filter(|c| library[*c].kind != ShapeKind::Power || self.viscous[output].is_some())
+            .collect();
+        let (replacing, candidates): (Vec<usize>, Vec<usize>) =
+            candidates.into_iter().partition(|c| library[*c].kind == ShapeKind::Power);
+        let before = self.weighted_loss(base, variances);
+        let mut found: Vec<(usize, f64)> = (replacing.into_par_iter())
+            .filter_map(|c| Some((c, before? - self.weighted_loss(&with(base, output, c), variances)?)))
+            .filter(|(_, gain)| *gain > 0.0)
             .collect();
         let (mut groups, unknowns) = self.groups(base, None);
         let scales = self.trial.scales_hz.len();
@@ -234,7 +286,7 @@ impl<'a> Search<'a> {
         }
         let normal = self.normal(&groups, unknowns + candidates.len(), variances);
         let scale = normal.scale();
-        let Some(factor) = normal.unit(unknowns, &scale) else { return Vec::new() };
+        let Some(factor) = normal.unit(unknowns, &scale) else { return found };
         let unit = |i: usize, k: usize| scale[i] * scale[unknowns + k] * normal.matrix[(i, unknowns + k)];
         let cross = Mat::from_fn(unknowns, candidates.len(), unit);
         let solved = factor.solve(&cross);
@@ -248,7 +300,25 @@ impl<'a> Search<'a> {
             let allowed = library[candidates[k]].kind == ShapeKind::ViscousMagnitude || slope > 0.0;
             (allowed && scale[c] > 0.0 && rest > COLLINEAR).then(|| slope * slope / rest)
         };
-        candidates.iter().enumerate().filter_map(|(k, c)| Some((*c, gain(k)?))).collect()
+        found.extend(candidates.iter().enumerate().filter_map(|(k, c)| Some((*c, gain(k)?))));
+        found
+    }
+
+    /// Least weighted loss of a fit on all rows, up to a constant; `None` where its friction that is a power would drive.
+    fn weighted_loss(&self, fit: &Fit, variances: &[f64]) -> Option<f64> {
+        let (groups, unknowns) = self.groups(fit, None);
+        let normal = self.normal(&groups, unknowns, variances);
+        let x = normal.solve()?;
+        let mut place = self.trial.columns.total;
+        for (output, shapes) in fit.shapes.iter().enumerate() {
+            for shape in shapes {
+                if self.library[output][*shape].kind == ShapeKind::Power && x[place] < 0.0 {
+                    return None;
+                }
+                place += 1;
+            }
+        }
+        Some(-x.iter().enumerate().map(|(k, x)| x * normal.rhs[(k, 0)]).sum::<f64>())
     }
 
     /// Losses of an output: logarithm of the mean square residual in every time block, fitted without that block.
@@ -293,7 +363,14 @@ impl<'a> Search<'a> {
     fn columns(&self, output: usize, shapes: &[usize]) -> Vec<usize> {
         let own = self.trial.columns.global[output].len();
         let effort = own + self.library[output].len();
-        (0..own).chain(shapes.iter().map(|s| own + s)).chain([effort]).collect()
+        let model = (0..own).filter(|k| !self.is_replaced(output, shapes, *k));
+        model.chain(shapes.iter().map(|s| own + s)).chain([effort]).collect()
+    }
+
+    /// Whether a shape stands in place of a column of the model.
+    fn is_replaced(&self, output: usize, shapes: &[usize], column: usize) -> bool {
+        let replaces = |s: &usize| self.library[output][*s].kind == ShapeKind::Power;
+        self.viscous[output] == Some(column) && shapes.iter().any(replaces)
     }
 
     /// Rows of a fit, scale by scale for every output, and its number of unknowns.
@@ -301,7 +378,11 @@ impl<'a> Search<'a> {
         let mut groups = Vec::new();
         let mut unknowns = self.trial.columns.total;
         for (output, shapes) in fit.shapes.iter().enumerate() {
-            let mut own = self.trial.columns.global[output].clone();
+            let of_model = self.trial.columns.global[output].iter().enumerate();
+            let mut own: Vec<usize> = of_model
+                .filter(|(place, _)| !self.is_replaced(output, shapes, *place))
+                .map(|(_, unknown)| *unknown)
+                .collect();
             own.extend(unknowns..unknowns + shapes.len());
             unknowns += shapes.len();
             let columns = self.columns(output, shapes);
