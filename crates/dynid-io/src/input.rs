@@ -3,7 +3,7 @@
 //! `-` in the place of a file is standard input; a file of this name is `./-`.
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Cursor, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -20,7 +20,7 @@ pub struct Opened(Source);
 #[derive(Debug)]
 enum Source {
     File(File),
-    StandardInput(&'static [u8]),
+    StandardInput(Cursor<&'static [u8]>),
 }
 
 impl Opened {
@@ -28,7 +28,7 @@ impl Opened {
     pub(crate) fn length(&self) -> io::Result<u64> {
         match &self.0 {
             Source::File(file) => Ok(file.metadata()?.len()),
-            Source::StandardInput(bytes) => Ok(bytes.len() as u64),
+            Source::StandardInput(bytes) => Ok(bytes.get_ref().len() as u64),
         }
     }
 }
@@ -42,13 +42,22 @@ impl Read for Opened {
     }
 }
 
+impl Seek for Opened {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        match &mut self.0 {
+            Source::File(file) => file.seek(to),
+            Source::StandardInput(bytes) => bytes.seek(to),
+        }
+    }
+}
+
 /// Opens a file for reading; `-` is standard input, which is read to its end once and may be opened as often as a file.
 ///
 /// # Errors
 /// The operating system's; [`io::ErrorKind::IsADirectory`]; [`io::ErrorKind::FileTooLarge`] for more than 4 GiB of standard input.
 pub fn open(path: &Path) -> io::Result<Opened> {
     if path == Path::new("-") {
-        return Ok(Opened(Source::StandardInput(standard_input()?)));
+        return Ok(Opened(Source::StandardInput(Cursor::new(standard_input()?))));
     }
     let file = File::open(path)?;
     match file.metadata()?.is_dir() {

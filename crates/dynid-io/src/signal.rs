@@ -139,6 +139,23 @@ pub fn is_time_name(column: &str) -> bool {
     ColumnName::new(column).reading(|stem| TIME_NAMES.contains(&stem)).is_some()
 }
 
+/// True if a part of a column's path says that it was asked of the robot, or formed of that.
+pub(crate) fn is_command(column: &str) -> bool {
+    let words = [
+        "action",
+        "command",
+        "commands",
+        "desired",
+        "error",
+        "goal",
+        "output",
+        "reference",
+        "setpoint",
+        "target",
+    ];
+    column.to_lowercase().split(['/', '.']).any(|part| words.contains(&part))
+}
+
 /// True if `stem` means `name` of the joint: `q_arm`, `arm_q`, `arm.q`, `q.arm`, ...
 pub(crate) fn names_joint(stem: &str, name: &str, joint: &str) -> bool {
     let joint = joint.to_lowercase();

@@ -19,7 +19,7 @@ pub struct Signals {
     /// Time, s, minus `time_origin`.
     pub time: Vec<f64>,
     /// Time that was subtracted, s: the first stamp of a clock beyond 1e6 s, else 0. The difference is taken before the
-    /// conversion. Of tables read by [`LogText`](crate::LogText) it is exact; of others, what an `f64` of the raw stamp resolves
+    /// conversion. Of tables read by [`LogSource::read`](crate::LogSource::read) it is exact; of others, what an `f64` of the raw stamp resolves
     /// (256 ns for nanoseconds since 1970) is all there is.
     pub time_origin: f64,
     /// Position, rad or m.

@@ -5,7 +5,7 @@ use super::units::{Conversion, conversion};
 use super::{ColumnMapping, ColumnUse, TimeColumns, TimeSource};
 use crate::log::{LogHeader, Missing};
 use crate::signal::{
-    CURRENT_NAMES, ColumnName, Signal, TIME_NAMES, names, names_joint, number_of, part_of_time,
+    CURRENT_NAMES, ColumnName, Signal, TIME_NAMES, is_command, names, names_joint, number_of, part_of_time,
 };
 
 /// Settings of [`ColumnMapping::guess`].
@@ -250,9 +250,11 @@ impl<'a> Finder<'a> {
         Ok(None)
     }
 
-    /// Columns of a pattern whose `{}` counts joints from 0; `None` if there is no such column.
+    /// Columns of a pattern whose `{}` counts joints from 0 and whose `{joint}` is their name; `None` if there is no such column.
     fn numbered(&self, pattern: &str) -> Option<Vec<Option<usize>>> {
-        let column = |k: usize| self.log.column(&pattern.replace("{}", &k.to_string()));
+        let column = |k: usize| {
+            self.log.column(&pattern.replace("{joint}", &self.joints[k]).replace("{}", &k.to_string()))
+        };
         let columns: Vec<Option<usize>> = (0..self.joints.len()).map(column).collect();
         columns.iter().any(Option::is_some).then_some(columns)
     }
@@ -297,7 +299,11 @@ impl<'a> Finder<'a> {
             return Ok(None);
         }
         let mut columns = Vec::with_capacity(found.len());
-        for (joint, candidates) in self.joints.iter().zip(found) {
+        for (joint, mut candidates) in self.joints.iter().zip(found) {
+            // What was asked of the robot is no measurement, where there is one.
+            if candidates.iter().any(|(k, _)| !is_command(&self.header[*k])) {
+                candidates.retain(|(k, _)| !is_command(&self.header[*k]));
+            }
             columns.push(match candidates.as_slice() {
                 [] => None,
                 [(column, unit)] => {

@@ -9,7 +9,7 @@ use super::guess::{Finder, GuessOptions, PerJointColumns, of_logged};
 use super::units::{Conversion, conversion};
 use super::{ColumnMapping, ColumnUse, EffortColumn, TimeColumns, TimeSource};
 use crate::excerpt::nearest;
-use crate::log::{DecimalMark, LogHeader, LogOptions, Missing};
+use crate::log::{DecimalMark, LogFormat, LogHeader, LogOptions, Missing};
 use crate::signal::{ColumnName, Signal, part_of_time};
 
 /// An explicit mapping; signals that it does not mention are found by name as in [`ColumnMapping::guess`].
@@ -60,7 +60,7 @@ pub struct MappingSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decimal: Option<DecimalMark>,
     /// What becomes of rows in which a signal has no value: `error`, `drop` or `interpolate`. Default: `drop` for formats
-    /// that leave cells empty by design (PlotJuggler, `ros2 topic echo`), else `error`.
+    /// that leave cells empty by design (PlotJuggler, `ros2 topic echo`), `interpolate` for bags, else `error`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<Missing>,
 }
@@ -331,10 +331,7 @@ impl ColumnMapping {
             effort,
             undriven: undriven.clone(),
             channels: channels.collect::<Result<_, _>>()?,
-            missing: spec.missing.unwrap_or(match header.format {
-                Some(format) if format.leaves_cells_empty() => Missing::Drop,
-                _ => Missing::Error,
-            }),
+            missing: spec.missing.unwrap_or(header.format.map_or(Missing::Error, LogFormat::missing)),
             time,
             position,
         };

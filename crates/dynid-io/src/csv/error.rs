@@ -318,6 +318,76 @@ pub enum LogFileError {
         /// The line.
         found: String,
     },
+    /// A number of a file of arrays or messages that is no value of a signal.
+    #[error("{file}: row {row}, column `{column}`: expected {expected}, found {found}")]
+    Cell {
+        /// File.
+        file: String,
+        /// Row, from 1.
+        row: usize,
+        /// Column name.
+        column: String,
+        /// What a signal may be.
+        expected: String,
+        /// The number.
+        found: f64,
+    },
+    /// A file of a known format that holds something else than is needed.
+    #[error("{file}: {format}: expected {expected}, found {found}")]
+    Content {
+        /// File.
+        file: String,
+        /// Format of the file.
+        format: &'static str,
+        /// What is needed.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+    /// A file of a known format that is broken, or beyond what is read of the format.
+    #[error("{file}: {format}: {reason}")]
+    Damaged {
+        /// File.
+        file: String,
+        /// Format of the file.
+        format: &'static str,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A format that this build cannot read.
+    #[error("{file}: {format}: expected a build with the feature `{feature}`, found one without")]
+    NotBuilt {
+        /// File.
+        file: String,
+        /// Format of the file.
+        format: &'static str,
+        /// Feature that reads it.
+        feature: &'static str,
+    },
+    /// A setting of text for a file that is none.
+    #[error("{file}: `{key}`: expected a log in text, found {format}")]
+    SettingOfText {
+        /// File.
+        file: String,
+        /// Setting.
+        key: &'static str,
+        /// Format of the file.
+        format: &'static str,
+    },
+    /// A member of the file (`FILE#MEMBER`) that does not exist, or that has to be stated.
+    #[error("{file}: {format}: expected {expected}, found {found}")]
+    Member {
+        /// File.
+        file: String,
+        /// Format of the file.
+        format: &'static str,
+        /// Members that there are.
+        expected: String,
+        /// Member that was asked for.
+        found: String,
+        /// Name of the file with a member of it.
+        example: String,
+    },
     /// A column that shall be ignored does not exist.
     #[error("{file}: column `{column}` to be ignored: expected a column of the header, found none")]
     UnknownIgnored {
@@ -384,6 +454,17 @@ impl LogFileError {
             E::TooBig { .. } => "a sentinel or a damaged value: remove the row, or ignore the column",
             E::RowRange { .. } => "rows are counted from 1 after the header, the last one included",
             E::UnknownIgnored { .. } => "use a name of the header",
+            E::Cell { found, .. } if found.is_nan() => {
+                "`missing = \"drop\"` under [columns] (or `--missing drop`) leaves rows without a value out"
+            }
+            E::Cell { .. } => "limit the range of rows, or ignore the column",
+            E::Content { .. } => "`dynid inspect` shows what the file holds",
+            E::Damaged { .. } => "copy or record the file again, or write it in another format",
+            E::NotBuilt { feature, .. } => {
+                return Some(format!("take a released binary, or build with `--features {feature}`"));
+            }
+            E::SettingOfText { .. } => "leave the setting out",
+            E::Member { example, .. } => return Some(format!("such as `{example}`")),
         };
         Some(hint.to_owned())
     }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::Missing;
 use crate::signal::Signal;
 
 /// A tool whose logs are recognised.
@@ -15,6 +16,10 @@ pub enum LogFormat {
     Ros2TopicEcho,
     /// A recording of the real-time data exchange of Universal Robots: `timestamp actual_q_0 ...`.
     Rtde,
+    /// A bag of ROS: topics with stamps of their own.
+    Bag,
+    /// A dataset of LeRobot: `observation.state`, `action`, `timestamp`, `episode_index`.
+    LeRobot,
     /// A log of libfranka: `time,success_rate,state.q[0],...`, or `duration, success rate, q[0], ...` of older versions.
     Libfranka,
 }
@@ -26,6 +31,8 @@ impl fmt::Display for LogFormat {
             LogFormat::RostopicEcho => "rostopic echo -p (ROS 1)",
             LogFormat::Ros2TopicEcho => "ros2 topic echo --csv",
             LogFormat::Rtde => "UR RTDE recording",
+            LogFormat::Bag => "ROS bag",
+            LogFormat::LeRobot => "LeRobot dataset",
             LogFormat::Libfranka => "libfranka log",
         })
     }
@@ -43,6 +50,9 @@ impl LogFormat {
         if has("actual_q_0") || has("target_q_0") {
             return Some(LogFormat::Rtde);
         }
+        if has("episode_index") && names.iter().any(|n| n.starts_with("observation.state")) {
+            return Some(LogFormat::LeRobot);
+        }
         let success = has("success_rate") || has("success rate");
         if success && (has("state.q[0]") || has("tau_J[0]")) {
             return Some(LogFormat::Libfranka);
@@ -59,21 +69,39 @@ impl LogFormat {
                 "no header; seconds, nanoseconds, a frame, names of joints, then numbers"
             }
             LogFormat::Rtde => "it has columns such as `actual_q_0`",
+            LogFormat::Bag => "it has topics",
+            LogFormat::LeRobot => "it has `observation.state` beside `episode_index`",
             LogFormat::Libfranka => "it has a success rate beside `q[0]` and `tau_J[0]`",
         }
     }
 
-    /// Whether cells are empty by design, since series have stamps of their own.
-    pub fn leaves_cells_empty(self) -> bool {
-        matches!(self, LogFormat::PlotJuggler | LogFormat::Ros2TopicEcho)
+    /// What becomes of rows without a value unless it is stated: in some formats cells are empty by design, since series have
+    /// stamps of their own.
+    pub fn missing(self) -> Missing {
+        match self {
+            LogFormat::PlotJuggler | LogFormat::Ros2TopicEcho => Missing::Drop,
+            LogFormat::Bag => Missing::Interpolate,
+            _ => Missing::Error,
+        }
     }
 
-    /// Names that the format has for a signal, most trusted first; `{}` is the number of the joint from 0.
+    /// Names that the format has for a signal, most trusted first; `{}` is the number of the joint from 0, `{joint}` its name.
     pub(crate) fn patterns(self, signal: Signal) -> &'static [&'static str] {
         match (self, signal) {
             (LogFormat::Rtde, Signal::Position) => &["actual_q_{}"],
             (LogFormat::Rtde, Signal::Velocity) => &["actual_qd_{}"],
             (LogFormat::Rtde, Signal::Temperature) => &["joint_temperatures_{}"],
+            (LogFormat::LeRobot, Signal::Position) => {
+                &["observation.state/{joint}.pos", "observation.state/{joint}", "observation.state[{}]"]
+            }
+            (LogFormat::LeRobot, Signal::Velocity) => &[
+                "observation.velocity/{joint}.vel",
+                "observation.velocity/{joint}",
+                "observation.velocity[{}]",
+            ],
+            (LogFormat::LeRobot, Signal::Effort) => {
+                &["observation.effort/{joint}.effort", "observation.effort/{joint}", "observation.effort[{}]"]
+            }
             (LogFormat::Libfranka, Signal::Position) => &["state.q[{}]", "q[{}]"],
             (LogFormat::Libfranka, Signal::Velocity) => &["state.dq[{}]", "dq[{}]"],
             (LogFormat::Libfranka, Signal::Effort) => &["state.tau_J[{}]", "tau_J[{}]"],
@@ -91,7 +119,8 @@ impl LogFormat {
         match self {
             LogFormat::PlotJuggler => &["__time"],
             LogFormat::RostopicEcho => &["field.header.stamp", "%time"],
-            LogFormat::Ros2TopicEcho | LogFormat::Rtde => &[],
+            LogFormat::LeRobot => &["timestamp"],
+            LogFormat::Bag | LogFormat::Ros2TopicEcho | LogFormat::Rtde => &[],
             LogFormat::Libfranka => &["time", "duration"],
         }
     }

@@ -1,25 +1,36 @@
 //! Logs as tools write them: which format, which columns, where numbers, lists and texts are, and what is missing.
 //!
-//! A log is opened first: its first lines tell the delimiter, the decimal mark, the names of the columns and the tool that
-//! wrote it ([`LogText::open`]). Then columns are assigned to signals ([`ColumnMapping::of_log`](crate::ColumnMapping::of_log)),
-//! and only those that are used are read ([`LogText::read`]).
+//! A log is opened first ([`open`]): its first bytes tell the format, and the format tells the names of the columns. Then columns
+//! are assigned to signals ([`ColumnMapping::of_log`](crate::ColumnMapping::of_log)), and only those that are used are read
+//! ([`LogSource::read`]).
+//!
+//! Text is read line by line (`text`); files of arrays and tables (`arrays`) column by column; bags (`bag`) message by
+//! message, their topics joined by time.
 
-mod cell;
-mod fault;
+mod arrays;
+#[cfg(feature = "mcap")]
+mod bag;
 mod format;
+#[cfg(feature = "hdf5")]
+mod hdf5;
 mod header;
-mod layout;
-mod read;
-mod ros;
-mod row;
+mod matlab;
+mod member;
+#[cfg(feature = "numpy")]
+mod numpy;
+mod open;
+#[cfg(feature = "parquet")]
+mod parquet;
+mod text;
 
 use serde::{Deserialize, Serialize};
 
 pub use format::LogFormat;
 pub use header::LogHeader;
-pub use read::{LogText, Wanted};
+pub use member::LogFile;
+pub use open::open;
 
-use crate::csv::ReadOptions;
+use crate::csv::{LogFileError, ReadOptions, Table};
 
 /// What stands between the whole part and the fraction of a number.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize, schemars::JsonSchema)]
@@ -45,7 +56,34 @@ pub enum Missing {
     Interpolate,
 }
 
-/// Settings of [`LogText::open`].
+/// Which columns of a log are read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wanted {
+    /// Columns of the header; `None`: all that hold numbers.
+    pub columns: Option<Vec<usize>>,
+    /// Those among them that hold times, which may be of any size and keep all their digits.
+    pub time: Vec<usize>,
+    /// What becomes of cells without a value: unless they are refused, they become NaN.
+    pub missing: Missing,
+}
+
+/// An opened log: what it holds is known, and nothing was read yet but for that.
+pub trait LogSource {
+    /// Columns that can be asked for, those to be ignored left out.
+    fn header(&self) -> LogHeader;
+
+    /// What was found out about the file.
+    fn notes(&self) -> &[ReadingNote];
+
+    /// Reads columns of [`LogSource::header`]; others are not looked at. Notes: those of [`LogSource::notes`] and what reading told
+    /// besides.
+    ///
+    /// # Errors
+    /// [`LogFileError`], the first fault met.
+    fn read(self: Box<Self>, wanted: &Wanted) -> Result<(Table, Vec<ReadingNote>), LogFileError>;
+}
+
+/// Settings of [`open`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LogOptions {
     /// Rows, delimiter, columns to ignore and bounds.
@@ -54,6 +92,21 @@ pub struct LogOptions {
     pub names: Option<Vec<String>>,
     /// Decimal mark. Default: found from the numbers.
     pub decimal: Option<DecimalMark>,
+}
+
+impl LogOptions {
+    /// Files that are no text have no use for settings of text.
+    fn refuse_settings_of_text(&self, file: &str, format: &'static str) -> Result<(), LogFileError> {
+        let stated = [
+            ("names", self.names.is_some()),
+            ("decimal", self.decimal.is_some()),
+            ("delimiter", self.read.delimiter.is_some()),
+        ];
+        match stated.into_iter().find(|(_, is_stated)| *is_stated) {
+            Some((key, _)) => Err(LogFileError::SettingOfText { file: file.to_owned(), key, format }),
+            None => Ok(()),
+        }
+    }
 }
 
 /// A setting of the reading that was found, with its reason.

@@ -5,20 +5,20 @@
 use std::fs;
 
 use dynid_io::columns::{EffortColumn, MappingSpec, TimeReading};
-use dynid_io::log::{LogFormat, Missing, Wanted};
-use dynid_io::{ColumnMapping, LogFileError, LogHeader, LogText, Signals, Table};
+use dynid_io::log::{self, LogFormat, Missing, Wanted};
+use dynid_io::{ColumnMapping, LogFileError, LogHeader, LogSource, Signals, Table};
 use dynid_testing::shared;
 
 fn strings(list: &str) -> Vec<String> {
     list.split(',').map(str::to_owned).collect()
 }
 
-fn open(text: &str, spec: &MappingSpec) -> Result<LogText, LogFileError> {
+fn open(text: &str, spec: &MappingSpec) -> Result<Box<dyn LogSource>, LogFileError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
     fs::write(&path, text).unwrap();
     // The file stays open when its folder goes.
-    LogText::open(&path, &spec.options(None))
+    log::open(&path, &spec.options(None))
 }
 
 fn header(text: &str) -> LogHeader {
@@ -253,7 +253,7 @@ fn headers_with_faults_are_refused() {
 fn a_recorded_log_with_lists_in_cells() {
     let Some(recorded) = shared("data/so101-sage/multisine_state_motor_as_recorded.csv.gz") else { return };
     let spec = MappingSpec::default();
-    let log = LogText::open(&recorded, &spec.options(None)).unwrap();
+    let log = log::open(&recorded, &spec.options(None)).unwrap();
     let joints = strings("a,b,c,d,e,f");
     let mut mapping =
         ColumnMapping::of_log(&log.header(), &joints, &[EffortColumn::Drive; 6], &spec).unwrap();

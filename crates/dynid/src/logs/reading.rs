@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use dynid_io::columns::{ChannelSpec, EffortColumn, columns_of_unnamed, is_time_name};
-use dynid_io::log::{Missing, Wanted};
-use dynid_io::{ColumnMapping, LogHeader, LogText, MappingError, MappingSpec, ReadingNote, Signals, Table};
+use dynid_io::log::{self, LogFormat, Missing, Wanted};
+use dynid_io::{ColumnMapping, LogHeader, MappingError, MappingSpec, ReadingNote, Signals, Table};
 
 use dynid_model::journal_channels;
 
@@ -29,7 +29,7 @@ pub(crate) fn understand(
     motors: bool,
 ) -> Result<Understood, Error> {
     let named = |source| columns_error(&log.path, source);
-    let text = LogText::open(&log.path, &spec.options(log.rows))?;
+    let text = log::open(&log.path, &spec.options(log.rows))?;
     let header = text.header();
     let (mut spec, text, unnamed) = match of_unnamed(log, &header, axes, spec)? {
         Some((found, note)) => (found, text, Some(note)),
@@ -109,7 +109,7 @@ fn of_unnamed(
         return Ok(None);
     }
     let all = Wanted { columns: None, time: vec![0], missing: Missing::Error };
-    let (table, _) = LogText::open(&log.path, &spec.options(log.rows))?.read(&all)?;
+    let (table, _) = log::open(&log.path, &spec.options(log.rows))?.read(&all)?;
     let found = columns_of_unnamed(&table, axes.len()).map_err(|e| columns_error(&log.path, e))?;
     let merged = MappingSpec {
         time: found.time.clone(),
@@ -139,10 +139,9 @@ fn of_unnamed(
 /// # Errors
 /// [`Error::LogFile`].
 pub fn table(log: &LogConfig, spec: &MappingSpec) -> Result<(Table, LogHeader), Error> {
-    let text = LogText::open(&log.path, &spec.options(log.rows))?;
+    let text = log::open(&log.path, &spec.options(log.rows))?;
     let header = text.header();
-    let drops = header.format.is_some_and(|f| f.leaves_cells_empty());
-    let missing = spec.missing.unwrap_or(if drops { Missing::Drop } else { Missing::Error });
+    let missing = spec.missing.unwrap_or(header.format.map_or(Missing::Error, LogFormat::missing));
     let columns: Vec<usize> = (0..header.names.len()).filter(|k| !header.text[*k]).collect();
     let stated = spec.time_names();
     let is_time = |k: &usize| {

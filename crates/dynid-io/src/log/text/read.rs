@@ -4,32 +4,21 @@ use std::collections::VecDeque;
 use std::path::Path;
 
 use super::fault::Fault;
-use super::header::LogHeader;
 use super::layout::{Form, Holds, Layout, Line};
 use super::row::{Cells, LineParser, Take};
-use super::{LogOptions, Missing, ReadingNote};
 use crate::csv::input::{Bounds, Input};
 use crate::csv::lines::Lines;
 use crate::csv::{Delimiter, LogFileError, Table, number, split};
+use crate::log::header::LogHeader;
+use crate::log::{LogOptions, LogSource, Missing, ReadingNote, Wanted};
 
 /// Lines that are looked at before anything is read.
 const SAMPLE_LINES: usize = 64;
 /// Stamps from this size on may have more digits than an `f64` holds.
 const LONG_STAMP: i64 = 1_000_000_000;
 
-/// Which columns of a log are read.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Wanted {
-    /// Columns of the header; `None`: all that hold numbers.
-    pub columns: Option<Vec<usize>>,
-    /// Those among them that hold times, which may be of any size and keep all their digits.
-    pub time: Vec<usize>,
-    /// What becomes of cells without a value: unless they are refused, they become NaN.
-    pub missing: Missing,
-}
-
 /// A log whose first lines were read.
-pub struct LogText {
+pub(in crate::log) struct LogText {
     file: String,
     lines: Lines,
     /// Lines that were looked at and not yet read.
@@ -51,7 +40,7 @@ impl LogText {
     /// # Errors
     /// [`LogFileError`]: the file cannot be read, has no line, a column name twice, or numbers whose commas may mean two
     /// things.
-    pub fn open(path: impl AsRef<Path>, options: &LogOptions) -> Result<Self, LogFileError> {
+    pub(in crate::log) fn open(path: impl AsRef<Path>, options: &LogOptions) -> Result<Self, LogFileError> {
         let path = path.as_ref();
         let file = path.display().to_string();
         let read = &options.read;
@@ -85,71 +74,6 @@ impl LogText {
             held.push_front(first);
         }
         Ok(LogText { file, lines, held, header_line, layout, options: options.clone() })
-    }
-
-    /// Columns that can be asked for, those to be ignored left out.
-    pub fn header(&self) -> LogHeader {
-        self.layout.header.without(&self.options.read.ignore)
-    }
-
-    /// What was found out about the file.
-    pub fn notes(&self) -> &[ReadingNote] {
-        &self.layout.notes
-    }
-
-    /// Reads columns of [`LogText::header`]; others are not looked at. What follows the last row asked for is hashed
-    /// alone.
-    ///
-    /// # Errors
-    /// [`LogFileError`], the first fault met.
-    pub fn read(mut self, wanted: &Wanted) -> Result<(Table, Vec<ReadingNote>), LogFileError> {
-        let shown = self.header();
-        let place = |k: &usize| self.layout.header.column(&shown.names[*k]);
-        let all: Vec<usize> = (0..shown.names.len()).filter(|k| !shown.text[*k]).collect();
-        let columns: Vec<usize> = wanted.columns.as_ref().unwrap_or(&all).iter().filter_map(place).collect();
-        let time: Vec<usize> = wanted.time.iter().filter_map(place).collect();
-        let mut rows = self.rows(columns, &time, wanted.missing != Missing::Error);
-        let (first, last) = self.options.read.rows.unwrap_or((1, usize::MAX));
-        let mut row = 0;
-        while row < last
-            && let Some((line, text)) = self.held.pop_front()
-        {
-            rows.take(&mut row, first, line, &text, &self)?;
-        }
-        while row < last {
-            // What is said of a faulty row needs the whole of `self`, which lines are borrowed from.
-            let taken = match self.lines.next()? {
-                None => break,
-                Some(text) => rows.parse(row + 1 >= first, text),
-            };
-            let line = self.lines.number();
-            rows.settle(taken, &mut row, line, &self)?;
-        }
-        if row == 0 {
-            return Err(LogFileError::NoRows { file: self.file, line: self.header_line });
-        }
-        if row < first || (self.options.read.rows.is_some() && row < last) {
-            let found = format!("{row} rows");
-            return Err(LogFileError::RowRange { file: self.file, first, last, found });
-        }
-        let mut notes = self.layout.notes;
-        if let LineParser::Echo(echo) = &rows.parser
-            && echo.remarks > 0
-        {
-            let reason = "the recorder says that it lost some; the clock takes them for gaps";
-            notes.push(ReadingNote::new("lost messages", echo.remarks.to_string(), reason));
-        }
-        let header = rows.columns.iter().map(|k| self.layout.header.names[*k].clone()).collect();
-        let table = Table {
-            source: self.file,
-            header,
-            origin: rows.columns.iter().map(|k| rows.origin[*k]).collect(),
-            columns: rows.values_of,
-            rows: row + 1 - first,
-            first_row: first,
-            sha256: self.lines.digest()?,
-        };
-        Ok((table, notes))
     }
 
     /// A reader of rows that keeps columns, by their places among all of the header.
@@ -265,6 +189,67 @@ impl LogText {
             _ if header.in_file[slot].is_empty() => name.clone(),
             _ => header.in_file[slot].clone(),
         }
+    }
+}
+
+impl LogSource for LogText {
+    fn header(&self) -> LogHeader {
+        self.layout.header.without(&self.options.read.ignore)
+    }
+
+    fn notes(&self) -> &[ReadingNote] {
+        &self.layout.notes
+    }
+
+    /// What follows the last row asked for is hashed and not looked at.
+    fn read(mut self: Box<Self>, wanted: &Wanted) -> Result<(Table, Vec<ReadingNote>), LogFileError> {
+        let shown = self.header();
+        let place = |k: &usize| self.layout.header.column(&shown.names[*k]);
+        let all: Vec<usize> = (0..shown.names.len()).filter(|k| !shown.text[*k]).collect();
+        let columns: Vec<usize> = wanted.columns.as_ref().unwrap_or(&all).iter().filter_map(place).collect();
+        let time: Vec<usize> = wanted.time.iter().filter_map(place).collect();
+        let mut rows = self.rows(columns, &time, wanted.missing != Missing::Error);
+        let (first, last) = self.options.read.rows.unwrap_or((1, usize::MAX));
+        let mut row = 0;
+        while row < last
+            && let Some((line, text)) = self.held.pop_front()
+        {
+            rows.take(&mut row, first, line, &text, &self)?;
+        }
+        while row < last {
+            // What is said of a faulty row needs the whole of `self`, which lines are borrowed from.
+            let taken = match self.lines.next()? {
+                None => break,
+                Some(text) => rows.parse(row + 1 >= first, text),
+            };
+            let line = self.lines.number();
+            rows.settle(taken, &mut row, line, &self)?;
+        }
+        if row == 0 {
+            return Err(LogFileError::NoRows { file: self.file, line: self.header_line });
+        }
+        if row < first || (self.options.read.rows.is_some() && row < last) {
+            let found = format!("{row} rows");
+            return Err(LogFileError::RowRange { file: self.file, first, last, found });
+        }
+        let mut notes = self.layout.notes;
+        if let LineParser::Echo(echo) = &rows.parser
+            && echo.remarks > 0
+        {
+            let reason = "the recorder says that it lost some; the clock takes them for gaps";
+            notes.push(ReadingNote::new("lost messages", echo.remarks.to_string(), reason));
+        }
+        let header = rows.columns.iter().map(|k| self.layout.header.names[*k].clone()).collect();
+        let table = Table {
+            source: self.file,
+            header,
+            origin: rows.columns.iter().map(|k| rows.origin[*k]).collect(),
+            columns: rows.values_of,
+            rows: row + 1 - first,
+            first_row: first,
+            sha256: self.lines.digest()?,
+        };
+        Ok((table, notes))
     }
 }
 

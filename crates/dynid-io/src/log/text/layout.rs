@@ -3,12 +3,12 @@
 use std::collections::HashMap;
 
 use super::cell::{Cell, classify};
-use super::format::LogFormat;
-use super::header::LogHeader;
 use super::ros::{Echo, name_after_joints};
-use super::{DecimalMark, LogOptions, ReadingNote};
 use crate::csv::{Delimiter, LogFileError, MAX_COLUMNS, detect, number, split};
 use crate::excerpt::{excerpt_bytes, listed};
+use crate::log::format::LogFormat;
+use crate::log::header::LogHeader;
+use crate::log::{DecimalMark, LogOptions, ReadingNote};
 
 /// Names repeated in a note.
 const LISTED: usize = 8;

@@ -1,8 +1,8 @@
 //! Joint states as the tools of ROS print them.
 
 use super::fault::Fault;
-use super::header::LogHeader;
 use crate::excerpt::excerpt_bytes;
+use crate::log::header::LogHeader;
 
 /// Nanoseconds of a second.
 const SECOND: u32 = 1_000_000_000;

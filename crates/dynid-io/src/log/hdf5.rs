@@ -1,0 +1,134 @@
+//! HDF5 files, `.mat` files of MATLAB 7.3 among them: every dataset of numbers is an array, named by its path.
+
+use std::io::{Seek, SeekFrom};
+
+use hdf5_pure::{DType, File, Group};
+
+use super::arrays::{Array, ArrayFile, Holds, Values};
+use crate::input::Opened;
+
+/// Deepest nesting of groups.
+const MAX_DEPTH: usize = 16;
+/// Most datasets of a file.
+const MAX_DATASETS: usize = 50_000;
+
+/// A file of datasets, or one of its groups.
+pub(super) struct Hdf5 {
+    file: File,
+    /// Path per array.
+    paths: Vec<String>,
+    arrays: Vec<Array>,
+}
+
+impl Hdf5 {
+    /// Lists the datasets below a group, `""` for the whole file.
+    pub(super) fn open(mut file: Opened, group: &str) -> Result<Self, String> {
+        file.seek(SeekFrom::Start(0)).map_err(|e| e.to_string())?;
+        let source = hdf5_pure::ReadSeekSource::new(file).map_err(|e| e.to_string())?;
+        let file = File::from_source(source).map_err(|e| e.to_string())?;
+        let mut found = Found { paths: Vec::new(), arrays: Vec::new() };
+        let group = group.trim_matches('/');
+        let root =
+            if group.is_empty() { file.root() } else { file.group(group).map_err(|e| e.to_string())? };
+        found.list(&root, group, "", 0)?;
+        let Found { paths, arrays } = found;
+        Ok(Hdf5 { file, paths, arrays })
+    }
+
+    /// Groups beside one another that hold the same datasets, such as the demonstrations of a dataset: their paths.
+    pub(super) fn alike(&self) -> Vec<String> {
+        let mut parents: Vec<(String, Vec<String>)> = Vec::new();
+        for path in &self.paths {
+            // The first group whose name ends in a number.
+            let ends_in_number = |name: &str| name.ends_with(|c: char| c.is_ascii_digit());
+            let mut end = 0;
+            for part in path.split('/') {
+                end += part.len();
+                if ends_in_number(part) && end < path.len() {
+                    let (group, rest) = (path[..end].to_owned(), path[end..].to_owned());
+                    match parents.iter_mut().find(|(g, _)| *g == group) {
+                        Some((_, all)) => all.push(rest),
+                        None => parents.push((group, vec![rest])),
+                    }
+                    break;
+                }
+                end += 1;
+            }
+        }
+        let stem = |name: &str| name.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned();
+        match parents.as_slice() {
+            [(first, datasets), rest @ ..] if !rest.is_empty() => {
+                let same = |(g, d): &(String, Vec<String>)| stem(g) == stem(first) && d == datasets;
+                if rest.iter().all(same) { parents.into_iter().map(|(g, _)| g).collect() } else { Vec::new() }
+            }
+            _ => Vec::new(),
+        }
+    }
+}
+
+struct Found {
+    paths: Vec<String>,
+    arrays: Vec<Array>,
+}
+
+impl Found {
+    /// `name`: the path below the group that was asked for.
+    fn list(&mut self, group: &Group, path: &str, name: &str, depth: usize) -> Result<(), String> {
+        let below = |of: &str, child: &str| {
+            if of.is_empty() { child.to_owned() } else { format!("{of}/{child}") }
+        };
+        for child in group.datasets().map_err(|e| e.to_string())? {
+            if self.arrays.len() >= MAX_DATASETS {
+                return Err(format!("expected at most {MAX_DATASETS} datasets, found more"));
+            }
+            // References of MATLAB cells, and what it keeps for itself.
+            let Ok(dataset) = group.dataset(&child) else { continue };
+            let (Ok(shape), Ok(kind)) = (dataset.shape(), dataset.dtype()) else { continue };
+            let holds = match kind {
+                DType::F32 | DType::F64 | DType::I8 | DType::I16 | DType::I32 | DType::I64 => Holds::Numbers,
+                DType::U8 | DType::U16 | DType::U32 | DType::U64 => Holds::Numbers,
+                _ => Holds::Texts,
+            };
+            let shape = shape.iter().map(|n| usize::try_from(*n).unwrap_or(usize::MAX)).collect();
+            self.paths.push(below(path, &child));
+            self.arrays.push(Array { name: below(name, &child), shape, holds, entries: Vec::new() });
+        }
+        if depth < MAX_DEPTH {
+            for child in group.groups().map_err(|e| e.to_string())? {
+                if child.starts_with('#') {
+                    continue;
+                }
+                let inner = group.group(&child).map_err(|e| e.to_string())?;
+                self.list(&inner, &below(path, &child), &below(name, &child), depth + 1)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl ArrayFile for Hdf5 {
+    fn arrays(&self) -> &[Array] {
+        &self.arrays
+    }
+
+    fn load(&mut self, array: usize) -> Result<Values, String> {
+        let path = &self.paths[array];
+        let read = || {
+            let dataset = self.file.dataset(path)?;
+            Ok::<_, hdf5_pure::Error>(match dataset.dtype()? {
+                DType::F32 | DType::F64 | DType::U64 => Values::Float(dataset.read_f64()?),
+                _ => Values::Whole(dataset.read_i64()?),
+            })
+        };
+        let values = read().map_err(|e| format!("dataset `{path}`: {e}"))?;
+        let found = match &values {
+            Values::Float(x) => x.len(),
+            Values::Whole(x) => x.len(),
+        };
+        let shape = &self.arrays[array].shape;
+        match shape.iter().try_fold(1_usize, |n, m| n.checked_mul(*m)) {
+            Some(count) if count == found => Ok(values),
+            _ => Err(format!("dataset `{path}`: expected {shape:?} numbers, found {found}")),
+        }
+    }
+}

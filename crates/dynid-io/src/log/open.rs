@@ -1,0 +1,223 @@
+//! From the name of a file to an opened log.
+
+use std::fs;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use super::arrays::{ArrayFile, ArrayLog};
+use super::member::{LogFile, OpenFault};
+use super::text::LogText;
+use super::{LogOptions, LogSource};
+use crate::csv::LogFileError;
+use crate::digest::Hashed;
+use crate::input::{self, Opened};
+
+/// What the first bytes of a file tell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Container {
+    Npy,
+    Zip,
+    Matlab,
+    Hdf5,
+    Parquet,
+    Mcap,
+    RosBag,
+    Sqlite,
+    Arrow,
+}
+
+impl Container {
+    fn of(start: &[u8]) -> Option<Self> {
+        let begins = |mark: &[u8]| start.starts_with(mark);
+        Some(match () {
+            () if begins(b"\x93NUMPY") => Container::Npy,
+            () if begins(b"PK\x03\x04") || begins(b"PK\x05\x06") => Container::Zip,
+            () if begins(b"MATLAB 5.0") => Container::Matlab,
+            // A block of MATLAB's own stands before what HDF5 begins with.
+            () if begins(b"\x89HDF\r\n\x1a\n") || begins(b"MATLAB 7.3") => Container::Hdf5,
+            () if begins(b"PAR1") => Container::Parquet,
+            () if begins(b"\x89MCAP0\r\n") => Container::Mcap,
+            () if begins(b"#ROSBAG V") => Container::RosBag,
+            () if begins(b"SQLite format 3\0") => Container::Sqlite,
+            () if begins(b"ARROW1") => Container::Arrow,
+            () => return None,
+        })
+    }
+
+    /// Name of the format, and the feature that reads it.
+    fn named(self) -> (&'static str, &'static str) {
+        match self {
+            Container::Npy => ("NumPy array", "numpy"),
+            Container::Zip => ("NumPy arrays", "numpy"),
+            Container::Matlab => ("MATLAB file", ""),
+            Container::Hdf5 => ("HDF5", "hdf5"),
+            Container::Parquet => ("Parquet", "parquet"),
+            Container::Mcap => ("MCAP", "mcap"),
+            Container::RosBag => ("ROS 1 bag", ""),
+            Container::Sqlite => ("ROS 2 bag in SQLite", ""),
+            Container::Arrow => ("Arrow file", ""),
+        }
+    }
+}
+
+/// Opens a log of any format that is read, told by its first bytes. `FILE#MEMBER` is a member of a file with several: an episode of
+/// a dataset, a group of an HDF5 file, the topics of a bag that begin so.
+///
+/// # Errors
+/// [`LogFileError`]: the file cannot be read, is broken, holds no table, has several members and none is stated, or this build cannot
+/// read its format.
+pub fn open(path: impl AsRef<Path>, options: &LogOptions) -> Result<Box<dyn LogSource>, LogFileError> {
+    let file = LogFile::of(path.as_ref());
+    let unreadable = |error| LogFileError::Unreadable { file: file.path.display().to_string(), error };
+    if file.path.is_dir() {
+        return open_folder(&file, options);
+    }
+    let mut opened = input::open(&file.path).map_err(unreadable)?;
+    let mut start = Vec::with_capacity(16);
+    (&mut opened).take(16).read_to_end(&mut start).map_err(unreadable)?;
+    let Some(container) = Container::of(&start) else {
+        let (format, found) = ("text", file.member.clone().unwrap_or_default());
+        return match file.member {
+            None => LogText::open(&file.path, options).map(|log| Box::new(log) as Box<dyn LogSource>),
+            Some(_) => {
+                let fault =
+                    OpenFault::Member { expected: "a log without members".to_owned(), found, example: None };
+                Err(fault.of(&file, format))
+            }
+        };
+    };
+    container.open(opened, &file, options)
+}
+
+/// Opens a folder: a dataset of LeRobot, or a bag of ROS 2 in one file or several.
+fn open_folder(file: &LogFile, options: &LogOptions) -> Result<Box<dyn LogSource>, LogFileError> {
+    #[cfg(feature = "parquet")]
+    if file.path.join("meta/info.json").is_file() {
+        let found = super::parquet::file_of_episode(&file.path, file.member.as_deref());
+        let path = found.map_err(|fault| fault.of(file, "LeRobot dataset"))?;
+        let opened = input::open(&path)
+            .map_err(|error| LogFileError::Unreadable { file: path.display().to_string(), error })?;
+        return Container::Parquet.open(opened, &LogFile { path, member: file.member.clone() }, options);
+    }
+    #[cfg(feature = "mcap")]
+    {
+        let mut bags: Vec<PathBuf> = fs::read_dir(&file.path)
+            .into_iter()
+            .flatten()
+            .flatten()
+            .map(|entry| entry.path())
+            .filter(|path| path.extension().is_some_and(|e| e == "mcap"))
+            .collect();
+        bags.sort();
+        if !bags.is_empty() {
+            return super::bag::open(&file.path, &bags, file.member.as_deref(), options);
+        }
+    }
+    let error = io::Error::from(io::ErrorKind::IsADirectory);
+    Err(LogFileError::Unreadable { file: file.path.display().to_string(), error })
+}
+
+impl Container {
+    fn open(
+        self,
+        mut opened: Opened,
+        file: &LogFile,
+        options: &LogOptions,
+    ) -> Result<Box<dyn LogSource>, LogFileError> {
+        let (format, feature) = self.named();
+        let name = file.path.display().to_string();
+        let (path, member) = (file.path.as_path(), file.member.as_deref());
+        let fault = |fault: OpenFault| fault.of(file, format);
+        let damaged = |reason: String| OpenFault::Damaged(reason).of(file, format);
+        let no_member = || match member {
+            None => Ok(()),
+            Some(member) => {
+                let expected = "a file without members".to_owned();
+                Err(OpenFault::Member { expected, found: format!("`{member}`"), example: None }
+                    .of(file, format))
+            }
+        };
+        let mut notes = Vec::new();
+        let (source, format): (Box<dyn ArrayFile>, &'static str) = match self {
+            #[cfg(feature = "numpy")]
+            Container::Npy => {
+                no_member()?;
+                let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+                (
+                    Box::new(
+                        super::numpy::Npy::open(reopened(path).map_err(damaged)?, &stem).map_err(damaged)?,
+                    ),
+                    format,
+                )
+            }
+            #[cfg(feature = "numpy")]
+            Container::Zip => {
+                no_member()?;
+                (
+                    Box::new(super::numpy::Npz::open(reopened(path).map_err(damaged)?).map_err(damaged)?),
+                    format,
+                )
+            }
+            Container::Matlab => {
+                no_member()?;
+                let bytes = input::read(path).map_err(|e| damaged(e.to_string()))?;
+                let parsed = super::matlab::MatFile::parse(bytes, options.read.max_bytes);
+                (Box::new(parsed.map_err(damaged)?), format)
+            }
+            #[cfg(feature = "hdf5")]
+            Container::Hdf5 => {
+                let group = member.unwrap_or_default();
+                let read =
+                    super::hdf5::Hdf5::open(reopened(path).map_err(damaged)?, group).map_err(damaged)?;
+                let alike = read.alike();
+                if let Some(first) = alike.first() {
+                    let expected = format!("one of the groups {}", crate::excerpt::listed(&alike, 6));
+                    let found =
+                        member.map_or_else(|| "none stated".to_owned(), |member| format!("`{member}`"));
+                    return Err(fault(OpenFault::Member { expected, found, example: Some(first.clone()) }));
+                }
+                (Box::new(read), format)
+            }
+            #[cfg(feature = "parquet")]
+            Container::Parquet => {
+                let read = super::parquet::Parquet::open(reopened(path).map_err(damaged)?, path, member)
+                    .map_err(fault)?;
+                for (setting, value) in read.about() {
+                    notes.push(super::ReadingNote::new(setting, value.clone(), "the dataset says so"));
+                }
+                (Box::new(read), format)
+            }
+            #[cfg(feature = "mcap")]
+            Container::Mcap => return super::bag::open(path, &[path.to_owned()], member, options),
+            _ => {
+                return Err(match feature {
+                    "" => LogFileError::Content {
+                        file: name,
+                        format,
+                        expected: "a format that is read".to_owned(),
+                        found: "one that is not: write it as MCAP, Parquet, HDF5 or CSV".to_owned(),
+                    },
+                    _ => LogFileError::NotBuilt { file: name, format, feature },
+                });
+            }
+        };
+        let digest = rewound(&mut opened).and_then(|()| Hashed::new(opened).finish());
+        let sha256 = digest.map_err(|error| LogFileError::Unreadable { file: name.clone(), error })?;
+        let bounds = input_bytes(path);
+        let log = ArrayLog::new(&name, format, sha256, source, notes, bounds, options)?;
+        Ok(Box::new(log))
+    }
+}
+
+fn rewound(file: &mut Opened) -> io::Result<()> {
+    file.seek(SeekFrom::Start(0)).map(|_| ())
+}
+
+/// The file once more, with a place of its own.
+fn reopened(path: &Path) -> Result<Opened, String> {
+    input::open(path).map_err(|e| e.to_string())
+}
+
+fn input_bytes(path: &Path) -> u64 {
+    fs::metadata(path).map_or(u64::MAX, |m| m.len())
+}
