@@ -25,6 +25,7 @@ fn run(command: &Command) -> Result<u8, Failure> {
         Command::Clearance(args) => commands::clearance::run(args),
         Command::Compare(args) => commands::compare::run(args),
         Command::Completions(args) => commands::completions::run(args),
+        Command::Convert(args) => commands::convert::run(args),
         Command::Design(args) => commands::design::run(args),
         Command::Diff(args) => commands::diff::run(args),
         Command::Explain(args) => commands::explain::run(args),

@@ -21,6 +21,7 @@ mod signal;
 mod source;
 pub mod states;
 pub mod stream;
+pub mod table_file;
 mod tie;
 pub mod toml_robot;
 pub mod trajectory;

@@ -139,6 +139,37 @@ pub fn is_time_name(column: &str) -> bool {
     ColumnName::new(column).reading(|stem| TIME_NAMES.contains(&stem)).is_some()
 }
 
+/// What a column's name says that it holds, whatever joint it is of: `q_arm`, `/joint_states/arm/velocity`, `tau[3]`.
+pub fn signal_of_name(column: &str) -> Option<Signal> {
+    let name = ColumnName::new(column);
+    let means = |signal: Signal| {
+        let of_joint = |stem: &str, word: &str| {
+            let beside = |rest: &str| rest.starts_with(['_', '.', '/', ' ', '-']) && rest.len() > 1;
+            let behind = |rest: &str| rest.ends_with(['_', '.', '/', ' ', '-']) && rest.len() > 1;
+            // Single letters begin and end too many words.
+            let is_word = word.len() > 1 || signal == Signal::Position;
+            stem == word
+                || number_of(stem, word).is_some()
+                || (is_word && stem.strip_prefix(word).is_some_and(beside))
+                || (is_word && stem.strip_suffix(word).is_some_and(behind))
+        };
+        let words = names(signal).iter().flat_map(|group| group.iter());
+        words.into_iter().any(|word| name.reading_of_path(|stem| of_joint(stem, word)).is_some())
+    };
+    let signals = [
+        Signal::Time,
+        Signal::Position,
+        Signal::Velocity,
+        Signal::Acceleration,
+        Signal::Effort,
+        Signal::Temperature,
+    ];
+    match is_time_name(column) {
+        true => Some(Signal::Time),
+        false => signals.into_iter().skip(1).find(|signal| means(*signal)),
+    }
+}
+
 /// True if a part of a column's path says that it was asked of the robot, or formed of that.
 pub(crate) fn is_command(column: &str) -> bool {
     let words = [

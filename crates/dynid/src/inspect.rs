@@ -1,6 +1,7 @@
-//! What a robot file holds and what of it can be identified.
+//! What a robot file holds and what of it can be identified, and what a log holds.
 
 mod clearance;
+mod log;
 mod loops;
 
 use dynid_model::{BaseParameters, BaseSettings, EffortModel, Ties};
@@ -11,6 +12,7 @@ use crate::elements::ElementPlan;
 use crate::estimate::JointType;
 use crate::robot::Robot;
 pub use clearance::{ClearanceRow, ContactLawName, RestingJournal};
+pub use log::{LogColumn, LogInspection, inspect_log};
 pub use loops::{ClosureRow, LoopsInspection};
 
 /// Structure of a robot.

@@ -8,6 +8,7 @@ pub mod check;
 pub mod clearance;
 pub mod compare;
 pub mod config;
+pub mod convert;
 pub mod design;
 pub mod diff;
 pub mod explain;

@@ -11,7 +11,7 @@ mod known_motion;
 mod reading;
 
 pub(crate) use reading::map_columns;
-pub use reading::table;
+pub use reading::{WholeTable, table};
 
 use crate::Error;
 use crate::config::{InstrumentsConfig, LogConfig, MotorSide};
@@ -47,6 +47,18 @@ pub(crate) fn load_as_it_is(
 ) -> Result<Log, Error> {
     let read = read(config, axes, run_columns, motor_side)?;
     finish(config, &config.path.display().to_string(), read, axes)
+}
+
+/// Signals of a robot in a log, in SI, as they were recorded, and what was found out about reading it.
+pub(crate) fn recorded(
+    config: &LogConfig,
+    axes: &[LogAxis],
+    columns: &MappingSpec,
+) -> Result<(Signals, Vec<ReadingNote>), Error> {
+    let mut understood = reading::understand(config, axes, columns, false)?;
+    let file = config.path.display().to_string();
+    let signals = understood.signals().map_err(|source| Error::Columns { file, source: Box::new(source) })?;
+    Ok((signals, understood.notes))
 }
 
 /// A file as it was read.

@@ -30,6 +30,7 @@ pub fn all() -> Vec<ResultSchema> {
         schema::<crate::FrictionModel>("friction", "`friction.json`"),
         schema::<crate::gains::GainsFile>("gains", "`dynid gains --json`"),
         schema::<crate::inspect::Inspection>("inspect", "`dynid inspect --json`"),
+        schema::<crate::inspect::LogInspection>("inspect-log", "`dynid inspect LOG --json`"),
         schema::<crate::export::RobotJson>("model", "`dynid export --model`"),
         schema::<crate::motions::MotionRecord>("motion", "`motion.json`"),
         schema::<crate::online::Event>("online", "a line of `dynid online`"),

@@ -71,6 +71,32 @@ pub(crate) struct InitArgs {
     pub(crate) quiet: bool,
 }
 
+#[derive(Debug, Args)]
+pub(crate) struct ConvertArgs {
+    /// Log; `FILE#MEMBER`: an episode, a group, or topics of it.
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub(crate) log: PathBuf,
+    /// File to write: .csv, .csv.gz, .parquet, .npz or .mcap.
+    #[arg(value_hint = ValueHint::AnyPath)]
+    pub(crate) out: PathBuf,
+    /// Robot file: write the signals of its joints, in SI (default: all columns as they are).
+    #[arg(long, value_name = "ROBOT", value_hint = ValueHint::FilePath)]
+    pub(crate) robot: Option<PathBuf>,
+    /// First and last data row, from 1.
+    #[arg(long, value_name = "FIRST:LAST", value_parser = row_range)]
+    pub(crate) rows: Option<(usize, usize)>,
+    /// Configuration whose [columns] the log follows.
+    #[arg(long, value_name = "FILE.toml", value_hint = ValueHint::FilePath)]
+    pub(crate) config: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) columns: LogArgs,
+    #[command(flatten)]
+    pub(crate) force: ForceArgs,
+    /// Print nothing but errors.
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
+}
+
 /// How the logs of a command that works with an estimate are read.
 #[derive(Debug, Args)]
 pub(crate) struct ReadingArgs {

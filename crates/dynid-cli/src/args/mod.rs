@@ -23,7 +23,7 @@ pub(crate) use experiments::{BacklashArgs, ClearanceArgs, FrictionTestArgs, Gain
 pub(crate) use identify::{
     CheckArgs, CompareArgs, ConsistencyArg, FrictionArg, IdentifyArgs, MethodArg, RouteArg,
 };
-pub(crate) use logs::{InitArgs, LogArgs, MissingArg, ReadingArgs};
+pub(crate) use logs::{ConvertArgs, InitArgs, LogArgs, MissingArg, ReadingArgs};
 pub(crate) use model::{
     DiffArgs, ExportArgs, InspectArgs, PredictArgs, RegressorArgs, SchemaArgs, ValidateArgs,
 };
@@ -66,6 +66,8 @@ pub(crate) enum Command {
     Compare(CompareArgs),
     /// Print what a shell needs to complete commands, flags and files.
     Completions(CompletionsArgs),
+    /// Write a log in another format: CSV, Parquet, NumPy or MCAP; as it is, or as the signals of a robot.
+    Convert(ConvertArgs),
     /// Design an excitation trajectory within all limits: writes trajectory files, design.json and report.html.
     Design(Box<DesignArgs>),
     /// Compare two models of a robot: parameters that differ beyond their intervals, difference of the effort.
@@ -82,7 +84,7 @@ pub(crate) enum Command {
     Identify(Box<IdentifyArgs>),
     /// Write a commented configuration for a robot and its logs: what their columns are, units, time, validation.
     Init(InitArgs),
-    /// Show a robot's tree, its parameters and which combinations of them can be identified.
+    /// Show a robot's tree, its parameters and which combinations of them can be identified; of a log, its columns, rates and gaps.
     Inspect(InspectArgs),
     /// Write manual pages, one per command.
     Man(ManArgs),

@@ -2,7 +2,12 @@
 
 use std::fmt::Write;
 
-use dynid::inspect::{ClearanceRow, Inspection, LoopsInspection, MotorRow, inspect};
+use dynid::config::LogConfig;
+use dynid::inspect::{
+    ClearanceRow, Inspection, LogColumn, LogInspection, LoopsInspection, MotorRow, inspect, inspect_log,
+};
+use dynid::io::MappingSpec;
+use dynid::io::log::Missing;
 use dynid_terminal::message::{Failure, Notes, data, json};
 use dynid_terminal::progress::Progress;
 
@@ -10,6 +15,9 @@ use super::{element_names, load_robot, table};
 use crate::args::InspectArgs;
 
 pub(crate) fn run(args: &InspectArgs) -> Result<u8, Failure> {
+    if dynid::io::log::is_log(&args.robot.robot) {
+        return log(args);
+    }
     let robot = load_robot(&args.robot)?;
     let progress = Progress::new(args.print.quiet);
     progress.doing("finding base parameters");
@@ -23,6 +31,65 @@ pub(crate) fn run(args: &InspectArgs) -> Result<u8, Failure> {
         }
     }
     Ok(0)
+}
+
+fn log(args: &InspectArgs) -> Result<u8, Failure> {
+    let robot = &args.robot;
+    let of_robots = [
+        ("--elements", args.elements.is_some()),
+        ("--floating-base", robot.floating_base),
+        ("--couple-mimics", robot.couple_mimics),
+        ("--lock", !robot.lock.is_empty()),
+        ("--gravity", robot.gravity.is_some()),
+    ];
+    if let Some((flag, _)) = of_robots.into_iter().find(|(_, given)| *given) {
+        let text = format!("{flag}: expected a robot file, found the log {}", robot.robot.display());
+        return Err(Failure::Usage(text, "leave the flag out: a log has no such setting"));
+    }
+    let progress = Progress::new(args.print.quiet);
+    progress.doing("reading");
+    let config = LogConfig { path: robot.robot.clone(), ..LogConfig::default() };
+    // Whatever is there is shown: no value is missed.
+    let columns = MappingSpec { missing: Some(Missing::Drop), ..MappingSpec::default() };
+    let found = inspect_log(&config, &columns)?;
+    drop(progress);
+    match args.print.json {
+        true => json(&found)?,
+        false => {
+            Notes::new(args.print.quiet).warnings(&found.warnings);
+            data(&text_of_log(&found))?;
+        }
+    }
+    Ok(0)
+}
+
+fn text_of_log(found: &LogInspection) -> String {
+    let length = found.duration_s.map_or_else(String::new, |s| format!(", {} s", table::number(Some(s))));
+    let mut out = format!("{}: {} rows{length}\n", found.log, found.rows);
+    for note in &found.notes {
+        let _ = writeln!(out, "  {}: {} ({})", note.setting, note.value, note.reason);
+    }
+    let row = |c: &LogColumn| {
+        vec![
+            c.name.clone(),
+            c.signal.clone().unwrap_or_else(|| "-".to_owned()),
+            c.values.to_string(),
+            table::number(c.rate_hz),
+            table::number(c.longest_gap_s),
+            c.out_of_order.map_or_else(|| "-".to_owned(), |n| n.to_string()),
+            table::number(c.least),
+            table::number(c.greatest),
+        ]
+    };
+    let rows: Vec<Vec<String>> = found.columns.iter().map(row).collect();
+    let header =
+        ["column", "signal", "values", "rate Hz", "longest gap s", "out of order", "least", "greatest"];
+    out.push('\n');
+    out.push_str(&table::aligned(&header, &rows));
+    if !found.texts.is_empty() {
+        let _ = writeln!(out, "\ntexts: {}", found.texts.join(", "));
+    }
+    out
 }
 
 fn text(i: &Inspection) -> String {

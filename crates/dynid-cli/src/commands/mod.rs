@@ -5,6 +5,7 @@ pub(crate) mod check;
 pub(crate) mod clearance;
 pub(crate) mod compare;
 pub(crate) mod completions;
+pub(crate) mod convert;
 pub(crate) mod design;
 pub(crate) mod diff;
 pub(crate) mod explain;

@@ -81,7 +81,7 @@ impl Run {
         for log in self.config.log.clone() {
             let name = log.path.display().to_string();
             let columns = log.columns.as_ref().unwrap_or(&self.config.columns);
-            let (table, header) = dynid::logs::table(&log, columns)?;
+            let dynid::logs::WholeTable { table, header, .. } = dynid::logs::table(&log, columns)?;
             self.source(&name, &header, Some(&log))?;
             let mut row = vec![0.0; table.columns.len()];
             for k in part(&log, &table) {

@@ -10,4 +10,5 @@ mod write;
 pub use error::LogFileError;
 pub use read::{Delimiter, ReadOptions, Table, read};
 pub(crate) use read::{MAX_COLUMNS, RowFault, RowParser, detect, split};
+pub(crate) use write::OutCell;
 pub use write::{GZIP_COMMENT, RowWriter, text, write};

@@ -53,6 +53,14 @@ pub struct RowWriter {
     rows: usize,
 }
 
+/// A cell of a row.
+#[derive(Clone, Copy)]
+pub(crate) enum OutCell {
+    /// NaN: no value.
+    Float(f64),
+    Whole(i64),
+}
+
 enum Sink {
     Plain(BufWriter<AtomicFile>),
     Gzip(Box<GzEncoder<BufWriter<AtomicFile>>>),
@@ -121,16 +129,38 @@ impl RowWriter {
             let (file, what) = (self.file.clone(), format!("values of row {}", self.rows));
             return Err(OutputError::Shape { file, what, expected: self.header.len(), found: values.len() });
         }
-        let mut line = String::with_capacity(20 * values.len());
-        for (k, x) in values.iter().enumerate() {
-            if !x.is_finite() {
-                let (file, column) = (self.file.clone(), self.header[k].clone());
-                return Err(OutputError::NotFinite { file, row: self.rows, column, found: *x });
-            }
+        if let Some(k) = values.iter().position(|x| !x.is_finite()) {
+            let (file, column) = (self.file.clone(), self.header[k].clone());
+            return Err(OutputError::NotFinite { file, row: self.rows, column, found: values[k] });
+        }
+        self.line(values.iter().map(|x| OutCell::Float(*x)))
+    }
+
+    /// Writes a row as [`RowWriter::row`] does; NaN is a cell without a value.
+    ///
+    /// # Errors
+    /// [`OutputError`]: an infinite value, a failed write.
+    pub(crate) fn cells(&mut self, cells: impl Iterator<Item = OutCell> + Clone) -> Result<(), OutputError> {
+        self.rows += 1;
+        let infinite = |cell: OutCell| matches!(cell, OutCell::Float(x) if x.is_infinite());
+        if let Some(k) = cells.clone().position(infinite) {
+            let (file, column) = (self.file.clone(), self.header[k].clone());
+            return Err(OutputError::NotFinite { file, row: self.rows, column, found: f64::INFINITY });
+        }
+        self.line(cells)
+    }
+
+    fn line(&mut self, cells: impl Iterator<Item = OutCell>) -> Result<(), OutputError> {
+        let mut line = String::with_capacity(20 * self.header.len());
+        for (k, cell) in cells.enumerate() {
             if k > 0 {
                 line.push(',');
             }
-            push_shortest(&mut line, *x);
+            match cell {
+                OutCell::Float(x) if x.is_nan() => {}
+                OutCell::Float(x) => push_shortest(&mut line, x),
+                OutCell::Whole(x) => line.push_str(&x.to_string()),
+            }
         }
         line.push('\n');
         self.put(line.as_bytes())

@@ -324,7 +324,7 @@ impl<'a> TableBuilder<'a> {
     }
 }
 
-/// The length of the array that is called a time, else the one whose arrays hold most numbers; of equals, the larger.
+/// The length of the array that is called a time, else the longest axis of arrays that hold most numbers; of equals, the longer.
 fn length_of_log(arrays: &[Array]) -> Option<usize> {
     let numbers = || arrays.iter().filter(|a| a.holds == Holds::Numbers && a.shape.len() <= 2);
     let stamps = |a: &&Array| {
@@ -337,14 +337,12 @@ fn length_of_log(arrays: &[Array]) -> Option<usize> {
     }
     let mut votes: Vec<(usize, usize)> = Vec::new();
     for array in numbers() {
-        let mut lengths: Vec<usize> = array.shape.iter().copied().filter(|n| *n > 1).collect();
-        lengths.dedup();
+        // A log is longer than it is wide.
+        let Some(length) = array.shape.iter().copied().max().filter(|n| *n > 1) else { continue };
         let size = array.shape.iter().fold(1_usize, |n, m| n.saturating_mul(*m));
-        for length in lengths {
-            match votes.iter_mut().find(|(_, n)| *n == length) {
-                Some((count, _)) => *count = count.saturating_add(size),
-                None => votes.push((size, length)),
-            }
+        match votes.iter_mut().find(|(_, n)| *n == length) {
+            Some((count, _)) => *count = count.saturating_add(size),
+            None => votes.push((size, length)),
         }
     }
     votes.into_iter().max().map(|(_, length)| length)

@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 pub use format::LogFormat;
 pub use header::LogHeader;
 pub use member::LogFile;
-pub use open::open;
+pub use open::{is_log, open};
 
 use crate::csv::{LogFileError, ReadOptions, Table};
 

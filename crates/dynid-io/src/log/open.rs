@@ -60,6 +60,22 @@ impl Container {
     }
 }
 
+/// Whether a file is a log rather than a robot: told by its first bytes, else by its name (`.csv`, `.tsv`, `.txt`, `.dat`, `.gz`), or a
+/// folder.
+pub fn is_log(path: &Path) -> bool {
+    let LogFile { path, member } = LogFile::of(path);
+    let name = path.to_string_lossy().to_lowercase();
+    if member.is_some()
+        || path.is_dir()
+        || [".csv", ".tsv", ".txt", ".dat", ".gz"].iter().any(|end| name.ends_with(end))
+    {
+        return true;
+    }
+    let mut start = Vec::new();
+    let read = fs::File::open(&path).and_then(|file| file.take(16).read_to_end(&mut start));
+    read.is_ok() && Container::of(&start).is_some()
+}
+
 /// Opens a log of any format that is read, told by its first bytes. `FILE#MEMBER` is a member of a file with several: an episode of
 /// a dataset, a group of an HDF5 file, the topics of a bag that begin so.
 ///

@@ -44,6 +44,16 @@ pub enum OutputError {
         /// The value.
         found: f64,
     },
+    /// The name of the file tells no format that can hold what is written.
+    #[error("{file}: expected {expected}, found {found}")]
+    Format {
+        /// File.
+        file: String,
+        /// What can be written.
+        expected: &'static str,
+        /// What the name tells.
+        found: String,
+    },
     /// Rows or columns do not fit the header.
     #[error("{file}: {what}: expected {expected}, found {found}")]
     Shape {
@@ -68,6 +78,7 @@ impl OutputError {
             OutputError::Busy { .. } => {
                 Some("let it end, or give a folder of its own to each run".to_owned())
             }
+            OutputError::Format { .. } => Some("give the file a name with such an end".to_owned()),
             OutputError::NotFinite { .. } | OutputError::Shape { .. } => None,
         }
     }

@@ -133,14 +133,26 @@ fn of_unnamed(
     Ok(Some((merged, ReadingNote::new("columns", value, reason))))
 }
 
-/// A log as a table of all its columns that hold numbers, with their header. Cells without a value are NaN where rows
-/// without one are not refused.
+/// A log as a table of all its columns that hold numbers.
+#[derive(Debug)]
+pub struct WholeTable {
+    /// Numbers; cells without a value are NaN where rows without one are not refused.
+    pub table: Table,
+    /// The columns of the table.
+    pub header: LogHeader,
+    /// Columns that hold texts.
+    pub texts: Vec<String>,
+    /// What was found out about how to read it.
+    pub notes: Vec<ReadingNote>,
+}
+
+/// Reads all columns of a log that hold numbers.
 ///
 /// # Errors
 /// [`Error::LogFile`].
-pub fn table(log: &LogConfig, spec: &MappingSpec) -> Result<(Table, LogHeader), Error> {
-    let text = log::open(&log.path, &spec.options(log.rows))?;
-    let header = text.header();
+pub fn table(log: &LogConfig, spec: &MappingSpec) -> Result<WholeTable, Error> {
+    let source = log::open(&log.path, &spec.options(log.rows))?;
+    let header = source.header();
     let missing = spec.missing.unwrap_or(header.format.map_or(Missing::Error, LogFormat::missing));
     let columns: Vec<usize> = (0..header.names.len()).filter(|k| !header.text[*k]).collect();
     let stated = spec.time_names();
@@ -148,10 +160,10 @@ pub fn table(log: &LogConfig, spec: &MappingSpec) -> Result<(Table, LogHeader), 
         header.time.contains(k) || stated.contains(&header.names[*k]) || is_time_name(&header.names[*k])
     };
     let time = columns.iter().copied().filter(is_time).collect();
-    let (table, _) = text.read(&Wanted { columns: Some(columns.clone()), time, missing })?;
+    let (table, notes) = source.read(&Wanted { columns: Some(columns.clone()), time, missing })?;
     let texts: Vec<String> =
         (0..header.names.len()).filter(|k| header.text[*k]).map(|k| header.names[k].clone()).collect();
-    Ok((table, header.without(&texts)))
+    Ok(WholeTable { table, header: header.without(&texts), texts, notes })
 }
 
 /// Columns of a robot's signals. The sign of torque sensors is that of efforts from here on.
