@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use dynid::config::{Config, LogConfig};
 use dynid::convert::convert;
 use dynid::io::MappingSpec;
+use dynid::io::table_file::TableFormat;
 use dynid::{Robot, RobotOptions};
 use dynid_terminal::message::{Failure, Notes};
 use dynid_terminal::outputs;
@@ -19,6 +20,18 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<u8, Failure> {
         .flatten()
         .map(PathBuf::as_path)
         .collect();
+    match TableFormat::of(&args.out) {
+        None => {
+            let text =
+                format!("OUT: expected .csv, .csv.gz, .parquet, .npz or .mcap, found {}", args.out.display());
+            return Err(Failure::Usage(text, "the end of the name says which format to write"));
+        }
+        Some(TableFormat::Mcap) if args.robot.is_none() => {
+            let text = "expected a robot, whose joint states .mcap holds, found none".to_owned();
+            return Err(Failure::Usage(text, "add --robot ROBOT, or write another format"));
+        }
+        Some(_) => {}
+    }
     let set = outputs::prepare_files(&[("OUT", args.out.as_path())], &inputs, args.force)?;
     let mut columns = match &args.config {
         Some(path) => Config::read_for_stream(path)?.columns,

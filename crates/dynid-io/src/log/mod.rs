@@ -8,7 +8,7 @@
 //! message, their topics joined by time.
 
 mod arrays;
-#[cfg(feature = "mcap")]
+#[cfg(feature = "bags")]
 mod bag;
 mod format;
 #[cfg(feature = "hdf5")]

@@ -5,6 +5,8 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use super::arrays::{ArrayFile, ArrayLog};
+#[cfg(feature = "bags")]
+use super::bag::BagFormat;
 use super::member::{LogFile, OpenFault};
 use super::text::LogText;
 use super::{LogOptions, LogSource};
@@ -52,9 +54,9 @@ impl Container {
             Container::Matlab => ("MATLAB file", ""),
             Container::Hdf5 => ("HDF5", "hdf5"),
             Container::Parquet => ("Parquet", "parquet"),
-            Container::Mcap => ("MCAP", "mcap"),
-            Container::RosBag => ("ROS 1 bag", ""),
-            Container::Sqlite => ("ROS 2 bag in SQLite", ""),
+            Container::Mcap => ("MCAP", "bags"),
+            Container::RosBag => ("ROS 1 bag", "bags"),
+            Container::Sqlite => ("ROS 2 bag in SQLite", "bags"),
             Container::Arrow => ("Arrow file", ""),
         }
     }
@@ -115,18 +117,14 @@ fn open_folder(file: &LogFile, options: &LogOptions) -> Result<Box<dyn LogSource
             .map_err(|error| LogFileError::Unreadable { file: path.display().to_string(), error })?;
         return Container::Parquet.open(opened, &LogFile { path, member: file.member.clone() }, options);
     }
-    #[cfg(feature = "mcap")]
-    {
-        let mut bags: Vec<PathBuf> = fs::read_dir(&file.path)
-            .into_iter()
-            .flatten()
-            .flatten()
-            .map(|entry| entry.path())
-            .filter(|path| path.extension().is_some_and(|e| e == "mcap"))
-            .collect();
+    #[cfg(feature = "bags")]
+    for (ending, format) in [("mcap", BagFormat::Mcap), ("db3", BagFormat::Sqlite)] {
+        let entries = fs::read_dir(&file.path).into_iter().flatten().flatten().map(|entry| entry.path());
+        let mut bags: Vec<PathBuf> =
+            entries.filter(|path| path.extension().is_some_and(|e| e == ending)).collect();
         bags.sort();
         if !bags.is_empty() {
-            return super::bag::open(&file.path, &bags, file.member.as_deref(), options);
+            return super::bag::open(format, &file.path, &bags, file.member.as_deref(), options);
         }
     }
     let error = io::Error::from(io::ErrorKind::IsADirectory);
@@ -203,8 +201,15 @@ impl Container {
                 }
                 (Box::new(read), format)
             }
-            #[cfg(feature = "mcap")]
-            Container::Mcap => return super::bag::open(path, &[path.to_owned()], member, options),
+            #[cfg(feature = "bags")]
+            Container::Mcap | Container::RosBag | Container::Sqlite => {
+                let format = match self {
+                    Container::RosBag => BagFormat::Ros1,
+                    Container::Sqlite => BagFormat::Sqlite,
+                    _ => BagFormat::Mcap,
+                };
+                return super::bag::open(format, path, &[path.to_owned()], member, options);
+            }
             _ => {
                 return Err(match feature {
                     "" => LogFileError::Content {

@@ -1,6 +1,6 @@
 //! Tables written in the formats of other tools: CSV, Parquet, NumPy, and MCAP with joint states.
 
-#[cfg(feature = "mcap")]
+#[cfg(feature = "bags")]
 mod mcap;
 #[cfg(feature = "numpy")]
 mod numpy;
@@ -97,7 +97,7 @@ pub struct JointStates {
 /// [`OutputError::Format`] for another name than `.mcap` and for a build that cannot write it; [`OutputError::Unwritable`].
 pub fn write_joint_states(path: &Path, states: &JointStates) -> Result<(), OutputError> {
     match TableFormat::of(path) {
-        #[cfg(feature = "mcap")]
+        #[cfg(feature = "bags")]
         Some(TableFormat::Mcap) => mcap::write(path, states),
         other => Err(no_format(path, other, "joint states as .mcap")),
     }
@@ -139,7 +139,7 @@ fn write_csv(path: &Path, names: &[String], columns: &[Column]) -> Result<(), Ou
 }
 
 /// What the operating system says of a file that is written.
-#[cfg(any(feature = "mcap", feature = "numpy", feature = "parquet"))]
+#[cfg(any(feature = "bags", feature = "numpy", feature = "parquet"))]
 fn unwritable(path: &Path, error: impl std::fmt::Display) -> OutputError {
     OutputError::Unwritable {
         file: path.display().to_string(),

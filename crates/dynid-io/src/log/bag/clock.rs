@@ -69,15 +69,15 @@ pub(super) struct Choice {
 }
 
 /// Which clock to use for some topics: stamps of headers, which do not know of the way to the recorder, unless they fail.
-pub(super) fn choose(topics: &[&Times]) -> Choice {
+pub(super) fn choose(topics: &[(&str, &Times)]) -> Choice {
     let receipt = |reason: &str| Choice { clock: Clock::Receipt, reason: reason.to_owned() };
-    if topics.iter().any(|t| !t.has_headers()) {
-        return receipt("a topic has no stamps in its headers");
+    if let Some((name, _)) = topics.iter().find(|(_, times)| !times.has_headers()) {
+        return receipt(&format!("`{name}` has no stamps in its headers"));
     }
     let mut about = Vec::new();
-    for times in topics {
+    for (name, times) in topics {
         let (Some(header), Some(received)) = (Steps::of(&times.header), Steps::of(&times.receipt)) else {
-            return receipt("a topic has a single message");
+            return receipt(&format!("`{name}` has a single message"));
         };
         if header.usual <= 0.0 || header.out_of_order as f64 > MOST_OUT_OF_ORDER * times.header.len() as f64 {
             return receipt(&format!(
@@ -86,7 +86,7 @@ pub(super) fn choose(topics: &[&Times]) -> Choice {
             ));
         }
         about.push(format!(
-            "steps of {:.3} ms with jitter {:.3} ms (received: {:.3} ms), drift {:.1} ppm, {} out of order (received: {})",
+            "`{name}`: steps of {:.3} ms with jitter {:.3} ms (received: {:.3} ms), drift {:.1} ppm, {} out of order (received: {})",
             header.usual * 1e-6,
             header.jitter * 1e-6,
             received.jitter * 1e-6,
@@ -95,7 +95,7 @@ pub(super) fn choose(topics: &[&Times]) -> Choice {
             received.out_of_order
         ));
     }
-    let delays: Vec<f64> = topics.iter().map(|times| delay(times)).collect();
+    let delays: Vec<f64> = topics.iter().map(|(_, times)| delay(times)).collect();
     let spread =
         delays.iter().fold(f64::MIN, |a, b| a.max(*b)) - delays.iter().fold(f64::MAX, |a, b| a.min(*b));
     if spread > SAME_CLOCK_NS {
@@ -140,13 +140,13 @@ mod tests {
     #[test]
     fn headers_are_taken_unless_they_fail() {
         let good = times(|k| 5_000 + 1_000_000 * k, |k| 5_000_000 + 1_000_100 * k + 300_000 * (k % 3));
-        let choice = choose(&[&good]);
+        let choice = choose(&[("/a", &good)]);
         assert_eq!(choice.clock, Clock::Header);
         assert!(choice.reason.contains("drift -"), "{}", choice.reason);
-        assert_eq!(choose(&[&times(|_| 0, |k| k)]).clock, Clock::Receipt);
-        assert_eq!(choose(&[&times(|_| 7, |k| k)]).clock, Clock::Receipt);
-        assert_eq!(choose(&[&times(|k| (k - 500).abs(), |k| k)]).clock, Clock::Receipt);
+        assert_eq!(choose(&[("/a", &times(|_| 0, |k| k))]).clock, Clock::Receipt);
+        assert_eq!(choose(&[("/a", &times(|_| 7, |k| k))]).clock, Clock::Receipt);
+        assert_eq!(choose(&[("/a", &times(|k| (k - 500).abs(), |k| k))]).clock, Clock::Receipt);
         let other = times(|k| 3_000_000_000 + 1_000_000 * k, |k| 5_000_000 + 1_000_000 * k);
-        assert_eq!(choose(&[&good, &other]).clock, Clock::Receipt);
+        assert_eq!(choose(&[("/a", &good), ("/b", &other)]).clock, Clock::Receipt);
     }
 }

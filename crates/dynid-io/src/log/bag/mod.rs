@@ -6,8 +6,11 @@
 mod clock;
 mod definition;
 mod file;
+mod known;
 mod mcap;
 mod names;
+mod rosbag;
+mod sqlite;
 mod topics;
 mod walk;
 mod wire;
@@ -20,6 +23,8 @@ use std::path::{Path, PathBuf};
 use self::clock::{Choice, Clock, Times};
 use self::file::{BagFile, End, RawMessage};
 use self::mcap::Mcap;
+use self::rosbag::RosBag;
+use self::sqlite::Sqlite;
 use self::topics::{Decoded, Encoding};
 use super::arrays::{TableBuilder, Values};
 use super::format::LogFormat;
@@ -30,8 +35,24 @@ use crate::digest::Hashed;
 use crate::excerpt::listed;
 use crate::input;
 
-/// Name of the format.
-const MCAP: &str = "MCAP";
+/// How a bag is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum BagFormat {
+    Mcap,
+    Ros1,
+    Sqlite,
+}
+
+impl BagFormat {
+    fn name(self) -> &'static str {
+        match self {
+            BagFormat::Mcap => "MCAP",
+            BagFormat::Ros1 => "ROS 1 bag",
+            BagFormat::Sqlite => "ROS 2 bag in SQLite",
+        }
+    }
+}
+
 /// Columns in front of those of the topics: the time that suits the topics, and both clocks.
 const CLOCKS: [&str; 3] = ["time", "header_stamp", "receive_time"];
 /// Messages of a topic that are looked at before any column is known.
@@ -40,6 +61,7 @@ const LOOKED_AT: usize = 50;
 /// A bag, in one file or several.
 struct BagLog {
     name: String,
+    format: &'static str,
     files: Vec<Box<dyn BagFile>>,
     paths: Vec<PathBuf>,
     topics: Vec<Decoded>,
@@ -54,16 +76,19 @@ struct BagLog {
 
 /// Opens a bag. `member`: the topic that is read alone, or the beginning of the names of several.
 pub(super) fn open(
+    format: BagFormat,
     name: &Path,
     paths: &[PathBuf],
     member: Option<&str>,
     options: &LogOptions,
 ) -> Result<Box<dyn LogSource>, LogFileError> {
-    let file = name.display().to_string();
-    options.refuse_settings_of_text(&file, MCAP)?;
-    let damaged = |reason: String| LogFileError::Damaged { file: file.clone(), format: MCAP, reason };
+    let kind = format;
+    let (file, format) = (name.display().to_string(), format.name());
+    options.refuse_settings_of_text(&file, format)?;
+    let damaged = |reason: String| LogFileError::Damaged { file: file.clone(), format, reason };
     let mut bag = BagLog {
         name: file.clone(),
+        format,
         files: Vec::new(),
         paths: paths.to_vec(),
         topics: Vec::new(),
@@ -74,9 +99,14 @@ pub(super) fn open(
         options: options.clone(),
     };
     for path in paths {
-        let (opened, end) = Mcap::open(path).map_err(damaged)?;
+        let (opened, end): (Box<dyn BagFile>, End) = match kind {
+            BagFormat::Mcap => Mcap::open(path).map(|(f, end)| (Box::new(f) as _, end)),
+            BagFormat::Ros1 => RosBag::open(path).map(|(f, end)| (Box::new(f) as _, end)),
+            BagFormat::Sqlite => Sqlite::open(path).map(|f| (Box::new(f) as _, End::Whole)),
+        }
+        .map_err(damaged)?;
         bag.note_end(&end);
-        bag.files.push(Box::new(opened));
+        bag.files.push(opened);
     }
     let passed = bag.find_topics(member);
     if bag.topics.is_empty() {
@@ -84,11 +114,11 @@ pub(super) fn open(
             Some(member) => format!("topics below `{member}` whose messages can be read"),
             None => "topics whose messages can be read (`ros2msg` or `ros1msg`)".to_owned(),
         };
-        return Err(LogFileError::Content { file, format: MCAP, expected, found: listed(&passed, 6) });
+        return Err(LogFileError::Content { file, format, expected, found: listed(&passed, 6) });
     }
     bag.find_columns().map_err(damaged)?;
     let topics: Vec<String> = bag.topics.iter().map(|t| format!("{} ({})", t.name, t.kind)).collect();
-    let mut notes = vec![ReadingNote::new("format", MCAP, format!("topics {}", listed(&topics, 8)))];
+    let mut notes = vec![ReadingNote::new("format", format, format!("topics {}", listed(&topics, 8)))];
     if !passed.is_empty() {
         let reason = "no message of them can be read";
         notes.push(ReadingNote::new("topics left out", listed(&passed, 6), reason));
@@ -217,7 +247,7 @@ impl LogSource for BagLog {
         let times: Vec<usize> = wanted.time.iter().filter_map(place).collect();
         let (file, damaged) = (self.name.clone(), |reason: String| LogFileError::Damaged {
             file: self.name.clone(),
-            format: MCAP,
+            format: self.format,
             reason,
         });
         // Where a wanted column goes among those of its topic.
@@ -316,14 +346,15 @@ impl LogSource for BagLog {
 impl BagLog {
     /// The clock that is stated, else the better one.
     fn clock(&self, read: &BTreeMap<usize, TopicRows>, times: &[usize]) -> Result<Choice, LogFileError> {
-        let topics: Vec<&Times> = read.values().map(|topic| &topic.times).collect();
+        let topics: Vec<(&str, &Times)> =
+            read.iter().map(|(k, topic)| (self.topics[*k].name.as_str(), &topic.times)).collect();
         let stated = |clock: Clock| Choice { clock, reason: "stated".to_owned() };
         match times {
-            [1] => match topics.iter().find(|t| t.header.len() != t.receipt.len()) {
+            [1] => match topics.iter().find(|(_, t)| t.header.len() != t.receipt.len()) {
                 None => Ok(stated(Clock::Header)),
                 Some(_) => Err(LogFileError::Content {
                     file: self.name.clone(),
-                    format: MCAP,
+                    format: self.format,
                     expected: "messages with stamps in their headers".to_owned(),
                     found: "some without: take `receive_time`".to_owned(),
                 }),
