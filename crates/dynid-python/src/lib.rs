@@ -30,7 +30,7 @@ mod _native {
     #[pymodule_export]
     use super::factor::Factor;
     #[pymodule_export]
-    use super::log::{Log, simulate};
+    use super::log::{Log, read_columns, simulate};
     #[pymodule_export]
     use super::robot::Robot;
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use dynid::config::LogConfig;
 use dynid::estimate::MotorSide;
 use dynid::io::MappingSpec;
+use dynid::io::table_file::Column;
 use dynid::log::LogAxis;
 use dynid::motion::{Channel, JointSignals, Log as Recording};
 use dynid::settings::LogSettings;
@@ -251,5 +252,30 @@ pub(crate) fn simulate<'py>(py: Python<'py>, robot: &Robot, settings: &str) -> P
     }
     out.set_item("truth", values)?;
     out.set_item("warnings", warnings)?;
+    Ok(out)
+}
+
+/// All columns of a log, or the signals of a robot in it: a dictionary of arrays.
+#[pyfunction]
+#[pyo3(signature = (path, robot=None, *, columns="{}", rows=None))]
+pub(crate) fn read_columns<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    robot: Option<&Robot>,
+    columns: &str,
+    rows: Option<(usize, usize)>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let columns: MappingSpec = parsed(py, columns, "columns")?;
+    let columns = MappingSpec { allow_no_effort: true, ..columns };
+    let log = LogConfig { path, rows, ..LogConfig::default() };
+    let own = robot.map(|robot| robot.robot.clone());
+    let read = crate::work::run(py, None, 0, move |_| dynid::convert::convert(&log, &columns, own.as_ref()))?;
+    let out = PyDict::new(py);
+    for (name, column) in read.names.iter().zip(&read.columns) {
+        match column {
+            Column::Float(values) => out.set_item(name, vector(py, values))?,
+            Column::Whole(values) => out.set_item(name, numpy::PyArray1::from_slice(py, values))?,
+        }
+    }
     Ok(out)
 }

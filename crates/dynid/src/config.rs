@@ -138,7 +138,7 @@ pub struct CouplingConfig {
 #[derive(Debug, Clone, Default, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct LogConfig {
-    /// CSV or CSV.gz, relative to the configuration.
+    /// File, relative to the configuration; `FILE#MEMBER`: an episode, a group, or topics of it.
     pub path: PathBuf,
     /// First and last data row, from 1, both included. Default: all.
     #[serde(deserialize_with = "lists::pair")]

@@ -64,6 +64,17 @@ const ENDINGS: &[Ending] = &[
         ],
     },
     Ending {
+        command: "convert",
+        negative: "",
+        examples: &[
+            ("All columns of a bag, as a table", "convert log.mcap log.parquet"),
+            (
+                "The signals of a robot, from an episode of a dataset",
+                "convert dataset#12 log.csv --robot arm.urdf",
+            ),
+        ],
+    },
+    Ending {
         command: "design",
         negative: "no trajectory within all limits was found",
         examples: &[
@@ -157,6 +168,7 @@ const ENDINGS: &[Ending] = &[
                 "With friction and rotors at every joint",
                 "inspect arm.urdf --elements coulomb,viscous,offset,rotor --json",
             ),
+            ("What a log holds", "inspect log.mcap"),
         ],
     },
     Ending {

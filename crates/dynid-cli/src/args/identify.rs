@@ -74,7 +74,7 @@ pub(crate) struct CheckArgs {
     /// Robot file, URDF or TOML, of the logs named first.
     #[arg(long, value_name = "ROBOT", value_hint = ValueHint::FilePath)]
     pub(crate) robot: Option<PathBuf>,
-    /// Log, CSV or CSV.gz, in place of those of the configuration; repeat for several.
+    /// Log of any format that is read, in place of those of the configuration; repeat for several.
     #[arg(long, value_name = "LOG", value_hint = ValueHint::FilePath)]
     pub(crate) log: Vec<PathBuf>,
     /// First and last data row of the training logs, from 1.
@@ -108,7 +108,7 @@ pub(crate) struct CompareArgs {
     /// Configuration (TOML), or a robot file together with --log; `-`: standard input.
     #[arg(value_hint = ValueHint::FilePath)]
     pub(crate) input: PathBuf,
-    /// Log, CSV or CSV.gz, in place of those of the configuration; repeat for several.
+    /// Log of any format that is read, in place of those of the configuration; repeat for several.
     #[arg(long, value_name = "LOG", value_hint = ValueHint::FilePath)]
     pub(crate) log: Vec<PathBuf>,
     /// First and last data row of the training logs, from 1.
@@ -130,7 +130,7 @@ pub(crate) struct IdentifyArgs {
     /// Configuration (TOML), or a robot file together with --log; `-`: standard input.
     #[arg(value_hint = ValueHint::FilePath)]
     pub(crate) input: PathBuf,
-    /// Log to identify from, CSV or CSV.gz, in place of those of the configuration; repeat for several.
+    /// Log to identify from, of any format that is read, in place of those of the configuration; repeat for several.
     #[arg(long, value_name = "LOG", value_hint = ValueHint::FilePath)]
     pub(crate) log: Vec<PathBuf>,
     /// First and last data row of the training logs, from 1.

@@ -56,7 +56,7 @@ pub(crate) struct InitArgs {
     /// Robot file: URDF or TOML.
     #[arg(value_hint = ValueHint::FilePath)]
     pub(crate) robot: PathBuf,
-    /// Logs, CSV or CSV.gz: of several the last one is kept for validation.
+    /// Logs: of several the last one is kept for validation.
     #[arg(required = true, value_name = "LOG", value_hint = ValueHint::FilePath)]
     pub(crate) log: Vec<PathBuf>,
     /// Configuration to write.

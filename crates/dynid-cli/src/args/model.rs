@@ -138,7 +138,7 @@ pub(crate) struct ExportArgs {
     /// Write the whole identified model, links, joints and all elements, as compact JSON; `-`: standard output.
     #[arg(long, value_name = "FILE.json", value_hint = ValueHint::AnyPath)]
     pub(crate) model: Option<PathBuf>,
-    /// Log to compare efforts on, CSV or CSV.gz; repeat for several (default: random states within the limits).
+    /// Log to compare efforts on; repeat for several (default: random states within the limits).
     #[arg(long, value_name = "LOG", value_hint = ValueHint::FilePath)]
     pub(crate) log: Vec<PathBuf>,
     /// First and last data row of the logs, from 1.

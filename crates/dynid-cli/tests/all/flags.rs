@@ -42,7 +42,7 @@ fn flags() -> BTreeSet<String> {
 }
 
 /// Flags of which another test, or nothing, can show the effect.
-const ELSEWHERE: [(&str, &str); 30] = [
+const ELSEWHERE: [(&str, &str); 32] = [
     ("init ", "writes a configuration: `logs_of_tools`"),
     ("backlash --missing", "columns are read alike by all commands: `logs_of_tools`"),
     ("backlash --names", "columns are read alike by all commands: `logs_of_tools`"),
@@ -50,6 +50,8 @@ const ELSEWHERE: [(&str, &str); 30] = [
     ("check --names", "columns are read alike by all commands: `logs_of_tools`"),
     ("compare --missing", "columns are read alike by all commands: `logs_of_tools`"),
     ("compare --names", "columns are read alike by all commands: `logs_of_tools`"),
+    ("convert --missing", "columns are read alike by all commands: `logs_of_tools`"),
+    ("convert --names", "columns are read alike by all commands: `logs_of_tools`"),
     ("export --missing", "columns are read alike by all commands: `logs_of_tools`"),
     ("export --names", "columns are read alike by all commands: `logs_of_tools`"),
     ("identify --missing", "`logs_of_tools`"),
@@ -232,6 +234,12 @@ fn cases() -> Vec<Case> {
             &["--floating-base", "--lock elbow=0.3", "--gravity 0,0,-3", "--elements viscous", "--json"],
         ),
         ("inspect", "inspect arm.urdf --lock elbow=0.3", &["--quiet"]),
+        ("convert", "convert log.csv out.csv", &["--robot arm.urdf", "--rows 3:50", "--quiet"]),
+        ("convert", "convert log.csv other.csv", &["--force"]),
+        ("convert", "convert log.csv out.csv --robot arm.urdf", &["--config turned.toml"]),
+        ("convert", "convert no-time.csv out.csv --robot arm.urdf", &["--rate-hz 100"]),
+        ("convert", "convert currents.csv out.csv --robot arm.urdf", &["--gains 2,3"]),
+        ("convert", "convert no-elbow.csv out.csv --robot arm.urdf", &["--allow-unlogged"]),
         ("explain", "explain", &["--json", "--markdown"]),
         ("man", "man", &["--out pages"]),
         ("man", "man --out pages", &["--quiet"]),

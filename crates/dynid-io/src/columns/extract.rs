@@ -125,7 +125,7 @@ impl ColumnMapping {
                 for part in &time.parts {
                     let (raw, _) = raw_column(table, "time", part)?;
                     let first = raw.first().copied().unwrap_or(0.0);
-                    out.iter_mut().zip(raw).for_each(|(t, x)| *t += (x - first) * part.factor);
+                    out.iter_mut().zip(raw).for_each(|(t, x)| *t += scaled(x - first, part.factor));
                 }
                 Ok((out, start))
             }
@@ -147,12 +147,19 @@ fn per_joint(
     columns.iter().flatten().map(|c| convert(table, &signal.to_string(), c)).collect()
 }
 
+/// `factor` times `x`. A thousandth and its powers are no binary fractions: what they scale is divided instead, so that 15 ms are the
+/// `f64` next to 0.015 s.
+fn scaled(x: f64, factor: f64) -> f64 {
+    let divisor = [1e-3, 1e-6, 1e-9].into_iter().zip([1e3, 1e6, 1e9]).find(|(small, _)| *small == factor);
+    divisor.map_or_else(|| factor * x, |(_, divisor)| x / divisor)
+}
+
 fn convert(table: &Table, signal: &str, column: &ColumnUse) -> Result<Vec<f64>, MappingError> {
     let (raw, origin) = raw_column(table, signal, column)?;
     let values: Vec<f64> = if column.factor == 1.0 && column.offset == 0.0 && origin == 0 {
         raw.to_vec()
     } else {
-        raw.iter().map(|x| column.factor * (x + origin as f64) + column.offset).collect()
+        raw.iter().map(|x| scaled(x + origin as f64, column.factor) + column.offset).collect()
     };
     match values.iter().position(|x| !x.is_finite()) {
         None => Ok(values),

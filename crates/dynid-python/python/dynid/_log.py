@@ -99,6 +99,24 @@ class Log:
         return repr(self._native)
 
 
+def read_columns(
+    path: str | os.PathLike[str],
+    robot: _native.Robot | None = None,
+    *,
+    columns: Mapping[str, Any] | None = None,
+    rows: tuple[int, int] | None = None,
+) -> dict[str, NDArray[Any]]:
+    """The columns of a log by name, `(n,)` each: a CSV, a bag, a Parquet, HDF5, MATLAB or NumPy file.
+
+    Without a robot all columns that hold numbers, as they are; whole stamps stay whole (`int64`), NaN stands where there is no value. With a
+    robot the signals of its joints in SI: `t`, `q_<joint>`, `dq_<joint>`, `tau_<joint>`. `path` may end in `#MEMBER` (an episode, a group, topics);
+    `columns` are those of a configuration; `rows` the first and the last row, from 1.
+
+    Raises `LogError` for a file that cannot be read.
+    """
+    return _native.read_columns(os.fspath(path), robot, columns=as_json(dict(columns or {})), rows=rows)
+
+
 class Simulation:
     """A virtual log with its truth.
 

@@ -1,0 +1,430 @@
+"""Logs in files that the official packages write: read equal to what was written, and identified to the same bits as the CSV."""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import dynid
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+NAMES = [f"j{k + 1}" for k in range(6)]
+# Nanoseconds since 1970 that an f64 cannot hold.
+START = 1_700_000_000_000_000_123
+STEP = 5_000_000
+
+
+@pytest.fixture(scope="module")
+def signals(made: dynid.Simulation) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    count = 1200
+    return np.arange(count) * STEP / 1e9, made.q[:count], made.tau[:count]
+
+
+Signals = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
+
+def result(robot: dynid.Robot, path: Path | str, **columns: Any) -> str:
+    """What an identification found, without the name of the file."""
+    found = json.loads(dynid.identify(robot, dynid.Log.read(path, columns=columns, name="log")).to_json())
+    return json.dumps([found[key] for key in ("parameters", "base_parameters", "fit")])
+
+
+@pytest.fixture(scope="module")
+def of_csv(indy7: dynid.Robot, signals: Signals, tmp_path_factory: pytest.TempPathFactory) -> str:
+    t, q, tau = signals
+    path = tmp_path_factory.mktemp("csv") / "log.csv"
+    header = ",".join(["t", *(f"q_{n}" for n in NAMES), *(f"tau_{n}" for n in NAMES)])
+    lines = [",".join(repr(float(x)) for x in row) for row in np.column_stack([t, q, tau])]
+    path.write_text("\n".join([header, *lines]) + "\n")
+    return result(indy7, path)
+
+
+def check(robot: dynid.Robot, path: Path | str, signals: Signals, of_csv: str | None, **columns: Any) -> None:
+    """The signals are those that were written; so is the estimate, where one is asked for."""
+    t, q, tau = signals
+    read = dynid.read_columns(path, robot, columns=columns)
+    np.testing.assert_array_equal(read["t"], t)
+    for k, name in enumerate(NAMES):
+        np.testing.assert_array_equal(read[f"q_{name}"], q[:, k])
+        np.testing.assert_array_equal(read[f"tau_{name}"], tau[:, k])
+    if of_csv is not None:
+        assert result(robot, path, **columns) == of_csv
+
+
+def test_numpy(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Path) -> None:
+    t, q, tau = signals
+    np.savez(tmp_path / "a.npz", t=t, q=q, tau=tau)
+    np.savez_compressed(tmp_path / "b.npz", t=t, q=np.asfortranarray(q), tau=tau.T, texts=np.array(["x"] * len(t)), limits=np.zeros(6))
+    check(indy7, tmp_path / "a.npz", signals, of_csv)
+    check(indy7, tmp_path / "b.npz", signals, None)
+    np.save(tmp_path / "c.npy", np.column_stack([t, q, tau]))
+    check(indy7, tmp_path / "c.npy", signals, None, names=["t", *(f"q{k}" for k in range(1, 7)), *(f"tau{k}" for k in range(1, 7))])
+    np.savez(tmp_path / "big.npz", t=t.astype(">f8"), q=q.astype(">f8"), tau=tau)
+    check(indy7, tmp_path / "big.npz", signals, None)
+    np.savez(tmp_path / "objects.npz", t=t, q=np.array([None] * len(t)))
+    with pytest.raises(dynid.LogError, match="objects"):
+        dynid.read_columns(tmp_path / "objects.npz")
+
+
+def test_types_of_numpy(tmp_path: Path) -> None:
+    kinds = ["f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", ">i4", ">f4", "?"]
+    rng = np.random.default_rng(3)
+    arrays = {f"x{k}": rng.integers(0, 100, 50).astype(kind) for k, kind in enumerate(kinds)}
+    np.savez(tmp_path / "kinds.npz", **arrays)
+    read = dynid.read_columns(tmp_path / "kinds.npz")
+    for name, values in arrays.items():
+        np.testing.assert_array_equal(read[name], values.astype(float))
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_matlab(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Path, compressed: bool) -> None:
+    scipy_io = pytest.importorskip("scipy.io")
+    t, q, tau = signals
+    path = tmp_path / "log.mat"
+    scipy_io.savemat(path, {"t": t, "q": q, "tau": tau, "whole": np.arange(len(t))}, do_compression=compressed)
+    check(indy7, path, signals, of_csv if compressed else None)
+    np.testing.assert_array_equal(dynid.read_columns(path)["whole"], np.arange(len(t)))
+    scipy_io.savemat(path, {"data": {"t": t, "q": q, "tau": tau, "name": "arm"}, "rate": 200.0}, do_compression=compressed)
+    check(indy7, path, signals, None)
+
+
+def test_hdf5(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    t, q, tau = signals
+    for k, settings in enumerate([{}, {"compression": "gzip"}, {"compression": "lzf"}, {"compression": "gzip", "shuffle": True, "chunks": True}]):
+        path = tmp_path / f"{k}.h5"
+        with h5py.File(path, "w") as file:
+            for name, values in [("t", t), ("q", q), ("tau", tau)]:
+                file.create_dataset(f"log/{name}", data=values, **settings)
+        check(indy7, path, signals, of_csv if k == 1 else None)
+    # MATLAB 7.3 has a block of its own in front, and axes turned.
+    with h5py.File(tmp_path / "v73.mat", "w", userblock_size=512) as file:
+        for name, values in [("t", t[None, :]), ("q", q.T), ("tau", tau.T)]:
+            file[name] = values
+    with open(tmp_path / "v73.mat", "r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+    check(indy7, tmp_path / "v73.mat", signals, None)
+
+
+def test_groups_of_hdf5(indy7: dynid.Robot, signals: Signals, tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    t, q, tau = signals
+    path = tmp_path / "demos.hdf5"
+    with h5py.File(path, "w") as file:
+        for demo in range(3):
+            group = file.create_group(f"data/demo_{demo}")
+            for name, values in [("t", t), ("obs/q", q + demo), ("obs/tau", tau)]:
+                group[name] = values
+    check(indy7, f"{path}#data/demo_2", (t, q + 2, tau), None)
+    with pytest.raises(dynid.LogError, match="data/demo_0, data/demo_1, data/demo_2"):
+        dynid.read_columns(path)
+
+
+def test_parquet(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Path) -> None:
+    pa = pytest.importorskip("pyarrow")
+    pq = pytest.importorskip("pyarrow.parquet")
+    t, q, tau = signals
+    lists = pa.table({"t": t, "q": pa.array(list(q)), "tau": pa.FixedSizeListArray.from_arrays(tau.ravel(), 6), "text": ["x"] * len(t)})
+    wide = pa.table({"t": t, **{f"q_{n}": q[:, k] for k, n in enumerate(NAMES)}, **{f"tau_{n}": tau[:, k] for k, n in enumerate(NAMES)}})
+    for k, (table, settings) in enumerate(
+        [
+            *((lists, {"compression": name, "row_group_size": 500}) for name in ["none", "snappy", "gzip", "lz4", "zstd"]),
+            (wide, {}),
+            (lists, {"data_page_version": "2.0", "compression": "zstd", "data_page_size": 4096}),
+            (wide, {"data_page_version": "2.0", "use_dictionary": False, "use_byte_stream_split": True}),
+            (wide, {"version": "1.0", "write_statistics": True, "write_page_index": True}),
+        ]
+    ):
+        pq.write_table(table, tmp_path / f"{k}.parquet", **settings)
+        check(indy7, tmp_path / f"{k}.parquet", signals, of_csv if k == 4 else None)
+    holes = pa.table({"t": t, "q": pa.array([None if k == 7 else list(row) for k, row in enumerate(q)]), "tau": pa.array(list(tau))})
+    pq.write_table(holes, tmp_path / "holes.parquet")
+    with pytest.raises(dynid.LogError, match=r"row 8, column `q\[0\]`: expected a value"):
+        dynid.read_columns(tmp_path / "holes.parquet")
+    read = dynid.read_columns(tmp_path / "holes.parquet", columns={"missing": "drop"})
+    assert np.isnan(read["q[0]"][7]) and np.isnan(read["q[0]"]).sum() == 1
+
+
+def test_episodes_of_lerobot(indy7: dynid.Robot, signals: Signals, tmp_path: Path) -> None:
+    pa = pytest.importorskip("pyarrow")
+    pq = pytest.importorskip("pyarrow.parquet")
+    t, q, tau = signals
+    count = len(t)
+
+    def episode(number: int) -> Any:
+        return pa.table(
+            {
+                "observation.state": pa.array(list(q + number)),
+                "action": pa.array(list(q)),
+                "observation.effort": pa.array(list(tau)),
+                "timestamp": t,
+                "episode_index": np.full(count, number),
+            }
+        )
+
+    data = tmp_path / "data" / "chunk-000"
+    data.mkdir(parents=True)
+    (tmp_path / "meta").mkdir()
+    names = {"motors": [f"{name}.pos" for name in NAMES]}
+    info = {"robot_type": "indy7", "features": {"observation.state": {"names": names}, "action": {"names": names}}}
+    (tmp_path / "meta" / "info.json").write_text(json.dumps(info))
+    # Version 3: several episodes in a file.
+    pq.write_table(pa.concat_tables([episode(k) for k in range(3)]), data / "file-000.parquet", row_group_size=1000)
+    check(indy7, f"{tmp_path}#1", (t, q + 1, tau), None)
+    check(indy7, f"{data / 'file-000.parquet'}#2", (t, q + 2, tau), None)
+    with pytest.raises(dynid.LogError, match="episodes 0, 1, 2"):
+        dynid.read_columns(data / "file-000.parquet")
+    # Version 2: a file each.
+    (data / "file-000.parquet").unlink()
+    for k in range(3):
+        pq.write_table(episode(k), data / f"episode_{k:06d}.parquet")
+    check(indy7, f"{tmp_path}#2", (t, q + 2, tau), None)
+
+
+def stamp(ns: int) -> dict[str, int]:
+    return {"sec": ns // 10**9, "nanosec": ns % 10**9}
+
+
+TIME = "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec"
+HEADER = "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id"
+BAR = "\n" + "=" * 80 + "\n"
+JOINT_STATE = "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort" + BAR + HEADER + BAR + TIME
+
+
+def write_mcap(path: Path, signals: Signals, compression: Any, write: Callable[[Any, Any, int], None]) -> None:
+    writer = pytest.importorskip("mcap_ros2.writer")
+    with open(path, "wb") as file:
+        mcap = writer.Writer(file, compression=compression, chunk_size=50_000)
+        schema = mcap.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
+        for row in range(len(signals[0])):
+            write(mcap, schema, row)
+        mcap.finish()
+
+
+@pytest.mark.parametrize("compression", ["NONE", "LZ4", "ZSTD"])
+def test_mcap(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Path, compression: str) -> None:
+    kinds = pytest.importorskip("mcap.writer").CompressionType
+    _, q, tau = signals
+    order = [2, 0, 1, 5, 4, 3]
+    late = np.random.default_rng(1).integers(0, 2_000_000, len(q))
+
+    def write(mcap: Any, schema: Any, row: int) -> None:
+        ns = START + STEP * row
+        message = {
+            "header": {"stamp": stamp(ns), "frame_id": "base"},
+            "name": [NAMES[k] for k in order],
+            "position": q[row, order].tolist(),
+            "velocity": [],
+            "effort": tau[row, order].tolist(),
+        }
+        mcap.write_message("/joint_states", schema, message, log_time=ns + 3_000_000 + int(late[row]), publish_time=ns)
+
+    path = tmp_path / "log.mcap"
+    write_mcap(path, signals, kinds[compression], write)
+    # Stamps of headers are even, times of receipt are not.
+    check(indy7, path, signals, of_csv if compression == "ZSTD" else None)
+    raw = dynid.read_columns(path)
+    np.testing.assert_array_equal(raw["header_stamp"], START + STEP * np.arange(len(q)))
+    np.testing.assert_array_equal(raw["receive_time"], START + STEP * np.arange(len(q)) + 3_000_000 + late)
+    received = dynid.read_columns(path, indy7, columns={"time": "receive_time"})
+    np.testing.assert_allclose(received["t"], STEP * 1e-9 * np.arange(len(q)) + (late - late[0]) * 1e-9, atol=1e-12)
+    # Whatever a bag is cut to is read up to the cut, or refused.
+    whole = path.read_bytes()
+    for end in range(1000, len(whole), max(1000, len(whole) // 40)):
+        (tmp_path / "cut.mcap").write_bytes(whole[:end])
+        try:
+            cut = dynid.read_columns(tmp_path / "cut.mcap", indy7)
+        except dynid.LogError:
+            assert end < 60_000
+        else:
+            np.testing.assert_array_equal(cut["q_j1"], q[: len(cut["t"]), 0])
+
+
+def test_topics_with_stamps_of_their_own_are_joined(indy7: dynid.Robot, signals: Signals, tmp_path: Path) -> None:
+    kinds = pytest.importorskip("mcap.writer").CompressionType
+    t, q, tau = signals
+
+    def write(mcap: Any, schema: Any, row: int) -> None:
+        for topic, ns, position, effort in [("/a", START + STEP * row, q[row], []), ("/b", START + STEP * row + 1_000_000, [], tau[row])]:
+            message = {"header": {"stamp": stamp(ns)}, "name": NAMES, "position": list(position), "velocity": [], "effort": list(effort)}
+            mcap.write_message(topic, schema, message, log_time=ns, publish_time=ns)
+
+    path = tmp_path / "log.mcap"
+    write_mcap(path, signals, kinds.ZSTD, write)
+    read = dynid.read_columns(path, indy7)
+    # Before the first effort there is none to interpolate, and the time begins with what is kept.
+    kept = 1 + np.round(read["t"] / (STEP * 1e-9)).astype(int)
+    np.testing.assert_array_equal(read["q_j3"], q[kept, 2])
+    between = np.interp(t[kept], t + 1e-3, tau[:, 2])
+    np.testing.assert_allclose(read["tau_j3"], between, atol=1e-9 * np.abs(tau).max())
+    # One topic alone has no efforts.
+    alone = dynid.read_columns(f"{path}#/a", indy7)
+    assert "tau_j1" not in alone and len(alone["t"]) == len(t)
+
+
+def test_bags_of_ros(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Path) -> None:
+    rosbag1 = pytest.importorskip("rosbags.rosbag1")
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    typesys = pytest.importorskip("rosbags.typesys")
+    _, q, tau = signals
+    empty = np.array([])
+    for k, compression in enumerate([None, rosbag1.Writer.CompressionFormat.LZ4, rosbag1.Writer.CompressionFormat.BZ2]):
+        store = typesys.get_typestore(typesys.Stores.ROS1_NOETIC)
+        joint_state, header, time = (store.types[n] for n in ("sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time"))
+        writer = rosbag1.Writer(tmp_path / f"{k}.bag")
+        if compression is not None:
+            writer.set_compression(compression)
+        with writer:
+            connection = writer.add_connection("/joint_states", joint_state.__msgtype__, typestore=store)
+            for row in range(len(q)):
+                ns = START + STEP * row
+                message = joint_state(header(row, time(ns // 10**9, ns % 10**9), ""), NAMES, q[row], empty, tau[row])
+                writer.write(connection, ns + 2_000_000, store.serialize_ros1(message, joint_state.__msgtype__))
+        check(indy7, tmp_path / f"{k}.bag", signals, of_csv if k == 1 else None)
+    # SQLite of Humble does not say what messages hold.
+    for version, plugin in [(8, "SQLITE3"), (9, "SQLITE3"), (9, "MCAP")]:
+        store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+        joint_state, header, time = (store.types[n] for n in ("sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time"))
+        folder = tmp_path / f"{plugin}{version}"
+        with rosbag2.Writer(folder, version=version, storage_plugin=rosbag2.StoragePlugin[plugin]) as writer:
+            connection = writer.add_connection("/joint_states", joint_state.__msgtype__, typestore=store)
+            for row in range(len(q)):
+                ns = START + STEP * row
+                message = joint_state(header(time(ns // 10**9, ns % 10**9), ""), NAMES, q[row], empty, tau[row])
+                writer.write(connection, ns + 2_000_000, store.serialize_cdr(message, joint_state.__msgtype__))
+        check(indy7, folder, signals, of_csv if plugin == "SQLITE3" else None)
+
+
+@pytest.mark.parametrize("ending", ["csv", "csv.gz", "parquet", "npz", "mcap"])
+def test_what_convert_writes_is_read_by_others_and_by_dynid(indy7: dynid.Robot, signals: Signals, tmp_path: Path, ending: str) -> None:
+    t, q, tau = signals
+    np.savez(tmp_path / "log.npz", t=t, q=q, tau=tau)
+    out = tmp_path / f"out.{ending}"
+    robot = Path(__file__).resolve().parents[3] / "robots" / "indy7.toml"
+    assert dynid._native.command_line(["dynid", "convert", str(tmp_path / "log.npz"), str(out), "--robot", str(robot), "--quiet"]) == 0
+    check(indy7, out, signals, None)
+    if ending == "npz":
+        np.testing.assert_array_equal(np.load(out)["q_j2"], q[:, 1])
+    if ending == "parquet":
+        table = pytest.importorskip("pyarrow.parquet").read_table(out)
+        np.testing.assert_array_equal(table["q_j2"].to_numpy(), q[:, 1])
+    if ending == "mcap":
+        messages = list(pytest.importorskip("mcap_ros2.reader").read_ros2_messages(str(out)))
+        np.testing.assert_array_equal([m.ros_msg.position[1] for m in messages], q[:, 1])
+
+
+def small_files(folder: Path) -> list[Path]:
+    """A small log in every format of which there is a writer."""
+    count = 40
+    t, q = np.arange(count) * 0.01, np.sin(np.arange(count * 2.0)).reshape(count, 2)
+    out = []
+
+    def made(name: str) -> Path:
+        out.append(folder / name)
+        return out[-1]
+
+    np.savez(made("a.npz"), t=t, q=q, k=np.arange(count))
+    np.savez_compressed(made("b.npz"), t=t, q=q)
+    np.save(made("c.npy"), q)
+    for ending in ["parquet", "npz", "csv.gz"]:
+        target = made(f"own.{ending}")
+        assert dynid._native.command_line(["dynid", "convert", str(folder / "a.npz"), str(target), "--quiet"]) == 0
+    try:
+        import scipy.io
+
+        scipy.io.savemat(made("a.mat"), {"t": t, "q": q, "data": {"x": t, "name": "arm"}})
+        scipy.io.savemat(made("b.mat"), {"t": t, "data": {"q": q}}, do_compression=True)
+    except ImportError:
+        pass
+    try:
+        import h5py
+
+        for k, settings in enumerate([{}, {"compression": "gzip", "chunks": (10,)}]):
+            with h5py.File(made(f"{k}.h5"), "w") as file:
+                file.create_dataset("g/t", data=t, **settings)
+                file["g/q"] = q
+    except ImportError:
+        pass
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        table = pa.table({"t": t, "q": pa.array(list(q)), "n": pa.array([None, *t[1:]]), "s": ["x"] * count})
+        for compression in ["none", "snappy", "gzip", "lz4", "zstd"]:
+            pq.write_table(table, made(f"{compression}.parquet"), compression=compression, row_group_size=15)
+    except ImportError:
+        pass
+    with sqlite3.connect(made("a.db3")) as base:
+        base.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,serialization_format TEXT NOT NULL)")
+        base.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,timestamp INTEGER NOT NULL, data BLOB NOT NULL)")
+        base.execute("INSERT INTO topics VALUES(1,'/x','std_msgs/msg/Float64','cdr')")
+        for row in range(300):
+            data = b"\0\1\0\0" + np.float64(row).tobytes() + b"\0" * (6000 if row == 7 else 0)
+            base.execute("INSERT INTO messages(topic_id,timestamp,data) VALUES(1,?,?)", (START + row, data))
+    base.close()
+    try:
+        from mcap.writer import CompressionType
+        from mcap_ros2.writer import Writer
+
+        for compression in CompressionType:
+            with open(made(f"{compression.name}.mcap"), "wb") as raw:
+                writer = Writer(raw, compression=compression, chunk_size=1000)
+                schema = writer.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
+                for row in range(count):
+                    message = {"header": {"stamp": stamp(START + row)}, "name": ["a", "b"], "position": list(q[row]), "velocity": [], "effort": [0.0, 1.0]}
+                    writer.write_message("/j", schema, message, log_time=START + row, publish_time=START)
+                writer.finish()
+        from rosbags.rosbag1 import Writer as BagWriter
+        from rosbags.typesys import Stores, get_typestore
+
+        store = get_typestore(Stores.ROS1_NOETIC)
+        number = store.types["std_msgs/msg/Float64"]
+        for compression in [None, BagWriter.CompressionFormat.LZ4, BagWriter.CompressionFormat.BZ2]:
+            bag = BagWriter(made(f"{compression}.bag"))
+            if compression is not None:
+                bag.set_compression(compression)
+            with bag:
+                connection = bag.add_connection("/x", number.__msgtype__, typestore=store)
+                for row in range(count):
+                    bag.write(connection, START + row, store.serialize_ros1(number(float(row)), number.__msgtype__))
+    except ImportError:
+        pass
+    return out
+
+
+def test_damaged_files_are_read_or_refused(tmp_path: Path) -> None:
+    """Single bytes, words and ends of files changed at random: an answer or a `LogError`, never anything else. `DYNID_MUTATIONS`: how many of each file."""
+    count = int(os.environ.get("DYNID_MUTATIONS", "150"))
+    rng = np.random.default_rng(int(os.environ.get("DYNID_SEED", "1")))
+    for path in small_files(tmp_path):
+        whole = path.read_bytes()
+        assert len(dynid.read_columns(path, columns={"missing": "drop"})) > 0, path
+        target = tmp_path / f"damaged{''.join(path.suffixes)}"
+        for _ in range(count):
+            damaged = bytearray(whole)
+            kind = rng.integers(0, 5)
+            for _ in range(rng.integers(1, 4)):
+                at = int(rng.integers(0, len(damaged)))
+                if kind == 0:
+                    damaged[at] ^= 1 << int(rng.integers(0, 8))
+                elif kind == 1:
+                    damaged[at] = int(rng.choice([0, 1, 0x7F, 0x80, 0xFF]))
+                elif kind == 2:
+                    damaged[at : at + 4] = rng.choice([b"\xff\xff\xff\xff", b"\0\0\0\0", b"\xff\xff\xff\x7f", b"\0\0\0\x80"])
+                elif kind == 3:
+                    del damaged[at:]
+                    break
+                else:
+                    other = int(rng.integers(0, len(damaged)))
+                    damaged[at:at] = damaged[other : other + int(rng.integers(1, 30))]
+            target.write_bytes(damaged)
+            try:
+                dynid.read_columns(target, columns={"missing": "drop"})
+            except dynid.LogError:
+                pass
