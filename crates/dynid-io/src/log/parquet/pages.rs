@@ -22,12 +22,14 @@ pub(super) struct Pages {
     compression: Compression,
     /// The page that is next, if its header was read: the header, and where its bytes begin.
     next: Option<(Header, usize)>,
+    /// Whether a dictionary came before: pages that refer to one need it.
+    has_dictionary: bool,
 }
 
 impl Pages {
     /// `bytes`: all of the column's pages.
     pub(super) fn new(bytes: Bytes, compression: Compression) -> Self {
-        Pages { bytes, at: 0, compression, next: None }
+        Pages { bytes, at: 0, compression, next: None, has_dictionary: false }
     }
 
     /// The header of the next page that holds data or a dictionary.
@@ -126,6 +128,11 @@ impl PageReader for Pages {
         let bytes = self.bytes.slice(start..start + header.compressed);
         self.pass();
         let whole = |pages: &Self| pages.inflate(&bytes, header.uncompressed).map(Bytes::from);
+        let refers = matches!(header.encoding, 2 | 8) && !matches!(header.kind, Kind::Dictionary { .. });
+        if refers && !self.has_dictionary {
+            return Err(wrong("expected a dictionary before pages that refer to it, found none".to_owned()));
+        }
+        self.has_dictionary |= matches!(header.kind, Kind::Dictionary { .. });
         let values = u32::try_from(header.values).map_err(|e| wrong(e.to_string()))?;
         Ok(Some(match header.kind {
             Kind::Data { definitions, repetitions } => Page::DataPage {
