@@ -1,6 +1,6 @@
 //! What is exported, and the robot file that it goes into.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use dynid_io::RobotFile;
 use dynid_model::{Description, Inertia, RobotModel};
@@ -77,38 +77,57 @@ pub struct Source {
     pub(crate) file: RobotFile,
     /// Text of the URDF that holds the tree, if one does.
     pub(crate) urdf: Option<String>,
+    /// Text of the MJCF, if the file is one.
+    pub(crate) mjcf: Option<String>,
 }
 
 impl Source {
-    /// Reads a robot file (URDF or TOML) and the URDF that it may refer to.
+    /// Reads a robot file (URDF, MJCF or TOML) and the URDF that it may refer to.
     ///
     /// # Errors
     /// [`Error::RobotFile`], [`Error::Read`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let file = dynid_io::robot::read(path)?;
-        let text = |path: &String| {
-            dynid_io::input::read_text(path.as_ref())
-                .map_err(|source| Error::Read { file: path.into(), source })
-        };
-        let urdf = file.urdf.as_ref().map(text).transpose()?;
-        Ok(Source { path: path.to_owned(), file, urdf })
+        Self::of(dynid_io::robot::read(path)?, path, text_of)
     }
 
-    /// A robot file from its text; `path` stands in messages, and places a URDF that the text refers to.
+    /// A robot file from its text; `path` stands in messages, and places files that the text refers to.
     ///
     /// # Errors
     /// As [`Source::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, Error> {
-        let file = dynid_io::robot::parse(text, path)?;
-        let own = path.display().to_string();
-        let of = |name: &String| match *name == own {
-            true => Ok(text.to_owned()),
-            false => dynid_io::input::read_text(name.as_ref())
-                .map_err(|source| Error::Read { file: name.into(), source }),
-        };
-        let urdf = file.urdf.as_ref().map(of).transpose()?;
-        Ok(Source { path: path.to_owned(), file, urdf })
+        let own = |name: &Path| if name == path { Ok(text.to_owned()) } else { text_of(name) };
+        Self::of(dynid_io::robot::parse(text, path)?, path, own)
     }
+
+    fn of(file: RobotFile, path: &Path, text: impl Fn(&Path) -> Result<String, Error>) -> Result<Self, Error> {
+        let urdf = file.urdf.as_ref().map(|urdf| text(urdf.as_ref())).transpose()?;
+        let mjcf = file.mjcf.as_ref().map(|_| text(path)).transpose()?;
+        Ok(Source { path: path.to_owned(), file, urdf, mjcf })
+    }
+
+    /// Whether the robot is an MJCF, into which identified parameters are put in place.
+    pub fn is_mjcf(&self) -> bool {
+        self.mjcf.is_some()
+    }
+
+    /// Files of its folder that an MJCF includes, by their paths from there: they may change with it.
+    pub fn included(&self) -> Vec<&str> {
+        let below = |name: &&str| {
+            let mut parts = Path::new(name).components();
+            !name.is_empty() && parts.all(|part| matches!(part, Component::Normal(_)))
+        };
+        self.file.mjcf.iter().flatten().map(String::as_str).filter(below).collect()
+    }
+
+    /// Whether a link stands for nothing but the place between two joints of one body of an MJCF.
+    pub(crate) fn is_between(&self, link: &str) -> bool {
+        let mut massless = self.file.elements.ties.iter().flat_map(|tie| &tie.massless);
+        self.is_mjcf() && massless.any(|name| name == link)
+    }
+}
+
+fn text_of(path: &Path) -> Result<String, Error> {
+    dynid_io::input::read_text(path).map_err(|source| Error::Read { file: path.into(), source })
 }
 
 impl<'a> Identified<'a> {

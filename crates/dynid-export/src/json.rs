@@ -122,7 +122,8 @@ pub fn json(identified: &Identified<'_>, states: &CheckStates) -> Result<Exporte
         (model, &read.shape_values(model), &read.values(model)),
         states,
     );
-    Ok(Exported { text, difference: judge("JSON", difference)?, notes: Vec::new() })
+    let difference = judge("JSON", difference)?;
+    Ok(Exported { text, included: Vec::new(), difference, notes: Vec::new() })
 }
 
 impl RobotJson {

@@ -15,6 +15,8 @@
 //! add to the efforts of other joints, and would count twice once the simulator is given an armature. The JSON holds everything: all parameters, shape parameters, and what
 //! friction of the load refers to.
 //!
+//! A robot from URDF or MJCF is edited in place: everything that does not change stays byte for byte.
+//!
 //! **Welded links.** A log shows the body that moves as one: a moving link with everything on fixed joints behind it.
 //! Links on fixed joints keep the inertia of the robot file and the moving link gets the difference, as long as that is a
 //! possible body; so a tool or sensor can be taken off later with the mass the file states. Where the difference is
@@ -61,6 +63,8 @@ pub use read_back::with_slipping_bristles;
 pub struct Exported {
     /// The file's text.
     pub text: String,
+    /// Files that the robot file includes and that change with it: path from its folder, and text.
+    pub included: Vec<(String, String)>,
     /// Largest difference of effort after reading the text back, relative to the joint's largest effort.
     pub difference: f64,
     /// What a user should know: shares of welded links, what was left out, negative friction.
@@ -132,7 +136,9 @@ impl<'a> RobotExport<'a> {
         {
             return Err(other(format!("it has no moving joint `{}`", missing.joint.name)).into());
         }
-        let Shares { links, faults, notes } = bodies::share(&target, &still, &held, &shared);
+        let Shares { links, mut faults, notes } = bodies::share(&target, &still, &held, &shared);
+        // MJCF has several joints in one body, and no link between them.
+        faults.retain(|fault| !source.is_between(&fault.link));
         for (name, inertia) in &links {
             if let Some(link) = description.links.iter_mut().find(|l| l.name == *name) {
                 link.inertia = Some(*inertia);
@@ -234,15 +240,35 @@ impl<'a> RobotExport<'a> {
                 "left out, URDF has no place for them: loops; they are in the file beside it".to_owned(),
             );
         }
+        let between = self.links.iter().map(|(link, _)| link).filter(|link| self.source.is_between(link));
+        let between: Vec<&str> = between.map(String::as_str).collect();
+        if !between.is_empty() {
+            notes.push(format!(
+                "links without mass between joints of one body, which simulators refuse in a URDF: {}",
+                between.join(", ")
+            ));
+        }
         self.checked(Format::Urdf, text, (read, &found), &joints, notes, states)
     }
 
-    /// MJCF, written anew; see [`dynid_io::mjcf::from_description`], and [`dynid_io::mjcf::from_closed`] for mechanisms with loops.
+    /// The robot file itself with identified values: MJCF in place for a robot from MJCF, URDF for any other.
+    ///
+    /// # Errors
+    /// Fails as [`RobotExport::mjcf`] and [`RobotExport::urdf`] do.
+    pub fn robot_file(&self, states: &CheckStates) -> Result<Exported, Error> {
+        if self.source.is_mjcf() { self.mjcf(states) } else { self.urdf(states) }
+    }
+
+    /// MJCF: that of the robot is edited in place (see [`dynid_io::mjcf::edit`]); other robots are written anew, see
+    /// [`dynid_io::mjcf::from_description`], and [`dynid_io::mjcf::from_closed`] for mechanisms with loops.
     ///
     /// # Errors
     /// [`Error::RobotFile`]: MJCF cannot state the robot; [`ExportError`]: see [`ExportError::ReadBack`].
     pub fn mjcf(&self, states: &CheckStates) -> Result<Exported, Error> {
         let JointValues { joints, mut notes } = self.joint_values(Format::Mjcf, states);
+        if let Some(text) = &self.source.mjcf {
+            return self.mjcf_in_place(text, &joints, notes, states);
+        }
         let text = match self.identified.model.closed() {
             Some(closed) => {
                 let machine = closed.machine();
@@ -259,6 +285,42 @@ impl<'a> RobotExport<'a> {
         let read = mjcf::parse(&text, "exported MJCF")?;
         notes = [self.notes.clone(), notes].concat();
         self.checked(Format::Mjcf, text, (read.description, &read.joints), &joints, notes, states)
+    }
+
+    fn mjcf_in_place(
+        &self,
+        text: &str,
+        joints: &[JointParameters],
+        notes: Vec<String>,
+        states: &CheckStates,
+    ) -> Result<Exported, Error> {
+        let path = &self.source.path;
+        let mut files = mjcf::edit(text, path, &self.links, joints)?;
+        let main = files.remove(0);
+        let mut read = mjcf::parse_edited(&main.text, path, &files)?;
+        let mut notes = [self.notes.clone(), notes].concat();
+        let ours = |p: &&JointParameters| joints.iter().any(|j| j.joint == p.joint);
+        let found: Vec<JointParameters> = read.joints.iter().filter(ours).cloned().collect();
+        let acts = |p: &JointParameters| [p.damping, p.friction_loss, p.armature].iter().any(|x| *x != 0.0);
+        let others = read.joints.iter().filter(|p| !ours(p) && acts(p));
+        let others: Vec<&str> = others.map(|p| p.joint.as_str()).collect();
+        if !others.is_empty() {
+            notes.push(format!(
+                "friction and rotor not identified, left as in the file: {}",
+                others.join(", ")
+            ));
+        }
+        if read.description.gravity != self.description.gravity {
+            notes.push(format!(
+                "gravity is left as in the file, {:?} m/s²; the identification had {:?} m/s²",
+                read.description.gravity, self.description.gravity
+            ));
+            read.description.gravity = self.description.gravity;
+        }
+        read.description.floating_base = self.description.floating_base;
+        let back = (read.description, found.as_slice());
+        let checked = self.checked(Format::Mjcf, main.text, back, joints, notes, states)?;
+        Ok(Exported { included: files.into_iter().map(|f| (f.name, f.text)).collect(), ..checked })
     }
 
     /// What its URDF cannot state of a mechanism with loops: a robot in TOML that names the URDF, by the file name `urdf`.
@@ -292,7 +354,7 @@ impl<'a> RobotExport<'a> {
         let other = |fault| ExportError::OtherRobot { file: format!("exported {}", format.name()), fault };
         let back = read_back::compile(read, joints, &self.held, model).map_err(other)?;
         if model.mechanism().bodies().is_empty() {
-            return Ok(Exported { text, difference: 0.0, notes });
+            return Ok(Exported { text, included: Vec::new(), difference: 0.0, notes });
         }
         let bodies = self.identified.values[..10 * model.mechanism().bodies().len()].to_vec();
         let meant =
@@ -302,7 +364,8 @@ impl<'a> RobotExport<'a> {
             (&back.0, &back.0.parameters().shape_start(), &back.1),
             states,
         );
-        Ok(Exported { text, difference: read_back::judge(format.name(), difference)?, notes })
+        let difference = read_back::judge(format.name(), difference)?;
+        Ok(Exported { text, included: Vec::new(), difference, notes })
     }
 }
 

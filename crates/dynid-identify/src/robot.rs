@@ -60,7 +60,7 @@ impl Robot {
         Self::of_file(path, dynid_io::robot::read(path)?, options)
     }
 
-    /// Reads a robot from the text of a URDF or TOML file; `path` says which by its ending, and stands in messages and provenance.
+    /// Reads a robot from the text of a URDF, MJCF or TOML file; `path` says which by its ending, and stands in messages and provenance.
     ///
     /// # Errors
     /// Fails as [`Robot::load`] does.
@@ -100,6 +100,7 @@ impl Robot {
         let measured = file.elements.elastic.iter().any(|e| e.sensor);
         let bodies = mechanism.warnings().iter().filter(|_| !measured);
         let mut warnings: Vec<String> = bodies.map(ToString::to_string).collect();
+        warnings.extend(file.warnings.iter().cloned());
         warnings.extend(held(locked));
         let closed = closed(path, &mut file, &mechanism)?;
         warnings.extend(closed.iter().flat_map(|c| c.warnings().iter().map(ToString::to_string)));

@@ -7,11 +7,13 @@ pub use crate::robot_error::{Place, RobotFileError};
 use crate::digest::SourceFile;
 use crate::source::{MAX_ROBOT_FILE_BYTES, read_text};
 use crate::toml_robot::{self, ElementSpec, RobotFile};
-use crate::urdf;
+use crate::urdf::xml::{Tag, Tags};
+use crate::{mjcf, urdf};
 
-/// Reads a robot file: `.urdf` and `.xml` as URDF, `.toml` as TOML, anything else by its first character.
+/// Reads a robot file: `.toml` as TOML, `.urdf` and `.xml` by their outermost element (`<robot>`: URDF, `<mujoco>`: MJCF), anything else by
+/// its first character.
 ///
-/// A URDF carries no element list, so its [`ElementSpec`] is empty.
+/// A URDF carries no element list, so its [`ElementSpec`] is empty; MJCF states values of rotors and friction.
 ///
 /// # Errors
 /// [`RobotFileError`]: the file cannot be read, is too large, or is not a robot.
@@ -38,10 +40,24 @@ fn parse_source(text: &str, path: &Path, source: Option<SourceFile>) -> Result<R
         "xacro" => return Err(RobotFileError::Xacro { at: Place::start(&name), found: name }),
         _ => text.trim_start().starts_with('<'),
     };
-    if is_xml {
-        let plain = RobotFile::plain(urdf::parse(text, &name)?, ElementSpec::default());
-        Ok(RobotFile { urdf: Some(name), sources: source.into_iter().collect(), ..plain })
-    } else {
-        toml_robot::parse_source(text, &name, source)
+    let sources: Vec<SourceFile> = source.into_iter().collect();
+    if !is_xml {
+        return toml_robot::parse_source(text, &name, sources.into_iter().next());
     }
+    if outermost(text, &name)?.as_deref() == Some("mujoco") {
+        let mut robot = mjcf::parse(text, path)?.file;
+        robot.sources.splice(0..0, sources);
+        return Ok(robot);
+    }
+    let plain = RobotFile::plain(urdf::parse(text, &name)?, ElementSpec::default());
+    Ok(RobotFile { urdf: Some(name), sources, ..plain })
+}
+
+/// The name of the outermost element of an XML text, if there is one.
+fn outermost(text: &str, name: &str) -> Result<Option<String>, RobotFileError> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    Ok(match Tags::new(text, name).next()? {
+        Some((_, Tag::Open { start, .. })) => Some(start.name().0.to_owned()),
+        _ => None,
+    })
 }

@@ -105,8 +105,8 @@ pub enum RobotFileError {
         /// The tag or expression.
         found: String,
     },
-    /// The outermost element is not `<robot>`.
-    #[error("{at}: expected <robot> as the outermost element, found {found}")]
+    /// The outermost element is neither `<robot>` nor `<mujoco>`.
+    #[error("{at}: expected <robot> (URDF) or <mujoco> (MJCF) as the outermost element, found {found}")]
     NotARobot {
         /// Where.
         at: Place,
@@ -171,15 +171,17 @@ pub enum RobotFileError {
         /// The kind found.
         found: String,
     },
-    /// A feature of the format that this version does not read.
-    #[error("{at}: `{key}`: {feature} are not supported yet by this version")]
-    Unsupported {
+    /// Something that changes efforts and has no place here.
+    #[error("{at}: {owner}: cannot be carried: {reason}")]
+    NotCarried {
         /// Where.
         at: Place,
-        /// Key.
-        key: String,
-        /// Plural noun.
-        feature: &'static str,
+        /// Element that states it.
+        owner: String,
+        /// Why.
+        reason: String,
+        /// What to do about it.
+        hint: String,
     },
     /// A link or joint that is referred to does not exist.
     #[error("{at}: {context}: expected the name of a {kind}, found `{name}`")]
@@ -232,7 +234,7 @@ impl RobotFileError {
             E::TooMany { .. } => "this does not look like a robot".into(),
             E::Xacro { .. } => "expand it first: `xacro robot.urdf.xacro > robot.urdf`".into(),
             E::NotARobot { .. } => {
-                "a URDF starts with <robot name=\"...\">; SDF and MJCF are not read".into()
+                "a URDF starts with <robot name=\"...\">, MJCF with <mujoco>; SDF is not read".into()
             }
             E::Missing { expected, .. } if expected.contains("<mass>") || expected.contains("<inertia>") => {
                 "complete the <inertial> or remove it: a link without one counts as not stated".into()
@@ -250,7 +252,7 @@ impl RobotFileError {
                     .into()
             }
             E::JointKind { .. } => "correct the `type` of the joint".into(),
-            E::Unsupported { .. } => "describe the open tree only, without this key".into(),
+            E::NotCarried { hint, .. } => hint.clone(),
             E::UnknownName { meant: Some(meant), .. } => format!("did you mean `{meant}`?"),
             E::UnknownName { kind, .. } => format!("use the {kind} names of the robot file"),
             E::Unwritable { .. } => "keep the robot as TOML".into(),

@@ -109,7 +109,7 @@ impl Estimate {
         let refused =
             faults.map(|f| format!("link `{}` {}: simulators refuse such a robot", f.link, f.fault));
         let notes = changed.into_iter().chain(made.notes).chain(refused).collect();
-        Ok(Made { text: made.text, notes, loops })
+        Ok(Made { text: made.text, notes, loops, included: made.included })
     }
 }
 
@@ -118,7 +118,12 @@ struct Made {
     text: String,
     notes: Vec<String>,
     loops: Option<String>,
+    /// Included files that change with an MJCF, by their paths from its folder.
+    included: Vec<(String, String)>,
 }
+
+/// Text of an exported file, of the file of its loops, and of files that it includes.
+type Texts = (String, Option<String>, Vec<(String, String)>);
 
 #[derive(Clone, Copy)]
 enum Kind {
@@ -239,7 +244,8 @@ impl Estimate {
         py.detach(|| dynid::report_page(&found, &self.record)).map_err(|e| raise(py, &e))
     }
 
-    /// Text of a robot file, `urdf`, `mjcf` or `model`, and of the file of its loops beside a URDF of that name; what is lost is told.
+    /// Text of a robot file, `urdf`, `mjcf` or `model`, of the file of its loops beside a URDF of that name, and of files that an MJCF includes
+    /// and that change with it; what is lost is told.
     #[pyo3(signature = (kind, name, allow_unphysical))]
     fn exported(
         &self,
@@ -247,7 +253,7 @@ impl Estimate {
         kind: &str,
         name: &str,
         allow_unphysical: bool,
-    ) -> PyResult<(String, Option<String>)> {
+    ) -> PyResult<Texts> {
         let kind = match kind {
             "urdf" => Kind::Urdf,
             "mjcf" => Kind::Mjcf,
@@ -259,7 +265,7 @@ impl Estimate {
         };
         let made = py.detach(|| self.export(kind, name, allow_unphysical)).map_err(|e| raise(py, &e))?;
         made.notes.iter().try_for_each(|note| warn(py, note))?;
-        Ok((made.text, made.loops))
+        Ok((made.text, made.loops, made.included))
     }
 
     fn __repr__(&self) -> String {

@@ -139,7 +139,7 @@ impl Robot {
 
 #[pymethods]
 impl Robot {
-    /// Reads a robot file: URDF, or TOML with DH rows or bodies.
+    /// Reads a robot file: URDF, MJCF, or TOML with DH rows or bodies.
     ///
     /// `gravity`: m/s² in base axes, in place of the file's; `couple_mimics`: mimic joints follow their leaders; `floating_base`: a floating
     /// joint under the root link; `locked`: joints held at a position (rad or m), by name. Raises `RobotError`.
@@ -158,7 +158,7 @@ impl Robot {
         Robot::of(py, robot, None, options)?.told(py)
     }
 
-    /// A robot from the text of a robot file; `name` says by its ending which kind (`.urdf`, `.toml`), and stands in messages.
+    /// A robot from the text of a robot file; `name` says by its ending which kind (`.urdf`, `.xml`, `.toml`), and stands in messages.
     #[staticmethod]
     #[pyo3(signature = (text, name="robot", *, gravity=None, couple_mimics=false, floating_base=false, locked=None))]
     fn parse(

@@ -61,17 +61,17 @@ impl Run {
         Identified::of(&self.identification)
     }
 
-    /// URDF of the robot with identified inertias and friction, checked on the training logs; links that no body could
-    /// be are written as they are and named in the notes.
+    /// The robot file with identified inertias and friction, an MJCF in place, else a URDF ([`RobotExport::robot_file`]), checked on the
+    /// training logs; links that no body could be are written as they are and named in the notes.
     ///
     /// # Errors
-    /// Fails as [`Source::read`], [`RobotExport::new`] and [`RobotExport::urdf`] do.
-    pub fn urdf(&self) -> Result<Exported, Error> {
+    /// Fails as [`Source::read`], [`RobotExport::new`] and [`RobotExport::robot_file`] do.
+    pub fn robot_file(&self) -> Result<Exported, Error> {
         let source = Source::read(&self.robot.path)?;
         let export =
             RobotExport::new(self.identified(), &source)?.with_projections(&self.exported.projections);
         let states = CheckStates::logs(&self.logs, self.state_hz, &self.conditioning_settings)?;
-        let mut exported = export.urdf(&states)?;
+        let mut exported = export.robot_file(&states)?;
         exported.notes.extend(
             export
                 .faults()

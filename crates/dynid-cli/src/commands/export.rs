@@ -42,18 +42,11 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
         .chain(&args.config)
         .map(PathBuf::as_path)
         .collect();
-    // Loops stand beside the URDF, which has no place for them.
-    let beside = args.urdf.as_ref().filter(|urdf| !is_stdout(urdf)).map(|u| u.with_extension("loops.toml"));
-    let models = outputs.len();
-    outputs.extend(beside.iter().map(|path| ("--urdf", path.as_path())));
-    let set = outputs::prepare_files(&outputs, &inputs, args.force)?;
-    demand_stdout(args.print, &set)?;
-
+    let source = Source::read(&robot)?;
     let progress = Progress::new(args.print.quiet);
     progress.doing("reading");
     let identified = dynid::export::IdentifiedRobot::of(&estimate, &args.estimate)?;
     let states = states(args, &estimate, &identified)?;
-    let source = Source::read(&robot)?;
     let changed = match estimate.robot_file() {
         Some(record) => sha256(&robot)? != record.sha256,
         None => false,
@@ -66,7 +59,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
         export.require_physical()?;
     }
     progress.doing("writing and reading back");
-    let exported = outputs[..models]
+    let exported = outputs
         .iter()
         .map(|(argument, path)| {
             let exported = match *argument {
@@ -77,12 +70,25 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
             Ok(Made { argument, path, exported: exported? })
         })
         .collect::<Result<Vec<_>, Failure>>()?;
+    // Loops stand beside the URDF, which has no place for them.
+    let beside = args.urdf.as_ref().filter(|urdf| !is_stdout(urdf)).map(|u| u.with_extension("loops.toml"));
+    let models = outputs.len();
+    outputs.extend(beside.iter().map(|path| ("--urdf", path.as_path())));
+    // Files that an MJCF includes keep their names.
+    let included = included(args, &exported)?;
+    let more = outputs.len();
+    outputs.extend(included.iter().map(|(path, _)| ("--mjcf", path.as_path())));
+    let set = outputs::prepare_files(&outputs, &inputs, args.force)?;
+    demand_stdout(args.print, &set)?;
     for (number, made) in exported.iter().enumerate() {
         let text = match made.argument {
             "--model" => made.exported.text.clone(),
             _ => marked_xml(&made.exported.text),
         };
         set.write(number, text.as_bytes())?;
+    }
+    for (number, (_, text)) in included.iter().enumerate() {
+        set.write(more + number, marked_xml(text).as_bytes())?;
     }
     let name = args.urdf.as_ref().and_then(|urdf| urdf.file_name());
     let loops = name.and_then(|name| export.loops(&name.to_string_lossy()));
@@ -105,6 +111,9 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
         notes
             .tell(&format!("warning: link `{}` {}: simulators refuse such a robot", fault.link, fault.fault));
     }
+    for (path, _) in &included {
+        notes.tell(&format!("written: {} (included)", path.display()));
+    }
     if let (Some(path), Some(_)) = (&beside, &loops) {
         notes.tell(&format!("written: {} (its loops)", path.display()));
     }
@@ -121,6 +130,20 @@ pub(crate) fn run(args: &ExportArgs) -> Result<u8, Failure> {
         }))?;
     }
     Ok(0)
+}
+
+/// Files that an exported MJCF includes and that change with it: where they go, and their texts.
+fn included(args: &ExportArgs, exported: &[Made<'_>]) -> Result<Vec<(PathBuf, String)>, Failure> {
+    let folder = args.mjcf.as_ref().filter(|mjcf| !is_stdout(mjcf)).and_then(|mjcf| mjcf.parent());
+    let texts = exported.iter().flat_map(|made| &made.exported.included);
+    let place = |(name, text): &(String, String)| match folder {
+        Some(folder) => Ok((folder.join(name), text.clone())),
+        None => Err(Failure::Usage(
+            format!("--mjcf: `{name}`, which the robot includes, changes as well, found `-`"),
+            "name a file: --mjcf robot.xml",
+        )),
+    };
+    texts.map(place).collect()
 }
 
 /// A file that was made.
@@ -152,17 +175,18 @@ impl Made<'_> {
     }
 }
 
-/// Tells what `identify` did with its URDF.
+/// Tells what `identify` did with its robot file, of a format (`--urdf`, `--mjcf`).
 pub(super) fn tell(
     path: &Path,
     exported: &Result<Exported, dynid::Error>,
+    format: &str,
     estimate: &Estimate,
     notes: Notes,
 ) {
     match exported {
         Ok(exported) => {
             tell_notes(exported, notes);
-            loss(estimate, "--urdf", notes);
+            loss(estimate, format, notes);
         }
         // A file that is missing is told in any case.
         Err(reason) => note(&format!("not written: {}: {reason}", path.display())),

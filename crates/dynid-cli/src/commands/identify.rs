@@ -5,7 +5,7 @@ mod summary;
 use std::path::{Path, PathBuf};
 
 use dynid::config::{Config, Consistency, Friction, Method, Route};
-use dynid::export::ExportError;
+use dynid::export::{ExportError, Source};
 use dynid::record::Status;
 use dynid::{Error, identify};
 
@@ -23,11 +23,10 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     let notes = Notes::new(args.print.quiet);
     let config = configuration(args, notes)?;
     let out = config.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
-    let stem = config.robot.file_stem().filter(|stem| *stem != "-");
-    let robot = stem.map_or_else(|| "robot".into(), |s| s.to_string_lossy().into_owned());
-    let urdf_name = format!("{robot}.urdf");
-    let names = ["estimate.json", "report.html", &urdf_name, &format!("{robot}.loops.toml")];
-    let files = names.map(|name| out.join(name));
+    let robot = RobotNames::of(&config.robot);
+    let names = ["estimate.json", "report.html", robot.main.as_str(), robot.loops.as_str()];
+    let names = names.into_iter().chain(robot.included.iter().map(String::as_str));
+    let files: Vec<PathBuf> = names.map(|name| out.join(name)).collect();
     let logs = config.log.iter().chain(&config.validation).map(|log| log.path.as_path());
     let friction = config.elements.known_friction.as_deref();
     let inputs: Vec<&Path> = logs.chain([args.input.as_path(), &config.robot]).chain(friction).collect();
@@ -38,11 +37,12 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     estimate.provenance.command_line = command_line();
     estimate.provenance.revision = option_env!("DYNID_REVISION").map(str::to_owned);
     // Drawing and reading back know nothing of each other.
-    let (report, urdf) = rayon::join(|| identification.report(&estimate), || identification.urdf());
+    let (report, exported) =
+        rayon::join(|| identification.report(&estimate), || identification.robot_file());
     let report = report?;
-    let urdf = match urdf {
+    let exported = match exported {
         Ok(exported) => Ok(exported),
-        // What a URDF cannot state is no reason to lose the identification.
+        // What a robot file cannot state is no reason to lose the identification.
         Err(reason) if matches!(reason, Error::RobotFile(_)) || reason.job::<ExportError>().is_some() => {
             Err(reason)
         }
@@ -50,23 +50,55 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     };
     drop(progress);
 
-    let loops = if urdf.is_ok() { identification.loops(&urdf_name)? } else { None };
-    let urdf_text = urdf.as_ref().ok().map(|u| marked_xml(&u.text));
+    let keeps_loops = robot.is_mjcf || exported.is_err();
+    let loops = if keeps_loops { None } else { identification.loops(&robot.main)? };
+    let text = exported.as_ref().ok().map(|e| marked_xml(&e.text));
     let loops = loops.map(|text| marked_toml(&text));
     let json = estimate.to_json();
-    let texts = [Some(&json), Some(&report), urdf_text.as_ref(), loops.as_ref()];
+    let texts = [Some(&json), Some(&report), text.as_ref(), loops.as_ref()];
     for (number, text) in texts.into_iter().enumerate() {
         text.map(|text| set.write(number, text.as_bytes())).transpose()?;
+    }
+    for (name, text) in exported.iter().flat_map(|e| &e.included) {
+        if let Some(k) = robot.included.iter().position(|included| included == name) {
+            set.write(texts.len() + k, marked_xml(text).as_bytes())?;
+        }
     }
     let written = set.publish()?;
     notes.warnings(&estimate.verdict.warnings);
     data(&if args.print.json { json } else { summary(&estimate) })?;
     notes.written(&written);
-    export::tell(&files[2], &urdf, &estimate, notes);
+    let format = if robot.is_mjcf { "--mjcf" } else { "--urdf" };
+    export::tell(&files[2], &exported, format, &estimate, notes);
     if estimate.verdict.status != Status::Ok {
         notes.tell("`dynid explain NAME` says what a check means and what to do");
     }
     Ok(u8::from(estimate.verdict.status == Status::Fail))
+}
+
+/// Names of the files that a robot becomes.
+struct RobotNames {
+    main: String,
+    loops: String,
+    /// Files that it includes, and that may change with it.
+    included: Vec<String>,
+    is_mjcf: bool,
+}
+
+impl RobotNames {
+    /// A robot that cannot be read is told of by whoever needs it.
+    fn of(path: &Path) -> Self {
+        let stem = path.file_stem().filter(|stem| *stem != "-");
+        let stem = stem.map_or_else(|| "robot".into(), |s| s.to_string_lossy().into_owned());
+        let source = Source::read(path).ok();
+        let is_mjcf = source.as_ref().is_some_and(Source::is_mjcf);
+        RobotNames {
+            main: format!("{stem}.{}", if is_mjcf { "xml" } else { "urdf" }),
+            loops: format!("{stem}.loops.toml"),
+            included: source.iter().flat_map(Source::included).map(str::to_owned).collect(),
+            is_mjcf,
+        }
+    }
 }
 
 /// The configuration file with flags over it, or one made of flags alone.

@@ -1,15 +1,40 @@
-//! MJCF, the robot files of MuJoCo: writing, and reading back what is written.
+//! MJCF, the robot files of MuJoCo: reading, editing in place, writing.
 
+mod actuator;
+mod compiler;
+mod defaults;
+mod document;
+mod edit;
+mod equality;
+mod fields;
+mod geom;
+mod inertia;
+mod joint;
 mod loops;
-mod quaternion;
+mod mesh;
+mod model;
+mod orientation;
 mod read;
+mod walk;
 mod write;
 
+pub use document::EditedFile;
+pub use edit::edit;
 pub use loops::Loops;
-pub use read::{MjcfRobot, parse};
+pub use read::{MjcfRobot, parse, parse_edited};
 pub use write::{from_closed, from_description};
 
 use crate::robot_error::RobotFileError;
+
+/// Ranges from here on are none.
+const NO_LIMIT: f64 = 1e10;
+/// What helps where MuJoCo makes something of an element.
+const FLATTEN: &str =
+    "save the compiled model and give that file: `mujoco.mj_saveLastXML(\"flat.xml\", model)` in Python";
+/// What helps where an inertia is not computed.
+const SOLID: &str = "state an <inertial> in the body (`mujoco.mj_saveLastXML` writes those that MuJoCo computes)";
+/// What helps with a constraint.
+const REMOVE_OR_DISABLE: &str = "remove it, or write active=\"false\"";
 
 /// What a joint of MJCF states about dissipation and rotor, all of it on the drive's side of the effort:
 /// `armature · q̈ + damping · q̇ + frictionloss · sign(q̇)`.

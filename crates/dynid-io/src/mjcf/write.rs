@@ -8,13 +8,12 @@ use dynid_model::{Description, Inertia, JointDescription, JointKind, Mat3, Place
 use quick_xml::escape::escape;
 
 use super::loops::{Constraints, Loops};
-use super::quaternion::quaternion;
+use super::model::WORLD;
+use super::orientation::quaternion;
 use super::{JointParameters, unwritable};
 use crate::robot_error::RobotFileError;
 use crate::urdf::inertial::Inertial;
 
-/// Name of the body that every MJCF has.
-const WORLD: &str = "world";
 
 /// Writes links, joints and gravity as MJCF, numbers in the shortest form that reads back to the same `f64`.
 ///

@@ -50,6 +50,10 @@ pub struct RobotFile {
     pub closures: Vec<ClosureDescription>,
     /// Path of the URDF that holds the tree, if the file is a URDF or refers to one.
     pub urdf: Option<String>,
+    /// Files of the MJCF that this is, if it is one: the path from the folder of the main file, which itself comes first and is empty.
+    pub mjcf: Option<Vec<String>>,
+    /// What a user should know about what was read.
+    pub warnings: Vec<String>,
     /// Files that were read, this one first; a text alone has none but those that it refers to.
     pub sources: Vec<SourceFile>,
 }
@@ -64,6 +68,8 @@ impl RobotFile {
             home: Vec::new(),
             closures: Vec::new(),
             urdf: None,
+            mjcf: None,
+            warnings: Vec::new(),
             sources: Vec::new(),
         }
     }
@@ -174,7 +180,8 @@ pub(crate) fn parse_source(
     let home = home::build(&source, &robot.home, &description)?;
     let closures = loops::build(&source, &robot.loops, &description)?;
     let actuated = robot.actuated.map(|names| names.into_iter().map(Spanned::into_inner).collect());
-    Ok(RobotFile { elements, actuated, home, closures, urdf: urdf_path, sources, description })
+    let plain = RobotFile::plain(description, elements);
+    Ok(RobotFile { actuated, home, closures, urdf: urdf_path, sources, ..plain })
 }
 
 /// `dh` and `tool` belong to DH tables.

@@ -167,7 +167,7 @@ class Estimate:
         Loops of a mechanism are written beside `path`, as `<name>.loops.toml`; without a path see `to_loops`.
         """
         name = "robot.urdf" if path is None else Path(path).name
-        text, loops = self._native.exported("urdf", name, allow_unphysical)
+        text, loops, _ = self._native.exported("urdf", name, allow_unphysical)
         if path is not None and loops is not None:
             written(Path(path).with_suffix(".loops.toml"), loops)
         return written(path, text)
@@ -180,8 +180,19 @@ class Estimate:
             return self._native.exported("urdf", urdf, True)[1]
 
     def to_mjcf(self, path: str | os.PathLike[str] | None = None, *, allow_unphysical: bool = False) -> str:
-        """MJCF with identified inertias, friction and armature. What it has no place for is told by a `DynidWarning`."""
-        return written(path, self._native.exported("mjcf", "", allow_unphysical)[0])
+        """MJCF with identified inertias, friction and armature. What it has no place for is told by a `DynidWarning`.
+
+        The MJCF of a robot from MJCF is edited in place. Included files that change are written beside `path`, under the names by which they
+        are included.
+        """
+        text, _, included = self._native.exported("mjcf", "", allow_unphysical)
+        if included and path is None:
+            raise ValueError(f"to_mjcf: {', '.join(name for name, _ in included)}, which the robot includes, changes as well: give a path")
+        for name, other in included if path is not None else []:
+            target = Path(path).parent / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            written(target, other)
+        return written(path, text)
 
     def to_model_json(self, path: str | os.PathLike[str] | None = None) -> str:
         """The whole identified model, elements of every law included, as JSON."""

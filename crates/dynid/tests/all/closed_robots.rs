@@ -142,7 +142,7 @@ fn a_controlled_delta_is_identified_and_comes_back_as_urdf_and_loops() {
     write_log(&simulate(&robot, &settings).unwrap(), &path);
     let text = format!("robot = {:?}\n[[log]]\npath = {path:?}\n", robot_file("delta"));
     let id = identify(&Config::parse(&text, "run.toml").unwrap(), &mut |_| ()).unwrap();
-    let urdf = id.urdf().unwrap();
+    let urdf = id.robot_file().unwrap();
     assert!(urdf.difference < 1e-6, "{}", urdf.difference);
     std::fs::write(folder.join("delta.urdf"), &urdf.text).unwrap();
     let loops = id.loops("delta.urdf").unwrap().unwrap();

@@ -129,7 +129,7 @@ fn an_elastic_arm_is_identified_from_positions_of_motors_and_joints() {
 
     let report = found.report(&estimate).unwrap();
     assert!(report.contains("driven by `j1_motor`") && report.contains("motor of `j2`"));
-    let urdf = found.urdf().unwrap();
+    let urdf = found.robot_file().unwrap();
     assert!(urdf.text.contains("link2") && !urdf.text.contains("j1_motor"), "{}", urdf.text);
     assert!(urdf.notes.iter().any(|n| n.contains("elasticity of j1, j2")), "{:?}", urdf.notes);
 
@@ -281,7 +281,7 @@ path = "log.csv"
         let off = value(name) / truth - 1.0;
         assert!(off.abs() < within, "{name}: {} is {off} off", value(name));
     }
-    let urdf = found.urdf().unwrap();
+    let urdf = found.robot_file().unwrap();
     assert!(urdf.notes.iter().any(|n| n.contains("no body was identified")), "{:?}", urdf.notes);
 }
 

@@ -120,7 +120,7 @@ fn the_factor_of_a_cold_log_is_found_and_the_robot_alone_is_that_of_the_warm_one
     assert!(errors.iter().all(|e| e.unwrap() < 1.0), "{errors:?}");
     // What is written is the robot alone, in its own order, and says so to the last bit where it is read back.
     assert_eq!(found.model.log_columns().len(), 0);
-    found.urdf().unwrap();
+    found.robot_file().unwrap();
     let file = bench.path("estimate.json");
     let own = |name: &str| dynid::config::LogConfig { path: bench.path(name), ..Default::default() };
     let again =
