@@ -99,7 +99,11 @@ impl Source {
         Self::of(dynid_io::robot::parse(text, path)?, path, own)
     }
 
-    fn of(file: RobotFile, path: &Path, text: impl Fn(&Path) -> Result<String, Error>) -> Result<Self, Error> {
+    fn of(
+        file: RobotFile,
+        path: &Path,
+        text: impl Fn(&Path) -> Result<String, Error>,
+    ) -> Result<Self, Error> {
         let urdf = file.urdf.as_ref().map(|urdf| text(urdf.as_ref())).transpose()?;
         let mjcf = file.mjcf.as_ref().map(|_| text(path)).transpose()?;
         Ok(Source { path: path.to_owned(), file, urdf, mjcf })

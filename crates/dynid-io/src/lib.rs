@@ -1,5 +1,5 @@
-//! Robot files and logs: URDF, robots in TOML (DH tables or body trees), MJCF (written), logs (CSV, MCAP, Parquet, HDF5, NumPy,
-//! MATLAB), states in CSV, trajectories (JSON; CSV and ROS 2 messages, written), meshes (STL, OBJ).
+//! Robot files and logs: URDF, MJCF, robots in TOML (DH tables or body trees), logs (CSV, MCAP, Parquet, HDF5, NumPy, MATLAB),
+//! states in CSV, trajectories (JSON; CSV and ROS 2 messages, written), meshes (STL, OBJ).
 //!
 //! Every door checks what it lets in: numbers are finite, names are unique, sizes are bounded. A fault becomes one
 //! typed error whose `Display` is one line (file, line, column or row, expected, found) and whose `hint()` says what

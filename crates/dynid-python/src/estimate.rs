@@ -247,13 +247,7 @@ impl Estimate {
     /// Text of a robot file, `urdf`, `mjcf` or `model`, of the file of its loops beside a URDF of that name, and of files that an MJCF includes
     /// and that change with it; what is lost is told.
     #[pyo3(signature = (kind, name, allow_unphysical))]
-    fn exported(
-        &self,
-        py: Python<'_>,
-        kind: &str,
-        name: &str,
-        allow_unphysical: bool,
-    ) -> PyResult<Texts> {
+    fn exported(&self, py: Python<'_>, kind: &str, name: &str, allow_unphysical: bool) -> PyResult<Texts> {
         let kind = match kind {
             "urdf" => Kind::Urdf,
             "mjcf" => Kind::Mjcf,

@@ -132,7 +132,8 @@ pub(crate) struct ExportArgs {
     /// standard output.
     #[arg(long, value_name = "FILE.urdf", value_hint = ValueHint::AnyPath)]
     pub(crate) urdf: Option<PathBuf>,
-    /// Write an MJCF for MuJoCo: inertias, friction, rotor inertias, gravity, a motor per joint; `-`: standard output.
+    /// Write an MJCF for MuJoCo: inertias, friction, rotor inertias; an MJCF is edited in place, any other robot gets a new file with gravity and
+    /// a motor per joint; `-`: standard output.
     #[arg(long, value_name = "FILE.xml", value_hint = ValueHint::AnyPath)]
     pub(crate) mjcf: Option<PathBuf>,
     /// Write the whole identified model, links, joints and all elements, as compact JSON; `-`: standard output.

@@ -37,8 +37,7 @@ pub(crate) fn run(args: &IdentifyArgs) -> Result<u8, Failure> {
     estimate.provenance.command_line = command_line();
     estimate.provenance.revision = option_env!("DYNID_REVISION").map(str::to_owned);
     // Drawing and reading back know nothing of each other.
-    let (report, exported) =
-        rayon::join(|| identification.report(&estimate), || identification.robot_file());
+    let (report, exported) = rayon::join(|| identification.report(&estimate), || identification.robot_file());
     let report = report?;
     let exported = match exported {
         Ok(exported) => Ok(exported),

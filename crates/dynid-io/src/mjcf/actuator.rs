@@ -22,7 +22,8 @@ pub(super) fn read<'a>(
         let fields = Fields::new(document, element, defaults.behind(element, None)?);
         for key in ["armature", "damping"] {
             if fields.linear(key)? != 0.0 {
-                let reason = format!("its own `{key}` acts on what it drives, and joints alone have one here");
+                let reason =
+                    format!("its own `{key}` acts on what it drives, and joints alone have one here");
                 let hint = "state it at the joint, multiplied by the square of the gear";
                 return Err(fields.refuse(key, reason, hint));
             }

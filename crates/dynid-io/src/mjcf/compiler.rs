@@ -65,8 +65,7 @@ impl<'a> Compiler<'a> {
         if let Some(sequence) = fields.text("eulerseq") {
             let axes: Option<[u8; 3]> = sequence.as_bytes().try_into().ok();
             let known = axes.filter(|a| a.iter().all(|c| b"xyzXYZ".contains(c)));
-            compiler.euler =
-                known.ok_or_else(|| fields.value("eulerseq", "three letters of xyz or XYZ"))?;
+            compiler.euler = known.ok_or_else(|| fields.value("eulerseq", "three letters of xyz or XYZ"))?;
         }
         compiler.from_geoms = match fields.text("inertiafromgeom") {
             None | Some("auto") => FromGeoms::Missing,
@@ -136,8 +135,13 @@ impl Options {
             }
             for key in ["density", "viscosity"] {
                 if fields.number(key, 0.0)? != 0.0 {
-                    let reason = format!("`{key}` of a medium acts on the bodies, and no medium is known here");
-                    return Err(fields.refuse(key, reason, "remove the attribute, if the robot moves in air"));
+                    let reason =
+                        format!("`{key}` of a medium acts on the bodies, and no medium is known here");
+                    return Err(fields.refuse(
+                        key,
+                        reason,
+                        "remove the attribute, if the robot moves in air",
+                    ));
                 }
             }
             for flag in element.children.iter().filter(|c| c.name == "flag") {

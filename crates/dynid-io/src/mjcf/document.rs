@@ -17,18 +17,8 @@ const MAX_ELEMENTS: usize = 500_000;
 const MAX_FILES: usize = 256;
 
 /// Elements that say nothing about dynamics, and may be many.
-const PASSED_OVER: [&str; 10] = [
-    "visual",
-    "statistic",
-    "size",
-    "custom",
-    "sensor",
-    "contact",
-    "texture",
-    "material",
-    "skin",
-    "hfield",
-];
+const PASSED_OVER: [&str; 10] =
+    ["visual", "statistic", "size", "custom", "sensor", "contact", "texture", "material", "skin", "hfield"];
 
 /// A file of a model that has been edited.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -97,7 +87,8 @@ impl Document {
             bytes: 0,
         };
         let text = text.strip_prefix('\u{feff}').unwrap_or(text).to_owned();
-        let root = loader.file(ModelFile { name: String::new(), path: path.display().to_string(), text }, 0)?;
+        let root =
+            loader.file(ModelFile { name: String::new(), path: path.display().to_string(), text }, 0)?;
         let Loader { files, sources, .. } = loader;
         let document = Document { files, root, sources };
         if document.root.name == "mujoco" {

@@ -5,11 +5,12 @@ use std::fmt::Write;
 use std::ops::Range;
 use std::path::Path;
 
-use dynid_model::{Inertia, Placement};
+use dynid_model::{Inertia, Mat3, Placement, Vec3, symmetric};
 
 use super::compiler::Compiler;
 use super::document::{Document, EditedFile, Element};
 use super::model::{BodyPart, Model};
+use super::orientation::quaternion;
 use super::read::model;
 use super::{JointParameters, unwritable};
 use crate::excerpt::closest;
@@ -19,8 +20,9 @@ use crate::urdf::inertial::Inertial;
 /// Replaces the inertia of some links, and friction and rotor of some joints, in an MJCF; gives the main file first, then included files
 /// that change.
 ///
-/// `links`: the new inertia about the link frame. It becomes an `<inertial>` with `fullinertia` in the body, in the place of one that is
-/// there. Where `<compiler>` would make something else of stated inertias (`inertiafromgeom="true"`, `balanceinertia`, bounds, a total
+/// `links`: the new inertia about the link frame. It becomes an `<inertial>` with principal moments and axes in the body, in the place of one that is
+/// there.
+/// Where `<compiler>` would make something else of stated inertias (`inertiafromgeom="true"`, `balanceinertia`, bounds, a total
 /// mass), these attributes are set to what leaves them alone, and every body that moves states its inertia. A massless link between the
 /// joints of one body has no element and is left as it is. `joints`: `damping`, `frictionloss` and `armature` are set where they differ
 /// from what the joint has already, other attributes are kept. Everything else is byte for byte the input.
@@ -97,15 +99,16 @@ impl<'a> Editor<'a> {
         if body.copied {
             return Err(unwritable("link", &body.link, "it is one copy of a <replicate>".to_owned()));
         }
-        let back = Placement { translation: -body.shift, ..Placement::identity() };
+        let Inertial { mass, com, tensor } =
+            Inertial::of(inertia).map_err(|reason| unwritable("link", &body.link, reason))?;
+        // About the centre of mass, so that a distant frame costs no digits.
         let frame = body.inertial.map_or(Placement::identity(), |(_, frame)| frame);
-        let own = inertia.in_frame(&back).in_frame(&frame.inverse());
-        let Inertial { mass, com: [x, y, z], tensor: [[xx, xy, xz], [_, yy, yz], [_, _, zz]] } =
-            Inertial::of(&own).map_err(|reason| unwritable("link", &body.link, reason))?;
-        let inertial = format!(
-            "<inertial pos=\"{x:?} {y:?} {z:?}\" mass=\"{mass:?}\" \
-             fullinertia=\"{xx:?} {yy:?} {zz:?} {xy:?} {xz:?} {yz:?}\"/>"
-        );
+        let r = frame.rotation.transpose();
+        let [x, y, z] = r.mul_vec(Vec3(com) - body.shift - frame.translation).0;
+        let turned = r.mul_mat(&Mat3::from_rows(tensor)).mul_mat(&frame.rotation);
+        let tensor = if r == Mat3::identity() { tensor } else { turned.rows() };
+        let inertial =
+            format!("<inertial pos=\"{x:?} {y:?} {z:?}\" mass=\"{mass:?}\" {}/>", principal(&tensor));
         if let Some((old, _)) = body.inertial {
             self.splice(old.file, old.open.start..old.end, inertial);
             return Ok(());
@@ -209,7 +212,8 @@ impl<'a> Editor<'a> {
             if splices.is_none() && number > 0 {
                 continue;
             }
-            let below = Path::new(&file.name).components().all(|c| matches!(c, std::path::Component::Normal(_)));
+            let below =
+                Path::new(&file.name).components().all(|c| matches!(c, std::path::Component::Normal(_)));
             if !below {
                 let reason = format!(
                     "what changes is in `{}`, which is not in the folder of the robot file or below",
@@ -236,6 +240,18 @@ fn spliced(text: &str, mut splices: Vec<(Range<usize>, String)>) -> String {
     }
     out.push_str(&text[from..]);
     out
+}
+
+/// A tensor by its principal moments and axes: MuJoCo finds those of `fullinertia` to 1e-12 kg m² alone.
+fn principal(tensor: &[[f64; 3]; 3]) -> String {
+    let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = *tensor;
+    if [xy, xz, yz] == [0.0; 3] {
+        return format!("diaginertia=\"{xx:?} {yy:?} {zz:?}\"");
+    }
+    let ([a, b, c], axes) = symmetric::eigen(tensor);
+    let [x, y, _] = Mat3::from_rows(axes).0;
+    let [w, i, j, k] = quaternion(&Mat3([x, y, x.cross(y)]));
+    format!("diaginertia=\"{a:?} {b:?} {c:?}\" quat=\"{w:?} {i:?} {j:?} {k:?}\"")
 }
 
 /// The bytes between the quotes of an attribute whose name begins at an offset.

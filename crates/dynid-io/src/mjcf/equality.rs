@@ -148,11 +148,7 @@ fn body<'m>(fields: &Fields<'_>, model: &'m Model<'_>, key: &str) -> Result<&'m 
     Ok(frame)
 }
 
-fn site(
-    fields: &Fields<'_>,
-    model: &Model<'_>,
-    key: &str,
-) -> Result<(LinkFrame, bool), RobotFileError> {
+fn site(fields: &Fields<'_>, model: &Model<'_>, key: &str) -> Result<(LinkFrame, bool), RobotFileError> {
     let Some(name) = fields.text(key) else { return Err(fields.missing(format!("an attribute `{key}`"))) };
     let Some((body, place)) = model.sites.get(name) else {
         let known: Vec<&String> = model.sites.keys().collect();

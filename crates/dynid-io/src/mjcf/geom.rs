@@ -94,8 +94,7 @@ fn sized(
         if length < LEAST_VOLUME {
             return Err(fields.value("fromto", "two points that are apart"));
         }
-        place =
-            Placement { rotation: from_z(way.scale(1.0 / length)), translation: (from + to).scale(0.5) };
+        place = Placement { rotation: from_z(way.scale(1.0 / length)), translation: (from + to).scale(0.5) };
         size = match kind {
             "box" | "ellipsoid" => [size[0], size[0], 0.5 * length],
             _ => [size[0], 0.5 * length, 0.0],
@@ -107,7 +106,8 @@ fn sized(
         _ => 3,
     };
     if size[..needed].iter().any(|x| *x <= 0.0) {
-        let plural = if needed == 1 { "a positive size".to_owned() } else { format!("{needed} positive sizes") };
+        let plural =
+            if needed == 1 { "a positive size".to_owned() } else { format!("{needed} positive sizes") };
         return Err(fields.value("size", plural));
     }
     Ok((place, size))
@@ -132,9 +132,7 @@ fn solid(kind: &str, [a, b, c]: [f64; 3]) -> Moments {
             let across = (3.0 * aa + 4.0 * bb) / 12.0;
             of(2.0 * PI * aa * b, [across, across, aa / 2.0])
         }
-        "ellipsoid" => {
-            of(4.0 * PI * a * b * c / 3.0, [(bb + cc) / 5.0, (aa + cc) / 5.0, (aa + bb) / 5.0])
-        }
+        "ellipsoid" => of(4.0 * PI * a * b * c / 3.0, [(bb + cc) / 5.0, (aa + cc) / 5.0, (aa + bb) / 5.0]),
         _ => of(8.0 * a * b * c, [(bb + cc) / 3.0, (aa + cc) / 3.0, (aa + bb) / 3.0]),
     }
 }

@@ -80,7 +80,11 @@ pub(super) fn read(
     let parameter = |key: &str| fields.not_negative(key, fields.number(key, 0.0)?);
     let parameters = JointParameters {
         joint: String::new(),
-        damping: if options.dampers { fields.not_negative("damping", fields.linear("damping")?)? } else { 0.0 },
+        damping: if options.dampers {
+            fields.not_negative("damping", fields.linear("damping")?)?
+        } else {
+            0.0
+        },
         friction_loss: if options.friction { parameter("frictionloss")? } else { 0.0 },
         armature: parameter("armature")?,
     };
@@ -110,7 +114,8 @@ fn free(fields: &Fields<'_>) -> Result<JointElement, RobotFileError> {
 
 /// Least and largest position that are stated; where one is beyond all reason there is no limit.
 fn range(fields: &Fields<'_>) -> Result<Option<(f64, f64)>, RobotFileError> {
-    Ok(pair(fields, "range")?.filter(|(low, high)| low.abs() < NO_LIMIT && high.abs() < NO_LIMIT && low < high))
+    Ok(pair(fields, "range")?
+        .filter(|(low, high)| low.abs() < NO_LIMIT && high.abs() < NO_LIMIT && low < high))
 }
 
 /// Two numbers, which may be infinite. Two zeros are no statement.

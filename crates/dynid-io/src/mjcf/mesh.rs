@@ -163,18 +163,19 @@ impl<'a> Meshes<'a> {
         }
         // MuJoCo holds corners in single precision.
         #[expect(clippy::cast_possible_truncation, reason = "as the model is compiled")]
-        let corners: Vec<[f64; 3]> =
-            list("vertex")?.chunks_exact(3).map(|c| [c[0], c[1], c[2]].map(|x| f64::from(x as f32))).collect();
+        let corners: Vec<[f64; 3]> = list("vertex")?
+            .chunks_exact(3)
+            .map(|c| [c[0], c[1], c[2]].map(|x| f64::from(x as f32)))
+            .collect();
         let corner = |k: f64| {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
-            let known = (k >= 0.0 && k.fract() == 0.0 && k < corners.len() as f64).then(|| k as usize);
+            let known = (k >= 0.0 && k.fract() == 0.0 && k < corners.len() as f64).then_some(k as usize);
             known.map(|k| corners[k]).ok_or_else(|| asset.value("face", "numbers of corners, from 0"))
         };
         let faces = list("face")?;
         let triangles = faces.chunks_exact(3).map(|f| Ok([corner(f[0])?, corner(f[1])?, corner(f[2])?]));
         Ok(Mesh { triangles: triangles.collect::<Result<_, RobotFileError>>()? })
     }
-
 }
 
 /// Volume, centre and tensor of triangles; `None` if they enclose nothing.

@@ -32,7 +32,8 @@ const NO_LIMIT: f64 = 1e10;
 const FLATTEN: &str =
     "save the compiled model and give that file: `mujoco.mj_saveLastXML(\"flat.xml\", model)` in Python";
 /// What helps where an inertia is not computed.
-const SOLID: &str = "state an <inertial> in the body (`mujoco.mj_saveLastXML` writes those that MuJoCo computes)";
+const SOLID: &str =
+    "state an <inertial> in the body (`mujoco.mj_saveLastXML` writes those that MuJoCo computes)";
 /// What helps with a constraint.
 const REMOVE_OR_DISABLE: &str = "remove it, or write active=\"false\"";
 

@@ -47,10 +47,7 @@ pub(super) fn placement(fields: &Fields<'_>, compiler: &Compiler<'_>) -> Result<
 }
 
 /// The orientation of an element. A `quat` beside another way is passed over, as MuJoCo does.
-pub(super) fn orientation(
-    fields: &Fields<'_>,
-    compiler: &Compiler<'_>,
-) -> Result<Mat3<f64>, RobotFileError> {
+pub(super) fn orientation(fields: &Fields<'_>, compiler: &Compiler<'_>) -> Result<Mat3<f64>, RobotFileError> {
     let direction = |key: &str, v: Vec3<f64>| match v.norm() {
         norm if norm > LEAST => Ok(v.scale(1.0 / norm)),
         _ => Err(fields.value(key, "a direction, not zero")),

@@ -53,11 +53,7 @@ pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<MjcfRobot, RobotFileE
 ///
 /// # Errors
 /// As [`parse`].
-pub fn parse_edited(
-    text: &str,
-    path: &Path,
-    changed: &[EditedFile],
-) -> Result<MjcfRobot, RobotFileError> {
+pub fn parse_edited(text: &str, path: &Path, changed: &[EditedFile]) -> Result<MjcfRobot, RobotFileError> {
     let document = Document::load(text, path, changed)?;
     let (model, meshes) = model(&document, path)?;
     let files = document.files.iter().map(|f| f.name.clone()).collect();

@@ -4,7 +4,6 @@ use std::collections::HashMap;
 
 use dynid_model::{Inertia, JointDescription, JointKind, Limits, LinkDescription, Placement, Vec3};
 
-use super::{FLATTEN, JointParameters};
 use super::compiler::{Compiler, Options};
 use super::defaults::Defaults;
 use super::document::{Document, Element};
@@ -14,6 +13,7 @@ use super::joint::{self, JointElement, MovingJoint};
 use super::mesh::Meshes;
 use super::model::{BodyFrame, BodyPart, JointPart, Model, WORLD};
 use super::orientation::{euler, placement};
+use super::{FLATTEN, JointParameters};
 use crate::excerpt::excerpt;
 use crate::robot_error::RobotFileError;
 use crate::{ElementSetting, SettingValue, TieSpec};
@@ -168,9 +168,8 @@ impl<'a: 'w, 'w> Walk<'w, 'a> {
     ) -> Result<(), RobotFileError> {
         let expected = format!("a whole number from 1 to {MAX_PARTS}");
         let count = fields.text("count").and_then(|c| c.trim().parse::<usize>().ok());
-        let count = count
-            .filter(|c| (1..=MAX_PARTS).contains(c))
-            .ok_or_else(|| fields.value("count", expected))?;
+        let count =
+            count.filter(|c| (1..=MAX_PARTS).contains(c)).ok_or_else(|| fields.value("count", expected))?;
         let (offset, angles) = (fields.vector("offset")?, fields.numbers("euler")?.unwrap_or_default());
         let width = count.to_string().len();
         let separator = fields.text("sep").unwrap_or("");
@@ -191,12 +190,7 @@ impl<'a: 'w, 'w> Walk<'w, 'a> {
     }
 
     /// The name of a body or joint: its own, or one by its number.
-    fn name(
-        &mut self,
-        part: &Part<'a>,
-        kind: &'static str,
-        number: usize,
-    ) -> Result<String, RobotFileError> {
+    fn name(&mut self, part: &Part<'a>, kind: &'static str, number: usize) -> Result<String, RobotFileError> {
         let name = match part.element.text("name") {
             Some(name) if !name.is_empty() => format!("{name}{}", part.around.suffix),
             _ => format!("{kind}{number}"),
@@ -319,8 +313,7 @@ impl<'a: 'w, 'w> Walk<'w, 'a> {
                 }
                 JointElement::Free => {
                     // The position of a free body is that in the world, wherever it is drawn.
-                    let free =
-                        description(joint, &parent, name, JointKind::Floating, Placement::identity());
+                    let free = description(joint, &parent, name, JointKind::Floating, Placement::identity());
                     self.model.description.joints.push(free);
                     return Ok(Vec3::zero());
                 }

@@ -14,7 +14,6 @@ use super::{JointParameters, unwritable};
 use crate::robot_error::RobotFileError;
 use crate::urdf::inertial::Inertial;
 
-
 /// Writes links, joints and gravity as MJCF, numbers in the shortest form that reads back to the same `f64`.
 ///
 /// - Links are bodies under their own names, one inside the other as joints say; a link on a fixed joint is a body

@@ -39,9 +39,21 @@ fn broken_urdfs() {
     let joint = |s: &str| two_links(GOOD_INERTIAL, "revolute", s);
     let deep = "<a>".repeat(100_000);
     let cases: Vec<(String, Vec<&str>, &str)> = vec![
-        (String::new(), vec!["r.urdf:1:1", "expected <robot>", "an empty file"], "<robot name"),
-        ("hello".into(), vec!["r.urdf:1:1", "expected <robot>", "`hello`"], "<robot name"),
-        ("<sdf version=\"1.6\"></sdf>".into(), vec!["expected <robot>", "<sdf>"], "SDF"),
+        (
+            String::new(),
+            vec!["r.urdf:1:1", "expected <robot> (URDF) or <mujoco> (MJCF)", "an empty file"],
+            "<robot name",
+        ),
+        (
+            "hello".into(),
+            vec!["r.urdf:1:1", "expected <robot> (URDF) or <mujoco> (MJCF)", "`hello`"],
+            "<robot name",
+        ),
+        (
+            "<sdf version=\"1.6\"></sdf>".into(),
+            vec!["expected <robot> (URDF) or <mujoco> (MJCF)", "<sdf>"],
+            "SDF",
+        ),
         ("<robot name=\"r\">".into(), vec!["r.urdf:1:1", "never closed"], "cut off"),
         (
             "<robot name=\"r\">\n<link name=\"a\">\n</lnk></robot>".into(),
