@@ -70,7 +70,9 @@ def compared(robot: dynid.Robot, model: Any, count: int = 10) -> float:
 
 @pytest.mark.parametrize("seed", range(30))
 @pytest.mark.filterwarnings("ignore::dynid.DynidWarning")
-def test_random_models_have_the_efforts_of_mujoco(seed: int, tmp_path: Path) -> None:
+def test_random_models_have_the_efforts_of_mujoco(seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # MuJoCo writes a file of its warnings where it runs.
+    monkeypatch.chdir(tmp_path)
     write_meshes(tmp_path)
     file = tmp_path / "model.xml"
     file.write_text(Random(seed).text(), encoding="utf-8")

@@ -83,8 +83,10 @@ impl Tree {
             let body = &bodies[b];
             let joint = &body.joint;
             let parent = body.parent.map(|p| node_of_body[p]);
+            // A component of 1e-8 beside 1 is lost in the length, and turns bodies all the same.
+            let alone = |k: usize| (0..3).all(|i| i == k || joint.axis.0[i] == 0.0);
             let aligned = (joint.kind == JointKind::Revolute || joint.kind == JointKind::Continuous)
-                .then(|| (0..3).find(|k| joint.axis.0[*k].abs() == 1.0))
+                .then(|| (0..3).find(|k| joint.axis.0[*k].abs() == 1.0 && alone(*k)))
                 .flatten();
             let axes = aligned.map_or([0, 1, 2], |k| [(k + 1) % 3, (k + 2) % 3, k]);
             let parent_axes = parent.map_or([0, 1, 2], |p| nodes[p].axes);
