@@ -1,7 +1,6 @@
 //! Edits of an existing MJCF that leave every other byte alone.
 
 use std::collections::HashMap;
-use std::fmt::Write;
 use std::ops::Range;
 use std::path::Path;
 
@@ -235,7 +234,7 @@ fn spliced(text: &str, mut splices: Vec<(Range<usize>, String)>) -> String {
     let mut from = 0;
     for (range, replacement) in splices {
         out.push_str(&text[from..range.start]);
-        let _ = write!(out, "{replacement}");
+        out.push_str(&replacement);
         from = range.end;
     }
     out.push_str(&text[from..]);

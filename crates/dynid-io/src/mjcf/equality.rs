@@ -95,7 +95,8 @@ fn close(fields: &Fields<'_>, model: &mut Model<'_>, kind: CutKind) -> Result<()
         return Ok(());
     }
     if a.link == b.link {
-        return Err(fields.value("name", "two bodies that move against each other"));
+        let reason = "it holds a body to itself";
+        return Err(fields.refuse("", reason, REMOVE_OR_DISABLE));
     }
     let plain = if kind == CutKind::Fixed { "weld" } else { "connect" };
     let name = fields.text("name").filter(|n| !n.is_empty()).map(str::to_owned);

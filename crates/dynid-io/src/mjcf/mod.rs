@@ -14,6 +14,7 @@ mod loops;
 mod mesh;
 mod model;
 mod orientation;
+mod parts;
 mod read;
 mod walk;
 mod write;

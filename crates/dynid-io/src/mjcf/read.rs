@@ -12,6 +12,7 @@ use super::document::{Document, EditedFile};
 use super::equality;
 use super::mesh::Meshes;
 use super::model::Model;
+use super::parts::Parts;
 use super::walk::{Count, Walk};
 use crate::digest::SourceFile;
 use crate::robot_error::RobotFileError;
@@ -90,6 +91,7 @@ pub(super) fn model<'a>(
         compiler: &compiler,
         options: &options,
         defaults: &defaults,
+        parts: Parts { document, compiler: &compiler, defaults: &defaults, count: 0 },
         meshes: Meshes::of(document, &compiler, &defaults, folder)?,
         model,
         count: Count::default(),

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use dynid_model::{Inertia, JointDescription, JointKind, Limits, LinkDescription, Placement, Vec3};
 
+use super::JointParameters;
 use super::compiler::{Compiler, Options};
 use super::defaults::Defaults;
 use super::document::{Document, Element};
@@ -12,14 +13,11 @@ use super::inertia::{self, Matter};
 use super::joint::{self, JointElement, MovingJoint};
 use super::mesh::Meshes;
 use super::model::{BodyFrame, BodyPart, JointPart, Model, WORLD};
-use super::orientation::{euler, placement};
-use super::{FLATTEN, JointParameters};
+use super::orientation::placement;
+use super::parts::{Around, Part, Parts};
 use crate::excerpt::excerpt;
 use crate::robot_error::RobotFileError;
 use crate::{ElementSetting, SettingValue, TieSpec};
-
-/// Most bodies, joints, shapes and frames of a model, copies counted.
-const MAX_PARTS: usize = 100_000;
 
 /// What reads the bodies of a model.
 pub(super) struct Walk<'w, 'a> {
@@ -27,6 +25,7 @@ pub(super) struct Walk<'w, 'a> {
     pub(super) compiler: &'w Compiler<'a>,
     pub(super) options: &'w Options,
     pub(super) defaults: &'w Defaults<'a>,
+    pub(super) parts: Parts<'w, 'a>,
     pub(super) meshes: Meshes<'w>,
     pub(super) model: Model<'a>,
     pub(super) count: Count<'a>,
@@ -37,18 +36,8 @@ pub(super) struct Walk<'w, 'a> {
 pub(super) struct Count<'a> {
     bodies: usize,
     joints: usize,
-    parts: usize,
     /// Elements of named bodies and joints.
     names: HashMap<(&'static str, String), &'a Element>,
-}
-
-/// What stands around an element: class, frames, and the suffix of copies.
-#[derive(Clone, Debug)]
-struct Around {
-    class: Option<usize>,
-    frame: Placement,
-    suffix: String,
-    copied: bool,
 }
 
 /// What a body hangs on.
@@ -57,21 +46,14 @@ struct Carrier {
     frame: BodyFrame,
 }
 
-/// An element of a body with what stands around it.
-struct Part<'a> {
-    element: &'a Element,
-    around: Around,
-}
-
 impl<'a: 'w, 'w> Walk<'w, 'a> {
     /// Reads all bodies.
     pub(super) fn world(&mut self) -> Result<(), RobotFileError> {
         let world = self.model.frames[WORLD].clone();
         let carrier = Carrier { link: WORLD.to_owned(), frame: world };
-        let around =
-            Around { class: None, frame: Placement::identity(), suffix: String::new(), copied: false };
+        let around = Around::nothing();
         for section in self.document.sections("worldbody") {
-            let parts = self.parts(section, &around)?;
+            let parts = self.parts.inside(section, &around)?;
             for part in parts {
                 match part.element.name.as_str() {
                     "body" => self.body(&part, &carrier)?,
@@ -100,93 +82,6 @@ impl<'a: 'w, 'w> Walk<'w, 'a> {
     fn fields(&self, part: &Part<'a>) -> Result<Fields<'a>, RobotFileError> {
         let behind = self.defaults.behind(part.element, part.around.class)?;
         Ok(Fields::new(self.document, part.element, behind))
-    }
-
-    /// Elements inside a body, frames and copies resolved.
-    fn parts(&mut self, holder: &'a Element, around: &Around) -> Result<Vec<Part<'a>>, RobotFileError> {
-        let mut out = Vec::new();
-        self.collect(holder, around, &mut out)?;
-        Ok(out)
-    }
-
-    fn collect(
-        &mut self,
-        holder: &'a Element,
-        around: &Around,
-        out: &mut Vec<Part<'a>>,
-    ) -> Result<(), RobotFileError> {
-        for element in &holder.children {
-            self.counted(element)?;
-            let fields = Fields::alone(self.document, element);
-            match element.name.as_str() {
-                "frame" => {
-                    let inner = Around {
-                        class: self.defaults.class(element, "childclass")?.or(around.class),
-                        frame: around.frame.then(&placement(&fields, self.compiler)?),
-                        ..around.clone()
-                    };
-                    self.collect(element, &inner, out)?;
-                }
-                "replicate" => self.copies(element, &fields, around, out)?,
-                "body" | "joint" | "freejoint" | "inertial" | "geom" | "site" => {
-                    out.push(Part { element, around: around.clone() });
-                }
-                "camera" | "light" => {}
-                "attach" | "composite" | "flexcomp" => {
-                    let reason = "it stands for bodies that MuJoCo makes";
-                    return Err(fields.refuse("", reason, FLATTEN));
-                }
-                "plugin" => {
-                    let reason = "a plugin acts on the body by forces that are not known here";
-                    return Err(fields.refuse("", reason, "remove it, if the robot does not need it"));
-                }
-                _ => {
-                    let reason = "MJCF has no such element inside a body";
-                    return Err(fields.refuse("", reason, "correct its name"));
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn counted(&mut self, element: &Element) -> Result<(), RobotFileError> {
-        self.count.parts += 1;
-        if self.count.parts <= MAX_PARTS {
-            return Ok(());
-        }
-        let what = "bodies, joints, shapes and frames";
-        Err(RobotFileError::TooMany { at: self.document.place(element, 0), what, limit: MAX_PARTS })
-    }
-
-    /// The copies of a `<replicate>`.
-    fn copies(
-        &mut self,
-        element: &'a Element,
-        fields: &Fields<'a>,
-        around: &Around,
-        out: &mut Vec<Part<'a>>,
-    ) -> Result<(), RobotFileError> {
-        let expected = format!("a whole number from 1 to {MAX_PARTS}");
-        let count = fields.text("count").and_then(|c| c.trim().parse::<usize>().ok());
-        let count =
-            count.filter(|c| (1..=MAX_PARTS).contains(c)).ok_or_else(|| fields.value("count", expected))?;
-        let (offset, angles) = (fields.vector("offset")?, fields.numbers("euler")?.unwrap_or_default());
-        let width = count.to_string().len();
-        let separator = fields.text("sep").unwrap_or("");
-        let mut at = Vec3::zero();
-        for k in 0..count {
-            self.counted(element)?;
-            let rotation = euler(angles.map(|a| a * k as f64), self.compiler);
-            let inner = Around {
-                class: self.defaults.class(element, "childclass")?.or(around.class),
-                frame: around.frame.then(&Placement { rotation, translation: at }),
-                suffix: format!("{separator}{k:0width$}{}", around.suffix),
-                copied: true,
-            };
-            self.collect(element, &inner, out)?;
-            at = at + rotation.mul_vec(offset);
-        }
-        Ok(())
     }
 
     /// The name of a body or joint: its own, or one by its number.
@@ -233,7 +128,7 @@ impl<'a: 'w, 'w> Walk<'w, 'a> {
             ..part.around.clone()
         };
         let own = part.around.frame.then(&placement(&fields, self.compiler)?);
-        let parts = self.parts(element, &around)?;
+        let parts = self.parts.inside(element, &around)?;
         let joints = self.joints(&parts)?;
         let on_parent = carrier.frame.in_link.then(&own);
         let anchor = self.chain(&name, &joints, carrier, on_parent)?;
@@ -407,7 +302,11 @@ impl<'a: 'w, 'w> Walk<'w, 'a> {
         let inertia = inertia.map(|i| i.in_frame(&frame.in_link));
         if inertia.is_some_and(|i| !i.0.iter().all(|x| x.is_finite())) {
             let fields = Fields::alone(self.document, part.element);
-            return Err(fields.value("", "an inertia that does not overflow"));
+            return Err(fields.refuse(
+                "",
+                "its inertia overflows about the frame of its link",
+                "correct its numbers",
+            ));
         }
         self.model.description.links.push(LinkDescription { name: name.to_owned(), inertia });
         self.model.bodies.push(BodyPart {
