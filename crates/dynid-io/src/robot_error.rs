@@ -181,7 +181,7 @@ pub enum RobotFileError {
         /// Why.
         reason: String,
         /// What to do about it.
-        hint: String,
+        hint: &'static str,
     },
     /// A link or joint that is referred to does not exist.
     #[error("{at}: {context}: expected the name of a {kind}, found `{name}`")]
@@ -252,7 +252,7 @@ impl RobotFileError {
                     .into()
             }
             E::JointKind { .. } => "correct the `type` of the joint".into(),
-            E::NotCarried { hint, .. } => hint.clone(),
+            E::NotCarried { hint, .. } => (*hint).to_owned(),
             E::UnknownName { meant: Some(meant), .. } => format!("did you mean `{meant}`?"),
             E::UnknownName { kind, .. } => format!("use the {kind} names of the robot file"),
             E::Unwritable { .. } => "keep the robot as TOML".into(),

@@ -76,13 +76,13 @@ impl<'a> Fields<'a> {
     }
 
     /// That something cannot be carried; `key` is the attribute that says it, or nothing.
-    pub(super) fn refuse(&self, key: &str, reason: impl Into<String>, hint: &str) -> RobotFileError {
+    pub(super) fn refuse(&self, key: &str, reason: impl Into<String>, hint: &'static str) -> RobotFileError {
         let (element, offset) = self.find(key).map_or((self.element, 0), |(e, a)| (e, a.offset));
         RobotFileError::NotCarried {
             at: self.document.place(element, offset),
             owner: self.owner(),
             reason: reason.into(),
-            hint: hint.to_owned(),
+            hint,
         }
     }
 
