@@ -382,11 +382,11 @@ pub enum LogFileError {
         /// Format of the file.
         format: &'static str,
         /// Members that there are.
-        expected: String,
+        expected: Box<str>,
         /// Member that was asked for.
-        found: String,
+        found: Box<str>,
         /// Name of the file with a member of it.
-        example: String,
+        example: Box<str>,
     },
     /// A column that shall be ignored does not exist.
     #[error("{file}: column `{column}` to be ignored: expected a column of the header, found none")]

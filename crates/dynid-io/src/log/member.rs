@@ -48,7 +48,13 @@ impl OpenFault {
             OpenFault::Damaged(reason) => LogFileError::Damaged { file: path, format, reason },
             OpenFault::Member { expected, found, example } => {
                 let example = example.map_or_else(|| path.clone(), |member| format!("{path}#{member}"));
-                LogFileError::Member { file: path, format, expected, found, example }
+                LogFileError::Member {
+                    file: path,
+                    format,
+                    expected: expected.into(),
+                    found: found.into(),
+                    example: example.into(),
+                }
             }
         }
     }
