@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import collections
+import io
 import json
 import os
+import pickle
 import sqlite3
+import sys
+import types
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -80,6 +86,60 @@ def test_types_of_numpy(tmp_path: Path) -> None:
     read = dynid.read_columns(tmp_path / "kinds.npz")
     for name, values in arrays.items():
         np.testing.assert_array_equal(read[name], values.astype(float))
+
+
+def write_torch(path: Path, tensors: dict[str, NDArray[Any]]) -> None:
+    """Writes tensors as `torch.save` does, which pickles names of functions that put them together; modules stand in for those of PyTorch."""
+    torch, utils = types.ModuleType("torch"), types.ModuleType("torch._utils")
+
+    def _rebuild_tensor_v2() -> None: ...
+
+    _rebuild_tensor_v2.__module__, _rebuild_tensor_v2.__qualname__ = "torch._utils", "_rebuild_tensor_v2"
+    utils._rebuild_tensor_v2 = _rebuild_tensor_v2  # type: ignore[attr-defined]
+    kinds = {"f4": "FloatStorage", "f8": "DoubleStorage", "i8": "LongStorage"}
+    for name in kinds.values():
+        setattr(torch, name, type(name, (), {"__module__": "torch", "__qualname__": name}))
+
+    class Storage:
+        def __init__(self, key: int, values: NDArray[Any]) -> None:
+            self.id = ("storage", getattr(torch, kinds[values.dtype.str[1:]]), str(key), "cpu", values.size)
+
+    class Tensor:
+        def __init__(self, storage: Storage, values: NDArray[Any]) -> None:
+            self.parts = (storage, 0, values.shape, tuple(s // values.itemsize for s in values.strides), False, collections.OrderedDict())
+
+        def __reduce__(self) -> Any:
+            return _rebuild_tensor_v2, self.parts
+
+    class Pickler(pickle.Pickler):
+        def persistent_id(self, value: Any) -> Any:
+            return value.id if isinstance(value, Storage) else None
+
+    modules = {"torch": torch, "torch._utils": utils}
+    sys.modules.update(modules)
+    try:
+        buffer = io.BytesIO()
+        made = {name: Tensor(Storage(key, values), values) for key, (name, values) in enumerate(tensors.items())}
+        Pickler(buffer, protocol=2).dump({**made, "note": "x", "rate": 200.0, "nested": {"more": [1, 2]}})
+    finally:
+        for name in modules:
+            del sys.modules[name]
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as file:
+        file.writestr("archive/data.pkl", buffer.getvalue())
+        file.writestr("archive/byteorder", "little")
+        for key, values in enumerate(tensors.values()):
+            # Numbers as they lie: of a turned array, turned.
+            file.writestr(f"archive/data/{key}", values.tobytes(order="A"))
+
+
+def test_torch(indy7: dynid.Robot, signals: Signals, tmp_path: Path) -> None:
+    t, q, tau = signals
+    write_torch(tmp_path / "a.pt", {"time": t, "dof_pos": q, "torque": np.asfortranarray(tau), "step": np.arange(len(t))})
+    columns = {"position": "dof_pos", "effort": "torque"}
+    check(indy7, tmp_path / "a.pt", signals, None, **columns)
+    np.testing.assert_array_equal(dynid.read_columns(tmp_path / "a.pt")["step"], np.arange(len(t)))
+    write_torch(tmp_path / "b.pt", {"time": t.astype("f4"), "dof_pos": q.astype("f4")})
+    np.testing.assert_array_equal(dynid.read_columns(tmp_path / "b.pt")["dof_pos[3]"], q[:, 3].astype("f4"))
 
 
 @pytest.mark.parametrize("compressed", [False, True])
@@ -332,6 +392,7 @@ def small_files(folder: Path) -> list[Path]:
     np.savez(made("a.npz"), t=t, q=q, k=np.arange(count))
     np.savez_compressed(made("b.npz"), t=t, q=q)
     np.save(made("c.npy"), q)
+    write_torch(made("a.pt"), {"t": t, "q": q})
     for ending in ["parquet", "npz", "csv.gz"]:
         target = made(f"own.{ending}")
         assert dynid._native.command_line(["dynid", "convert", str(folder / "a.npz"), str(target), "--quiet"]) == 0

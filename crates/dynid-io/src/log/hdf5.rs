@@ -2,19 +2,23 @@
 
 use std::io::{Seek, SeekFrom};
 
-use hdf5_pure::{DType, File, Group};
+use hdf5_pure::{Chunk, DType, Dataset, File, Group};
 
 use super::arrays::{Array, ArrayFile, Holds, Values};
 use crate::input::Opened;
 
 /// Deepest nesting of groups.
 const MAX_DEPTH: usize = 16;
+/// Largest chunk, bytes.
+const MAX_CHUNK: u64 = 512 << 20;
 /// Most datasets of a file.
 const MAX_DATASETS: usize = 50_000;
 
 /// A file of datasets, or one of its groups.
 pub(super) struct Hdf5 {
     file: File,
+    /// Bytes of the file.
+    length: u64,
     /// Path per array.
     paths: Vec<String>,
     arrays: Vec<Array>,
@@ -24,6 +28,7 @@ impl Hdf5 {
     /// Lists the datasets below a group, `""` for the whole file.
     pub(super) fn open(mut file: Opened, group: &str) -> Result<Self, String> {
         file.seek(SeekFrom::Start(0)).map_err(|e| e.to_string())?;
+        let length = file.length().map_err(|e| e.to_string())?;
         let source = hdf5_pure::ReadSeekSource::new(file).map_err(|e| e.to_string())?;
         let file = File::from_source(source).map_err(|e| e.to_string())?;
         let mut found = Found { paths: Vec::new(), arrays: Vec::new() };
@@ -32,7 +37,29 @@ impl Hdf5 {
             if group.is_empty() { file.root() } else { file.group(group).map_err(|e| e.to_string())? };
         found.list(&root, group, "", 0)?;
         let Found { paths, arrays } = found;
-        Ok(Hdf5 { file, paths, arrays })
+        Ok(Hdf5 { file, length, paths, arrays })
+    }
+
+    /// Chunks lie within the file, and are of a size that can be read: the library reserves what they promise.
+    fn check_chunks(&self, dataset: &Dataset) -> Result<(), String> {
+        if !dataset.is_chunked() {
+            return Ok(());
+        }
+        let text = |e: hdf5_pure::Error| e.to_string();
+        let size = dataset.chunk_shape().map_err(text)?.unwrap_or_default();
+        let size = size.iter().fold(dataset.element_size().map_err(text)?, |n, m| n.saturating_mul(*m));
+        if size > MAX_CHUNK {
+            return Err(format!("expected chunks of at most {MAX_CHUNK} bytes, found {size}"));
+        }
+        let chunks = dataset.chunks().map_err(text)?;
+        let is_outside = |c: &&Chunk| c.address.saturating_add(c.storage_size) > self.length;
+        match chunks.iter().find(is_outside) {
+            None => Ok(()),
+            Some(chunk) => Err(format!(
+                "expected chunks within the file, found one of {} bytes at byte {}",
+                chunk.storage_size, chunk.address
+            )),
+        }
     }
 
     /// Groups beside one another that hold the same datasets, such as the demonstrations of a dataset: their paths.
@@ -113,6 +140,8 @@ impl ArrayFile for Hdf5 {
 
     fn load(&mut self, array: usize) -> Result<Values, String> {
         let path = &self.paths[array];
+        let opened = self.file.dataset(path).map_err(|e| e.to_string());
+        opened.and_then(|d| self.check_chunks(&d)).map_err(|e| format!("dataset `{path}`: {e}"))?;
         let read = || {
             let dataset = self.file.dataset(path)?;
             Ok::<_, hdf5_pure::Error>(match dataset.dtype()? {

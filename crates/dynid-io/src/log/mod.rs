@@ -10,6 +10,8 @@
 mod arrays;
 #[cfg(feature = "bags")]
 mod bag;
+#[cfg(feature = "numpy")]
+mod binary;
 mod format;
 #[cfg(feature = "hdf5")]
 mod hdf5;
@@ -22,6 +24,8 @@ mod open;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod text;
+#[cfg(feature = "numpy")]
+mod torch;
 
 use serde::{Deserialize, Serialize};
 

@@ -7,6 +7,7 @@ use std::io::{Read, Seek, SeekFrom};
 use zip::ZipArchive;
 
 use super::arrays::{Array, ArrayFile, Holds, Values};
+use super::binary::{Kind, Numbers};
 use crate::input::Opened;
 
 /// Longest header that is read, bytes.
@@ -17,22 +18,16 @@ const MAX_ARRAYS: usize = 10_000;
 /// What the header of an array says.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Header {
-    kind: Kind,
+    entries: Entries,
     big_endian: bool,
     column_major: bool,
     shape: Vec<usize>,
 }
 
+/// What an array is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Half,
-    Single,
-    Double,
-    Signed(usize),
-    Unsigned(usize),
-    Bool,
-    /// Times in a unit of `np.datetime64` or `np.timedelta64`.
-    Stamp,
+enum Entries {
+    Numbers(Kind),
     Text,
 }
 
@@ -75,8 +70,7 @@ pub(super) struct Npz {
 }
 
 impl Npz {
-    pub(super) fn open(file: Opened) -> Result<Self, String> {
-        let mut zip = ZipArchive::new(file).map_err(|e| e.to_string())?;
+    pub(super) fn open(mut zip: ZipArchive<Opened>) -> Result<Self, String> {
         if zip.len() > MAX_ARRAYS {
             return Err(format!("expected at most {MAX_ARRAYS} arrays, found {}", zip.len()));
         }
@@ -106,7 +100,7 @@ impl ArrayFile for Npz {
 }
 
 fn array_of(name: &str, header: &Header) -> Array {
-    let holds = if header.kind == Kind::Text { Holds::Texts } else { Holds::Numbers };
+    let holds = if header.entries == Entries::Text { Holds::Texts } else { Holds::Numbers };
     Array { name: name.to_owned(), shape: header.shape.clone(), holds, entries: Vec::new() }
 }
 
@@ -166,8 +160,11 @@ fn parse_header(text: &str) -> Result<Header, String> {
         ("i", n @ (1 | 2 | 4 | 8)) => Kind::Signed(n),
         ("u", n @ (1 | 2 | 4 | 8)) => Kind::Unsigned(n),
         ("b", 1) => Kind::Bool,
-        ("M" | "m", _) => Kind::Stamp,
-        ("U" | "S", _) => Kind::Text,
+        // Times in a unit of `np.datetime64` or `np.timedelta64`.
+        ("M" | "m", _) => Kind::Signed(8),
+        ("U" | "S", _) => {
+            return Ok(Header { entries: Entries::Text, big_endian: false, column_major, shape });
+        }
         ("O", _) => {
             return Err(
                 "expected an array of numbers, found Python objects, whose reading would run code".to_owned()
@@ -175,52 +172,16 @@ fn parse_header(text: &str) -> Result<Header, String> {
         }
         _ => return Err(format!("expected an array of numbers, found the type `{descr}`")),
     };
-    Ok(Header { kind, big_endian: order == ">", column_major, shape })
+    Ok(Header { entries: Entries::Numbers(kind), big_endian: order == ">", column_major, shape })
 }
 
 fn read_values(file: &mut impl Read, header: &Header) -> Result<Values, String> {
-    let count = header
-        .shape
-        .iter()
-        .try_fold(1_usize, |n, m| n.checked_mul(*m))
-        .ok_or("expected a shape that fits memory")?;
-    let size = match header.kind {
-        Kind::Half => 2,
-        Kind::Single => 4,
-        Kind::Double | Kind::Stamp => 8,
-        Kind::Signed(n) | Kind::Unsigned(n) => n,
-        Kind::Bool => 1,
-        Kind::Text => return Err("expected numbers, found texts".to_owned()),
+    let count = header.shape.iter().try_fold(1_usize, |n, m| n.checked_mul(*m));
+    let Entries::Numbers(kind) = header.entries else {
+        return Err("expected numbers, found texts".to_owned());
     };
-    // What the header promises is taken only as it arrives.
-    let mut bytes = Vec::new();
-    let wanted = count.checked_mul(size).ok_or("expected a shape that fits memory")?;
-    file.take(wanted as u64).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
-    if bytes.len() < wanted {
-        return Err(format!("expected {wanted} bytes of numbers, found {}", bytes.len()));
-    }
-    let word = |chunk: &[u8]| {
-        let mut word = [0; 8];
-        for (k, byte) in chunk.iter().enumerate() {
-            word[if header.big_endian { chunk.len() - 1 - k } else { k }] = *byte;
-        }
-        u64::from_le_bytes(word)
-    };
-    let words = bytes.chunks_exact(size).map(word);
-    let values = match header.kind {
-        Kind::Half => Values::Float(words.map(|w| half(w as u16)).collect()),
-        Kind::Single => Values::Float(words.map(|w| f64::from(f32::from_bits(w as u32))).collect()),
-        Kind::Double => Values::Float(words.map(f64::from_bits).collect()),
-        Kind::Unsigned(_) | Kind::Bool => match words.clone().map(i64::try_from).collect() {
-            Ok(whole) => Values::Whole(whole),
-            Err(_) => Values::Float(words.map(|w| w as f64).collect()),
-        },
-        Kind::Signed(n) => {
-            let shift = 64 - 8 * n as u32;
-            Values::Whole(words.map(|w| ((w << shift) as i64) >> shift).collect())
-        }
-        Kind::Stamp | Kind::Text => Values::Whole(words.map(|w| w as i64).collect()),
-    };
+    let numbers = Numbers { kind, big_endian: header.big_endian };
+    let values = numbers.read(file, count.ok_or("expected a shape that fits memory")?)?;
     Ok(match (header.column_major, header.shape.as_slice()) {
         (true, [rows, columns]) => turned(&values, *rows, *columns),
         _ => values,
@@ -236,18 +197,6 @@ fn turned(values: &Values, rows: usize, columns: usize) -> Values {
     }
 }
 
-/// The number of IEEE 754 half precision with these bits.
-fn half(bits: u16) -> f64 {
-    let (exponent, fraction) = (i32::from(bits >> 10 & 0x1f), f64::from(bits & 0x3ff));
-    let size = match exponent {
-        0 => fraction * 2f64.powi(-24),
-        31 if fraction == 0.0 => f64::INFINITY,
-        31 => f64::NAN,
-        _ => (1024.0 + fraction) * 2f64.powi(exponent - 25),
-    };
-    if bits >> 15 == 1 { -size } else { size }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -257,7 +206,12 @@ mod tests {
         let header = parse_header("{'descr': '<f8', 'fortran_order': True, 'shape': (3, 4), }").unwrap();
         assert_eq!(
             header,
-            Header { kind: Kind::Double, big_endian: false, column_major: true, shape: vec![3, 4] }
+            Header {
+                entries: Entries::Numbers(Kind::Double),
+                big_endian: false,
+                column_major: true,
+                shape: vec![3, 4]
+            }
         );
         assert_eq!(
             parse_header("{'descr': '>i2', 'fortran_order': False, 'shape': (7,), }").unwrap().shape,
@@ -276,13 +230,5 @@ mod tests {
         ] {
             parse_header(text).unwrap_err();
         }
-    }
-
-    #[test]
-    fn halves_are_exact() {
-        assert_eq!(
-            [0x3c00, 0xc000, 0x3555, 0x0001].map(half),
-            [1.0, -2.0, 0.333_251_953_125, 2f64.powi(-24)]
-        );
     }
 }

@@ -9,6 +9,8 @@ use super::arrays::{ArrayFile, ArrayLog};
 use super::bag::BagFormat;
 use super::member::{LogFile, OpenFault};
 use super::text::LogText;
+#[cfg(feature = "numpy")]
+use super::torch::Torch;
 use super::{LogOptions, LogSource};
 use crate::csv::LogFileError;
 use crate::digest::Hashed;
@@ -26,6 +28,7 @@ enum Container {
     RosBag,
     Sqlite,
     Arrow,
+    Zstd,
 }
 
 impl Container {
@@ -42,6 +45,7 @@ impl Container {
             () if begins(b"#ROSBAG V") => Container::RosBag,
             () if begins(b"SQLite format 3\0") => Container::Sqlite,
             () if begins(b"ARROW1") => Container::Arrow,
+            () if begins(b"\x28\xb5\x2f\xfd") => Container::Zstd,
             () => return None,
         })
     }
@@ -58,6 +62,7 @@ impl Container {
             Container::RosBag => ("ROS 1 bag", "bags"),
             Container::Sqlite => ("ROS 2 bag in SQLite", "bags"),
             Container::Arrow => ("Arrow file", ""),
+            Container::Zstd => ("file compressed with zstd", ""),
         }
     }
 }
@@ -167,10 +172,14 @@ impl Container {
             #[cfg(feature = "numpy")]
             Container::Zip => {
                 no_member()?;
-                (
-                    Box::new(super::numpy::Npz::open(reopened(path).map_err(damaged)?).map_err(damaged)?),
-                    format,
-                )
+                let zip = zip::ZipArchive::new(reopened(path).map_err(damaged)?);
+                let zip = zip.map_err(|e| damaged(e.to_string()))?;
+                match Torch::pickle_of(&zip) {
+                    Some(pickle) => {
+                        (Box::new(Torch::open(zip, &pickle).map_err(damaged)?), "PyTorch tensors")
+                    }
+                    None => (Box::new(super::numpy::Npz::open(zip).map_err(damaged)?), format),
+                }
             }
             Container::Matlab => {
                 no_member()?;
@@ -216,7 +225,10 @@ impl Container {
                         file: name,
                         format,
                         expected: "a format that is read".to_owned(),
-                        found: "one that is not: write it as MCAP, Parquet, HDF5 or CSV".to_owned(),
+                        found: match self {
+                            Container::Zstd => "one to decompress first: `zstd -d FILE`".to_owned(),
+                            _ => "one that is not: write it as MCAP, Parquet, HDF5 or CSV".to_owned(),
+                        },
                     },
                     _ => LogFileError::NotBuilt { file: name, format, feature },
                 });

@@ -73,7 +73,7 @@ fn stated(
     let required = |key: &str| fields.missing(format!("an attribute `{key}`"));
     let com = Vec3(fields.numbers("pos")?.ok_or_else(|| required("pos"))?);
     let [mass] = fields.numbers("mass")?.ok_or_else(|| required("mass"))?;
-    let mass = fields.not_negative("mass", mass)?;
+    // Whether a body can have this mass is decided where bodies are put together, as of a URDF.
     let tensor = match (fields.numbers("fullinertia")?, fields.numbers("diaginertia")?) {
         (Some(_), Some(_)) => return Err(fields.value("fullinertia", "no `diaginertia` beside it")),
         (Some([xx, yy, zz, xy, xz, yz]), None) => {
