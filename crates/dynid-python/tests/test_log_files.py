@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import importlib
 import io
 import json
 import os
@@ -82,7 +83,7 @@ def test_types_of_numpy(tmp_path: Path) -> None:
     kinds = ["f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", ">i4", ">f4", "?"]
     rng = np.random.default_rng(3)
     arrays = {f"x{k}": rng.integers(0, 100, 50).astype(kind) for k, kind in enumerate(kinds)}
-    np.savez(tmp_path / "kinds.npz", **arrays)
+    np.savez(tmp_path / "kinds.npz", **arrays)  # type: ignore[arg-type]
     read = dynid.read_columns(tmp_path / "kinds.npz")
     for name, values in arrays.items():
         np.testing.assert_array_equal(read[name], values.astype(float))
@@ -106,7 +107,7 @@ def write_torch(path: Path, tensors: dict[str, NDArray[Any]]) -> None:
 
     class Tensor:
         def __init__(self, storage: Storage, values: NDArray[Any]) -> None:
-            self.parts = (storage, 0, values.shape, tuple(s // values.itemsize for s in values.strides), False, collections.OrderedDict())
+            self.parts: tuple[Any, ...] = (storage, 0, values.shape, tuple(s // values.itemsize for s in values.strides), False, collections.OrderedDict())
 
         def __reduce__(self) -> Any:
             return _rebuild_tensor_v2, self.parts
@@ -157,7 +158,8 @@ def test_matlab(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Pat
 def test_hdf5(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     t, q, tau = signals
-    for k, settings in enumerate([{}, {"compression": "gzip"}, {"compression": "lzf"}, {"compression": "gzip", "shuffle": True, "chunks": True}]):
+    ways: list[dict[str, Any]] = [{}, {"compression": "gzip"}, {"compression": "lzf"}, {"compression": "gzip", "shuffle": True, "chunks": True}]
+    for k, settings in enumerate(ways):
         path = tmp_path / f"{k}.h5"
         with h5py.File(path, "w") as file:
             for name, values in [("t", t), ("q", q), ("tau", tau)]:
@@ -379,6 +381,14 @@ def test_what_convert_writes_is_read_by_others_and_by_dynid(indy7: dynid.Robot, 
         np.testing.assert_array_equal([m.ros_msg.position[1] for m in messages], q[:, 1])
 
 
+def found(module: str) -> Any:
+    """A module, if it is installed."""
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        return None
+
+
 def small_files(folder: Path) -> list[Path]:
     """A small log in every format of which there is a writer."""
     count = 40
@@ -396,31 +406,18 @@ def small_files(folder: Path) -> list[Path]:
     for ending in ["parquet", "npz", "csv.gz"]:
         target = made(f"own.{ending}")
         assert dynid._native.command_line(["dynid", "convert", str(folder / "a.npz"), str(target), "--quiet"]) == 0
-    try:
-        import scipy.io
-
-        scipy.io.savemat(made("a.mat"), {"t": t, "q": q, "data": {"x": t, "name": "arm"}})
-        scipy.io.savemat(made("b.mat"), {"t": t, "data": {"q": q}}, do_compression=True)
-    except ImportError:
-        pass
-    try:
-        import h5py
-
+    if scipy_io := found("scipy.io"):
+        scipy_io.savemat(made("a.mat"), {"t": t, "q": q, "data": {"x": t, "name": "arm"}})
+        scipy_io.savemat(made("b.mat"), {"t": t, "data": {"q": q}}, do_compression=True)
+    if h5py := found("h5py"):
         for k, settings in enumerate([{}, {"compression": "gzip", "chunks": (10,)}]):
             with h5py.File(made(f"{k}.h5"), "w") as file:
                 file.create_dataset("g/t", data=t, **settings)
                 file["g/q"] = q
-    except ImportError:
-        pass
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
+    if (pa := found("pyarrow")) and (pq := found("pyarrow.parquet")):
         table = pa.table({"t": t, "q": pa.array(list(q)), "n": pa.array([None, *t[1:]]), "s": ["x"] * count})
-        for compression in ["none", "snappy", "gzip", "lz4", "zstd"]:
-            pq.write_table(table, made(f"{compression}.parquet"), compression=compression, row_group_size=15)
-    except ImportError:
-        pass
+        for name in ["none", "snappy", "gzip", "lz4", "zstd"]:
+            pq.write_table(table, made(f"{name}.parquet"), compression=name, row_group_size=15)
     with sqlite3.connect(made("a.db3")) as base:
         base.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,serialization_format TEXT NOT NULL)")
         base.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,timestamp INTEGER NOT NULL, data BLOB NOT NULL)")
@@ -429,33 +426,26 @@ def small_files(folder: Path) -> list[Path]:
             data = b"\0\1\0\0" + np.float64(row).tobytes() + b"\0" * (6000 if row == 7 else 0)
             base.execute("INSERT INTO messages(topic_id,timestamp,data) VALUES(1,?,?)", (START + row, data))
     base.close()
-    try:
-        from mcap.writer import CompressionType
-        from mcap_ros2.writer import Writer
-
-        for compression in CompressionType:
+    if (mcap := found("mcap.writer")) and (ros2 := found("mcap_ros2.writer")):
+        for compression in mcap.CompressionType:
             with open(made(f"{compression.name}.mcap"), "wb") as raw:
-                writer = Writer(raw, compression=compression, chunk_size=1000)
+                writer = ros2.Writer(raw, compression=compression, chunk_size=1000)
                 schema = writer.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
                 for row in range(count):
                     message = {"header": {"stamp": stamp(START + row)}, "name": ["a", "b"], "position": list(q[row]), "velocity": [], "effort": [0.0, 1.0]}
                     writer.write_message("/j", schema, message, log_time=START + row, publish_time=START)
                 writer.finish()
-        from rosbags.rosbag1 import Writer as BagWriter
-        from rosbags.typesys import Stores, get_typestore
-
-        store = get_typestore(Stores.ROS1_NOETIC)
+    if (rosbag1 := found("rosbags.rosbag1")) and (typesys := found("rosbags.typesys")):
+        store = typesys.get_typestore(typesys.Stores.ROS1_NOETIC)
         number = store.types["std_msgs/msg/Float64"]
-        for compression in [None, BagWriter.CompressionFormat.LZ4, BagWriter.CompressionFormat.BZ2]:
-            bag = BagWriter(made(f"{compression}.bag"))
-            if compression is not None:
-                bag.set_compression(compression)
+        for way in [None, rosbag1.Writer.CompressionFormat.LZ4, rosbag1.Writer.CompressionFormat.BZ2]:
+            bag = rosbag1.Writer(made(f"{way}.bag"))
+            if way is not None:
+                bag.set_compression(way)
             with bag:
                 connection = bag.add_connection("/x", number.__msgtype__, typestore=store)
                 for row in range(count):
                     bag.write(connection, START + row, store.serialize_ros1(number(float(row)), number.__msgtype__))
-    except ImportError:
-        pass
     return out
 
 

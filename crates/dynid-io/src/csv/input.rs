@@ -77,20 +77,25 @@ impl Read for Counted {
 }
 
 impl Input {
-    /// Opens a file; gzip is told by its first two bytes.
+    /// Opens a file.
     pub(crate) fn open(path: &Path, bounds: Bounds) -> io::Result<Self> {
         let mut file = input::open(path)?;
-        let mut magic = Vec::with_capacity(2);
-        (&mut file).take(2).read_to_end(&mut magic)?;
-        let is_gzip = magic == [0x1f, 0x8b];
-        let file = Whole { front: magic, file };
+        let mut front = Vec::with_capacity(2);
+        (&mut file).take(2).read_to_end(&mut front)?;
+        Ok(Self::of(front, file, bounds))
+    }
+
+    /// A file of which the bytes in front, two of them at least, were read; gzip is told by these.
+    pub(crate) fn of(front: Vec<u8>, file: Opened, bounds: Bounds) -> Self {
+        let is_gzip = front.starts_with(&[0x1f, 0x8b]);
+        let file = Whole { front, file };
         let stream = if is_gzip {
             let inner = BufReader::with_capacity(BUFFER_BYTES, Hashed::new(file));
             Stream::Gzip(Box::new(MultiGzDecoder::new(Counted { inner, bytes: 0 })))
         } else {
             Stream::Plain(Hashed::new(file))
         };
-        Ok(Input { stream, bounds, text_bytes: 0 })
+        Input { stream, bounds, text_bytes: 0 }
     }
 
     /// Digest of all bytes of the file, those read so far and those behind them.

@@ -78,6 +78,10 @@ pub fn is_log(path: &Path) -> bool {
     {
         return true;
     }
+    // What is no file gives its bytes once.
+    if !path.is_file() {
+        return false;
+    }
     let mut start = Vec::new();
     let read = fs::File::open(&path).and_then(|file| file.take(16).read_to_end(&mut start));
     read.is_ok() && Container::of(&start).is_some()
@@ -101,7 +105,9 @@ pub fn open(path: impl AsRef<Path>, options: &LogOptions) -> Result<Box<dyn LogS
     let Some(container) = Container::of(&start) else {
         let (format, found) = ("text", file.member.clone().unwrap_or_default());
         return match file.member {
-            None => LogText::open(&file.path, options).map(|log| Box::new(log) as Box<dyn LogSource>),
+            // A pipe cannot be wound back.
+            None => LogText::open(&file.path, start, opened, options)
+                .map(|log| Box::new(log) as Box<dyn LogSource>),
             Some(_) => {
                 let fault =
                     OpenFault::Member { expected: "a log without members".to_owned(), found, example: None };

@@ -120,7 +120,7 @@ fn a_row_reads_alike_on_both_ways() {
 #[test]
 fn no_digit_of_a_stamp_is_lost() {
     let stamp = |k: usize| 1_700_000_000_123_456_789_i64 + 10_000_000 * k as i64 + (k % 3) as i64;
-    let exact = |k: usize| (stamp(k) - stamp(0)) as f64 * 1e-9;
+    let exact = |k: usize| (stamp(k) - stamp(0)) as f64 / 1e9;
     let position = |k: usize| 0.01 * k as f64;
     let nanoseconds = rows("clock,q,tau", |k| format!("{},{},1", stamp(k), position(k)));
     let (signals, time) = understood(&nanoseconds, "j", "time = \"clock\"").unwrap();

@@ -188,10 +188,11 @@ class Estimate:
         text, _, included = self._native.exported("mjcf", "", allow_unphysical)
         if included and path is None:
             raise ValueError(f"to_mjcf: {', '.join(name for name, _ in included)}, which the robot includes, changes as well: give a path")
-        for name, other in included if path is not None else []:
-            target = Path(path).parent / name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            written(target, other)
+        if path is not None:
+            for name, other in included:
+                target = Path(path).parent / name
+                target.parent.mkdir(parents=True, exist_ok=True)
+                written(target, other)
         return written(path, text)
 
     def to_model_json(self, path: str | os.PathLike[str] | None = None) -> str:

@@ -9,6 +9,7 @@ use super::row::{Cells, LineParser, Take};
 use crate::csv::input::{Bounds, Input};
 use crate::csv::lines::Lines;
 use crate::csv::{Delimiter, LogFileError, Table, number, split};
+use crate::input::Opened;
 use crate::log::header::LogHeader;
 use crate::log::{LogOptions, LogSource, Missing, ReadingNote, Wanted};
 
@@ -35,13 +36,17 @@ impl std::fmt::Debug for LogText {
 }
 
 impl LogText {
-    /// Opens a log, gzip-compressed or not, and finds out how it is to be read.
+    /// Finds out how a log, gzip-compressed or not, is to be read. `front`: its first bytes, which were read of it.
     ///
     /// # Errors
     /// [`LogFileError`]: the file cannot be read, has no line, a column name twice, or numbers whose commas may mean two
     /// things.
-    pub(in crate::log) fn open(path: impl AsRef<Path>, options: &LogOptions) -> Result<Self, LogFileError> {
-        let path = path.as_ref();
+    pub(in crate::log) fn open(
+        path: &Path,
+        front: Vec<u8>,
+        opened: Opened,
+        options: &LogOptions,
+    ) -> Result<Self, LogFileError> {
         let file = path.display().to_string();
         let read = &options.read;
         if let Some((first, last)) = read.rows.filter(|(first, last)| *first == 0 || first > last) {
@@ -50,8 +55,7 @@ impl LogText {
         }
         let bounds =
             Bounds { max_bytes: read.max_bytes, max_ratio: read.max_ratio, ratio_grace: read.ratio_grace };
-        let input = Input::open(path, bounds)
-            .map_err(|error| LogFileError::Unreadable { file: file.clone(), error })?;
+        let input = Input::of(front, opened, bounds);
         let mut lines = Lines::new(input, &file, read.max_bytes, read.max_ratio);
         let Some(mut first) = next(&mut lines)? else { return Err(LogFileError::Empty { file }) };
         let mut delimiter = read.delimiter;
