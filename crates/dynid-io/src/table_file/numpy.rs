@@ -14,9 +14,9 @@ use crate::output::{AtomicFile, OutputError};
 const ALIGNMENT: usize = 64;
 
 pub(super) fn write(path: &Path, names: &[String], columns: &[Column]) -> Result<(), OutputError> {
-    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut file = BufWriter::new(AtomicFile::create(path)?);
     let mut fill = || {
-        let mut zip = ZipWriter::new(&mut bytes);
+        let mut zip = ZipWriter::new_stream(&mut file);
         zip.set_comment(GZIP_COMMENT)?;
         let options =
             SimpleFileOptions::default().compression_method(CompressionMethod::Deflated).large_file(true);
@@ -38,7 +38,5 @@ pub(super) fn write(path: &Path, names: &[String], columns: &[Column]) -> Result
         zip.finish().map(|_| ())
     };
     fill().map_err(|e: zip::result::ZipError| unwritable(path, e))?;
-    let mut file = BufWriter::new(AtomicFile::create(path)?);
-    file.write_all(bytes.get_ref()).map_err(|e| unwritable(path, e))?;
     file.into_inner().map_err(|e| unwritable(path, e.into_error()))?.finish()
 }

@@ -232,8 +232,10 @@ impl Parquet {
             let described = chunk.column_descr_ptr();
             let (at, length) = chunk_range(chunk)?;
             let bytes = self.file.get_bytes(at, length).map_err(|e| e.to_string())?;
-            let column =
-                get_column_reader(described.clone(), Box::new(Pages::new(bytes, chunk.compression())));
+            let column = get_column_reader(
+                described.clone(),
+                Box::new(Pages::new(bytes, chunk.compression(), &described)),
+            );
             let levels = (described.max_def_level(), described.max_rep_level());
             match column {
                 ColumnReader::BoolColumnReader(c) => {

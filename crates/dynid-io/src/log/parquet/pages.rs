@@ -6,12 +6,15 @@ use std::io::Read;
 
 use bytes::Bytes;
 use flate2::read::MultiGzDecoder;
-use parquet::basic::{Compression, Encoding};
+use parquet::basic::{Compression, Encoding, Type};
 use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::errors::{ParquetError, Result};
+use parquet::schema::types::ColumnDescriptor;
 
 /// Largest page, bytes.
 const MAX_PAGE: usize = 1 << 30;
+/// The encoding of pages whose numbers are split into streams of bytes.
+const SPLIT: i64 = 9;
 /// Deepest nesting of a header.
 const MAX_DEPTH: usize = 8;
 
@@ -22,14 +25,50 @@ pub(super) struct Pages {
     compression: Compression,
     /// The page that is next, if its header was read: the header, and where its bytes begin.
     next: Option<(Header, usize)>,
+    /// Bytes of a number, and whether pages of the first version begin with levels of repetition and of definition.
+    size: usize,
+    levels: [bool; 2],
     /// Whether a dictionary came before: pages that refer to one need it.
     has_dictionary: bool,
 }
 
 impl Pages {
-    /// `bytes`: all of the column's pages.
-    pub(super) fn new(bytes: Bytes, compression: Compression) -> Self {
-        Pages { bytes, at: 0, compression, next: None, has_dictionary: false }
+    /// `bytes`: all pages of the column that is described.
+    pub(super) fn new(bytes: Bytes, compression: Compression, column: &ColumnDescriptor) -> Self {
+        let size = match column.physical_type() {
+            Type::INT32 | Type::FLOAT => 4,
+            _ => 8,
+        };
+        let levels = [column.max_rep_level() > 0, column.max_def_level() > 0];
+        Pages { bytes, at: 0, compression, next: None, size, levels, has_dictionary: false }
+    }
+
+    /// A page whose numbers are split into streams of first bytes, second bytes, and so on, with its numbers one behind the other. `start`:
+    /// where they begin. The library takes for granted that there are as many as it needs.
+    fn joined(&self, page: &[u8], start: usize) -> Result<Vec<u8>> {
+        let values =
+            page.get(start..).ok_or_else(|| wrong("expected numbers in a page, found its end".to_owned()))?;
+        let count = values.len() / self.size;
+        if count * self.size != values.len() {
+            return Err(wrong(format!(
+                "expected streams of one length in a page, found {} bytes",
+                values.len()
+            )));
+        }
+        let mut out = page[..start].to_vec();
+        out.extend((0..count).flat_map(|k| (0..self.size).map(move |byte| values[byte * count + k])));
+        Ok(out)
+    }
+
+    /// Where the numbers of a page of the first version begin.
+    fn behind_levels(&self, page: &[u8]) -> usize {
+        let mut at = 0;
+        for _ in self.levels.iter().filter(|there| **there) {
+            let length =
+                page.get(at..at + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+            at = at.saturating_add(4).saturating_add(length);
+        }
+        at
     }
 
     /// The header of the next page that holds data or a dictionary.
@@ -117,7 +156,6 @@ fn encoding(number: i64) -> Result<Encoding> {
         6 => Encoding::DELTA_LENGTH_BYTE_ARRAY,
         7 => Encoding::DELTA_BYTE_ARRAY,
         8 => Encoding::RLE_DICTIONARY,
-        9 => Encoding::BYTE_STREAM_SPLIT,
         _ => return Err(wrong(format!("expected an encoding of pages, found the number {number}"))),
     })
 }
@@ -134,11 +172,19 @@ impl PageReader for Pages {
         }
         self.has_dictionary |= matches!(header.kind, Kind::Dictionary { .. });
         let values = u32::try_from(header.values).map_err(|e| wrong(e.to_string()))?;
+        let is_split = header.encoding == SPLIT;
+        let own_encoding = encoding(if is_split { 0 } else { header.encoding });
         Ok(Some(match header.kind {
             Kind::Data { definitions, repetitions } => Page::DataPage {
-                buf: whole(self)?,
+                buf: match is_split {
+                    true => {
+                        let page = whole(self)?;
+                        self.joined(&page, self.behind_levels(&page))?.into()
+                    }
+                    false => whole(self)?,
+                },
                 num_values: values,
-                encoding: encoding(header.encoding)?,
+                encoding: own_encoding?,
                 def_level_encoding: encoding(definitions)?,
                 rep_level_encoding: encoding(repetitions)?,
                 statistics: None,
@@ -161,10 +207,13 @@ impl PageReader for Pages {
                     true => out.extend(self.inflate(&bytes[levels..], header.uncompressed - levels)?),
                     false => out.extend(&bytes[levels..]),
                 }
+                if is_split {
+                    out = self.joined(&out, levels)?;
+                }
                 Page::DataPageV2 {
                     buf: out.into(),
                     num_values: values,
-                    encoding: encoding(header.encoding)?,
+                    encoding: own_encoding?,
                     num_nulls: nulls,
                     num_rows: rows,
                     def_levels_byte_len: definitions as u32,
