@@ -21,6 +21,10 @@ mod signal;
 mod source;
 pub mod states;
 pub mod stream;
+#[cfg_attr(
+    not(all(feature = "bags", feature = "hdf5", feature = "numpy", feature = "parquet")),
+    allow(unused, reason = "a build that leaves formats out has no use for some of what they share")
+)]
 pub mod table_file;
 mod tie;
 pub mod toml_robot;

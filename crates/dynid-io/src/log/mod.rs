@@ -7,6 +7,10 @@
 //! Text is read line by line (`text`); files of arrays and tables (`arrays`) column by column; bags (`bag`) message by
 //! message, their topics joined by time.
 
+#[cfg_attr(
+    not(all(feature = "bags", feature = "hdf5", feature = "numpy", feature = "parquet")),
+    allow(unused, reason = "a build that leaves formats out has no use for some of what they share")
+)]
 mod arrays;
 #[cfg(feature = "bags")]
 mod bag;
@@ -17,9 +21,17 @@ mod format;
 mod hdf5;
 mod header;
 mod matlab;
+#[cfg_attr(
+    not(all(feature = "bags", feature = "hdf5", feature = "numpy", feature = "parquet")),
+    allow(unused, reason = "a build that leaves formats out has no use for some of what they share")
+)]
 mod member;
 #[cfg(feature = "numpy")]
 mod numpy;
+#[cfg_attr(
+    not(all(feature = "bags", feature = "hdf5", feature = "numpy", feature = "parquet")),
+    allow(unused, reason = "a build that leaves formats out has no use for some of what they share")
+)]
 mod open;
 #[cfg(feature = "parquet")]
 mod parquet;
