@@ -5,11 +5,9 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use mcap::records::{ChunkIndex, Record};
 use mcap::sans_io::decompressor::{DecompressResult, Decompressor};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
-use mcap::{McapError, McapResult, Summary};
+use mcap::{McapError, McapResult};
 
 use super::file::{BagFile, End, RawMessage, Take, Topic, Waiting};
 use crate::input::{self, Opened};
@@ -19,6 +17,9 @@ const MAX_RECORD: usize = 512 << 20;
 const SCHEMA: u8 = 0x03;
 const CHANNEL: u8 = 0x04;
 const MESSAGE: u8 = 0x05;
+const CHUNK_INDEX: u8 = 0x08;
+/// The last record of a file and the mark behind it, bytes.
+const FOOTER: u64 = 1 + 8 + 20 + 8;
 /// Channel, sequence number, time of receipt, time of publication.
 const MESSAGE_HEADER: usize = 2 + 4 + 8 + 8;
 
@@ -50,12 +51,13 @@ impl Mcap {
         let mut opened = input::open(path).map_err(|e| e.to_string())?;
         let length = opened.length().map_err(|e| e.to_string())?;
         let mut file = Mcap { path: path.to_owned(), length, topics: BTreeMap::new(), chunks: Vec::new() };
-        if let Ok(Some(summary)) = summary_of(&mut opened, length)
-            && !summary.channels.is_empty()
-        {
-            file.take_summary(&summary);
+        if let Some(start) = summary_start(&mut opened, length) {
+            file.read_index(Stretch { start, end: length - FOOTER })?;
+        }
+        if !file.topics.is_empty() {
             return Ok((file, End::Whole));
         }
+        file.chunks.clear();
         let mut topics = BTreeMap::new();
         let end = file.records(&[file.whole()], &mut |record| {
             if let Found::Topic(channel, topic) = record {
@@ -67,26 +69,24 @@ impl Mcap {
         Ok((file, end))
     }
 
-    fn take_summary(&mut self, summary: &Summary) {
-        for (id, channel) in &summary.channels {
-            let schema = channel.schema.as_ref();
-            let text = |of: fn(&mcap::Schema<'_>) -> String| schema.map_or_else(String::new, |s| of(s));
-            let topic = Topic {
-                name: channel.topic.clone(),
-                kind: text(|s| s.name.clone()),
-                encoding: channel.message_encoding.clone(),
-                schema_encoding: text(|s| s.encoding.clone()),
-                schema: text(|s| String::from_utf8_lossy(&s.data).into_owned()),
-            };
-            self.topics.insert(u32::from(*id), topic);
+    /// Reads topics and places of chunks at the end of the file; what is broken there is not taken.
+    fn read_index(&mut self, summary: Stretch) -> Result<(), String> {
+        let (mut topics, mut chunks) = (BTreeMap::new(), Vec::new());
+        let end = self.records(&[summary], &mut |record| {
+            match record {
+                Found::Topic(channel, topic) => {
+                    topics.insert(channel, topic);
+                }
+                Found::Chunk(chunk) => chunks.push(chunk),
+                Found::Message(_) => {}
+            }
+            ControlFlow::Continue(())
+        })?;
+        if end == End::Whole {
+            chunks.sort_by_key(|c: &Chunk| c.start);
+            (self.topics, self.chunks) = (topics, chunks);
         }
-        let chunk = |index: &ChunkIndex| Chunk {
-            start: index.chunk_start_offset,
-            length: index.chunk_length,
-            channels: index.message_index_offsets.keys().map(|c| u32::from(*c)).collect(),
-        };
-        self.chunks = summary.chunk_indexes.iter().map(chunk).collect();
-        self.chunks.sort_by_key(|c| c.start);
+        Ok(())
     }
 
     fn whole(&self) -> Stretch {
@@ -178,7 +178,7 @@ impl BagFile for Mcap {
             }
             let found = self.records(&[stretch], &mut |record| match record {
                 Found::Message(message) => waiting.take(message, take),
-                Found::Topic(..) => ControlFlow::Continue(()),
+                _ => ControlFlow::Continue(()),
             })?;
             if found != End::Whole {
                 end = found;
@@ -194,6 +194,7 @@ impl BagFile for Mcap {
 /// A record that matters.
 enum Found<'a> {
     Topic(u32, Topic),
+    Chunk(Chunk),
     Message(RawMessage<'a>),
 }
 
@@ -212,46 +213,72 @@ fn found<'a>(
             let received = i64::try_from(u64::from_le_bytes(time)).unwrap_or(i64::MAX);
             Ok(Some(Found::Message(RawMessage { channel, received, data: &data[MESSAGE_HEADER..] })))
         }
-        SCHEMA | CHANNEL => match mcap::parse_record(opcode, data).map_err(|e| e.to_string())? {
-            Record::Schema { header, data } => {
-                let text = String::from_utf8_lossy(&data).into_owned();
-                schemas.insert(header.id, (header.name, header.encoding, text));
-                Ok(None)
+        SCHEMA => {
+            let mut fields = Fields(data);
+            let id = fields.number(2)? as u16;
+            let (name, encoding) = (fields.text()?, fields.text()?);
+            schemas.insert(id, (name, encoding, fields.text()?));
+            Ok(None)
+        }
+        CHANNEL => {
+            let mut fields = Fields(data);
+            let (id, schema) = (fields.number(2)? as u32, fields.number(2)? as u16);
+            let (name, encoding) = (fields.text()?, fields.text()?);
+            let (kind, schema_encoding, schema) = schemas.get(&schema).cloned().unwrap_or_default();
+            Ok(Some(Found::Topic(id, Topic { name, kind, encoding, schema_encoding, schema })))
+        }
+        CHUNK_INDEX => {
+            let mut fields = Fields(data);
+            // Times of the first and the last message.
+            fields.take(16)?;
+            let (start, length) = (fields.number(8)?, fields.number(8)?);
+            let mut indices = Fields(fields.part()?);
+            let mut channels = Vec::new();
+            while !indices.0.is_empty() {
+                channels.push(indices.number(2)? as u32);
+                indices.take(8)?;
             }
-            Record::Channel(channel) => {
-                let (kind, schema_encoding, schema) =
-                    schemas.get(&channel.schema_id).cloned().unwrap_or_default();
-                let topic = Topic {
-                    name: channel.topic,
-                    kind,
-                    encoding: channel.message_encoding,
-                    schema_encoding,
-                    schema,
-                };
-                Ok(Some(Found::Topic(channel.id.into(), topic)))
-            }
-            _ => Ok(None),
-        },
+            Ok(Some(Found::Chunk(Chunk { start, length, channels })))
+        }
         _ => Ok(None),
     }
 }
 
-fn summary_of(file: &mut Opened, length: u64) -> McapResult<Option<Summary>> {
-    let options = SummaryReaderOptions::default().with_file_size(length).with_record_length_limit(MAX_RECORD);
-    let mut reader = SummaryReader::new_with_options(options);
-    while let Some(event) = reader.next_event() {
-        match event? {
-            SummaryReadEvent::ReadRequest(count) => {
-                let read = file.read(reader.insert(count.clamp(1, 1 << 20)))?;
-                reader.notify_read(read);
-            }
-            SummaryReadEvent::SeekRequest(to) => {
-                let place = file.seek(to)?;
-                reader.notify_seeked(place);
-            }
-        }
+/// Fields of a record one behind the other. The library has types for records, which reserve what a length promises before they look for it.
+struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    fn take(&mut self, count: usize) -> Result<&'a [u8], String> {
+        let (part, rest) =
+            self.0.split_at_checked(count).ok_or("expected a field of a record, found its end")?;
+        self.0 = rest;
+        Ok(part)
     }
-    Ok(reader.finish())
+
+    fn number(&mut self, size: usize) -> Result<u64, String> {
+        Ok(self.take(size)?.iter().rev().fold(0, |sum, byte| sum << 8 | u64::from(*byte)))
+    }
+
+    /// Bytes behind their length.
+    fn part(&mut self) -> Result<&'a [u8], String> {
+        let length = self.number(4)? as usize;
+        self.take(length)
+    }
+
+    fn text(&mut self) -> Result<String, String> {
+        Ok(String::from_utf8_lossy(self.part()?).into_owned())
+    }
+}
+
+/// Where the summary of a file begins, if it has one.
+fn summary_start(file: &mut Opened, length: u64) -> Option<u64> {
+    let mut footer = [0; FOOTER as usize];
+    file.seek(SeekFrom::Start(length.checked_sub(FOOTER)?)).ok()?;
+    file.read_exact(&mut footer).ok()?;
+    let mut fields = Fields(&footer);
+    let is_footer = fields.number(1) == Ok(2) && fields.number(8) == Ok(20);
+    let start = fields.number(8).ok()?;
+    (is_footer && footer.ends_with(mcap::MAGIC) && start > 0 && start < length - FOOTER).then_some(start)
 }
 
 /// Stretches of a file one behind the other.
