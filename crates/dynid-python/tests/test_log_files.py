@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 import importlib
 import io
 import json
@@ -10,6 +11,7 @@ import os
 import pickle
 import sqlite3
 import sys
+import threading
 import types
 import zipfile
 from collections.abc import Callable
@@ -186,6 +188,21 @@ def test_groups_of_hdf5(indy7: dynid.Robot, signals: Signals, tmp_path: Path) ->
     check(indy7, f"{path}#data/demo_2", (t, q + 2, tau), None)
     with pytest.raises(dynid.LogError, match="data/demo_0, data/demo_1, data/demo_2"):
         dynid.read_columns(path)
+    # Groups of joints are one log.
+    with h5py.File(tmp_path / "joints.h5", "w") as file:
+        file["t"] = t
+        for k, name in enumerate(NAMES):
+            file[f"{name}/q"], file[f"{name}/tau"] = q[:, k], tau[:, k]
+    check(indy7, tmp_path / "joints.h5", signals, None)
+    # Of different lengths they are logs, unless it is said that they are not.
+    with h5py.File(tmp_path / "parts.h5", "w") as file:
+        for part in range(2):
+            for name, values in [("t", t), ("q", q), ("tau", tau)]:
+                file[f"part{part}/{name}"] = values[: len(t) - part]
+    with pytest.raises(dynid.LogError, match="part0, part1"):
+        dynid.read_columns(tmp_path / "parts.h5")
+    check(indy7, f"{tmp_path / 'parts.h5'}#part0", signals, None)
+    assert "part0/t" in dynid.read_columns(f"{tmp_path / 'parts.h5'}#/")
 
 
 def test_parquet(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Path) -> None:
@@ -328,6 +345,46 @@ def test_topics_with_stamps_of_their_own_are_joined(indy7: dynid.Robot, signals:
     # One topic alone has no efforts.
     alone = dynid.read_columns(f"{path}#/a", indy7)
     assert "tau_j1" not in alone and len(alone["t"]) == len(t)
+
+
+def test_publishers_that_share_a_topic_are_joined(tmp_path: Path, signals: Signals) -> None:
+    """An arm and its gripper: no message has the positions of both."""
+    kinds = pytest.importorskip("mcap.writer").CompressionType
+    t, q, tau = signals
+    robot = dynid.Robot.load(Path(__file__).resolve().parents[3] / "robots" / "indy7.toml")
+
+    def write(mcap: Any, schema: Any, row: int) -> None:
+        late = 0 if row % 2 else 1_000_000
+        for part, ns in [(slice(0, 5), START + STEP * row), (slice(5, 6), START + STEP * row + late)]:
+            if part.start and row % 3:
+                continue
+            message = {"header": {"stamp": stamp(ns)}, "name": NAMES[part], "position": q[row, part].tolist(), "velocity": [], "effort": tau[row, part].tolist()}
+            mcap.write_message("/joint_states", schema, message, log_time=ns, publish_time=ns)
+
+    path = tmp_path / "log.mcap"
+    write_mcap(path, signals, kinds.NONE, write)
+    read = dynid.read_columns(path, robot)
+    kept = np.searchsorted(t, read["t"] + t[1] * 0.999)
+    np.testing.assert_array_equal(read["q_j1"], q[kept, 0])
+    heard = np.arange(0, len(t), 3)
+    line = np.interp(t[kept], t[heard] + np.where(heard % 2, 0.0, 1e-3), q[heard, 5])
+    np.testing.assert_allclose(read["q_j6"], line, atol=1e-9)
+    assert len(kept) > 0.95 * len(t)
+
+
+def test_a_pipe_is_no_file_with_an_index(signals: Signals, tmp_path: Path) -> None:
+    t, q, tau = signals
+    np.savez(tmp_path / "a.npz", t=t, q=q, tau=tau)
+    os.mkfifo(tmp_path / "pipe")
+    def quietly() -> None:
+        with contextlib.suppress(BrokenPipeError):
+            (tmp_path / "pipe").write_bytes((tmp_path / "a.npz").read_bytes())
+
+    writer = threading.Thread(target=quietly)
+    writer.start()
+    with pytest.raises(dynid.LogError, match="found a pipe"):
+        dynid.read_columns(tmp_path / "pipe")
+    writer.join()
 
 
 def test_bags_of_ros(indy7: dynid.Robot, signals: Signals, of_csv: str, tmp_path: Path) -> None:

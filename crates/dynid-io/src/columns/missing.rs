@@ -51,12 +51,19 @@ impl ColumnMapping {
             let row = table.columns[place].iter().position(|x| x.is_nan()).unwrap_or_default();
             return Err(MappingError::NoValue { column: column.clone(), row: table.first_row + row });
         }
-        let needed: Vec<usize> =
+        let mut needed: Vec<usize> =
             self.time_columns().iter().chain(self.position.iter().flatten()).filter_map(place).collect();
         let whole = |table: &Table, columns: &[usize], row: usize| {
             columns.iter().all(|k| !table.columns[*k][row].is_nan())
         };
-        let positioned: Vec<usize> = (0..table.rows).filter(|row| whole(table, &needed, *row)).collect();
+        let mut positioned: Vec<usize> = (0..table.rows).filter(|row| whole(table, &needed, *row)).collect();
+        if positioned.is_empty() && self.missing == Missing::Interpolate {
+            // Positions of several publishers, an arm and its gripper: those of the one that speaks most say which rows there are.
+            let positions = self.position.iter().flatten().filter_map(place);
+            let most = positions.min_by_key(|k| gaps(k));
+            needed = self.time_columns().iter().filter_map(place).chain(most).collect();
+            positioned = (0..table.rows).filter(|row| whole(table, &needed, *row)).collect();
+        }
         if self.missing == Missing::Interpolate {
             let time = self.clock(table)?;
             for k in used.iter().filter(|k| !needed.contains(k)) {

@@ -1,7 +1,7 @@
 //! Files of arrays and tables as logs: which arrays make up the rows, and their numbers.
 
 use super::header::LogHeader;
-use super::{LogOptions, LogSource, Missing, ReadingNote, Wanted};
+use super::{LogOptions, LogSource, Missing, ReadingNote, Wanted, places_of};
 use crate::csv::{LogFileError, MAX_COLUMNS, Table};
 use crate::excerpt::listed;
 use crate::signal::is_time_name;
@@ -198,11 +198,7 @@ impl LogSource for ArrayLog {
     }
 
     fn read(mut self: Box<Self>, wanted: &Wanted) -> Result<(Table, Vec<ReadingNote>), LogFileError> {
-        let shown = self.header();
-        let place = |k: &usize| self.header.column(&shown.names[*k]);
-        let all: Vec<usize> = (0..shown.names.len()).filter(|k| !shown.text[*k]).collect();
-        let columns: Vec<usize> = wanted.columns.as_ref().unwrap_or(&all).iter().filter_map(place).collect();
-        let times: Vec<usize> = wanted.time.iter().filter_map(place).collect();
+        let (columns, times) = places_of(&self.header, &self.header(), wanted);
         let (file, format) = (self.file.clone(), self.format);
         let (read, bytes) = (&self.options.read, self.bytes(&columns));
         let most =

@@ -1,5 +1,6 @@
 //! HDF5 files, `.mat` files of MATLAB 7.3 among them: every dataset of numbers is an array, named by its path.
 
+use std::collections::BTreeMap;
 use std::io::{Seek, SeekFrom};
 
 use hdf5_pure::{Chunk, DType, Dataset, File, Group};
@@ -7,6 +8,9 @@ use hdf5_pure::{Chunk, DType, Dataset, File, Group};
 use super::arrays::{Array, ArrayFile, Holds, Values};
 use crate::input::Opened;
 
+/// What groups are called that are logs of their own, before their numbers.
+const NAMES_OF_LOGS: [&str; 10] =
+    ["demo", "ep", "episode", "log", "rollout", "run", "sequence", "traj", "trajectory", "trial"];
 /// Deepest nesting of groups.
 const MAX_DEPTH: usize = 16;
 /// Largest chunk, bytes.
@@ -62,35 +66,37 @@ impl Hdf5 {
         }
     }
 
-    /// Groups beside one another that hold the same datasets, such as the demonstrations of a dataset: their paths.
-    pub(super) fn alike(&self) -> Vec<String> {
-        let mut parents: Vec<(String, Vec<String>)> = Vec::new();
-        for path in &self.paths {
-            // The first group whose name ends in a number.
-            let ends_in_number = |name: &str| name.ends_with(|c: char| c.is_ascii_digit());
-            let mut end = 0;
-            for part in path.split('/') {
-                end += part.len();
-                if ends_in_number(part) && end < path.len() {
-                    let (group, rest) = (path[..end].to_owned(), path[end..].to_owned());
-                    match parents.iter_mut().find(|(g, _)| *g == group) {
-                        Some((_, all)) => all.push(rest),
-                        None => parents.push((group, vec![rest])),
-                    }
-                    break;
-                }
-                end += 1;
+    /// Groups that are logs of their own, such as the demonstrations of a dataset: they hold the same datasets, their names differ in a number alone, and
+    /// they are called so or are of different lengths. Groups of joints are none.
+    pub(super) fn logs(&self) -> Vec<String> {
+        let mut groups: BTreeMap<&str, Vec<(&str, usize)>> = BTreeMap::new();
+        for (path, array) in self.paths.iter().zip(&self.arrays) {
+            let ends = path.match_indices('/').map(|(end, _)| &path[..end]);
+            if let Some(group) = ends.into_iter().find(|group| stem(group) != *group) {
+                let length = array.shape.first().copied().unwrap_or(0);
+                groups.entry(group).or_default().push((&path[group.len()..], length));
             }
         }
-        let stem = |name: &str| name.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned();
-        match parents.as_slice() {
-            [(first, datasets), rest @ ..] if !rest.is_empty() => {
-                let same = |(g, d): &(String, Vec<String>)| stem(g) == stem(first) && d == datasets;
-                if rest.iter().all(same) { parents.into_iter().map(|(g, _)| g).collect() } else { Vec::new() }
-            }
-            _ => Vec::new(),
+        let Some((first, datasets)) = groups.first_key_value().filter(|_| groups.len() > 1) else {
+            return Vec::new();
+        };
+        let names =
+            |list: &[(&str, usize)]| list.iter().map(|(name, _)| (*name).to_owned()).collect::<Vec<_>>();
+        let are_alike =
+            groups.iter().all(|(group, d)| stem(group) == stem(first) && names(d) == names(datasets));
+        let called = stem(first).rsplit('/').next().unwrap_or_default().trim_end_matches(['_', '-', ' ']);
+        let are_logs =
+            NAMES_OF_LOGS.contains(&called.to_lowercase().as_str()) || groups.values().any(|d| d != datasets);
+        match are_alike && are_logs {
+            true => groups.into_keys().map(str::to_owned).collect(),
+            false => Vec::new(),
         }
     }
+}
+
+/// A name without the number at its end.
+fn stem(name: &str) -> &str {
+    name.trim_end_matches(|c: char| c.is_ascii_digit())
 }
 
 struct Found {

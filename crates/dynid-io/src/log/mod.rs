@@ -68,8 +68,17 @@ pub enum Missing {
     /// Rows without all signals are left out; the clock takes what is missing for a gap.
     Drop,
     /// Signals are interpolated linearly at the rows that have all positions, for logs that mix topics with stamps of their
-    /// own. Where a signal is silent for more than five of its usual steps the rows are left out.
+    /// own; where no row has all of them, at those of the position with most values. Where a signal is silent for more than five of
+    /// its usual steps the rows are left out.
     Interpolate,
+}
+
+/// Places among all columns of those that are wanted of the ones `shown`, and of the times among them.
+fn places_of(all: &LogHeader, shown: &LogHeader, wanted: &Wanted) -> (Vec<usize>, Vec<usize>) {
+    let place = |k: &usize| all.column(&shown.names[*k]);
+    let numbers: Vec<usize> = (0..shown.names.len()).filter(|k| !shown.text[*k]).collect();
+    let columns = wanted.columns.as_ref().unwrap_or(&numbers).iter().filter_map(place).collect();
+    (columns, wanted.time.iter().filter_map(place).collect())
 }
 
 /// Which columns of a log are read.

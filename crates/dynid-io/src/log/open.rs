@@ -115,6 +115,16 @@ pub fn open(path: impl AsRef<Path>, options: &LogOptions) -> Result<Box<dyn LogS
             }
         };
     };
+    // Files with an index are read at several places; standard input by its own name (`-`) is kept.
+    if !file.path.is_file() && file.path != Path::new("-") {
+        let (format, _) = container.named();
+        let (expected, found) = (
+            "a file, which is read at several places".to_owned(),
+            "a pipe: write it to a file, or give it as `-`".to_owned(),
+        );
+        let file = file.path.display().to_string();
+        return Err(LogFileError::Content { file, format, expected, found });
+    }
     container.open(opened, &file, options)
 }
 
@@ -198,7 +208,8 @@ impl Container {
                 let group = member.unwrap_or_default();
                 let read =
                     super::hdf5::Hdf5::open(reopened(path).map_err(damaged)?, group).map_err(damaged)?;
-                let alike = read.alike();
+                // `FILE#/` is the whole file, whatever its groups are called.
+                let alike = if group == "/" { Vec::new() } else { read.logs() };
                 if let Some(first) = alike.first() {
                     let expected = format!("one of the groups {}", crate::excerpt::listed(&alike, 6));
                     let found =

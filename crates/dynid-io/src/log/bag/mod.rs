@@ -6,6 +6,7 @@
 mod clock;
 mod definition;
 mod file;
+mod joined;
 mod known;
 mod mcap;
 mod names;
@@ -22,14 +23,15 @@ use std::path::{Path, PathBuf};
 
 use self::clock::{Choice, Clock, Times};
 use self::file::{BagFile, End, RawMessage};
+use self::joined::{Joined, TopicRows, Topics};
 use self::mcap::Mcap;
 use self::rosbag::RosBag;
 use self::sqlite::Sqlite;
 use self::topics::{Decoded, Encoding};
-use super::arrays::{TableBuilder, Values};
+use super::arrays::TableBuilder;
 use super::format::LogFormat;
 use super::header::LogHeader;
-use super::{LogOptions, LogSource, Missing, ReadingNote, Wanted};
+use super::{LogOptions, LogSource, Missing, ReadingNote, Wanted, places_of};
 use crate::csv::{LogFileError, Table};
 use crate::digest::Hashed;
 use crate::excerpt::listed;
@@ -221,14 +223,8 @@ impl BagLog {
     }
 }
 
-/// What was read of a topic.
-#[derive(Default)]
-struct TopicRows {
-    times: Times,
-    /// Numbers of the wanted columns, message by message.
-    columns: Vec<Vec<f64>>,
-    no_header: bool,
-}
+/// Per topic, where its columns go among those that are read of it.
+type Slots = BTreeMap<usize, Vec<Option<usize>>>;
 
 impl LogSource for BagLog {
     fn header(&self) -> LogHeader {
@@ -240,18 +236,8 @@ impl LogSource for BagLog {
     }
 
     fn read(mut self: Box<Self>, wanted: &Wanted) -> Result<(Table, Vec<ReadingNote>), LogFileError> {
-        let shown = self.header();
-        let place = |k: &usize| self.header.column(&shown.names[*k]);
-        let all: Vec<usize> = (0..shown.names.len()).collect();
-        let columns: Vec<usize> = wanted.columns.as_ref().unwrap_or(&all).iter().filter_map(place).collect();
-        let times: Vec<usize> = wanted.time.iter().filter_map(place).collect();
-        let (file, damaged) = (self.name.clone(), |reason: String| LogFileError::Damaged {
-            file: self.name.clone(),
-            format: self.format,
-            reason,
-        });
-        // Where a wanted column goes among those of its topic.
-        let mut slots: BTreeMap<usize, Vec<Option<usize>>> = BTreeMap::new();
+        let (columns, times) = places_of(&self.header, &self.header(), wanted);
+        let mut slots = Slots::new();
         let mut slot_of: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
         for k in columns.iter().filter(|k| **k >= CLOCKS.len()) {
             let (topic, column) = self.places[*k - CLOCKS.len()];
@@ -260,19 +246,55 @@ impl LogSource for BagLog {
             let slot = *slots[column].get_or_insert(next);
             slot_of.insert(*k, (topic, slot));
         }
-        let mut read: BTreeMap<usize, TopicRows> = BTreeMap::new();
-        for (topic, slots) in &slots {
-            let columns = vec![Vec::new(); slots.iter().flatten().count()];
-            read.insert(*topic, TopicRows { columns, ..TopicRows::default() });
+        let read = self.collect(&slots)?;
+        let choice = self.clock(&read, &times)?;
+        let joined = Joined::of(&read, choice.clock);
+        if joined.rows == 0 {
+            return Err(LogFileError::NoRows { file: self.name, line: 0 });
         }
+        let mut out = TableBuilder::new(&self.name, joined.rows, &self.options)?;
+        for k in columns {
+            let (values, is_time) = match k {
+                0 => (joined.stamps(choice.clock), true),
+                1 => (joined.stamps(Clock::Header), true),
+                2 => (joined.stamps(Clock::Receipt), true),
+                _ => {
+                    let (topic, slot) = slot_of[&k];
+                    (joined.column(topic, slot), times.contains(&k))
+                }
+            };
+            let missing = if is_time { Missing::Error } else { wanted.missing };
+            out.add(&self.header.names[k], &values, 0, 1, is_time, missing)?;
+        }
+        let digest = self.digest();
+        let sha256 = digest.map_err(|error| LogFileError::Unreadable { file: self.name.clone(), error })?;
+        let clock = match choice.clock {
+            Clock::Header => "stamps of headers",
+            Clock::Receipt => "times of receipt",
+        };
+        self.notes.push(ReadingNote::new("clock", clock, choice.reason));
+        if read.len() > 1 {
+            let names: Vec<&str> = read.keys().map(|k| self.topics[*k].name.as_str()).collect();
+            let reason = format!("{} have stamps of their own", listed(&names, 6));
+            self.notes.push(ReadingNote::new("topics", format!("joined, {} rows", joined.rows), reason));
+        }
+        Ok((out.finish(sha256), self.notes))
+    }
+}
+
+impl BagLog {
+    /// Reads the messages of the topics of which columns are wanted.
+    fn collect(&mut self, slots: &Slots) -> Result<Topics, LogFileError> {
+        let of_topic = |(topic, slots): (&usize, &Vec<Option<usize>>)| {
+            let columns = vec![Vec::new(); slots.iter().flatten().count()];
+            (*topic, TopicRows { columns, ..TopicRows::default() })
+        };
+        let mut read: Topics = slots.iter().map(of_topic).collect();
         let (mut ends, mut broken) = (Vec::new(), 0_usize);
         for (place, source) in self.files.iter().enumerate() {
-            let wanted: Vec<u32> = self
-                .channels
-                .iter()
-                .filter(|((f, _), topic)| *f == place && slots.contains_key(topic))
-                .map(|((_, c), _)| *c)
-                .collect();
+            let of_file =
+                |((file, _), topic): &(&(usize, u32), &usize)| *file == place && slots.contains_key(*topic);
+            let wanted: Vec<u32> = self.channels.iter().filter(of_file).map(|((_, c), _)| *c).collect();
             let (topics, channels) = (&mut self.topics, &self.channels);
             let mut take = |message: RawMessage<'_>| {
                 let topic = channels[&(place, message.channel)];
@@ -292,123 +314,61 @@ impl LogSource for BagLog {
                     }
                 }
                 read.times.receipt.push(message.received);
-                match values.stamp {
-                    Some(ns) => read.times.header.push(ns),
-                    None => read.no_header = true,
-                }
+                // One without leaves the list shorter than that of the times of receipt, which says so.
+                read.times.header.extend(values.stamp);
                 ControlFlow::Continue(())
             };
-            ends.push(source.messages(&wanted, &mut take).map_err(&damaged)?);
+            ends.push(source.messages(&wanted, &mut take).map_err(|reason| LogFileError::Damaged {
+                file: self.name.clone(),
+                format: self.format,
+                reason,
+            })?);
         }
         ends.iter().for_each(|end| self.note_end(end));
         for topic in read.values_mut() {
             let rows = topic.times.receipt.len();
             topic.columns.iter_mut().for_each(|column| column.resize(rows, f64::NAN));
-            if topic.no_header {
+            if topic.times.header.len() < rows {
                 topic.times.header.clear();
             }
         }
         if broken > 0 {
             self.notes.push(ReadingNote::new("broken messages", broken.to_string(), "they were left out"));
         }
-        let choice = self.clock(&read, &times)?;
-        let joined = Joined::of(&read, choice.clock);
-        if joined.rows == 0 {
-            return Err(LogFileError::NoRows { file, line: 0 });
-        }
-        let mut out = TableBuilder::new(&file, joined.rows, &self.options)?;
-        for k in columns {
-            let (values, is_time) = match k {
-                0 => (joined.stamps(choice.clock, &read), true),
-                1 => (joined.stamps(Clock::Header, &read), true),
-                2 => (joined.stamps(Clock::Receipt, &read), true),
-                _ => (joined.column(&read, slot_of[&k]), times.contains(&k)),
-            };
-            let missing = if is_time { Missing::Error } else { wanted.missing };
-            out.add(&self.header.names[k], &values, 0, 1, is_time, missing)?;
-        }
-        let digest = self.digest();
-        let sha256 = digest.map_err(|error| LogFileError::Unreadable { file: file.clone(), error })?;
-        let clock = match choice.clock {
-            Clock::Header => "stamps of headers",
-            Clock::Receipt => "times of receipt",
-        };
-        self.notes.push(ReadingNote::new("clock", clock, choice.reason));
-        if read.len() > 1 {
-            let names: Vec<&str> = read.keys().map(|k| self.topics[*k].name.as_str()).collect();
-            let reason = format!("{} have stamps of their own", listed(&names, 6));
-            self.notes.push(ReadingNote::new("topics", format!("joined, {} rows", joined.rows), reason));
-        }
-        Ok((out.finish(sha256), self.notes))
+        self.note_late_columns(slots);
+        Ok(read)
     }
-}
 
-impl BagLog {
+    /// Columns that no message had among the first, so that nobody could ask for them.
+    fn note_late_columns(&mut self, slots: &Slots) {
+        let late: Vec<&str> = slots
+            .iter()
+            .flat_map(|(topic, known)| self.topics[*topic].columns[known.len()..].iter())
+            .map(String::as_str)
+            .collect();
+        if !late.is_empty() {
+            let reason = format!("none of the first {LOOKED_AT} messages of their topic has them");
+            self.notes.push(ReadingNote::new("columns left out", listed(&late, 6), reason));
+        }
+    }
+
     /// The clock that is stated, else the better one.
-    fn clock(&self, read: &BTreeMap<usize, TopicRows>, times: &[usize]) -> Result<Choice, LogFileError> {
+    fn clock(&self, read: &Topics, times: &[usize]) -> Result<Choice, LogFileError> {
         let topics: Vec<(&str, &Times)> =
             read.iter().map(|(k, topic)| (self.topics[*k].name.as_str(), &topic.times)).collect();
         let stated = |clock: Clock| Choice { clock, reason: "stated".to_owned() };
         match times {
             [1] => match topics.iter().find(|(_, t)| t.header.len() != t.receipt.len()) {
                 None => Ok(stated(Clock::Header)),
-                Some(_) => Err(LogFileError::Content {
+                Some((name, _)) => Err(LogFileError::Content {
                     file: self.name.clone(),
                     format: self.format,
-                    expected: "messages with stamps in their headers".to_owned(),
-                    found: "some without: take `receive_time`".to_owned(),
+                    expected: "stamps in the headers of all messages".to_owned(),
+                    found: format!("messages of `{name}` without: take `receive_time`"),
                 }),
             },
             [2] => Ok(stated(Clock::Receipt)),
             _ => Ok(clock::choose(&topics)),
         }
-    }
-}
-
-/// Rows that topics share.
-struct Joined {
-    rows: usize,
-    /// Per topic, the message of each row.
-    messages: BTreeMap<usize, Vec<Option<usize>>>,
-}
-
-impl Joined {
-    fn of(read: &BTreeMap<usize, TopicRows>, clock: Clock) -> Self {
-        if let [(topic, only)] = read.iter().collect::<Vec<_>>()[..] {
-            // As they come: whether stamps may run backwards is for others to say.
-            let rows = only.times.receipt.len();
-            return Joined { rows, messages: [(*topic, (0..rows).map(Some).collect())].into() };
-        }
-        let mut stamps: Vec<i64> = read.values().flat_map(|topic| topic.times.of(clock)).copied().collect();
-        stamps.sort_unstable();
-        stamps.dedup();
-        let place = |topic: &TopicRows| {
-            let mut messages = vec![None; stamps.len()];
-            for (k, stamp) in topic.times.of(clock).iter().enumerate() {
-                if let Ok(row) = stamps.binary_search(stamp) {
-                    messages[row] = Some(k);
-                }
-            }
-            messages
-        };
-        Joined { rows: stamps.len(), messages: read.iter().map(|(k, topic)| (*k, place(topic))).collect() }
-    }
-
-    /// Stamps of a clock; of rows that several topics share, those of the first.
-    fn stamps(&self, clock: Clock, read: &BTreeMap<usize, TopicRows>) -> Values {
-        let stamp = |row: usize| {
-            let of = |(topic, messages): (&usize, &Vec<Option<usize>>)| {
-                let message = messages[row]?;
-                read[topic].times.of(clock).get(message).copied()
-            };
-            self.messages.iter().find_map(of).unwrap_or(0)
-        };
-        Values::Whole((0..self.rows).map(stamp).collect())
-    }
-
-    fn column(&self, read: &BTreeMap<usize, TopicRows>, (topic, slot): (usize, usize)) -> Values {
-        let column = &read[&topic].columns[slot];
-        let number = |message: &Option<usize>| message.map_or(f64::NAN, |k| column[k]);
-        Values::Float(self.messages[&topic].iter().map(number).collect())
     }
 }

@@ -52,8 +52,6 @@ impl Names {
 }
 
 impl Sink for Names {
-    fn stamp(&mut self, _: i64) {}
-
     fn field(&mut self, name: &str) {
         name.clone_into(&mut self.field);
     }

@@ -130,8 +130,6 @@ impl Sink for Scratch {
         self.stamp = Some(ns);
     }
 
-    fn field(&mut self, _: &str) {}
-
     fn number(&mut self, value: f64) {
         self.numbers.push(value);
     }
@@ -152,10 +150,6 @@ impl Sink for Scratch {
     fn messages(&mut self, count: usize) {
         self.numbers(count);
     }
-
-    fn open(&mut self) {}
-
-    fn close(&mut self) {}
 }
 
 #[cfg(test)]

@@ -8,30 +8,30 @@ const LONGEST: usize = 1024;
 /// Longest sequence of messages that becomes columns.
 const MOST_MESSAGES: usize = 256;
 
-/// Takes what a message holds, in its order.
+/// Takes what a message holds, in its order; what a sink has no use for it leaves out.
 pub(super) trait Sink {
     /// The stamp of the message's header, ns.
-    fn stamp(&mut self, ns: i64);
+    fn stamp(&mut self, _ns: i64) {}
     /// One time, ns.
     fn time(&mut self, ns: i64) {
         self.number(ns as f64 * 1e-9);
     }
     /// A field begins.
-    fn field(&mut self, name: &str);
+    fn field(&mut self, _name: &str) {}
     /// One number.
-    fn number(&mut self, value: f64);
+    fn number(&mut self, _value: f64) {}
     /// As many numbers follow.
-    fn numbers(&mut self, count: usize);
+    fn numbers(&mut self, _count: usize) {}
     /// One text.
-    fn text(&mut self, text: &[u8]);
+    fn text(&mut self, _text: &[u8]) {}
     /// As many texts follow.
-    fn texts(&mut self, count: usize);
+    fn texts(&mut self, _count: usize) {}
     /// As many messages follow, each between [`Sink::open`] and [`Sink::close`].
-    fn messages(&mut self, count: usize);
+    fn messages(&mut self, _count: usize) {}
     /// A message begins.
-    fn open(&mut self);
+    fn open(&mut self) {}
     /// A message ends.
-    fn close(&mut self);
+    fn close(&mut self) {}
 }
 
 /// Hands the values of a message to a sink. Bytes, and sequences that are too long for signals, are passed over.
@@ -170,30 +170,11 @@ struct Header {
 }
 
 impl Sink for Header {
-    fn stamp(&mut self, _: i64) {}
     fn time(&mut self, ns: i64) {
         self.stamp.get_or_insert(ns);
     }
-    fn field(&mut self, _: &str) {}
-    fn number(&mut self, _: f64) {}
-    fn numbers(&mut self, _: usize) {}
-    fn text(&mut self, _: &[u8]) {}
-    fn texts(&mut self, _: usize) {}
-    fn messages(&mut self, _: usize) {}
-    fn open(&mut self) {}
-    fn close(&mut self) {}
 }
 
 struct Nothing;
 
-impl Sink for Nothing {
-    fn stamp(&mut self, _: i64) {}
-    fn field(&mut self, _: &str) {}
-    fn number(&mut self, _: f64) {}
-    fn numbers(&mut self, _: usize) {}
-    fn text(&mut self, _: &[u8]) {}
-    fn texts(&mut self, _: usize) {}
-    fn messages(&mut self, _: usize) {}
-    fn open(&mut self) {}
-    fn close(&mut self) {}
-}
+impl Sink for Nothing {}

@@ -11,7 +11,7 @@ use crate::csv::lines::Lines;
 use crate::csv::{Delimiter, LogFileError, Table, number, split};
 use crate::input::Opened;
 use crate::log::header::LogHeader;
-use crate::log::{LogOptions, LogSource, Missing, ReadingNote, Wanted};
+use crate::log::{LogOptions, LogSource, Missing, ReadingNote, Wanted, places_of};
 
 /// Lines that are looked at before anything is read.
 const SAMPLE_LINES: usize = 64;
@@ -207,11 +207,7 @@ impl LogSource for LogText {
 
     /// What follows the last row asked for is hashed and not looked at.
     fn read(mut self: Box<Self>, wanted: &Wanted) -> Result<(Table, Vec<ReadingNote>), LogFileError> {
-        let shown = self.header();
-        let place = |k: &usize| self.layout.header.column(&shown.names[*k]);
-        let all: Vec<usize> = (0..shown.names.len()).filter(|k| !shown.text[*k]).collect();
-        let columns: Vec<usize> = wanted.columns.as_ref().unwrap_or(&all).iter().filter_map(place).collect();
-        let time: Vec<usize> = wanted.time.iter().filter_map(place).collect();
+        let (columns, time) = places_of(&self.layout.header, &self.header(), wanted);
         let mut rows = self.rows(columns, &time, wanted.missing != Missing::Error);
         let (first, last) = self.options.read.rows.unwrap_or((1, usize::MAX));
         let mut row = 0;
