@@ -158,12 +158,15 @@ impl Node {
     /// What the message says it is called.
     fn own_name(&self) -> Option<String> {
         self.fields.iter().find_map(|(field, value)| match value {
-            Value::Text(text) if !text.is_empty() && matches!(field.as_str(), "name" | "joint_name") => {
-                Some(text.clone())
-            }
+            Value::Text(text) if !text.is_empty() && is_name(field) => Some(text.clone()),
             _ => None,
         })
     }
+}
+
+/// Whether a field of this name says what its message is called.
+pub(super) fn is_name(field: &str) -> bool {
+    matches!(field, "name" | "joint_name")
 }
 
 fn all_differ(names: &[String]) -> bool {

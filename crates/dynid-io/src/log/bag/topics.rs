@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::definition::Definition;
-use super::names::Names;
+use super::names::{Names, is_name};
 use super::walk::{Sink, walk};
 use super::wire::Wire;
 use crate::csv::MAX_COLUMNS;
@@ -51,6 +51,10 @@ struct Scratch {
     /// Lengths of sequences and texts that name numbers: messages that agree in them have the same columns.
     shape: Vec<u8>,
     stamp: Option<i64>,
+    /// Whether a text in this place may name numbers: as one of a sequence of which as many are to come, or by its field. Others, such as
+    /// messages of errors, change without a meaning for columns.
+    entries: usize,
+    names: bool,
 }
 
 /// The numbers of a message.
@@ -93,7 +97,7 @@ impl Decoded {
         let mut scratch = std::mem::take(&mut self.scratch);
         scratch.numbers.clear();
         scratch.shape.clear();
-        scratch.stamp = None;
+        (scratch.stamp, scratch.entries) = (None, 0);
         walk(&self.definition, &mut wire, &mut scratch).map_err(short)?;
         self.scratch = scratch;
         if !self.shapes.contains_key(&self.scratch.shape) {
@@ -138,13 +142,22 @@ impl Sink for Scratch {
         self.shape.extend((count as u32).to_le_bytes());
     }
 
+    fn field(&mut self, name: &str) {
+        self.names = is_name(name);
+    }
+
     fn text(&mut self, text: &[u8]) {
-        self.shape.extend((text.len() as u32).to_le_bytes());
-        self.shape.extend(text);
+        let is_entry = self.entries > 0;
+        self.entries = self.entries.saturating_sub(1);
+        if is_entry || self.names {
+            self.shape.extend((text.len() as u32).to_le_bytes());
+            self.shape.extend(text);
+        }
     }
 
     fn texts(&mut self, count: usize) {
         self.numbers(count);
+        self.entries = count;
     }
 
     fn messages(&mut self, count: usize) {
@@ -234,6 +247,18 @@ mod tests {
             ("/t/y/output", 6.0),
         ]);
         assert_eq!(columns("c/ControllerState", schema, bytes), expected);
+    }
+
+    #[test]
+    fn texts_that_name_nothing_make_no_columns_of_their_own() {
+        let schema = "string status\nfloat64 x\nPart part\n===\nMSG: c/Part\nstring note\nfloat64 y";
+        let mut topic = Decoded::new("/t", "c/Status", Encoding::Ros1, schema).unwrap();
+        for k in 0..2 * MAX_SHAPES {
+            let bytes =
+                Bytes::default().text(&k.to_string()).number(1.0).text(&"n".repeat(k)).number(k as f64);
+            assert_eq!(topic.decode(&bytes.0).unwrap().numbers, [1.0, k as f64]);
+        }
+        assert_eq!((topic.shapes.len(), topic.columns), (1, vec!["/t/x".to_owned(), "/t/part/y".to_owned()]));
     }
 
     #[test]
