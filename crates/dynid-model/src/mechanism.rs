@@ -168,6 +168,37 @@ impl Mechanism {
         self
     }
 
+    /// The trees that hang on the ground one by one, each with the independent rates of this mechanism that it moves: on a fixed base
+    /// none feels another. A mechanism whose mimic joints are coupled is one.
+    pub fn chains(&self) -> Vec<(Mechanism, Vec<usize>)> {
+        if self.follows.is_some() {
+            return vec![(self.clone(), (0..self.rates()).collect())];
+        }
+        let mut root: Vec<usize> = (0..self.bodies.len()).collect();
+        for &b in &self.sweep {
+            root[b] = self.bodies[b].parent.map_or(b, |p| root[p]);
+        }
+        let roots = (0..self.bodies.len()).filter(|b| self.bodies[*b].parent.is_none());
+        roots.map(|r| self.part(|b| root[b] == r)).collect()
+    }
+
+    /// The bodies of a choice that is closed under parents, with the rates of this mechanism that they have.
+    fn part(&self, chosen: impl Fn(usize) -> bool) -> (Mechanism, Vec<usize>) {
+        let mut place = vec![usize::MAX; self.bodies.len()];
+        let (mut bodies, mut rates, mut position) = (Vec::new(), Vec::new(), 0);
+        for (b, body) in self.bodies.iter().enumerate().filter(|(b, _)| chosen(*b)) {
+            place[b] = bodies.len();
+            bodies.push(Body { position, rate: rates.len(), ..body.clone() });
+            position += body.joint.positions();
+            rates.extend(body.rate..body.rate + body.joint.rates());
+        }
+        for body in &mut bodies {
+            body.parent = body.parent.map(|p| place[p]);
+        }
+        let sweep = self.sweep.iter().filter(|b| chosen(**b)).map(|b| place[*b]).collect();
+        (Mechanism { bodies, sweep, ..self.clone() }, rates)
+    }
+
     /// Name of the root link of the file.
     pub fn base_link(&self) -> &str {
         &self.base_link

@@ -170,6 +170,11 @@ impl Dynamics {
         10 * self.bodies
     }
 
+    /// Acceleration of gravity in base axes, m/s².
+    pub fn gravity(&self) -> Vec3<f64> {
+        self.gravity
+    }
+
     fn check<S>(&self, state: &State<'_, S>) {
         assert_eq!(state.q.len(), self.positions, "length of q");
         assert_eq!(state.dq.len(), self.rates, "length of dq");

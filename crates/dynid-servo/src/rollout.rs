@@ -1,0 +1,533 @@
+//! Closed-loop simulation of a chain along a log's commands, with exact sensitivities.
+
+use std::ops::Range;
+
+use crate::chain::{Chain, Equation};
+use crate::free::{Free, ServoValues, Target};
+use crate::joint::{LoadOf, Scheme};
+use crate::log::{Command, ServoLog};
+use crate::step::{Begin, Drive, Numbers, Solver, Wanted};
+use crate::term::Term;
+
+/// Farthest that a simulated joint may go before the simulation counts as lost, rad or m.
+const FAR: f64 = 1e3;
+
+/// The simulated state of a chain at a row of the log.
+#[derive(Debug, Clone, Copy)]
+pub struct SimulatedRow<'a> {
+    /// Row of the log.
+    pub row: usize,
+    /// Encoder readings of the chain's joints, not rounded.
+    pub reading: &'a [f64],
+    /// Velocities of the joints.
+    pub velocity: &'a [f64],
+    /// Efforts of the drives in the middle of the last step.
+    pub effort: &'a [f64],
+    /// Slopes of the readings over the free parameters of the chain, row-major: joints by [`Rollout::columns`].
+    pub by_parameter: &'a [f64],
+    /// Slopes of the efforts, alike.
+    pub effort_by_parameter: &'a [f64],
+}
+
+/// A simulation that went out of bounds.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("the simulated motion leaves all bounds at row {row} of the log: gains, limits or delay make the loop unstable")]
+pub struct Lost {
+    /// Row of the log.
+    pub row: usize,
+}
+
+/// A free parameter as a chain sees it.
+#[derive(Debug, Clone)]
+struct Column {
+    /// Its place among all free parameters.
+    place: usize,
+    kind: Kind,
+}
+
+#[derive(Debug, Clone)]
+enum Kind {
+    /// A term of these joints of the chain.
+    Term(Term, Vec<usize>),
+    /// An entry of the chain's standard parameters.
+    Inertia(usize),
+}
+
+/// Simulates a chain along a log.
+#[derive(Debug)]
+pub struct Rollout<'a> {
+    chain: &'a Chain,
+    scheme: Scheme,
+    columns: Vec<Column>,
+    /// Places of the columns among all free parameters.
+    places: Vec<usize>,
+    of_inertias: bool,
+    of_commands: bool,
+}
+
+impl<'a> Rollout<'a> {
+    /// A simulation whose sensitivities are those of the free parameters that reach the chain; none: values alone.
+    pub fn new(chain: &'a Chain, scheme: Scheme, free: &[Free]) -> Self {
+        let mut columns = Vec::new();
+        for (place, f) in free.iter().enumerate() {
+            match &f.target {
+                Target::Term { term, joints } => {
+                    let local = |j: &usize| chain.joints.iter().position(|c| c == j);
+                    let joints: Vec<usize> = joints.iter().filter_map(local).collect();
+                    if !joints.is_empty() {
+                        columns.push(Column { place, kind: Kind::Term(*term, joints) });
+                    }
+                }
+                Target::Inertia(entry) => {
+                    if let Some(local) = chain.inertias.iter().position(|e| e == entry) {
+                        columns.push(Column { place, kind: Kind::Inertia(local) });
+                    }
+                }
+            }
+        }
+        let of_inertias = columns.iter().any(|c| matches!(c.kind, Kind::Inertia(_)));
+        let commands = [Term::Delay, Term::RateLimit, Term::SmoothingTime];
+        let of_commands = columns.iter().any(|c| matches!(&c.kind, Kind::Term(t, _) if commands.contains(t)));
+        let places = columns.iter().map(|c| c.place).collect();
+        Rollout { chain, scheme, columns, places, of_inertias, of_commands }
+    }
+
+    /// Places among all free parameters of those that reach the chain.
+    pub fn columns(&self) -> &[usize] {
+        &self.places
+    }
+
+    /// Simulates a log and shows every row; sensitivities are those that [`Rollout::new`] was asked for.
+    ///
+    /// # Errors
+    /// [`Lost`]: numbers that are not finite or out of bounds.
+    pub fn run(
+        &self,
+        values: &ServoValues,
+        log: &ServoLog,
+        mut see: impl FnMut(SimulatedRow<'_>),
+    ) -> Result<Count, Lost> {
+        let mut count = Count::default();
+        for segment in log.segments() {
+            let mut run = Run::new(self, values, log);
+            run.segment(segment, log, &mut see)?;
+            count.steps += run.steps;
+            count.unsettled += run.solver.unsettled;
+        }
+        Ok(count)
+    }
+}
+
+/// Steps of a simulation.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Count {
+    /// Steps.
+    pub steps: usize,
+    /// Steps whose friction did not settle within the rounds of the solver.
+    pub unsettled: usize,
+}
+
+/// A command of one joint on its way through rate limit and smoothing.
+struct Shaped {
+    position: Command,
+    velocity: Option<Command>,
+    effort: Option<Command>,
+    /// Rows at which the last look into each was made.
+    at: [usize; 3],
+    limited: f64,
+    smoothed: f64,
+}
+
+struct Run<'a> {
+    rollout: &'a Rollout<'a>,
+    n: usize,
+    p: usize,
+    joints: Vec<Numbers>,
+    commands: Vec<Shaped>,
+    equation: Equation<'a>,
+    solver: Solver,
+    wanted: Vec<Wanted>,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    middle: Vec<f64>,
+    acceleration: Vec<f64>,
+    reading: Vec<f64>,
+    effort: Vec<f64>,
+    slopes: Slopes,
+    steps: usize,
+}
+
+/// Slopes over the free parameters, row-major.
+struct Slopes {
+    q: Vec<f64>,
+    v: Vec<f64>,
+    wanted: Vec<f64>,
+    limited: Vec<f64>,
+    smoothed: Vec<f64>,
+    drive: Vec<f64>,
+    rhs: Vec<f64>,
+    reading: Vec<f64>,
+    effort: Vec<f64>,
+    half: Vec<f64>,
+    /// Of one drive at the beginning of a step.
+    before: Vec<f64>,
+}
+
+impl<'a> Run<'a> {
+    fn new(rollout: &'a Rollout<'a>, values: &ServoValues, log: &ServoLog) -> Self {
+        let chain = rollout.chain;
+        let (n, p) = (chain.len(), rollout.columns.len());
+        let hold = rollout.scheme.hold;
+        let command = |of: &[Vec<f64>], j: usize| of.get(j).map(|c| Command::new(&log.time, c, hold));
+        let shaped = |j: &usize| Shaped {
+            position: Command::new(&log.time, &log.command[*j], hold),
+            velocity: command(&log.velocity_command, *j),
+            effort: command(&log.feed_forward, *j),
+            at: [0; 3],
+            limited: 0.0,
+            smoothed: 0.0,
+        };
+        let zeros = || vec![0.0; n * p];
+        Run {
+            rollout,
+            n,
+            p,
+            joints: chain.joints.iter().map(|j| Numbers::of(&values.joints[*j])).collect(),
+            commands: chain.joints.iter().map(shaped).collect(),
+            equation: Equation::new(chain, &values.inertias),
+            solver: Solver::new(n, rollout.scheme),
+            wanted: vec![Wanted::default(); n],
+            q: vec![0.0; n],
+            v: vec![0.0; n],
+            middle: vec![0.0; n],
+            acceleration: vec![0.0; n],
+            reading: vec![0.0; n],
+            effort: vec![0.0; n],
+            slopes: Slopes {
+                q: zeros(),
+                v: zeros(),
+                wanted: zeros(),
+                limited: zeros(),
+                smoothed: zeros(),
+                drive: zeros(),
+                rhs: zeros(),
+                reading: zeros(),
+                effort: zeros(),
+                half: zeros(),
+                before: vec![0.0; p],
+            },
+            steps: 0,
+        }
+    }
+
+    fn segment(
+        &mut self,
+        rows: Range<usize>,
+        log: &ServoLog,
+        see: &mut impl FnMut(SimulatedRow<'_>),
+    ) -> Result<(), Lost> {
+        self.begin(rows.start, log);
+        self.show(rows.start, see);
+        for row in rows.start + 1..rows.end {
+            let (from, to) = (log.time[row - 1], log.time[row]);
+            // A whole number of steps may come out a hair above itself.
+            let steps = ((to - from) / self.rollout.scheme.step_s - 1e-6).ceil().max(1.0);
+            let h = (to - from) / steps;
+            for k in 0..steps as usize {
+                self.step(from + k as f64 * h, h);
+            }
+            if !self.q.iter().chain(&self.v).all(|x| x.abs() < FAR) {
+                return Err(Lost { row });
+            }
+            self.show(row, see);
+        }
+        Ok(())
+    }
+
+    /// At rest, or moving as the first readings do.
+    fn begin(&mut self, row: usize, log: &ServoLog) {
+        let given = log.start.as_ref().filter(|_| row == 0);
+        let Run { rollout, n, p, joints, commands, .. } = self;
+        for (j, robot) in rollout.chain.joints.iter().enumerate() {
+            let joint = &joints[j];
+            let reading = given.map_or(log.position[*robot][row], |start| start[*robot]);
+            self.q[j] = joint.direction * reading + joint.zero;
+            self.v[j] = if given.is_some() { 0.0 } else { joint.direction * first_speed(log, *robot, row) };
+            let shaped = &mut commands[j];
+            shaped.at = [row; 3];
+            let first = joint.direction * shaped.position.mean(log.time[row], 1e-9, joint.delay, &mut 0).0;
+            (shaped.limited, shaped.smoothed) = (first, first);
+        }
+        let slopes = &mut self.slopes;
+        for all in [&mut slopes.q, &mut slopes.v, &mut slopes.limited, &mut slopes.smoothed, &mut slopes.effort] {
+            all.fill(0.0);
+        }
+        for (c, column) in rollout.columns.iter().enumerate() {
+            if let Kind::Term(Term::Zero, of) = &column.kind {
+                of.iter().for_each(|j| slopes.q[j * *p + c] = 1.0);
+            }
+        }
+        self.effort = vec![0.0; *n];
+    }
+
+    fn show(&mut self, row: usize, see: &mut impl FnMut(SimulatedRow<'_>)) {
+        let Run { rollout, p, joints, slopes, .. } = self;
+        for (j, joint) in joints.iter().enumerate() {
+            self.reading[j] = joint.direction * (self.q[j] - joint.zero);
+            let from = &slopes.q[j * *p..][..*p];
+            let to = &mut slopes.reading[j * *p..][..*p];
+            to.iter_mut().zip(from).for_each(|(t, f)| *t = joint.direction * f);
+        }
+        for (c, column) in rollout.columns.iter().enumerate() {
+            if let Kind::Term(Term::Zero, of) = &column.kind {
+                of.iter().for_each(|j| slopes.reading[j * *p + c] -= joints[*j].direction);
+            }
+        }
+        see(SimulatedRow {
+            row,
+            reading: &self.reading,
+            velocity: &self.v,
+            effort: &self.effort,
+            by_parameter: &slopes.reading,
+            effort_by_parameter: &slopes.effort,
+        });
+    }
+
+    /// What the drives are told over a step.
+    fn command(&mut self, t: f64, h: f64) {
+        let Run { rollout, p, joints, commands, slopes, wanted, .. } = self;
+        for (j, (joint, shaped)) in joints.iter().zip(commands).enumerate() {
+            let ask = |command: &Option<Command>, at: &mut usize| {
+                command.as_ref().map_or(0.0, |c| joint.direction * c.mean(t, h, joint.delay, at).0)
+            };
+            let [_, at_velocity, at_effort] = &mut shaped.at;
+            let velocity = ask(&shaped.velocity, at_velocity);
+            let effort = ask(&shaped.effort, at_effort);
+            let (mean, by_delay) = shaped.position.mean(t, h, joint.delay, &mut shaped.at[0]);
+            let (mean, by_delay) = (joint.direction * mean, joint.direction * by_delay);
+            let ahead = mean - shaped.limited;
+            let most = joint.rate * h;
+            let held = if ahead > most { 1.0 } else if ahead < -most { -1.0 } else { 0.0 };
+            let limited = if held == 0.0 { mean } else { shaped.limited + held * most };
+            let share = if joint.smoothing > 0.0 { -(-h / joint.smoothing).exp_m1() } else { 1.0 };
+            let smoothed = shaped.smoothed + share * (limited - shaped.smoothed);
+            let position = if joint.smoothing > 0.0 { 0.5 * (shaped.smoothed + smoothed) } else { limited };
+            if rollout.of_commands {
+                let range = j * *p..(j + 1) * *p;
+                let row = &mut slopes.limited[range.clone()];
+                if held == 0.0 {
+                    row.fill(0.0);
+                }
+                for (c, column) in rollout.columns.iter().enumerate() {
+                    match &column.kind {
+                        Kind::Term(Term::Delay, of) if held == 0.0 && of.contains(&j) => row[c] = by_delay,
+                        Kind::Term(Term::RateLimit, of) if of.contains(&j) => row[c] += held * h,
+                        _ => {}
+                    }
+                }
+                let wanted = &mut slopes.wanted[range.clone()];
+                if joint.smoothing > 0.0 {
+                    let faster = -(1.0 - share) * h / (joint.smoothing * joint.smoothing);
+                    let smooth = &mut slopes.smoothed[range];
+                    for (c, column) in rollout.columns.iter().enumerate() {
+                        let mut next = smooth[c] + share * (row[c] - smooth[c]);
+                        if matches!(&column.kind, Kind::Term(Term::SmoothingTime, of) if of.contains(&j)) {
+                            next += faster * (limited - shaped.smoothed);
+                        }
+                        wanted[c] = 0.5 * (smooth[c] + next);
+                        smooth[c] = next;
+                    }
+                } else {
+                    wanted.copy_from_slice(row);
+                }
+            }
+            (shaped.limited, shaped.smoothed) = (limited, smoothed);
+            wanted[j] = Wanted { position, velocity, effort };
+        }
+    }
+
+    fn step(&mut self, t: f64, h: f64) {
+        self.steps += 1;
+        self.command(t, h);
+        for j in 0..self.n {
+            self.middle[j] = self.q[j] + 0.5 * h * self.v[j];
+        }
+        self.equation.values(&self.middle, &self.v);
+        let begin = Begin {
+            joints: &self.joints,
+            wanted: &self.wanted,
+            mass: &self.equation.mass,
+            bias: &self.equation.bias,
+            q: &self.q,
+            v: &self.v,
+            h,
+        };
+        self.solver.step(&begin);
+        for (effort, drive) in self.effort.iter_mut().zip(&self.solver.drive) {
+            *effort = drive.effort;
+        }
+        if self.p > 0 {
+            self.sensitivities(h);
+        }
+        for j in 0..self.n {
+            let next = self.solver.next[j];
+            self.q[j] += 0.5 * h * (self.v[j] + next);
+            self.v[j] = next;
+        }
+    }
+
+    /// Differentiates the step that was just solved: the residual's slope at fixed `v⁺`, then the tangent.
+    fn sensitivities(&mut self, h: f64) {
+        let (n, p) = (self.n, self.p);
+        for j in 0..n {
+            self.acceleration[j] = (self.solver.next[j] - self.v[j]) / h;
+        }
+        let loaded = self.joints.iter().any(|j| j.load > 0.0) || self.has(Term::LoadFriction);
+        let by_bodies = loaded && self.rollout.scheme.load == LoadOf::Bodies;
+        self.equation.slopes(&self.middle, &self.v, &self.acceleration, by_bodies);
+        if self.rollout.of_inertias {
+            self.equation.regressors(&self.middle, &self.v, &self.acceleration);
+        }
+        let (equation, solver) = (&self.equation, &self.solver);
+        let Slopes { q, v, wanted, drive, rhs, half, effort, before: row_before, .. } = &mut self.slopes;
+        for (half, (q, v)) in half.iter_mut().zip(q.iter().zip(v.iter())) {
+            *half = q + 0.5 * h * v;
+        }
+        for j in 0..n {
+            let joint = &self.joints[j];
+            let own = j * p..(j + 1) * p;
+            let at = solver.drive[j];
+            let mean = 0.5 * (self.v[j] + solver.next[j]);
+            let sign = solver.sign(j);
+            let row = &mut drive[own.clone()];
+            let quarter = 0.25 * h * at.by_error + 0.5 * at.by_damping * joint.kd;
+            for c in 0..p {
+                let i = own.start + c;
+                row[c] = at.by_error * (wanted[i] - q[i]) - quarter * v[i];
+            }
+            self.rollout.by_drive(j, &at, self.wanted[j].velocity - mean, row);
+            let to = &mut rhs[own.clone()];
+            for c in 0..p {
+                to[c] = 0.5 * joint.viscous * v[own.start + c] - row[c];
+            }
+            for k in 0..n {
+                let inertia = equation.mass[j * n + k] + if j == k { joint.rotor } else { 0.0 };
+                let by_position = equation.by_position[j * n + k];
+                let by_rate = equation.by_rate[j * n + k] - inertia / h;
+                let (half, v) = (&half[k * p..][..p], &v[k * p..][..p]);
+                for c in 0..p {
+                    to[c] += by_position * half[c] + by_rate * v[c];
+                }
+            }
+            let carried = solver.carried[j];
+            let level = sign * joint.load * carried.signum();
+            if level != 0.0 {
+                match self.rollout.scheme.load {
+                    LoadOf::Bodies => {
+                        for k in 0..n {
+                            let by_position = level * equation.bias_by_position[j * n + k];
+                            let by_rate = level * equation.by_rate[j * n + k];
+                            let (half, v) = (&half[k * p..][..p], &v[k * p..][..p]);
+                            for c in 0..p {
+                                to[c] += by_position * half[c] + by_rate * v[c];
+                            }
+                        }
+                    }
+                    LoadOf::Drive => {
+                        let before = solver.before[j];
+                        let row = &mut *row_before;
+                        for c in 0..p {
+                            let i = own.start + c;
+                            row[c] = before.by_error * (wanted[i] - q[i]) - before.by_damping * joint.kd * v[i];
+                        }
+                        self.rollout.by_drive(j, &before, self.wanted[j].velocity - self.v[j], row);
+                        for c in 0..p {
+                            to[c] += level * row[c];
+                        }
+                    }
+                }
+            }
+            let speed = solver.next[j].abs();
+            let x = speed / joint.stribeck;
+            let decay = (-x * x).exp();
+            for (c, column) in self.rollout.columns.iter().enumerate() {
+                match &column.kind {
+                    Kind::Term(term, of) if of.contains(&j) => {
+                        to[c] += match term {
+                            Term::RotorInertia => self.acceleration[j],
+                            Term::Viscous => mean,
+                            Term::Offset => 1.0,
+                            Term::Coulomb => sign,
+                            Term::Stiction => sign * decay,
+                            Term::StribeckVelocity => sign * joint.stiction * decay * 2.0 * x * x / joint.stribeck,
+                            Term::LoadFriction => sign * carried.abs(),
+                            _ => 0.0,
+                        }
+                    }
+                    Kind::Inertia(entry) => {
+                        let i = j * equation.columns() + entry;
+                        to[c] += equation.regressor[i];
+                        if self.rollout.scheme.load == LoadOf::Bodies {
+                            to[c] += level * equation.bias_regressor[i];
+                        }
+                    }
+                    Kind::Term(..) => {}
+                }
+            }
+            if solver.side[j] == 0.0 {
+                to.fill(0.0);
+            }
+        }
+        solver.tangent.solve(rhs, p);
+        for j in 0..n {
+            let at = solver.drive[j];
+            let quarter = 0.25 * h * at.by_error + 0.5 * at.by_damping * self.joints[j].kd;
+            for i in j * p..(j + 1) * p {
+                let next = -rhs[i];
+                effort[i] = drive[i] - quarter * next;
+                q[i] += 0.5 * h * (v[i] + next);
+                v[i] = next;
+            }
+        }
+    }
+
+    fn has(&self, wanted: Term) -> bool {
+        self.rollout.columns.iter().any(|c| matches!(&c.kind, Kind::Term(term, _) if *term == wanted))
+    }
+}
+
+impl Rollout<'_> {
+    /// Adds what a drive's own parameters change of its effort at a fixed state; `lag`: commanded less actual velocity.
+    fn by_drive(&self, j: usize, at: &Drive, lag: f64, row: &mut [f64]) {
+        for (column, to) in self.columns.iter().zip(row) {
+            let Kind::Term(term, of) = &column.kind else { continue };
+            if !of.contains(&j) {
+                continue;
+            }
+            *to += match term {
+                Term::PositionGain => at.free * at.banded,
+                Term::VelocityGain => at.by_damping * lag,
+                Term::Zero => at.by_error,
+                Term::DeadBand => -at.by_error * at.side,
+                Term::EffortLimit => at.capped,
+                _ => 0.0,
+            };
+        }
+    }
+}
+
+/// Speed of the first readings of a segment; 0 where they stay within two steps of the encoder.
+fn first_speed(log: &ServoLog, joint: usize, row: usize) -> f64 {
+    const ROWS: usize = 5;
+    let end = (row + ROWS).min(log.rows());
+    let (time, reading) = (&log.time[row..end], &log.position[joint][row..end]);
+    let n = time.len() as f64;
+    let span = reading.iter().fold(0.0_f64, |m, x| m.max((x - reading[0]).abs()));
+    if span <= 2.0 * log.resolution.get(joint).copied().unwrap_or(0.0) {
+        return 0.0;
+    }
+    let (t, x) = (time.iter().sum::<f64>() / n, reading.iter().sum::<f64>() / n);
+    let along: f64 = time.iter().zip(reading).map(|(a, b)| (a - t) * (b - x)).sum();
+    let across: f64 = time.iter().map(|a| (a - t) * (a - t)).sum();
+    if across > 0.0 { along / across } else { 0.0 }
+}

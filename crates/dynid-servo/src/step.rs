@@ -1,0 +1,399 @@
+//! One implicit step of a chain with drives and friction.
+//!
+//! Unknown is the velocity `v⁺` at the end of a step `h` from `(q, v)`:
+//!
+//! ```text
+//! (M(m) + I_a)(v⁺ - v)/h + b(m, v) - τ(u, q_a, v_a) + F_v v_a + o + L(v⁺) sign(v⁺) ∋ 0
+//! m = q + h v/2,   v_a = (v + v⁺)/2,   q_a = q + h v_a/2,   q⁺ = q + h v_a
+//! ```
+//!
+//! Position and damping stand in the middle (second order), friction at the end, so that it can hold: with a sign width of 0
+//! the sign is the set `[-1, 1]` at rest and a joint that the rest cannot move stays where it is, exactly.
+
+use crate::joint::{Limited, LoadOf, Scheme, ServoJoint};
+use crate::term::Term;
+
+/// Rounds of the solver; beyond, the best found so far is taken and counted.
+const ROUNDS: usize = 60;
+
+/// Rounds after which only one joint a round changes between sticking and slipping. Changing all at once is faster and may
+/// go in circles; the least index first does not (Bard 1974).
+const FREE_ROUNDS: usize = 8;
+
+/// Least change of a velocity, rad/s, that asks for another round.
+const CHANGE: f64 = 1e-11;
+
+/// Numbers of one joint, unpacked.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Numbers {
+    pub(crate) kp: f64,
+    pub(crate) kd: f64,
+    pub(crate) rotor: f64,
+    pub(crate) viscous: f64,
+    pub(crate) coulomb: f64,
+    pub(crate) stiction: f64,
+    pub(crate) stribeck: f64,
+    pub(crate) load: f64,
+    pub(crate) offset: f64,
+    pub(crate) zero: f64,
+    pub(crate) delay: f64,
+    pub(crate) limit: f64,
+    pub(crate) dead: f64,
+    pub(crate) rate: f64,
+    pub(crate) smoothing: f64,
+    pub(crate) direction: f64,
+    pub(crate) limited: Limited,
+}
+
+impl Numbers {
+    pub(crate) fn of(joint: &ServoJoint) -> Self {
+        Numbers {
+            kp: joint.get(Term::PositionGain),
+            kd: joint.get(Term::VelocityGain),
+            rotor: joint.get(Term::RotorInertia),
+            viscous: joint.get(Term::Viscous),
+            coulomb: joint.get(Term::Coulomb),
+            stiction: joint.get(Term::Stiction),
+            stribeck: joint.get(Term::StribeckVelocity),
+            load: joint.get(Term::LoadFriction),
+            offset: joint.get(Term::Offset),
+            zero: joint.get(Term::Zero),
+            delay: joint.get(Term::Delay),
+            limit: joint.get(Term::EffortLimit),
+            dead: joint.get(Term::DeadBand),
+            rate: joint.get(Term::RateLimit),
+            smoothing: joint.get(Term::SmoothingTime),
+            direction: joint.direction,
+            limited: joint.limited,
+        }
+    }
+
+    /// Friction without load at a speed, and its slope over the speed.
+    pub(crate) fn dry(&self, speed: f64) -> (f64, f64) {
+        if self.stiction == 0.0 {
+            return (self.coulomb, 0.0);
+        }
+        let x = speed / self.stribeck;
+        let decay = (-x * x).exp();
+        (self.coulomb + self.stiction * decay, -2.0 * x / self.stribeck * self.stiction * decay)
+    }
+
+    /// The drive's effort at a state.
+    pub(crate) fn drive(&self, wanted: Wanted, q: f64, v: f64) -> Drive {
+        let error = wanted.position + self.zero - q;
+        let side = if error > self.dead { 1.0 } else if error < -self.dead { -1.0 } else { 0.0 };
+        let banded = if side == 0.0 { 0.0 } else { error - side * self.dead };
+        let follow = self.kp * banded + wanted.effort;
+        let damp = self.kd * (wanted.velocity - v);
+        let acted = if self.limited == Limited::Whole { follow + damp } else { follow };
+        let capped = if acted > self.limit { 1.0 } else if acted < -self.limit { -1.0 } else { 0.0 };
+        let free = if capped == 0.0 { 1.0 } else { 0.0 };
+        let (effort, by_damping) = match self.limited {
+            Limited::Whole => (if capped == 0.0 { acted } else { capped * self.limit }, free),
+            Limited::Proportional => ((if capped == 0.0 { acted } else { capped * self.limit }) + damp, 1.0),
+        };
+        Drive { effort, banded, side, capped, by_error: free * self.kp * side.abs(), free, by_damping }
+    }
+}
+
+/// What a drive is told, in the joint's own direction: position without the encoder's zero, velocity, effort.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Wanted {
+    pub(crate) position: f64,
+    pub(crate) velocity: f64,
+    pub(crate) effort: f64,
+}
+
+/// Effort of a drive and its slopes.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Drive {
+    pub(crate) effort: f64,
+    /// Control error behind the dead band.
+    pub(crate) banded: f64,
+    /// Side of the dead band: -1, 0 (inside), 1.
+    pub(crate) side: f64,
+    /// Side of the limit: -1, 0 (below it), 1.
+    pub(crate) capped: f64,
+    /// Slope over the control error.
+    pub(crate) by_error: f64,
+    /// 1 where the control error acts, 0 at the limit.
+    pub(crate) free: f64,
+    /// 1 where the damping acts.
+    pub(crate) by_damping: f64,
+}
+
+/// Memory and results of steps.
+#[derive(Debug)]
+pub(crate) struct Solver {
+    n: usize,
+    scheme: Scheme,
+    /// Whether a joint slips, and which way; 0: it sticks. With a width of the sign: 1.
+    pub(crate) side: Vec<f64>,
+    /// Velocities at the end.
+    pub(crate) next: Vec<f64>,
+    /// Drives at the solution.
+    pub(crate) drive: Vec<Drive>,
+    /// What load friction grows with.
+    pub(crate) carried: Vec<f64>,
+    /// Drives at the beginning of the step, for [`LoadOf::Drive`].
+    pub(crate) before: Vec<Drive>,
+    /// Steps that did not settle.
+    pub(crate) unsettled: usize,
+    residual: Vec<f64>,
+    slope: Vec<f64>,
+    change: Vec<f64>,
+    pub(crate) tangent: Tangent,
+}
+
+/// What a step begins from.
+pub(crate) struct Begin<'a> {
+    pub(crate) joints: &'a [Numbers],
+    pub(crate) wanted: &'a [Wanted],
+    pub(crate) mass: &'a [f64],
+    pub(crate) bias: &'a [f64],
+    pub(crate) q: &'a [f64],
+    pub(crate) v: &'a [f64],
+    pub(crate) h: f64,
+}
+
+impl Solver {
+    pub(crate) fn new(n: usize, scheme: Scheme) -> Self {
+        Solver {
+            n,
+            scheme,
+            side: vec![0.0; n],
+            next: vec![0.0; n],
+            drive: vec![Drive::default(); n],
+            carried: vec![0.0; n],
+            before: vec![Drive::default(); n],
+            unsettled: 0,
+            residual: vec![0.0; n],
+            slope: vec![0.0; n],
+            change: vec![0.0; n],
+            tangent: Tangent::new(n),
+        }
+    }
+
+    /// Residual without friction of the sign, and the diagonal of its slope beside the inertia, at velocities `self.next`.
+    fn smooth(&mut self, b: &Begin<'_>) {
+        let n = self.n;
+        for j in 0..n {
+            let joint = &b.joints[j];
+            let mean = 0.5 * (b.v[j] + self.next[j]);
+            let middle = b.q[j] + 0.5 * b.h * mean;
+            let drive = joint.drive(b.wanted[j], middle, mean);
+            let mut inertial = joint.rotor * (self.next[j] - b.v[j]);
+            for k in 0..n {
+                inertial += b.mass[j * n + k] * (self.next[k] - b.v[k]);
+            }
+            self.residual[j] = inertial / b.h + b.bias[j] - drive.effort + joint.viscous * mean + joint.offset;
+            self.slope[j] =
+                0.25 * b.h * drive.by_error + 0.5 * drive.by_damping * joint.kd + 0.5 * joint.viscous;
+            self.drive[j] = drive;
+        }
+    }
+
+    /// Friction of the sign at a velocity and its slope.
+    fn kink(&self, joint: &Numbers, j: usize) -> (f64, f64) {
+        let v = self.next[j];
+        let (dry, dry_slope) = joint.dry(v.abs());
+        let level = dry + joint.load * self.carried[j].abs();
+        let width = self.scheme.sign_width;
+        if width > 0.0 {
+            let sign = (v / width).tanh();
+            let signed_slope = dry_slope * v.signum();
+            return (level * sign, level * (1.0 - sign * sign) / width + signed_slope * sign);
+        }
+        (level * self.side[j], dry_slope * self.side[j] * self.side[j])
+    }
+
+    /// Sign of a joint's velocity at the end of the step as friction takes it.
+    pub(crate) fn sign(&self, j: usize) -> f64 {
+        let width = self.scheme.sign_width;
+        if width > 0.0 { (self.next[j] / width).tanh() } else { self.side[j] }
+    }
+
+    /// Most that a resting joint can hold.
+    fn hold(&self, joint: &Numbers, j: usize) -> f64 {
+        joint.dry(0.0).0 + joint.load * self.carried[j].abs()
+    }
+
+    /// Finds the velocities at the end of a step.
+    pub(crate) fn step(&mut self, b: &Begin<'_>) {
+        for j in 0..self.n {
+            self.carried[j] = match self.scheme.load {
+                LoadOf::Bodies => b.bias[j],
+                LoadOf::Drive => {
+                    self.before[j] = b.joints[j].drive(b.wanted[j], b.q[j], b.v[j]);
+                    self.before[j].effort
+                }
+            };
+        }
+        self.next.copy_from_slice(b.v);
+        if self.scheme.sign_width > 0.0 { self.step_smooth(b) } else { self.step_with_rest(b) }
+    }
+
+    /// Newton's method with a smooth sign: a joint that would cross a steep part stops at zero first.
+    fn step_smooth(&mut self, b: &Begin<'_>) {
+        let width = self.scheme.sign_width;
+        self.side.fill(1.0);
+        for _ in 0..ROUNDS {
+            self.smooth(b);
+            for j in 0..self.n {
+                let (friction, slope) = self.kink(&b.joints[j], j);
+                self.residual[j] += friction;
+                self.slope[j] += slope.max(0.0);
+            }
+            self.solve_change(b);
+            let mut largest = 0.0_f64;
+            for j in 0..self.n {
+                let (from, to) = (self.next[j], self.next[j] + self.change[j]);
+                let crosses = from * to < 0.0 && from.abs() > 2.0 * width;
+                self.next[j] = if crosses { 0.0 } else { to };
+                largest = largest.max((self.next[j] - from).abs());
+            }
+            if largest <= CHANGE {
+                self.finish(b);
+                return;
+            }
+        }
+        self.unsettled += 1;
+        self.finish(b);
+    }
+
+    /// Newton's method among joints that slip, and a choice of those that stick.
+    fn step_with_rest(&mut self, b: &Begin<'_>) {
+        for j in 0..self.n {
+            let v = b.v[j];
+            self.side[j] = if v > 0.0 { 1.0 } else if v < 0.0 { -1.0 } else { 0.0 };
+        }
+        for round in 0..ROUNDS {
+            self.smooth(b);
+            for j in 0..self.n {
+                let (friction, slope) = self.kink(&b.joints[j], j);
+                self.residual[j] += friction;
+                self.slope[j] += slope.max(0.0);
+            }
+            self.solve_change(b);
+            let mut largest = 0.0_f64;
+            for j in 0..self.n {
+                largest = largest.max(self.change[j].abs());
+                self.next[j] += self.change[j];
+            }
+            let one_by_one = round >= FREE_ROUNDS;
+            let mut turned = false;
+            for j in 0..self.n {
+                if self.side[j] != 0.0 && self.next[j] * self.side[j] < 0.0 && !(turned && one_by_one) {
+                    self.side[j] = 0.0;
+                    self.next[j] = 0.0;
+                    turned = true;
+                }
+            }
+            if turned {
+                continue;
+            }
+            self.smooth(b);
+            for j in 0..self.n {
+                if self.side[j] == 0.0
+                    && self.residual[j].abs() > self.hold(&b.joints[j], j) * (1.0 + 1e-12)
+                    && !(turned && one_by_one)
+                {
+                    self.side[j] = -self.residual[j].signum();
+                    turned = true;
+                }
+            }
+            if !turned && largest <= CHANGE {
+                self.finish(b);
+                return;
+            }
+        }
+        self.unsettled += 1;
+        self.finish(b);
+    }
+
+    /// Change of velocities that the residual asks for; joints that stick have none.
+    fn solve_change(&mut self, b: &Begin<'_>) {
+        let n = self.n;
+        self.tangent.fill(b, &self.slope, &self.side);
+        for j in 0..n {
+            self.change[j] = if self.side[j] == 0.0 { 0.0 } else { -self.residual[j] };
+        }
+        self.tangent.solve(&mut self.change, 1);
+    }
+
+    /// Drives and the true tangent at the solution.
+    fn finish(&mut self, b: &Begin<'_>) {
+        self.smooth(b);
+        for j in 0..self.n {
+            self.slope[j] += self.kink(&b.joints[j], j).1;
+        }
+        self.tangent.fill(b, &self.slope, &self.side);
+    }
+}
+
+/// `(M + I_a)/h` and a diagonal, factored as `L D Lᵀ` without pivoting: the inertia leads, rows of joints that stick are those of the
+/// identity.
+#[derive(Debug)]
+pub(crate) struct Tangent {
+    n: usize,
+    lower: Vec<f64>,
+}
+
+impl Tangent {
+    fn new(n: usize) -> Self {
+        Tangent { n, lower: vec![0.0; n * n] }
+    }
+
+    fn fill(&mut self, b: &Begin<'_>, slope: &[f64], side: &[f64]) {
+        let n = self.n;
+        for j in 0..n {
+            for k in 0..=j {
+                let moves = side[j] != 0.0 && side[k] != 0.0;
+                let entry = if moves { b.mass[j * n + k] / b.h } else { 0.0 };
+                self.lower[j * n + k] = entry;
+            }
+            let own = if side[j] == 0.0 { 1.0 } else { b.joints[j].rotor / b.h + slope[j] };
+            self.lower[j * n + j] += own;
+        }
+        for j in 0..n {
+            for k in 0..j {
+                let mut sum = self.lower[j * n + k];
+                for i in 0..k {
+                    sum -= self.lower[j * n + i] * self.lower[k * n + i] * self.lower[i * n + i];
+                }
+                self.lower[j * n + k] = sum / self.lower[k * n + k];
+            }
+            let mut pivot = self.lower[j * n + j];
+            for i in 0..j {
+                pivot -= self.lower[j * n + i] * self.lower[j * n + i] * self.lower[i * n + i];
+            }
+            self.lower[j * n + j] = pivot;
+        }
+    }
+
+    /// Solves for `columns` right-hand sides, row-major, in place.
+    pub(crate) fn solve(&self, rhs: &mut [f64], columns: usize) {
+        let n = self.n;
+        for j in 0..n {
+            let (above, own) = rhs.split_at_mut(j * columns);
+            let own = &mut own[..columns];
+            for k in 0..j {
+                subtract(own, self.lower[j * n + k], &above[k * columns..][..columns]);
+            }
+        }
+        for j in (0..n).rev() {
+            let (own, below) = rhs[j * columns..].split_at_mut(columns);
+            let pivot = 1.0 / self.lower[j * n + j];
+            own.iter_mut().for_each(|x| *x *= pivot);
+            for k in j + 1..n {
+                subtract(own, self.lower[k * n + j], &below[(k - j - 1) * columns..][..columns]);
+            }
+        }
+    }
+}
+
+fn subtract(to: &mut [f64], factor: f64, from: &[f64]) {
+    if factor != 0.0 {
+        to.iter_mut().zip(from).for_each(|(t, f)| *t -= factor * f);
+    }
+}
