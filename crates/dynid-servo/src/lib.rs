@@ -1,9 +1,11 @@
 //! Position-controlled drives whose effort nobody measures.
 pub mod chain;
+pub mod fit;
 mod free;
 mod joint;
 mod log;
 mod rollout;
+pub mod start;
 mod step;
 mod term;
 

@@ -1,6 +1,8 @@
 //! Rollouts and sensitivities against prototypes written elsewhere.
 
 use dynid_model::{Description, Inertia, JointDescription, JointKind, LinkDescription, Mat3, Mechanism, Placement, Vec3};
+use dynid_servo::fit::{GaussNewton, ServoProblem, blocks, deviations, fit};
+use dynid_servo::start::{StartSettings, linear_start};
 use dynid_servo::{Chain, Free, Hold, LoadOf, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Term};
 use dynid_testing::golden;
 use serde_json::Value;
@@ -148,4 +150,68 @@ fn rollout_and_sensitivities_are_those_of_the_prototype() {
         assert!(worst <= within * largest, "{name}_{j}");
     }
     assert!(worst_q <= 1e-8 && worst_v <= 1e-6, "{worst_q:e} {worst_v:e}");
+}
+
+#[test]
+fn fit_is_that_of_the_prototype() {
+    let (Some(golden), Some(model)) = (golden("servo_arm2_fit.json"), golden("servo_arm2_rollout.json")) else {
+        return;
+    };
+    let mechanism = arm(&model, 1.0);
+    let command = columns(&rows(&golden["command"]));
+    let step = std::f64::consts::TAU / golden["counts_per_turn"].as_f64().unwrap();
+    let position: Vec<Vec<f64>> = columns(&rows(&golden["counts"]))
+        .iter()
+        .map(|counts| counts.iter().map(|c| c * step).collect())
+        .collect();
+    let ts = golden["Ts"].as_f64().unwrap();
+    let time = (0..command[0].len()).map(|k| k as f64 * ts).collect();
+    let mut log = ServoLog::new("golden", time, command.clone(), position);
+    log.start = Some(command.iter().map(|c| c[0]).collect());
+    let scheme =
+        Scheme { step_s: ts / 4.0, sign_width: 0.01, load: LoadOf::Bodies, hold: Hold::Held };
+    let names = ["kp_1", "kp_2", "viscous_1", "viscous_2", "armature_1", "armature_2", "coulomb_1", "coulomb_2", "zero_1", "zero_2", "delay"];
+    let mut free = Vec::new();
+    for term in [Term::PositionGain, Term::Viscous, Term::RotorInertia, Term::Coulomb, Term::Zero] {
+        free.extend((0..2).map(|j| Free::term(term, [j])));
+    }
+    free.push(Free::term(Term::Delay, 0..2));
+    // Some way off the truth.
+    let joint = |kp: f64, kd: f64| {
+        ServoJoint::default()
+            .with(Term::PositionGain, kp)
+            .with(Term::VelocityGain, kd)
+            .with(Term::Viscous, 0.5)
+            .with(Term::RotorInertia, 0.02)
+            .with(Term::Coulomb, 0.1)
+            .with(Term::Delay, 0.004)
+    };
+    let known = |kd| ServoJoint::default().with(Term::VelocityGain, kd);
+    let linear = ServoValues { joints: vec![known(1.5), known(1.0)], inertias: mechanism.inertia_vector() };
+    let chains = Chain::all(&mechanism);
+    let logs = [log];
+    let mut asked: Vec<Free> = free.iter().filter(|f| f.as_term() != Some(Term::Zero)).cloned().collect();
+    asked.extend((0..2).map(|j| Free::term(Term::Offset, [j])));
+    let found = linear_start(&chains, &logs, &linear, &asked, scheme, &StartSettings::default()).unwrap();
+    for j in 0..2 {
+        let of = &golden["linear_start"]["control_error_on_the_left"][j];
+        let kd = linear.joints[j].get(Term::VelocityGain);
+        for (k, term) in [Term::PositionGain, Term::Viscous, Term::RotorInertia, Term::Coulomb, Term::Offset].iter().enumerate() {
+            println!("{term} {} {}", found.values.joints[j].get(*term) + if k == 1 { kd } else { 0.0 }, of[k]);
+        }
+    }
+    println!("{} {}", found.values.joints[0].get(Term::Delay), golden["linear_start"]["delay"]);
+    let start = ServoValues { joints: vec![joint(22.0, 1.5), joint(26.0, 1.0)], inertias: mechanism.inertia_vector() };
+    let blocks = blocks(&logs, 24);
+    let problem = ServoProblem { chains: &chains, logs: &logs, scheme, free: &free, blocks: &blocks };
+    let fitted = fit(&problem, &start, &GaussNewton::default(), &|_| true).unwrap();
+    let found = deviations(&problem, &fitted);
+    println!("{:?} {} {}", fitted.ending, fitted.iterations, fitted.evaluations);
+    for (k, name) in names.iter().enumerate() {
+        let number = |of: &str| golden[of][name].as_f64().unwrap();
+        let (sd, jack) = (found.model[k].unwrap(), found.jackknife[k].unwrap());
+        println!("{name} {:.3} {:.4} {:.4}", (fitted.estimate[k] - number("estimate")) / number("sd_model"), sd / number("sd_model"), jack / number("sd_block_jackknife_24"));
+    }
+    let squares = fitted.evaluation.mean_squares(&|_| true);
+    println!("rms {:.6e} {:?}", ((squares[0] + squares[1]) / 2.0).sqrt(), golden["rms_rad"]);
 }

@@ -1,0 +1,9 @@
+//! Output error: parameters whose closed-loop simulation gives the measured positions.
+
+mod evaluation;
+mod gauss_newton;
+mod spread;
+
+pub use evaluation::{Block, BlockSums, Evaluation, ServoProblem, blocks};
+pub use gauss_newton::{Ending, Fitted, GaussNewton, Place, fit};
+pub use spread::{Deviations, deviations};

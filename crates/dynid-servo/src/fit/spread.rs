@@ -1,0 +1,67 @@
+//! Standard deviations of a fit: from the model, and from leaving out blocks of time.
+
+use dynid_linalg::Mat;
+
+use super::evaluation::ServoProblem;
+use super::gauss_newton::{Fitted, Place, damped, with_priors};
+
+/// Standard deviations of the free parameters; `None` for those at a bound or not seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Deviations {
+    /// From the curvature of the loss with the residuals' own size: right only if the model is.
+    pub model: Vec<Option<f64>>,
+    /// From the estimate without one block of time after the other, linearised.
+    pub jackknife: Vec<Option<f64>>,
+    /// Correlations by the model of the parameters that are not at a bound.
+    pub correlation: Mat,
+    /// Those parameters.
+    pub inside: Vec<usize>,
+    /// Degrees of freedom of the jackknife: blocks less one.
+    pub freedom: usize,
+}
+
+/// Share of a unit diagonal that keeps a factor of sums alive which a block leaves without a parameter.
+const RIDGE: f64 = 1e-12;
+
+/// Standard deviations of a fit to all blocks.
+///
+/// With `H = Jᵀ W J`, blocks `b` of `B`, `g_b = J_bᵀ W r_b`: model `H⁻¹`; jackknife `(B-1)/B Σ δ_b δ_bᵀ` with
+/// `δ_b = (H - H_b)⁻¹ g_b`, which has the leverage of every block in it (Efron and Stein 1981, linearised). Parameters at a bound
+/// are left out of both: as columns they would widen all others.
+pub fn deviations(problem: &ServoProblem<'_>, fitted: &Fitted) -> Deviations {
+    let free = problem.free;
+    let all = with_priors(fitted.evaluation.normal(&|_| true), free, &fitted.estimate).0;
+    let inside: Vec<usize> = (0..free.len()).filter(|k| fitted.places[*k] == Place::Inside).collect();
+    let m = inside.len();
+    let mut out = Deviations {
+        model: vec![None; free.len()],
+        jackknife: vec![None; free.len()],
+        correlation: Mat::identity(m, m),
+        inside: inside.clone(),
+        freedom: problem.blocks.len().saturating_sub(1),
+    };
+    let scale: Vec<f64> = inside.iter().map(|k| all[(*k, *k)].sqrt()).collect();
+    let scaled = Mat::from_fn(m, m, |i, j| {
+        all[(inside[i], inside[j])] / (scale[i] * scale[j]) + if i == j { RIDGE } else { 0.0 }
+    });
+    let Some(factor) = scaled.cholesky() else { return out };
+    let inverse = factor.solve(&Mat::identity(m, m));
+    for (i, k) in inside.iter().enumerate() {
+        out.model[*k] = Some(inverse[(i, i)].sqrt() / scale[i]);
+    }
+    out.correlation = Mat::from_fn(m, m, |i, j| inverse[(i, j)] / (inverse[(i, i)] * inverse[(j, j)]).sqrt());
+    let blocks = &fitted.evaluation.blocks;
+    let share = (blocks.len() as f64 - 1.0) / blocks.len() as f64;
+    let mut squares = vec![0.0; m];
+    for block in blocks {
+        let left = Mat::from_fn(free.len(), free.len(), |i, j| all[(i, j)] - block.hessian[(i, j)]);
+        let Some(change) = damped(&left, &block.gradient, &inside, RIDGE) else { return out };
+        squares.iter_mut().zip(&change).for_each(|(s, d)| *s += d * d);
+    }
+    if blocks.len() > 1 {
+        for (k, s) in inside.iter().zip(&squares) {
+            out.jackknife[*k] = Some((share * s).sqrt());
+        }
+    }
+    out
+}
