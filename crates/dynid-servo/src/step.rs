@@ -272,7 +272,9 @@ impl Solver {
             for j in 0..self.n {
                 let (friction, slope) = self.kink(&b.joints[j], j);
                 self.residual[j] += friction;
-                self.slope[j] += slope.max(0.0);
+                // The falling part of Stribeck's curve, as far as the inertia outweighs it: cut off, the rounds would creep.
+                let least = -0.5 * (b.mass[j * self.n + j] + b.joints[j].rotor) / b.h;
+                self.slope[j] = (self.slope[j] + slope).max(least);
             }
             self.solve_change(b);
             let mut largest = 0.0_f64;

@@ -11,9 +11,10 @@ use dynid_algebra::inertia::Inertia;
 use dynid_algebra::spatial::{Placement, Vec3};
 
 impl Description {
-    /// Holds joints at fixed positions (rad or m): they become fixed joints and their links are merged.
+    /// Holds joints at fixed positions (rad or m): they become fixed joints and their links are merged. A floating joint is held where
+    /// the file puts it, by position 0.
     ///
-    /// Fails if a name is not that of a moving joint with one coordinate.
+    /// Fails if a name is not that of a moving joint, or a floating one is to be held elsewhere.
     pub fn lock(&mut self, joints: &[(String, f64)]) -> Result<(), MechanismError> {
         for (name, position) in joints {
             let known = || {
@@ -22,11 +23,16 @@ impl Description {
             let found = self
                 .joints
                 .iter()
-                .position(|j| j.name == *name && !matches!(j.kind, JointKind::Fixed | JointKind::Floating));
+                .position(|j| j.name == *name && j.kind != JointKind::Fixed)
+                .filter(|j| self.joints[*j].kind != JointKind::Floating || *position == 0.0);
             let Some(index) = found else {
                 return Err(MechanismError::UnknownJoint { name: name.clone(), known: known() });
             };
             let joint = &mut self.joints[index];
+            if joint.kind == JointKind::Floating {
+                joint.kind = JointKind::Fixed;
+                continue;
+            }
             let axis = unit_axis(joint)?;
             let moved = match joint.kind {
                 JointKind::Prismatic => {

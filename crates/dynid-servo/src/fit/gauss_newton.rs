@@ -67,6 +67,13 @@ pub struct Fitted {
     pub ending: Ending,
 }
 
+/// Relative rise of the loss that a step may bring. Whether a joint at rest breaks away or not is decided at an instant, and no slope
+/// sees it: the loss has jumps of this size where gears stick.
+const ROUGH: f64 = 0.01;
+
+/// Steps in a row that may raise the loss.
+const SIDEWAYS: usize = 4;
+
 /// Relative change of a standard deviation of the weights that does not matter any more.
 const SETTLED: f64 = 0.01;
 
@@ -111,6 +118,9 @@ pub fn fit(
     let mut damping = FIRST_DAMPING;
     let mut ending = Ending::Unfinished;
     let mut places = vec![Place::Inside; free.len()];
+    // Where the loss was lowest before steps that raised it.
+    let mut best: Option<(f64, Evaluation, Vec<f64>, ServoValues)> = None;
+    let mut sideways = 0;
     while evaluations < settings.evaluations {
         let (hessian, gradient) = with_priors(evaluation.normal(take), free, &estimate);
         places = placed(free, &estimate, &hessian, &gradient);
@@ -135,29 +145,39 @@ pub fn fit(
         evaluations += 1;
         let tried = Evaluation::new(problem, &next, &next_sigma, true);
         let after = tried.as_ref().map_or(f64::INFINITY, |e| loss(e, &proposed));
-        match tried {
-            Ok(tried) if after <= before => {
-                (evaluation, estimate, values) = (tried, proposed, next);
-                iterations += 1;
-                damping = (damping / 5.0).max(LEAST_DAMPING);
-                if settled && before - after <= settings.tolerance * before {
-                    ending = Ending::Converged;
-                    break;
-                }
+        let gain = (before - after) / before;
+        let small = gain.abs() <= settings.tolerance;
+        let Ok(tried) = tried.map_err(|_| ()).and_then(|t| if gain >= -ROUGH { Ok(t) } else { Err(()) }) else {
+            damping *= 8.0;
+            if damping > MOST_DAMPING {
+                ending = Ending::Stalled;
+                break;
             }
-            _ => {
-                damping *= 8.0;
-                // A start that is a minimum already: steps change nothing but the last bits.
-                if after <= before * (1.0 + settings.tolerance) {
-                    ending = Ending::Converged;
-                    break;
-                }
-                if damping > MOST_DAMPING {
-                    ending = Ending::Stalled;
-                    break;
-                }
+            continue;
+        };
+        if gain < 0.0 && !small {
+            sideways += 1;
+            if sideways > SIDEWAYS {
+                ending = Ending::Stalled;
+                break;
             }
+            best.get_or_insert((before, evaluation.clone(), estimate.clone(), values.clone()));
+            damping *= 2.0;
+        } else {
+            damping = (damping / 5.0).max(LEAST_DAMPING);
         }
+        (evaluation, estimate, values) = (tried, proposed, next);
+        iterations += 1;
+        if best.as_ref().is_some_and(|b| evaluation.loss(&b.1.sigma, take) + prior_loss(free, &estimate) < b.0) {
+            (best, sideways) = (None, 0);
+        }
+        if settled && small {
+            ending = Ending::Converged;
+            break;
+        }
+    }
+    if let Some((_, e, x, v)) = best {
+        (evaluation, estimate, values) = (e, x, v);
     }
     let (hessian, gradient) = with_priors(evaluation.normal(take), free, &estimate);
     let last = placed(free, &estimate, &hessian, &gradient);

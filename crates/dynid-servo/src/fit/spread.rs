@@ -14,6 +14,8 @@ pub struct Deviations {
     pub jackknife: Vec<Option<f64>>,
     /// Correlations by the model of the parameters that are not at a bound.
     pub correlation: Mat,
+    /// Covariance by the jackknife of the same parameters; empty where there is none.
+    pub covariance: Mat,
     /// Those parameters.
     pub inside: Vec<usize>,
     /// Degrees of freedom of the jackknife: blocks less one.
@@ -37,6 +39,7 @@ pub fn deviations(problem: &ServoProblem<'_>, fitted: &Fitted) -> Deviations {
         model: vec![None; free.len()],
         jackknife: vec![None; free.len()],
         correlation: Mat::identity(m, m),
+        covariance: Mat::zeros(0, 0),
         inside: inside.clone(),
         freedom: problem.blocks.len().saturating_sub(1),
     };
@@ -52,16 +55,20 @@ pub fn deviations(problem: &ServoProblem<'_>, fitted: &Fitted) -> Deviations {
     out.correlation = Mat::from_fn(m, m, |i, j| inverse[(i, j)] / (inverse[(i, i)] * inverse[(j, j)]).sqrt());
     let blocks = &fitted.evaluation.blocks;
     let share = (blocks.len() as f64 - 1.0) / blocks.len() as f64;
-    let mut squares = vec![0.0; m];
+    let mut covariance = Mat::zeros(m, m);
     for block in blocks {
         let left = Mat::from_fn(free.len(), free.len(), |i, j| all[(i, j)] - block.hessian[(i, j)]);
         let Some(change) = damped(&left, &block.gradient, &inside, RIDGE) else { return out };
-        squares.iter_mut().zip(&change).for_each(|(s, d)| *s += d * d);
+        for (c, by) in change.iter().enumerate() {
+            let to = covariance.col_mut(c);
+            to.iter_mut().zip(&change).for_each(|(t, d)| *t += share * by * d);
+        }
     }
     if blocks.len() > 1 {
-        for (k, s) in inside.iter().zip(&squares) {
-            out.jackknife[*k] = Some((share * s).sqrt());
+        for (i, k) in inside.iter().enumerate() {
+            out.jackknife[*k] = Some(covariance[(i, i)].sqrt());
         }
+        out.covariance = covariance;
     }
     out
 }

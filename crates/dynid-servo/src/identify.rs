@@ -1,0 +1,845 @@
+//! From a robot and logs to parameters, each with an interval and a verdict.
+//!
+//! 1. [Linear start](crate::start), then [output error](crate::fit) of the plain law: rotor inertia, viscous and Coulomb friction,
+//!    delay, and position gains where they are not known.
+//! 2. [`Addition`]s one by one, as far as they predict folds of the logs that they were not fitted to.
+//! 3. The step of the simulation is halved until it does not matter.
+//! 4. Intervals: block jackknife, and what the estimate moves by under half the step, without folds of the logs, under richer laws and
+//!    other gains ([`Spread`]). Where the model is wrong these decide.
+//! 5. Verdicts and groups of parameters that only act together.
+
+use std::collections::BTreeSet;
+
+use dynid_model::Mechanism;
+use dynid_motion::signal::SignalError;
+
+use crate::chain::Chain;
+use crate::fit::{
+    Block, Deviations, Ending, Evaluation, Fitted, GaussNewton, Place, ServoProblem, blocks, deviations, fit,
+};
+use crate::free::{Free, ServoValues};
+use crate::joint::{Hold, Scheme};
+use crate::log::ServoLog;
+use crate::rollout::Lost;
+use crate::settings::{Addition, Choice, ServoSettings, Shared};
+use crate::start::{StartSettings, linear_start};
+use crate::term::Term;
+
+/// Folds of the logs that additions are judged on.
+const FOLDS: usize = 3;
+
+/// Least gain of the held-out error that takes an addition which does not win on every fold.
+const LEAST_GAIN: f64 = 0.02;
+
+/// Least gain of the held-out error that takes an addition which wins on every fold.
+const LEAST_SURE_GAIN: f64 = 0.005;
+
+/// Share of the residual that half the step may move the simulation by.
+const STEP_SHARE: f64 = 0.2;
+
+/// Halvings of the step at most.
+const HALVINGS: usize = 4;
+
+/// Fits that leave a fold out begin at the estimate of all: a few steps are enough.
+const OF_FOLDS: GaussNewton = GaussNewton { evaluations: 5, tolerance: 1e-3, reweighted: 0 };
+
+/// Residual over the encoder's rounding from which the model counts as wrong.
+pub const MISFIT: f64 = 1.3;
+
+/// Why there is no identification.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ServoError {
+    /// A log that cannot be filtered.
+    #[error("{log}: {source}")]
+    Signal {
+        /// Name of the log.
+        log: String,
+        /// Why.
+        source: SignalError,
+    },
+    /// The simulation got lost.
+    #[error(transparent)]
+    Lost(#[from] Lost),
+    /// Logs, settings and robot do not have the same joints.
+    #[error("{what}: expected {expected} joints, found {found}")]
+    Joints {
+        /// What has the wrong number.
+        what: String,
+        /// Joints of the robot.
+        expected: usize,
+        /// Joints found.
+        found: usize,
+    },
+    /// Too few rows to say anything.
+    #[error("{log}: expected at least {expected} rows, found {found}")]
+    Short {
+        /// Name of the log.
+        log: String,
+        /// Least number.
+        expected: usize,
+        /// Rows.
+        found: usize,
+    },
+}
+
+/// Rows that a log needs at least.
+const LEAST_ROWS: usize = 50;
+
+/// What an estimate moves by when something is changed that should not matter.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Spread {
+    /// Largest change under laws that are richer by one of friction or offset.
+    pub law: f64,
+    /// Change under half the step.
+    pub step: f64,
+    /// Standard deviation over fits that each leave a fold of the logs out.
+    pub folds: f64,
+    /// Largest change under stated gains that are wrong by their error.
+    pub gain: f64,
+}
+
+/// What can be said of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ServoVerdict {
+    /// The interval is narrow, and nothing that should not matter moves the value out of it.
+    Seen,
+    /// The interval is known and wide.
+    Coarse,
+    /// The value moves by more than its own interval with the law, the step, the fold or a stated gain.
+    Unstable,
+    /// What is known beforehand decides.
+    Prior,
+    /// The value stands at a bound, where it has no interval: the data would have it go on, which hints at a wrong model.
+    AtBound,
+    /// No reading depends on it.
+    NotSeen,
+}
+
+/// A parameter that was asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ServoParameter {
+    /// What it is.
+    pub free: Free,
+    /// Value.
+    pub value: f64,
+    /// Half width of the 95 % interval with all spreads; `None`: there is none.
+    pub half_width: Option<f64>,
+    /// Standard deviation by the block jackknife.
+    pub std: Option<f64>,
+    /// Standard deviation by the model alone: right only if the model is.
+    pub model_std: Option<f64>,
+    /// What it moves by.
+    pub spread: Spread,
+    /// Value over the position gain of its joint and the half width of its interval, where the gain was found and both scale together.
+    pub per_gain: Option<(f64, f64)>,
+    /// Verdict.
+    pub verdict: ServoVerdict,
+}
+
+/// What makes some parameters act together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GroupKind {
+    /// They share one scale: only bodies of known mass, a stated gain or a measured effort pin it.
+    Scale,
+    /// They are lags: content above 5 Hz parts them.
+    Lag,
+    /// Zero and constant effort: several postures part them.
+    Posture,
+    /// Parts of friction: more speeds and loads part them.
+    Friction,
+    /// Others.
+    Other,
+}
+
+/// Parameters that are known together only.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ServoGroup {
+    /// What makes them.
+    pub kind: GroupKind,
+    /// Places among the parameters.
+    pub members: Vec<usize>,
+}
+
+/// An addition and what held-out folds say to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AdditionTrial {
+    /// Laws that it was added to.
+    pub beside: Vec<Addition>,
+    /// The addition.
+    pub addition: Addition,
+    /// Held-out error over that without it, per fold; `NaN`: the simulation got lost.
+    pub ratios: Vec<f64>,
+    /// Whether it was taken.
+    pub taken: bool,
+}
+
+/// Error of rollouts that begin from measured states again and again.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HorizonError {
+    /// Time after which a rollout begins anew, s; infinite: never.
+    pub horizon_s: f64,
+    /// RMS of every joint.
+    pub rms: Vec<f64>,
+}
+
+/// An identification.
+#[derive(Debug, Clone)]
+pub struct ServoIdentification {
+    /// Chains of the robot.
+    pub chains: Vec<Chain>,
+    /// All numbers.
+    pub values: ServoValues,
+    /// Parameters that were asked for.
+    pub parameters: Vec<ServoParameter>,
+    /// Groups of parameters that only act together.
+    pub groups: Vec<ServoGroup>,
+    /// What was added to the plain law.
+    pub additions: Vec<Addition>,
+    /// Additions that were tried.
+    pub trials: Vec<AdditionTrial>,
+    /// How the simulation was done.
+    pub scheme: Scheme,
+    /// RMS residual of every joint over all logs, whole rollouts.
+    pub rms: Vec<f64>,
+    /// The same by log.
+    pub rms_by_log: Vec<Vec<f64>>,
+    /// RMS of the command less the position.
+    pub command_rms: Vec<f64>,
+    /// Standard deviation of every encoder's rounding.
+    pub floor: Vec<f64>,
+    /// Residual over floor of every joint, the median over joints: above [`MISFIT`] the model is wrong somewhere.
+    pub misfit: f64,
+    /// RMS by which half the step moves the simulation, over the residual's.
+    pub step_share: f64,
+    /// Errors over horizons.
+    pub horizons: Vec<HorizonError>,
+    /// Relative residual of the linear start, by joint.
+    pub start_residual: Vec<f64>,
+    /// The linear start.
+    pub start: ServoValues,
+    /// How the last fit ended.
+    pub ending: Ending,
+    /// Accepted steps of it.
+    pub iterations: usize,
+    /// Simulations of all logs, all fits together.
+    pub evaluations: usize,
+    /// Steps whose friction did not settle, and all steps, of one simulation of all logs.
+    pub unsettled: (usize, usize),
+    /// Blocks of the jackknife.
+    pub blocks: usize,
+}
+
+/// Identifies a robot on a fixed base from commands and positions.
+///
+/// # Errors
+/// [`ServoError`].
+pub fn identify(
+    mechanism: &Mechanism,
+    logs: &[ServoLog],
+    settings: &ServoSettings,
+) -> Result<ServoIdentification, ServoError> {
+    check(mechanism, logs, settings)?;
+    let chains = Chain::all(mechanism);
+    let known = ServoValues { joints: settings.joints.clone(), inertias: mechanism.inertia_vector() };
+    let period = logs.iter().map(ServoLog::period).fold(0.0_f64, f64::max);
+    let mut work = Work {
+        chains: &chains,
+        logs,
+        settings,
+        blocks: blocks(logs, settings.blocks),
+        // A clock that jitters a little is no reason for another step.
+        scheme: Scheme {
+            step_s: settings.step_s.unwrap_or(1.1 * period),
+            sign_width: 0.0,
+            load: settings.load,
+            hold: settings.hold,
+        },
+        evaluations: 0,
+    };
+    let plain = work.free(&BTreeSet::new());
+    let start = linear_start(&chains, logs, &known, &plain, work.scheme, &StartSettings::default())
+        .map_err(|source| ServoError::Signal { log: logs[0].name.clone(), source })?;
+    let mut laws: BTreeSet<Addition> = match &settings.choice {
+        Choice::HeldOut => BTreeSet::new(),
+        Choice::Given(given) => given.iter().copied().collect(),
+    };
+    let begin = work.begin(&start.values, &laws, None);
+    let mut fitted = work.fit(&laws, &begin)?;
+    let mut trials = Vec::new();
+    let mut richer = Vec::new();
+    // One measure of all laws: by joint the residual of the first.
+    let sigma: Vec<f64> = fitted.evaluation.mean_squares(&|_| true).iter().map(|s| s.sqrt().max(1e-12)).collect();
+    let free = work.free(&laws);
+    let mut folds = work.held_out(&free, &fitted, &sigma);
+    if settings.choice == Choice::HeldOut {
+        loop {
+            let round = work.round(&laws, &fitted, &folds, &sigma)?;
+            let best = round.iter().filter(|t| t.trial.taken).min_by(|a, b| a.mean.total_cmp(&b.mean));
+            let best = best.map(|t| t.trial.addition);
+            for tried in &round {
+                let taken = Some(tried.trial.addition) == best;
+                trials.push(AdditionTrial { taken, ..tried.trial.clone() });
+            }
+            let Some(best) = best else {
+                richer = round;
+                break;
+            };
+            laws.insert(best);
+            if let Some(next) = round.into_iter().find(|t| t.trial.addition == best) {
+                fitted = work.fit(&laws, &next.fitted.values)?;
+                folds = next.folds;
+            }
+        }
+    }
+    let step_share = work.settle_step(&laws, &mut fitted)?;
+    work.judge(mechanism, laws, fitted, trials, &richer, step_share, start)
+}
+
+fn check(mechanism: &Mechanism, logs: &[ServoLog], settings: &ServoSettings) -> Result<(), ServoError> {
+    let n = mechanism.rates();
+    let demand = |what: &str, found: usize| {
+        if found == n { Ok(()) } else { Err(ServoError::Joints { what: what.to_owned(), expected: n, found }) }
+    };
+    demand("settings", settings.joints.len())?;
+    for log in logs {
+        demand(&log.name, log.joints())?;
+        if log.rows() < LEAST_ROWS {
+            let (expected, found) = (LEAST_ROWS, log.rows());
+            return Err(ServoError::Short { log: log.name.clone(), expected, found });
+        }
+    }
+    if logs.is_empty() {
+        return Err(ServoError::Short { log: "no log".to_owned(), expected: LEAST_ROWS, found: 0 });
+    }
+    Ok(())
+}
+
+/// An addition that was fitted and scored.
+struct Tried {
+    trial: AdditionTrial,
+    fitted: Fitted,
+    free: Vec<Free>,
+    folds: Folds,
+    /// Mean ratio of held-out errors.
+    mean: f64,
+}
+
+/// Fits that leave a fold out each.
+#[derive(Debug, Clone, Default)]
+struct Folds {
+    errors: Vec<f64>,
+    estimates: Vec<Vec<f64>>,
+}
+
+struct Work<'a> {
+    chains: &'a [Chain],
+    logs: &'a [ServoLog],
+    settings: &'a ServoSettings,
+    blocks: Vec<Block>,
+    scheme: Scheme,
+    evaluations: usize,
+}
+
+impl Work<'_> {
+    /// What a law leaves free.
+    fn free(&self, laws: &BTreeSet<Addition>) -> Vec<Free> {
+        let s = self.settings;
+        let n = s.joints.len();
+        let own = |term: Term| (0..n).map(move |j| Free::term(term, [j]));
+        let mut out: Vec<Free> = Vec::new();
+        let unknown: Vec<usize> = (0..n).filter(|j| !s.known_gain[*j]).collect();
+        if laws.contains(&Addition::OwnGains) {
+            out.extend(unknown.iter().map(|j| Free::term(Term::PositionGain, [*j])));
+        } else if !unknown.is_empty() {
+            out.push(Free::term(Term::PositionGain, unknown));
+        }
+        for term in [Term::RotorInertia, Term::Viscous, Term::Coulomb] {
+            out.extend(own(term));
+        }
+        if !s.known_delay {
+            match s.delay {
+                Shared::All => out.push(Free::term(Term::Delay, 0..n)),
+                Shared::Chain => {
+                    out.extend(self.chains.iter().map(|c| Free::term(Term::Delay, c.joints.iter().copied())));
+                }
+                Shared::Own => out.extend(own(Term::Delay)),
+            }
+        }
+        for term in &s.find {
+            out.extend(own(*term));
+        }
+        for addition in laws {
+            match addition {
+                Addition::Offset => out.extend(own(Term::Offset)),
+                Addition::Zero => {
+                    let zero = |j: usize| {
+                        Free::term(Term::Zero, [j]).known(s.joints[j].get(Term::Zero), s.zero_std)
+                    };
+                    out.extend((0..n).filter(|j| !s.known_zero[*j]).map(zero));
+                }
+                Addition::Stiction => {
+                    out.extend(own(Term::Stiction));
+                    out.extend(own(Term::StribeckVelocity).map(|f| Free { upper: 1.0, ..f }));
+                }
+                Addition::Load => out.extend(own(Term::LoadFriction)),
+                Addition::OwnGains => {}
+            }
+        }
+        out
+    }
+
+    /// Start of a law from an estimate of the law that it is added to.
+    fn begin(&self, from: &ServoValues, laws: &BTreeSet<Addition>, new: Option<Addition>) -> ServoValues {
+        let mut out = from.clone();
+        let added = |a: Addition| new.map_or(laws.contains(&a), |n| n == a);
+        for joint in &mut out.joints {
+            let coulomb = joint.get(Term::Coulomb);
+            if added(Addition::Stiction) {
+                // A peak of a tenth, so that the Stribeck velocity has a slope.
+                joint.set(Term::Stiction, 0.1 * coulomb.max(1e-3));
+                joint.set(Term::StribeckVelocity, 0.1);
+            }
+            if added(Addition::Load) {
+                joint.set(Term::LoadFriction, 0.02);
+            }
+        }
+        out
+    }
+
+    fn problem<'b>(&'b self, free: &'b [Free], scheme: Scheme) -> ServoProblem<'b> {
+        ServoProblem { chains: self.chains, logs: self.logs, scheme, free, blocks: &self.blocks }
+    }
+
+    fn fit(&mut self, laws: &BTreeSet<Addition>, start: &ServoValues) -> Result<Fitted, Lost> {
+        let free = self.free(laws);
+        self.refit(&free, start, self.scheme, &GaussNewton::default())
+    }
+
+    fn refit(
+        &mut self,
+        free: &[Free],
+        start: &ServoValues,
+        scheme: Scheme,
+        settings: &GaussNewton,
+    ) -> Result<Fitted, Lost> {
+        let fitted = fit(&self.problem(free, scheme), start, settings, &|_| true)?;
+        self.evaluations += fitted.evaluations;
+        Ok(fitted)
+    }
+
+    /// The fold that a block belongs to: whole logs where there are enough, else thirds of the time.
+    fn fold(&self, block: usize) -> usize {
+        if self.logs.len() >= FOLDS {
+            self.blocks[block].log % FOLDS
+        } else {
+            block * FOLDS / self.blocks.len()
+        }
+    }
+
+    /// Fits that leave a fold out each, and their errors on it in units of `sigma`; `NaN` where the simulation gets lost.
+    fn held_out(&mut self, free: &[Free], fitted: &Fitted, sigma: &[f64]) -> Folds {
+        let mut out = Folds::default();
+        for fold in 0..FOLDS {
+            let problem = self.problem(free, self.scheme);
+            let other = fit(&problem, &fitted.values, &OF_FOLDS, &|b| self.fold(b) != fold);
+            let Ok(other) = other else {
+                out.errors.push(f64::NAN);
+                continue;
+            };
+            self.evaluations += other.evaluations;
+            let squares = other.evaluation.mean_squares(&|b| self.fold(b) == fold);
+            let scaled = squares.iter().zip(sigma).map(|(s, sd)| s / (sd * sd));
+            out.errors.push((scaled.sum::<f64>() / sigma.len() as f64).sqrt());
+            out.estimates.push(other.estimate);
+        }
+        out
+    }
+
+    /// Fits and scores every addition that is not there yet.
+    fn round(
+        &mut self,
+        laws: &BTreeSet<Addition>,
+        fitted: &Fitted,
+        before: &Folds,
+        sigma: &[f64],
+    ) -> Result<Vec<Tried>, Lost> {
+        let without = fitted.evaluation.loss(sigma, &|_| true);
+        let short = GaussNewton { evaluations: 8, tolerance: 1e-3, ..GaussNewton::default() };
+        let mut out = Vec::new();
+        for addition in Addition::ALL {
+            if laws.contains(&addition) || !self.applies(addition) {
+                continue;
+            }
+            let mut with = laws.clone();
+            with.insert(addition);
+            let begin = self.begin(&fitted.values, &with, Some(addition));
+            let free = self.free(&with);
+            let Ok(fitted) = self.refit(&free, &begin, self.scheme, &short) else { continue };
+            // What does not gain on the logs that it is fitted to gains nowhere.
+            let gain = fitted.evaluation.loss(sigma, &|_| true) / without;
+            let folds = if gain < (1.0 - LEAST_SURE_GAIN).powi(2) {
+                self.held_out(&free, &fitted, sigma)
+            } else {
+                Folds { errors: before.errors.clone(), estimates: Vec::new() }
+            };
+            let ratios: Vec<f64> = folds.errors.iter().zip(&before.errors).map(|(a, b)| a / b).collect();
+            let mean = folds.errors.iter().sum::<f64>() / before.errors.iter().sum::<f64>();
+            let wins = ratios.iter().all(|r| *r < 1.0) && mean < 1.0 - LEAST_SURE_GAIN;
+            // Gains of their own predict better and mean less: gain, gravity and zero of a joint trade off.
+            let taken = addition != Addition::OwnGains && (wins || mean < 1.0 - LEAST_GAIN);
+            let beside = laws.iter().copied().collect();
+            out.push(Tried {
+                trial: AdditionTrial { beside, addition, ratios, taken },
+                fitted,
+                free,
+                folds,
+                mean: if mean.is_nan() { f64::INFINITY } else { mean },
+            });
+        }
+        Ok(out)
+    }
+
+    fn applies(&self, addition: Addition) -> bool {
+        let s = self.settings;
+        match addition {
+            Addition::OwnGains => s.known_gain.iter().filter(|k| !**k).count() > 1,
+            Addition::Zero => s.known_zero.iter().any(|k| !k),
+            _ => true,
+        }
+    }
+
+    /// Halves the step until the simulation hardly moves; returns the share by which it still does.
+    fn settle_step(&mut self, laws: &BTreeSet<Addition>, fitted: &mut Fitted) -> Result<f64, ServoError> {
+        let free = self.free(laws);
+        let mut share = 0.0;
+        for round in 0..=HALVINGS {
+            share = self.step_share(fitted)?;
+            if self.settings.step_s.is_some() || share <= STEP_SHARE || round == HALVINGS {
+                break;
+            }
+            self.scheme.step_s *= 0.5;
+            *fitted = self.refit(&free, &fitted.values, self.scheme, &GaussNewton::default())?;
+        }
+        Ok(share)
+    }
+
+    /// RMS by which half the step moves the readings, over that of the residual.
+    fn step_share(&mut self, fitted: &Fitted) -> Result<f64, Lost> {
+        let fine = Scheme { step_s: 0.5 * self.scheme.step_s, ..self.scheme };
+        let coarse = readings(self.chains, self.logs, &fitted.values, self.scheme)?;
+        let fine = readings(self.chains, self.logs, &fitted.values, fine)?;
+        self.evaluations += 2;
+        let moved: f64 = coarse.iter().zip(&fine).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / coarse.len() as f64;
+        let squares = fitted.evaluation.mean_squares(&|_| true);
+        let residual = squares.iter().sum::<f64>() / squares.len() as f64;
+        Ok((moved / residual).sqrt())
+    }
+
+    /// Intervals, verdicts, groups and errors of the chosen law.
+    #[expect(clippy::too_many_arguments, reason = "what the steps before left, each used once")]
+    fn judge(
+        mut self,
+        mechanism: &Mechanism,
+        laws: BTreeSet<Addition>,
+        fitted: Fitted,
+        trials: Vec<AdditionTrial>,
+        richer: &[Tried],
+        step_share: f64,
+        start: crate::start::LinearStart,
+    ) -> Result<ServoIdentification, ServoError> {
+        let free = self.free(&laws);
+        let n = mechanism.rates();
+        let rms: Vec<f64> = fitted.evaluation.mean_squares(&|_| true).iter().map(|s| s.sqrt()).collect();
+        let floor: Vec<f64> = (0..n).map(|j| self.logs.iter().map(|l| l.floor(j)).fold(0.0, f64::max)).collect();
+        let misfit = median(rms.iter().zip(&floor).map(|(r, f)| r / f.max(1e-12)).collect());
+        let found = deviations(&self.problem(&free, self.scheme), &fitted);
+        let spreads = self.spreads(&free, &fitted, richer, misfit > MISFIT)?;
+        let parameters = parameters(&free, &fitted, &found, &spreads, self.settings, self.logs);
+        let groups = groups(&free, &found);
+        let mut horizons = Vec::new();
+        for horizon_s in [0.1, 0.5, 2.0, f64::INFINITY] {
+            horizons.push(HorizonError { horizon_s, rms: self.horizon(&fitted, horizon_s)? });
+        }
+        let of_log = |l: usize| -> Vec<f64> {
+            let squares = fitted.evaluation.mean_squares(&|b| self.blocks[b].log == l);
+            squares.iter().map(|s| s.sqrt()).collect()
+        };
+        let count = fitted.evaluation.count;
+        Ok(ServoIdentification {
+            chains: self.chains.to_vec(),
+            parameters,
+            groups,
+            additions: laws.into_iter().collect(),
+            trials,
+            scheme: self.scheme,
+            rms_by_log: (0..self.logs.len()).map(of_log).collect(),
+            rms,
+            command_rms: command_rms(self.logs, n),
+            floor,
+            misfit,
+            step_share,
+            horizons,
+            start_residual: start.residual,
+            start: start.values,
+            ending: fitted.ending,
+            iterations: fitted.iterations,
+            evaluations: self.evaluations,
+            unsettled: (count.unsettled, count.steps),
+            blocks: self.blocks.len(),
+            values: fitted.values,
+        })
+    }
+
+    fn spreads(
+        &mut self,
+        free: &[Free],
+        fitted: &Fitted,
+        richer: &[Tried],
+        wrong: bool,
+    ) -> Result<Vec<Spread>, ServoError> {
+        let mut out = vec![Spread::default(); free.len()];
+        let short = GaussNewton { evaluations: 5, tolerance: 1e-6, reweighted: 0 };
+        let estimate = &fitted.estimate;
+        // Half the step.
+        let fine = Scheme { step_s: 0.5 * self.scheme.step_s, ..self.scheme };
+        let half = self.refit(free, &fitted.values, fine, &short)?;
+        out.iter_mut().zip(&half.estimate).zip(estimate).for_each(|((s, a), b)| s.step = (a - b).abs());
+        // Stated gains that are wrong.
+        if self.settings.known_gain.iter().any(|k| *k) && self.settings.gain_error > 0.0 {
+            for side in [-1.0, 1.0] {
+                let mut values = fitted.values.clone();
+                for (joint, known) in values.joints.iter_mut().zip(&self.settings.known_gain) {
+                    if *known {
+                        let factor = 1.0 + side * self.settings.gain_error;
+                        joint.set(Term::PositionGain, factor * joint.get(Term::PositionGain));
+                    }
+                }
+                if let Ok(other) = self.refit(free, &values, self.scheme, &short) {
+                    for ((s, a), b) in out.iter_mut().zip(&other.estimate).zip(estimate) {
+                        s.gain = s.gain.max((a - b).abs());
+                    }
+                }
+            }
+        }
+        if !wrong {
+            return Ok(out);
+        }
+        for tried in richer {
+            if matches!(tried.trial.addition, Addition::Zero | Addition::OwnGains) {
+                continue;
+            }
+            for (k, f) in free.iter().enumerate() {
+                if let Some(at) = tried.free.iter().position(|g| g.target == f.target) {
+                    out[k].law = out[k].law.max((tried.fitted.estimate[at] - estimate[k]).abs());
+                }
+            }
+        }
+        let of_folds = self.held_out(free, fitted, &vec![1.0; fitted.values.joints.len()]).estimates;
+        let folds = of_folds.len() as f64;
+        for (k, spread) in out.iter_mut().enumerate() {
+            let mean = of_folds.iter().map(|e| e[k]).sum::<f64>() / folds;
+            let squares: f64 = of_folds.iter().map(|e| (e[k] - mean) * (e[k] - mean)).sum();
+            spread.folds = ((folds - 1.0) / folds * squares).sqrt();
+        }
+        Ok(out)
+    }
+
+    /// RMS of rollouts that begin from measured states after every horizon.
+    fn horizon(&mut self, fitted: &Fitted, horizon_s: f64) -> Result<Vec<f64>, Lost> {
+        let rows = |log: &ServoLog| ((horizon_s / log.period()).round() as usize).max(1);
+        let cut = |log: &ServoLog| {
+            let mut log = log.clone();
+            if horizon_s.is_finite() {
+                let every = rows(&log);
+                log.breaks = (1..).map(|k| k * every).take_while(|r| *r < log.rows()).collect();
+            }
+            log
+        };
+        let logs: Vec<ServoLog> = self.logs.iter().map(cut).collect();
+        let problem =
+            ServoProblem { chains: self.chains, logs: &logs, scheme: self.scheme, free: &[], blocks: &self.blocks };
+        let sigma = vec![1.0; fitted.values.joints.len()];
+        let evaluation = Evaluation::new(&problem, &fitted.values, &sigma, false)?;
+        Ok(evaluation.mean_squares(&|_| true).iter().map(|s| s.sqrt()).collect())
+    }
+}
+
+/// Simulated readings of all logs, log by log, row by row of every chain.
+fn readings(
+    chains: &[Chain],
+    logs: &[ServoLog],
+    values: &ServoValues,
+    scheme: Scheme,
+) -> Result<Vec<f64>, Lost> {
+    let mut out = Vec::new();
+    for log in logs {
+        for chain in chains {
+            let rollout = crate::rollout::Rollout::new(chain, scheme, &[]);
+            rollout.run(values, log, |row| out.extend_from_slice(row.reading))?;
+        }
+    }
+    Ok(out)
+}
+
+fn command_rms(logs: &[ServoLog], joints: usize) -> Vec<f64> {
+    let rows: usize = logs.iter().map(ServoLog::rows).sum();
+    let squares = |j: usize| -> f64 {
+        let pairs = logs.iter().flat_map(|l| l.command[j].iter().zip(&l.position[j]));
+        pairs.map(|(u, x)| (u - x) * (u - x)).sum()
+    };
+    (0..joints).map(|j| (squares(j) / rows as f64).sqrt()).collect()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// Quantile 0.975 of Student's distribution, to 1e-3 from 5 degrees on (Cornish and Fisher's expansion).
+pub(crate) fn quantile(freedom: usize) -> f64 {
+    let (z, f) = (1.959_963_984_540_054_f64, freedom.max(1) as f64);
+    let g1 = (z.powi(3) + z) / 4.0;
+    let g2 = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0;
+    let g3 = (3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z) / 384.0;
+    z + g1 / f + g2 / (f * f) + g3 / (f * f * f)
+}
+
+fn parameters(
+    free: &[Free],
+    fitted: &Fitted,
+    found: &Deviations,
+    spreads: &[Spread],
+    settings: &ServoSettings,
+    logs: &[ServoLog],
+) -> Vec<ServoParameter> {
+    let t = quantile(found.freedom);
+    let period = logs.iter().map(ServoLog::period).fold(f64::INFINITY, f64::min);
+    let one = |k: usize| {
+        let (f, value, spread) = (&free[k], fitted.estimate[k], spreads[k]);
+        let std = found.jackknife[k];
+        let half_width = std.map(|sd| {
+            let parts = [t * sd, spread.law, spread.step, t * spread.folds, spread.gain];
+            // Folds and jackknife measure the same thing: the larger counts.
+            let own = parts[0].max(parts[3]);
+            (own * own + parts[1].powi(2) + parts[2].powi(2) + parts[4].powi(2)).sqrt()
+        });
+        let joint = f.joints().first().map(|j| &fitted.values.joints[*j]);
+        let scale = match (f.as_term(), joint) {
+            (Some(Term::Zero), _) => 10.0 / 3.0 * settings.zero_std,
+            (Some(Term::Delay | Term::SmoothingTime), _) => value.abs().max(period),
+            (Some(Term::Offset), Some(joint)) => value.abs().max(joint.get(Term::Coulomb)),
+            _ => value.abs(),
+        };
+        let of_prior = f.prior.is_some_and(|(_, sd)| found.model[k].is_none_or(|m| m > sd / 3.0));
+        let verdict = match (fitted.places[k], half_width, std) {
+            (Place::AtLower | Place::AtUpper, ..) => ServoVerdict::AtBound,
+            (Place::Unseen, ..) => ServoVerdict::NotSeen,
+            _ if of_prior => ServoVerdict::Prior,
+            (Place::Inside, Some(half), Some(sd)) => {
+                let moved = [spread.law, spread.step, spread.folds, spread.gain];
+                if moved.iter().any(|s| *s > t * sd) {
+                    ServoVerdict::Unstable
+                } else if half <= 0.1 * scale {
+                    ServoVerdict::Seen
+                } else {
+                    ServoVerdict::Coarse
+                }
+            }
+            _ => ServoVerdict::NotSeen,
+        };
+        ServoParameter {
+            free: f.clone(),
+            value,
+            half_width: half_width.filter(|_| !matches!(verdict, ServoVerdict::Prior | ServoVerdict::NotSeen)),
+            std,
+            model_std: found.model[k],
+            spread,
+            per_gain: per_gain(free, fitted, found, k, t),
+            verdict,
+        }
+    };
+    (0..free.len()).map(one).collect()
+}
+
+/// A parameter over the position gain that it scales with, and the half width of that.
+fn per_gain(
+    free: &[Free],
+    fitted: &Fitted,
+    found: &Deviations,
+    k: usize,
+    t: f64,
+) -> Option<(f64, f64)> {
+    let term = free[k].as_term()?;
+    if !term.scales_with_effort() || term == Term::PositionGain || found.covariance.nrows() == 0 {
+        return None;
+    }
+    let joint = *free[k].joints().first()?;
+    let is_gain = |f: &Free| f.as_term() == Some(Term::PositionGain) && f.joints().contains(&joint);
+    let gain = free.iter().position(is_gain)?;
+    let at = |k: usize| found.inside.iter().position(|i| *i == k);
+    let (a, b) = (at(k)?, at(gain)?);
+    let (value, kp) = (fitted.estimate[k], fitted.estimate[gain]);
+    let c = &found.covariance;
+    let ratio = value / kp;
+    let variance = (c[(a, a)] - 2.0 * ratio * c[(a, b)] + ratio * ratio * c[(b, b)]) / (kp * kp);
+    Some((ratio, t * variance.max(0.0).sqrt()))
+}
+
+/// Correlation from which parameters count as one.
+const TOGETHER: f64 = 0.9;
+
+fn groups(free: &[Free], found: &Deviations) -> Vec<ServoGroup> {
+    let m = found.inside.len();
+    let mut group: Vec<usize> = (0..m).collect();
+    for i in 0..m {
+        for j in 0..i {
+            if found.correlation[(i, j)].abs() > TOGETHER && group[i] != group[j] {
+                let (from, to) = (group[i].max(group[j]), group[i].min(group[j]));
+                group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
+            }
+        }
+    }
+    let mut out = Vec::new();
+    for g in 0..m {
+        let members: Vec<usize> =
+            (0..m).filter(|i| group[*i] == g).map(|i| found.inside[i]).collect();
+        if members.len() < 2 {
+            continue;
+        }
+        let terms: Vec<Term> = members.iter().filter_map(|k| free[*k].as_term()).collect();
+        let all = |of: &[Term]| terms.iter().all(|t| of.contains(t));
+        let kind = match () {
+            () if terms.contains(&Term::PositionGain) => GroupKind::Scale,
+            () if all(&[Term::Delay, Term::RotorInertia, Term::SmoothingTime, Term::Viscous]) => GroupKind::Lag,
+            () if all(&[Term::Zero, Term::Offset]) => GroupKind::Posture,
+            () if all(&[
+                Term::Coulomb,
+                Term::Stiction,
+                Term::StribeckVelocity,
+                Term::LoadFriction,
+                Term::Viscous,
+                Term::Offset,
+            ]) =>
+            {
+                GroupKind::Friction
+            }
+            () => GroupKind::Other,
+        };
+        out.push(ServoGroup { kind, members });
+    }
+    out
+}
+
+impl Default for ServoVerdict {
+    fn default() -> Self {
+        ServoVerdict::NotSeen
+    }
+}
+
+/// Whether commands are held, for messages.
+pub fn hold_word(hold: Hold) -> &'static str {
+    match hold {
+        Hold::Held => "held",
+        Hold::Line => "line",
+    }
+}
