@@ -109,6 +109,21 @@ impl Source {
         Ok(Source { path: path.to_owned(), file, urdf, mjcf })
     }
 
+    /// Text of the MJCF, if the robot is one.
+    pub fn mjcf_text(&self) -> Option<&str> {
+        self.mjcf.as_deref()
+    }
+
+    /// Text of the URDF that holds the tree, if one does.
+    pub fn urdf_text(&self) -> Option<&str> {
+        self.urdf.as_deref()
+    }
+
+    /// The robot as the file has it.
+    pub fn description(&self) -> &Description {
+        &self.file.description
+    }
+
     /// Whether the robot is an MJCF, into which identified parameters are put in place.
     pub fn is_mjcf(&self) -> bool {
         self.mjcf.is_some()

@@ -38,8 +38,8 @@ pub use data::{
     Starts, Status, StudyReport, StudyRow, StudySection, StudyTable, Trajectory, UnidentifiableColumn,
     ValidationPrice, Value, Verdict, Warning, Whiteness,
 };
-pub use data::{CurvesByTemperature, FrictionReport, FrictionTest, Surface, TemperatureLevel};
+pub use data::{CurvesByTemperature, JointSection, JointsReport, Surface, TemperatureLevel};
 pub use data::{FindingRow, LogPage, Ranked, Ranking};
 pub use data::{Judged, LineKind, PictureLine, PointKind, Pose, RobotPicture};
 pub use error::ReportError;
-pub use page::{render, render_design, render_friction, render_kind, render_log_page, render_study};
+pub use page::{render, render_design, render_joints, render_kind, render_log_page, render_study};

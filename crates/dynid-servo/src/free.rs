@@ -35,17 +35,17 @@ impl Free {
     /// A term of some joints within what physics allows.
     pub fn term(term: Term, joints: impl IntoIterator<Item = usize>) -> Self {
         let (lower, upper) = term.range();
-        Free { target: Target::Term { term, joints: joints.into_iter().collect() }, lower, upper, prior: None }
+        Free {
+            target: Target::Term { term, joints: joints.into_iter().collect() },
+            lower,
+            upper,
+            prior: None,
+        }
     }
 
     /// An inertial parameter without bounds.
     pub fn inertia(entry: usize) -> Self {
-        Free {
-            target: Target::Inertia(entry),
-            lower: f64::NEG_INFINITY,
-            upper: f64::INFINITY,
-            prior: None,
-        }
+        Free { target: Target::Inertia(entry), lower: f64::NEG_INFINITY, upper: f64::INFINITY, prior: None }
     }
 
     /// Returns the parameter with a value known beforehand.

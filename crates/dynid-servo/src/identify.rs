@@ -18,7 +18,7 @@ use crate::fit::{
     Block, Deviations, Ending, Evaluation, Fitted, GaussNewton, Place, ServoProblem, blocks, deviations, fit,
 };
 use crate::free::{Free, ServoValues};
-use crate::joint::{Hold, Scheme};
+use crate::joint::Scheme;
 use crate::log::ServoLog;
 use crate::rollout::Lost;
 use crate::settings::{Addition, Choice, ServoSettings, Shared};
@@ -111,7 +111,7 @@ pub enum ServoVerdict {
     Prior,
     /// The value stands at a bound, where it has no interval: the data would have it go on, which hints at a wrong model.
     AtBound,
-    /// No reading depends on it.
+    /// No reading depends on it, or so little that its interval holds 0.
     NotSeen,
 }
 
@@ -240,7 +240,18 @@ pub fn identify(
 ) -> Result<ServoIdentification, ServoError> {
     check(mechanism, logs, settings)?;
     let chains = Chain::all(mechanism);
-    let known = ServoValues { joints: settings.joints.clone(), inertias: mechanism.inertia_vector() };
+    let mut known = ServoValues { joints: settings.joints.clone(), inertias: mechanism.inertia_vector() };
+    if settings.find.contains(&Term::RateLimit) {
+        // A limit that the fastest command reaches: one that is never reached has no slope.
+        for (j, joint) in known.joints.iter_mut().enumerate() {
+            let speed = |log: &ServoLog| {
+                let pairs = log.time.windows(2).zip(log.command[j].windows(2));
+                pairs.map(|(t, u)| ((u[1] - u[0]) / (t[1] - t[0])).abs()).fold(0.0, f64::max)
+            };
+            let fastest = logs.iter().map(speed).fold(0.0, f64::max);
+            joint.set(Term::RateLimit, (0.8 * fastest).max(1e-3));
+        }
+    }
     let period = logs.iter().map(ServoLog::period).fold(0.0_f64, f64::max);
     let mut work = Work {
         chains: &chains,
@@ -256,19 +267,24 @@ pub fn identify(
         },
         evaluations: 0,
     };
-    let plain = work.free(&BTreeSet::new());
+    let own_gains = settings.own_gains.then_some(Addition::OwnGains);
+    let plain = work.free(&own_gains.into_iter().collect());
     let start = linear_start(&chains, logs, &known, &plain, work.scheme, &StartSettings::default())
         .map_err(|source| ServoError::Signal { log: logs[0].name.clone(), source })?;
     let mut laws: BTreeSet<Addition> = match &settings.choice {
         Choice::HeldOut => BTreeSet::new(),
         Choice::Given(given) => given.iter().copied().collect(),
     };
+    if settings.own_gains {
+        laws.insert(Addition::OwnGains);
+    }
     let begin = work.begin(&start.values, &laws, None);
     let mut fitted = work.fit(&laws, &begin)?;
     let mut trials = Vec::new();
     let mut richer = Vec::new();
     // One measure of all laws: by joint the residual of the first.
-    let sigma: Vec<f64> = fitted.evaluation.mean_squares(&|_| true).iter().map(|s| s.sqrt().max(1e-12)).collect();
+    let sigma: Vec<f64> =
+        fitted.evaluation.mean_squares(&|_| true).iter().map(|s| s.sqrt().max(1e-12)).collect();
     let free = work.free(&laws);
     let mut folds = work.held_out(&free, &fitted, &sigma);
     if settings.choice == Choice::HeldOut {
@@ -298,7 +314,11 @@ pub fn identify(
 fn check(mechanism: &Mechanism, logs: &[ServoLog], settings: &ServoSettings) -> Result<(), ServoError> {
     let n = mechanism.rates();
     let demand = |what: &str, found: usize| {
-        if found == n { Ok(()) } else { Err(ServoError::Joints { what: what.to_owned(), expected: n, found }) }
+        if found == n {
+            Ok(())
+        } else {
+            Err(ServoError::Joints { what: what.to_owned(), expected: n, found })
+        }
     };
     demand("settings", settings.joints.len())?;
     for log in logs {
@@ -372,9 +392,8 @@ impl Work<'_> {
             match addition {
                 Addition::Offset => out.extend(own(Term::Offset)),
                 Addition::Zero => {
-                    let zero = |j: usize| {
-                        Free::term(Term::Zero, [j]).known(s.joints[j].get(Term::Zero), s.zero_std)
-                    };
+                    let zero =
+                        |j: usize| Free::term(Term::Zero, [j]).known(s.joints[j].get(Term::Zero), s.zero_std);
                     out.extend((0..n).filter(|j| !s.known_zero[*j]).map(zero));
                 }
                 Addition::Stiction => {
@@ -529,7 +548,8 @@ impl Work<'_> {
         let coarse = readings(self.chains, self.logs, &fitted.values, self.scheme)?;
         let fine = readings(self.chains, self.logs, &fitted.values, fine)?;
         self.evaluations += 2;
-        let moved: f64 = coarse.iter().zip(&fine).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / coarse.len() as f64;
+        let moved: f64 =
+            coarse.iter().zip(&fine).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / coarse.len() as f64;
         let squares = fitted.evaluation.mean_squares(&|_| true);
         let residual = squares.iter().sum::<f64>() / squares.len() as f64;
         Ok((moved / residual).sqrt())
@@ -550,7 +570,8 @@ impl Work<'_> {
         let free = self.free(&laws);
         let n = mechanism.rates();
         let rms: Vec<f64> = fitted.evaluation.mean_squares(&|_| true).iter().map(|s| s.sqrt()).collect();
-        let floor: Vec<f64> = (0..n).map(|j| self.logs.iter().map(|l| l.floor(j)).fold(0.0, f64::max)).collect();
+        let floor: Vec<f64> =
+            (0..n).map(|j| self.logs.iter().map(|l| l.floor(j)).fold(0.0, f64::max)).collect();
         let misfit = median(rms.iter().zip(&floor).map(|(r, f)| r / f.max(1e-12)).collect());
         let found = deviations(&self.problem(&free, self.scheme), &fitted);
         let spreads = self.spreads(&free, &fitted, richer, misfit > MISFIT)?;
@@ -656,8 +677,13 @@ impl Work<'_> {
             log
         };
         let logs: Vec<ServoLog> = self.logs.iter().map(cut).collect();
-        let problem =
-            ServoProblem { chains: self.chains, logs: &logs, scheme: self.scheme, free: &[], blocks: &self.blocks };
+        let problem = ServoProblem {
+            chains: self.chains,
+            logs: &logs,
+            scheme: self.scheme,
+            free: &[],
+            blocks: &self.blocks,
+        };
         let sigma = vec![1.0; fitted.values.joints.len()];
         let evaluation = Evaluation::new(&problem, &fitted.values, &sigma, false)?;
         Ok(evaluation.mean_squares(&|_| true).iter().map(|s| s.sqrt()).collect())
@@ -741,6 +767,8 @@ fn parameters(
                     ServoVerdict::Unstable
                 } else if half <= 0.1 * scale {
                     ServoVerdict::Seen
+                } else if half >= scale {
+                    ServoVerdict::NotSeen
                 } else {
                     ServoVerdict::Coarse
                 }
@@ -750,7 +778,7 @@ fn parameters(
         ServoParameter {
             free: f.clone(),
             value,
-            half_width: half_width.filter(|_| !matches!(verdict, ServoVerdict::Prior | ServoVerdict::NotSeen)),
+            half_width: half_width.filter(|_| verdict != ServoVerdict::Prior),
             std,
             model_std: found.model[k],
             spread,
@@ -762,13 +790,7 @@ fn parameters(
 }
 
 /// A parameter over the position gain that it scales with, and the half width of that.
-fn per_gain(
-    free: &[Free],
-    fitted: &Fitted,
-    found: &Deviations,
-    k: usize,
-    t: f64,
-) -> Option<(f64, f64)> {
+fn per_gain(free: &[Free], fitted: &Fitted, found: &Deviations, k: usize, t: f64) -> Option<(f64, f64)> {
     let term = free[k].as_term()?;
     if !term.scales_with_effort() || term == Term::PositionGain || found.covariance.nrows() == 0 {
         return None;
@@ -801,8 +823,7 @@ fn groups(free: &[Free], found: &Deviations) -> Vec<ServoGroup> {
     }
     let mut out = Vec::new();
     for g in 0..m {
-        let members: Vec<usize> =
-            (0..m).filter(|i| group[*i] == g).map(|i| found.inside[i]).collect();
+        let members: Vec<usize> = (0..m).filter(|i| group[*i] == g).map(|i| found.inside[i]).collect();
         if members.len() < 2 {
             continue;
         }
@@ -810,7 +831,9 @@ fn groups(free: &[Free], found: &Deviations) -> Vec<ServoGroup> {
         let all = |of: &[Term]| terms.iter().all(|t| of.contains(t));
         let kind = match () {
             () if terms.contains(&Term::PositionGain) => GroupKind::Scale,
-            () if all(&[Term::Delay, Term::RotorInertia, Term::SmoothingTime, Term::Viscous]) => GroupKind::Lag,
+            () if all(&[Term::Delay, Term::RotorInertia, Term::SmoothingTime, Term::Viscous]) => {
+                GroupKind::Lag
+            }
             () if all(&[Term::Zero, Term::Offset]) => GroupKind::Posture,
             () if all(&[
                 Term::Coulomb,
@@ -828,18 +851,4 @@ fn groups(free: &[Free], found: &Deviations) -> Vec<ServoGroup> {
         out.push(ServoGroup { kind, members });
     }
     out
-}
-
-impl Default for ServoVerdict {
-    fn default() -> Self {
-        ServoVerdict::NotSeen
-    }
-}
-
-/// Whether commands are held, for messages.
-pub fn hold_word(hold: Hold) -> &'static str {
-    match hold {
-        Hold::Held => "held",
-        Hold::Line => "line",
-    }
 }

@@ -31,7 +31,9 @@ pub struct SimulatedRow<'a> {
 
 /// A simulation that went out of bounds.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("the simulated motion leaves all bounds at row {row} of the log: gains, limits or delay make the loop unstable")]
+#[error(
+    "the simulated motion leaves all bounds at row {row} of the log: gains, limits or delay make the loop unstable"
+)]
 pub struct Lost {
     /// Row of the log.
     pub row: usize,
@@ -259,7 +261,9 @@ impl<'a> Run<'a> {
             (shaped.limited, shaped.smoothed) = (first, first);
         }
         let slopes = &mut self.slopes;
-        for all in [&mut slopes.q, &mut slopes.v, &mut slopes.limited, &mut slopes.smoothed, &mut slopes.effort] {
+        for all in
+            [&mut slopes.q, &mut slopes.v, &mut slopes.limited, &mut slopes.smoothed, &mut slopes.effort]
+        {
             all.fill(0.0);
         }
         for (c, column) in rollout.columns.iter().enumerate() {
@@ -307,7 +311,13 @@ impl<'a> Run<'a> {
             let (mean, by_delay) = (joint.direction * mean, joint.direction * by_delay);
             let ahead = mean - shaped.limited;
             let most = joint.rate * h;
-            let held = if ahead > most { 1.0 } else if ahead < -most { -1.0 } else { 0.0 };
+            let held = if ahead > most {
+                1.0
+            } else if ahead < -most {
+                -1.0
+            } else {
+                0.0
+            };
             let limited = if held == 0.0 { mean } else { shaped.limited + held * most };
             let share = if joint.smoothing > 0.0 { -(-h / joint.smoothing).exp_m1() } else { 1.0 };
             let smoothed = shaped.smoothed + share * (limited - shaped.smoothed);
@@ -438,7 +448,8 @@ impl<'a> Run<'a> {
                         let row = &mut *row_before;
                         for c in 0..p {
                             let i = own.start + c;
-                            row[c] = before.by_error * (wanted[i] - q[i]) - before.by_damping * joint.kd * v[i];
+                            row[c] =
+                                before.by_error * (wanted[i] - q[i]) - before.by_damping * joint.kd * v[i];
                         }
                         self.rollout.by_drive(j, &before, self.wanted[j].velocity - self.v[j], row);
                         for c in 0..p {
@@ -459,7 +470,9 @@ impl<'a> Run<'a> {
                             Term::Offset => 1.0,
                             Term::Coulomb => sign,
                             Term::Stiction => sign * decay,
-                            Term::StribeckVelocity => sign * joint.stiction * decay * 2.0 * x * x / joint.stribeck,
+                            Term::StribeckVelocity => {
+                                sign * joint.stiction * decay * 2.0 * x * x / joint.stribeck
+                            }
                             Term::LoadFriction => sign * carried.abs(),
                             _ => 0.0,
                         }

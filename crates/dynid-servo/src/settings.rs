@@ -27,7 +27,7 @@ pub enum Addition {
     Stiction,
     /// Friction that grows with the load of the gear.
     Load,
-    /// A position gain of its own for every joint, in place of a shared one.
+    /// A position gain of its own for every joint, in place of a shared one: tried, never taken by itself.
     OwnGains,
 }
 
@@ -68,7 +68,10 @@ pub struct ServoSettings {
     pub known_gain: Vec<bool>,
     /// Relative error that known gains may have, 95 %. Default 0.1.
     pub gain_error: f64,
-    /// Which joints share a position gain that is not known. Default: all, unless [`Addition::OwnGains`] is taken.
+    /// Whether every joint has a position gain of its own where it is not known; else all share one. Default false, with what gains of their
+    /// own would predict as a trial.
+    pub own_gains: bool,
+    /// Which joints share a delay that is not known. Default: those of a chain.
     pub delay: Shared,
     /// Whether the delay is known.
     pub known_delay: bool,
@@ -97,6 +100,7 @@ impl ServoSettings {
             joints: vec![ServoJoint::default(); joints],
             known_gain: vec![false; joints],
             gain_error: 0.1,
+            own_gains: false,
             delay: Shared::Chain,
             known_delay: false,
             known_zero: vec![false; joints],

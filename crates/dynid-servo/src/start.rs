@@ -110,7 +110,8 @@ pub fn linear_start(
         of.extend(alone.into_iter().map(|j| vec![j]));
         of
     };
-    let is_free = |term: Term, j: usize| free.iter().any(|f| f.as_term() == Some(term) && f.joints().contains(&j));
+    let is_free =
+        |term: Term, j: usize| free.iter().any(|f| f.as_term() == Some(term) && f.joints().contains(&j));
     let gains = groups(Term::PositionGain);
     let mut delays: Vec<f64> = values.joints.iter().map(|j| j.get(Term::Delay)).collect();
     let delay_groups: Vec<Vec<usize>> =
@@ -210,7 +211,9 @@ fn signals(
             let n = chain.len();
             let mut effort = vec![0.0; n];
             for row in keep.clone() {
-                let of = |pick: fn(&Motion) -> &Vec<f64>| motion.iter().map(|m| pick(m)[row]).collect::<Vec<f64>>();
+                let of = |pick: fn(&Motion) -> &Vec<f64>| {
+                    motion.iter().map(|m| pick(m)[row]).collect::<Vec<f64>>()
+                };
                 equation.efforts(&of(|m| &m.1), &of(|m| &m.2), &of(|m| &m.3), &mut effort);
                 chain.joints.iter().zip(&effort).for_each(|(j, e)| out[*j].rigid.push(*e));
             }
@@ -320,11 +323,8 @@ impl LinearSolver<'_> {
                 }
             }
             let kp = joint.get(Term::PositionGain);
-            let left: Vec<f64> = if gain_free {
-                error
-            } else {
-                error.iter().zip(&known).map(|(e, k)| kp * e - k).collect()
-            };
+            let left: Vec<f64> =
+                if gain_free { error } else { error.iter().zip(&known).map(|(e, k)| kp * e - k).collect() };
             let weight = 1.0 / rms(&left).max(f64::MIN_POSITIVE);
             parts.push((*j, left, known, columns, weight));
         }

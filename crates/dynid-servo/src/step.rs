@@ -81,12 +81,24 @@ impl Numbers {
     /// The drive's effort at a state.
     pub(crate) fn drive(&self, wanted: Wanted, q: f64, v: f64) -> Drive {
         let error = wanted.position + self.zero - q;
-        let side = if error > self.dead { 1.0 } else if error < -self.dead { -1.0 } else { 0.0 };
+        let side = if error > self.dead {
+            1.0
+        } else if error < -self.dead {
+            -1.0
+        } else {
+            0.0
+        };
         let banded = if side == 0.0 { 0.0 } else { error - side * self.dead };
         let follow = self.kp * banded + wanted.effort;
         let damp = self.kd * (wanted.velocity - v);
         let acted = if self.limited == Limited::Whole { follow + damp } else { follow };
-        let capped = if acted > self.limit { 1.0 } else if acted < -self.limit { -1.0 } else { 0.0 };
+        let capped = if acted > self.limit {
+            1.0
+        } else if acted < -self.limit {
+            -1.0
+        } else {
+            0.0
+        };
         let free = if capped == 0.0 { 1.0 } else { 0.0 };
         let (effort, by_damping) = match self.limited {
             Limited::Whole => (if capped == 0.0 { acted } else { capped * self.limit }, free),
@@ -186,7 +198,8 @@ impl Solver {
             for k in 0..n {
                 inertial += b.mass[j * n + k] * (self.next[k] - b.v[k]);
             }
-            self.residual[j] = inertial / b.h + b.bias[j] - drive.effort + joint.viscous * mean + joint.offset;
+            self.residual[j] =
+                inertial / b.h + b.bias[j] - drive.effort + joint.viscous * mean + joint.offset;
             self.slope[j] =
                 0.25 * b.h * drive.by_error + 0.5 * drive.by_damping * joint.kd + 0.5 * joint.viscous;
             self.drive[j] = drive;
@@ -265,7 +278,13 @@ impl Solver {
     fn step_with_rest(&mut self, b: &Begin<'_>) {
         for j in 0..self.n {
             let v = b.v[j];
-            self.side[j] = if v > 0.0 { 1.0 } else if v < 0.0 { -1.0 } else { 0.0 };
+            self.side[j] = if v > 0.0 {
+                1.0
+            } else if v < 0.0 {
+                -1.0
+            } else {
+                0.0
+            };
         }
         for round in 0..ROUNDS {
             self.smooth(b);

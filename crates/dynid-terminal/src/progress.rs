@@ -6,6 +6,7 @@ use std::time::Duration;
 use dynid::Step;
 use dynid::design::DesignStep;
 use dynid::friction::FrictionStep;
+use dynid::servo::ServoStep;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::memory;
@@ -57,6 +58,14 @@ impl Progress {
             FrictionStep::Read(file) => format!("reading {file}"),
             FrictionStep::Law(joint) => format!("fitting friction of {joint}"),
             FrictionStep::Presliding(joint) => format!("searching bristles of {joint}"),
+        });
+    }
+
+    /// A step of a servo identification.
+    pub fn servo(&self, step: ServoStep) {
+        self.doing(match step {
+            ServoStep::Read(file) => format!("reading {file}"),
+            ServoStep::Fit => "fitting drives by simulation".to_owned(),
         });
     }
 

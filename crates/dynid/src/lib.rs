@@ -33,6 +33,7 @@ mod report_data;
 mod run;
 pub mod schema;
 mod sealed;
+pub mod servo;
 pub mod simulate;
 pub mod validate;
 
@@ -55,6 +56,7 @@ pub use dynid_model as model;
 pub use dynid_motion as motion;
 pub use dynid_record as record;
 pub use dynid_report as report;
+pub use dynid_servo as servo_fits;
 pub use dynid_sim as sim;
 
 /// Everything between rows and estimates, whichever room it is in.

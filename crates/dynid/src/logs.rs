@@ -49,6 +49,18 @@ pub(crate) fn load_as_it_is(
     finish(config, &config.path.display().to_string(), read, axes)
 }
 
+/// Positions of a robot in a log of any effort or none, checked and unwrapped, and where they come from. `part` of the log is not cut.
+pub(crate) fn positions(
+    config: &LogConfig,
+    axes: &[LogAxis],
+    columns: &MappingSpec,
+) -> Result<(Signals, InputRecord), Error> {
+    let Read { mut signals, source, .. } = read(config, axes, columns, None)?;
+    check(&signals, axes, &config.path.display().to_string())?;
+    turns::unwrap(&mut signals, axes);
+    Ok((signals, InputRecord::of(InputKind::Log, &source)))
+}
+
 /// Signals of a robot in a log, in SI, as they were recorded, and what was found out about reading it.
 pub(crate) fn recorded(
     config: &LogConfig,

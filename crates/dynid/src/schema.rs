@@ -35,6 +35,7 @@ pub fn all() -> Vec<ResultSchema> {
         schema::<crate::motions::MotionRecord>("motion", "`motion.json`"),
         schema::<crate::online::Event>("online", "a line of `dynid online`"),
         schema::<crate::payload::PayloadFile>("payload", "`payload.json`"),
+        schema::<crate::servo::ServoFile>("servo", "`servo.json`"),
         schema::<Vec<LogFit>>("validate", "`dynid validate --json`"),
     ]
 }

@@ -253,6 +253,21 @@ const ENDINGS: &[Ending] = &[
         examples: &[("What there is", "schema"), ("What `estimate.json` holds", "schema estimate")],
     },
     Ending {
+        command: "servo",
+        negative: "the simulation predicts no better than the command itself, or the fit did not settle",
+        examples: &[
+            (
+                "Drives of a hobby arm from two logs, judged on a third",
+                "servo arm.urdf --log sweep.csv --log steps.csv --validate pick.csv",
+            ),
+            (
+                "Legs in the air with stated gains",
+                "servo go2.xml --log chirps.csv --position-gain 20 --velocity-gain 1.5",
+            ),
+            ("By a configuration, into a folder", "servo servo.toml --out dynid-servo"),
+        ],
+    },
+    Ending {
         command: "simulate",
         negative: "",
         examples: &[

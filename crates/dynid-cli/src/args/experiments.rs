@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueHint};
 
 use super::logs::stated_in_the_configuration;
+use super::robot::joint_value;
 use super::{ForceArgs, PrintArgs, ReadingArgs};
 
 #[derive(Debug, Args)]
@@ -49,6 +50,35 @@ pub(crate) struct GainsArgs {
     /// Refused: the configuration says which log carries what.
     #[arg(long, hide = true, value_name = "LOG", value_parser = stated_in_the_configuration)]
     pub(crate) log: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) print: PrintArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ServoArgs {
+    /// Configuration (TOML), or a robot file together with --log.
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub(crate) input: PathBuf,
+    /// Log of commands and positions, of any format that is read; repeat for several. The first argument is a robot file then.
+    #[arg(long, value_name = "LOG", value_hint = ValueHint::FilePath)]
+    pub(crate) log: Vec<PathBuf>,
+    /// Log to predict only, beside --log; repeat for several.
+    #[arg(long, value_name = "LOG", value_hint = ValueHint::FilePath, requires = "log")]
+    pub(crate) validate: Vec<PathBuf>,
+    /// Hold a joint at a position, rad or m, beside --log.
+    #[arg(long, value_name = "JOINT=POSITION", value_parser = joint_value, requires = "log")]
+    pub(crate) lock: Vec<(String, f64)>,
+    /// Position gain of all drives where it is known, N m/rad, beside --log.
+    #[arg(long, value_name = "GAIN", requires = "log")]
+    pub(crate) position_gain: Option<f64>,
+    /// Velocity gain of all drives where it is known, N m s/rad, beside --log.
+    #[arg(long, value_name = "GAIN", requires = "log")]
+    pub(crate) velocity_gain: Option<f64>,
+    /// Output folder (default: the configuration's, else dynid-servo).
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) force: ForceArgs,
     #[command(flatten)]
     pub(crate) print: PrintArgs,
 }

@@ -19,7 +19,9 @@ pub(crate) use dynid_terminal::study::StudyArgs;
 
 pub(crate) use about::{CompletionsArgs, ExplainArgs, ManArgs};
 pub(crate) use design::{ColumnsArg, CriterionArg, DesignArgs};
-pub(crate) use experiments::{BacklashArgs, ClearanceArgs, FrictionTestArgs, GainsArgs, PayloadArgs};
+pub(crate) use experiments::{
+    BacklashArgs, ClearanceArgs, FrictionTestArgs, GainsArgs, PayloadArgs, ServoArgs,
+};
 pub(crate) use identify::{
     CheckArgs, CompareArgs, ConsistencyArg, FrictionArg, IdentifyArgs, MethodArg, RouteArg,
 };
@@ -106,6 +108,9 @@ pub(crate) enum Command {
     Regressor(RegressorArgs),
     /// Print the JSON Schema of a result.
     Schema(SchemaArgs),
+    /// Drives that log commands and positions only: gains, friction, rotor inertia, delay by simulation; writes servo.json, report.html, the
+    /// robot file and tables of actuators.
+    Servo(ServoArgs),
     /// Make a virtual log: by inverse dynamics, or of a controlled robot.
     Simulate(SimulateArgs),
     /// Estimate from factors of logs: writes estimate.json and report.html.

@@ -24,6 +24,7 @@ pub(crate) mod reduce;
 pub(crate) mod regressor;
 mod run;
 pub(crate) mod schema;
+pub(crate) mod servo;
 pub(crate) mod simulate;
 pub(crate) mod study;
 mod table;

@@ -52,6 +52,11 @@ pub struct JointParameters {
     pub armature: f64,
 }
 
+/// A name as it stands between the quotes of an attribute.
+pub fn escaped(name: &str) -> std::borrow::Cow<'_, str> {
+    quick_xml::escape::escape(name)
+}
+
 fn unwritable(what: &'static str, name: &str, reason: String) -> RobotFileError {
     RobotFileError::Unwritable { format: "MJCF", what, name: name.to_owned(), reason }
 }

@@ -17,7 +17,7 @@ mod design;
 mod files;
 mod first;
 mod friction;
-mod friction_test;
+mod joints;
 mod log;
 mod log_page;
 mod parameters;
@@ -40,7 +40,7 @@ pub use design::{
 pub use files::{FileJoint, FileJudgement, FileLoss};
 pub use first::Judged;
 pub use friction::{FrictionTrial, ShapeParameter, ShapeVerdict};
-pub use friction_test::{CurvesByTemperature, FrictionReport, FrictionTest, Surface, TemperatureLevel};
+pub use joints::{CurvesByTemperature, JointSection, JointsReport, Surface, TemperatureLevel};
 pub use log::{JointQuality, JointSeries, LogReport, LogRole, LogSeries, Quality};
 pub use log_page::{FindingRow, LogPage};
 pub use parameters::{BaseParameter, CarriedReason, OwnerKind, ParameterVerdict, StandardParameter};

@@ -11,7 +11,7 @@ use crate::number::{self, UNDEFINED};
 
 pub(super) const PAGE: &str = "page.html";
 pub(super) const DESIGN_PAGE: &str = "design/page.html";
-pub(super) const FRICTION_PAGE: &str = "friction_test/page.html";
+pub(super) const JOINTS_PAGE: &str = "joints/page.html";
 pub(super) const LOG_PAGE: &str = "log/page.html";
 pub(super) const STUDY_PAGE: &str = "study/page.html";
 
@@ -45,7 +45,7 @@ const TEMPLATES: [(&str, &str); 33] = [
     ("design/motion.html", include_str!("../../template/design/motion.html")),
     ("design/paths.html", include_str!("../../template/design/paths.html")),
     ("design/starts.html", include_str!("../../template/design/starts.html")),
-    (FRICTION_PAGE, include_str!("../../template/friction_test/page.html")),
+    (JOINTS_PAGE, include_str!("../../template/joints/page.html")),
     ("sections.html", include_str!("../../template/sections.html")),
     (LOG_PAGE, include_str!("../../template/log/page.html")),
     (STUDY_PAGE, include_str!("../../template/study/page.html")),

@@ -6,7 +6,7 @@ mod context;
 mod design;
 mod environment;
 mod first;
-mod friction_test;
+mod joints;
 mod lengths;
 mod log_page;
 mod picture;
@@ -17,7 +17,7 @@ mod study;
 mod trust;
 mod words;
 
-use crate::data::{DesignReport, FrictionReport, LogPage, ReportData, StudyReport, StudyTable};
+use crate::data::{DesignReport, JointsReport, LogPage, ReportData, StudyReport, StudyTable};
 use crate::error::ReportError;
 
 /// Lays the report out as one HTML file that needs nothing else.
@@ -52,17 +52,17 @@ pub fn render_design(data: &DesignReport) -> Result<String, ReportError> {
     Ok(environment.get_template(environment::DESIGN_PAGE)?.render(context)?)
 }
 
-/// Lays the report of friction experiments out as one HTML file, with the properties of [`render`]'s; it is complete without
+/// Lays a report by joints out as one HTML file, with the properties of [`render`]'s; it is complete without
 /// a script.
 ///
 /// # Errors
 ///
 /// [`ReportError::Length`] if a row of a table has more cells than the table has headings. The other variants would be
 /// faults of this crate.
-pub fn render_friction(data: &FrictionReport) -> Result<String, ReportError> {
+pub fn render_joints(data: &JointsReport) -> Result<String, ReportError> {
     check_tables(data.joints.iter().flat_map(|j| &j.tables))?;
     let environment = environment::environment()?;
-    Ok(environment.get_template(environment::FRICTION_PAGE)?.render(friction_test::context(data))?)
+    Ok(environment.get_template(environment::JOINTS_PAGE)?.render(joints::context(data))?)
 }
 
 fn check_tables<'a>(tables: impl Iterator<Item = &'a StudyTable>) -> Result<(), ReportError> {

@@ -147,7 +147,8 @@ pub fn fit(
         let after = tried.as_ref().map_or(f64::INFINITY, |e| loss(e, &proposed));
         let gain = (before - after) / before;
         let small = gain.abs() <= settings.tolerance;
-        let Ok(tried) = tried.map_err(|_| ()).and_then(|t| if gain >= -ROUGH { Ok(t) } else { Err(()) }) else {
+        let Ok(tried) = tried.map_err(|_| ()).and_then(|t| if gain >= -ROUGH { Ok(t) } else { Err(()) })
+        else {
             damping *= 8.0;
             if damping > MOST_DAMPING {
                 ending = Ending::Stalled;
@@ -168,7 +169,10 @@ pub fn fit(
         }
         (evaluation, estimate, values) = (tried, proposed, next);
         iterations += 1;
-        if best.as_ref().is_some_and(|b| evaluation.loss(&b.1.sigma, take) + prior_loss(free, &estimate) < b.0) {
+        if best
+            .as_ref()
+            .is_some_and(|b| evaluation.loss(&b.1.sigma, take) + prior_loss(free, &estimate) < b.0)
+        {
             (best, sideways) = (None, 0);
         }
         if settled && small {

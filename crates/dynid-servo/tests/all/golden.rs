@@ -1,6 +1,8 @@
 //! Rollouts and sensitivities against prototypes written elsewhere.
 
-use dynid_model::{Description, Inertia, JointDescription, JointKind, LinkDescription, Mat3, Mechanism, Placement, Vec3};
+use dynid_model::{
+    Description, Inertia, JointDescription, JointKind, LinkDescription, Mat3, Mechanism, Placement, Vec3,
+};
 use dynid_servo::fit::{GaussNewton, ServoProblem, blocks, deviations, fit};
 use dynid_servo::start::{StartSettings, linear_start};
 use dynid_servo::{Chain, Free, Hold, LoadOf, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Term};
@@ -28,7 +30,11 @@ pub fn arm(golden: &Value, factor: f64) -> Mechanism {
     for i in 0..2 {
         let matrix = |v: &Value| {
             let r = rows(v);
-            Mat3::from_rows([[r[0][0], r[0][1], r[0][2]], [r[1][0], r[1][1], r[1][2]], [r[2][0], r[2][1], r[2][2]]])
+            Mat3::from_rows([
+                [r[0][0], r[0][1], r[0][2]],
+                [r[1][0], r[1][1], r[1][2]],
+                [r[2][0], r[2][1], r[2][2]],
+            ])
         };
         let (p, c) = (numbers(&model["p"][i]), numbers(&model["centre"][i]));
         let mass = factor * model["mass"][i].as_f64().unwrap();
@@ -99,7 +105,8 @@ fn log(golden: &Value) -> ServoLog {
 
 #[test]
 fn rollout_and_sensitivities_are_those_of_the_prototype() {
-    let (Some(golden), Some(slopes)) = (golden("servo_arm2_rollout.json"), golden("servo_arm2_sensitivity.json"))
+    let (Some(golden), Some(slopes)) =
+        (golden("servo_arm2_rollout.json"), golden("servo_arm2_sensitivity.json"))
     else {
         return;
     };
@@ -113,8 +120,7 @@ fn rollout_and_sensitivities_are_those_of_the_prototype() {
         load: LoadOf::Bodies,
         hold: Hold::Held,
     };
-    let free: Vec<Free> =
-        NAMES.iter().flat_map(|(_, term)| (0..2).map(|j| Free::term(*term, [j]))).collect();
+    let free: Vec<Free> = NAMES.iter().flat_map(|(_, term)| (0..2).map(|j| Free::term(*term, [j]))).collect();
     let rollout = Rollout::new(&chains[0], scheme, &free);
     let at: Vec<usize> = numbers(&golden["sample_index"]).iter().map(|k| *k as usize).collect();
     let (q, v) = (rows(&golden["q"]), rows(&golden["v"]));
@@ -127,7 +133,12 @@ fn rollout_and_sensitivities_are_those_of_the_prototype() {
                 // What the file calls q is the encoder's reading.
                 let position = row.reading[j];
                 worst_q = worst_q.max((position - q[k][j]).abs());
-                println!("{} {j} {:.3e} {:.3e}", row.row, position - q[k][j], row.effort[j]-rows(&golden["servo_torque"])[k][j]);
+                println!(
+                    "{} {j} {:.3e} {:.3e}",
+                    row.row,
+                    position - q[k][j],
+                    row.effort[j] - rows(&golden["servo_torque"])[k][j]
+                );
                 worst_v = worst_v.max((row.velocity[j] - v[k][j]).abs());
             }
             for (c, found) in found.iter_mut().enumerate() {
@@ -154,7 +165,8 @@ fn rollout_and_sensitivities_are_those_of_the_prototype() {
 
 #[test]
 fn fit_is_that_of_the_prototype() {
-    let (Some(golden), Some(model)) = (golden("servo_arm2_fit.json"), golden("servo_arm2_rollout.json")) else {
+    let (Some(golden), Some(model)) = (golden("servo_arm2_fit.json"), golden("servo_arm2_rollout.json"))
+    else {
         return;
     };
     let mechanism = arm(&model, 1.0);
@@ -168,9 +180,20 @@ fn fit_is_that_of_the_prototype() {
     let time = (0..command[0].len()).map(|k| k as f64 * ts).collect();
     let mut log = ServoLog::new("golden", time, command.clone(), position);
     log.start = Some(command.iter().map(|c| c[0]).collect());
-    let scheme =
-        Scheme { step_s: ts / 4.0, sign_width: 0.01, load: LoadOf::Bodies, hold: Hold::Held };
-    let names = ["kp_1", "kp_2", "viscous_1", "viscous_2", "armature_1", "armature_2", "coulomb_1", "coulomb_2", "zero_1", "zero_2", "delay"];
+    let scheme = Scheme { step_s: ts / 4.0, sign_width: 0.01, load: LoadOf::Bodies, hold: Hold::Held };
+    let names = [
+        "kp_1",
+        "kp_2",
+        "viscous_1",
+        "viscous_2",
+        "armature_1",
+        "armature_2",
+        "coulomb_1",
+        "coulomb_2",
+        "zero_1",
+        "zero_2",
+        "delay",
+    ];
     let mut free = Vec::new();
     for term in [Term::PositionGain, Term::Viscous, Term::RotorInertia, Term::Coulomb, Term::Zero] {
         free.extend((0..2).map(|j| Free::term(term, [j])));
@@ -196,12 +219,22 @@ fn fit_is_that_of_the_prototype() {
     for j in 0..2 {
         let of = &golden["linear_start"]["control_error_on_the_left"][j];
         let kd = linear.joints[j].get(Term::VelocityGain);
-        for (k, term) in [Term::PositionGain, Term::Viscous, Term::RotorInertia, Term::Coulomb, Term::Offset].iter().enumerate() {
-            println!("{term} {} {}", found.values.joints[j].get(*term) + if k == 1 { kd } else { 0.0 }, of[k]);
+        for (k, term) in [Term::PositionGain, Term::Viscous, Term::RotorInertia, Term::Coulomb, Term::Offset]
+            .iter()
+            .enumerate()
+        {
+            println!(
+                "{term} {} {}",
+                found.values.joints[j].get(*term) + if k == 1 { kd } else { 0.0 },
+                of[k]
+            );
         }
     }
     println!("{} {}", found.values.joints[0].get(Term::Delay), golden["linear_start"]["delay"]);
-    let start = ServoValues { joints: vec![joint(22.0, 1.5), joint(26.0, 1.0)], inertias: mechanism.inertia_vector() };
+    let start = ServoValues {
+        joints: vec![joint(22.0, 1.5), joint(26.0, 1.0)],
+        inertias: mechanism.inertia_vector(),
+    };
     let blocks = blocks(&logs, 24);
     let problem = ServoProblem { chains: &chains, logs: &logs, scheme, free: &free, blocks: &blocks };
     let fitted = fit(&problem, &start, &GaussNewton::default(), &|_| true).unwrap();
@@ -210,7 +243,12 @@ fn fit_is_that_of_the_prototype() {
     for (k, name) in names.iter().enumerate() {
         let number = |of: &str| golden[of][name].as_f64().unwrap();
         let (sd, jack) = (found.model[k].unwrap(), found.jackknife[k].unwrap());
-        println!("{name} {:.3} {:.4} {:.4}", (fitted.estimate[k] - number("estimate")) / number("sd_model"), sd / number("sd_model"), jack / number("sd_block_jackknife_24"));
+        println!(
+            "{name} {:.3} {:.4} {:.4}",
+            (fitted.estimate[k] - number("estimate")) / number("sd_model"),
+            sd / number("sd_model"),
+            jack / number("sd_block_jackknife_24")
+        );
     }
     let squares = fitted.evaluation.mean_squares(&|_| true);
     println!("rms {:.6e} {:?}", ((squares[0] + squares[1]) / 2.0).sqrt(), golden["rms_rad"]);

@@ -24,7 +24,8 @@ impl FrictionIdentification {
     /// [`PageError`](crate::fault::PageError).
     pub fn report(&self, model: &FrictionModel) -> Result<String, Error> {
         let p = &model.provenance;
-        crate::fault::page(report::render_friction(&report::FrictionReport {
+        crate::fault::page(report::render_joints(&report::JointsReport {
+            kind: "Friction experiments".to_owned(),
             title: format!("Friction of {}", model.robot),
             verdict: report::Verdict {
                 status: model.verdict.status.into(),
@@ -60,14 +61,14 @@ impl FrictionIdentification {
         }))
     }
 
-    fn test(&self, joint: &IdentifiedJoint, record: &JointFrictionModel) -> report::FrictionTest {
+    fn test(&self, joint: &IdentifiedJoint, record: &JointFrictionModel) -> report::JointSection {
         let units = self.units(&record.joint);
         let mut charts = Vec::new();
         if let Ok(found) = &joint.law {
             charts.extend(found.lines.iter().map(|line| line_chart(line, found, record, &units)));
         }
         charts.extend(joint.presliding.iter().filter(|p| !p.curves.is_empty()).map(|p| motion(p, &units)));
-        report::FrictionTest {
+        report::JointSection {
             name: record.joint.clone(),
             status: match record.status {
                 FrictionStatus::Identified => report::Status::Ok,

@@ -1,12 +1,14 @@
-//! What a report of friction experiments is made of; the conventions are those of [`crate::ReportData`].
+//! What a report by joints is made of, of friction experiments or drives; the conventions are those of [`crate::ReportData`].
 
 use serde::Serialize;
 
 use super::{Chart, ChartAxis, Fact, Provenance, Robot, Status, StudyTable, Verdict, Warning};
 
-/// Everything the report of friction experiments shows. [`Default`] gives an empty report.
+/// Everything a report by joints shows. [`Default`] gives an empty report.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct FrictionReport {
+pub struct JointsReport {
+    /// What the page is, e.g. `Friction experiments`.
+    pub kind: String,
     /// Title of the page, e.g. `Friction of indy7`.
     pub title: String,
     /// The result in plain words.
@@ -15,20 +17,20 @@ pub struct FrictionReport {
     pub warnings: Vec<Warning>,
     /// The mechanism.
     pub robot: Robot,
-    /// What the coefficients mean, a paragraph each.
+    /// What the numbers mean, a paragraph each.
     pub introduction: Vec<String>,
-    /// Joints with tests.
-    pub joints: Vec<FrictionTest>,
+    /// Sections, one per joint; a first one may be of the whole robot.
+    pub joints: Vec<JointSection>,
     /// What is needed to repeat the run.
     pub provenance: Provenance,
 }
 
-/// What the tests of one joint told.
+/// What is told of one joint.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct FrictionTest {
+pub struct JointSection {
     /// Joint.
     pub name: String,
-    /// Whether the law may be used.
+    /// Whether the numbers may be used.
     pub status: Status,
     /// The state in a word or two.
     pub state: String,
@@ -36,7 +38,7 @@ pub struct FrictionTest {
     pub facts: Vec<Fact>,
     /// What could not be told, a sentence each.
     pub notes: Vec<String>,
-    /// Tables: coefficients first.
+    /// Tables: the numbers first.
     pub tables: Vec<StudyTable>,
     /// Measured friction and the law by temperature.
     pub curves: Option<CurvesByTemperature>,

@@ -1,16 +1,17 @@
-//! What the templates of the page of friction experiments see.
+//! What the templates of a page by joints see.
 
 use minijinja::context;
 use minijinja::value::{Serde, Value};
 use serde::Serialize;
 
 use super::chart::{ChartView, chart};
-use crate::data::{ChartAxis, Fact, FrictionReport, FrictionTest, Status, StudyTable};
+use crate::data::{ChartAxis, Fact, JointSection, JointsReport, Status, StudyTable};
 use crate::drawing::{by_temperature_svg, surface_svg};
 
-pub(super) fn context(data: &FrictionReport) -> Value {
+pub(super) fn context(data: &JointsReport) -> Value {
     let joints: Vec<JointView<'_>> = data.joints.iter().map(joint).collect();
     context! {
+        kind => data.kind.as_str(),
         title => data.title.as_str(),
         verdict => Serde(&data.verdict),
         warnings => Serde(&data.warnings),
@@ -44,7 +45,7 @@ struct MapView<'a> {
     picture: String,
 }
 
-fn joint(test: &FrictionTest) -> JointView<'_> {
+fn joint(test: &JointSection) -> JointView<'_> {
     let curves = test.curves.iter().map(|c| MapView {
         title: &c.title,
         note: &c.note,

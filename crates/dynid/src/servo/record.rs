@@ -1,0 +1,461 @@
+//! `servo.json`.
+
+use dynid_record::{Outcome, words};
+use dynid_servo::fit::Ending;
+use dynid_servo::identify::{GroupKind, MISFIT, ServoGroup, ServoParameter};
+use dynid_servo::{Addition, Hold, LoadOf, Term};
+use serde::{Deserialize, Serialize};
+
+use super::ServoResult;
+use super::config::ServoConfig;
+use crate::estimate::{Provenance, SCHEMA};
+
+words! {
+    /// What can be said of a parameter.
+    ServoVerdict {
+        /// The interval is narrower than a tenth, and nothing that should not matter moves the value out of it.
+        Seen = "seen",
+        /// The interval is known and wider.
+        Coarse = "coarse",
+        /// The value moves by more than its own interval with the law, the step, the fold of the logs, or a stated gain.
+        Unstable = "unstable",
+        /// What was known beforehand decides.
+        Prior = "prior",
+        /// The value stands at a bound and has no interval: the data would have it go on, which hints at a wrong model.
+        AtBound = "at bound",
+        /// The readings hardly depend on it.
+        NotSeen = "not seen",
+    }
+}
+
+words! {
+    /// What makes some parameters act together.
+    ServoGroupKind {
+        /// They share one scale.
+        Scale = "scale",
+        /// They are lags.
+        Lag = "lag",
+        /// Zero and constant effort.
+        Posture = "posture",
+        /// Parts of friction.
+        Friction = "friction",
+        /// Others.
+        Other = "other",
+    }
+}
+
+/// The output of `dynid servo`.
+#[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ServoFile {
+    /// Layout version.
+    pub schema: u32,
+    /// Robot.
+    pub robot: String,
+    /// The result in a word: `pass`, `warn` where the model is wrong or a parameter not told, `fail` where it predicts no better than the
+    /// command itself or the fit did not settle.
+    pub status: Outcome,
+    /// The result in a sentence.
+    pub headline: String,
+    /// Joints, in the order of all lists by joint.
+    pub joints: Vec<String>,
+    /// Parameters that were found.
+    pub parameters: Vec<ServoParameterRecord>,
+    /// Parameters that are known together only.
+    pub groups: Vec<ServoGroupRecord>,
+    /// The law.
+    pub law: ServoLaw,
+    /// How well it predicts.
+    pub fit: ServoFit,
+    /// Validation logs.
+    pub validation: Vec<ServoLogFit>,
+    /// How motion was simulated.
+    pub simulation: ServoSimulation,
+    /// Warnings.
+    pub warnings: Vec<String>,
+    /// Inputs and settings.
+    pub provenance: Provenance,
+}
+
+/// A parameter that was found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ServoParameterRecord {
+    /// The term: `position_gain`, `rotor_inertia`, `viscous`, `coulomb`, `delay`, ...
+    pub term: String,
+    /// Joints that share it.
+    pub joints: Vec<String>,
+    /// Unit.
+    pub unit: String,
+    /// Value.
+    pub value: f64,
+    /// 95 % interval with all spreads; absent where there is none.
+    pub interval: Option<(f64, f64)>,
+    /// Standard deviation by leaving out blocks of time.
+    pub std: Option<f64>,
+    /// Standard deviation by the model alone: right only if the model is, and absent where it is not.
+    pub model_std: Option<f64>,
+    /// What the value moves by when something is changed that should not matter.
+    pub spread: ServoSpread,
+    /// Value over the position gain of the joint, and half the width of its 95 % interval, where the gain was found.
+    pub per_gain: Option<(f64, f64)>,
+    /// Verdict.
+    pub verdict: ServoVerdict,
+}
+
+/// What an estimate moves by.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ServoSpread {
+    /// Largest change under laws richer by one addition.
+    pub law: f64,
+    /// Change under half the step of the simulation.
+    pub step: f64,
+    /// Standard deviation over fits that leave a fold of the logs out.
+    pub folds: f64,
+    /// Largest change under stated gains that are wrong by their error.
+    pub gain: f64,
+}
+
+/// Parameters that are known together only.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ServoGroupRecord {
+    /// What makes them.
+    pub kind: ServoGroupKind,
+    /// Members, `term joint`.
+    pub members: Vec<String>,
+    /// What would part them.
+    pub remedy: String,
+}
+
+/// What was added to rotor inertia, viscous and Coulomb friction, and what was tried.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ServoLaw {
+    /// Additions in use.
+    pub additions: Vec<String>,
+    /// Additions that were tried on held-out folds.
+    pub trials: Vec<AdditionRecord>,
+}
+
+/// An addition that was tried.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct AdditionRecord {
+    /// What the law had already.
+    pub beside: Vec<String>,
+    /// The addition.
+    pub addition: String,
+    /// Held-out error over that without it, by fold; `null`: the simulation got lost.
+    pub ratios: Vec<Option<f64>>,
+    /// Whether it was taken.
+    pub taken: bool,
+}
+
+/// How well the closed-loop simulation gives the measured positions. Lists go by joint, rad or m.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ServoFit {
+    /// RMS over whole rollouts of the training logs.
+    pub rms: Vec<f64>,
+    /// RMS of the command less the position: what a stiff drive would predict.
+    pub command_rms: Vec<f64>,
+    /// RMS with the numbers of the robot file; absent where no position gain is known to go with them.
+    pub robot_file_rms: Option<Vec<f64>>,
+    /// Standard deviation of the encoders' rounding.
+    pub floor: Vec<f64>,
+    /// RMS over floor, the median over joints; above 1.3 the model is wrong somewhere.
+    pub misfit: f64,
+    /// RMS by log.
+    pub by_log: Vec<ServoLogFit>,
+    /// RMS of rollouts that begin from measured states again and again.
+    pub horizons: Vec<HorizonRecord>,
+    /// Relative residual of the linear start.
+    pub start_residual: Vec<f64>,
+    /// How the fit ended: `converged`, `stalled` (no step helps any more), `unfinished`.
+    pub ending: String,
+    /// Steps of the last fit.
+    pub iterations: usize,
+    /// Simulations of all logs, all fits together.
+    pub evaluations: usize,
+    /// Blocks of time behind the standard deviations.
+    pub blocks: usize,
+}
+
+/// RMS of one log.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ServoLogFit {
+    /// Log.
+    pub log: String,
+    /// RMS by joint; `null`: the simulation got lost.
+    pub rms: Vec<Option<f64>>,
+    /// RMS of the command less the position.
+    pub command_rms: Vec<f64>,
+}
+
+/// Error over a horizon.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct HorizonRecord {
+    /// Time after which a rollout begins anew, s; absent: never.
+    pub horizon_s: Option<f64>,
+    /// RMS by joint.
+    pub rms: Vec<f64>,
+}
+
+/// How motion was simulated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ServoSimulation {
+    /// Longest step, s.
+    pub step_s: f64,
+    /// RMS by which half the step moves the readings, over the residual's.
+    pub half_step_share: f64,
+    /// What a command does between samples: `held` or `line`.
+    pub hold: String,
+    /// What load friction grows with: `drive` or `bodies`.
+    pub load: String,
+    /// Steps whose friction did not settle, of all.
+    pub unsettled: (usize, usize),
+}
+
+impl ServoFile {
+    /// The file as text.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+}
+
+fn words_of(additions: &[Addition]) -> Vec<String> {
+    additions.iter().map(|a| a.name().to_owned()).collect()
+}
+
+fn finite(values: &[f64]) -> Vec<Option<f64>> {
+    values.iter().map(|x| Some(*x).filter(|x| x.is_finite())).collect()
+}
+
+impl ServoResult {
+    /// What the identification leaves behind.
+    pub fn file(&self, config: &ServoConfig, left_out: &[String]) -> ServoFile {
+        let f = &self.found;
+        let names = self.robot.rate_names();
+        let wrong = f.misfit > MISFIT;
+        let parameters: Vec<ServoParameterRecord> =
+            f.parameters.iter().map(|p| self.parameter(p, &names, wrong)).collect();
+        let (status, headline) = self.verdict(&parameters);
+        let mut warnings = self.warnings.clone();
+        warnings.extend(self.doubts(&parameters));
+        warnings.extend(left_out.iter().cloned());
+        let logs = |logs: &[dynid_servo::ServoLog], rms: &[Vec<f64>]| -> Vec<ServoLogFit> {
+            logs.iter()
+                .zip(rms)
+                .map(|(log, rms)| ServoLogFit {
+                    log: log.name.clone(),
+                    rms: finite(rms),
+                    command_rms: command_rms(log),
+                })
+                .collect()
+        };
+        ServoFile {
+            schema: SCHEMA,
+            robot: self.robot.file.description.name.clone(),
+            status,
+            headline,
+            groups: f.groups.iter().map(|g| self.group(g, &names)).collect(),
+            joints: names,
+            parameters,
+            law: ServoLaw {
+                additions: words_of(&f.additions),
+                trials: f
+                    .trials
+                    .iter()
+                    .map(|t| AdditionRecord {
+                        beside: words_of(&t.beside),
+                        addition: t.addition.name().to_owned(),
+                        ratios: finite(&t.ratios),
+                        taken: t.taken,
+                    })
+                    .collect(),
+            },
+            fit: ServoFit {
+                rms: f.rms.clone(),
+                command_rms: f.command_rms.clone(),
+                robot_file_rms: self.as_it_came.clone(),
+                floor: f.floor.clone(),
+                misfit: f.misfit,
+                by_log: logs(&self.logs, &f.rms_by_log),
+                horizons: f
+                    .horizons
+                    .iter()
+                    .map(|h| HorizonRecord {
+                        horizon_s: Some(h.horizon_s).filter(|s| s.is_finite()),
+                        rms: h.rms.clone(),
+                    })
+                    .collect(),
+                start_residual: f.start_residual.clone(),
+                ending: match f.ending {
+                    Ending::Converged => "converged",
+                    Ending::Stalled => "stalled",
+                    Ending::Unfinished => "unfinished",
+                }
+                .to_owned(),
+                iterations: f.iterations,
+                evaluations: f.evaluations,
+                blocks: f.blocks,
+            },
+            validation: logs(&self.validation, &self.validation_rms),
+            simulation: ServoSimulation {
+                step_s: f.scheme.step_s,
+                half_step_share: f.step_share,
+                hold: if f.scheme.hold == Hold::Held { "held" } else { "line" }.to_owned(),
+                load: if f.scheme.load == LoadOf::Drive { "drive" } else { "bodies" }.to_owned(),
+                unsettled: f.unsettled,
+            },
+            warnings,
+            provenance: Provenance {
+                inputs: self.inputs.clone(),
+                settings: serde_json::to_value(config).unwrap_or_default(),
+                ..Provenance::default()
+            },
+        }
+    }
+
+    fn parameter(&self, p: &ServoParameter, names: &[String], wrong: bool) -> ServoParameterRecord {
+        use dynid_servo::identify::ServoVerdict as V;
+        let term = p.free.as_term().unwrap_or(Term::Offset);
+        let joints = p.free.joints();
+        let units = self.robot.mechanism.effort_units();
+        let slides = joints.first().is_some_and(|j| units.get(*j) == Some(&"N"));
+        ServoParameterRecord {
+            term: term.name().to_owned(),
+            joints: joints.iter().map(|j| names[*j].clone()).collect(),
+            unit: term.unit(slides).to_owned(),
+            value: p.value,
+            interval: p.half_width.map(|h| (p.value - h, p.value + h)),
+            std: p.std,
+            model_std: p.model_std.filter(|_| !wrong),
+            spread: ServoSpread {
+                law: p.spread.law,
+                step: p.spread.step,
+                folds: p.spread.folds,
+                gain: p.spread.gain,
+            },
+            per_gain: p.per_gain,
+            verdict: match p.verdict {
+                V::Seen => ServoVerdict::Seen,
+                V::Coarse => ServoVerdict::Coarse,
+                V::Unstable => ServoVerdict::Unstable,
+                V::Prior => ServoVerdict::Prior,
+                V::AtBound => ServoVerdict::AtBound,
+                V::NotSeen => ServoVerdict::NotSeen,
+            },
+        }
+    }
+
+    fn group(&self, group: &ServoGroup, names: &[String]) -> ServoGroupRecord {
+        let member = |k: &usize| {
+            let free = &self.found.parameters[*k].free;
+            let joints: Vec<&str> = free.joints().iter().map(|j| names[*j].as_str()).collect();
+            format!("{} {}", free.as_term().map_or("inertia", Term::name), joints.join(", "))
+        };
+        let (kind, remedy) = match group.kind {
+            GroupKind::Scale => (
+                ServoGroupKind::Scale,
+                "their ratios are known, their common scale is not: state `position_gain`, or log the same motion with a known mass \
+                 at the last link and move joints that lift it",
+            ),
+            GroupKind::Lag => (
+                ServoGroupKind::Lag,
+                "lags are alike below 5 Hz: move faster, with steps or chirps above 5 Hz",
+            ),
+            GroupKind::Posture => (
+                ServoGroupKind::Posture,
+                "record the joint in several postures, up to where gravity turns its sign",
+            ),
+            GroupKind::Friction => (
+                ServoGroupKind::Friction,
+                "record more speeds, from below 0.1 rad/s to the fastest, and loads of both signs",
+            ),
+            GroupKind::Other => (
+                ServoGroupKind::Other,
+                "move these joints apart from one another, at other speeds and postures",
+            ),
+        };
+        ServoGroupRecord {
+            kind,
+            members: group.members.iter().map(member).collect(),
+            remedy: remedy.to_owned(),
+        }
+    }
+
+    fn verdict(&self, parameters: &[ServoParameterRecord]) -> (Outcome, String) {
+        let f = &self.found;
+        let mean = |v: &[f64]| (v.iter().map(|x| x * x).sum::<f64>() / v.len().max(1) as f64).sqrt();
+        let (rms, command) = (mean(&f.rms), mean(&f.command_rms));
+        let told = parameters.iter().filter(|p| p.verdict == ServoVerdict::Seen).count();
+        let of = parameters.len();
+        let size = format!(
+            "{:.3} mrad or mm RMS over whole rollouts, {:.1} times the encoders' rounding",
+            1e3 * rms,
+            f.misfit
+        );
+        if rms.is_nan() || rms >= command {
+            let why = format!(
+                "the simulation predicts no better than the command itself: {size}; check signs, units and gains"
+            );
+            return (Outcome::Fail, why);
+        }
+        if f.ending == Ending::Unfinished {
+            return (Outcome::Fail, format!("the fit did not settle within its rounds: {size}"));
+        }
+        let headline = format!("{told} of {of} parameters are told to a tenth; {size}");
+        let wrong = f.misfit > MISFIT;
+        if wrong {
+            let why = format!(
+                "{headline}: the model is not the whole truth, and intervals have what it moves by in them"
+            );
+            return (Outcome::Warn, why);
+        }
+        let bad = |p: &&ServoParameterRecord| {
+            !matches!(p.verdict, ServoVerdict::Seen | ServoVerdict::Coarse | ServoVerdict::Prior)
+        };
+        let status = if parameters.iter().any(|p| bad(&p)) { Outcome::Warn } else { Outcome::Pass };
+        (status, headline)
+    }
+
+    /// What a reader has to know before using the numbers.
+    fn doubts(&self, parameters: &[ServoParameterRecord]) -> Vec<String> {
+        let f = &self.found;
+        let mut out = Vec::new();
+        let named = |verdict: ServoVerdict| -> Vec<String> {
+            let of = |p: &&ServoParameterRecord| p.verdict == verdict;
+            parameters.iter().filter(of).map(|p| format!("{} {}", p.term, p.joints.join(", "))).collect()
+        };
+        let bounds = named(ServoVerdict::AtBound);
+        if !bounds.is_empty() {
+            out.push(format!("at a bound, without an interval: {}", bounds.join("; ")));
+        }
+        let unstable = named(ServoVerdict::Unstable);
+        if !unstable.is_empty() {
+            out.push(format!(
+                "move by more than their own interval with the law, the step, the part of the logs or a stated gain: {}",
+                unstable.join("; ")
+            ));
+        }
+        if f.step_share > 0.2 {
+            out.push(format!(
+                "half the step moves the simulation by {:.0} % of the residual: a smaller `step_s` would move the estimate",
+                100.0 * f.step_share
+            ));
+        }
+        let own = f.trials.iter().filter(|t| t.addition == Addition::OwnGains);
+        let better = own.map(|t| t.ratios.iter().sum::<f64>() / t.ratios.len() as f64).fold(1.0, f64::min);
+        if better < 0.98 {
+            out.push(format!(
+                "a position gain of its own for every joint would predict held-out parts {:.1} % better; if the drives differ, say `gains = \"own\"`",
+                100.0 * (1.0 - better)
+            ));
+        }
+        out
+    }
+}
+
+/// RMS of the command less the position, by joint.
+fn command_rms(log: &dynid_servo::ServoLog) -> Vec<f64> {
+    let rms = |(u, x): (&Vec<f64>, &Vec<f64>)| {
+        (u.iter().zip(x).map(|(u, x)| (u - x) * (u - x)).sum::<f64>() / u.len() as f64).sqrt()
+    };
+    log.command.iter().zip(&log.position).map(rms).collect()
+}
