@@ -41,7 +41,7 @@ const STEP_SHARE: f64 = 0.2;
 const HALVINGS: usize = 4;
 
 /// Fits that leave a fold out begin at the estimate of all: a few steps are enough.
-const OF_FOLDS: GaussNewton = GaussNewton { evaluations: 5, tolerance: 1e-3, reweighted: 0 };
+const OF_FOLDS: GaussNewton = GaussNewton { evaluations: 4, tolerance: 1e-3, reweighted: 0 };
 
 /// Residual over the encoder's rounding from which the model counts as wrong.
 pub const MISFIT: f64 = 1.3;
@@ -167,7 +167,8 @@ pub struct AdditionTrial {
     pub beside: Vec<Addition>,
     /// The addition.
     pub addition: Addition,
-    /// Held-out error over that without it, per fold; `NaN`: the simulation got lost.
+    /// Held-out error over that without it, per fold; `NaN`: the simulation got lost; empty: it gains nothing on the logs that it is
+    /// fitted to, or another was taken before.
     pub ratios: Vec<f64>,
     /// Whether it was taken.
     pub taken: bool,
@@ -207,7 +208,8 @@ pub struct ServoIdentification {
     pub command_rms: Vec<f64>,
     /// Standard deviation of every encoder's rounding.
     pub floor: Vec<f64>,
-    /// Residual over floor of every joint, the median over joints: above [`MISFIT`] the model is wrong somewhere.
+    /// Residual over floor of every joint, the median over joints whose encoder's step is known: above [`MISFIT`] the model is wrong
+    /// somewhere; `NaN`: no step is known, and the model counts as wrong.
     pub misfit: f64,
     /// RMS by which half the step moves the simulation, over the residual's.
     pub step_share: f64,
@@ -289,22 +291,15 @@ pub fn identify(
     let mut folds = work.held_out(&free, &fitted, &sigma);
     if settings.choice == Choice::HeldOut {
         loop {
-            let round = work.round(&laws, &fitted, &folds, &sigma)?;
-            let best = round.iter().filter(|t| t.trial.taken).min_by(|a, b| a.mean.total_cmp(&b.mean));
-            let best = best.map(|t| t.trial.addition);
-            for tried in &round {
-                let taken = Some(tried.trial.addition) == best;
-                trials.push(AdditionTrial { taken, ..tried.trial.clone() });
-            }
-            let Some(best) = best else {
+            let round = work.round(&laws, &fitted, &folds, &sigma);
+            trials.extend(round.iter().map(|t| t.trial.clone()));
+            let Some(at) = round.iter().position(|t| t.trial.taken) else {
                 richer = round;
                 break;
             };
-            laws.insert(best);
-            if let Some(next) = round.into_iter().find(|t| t.trial.addition == best) {
-                fitted = work.fit(&laws, &next.fitted.values)?;
-                folds = next.folds;
-            }
+            laws.insert(round[at].trial.addition);
+            fitted = work.fit(&laws, &round[at].fitted.values)?;
+            folds = round[at].folds.clone();
         }
     }
     let step_share = work.settle_step(&laws, &mut fitted)?;
@@ -340,8 +335,8 @@ struct Tried {
     fitted: Fitted,
     free: Vec<Free>,
     folds: Folds,
-    /// Mean ratio of held-out errors.
-    mean: f64,
+    /// Loss over that without it.
+    gain: f64,
 }
 
 /// Fits that leave a fold out each.
@@ -474,19 +469,20 @@ impl Work<'_> {
         out
     }
 
-    /// Fits and scores every addition that is not there yet.
+    /// Fits every addition that is not there yet, and scores them on held-out folds from the one that gains most on all logs, up to the
+    /// first that is taken.
     fn round(
         &mut self,
         laws: &BTreeSet<Addition>,
         fitted: &Fitted,
         before: &Folds,
         sigma: &[f64],
-    ) -> Result<Vec<Tried>, Lost> {
+    ) -> Vec<Tried> {
         let without = fitted.evaluation.loss(sigma, &|_| true);
         let short = GaussNewton { evaluations: 8, tolerance: 1e-3, ..GaussNewton::default() };
         let mut out = Vec::new();
         for addition in Addition::ALL {
-            if laws.contains(&addition) || !self.applies(addition) {
+            if !self.applies(addition, laws) {
                 continue;
             }
             let mut with = laws.clone();
@@ -494,37 +490,43 @@ impl Work<'_> {
             let begin = self.begin(&fitted.values, &with, Some(addition));
             let free = self.free(&with);
             let Ok(fitted) = self.refit(&free, &begin, self.scheme, &short) else { continue };
-            // What does not gain on the logs that it is fitted to gains nowhere.
             let gain = fitted.evaluation.loss(sigma, &|_| true) / without;
-            let folds = if gain < (1.0 - LEAST_SURE_GAIN).powi(2) {
-                self.held_out(&free, &fitted, sigma)
-            } else {
-                Folds { errors: before.errors.clone(), estimates: Vec::new() }
-            };
-            let ratios: Vec<f64> = folds.errors.iter().zip(&before.errors).map(|(a, b)| a / b).collect();
-            let mean = folds.errors.iter().sum::<f64>() / before.errors.iter().sum::<f64>();
-            let wins = ratios.iter().all(|r| *r < 1.0) && mean < 1.0 - LEAST_SURE_GAIN;
-            // Gains of their own predict better and mean less: gain, gravity and zero of a joint trade off.
-            let taken = addition != Addition::OwnGains && (wins || mean < 1.0 - LEAST_GAIN);
             let beside = laws.iter().copied().collect();
-            out.push(Tried {
-                trial: AdditionTrial { beside, addition, ratios, taken },
-                fitted,
-                free,
-                folds,
-                mean: if mean.is_nan() { f64::INFINITY } else { mean },
-            });
+            let trial = AdditionTrial { beside, addition, ratios: Vec::new(), taken: false };
+            out.push(Tried { trial, fitted, free, folds: Folds::default(), gain });
         }
-        Ok(out)
+        out.sort_by(|a, b| a.gain.total_cmp(&b.gain));
+        for tried in &mut out {
+            // What does not gain on the logs that it is fitted to gains nowhere.
+            if tried.gain.is_nan() || tried.gain > (1.0 - LEAST_SURE_GAIN).powi(2) {
+                continue;
+            }
+            tried.folds = self.held_out(&tried.free, &tried.fitted, sigma);
+            let (after, before) = (&tried.folds.errors, &before.errors);
+            tried.trial.ratios = after.iter().zip(before).map(|(a, b)| a / b).collect();
+            let mean = after.iter().sum::<f64>() / before.iter().sum::<f64>();
+            let wins = tried.trial.ratios.iter().all(|r| *r < 1.0) && mean < 1.0 - LEAST_SURE_GAIN;
+            // Gains of their own predict better and mean less: gain, gravity and zero of a joint trade off.
+            let taken = wins || mean < 1.0 - LEAST_GAIN;
+            if taken && tried.trial.addition != Addition::OwnGains {
+                tried.trial.taken = true;
+                break;
+            }
+        }
+        out
     }
 
-    fn applies(&self, addition: Addition) -> bool {
+    /// Whether an addition is to be tried beside these. Offset and zero act alike where a joint moves in few postures: one of them is
+    /// taken by itself, both on request.
+    fn applies(&self, addition: Addition, laws: &BTreeSet<Addition>) -> bool {
         let s = self.settings;
-        match addition {
-            Addition::OwnGains => s.known_gain.iter().filter(|k| !**k).count() > 1,
-            Addition::Zero => s.known_zero.iter().any(|k| !k),
-            _ => true,
-        }
+        !laws.contains(&addition)
+            && match addition {
+                Addition::OwnGains => s.known_gain.iter().filter(|k| !**k).count() > 1,
+                Addition::Zero => !laws.contains(&Addition::Offset) && s.known_zero.iter().any(|k| !k),
+                Addition::Offset => !laws.contains(&Addition::Zero),
+                _ => true,
+            }
     }
 
     /// Halves the step until the simulation hardly moves; returns the share by which it still does.
@@ -572,9 +574,10 @@ impl Work<'_> {
         let rms: Vec<f64> = fitted.evaluation.mean_squares(&|_| true).iter().map(|s| s.sqrt()).collect();
         let floor: Vec<f64> =
             (0..n).map(|j| self.logs.iter().map(|l| l.floor(j)).fold(0.0, f64::max)).collect();
-        let misfit = median(rms.iter().zip(&floor).map(|(r, f)| r / f.max(1e-12)).collect());
+        let told = rms.iter().zip(&floor).filter(|(_, f)| **f > 0.0);
+        let misfit = median(told.map(|(r, f)| r / f).collect());
         let found = deviations(&self.problem(&free, self.scheme), &fitted);
-        let spreads = self.spreads(&free, &fitted, richer, misfit > MISFIT)?;
+        let spreads = self.spreads(&free, &fitted, richer, misfit.is_nan() || misfit > MISFIT)?;
         let parameters = parameters(&free, &fitted, &found, &spreads, self.settings, self.logs);
         let groups = groups(&free, &found);
         let mut horizons = Vec::new();

@@ -27,7 +27,7 @@ pub struct ServoLog {
 }
 
 impl ServoLog {
-    /// A log from its arrays; resolutions of encoders are the smallest steps of their readings.
+    /// A log from its arrays; resolutions of encoders are the smallest steps of their readings, where all steps are multiples of it.
     ///
     /// # Panics
     /// If arrays differ in length.
@@ -40,7 +40,7 @@ impl ServoLog {
         assert_eq!(command.len(), position.len(), "joints of commands and positions");
         let whole = command.iter().chain(&position).all(|values| values.len() == time.len());
         assert!(whole, "rows of time, commands and positions");
-        let resolution = position.iter().map(|x| dynid_motion::signal::quantum(x)).collect();
+        let resolution = position.iter().map(|x| resolution(x)).collect();
         ServoLog { name: name.into(), time, command, position, resolution, ..ServoLog::default() }
     }
 
@@ -72,6 +72,31 @@ impl ServoLog {
     pub fn floor(&self, joint: usize) -> f64 {
         self.resolution.get(joint).copied().unwrap_or(0.0) / 12.0_f64.sqrt()
     }
+}
+
+/// Steps between readings, in steps of an encoder, beyond which the smallest step is taken for that of a printed number.
+const MOST_STEPS: f64 = 1e3;
+
+/// Departure of steps from multiples of the smallest one, as a share of it.
+const DEPARTURE: f64 = 0.1;
+
+/// Share of steps that must be multiples.
+const MULTIPLES: f64 = 0.9;
+
+/// Step of an encoder, 0 if its readings do not tell one.
+fn resolution(readings: &[f64]) -> f64 {
+    let least = dynid_motion::signal::quantum(readings);
+    let mut steps: Vec<f64> = readings.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0).collect();
+    if least <= 0.0 || steps.is_empty() {
+        return 0.0;
+    }
+    let multiple = |s: &&f64| (*s / least - (*s / least).round()).abs() <= DEPARTURE;
+    let multiples = steps.iter().filter(multiple).count() as f64;
+    let whole = multiples >= MULTIPLES * steps.len() as f64;
+    steps.sort_by(f64::total_cmp);
+    // Printed digits make every step a multiple of something small.
+    let told = whole && steps[steps.len() / 2] <= MOST_STEPS * least;
+    if told { least } else { 0.0 }
 }
 
 /// A command of one joint as a function of time whose mean over any interval is exact, and smooth in a delay.

@@ -3,7 +3,7 @@
 use dynid_model::{
     Description, Inertia, JointDescription, JointKind, LinkDescription, Mat3, Mechanism, Placement, Vec3,
 };
-use dynid_servo::fit::{GaussNewton, ServoProblem, blocks, deviations, fit};
+use dynid_servo::fit::{Block, Ending, GaussNewton, ServoProblem, deviations, fit};
 use dynid_servo::start::{StartSettings, linear_start};
 use dynid_servo::{Chain, Free, Hold, LoadOf, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Term};
 use dynid_testing::golden;
@@ -21,8 +21,8 @@ fn columns(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     (0..rows[0].len()).map(|j| rows.iter().map(|r| r[j]).collect()).collect()
 }
 
-/// The planar arm of the golden files, its masses times a factor.
-pub fn arm(golden: &Value, factor: f64) -> Mechanism {
+/// The planar arm of the golden files.
+fn arm(golden: &Value) -> Mechanism {
     let model = &golden["model"];
     let mut robot = Description::new("arm2");
     robot.gravity = [0.0, 0.0, -9.81];
@@ -37,8 +37,8 @@ pub fn arm(golden: &Value, factor: f64) -> Mechanism {
             ])
         };
         let (p, c) = (numbers(&model["p"][i]), numbers(&model["centre"][i]));
-        let mass = factor * model["mass"][i].as_f64().unwrap();
-        let tensor = matrix(&model["inertia"][i]) * factor;
+        let mass = model["mass"][i].as_f64().unwrap();
+        let tensor = matrix(&model["inertia"][i]);
         let name = format!("link{}", i + 1);
         let parent = if i == 0 { "base".to_owned() } else { "link1".to_owned() };
         robot.links.push(LinkDescription {
@@ -77,7 +77,7 @@ const NAMES: [(&str, Term); 15] = [
     ("smoothing_time", Term::SmoothingTime),
 ];
 
-pub fn values(golden: &Value, mechanism: &Mechanism) -> ServoValues {
+fn values(golden: &Value, mechanism: &Mechanism) -> ServoValues {
     let joints = (0..2)
         .map(|j| {
             let mut joint = ServoJoint::default();
@@ -110,7 +110,7 @@ fn rollout_and_sensitivities_are_those_of_the_prototype() {
     else {
         return;
     };
-    let mechanism = arm(&golden, 1.0);
+    let mechanism = arm(&golden);
     let values = values(&golden, &mechanism);
     let log = log(&golden);
     let chains = Chain::all(&mechanism);
@@ -133,12 +133,6 @@ fn rollout_and_sensitivities_are_those_of_the_prototype() {
                 // What the file calls q is the encoder's reading.
                 let position = row.reading[j];
                 worst_q = worst_q.max((position - q[k][j]).abs());
-                println!(
-                    "{} {j} {:.3e} {:.3e}",
-                    row.row,
-                    position - q[k][j],
-                    row.effort[j] - rows(&golden["servo_torque"])[k][j]
-                );
                 worst_v = worst_v.max((row.velocity[j] - v[k][j]).abs());
             }
             for (c, found) in found.iter_mut().enumerate() {
@@ -146,7 +140,6 @@ fn rollout_and_sensitivities_are_those_of_the_prototype() {
             }
         })
         .unwrap();
-    println!("q {worst_q:.2e} v {worst_v:.2e}");
     for (c, (name, j)) in NAMES.iter().flat_map(|(n, _)| (1..3).map(move |j| (n, j))).enumerate() {
         let wanted = rows(&slopes["sensitivity"][format!("{name}_{j}")]["x"]);
         let largest = wanted.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -155,7 +148,6 @@ fn rollout_and_sensitivities_are_those_of_the_prototype() {
             .zip(&found[c])
             .flat_map(|(w, f)| w.iter().zip(f))
             .fold(0.0_f64, |m, (w, f)| m.max((w - f).abs()));
-        println!("{name}_{j} {:.2e}", worst / largest);
         let kinked = ["kp_1", "kd_1", "torque_limit_1", "rate_limit_1"];
         let within = if kinked.contains(&format!("{name}_{j}").as_str()) { 5e-3 } else { 1e-5 };
         assert!(worst <= within * largest, "{name}_{j}");
@@ -169,7 +161,7 @@ fn fit_is_that_of_the_prototype() {
     else {
         return;
     };
-    let mechanism = arm(&model, 1.0);
+    let mechanism = arm(&model);
     let command = columns(&rows(&golden["command"]));
     let step = std::f64::consts::TAU / golden["counts_per_turn"].as_f64().unwrap();
     let position: Vec<Vec<f64>> = columns(&rows(&golden["counts"]))
@@ -216,40 +208,37 @@ fn fit_is_that_of_the_prototype() {
     let mut asked: Vec<Free> = free.iter().filter(|f| f.as_term() != Some(Term::Zero)).cloned().collect();
     asked.extend((0..2).map(|j| Free::term(Term::Offset, [j])));
     let found = linear_start(&chains, &logs, &linear, &asked, scheme, &StartSettings::default()).unwrap();
+    // Other filters than the prototype's.
     for j in 0..2 {
-        let of = &golden["linear_start"]["control_error_on_the_left"][j];
-        let kd = linear.joints[j].get(Term::VelocityGain);
-        for (k, term) in [Term::PositionGain, Term::Viscous, Term::RotorInertia, Term::Coulomb, Term::Offset]
-            .iter()
-            .enumerate()
-        {
-            println!(
-                "{term} {} {}",
-                found.values.joints[j].get(*term) + if k == 1 { kd } else { 0.0 },
-                of[k]
-            );
-        }
+        let of = numbers(&golden["linear_start"]["control_error_on_the_left"][j]);
+        let gain = found.values.joints[j].get(Term::PositionGain);
+        assert!((gain / of[0] - 1.0).abs() < 0.02, "{gain} {of:?}");
     }
-    println!("{} {}", found.values.joints[0].get(Term::Delay), golden["linear_start"]["delay"]);
+    let delay = found.values.joints[0].get(Term::Delay);
+    assert!((delay - golden["linear_start"]["delay"].as_f64().unwrap()).abs() < 3e-4, "{delay}");
     let start = ServoValues {
         joints: vec![joint(22.0, 1.5), joint(26.0, 1.0)],
         inertias: mechanism.inertia_vector(),
     };
-    let blocks = blocks(&logs, 24);
+    // Blocks of a quarter of a second, as the prototype cut them.
+    let rows = logs[0].rows();
+    let blocks: Vec<Block> =
+        (0..24).map(|b| Block { log: 0, rows: b * rows / 24..(b + 1) * rows / 24 }).collect();
     let problem = ServoProblem { chains: &chains, logs: &logs, scheme, free: &free, blocks: &blocks };
     let fitted = fit(&problem, &start, &GaussNewton::default(), &|_| true).unwrap();
     let found = deviations(&problem, &fitted);
-    println!("{:?} {} {}", fitted.ending, fitted.iterations, fitted.evaluations);
+    assert_eq!(fitted.ending, Ending::Converged);
     for (k, name) in names.iter().enumerate() {
         let number = |of: &str| golden[of][name].as_f64().unwrap();
-        let (sd, jack) = (found.model[k].unwrap(), found.jackknife[k].unwrap());
-        println!(
-            "{name} {:.3} {:.4} {:.4}",
-            (fitted.estimate[k] - number("estimate")) / number("sd_model"),
-            sd / number("sd_model"),
-            jack / number("sd_block_jackknife_24")
-        );
+        let off = (fitted.estimate[k] - number("estimate")) / number("sd_model");
+        assert!(off.abs() < 0.05, "{name}: {off} standard deviations");
+        // Ours weighs joints by their residuals, the prototype alike.
+        let model = found.model[k].unwrap() / number("sd_model");
+        assert!((model - 1.0).abs() < 0.01, "{name}: {model}");
+        let jackknife = found.jackknife[k].unwrap() / number("sd_block_jackknife_24");
+        assert!((jackknife - 1.0).abs() < 0.02, "{name}: {jackknife}");
     }
     let squares = fitted.evaluation.mean_squares(&|_| true);
-    println!("rms {:.6e} {:?}", ((squares[0] + squares[1]) / 2.0).sqrt(), golden["rms_rad"]);
+    let rms = ((squares[0] + squares[1]) / 2.0).sqrt();
+    assert!((rms / golden["rms_rad"].as_f64().unwrap() - 1.0).abs() < 1e-5, "{rms}");
 }

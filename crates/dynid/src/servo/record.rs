@@ -141,7 +141,8 @@ pub struct AdditionRecord {
     pub beside: Vec<String>,
     /// The addition.
     pub addition: String,
-    /// Held-out error over that without it, by fold; `null`: the simulation got lost.
+    /// Held-out error over that without it, by fold; `null`: the simulation got lost; empty: it gains nothing on the logs that it is fitted to,
+    /// or another was taken before.
     pub ratios: Vec<Option<f64>>,
     /// Whether it was taken.
     pub taken: bool,
@@ -158,8 +159,8 @@ pub struct ServoFit {
     pub robot_file_rms: Option<Vec<f64>>,
     /// Standard deviation of the encoders' rounding.
     pub floor: Vec<f64>,
-    /// RMS over floor, the median over joints; above 1.3 the model is wrong somewhere.
-    pub misfit: f64,
+    /// RMS over floor, the median over joints; above 1.3 the model is wrong somewhere; absent: no encoder's step is known.
+    pub misfit: Option<f64>,
     /// RMS by log.
     pub by_log: Vec<ServoLogFit>,
     /// RMS of rollouts that begin from measured states again and again.
@@ -231,7 +232,7 @@ impl ServoResult {
     pub fn file(&self, config: &ServoConfig, left_out: &[String]) -> ServoFile {
         let f = &self.found;
         let names = self.robot.rate_names();
-        let wrong = f.misfit > MISFIT;
+        let wrong = f.misfit.is_nan() || f.misfit > MISFIT;
         let parameters: Vec<ServoParameterRecord> =
             f.parameters.iter().map(|p| self.parameter(p, &names, wrong)).collect();
         let (status, headline) = self.verdict(&parameters);
@@ -274,7 +275,7 @@ impl ServoResult {
                 command_rms: f.command_rms.clone(),
                 robot_file_rms: self.as_it_came.clone(),
                 floor: f.floor.clone(),
-                misfit: f.misfit,
+                misfit: Some(f.misfit).filter(|m| m.is_finite()),
                 by_log: logs(&self.logs, &f.rms_by_log),
                 horizons: f
                     .horizons
@@ -386,11 +387,11 @@ impl ServoResult {
         let (rms, command) = (mean(&f.rms), mean(&f.command_rms));
         let told = parameters.iter().filter(|p| p.verdict == ServoVerdict::Seen).count();
         let of = parameters.len();
-        let size = format!(
-            "{:.3} mrad or mm RMS over whole rollouts, {:.1} times the encoders' rounding",
-            1e3 * rms,
-            f.misfit
-        );
+        let floor = match f.misfit.is_nan() {
+            true => "the encoders' rounding is not known".to_owned(),
+            false => format!("{:.1} times the encoders' rounding", f.misfit),
+        };
+        let size = format!("{:.3} mrad or mm RMS over whole rollouts, {floor}", 1e3 * rms);
         if rms.is_nan() || rms >= command {
             let why = format!(
                 "the simulation predicts no better than the command itself: {size}; check signs, units and gains"
@@ -401,8 +402,7 @@ impl ServoResult {
             return (Outcome::Fail, format!("the fit did not settle within its rounds: {size}"));
         }
         let headline = format!("{told} of {of} parameters are told to a tenth; {size}");
-        let wrong = f.misfit > MISFIT;
-        if wrong {
+        if f.misfit > MISFIT {
             let why = format!(
                 "{headline}: the model is not the whole truth, and intervals have what it moves by in them"
             );
@@ -440,7 +440,7 @@ impl ServoResult {
                 100.0 * f.step_share
             ));
         }
-        let own = f.trials.iter().filter(|t| t.addition == Addition::OwnGains);
+        let own = f.trials.iter().filter(|t| t.addition == Addition::OwnGains && !t.ratios.is_empty());
         let better = own.map(|t| t.ratios.iter().sum::<f64>() / t.ratios.len() as f64).fold(1.0, f64::min);
         if better < 0.98 {
             out.push(format!(

@@ -1,0 +1,122 @@
+//! A planar arm of two joints in a vertical plane, and logs of it.
+
+use std::f64::consts::TAU;
+
+use dynid_model::{
+    Description, Inertia, JointDescription, JointKind, LinkDescription, Mat3, Mechanism, Placement, Vec3,
+};
+use dynid_servo::{Chain, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Term};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// The arm; its masses times a factor.
+pub(crate) fn arm(factor: f64) -> Mechanism {
+    let mut robot = Description::new("arm");
+    robot.links.push(LinkDescription { name: "base".into(), inertia: None });
+    let bodies = [(1.2, 0.15, 0.01, [1.0, 0.0, 0.0]), (0.8, 0.12, 0.005, [0.0, 0.0, 0.0])];
+    for (i, (mass, centre, inertia, _)) in bodies.into_iter().enumerate() {
+        let tensor = Mat3::from_rows([[0.001, 0.0, 0.0], [0.0, inertia, 0.0], [0.0, 0.0, inertia]]) * factor;
+        let name = format!("link{}", i + 1);
+        robot.links.push(LinkDescription {
+            name: name.clone(),
+            inertia: Some(Inertia::from_com(factor * mass, Vec3([centre, 0.0, 0.0]), &tensor)),
+        });
+        let placement = match i {
+            // The axis lies, so that gravity acts.
+            0 => Placement::rotate([1.0, 0.0, 0.0], TAU / 4.0),
+            _ => Placement::translate(0.3, 0.0, 0.0),
+        };
+        robot.joints.push(JointDescription {
+            name: format!("joint{}", i + 1),
+            parent: if i == 0 { "base".to_owned() } else { "link1".to_owned() },
+            child: name,
+            kind: JointKind::Revolute,
+            placement,
+            axis: [0.0, 0.0, 1.0],
+            limits: Default::default(),
+            mimic: None,
+        });
+    }
+    robot.build().unwrap()
+}
+
+/// Drives whose numbers lie about nominal ones by factors of up to `e^0.4`.
+pub(crate) fn drives(random: &mut ChaCha8Rng) -> Vec<ServoJoint> {
+    let delay = random.random_range(0.3..3.7) * PERIOD;
+    let nominal = [(30.0, 1.5, 0.02, 0.3, 0.4), (20.0, 1.0, 0.01, 0.15, 0.2)];
+    nominal
+        .into_iter()
+        .map(|(kp, kd, rotor, viscous, coulomb)| {
+            let mut about = |x: f64| x * random.random_range(-0.4..0.4_f64).exp();
+            let (kp, rotor, viscous, coulomb) = (about(kp), about(rotor), about(viscous), about(coulomb));
+            ServoJoint::default()
+                .with(Term::PositionGain, kp)
+                .with(Term::VelocityGain, kd)
+                .with(Term::RotorInertia, rotor)
+                .with(Term::Viscous, viscous)
+                .with(Term::Coulomb, coulomb)
+                .with(Term::Zero, random.random_range(-0.05..0.05))
+                .with(Term::Delay, delay)
+        })
+        .collect()
+}
+
+/// Time between rows, s.
+pub(crate) const PERIOD: f64 = 0.005;
+
+/// Step of an encoder of 12 bits.
+pub(crate) const STEP: f64 = TAU / 4096.0;
+
+/// Commands: sums of sinusoids from 0.1 to 5 Hz with random phases, and pauses.
+pub(crate) fn commands(random: &mut ChaCha8Rng, rows: usize) -> Vec<Vec<f64>> {
+    (0..2)
+        .map(|j| {
+            let waves: Vec<[f64; 3]> = [0.13, 0.31, 0.7, 1.3, 2.7, 4.6]
+                .iter()
+                .map(|f| {
+                    [f * random.random_range(0.8..1.2), 0.5 / (1.0 + 2.0 * f), random.random_range(0.0..TAU)]
+                })
+                .collect();
+            let value = |t: f64| {
+                let sum: f64 = waves.iter().map(|[f, a, p]| a * (TAU * f * t + p).sin()).sum();
+                sum + if j == 0 { -0.6 } else { 0.8 }
+            };
+            // One pause of a second in the middle.
+            let time = |k: usize| {
+                let t = k as f64 * PERIOD;
+                let half = 0.5 * rows as f64 * PERIOD;
+                if t < half { t } else { (t - 1.0).max(half) }
+            };
+            (0..rows).map(|k| value(time(k))).collect()
+        })
+        .collect()
+}
+
+/// A log of a simulated arm, rounded by its encoders.
+pub(crate) fn log(
+    mechanism: &Mechanism,
+    joints: &[ServoJoint],
+    scheme: Scheme,
+    rows: usize,
+    seed: u64,
+) -> ServoLog {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let command = commands(&mut random, rows);
+    let time: Vec<f64> = (0..rows).map(|k| k as f64 * PERIOD).collect();
+    let values = ServoValues { joints: joints.to_vec(), inertias: mechanism.inertia_vector() };
+    let mut log = ServoLog::new(format!("log {seed}"), time, command.clone(), command.clone());
+    log.start = Some(command.iter().map(|c| c[0]).collect());
+    let chains = Chain::all(mechanism);
+    let mut position = vec![Vec::new(); 2];
+    Rollout::new(&chains[0], scheme, &[])
+        .run(&values, &log, |row| {
+            for (to, x) in position.iter_mut().zip(row.reading) {
+                to.push((x / STEP).round() * STEP);
+            }
+        })
+        .unwrap();
+    let start = log.start.take();
+    let mut log = ServoLog::new(log.name, log.time, command, position);
+    log.start = start;
+    log
+}
