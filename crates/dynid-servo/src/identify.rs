@@ -724,15 +724,6 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// Quantile 0.975 of Student's distribution, to 1e-3 from 5 degrees on (Cornish and Fisher's expansion).
-pub(crate) fn quantile(freedom: usize) -> f64 {
-    let (z, f) = (1.959_963_984_540_054_f64, freedom.max(1) as f64);
-    let g1 = (z.powi(3) + z) / 4.0;
-    let g2 = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0;
-    let g3 = (3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z) / 384.0;
-    z + g1 / f + g2 / (f * f) + g3 / (f * f * f)
-}
-
 fn parameters(
     free: &[Free],
     fitted: &Fitted,
@@ -741,10 +732,10 @@ fn parameters(
     settings: &ServoSettings,
     logs: &[ServoLog],
 ) -> Vec<ServoParameter> {
-    let t = quantile(found.freedom);
     let period = logs.iter().map(ServoLog::period).fold(f64::INFINITY, f64::min);
     let one = |k: usize| {
         let (f, value, spread) = (&free[k], fitted.estimate[k], spreads[k]);
+        let t = found.quantile[k];
         let std = found.jackknife[k];
         let half_width = std.map(|sd| {
             let parts = [t * sd, spread.law, spread.step, t * spread.folds, spread.gain];

@@ -18,12 +18,17 @@ pub struct Deviations {
     pub covariance: Mat,
     /// Those parameters.
     pub inside: Vec<usize>,
-    /// Degrees of freedom of the jackknife: blocks less one.
-    pub freedom: usize,
+    /// Quantiles of Student's distribution for 95 % intervals by the jackknife, one per parameter.
+    pub quantile: Vec<f64>,
 }
 
 /// Share of a unit diagonal that keeps a factor of sums alive which a block leaves without a parameter.
 const RIDGE: f64 = 1e-12;
+
+/// Quantile 0.975 of Student's distribution; infinite without a degree of freedom.
+fn quantile(freedom: f64) -> f64 {
+    dynid_estimate::distribution::t_quantile(0.975, freedom).unwrap_or(f64::INFINITY)
+}
 
 /// Standard deviations of a fit to all blocks.
 ///
@@ -41,7 +46,7 @@ pub fn deviations(problem: &ServoProblem<'_>, fitted: &Fitted) -> Deviations {
         correlation: Mat::identity(m, m),
         covariance: Mat::zeros(0, 0),
         inside: inside.clone(),
-        freedom: problem.blocks.len().saturating_sub(1),
+        quantile: vec![quantile(problem.blocks.len() as f64 - 1.0); free.len()],
     };
     let scale: Vec<f64> = inside.iter().map(|k| all[(*k, *k)].sqrt()).collect();
     let scaled = Mat::from_fn(m, m, |i, j| {
@@ -56,17 +61,24 @@ pub fn deviations(problem: &ServoProblem<'_>, fitted: &Fitted) -> Deviations {
     let blocks = &fitted.evaluation.blocks;
     let share = (blocks.len() as f64 - 1.0) / blocks.len() as f64;
     let mut covariance = Mat::zeros(m, m);
+    let mut fourth = vec![0.0; m];
     for block in blocks {
         let left = Mat::from_fn(free.len(), free.len(), |i, j| all[(i, j)] - block.hessian[(i, j)]);
         let Some(change) = damped(&left, &block.gradient, &inside, RIDGE) else { return out };
         for (c, by) in change.iter().enumerate() {
             let to = covariance.col_mut(c);
             to.iter_mut().zip(&change).for_each(|(t, d)| *t += share * by * d);
+            fourth[c] += by.powi(4);
         }
     }
     if blocks.len() > 1 {
         for (i, k) in inside.iter().enumerate() {
             out.jackknife[*k] = Some(covariance[(i, i)].sqrt());
+            // Where one block decides, such as the one rest of a record whose encoder stands still, a variance from many is that of one:
+            // degrees of freedom by the fourth moment, blocks less one where all count alike (Satterthwaite 1946).
+            let squares = covariance[(i, i)] / share;
+            let counted = if fourth[i] > 0.0 { 3.0 * squares * squares / fourth[i] - 2.0 } else { 1.0 };
+            out.quantile[*k] = quantile(counted.clamp(1.0, blocks.len() as f64 - 1.0));
         }
         out.covariance = covariance;
     }
