@@ -673,6 +673,7 @@ impl Work<'_> {
         let rows = |log: &ServoLog| ((horizon_s / log.period()).round() as usize).max(1);
         let cut = |log: &ServoLog| {
             let mut log = log.clone();
+            log.settle_s = 0.0;
             if horizon_s.is_finite() {
                 let every = rows(&log);
                 log.breaks = (1..).map(|k| k * every).take_while(|r| *r < log.rows()).collect();

@@ -1,4 +1,19 @@
-//! Position-controlled drives whose effort nobody measures.
+//! Position-controlled drives whose effort nobody measures: closed-loop simulation of commands, its sensitivities, and fits.
+//!
+//! A robot on a fixed base is told positions by its drives' commands and logs where its encoders are. [`ServoJoint`] is the law of
+//! one joint behind its drive: position and velocity gain, limits, dead band, delay and shaping of the command, rotor inertia, friction that
+//! sticks, the encoder's zero and direction.
+//!
+//! | question | where |
+//! |---|---|
+//! | where does the robot go, and how does that change with every number | [`Rollout`] |
+//! | a first guess from filtered motion | [`start`] |
+//! | numbers whose simulation gives the measured positions | [`fit`] |
+//! | numbers with intervals, verdicts and what cannot be told | [`identify`] |
+//!
+//! Input is a [`Mechanism`](dynid_model::Mechanism) and arrays; no file is opened. Units are SI, angles rad. Whatever number of threads
+//! runs, results have the same bits.
+
 pub mod chain;
 pub mod fit;
 mod free;

@@ -24,7 +24,13 @@ pub struct ServoLog {
     pub start: Option<Vec<f64>>,
     /// Rows at which a rollout begins anew, beside the first.
     pub breaks: Vec<usize>,
+    /// Time behind the beginning of a rollout that no sum holds, s: the velocity it begins with is not measured, and a position loop forgets
+    /// it. Not where [`ServoLog::start`] is given. Default 0.2.
+    pub settle_s: f64,
 }
+
+/// Time in which position loops of robots forget where they began: two to four of their time constants `(k_d + F_v)/k_p`.
+const SETTLE_S: f64 = 0.2;
 
 impl ServoLog {
     /// A log from its arrays; resolutions of encoders are the smallest steps of their readings, where all steps are multiples of it.
@@ -41,7 +47,8 @@ impl ServoLog {
         let whole = command.iter().chain(&position).all(|values| values.len() == time.len());
         assert!(whole, "rows of time, commands and positions");
         let resolution = position.iter().map(|x| resolution(x)).collect();
-        ServoLog { name: name.into(), time, command, position, resolution, ..ServoLog::default() }
+        let settle_s = SETTLE_S;
+        ServoLog { name: name.into(), time, command, position, resolution, settle_s, ..ServoLog::default() }
     }
 
     /// Number of rows.
@@ -66,6 +73,19 @@ impl ServoLog {
         let mut starts: Vec<usize> = std::iter::once(0).chain(self.breaks.iter().copied()).collect();
         starts.push(self.rows());
         starts.windows(2).map(|w| w[0]..w[1]).filter(|r| r.len() > 1).collect()
+    }
+
+    /// For every row, whether sums hold it.
+    pub(crate) fn counted(&self) -> Vec<bool> {
+        let mut out = vec![false; self.rows()];
+        for segment in self.segments() {
+            let given = segment.start == 0 && self.start.is_some();
+            let from = if given { f64::NEG_INFINITY } else { self.time[segment.start] + self.settle_s };
+            for row in segment {
+                out[row] = self.time[row] >= from;
+            }
+        }
+        out
     }
 
     /// Standard deviation of an encoder's rounding, 0 if its step is not known.

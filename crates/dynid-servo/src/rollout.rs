@@ -411,9 +411,8 @@ impl<'a> Run<'a> {
             let sign = solver.sign(j);
             let row = &mut drive[own.clone()];
             let quarter = 0.25 * h * at.by_error + 0.5 * at.by_damping * joint.kd;
-            for c in 0..p {
-                let i = own.start + c;
-                row[c] = at.by_error * (wanted[i] - q[i]) - quarter * v[i];
+            for (to, i) in row.iter_mut().zip(own.clone()) {
+                *to = at.by_error * (wanted[i] - q[i]) - quarter * v[i];
             }
             self.rollout.by_drive(j, &at, self.wanted[j].velocity - mean, row);
             let to = &mut rhs[own.clone()];
@@ -446,10 +445,8 @@ impl<'a> Run<'a> {
                     LoadOf::Drive => {
                         let before = solver.before[j];
                         let row = &mut *row_before;
-                        for c in 0..p {
-                            let i = own.start + c;
-                            row[c] =
-                                before.by_error * (wanted[i] - q[i]) - before.by_damping * joint.kd * v[i];
+                        for (to, i) in row.iter_mut().zip(own.clone()) {
+                            *to = before.by_error * (wanted[i] - q[i]) - before.by_damping * joint.kd * v[i];
                         }
                         self.rollout.by_drive(j, &before, self.wanted[j].velocity - self.v[j], row);
                         for c in 0..p {
@@ -529,18 +526,42 @@ impl Rollout<'_> {
     }
 }
 
-/// Speed of the first readings of a segment; 0 where they stay within two steps of the encoder.
+/// Speed at the beginning of a segment; 0 where readings about it stay within two steps of the encoder.
+///
+/// Within a record the slope of a line through readings on both sides; at its beginning that of a parabola through the first ones.
 fn first_speed(log: &ServoLog, joint: usize, row: usize) -> f64 {
-    const ROWS: usize = 5;
-    let end = (row + ROWS).min(log.rows());
-    let (time, reading) = (&log.time[row..end], &log.position[joint][row..end]);
-    let n = time.len() as f64;
+    const AROUND: usize = 3;
+    let rows = if row >= AROUND && row + AROUND < log.rows() {
+        row - AROUND..row + AROUND + 1
+    } else {
+        row..(row + 2 * AROUND + 1).min(log.rows())
+    };
+    let (time, reading) = (&log.time[rows.clone()], &log.position[joint][rows.clone()]);
     let span = reading.iter().fold(0.0_f64, |m, x| m.max((x - reading[0]).abs()));
-    if span <= 2.0 * log.resolution.get(joint).copied().unwrap_or(0.0) {
+    let resolution = log.resolution.get(joint).copied().unwrap_or(0.0);
+    if span <= 2.0 * resolution || rows.len() < 4 {
         return 0.0;
     }
-    let (t, x) = (time.iter().sum::<f64>() / n, reading.iter().sum::<f64>() / n);
-    let along: f64 = time.iter().zip(reading).map(|(a, b)| (a - t) * (b - x)).sum();
-    let across: f64 = time.iter().map(|a| (a - t) * (a - t)).sum();
-    if across > 0.0 { along / across } else { 0.0 }
+    let n = time.len() as f64;
+    let mean = time.iter().sum::<f64>() / n;
+    let moment = |p: i32, q: &dyn Fn(usize) -> f64| -> f64 {
+        (0..time.len()).map(|k| (time[k] - mean).powi(p) * q(k)).sum()
+    };
+    let one = |_: usize| 1.0;
+    let (s2, s3, s4) = (moment(2, &one), moment(3, &one), moment(4, &one));
+    let of_reading = |k: usize| reading[k] - reading[0];
+    let (b0, b1, b2) = (moment(0, &of_reading), moment(1, &of_reading), moment(2, &of_reading));
+    if rows.start < row {
+        return b1 / s2;
+    }
+    // Normal equations of a parabola about the mean time, whose first moment is zero.
+    let c2 = b2 - s2 * b0 / n;
+    let (a11, a12, a22) = (s2, s3, s4 - s2 * s2 / n);
+    let determinant = a11 * a22 - a12 * a12;
+    if determinant <= 0.0 {
+        return b1 / s2;
+    }
+    let slope = (b1 * a22 - c2 * a12) / determinant;
+    let bend = (a11 * c2 - a12 * b1) / determinant;
+    slope + 2.0 * bend * (time[0] - mean)
 }

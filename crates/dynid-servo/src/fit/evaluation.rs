@@ -94,14 +94,17 @@ impl Evaluation {
             .collect();
         let parts: Vec<Result<Part, Lost>> =
             tasks.par_iter().map(|(l, chain)| part(problem, values, sigma, slopes, (*l, chain))).collect();
-        let empty = |b: &Block| BlockSums {
+        let empty = |_: &Block| BlockSums {
             hessian: Mat::zeros(p, p),
             gradient: vec![0.0; p],
             squares: vec![0.0; n],
-            rows: b.rows.len(),
+            rows: 0,
         };
         let mut blocks: Vec<BlockSums> = problem.blocks.iter().map(empty).collect();
         let mut count = Count::default();
+        let Some((_, first)) = tasks.first() else {
+            return Ok(Evaluation { blocks, sigma: sigma.to_vec(), count });
+        };
         for ((log, chain), part) in tasks.iter().zip(parts) {
             let part = part?;
             count.steps += part.count.steps;
@@ -109,6 +112,9 @@ impl Evaluation {
             let of_log = (0..blocks.len()).filter(|b| problem.blocks[*b].log == *log);
             for (b, sums) in of_log.zip(&part.sums) {
                 let to = &mut blocks[b];
+                if chain.joints == first.joints {
+                    to.rows += sums.rows;
+                }
                 for (j, squares) in chain.joints.iter().zip(&sums.squares) {
                     to.squares[*j] += squares;
                 }
@@ -150,10 +156,10 @@ impl Evaluation {
         let p = self.blocks.first().map_or(0, |b| b.gradient.len());
         let (mut hessian, mut gradient) = (Mat::zeros(p, p), vec![0.0; p]);
         for (_, block) in self.blocks.iter().enumerate().filter(|(b, _)| take(*b)) {
-            for c in 0..p {
+            for (c, (to, from)) in gradient.iter_mut().zip(&block.gradient).enumerate() {
+                *to += from;
                 let (to, from) = (hessian.col_mut(c), block.hessian.col(c));
                 to.iter_mut().zip(from).for_each(|(t, f)| *t += f);
-                gradient[c] += block.gradient[c];
             }
         }
         (hessian, gradient)
@@ -172,6 +178,7 @@ struct PartSums {
     hessian: Vec<f64>,
     gradient: Vec<f64>,
     squares: Vec<f64>,
+    rows: usize,
 }
 
 fn part(
@@ -185,15 +192,24 @@ fn part(
     let rollout = Rollout::new(chain, problem.scheme, if slopes { problem.free } else { &[] });
     let p = rollout.columns().len();
     let ends: Vec<usize> = problem.blocks.iter().filter(|b| b.log == l).map(|b| b.rows.end).collect();
-    let empty =
-        || PartSums { hessian: vec![0.0; p * p], gradient: vec![0.0; p], squares: vec![0.0; chain.len()] };
+    let empty = || PartSums {
+        hessian: vec![0.0; p * p],
+        gradient: vec![0.0; p],
+        squares: vec![0.0; chain.len()],
+        rows: 0,
+    };
+    let counted = log.counted();
     let mut sums: Vec<PartSums> = ends.iter().map(|_| empty()).collect();
     let mut at = 0;
     let count = rollout.run(values, log, |row| {
         while at + 1 < ends.len() && row.row >= ends[at] {
             at += 1;
         }
+        if !counted[row.row] {
+            return;
+        }
         let to = &mut sums[at];
+        to.rows += 1;
         for (j, robot) in chain.joints.iter().enumerate() {
             let residual = log.position[*robot][row.row] - row.reading[j];
             to.squares[j] += residual * residual;

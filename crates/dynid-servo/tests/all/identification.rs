@@ -124,7 +124,7 @@ fn light_links_leave_one_scale_open_and_their_ratios_known() {
     });
     settings.step_s = Some(PERIOD * 1.01);
     let found = identify(&mechanism, &[log], &settings).unwrap();
-    for joint in 0..2 {
+    for (joint, true_joint) in truth.iter().enumerate() {
         let of = |term: Term| {
             found
                 .parameters
@@ -138,8 +138,8 @@ fn light_links_leave_one_scale_open_and_their_ratios_known() {
         for term in [Term::RotorInertia, Term::Coulomb, Term::Viscous] {
             assert!(scale.members.contains(&of(term)), "joint {joint} {term}: {:?}", found.groups);
             let (ratio, half) = found.parameters[of(term)].per_gain.unwrap();
-            let damping = if term == Term::Viscous { truth[joint].get(Term::VelocityGain) } else { 0.0 };
-            let true_ratio = (truth[joint].get(term) + damping) / truth[joint].get(Term::PositionGain);
+            let damping = if term == Term::Viscous { true_joint.get(Term::VelocityGain) } else { 0.0 };
+            let true_ratio = (true_joint.get(term) + damping) / true_joint.get(Term::PositionGain);
             println!("joint {joint} {term} {ratio} ± {half} truth {true_ratio}");
             assert!((ratio / true_ratio - 1.0).abs() < 0.02, "joint {joint} {term}: {ratio} {true_ratio}");
         }

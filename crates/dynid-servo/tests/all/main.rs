@@ -1,5 +1,7 @@
 //! Tests of the crate, one program.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
 mod arm;
 mod golden;
 mod identification;

@@ -31,8 +31,7 @@ fn a_joint_under_load_holds_exactly() {
     // A step, then a hold of two seconds under gravity.
     let command: Vec<f64> = (0..600).map(|k| if k < 100 { 0.0 } else { 0.4 }).collect();
     let held = run(vec![joint(), joint()], vec![command.clone(), command], Scheme::default());
-    for j in 0..2 {
-        let (from, to) = (held[400][j], held[599][j]);
+    for (j, (from, to)) in held[400].into_iter().zip(held[599]).enumerate() {
         assert_eq!(from, to, "joint {j} creeps");
         // Friction holds it off the command, which a drive without integral part does not mind.
         assert!((to - 0.4).abs() > 1e-3, "joint {j}: {to}");

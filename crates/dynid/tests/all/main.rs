@@ -37,6 +37,7 @@ mod recorded_logs;
 mod reduce;
 mod report_page;
 mod safe_designs;
+mod servo;
 mod settings;
 mod stiffness;
 mod support;

@@ -6,6 +6,7 @@ use std::path::Path;
 use dynid::design::{DesignConfig, design};
 use dynid::io::csv::{ReadOptions, read};
 use dynid::online::Session;
+use dynid::servo::{ServoConfig, identify_servo};
 use dynid::simulate::{SimulateSettings, simulate};
 use dynid::{Config, FrictionConfig, Robot, RobotOptions, identify_friction};
 
@@ -541,6 +542,100 @@ fn every_key_of_a_friction_experiment_takes_effect_or_is_refused() {
     });
     found.remove("out");
     walk("friction", &found, &cases, &of_friction);
+}
+
+/// What drives an arm of two joints has, by a configuration.
+fn of_servo(files: &Path, text: &Text) -> Result<String, String> {
+    let path = files.join("servo.toml");
+    let head = defaults(text.top, &[("robot", "\"arm.urdf\"")]);
+    let log = defaults(text.log, &[("path", "\"a.csv\"")]);
+    // The law is given, so that a key costs one fit.
+    let stated = text.tables.strip_prefix("[servo]\n").unwrap_or("");
+    let servo = defaults(stated, &[("law", "[\"offset\"]"), ("velocity_gain", "1.0")]);
+    let others = if stated.is_empty() { text.tables } else { "" };
+    let whole =
+        format!("{head}{}\n[[log]]\n{log}{}\n[servo]\n{servo}{stated}\n{others}\n", text.top, text.log);
+    std::fs::write(&path, whole).unwrap();
+    let run = || {
+        let config = ServoConfig::read(&path)?;
+        let found = identify_servo(&config, &mut |_| {})?;
+        let mut json = serde_json::to_value(found.file(&config, &[])).unwrap();
+        json.as_object_mut().unwrap().remove("provenance");
+        Ok(json.to_string())
+    };
+    run().map_err(|e: dynid::Error| e.to_string())
+}
+
+#[test]
+fn every_key_of_drives_takes_effect_or_is_refused() {
+    let folder = crate::servo::folder();
+    let files = folder.path();
+    let of = |key, top, log, tables, expect| {
+        let after = Text { top, log, tables, ..Text::default() };
+        Case { key, before: Text::default(), after, expect }
+    };
+    let servo = |key, tables, expect| of(key, "", "", tables, expect);
+    let beside = |key, before, tables| Case {
+        key,
+        before: Text { tables: before, ..Text::default() },
+        after: Text { tables, ..Text::default() },
+        expect: Changes,
+    };
+    let cases = vec![
+        of("robot", "robot = \"none.urdf\"", "", "", Refused("none.urdf")),
+        of("lock", "lock = { finger = 0.5 }", "", "", Changes),
+        of("gravity", "gravity = [0, 0, -1.62]", "", "", Changes),
+        of("log.path", "", "path = \"b.csv\"", "", Changes),
+        of("log.rows", "", "rows = [1, 1000]", "", Changes),
+        of("log.part", "", "part = [0.0, 0.6]", "", Changes),
+        of("validation.path", "", "", "[[validation]]\npath = \"b.csv\"", Changes),
+        of("validation.rows", "", "", "[[validation]]\npath = \"b.csv\"\nrows = [1, 600]", Changes),
+        of(
+            "validation.part",
+            "",
+            "",
+            "[[validation]]\npath = \"b.csv\"\npart = [0.5, 0.2]",
+            Refused("two shares"),
+        ),
+        of("command.position", "", "", "[command]\nposition = \"q_{joint}\"", Changes),
+        of("command.velocity", "", "", "[command]\nvelocity = \"cmd_{joint}\"", Changes),
+        of("command.effort", "", "", "[command]\neffort = \"cmd_{joint}\"", Changes),
+        servo("servo.position_gain", "[servo]\nposition_gain = 25.0", Changes),
+        beside(
+            "servo.gain_error",
+            "[servo]\nposition_gain = 25.0",
+            "[servo]\nposition_gain = 25.0\ngain_error = 0.02",
+        ),
+        servo("servo.gains", "[servo]\ngains = \"own\"", Changes),
+        servo("servo.velocity_gain", "[servo]\nvelocity_gain = 0.5", Changes),
+        servo("servo.effort_limit", "[servo]\neffort_limit = 6.0", Changes),
+        beside(
+            "servo.limited",
+            "[servo]\neffort_limit = 6.0",
+            "[servo]\neffort_limit = 6.0\nlimited = \"proportional\"",
+        ),
+        servo("servo.direction", "[servo]\ndirection = 2", Refused("1 or -1")),
+        servo("servo.zero", "[servo]\nzero = { lift = 0.1 }", Changes),
+        beside("servo.zero_std", "[servo]\nlaw = [\"zero\"]", "[servo]\nlaw = [\"zero\"]\nzero_std = 0.001"),
+        servo("servo.delay", "[servo]\ndelay = 0.004", Changes),
+        servo("servo.delays", "[servo]\ndelays = \"own\"", Changes),
+        servo("servo.hold", "[servo]\nhold = \"line\"", Changes),
+        servo("servo.law", "[servo]\nlaw = []", Changes),
+        servo("servo.find", "[servo]\nfind = [\"dead_band\"]", Changes),
+        beside(
+            "servo.load",
+            "[servo]\nlaw = [\"load_friction\"]",
+            "[servo]\nlaw = [\"load_friction\"]\nload = \"bodies\"",
+        ),
+        servo("servo.step_s", "[servo]\nstep_s = 0.002", Changes),
+        servo("servo.blocks", "[servo]\nblocks = 8", Changes),
+    ];
+    let parse = |text: &str| ServoConfig::parse(text, "servo.toml").err().map(|e| e.to_string());
+    let mut found = keys(&parse);
+    // Columns are those of an identification.
+    found.retain(|key| !key.contains("columns"));
+    found.remove("out");
+    walk("servo", &found, &cases, &|text| of_servo(files, text));
 }
 
 /// Events of a stream.

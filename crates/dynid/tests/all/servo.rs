@@ -1,0 +1,262 @@
+//! Drives from files of commands and positions, to the files that go into simulators.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
+use std::fmt::Write;
+use std::path::Path;
+
+use dynid::servo::{ServoConfig, ServoFault, ServoFiles, ServoVerdict, identify_servo};
+use dynid::servo_fits::{Chain, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Term};
+use dynid::{Robot, RobotOptions};
+use tempfile::TempDir;
+
+/// Two links in a vertical plane and a finger that nobody logs.
+pub(crate) const ARM: &str = r#"<robot name="servo_arm">
+  <link name="base"/>
+  <link name="upper"><inertial><origin xyz="0.15 0 0"/><mass value="1.2"/>
+    <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+  <link name="fore"><inertial><origin xyz="0.12 0 0"/><mass value="0.8"/>
+    <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.005" iyz="0" izz="0.005"/></inertial></link>
+  <link name="tip"><inertial><origin xyz="0.02 0 0"/><mass value="0.05"/>
+    <inertia ixx="1e-5" ixy="0" ixz="0" iyy="1e-5" iyz="0" izz="1e-5"/></inertial></link>
+  <joint name="lift" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-3" upper="3" effort="50" velocity="10"/><dynamics damping="0.1" friction="0.05"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>
+    <limit lower="-3" upper="3" effort="50" velocity="10"/></joint>
+  <joint name="finger" type="revolute"><parent link="fore"/><child link="tip"/><origin xyz="0.24 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="5" velocity="10"/></joint>
+</robot>
+"#;
+
+/// True drives of lift and elbow.
+fn truth() -> Vec<ServoJoint> {
+    let joint = |kp: f64, rotor: f64, viscous: f64, coulomb: f64| {
+        ServoJoint::default()
+            .with(Term::PositionGain, kp)
+            .with(Term::VelocityGain, 1.0)
+            .with(Term::RotorInertia, rotor)
+            .with(Term::Viscous, viscous)
+            .with(Term::Coulomb, coulomb)
+            .with(Term::Offset, 0.2)
+            .with(Term::Delay, 0.008)
+    };
+    vec![joint(25.0, 0.02, 0.3, 0.4), joint(25.0, 0.01, 0.15, 0.2)]
+}
+
+/// A log of the arm as text: `t, cmd_*, q_*`.
+fn log(seed: f64, rows: usize) -> String {
+    let locked = vec![("finger".to_owned(), 0.0)];
+    let options = RobotOptions { locked, ..RobotOptions::default() };
+    let robot = Robot::parse(ARM, Path::new("arm.urdf"), &options).unwrap();
+    let wave = |k: usize, j: usize| {
+        let t = k as f64 * 0.005;
+        let f = [0.23, 0.61, 1.7, 3.9];
+        let sum: f64 = f
+            .iter()
+            .map(|f| 0.4 / (1.0 + 1.5 * f) * (std::f64::consts::TAU * f * t + seed + j as f64).sin())
+            .sum();
+        sum + if j == 0 { 0.6 } else { 0.5 }
+    };
+    let command: Vec<Vec<f64>> = (0..2).map(|j| (0..rows).map(|k| wave(k, j)).collect()).collect();
+    let time: Vec<f64> = (0..rows).map(|k| k as f64 * 0.005).collect();
+    let mut log = ServoLog::new("log", time, command.clone(), command.clone());
+    log.start = Some(command.iter().map(|c| c[0]).collect());
+    let values = ServoValues { joints: truth(), inertias: robot.mechanism.inertia_vector() };
+    let chains = Chain::all(&robot.mechanism);
+    let step = std::f64::consts::TAU / 4096.0;
+    let mut out = String::from("t,cmd_lift,cmd_elbow,q_lift,q_elbow\n");
+    Rollout::new(&chains[0], Scheme::default(), &[])
+        .run(&values, &log, |row| {
+            let [a, b] = [0, 1].map(|j| (row.reading[j] / step).round() * step);
+            let k = row.row;
+            writeln!(out, "{},{},{},{a},{b}", k as f64 * 0.005, command[0][k], command[1][k]).unwrap();
+        })
+        .unwrap();
+    out
+}
+
+/// A folder with the arm, two logs and a configuration.
+pub(crate) fn folder() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("arm.urdf", ARM);
+    write("a.csv", &log(0.3, 1600));
+    write("b.csv", &log(2.1, 1200));
+    folder
+}
+
+fn config(folder: &TempDir, text: &str) -> ServoConfig {
+    let path = folder.path().join("servo.toml");
+    std::fs::write(&path, text).unwrap();
+    ServoConfig::read(&path).unwrap()
+}
+
+const PLAIN: &str = "robot = \"arm.urdf\"\n[[log]]\npath = \"a.csv\"\n[[validation]]\npath = \"b.csv\"\n\
+    [servo]\nvelocity_gain = 1.0\n";
+
+#[test]
+fn drives_are_found_and_the_files_say_so() {
+    let folder = folder();
+    let config = config(&folder, PLAIN);
+    let found = identify_servo(&config, &mut |_| {}).unwrap();
+    let files = found.files().unwrap();
+    let file = found.file(&config, &files.notes);
+    assert_eq!(file.joints, ["lift", "elbow"]);
+    assert_eq!(file.law.additions, ["offset"], "{:?}", file.law.trials);
+    assert!(file.fit.misfit.unwrap() < 1.1, "{:?}", file.fit);
+    assert!(file.warnings.iter().any(|w| w.contains("finger")), "{:?}", file.warnings);
+    let mut told = 0;
+    for p in &file.parameters {
+        let term = Term::named(&p.term).unwrap();
+        let joint = usize::from(p.joints[0] == "elbow");
+        let true_value = truth()[joint].get(term);
+        assert!((p.value - true_value).abs() <= 0.03 * true_value.abs().max(1e-3), "{p:?} {true_value}");
+        told += usize::from(p.verdict == ServoVerdict::Seen);
+    }
+    assert!(told >= file.parameters.len() - 1, "{:?}", file.parameters);
+    for (rms, command) in file.validation[0].rms.iter().zip(&file.validation[0].command_rms) {
+        assert!(rms.unwrap() < 0.02 * command, "{:?}", file.validation);
+    }
+
+    let names: Vec<&str> = files.files.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["arm.urdf", "arm.mujoco.xml", "actuators.xml", "actuators.json", "actuators.h"]);
+    assert_eq!(ServoFiles::names(&config.robot).unwrap(), names);
+    let text = |name: &str| &files.files.iter().find(|(n, _)| n == name).unwrap().1;
+    let dynamics = dynid::io::urdf::dynamics(text("arm.urdf"), "arm.urdf").unwrap();
+    let lift = dynamics.iter().find(|d| d.joint == "lift").unwrap();
+    assert!((lift.damping - 0.3).abs() < 0.01 && (lift.friction - 0.4).abs() < 0.01, "{lift:?}");
+    // Everything but friction is the file as it was.
+    assert!(text("arm.urdf").contains("<mass value=\"1.2\"/>"));
+    let mjcf = dynid::io::mjcf::parse(text("arm.mujoco.xml"), "arm.mujoco.xml").unwrap();
+    let elbow = mjcf.joints.iter().find(|j| j.joint == "elbow").unwrap();
+    assert!((elbow.armature - 0.01).abs() < 5e-4, "{elbow:?}");
+    assert_eq!(text("arm.mujoco.xml").matches("<general ").count(), 2);
+    assert!(text("arm.mujoco.xml").contains("joint=\"finger\""), "the finger stays a joint");
+    let table: serde_json::Value = serde_json::from_str(text("actuators.json")).unwrap();
+    assert!((table["joints"][0]["delay"].as_f64().unwrap() - 0.008).abs() < 5e-4);
+    let page = found.report(&file).unwrap();
+    assert!(page.contains("Whole robot") && page.contains("elbow"));
+
+    // The same bits whatever number of threads.
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let again = alone.install(|| identify_servo(&config, &mut |_| {}).unwrap());
+    assert_eq!(again.file(&config, &files.notes).to_json(), file.to_json());
+}
+
+#[test]
+fn stated_gains_bring_the_robot_file_as_a_baseline_and_a_spread() {
+    let folder = folder();
+    let config = config(
+        &folder,
+        &format!("{PLAIN}position_gain = {{ lift = 25.0, elbow = 25.0 }}\nlaw = [\"offset\"]\n"),
+    );
+    let found = identify_servo(&config, &mut |_| {}).unwrap();
+    let file = found.file(&config, &[]);
+    let came = file.fit.robot_file_rms.as_ref().unwrap();
+    assert!(came.iter().zip(&file.fit.rms).all(|(a, b)| *a > 3.0 * b), "{came:?} {:?}", file.fit.rms);
+    let viscous = file.parameters.iter().find(|p| p.term == "viscous").unwrap();
+    assert!(viscous.spread.gain > 0.0 && viscous.interval.unwrap().1 > 0.3, "{viscous:?}");
+    assert!(!file.parameters.iter().any(|p| p.term == "position_gain"));
+}
+
+#[test]
+fn bad_logs_are_refused_with_what_to_write() {
+    let folder = folder();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let plain = std::fs::read_to_string(folder.path().join("a.csv")).unwrap();
+    write("nameless.csv", &plain.replace("cmd_", "told_"));
+    let degrees: String = plain
+        .lines()
+        .enumerate()
+        .map(|(k, line)| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if k > 0 {
+                for cell in &mut cells[1..3] {
+                    *cell = (cell.parse::<f64>().unwrap() * 57.29578).to_string();
+                }
+            }
+            cells.join(",") + "\n"
+        })
+        .collect();
+    write("degrees.csv", &degrees);
+    write("short.csv", &plain.lines().take(30).map(|l| format!("{l}\n")).collect::<String>());
+    let run = |log: &str| {
+        let text = format!("robot = \"arm.urdf\"\n[[log]]\npath = \"{log}\"\n");
+        let error = identify_servo(&config(&folder, &text), &mut |_| {}).unwrap_err();
+        format!("{error} | {}", error.hint().unwrap_or_default())
+    };
+    let nameless = run("nameless.csv");
+    assert!(nameless.contains("no columns of commanded positions for lift, elbow"), "{nameless}");
+    assert!(nameless.contains("position = \"cmd_{joint}\""), "{nameless}");
+    let degrees = run("degrees.csv");
+    assert!(degrees.contains("look like degrees") && degrees.contains("unit = \"deg\""), "{degrees}");
+    let short = run("short.csv");
+    assert!(short.contains("at least 50 rows, found 29"), "{short}");
+    let gone = run("gone.csv");
+    assert!(gone.contains("gone.csv"), "{gone}");
+    let text = format!("{PLAIN}position_gain = {{ wrist = 3.0 }}\n");
+    let unknown = identify_servo(&config(&folder, &text), &mut |_| {}).unwrap_err().to_string();
+    assert!(unknown.contains("wrist"), "{unknown}");
+    // A gain that no robot of this size can have.
+    let text = format!("{PLAIN}position_gain = 25.0\ndirection = -1\nstep_s = 0.1\n");
+    if let Err(error) = identify_servo(&config(&folder, &text), &mut |_| {}) {
+        assert!(error.job::<ServoFault>().is_some(), "{error}");
+    }
+}
+
+#[test]
+fn columns_of_other_names_and_units_are_read() {
+    let folder = folder();
+    let plain = std::fs::read_to_string(folder.path().join("a.csv")).unwrap();
+    let head = "t,u1,u2,x1,x2\n";
+    let other = plain.replacen("t,cmd_lift,cmd_elbow,q_lift,q_elbow\n", head, 1);
+    std::fs::write(folder.path().join("other.csv"), other).unwrap();
+    let text = "robot = \"arm.urdf\"\n[columns]\nposition = { lift = \"x1\", elbow = \"x2\" }\n\
+        [command]\nposition = { lift = \"u1\", elbow = \"u2\" }\n[[log]]\npath = \"other.csv\"\n\
+        [servo]\nvelocity_gain = 1.0\nlaw = [\"offset\"]\n";
+    let found = identify_servo(&config(&folder, text), &mut |_| {}).unwrap();
+    let named = format!("{PLAIN}law = [\"offset\"]\n");
+    let same = identify_servo(&config(&folder, &named), &mut |_| {}).unwrap();
+    assert_eq!(found.found.values, same.found.values);
+}
+
+#[test]
+fn recorded_legs_and_a_hobby_arm_are_predicted() {
+    let (Some(go2), Some(so101)) =
+        (dynid_testing::shared("data/go2-inair"), dynid_testing::shared("data/so101-sage"))
+    else {
+        return;
+    };
+    // The first 70 % of one record of chirps; the rest is predicted from its own first row.
+    let text = format!(
+        "robot = \"{0}/go2_nomesh.xml\"\n[[log]]\npath = \"{0}/log.csv.gz\"\npart = [0.0, 0.7]\n\
+         [servo]\nposition_gain = 20\nvelocity_gain = 1.5\nlaw = [\"offset\", \"load_friction\"]\n",
+        go2.display()
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let found = identify_servo(&config(&folder, &text), &mut |_| {}).unwrap();
+    let whole = format!("{text}[[validation]]\npath = \"{}/log.csv.gz\"\n", go2.display());
+    let whole = identify_servo(&config(&folder, &whole), &mut |_| {}).unwrap();
+    let (train, all) = (&found.found.rms, &whole.validation_rms[0]);
+    // From errors of the first 70 % and of the whole that of the rest, one rollout from the first row.
+    let rest = train.iter().zip(all).map(|(t, a)| (a * a - 0.7 * t * t) / 0.3).sum::<f64>() / 12.0;
+    assert!(rest.sqrt() < 7.0e-3, "{}", rest.sqrt());
+    let unstable = found.found.parameters.iter().filter(|p| p.half_width.is_none()).count();
+    assert!(unstable > 0, "armatures and delays stand at bounds");
+
+    let log = |name: &str| format!("path = \"{}/{name}.csv.gz\"\n", so101.display());
+    let logs = ["multisine", "friction_gravity", "pick_place", "static_holding"]
+        .map(|n| format!("[[log]]\n{}part = [0.0, 0.3]\n", log(n)));
+    let held = ["step_response", "trapezoidal_profile"].map(|n| format!("[[validation]]\n{}", log(n)));
+    let text = format!(
+        "robot = \"{}/so_arm101.urdf\"\nlock = {{ gripper = 0.3 }}\n{}{}[servo]\nlaw = []\n",
+        so101.display(),
+        logs.concat(),
+        held.concat()
+    );
+    let found = identify_servo(&config(&folder, &text), &mut |_| {}).unwrap();
+    for (log, rms) in found.validation.iter().zip(&found.validation_rms) {
+        let degrees = rms.iter().sum::<f64>() / 5.0 * 180.0 / std::f64::consts::PI;
+        assert!(degrees < 0.6, "{}: {degrees}", log.name);
+    }
+}
