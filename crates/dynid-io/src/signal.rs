@@ -179,12 +179,19 @@ pub(crate) fn is_command(column: &str) -> bool {
         "desired",
         "error",
         "goal",
+        "joint_trajectory",
         "output",
         "reference",
         "setpoint",
         "target",
     ];
     column.to_lowercase().split(['/', '.']).any(|part| words.contains(&part))
+}
+
+/// Whether a column holds from one of its values to the next, as what is asked of a robot does (a part of its path says so: `command`,
+/// `reference`, `joint_trajectory`, ..). Measurements go on between their values; so do errors, which are made of them.
+pub fn is_held(column: &str) -> bool {
+    is_command(column) && !column.to_lowercase().split(['/', '.']).any(|part| part == "error")
 }
 
 /// True if `stem` means `name` of the joint: `q_arm`, `arm_q`, `arm.q`, `q.arm`, ...

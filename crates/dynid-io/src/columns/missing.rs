@@ -4,6 +4,7 @@ use super::column_values::{place_of, raw_column};
 use super::{ColumnMapping, ColumnUse, MappingError, Signal};
 use crate::csv::Table;
 use crate::log::Missing;
+use crate::signal::is_held;
 
 /// Share of the rows with positions that must have all signals.
 const LEAST_SHARE: f64 = 0.5;
@@ -17,6 +18,8 @@ pub struct Sparse {
     pub left_out: usize,
     /// Values that were interpolated.
     pub interpolated: usize,
+    /// Values of commands that were held.
+    pub held: usize,
     /// Columns with missing values, each with how many.
     pub columns: Vec<(String, usize)>,
 }
@@ -67,7 +70,10 @@ impl ColumnMapping {
         if self.missing == Missing::Interpolate {
             let time = self.clock(table)?;
             for k in used.iter().filter(|k| !needed.contains(k)) {
-                sparse.interpolated += interpolate(&time, &mut table.columns[*k], &positioned);
+                match is_held(&table.header[*k]) {
+                    true => sparse.held += hold(&time, &mut table.columns[*k], &positioned),
+                    false => sparse.interpolated += interpolate(&time, &mut table.columns[*k], &positioned),
+                }
             }
         }
         let rows: Vec<usize> = positioned.iter().copied().filter(|row| whole(table, &used, *row)).collect();
@@ -135,9 +141,38 @@ fn interpolate(time: &[f64], values: &mut [f64], at: &[usize]) -> usize {
     filled
 }
 
+/// Gives some rows the value that a column had last, however long ago; how many were filled.
+fn hold(time: &[f64], values: &mut [f64], at: &[usize]) -> usize {
+    let mut filled = 0;
+    let (mut last, mut row) = (f64::NAN, 0);
+    for place in at {
+        while row <= *place {
+            if !values[row].is_nan() && !time[row].is_nan() {
+                last = values[row];
+            }
+            row += 1;
+        }
+        if values[*place].is_nan() && !last.is_nan() {
+            values[*place] = last;
+            filled += 1;
+        }
+    }
+    filled
+}
+
 #[cfg(test)]
 mod tests {
-    use super::interpolate;
+    use super::{hold, interpolate};
+
+    #[test]
+    fn commands_are_held_until_the_next_one_and_not_before_the_first() {
+        let time: Vec<f64> = (0..9).map(f64::from).collect();
+        let gap = f64::NAN;
+        let mut values = vec![gap, 1.0, gap, gap, 3.0, gap, gap, gap, gap];
+        assert_eq!(hold(&time, &mut values, &[0, 2, 3, 8]), 3);
+        assert!(values[0].is_nan() && values[5].is_nan());
+        assert_eq!([values[2], values[3], values[4], values[8]], [1.0, 1.0, 3.0, 3.0]);
+    }
 
     #[test]
     fn gaps_are_bridged_on_a_line_and_long_ones_are_not() {

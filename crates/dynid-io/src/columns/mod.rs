@@ -11,7 +11,7 @@ mod spec;
 mod units;
 mod unnamed;
 
-pub use crate::signal::{Signal, is_time_name, signal_of_name};
+pub use crate::signal::{Signal, is_held, is_time_name, signal_of_name};
 pub use clock::TimeReading;
 pub use degrees::{DegreesEvidence, degrees_suspected};
 pub use error::{MappingError, holds_currents};

@@ -69,7 +69,7 @@ pub enum Missing {
     Drop,
     /// Signals are interpolated linearly at the rows that have all positions, for logs that mix topics with stamps of their
     /// own; where no row has all of them, at those of the position with most values. Where a signal is silent for more than five of
-    /// its usual steps the rows are left out.
+    /// its usual steps the rows are left out. Commands are held until the next one instead.
     Interpolate,
 }
 

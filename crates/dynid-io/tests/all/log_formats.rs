@@ -224,6 +224,28 @@ fn rows_without_a_value_follow_the_policy() {
 }
 
 #[test]
+fn commands_of_another_topic_are_held_and_measurements_interpolated() {
+    // Efforts are commanded every fourth row, temperatures measured there; positions are the other rows.
+    let text =
+        rows("__time,/state/j/position,/controller/commands/j/effort,/state/j/temperature", |k| {
+            match k % 4 {
+                0 => format!("{},,{k},{}", 0.01 * k as f64, 20.0 + 0.1 * k as f64),
+                _ => format!("{},{},,", 0.01 * k as f64, 0.01 * k as f64),
+            }
+        });
+    let (signals, _) = understood(&text, "j", "missing = \"interpolate\"").unwrap();
+    let (effort, temperature) =
+        (&signals.effort.unwrap()[0], signals.temperature.unwrap()[0].clone().unwrap());
+    let rows = signals.rows.unwrap();
+    assert_eq!(rows[..4], [1, 2, 3, 5]);
+    for ((row, effort), temperature) in rows.iter().zip(effort).zip(temperature) {
+        assert_eq!(*effort, (row - row % 4) as f64, "row {row}");
+        assert!((temperature - 20.0 - 0.1 * *row as f64).abs() < 1e-12, "row {row}");
+    }
+    assert_eq!((signals.sparse.held, signals.sparse.interpolated), (37, 36));
+}
+
+#[test]
 fn headers_with_faults_are_refused() {
     let spec = |text: &str| toml::from_str::<MappingSpec>(text).unwrap();
     for (text, keys, parts) in [

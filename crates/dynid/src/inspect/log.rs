@@ -1,7 +1,8 @@
 //! What a log holds.
 
-use dynid_io::columns::{Signal, signal_of_name};
-use dynid_io::{ColumnMapping, MappingSpec, ReadingNote};
+use dynid_io::columns::{Signal, is_held, signal_of_name};
+use dynid_io::log::{LogFormat, Missing};
+use dynid_io::{ColumnMapping, MappingSpec, ReadingNote, Table};
 use serde::Serialize;
 
 use crate::Error;
@@ -84,6 +85,9 @@ pub fn inspect_log(log: &LogConfig, columns: &MappingSpec) -> Result<LogInspecti
             None
         }
     };
+    if header.format.map(LogFormat::missing) == Some(Missing::Interpolate) {
+        notes.extend(held(&table));
+    }
     let rows = table.rows;
     let described = (table.header.iter().zip(&table.columns).zip(&table.origin))
         .map(|((name, values), origin)| column(name, values, *origin, time.as_deref()))
@@ -99,6 +103,17 @@ pub fn inspect_log(log: &LogConfig, columns: &MappingSpec) -> Result<LogInspecti
         texts,
         warnings,
     })
+}
+
+/// Commands with stamps of their own, which are held where topics are joined.
+fn held(table: &Table) -> Option<ReadingNote> {
+    let with_gaps = table.header.iter().zip(&table.columns).filter(|(_, x)| x.iter().any(|x| x.is_nan()));
+    let names: Vec<String> = with_gaps.map(|(name, _)| name.clone()).filter(|name| is_held(name)).collect();
+    let shown = names.iter().take(4).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    let more = if names.len() > 4 { ", .." } else { "" };
+    let reason =
+        "what is asked of the robot holds until the next value; measurements are interpolated linearly";
+    (!names.is_empty()).then(|| ReadingNote::new("commands held", format!("{shown}{more}"), reason))
 }
 
 fn column(name: &str, values: &[f64], origin: i64, time: Option<&[f64]>) -> LogColumn {

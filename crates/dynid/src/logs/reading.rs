@@ -87,7 +87,14 @@ impl Understood {
             });
             let value = match self.mapping.missing {
                 Missing::Interpolate => {
-                    format!("interpolate, {} values; {} rows left out", sparse.interpolated, sparse.left_out)
+                    let held = match sparse.held {
+                        0 => String::new(),
+                        held => format!(", {held} of commands held"),
+                    };
+                    format!(
+                        "interpolate, {} values{held}; {} rows left out",
+                        sparse.interpolated, sparse.left_out
+                    )
                 }
                 _ => format!("drop, {} of {} rows left out", sparse.left_out, self.table.rows),
             };
