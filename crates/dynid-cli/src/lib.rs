@@ -15,7 +15,11 @@ use args::{Cli, Command};
 /// Does what the arguments say, the first of which is the program's name; gives the exit code.
 pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    end(Cli::of(&arguments).map(|cli| cli.and_then(|cli| run(&cli.command))))
+    let run = |mut cli: Cli| {
+        cli.command.find_logs()?;
+        run(&cli.command)
+    };
+    end(Cli::of(&arguments).map(|cli| cli.and_then(run)))
 }
 
 fn run(command: &Command) -> Result<u8, Failure> {

@@ -30,7 +30,7 @@ mod _native {
     #[pymodule_export]
     use super::factor::Factor;
     #[pymodule_export]
-    use super::log::{Log, read_columns, simulate};
+    use super::log::{Log, find_logs, read_columns, simulate};
     #[pymodule_export]
     use super::robot::Robot;
 

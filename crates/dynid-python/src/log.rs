@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{Matrix, as_doubles, columns_by_name, vector};
-use crate::error::setting;
+use crate::error::{raise, setting};
 use crate::robot::Robot;
 use crate::settings::parsed;
 
@@ -253,6 +253,12 @@ pub(crate) fn simulate<'py>(py: Python<'py>, robot: &Robot, settings: &str) -> P
     out.set_item("truth", values)?;
     out.set_item("warnings", warnings)?;
     Ok(out)
+}
+
+/// The logs that a path stands for: a pattern, a folder, a list.
+#[pyfunction]
+pub(crate) fn find_logs(py: Python<'_>, path: PathBuf) -> PyResult<Vec<PathBuf>> {
+    dynid::io::log::files(&path).map_err(|error| raise(py, &error.into()))
 }
 
 /// All columns of a log, or the signals of a robot in it: a dictionary of arrays.

@@ -188,6 +188,10 @@ def test_groups_of_hdf5(indy7: dynid.Robot, signals: Signals, tmp_path: Path) ->
     check(indy7, f"{path}#data/demo_2", (t, q + 2, tau), None)
     with pytest.raises(dynid.LogError, match="data/demo_0, data/demo_1, data/demo_2"):
         dynid.read_columns(path)
+    assert dynid.find_logs(f"{path}#data/*") == [f"{path}#data/demo_{demo}" for demo in range(3)]
+    assert dynid.find_logs(f"{tmp_path}/*.hdf5#*[12]") == [f"{path}#data/demo_{demo}" for demo in (1, 2)]
+    with pytest.raises(dynid.LogError, match="expected logs in"):
+        dynid.find_logs(f"{path}#other*")
     # Groups of joints are one log.
     with h5py.File(tmp_path / "joints.h5", "w") as file:
         file["t"] = t

@@ -138,7 +138,8 @@ pub struct CouplingConfig {
 #[derive(Debug, Clone, Default, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct LogConfig {
-    /// File, relative to the configuration; `FILE#MEMBER`: an episode, a group, or topics of it.
+    /// File, relative to the configuration; `FILE#MEMBER`: an episode, a group, or topics of it. A pattern (`runs/*.csv`), a folder or a list
+    /// (`runs.manifest`) stands for several logs, to each of which the other keys apply.
     pub path: PathBuf,
     /// First and last data row, from 1, both included. Default: all.
     #[serde(deserialize_with = "lists::pair")]
@@ -172,17 +173,21 @@ pub struct LogConfig {
 }
 
 impl Config {
-    /// Reads a configuration; paths in it become relative to its folder.
+    /// Reads a configuration; paths in it become relative to its folder, and patterns, folders and lists become the logs that they stand
+    /// for.
     ///
     /// # Errors
-    /// [`Error::Read`], and as [`Config::parse`].
+    /// [`Error::Read`], as [`Config::parse`], and as [`LogConfig::all`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let config = Self::read_for_stream(path)?;
-        config.demand_logs(&path.display().to_string())?;
+        let mut config = Self::read_for_stream(path)?;
+        let file = path.display().to_string();
+        config.demand_logs(&file)?;
+        config.find_logs()?;
+        toml_file::in_file(&file, config.check_logs())?;
         Ok(config)
     }
 
-    /// Reads a configuration for a run that need not have a log.
+    /// Reads a configuration for a run that need not have a log; logs stay as they are stated ([`Config::find_logs`]).
     ///
     /// # Errors
     /// Fails as [`Config::read`] does.
@@ -202,6 +207,16 @@ impl Config {
         }
         config.online.checkpoint = config.online.checkpoint.map(|c| folder.join(c));
         Ok(config)
+    }
+
+    /// Puts the logs that patterns, folders and lists stand for in their place ([`LogConfig::all`]).
+    ///
+    /// # Errors
+    /// Fails as [`LogConfig::all`] does.
+    pub fn find_logs(&mut self) -> Result<(), Error> {
+        self.log = LogConfig::all(&self.log)?;
+        self.validation = LogConfig::all(&self.validation)?;
+        Ok(())
     }
 
     /// Parses a configuration.
@@ -305,6 +320,26 @@ impl Config {
             ..log.clone()
         };
         self.log.iter().map(|log| if own(log) { log.clone() } else { with_run(log) }).collect()
+    }
+}
+
+impl LogConfig {
+    /// The logs that entries stand for, in their order: patterns, folders and lists become one entry per log
+    /// ([`files`](dynid_io::log::files)).
+    ///
+    /// # Errors
+    /// [`Error::LogFile`]: there is no such log; [`Error::Setting`]: a name for several logs.
+    pub fn all<'a>(stated: impl IntoIterator<Item = &'a LogConfig>) -> Result<Vec<LogConfig>, Error> {
+        let mut logs = Vec::new();
+        for entry in stated {
+            let files = dynid_io::log::files(&entry.path)?;
+            if let (Some(name), 2..) = (&entry.name, files.len()) {
+                let found = format!("{name}, and {} logs of {}", files.len(), entry.path.display());
+                return Err(Error::setting("log.name", "a name for one log", found));
+            }
+            logs.extend(files.into_iter().map(|path| LogConfig { path, ..entry.clone() }));
+        }
+        Ok(logs)
     }
 }
 

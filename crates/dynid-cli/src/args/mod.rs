@@ -36,9 +36,11 @@ pub(crate) use robot::RobotArgs;
 pub(crate) use simulate::SimulateArgs;
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueHint};
+use dynid::io::log::{files, is_log};
 use dynid_terminal::message::Failure;
 
 /// Version with the revision that the program was built from, where that is known.
@@ -119,6 +121,55 @@ pub(crate) enum Command {
     Study(StudyArgs),
     /// Compare an identified model with other logs.
     Validate(ValidateArgs),
+}
+
+impl Command {
+    /// Puts the logs that patterns, folders and lists stand for in their place.
+    ///
+    /// # Errors
+    /// There is no such log, or several where a command takes one.
+    pub(crate) fn find_logs(&mut self) -> Result<(), Failure> {
+        let (lists, one) = self.logs();
+        for list in lists {
+            let found = list.iter().map(|path| files(path)).collect::<Result<Vec<_>, _>>();
+            *list = found.map_err(dynid::Error::from)?.concat();
+        }
+        let Some(path) = one else { return Ok(()) };
+        let found = files(path).map_err(dynid::Error::from)?;
+        let [log] = found.as_slice() else {
+            let names: Vec<String> = found.iter().map(|log| log.display().to_string()).collect();
+            let more = if names.len() > 3 { ", .." } else { "" };
+            let names = names[..names.len().min(3)].join(", ");
+            let text = format!("{}: expected one log, found {}: {names}{more}", path.display(), found.len());
+            return Err(Failure::Usage(text, "this command takes one log: name it"));
+        };
+        log.clone_into(path);
+        Ok(())
+    }
+
+    /// Arguments that are logs: lists of them, or a single one.
+    fn logs(&mut self) -> (Vec<&mut Vec<PathBuf>>, Option<&mut PathBuf>) {
+        match self {
+            Command::Backlash(args) => (vec![&mut args.log], None),
+            Command::Check(args) => match args.robot {
+                Some(_) => (vec![&mut args.log, &mut args.input], None),
+                None => (vec![&mut args.log], None),
+            },
+            Command::Clearance(args) => (Vec::new(), Some(&mut args.log)),
+            Command::Compare(args) => (vec![&mut args.log], None),
+            Command::Convert(args) => (Vec::new(), Some(&mut args.log)),
+            Command::Export(args) => (vec![&mut args.log], None),
+            Command::Identify(args) => (vec![&mut args.log, &mut args.validate], None),
+            Command::Init(args) => (vec![&mut args.log], None),
+            Command::Inspect(args) if is_log(&args.robot.robot) => (Vec::new(), Some(&mut args.robot.robot)),
+            Command::Online(args) => (vec![&mut args.log], None),
+            Command::Reduce(args) => (vec![&mut args.log], None),
+            Command::Servo(args) => (vec![&mut args.log, &mut args.validate], None),
+            Command::Solve(args) => (vec![&mut args.validate], None),
+            Command::Validate(args) => (vec![&mut args.log], None),
+            _ => (Vec::new(), None),
+        }
+    }
 }
 
 static COMMAND_LINE: OnceLock<Vec<String>> = OnceLock::new();

@@ -33,6 +33,9 @@ pub(crate) fn run(args: &OnlineArgs) -> Result<u8, Failure> {
     if !args.log.is_empty() {
         run::replace(&mut config, &args.log, Notes::new(args.quiet));
     }
+    if args.stream.is_none() {
+        config.find_logs()?;
+    }
     if args.rows.is_some() {
         config.log.iter_mut().for_each(|log| log.rows = args.rows);
     }

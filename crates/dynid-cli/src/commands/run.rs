@@ -23,6 +23,7 @@ pub(super) fn configuration(input: &Path, logs: &GivenLogs<'_>, notes: Notes) ->
         (true, paths) => {
             let mut config = Config::read_for_stream(input)?;
             replace(&mut config, paths, notes);
+            config.find_logs()?;
             config
         }
         (false, []) => return Err(without_logs(input)),

@@ -388,6 +388,28 @@ pub enum LogFileError {
         /// Name of the file with a member of it.
         example: Box<str>,
     },
+    /// No log is called as a path says, or a folder has none.
+    #[error("{pattern}: expected logs in `{place}`, found {there}")]
+    NoLogs {
+        /// Path, as it was stated.
+        pattern: String,
+        /// Folder or file that was looked into.
+        place: String,
+        /// What is there.
+        there: Box<str>,
+    },
+    /// A line of a list of logs.
+    #[error("{file}: line {line}: expected {expected}, found {found}")]
+    Listed {
+        /// The list.
+        file: String,
+        /// Line.
+        line: usize,
+        /// What a line may say.
+        expected: &'static str,
+        /// What it says.
+        found: Box<str>,
+    },
     /// A column that shall be ignored does not exist.
     #[error("{file}: column `{column}` to be ignored: expected a column of the header, found none")]
     UnknownIgnored {
@@ -462,6 +484,10 @@ impl LogFileError {
             E::Damaged { .. } => "copy or record the file again, or write it in another format",
             E::NotBuilt { feature, .. } => {
                 return Some(format!("take a released binary, or build with `--features {feature}`"));
+            }
+            E::NoLogs { .. } => "check the path: `*` is any text within a name, `**` any number of folders",
+            E::Listed { .. } => {
+                "a list has one path per line, relative to itself; lines that begin with `#` count for nothing"
             }
             E::SettingOfText { .. } => "leave the setting out",
             E::Member { example, .. } => return Some(format!("such as `{example}`")),

@@ -1,4 +1,4 @@
-//! Files with several logs in them: `FILE#MEMBER`.
+//! Paths that stand for more than a file: `FILE#MEMBER`, patterns, lists.
 
 use std::path::{Path, PathBuf};
 
@@ -23,6 +23,21 @@ impl LogFile {
         }
         LogFile { path: file.into(), member: Some(member.to_owned()) }
     }
+}
+
+/// Whether a file is called as lists of logs are.
+pub(super) fn is_manifest(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("manifest"))
+}
+
+/// Whether a path is a pattern: it has its characters, and no file has its name.
+pub(super) fn is_pattern(path: &Path) -> bool {
+    has_pattern(&path.to_string_lossy()) && !path.exists()
+}
+
+/// Whether a text has the characters of a pattern.
+pub(super) fn has_pattern(text: &str) -> bool {
+    text.contains(['*', '?', '['])
 }
 
 /// Why a file of a known format cannot be opened.

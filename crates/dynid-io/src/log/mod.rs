@@ -16,6 +16,7 @@ mod arrays;
 mod bag;
 #[cfg(feature = "numpy")]
 mod binary;
+mod files;
 mod format;
 #[cfg(feature = "hdf5")]
 mod hdf5;
@@ -41,6 +42,7 @@ mod torch;
 
 use serde::{Deserialize, Serialize};
 
+pub use files::files;
 pub use format::LogFormat;
 pub use header::LogHeader;
 pub use member::LogFile;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::arrays::{ArrayFile, ArrayLog};
 #[cfg(feature = "bags")]
 use super::bag::BagFormat;
-use super::member::{LogFile, OpenFault};
+use super::member::{LogFile, OpenFault, is_manifest, is_pattern};
 use super::text::LogText;
 #[cfg(feature = "numpy")]
 use super::torch::Torch;
@@ -67,13 +67,15 @@ impl Container {
     }
 }
 
-/// Whether a file is a log rather than a robot: told by its first bytes, else by its name (`.csv`, `.tsv`, `.txt`, `.dat`, `.gz`), or a
-/// folder.
+/// Whether a file is a log rather than a robot: told by its first bytes, else by its name (`.csv`, `.tsv`, `.txt`, `.dat`, `.gz`,
+/// `.manifest`), a folder, or a pattern.
 pub fn is_log(path: &Path) -> bool {
     let LogFile { path, member } = LogFile::of(path);
     let name = path.to_string_lossy().to_lowercase();
     if member.is_some()
         || path.is_dir()
+        || is_manifest(&path)
+        || is_pattern(&path)
         || [".csv", ".tsv", ".txt", ".dat", ".gz"].iter().any(|end| name.ends_with(end))
     {
         return true;
@@ -128,10 +130,63 @@ pub fn open(path: impl AsRef<Path>, options: &LogOptions) -> Result<Box<dyn LogS
     container.open(opened, &file, options)
 }
 
+/// Members of a file or a folder that are logs of their own, in the order of the file: episodes of a dataset, groups of an HDF5 file. `None`: a
+/// file of another format.
+///
+/// # Errors
+/// The file cannot be read, or is broken.
+pub(super) fn members(path: &Path) -> Result<Option<Vec<String>>, LogFileError> {
+    let file = LogFile { path: path.to_owned(), member: None };
+    #[cfg(feature = "parquet")]
+    if is_dataset(path) {
+        let found = super::parquet::episodes_of_dataset(path);
+        return found.map(Some).map_err(|fault| fault.of(&file, "LeRobot dataset"));
+    }
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let unreadable = |error| LogFileError::Unreadable { file: path.display().to_string(), error };
+    let mut opened = input::open(path).map_err(unreadable)?;
+    let mut start = Vec::with_capacity(16);
+    (&mut opened).take(16).read_to_end(&mut start).map_err(unreadable)?;
+    let found: Result<Vec<String>, OpenFault> = match Container::of(&start) {
+        #[cfg(feature = "hdf5")]
+        Some(Container::Hdf5) => {
+            super::hdf5::Hdf5::open(opened, "").map(|read| read.logs()).map_err(OpenFault::Damaged)
+        }
+        #[cfg(feature = "parquet")]
+        Some(Container::Parquet) => super::parquet::episodes_of_file(opened),
+        _ => return Ok(None),
+    };
+    let (format, _) = Container::of(&start).map_or(("file", ""), Container::named);
+    found.map(Some).map_err(|fault| fault.of(&file, format))
+}
+
+/// Whether a folder is a log: a dataset, or a bag in one file or several.
+pub(super) fn is_log_folder(path: &Path) -> bool {
+    is_dataset(path) || BAGS.iter().any(|ending| !bags_in(path, ending).is_empty())
+}
+
+fn is_dataset(path: &Path) -> bool {
+    path.join("meta/info.json").is_file()
+}
+
+/// What names of the files of bags end in.
+const BAGS: [&str; 2] = ["mcap", "db3"];
+
+/// Files of a bag in a folder, in the order of their names.
+fn bags_in(folder: &Path, ending: &str) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut bags: Vec<PathBuf> =
+        entries.filter(|path| path.extension().is_some_and(|e| e == ending)).collect();
+    bags.sort();
+    bags
+}
+
 /// Opens a folder: a dataset of LeRobot, or a bag of ROS 2 in one file or several.
 fn open_folder(file: &LogFile, options: &LogOptions) -> Result<Box<dyn LogSource>, LogFileError> {
     #[cfg(feature = "parquet")]
-    if file.path.join("meta/info.json").is_file() {
+    if is_dataset(&file.path) {
         let found = super::parquet::file_of_episode(&file.path, file.member.as_deref());
         let path = found.map_err(|fault| fault.of(file, "LeRobot dataset"))?;
         let opened = input::open(&path)
@@ -139,11 +194,8 @@ fn open_folder(file: &LogFile, options: &LogOptions) -> Result<Box<dyn LogSource
         return Container::Parquet.open(opened, &LogFile { path, member: file.member.clone() }, options);
     }
     #[cfg(feature = "bags")]
-    for (ending, format) in [("mcap", BagFormat::Mcap), ("db3", BagFormat::Sqlite)] {
-        let entries = fs::read_dir(&file.path).into_iter().flatten().flatten().map(|entry| entry.path());
-        let mut bags: Vec<PathBuf> =
-            entries.filter(|path| path.extension().is_some_and(|e| e == ending)).collect();
-        bags.sort();
+    for (ending, format) in BAGS.into_iter().zip([BagFormat::Mcap, BagFormat::Sqlite]) {
+        let bags = bags_in(&file.path, ending);
         if !bags.is_empty() {
             return super::bag::open(format, &file.path, &bags, file.member.as_deref(), options);
         }

@@ -3,6 +3,7 @@
 mod broken_files;
 mod clearance;
 mod closed_robots;
+mod log_files;
 mod log_formats;
 mod logs;
 mod loops;

@@ -16,7 +16,7 @@ order of `Robot.joints`; one state may be given without the axis of samples, and
 from . import examples
 from ._commands import Design, Online, check, design
 from ._estimate import Estimate, Factor, identify, identify_file
-from ._log import Log, Simulation, read_columns, simulate
+from ._log import Log, Simulation, find_logs, read_columns, simulate
 from ._native import (
     DynidError,
     DynidWarning,
@@ -50,6 +50,7 @@ __all__ = [
     "check",
     "design",
     "examples",
+    "find_logs",
     "identify",
     "identify_file",
     "read_columns",

@@ -99,6 +99,17 @@ class Log:
         return repr(self._native)
 
 
+def find_logs(path: str | os.PathLike[str]) -> list[str]:
+    """The logs that a path stands for, always in the same order.
+
+    A pattern (`runs/*.csv`, `**`), a folder that is no bag, a list (`good.manifest`: a path per line), `demos.hdf5#*` for groups and episodes. A
+    log is itself. Each may be given to `Log.read`.
+
+    Raises `LogError` if there is none.
+    """
+    return [str(log) for log in _native.find_logs(os.fspath(path))]
+
+
 def read_columns(
     path: str | os.PathLike[str],
     robot: _native.Robot | None = None,

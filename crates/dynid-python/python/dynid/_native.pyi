@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -176,6 +177,7 @@ class Online:
     def feed(self, rows: ArrayLike) -> str: ...
     def finish(self) -> str: ...
 
+def find_logs(path: str) -> list[Path]: ...
 def read_columns(
     path: str,
     robot: Robot | None = None,

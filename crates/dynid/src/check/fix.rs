@@ -1,6 +1,6 @@
 //! The configuration that applies the remedies.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use dynid_io::columns::{ColumnUse, TimeSource};
 use dynid_io::{ColumnMapping, MappingSpec};
@@ -44,12 +44,15 @@ impl Check {
         let count = training.len();
         let folder = source.and_then(Path::parent).unwrap_or(Path::new(""));
         for (key, logs, first) in [("log", &training, 0), ("validation", &config.validation, count)] {
+            let stated = as_read(&table, key, folder);
             let entries: Vec<Value> = logs
                 .iter()
                 .enumerate()
                 .filter(|(k, _)| !self.is_dropped(first + k))
                 .map(|(k, log)| {
-                    self.log_entry(first + k, log, config, as_read(&table, (key, k), folder, &log.path))
+                    let own = stated.get(k).filter(|(path, _)| *path == log.path);
+                    let own = own.map(|(_, entry)| (*entry).clone()).unwrap_or_default();
+                    self.log_entry(first + k, log, config, own)
                 })
                 .collect();
             if entries.is_empty() {
@@ -227,12 +230,14 @@ fn read(path: &Path) -> Result<Table, Error> {
 }
 
 /// Entry of a log as the configuration file states it.
-fn as_read(table: &Table, (key, number): (&str, usize), folder: &Path, log: &Path) -> Table {
-    let entry = table.get(key).and_then(|list| list.get(number)).and_then(Value::as_table);
-    let is_of_log = |entry: &&Table| {
-        entry.get("path").and_then(Value::as_str).is_some_and(|path| folder.join(path) == log)
+fn as_read<'a>(table: &'a Table, key: &str, folder: &Path) -> Vec<(PathBuf, &'a Table)> {
+    let entries = table.get(key).and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_table);
+    let paths = |entry: &Table| {
+        let path = entry.get("path").and_then(Value::as_str).map(|path| folder.join(path))?;
+        dynid_io::log::files(&path).ok()
     };
-    entry.filter(is_of_log).cloned().unwrap_or_default()
+    let of_entry = |entry| paths(entry).into_iter().flatten().map(move |path| (path, entry));
+    entries.flat_map(of_entry).collect()
 }
 
 fn make_absolute(table: &mut Table, config: &Config) {

@@ -267,12 +267,18 @@ impl FrictionConfig {
     /// Reads a configuration; paths in it become relative to its folder.
     ///
     /// # Errors
-    /// [`Error::Read`], and as [`FrictionConfig::parse`].
+    /// [`Error::Read`], [`Error::LogFile`] for patterns, folders and lists without a log, and as [`FrictionConfig::parse`].
     pub fn read(path: &Path) -> Result<Self, Error> {
         let (mut config, folder) = toml_file::read(path, Self::parse)?;
         config.robot = folder.join(&config.robot);
         config.out = config.out.map(|o| folder.join(o));
-        config.log.iter_mut().for_each(|log| log.path = folder.join(&log.path));
+        let mut logs = Vec::new();
+        for log in &config.log {
+            for path in dynid_io::log::files(&folder.join(&log.path))? {
+                logs.push(FrictionLog { path, ..log.clone() });
+            }
+        }
+        config.log = logs;
         config.presliding.iter_mut().for_each(|log| log.path = folder.join(&log.path));
         Ok(config)
     }

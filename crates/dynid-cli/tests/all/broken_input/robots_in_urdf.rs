@@ -25,7 +25,7 @@ fn are_refused() {
         case("bad.urdf", "", INSPECT, &["bad.urdf:1:1", "<robot>", "empty"], "<robot"),
         case("bad.urdf", b"\x00\x01\xff\xfe\x80".repeat(100), INSPECT, &["bad.urdf"], ""),
         case("bad.urdf", &TWO_LINKS[..TWO_LINKS.len() / 2], INSPECT, &["bad.urdf:"], "cut off"),
-        case("bad.urdf", "<sdf version=\"1.6\"/>", INSPECT, &["bad.urdf:1:1", "<robot>", "<sdf>"], "SDF"),
+        case("bad.urdf", "<collada version=\"1.6\"/>", INSPECT, &["bad.urdf:1:1", "<robot>", "<sdf>"], "SDF"),
         case("bad.urdf", deep, INSPECT, &["bad.urdf:1:", "at most", "levels"], "robot"),
         case("bad.urdf", chain, INSPECT, &["bad.urdf"], ""),
         case("bad.urdf", cycle, INSPECT, &["bad.urdf"], "loop"),
@@ -108,7 +108,7 @@ fn are_refused() {
         ),
         case("bad.urdf", fixed, INSPECT, &["bad.urdf"], "not fixed"),
         case("other", "", "inspect gone.urdf", &["gone.urdf", "No such file"], "path"),
-        case("other", "", "inspect .", &[".: ", "directory"], "file"),
+        case("other", "", "inspect .", &[".: expected one log, found 2: ./log.csv, ./states.csv"], "name it"),
         case("other", "", "inspect robot.urdf --lock wrist=1", &["`wrist`", "shoulder, elbow"], ""),
         case("other", "", "inspect robot.urdf --lock shoulder=0 --lock elbow=0", &["robot.urdf"], ""),
         case(

@@ -5,6 +5,7 @@
 mod arm;
 mod formats;
 mod init;
+mod many;
 mod misread;
 
 use std::path::Path;

@@ -72,6 +72,9 @@ impl ChunkReader for Shared {
     }
 }
 
+/// Numbers of episodes, each with its rows.
+type Episodes = Vec<(i64, Range<usize>)>;
+
 /// A file of columns, or an episode of it.
 pub(super) struct Parquet {
     file: Shared,
@@ -88,6 +91,15 @@ pub(super) struct Parquet {
 impl Parquet {
     /// `member`: the episode, where there are several.
     pub(super) fn open(file: Opened, path: &Path, member: Option<&str>) -> Result<Self, OpenFault> {
+        let mut parquet = Parquet::of_all_rows(file)?;
+        parquet.choose_episode(member)?;
+        if let Some(description) = description_of(path) {
+            parquet.describe(&description);
+        }
+        Ok(parquet)
+    }
+
+    fn of_all_rows(file: Opened) -> Result<Self, OpenFault> {
         let length = file.length().map_err(|e| OpenFault::Damaged(e.to_string()))?;
         let shared = Shared { file: Arc::new(Mutex::new(file)), length };
         let reader =
@@ -102,10 +114,6 @@ impl Parquet {
             about: Vec::new(),
         };
         parquet.list().map_err(OpenFault::Damaged)?;
-        parquet.choose_episode(member)?;
-        if let Some(description) = description_of(path) {
-            parquet.describe(&description);
-        }
         Ok(parquet)
     }
 
@@ -151,8 +159,27 @@ impl Parquet {
         Ok(lists.width.unwrap_or(0))
     }
 
-    fn choose_episode(&mut self, member: Option<&str>) -> Result<(), OpenFault> {
+    /// Episodes with their rows; `None`: the file has no column that numbers them.
+    fn episodes(&mut self) -> Result<Option<Episodes>, OpenFault> {
         let Some(column) = self.arrays.iter().position(|a| a.name == EPISODE && a.shape.len() == 1) else {
+            return Ok(None);
+        };
+        let index = match self.load(column).map_err(OpenFault::Damaged)? {
+            Values::Whole(index) => index,
+            Values::Float(index) => index.iter().map(|x| *x as i64).collect(),
+        };
+        let mut episodes = Episodes::new();
+        for (k, episode) in index.iter().enumerate() {
+            match episodes.last_mut() {
+                Some((last, rows)) if last == episode => rows.end = k + 1,
+                _ => episodes.push((*episode, k..k + 1)),
+            }
+        }
+        Ok(Some(episodes))
+    }
+
+    fn choose_episode(&mut self, member: Option<&str>) -> Result<(), OpenFault> {
+        let Some(episodes) = self.episodes()? else {
             return match member {
                 None => Ok(()),
                 Some(member) => Err(OpenFault::Member {
@@ -162,17 +189,6 @@ impl Parquet {
                 }),
             };
         };
-        let index = match self.load(column).map_err(OpenFault::Damaged)? {
-            Values::Whole(index) => index,
-            Values::Float(index) => index.iter().map(|x| *x as i64).collect(),
-        };
-        let mut episodes: Vec<(i64, Range<usize>)> = Vec::new();
-        for (k, episode) in index.iter().enumerate() {
-            match episodes.last_mut() {
-                Some((last, rows)) if last == episode => rows.end = k + 1,
-                _ => episodes.push((*episode, k..k + 1)),
-            }
-        }
         let chosen = match member {
             None if episodes.len() <= 1 => return Ok(()),
             None => None,
@@ -410,6 +426,38 @@ fn description_of(path: &Path) -> Option<serde_json::Value> {
     let mut text = String::new();
     fs::File::open(file).ok()?.take(MAX_DESCRIPTION).read_to_string(&mut text).ok()?;
     serde_json::from_str(&text).ok()
+}
+
+/// Numbers of the episodes of a file, in its order; none, if nothing numbers them.
+///
+/// # Errors
+/// [`OpenFault`]: the file is broken.
+pub(super) fn episodes_of_file(file: Opened) -> Result<Vec<String>, OpenFault> {
+    let episodes = Parquet::of_all_rows(file)?.episodes()?.unwrap_or_default();
+    Ok(episodes.iter().map(|(episode, _)| episode.to_string()).collect())
+}
+
+/// Numbers of the episodes of a LeRobot dataset, in their order.
+///
+/// # Errors
+/// [`OpenFault`]: one of its files is broken.
+pub(super) fn episodes_of_dataset(dataset: &Path) -> Result<Vec<String>, OpenFault> {
+    let mut files = Vec::new();
+    collect(&dataset.join("data"), 0, &mut files);
+    let mut episodes: Vec<u64> = Vec::new();
+    for file in &files {
+        let name = file.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        match name.strip_prefix("episode_").map(str::parse::<u64>) {
+            Some(Ok(episode)) => episodes.push(episode),
+            _ => {
+                let opened = crate::input::open(file).map_err(|e| OpenFault::Damaged(e.to_string()))?;
+                episodes.extend(episodes_of_file(opened)?.iter().filter_map(|e| e.parse::<u64>().ok()));
+            }
+        }
+    }
+    episodes.sort_unstable();
+    episodes.dedup();
+    Ok(episodes.iter().map(u64::to_string).collect())
 }
 
 /// The file of a LeRobot dataset that holds an episode.
