@@ -82,7 +82,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// Reads a robot file (URDF, MJCF or TOML) and the URDF that it may refer to.
+    /// Reads a robot file (URDF, MJCF, SDF or TOML) and the URDF that it may refer to.
     ///
     /// # Errors
     /// [`Error::RobotFile`], [`Error::Read`].

@@ -190,7 +190,7 @@ impl<'a> RobotExport<'a> {
     }
 
     /// URDF: a URDF is edited in place, so comments, meshes, order and unknown elements stay byte for byte; a robot from
-    /// TOML is written anew.
+    /// TOML, MJCF or SDF is written anew.
     ///
     /// # Errors
     /// [`Error::RobotFile`]: URDF cannot state the robot; [`ExportError`]: see [`ExportError::ReadBack`].
@@ -238,6 +238,11 @@ impl<'a> RobotExport<'a> {
         if self.identified.model.closed().is_some() {
             notes.push(
                 "left out, URDF has no place for them: loops; they are in the file beside it".to_owned(),
+            );
+        }
+        if self.source.file.sdf {
+            notes.push(
+                "SDF is read and not written: this is a new URDF, without the shapes of the SDF".to_owned(),
             );
         }
         let between = self.links.iter().map(|(link, _)| link).filter(|link| self.source.is_between(link));

@@ -1,4 +1,4 @@
-//! Robot files and logs: URDF, MJCF, robots in TOML (DH tables or body trees), logs (CSV, MCAP, Parquet, HDF5, NumPy, MATLAB),
+//! Robot files and logs: URDF, MJCF, SDF, robots in TOML (DH tables or body trees), logs (CSV, MCAP, Parquet, HDF5, NumPy, MATLAB),
 //! states in CSV, trajectories (JSON; CSV and ROS 2 messages, written), meshes (STL, OBJ).
 //!
 //! Every door checks what it lets in: numbers are finite, names are unique, sizes are bounded. A fault becomes one
@@ -17,6 +17,7 @@ pub mod output;
 pub mod robot;
 mod robot_error;
 mod robot_numbers;
+pub mod sdf;
 mod signal;
 mod source;
 pub mod states;

@@ -105,8 +105,10 @@ pub enum RobotFileError {
         /// The tag or expression.
         found: String,
     },
-    /// The outermost element is neither `<robot>` nor `<mujoco>`.
-    #[error("{at}: expected <robot> (URDF) or <mujoco> (MJCF) as the outermost element, found {found}")]
+    /// The outermost element is none of `<robot>`, `<mujoco>` and `<sdf>`.
+    #[error(
+        "{at}: expected <robot> (URDF), <mujoco> (MJCF) or <sdf> (SDF) as the outermost element, found {found}"
+    )]
     NotARobot {
         /// Where.
         at: Place,
@@ -232,9 +234,17 @@ impl RobotFileError {
             }
             E::Syntax { .. } => "the file is damaged or cut off at or before this place".into(),
             E::TooMany { .. } => "this does not look like a robot".into(),
-            E::Xacro { .. } => "expand it first: `xacro robot.urdf.xacro > robot.urdf`".into(),
+            E::Xacro { at, .. } => {
+                let stem = at.file.strip_suffix(".xacro").map(|name| name.trim_end_matches(".urdf"));
+                let to = stem.map_or_else(|| format!("{}.expanded", at.file), str::to_owned);
+                format!(
+                    "expand it first: `xacro {} > {to}.urdf` (behind the file its arguments, `name:=value`)",
+                    at.file
+                )
+            }
             E::NotARobot { .. } => {
-                "a URDF starts with <robot name=\"...\">, MJCF with <mujoco>; SDF is not read".into()
+                "a URDF starts with <robot name=\"...\">, MJCF with <mujoco>, SDF with <sdf version=\"...\">"
+                    .into()
             }
             E::Missing { expected, .. } if expected.contains("<mass>") || expected.contains("<inertia>") => {
                 "complete the <inertial> or remove it: a link without one counts as not stated".into()

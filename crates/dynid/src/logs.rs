@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use dynid_io::columns::{ColumnNames, FullSignal, SignalSpec};
+use dynid_io::log::LogFile;
 use dynid_io::{ColumnMapping, MappingSpec, ReadingNote, Signals, SourceFile, TrajectoryFile};
 use dynid_motion::temperature::{self, TemperatureDoubt};
 use sha2::{Digest, Sha256};
@@ -322,13 +323,13 @@ pub(crate) fn mapping_of(log: &Log) -> &ColumnMapping {
     mapping.unwrap_or_else(|| unreachable!("logs from files have columns"))
 }
 
-/// SHA-256 of a file, hexadecimal.
+/// SHA-256 of a file, hexadecimal; of `FILE#MEMBER` that of the whole file.
 ///
 /// # Errors
 /// [`Error::Read`].
 pub fn sha256(path: &Path) -> Result<String, Error> {
     let read_error = |source| Error::Read { file: path.to_owned(), source };
-    let mut file = dynid_io::input::open(path).map_err(read_error)?;
+    let mut file = dynid_io::input::open(&LogFile::of(path).path).map_err(read_error)?;
     let mut hasher = Sha256::new();
     std::io::copy(&mut file, &mut hasher).map_err(read_error)?;
     Ok(hasher.finalize().iter().map(|b| format!("{b:02x}")).collect())

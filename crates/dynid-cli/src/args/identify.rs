@@ -71,7 +71,7 @@ pub(crate) struct CheckArgs {
     /// Configuration (TOML), or a robot file together with --log, or logs together with --robot; `-`: standard input.
     #[arg(required = true, value_name = "CONFIG | ROBOT | LOG", value_hint = ValueHint::FilePath)]
     pub(crate) input: Vec<PathBuf>,
-    /// Robot file, URDF, MJCF or TOML, of the logs named first.
+    /// Robot file, URDF, MJCF, SDF or TOML, of the logs named first.
     #[arg(long, value_name = "ROBOT", value_hint = ValueHint::FilePath)]
     pub(crate) robot: Option<PathBuf>,
     /// Log of any format that is read, in place of those of the configuration; repeat for several.

@@ -53,7 +53,7 @@ impl LogArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct InitArgs {
-    /// Robot file: URDF, MJCF or TOML.
+    /// Robot file: URDF, MJCF, SDF or TOML.
     #[arg(value_hint = ValueHint::FilePath)]
     pub(crate) robot: PathBuf,
     /// Logs: of several the last one is kept for validation.

@@ -68,7 +68,7 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
 
 /// The configuration file, or one made of a robot file, with flags over it.
 fn configuration(args: &DesignArgs) -> Result<DesignConfig, Failure> {
-    let is_xml = args.input.extension().is_some_and(|e| e == "urdf" || e == "xml");
+    let is_xml = args.input.extension().is_some_and(|e| e == "sdf" || e == "urdf" || e == "xml");
     let robot = || DesignConfig { robot: args.input.clone(), ..DesignConfig::default() };
     let mut config = if is_xml {
         robot()

@@ -52,6 +52,8 @@ pub struct RobotFile {
     pub urdf: Option<String>,
     /// Files of the MJCF that this is, if it is one: the path from the folder of the main file, which itself comes first and is empty.
     pub mjcf: Option<Vec<String>>,
+    /// Whether it is an SDF, which is read and not written.
+    pub sdf: bool,
     /// What a user should know about what was read.
     pub warnings: Vec<String>,
     /// Files that were read, this one first; a text alone has none but those that it refers to.
@@ -69,6 +71,7 @@ impl RobotFile {
             closures: Vec::new(),
             urdf: None,
             mjcf: None,
+            sdf: false,
             warnings: Vec::new(),
             sources: Vec::new(),
         }

@@ -41,17 +41,17 @@ fn broken_urdfs() {
     let cases: Vec<(String, Vec<&str>, &str)> = vec![
         (
             String::new(),
-            vec!["r.urdf:1:1", "expected <robot> (URDF) or <mujoco> (MJCF)", "an empty file"],
+            vec!["r.urdf:1:1", "expected <robot> (URDF), <mujoco> (MJCF) or <sdf>", "an empty file"],
             "<robot name",
         ),
         (
             "hello".into(),
-            vec!["r.urdf:1:1", "expected <robot> (URDF) or <mujoco> (MJCF)", "`hello`"],
+            vec!["r.urdf:1:1", "expected <robot> (URDF), <mujoco> (MJCF) or <sdf>", "`hello`"],
             "<robot name",
         ),
         (
-            "<sdf version=\"1.6\"></sdf>".into(),
-            vec!["expected <robot> (URDF) or <mujoco> (MJCF)", "<sdf>"],
+            "<collada version=\"1.6\"></collada>".into(),
+            vec!["expected <robot> (URDF), <mujoco> (MJCF) or <sdf>", "<collada>"],
             "SDF",
         ),
         ("<robot name=\"r\">".into(), vec!["r.urdf:1:1", "never closed"], "cut off"),

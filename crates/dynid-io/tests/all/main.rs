@@ -14,5 +14,6 @@ mod mjcf_read;
 mod mjcf_refused;
 mod oracles;
 mod robot_files;
+mod sdf;
 mod trajectory_files;
 mod trajectory_tables;

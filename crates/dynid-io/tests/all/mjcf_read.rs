@@ -314,6 +314,6 @@ fn the_outermost_element_tells_the_kind_of_file() {
     assert!(robot::parse(&mjcf, "a.urdf").unwrap().mjcf.is_some());
     let urdf = "<?xml version=\"1.0\"?><!-- <mujoco> --><robot name=\"r\"><link name=\"a\"/></robot>";
     assert!(robot::parse(urdf, "a.xml").unwrap().urdf.is_some());
-    let error = robot::parse("<sdf/>", "a.xml").unwrap_err();
-    assert!(error.to_string().contains("expected <robot> (URDF) or <mujoco> (MJCF)"), "{error}");
+    let error = robot::parse("<kml/>", "a.xml").unwrap_err();
+    assert!(error.to_string().contains("expected <robot> (URDF), <mujoco> (MJCF) or <sdf>"), "{error}");
 }

@@ -16,7 +16,7 @@ const LARGEST_SEED: u64 = u64::MAX - 1_000_000;
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DesignConfig {
-    /// Robot file (URDF, MJCF or TOML), relative to the configuration.
+    /// Robot file (URDF, MJCF, SDF or TOML), relative to the configuration.
     pub robot: PathBuf,
     /// Output folder, relative to the configuration. Without it the program writes to `dynid-design` in the current
     /// folder.

@@ -16,7 +16,7 @@ use crate::settings::lists::exactly;
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FrictionConfig {
-    /// Robot file (URDF, MJCF or TOML), relative to the configuration.
+    /// Robot file (URDF, MJCF, SDF or TOML), relative to the configuration.
     pub robot: PathBuf,
     /// Output folder, relative to the configuration. Without it the program writes to `dynid-friction` in the current
     /// folder.

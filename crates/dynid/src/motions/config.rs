@@ -16,7 +16,7 @@ const MOST_REPEATS: usize = 100_000;
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MotionConfig {
-    /// Robot file (URDF, MJCF or TOML), relative to the configuration.
+    /// Robot file (URDF, MJCF, SDF or TOML), relative to the configuration.
     pub robot: PathBuf,
     /// Output folder, relative to the configuration. Without it the program writes to `dynid-motion` in the current folder.
     pub out: Option<PathBuf>,

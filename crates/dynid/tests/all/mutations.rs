@@ -152,6 +152,16 @@ path = "a.csv"
 learn_s = 5
 "#;
 
+const SDF: &str = r#"<sdf version="1.9"><world name="w"><gravity>0 0 -9.8</gravity><model name="m"><pose>1 0 0.5 0 0 0.1</pose>
+<link name="a"><inertial><mass>2</mass><pose>0.1 0 0 0.1 0 0</pose><inertia><ixx>0.1</ixx><iyy>0.2</iyy><izz>0.2</izz></inertia></inertial></link>
+<frame name="f" attached_to="a"><pose degrees="true">0 0 0.3 0 90 0</pose></frame>
+<link name="b"><pose relative_to="f"/><inertial><mass>1</mass></inertial></link>
+<joint name="w" type="fixed"><parent>world</parent><child>a</child></joint>
+<joint name="j" type="revolute"><pose relative_to="f">0 0 0.1 0 0 0</pose><parent>f</parent><child>b</child>
+<axis><xyz expressed_in="__model__">0 1 0</xyz><limit><lower>-1</lower><upper>2</upper><effort>5</effort></limit><dynamics><damping>0.1</damping></dynamics></axis></joint>
+</model></world></sdf>
+"#;
+
 const DESIGN: &str = r#"robot = "arm.toml"
 [trajectory]
 period_s = 8
@@ -214,6 +224,7 @@ fn corpus(folder: &Path) -> Vec<Entry> {
     [
         (Reader::Robot, URDF),
         (Reader::Robot, ARM),
+        (Reader::Robot, SDF),
         (Reader::Mjcf, &mjcf),
         (Reader::Config, CONFIG),
         (Reader::Design, DESIGN),
