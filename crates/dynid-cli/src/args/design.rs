@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum, ValueHint};
 
 use super::elements::with_elements;
 use super::robot::joint_value;
-use super::{ForceArgs, PrintArgs};
+use super::{ForceArgs, PlaybackArg, PrintArgs};
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum CriterionArg {
@@ -42,6 +42,9 @@ pub(crate) struct DesignArgs {
     /// Output folder (default: dynid-design).
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub(crate) out: Option<PathBuf>,
+    /// Write the motion also for what plays it, comma separated.
+    #[arg(long, value_enum, value_name = "FORMAT,..", value_delimiter = ',')]
+    pub(crate) also: Vec<PlaybackArg>,
     /// Period, s (default: 20).
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) period: Option<f64>,

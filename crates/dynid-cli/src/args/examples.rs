@@ -76,7 +76,7 @@ const ENDINGS: &[Ending] = &[
     },
     Ending {
         command: "design",
-        negative: "no trajectory within all limits was found",
+        negative: "no trajectory within all limits was found, or a format of --also cannot hold it",
         examples: &[
             ("Design a motion of 20 s for a robot file", "design arm.urdf --out motion"),
             (
@@ -186,7 +186,7 @@ const ENDINGS: &[Ending] = &[
     },
     Ending {
         command: "motion",
-        negative: "",
+        negative: "a format of --also cannot hold the motion",
         examples: &[
             (
                 "Constant speeds of two joints, one after the other, for `friction`",

@@ -29,7 +29,7 @@ pub(crate) use logs::{ConvertArgs, InitArgs, LogArgs, MissingArg, ReadingArgs};
 pub(crate) use model::{
     DiffArgs, ExportArgs, InspectArgs, PredictArgs, RegressorArgs, SchemaArgs, ValidateArgs,
 };
-pub(crate) use motion::MotionArgs;
+pub(crate) use motion::{MotionArgs, PlaybackArg};
 pub(crate) use online::{OnlineArgs, StreamArg};
 pub(crate) use reduce::{FactorsArgs, MergeArgs, ReduceArgs, SolveArgs};
 pub(crate) use robot::RobotArgs;

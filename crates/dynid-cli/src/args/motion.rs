@@ -2,10 +2,38 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueHint};
+use clap::{Args, ValueEnum, ValueHint};
+use dynid::io::trajectory::Playback;
 
 use super::robot::joint_value;
 use super::{ForceArgs, PrintArgs};
+
+/// What plays a motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PlaybackArg {
+    /// MoveIt: `moveit_msgs/RobotTrajectory` (.moveit.yaml).
+    Moveit,
+    /// Universal Robots: a script with a `servoj` per sample (.ur.script).
+    Ur,
+    /// Franka: positions at 1 kHz for libfranka (.fci.csv).
+    Fci,
+    /// KUKA: positions at 1 kHz for the Fast Robot Interface (.fri.csv).
+    Fri,
+    /// MuJoCo: keyframes (.mujoco.xml).
+    Mujoco,
+}
+
+impl PlaybackArg {
+    pub(crate) fn of(self) -> Playback {
+        match self {
+            PlaybackArg::Moveit => Playback::MoveIt,
+            PlaybackArg::Ur => Playback::UrScript,
+            PlaybackArg::Fci => Playback::Fci,
+            PlaybackArg::Fri => Playback::Fri,
+            PlaybackArg::Mujoco => Playback::MuJoCo,
+        }
+    }
+}
 
 #[derive(Debug, Args)]
 pub(crate) struct MotionArgs {
@@ -36,6 +64,9 @@ pub(crate) struct MotionArgs {
         requires = "sweep"
     )]
     pub(crate) range: Vec<f64>,
+    /// Write the motion also for what plays it, comma separated.
+    #[arg(long, value_enum, value_name = "FORMAT,..", value_delimiter = ',')]
+    pub(crate) also: Vec<PlaybackArg>,
     /// Rate of the samples, Hz (default: 500).
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate_hz: Option<f64>,

@@ -9,7 +9,7 @@ use dynid_terminal::message::{Failure, Notes, data};
 use dynid_terminal::outputs;
 use dynid_terminal::progress::Progress;
 
-use super::{element_names, table};
+use super::{element_names, playback, table};
 use crate::args::{ColumnsArg, CriterionArg, DesignArgs, ForceArgs};
 
 const DEFAULT_OUT: &str = "dynid-design";
@@ -26,9 +26,11 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
     };
     let record_path = out.join("design.json");
     let report_path = out.join("report.html");
-    let files =
-        [&paths.coefficients, &paths.samples, &paths.ros_yaml, &paths.ros_json, &record_path, &report_path]
-            .map(Clone::clone);
+    let also = playback::files(&args.also, &out);
+    let own =
+        [&paths.coefficients, &paths.samples, &paths.ros_yaml, &paths.ros_json, &record_path, &report_path];
+    let files: Vec<PathBuf> =
+        own.iter().map(|path| (*path).clone()).chain(also.iter().map(|(_, path)| path.clone())).collect();
     let earlier = config.earlier.iter().map(PathBuf::as_path);
     let inputs: Vec<&Path> = earlier.chain([args.input.as_path(), &config.robot]).collect();
     if let Some(checkpoint) = &config.search.checkpoint {
@@ -50,7 +52,10 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
     let report = run.report(&config, &record)?;
     drop(progress);
 
+    let mut all = true;
     if let Ok(designed) = &run.outcome {
+        let text = |format, file: &Path| designed.motion.playback(format, file);
+        all = playback::write(&also, (&set, own.len()), text)?;
         let staged = |number: usize| set.staged(number).to_owned();
         let [coefficients, samples, ros_yaml, ros_json] = [0, 1, 2, 3].map(staged);
         designed.motion.write(&MotionPaths { coefficients, samples, ros_yaml, ros_json })?;
@@ -63,7 +68,7 @@ pub(crate) fn run(args: &DesignArgs) -> Result<u8, Failure> {
     notes.warnings(&record.verdict.warnings);
     data(&if args.print.json { text } else { summary(&record) })?;
     notes.written(&written);
-    Ok(u8::from(record.verdict.status == Outcome::Fail))
+    Ok(u8::from(record.verdict.status == Outcome::Fail || !all))
 }
 
 /// The configuration file, or one made of a robot file, with flags over it.

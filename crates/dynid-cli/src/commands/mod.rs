@@ -19,6 +19,7 @@ pub(crate) mod man;
 pub(crate) mod motion;
 pub(crate) mod online;
 pub(crate) mod payload;
+mod playback;
 pub(crate) mod predict;
 pub(crate) mod reduce;
 pub(crate) mod regressor;

@@ -8,7 +8,7 @@ use dynid_terminal::message::{Failure, Notes, data};
 use dynid_terminal::outputs;
 use dynid_terminal::progress::Progress;
 
-use super::table;
+use super::{playback, table};
 use crate::args::MotionArgs;
 
 const DEFAULT_OUT: &str = "dynid-motion";
@@ -19,7 +19,9 @@ pub(crate) fn run(args: &MotionArgs) -> Result<u8, Failure> {
     let out = config.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
     let names =
         ["trajectory.csv", "trajectory.ros2.yaml", "trajectory.ros2.json", "motion.json", "report.html"];
-    let files = names.map(|name| out.join(name));
+    let also = playback::files(&args.also, &out);
+    let files: Vec<PathBuf> =
+        names.iter().map(|name| out.join(name)).chain(also.iter().map(|(_, path)| path.clone())).collect();
     let inputs: [&Path; 2] = [&args.input, &config.robot];
     let set = outputs::prepare_folder(&files, &inputs, args.force)?;
     let progress = Progress::new(args.print.quiet);
@@ -33,12 +35,13 @@ pub(crate) fn run(args: &MotionArgs) -> Result<u8, Failure> {
     let text = serde_json::to_string_pretty(&run.record).map_err(|e| Failure::Output(e.into()))? + "\n";
     set.write(3, text.as_bytes())?;
     set.write(4, report.as_bytes())?;
+    let all = playback::write(&also, (&set, names.len()), |format, file| run.playback(format, file))?;
     let written = set.publish()?;
     let notes = Notes::new(args.print.quiet);
     notes.warnings(&run.record.warnings);
     data(&if args.print.json { text } else { summary(&run.record) })?;
     notes.written(&written);
-    Ok(0)
+    Ok(u8::from(!all))
 }
 
 /// The motion file, or sweeps of a robot file, with flags over it.

@@ -498,6 +498,12 @@ fn cases() -> Vec<Case> {
             "motion arm.urdf --sweep elbow --speeds 3.2 --acceleration 40",
             "motion arm.urdf --sweep elbow --speeds 3.2 --acceleration 40 --slower",
         ),
+        case(
+            "motion --also",
+            "motion arm.urdf --sweep elbow --speeds 1",
+            "motion arm.urdf --sweep elbow --speeds 1 --also mujoco,moveit",
+        ),
+        case("design --also", "design small.toml", "design small.toml --also ur"),
         case("design --force", "design small.toml --out .", "design small.toml --out . --force"),
         case("payload --force", "payload payload.toml --out .", "payload payload.toml --out . --force"),
         case("man --force", "man --out .", "man --out . --force"),

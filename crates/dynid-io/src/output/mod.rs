@@ -54,6 +54,18 @@ pub enum OutputError {
         /// What the name tells.
         found: String,
     },
+    /// A motion that what it is written for cannot play.
+    #[error("{file}: {subject}: expected {expected}, found {found}")]
+    Refused {
+        /// File.
+        file: String,
+        /// What is beyond.
+        subject: String,
+        /// What can be played.
+        expected: String,
+        /// What the motion has.
+        found: String,
+    },
     /// Rows or columns do not fit the header.
     #[error("{file}: {what}: expected {expected}, found {found}")]
     Shape {
@@ -79,6 +91,10 @@ impl OutputError {
                 Some("let it end, or give a folder of its own to each run".to_owned())
             }
             OutputError::Format { .. } => Some("give the file a name with such an end".to_owned()),
+            OutputError::Refused { .. } => Some(
+                "other limits (`[limits]`), rates or a motion from rest may do; or leave the format out"
+                    .to_owned(),
+            ),
             OutputError::NotFinite { .. } | OutputError::Shape { .. } => None,
         }
     }

@@ -13,6 +13,7 @@ mod mjcf_edit;
 mod mjcf_read;
 mod mjcf_refused;
 mod oracles;
+mod playback;
 mod robot_files;
 mod sdf;
 mod trajectory_files;

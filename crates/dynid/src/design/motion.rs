@@ -2,7 +2,7 @@
 
 use dynid_excitation::LimitKind;
 use dynid_excitation::constraint::{ConstraintError, PathConstraint};
-use dynid_io::trajectory::{Leg, TrajectoryJoint};
+use dynid_io::trajectory::{Leg, Playback, TrajectoryJoint};
 use dynid_io::{OutputError, TrajectoryFile};
 use dynid_model::{BodyPoint, Dynamics, MotionBlock};
 use dynid_motion::trajectory::{Form, FourierTrajectory, Phase, RowOrder, Sampled, Sequence};
@@ -147,6 +147,15 @@ impl DesignedMotion {
             .map_err(output)?;
         dynid_io::trajectory::write_ros_yaml(&paths.ros_yaml, &self.joints, &sampled).map_err(output)?;
         dynid_io::trajectory::write_ros_json(&paths.ros_json, &self.joints, &sampled).map_err(output)
+    }
+
+    /// The motion as a file for what plays it; `file` stands in errors.
+    ///
+    /// # Errors
+    /// [`Error::Trajectory`] if there are too many samples; [`Error::Output`] with what cannot be played.
+    pub fn playback(&self, format: Playback, file: &std::path::Path) -> Result<String, Error> {
+        let sampled = Sampled::at_rate(&self.sequence, format.rate_hz(self.rate_hz))?;
+        format.text(file, &self.joints, &sampled).map_err(Error::Output)
     }
 }
 

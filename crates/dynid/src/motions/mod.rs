@@ -3,7 +3,7 @@
 //!
 //! A motion is a list of parts, each from rest to rest; quintics lead from one to the next and back to the start pose. Borders of blends
 //! and pauses lie on samples, so that the table of samples with polynomials of degree 5 between its rows
-//! ([`QuinticSpline`](dynid_motion::trajectory::QuinticSpline)) is the motion itself; limits are checked on it, between samples too.
+//! ([`QuinticSpline`]) is the motion itself; limits are checked on it, between samples too.
 
 mod bench;
 pub mod config;
@@ -13,10 +13,11 @@ mod page;
 mod parts;
 mod record;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use dynid_io::OutputError;
-use dynid_motion::trajectory::{Phase, Point, Sampled, Sequence, Trajectory};
+use dynid_io::trajectory::Playback;
+use dynid_motion::trajectory::{Phase, Point, QuinticSpline, Sampled, Sequence, Trajectory};
 
 use crate::Error;
 use crate::estimate::{InputRecord, Provenance};
@@ -145,6 +146,20 @@ impl MotionRun {
         .map_err(output)?;
         dynid_io::trajectory::write_ros_yaml(&paths.ros_yaml, joints, &self.sampled).map_err(output)?;
         dynid_io::trajectory::write_ros_json(&paths.ros_json, joints, &self.sampled).map_err(output)
+    }
+
+    /// The motion as a file for what plays it, without loads; `file` stands in errors.
+    ///
+    /// # Errors
+    /// [`Error::Trajectory`] if there are too many samples; [`Error::Output`] with what cannot be played.
+    pub fn playback(&self, format: Playback, file: &Path) -> Result<String, Error> {
+        let rate_hz = format.rate_hz(self.record.sample_rate_hz);
+        let resampled = match rate_hz == self.record.sample_rate_hz {
+            true => None,
+            false => Some(Sampled::at_rate(&QuinticSpline::new(self.sampled.clone())?, rate_hz)?),
+        };
+        let sampled = resampled.as_ref().unwrap_or(&self.sampled);
+        format.text(file, &self.record.joints, sampled).map_err(Error::Output)
     }
 }
 
