@@ -40,12 +40,29 @@ pub(crate) fn names(signal: Signal) -> &'static [&'static [&'static str]] {
     match signal {
         Signal::Time => &[&TIME_NAMES],
         Signal::Position => &[
-            &["q", "pos", "position", "joint_position", "positions", "joint_positions"],
+            &[
+                "q",
+                "pos",
+                "position",
+                "joint_position",
+                "positions",
+                "joint_positions",
+                "measured_joint_position",
+                "joint_position_measured",
+            ],
             &["qm", "motor_position"],
         ],
-        Signal::Velocity => {
-            &[&["dq", "qd", "v", "vel", "velocity", "joint_velocity", "velocities", "joint_velocities"]]
-        }
+        Signal::Velocity => &[&[
+            "dq",
+            "qd",
+            "v",
+            "vel",
+            "velocity",
+            "joint_velocity",
+            "velocities",
+            "joint_velocities",
+            "joint_velocity_estimated",
+        ]],
         Signal::Acceleration => {
             &[&["ddq", "qdd", "a", "acc", "acceleration", "joint_acceleration", "accelerations"]]
         }
@@ -60,6 +77,8 @@ pub(crate) fn names(signal: Signal) -> &'static [&'static [&'static str]] {
                 "torques",
                 "joint_torques",
                 "joint_efforts",
+                "measured_torque",
+                "joint_torque_measured",
             ],
             &["u"],
         ],

@@ -98,10 +98,14 @@ impl LogFormat {
                 "observation.velocity/{joint}.vel",
                 "observation.velocity/{joint}",
                 "observation.velocity[{}]",
+                "observation.state/{joint}.vel",
             ],
-            (LogFormat::LeRobot, Signal::Effort) => {
-                &["observation.effort/{joint}.effort", "observation.effort/{joint}", "observation.effort[{}]"]
-            }
+            (LogFormat::LeRobot, Signal::Effort) => &[
+                "observation.effort/{joint}.effort",
+                "observation.effort/{joint}",
+                "observation.effort[{}]",
+                "observation.state/{joint}.torque",
+            ],
             (LogFormat::Libfranka, Signal::Position) => &["state.q[{}]", "q[{}]"],
             (LogFormat::Libfranka, Signal::Velocity) => &["state.dq[{}]", "dq[{}]"],
             (LogFormat::Libfranka, Signal::Effort) => &["state.tau_J[{}]", "tau_J[{}]"],

@@ -245,6 +245,74 @@ fn commands_of_another_topic_are_held_and_measurements_interpolated() {
     assert_eq!((signals.sparse.held, signals.sparse.interpolated), (37, 36));
 }
 
+/// Columns of a robot in a log of its own kind, with what has to be stated.
+fn columns_of(names: &[String], joints: &str, spec: &str) -> ColumnMapping {
+    let header = LogHeader::of_names(names);
+    let joints = strings(joints);
+    let spec: MappingSpec = toml::from_str(spec).unwrap();
+    ColumnMapping::of_log(&header, &joints, &vec![EffortColumn::Drive; joints.len()], &spec).unwrap()
+}
+
+#[test]
+fn logs_of_arms_as_their_drivers_call_them() {
+    let used = |list: &[Option<dynid_io::columns::ColumnUse>]| -> Vec<String> {
+        list.iter().flatten().map(|c| c.name.clone()).collect()
+    };
+    // KUKA iiwa: `LBRState` of the driver of its Fast Robot Interface, and the status message of Drake.
+    for (before, position, effort, others) in [
+        (
+            "/lbr/state/",
+            "measured_joint_position",
+            "measured_torque",
+            ["commanded_torque", "external_torque", "ipo_joint_position"],
+        ),
+        (
+            "",
+            "joint_position_measured",
+            "joint_torque_measured",
+            ["joint_position_commanded", "joint_torque_commanded", "joint_torque_external"],
+        ),
+    ] {
+        let of = |field: &str| (0..7).map(|k| format!("{before}{field}[{k}]")).collect::<Vec<String>>();
+        let mut names = vec!["time".to_owned()];
+        names.extend([position, effort].iter().chain(&others).flat_map(|field| of(field)));
+        let found = columns_of(&names, "a1,a2,a3,a4,a5,a6,a7", "");
+        assert_eq!(used(&found.position), of(position));
+        assert_eq!(used(&found.effort.unwrap()), of(effort));
+    }
+    // Kinova Gen3: feedback of actuators in degrees.
+    let of = |field: &str| {
+        (0..6).map(|k| format!("/base_feedback/actuators[{k}]/{field}")).collect::<Vec<String>>()
+    };
+    let mut names = vec!["time".to_owned()];
+    names.extend(["position", "velocity", "torque", "current_motor"].iter().flat_map(|field| of(field)));
+    let spec = "position = { columns = \"/base_feedback/actuators[{}]/position\", unit = \"deg\" }\n\
+                velocity = { columns = \"/base_feedback/actuators[{}]/velocity\", unit = \"deg/s\" }\n\
+                effort = \"/base_feedback/actuators[{}]/torque\"";
+    let found = columns_of(&names, "joint_1,joint_2,joint_3,joint_4,joint_5,joint_6", spec);
+    assert_eq!(used(&found.position), of("position"));
+    assert_eq!(found.position[0].as_ref().unwrap().factor, std::f64::consts::PI / 180.0);
+    assert_eq!(used(&found.effort.unwrap()), of("torque"));
+    // OpenArm by LeRobot: positions, rates and torques beside each other in the state.
+    let joints = ["joint_1", "joint_2"];
+    let mut names = strings("timestamp,episode_index");
+    names.extend(
+        joints.iter().flat_map(|j| ["pos", "vel", "torque"].map(|s| format!("observation.state/{j}.{s}"))),
+    );
+    let text = rows(&names.join(","), |k| format!("{},0,{k},0,1,{k},0,2", 0.01 * k as f64));
+    let log = open(&text, &MappingSpec::default()).unwrap();
+    assert_eq!(log.header().format, Some(LogFormat::LeRobot));
+    let efforts = [EffortColumn::Drive; 2];
+    let found =
+        ColumnMapping::of_log(&log.header(), &strings("joint_1,joint_2"), &efforts, &MappingSpec::default())
+            .unwrap();
+    for (list, signal) in
+        [(&found.position, "pos"), (&found.velocity.unwrap(), "vel"), (&found.effort.unwrap(), "torque")]
+    {
+        assert_eq!(used(list), joints.map(|j| format!("observation.state/{j}.{signal}")));
+    }
+}
+
 #[test]
 fn headers_with_faults_are_refused() {
     let spec = |text: &str| toml::from_str::<MappingSpec>(text).unwrap();
