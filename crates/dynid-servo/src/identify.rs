@@ -739,7 +739,8 @@ fn parameters(
         let t = found.quantile[k];
         let std = found.jackknife[k];
         let half_width = std.map(|sd| {
-            let parts = [t * sd, spread.law, spread.step, t * spread.folds, spread.gain];
+            // The step's error is of first order: half of it is what half the step takes away.
+            let parts = [t * sd, spread.law, 2.0 * spread.step, t * spread.folds, spread.gain];
             // Folds and jackknife measure the same thing: the larger counts.
             let own = parts[0].max(parts[3]);
             (own * own + parts[1].powi(2) + parts[2].powi(2) + parts[4].powi(2)).sqrt()

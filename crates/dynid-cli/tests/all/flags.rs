@@ -217,6 +217,24 @@ fn prepared() -> tempfile::TempDir {
         "robot = \"arm.urdf\"\n[trajectory]\nperiod_s = 4\nharmonics = 3\nsample_rate_hz = 50\n[search]\nstarts = 1\n",
     );
     write("sim.toml", "harmonics = 2\n");
+    // A drive that lags its command by 30 ms.
+    let text = std::fs::read_to_string(at.join("log.csv")).unwrap();
+    let head: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    let place = |name: &str| head.iter().position(|h| *h == name).unwrap();
+    let [time, shoulder, elbow] = ["t", "q_shoulder", "q_elbow"].map(place);
+    let mut told = "t,cmd_shoulder,cmd_elbow,q_shoulder,q_elbow\n".to_owned();
+    for (now, later) in rows.iter().zip(&rows[3..]) {
+        let cells = [now[time], later[shoulder], later[elbow], now[shoulder], now[elbow]];
+        told += &(cells.join(",") + "\n");
+    }
+    write("told.csv", &told);
+    let half: String = told.lines().take(400).map(|line| format!("{line}\n")).collect();
+    write("half-told.csv", &half);
+    // Beside the robot: a file that refers to it, whose own name is free.
+    write("two.toml", "name = \"two\"\nurdf = \"arm.urdf\"\n");
+    write("servo-here.toml", "robot = \"two.toml\"\n[[log]]\npath = \"told.csv\"\n[servo]\nlaw = []\n");
+    write("servo.toml", "robot = \"arm.urdf\"\n[[log]]\npath = \"told.csv\"\n[servo]\nlaw = []\n");
     for mine in ["report.html", "payload.html", "dynid.1"] {
         write(mine, "not of this program\n");
     }
@@ -227,6 +245,7 @@ fn cases() -> Vec<Case> {
     let case = |flag, before, after| Case { flag, before, after, refused: None };
     let refused = |flag, after, words| Case { flag, before: "inspect arm.urdf", after, refused: Some(words) };
     let mut out = Vec::new();
+    out.push(case("servo --log", "servo servo.toml --out s", "servo arm.urdf --log half-told.csv --out s"));
     let plain: &[(&str, &str, &[&str])] = &[
         (
             "inspect",
@@ -242,6 +261,14 @@ fn cases() -> Vec<Case> {
         ("convert", "convert currents.csv out.csv --robot arm.urdf", &["--gains 2,3"]),
         ("convert", "convert no-elbow.csv out.csv --robot arm.urdf", &["--allow-unlogged"]),
         ("explain", "explain", &["--json", "--markdown"]),
+        ("servo", "servo servo.toml", &["--out s", "--json"]),
+        ("servo", "servo servo.toml --out s", &["--quiet"]),
+        ("servo", "servo servo-here.toml --out .", &["--force"]),
+        (
+            "servo",
+            "servo arm.urdf --log half-told.csv --out s",
+            &["--lock elbow=0.3", "--position-gain 200", "--velocity-gain 3", "--validate told.csv"],
+        ),
         ("man", "man", &["--out pages"]),
         ("man", "man --out pages", &["--quiet"]),
         ("diff", "diff arm.urdf estimate.json", &["--states clean.csv", "--all", "--json"]),

@@ -56,7 +56,8 @@ pub struct CommandColumns {
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ServoLogConfig {
-    /// File of any format that is read, relative to the configuration; `FILE#MEMBER`: an episode, a group, or topics of it.
+    /// File of any format that is read, relative to the configuration; a pattern, a folder or a list stands for its logs; `FILE#MEMBER`: an
+    /// episode, a group, or topics of it.
     pub path: PathBuf,
     /// First and last data row, from 1, both included. Default: all.
     #[serde(deserialize_with = "crate::settings::lists::pair")]
@@ -245,13 +246,19 @@ impl ServoConfig {
     /// Reads a configuration; paths in it become relative to its folder.
     ///
     /// # Errors
-    /// [`Error::Read`], and as [`ServoConfig::parse`].
+    /// [`Error::Read`], [`Error::LogFile`], and as [`ServoConfig::parse`].
     pub fn read(path: &Path) -> Result<Self, Error> {
         let (mut config, folder) = toml_file::read(path, Self::parse)?;
         config.robot = folder.join(&config.robot);
         config.out = config.out.map(|o| folder.join(o));
-        for log in config.log.iter_mut().chain(&mut config.validation) {
-            log.path = folder.join(&log.path);
+        for logs in [&mut config.log, &mut config.validation] {
+            let mut all = Vec::with_capacity(logs.len());
+            for log in logs.iter() {
+                for path in dynid_io::log::files(&folder.join(&log.path))? {
+                    all.push(ServoLogConfig { path, ..log.clone() });
+                }
+            }
+            *logs = all;
         }
         Ok(config)
     }

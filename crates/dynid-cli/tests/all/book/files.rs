@@ -36,10 +36,11 @@ fn toml(block: &Block) -> Result<(), String> {
         Some("design") => dynid::design::DesignConfig::parse(text, name).map(drop).map_err(said),
         Some("motion") => dynid::motions::MotionConfig::parse(text, name).map(drop).map_err(said),
         Some("friction") => dynid::FrictionConfig::parse(text, name).map(drop).map_err(said),
+        Some("servo") => dynid::servo::ServoConfig::parse(text, name).map(drop).map_err(said),
         Some("simulate") => dynid::simulate::SimulateSettings::parse(text, name).map(drop).map_err(said),
         Some("robot") if part => robot(&completed_robot(text)?),
         Some("robot") => robot(text),
-        _ => Err("`toml` needs a kind: run, design, motion, friction, simulate or robot".to_owned()),
+        _ => Err("`toml` needs a kind: run, design, motion, friction, servo, simulate or robot".to_owned()),
     }
 }
 

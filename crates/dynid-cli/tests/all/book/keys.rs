@@ -19,7 +19,7 @@ struct Keys {
     sources: &'static [&'static str],
 }
 
-const PAGES: [Keys; 6] = [
+const PAGES: [Keys; 7] = [
     Keys {
         page: "run",
         title: "Keys of a run configuration",
@@ -66,6 +66,13 @@ const PAGES: [Keys; 6] = [
         opening: "Read by `friction`. An example with comments: [The file of a friction experiment](../files/friction.md).",
         top: "FrictionConfig",
         sources: &["crates/dynid/src/friction", "crates/dynid/src/config.rs", MOTOR_SIDE, COLUMNS],
+    },
+    Keys {
+        page: "servo",
+        title: "Keys of drives from commands and positions",
+        opening: "Read by `servo`. An example with comments: [servo](../commands/servo.md).",
+        top: "ServoConfig",
+        sources: &["crates/dynid/src/servo", PER_JOINT, COLUMNS],
     },
     Keys {
         page: "simulate",
