@@ -19,7 +19,9 @@ pub struct JointsReport {
     pub robot: Robot,
     /// What the numbers mean, a paragraph each.
     pub introduction: Vec<String>,
-    /// Sections, one per joint; a first one may be of the whole robot.
+    /// A section on the whole robot before those of its joints.
+    pub overview: Option<JointSection>,
+    /// Sections, one per joint.
     pub joints: Vec<JointSection>,
     /// What is needed to repeat the run.
     pub provenance: Provenance,

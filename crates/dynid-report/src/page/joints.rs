@@ -9,7 +9,7 @@ use crate::data::{ChartAxis, Fact, JointSection, JointsReport, Status, StudyTabl
 use crate::drawing::{by_temperature_svg, surface_svg};
 
 pub(super) fn context(data: &JointsReport) -> Value {
-    let joints: Vec<JointView<'_>> = data.joints.iter().map(joint).collect();
+    let sections: Vec<JointView<'_>> = data.overview.iter().chain(&data.joints).map(joint).collect();
     context! {
         kind => data.kind.as_str(),
         title => data.title.as_str(),
@@ -17,7 +17,8 @@ pub(super) fn context(data: &JointsReport) -> Value {
         warnings => Serde(&data.warnings),
         robot => Serde(&data.robot),
         introduction => Serde(&data.introduction),
-        joints => Serde(joints),
+        count => data.joints.len(),
+        sections => Serde(sections),
         provenance => Serde(&data.provenance),
     }
 }

@@ -60,7 +60,7 @@ pub fn render_design(data: &DesignReport) -> Result<String, ReportError> {
 /// [`ReportError::Length`] if a row of a table has more cells than the table has headings. The other variants would be
 /// faults of this crate.
 pub fn render_joints(data: &JointsReport) -> Result<String, ReportError> {
-    check_tables(data.joints.iter().flat_map(|j| &j.tables))?;
+    check_tables(data.overview.iter().chain(&data.joints).flat_map(|j| &j.tables))?;
     let environment = environment::environment()?;
     Ok(environment.get_template(environment::JOINTS_PAGE)?.render(joints::context(data))?)
 }

@@ -87,7 +87,7 @@ pub struct ServoParameterRecord {
     pub unit: String,
     /// Value.
     pub value: f64,
-    /// 95 % interval with all spreads; absent where there is none.
+    /// 95 % interval with all spreads, within what is possible; absent where there is none.
     pub interval: Option<(f64, f64)>,
     /// Standard deviation by leaving out blocks of time.
     pub std: Option<f64>,
@@ -324,7 +324,10 @@ impl ServoResult {
             joints: joints.iter().map(|j| names[*j].clone()).collect(),
             unit: term.unit(slides).to_owned(),
             value: p.value,
-            interval: p.half_width.map(|h| (p.value - h, p.value + h)),
+            // What cannot be is no part of an interval.
+            interval: p
+                .half_width
+                .map(|h| ((p.value - h).max(p.free.lower), (p.value + h).min(p.free.upper))),
             std: p.std,
             model_std: p.model_std.filter(|_| !wrong),
             spread: ServoSpread {

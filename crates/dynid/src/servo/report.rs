@@ -25,7 +25,7 @@ impl ServoResult {
         let p = &file.provenance;
         let shown = self.validation.first().or(self.logs.first());
         let curves = shown.map(|log| simulated(&self.found.chains, &self.found, log));
-        let mut sections = vec![whole(file)];
+        let mut sections = Vec::with_capacity(file.joints.len());
         for (j, joint) in file.joints.iter().enumerate() {
             let slides = self.robot.mechanism.effort_units().get(j) == Some(&"N");
             let unit = if slides { "m" } else { "rad" };
@@ -54,6 +54,7 @@ impl ServoResult {
                 ..report::Robot::default()
             },
             introduction: introduction(),
+            overview: Some(whole(file)),
             joints: sections,
             provenance: report::Provenance {
                 version: p.version.clone(),
