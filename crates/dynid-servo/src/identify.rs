@@ -174,6 +174,23 @@ pub struct AdditionTrial {
     pub taken: bool,
 }
 
+/// A direction that was looked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DirectionTrial {
+    /// Joint.
+    pub joint: usize,
+    /// Direction in use.
+    pub direction: f64,
+    /// RMS with the other direction, fitted anew with zeros free, over that with this one; below [`TOLD_DIRECTION`] the logs do not tell it.
+    pub other: f64,
+}
+
+/// RMS with the other direction over that with the chosen one from which a direction is told.
+pub const TOLD_DIRECTION: f64 = 1.02;
+
+/// Sweeps over the joints whose directions are looked for.
+const SWEEPS: usize = 3;
+
 /// Error of rollouts that begin from measured states again and again.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HorizonError {
@@ -198,6 +215,8 @@ pub struct ServoIdentification {
     pub additions: Vec<Addition>,
     /// Additions that were tried.
     pub trials: Vec<AdditionTrial>,
+    /// Directions that were looked for.
+    pub directions: Vec<DirectionTrial>,
     /// How the simulation was done.
     pub scheme: Scheme,
     /// RMS residual of every joint over all logs, whole rollouts.
@@ -271,8 +290,6 @@ pub fn identify(
     };
     let own_gains = settings.own_gains.then_some(Addition::OwnGains);
     let plain = work.free(&own_gains.into_iter().collect());
-    let start = linear_start(&chains, logs, &known, &plain, work.scheme, &StartSettings::default())
-        .map_err(|source| ServoError::Signal { log: logs[0].name.clone(), source })?;
     let mut laws: BTreeSet<Addition> = match &settings.choice {
         Choice::HeldOut => BTreeSet::new(),
         Choice::Given(given) => given.iter().copied().collect(),
@@ -280,6 +297,8 @@ pub fn identify(
     if settings.own_gains {
         laws.insert(Addition::OwnGains);
     }
+    let directions = work.directions(&mut known, &plain, &laws)?;
+    let start = work.start(&known, &plain)?;
     let begin = work.begin(&start.values, &laws, None);
     let mut fitted = work.fit(&laws, &begin)?;
     let mut trials = Vec::new();
@@ -303,7 +322,8 @@ pub fn identify(
         }
     }
     let step_share = work.settle_step(&laws, &mut fitted)?;
-    work.judge(mechanism, laws, fitted, trials, &richer, step_share, start)
+    let found = work.judge(mechanism, laws, fitted, trials, &richer, step_share, start)?;
+    Ok(ServoIdentification { directions, ..found })
 }
 
 fn check(mechanism: &Mechanism, logs: &[ServoLog], settings: &ServoSettings) -> Result<(), ServoError> {
@@ -418,6 +438,65 @@ impl Work<'_> {
             }
         }
         out
+    }
+
+    fn start(&self, known: &ServoValues, plain: &[Free]) -> Result<crate::start::LinearStart, ServoError> {
+        linear_start(self.chains, self.logs, known, plain, self.scheme, &StartSettings::default())
+            .map_err(|source| ServoError::Signal { log: self.logs[0].name.clone(), source })
+    }
+
+    /// Turns directions that are to be found, one joint after the other, as long as the logs are met better. The mirror image of all
+    /// joints that gravity tells apart has a negative gain, which no fit takes.
+    fn directions(
+        &mut self,
+        known: &mut ServoValues,
+        plain: &[Free],
+        laws: &BTreeSet<Addition>,
+    ) -> Result<Vec<DirectionTrial>, ServoError> {
+        let asked: Vec<usize> =
+            (0..known.joints.len()).filter(|j| self.settings.find_direction[*j]).collect();
+        if asked.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut with = laws.clone();
+        with.insert(Addition::Zero);
+        let free = self.free(&with);
+        let short = GaussNewton { evaluations: 14, tolerance: 1e-3, ..GaussNewton::default() };
+        let fit_of = |work: &mut Self, known: &ServoValues| -> Result<Fitted, ServoError> {
+            let start = work.start(known, plain)?;
+            let begin = work.begin(&start.values, &with, None);
+            Ok(work.refit(&free, &begin, work.scheme, &short)?)
+        };
+        let mut best = fit_of(self, known)?;
+        let mut out = Vec::new();
+        for _ in 0..SWEEPS {
+            let mut turned = false;
+            out.clear();
+            for j in &asked {
+                let mut other = known.clone();
+                other.joints[*j].direction = -other.joints[*j].direction;
+                let fitted = fit_of(self, &other);
+                // By one measure: the residuals of the better fit so far.
+                let sigma = &best.evaluation.mean_squares(&|_| true);
+                let sigma: Vec<f64> = sigma.iter().map(|s| s.sqrt().max(1e-12)).collect();
+                let loss = |f: &Fitted| f.evaluation.loss(&sigma, &|_| true);
+                let ratio = fitted.as_ref().map_or(f64::INFINITY, |f| (loss(f) / loss(&best)).sqrt());
+                let direction = known.joints[*j].direction;
+                match fitted {
+                    Ok(fitted) if ratio * TOLD_DIRECTION < 1.0 => {
+                        *known = other;
+                        best = fitted;
+                        turned = true;
+                        out.push(DirectionTrial { joint: *j, direction: -direction, other: 1.0 / ratio });
+                    }
+                    _ => out.push(DirectionTrial { joint: *j, direction, other: ratio }),
+                }
+            }
+            if !turned {
+                break;
+            }
+        }
+        Ok(out)
     }
 
     fn problem<'b>(&'b self, free: &'b [Free], scheme: Scheme) -> ServoProblem<'b> {
@@ -595,6 +674,7 @@ impl Work<'_> {
             groups,
             additions: laws.into_iter().collect(),
             trials,
+            directions: Vec::new(),
             scheme: self.scheme,
             rms_by_log: (0..self.logs.len()).map(of_log).collect(),
             rms,

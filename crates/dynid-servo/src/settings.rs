@@ -77,6 +77,8 @@ pub struct ServoSettings {
     pub known_delay: bool,
     /// Per joint, whether its zero is known: [`Addition::Zero`] leaves it.
     pub known_zero: Vec<bool>,
+    /// Per joint, whether its direction is to be found: gravity tells it.
+    pub find_direction: Vec<bool>,
     /// Standard deviation of zeros about those of the robot file, rad or m. Default 0.5.
     pub zero_std: f64,
     /// Terms that are found besides, each for every joint: dead band, limits, smoothing.
@@ -104,6 +106,7 @@ impl ServoSettings {
             delay: Shared::Chain,
             known_delay: false,
             known_zero: vec![false; joints],
+            find_direction: vec![false; joints],
             zero_std: 0.5,
             find: Vec::new(),
             choice: Choice::HeldOut,

@@ -10,7 +10,7 @@ use crate::rollout::Lost;
 /// How far a fit goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaussNewton {
-    /// Largest number of simulations. Default 40.
+    /// Largest number of simulations. Default 80.
     pub evaluations: usize,
     /// Relative change of the loss that ends a fit. Default 1e-5.
     pub tolerance: f64,
@@ -20,7 +20,7 @@ pub struct GaussNewton {
 
 impl Default for GaussNewton {
     fn default() -> Self {
-        GaussNewton { evaluations: 40, tolerance: 1e-5, reweighted: 12 }
+        GaussNewton { evaluations: 80, tolerance: 1e-5, reweighted: 12 }
     }
 }
 
@@ -29,7 +29,7 @@ impl Default for GaussNewton {
 pub enum Ending {
     /// The loss changed by less than the tolerance.
     Converged,
-    /// No step lowers the loss any more, though the last one changed it by more than the tolerance.
+    /// No step lowers the loss any more, or the last ones lowered it by next to nothing, such as those along a parameter that is hardly seen.
     Stalled,
     /// The largest number of simulations was reached.
     Unfinished,
@@ -70,6 +70,11 @@ pub struct Fitted {
 /// Relative rise of the loss that a step may bring. Whether a joint at rest breaks away or not is decided at an instant, and no slope
 /// sees it: the loss has jumps of this size where gears stick.
 const ROUGH: f64 = 0.01;
+
+/// Last accepted steps that are looked at when the largest number of simulations is reached, and the relative gain of all of them
+/// below which the fit counts as done.
+const LAST: usize = 5;
+const NEXT_TO_NOTHING: f64 = 1e-3;
 
 /// Steps in a row that may raise the loss.
 const SIDEWAYS: usize = 4;
@@ -121,6 +126,7 @@ pub fn fit(
     // Where the loss was lowest before steps that raised it.
     let mut best: Option<(f64, Evaluation, Vec<f64>, ServoValues)> = None;
     let mut sideways = 0;
+    let mut gains = Vec::new();
     while evaluations < settings.evaluations {
         let (hessian, gradient) = with_priors(evaluation.normal(take), free, &estimate);
         places = placed(free, &estimate, &hessian, &gradient);
@@ -169,6 +175,7 @@ pub fn fit(
         }
         (evaluation, estimate, values) = (tried, proposed, next);
         iterations += 1;
+        gains.push(gain);
         if best
             .as_ref()
             .is_some_and(|b| evaluation.loss(&b.1.sigma, take) + prior_loss(free, &estimate) < b.0)
@@ -179,6 +186,10 @@ pub fn fit(
             ending = Ending::Converged;
             break;
         }
+    }
+    let last = &gains[gains.len().saturating_sub(LAST)..];
+    if ending == Ending::Unfinished && last.len() == LAST && last.iter().sum::<f64>() < NEXT_TO_NOTHING {
+        ending = Ending::Stalled;
     }
     if let Some((_, e, x, v)) = best {
         (evaluation, estimate, values) = (e, x, v);

@@ -165,3 +165,18 @@ fn a_bound_has_no_interval() {
     let delay = found.parameters.iter().find(|p| p.free.as_term() == Some(Term::Delay)).unwrap();
     assert_eq!((delay.value, delay.verdict, delay.half_width), (0.0, ServoVerdict::AtBound, None));
 }
+
+#[test]
+fn directions_that_gravity_tells_are_found() {
+    let mechanism = arm(1.0);
+    let mut truth = drives(&mut ChaCha8Rng::seed_from_u64(5));
+    truth[1].direction = -1.0;
+    let log = log(&mechanism, &truth, scheme(PERIOD), 2400, 5);
+    let mut settings = settings(&truth, &[Addition::Zero]);
+    settings.find_direction = vec![true; 2];
+    settings.step_s = Some(PERIOD * 1.01);
+    let found = identify(&mechanism, &[log], &settings).unwrap();
+    assert_eq!(found.values.joints.iter().map(|j| j.direction).collect::<Vec<_>>(), [1.0, -1.0]);
+    assert!(found.directions.iter().all(|d| d.other > 2.0), "{:?}", found.directions);
+    assert!(found.misfit < 1.1, "{}", found.misfit);
+}

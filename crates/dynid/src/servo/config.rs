@@ -104,6 +104,8 @@ pub struct DriveConfig {
     /// Direction of encoder and command against the joint of the robot file, 1 or -1. Default 1.
     #[serde(skip_serializing_if = "PerJoint::is_none")]
     pub direction: PerJoint,
+    /// Whether directions that `direction` does not state are found: gravity tells them. Default false.
+    pub find_directions: bool,
     /// Position of the joint where its encoder reads zero, where it is known, rad. Default: 0, and found if held-out data ask for it.
     #[serde(skip_serializing_if = "PerJoint::is_none")]
     pub zero: PerJoint,
@@ -139,6 +141,7 @@ impl Default for DriveConfig {
             effort_limit: PerJoint::default(),
             limited: LimitedName::Whole,
             direction: PerJoint::default(),
+            find_directions: false,
             zero: PerJoint::default(),
             zero_std: 0.5,
             delay: PerJoint::default(),
@@ -378,6 +381,7 @@ impl ServoConfig {
                     FoundName::RateLimit | FoundName::EffortLimit => {}
                 }
             }
+            out.find_direction[j] = s.find_directions && direction[j].is_none();
             out.known_gain[j] = gain[j].is_some();
             out.known_zero[j] = zero[j].is_some();
         }

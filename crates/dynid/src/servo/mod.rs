@@ -12,8 +12,8 @@ mod report;
 pub use config::ServoConfig;
 pub use files::ServoFiles;
 pub use record::{
-    AdditionRecord, HorizonRecord, ServoFile, ServoFit, ServoGroupKind, ServoGroupRecord, ServoLaw,
-    ServoLogFit, ServoParameterRecord, ServoSimulation, ServoSpread, ServoVerdict,
+    AdditionRecord, DirectionRecord, HorizonRecord, ServoFile, ServoFit, ServoGroupKind, ServoGroupRecord,
+    ServoLaw, ServoLogFit, ServoParameterRecord, ServoSimulation, ServoSpread, ServoVerdict,
 };
 
 use dynid_servo::fit::{Evaluation, ServoProblem, blocks};

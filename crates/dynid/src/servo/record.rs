@@ -2,7 +2,7 @@
 
 use dynid_record::{Outcome, words};
 use dynid_servo::fit::Ending;
-use dynid_servo::identify::{GroupKind, MISFIT, ServoGroup, ServoParameter};
+use dynid_servo::identify::{GroupKind, MISFIT, ServoGroup, ServoParameter, TOLD_DIRECTION};
 use dynid_servo::{Addition, Hold, LoadOf, Term};
 use serde::{Deserialize, Serialize};
 
@@ -132,6 +132,8 @@ pub struct ServoLaw {
     pub additions: Vec<String>,
     /// Additions that were tried on held-out folds.
     pub trials: Vec<AdditionRecord>,
+    /// Directions that were looked for.
+    pub directions: Vec<DirectionRecord>,
 }
 
 /// An addition that was tried.
@@ -146,6 +148,17 @@ pub struct AdditionRecord {
     pub ratios: Vec<Option<f64>>,
     /// Whether it was taken.
     pub taken: bool,
+}
+
+/// A direction that was looked for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct DirectionRecord {
+    /// Joint.
+    pub joint: String,
+    /// Direction in use, 1 or -1.
+    pub direction: f64,
+    /// RMS with the other direction over that with this one; absent: the simulation got lost. Below 1.02 the logs do not tell the direction.
+    pub other: Option<f64>,
 }
 
 /// How well the closed-loop simulation gives the measured positions. Lists go by joint, rad or m.
@@ -167,7 +180,7 @@ pub struct ServoFit {
     pub horizons: Vec<HorizonRecord>,
     /// Relative residual of the linear start.
     pub start_residual: Vec<f64>,
-    /// How the fit ended: `converged`, `stalled` (no step helps any more), `unfinished`.
+    /// How the fit ended: `converged`, `stalled` (no step helps any more, or hardly), `unfinished`.
     pub ending: String,
     /// Steps of the last fit.
     pub iterations: usize,
@@ -267,6 +280,15 @@ impl ServoResult {
                         addition: t.addition.name().to_owned(),
                         ratios: finite(&t.ratios),
                         taken: t.taken,
+                    })
+                    .collect(),
+                directions: f
+                    .directions
+                    .iter()
+                    .map(|d| DirectionRecord {
+                        joint: self.robot.rate_names()[d.joint].clone(),
+                        direction: d.direction,
+                        other: Some(d.other).filter(|x| x.is_finite()),
                     })
                     .collect(),
             },
@@ -435,6 +457,15 @@ impl ServoResult {
             out.push(format!(
                 "move by more than their own interval with the law, the step, the part of the logs or a stated gain: {}",
                 unstable.join("; ")
+            ));
+        }
+        let names = self.robot.rate_names();
+        let untold = f.directions.iter().filter(|d| d.other < TOLD_DIRECTION);
+        let untold: Vec<&str> = untold.map(|d| names[d.joint].as_str()).collect();
+        if !untold.is_empty() {
+            out.push(format!(
+                "the direction is not told by the logs, the other one meets them as well: {}",
+                untold.join(", ")
             ));
         }
         if f.step_share > 0.2 {

@@ -143,6 +143,16 @@ fn whole(file: &ServoFile) -> report::JointSection {
             })
             .collect(),
     };
+    let directions = StudyTable {
+        caption: "Directions of encoders: error with the other direction over that with this one".to_owned(),
+        head: ["Joint", "Direction", "Other"].map(str::to_owned).to_vec(),
+        rows: file
+            .law
+            .directions
+            .iter()
+            .map(|d| vec![text(d.joint.clone()), Value::from(d.direction), Value::from(d.other)])
+            .collect(),
+    };
     let groups = StudyTable {
         caption: "Parameters that are known together only".to_owned(),
         head: ["Kind", "Members", "What would part them"].map(str::to_owned).to_vec(),
@@ -152,7 +162,8 @@ fn whole(file: &ServoFile) -> report::JointSection {
             .map(|g| vec![text(g.kind.word()), text(g.members.join("; ")), text(g.remedy.clone())])
             .collect(),
     };
-    let tables = [horizons, by_log, trials, groups].into_iter().filter(|t| !t.rows.is_empty()).collect();
+    let tables =
+        [horizons, by_log, trials, directions, groups].into_iter().filter(|t| !t.rows.is_empty()).collect();
     report::JointSection {
         name: "Whole robot".to_owned(),
         status: file.status.into(),

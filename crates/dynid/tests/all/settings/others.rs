@@ -615,6 +615,7 @@ fn every_key_of_drives_takes_effect_or_is_refused() {
             "[servo]\neffort_limit = 6.0\nlimited = \"proportional\"",
         ),
         servo("servo.direction", "[servo]\ndirection = 2", Refused("1 or -1")),
+        servo("servo.find_directions", "[servo]\nfind_directions = true", Changes),
         servo("servo.zero", "[servo]\nzero = { lift = 0.1 }", Changes),
         beside("servo.zero_std", "[servo]\nlaw = [\"zero\"]", "[servo]\nlaw = [\"zero\"]\nzero_std = 0.001"),
         servo("servo.delay", "[servo]\ndelay = 0.004", Changes),
