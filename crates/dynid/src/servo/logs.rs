@@ -89,8 +89,8 @@ pub(super) fn read(config: &ServoConfig, log: &ServoLogConfig, robot: &Robot) ->
     let positions = &measured.position;
     for ((name, u), x) in names.iter().zip(&command).zip(positions) {
         let (told, done) = (spread(u), spread(x));
-        // Degrees beside radians differ by 57, and no drive falls short of a moving command by so much.
-        if told > 20.0 * done && done > 0.0 {
+        // Degrees beside radians differ by 57, and no drive falls short of a moving command by so much; one that stands still does.
+        if told > 20.0 * done && told < 200.0 * done {
             return Err(ServoFault::Unit {
                 file: file.clone(),
                 joint: (*name).to_owned(),

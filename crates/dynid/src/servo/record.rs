@@ -52,7 +52,7 @@ pub struct ServoFile {
     /// Robot.
     pub robot: String,
     /// The result in a word: `pass`, `warn` where the model is wrong or a parameter not told, `fail` where it predicts no better than the
-    /// command itself or the fit did not settle.
+    /// command itself or misses a third of the motion, no parameter is told, or the fit did not settle.
     pub status: Outcome,
     /// The result in a sentence.
     pub headline: String,
@@ -231,6 +231,9 @@ impl ServoFile {
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
     }
 }
+
+/// Residual over the motion itself from which a simulation counts as one of something else.
+const MOST_MISSED: f64 = 0.3;
 
 fn words_of(additions: &[Addition]) -> Vec<String> {
     additions.iter().map(|a| a.name().to_owned()).collect()
@@ -417,6 +420,21 @@ impl ServoResult {
             false => format!("{:.1} times the encoders' rounding", f.misfit),
         };
         let size = format!("{:.3} mrad or mm RMS over whole rollouts, {floor}", 1e3 * rms);
+        let usable = |p: &&ServoParameterRecord| {
+            matches!(p.verdict, ServoVerdict::Seen | ServoVerdict::Coarse | ServoVerdict::Unstable)
+        };
+        if !parameters.iter().any(|p| usable(&p)) {
+            return (
+                Outcome::Fail,
+                format!("no parameter is told by the logs, the joints hardly move: {size}"),
+            );
+        }
+        if rms > MOST_MISSED * mean(&self.motion()) {
+            let why = format!(
+                "the simulation does not follow the motion: {size}; check signs (`direction`), units and gains"
+            );
+            return (Outcome::Fail, why);
+        }
         if rms.is_nan() || rms >= command {
             let why = format!(
                 "the simulation predicts no better than the command itself: {size}; check signs, units and gains"
@@ -438,6 +456,17 @@ impl ServoResult {
         };
         let status = if parameters.iter().any(|p| bad(&p)) { Outcome::Warn } else { Outcome::Pass };
         (status, headline)
+    }
+
+    /// Standard deviation of every joint's position over all training logs.
+    fn motion(&self) -> Vec<f64> {
+        let of = |j: usize| {
+            let values = || self.logs.iter().flat_map(|log| log.position[j].iter());
+            let rows = values().count().max(1) as f64;
+            let mean = values().sum::<f64>() / rows;
+            (values().map(|x| (x - mean) * (x - mean)).sum::<f64>() / rows).sqrt()
+        };
+        (0..self.settings.joints.len()).map(of).collect()
     }
 
     /// What a reader has to know before using the numbers.

@@ -5,7 +5,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use dynid::servo::{ServoConfig, ServoFault, ServoFiles, ServoVerdict, identify_servo};
+use dynid::servo::{ServoConfig, ServoFiles, ServoVerdict, identify_servo};
 use dynid::servo_fits::{Chain, Rollout, Scheme, ServoJoint, ServoLog, ServoValues, Term};
 use dynid::{Robot, RobotOptions};
 use tempfile::TempDir;
@@ -197,10 +197,33 @@ fn bad_logs_are_refused_with_what_to_write() {
     let text = format!("{PLAIN}position_gain = {{ wrist = 3.0 }}\n");
     let unknown = identify_servo(&config(&folder, &text), &mut |_| {}).unwrap_err().to_string();
     assert!(unknown.contains("wrist"), "{unknown}");
-    // A gain that no robot of this size can have.
-    let text = format!("{PLAIN}position_gain = 25.0\ndirection = -1\nstep_s = 0.1\n");
-    if let Err(error) = identify_servo(&config(&folder, &text), &mut |_| {}) {
-        assert!(error.job::<ServoFault>().is_some(), "{error}");
+}
+
+#[test]
+fn what_is_no_answer_fails() {
+    let folder = folder();
+    let plain = std::fs::read_to_string(folder.path().join("a.csv")).unwrap();
+    let changed = |change: &dyn Fn(f64) -> f64| -> String {
+        let line = |(k, line): (usize, &str)| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            for cell in cells[3..].iter_mut().filter(|_| k > 0) {
+                *cell = change(cell.parse().unwrap()).to_string();
+            }
+            cells.join(",") + "\n"
+        };
+        plain.lines().enumerate().map(line).collect()
+    };
+    let cases = [("mirrored", changed(&|x| -x), "check signs"), ("still", changed(&|_| 0.1), "hardly move")];
+    for (name, text, words) in cases {
+        std::fs::write(folder.path().join("odd.csv"), text).unwrap();
+        let config =
+            config(&folder, "robot = \"arm.urdf\"\n[[log]]\npath = \"odd.csv\"\n[servo]\nlaw = []\n");
+        let found = identify_servo(&config, &mut |_| {}).unwrap();
+        let file = found.file(&config, &[]);
+        assert_eq!(file.status, dynid::record::Outcome::Fail, "{name}: {}", file.headline);
+        assert!(file.headline.contains(words), "{name}: {}", file.headline);
+        // A page is made all the same.
+        assert!(found.report(&file).unwrap().contains("</html>"));
     }
 }
 
