@@ -37,6 +37,9 @@ const LEAST_SURE_GAIN: f64 = 0.005;
 /// Share of the residual that half the step may move the simulation by.
 const STEP_SHARE: f64 = 0.2;
 
+/// Standard deviations from what is known of it within which a zero must lie.
+const ZERO_STDS: f64 = 3.0;
+
 /// Halvings of the step at most.
 const HALVINGS: usize = 4;
 
@@ -300,7 +303,14 @@ pub fn identify(
     let directions = work.directions(&mut known, &plain, &laws)?;
     let start = work.start(&known, &plain)?;
     let begin = work.begin(&start.values, &laws, None);
-    let mut fitted = work.fit(&laws, &begin)?;
+    let mut fitted = match work.fit(&laws, &begin) {
+        Ok(fitted) => fitted,
+        // Where signs or units are wrong the linear start is no start.
+        Err(Lost { .. }) => {
+            let free = work.free(&laws);
+            work.fit(&laws, &tame(begin, &free))?
+        }
+    };
     let mut trials = Vec::new();
     let mut richer = Vec::new();
     // One measure of all laws: by joint the residual of the first.
@@ -322,6 +332,10 @@ pub fn identify(
         }
     }
     let step_share = work.settle_step(&laws, &mut fitted)?;
+    if richer.is_empty() && is_wrong(work.misfit(&fitted)) {
+        // A law that is stated has neighbours all the same.
+        richer = work.neighbours(&laws, &fitted, &sigma);
+    }
     let found = work.judge(mechanism, laws, fitted, trials, &richer, step_share, start)?;
     Ok(ServoIdentification { directions, ..found })
 }
@@ -407,8 +421,12 @@ impl Work<'_> {
             match addition {
                 Addition::Offset => out.extend(own(Term::Offset)),
                 Addition::Zero => {
-                    let zero =
-                        |j: usize| Free::term(Term::Zero, [j]).known(s.joints[j].get(Term::Zero), s.zero_std);
+                    // Thousands of rows with the same error outweigh any knowledge: what is known bounds the zero too.
+                    let zero = |j: usize| {
+                        let (known, most) = (s.joints[j].get(Term::Zero), ZERO_STDS * s.zero_std);
+                        let free = Free::term(Term::Zero, [j]).known(known, s.zero_std);
+                        Free { lower: known - most, upper: known + most, ..free }
+                    };
                     out.extend((0..n).filter(|j| !s.known_zero[*j]).map(zero));
                 }
                 Addition::Stiction => {
@@ -557,24 +575,7 @@ impl Work<'_> {
         before: &Folds,
         sigma: &[f64],
     ) -> Vec<Tried> {
-        let without = fitted.evaluation.loss(sigma, &|_| true);
-        let short = GaussNewton { evaluations: 8, tolerance: 1e-3, ..GaussNewton::default() };
-        let mut out = Vec::new();
-        for addition in Addition::ALL {
-            if !self.applies(addition, laws) {
-                continue;
-            }
-            let mut with = laws.clone();
-            with.insert(addition);
-            let begin = self.begin(&fitted.values, &with, Some(addition));
-            let free = self.free(&with);
-            let Ok(fitted) = self.refit(&free, &begin, self.scheme, &short) else { continue };
-            let gain = fitted.evaluation.loss(sigma, &|_| true) / without;
-            let beside = laws.iter().copied().collect();
-            let trial = AdditionTrial { beside, addition, ratios: Vec::new(), taken: false };
-            out.push(Tried { trial, fitted, free, folds: Folds::default(), gain });
-        }
-        out.sort_by(|a, b| a.gain.total_cmp(&b.gain));
+        let mut out = self.neighbours(laws, fitted, sigma);
         for tried in &mut out {
             // What does not gain on the logs that it is fitted to gains nowhere.
             if tried.gain.is_nan() || tried.gain > (1.0 - LEAST_SURE_GAIN).powi(2) {
@@ -595,6 +596,29 @@ impl Work<'_> {
         out
     }
 
+    /// Fits every addition that is not there yet, from the one that gains most on; losses are measured by `sigma`.
+    fn neighbours(&mut self, laws: &BTreeSet<Addition>, fitted: &Fitted, sigma: &[f64]) -> Vec<Tried> {
+        let without = fitted.evaluation.loss(sigma, &|_| true);
+        let short = GaussNewton { evaluations: 8, tolerance: 1e-3, ..GaussNewton::default() };
+        let mut out = Vec::new();
+        for addition in Addition::ALL {
+            if !self.applies(addition, laws) {
+                continue;
+            }
+            let mut with = laws.clone();
+            with.insert(addition);
+            let begin = self.begin(&fitted.values, &with, Some(addition));
+            let free = self.free(&with);
+            let Ok(fitted) = self.refit(&free, &begin, self.scheme, &short) else { continue };
+            let gain = fitted.evaluation.loss(sigma, &|_| true) / without;
+            let beside = laws.iter().copied().collect();
+            let trial = AdditionTrial { beside, addition, ratios: Vec::new(), taken: false };
+            out.push(Tried { trial, fitted, free, folds: Folds::default(), gain });
+        }
+        out.sort_by(|a, b| a.gain.total_cmp(&b.gain));
+        out
+    }
+
     /// Whether an addition is to be tried beside these. Offset and zero act alike where a joint moves in few postures: one of them is
     /// taken by itself, both on request.
     fn applies(&self, addition: Addition, laws: &BTreeSet<Addition>) -> bool {
@@ -606,6 +630,15 @@ impl Work<'_> {
                 Addition::Offset => !laws.contains(&Addition::Zero),
                 _ => true,
             }
+    }
+
+    /// Residual over the encoders' rounding, the median over joints whose step is known.
+    fn misfit(&self, fitted: &Fitted) -> f64 {
+        let floors =
+            (0..fitted.values.joints.len()).map(|j| self.logs.iter().map(|l| l.floor(j)).fold(0.0, f64::max));
+        let squares = fitted.evaluation.mean_squares(&|_| true);
+        let told = squares.iter().zip(floors).filter(|(_, floor)| *floor > 0.0);
+        median(told.map(|(s, floor)| s.sqrt() / floor).collect())
     }
 
     /// Halves the step until the simulation hardly moves; returns the share by which it still does.
@@ -653,10 +686,9 @@ impl Work<'_> {
         let rms: Vec<f64> = fitted.evaluation.mean_squares(&|_| true).iter().map(|s| s.sqrt()).collect();
         let floor: Vec<f64> =
             (0..n).map(|j| self.logs.iter().map(|l| l.floor(j)).fold(0.0, f64::max)).collect();
-        let told = rms.iter().zip(&floor).filter(|(_, f)| **f > 0.0);
-        let misfit = median(told.map(|(r, f)| r / f).collect());
+        let misfit = self.misfit(&fitted);
         let found = deviations(&self.problem(&free, self.scheme), &fitted);
-        let spreads = self.spreads(&free, &fitted, richer, misfit.is_nan() || misfit > MISFIT)?;
+        let spreads = self.spreads(&free, &fitted, richer, is_wrong(misfit))?;
         let parameters = parameters(&free, &fitted, &found, &spreads, self.settings, self.logs);
         let groups = groups(&free, &found);
         let mut horizons = Vec::new();
@@ -772,6 +804,34 @@ impl Work<'_> {
         let evaluation = Evaluation::new(&problem, &fitted.values, &sigma, false)?;
         Ok(evaluation.mean_squares(&|_| true).iter().map(|s| s.sqrt()).collect())
     }
+}
+
+/// A start whose loop is stable whatever the bodies are: no friction that sticks, no lag, damping for a tenth of a second. What is known
+/// stays.
+fn tame(mut start: ServoValues, free: &[Free]) -> ServoValues {
+    const TIME: f64 = 0.1;
+    const GAIN: f64 = 10.0;
+    for (j, joint) in start.joints.iter_mut().enumerate() {
+        let gain = joint.get(Term::PositionGain);
+        let gain = if gain.is_finite() && gain > 0.0 { gain.min(1e3 * GAIN) } else { GAIN };
+        let all = [
+            (Term::PositionGain, gain),
+            (Term::Viscous, TIME * gain),
+            (Term::RotorInertia, TIME * TIME * gain),
+            (Term::Coulomb, 0.0),
+            (Term::Stiction, 0.0),
+            (Term::Offset, 0.0),
+            (Term::Delay, 0.0),
+        ];
+        let is_free = |term: Term| free.iter().any(|f| f.as_term() == Some(term) && f.joints().contains(&j));
+        all.into_iter().filter(|(term, _)| is_free(*term)).for_each(|(term, value)| joint.set(term, value));
+    }
+    start
+}
+
+/// Whether a residual over the encoders' rounding says that the model is wrong somewhere, or cannot say that it is right.
+fn is_wrong(misfit: f64) -> bool {
+    misfit.is_nan() || misfit > MISFIT
 }
 
 /// Simulated readings of all logs, log by log, row by row of every chain.
