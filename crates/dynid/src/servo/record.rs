@@ -423,7 +423,10 @@ impl ServoResult {
         let usable = |p: &&ServoParameterRecord| {
             matches!(p.verdict, ServoVerdict::Seen | ServoVerdict::Coarse | ServoVerdict::Unstable)
         };
-        if !parameters.iter().any(|p| usable(&p)) {
+        // Two steps of the encoder, or nothing that a number of the log would show.
+        let still =
+            self.motion().iter().zip(&f.floor).all(|(motion, floor)| *motion <= (2.0 * floor).max(1e-9));
+        if still || !parameters.iter().any(|p| usable(&p)) {
             return (
                 Outcome::Fail,
                 format!("no parameter is told by the logs, the joints hardly move: {size}"),
