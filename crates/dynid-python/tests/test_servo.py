@@ -51,7 +51,7 @@ def commands(rows: int, seed: int) -> np.ndarray[Any, Any]:
     random = np.random.default_rng(seed)
     t = np.arange(rows) * PERIOD
     waves = [0.4 / (1 + 1.5 * f) * np.sin(2 * np.pi * f * t[:, None] + random.uniform(0, 6, 2)) for f in (0.2, 0.6, 1.5, 3.7)]
-    command = np.sum(waves, axis=0) + [0.5, 0.4]
+    command: np.ndarray[Any, Any] = np.sum(waves, axis=0) + np.array([0.5, 0.4])
     command[rows // 2 : rows // 2 + 200] = command[rows // 2]
     return command
 
