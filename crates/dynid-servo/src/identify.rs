@@ -86,7 +86,7 @@ pub enum ServoError {
 }
 
 /// Rows that a log needs at least.
-const LEAST_ROWS: usize = 50;
+pub const LEAST_ROWS: usize = 50;
 
 /// What an estimate moves by when something is changed that should not matter.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -303,20 +303,13 @@ pub fn identify(
     let directions = work.directions(&mut known, &plain, &laws)?;
     let start = work.start(&known, &plain)?;
     let begin = work.begin(&start.values, &laws, None);
-    let mut fitted = match work.fit(&laws, &begin) {
-        Ok(fitted) => fitted,
-        // Where signs or units are wrong the linear start is no start.
-        Err(Lost { .. }) => {
-            let free = work.free(&laws);
-            work.fit(&laws, &tame(begin, &free))?
-        }
-    };
+    let free = work.free(&laws);
+    let mut fitted = work.first_fit(&free, begin, &GaussNewton::default())?;
     let mut trials = Vec::new();
     let mut richer = Vec::new();
     // One measure of all laws: by joint the residual of the first.
     let sigma: Vec<f64> =
         fitted.evaluation.mean_squares(&|_| true).iter().map(|s| s.sqrt().max(1e-12)).collect();
-    let free = work.free(&laws);
     let mut folds = work.held_out(&free, &fitted, &sigma);
     if settings.choice == Choice::HeldOut {
         loop {
@@ -483,7 +476,7 @@ impl Work<'_> {
         let fit_of = |work: &mut Self, known: &ServoValues| -> Result<Fitted, ServoError> {
             let start = work.start(known, plain)?;
             let begin = work.begin(&start.values, &with, None);
-            Ok(work.refit(&free, &begin, work.scheme, &short)?)
+            Ok(work.first_fit(&free, begin, &short)?)
         };
         let mut best = fit_of(self, known)?;
         let mut out = Vec::new();
@@ -536,6 +529,18 @@ impl Work<'_> {
         let fitted = fit(&self.problem(free, scheme), start, settings, &|_| true)?;
         self.evaluations += fitted.evaluations;
         Ok(fitted)
+    }
+
+    /// A fit from a linear start; where signs or units are wrong that is no start, and one that is stable takes its place.
+    fn first_fit(
+        &mut self,
+        free: &[Free],
+        begin: ServoValues,
+        settings: &GaussNewton,
+    ) -> Result<Fitted, Lost> {
+        let scheme = self.scheme;
+        self.refit(free, &begin, scheme, settings)
+            .or_else(|_| self.refit(free, &tame(begin, free), scheme, settings))
     }
 
     /// The fold that a block belongs to: whole logs where there are enough, else thirds of the time.

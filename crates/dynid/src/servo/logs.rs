@@ -1,7 +1,7 @@
 //! Logs of commands and positions from files.
 
-use dynid_io::MappingSpec;
 use dynid_io::columns::{ColumnNames, EffortColumn, FullSignal, SignalSpec};
+use dynid_io::{MappingSpec, Signals};
 use dynid_servo::ServoLog;
 
 use super::ServoFault;
@@ -67,14 +67,14 @@ pub(super) fn read(config: &ServoConfig, log: &ServoLogConfig, robot: &Robot) ->
     let (measured, input) = logs::positions(&own, &axes, &without_effort(columns))?;
     let not_logged = measured.not_logged.clone();
     let logged: Vec<LogAxis> = axes.iter().filter(|a| !not_logged.contains(&a.name)).cloned().collect();
-    let with = |spec: SignalSpec| -> Result<Vec<Vec<f64>>, Error> {
-        let columns = MappingSpec { position: Some(spec), velocity: None, ..without_effort(columns) };
-        let (read, _) = logs::positions(&own, &logged, &columns)?;
+    // Every joint that has positions has a command: signals are read as what they are, an effort is no position that may be far.
+    let with = |columns: MappingSpec, axes: &[LogAxis]| -> Result<Signals, Error> {
+        let (read, _) = logs::positions(&own, axes, &MappingSpec { allow_unlogged: false, ..columns })?;
         if read.time.len() != measured.time.len() {
             let (commands, positions) = (read.time.len(), measured.time.len());
             return Err(ServoFault::Rows { file: file.clone(), commands, positions }.into());
         }
-        Ok(read.position)
+        Ok(read)
     };
     let CommandColumns { position, velocity, effort } = &config.command;
     let names: Vec<&str> = logged.iter().map(|a| a.name.as_str()).collect();
@@ -83,9 +83,21 @@ pub(super) fn read(config: &ServoConfig, log: &ServoLogConfig, robot: &Robot) ->
         None => guess(&plain, columns, &names)?
             .ok_or_else(|| ServoFault::NoCommand { file: file.clone(), joint: names.join(", ") })?,
     };
-    let command = with(position)?;
-    let velocity = velocity.clone().map(&with).transpose()?.unwrap_or_default();
-    let effort = effort.clone().map(&with).transpose()?.unwrap_or_default();
+    let plain_columns = without_effort(columns);
+    let told = MappingSpec { position: Some(position), velocity: None, ..plain_columns.clone() };
+    let command = with(told, &logged)?.position;
+    let mut velocities = Vec::new();
+    if velocity.is_some() {
+        let told = MappingSpec { velocity: velocity.clone(), ..plain_columns.clone() };
+        velocities = with(told, &logged)?.velocity.unwrap_or_default();
+    }
+    let mut efforts = Vec::new();
+    if effort.is_some() {
+        let driven: Vec<LogAxis> =
+            logged.iter().map(|a| LogAxis { effort: EffortColumn::Drive, ..a.clone() }).collect();
+        let told = MappingSpec { effort: effort.clone(), allow_no_effort: false, ..plain_columns };
+        efforts = with(told, &driven)?.effort.unwrap_or_default();
+    }
     let positions = &measured.position;
     for ((name, u), x) in names.iter().zip(&command).zip(positions) {
         let (told, done) = (spread(u), spread(x));
@@ -110,8 +122,8 @@ pub(super) fn read(config: &ServoConfig, log: &ServoLogConfig, robot: &Robot) ->
     let picked = |all: &[Vec<f64>]| all.iter().map(|v| pick(v)).collect::<Vec<_>>();
     let label = log.path.file_name().map_or_else(|| file.clone(), |n| n.to_string_lossy().into_owned());
     let mut out = ServoLog::new(label, pick(&measured.time), picked(&command), picked(positions));
-    out.velocity_command = picked(&velocity);
-    out.feed_forward = picked(&effort);
+    out.velocity_command = picked(&velocities);
+    out.feed_forward = picked(&efforts);
     let period = out.period();
     out.breaks = (1..out.rows()).filter(|k| out.time[*k] - out.time[k - 1] > GAP * period).collect();
     if !out.breaks.is_empty() {

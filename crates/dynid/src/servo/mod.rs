@@ -17,7 +17,7 @@ pub use record::{
 };
 
 use dynid_servo::fit::{Evaluation, ServoProblem, blocks};
-use dynid_servo::identify::{ServoError, ServoIdentification, identify};
+use dynid_servo::identify::{LEAST_ROWS, ServoError, ServoIdentification, identify};
 use dynid_servo::{Chain, ServoLog, ServoSettings, ServoValues, Term};
 
 use crate::estimate::InputRecord;
@@ -41,6 +41,14 @@ pub enum ServoFault {
     /// No column of commands.
     #[error("{file}: no columns of commanded positions for {joint}")]
     NoCommand {
+        /// Log.
+        file: String,
+        /// Joints.
+        joint: String,
+    },
+    /// A validation log without a joint that the others have.
+    #[error("{file}: no columns of positions for {joint}, which the logs of the identification have")]
+    NoPosition {
         /// Log.
         file: String,
         /// Joints.
@@ -90,6 +98,7 @@ impl Fault for ServoFault {
                     .to_owned()
             }
             ServoFault::Rows { .. } => "give commands and positions on the same rows, or `missing = \"drop\"`".to_owned(),
+            ServoFault::NoPosition { .. } => "leave the log out, or lock the joint: `lock = { JOINT = 0.0 }`".to_owned(),
             ServoFault::NoJoint { .. } => "name the columns of positions: `[columns]` with `position`".to_owned(),
             ServoFault::Fit(ServoError::Lost(_)) => {
                 "check signs and units: state `direction`, `position_gain` and `velocity_gain` in `[servo]`".to_owned()
@@ -162,6 +171,16 @@ pub fn identify_servo(
         training = read(&config.log, &robot)?;
     }
     let validation = read(&config.validation, &robot)?;
+    for (log, config) in validation.iter().zip(&config.validation) {
+        if !log.not_logged.is_empty() {
+            let (file, joint) = (config.path.display().to_string(), log.not_logged.join(", "));
+            return Err(ServoFault::NoPosition { file, joint }.into());
+        }
+        if log.log.rows() < LEAST_ROWS {
+            let (log, found) = (log.log.name.clone(), log.log.rows());
+            return Err(ServoFault::Fit(ServoError::Short { log, expected: LEAST_ROWS, found }).into());
+        }
+    }
     for log in training.iter().chain(&validation) {
         warnings.extend(log.warnings.iter().cloned());
         inputs.extend(log.inputs.iter().cloned());

@@ -194,6 +194,20 @@ fn bad_logs_are_refused_with_what_to_write() {
     assert!(short.contains("at least 50 rows, found 29"), "{short}");
     let gone = run("gone.csv");
     assert!(gone.contains("gone.csv"), "{gone}");
+    // A command for one joint alone, and a validation log without a joint.
+    let refused = |text: &str| identify_servo(&config(&folder, text), &mut |_| {}).unwrap_err().to_string();
+    let one = refused(
+        "robot = \"arm.urdf\"\n[command]\nposition = { lift = \"cmd_lift\" }\n[[log]]\npath = \"a.csv\"\n",
+    );
+    assert!(one.contains("elbow"), "{one}");
+    write("half.csv", &plain.replacen("q_elbow", "other", 1));
+    let half =
+        refused("robot = \"arm.urdf\"\n[[log]]\npath = \"a.csv\"\n[[validation]]\npath = \"half.csv\"\n");
+    assert!(half.contains("half.csv") && half.contains("elbow"), "{half}");
+    let nothing = refused(
+        "robot = \"arm.urdf\"\n[[log]]\npath = \"a.csv\"\n[[validation]]\npath = \"b.csv\"\npart = [0.5, 0.51]\n",
+    );
+    assert!(nothing.contains("at least 50 rows"), "{nothing}");
     let text = format!("{PLAIN}position_gain = {{ wrist = 3.0 }}\n");
     let unknown = identify_servo(&config(&folder, &text), &mut |_| {}).unwrap_err().to_string();
     assert!(unknown.contains("wrist"), "{unknown}");
@@ -225,6 +239,25 @@ fn what_is_no_answer_fails() {
         // A page is made all the same.
         assert!(found.report(&file).unwrap().contains("</html>"));
     }
+}
+
+#[test]
+fn efforts_that_are_fed_forward_are_efforts() {
+    // 40 N m beside limits of 3 rad: no position that looks like degrees.
+    let folder = folder();
+    let plain = std::fs::read_to_string(folder.path().join("a.csv")).unwrap();
+    let more: String = plain
+        .lines()
+        .enumerate()
+        .map(|(k, l)| format!("{l},{}\n", if k == 0 { "f1,f2" } else { "40,0" }))
+        .collect();
+    std::fs::write(folder.path().join("fed.csv"), more).unwrap();
+    let text = "robot = \"arm.urdf\"\n[command]\neffort = { lift = \"f1\", elbow = \"f2\" }\n[[log]]\npath = \"fed.csv\"\n\
+        [servo]\nvelocity_gain = 1.0\nlaw = [\"offset\"]\n";
+    let found = identify_servo(&config(&folder, text), &mut |_| {}).unwrap();
+    // A constant effort is an offset that the log takes back.
+    let offset = found.found.values.joints[0].get(Term::Offset);
+    assert!((offset - 40.2).abs() < 0.1, "{offset}");
 }
 
 #[test]
