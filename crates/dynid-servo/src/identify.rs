@@ -8,15 +8,15 @@
 //!    other gains ([`Spread`]). Where the model is wrong these decide.
 //! 5. Verdicts and groups of parameters that only act together.
 
+mod result;
+mod verdict;
+
 use std::collections::BTreeSet;
 
 use dynid_model::Mechanism;
-use dynid_motion::signal::SignalError;
 
 use crate::chain::Chain;
-use crate::fit::{
-    Block, Deviations, Ending, Evaluation, Fitted, GaussNewton, Place, ServoProblem, blocks, deviations, fit,
-};
+use crate::fit::{Block, Evaluation, Fitted, GaussNewton, ServoProblem, blocks, deviations, fit};
 use crate::free::{Free, ServoValues};
 use crate::joint::Scheme;
 use crate::log::ServoLog;
@@ -24,6 +24,11 @@ use crate::rollout::Lost;
 use crate::settings::{Addition, Choice, ServoSettings, Shared};
 use crate::start::{StartSettings, linear_start};
 use crate::term::Term;
+pub use result::{
+    AdditionTrial, DirectionTrial, GroupKind, HorizonError, ServoError, ServoGroup, ServoIdentification,
+    ServoParameter, ServoVerdict, Spread, TOLD_DIRECTION,
+};
+use verdict::{groups, parameters};
 
 /// Folds of the logs that additions are judged on.
 const FOLDS: usize = 3;
@@ -49,209 +54,11 @@ const OF_FOLDS: GaussNewton = GaussNewton { evaluations: 4, tolerance: 1e-3, rew
 /// Residual over the encoder's rounding from which the model counts as wrong.
 pub const MISFIT: f64 = 1.3;
 
-/// Why there is no identification.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ServoError {
-    /// A log that cannot be filtered.
-    #[error("{log}: {source}")]
-    Signal {
-        /// Name of the log.
-        log: String,
-        /// Why.
-        source: SignalError,
-    },
-    /// The simulation got lost.
-    #[error(transparent)]
-    Lost(#[from] Lost),
-    /// Logs, settings and robot do not have the same joints.
-    #[error("{what}: expected {expected} joints, found {found}")]
-    Joints {
-        /// What has the wrong number.
-        what: String,
-        /// Joints of the robot.
-        expected: usize,
-        /// Joints found.
-        found: usize,
-    },
-    /// Too few rows to say anything.
-    #[error("{log}: expected at least {expected} rows, found {found}")]
-    Short {
-        /// Name of the log.
-        log: String,
-        /// Least number.
-        expected: usize,
-        /// Rows.
-        found: usize,
-    },
-}
-
 /// Rows that a log needs at least.
 pub const LEAST_ROWS: usize = 50;
 
-/// What an estimate moves by when something is changed that should not matter.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Spread {
-    /// Largest change under laws that are richer by one of friction or offset.
-    pub law: f64,
-    /// Change under half the step.
-    pub step: f64,
-    /// Standard deviation over fits that each leave a fold of the logs out.
-    pub folds: f64,
-    /// Largest change under stated gains that are wrong by their error.
-    pub gain: f64,
-}
-
-/// What can be said of a parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum ServoVerdict {
-    /// The interval is narrow, and nothing that should not matter moves the value out of it.
-    Seen,
-    /// The interval is known and wide.
-    Coarse,
-    /// The value moves by more than its own interval with the law, the step, the fold or a stated gain.
-    Unstable,
-    /// What is known beforehand decides.
-    Prior,
-    /// The value stands at a bound, where it has no interval: the data would have it go on, which hints at a wrong model.
-    AtBound,
-    /// No reading depends on it, or so little that its interval holds 0.
-    NotSeen,
-}
-
-/// A parameter that was asked for.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ServoParameter {
-    /// What it is.
-    pub free: Free,
-    /// Value.
-    pub value: f64,
-    /// Half width of the 95 % interval with all spreads; `None`: there is none.
-    pub half_width: Option<f64>,
-    /// Standard deviation by the block jackknife.
-    pub std: Option<f64>,
-    /// Standard deviation by the model alone: right only if the model is.
-    pub model_std: Option<f64>,
-    /// What it moves by.
-    pub spread: Spread,
-    /// Value over the position gain of its joint and the half width of its interval, where the gain was found and both scale together.
-    pub per_gain: Option<(f64, f64)>,
-    /// Verdict.
-    pub verdict: ServoVerdict,
-}
-
-/// What makes some parameters act together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum GroupKind {
-    /// They share one scale: only bodies of known mass, a stated gain or a measured effort pin it.
-    Scale,
-    /// They are lags: content above 5 Hz parts them.
-    Lag,
-    /// Zero and constant effort: several postures part them.
-    Posture,
-    /// Parts of friction: more speeds and loads part them.
-    Friction,
-    /// Others.
-    Other,
-}
-
-/// Parameters that are known together only.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ServoGroup {
-    /// What makes them.
-    pub kind: GroupKind,
-    /// Places among the parameters.
-    pub members: Vec<usize>,
-}
-
-/// An addition and what held-out folds say to it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AdditionTrial {
-    /// Laws that it was added to.
-    pub beside: Vec<Addition>,
-    /// The addition.
-    pub addition: Addition,
-    /// Held-out error over that without it, per fold; `NaN`: the simulation got lost; empty: it gains nothing on the logs that it is
-    /// fitted to, or another was taken before.
-    pub ratios: Vec<f64>,
-    /// Whether it was taken.
-    pub taken: bool,
-}
-
-/// A direction that was looked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DirectionTrial {
-    /// Joint.
-    pub joint: usize,
-    /// Direction in use.
-    pub direction: f64,
-    /// RMS with the other direction, fitted anew with zeros free, over that with this one; below [`TOLD_DIRECTION`] the logs do not tell it.
-    pub other: f64,
-}
-
-/// RMS with the other direction over that with the chosen one from which a direction is told.
-pub const TOLD_DIRECTION: f64 = 1.02;
-
 /// Sweeps over the joints whose directions are looked for.
 const SWEEPS: usize = 3;
-
-/// Error of rollouts that begin from measured states again and again.
-#[derive(Debug, Clone, PartialEq)]
-pub struct HorizonError {
-    /// Time after which a rollout begins anew, s; infinite: never.
-    pub horizon_s: f64,
-    /// RMS of every joint.
-    pub rms: Vec<f64>,
-}
-
-/// An identification.
-#[derive(Debug, Clone)]
-pub struct ServoIdentification {
-    /// Chains of the robot.
-    pub chains: Vec<Chain>,
-    /// All numbers.
-    pub values: ServoValues,
-    /// Parameters that were asked for.
-    pub parameters: Vec<ServoParameter>,
-    /// Groups of parameters that only act together.
-    pub groups: Vec<ServoGroup>,
-    /// What was added to the plain law.
-    pub additions: Vec<Addition>,
-    /// Additions that were tried.
-    pub trials: Vec<AdditionTrial>,
-    /// Directions that were looked for.
-    pub directions: Vec<DirectionTrial>,
-    /// How the simulation was done.
-    pub scheme: Scheme,
-    /// RMS residual of every joint over all logs, whole rollouts.
-    pub rms: Vec<f64>,
-    /// The same by log.
-    pub rms_by_log: Vec<Vec<f64>>,
-    /// RMS of the command less the position.
-    pub command_rms: Vec<f64>,
-    /// Standard deviation of every encoder's rounding.
-    pub floor: Vec<f64>,
-    /// Residual over floor of every joint, the median over joints whose encoder's step is known: above [`MISFIT`] the model is wrong
-    /// somewhere; `NaN`: no step is known, and the model counts as wrong.
-    pub misfit: f64,
-    /// RMS by which half the step moves the simulation, over the residual's.
-    pub step_share: f64,
-    /// Errors over horizons.
-    pub horizons: Vec<HorizonError>,
-    /// Relative residual of the linear start, by joint.
-    pub start_residual: Vec<f64>,
-    /// The linear start.
-    pub start: ServoValues,
-    /// How the last fit ended.
-    pub ending: Ending,
-    /// Accepted steps of it.
-    pub iterations: usize,
-    /// Simulations of all logs, all fits together.
-    pub evaluations: usize,
-    /// Steps whose friction did not settle, and all steps, of one simulation of all logs.
-    pub unsettled: (usize, usize),
-    /// Blocks of the jackknife.
-    pub blocks: usize,
-}
 
 /// Identifies a robot on a fixed base from commands and positions.
 ///
@@ -868,128 +675,4 @@ fn command_rms(logs: &[ServoLog], joints: usize) -> Vec<f64> {
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
-fn parameters(
-    free: &[Free],
-    fitted: &Fitted,
-    found: &Deviations,
-    spreads: &[Spread],
-    settings: &ServoSettings,
-    logs: &[ServoLog],
-) -> Vec<ServoParameter> {
-    let period = logs.iter().map(ServoLog::period).fold(f64::INFINITY, f64::min);
-    let one = |k: usize| {
-        let (f, value, spread) = (&free[k], fitted.estimate[k], spreads[k]);
-        let t = found.quantile[k];
-        let std = found.jackknife[k];
-        let half_width = std.map(|sd| {
-            // The step's error is of first order: half of it is what half the step takes away.
-            let parts = [t * sd, spread.law, 2.0 * spread.step, t * spread.folds, spread.gain];
-            // Folds and jackknife measure the same thing: the larger counts.
-            let own = parts[0].max(parts[3]);
-            (own * own + parts[1].powi(2) + parts[2].powi(2) + parts[4].powi(2)).sqrt()
-        });
-        let joint = f.joints().first().map(|j| &fitted.values.joints[*j]);
-        let scale = match (f.as_term(), joint) {
-            (Some(Term::Zero), _) => 10.0 / 3.0 * settings.zero_std,
-            (Some(Term::Delay | Term::SmoothingTime), _) => value.abs().max(period),
-            (Some(Term::Offset), Some(joint)) => value.abs().max(joint.get(Term::Coulomb)),
-            _ => value.abs(),
-        };
-        let of_prior = f.prior.is_some_and(|(_, sd)| found.model[k].is_none_or(|m| m > sd / 3.0));
-        let verdict = match (fitted.places[k], half_width, std) {
-            (Place::AtLower | Place::AtUpper, ..) => ServoVerdict::AtBound,
-            (Place::Unseen, ..) => ServoVerdict::NotSeen,
-            _ if of_prior => ServoVerdict::Prior,
-            (Place::Inside, Some(half), Some(sd)) => {
-                let moved = [spread.law, spread.step, spread.folds, spread.gain];
-                if moved.iter().any(|s| *s > t * sd) {
-                    ServoVerdict::Unstable
-                } else if half <= 0.1 * scale {
-                    ServoVerdict::Seen
-                } else if half >= scale {
-                    ServoVerdict::NotSeen
-                } else {
-                    ServoVerdict::Coarse
-                }
-            }
-            _ => ServoVerdict::NotSeen,
-        };
-        ServoParameter {
-            free: f.clone(),
-            value,
-            half_width: half_width.filter(|_| verdict != ServoVerdict::Prior),
-            std,
-            model_std: found.model[k],
-            spread,
-            per_gain: per_gain(free, fitted, found, k, t),
-            verdict,
-        }
-    };
-    (0..free.len()).map(one).collect()
-}
-
-/// A parameter over the position gain that it scales with, and the half width of that.
-fn per_gain(free: &[Free], fitted: &Fitted, found: &Deviations, k: usize, t: f64) -> Option<(f64, f64)> {
-    let term = free[k].as_term()?;
-    if !term.scales_with_effort() || term == Term::PositionGain || found.covariance.nrows() == 0 {
-        return None;
-    }
-    let joint = *free[k].joints().first()?;
-    let is_gain = |f: &Free| f.as_term() == Some(Term::PositionGain) && f.joints().contains(&joint);
-    let gain = free.iter().position(is_gain)?;
-    let at = |k: usize| found.inside.iter().position(|i| *i == k);
-    let (a, b) = (at(k)?, at(gain)?);
-    let (value, kp) = (fitted.estimate[k], fitted.estimate[gain]);
-    let c = &found.covariance;
-    let ratio = value / kp;
-    let variance = (c[(a, a)] - 2.0 * ratio * c[(a, b)] + ratio * ratio * c[(b, b)]) / (kp * kp);
-    Some((ratio, t * variance.max(0.0).sqrt()))
-}
-
-/// Correlation from which parameters count as one.
-const TOGETHER: f64 = 0.9;
-
-fn groups(free: &[Free], found: &Deviations) -> Vec<ServoGroup> {
-    let m = found.inside.len();
-    let mut group: Vec<usize> = (0..m).collect();
-    for i in 0..m {
-        for j in 0..i {
-            if found.correlation[(i, j)].abs() > TOGETHER && group[i] != group[j] {
-                let (from, to) = (group[i].max(group[j]), group[i].min(group[j]));
-                group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
-            }
-        }
-    }
-    let mut out = Vec::new();
-    for g in 0..m {
-        let members: Vec<usize> = (0..m).filter(|i| group[*i] == g).map(|i| found.inside[i]).collect();
-        if members.len() < 2 {
-            continue;
-        }
-        let terms: Vec<Term> = members.iter().filter_map(|k| free[*k].as_term()).collect();
-        let all = |of: &[Term]| terms.iter().all(|t| of.contains(t));
-        let kind = match () {
-            () if terms.contains(&Term::PositionGain) => GroupKind::Scale,
-            () if all(&[Term::Delay, Term::RotorInertia, Term::SmoothingTime, Term::Viscous]) => {
-                GroupKind::Lag
-            }
-            () if all(&[Term::Zero, Term::Offset]) => GroupKind::Posture,
-            () if all(&[
-                Term::Coulomb,
-                Term::Stiction,
-                Term::StribeckVelocity,
-                Term::LoadFriction,
-                Term::Viscous,
-                Term::Offset,
-            ]) =>
-            {
-                GroupKind::Friction
-            }
-            () => GroupKind::Other,
-        };
-        out.push(ServoGroup { kind, members });
-    }
-    out
 }

@@ -1,0 +1,208 @@
+//! What an identification is made of.
+
+use dynid_motion::signal::SignalError;
+
+use crate::chain::Chain;
+use crate::fit::Ending;
+use crate::free::{Free, ServoValues};
+use crate::joint::Scheme;
+use crate::rollout::Lost;
+use crate::settings::Addition;
+
+/// Why there is no identification.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ServoError {
+    /// A log that cannot be filtered.
+    #[error("{log}: {source}")]
+    Signal {
+        /// Name of the log.
+        log: String,
+        /// Why.
+        source: SignalError,
+    },
+    /// The simulation got lost.
+    #[error(transparent)]
+    Lost(#[from] Lost),
+    /// Logs, settings and robot do not have the same joints.
+    #[error("{what}: expected {expected} joints, found {found}")]
+    Joints {
+        /// What has the wrong number.
+        what: String,
+        /// Joints of the robot.
+        expected: usize,
+        /// Joints found.
+        found: usize,
+    },
+    /// Too few rows to say anything.
+    #[error("{log}: expected at least {expected} rows, found {found}")]
+    Short {
+        /// Name of the log.
+        log: String,
+        /// Least number.
+        expected: usize,
+        /// Rows.
+        found: usize,
+    },
+}
+
+/// What an estimate moves by when something is changed that should not matter.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Spread {
+    /// Largest change under laws that are richer by one of friction or offset.
+    pub law: f64,
+    /// Change under half the step.
+    pub step: f64,
+    /// Standard deviation over fits that each leave a fold of the logs out.
+    pub folds: f64,
+    /// Largest change under stated gains that are wrong by their error.
+    pub gain: f64,
+}
+
+/// What can be said of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ServoVerdict {
+    /// The interval is narrow, and nothing that should not matter moves the value out of it.
+    Seen,
+    /// The interval is known and wide.
+    Coarse,
+    /// The value moves by more than its own interval with the law, the step, the fold or a stated gain.
+    Unstable,
+    /// What is known beforehand decides.
+    Prior,
+    /// The value stands at a bound, where it has no interval: the data would have it go on, which hints at a wrong model.
+    AtBound,
+    /// No reading depends on it, or so little that its interval holds 0.
+    NotSeen,
+}
+
+/// A parameter that was asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ServoParameter {
+    /// What it is.
+    pub free: Free,
+    /// Value.
+    pub value: f64,
+    /// Half width of the 95 % interval with all spreads; `None`: there is none.
+    pub half_width: Option<f64>,
+    /// Standard deviation by the block jackknife.
+    pub std: Option<f64>,
+    /// Standard deviation by the model alone: right only if the model is.
+    pub model_std: Option<f64>,
+    /// What it moves by.
+    pub spread: Spread,
+    /// Value over the position gain of its joint and the half width of its interval, where the gain was found and both scale together.
+    pub per_gain: Option<(f64, f64)>,
+    /// Verdict.
+    pub verdict: ServoVerdict,
+}
+
+/// What makes some parameters act together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GroupKind {
+    /// They share one scale: only bodies of known mass, a stated gain or a measured effort pin it.
+    Scale,
+    /// They are lags: content above 5 Hz parts them.
+    Lag,
+    /// Zero and constant effort: several postures part them.
+    Posture,
+    /// Parts of friction: more speeds and loads part them.
+    Friction,
+    /// Others.
+    Other,
+}
+
+/// Parameters that are known together only.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ServoGroup {
+    /// What makes them.
+    pub kind: GroupKind,
+    /// Places among the parameters.
+    pub members: Vec<usize>,
+}
+
+/// An addition and what held-out folds say to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AdditionTrial {
+    /// Laws that it was added to.
+    pub beside: Vec<Addition>,
+    /// The addition.
+    pub addition: Addition,
+    /// Held-out error over that without it, per fold; `NaN`: the simulation got lost; empty: it gains nothing on the logs that it is
+    /// fitted to, or another was taken before.
+    pub ratios: Vec<f64>,
+    /// Whether it was taken.
+    pub taken: bool,
+}
+
+/// A direction that was looked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DirectionTrial {
+    /// Joint.
+    pub joint: usize,
+    /// Direction in use.
+    pub direction: f64,
+    /// RMS with the other direction, fitted anew with zeros free, over that with this one; below [`TOLD_DIRECTION`] the logs do not tell it.
+    pub other: f64,
+}
+
+/// RMS with the other direction over that with the chosen one from which a direction is told.
+pub const TOLD_DIRECTION: f64 = 1.02;
+
+/// Error of rollouts that begin from measured states again and again.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HorizonError {
+    /// Time after which a rollout begins anew, s; infinite: never.
+    pub horizon_s: f64,
+    /// RMS of every joint.
+    pub rms: Vec<f64>,
+}
+
+/// An identification.
+#[derive(Debug, Clone)]
+pub struct ServoIdentification {
+    /// Chains of the robot.
+    pub chains: Vec<Chain>,
+    /// All numbers.
+    pub values: ServoValues,
+    /// Parameters that were asked for.
+    pub parameters: Vec<ServoParameter>,
+    /// Groups of parameters that only act together.
+    pub groups: Vec<ServoGroup>,
+    /// What was added to the plain law.
+    pub additions: Vec<Addition>,
+    /// Additions that were tried.
+    pub trials: Vec<AdditionTrial>,
+    /// Directions that were looked for.
+    pub directions: Vec<DirectionTrial>,
+    /// How the simulation was done.
+    pub scheme: Scheme,
+    /// RMS residual of every joint over all logs, whole rollouts.
+    pub rms: Vec<f64>,
+    /// The same by log.
+    pub rms_by_log: Vec<Vec<f64>>,
+    /// RMS of the command less the position.
+    pub command_rms: Vec<f64>,
+    /// Standard deviation of every encoder's rounding.
+    pub floor: Vec<f64>,
+    /// Residual over floor of every joint, the median over joints whose encoder's step is known: above [`MISFIT`](super::MISFIT) the model is wrong
+    /// somewhere; `NaN`: no step is known, and the model counts as wrong.
+    pub misfit: f64,
+    /// RMS by which half the step moves the simulation, over the residual's.
+    pub step_share: f64,
+    /// Errors over horizons.
+    pub horizons: Vec<HorizonError>,
+    /// Relative residual of the linear start, by joint.
+    pub start_residual: Vec<f64>,
+    /// The linear start.
+    pub start: ServoValues,
+    /// How the last fit ended.
+    pub ending: Ending,
+    /// Accepted steps of it.
+    pub iterations: usize,
+    /// Simulations of all logs, all fits together.
+    pub evaluations: usize,
+    /// Steps whose friction did not settle, and all steps, of one simulation of all logs.
+    pub unsettled: (usize, usize),
+    /// Blocks of the jackknife.
+    pub blocks: usize,
+}

@@ -1,0 +1,134 @@
+//! Intervals, verdicts, and what is known together only.
+
+use super::result::{GroupKind, ServoGroup, ServoParameter, ServoVerdict, Spread};
+use crate::fit::{Deviations, Fitted, Place};
+use crate::free::Free;
+use crate::log::ServoLog;
+use crate::settings::ServoSettings;
+use crate::term::Term;
+
+/// Parameters with intervals and verdicts.
+pub(super) fn parameters(
+    free: &[Free],
+    fitted: &Fitted,
+    found: &Deviations,
+    spreads: &[Spread],
+    settings: &ServoSettings,
+    logs: &[ServoLog],
+) -> Vec<ServoParameter> {
+    let period = logs.iter().map(ServoLog::period).fold(f64::INFINITY, f64::min);
+    let one = |k: usize| {
+        let (f, value, spread) = (&free[k], fitted.estimate[k], spreads[k]);
+        let t = found.quantile[k];
+        let std = found.jackknife[k];
+        let half_width = std.map(|sd| {
+            // The step's error is of first order: half of it is what half the step takes away.
+            let parts = [t * sd, spread.law, 2.0 * spread.step, t * spread.folds, spread.gain];
+            // Folds and jackknife measure the same thing: the larger counts.
+            let own = parts[0].max(parts[3]);
+            (own * own + parts[1].powi(2) + parts[2].powi(2) + parts[4].powi(2)).sqrt()
+        });
+        let joint = f.joints().first().map(|j| &fitted.values.joints[*j]);
+        let scale = match (f.as_term(), joint) {
+            (Some(Term::Zero), _) => 10.0 / 3.0 * settings.zero_std,
+            (Some(Term::Delay | Term::SmoothingTime), _) => value.abs().max(period),
+            (Some(Term::Offset), Some(joint)) => value.abs().max(joint.get(Term::Coulomb)),
+            _ => value.abs(),
+        };
+        let of_prior = f.prior.is_some_and(|(_, sd)| found.model[k].is_none_or(|m| m > sd / 3.0));
+        let verdict = match (fitted.places[k], half_width, std) {
+            (Place::AtLower | Place::AtUpper, ..) => ServoVerdict::AtBound,
+            (Place::Unseen, ..) => ServoVerdict::NotSeen,
+            _ if of_prior => ServoVerdict::Prior,
+            (Place::Inside, Some(half), Some(sd)) => {
+                let moved = [spread.law, spread.step, spread.folds, spread.gain];
+                if moved.iter().any(|s| *s > t * sd) {
+                    ServoVerdict::Unstable
+                } else if half <= 0.1 * scale {
+                    ServoVerdict::Seen
+                } else if half >= scale {
+                    ServoVerdict::NotSeen
+                } else {
+                    ServoVerdict::Coarse
+                }
+            }
+            _ => ServoVerdict::NotSeen,
+        };
+        ServoParameter {
+            free: f.clone(),
+            value,
+            half_width: half_width.filter(|_| verdict != ServoVerdict::Prior),
+            std,
+            model_std: found.model[k],
+            spread,
+            per_gain: per_gain(free, fitted, found, k, t),
+            verdict,
+        }
+    };
+    (0..free.len()).map(one).collect()
+}
+
+/// A parameter over the position gain that it scales with, and the half width of that.
+fn per_gain(free: &[Free], fitted: &Fitted, found: &Deviations, k: usize, t: f64) -> Option<(f64, f64)> {
+    let term = free[k].as_term()?;
+    if !term.scales_with_effort() || term == Term::PositionGain || found.covariance.nrows() == 0 {
+        return None;
+    }
+    let joint = *free[k].joints().first()?;
+    let is_gain = |f: &Free| f.as_term() == Some(Term::PositionGain) && f.joints().contains(&joint);
+    let gain = free.iter().position(is_gain)?;
+    let at = |k: usize| found.inside.iter().position(|i| *i == k);
+    let (a, b) = (at(k)?, at(gain)?);
+    let (value, kp) = (fitted.estimate[k], fitted.estimate[gain]);
+    let c = &found.covariance;
+    let ratio = value / kp;
+    let variance = (c[(a, a)] - 2.0 * ratio * c[(a, b)] + ratio * ratio * c[(b, b)]) / (kp * kp);
+    Some((ratio, t * variance.max(0.0).sqrt()))
+}
+
+/// Correlation from which parameters count as one.
+const TOGETHER: f64 = 0.9;
+
+/// Parameters whose estimates go together.
+pub(super) fn groups(free: &[Free], found: &Deviations) -> Vec<ServoGroup> {
+    let m = found.inside.len();
+    let mut group: Vec<usize> = (0..m).collect();
+    for i in 0..m {
+        for j in 0..i {
+            if found.correlation[(i, j)].abs() > TOGETHER && group[i] != group[j] {
+                let (from, to) = (group[i].max(group[j]), group[i].min(group[j]));
+                group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
+            }
+        }
+    }
+    let mut out = Vec::new();
+    for g in 0..m {
+        let members: Vec<usize> = (0..m).filter(|i| group[*i] == g).map(|i| found.inside[i]).collect();
+        if members.len() < 2 {
+            continue;
+        }
+        let terms: Vec<Term> = members.iter().filter_map(|k| free[*k].as_term()).collect();
+        let all = |of: &[Term]| terms.iter().all(|t| of.contains(t));
+        let kind = match () {
+            () if terms.contains(&Term::PositionGain) => GroupKind::Scale,
+            () if all(&[Term::Delay, Term::RotorInertia, Term::SmoothingTime, Term::Viscous]) => {
+                GroupKind::Lag
+            }
+            () if all(&[Term::Zero, Term::Offset]) => GroupKind::Posture,
+            () if all(&[
+                Term::Coulomb,
+                Term::Stiction,
+                Term::StribeckVelocity,
+                Term::LoadFriction,
+                Term::Viscous,
+                Term::Offset,
+            ]) =>
+            {
+                GroupKind::Friction
+            }
+            () => GroupKind::Other,
+        };
+        out.push(ServoGroup { kind, members });
+    }
+    out
+}
