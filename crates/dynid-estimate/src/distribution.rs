@@ -33,6 +33,12 @@ pub fn chi_squared_quantile(probability: f64, freedom: f64) -> Option<f64> {
     inside(probability).then(|| law.inverse_cdf(probability))
 }
 
+/// Probability that `χ²` with `freedom` degrees of freedom exceeds `value ≥ 0`.
+pub fn chi_squared_exceedance(value: f64, freedom: f64) -> Option<f64> {
+    let law = ChiSquared::new(freedom).ok()?;
+    (value >= 0.0).then(|| law.sf(value))
+}
+
 fn inside(probability: f64) -> bool {
     probability > 0.0 && probability < 1.0
 }
@@ -59,6 +65,7 @@ mod tests {
         check(f_quantile(0.99, 5.0, 100.0), 3.205871771423001);
         check(chi_squared_quantile(0.95, 20.0), 31.41043284423092);
         check(chi_squared_quantile(0.01, 10.0), 2.558212160187206);
+        check(chi_squared_exceedance(9.46976102972671, 1.0), 0.0020888658259136674);
     }
 
     #[test]

@@ -1,0 +1,210 @@
+//! Once up and once down the fleet at given variances: generalised least squares by QR, and every deviation.
+//!
+//! Rows of a log `y = R_ff (f + b + c + Γ u) + R_fβ β + e` know of its deviation `c ~ N(0, D_c)`, whose variance goes into
+//! `S = 1 + R_ff D_c R_ffᵀ`. Whitened by the Cholesky factor of `S` they hold the robot's parameters alone. The rows of all logs of a robot
+//! are split at `f` and whitened alike for its deviation `b`; what is left, of all robots, is an ordinary factor of the type's parameters
+//! `θ = (f, Γ, β)`. Nothing is inverted but `S ⪰ 1`, so columns that a log does not excite do no harm.
+//!
+//! Source: Lindley and Smith 1972, Harville 1977, Laird and Ware 1982.
+
+use dynid_linalg::triangular::{inverse, solve_lower_in_place};
+use dynid_linalg::{AsView, Mat, View};
+use rayon::prelude::*;
+
+use crate::data::FleetError;
+use crate::split::Splits;
+use crate::tree;
+use crate::triangle::{behind, corner, head, of_stacked, squares, times, triangle};
+use crate::variances::Variances;
+
+/// A pivot below this share of its column's norm says that no log tells the column.
+const EXCITED: f64 = 1e-10;
+
+/// The fleet at given variances.
+#[derive(Debug)]
+pub(crate) struct Sweep<'a> {
+    pub(crate) splits: &'a Splits,
+    pub(crate) variances: &'a Variances,
+    /// Per log: whitened rows `[f | β | z]`.
+    pub(crate) logs: Vec<Mat>,
+    /// Per robot: whitened rows `[f | Γ | β | z]`; empty without logs.
+    robots: Vec<Mat>,
+    /// Per robot with logs, by key: what it says of the type, `[[R, z], [0, ρ]]`.
+    pub(crate) factors: Vec<(u64, Mat)>,
+    /// `(f, Γ, β)`.
+    pub(crate) theta: Vec<f64>,
+    /// `(R_θᵀ R_θ)⁻¹`.
+    pub(crate) covariance: Mat,
+    /// Minus twice the restricted log likelihood, but for what no variance changes.
+    pub(crate) m2l: f64,
+}
+
+/// A deviation that is told in part by its prior.
+pub(crate) struct Deviation {
+    /// Mean.
+    pub(crate) mean: Vec<f64>,
+    /// `D - M_f D`: its covariance where the parameters above it are known.
+    pub(crate) given: Mat,
+    /// `M C Mᵀ`: what their own uncertainty adds.
+    pub(crate) added: Mat,
+}
+
+impl Deviation {
+    /// Variance of a coordinate.
+    pub(crate) fn variance(&self, k: usize) -> f64 {
+        self.given[(k, k)] + self.added[(k, k)]
+    }
+}
+
+/// What is known of a robot.
+pub(crate) struct RobotState {
+    /// Its deviation `b`.
+    pub(crate) deviation: Deviation,
+    /// `(f + b, Γ, β)`.
+    pub(crate) values: Vec<f64>,
+    /// Their covariance.
+    pub(crate) covariance: Mat,
+}
+
+impl<'a> Sweep<'a> {
+    /// # Errors
+    /// [`FleetError::NotExcited`], [`FleetError::Confounded`].
+    pub(crate) fn new(splits: &'a Splits, variances: &'a Variances, prior: Option<&Mat>) -> Result<Self, FleetError> {
+        let up = |(k, log): (usize, &crate::split::LogSplit)| whitened(&log.top, splits.q, &variances.of_log(k));
+        let (logs, of_logs): (Vec<Mat>, Vec<f64>) = splits.logs.par_iter().enumerate().map(up).unzip();
+        let robots: Vec<(Mat, Mat, f64)> =
+            (0..splits.by_robot.len()).into_par_iter().map(|r| robot(splits, variances, &logs, r)).collect();
+        let of_robots: f64 = robots.iter().map(|(_, _, logdet)| logdet).sum();
+        let (tops, mut factors): (Vec<Mat>, Vec<Mat>) = robots.into_iter().map(|(top, factor, _)| (top, factor)).unzip();
+        let factors: Vec<(u64, Mat)> =
+            splits.robots.iter().map(|(key, r)| (*key, std::mem::replace(&mut factors[*r], Mat::zeros(0, 0)))).collect();
+        let parts: Vec<(u64, &Mat)> = factors.iter().map(|(key, factor)| (*key, factor)).collect();
+        let width = splits.parameters() + 1;
+        let merged = tree::merge(&parts).unwrap_or_else(|| Mat::zeros(0, width));
+        let merged = prior.map_or_else(|| merged.clone(), |prior| triangle(&[prior.view(), merged.view()]));
+        let factor = head(&merged, width);
+        let p = width - 1;
+        check_excited(splits, &factor)?;
+        let r = Mat::from_fn(p, p, |i, j| factor[(i, j)]);
+        let root = inverse(&r);
+        let z: Vec<f64> = (0..p).map(|i| factor[(i, p)]).collect();
+        let theta = times(&root, &z);
+        let covariance = root.view() * root.transpose();
+        let logdet: f64 = (0..p).map(|i| 2.0 * factor[(i, i)].ln()).sum();
+        let m2l = of_logs.iter().sum::<f64>() + of_robots + logdet + squares([factor[(p, p)]]);
+        Ok(Sweep { splits, variances, logs, robots: tops, factors, theta, covariance, m2l })
+    }
+
+    /// What is known of a robot with logs.
+    pub(crate) fn robot(&self, r: usize) -> RobotState {
+        let p = self.theta.len();
+        let (deviation, map) =
+            deviation(self.robots[r].view(), self.splits.q, &self.variances.of_robot(r), &self.theta, &self.covariance);
+        let mut values = self.theta.clone();
+        values.iter_mut().zip(&deviation.mean).for_each(|(x, b)| *x += b);
+        // A C Aᵀ with A = 1 - E M, and the robot's own variance.
+        let q = self.splits.q;
+        let mut covariance = self.covariance.clone();
+        for i in 0..p {
+            for j in 0..q {
+                covariance[(j, i)] -= map[(j, i)];
+                covariance[(i, j)] -= map[(j, i)];
+            }
+        }
+        for i in 0..q {
+            for j in 0..q {
+                covariance[(i, j)] += deviation.added[(i, j)] + deviation.given[(i, j)];
+            }
+        }
+        RobotState { deviation, values, covariance }
+    }
+
+    /// The deviation of a log from its robot.
+    pub(crate) fn log(&self, k: usize, robot: &RobotState) -> Deviation {
+        let rows = self.splits.with_slopes(&self.logs[k], &self.splits.logs[k].covariates);
+        deviation(rows.view(), self.splits.q, &self.variances.of_log(k), &robot.values, &robot.covariance).0
+    }
+
+    /// Largest information on every coordinate that one robot has, and one log.
+    pub(crate) fn information(&self) -> (Vec<f64>, Vec<f64>) {
+        let largest = |rows: &[Mat]| {
+            let of = |k: usize| rows.iter().filter(|m| m.nrows() > 0).map(|m| m.col_squares(k)).fold(0.0, f64::max);
+            (0..self.splits.q).map(of).collect()
+        };
+        (largest(&self.robots), largest(&self.logs))
+    }
+}
+
+/// `C⁻¹ [R_ff ...]` with `S = 1 + R_ff D R_ffᵀ = C Cᵀ`, and `ln |S|`.
+pub(crate) fn whitened(top: &Mat, q: usize, variances: &[f64]) -> (Mat, f64) {
+    let scaled = Mat::from_fn(q, q, |i, j| top[(i, j)] * variances[j].sqrt());
+    let mut s = scaled.view() * scaled.transpose();
+    for i in 0..q {
+        s[(i, i)] += 1.0;
+    }
+    // At least the unit matrix: positive definite.
+    let Some(factor) = s.cholesky() else { unreachable!("1 + A Aᵀ of finite numbers") };
+    let mut rows = top.clone();
+    solve_lower_in_place(&factor.lower(), &mut rows);
+    let lower = factor.lower();
+    (rows, (0..q).map(|i| 2.0 * lower[(i, i)].ln()).sum())
+}
+
+/// Whitened rows of a robot, what it says of the type, and its share of the logarithm of the determinants.
+fn robot(splits: &Splits, variances: &Variances, logs: &[Mat], r: usize) -> (Mat, Mat, f64) {
+    let (q, p) = (splits.q, splits.parameters());
+    let of_robot = &splits.by_robot[r];
+    let Some(lower) = &splits.lower[r] else { return (Mat::zeros(0, p + 1), Mat::zeros(0, p + 1), 0.0) };
+    let mut stacked = Mat::zeros(of_robot.len() * q, p + 1);
+    for (at, k) in of_robot.iter().enumerate() {
+        stacked.set_rows(at * q, &splits.with_slopes(&logs[*k], &splits.logs[*k].covariates));
+    }
+    let all = of_stacked(stacked);
+    let (top, logdet) = whitened(&head(&all, q), q, &variances.of_robot(r));
+    let below = behind(&corner(&all, q, q), q);
+    let shared = behind(lower, p + 1 - lower.ncols());
+    let factor = triangle(&[top.view(), below.view(), shared.view()]);
+    (top, factor, logdet)
+}
+
+/// Posterior of a deviation with variances `D` from whitened rows `[f | ... | z]`, and `M C`.
+fn deviation(rows: View<'_>, q: usize, variances: &[f64], x: &[f64], covariance: &Mat) -> (Deviation, Mat) {
+    let p = x.len();
+    let columns = rows.columns(0..p);
+    let fitted = times(&columns, x);
+    let residual: Vec<f64> = (0..rows.nrows()).map(|i| rows[(i, p)] - fitted[i]).collect();
+    // K = D R_ffᵀ S⁻¹ of the rows before they were whitened.
+    let gain = Mat::from_fn(q, rows.nrows(), |i, j| variances[i] * rows[(j, i)]);
+    let mean = gain.times(&residual);
+    let m = gain.view() * columns;
+    let map = m.view() * covariance;
+    let added = map.view() * m.transpose();
+    let given = Mat::from_fn(q, q, |i, j| {
+        let own = if i == j { variances[i] } else { 0.0 };
+        own - 0.5 * (m[(i, j)] * variances[j] + m[(j, i)] * variances[i])
+    });
+    (Deviation { mean, given, added }, map)
+}
+
+/// Every column of the type has a pivot worth the name.
+fn check_excited(splits: &Splits, factor: &Mat) -> Result<(), FleetError> {
+    let slopes = splits.q * splits.covariates;
+    let (mut columns, mut confounded) = (Vec::new(), None);
+    for j in 0..splits.parameters() {
+        let norm = factor.col_norm(j);
+        if factor[(j, j)] > EXCITED * norm && norm.is_finite() && norm > 0.0 {
+            continue;
+        }
+        match j {
+            _ if j < splits.q => columns.push(splits.order[j]),
+            _ if j < splits.q + slopes => confounded = Some((j - splits.q) / splits.q),
+            _ => columns.push(splits.order[j - slopes]),
+        }
+    }
+    columns.sort_unstable();
+    match (columns.is_empty(), confounded) {
+        (false, _) => Err(FleetError::NotExcited { columns }),
+        (true, Some(covariate)) => Err(FleetError::Confounded { covariate }),
+        (true, None) => Ok(()),
+    }
+}

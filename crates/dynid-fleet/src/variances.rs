@@ -1,0 +1,261 @@
+//! Spread of parameters between robots and between logs of a robot: restricted maximum likelihood by EM.
+//!
+//! Source: Laird and Ware 1982 (EM), Varadhan and Roland 2008 (acceleration), Lange, Little and Taylor 1989 (Student's t).
+
+use dynid_linalg::Mat;
+use rayon::prelude::*;
+
+use crate::data::{Fleet, FleetError};
+use crate::split::Splits;
+use crate::sweep::Sweep;
+
+/// Weight of a coordinate that is left out of the spread: its own prior is this much weaker than the fleet's.
+pub const LEFT_OUT: f64 = 1e-6;
+/// Degrees of freedom of the prior of a variance that few robots or logs tell.
+const PRIOR_FREEDOM: f64 = 4.0;
+/// Largest change of the logarithm of a variance by one extrapolation.
+const LONGEST: f64 = 3.0;
+/// A variance below this share of the smallest estimation variance is no spread.
+const NO_SPREAD: f64 = 1e-4;
+
+/// Variances of the deviations, one entry per coordinate, and what single robots and logs make of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Variances {
+    /// Between robots, squared units of the coordinates; 0: none.
+    pub robots: Vec<f64>,
+    /// Between logs of a robot.
+    pub logs: Vec<f64>,
+    /// Per robot and coordinate: the variance of its prior is that of the fleet over this weight.
+    pub robot_weights: Vec<Vec<f64>>,
+    /// Per log and coordinate, alike.
+    pub log_weights: Vec<Vec<f64>>,
+}
+
+impl Variances {
+    /// The same variances for so many robots and logs.
+    pub fn new(robots: Vec<f64>, logs: Vec<f64>, number: (usize, usize)) -> Variances {
+        let q = robots.len();
+        let (robot_weights, log_weights) = (vec![vec![1.0; q]; number.0], vec![vec![1.0; q]; number.1]);
+        Variances { robots, logs, robot_weights, log_weights }
+    }
+
+    /// Variance of every coordinate of a robot.
+    pub(crate) fn of_robot(&self, robot: usize) -> Vec<f64> {
+        self.robots.iter().zip(&self.robot_weights[robot]).map(|(d, w)| d / w).collect()
+    }
+
+    /// Variance of every coordinate of a log.
+    pub(crate) fn of_log(&self, log: usize) -> Vec<f64> {
+        self.logs.iter().zip(&self.log_weights[log]).map(|(d, w)| d / w).collect()
+    }
+
+    /// Both, one behind the other.
+    fn joined(&self) -> Vec<f64> {
+        self.robots.iter().chain(&self.logs).copied().collect()
+    }
+
+    fn with(&self, joined: &[f64]) -> Variances {
+        let (robots, logs) = joined.split_at(self.robots.len());
+        Variances { robots: robots.to_vec(), logs: logs.to_vec(), ..self.clone() }
+    }
+}
+
+/// How variances are found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VarianceSettings {
+    /// Degrees of freedom of Student's t, coordinate by coordinate; `None`: normal deviations, weights as they are.
+    pub freedom: Option<f64>,
+    /// Largest change of the logarithm of a variance at the end.
+    pub tolerance: f64,
+    /// Most sweeps of the fleet.
+    pub passes: usize,
+    /// A variance that fewer robots or logs tell leans on its start and on the other coordinates of its kind.
+    pub few: usize,
+    /// Whether steps are extrapolated.
+    pub accelerated: bool,
+}
+
+impl Default for VarianceSettings {
+    fn default() -> Self {
+        VarianceSettings { freedom: None, tolerance: 5e-3, passes: 100, few: crate::data::FEW, accelerated: true }
+    }
+}
+
+/// Whether variances settled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settled {
+    /// Sweeps of the fleet.
+    pub passes: usize,
+    /// Largest change of the logarithm of a variance in the last one.
+    pub change: f64,
+    /// Whether that is below the tolerance.
+    pub converged: bool,
+}
+
+/// Second moments of the deviations of single robots and logs; empty for a robot without logs.
+pub(crate) struct Moments {
+    pub(crate) robots: Vec<Vec<f64>>,
+    pub(crate) logs: Vec<Vec<f64>>,
+}
+
+impl Moments {
+    pub(crate) fn of(sweep: &Sweep<'_>) -> Moments {
+        let splits = sweep.splits;
+        let q = splits.q;
+        let of = |r: usize| {
+            let of_robot = &splits.by_robot[r];
+            if of_robot.is_empty() {
+                return (Vec::new(), Vec::new());
+            }
+            let state = sweep.robot(r);
+            let second = |d: &crate::sweep::Deviation| (0..q).map(|k| d.mean[k].powi(2) + d.variance(k)).collect();
+            let logs: Vec<(usize, Vec<f64>)> = of_robot.iter().map(|k| (*k, second(&sweep.log(*k, &state)))).collect();
+            (second(&state.deviation), logs)
+        };
+        let found: Vec<(Vec<f64>, Vec<(usize, Vec<f64>)>)> = (0..splits.by_robot.len()).into_par_iter().map(of).collect();
+        let mut logs = vec![Vec::new(); splits.logs.len()];
+        let mut robots = Vec::new();
+        for (robot, own) in found {
+            robots.push(robot);
+            own.into_iter().for_each(|(k, moments)| logs[k] = moments);
+        }
+        Moments { robots, logs }
+    }
+}
+
+/// One step of EM.
+struct Maximisation<'a> {
+    fleet: &'a Fleet,
+    settings: &'a VarianceSettings,
+    /// Variances at the start, the scale of coordinates.
+    start: &'a Variances,
+}
+
+impl Maximisation<'_> {
+    /// Renews weights (with Student's t) and variances.
+    fn step(&self, now: &Variances, moments: &Moments) -> Variances {
+        let mut next = now.clone();
+        if let Some(freedom) = self.settings.freedom {
+            renew(&mut next.robot_weights, &moments.robots, &now.robots, freedom);
+            renew(&mut next.log_weights, &moments.logs, &now.logs, freedom);
+        }
+        next.robots = self.level(&now.robots, &self.start.robots, &moments.robots, &next.robot_weights);
+        next.logs = self.level(&now.logs, &self.start.logs, &moments.logs, &next.log_weights);
+        next
+    }
+
+    fn level(&self, now: &[f64], start: &[f64], moments: &[Vec<f64>], weights: &[Vec<f64>]) -> Vec<f64> {
+        let sum = |k: usize| {
+            let of_unit = |(unit, weight): (&Vec<f64>, &Vec<f64>)| {
+                unit.get(k).filter(|_| weight[k] > LEFT_OUT).map(|moment| weight[k] * moment / start[k])
+            };
+            moments.iter().zip(weights).filter_map(of_unit).fold((0.0, 0.0), |(sum, n), x| (sum + x, n + 1.0))
+        };
+        let varying = &self.fleet.varying;
+        let sums: Vec<(f64, f64)> = (0..now.len()).map(|k| if now[k] > 0.0 { sum(k) } else { (0.0, 0.0) }).collect();
+        let few = self.settings.few as f64;
+        let variance = |k: usize| {
+            let (mut total, mut count) = sums[k];
+            if count < few {
+                let alike = |i: &usize| varying[*i].kind == varying[k].kind;
+                let pooled = (0..now.len()).filter(alike).map(|i| sums[i]);
+                (total, count) = pooled.fold((0.0, 0.0), |(t, c), (sum, n)| (t + sum, c + n));
+            }
+            if count < few {
+                (total, count) = (total + PRIOR_FREEDOM, count + PRIOR_FREEDOM);
+            }
+            start[k] * total / count
+        };
+        (0..now.len()).map(|k| if now[k] > 0.0 { variance(k) } else { 0.0 }).collect()
+    }
+}
+
+/// `ω = (ν + 1)/(ν + E[b²]/D)`; what is left out stays so.
+fn renew(weights: &mut [Vec<f64>], moments: &[Vec<f64>], variances: &[f64], freedom: f64) {
+    for (own, moments) in weights.iter_mut().zip(moments) {
+        for ((weight, moment), variance) in own.iter_mut().zip(moments).zip(variances) {
+            if *variance > 0.0 && *weight > LEFT_OUT {
+                *weight = (freedom + 1.0) / (freedom + moment / variance);
+            }
+        }
+    }
+}
+
+/// Variances that maximise the restricted likelihood from where they are; those that are 0 stay so.
+///
+/// # Errors
+/// As [`Sweep::new`].
+pub(crate) fn maximise(
+    fleet: &Fleet,
+    splits: &Splits,
+    (start, from): (&Variances, Variances),
+    settings: &VarianceSettings,
+    prior: Option<&Mat>,
+) -> Result<(Variances, Settled), FleetError> {
+    let step = Maximisation { fleet, settings, start };
+    let mut now = from;
+    let mut passes = 0;
+    let mut change = f64::INFINITY;
+    // The last points of a run of plain steps, and the likelihood of the one before the last.
+    let mut run: Vec<Variances> = Vec::new();
+    let mut guard: Option<(f64, Variances)> = None;
+    while passes < settings.passes && change > settings.tolerance {
+        let sweep = Sweep::new(splits, &now, prior)?;
+        passes += 1;
+        if let Some((m2l, before)) = guard.take()
+            && settings.freedom.is_none()
+            && sweep.m2l > m2l
+        {
+            // The extrapolation went too far.
+            now = before;
+            continue;
+        }
+        let mut next = step.step(&now, &Moments::of(&sweep));
+        let (m2l, (robots, logs)) = (sweep.m2l, sweep.information());
+        none_where_unseen(&mut next.robots, &robots);
+        none_where_unseen(&mut next.logs, &logs);
+        change = largest_change(&now, &next);
+        run.push(now);
+        if settings.accelerated && run.len() == 2 && change > settings.tolerance {
+            let far = extrapolated(&run[0], &run[1], &next);
+            guard = Some((m2l, next));
+            run.clear();
+            now = far;
+        } else {
+            if run.len() == 2 {
+                run.clear();
+            }
+            now = next;
+        }
+    }
+    Ok((now, Settled { passes, change, converged: change <= settings.tolerance }))
+}
+
+fn none_where_unseen(variances: &mut [f64], information: &[f64]) {
+    for (variance, information) in variances.iter_mut().zip(information) {
+        if *variance * information < NO_SPREAD {
+            *variance = 0.0;
+        }
+    }
+}
+
+fn largest_change(before: &Variances, after: &Variances) -> f64 {
+    let change = |(a, b): (f64, f64)| if a > 0.0 && b > 0.0 { (b / a).ln().abs() } else { 0.0 };
+    before.joined().into_iter().zip(after.joined()).map(change).fold(0.0, f64::max)
+}
+
+/// One step of squared extrapolation in the logarithms, with the weights of the last point.
+fn extrapolated(first: &Variances, second: &Variances, third: &Variances) -> Variances {
+    let (a, b, c) = (first.joined(), second.joined(), third.joined());
+    let lives: Vec<bool> = (0..a.len()).map(|k| a[k] > 0.0 && b[k] > 0.0 && c[k] > 0.0).collect();
+    let difference = |x: &[f64], y: &[f64], k: usize| if lives[k] { (y[k] / x[k]).ln() } else { 0.0 };
+    let r: Vec<f64> = (0..a.len()).map(|k| difference(&a, &b, k)).collect();
+    let v: Vec<f64> = (0..a.len()).map(|k| difference(&b, &c, k) - r[k]).collect();
+    let (long, bent) = (crate::triangle::squares(r.iter().copied()), crate::triangle::squares(v.iter().copied()));
+    let alpha = if bent > 0.0 { (-(long / bent).sqrt()).clamp(-8.0, -1.0) } else { -1.0 };
+    let far = |k: usize| {
+        let moved = (-2.0 * alpha * r[k] + alpha * alpha * v[k]).clamp(-LONGEST, LONGEST);
+        if lives[k] { a[k] * moved.exp() } else { c[k] }
+    };
+    third.with(&(0..a.len()).map(far).collect::<Vec<_>>())
+}

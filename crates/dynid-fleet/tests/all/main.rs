@@ -1,0 +1,5 @@
+//! Tests of the crate.
+
+mod golden;
+mod simulated;
+mod studies;
