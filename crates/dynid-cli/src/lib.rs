@@ -35,6 +35,7 @@ fn run(command: &Command) -> Result<u8, Failure> {
         Command::Explain(args) => commands::explain::run(args),
         Command::Export(args) => commands::export::run(args),
         Command::Servo(args) => commands::servo::run(args),
+        Command::Fleet(args) => commands::fleet::run(args),
         Command::Friction(args) => commands::friction::run(args),
         Command::Gains(args) => commands::gains::run(args),
         Command::Identify(args) => commands::identify::run(args),

@@ -6,7 +6,7 @@ use dynid_linalg::Mat;
 use rayon::prelude::*;
 
 use crate::colour::colours;
-use crate::data::{FEW, Fleet, FleetError};
+use crate::data::{FEW, Fleet, FleetError, FleetLog};
 use crate::jackknife;
 use crate::noise::Noise;
 use crate::split::{Splits, means, places};
@@ -29,6 +29,8 @@ pub struct FitSettings {
     pub log_weight: f64,
     /// Rounds of variances and colour of the noise.
     pub rounds: usize,
+    /// Robots that tell the colour of the noise, where there are more: the median over their logs does not get better by many.
+    pub colour_robots: usize,
     /// How variances are found, but for the degrees of freedom.
     pub variances: VarianceSettings,
     /// Rows `[W y]` of what was known of the columns before any log, over one another: a weak prior where logs tell too little.
@@ -42,6 +44,7 @@ impl Default for FitSettings {
             robot_weight: 0.3,
             log_weight: 0.2,
             rounds: 3,
+            colour_robots: 96,
             variances: VarianceSettings::default(),
             prior: None,
         }
@@ -119,17 +122,19 @@ pub struct FleetFit {
 pub fn fit(fleet: &Fleet, settings: &FitSettings) -> Result<FleetFit, FleetError> {
     fleet.check()?;
     let mut noise = Noise::of(fleet);
-    let mut splits = Splits::new(fleet, &noise);
-    let prior = settings.prior.as_ref().map(|prior| in_order(&splits, prior));
-    let start = start(fleet, &splits, prior.as_ref())?;
     let heavy = VarianceSettings { freedom: Some(settings.freedom), ..settings.variances.clone() };
-    let mut robust = start.clone();
-    for _ in 0..settings.rounds {
-        (robust, _) = maximise(fleet, &splits, (&start, robust), &heavy, prior.as_ref())?;
-        noise.colours = colours(fleet, &noise, &Sweep::new(&splits, &robust, prior.as_ref())?);
-        splits = Splits::new(fleet, &noise);
-    }
-    (robust, _) = maximise(fleet, &splits, (&start, robust), &heavy, prior.as_ref())?;
+    let sample = sample(fleet, settings.colour_robots);
+    let (colours, from) = coloured(sample.as_ref().unwrap_or(fleet), settings, &heavy)?;
+    noise.colours = colours;
+    let splits = Splits::new(fleet, &noise);
+    let prior = settings.prior.as_ref().map(|prior| in_order(&splits, prior));
+    let number = (fleet.robots.len(), fleet.logs.len());
+    let start = Variances::new(from.start.robots.clone(), from.start.logs.clone(), number);
+    let robust = match sample {
+        None => from.robust,
+        Some(_) => Variances::new(from.robust.robots, from.robust.logs, number),
+    };
+    let (robust, _) = maximise(fleet, &splits, (&start, robust), &heavy, prior.as_ref())?;
     let few = splits.robots.len() < FEW;
     let without = Variances {
         robot_weights: named(&robust.robot_weights, if few { 0.0 } else { settings.robot_weight }),
@@ -139,6 +144,53 @@ pub fn fit(fleet: &Fleet, settings: &FitSettings) -> Result<FleetFit, FleetError
     let normal = VarianceSettings { freedom: None, ..settings.variances.clone() };
     let (variances, settled) = maximise(fleet, &splits, (&start, without), &normal, prior.as_ref())?;
     finish(fleet, Found { noise, splits, variances, robust, settled, prior }, settings.freedom)
+}
+
+/// Variances with which the colour of the noise was found.
+struct Coloured {
+    start: Variances,
+    robust: Variances,
+}
+
+/// Colour of the noise and variances by Student's t in turns.
+fn coloured(
+    fleet: &Fleet,
+    settings: &FitSettings,
+    heavy: &VarianceSettings,
+) -> Result<(Vec<f64>, Coloured), FleetError> {
+    let mut noise = Noise::of(fleet);
+    let mut splits = Splits::new(fleet, &noise);
+    let prior = settings.prior.as_ref().map(|prior| in_order(&splits, prior));
+    let start = start(fleet, &splits, prior.as_ref())?;
+    let mut robust = start.clone();
+    for round in 0..settings.rounds {
+        if round > 0 {
+            splits = Splits::new(fleet, &noise);
+        }
+        (robust, _) = maximise(fleet, &splits, (&start, robust), heavy, prior.as_ref())?;
+        noise.colours = colours(fleet, &noise, &Sweep::new(&splits, &robust, prior.as_ref())?);
+    }
+    Ok((noise.colours, Coloured { start, robust }))
+}
+
+/// Some robots of a fleet, evenly among the keys of those with logs; `None` if there are no more than these.
+fn sample(fleet: &Fleet, robots: usize) -> Option<Fleet> {
+    let by_robot = fleet.by_robot();
+    let mut all: Vec<usize> = (0..fleet.robots.len()).filter(|r| !by_robot[*r].is_empty()).collect();
+    if all.len() <= robots {
+        return None;
+    }
+    all.sort_unstable_by_key(|r| fleet.robots[*r]);
+    let taken: Vec<usize> = (0..robots).map(|k| all[k * all.len() / robots]).collect();
+    let renamed = |(at, r): (usize, &usize)| {
+        by_robot[*r].iter().map(move |k| FleetLog { robot: at, ..fleet.logs[*k].clone() })
+    };
+    Some(Fleet {
+        robots: taken.iter().map(|r| fleet.robots[*r]).collect(),
+        logs: taken.iter().enumerate().flat_map(renamed).collect(),
+        varying: fleet.varying.clone(),
+        ..*fleet
+    })
 }
 
 /// The fleet at variances and noise that are given; nothing is left out or found.

@@ -3,7 +3,7 @@
 //! A node is a prefix of the keys, its value the triangle of its two sides stacked, the side of the lower keys first; an empty side passes the
 //! other through unchanged. A part that is added changes the nodes above it only (Demmel, Grigori, Hoemmen and Langou 2012).
 
-use dynid_linalg::Mat;
+use dynid_linalg::{AsView, Mat};
 
 use crate::triangle::triangle;
 
@@ -39,4 +39,3 @@ fn node(parts: &[(u64, &Mat)], bits: u32) -> Option<Mat> {
     }
 }
 
-use dynid_linalg::AsView;

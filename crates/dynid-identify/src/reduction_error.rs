@@ -120,6 +120,12 @@ pub enum FactorFileFault {
     /// The bytes are not those that were written.
     #[error("the file is damaged: its SHA-256 is not the one it ends with")]
     Damaged,
+    /// The factors of another recipe than the one that lies beside them.
+    #[error("factors of another recipe, {}", short(found))]
+    Recipe {
+        /// Hash of their recipe.
+        found: String,
+    },
     /// The description cannot be read.
     #[error("its description: {0}")]
     Description(String),

@@ -23,6 +23,14 @@ pub fn sha256_bytes(bytes: &[u8]) -> [u8; 32] {
     Sha256::digest(bytes).into()
 }
 
+/// SHA-256 of the bytes of a file, hexadecimal, in fixed memory.
+///
+/// # Errors
+/// The operating system's.
+pub fn sha256_of_file(path: &std::path::Path) -> io::Result<String> {
+    Hashed::new(std::fs::File::open(path)?).finish()
+}
+
 fn hexadecimal(hasher: Sha256) -> String {
     hasher.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }

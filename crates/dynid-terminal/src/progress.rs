@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use dynid::Step;
 use dynid::design::DesignStep;
+use dynid::fleet::FleetStep;
 use dynid::friction::FrictionStep;
 use dynid::servo::ServoStep;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -58,6 +59,15 @@ impl Progress {
             FrictionStep::Read(file) => format!("reading {file}"),
             FrictionStep::Law(joint) => format!("fitting friction of {joint}"),
             FrictionStep::Presliding(joint) => format!("searching bristles of {joint}"),
+        });
+    }
+
+    /// A step of a fleet.
+    pub fn fleet(&self, step: FleetStep) {
+        self.doing(match step {
+            FleetStep::Read => "reading factors",
+            FleetStep::Fit => "fitting the fleet",
+            FleetStep::Drift => "looking for changes",
         });
     }
 

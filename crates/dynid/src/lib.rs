@@ -14,6 +14,7 @@ pub mod diff;
 pub mod explain;
 pub mod export;
 pub mod fault;
+pub mod fleet;
 pub mod friction;
 pub mod friction_model;
 pub mod gains;

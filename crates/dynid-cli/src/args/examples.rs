@@ -126,6 +126,17 @@ const ENDINGS: &[Ending] = &[
         ],
     },
     Ending {
+        command: "fleet",
+        negative: "",
+        examples: &[
+            ("What the logs of a fleet say together", "fleet factors --out fleet"),
+            (
+                "Friction that follows the temperature, with a page of one robot",
+                "fleet factors --covariates temperature --robot r17 --out fleet",
+            ),
+        ],
+    },
+    Ending {
         command: "friction",
         negative: "no joint's friction could be identified",
         examples: &[(
@@ -233,6 +244,10 @@ const ENDINGS: &[Ending] = &[
             (
                 "Reduce another log by the same recipe, anywhere",
                 "reduce cell.factors --log other.csv --out other.factors",
+            ),
+            (
+                "Reduce the logs of a fleet into a folder, the first of eight processes",
+                "reduce type.factors --manifest logs.csv --shard 1/8 --out factors",
             ),
         ],
     },

@@ -31,7 +31,7 @@ pub(crate) use model::{
 };
 pub(crate) use motion::{MotionArgs, PlaybackArg};
 pub(crate) use online::{OnlineArgs, StreamArg};
-pub(crate) use reduce::{FactorsArgs, MergeArgs, ReduceArgs, SolveArgs};
+pub(crate) use reduce::{FactorsArgs, FleetArgs, MergeArgs, ReduceArgs, SolveArgs};
 pub(crate) use robot::RobotArgs;
 pub(crate) use simulate::SimulateArgs;
 
@@ -80,6 +80,9 @@ pub(crate) enum Command {
     Explain(ExplainArgs),
     /// Put identified parameters into a robot file: URDF, MJCF or JSON, read back and checked before it is written.
     Export(ExportArgs),
+    /// Many robots of a type from the factors of their logs: what they share, how each differs, what changes when; writes fleet.json,
+    /// report.html and pages of robots.
+    Fleet(FleetArgs),
     /// Friction from constant-speed tests and pre-sliding motion: writes friction.json and report.html.
     Friction(FrictionTestArgs),
     /// Drive gains from logs with and without a payload of known mass.

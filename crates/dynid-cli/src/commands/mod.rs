@@ -10,6 +10,7 @@ pub(crate) mod design;
 pub(crate) mod diff;
 pub(crate) mod explain;
 pub(crate) mod export;
+pub(crate) mod fleet;
 pub(crate) mod friction;
 pub(crate) mod gains;
 pub(crate) mod identify;

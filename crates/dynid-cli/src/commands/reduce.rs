@@ -18,6 +18,9 @@ use super::{Reading, apply_log_args_to, demand_stdout};
 use crate::args::{FactorsArgs, MergeArgs, PrintArgs, ReduceArgs, SolveArgs, command_line};
 
 pub(crate) fn run(args: &ReduceArgs) -> Result<u8, Failure> {
+    if let Some(manifest) = &args.manifest {
+        return super::fleet::reduce(args, manifest);
+    }
     let notes = Notes::new(args.to.print.quiet);
     let follows = reduce::is_factor_file(&args.input);
     if follows && args.log.is_empty() {

@@ -103,3 +103,15 @@ fn changes_are_found_and_dated() {
     }
     println!("false robots {false_robots} of {}", healthy + false_robots);
 }
+
+#[test]
+fn large_fleet() {
+    let Ok(robots) = std::env::var("DYNID_ROBOTS").map(|n| n.parse().expect("a number")) else { return };
+    let covariates = std::env::var_os("DYNID_PLAIN").is_none();
+    let made = simulate(&Plan { robots, logs: 20, covariates, ..PLAIN });
+    let started = Instant::now();
+    let found = fit(&made.fleet, &FitSettings::default()).expect("fits");
+    let fitted = started.elapsed();
+    let _ = drift(&made.fleet, &found, &DriftSettings::default()).expect("tests");
+    println!("{robots} robots: fit {fitted:?}, drift {:?}", started.elapsed() - fitted);
+}

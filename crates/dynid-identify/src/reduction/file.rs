@@ -4,12 +4,13 @@
 //! |---|---|
 //! | line | `dynid factors 1` and a line feed: what it is, and its version |
 //! | `u64` | length of the description, little-endian like all numbers |
-//! | description | JSON: `recipe`, `recipe_sha256`, and per log `key`, its facts, and how many bytes its factors take |
+//! | description | JSON: `recipe` (absent where it lies beside), `recipe_sha256`, and per log `key`, its facts, and how many bytes its factors take |
 //! | factors | of one log after the other, as [`dynid_factor::wire`] writes them |
 //! | 32 bytes | SHA-256 of all before |
 //!
 //! The same reduction gives the same bytes.
 
+use dynid_factor::groups::ReducedGroup;
 use dynid_factor::wire::{read_groups, write_groups};
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +25,8 @@ const DIGEST: usize = 32;
 
 #[derive(Serialize, Deserialize)]
 struct Description {
-    recipe: Recipe,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    recipe: Option<Recipe>,
     recipe_sha256: String,
     logs: Vec<LogEntry>,
 }
@@ -36,31 +38,18 @@ struct LogEntry {
     bytes: u64,
 }
 
-/// Key of a log: what it contributes, by which recipe.
-pub(super) fn key(recipe: &str, factors: &[u8]) -> String {
-    dynid_io::digest::sha256(&[recipe.as_bytes(), factors].concat())
+/// Key of a log: what it contributes by a recipe, however it is cut into time blocks.
+pub(super) fn key(recipe: &str, groups: &[ReducedGroup]) -> String {
+    let whole: Vec<ReducedGroup> = groups.iter().map(|g| g.coarsened(g.blocks.len().max(1))).collect();
+    let mut bytes = recipe.as_bytes().to_vec();
+    write_groups(&whole, &mut bytes);
+    dynid_io::digest::sha256(&bytes)
 }
 
 impl Reduction {
     /// The bytes of a factor file.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut factors = Vec::new();
-        let mut logs = Vec::new();
-        for log in &self.logs {
-            let before = factors.len();
-            write_groups(&log.groups, &mut factors);
-            let bytes = (factors.len() - before) as u64;
-            logs.push(LogEntry { key: log.key.clone(), facts: log.facts.clone(), bytes });
-        }
-        let description =
-            Description { recipe: self.recipe.clone(), recipe_sha256: self.recipe.hash(), logs };
-        let text = plain(&description);
-        let mut out = format!("{MAGIC}{VERSION}\n").into_bytes();
-        out.extend((text.len() as u64).to_le_bytes());
-        out.extend(text.as_bytes());
-        out.extend(factors);
-        out.extend(dynid_io::digest::sha256_bytes(&out));
-        out
+        written(Some(&self.recipe), &self.recipe.hash(), &self.logs)
     }
 
     /// Reads a factor file; `name` stands in messages.
@@ -68,11 +57,75 @@ impl Reduction {
     /// # Errors
     /// [`ReductionError::File`].
     pub fn from_bytes(bytes: &[u8], name: &str) -> Result<Reduction, ReductionError> {
-        read(bytes).map_err(|fault| ReductionError::File { file: name.to_owned(), fault })
+        let found = read(bytes, None).and_then(|(recipe, logs)| {
+            let recipe = recipe.ok_or_else(|| {
+                Fault::Description("a recipe is expected, which lies beside this file instead".to_owned())
+            })?;
+            Ok(Reduction { recipe, logs })
+        });
+        found.map_err(|fault| ReductionError::File { file: name.to_owned(), fault })
     }
 }
 
-fn read(bytes: &[u8]) -> Result<Reduction, Fault> {
+impl ReducedLog {
+    /// The bytes of a factor file of this log alone, for a place where the recipe lies beside it.
+    ///
+    /// `recipe_sha256`: [`Recipe::hash`] of the recipe that it was reduced by.
+    pub fn to_bytes(&self, recipe_sha256: &str) -> Vec<u8> {
+        written(None, recipe_sha256, std::slice::from_ref(self))
+    }
+
+    /// Reads a factor file of one log whose recipe lies beside it; `name` stands in messages, `recipe_sha256` is [`Recipe::hash`].
+    ///
+    /// # Errors
+    /// [`ReductionError::File`], [`ReductionError::OtherRecipe`].
+    pub fn from_bytes(
+        bytes: &[u8],
+        name: &str,
+        (recipe, recipe_sha256): (&Recipe, &str),
+    ) -> Result<ReducedLog, ReductionError> {
+        let fault = |fault| ReductionError::File { file: name.to_owned(), fault };
+        let (_, mut logs) = read(bytes, Some((recipe, recipe_sha256))).map_err(|found| match found {
+            Fault::Recipe { found } => {
+                ReductionError::OtherRecipe { log: name.to_owned(), expected: recipe_sha256.to_owned(), found }
+            }
+            other => fault(other),
+        })?;
+        match logs.len() {
+            1 => Ok(logs.remove(0)),
+            n => Err(fault(Fault::Description(format!("one log is expected, {n} were found")))),
+        }
+    }
+
+    /// Returns the log with one time block, which is enough where logs stand beside many others; its key stays.
+    #[must_use]
+    pub fn in_one_block(self) -> ReducedLog {
+        let groups = self.groups.iter().map(|g| g.coarsened(g.blocks.len().max(1))).collect();
+        ReducedLog { groups, ..self }
+    }
+}
+
+fn written(recipe: Option<&Recipe>, recipe_sha256: &str, reduced: &[ReducedLog]) -> Vec<u8> {
+    let mut factors = Vec::new();
+    let mut logs = Vec::new();
+    for log in reduced {
+        let before = factors.len();
+        write_groups(&log.groups, &mut factors);
+        let bytes = (factors.len() - before) as u64;
+        logs.push(LogEntry { key: log.key.clone(), facts: log.facts.clone(), bytes });
+    }
+    let description = Description { recipe: recipe.cloned(), recipe_sha256: recipe_sha256.to_owned(), logs };
+    let text = plain(&description);
+    let mut out = format!("{MAGIC}{VERSION}\n").into_bytes();
+    out.extend((text.len() as u64).to_le_bytes());
+    out.extend(text.as_bytes());
+    out.extend(factors);
+    out.extend(dynid_io::digest::sha256_bytes(&out));
+    out
+}
+
+/// Reads the file. `known`: the recipe that lies beside it, and its hash.
+fn read(bytes: &[u8], known: Option<(&Recipe, &str)>) -> Result<(Option<Recipe>, Vec<ReducedLog>), Fault> {
     let rest = bytes.strip_prefix(MAGIC.as_bytes()).ok_or(Fault::NotFactors)?;
     let end = rest.iter().take(12).position(|b| *b == b'\n').ok_or(Fault::NotFactors)?;
     let version = String::from_utf8_lossy(&rest[..end]).into_owned();
@@ -101,24 +154,29 @@ fn read(bytes: &[u8]) -> Result<Reduction, Fault> {
     if promised != factors.len() as u64 {
         return Err(cut(expected.saturating_add(promised)));
     }
-    if recipe.hash() != recipe_sha256 {
+    if recipe.as_ref().is_some_and(|recipe| recipe.hash() != recipe_sha256) {
         return Err(Fault::Description("the recipe is not the one that it was".to_owned()));
     }
+    if known.is_some_and(|(_, hash)| hash != recipe_sha256) {
+        return Err(Fault::Recipe { found: recipe_sha256 });
+    }
+    let beside = "its recipe lies beside it: read the folder, or a file with its recipe";
+    let by = recipe.as_ref().or(known.map(|(recipe, _)| recipe)).ok_or_else(|| Fault::Description(beside.to_owned()))?;
+    let (outputs, scales) = (by.outputs.len(), by.choices.scales_hz.len());
+    let columns = by.columns.len();
     let mut out: Vec<ReducedLog> = Vec::new();
     for LogEntry { key: expected, facts, bytes } in logs {
         let (own, others) = factors.split_at(bytes as usize);
         factors = others;
         let named = |fault| Fault::Factors { log: facts.name.clone(), fault };
-        let groups = read_groups(own, 0, recipe.columns.len()).map_err(named)?;
+        let groups = read_groups(own, 0, columns).map_err(named)?;
         let wrong = |what: &str| Err(Fault::Log { log: facts.name.clone(), what: what.to_owned() });
-        if key(&recipe_sha256, own) != expected {
-            return wrong("its key is not that of its factors");
+        if expected.len() != 2 * DIGEST || !expected.bytes().all(|b| b.is_ascii_hexdigit()) {
+            return wrong("its key is no SHA-256");
         }
         if out.last().is_some_and(|last| last.key >= expected) {
             return wrong("logs are not in the order of their keys");
         }
-        let outputs = recipe.outputs.len();
-        let scales = recipe.choices.scales_hz.len();
         if groups.is_empty()
             || groups.iter().any(|g| g.output >= outputs || g.scale >= scales || g.blocks.is_empty())
         {
@@ -131,7 +189,7 @@ fn read(bytes: &[u8]) -> Result<Reduction, Fault> {
         }
         out.push(ReducedLog { key: expected, facts, groups });
     }
-    Ok(Reduction { recipe, logs: out })
+    Ok((recipe, out))
 }
 
 impl LogFacts {

@@ -28,6 +28,8 @@ mod recipe;
 mod reduce;
 mod solve;
 
+use std::collections::BTreeMap;
+
 use dynid_factor::groups::ReducedGroup;
 use serde::{Deserialize, Serialize};
 
@@ -46,7 +48,7 @@ pub use reduce::Reducer;
 /// What is left of a log: its factors, and what has to be known of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReducedLog {
-    /// SHA-256 of recipe and factors, hexadecimal: the log by what it contributes.
+    /// SHA-256 of recipe and factors in one time block, hexadecimal: the log by what it contributes.
     pub key: String,
     /// What is known of the log.
     pub facts: LogFacts,
@@ -69,6 +71,22 @@ pub struct LogFacts {
     pub cautions: Vec<Caution>,
     /// Files that were read.
     pub inputs: Vec<InputRecord>,
+    /// Where the log comes from, in a fleet.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin: Option<Origin>,
+}
+
+/// Which robot of its type a log is of, and what is known of the log as a whole.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Origin {
+    /// Name or serial number of the robot.
+    pub robot: String,
+    /// When the log began, s since 1970-01-01 UTC.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start_s: Option<f64>,
+    /// Numbers that hold for the whole log (temperature, load, age ...), by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub covariates: BTreeMap<String, f64>,
 }
 
 /// A finding of the pre-flight of a log.
@@ -131,9 +149,15 @@ impl Reduction {
         Ok(Reduction::new(reducer.recipe().clone(), logs))
     }
 
+    /// A recipe alone, for a place where its logs lie beside it.
+    pub fn without_logs(recipe: Recipe) -> Reduction {
+        Reduction { recipe, logs: Vec::new() }
+    }
+
     fn new(recipe: Recipe, mut logs: Vec<ReducedLog>) -> Reduction {
-        // Of a log that was reduced twice from other places, the same one in any order.
-        logs.sort_by_cached_key(|log| (log.key.clone(), plain(&log.facts)));
+        // Of a log that was reduced twice, from other places or in other time blocks, the same one in any order: the one with most blocks.
+        let blocks = |log: &ReducedLog| log.groups.iter().map(|g| g.blocks.len()).sum::<usize>();
+        logs.sort_by_cached_key(|log| (log.key.clone(), std::cmp::Reverse(blocks(log)), plain(&log.facts)));
         logs.dedup_by(|a, b| a.key == b.key);
         Reduction { recipe, logs }
     }

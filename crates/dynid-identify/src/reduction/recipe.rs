@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dynid_estimate::consistent::Bound;
 use dynid_estimate::separable::{self, ShapeFinding, ShapeVerdict, StartReport};
-use dynid_model::{EffortModel, RobotModel};
+use dynid_model::{EffortModel, Parameter, RobotModel};
 use dynid_motion::cutoff::KernelLimit;
 use dynid_rows::conditioning::{Conditioning, DelayEstimate, most_blocks, prediction_hz_of, state_hz_of};
 use serde::{Deserialize, Serialize};
@@ -313,6 +313,16 @@ impl Recipe {
             ..self.clone()
         };
         dynid_io::digest::sha256(plain(&without_paths).as_bytes())
+    }
+
+    /// Per column the standard parameter that stands for it.
+    ///
+    /// # Errors
+    /// [`ReductionError::Contradiction`].
+    pub fn parameters(&self) -> Result<Vec<Parameter>, Error> {
+        let (problem, _) = self.problem()?;
+        let table = &problem.model.parameters().linear;
+        Ok(problem.structure.base.kept.iter().map(|c| table[*c].clone()).collect())
     }
 
     /// Returns the recipe with how its logs were read, for other logs to be read alike.

@@ -3,7 +3,6 @@
 use dynid_factor::FactorError;
 use dynid_factor::groups::ReducedGroup;
 use dynid_factor::rows::{BlockReducer, RowSource, RowVisitor, Rows, visit_all};
-use dynid_factor::wire::write_groups;
 use dynid_rows::conditioning::{ConditioningSettings, LogRows};
 
 use super::file::key;
@@ -95,11 +94,9 @@ impl Reducer {
         cautions.extend(log_cautions(model, logs));
         cautions.extend(self.beyond(&name, &prepared));
         cautions.extend(self.faster(&name, &trained));
-        let mut bytes = Vec::new();
-        write_groups(&groups, &mut bytes);
         let findings = findings.iter().map(ReducedFinding::of).collect();
-        let facts = LogFacts { name, log: trained, efforts, findings, cautions, inputs: log.source.inputs };
-        Ok(ReducedLog { key: key(&self.hash, &bytes), facts, groups })
+        let facts = LogFacts { name, log: trained, efforts, findings, cautions, inputs: log.source.inputs, origin: None };
+        Ok(ReducedLog { key: key(&self.hash, &groups), facts, groups })
     }
 
     /// Velocities beyond those of the logs that taught the recipe, by which shapes of friction and its bounds were chosen.
