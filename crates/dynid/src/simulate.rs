@@ -4,6 +4,7 @@ mod channels;
 mod clearance;
 mod closed_loop;
 mod elastic;
+mod fleet;
 mod settings;
 mod trajectory;
 
@@ -20,6 +21,7 @@ use crate::elements::{ElementPlan, LOAD, REACTION_FRICTION};
 use crate::nominal::{nominal_parameters, with_nominal_shape};
 use crate::robot::{Robot, refuse_elastic, refuse_internal_load, refuse_loops};
 pub use clearance::{ClearanceSummary, JournalSummary};
+pub use fleet::{FleetTable, PlannedChange, VirtualFleet, VirtualLog};
 pub use settings::{
     ControlTable, ImperfectionTable, PlantTable, SeriesSettings, SimulateMode, SimulateSettings,
 };
@@ -99,6 +101,9 @@ pub struct ExperimentSummary {
 pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedLog, Error> {
     settings.check()?;
     settings.check_effect()?;
+    if settings.fleet.is_some() {
+        return Err(Error::setting("fleet", "no table beside a single log", "[fleet]"));
+    }
     let mechanism = &robot.mechanism;
     if robot.closed.is_none() && mechanism.positions() != mechanism.rates() {
         return Err(Error::Unsupported(
@@ -168,6 +173,15 @@ pub fn simulate(robot: &Robot, settings: &SimulateSettings) -> Result<SimulatedL
             closed_loop::experiment(models, &reference, values, profiles, settings)
         }
     }
+}
+
+/// Parameters of the truth by name, as [`simulate`] takes them.
+fn nominal(robot: &Robot, settings: &SimulateSettings) -> Result<Vec<(String, f64)>, Error> {
+    let plan = ElementPlan::new(&robot.mechanism, &robot.elements, None, |rate| robot.is_driven(rate))?
+        .with_loops(robot.closed.clone());
+    let model = with_nominal_shape(plan.model(&robot.mechanism)?, &plan, &settings.values)?;
+    let values = nominal_parameters(&model, &plan, &settings.values)?;
+    Ok(named(&model, values))
 }
 
 /// The model with the loads of its friction at parameters of its own.

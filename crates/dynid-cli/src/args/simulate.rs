@@ -35,10 +35,14 @@ pub(crate) struct SimulateArgs {
     /// Noise of the logged offsets of journals in their bearings (joints with clearance), m.
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub(crate) journal_noise: Option<f64>,
+    /// A fleet of so many robots with so many logs each, by inverse dynamics: --out is a folder for logs, manifest.csv and truth.json. What
+    /// robots differ in is `[fleet]` of --config.
+    #[arg(long, value_name = "ROBOTSxLOGS", value_parser = robots_and_logs, conflicts_with_all = ["clean", "truth", "closed_loop"])]
+    pub(crate) fleet: Option<(usize, usize)>,
     /// Seed of trajectory and noise.
     #[arg(long)]
     pub(crate) seed: Option<u64>,
-    /// Output log, CSV or CSV.gz; `-`: standard output.
+    /// Output log, CSV or CSV.gz; `-`: standard output. Of a fleet a folder.
     #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::AnyPath)]
     pub(crate) out: PathBuf,
     /// Also write the true states and efforts.
@@ -51,4 +55,13 @@ pub(crate) struct SimulateArgs {
     pub(crate) force: ForceArgs,
     #[command(flatten)]
     pub(crate) print: PrintArgs,
+}
+
+fn robots_and_logs(text: &str) -> Result<(usize, usize), String> {
+    let fault = || format!("expected ROBOTSxLOGS such as 20x10, found `{text}`");
+    let (robots, logs) = text.split_once('x').ok_or_else(fault)?;
+    match (robots.parse(), logs.parse()) {
+        (Ok(robots), Ok(logs)) if robots > 0 && logs > 0 => Ok((robots, logs)),
+        _ => Err(fault()),
+    }
 }

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use dynid::sim::clearance::ContactEventKind;
 use dynid::simulate::{
-    ClearanceSummary, ExperimentSummary, SimulateMode, SimulateSettings, SimulatedLog, simulate,
+    ClearanceSummary, ExperimentSummary, FleetTable, SimulateMode, SimulateSettings, SimulatedLog, VirtualFleet,
+    VirtualLog, simulate,
 };
 use dynid_terminal::message::{Failure, Notes, json};
 use dynid_terminal::outputs::{self, Outputs, is_stdout};
@@ -17,6 +18,10 @@ use crate::args::SimulateArgs;
 const EFFORT: &str = "tau";
 
 pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
+    let settings = settings(args)?;
+    if settings.fleet.is_some() {
+        return fleet(args, &settings);
+    }
     let files: Vec<(&str, &Path)> =
         [("--out", Some(&args.out)), ("--clean", args.clean.as_ref()), ("--truth", args.truth.as_ref())]
             .into_iter()
@@ -30,22 +35,6 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
     let set = outputs::prepare_files(&files, &inputs, args.force)?;
     demand_stdout(args.print, &set)?;
     let robot = load_robot(&args.robot)?;
-    let mut settings = match &args.config {
-        None => SimulateSettings::default(),
-        Some(path) => read_settings(path)?,
-    };
-    if args.closed_loop {
-        settings.mode = SimulateMode::ClosedLoop;
-    }
-    if args.follow.is_some() {
-        settings.follow.clone_from(&args.follow);
-    }
-    settings.duration_s = args.duration.unwrap_or(settings.duration_s);
-    settings.rate_hz = args.rate_hz.unwrap_or(settings.rate_hz);
-    settings.effort_noise = args.effort_noise.unwrap_or(settings.effort_noise);
-    settings.encoder_bits = args.encoder_bits.unwrap_or(settings.encoder_bits);
-    settings.seed = args.seed.unwrap_or(settings.seed);
-    settings.journal_noise = args.journal_noise.unwrap_or(settings.journal_noise);
     let progress = Progress::new(args.print.quiet);
     progress.doing("simulating");
     let log = simulate(&robot, &settings)?;
@@ -68,6 +57,79 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<u8, Failure> {
         json(&summary(&log, args))?;
     }
     tell(&log, &args.out, Notes::new(args.print.quiet));
+    Ok(0)
+}
+
+/// Settings of the configuration, those of the command line over them.
+fn settings(args: &SimulateArgs) -> Result<SimulateSettings, Failure> {
+    let mut settings = match &args.config {
+        None => SimulateSettings::default(),
+        Some(path) => read_settings(path)?,
+    };
+    if args.closed_loop {
+        settings.mode = SimulateMode::ClosedLoop;
+    }
+    if args.follow.is_some() {
+        settings.follow.clone_from(&args.follow);
+    }
+    settings.duration_s = args.duration.unwrap_or(settings.duration_s);
+    settings.rate_hz = args.rate_hz.unwrap_or(settings.rate_hz);
+    settings.effort_noise = args.effort_noise.unwrap_or(settings.effort_noise);
+    settings.encoder_bits = args.encoder_bits.unwrap_or(settings.encoder_bits);
+    settings.seed = args.seed.unwrap_or(settings.seed);
+    settings.journal_noise = args.journal_noise.unwrap_or(settings.journal_noise);
+    if let Some((robots, logs)) = args.fleet {
+        settings.fleet = Some(FleetTable { robots, logs, ..settings.fleet.unwrap_or_default() });
+    }
+    Ok(settings)
+}
+
+/// Writes the logs of a virtual fleet, their manifest and the truth.
+fn fleet(args: &SimulateArgs, settings: &SimulateSettings) -> Result<u8, Failure> {
+    if args.clean.is_some() || args.truth.is_some() {
+        return Err(Failure::Usage(
+            "--clean and --truth: expected one log beside them, found a fleet".to_owned(),
+            "the truth of a fleet is `truth.json` in the folder of --out",
+        ));
+    }
+    let inputs: Vec<&Path> =
+        std::iter::once(&args.robot.robot).chain(&args.config).chain(&args.follow).map(PathBuf::as_path).collect();
+    let robot = load_robot(&args.robot)?;
+    let virtual_fleet = VirtualFleet::new(&robot, settings)?;
+    let about: Vec<VirtualLog> = (0..virtual_fleet.len()).map(|k| virtual_fleet.about(k)).collect();
+    let mut files = vec![args.out.join("manifest.csv"), args.out.join("truth.json")];
+    files.extend(about.iter().map(|log| args.out.join("logs").join(&log.file)));
+    let set = outputs::prepare_folder(&files, &inputs, args.force)?;
+    let progress = Progress::new(args.print.quiet);
+    for (k, log) in about.iter().enumerate() {
+        progress.counted(k, about.len(), log.file.clone());
+        let made = virtual_fleet.log(&robot, k)?;
+        let signals = [("q", &made.position), (EFFORT, &made.effort)];
+        write(&set, 2 + k, &made, &signals, &made.channels)?;
+    }
+    drop(progress);
+    let mut manifest = "log,robot,start".to_owned() + if about.iter().all(|log| log.temperature.is_some()) { ",temperature\n" } else { "\n" };
+    for log in &about {
+        let temperature = log.temperature.map_or_else(String::new, |t| format!(",{t}"));
+        manifest += &format!("logs/{},{},{}{temperature}\n", log.file, log.robot, log.start_s);
+    }
+    set.write(0, manifest.as_bytes())?;
+    let truth = serde_json::json!({
+        "schema": "dynid-fleet-truth/1",
+        "type": virtual_fleet.nominal.iter().cloned().collect::<std::collections::BTreeMap<String, f64>>(),
+        "changes": virtual_fleet.changes,
+        "outliers": virtual_fleet.outliers,
+        "logs": about,
+    });
+    let text = serde_json::to_string_pretty(&truth).map_err(|e| Failure::Output(e.into()))? + "\n";
+    set.write(1, text.as_bytes())?;
+    set.publish()?;
+    let told = serde_json::json!({ "folder": args.out.display().to_string(), "logs": about.len(), "changes": virtual_fleet.changes });
+    if args.print.json {
+        json(&told)?;
+    }
+    let notes = Notes::new(args.print.quiet);
+    notes.tell(&format!("{} logs written to {}, with manifest.csv and truth.json", about.len(), args.out.display()));
     Ok(0)
 }
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
+use super::fleet::FleetTable;
 use crate::Error;
 use crate::config::{PerJoint, toml_file};
 
@@ -61,6 +62,8 @@ pub struct SimulateSettings {
     /// Channels that elements read, such as temperatures, by name (`temperature_j1`, or `temperature` for all joints):
     /// `[time in s, value]`, linear in between.
     pub channels: BTreeMap<String, Vec<[f64; 2]>>,
+    /// A fleet in place of one log: `--out` is a folder then. By inverse dynamics only.
+    pub fleet: Option<FleetTable>,
 }
 
 /// How a virtual log is made.
@@ -216,6 +219,7 @@ impl Default for SimulateSettings {
             imperfections: None,
             plant: None,
             channels: BTreeMap::new(),
+            fleet: None,
         }
     }
 }
