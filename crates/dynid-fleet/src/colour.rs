@@ -39,11 +39,16 @@ pub(crate) fn colours(fleet: &Fleet, noise: &Noise, sweep: &Sweep<'_>) -> Vec<f6
                 let factor = &channel.factor;
                 let misfit = (factor.rss(&own) - squares([factor.rho()])).max(0.0);
                 // tr R V Rᵀ over the columns that vary.
-                let varying: Vec<(usize, usize)> = at.iter().enumerate().filter(|(_, at)| **at < q).map(|(j, at)| (j, *at)).collect();
+                let varying: Vec<(usize, usize)> =
+                    at.iter().enumerate().filter(|(_, at)| **at < q).map(|(j, at)| (j, *at)).collect();
                 let mut trace = 0.0;
                 for i in 0..factor.height() {
                     for (j, a) in varying.iter().filter(|(j, _)| *j >= i) {
-                        let row: f64 = varying.iter().filter(|(l, _)| *l >= i).map(|(l, b)| deviation.given[(*a, *b)] * factor.r(i, *l)).sum();
+                        let row: f64 = varying
+                            .iter()
+                            .filter(|(l, _)| *l >= i)
+                            .map(|(l, b)| deviation.given[(*a, *b)] * factor.r(i, *l))
+                            .sum();
                         trace += factor.r(i, *j) * row;
                     }
                 }
@@ -54,7 +59,9 @@ pub(crate) fn colours(fleet: &Fleet, noise: &Noise, sweep: &Sweep<'_>) -> Vec<f6
         out
     };
     let mut ratios = vec![Vec::new(); fleet.channels];
-    for (channel, _, ratio) in splits.robots.par_iter().map(of_robot).collect::<Vec<_>>().into_iter().flatten() {
+    for (channel, _, ratio) in
+        splits.robots.par_iter().map(of_robot).collect::<Vec<_>>().into_iter().flatten()
+    {
         ratios[channel].push(ratio);
     }
     ratios.into_iter().map(|ratios| median(ratios).max(1.0)).collect()

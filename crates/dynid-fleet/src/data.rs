@@ -128,7 +128,13 @@ impl Fleet {
         let mut taken = vec![false; self.columns];
         for coordinate in &self.varying {
             match taken.get_mut(coordinate.column) {
-                None => return Err(shape("column of what varies", format!("below {}", self.columns), coordinate.column)),
+                None => {
+                    return Err(shape(
+                        "column of what varies",
+                        format!("below {}", self.columns),
+                        coordinate.column,
+                    ));
+                }
                 Some(true) => return Err(shape("column of what varies", "each once", coordinate.column)),
                 Some(free) => *free = true,
             }
@@ -182,7 +188,11 @@ impl Fleet {
             }
             let ascends = channel.columns.windows(2).all(|pair| pair[0] < pair[1]);
             if !ascends || channel.columns.last().is_some_and(|last| *last >= self.columns) {
-                return Err(shape("columns of a channel", "ascending columns of the fleet", format!("{:?}", channel.columns)));
+                return Err(shape(
+                    "columns of a channel",
+                    "ascending columns of the fleet",
+                    format!("{:?}", channel.columns),
+                ));
             }
         }
         Ok(())

@@ -138,7 +138,10 @@ pub fn fit(fleet: &Fleet, settings: &FitSettings) -> Result<FleetFit, FleetError
     let few = splits.robots.len() < FEW;
     let without = Variances {
         robot_weights: named(&robust.robot_weights, if few { 0.0 } else { settings.robot_weight }),
-        log_weights: named(&robust.log_weights, if fleet.logs.len() < FEW { 0.0 } else { settings.log_weight }),
+        log_weights: named(
+            &robust.log_weights,
+            if fleet.logs.len() < FEW { 0.0 } else { settings.log_weight },
+        ),
         ..robust.clone()
     };
     let normal = VarianceSettings { freedom: None, ..settings.variances.clone() };
@@ -201,7 +204,11 @@ pub fn fit_at(fleet: &Fleet, noise: Noise, variances: Variances) -> Result<Fleet
     fleet.check()?;
     let splits = Splits::new(fleet, &noise);
     let settled = Settled { passes: 0, change: 0.0, converged: true };
-    finish(fleet, Found { noise, splits, robust: variances.clone(), variances, settled, prior: None }, FitSettings::default().freedom)
+    finish(
+        fleet,
+        Found { noise, splits, robust: variances.clone(), variances, settled, prior: None },
+        FitSettings::default().freedom,
+    )
 }
 
 /// Variances of normal deviations by restricted maximum likelihood, from a start, at noise that is given.
@@ -265,9 +272,11 @@ fn start(fleet: &Fleet, splits: &Splits, prior: Option<&Mat>) -> Result<Variance
         pooled.theta[k].abs().max(least).max(f64::MIN_POSITIVE.sqrt())
     };
     let alone = splits.by_robot.iter().all(|logs| logs.len() < 2);
-    let robots = (0..q).map(|k| if fleet.varying[k].between_robots { (START.0 * size(k)).powi(2) } else { 0.0 });
+    let robots =
+        (0..q).map(|k| if fleet.varying[k].between_robots { (START.0 * size(k)).powi(2) } else { 0.0 });
     // One log a robot: what differs between logs cannot be told from what differs between robots.
-    let between_logs = |k: usize| fleet.varying[k].between_logs && !(alone && fleet.varying[k].between_robots);
+    let between_logs =
+        |k: usize| fleet.varying[k].between_logs && !(alone && fleet.varying[k].between_robots);
     let logs = (0..q).map(|k| if between_logs(k) { (START.1 * size(k)).powi(2) } else { 0.0 });
     Ok(Variances::new(robots.collect(), logs.collect(), number))
 }

@@ -11,6 +11,8 @@ use crate::triangle::squares;
 const RANK_LOGS: usize = 64;
 /// A log with fewer rows beyond its rank than this leans on the noise of the channel in the other logs.
 const FIRM: f64 = 30.0;
+/// Efforts are not known better than this share of their power: rows without noise would weigh without bound.
+const EXACT: f64 = 1e-16;
 
 /// Noise of the rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,30 +28,44 @@ pub struct Noise {
 impl Noise {
     /// White noise, its variances from the residuals that no parameter explains: `σ² = ρ²/(N - rank)` of each log and channel.
     ///
-    /// A log with few rows takes its variance from the channel's median in other logs as well, as if that had been seen in
-    /// [`FIRM`] rows less its own.
+    /// A log with few rows leans on the channel's variance in other logs, as if that had been seen in 30 rows less its own. A channel that
+    /// has no row beyond its rank in any log tells no noise: its efforts count as noise of their own size.
     pub fn of(fleet: &Fleet) -> Noise {
         let ranks: Vec<usize> = (0..fleet.channels).into_par_iter().map(|c| rank(fleet, c)).collect();
         let own = |channel: &ChannelFactor| {
             let freedom = channel.factor.rows() as f64 - ranks[channel.channel] as f64;
-            let floor = f64::EPSILON * channel.factor.effort_norm();
-            (freedom.max(0.0), squares([channel.factor.rho().max(floor)]))
+            (freedom.max(0.0), squares([channel.factor.rho()]))
         };
-        let mut seen: Vec<Vec<f64>> = vec![Vec::new(); fleet.channels];
+        let mut seen: Vec<Vec<(f64, f64)>> = vec![Vec::new(); fleet.channels];
+        let mut power = vec![(0.0, 0.0); fleet.channels];
         for channel in fleet.logs.iter().flat_map(|log| &log.channels) {
-            let (freedom, rss) = own(channel);
-            if freedom >= FIRM && rss > 0.0 {
-                seen[channel.channel].push(rss / freedom);
-            }
+            seen[channel.channel].push(own(channel));
+            let (sum, rows) = &mut power[channel.channel];
+            *sum += squares([channel.factor.effort_norm()]);
+            *rows += channel.factor.rows() as f64;
         }
-        let usual: Vec<f64> = seen.into_iter().map(median).collect();
+        let usual = |(seen, (sum, rows)): (Vec<(f64, f64)>, (f64, f64))| {
+            let power = if rows > 0.0 { sum / rows } else { 1.0 };
+            let firm: Vec<f64> = seen
+                .iter()
+                .filter(|(freedom, _)| *freedom >= FIRM)
+                .map(|(freedom, rss)| rss / freedom)
+                .collect();
+            let (freedom, rss) =
+                seen.iter().fold((0.0, 0.0), |(f, r), (freedom, rss)| (f + freedom, r + rss));
+            let found = match () {
+                () if !firm.is_empty() => median(firm),
+                () if freedom > 0.0 => rss / freedom,
+                () => power,
+            };
+            (found, (EXACT * power).max(f64::MIN_POSITIVE.sqrt()))
+        };
+        let usual: Vec<(f64, f64)> = seen.into_iter().zip(power).map(usual).collect();
         let variance = |channel: &ChannelFactor| {
             let (freedom, rss) = own(channel);
             let leaning = (FIRM - freedom).max(0.0);
-            let usual = usual[channel.channel];
-            // No log of the fleet has rows enough: the channel's own residual, whatever it is worth.
-            let usual = if usual > 0.0 { usual } else { rss.max(f64::MIN_POSITIVE) };
-            (rss + leaning * usual) / (freedom + leaning)
+            let (usual, least) = usual[channel.channel];
+            ((rss + leaning * usual) / (freedom + leaning)).max(least)
         };
         let variances = fleet.logs.iter().map(|log| log.channels.iter().map(variance).collect()).collect();
         Noise { colours: vec![1.0; fleet.channels], ranks, variances }
@@ -65,8 +81,13 @@ impl Noise {
 fn rank(fleet: &Fleet, channel: usize) -> usize {
     let all = || fleet.logs.iter().flat_map(|log| &log.channels).filter(|c| c.channel == channel);
     let step = all().count().div_ceil(RANK_LOGS).max(1);
-    let factors: Vec<Factor> = all().step_by(step).map(|c| c.factor.embed(fleet.columns, &c.columns)).collect();
-    if factors.is_empty() { 0 } else { numerical_rank(&Factor::merge(&factors.iter().collect::<Vec<_>>())).rank }
+    let factors: Vec<Factor> =
+        all().step_by(step).map(|c| c.factor.embed(fleet.columns, &c.columns)).collect();
+    if factors.is_empty() {
+        0
+    } else {
+        numerical_rank(&Factor::merge(&factors.iter().collect::<Vec<_>>())).rank
+    }
 }
 
 /// The middle of some numbers; 0 of none.

@@ -42,7 +42,8 @@ impl Splits {
         let means = means(fleet);
         let place = places(&order);
         let split = |(k, log): (usize, &FleetLog)| {
-            let triangle = of_stacked(stacked(log, &place, |at| noise.weight(k, at, log.channels[at].channel)));
+            let triangle =
+                of_stacked(stacked(log, &place, |at| noise.weight(k, at, log.channels[at].channel)));
             let covariates = log.covariates.iter().zip(&means).map(|(u, mean)| u - mean).collect();
             (LogSplit { covariates, top: head(&triangle, q) }, corner(&triangle, q, q))
         };
@@ -78,7 +79,9 @@ impl Splits {
 /// Mean of every covariate over the logs.
 pub(crate) fn means(fleet: &Fleet) -> Vec<f64> {
     let count = fleet.logs.len().max(1) as f64;
-    (0..fleet.covariates).map(|c| fleet.logs.iter().map(|log| log.covariates[c]).sum::<f64>() / count).collect()
+    (0..fleet.covariates)
+        .map(|c| fleet.logs.iter().map(|log| log.covariates[c]).sum::<f64>() / count)
+        .collect()
 }
 
 /// Per column of the problem its place in the order of the fit.
@@ -112,4 +115,3 @@ fn stacked(log: &FleetLog, place: &[usize], weight: impl Fn(usize) -> f64) -> Ma
     }
     out
 }
-

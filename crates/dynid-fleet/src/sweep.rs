@@ -69,15 +69,24 @@ pub(crate) struct RobotState {
 impl<'a> Sweep<'a> {
     /// # Errors
     /// [`FleetError::NotExcited`], [`FleetError::Confounded`].
-    pub(crate) fn new(splits: &'a Splits, variances: &'a Variances, prior: Option<&Mat>) -> Result<Self, FleetError> {
-        let up = |(k, log): (usize, &crate::split::LogSplit)| whitened(&log.top, splits.q, &variances.of_log(k));
+    pub(crate) fn new(
+        splits: &'a Splits,
+        variances: &'a Variances,
+        prior: Option<&Mat>,
+    ) -> Result<Self, FleetError> {
+        let up =
+            |(k, log): (usize, &crate::split::LogSplit)| whitened(&log.top, splits.q, &variances.of_log(k));
         let (logs, of_logs): (Vec<Mat>, Vec<f64>) = splits.logs.par_iter().enumerate().map(up).unzip();
         let robots: Vec<(Mat, Mat, f64)> =
             (0..splits.by_robot.len()).into_par_iter().map(|r| robot(splits, variances, &logs, r)).collect();
         let of_robots: f64 = robots.iter().map(|(_, _, logdet)| logdet).sum();
-        let (tops, mut factors): (Vec<Mat>, Vec<Mat>) = robots.into_iter().map(|(top, factor, _)| (top, factor)).unzip();
-        let factors: Vec<(u64, Mat)> =
-            splits.robots.iter().map(|(key, r)| (*key, std::mem::replace(&mut factors[*r], Mat::zeros(0, 0)))).collect();
+        let (tops, mut factors): (Vec<Mat>, Vec<Mat>) =
+            robots.into_iter().map(|(top, factor, _)| (top, factor)).unzip();
+        let factors: Vec<(u64, Mat)> = splits
+            .robots
+            .iter()
+            .map(|(key, r)| (*key, std::mem::replace(&mut factors[*r], Mat::zeros(0, 0))))
+            .collect();
         let parts: Vec<(u64, &Mat)> = factors.iter().map(|(key, factor)| (*key, factor)).collect();
         let width = splits.parameters() + 1;
         let merged = tree::merge(&parts).unwrap_or_else(|| Mat::zeros(0, width));
@@ -98,8 +107,13 @@ impl<'a> Sweep<'a> {
     /// What is known of a robot with logs.
     pub(crate) fn robot(&self, r: usize) -> RobotState {
         let p = self.theta.len();
-        let (deviation, map) =
-            deviation(self.robots[r].view(), self.splits.q, &self.variances.of_robot(r), &self.theta, &self.covariance);
+        let (deviation, map) = deviation(
+            self.robots[r].view(),
+            self.splits.q,
+            &self.variances.of_robot(r),
+            &self.theta,
+            &self.covariance,
+        );
         let mut values = self.theta.clone();
         values.iter_mut().zip(&deviation.mean).for_each(|(x, b)| *x += b);
         // A C Aᵀ with A = 1 - E M, and the robot's own variance.
@@ -128,7 +142,9 @@ impl<'a> Sweep<'a> {
     /// Largest information on every coordinate that one robot has, and one log.
     pub(crate) fn information(&self) -> (Vec<f64>, Vec<f64>) {
         let largest = |rows: &[Mat]| {
-            let of = |k: usize| rows.iter().filter(|m| m.nrows() > 0).map(|m| m.col_squares(k)).fold(0.0, f64::max);
+            let of = |k: usize| {
+                rows.iter().filter(|m| m.nrows() > 0).map(|m| m.col_squares(k)).fold(0.0, f64::max)
+            };
             (0..self.splits.q).map(of).collect()
         };
         (largest(&self.robots), largest(&self.logs))

@@ -38,4 +38,3 @@ fn node(parts: &[(u64, &Mat)], bits: u32) -> Option<Mat> {
         }
     }
 }
-

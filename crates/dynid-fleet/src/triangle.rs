@@ -37,7 +37,9 @@ pub(crate) fn head(matrix: &Mat, rows: usize) -> Mat {
 
 /// A matrix with `columns` columns of zeros before it.
 pub(crate) fn behind(matrix: &Mat, columns: usize) -> Mat {
-    Mat::from_fn(matrix.nrows(), columns + matrix.ncols(), |i, j| if j < columns { 0.0 } else { matrix[(i, j - columns)] })
+    Mat::from_fn(matrix.nrows(), columns + matrix.ncols(), |i, j| {
+        if j < columns { 0.0 } else { matrix[(i, j - columns)] }
+    })
 }
 
 /// Sum of the squares of the entries.

@@ -11,6 +11,8 @@ use crate::sweep::Sweep;
 
 /// Weight of a coordinate that is left out of the spread: its own prior is this much weaker than the fleet's.
 pub const LEFT_OUT: f64 = 1e-6;
+/// Student's t takes a coordinate of a robot or log for at least this.
+const LEAST_WEIGHT: f64 = 2.0 * LEFT_OUT;
 /// Degrees of freedom of the prior of a variance that few robots or logs tell.
 const PRIOR_FREEDOM: f64 = 4.0;
 /// Largest change of the logarithm of a variance by one extrapolation.
@@ -77,7 +79,13 @@ pub struct VarianceSettings {
 
 impl Default for VarianceSettings {
     fn default() -> Self {
-        VarianceSettings { freedom: None, tolerance: 5e-3, passes: 100, few: crate::data::FEW, accelerated: true }
+        VarianceSettings {
+            freedom: None,
+            tolerance: 5e-3,
+            passes: 100,
+            few: crate::data::FEW,
+            accelerated: true,
+        }
     }
 }
 
@@ -108,11 +116,14 @@ impl Moments {
                 return (Vec::new(), Vec::new());
             }
             let state = sweep.robot(r);
-            let second = |d: &crate::sweep::Deviation| (0..q).map(|k| d.mean[k].powi(2) + d.variance(k)).collect();
-            let logs: Vec<(usize, Vec<f64>)> = of_robot.iter().map(|k| (*k, second(&sweep.log(*k, &state)))).collect();
+            let second =
+                |d: &crate::sweep::Deviation| (0..q).map(|k| d.mean[k].powi(2) + d.variance(k)).collect();
+            let logs: Vec<(usize, Vec<f64>)> =
+                of_robot.iter().map(|k| (*k, second(&sweep.log(*k, &state)))).collect();
             (second(&state.deviation), logs)
         };
-        let found: Vec<(Vec<f64>, Vec<(usize, Vec<f64>)>)> = (0..splits.by_robot.len()).into_par_iter().map(of).collect();
+        let found: Vec<(Vec<f64>, Vec<(usize, Vec<f64>)>)> =
+            (0..splits.by_robot.len()).into_par_iter().map(of).collect();
         let mut logs = vec![Vec::new(); splits.logs.len()];
         let mut robots = Vec::new();
         for (robot, own) in found {
@@ -152,7 +163,8 @@ impl Maximisation<'_> {
             moments.iter().zip(weights).filter_map(of_unit).fold((0.0, 0.0), |(sum, n), x| (sum + x, n + 1.0))
         };
         let varying = &self.fleet.varying;
-        let sums: Vec<(f64, f64)> = (0..now.len()).map(|k| if now[k] > 0.0 { sum(k) } else { (0.0, 0.0) }).collect();
+        let sums: Vec<(f64, f64)> =
+            (0..now.len()).map(|k| if now[k] > 0.0 { sum(k) } else { (0.0, 0.0) }).collect();
         let few = self.settings.few as f64;
         let variance = |k: usize| {
             let (mut total, mut count) = sums[k];
@@ -175,7 +187,7 @@ fn renew(weights: &mut [Vec<f64>], moments: &[Vec<f64>], variances: &[f64], free
     for (own, moments) in weights.iter_mut().zip(moments) {
         for ((weight, moment), variance) in own.iter_mut().zip(moments).zip(variances) {
             if *variance > 0.0 && *weight > LEFT_OUT {
-                *weight = (freedom + 1.0) / (freedom + moment / variance);
+                *weight = ((freedom + 1.0) / (freedom + moment / variance)).max(LEAST_WEIGHT);
             }
         }
     }
@@ -251,7 +263,8 @@ fn extrapolated(first: &Variances, second: &Variances, third: &Variances) -> Var
     let difference = |x: &[f64], y: &[f64], k: usize| if lives[k] { (y[k] / x[k]).ln() } else { 0.0 };
     let r: Vec<f64> = (0..a.len()).map(|k| difference(&a, &b, k)).collect();
     let v: Vec<f64> = (0..a.len()).map(|k| difference(&b, &c, k) - r[k]).collect();
-    let (long, bent) = (crate::triangle::squares(r.iter().copied()), crate::triangle::squares(v.iter().copied()));
+    let (long, bent) =
+        (crate::triangle::squares(r.iter().copied()), crate::triangle::squares(v.iter().copied()));
     let alpha = if bent > 0.0 { (-(long / bent).sqrt()).clamp(-8.0, -1.0) } else { -1.0 };
     let far = |k: usize| {
         let moved = (-2.0 * alpha * r[k] + alpha * alpha * v[k]).clamp(-LONGEST, LONGEST);

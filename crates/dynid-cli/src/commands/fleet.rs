@@ -22,7 +22,10 @@ const PRINTED: usize = 20;
 pub(super) fn reduce(args: &ReduceArgs, list: &Path) -> Result<u8, Failure> {
     if !reduce::is_factor_file(&args.input) {
         return Err(Failure::Usage(
-            format!("{}: expected a factor file beside --manifest, whose recipe is followed", args.input.display()),
+            format!(
+                "{}: expected a factor file beside --manifest, whose recipe is followed",
+                args.input.display()
+            ),
             "learn a recipe first, on logs that stand for all: `dynid reduce arm.urdf --log some.csv --out type.factors`",
         ));
     }
@@ -32,7 +35,8 @@ pub(super) fn reduce(args: &ReduceArgs, list: &Path) -> Result<u8, Failure> {
         None => entries,
     };
     let recipe = reduce::read(&args.input)?.recipe().clone();
-    let Reading { columns, motor_side, .. } = Reading::recorded(&args.reading, Some(&recipe.reading), &args.input)?;
+    let Reading { columns, motor_side, .. } =
+        Reading::recorded(&args.reading, Some(&recipe.reading), &args.input)?;
     let store = FactorStore::create(&args.to.out, recipe, StoreReading { columns, motor_side })?;
     let progress = Progress::new(args.to.print.quiet);
     let done = AtomicUsize::new(0);
@@ -43,11 +47,13 @@ pub(super) fn reduce(args: &ReduceArgs, list: &Path) -> Result<u8, Failure> {
     let count = |of: fn(&Outcome) -> bool| outcomes.iter().filter(|o| of(o)).count();
     let reduced = count(|o| matches!(o, Outcome::Reduced));
     let known = count(|o| matches!(o, Outcome::Known));
-    let failures: Vec<_> = outcomes.iter().filter_map(|o| if let Outcome::Failed(f) = o { Some(f) } else { None }).collect();
+    let failures: Vec<_> =
+        outcomes.iter().filter_map(|o| if let Outcome::Failed(f) = o { Some(f) } else { None }).collect();
     if args.to.print.json {
         json(&json!({ "logs": entries.len(), "reduced": reduced, "known": known, "failures": failures }))?;
     } else {
-        let mut out = format!("{} logs: {reduced} reduced, {known} known, {} failed\n", entries.len(), failures.len());
+        let mut out =
+            format!("{} logs: {reduced} reduced, {known} known, {} failed\n", entries.len(), failures.len());
         for failure in failures.iter().take(PRINTED) {
             out += &format!("  {} ({}): {}: {}\n", failure.log, failure.robot, failure.code, failure.message);
         }
@@ -84,7 +90,8 @@ pub(crate) fn run(args: &FleetArgs) -> Result<u8, Failure> {
     file.provenance.revision = option_env!("DYNID_REVISION").map(str::to_owned);
     let page = found.report(&file)?;
     let pages = found.robot_pages(&file, &args.robot)?;
-    let names: Vec<PathBuf> = pages.iter().map(|(name, _)| args.out.join("robots").join(page_name(name))).collect();
+    let names: Vec<PathBuf> =
+        pages.iter().map(|(name, _)| args.out.join("robots").join(page_name(name))).collect();
     let more = match names.is_empty() {
         true => None,
         false => Some(outputs::prepare_folder(&names, &inputs, args.force)?),

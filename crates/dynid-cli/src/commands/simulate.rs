@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use dynid::sim::clearance::ContactEventKind;
 use dynid::simulate::{
-    ClearanceSummary, ExperimentSummary, FleetTable, SimulateMode, SimulateSettings, SimulatedLog, VirtualFleet,
-    VirtualLog, simulate,
+    ClearanceSummary, ExperimentSummary, FleetTable, SimulateMode, SimulateSettings, SimulatedLog,
+    VirtualFleet, VirtualLog, simulate,
 };
 use dynid_terminal::message::{Failure, Notes, json};
 use dynid_terminal::outputs::{self, Outputs, is_stdout};
@@ -92,8 +92,11 @@ fn fleet(args: &SimulateArgs, settings: &SimulateSettings) -> Result<u8, Failure
             "the truth of a fleet is `truth.json` in the folder of --out",
         ));
     }
-    let inputs: Vec<&Path> =
-        std::iter::once(&args.robot.robot).chain(&args.config).chain(&args.follow).map(PathBuf::as_path).collect();
+    let inputs: Vec<&Path> = std::iter::once(&args.robot.robot)
+        .chain(&args.config)
+        .chain(&args.follow)
+        .map(PathBuf::as_path)
+        .collect();
     let robot = load_robot(&args.robot)?;
     let virtual_fleet = VirtualFleet::new(&robot, settings)?;
     let about: Vec<VirtualLog> = (0..virtual_fleet.len()).map(|k| virtual_fleet.about(k)).collect();
@@ -108,7 +111,8 @@ fn fleet(args: &SimulateArgs, settings: &SimulateSettings) -> Result<u8, Failure
         write(&set, 2 + k, &made, &signals, &made.channels)?;
     }
     drop(progress);
-    let mut manifest = "log,robot,start".to_owned() + if about.iter().all(|log| log.temperature.is_some()) { ",temperature\n" } else { "\n" };
+    let mut manifest = "log,robot,start".to_owned()
+        + if about.iter().all(|log| log.temperature.is_some()) { ",temperature\n" } else { "\n" };
     for log in &about {
         let temperature = log.temperature.map_or_else(String::new, |t| format!(",{t}"));
         manifest += &format!("logs/{},{},{}{temperature}\n", log.file, log.robot, log.start_s);
@@ -129,7 +133,11 @@ fn fleet(args: &SimulateArgs, settings: &SimulateSettings) -> Result<u8, Failure
         json(&told)?;
     }
     let notes = Notes::new(args.print.quiet);
-    notes.tell(&format!("{} logs written to {}, with manifest.csv and truth.json", about.len(), args.out.display()));
+    notes.tell(&format!(
+        "{} logs written to {}, with manifest.csv and truth.json",
+        about.len(),
+        args.out.display()
+    ));
     Ok(0)
 }
 

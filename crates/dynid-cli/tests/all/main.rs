@@ -13,6 +13,7 @@ mod explain;
 mod export;
 mod faults;
 mod flags;
+mod fleet;
 mod friction;
 mod logs_of_tools;
 #[cfg(target_os = "linux")]

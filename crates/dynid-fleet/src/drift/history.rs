@@ -25,7 +25,8 @@ impl<'a> Logs<'a> {
         index.sort_by(|a, b| dates[*a].total_cmp(&dates[*b]));
         let first_s = index.first().map_or(0.0, |k| dates[*k]);
         let span_s = index.last().map_or(0.0, |k| dates[*k] - first_s);
-        let times = index.iter().map(|k| if span_s > 0.0 { (dates[*k] - first_s) / span_s } else { 0.0 }).collect();
+        let times =
+            index.iter().map(|k| if span_s > 0.0 { (dates[*k] - first_s) / span_s } else { 0.0 }).collect();
         Logs { sweep, freedom, index, first_s, span_s, times }
     }
 
@@ -91,7 +92,10 @@ impl<'a> Logs<'a> {
         let of = |(l, weights): (usize, &Vec<f64>)| {
             let (rows, residual, _) = self.rows(l, weights);
             let varying = rows.columns(0..q);
-            let left: Vec<f64> = (crate::triangle::times(&varying, &background.fitted(l)).iter().zip(residual)).map(|(f, r)| r - f).collect();
+            let left: Vec<f64> =
+                (crate::triangle::times(&varying, &background.fitted(l)).iter().zip(residual))
+                    .map(|(f, r)| r - f)
+                    .collect();
             let moment = varying.transpose() * Mat::column(&left);
             let information = varying.transpose() * varying;
             let weight = |k: usize| {

@@ -171,7 +171,12 @@ pub fn drift(fleet: &Fleet, fit: &FleetFit, settings: &DriftSettings) -> Result<
     let logs = |r| Logs::of(&sweep, fit.freedom, &times, r);
     let slope_variances = slope_variances((0..fleet.robots.len()).into_par_iter().map(logs), fit, settings);
     let precision: Vec<Vec<f64>> = (slope_variances.iter().zip(&fit.slopes))
-        .map(|(of, slopes)| of.iter().zip(slopes).map(|(v, slope)| v.max(1e-8 * slope * slope).max(f64::MIN_POSITIVE).recip()).collect())
+        .map(|(of, slopes)| {
+            of.iter()
+                .zip(slopes)
+                .map(|(v, slope)| v.max(1e-8 * slope * slope).max(f64::MIN_POSITIVE).recip())
+                .collect()
+        })
         .collect();
     let tests = |r| Tests { logs: logs(r), precision: &precision, found: Vec::new() };
     let first = |r| {
@@ -259,7 +264,14 @@ impl Tests<'_> {
         let (weights, without) = self.settled(&self.found, weights);
         let mut series = self.logs.series(&weights);
         let (mut coordinate, mut candidate, statistics) = self.strongest(&series);
-        let mut best = Best { series: series.clone(), weights: weights.clone(), coordinate, candidate, evidence: candidate.statistic, statistics };
+        let mut best = Best {
+            series: series.clone(),
+            weights: weights.clone(),
+            coordinate,
+            candidate,
+            evidence: candidate.statistic,
+            statistics,
+        };
         if candidate.statistic < WORTH {
             return best;
         }
@@ -271,8 +283,20 @@ impl Tests<'_> {
             let (k, next, statistics) = self.strongest(&series);
             let evidence = without - with;
             if round == 0 || evidence > best.evidence {
-                let own = of_background(&Background::new(&series, self.precision, self.found.clone()), &series, coordinate, &[candidate.pattern]);
-                best = Best { series: series.clone(), weights: beside, coordinate, candidate: own[0], evidence, statistics };
+                let own = of_background(
+                    &Background::new(&series, self.precision, self.found.clone()),
+                    &series,
+                    coordinate,
+                    &[candidate.pattern],
+                );
+                best = Best {
+                    series: series.clone(),
+                    weights: beside,
+                    coordinate,
+                    candidate: own[0],
+                    evidence,
+                    statistics,
+                };
             }
             if (k, next.pattern) == (coordinate, candidate.pattern) {
                 break;
@@ -282,7 +306,13 @@ impl Tests<'_> {
         best
     }
 
-    fn history(mut self, fleet: &Fleet, best: Option<Best>, threshold: f64, settings: &DriftSettings) -> RobotHistory {
+    fn history(
+        mut self,
+        fleet: &Fleet,
+        best: Option<Best>,
+        threshold: f64,
+        settings: &DriftSettings,
+    ) -> RobotHistory {
         let logs = self.logs.index.clone();
         let Some(mut best) = best else {
             let history = History::TooShort { logs: logs.len() };
@@ -327,8 +357,9 @@ impl Tests<'_> {
         };
         let times = &series.times;
         // Either kind names dates of both.
-        let as_good =
-            |c: &&Candidate| c.statistic > best.statistic - AS_GOOD && (kind == Kind::Either || c.pattern.is_step() == step);
+        let as_good = |c: &&Candidate| {
+            c.statistic > best.statistic - AS_GOOD && (kind == Kind::Either || c.pattern.is_step() == step)
+        };
         let interval = |pattern: Pattern| match pattern {
             Pattern::Step { first } => (times[first - 1], times[first]),
             Pattern::Ramp { onset } => (onset, onset),
@@ -377,7 +408,9 @@ fn slope_variances<'a>(
     let q = fit.slopes.first().map_or(0, Vec::len);
     // Slopes of single robots that nothing holds but a prior ten times as wide as the fleet's slope.
     let loose: Vec<Vec<f64>> = (fit.slopes.iter().zip(&fit.slope_sds))
-        .map(|(of, sds)| of.iter().zip(sds).map(|(g, sd)| (10.0 * g.abs().max(*sd)).powi(2).recip()).collect())
+        .map(|(of, sds)| {
+            of.iter().zip(sds).map(|(g, sd)| (10.0 * g.abs().max(*sd)).powi(2).recip()).collect()
+        })
         .collect();
     let seen: Vec<Vec<Vec<(f64, f64)>>> = robots
         .filter(|logs| covariates > 0 && logs.index.len() >= settings.least_logs)
@@ -418,7 +451,8 @@ fn events(robots: &[RobotHistory], settings: &DriftSettings) -> Vec<SiteEvent> {
     let mut out = Vec::new();
     let mut start = 0;
     while start < steps.len() {
-        let end = start + steps[start..].iter().take_while(|(t, _)| *t <= steps[start].0 + settings.event_s).count();
+        let end = start
+            + steps[start..].iter().take_while(|(t, _)| *t <= steps[start].0 + settings.event_s).count();
         let mut of_event: Vec<usize> = steps[start..end].iter().map(|(_, r)| *r).collect();
         of_event.sort_unstable();
         of_event.dedup();

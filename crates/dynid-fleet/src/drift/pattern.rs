@@ -67,7 +67,12 @@ pub fn candidates(series: &Series, precision: &[Vec<f64>], k: usize, patterns: &
     of_background(&Background::new(series, precision, Vec::new()), series, k, patterns)
 }
 
-pub(crate) fn of_background(background: &Background<'_>, series: &Series, k: usize, patterns: &[Pattern]) -> Vec<Candidate> {
+pub(crate) fn of_background(
+    background: &Background<'_>,
+    series: &Series,
+    k: usize,
+    patterns: &[Pattern],
+) -> Vec<Candidate> {
     let values: Vec<Vec<f64>> = patterns.iter().map(|p| p.values(&series.times)).collect();
     let told = background.of(k, &values);
     let all = patterns.iter().zip(told).zip(&values);

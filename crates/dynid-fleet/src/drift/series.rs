@@ -2,7 +2,6 @@
 
 use dynid_linalg::Mat;
 
-
 /// Estimates of the varying parameters, log by log, as informations: a log that does not tell a parameter adds nothing to it.
 #[derive(Debug, Clone)]
 pub struct Series {
@@ -47,7 +46,11 @@ pub(crate) struct Background<'a> {
 }
 
 impl<'a> Background<'a> {
-    pub(crate) fn new(series: &'a Series, precision: &'a [Vec<f64>], patterns: Vec<(usize, Vec<f64>)>) -> Background<'a> {
+    pub(crate) fn new(
+        series: &'a Series,
+        precision: &'a [Vec<f64>],
+        patterns: Vec<(usize, Vec<f64>)>,
+    ) -> Background<'a> {
         let q = series.coordinates();
         let bases = 1 + precision.len();
         let size = bases * q + patterns.len();
@@ -134,8 +137,9 @@ impl<'a> Background<'a> {
     pub(crate) fn fitted(&self, l: usize) -> Vec<f64> {
         let q = self.series.coordinates();
         let regressors = regressors(self.series, l);
-        let mut out: Vec<f64> =
-            (0..q).map(|i| regressors.iter().enumerate().map(|(c, u)| u * self.explained[c * q + i]).sum()).collect();
+        let mut out: Vec<f64> = (0..q)
+            .map(|i| regressors.iter().enumerate().map(|(c, u)| u * self.explained[c * q + i]).sum())
+            .collect();
         for (p, (k, h)) in self.patterns.iter().enumerate() {
             out[*k] += h[l] * self.explained[regressors.len() * q + p];
         }

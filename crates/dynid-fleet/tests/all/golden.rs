@@ -1,7 +1,10 @@
 //! Against a prototype written elsewhere: `spec/golden/fleet_mixed.json`, `fleet_drift.json`.
 
 use dynid_factor::Factor;
-use dynid_fleet::{ChannelFactor, Coordinate, Fleet, FleetLog, Noise, VarianceSettings, Variances, fit_at, tree, variances_at};
+use dynid_fleet::{
+    ChannelFactor, Coordinate, Fleet, FleetLog, Noise, VarianceSettings, Variances, fit_at, tree,
+    variances_at,
+};
 use dynid_linalg::Mat;
 use serde_json::Value;
 
@@ -45,12 +48,24 @@ fn fleet(golden: &Value) -> (Fleet, Noise) {
             ChannelFactor { channel, columns, factor }
         };
         let channels = log["joints"].as_array().expect("joints").iter().enumerate().map(channel).collect();
-        FleetLog { robot: number(&log["robot"]) as usize, key: k as u64, time_s: k as f64, covariates: Vec::new(), channels }
+        FleetLog {
+            robot: number(&log["robot"]) as usize,
+            key: k as u64,
+            time_s: k as f64,
+            covariates: Vec::new(),
+            channels,
+        }
     };
     let logs = golden["factors"].as_array().expect("factors").iter().enumerate().map(log).collect();
     let coordinate = |column| Coordinate { column, between_robots: true, between_logs: true, kind: column };
-    let fleet =
-        Fleet { columns: 4, channels: 2, robots: (0..5).collect(), covariates: 0, varying: vec![coordinate(0), coordinate(1)], logs };
+    let fleet = Fleet {
+        columns: 4,
+        channels: 2,
+        robots: (0..5).collect(),
+        covariates: 0,
+        varying: vec![coordinate(0), coordinate(1)],
+        logs,
+    };
     let variances: Vec<Vec<f64>> = golden["sigma2"].as_array().expect("variances").iter().map(list).collect();
     (fleet, Noise { ranks: vec![4, 2], variances, colours: list(&golden["kappa"]) })
 }
@@ -82,8 +97,15 @@ fn the_mixed_model_agrees() {
 fn variances_agree() {
     let Some(golden) = dynid_testing::golden("fleet_mixed.json") else { return };
     let (fleet, noise) = fleet(&golden);
-    let start = Variances::new(list(&golden["fixed"]["D_b"]), list(&golden["fixed"]["D_c"]), (5, fleet.logs.len()));
-    let plain = |passes| VarianceSettings { passes, few: 0, accelerated: false, tolerance: 0.0, ..VarianceSettings::default() };
+    let start =
+        Variances::new(list(&golden["fixed"]["D_b"]), list(&golden["fixed"]["D_c"]), (5, fleet.logs.len()));
+    let plain = |passes| VarianceSettings {
+        passes,
+        few: 0,
+        accelerated: false,
+        tolerance: 0.0,
+        ..VarianceSettings::default()
+    };
     for (k, expected) in golden["em_path"].as_array().expect("steps").iter().enumerate() {
         let (found, _) = variances_at(&fleet, &noise, &start, &plain(k + 1)).expect("steps");
         close(&found.robots, &list(&expected["D_b"]), 1e-9, "D_b");

@@ -7,8 +7,8 @@ use dynid_factor::FactorBuilder;
 use dynid_fleet::{ChannelFactor, Coordinate, Fleet, FleetLog};
 use dynid_model::element::{Coulomb, JointElement, Offset, Viscous};
 use dynid_model::{
-    BaseParameters, BaseSettings, Description, EffortModel, Inertia, JointDescription, JointKind, Limits, LinkDescription, MotionBlock,
-    Placement, RegressorBlock, RobotModel,
+    BaseParameters, BaseSettings, Description, EffortModel, Inertia, JointDescription, JointKind, Limits,
+    LinkDescription, MotionBlock, Placement, RegressorBlock, RobotModel,
 };
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -87,7 +87,18 @@ fn arm() -> Arm {
         let m = 6.0 / k as f64;
         d.links.push(LinkDescription {
             name: format!("l{k}"),
-            inertia: Some(Inertia([m, 0.02 * m, -0.01 * m, 0.1 * m, 0.02 * m, 0.0, 0.001 * m, 0.02 * m, 0.0, 0.01 * m])),
+            inertia: Some(Inertia([
+                m,
+                0.02 * m,
+                -0.01 * m,
+                0.1 * m,
+                0.02 * m,
+                0.0,
+                0.001 * m,
+                0.02 * m,
+                0.0,
+                0.01 * m,
+            ])),
         });
         d.joints.push(JointDescription {
             name: format!("j{k}"),
@@ -101,7 +112,9 @@ fn arm() -> Arm {
         });
     }
     let elements = (0..JOINTS)
-        .flat_map(|rate| -> [Box<dyn JointElement>; 3] { [Box::new(Coulomb { rate }), Box::new(Viscous { rate }), Box::new(Offset { rate })] })
+        .flat_map(|rate| -> [Box<dyn JointElement>; 3] {
+            [Box::new(Coulomb { rate }), Box::new(Viscous { rate }), Box::new(Offset { rate })]
+        })
         .collect();
     let inertias: Vec<Inertia> = d.links.iter().filter_map(|l| l.inertia).collect();
     let model = RobotModel::new(d.build().unwrap(), elements);
@@ -122,12 +135,21 @@ impl Arm {
         let (mut q, mut dq, mut ddq) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..JOINTS {
             let amplitude = rng.random_range(0.3..1.2);
-            let waves: Vec<(f64, f64, f64)> =
-                (0..4).map(|_| (TAU * rng.random_range(0.05..0.5), rng.random_range(0.0..TAU), amplitude * normal(rng) / 4.0)).collect();
+            let waves: Vec<(f64, f64, f64)> = (0..4)
+                .map(|_| {
+                    (
+                        TAU * rng.random_range(0.05..0.5),
+                        rng.random_range(0.0..TAU),
+                        amplitude * normal(rng) / 4.0,
+                    )
+                })
+                .collect();
             let start = rng.random_range(-1.5..1.5);
             for k in 0..samples {
                 let t = k as f64 / RATE_HZ;
-                let at = |f: &dyn Fn(f64, f64) -> f64| waves.iter().map(|(w, phase, a)| a * f(*w, w * t + phase)).sum::<f64>();
+                let at = |f: &dyn Fn(f64, f64) -> f64| {
+                    waves.iter().map(|(w, phase, a)| a * f(*w, w * t + phase)).sum::<f64>()
+                };
                 q.push(start + at(&|_, x| x.sin()));
                 dq.push(at(&|w, x| w * x.cos()));
                 ddq.push(at(&|w, x| -w * w * x.sin()));
@@ -156,7 +178,9 @@ impl Arm {
         for (joint, (names, columns)) in self.rows(&mut rng).into_iter().enumerate() {
             let n = columns.len() / names.len();
             for i in 0..n {
-                let effort = |x: &[f64]| names.iter().enumerate().map(|(c, name)| columns[c * n + i] * x[*name]).sum::<f64>();
+                let effort = |x: &[f64]| {
+                    names.iter().enumerate().map(|(c, name)| columns[c * n + i] * x[*name]).sum::<f64>()
+                };
                 wrong += ((effort(found) - effort(truth)) / NOISE[joint]).powi(2);
                 all += (effort(truth) / NOISE[joint]).powi(2);
             }
@@ -198,7 +222,11 @@ pub(crate) fn simulate(plan: &Plan) -> Simulated {
     }
     let sizes_of_changes: Vec<f64> = (changes.iter())
         .map(|c| match c.step {
-            true => rng.random_range(0.2..0.4) * if rng.random_bool(0.5) { 1.0 } else { -1.0 } * COULOMB[c.coordinate / 3],
+            true => {
+                rng.random_range(0.2..0.4)
+                    * if rng.random_bool(0.5) { 1.0 } else { -1.0 }
+                    * COULOMB[c.coordinate / 3]
+            }
             false => rng.random_range(0.3..0.6) * sizes[c.coordinate],
         })
         .collect();
@@ -208,7 +236,11 @@ pub(crate) fn simulate(plan: &Plan) -> Simulated {
         let stands_out = outliers.contains(&r).then(|| rng.random_range(0..JOINTS));
         for k in 0..q {
             let sd = SPREAD[k % 3].0 * sizes[k];
-            let draw = if stands_out == Some(k / 3) { 8.0 * if normal(&mut rng) < 0.0 { -1.0 } else { 1.0 } } else { normal(&mut rng) };
+            let draw = if stands_out == Some(k / 3) {
+                8.0 * if normal(&mut rng) < 0.0 { -1.0 } else { 1.0 }
+            } else {
+                normal(&mut rng)
+            };
             x[arm.varying[k]] += sd * draw;
         }
         robots.push(x);
@@ -234,10 +266,16 @@ pub(crate) fn simulate(plan: &Plan) -> Simulated {
             }
         }
         for (change, size) in changes.iter().zip(&sizes_of_changes).filter(|(c, _)| c.robot == r) {
-            let share = if change.step { f64::from(at >= change.at) } else { ((at - change.at) / (1.0 - change.at)).max(0.0) };
+            let share = if change.step {
+                f64::from(at >= change.at)
+            } else {
+                ((at - change.at) / (1.0 - change.at)).max(0.0)
+            };
             x[arm.varying[change.coordinate]] += size * share;
         }
-        let level = (0.4 * normal(&mut ChaCha8Rng::seed_from_u64(plan.seed ^ (77 + r as u64))) + 0.2 * normal(&mut rng)).exp();
+        let level = (0.4 * normal(&mut ChaCha8Rng::seed_from_u64(plan.seed ^ (77 + r as u64)))
+            + 0.2 * normal(&mut rng))
+        .exp();
         let channel = |(joint, (columns, regressor)): (usize, (Vec<usize>, Vec<f64>))| {
             let n = regressor.len() / columns.len();
             let mut effort = noise(&mut rng, n);
@@ -252,16 +290,26 @@ pub(crate) fn simulate(plan: &Plan) -> Simulated {
         let mut motion = ChaCha8Rng::seed_from_u64(plan.seed.wrapping_mul(31) + index as u64);
         let channels = arm.rows(&mut motion).into_iter().enumerate().map(channel).collect();
         let covariates = if plan.covariates { vec![temperature, load] } else { Vec::new() };
-        (FleetLog { robot: r, key: index as u64, time_s: YEAR * at, covariates, channels }, x, broken.is_some())
+        (
+            FleetLog { robot: r, key: index as u64, time_s: YEAR * at, covariates, channels },
+            x,
+            broken.is_some(),
+        )
     };
-    let made: Vec<(FleetLog, Vec<f64>, bool)> = (0..plan.robots * plan.logs).into_par_iter().map(of_log).collect();
+    let made: Vec<(FleetLog, Vec<f64>, bool)> =
+        (0..plan.robots * plan.logs).into_par_iter().map(of_log).collect();
     let broken = (0..made.len()).filter(|k| made[*k].2).collect();
     let (mut logs, mut truths) = (Vec::new(), Vec::new());
     for (log, x, _) in made {
         logs.push(log);
         truths.push(x);
     }
-    let coordinate = |k: usize| Coordinate { column: arm.varying[k], between_robots: true, between_logs: true, kind: k % 3 };
+    let coordinate = |k: usize| Coordinate {
+        column: arm.varying[k],
+        between_robots: true,
+        between_logs: true,
+        kind: k % 3,
+    };
     let fleet = Fleet {
         columns: p,
         channels: JOINTS,

@@ -86,9 +86,11 @@ impl ReducedLog {
     ) -> Result<ReducedLog, ReductionError> {
         let fault = |fault| ReductionError::File { file: name.to_owned(), fault };
         let (_, mut logs) = read(bytes, Some((recipe, recipe_sha256))).map_err(|found| match found {
-            Fault::Recipe { found } => {
-                ReductionError::OtherRecipe { log: name.to_owned(), expected: recipe_sha256.to_owned(), found }
-            }
+            Fault::Recipe { found } => ReductionError::OtherRecipe {
+                log: name.to_owned(),
+                expected: recipe_sha256.to_owned(),
+                found,
+            },
             other => fault(other),
         })?;
         match logs.len() {
@@ -161,7 +163,10 @@ fn read(bytes: &[u8], known: Option<(&Recipe, &str)>) -> Result<(Option<Recipe>,
         return Err(Fault::Recipe { found: recipe_sha256 });
     }
     let beside = "its recipe lies beside it: read the folder, or a file with its recipe";
-    let by = recipe.as_ref().or(known.map(|(recipe, _)| recipe)).ok_or_else(|| Fault::Description(beside.to_owned()))?;
+    let by = recipe
+        .as_ref()
+        .or(known.map(|(recipe, _)| recipe))
+        .ok_or_else(|| Fault::Description(beside.to_owned()))?;
     let (outputs, scales) = (by.outputs.len(), by.choices.scales_hz.len());
     let columns = by.columns.len();
     let mut out: Vec<ReducedLog> = Vec::new();

@@ -95,7 +95,15 @@ impl Reducer {
         cautions.extend(self.beyond(&name, &prepared));
         cautions.extend(self.faster(&name, &trained));
         let findings = findings.iter().map(ReducedFinding::of).collect();
-        let facts = LogFacts { name, log: trained, efforts, findings, cautions, inputs: log.source.inputs, origin: None };
+        let facts = LogFacts {
+            name,
+            log: trained,
+            efforts,
+            findings,
+            cautions,
+            inputs: log.source.inputs,
+            origin: None,
+        };
         Ok(ReducedLog { key: key(&self.hash, &groups), facts, groups })
     }
 

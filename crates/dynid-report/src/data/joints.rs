@@ -23,6 +23,8 @@ pub struct JointsReport {
     pub overview: Option<JointSection>,
     /// Sections, one per joint.
     pub joints: Vec<JointSection>,
+    /// What the page is of, in place of the number of joints.
+    pub counted: Option<String>,
     /// What is needed to repeat the run.
     pub provenance: Provenance,
 }

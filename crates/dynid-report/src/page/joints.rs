@@ -17,10 +17,14 @@ pub(super) fn context(data: &JointsReport) -> Value {
         warnings => Serde(&data.warnings),
         robot => Serde(&data.robot),
         introduction => Serde(&data.introduction),
-        count => data.joints.len(),
+        counted => data.counted.clone().unwrap_or_else(|| joints(data.joints.len())),
         sections => Serde(sections),
         provenance => Serde(&data.provenance),
     }
+}
+
+fn joints(count: usize) -> String {
+    format!("{count} joint{}", if count == 1 { "" } else { "s" })
 }
 
 #[derive(Debug, Serialize)]

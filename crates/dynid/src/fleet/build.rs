@@ -38,7 +38,11 @@ pub(super) struct Built {
 }
 
 /// The fleet of logs, and its names.
-pub(super) fn fleet(recipe: &Recipe, logs: Vec<ReducedLog>, settings: &FleetSettings) -> Result<(Fleet, Built), Error> {
+pub(super) fn fleet(
+    recipe: &Recipe,
+    logs: Vec<ReducedLog>,
+    settings: &FleetSettings,
+) -> Result<(Fleet, Built), Error> {
     let origin = |log: &ReducedLog| log.facts.origin.clone().unwrap_or_default();
     let origins: Vec<Origin> = logs.iter().map(origin).collect();
     let names: BTreeSet<&String> = origins.iter().map(|o| &o.robot).collect();
@@ -59,7 +63,10 @@ pub(super) fn fleet(recipe: &Recipe, logs: Vec<ReducedLog>, settings: &FleetSett
             // Hexadecimal, as every key.
             key: u64::from_str_radix(&log.key[..16], 16).unwrap_or_default(),
             time_s: origin.start_s.unwrap_or(0.0) + 0.5 * log.facts.log.duration_s,
-            covariates: covariates.iter().map(|name| origin.covariates.get(name).copied().unwrap_or(f64::NAN)).collect(),
+            covariates: covariates
+                .iter()
+                .map(|name| origin.covariates.get(name).copied().unwrap_or(f64::NAN))
+                .collect(),
             channels: log.groups.iter().filter(|g| g.rows() > 0).map(channel).collect(),
         }
     };
@@ -76,7 +83,10 @@ pub(super) fn fleet(recipe: &Recipe, logs: Vec<ReducedLog>, settings: &FleetSett
     };
     warnings.extend(same_motion(&fleet, &robots));
     if undated > 0 {
-        warnings.push(format!("{undated} of {} logs state no start: changes with time were not looked for", logged.len()));
+        warnings.push(format!(
+            "{undated} of {} logs state no start: changes with time were not looked for",
+            logged.len()
+        ));
     } else if covariates.is_empty() {
         warnings.push(
             "no temperature, load or age is stated for all logs: a change of these, or of a lubricant, explains a change of friction as well"
@@ -88,7 +98,11 @@ pub(super) fn fleet(recipe: &Recipe, logs: Vec<ReducedLog>, settings: &FleetSett
 }
 
 /// Covariates that are taken.
-fn covariates(origins: &[Origin], settings: &FleetSettings, warnings: &mut Vec<String>) -> Result<Vec<String>, Error> {
+fn covariates(
+    origins: &[Origin],
+    settings: &FleetSettings,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<String>, Error> {
     let mut stated: BTreeMap<&String, (usize, f64, f64)> = BTreeMap::new();
     for (name, value) in origins.iter().flat_map(|o| &o.covariates) {
         let (count, least, most) = stated.entry(name).or_insert((0, f64::INFINITY, f64::NEG_INFINITY));
@@ -104,7 +118,12 @@ fn covariates(origins: &[Origin], settings: &FleetSettings, warnings: &mut Vec<S
             match stated.get(name) {
                 None => return Err(fault(name.clone()).into()),
                 Some((count, ..)) if *count < origins.len() => {
-                    return Err(fault(format!("{name}, which {} of {} logs do not state", origins.len() - count, origins.len())).into());
+                    return Err(fault(format!(
+                        "{name}, which {} of {} logs do not state",
+                        origins.len() - count,
+                        origins.len()
+                    ))
+                    .into());
                 }
                 Some((_, least, most)) if least == most => {
                     return Err(fault(format!("{name}, which is {least} in all logs")).into());
@@ -117,7 +136,8 @@ fn covariates(origins: &[Origin], settings: &FleetSettings, warnings: &mut Vec<S
     let mut out = Vec::new();
     for (name, (count, least, most)) in stated {
         if count < origins.len() {
-            warnings.push(format!("`{name}` is stated for {count} of {} logs: it was left out", origins.len()));
+            warnings
+                .push(format!("`{name}` is stated for {count} of {} logs: it was left out", origins.len()));
         } else if least < most {
             out.push(name.clone());
         }
@@ -135,13 +155,18 @@ fn varying(recipe: &Recipe, settings: &FleetSettings) -> Result<(Vec<Coordinate>
         let Some(wanted) = wanted else { return Ok(None) };
         for one in wanted {
             if !parameters.iter().any(|p| matches(one, &p.name)) {
-                let expected = format!("parameters or symbols of the recipe ({})", symbols.iter().cloned().collect::<Vec<_>>().join(", "));
+                let expected = format!(
+                    "parameters or symbols of the recipe ({})",
+                    symbols.iter().cloned().collect::<Vec<_>>().join(", ")
+                );
                 return Err(FleetFault::Setting { setting, expected, found: one.clone() }.into());
             }
         }
         Ok(Some(parameters.iter().map(|p| wanted.iter().any(|w| matches(w, &p.name))).collect()))
     };
-    let usual = || parameters.iter().map(|p| matches!(p.owner, Owner::Joint(_)) && symbol(&p.name) != ROTOR).collect();
+    let usual = || {
+        parameters.iter().map(|p| matches!(p.owner, Owner::Joint(_)) && symbol(&p.name) != ROTOR).collect()
+    };
     let robots: Vec<bool> = listed("between_robots", &settings.between_robots)?.unwrap_or_else(usual);
     let logs = listed("between_logs", &settings.between_logs)?.unwrap_or_else(|| robots.clone());
     let symbols: Vec<&String> = symbols.iter().collect();
@@ -170,7 +195,9 @@ pub(super) fn prior(recipe: &Recipe) -> Mat {
 /// Robots whose logs all have the same motion.
 fn same_motion(fleet: &Fleet, names: &[String]) -> Option<String> {
     let alike = |logs: &Vec<usize>| {
-        let Some((first, others)) = logs.split_first().filter(|(_, others)| !others.is_empty()) else { return false };
+        let Some((first, others)) = logs.split_first().filter(|(_, others)| !others.is_empty()) else {
+            return false;
+        };
         others.iter().all(|other| {
             let (a, b) = (&fleet.logs[*first].channels, &fleet.logs[*other].channels);
             a.len() == b.len()
@@ -180,7 +207,8 @@ fn same_motion(fleet: &Fleet, names: &[String]) -> Option<String> {
                 })
         })
     };
-    let repeated: Vec<&String> = fleet.by_robot().iter().zip(names).filter(|(logs, _)| alike(logs)).map(|(_, name)| name).collect();
+    let repeated: Vec<&String> =
+        fleet.by_robot().iter().zip(names).filter(|(logs, _)| alike(logs)).map(|(_, name)| name).collect();
     let first = repeated.first()?;
     Some(format!(
         "{} robots ({first} ...) repeat one motion: what the model gets wrong in it is taken for the robot; let robots exchange motions",
@@ -195,11 +223,15 @@ pub(super) fn said(error: &FleetError, recipe: &Recipe, built: &Built) -> String
             let names: Vec<&str> = columns.iter().map(|c| recipe.columns[*c].name.as_str()).collect();
             format!("no log of the fleet tells {}", names.join(", "))
         }
-        FleetError::Constant { covariate, value } => format!("`{}` is {value} in all logs: nothing follows it", built.covariates[*covariate]),
+        FleetError::Constant { covariate, value } => {
+            format!("`{}` is {value} in all logs: nothing follows it", built.covariates[*covariate])
+        }
         FleetError::Confounded { covariate } => {
-            format!("the effect of `{}` cannot be told from the other parameters of the type", built.covariates[*covariate])
+            format!(
+                "the effect of `{}` cannot be told from the other parameters of the type",
+                built.covariates[*covariate]
+            )
         }
         other => other.to_string(),
     }
 }
-

@@ -72,7 +72,12 @@ fn entries(bytes: &[u8], file: &str, folder: &Path) -> Result<Vec<Entry>, FleetF
         let start_s = match start.map(text).filter(|text| !text.is_empty()) {
             None => None,
             Some(text) => Some(date(text).ok_or_else(|| {
-                fault(row, "start", "a date as 2026-03-01T12:00:00Z, 2026-03-01, or seconds since 1970", format!("`{text}`"))
+                fault(
+                    row,
+                    "start",
+                    "a date as 2026-03-01T12:00:00Z, 2026-03-01, or seconds since 1970",
+                    format!("`{text}`"),
+                )
             })?),
         };
         let mut covariates = BTreeMap::new();
@@ -99,7 +104,8 @@ fn date(text: &str) -> Option<f64> {
         return seconds.is_finite().then_some(seconds);
     }
     let day = text.parse::<jiff::civil::Date>().ok().filter(|_| !text.contains(['T', 't', ' ']));
-    let stamp: jiff::Timestamp = day.map_or_else(|| text.to_owned(), |day| format!("{day}T00:00:00Z")).parse().ok()?;
+    let stamp: jiff::Timestamp =
+        day.map_or_else(|| text.to_owned(), |day| format!("{day}T00:00:00Z")).parse().ok()?;
     Some(stamp.as_second() as f64 + 1e-9 * f64::from(stamp.subsec_nanosecond()))
 }
 

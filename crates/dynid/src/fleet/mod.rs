@@ -13,12 +13,13 @@ mod store;
 use std::path::PathBuf;
 
 use dynid_fleet::drift::{Drift, DriftSettings, drift};
-use dynid_fleet::{Fleet, FleetError, FleetFit, FitSettings, fit};
+use dynid_fleet::{FitSettings, Fleet, FleetError, FleetFit, fit};
 
 pub use manifest::{Entry, manifest};
 pub use record::{
-    ChangeKind, ChangeRecord, ChannelRecord, CovariateRecord, DatedRecord, EventRecord, FleetFile, FleetParameter, LogDeviation, LogRecord,
-    OutlierRecord, RobotParameter, RobotRecord, RobotState, SlopeRecord,
+    ChangeKind, ChangeRecord, ChannelRecord, CovariateRecord, DatedRecord, EventRecord, FleetFile,
+    FleetParameter, LogDeviation, LogRecord, OutlierRecord, RobotParameter, RobotRecord, RobotState,
+    SlopeRecord,
 };
 pub use store::{FactorStore, Failure, FailureCode, NUMERICS, Outcome, StoreContent, StoreReading, read};
 
@@ -157,14 +158,25 @@ pub struct FleetResult {
 ///
 /// # Errors
 /// [`Error`]: folders that cannot be read; [`FleetFault`].
-pub fn fleet(folders: &[PathBuf], settings: &FleetSettings, progress: &mut dyn FnMut(FleetStep)) -> Result<FleetResult, Error> {
+pub fn fleet(
+    folders: &[PathBuf],
+    settings: &FleetSettings,
+    progress: &mut dyn FnMut(FleetStep),
+) -> Result<FleetResult, Error> {
     progress(FleetStep::Read);
     let content = read(folders)?;
-    let StoreContent { recipe, logs, failures, repeated } = content;
-    let (fleet, built) = build::fleet(&recipe, logs, settings)?;
+    let StoreContent { recipe, logs, failures, repeated, contradicting } = content;
+    let (fleet, mut built) = build::fleet(&recipe, logs, settings)?;
+    if contradicting > 0 {
+        let logs = if contradicting == 1 { "log is" } else { "logs are" };
+        built.warnings.push(format!(
+            "{contradicting} {logs} stated with different dates or numbers: the first by name was taken"
+        ));
+    }
     progress(FleetStep::Fit);
     let told = |error: FleetError| FleetFault::Fit(build::said(&error, &recipe, &built), error);
-    let found = fit(&fleet, &FitSettings { prior: Some(build::prior(&recipe)), ..FitSettings::default() }).map_err(told)?;
+    let found = fit(&fleet, &FitSettings { prior: Some(build::prior(&recipe)), ..FitSettings::default() })
+        .map_err(told)?;
     let mut changes = None;
     if built.undated == 0 {
         progress(FleetStep::Drift);

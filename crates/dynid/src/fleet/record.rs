@@ -307,7 +307,8 @@ impl FleetResult {
             self.failures.len()
         );
         if !events.is_empty() {
-            headline += &format!(" {} times many robots changed at once: a matter of the site.", events.len());
+            headline +=
+                &format!(" {} times many robots changed at once: a matter of the site.", events.len());
         }
         let settings = serde_json::to_value(&self.settings).unwrap_or_default();
         FleetFile {
@@ -409,12 +410,17 @@ impl FleetResult {
         let robot = fit.robots[r].as_ref();
         let parameter = |k: usize| {
             let column = self.fleet.varying[k].column;
-            let (value, sd) = robot.map_or((f64::NAN, f64::NAN), |x| (x.values[column], x.covariance[(column, column)].max(0.0).sqrt()));
+            let (value, sd) = robot.map_or((f64::NAN, f64::NAN), |x| {
+                (x.values[column], x.covariance[(column, column)].max(0.0).sqrt())
+            });
             let cut = self.built.positive[k] && value < 1.96 * sd;
             RobotParameter {
                 name: self.name(k),
                 value: if cut { value.max(0.0) } else { value },
-                interval: (if cut { 0.0 } else { value - 1.96 * sd }, (value + 1.96 * sd).max(0.0_f64.min(value))),
+                interval: (
+                    if cut { 0.0 } else { value - 1.96 * sd },
+                    (value + 1.96 * sd).max(0.0_f64.min(value)),
+                ),
                 cut_at_zero: cut,
                 deviation: robot.and_then(|x| Some(x.deviation[k] / spread(k)?)),
                 detectable: history.and_then(|h| h.detectable.get(k).copied()).filter(|d| d.is_finite()),
@@ -431,7 +437,9 @@ impl FleetResult {
             .collect();
         stands_out.sort_by(|a, b| b.deviation.abs().total_cmp(&a.deviation.abs()));
         let (p, changes) = match history.map(|h| &h.history) {
-            Some(History::Changed { p, changes }) => (Some(*p), changes.iter().map(|c| self.change(c)).collect()),
+            Some(History::Changed { p, changes }) => {
+                (Some(*p), changes.iter().map(|c| self.change(c)).collect())
+            }
             Some(History::Unchanged { p }) => (Some(*p), Vec::new()),
             Some(History::TooShort { .. }) | None => (None, Vec::new()),
         };
@@ -443,7 +451,12 @@ impl FleetResult {
         };
         let own: Vec<usize> = (0..self.fleet.logs.len()).filter(|k| self.fleet.logs[*k].robot == r).collect();
         let starts: Option<Vec<f64>> = own.iter().map(|k| self.built.starts[*k]).collect();
-        let dates_s = starts.map(|s| (s.iter().copied().fold(f64::INFINITY, f64::min), s.iter().copied().fold(f64::NEG_INFINITY, f64::max)));
+        let dates_s = starts.map(|s| {
+            (
+                s.iter().copied().fold(f64::INFINITY, f64::min),
+                s.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            )
+        });
         RobotRecord {
             name: self.built.robots[r].clone(),
             state,
@@ -467,7 +480,8 @@ impl FleetResult {
             ),
             "fo" => "an offset: zero or brake, cable, current sensor".to_owned(),
             _ if self.built.covariates.is_empty() => {
-                "friction: wear or damage; or temperature, lubricant or load, none of which is stated".to_owned()
+                "friction: wear or damage; or temperature, lubricant or load, none of which is stated"
+                    .to_owned()
             }
             _ => "friction: wear or damage of bearing, seal or gear".to_owned(),
         };
@@ -505,7 +519,11 @@ impl FleetResult {
                 .collect();
             parameters.sort_by(|a, b| b.deviation.abs().total_cmp(&a.deviation.abs()));
             if !parameters.is_empty() {
-                out.push(LogRecord { log: self.built.logs[l].clone(), robot: self.built.robots[log.robot].clone(), parameters });
+                out.push(LogRecord {
+                    log: self.built.logs[l].clone(),
+                    robot: self.built.robots[log.robot].clone(),
+                    parameters,
+                });
             }
         }
         out.sort_by(|a, b| b.parameters[0].deviation.abs().total_cmp(&a.parameters[0].deviation.abs()));
@@ -522,10 +540,15 @@ impl FleetResult {
                 "{robots} robots do not tell how robots of the type differ: the spread leans on 20 % between robots, and no robot is called out of it"
             ));
         } else if robots < SAMPLE {
-            out.push(format!("{robots} robots are few: intervals of the type hold if these stand for the others"));
+            out.push(format!(
+                "{robots} robots are few: intervals of the type hold if these stand for the others"
+            ));
         }
         if fit.jackknife.is_none() {
-            out.push("one robot alone tells some parameters of the type: their intervals are those of the model".to_owned());
+            out.push(
+                "one robot alone tells some parameters of the type: their intervals are those of the model"
+                    .to_owned(),
+            );
         }
         if !fit.settled.converged {
             out.push(format!(
@@ -536,7 +559,10 @@ impl FleetResult {
         }
         let unseen: Vec<&str> = parameters.iter().filter(|p| !p.seen).map(|p| p.name.as_str()).collect();
         if !unseen.is_empty() {
-            out.push(format!("no log tells {}: their values are near zero because nothing says otherwise", unseen.join(", ")));
+            out.push(format!(
+                "no log tells {}: their values are near zero because nothing says otherwise",
+                unseen.join(", ")
+            ));
         }
         for channel in self.noise().iter().filter(|c| c.colour > COLOURED) {
             out.push(format!(

@@ -42,7 +42,9 @@ impl FleetResult {
     /// [`PageError`](crate::fault::PageError).
     pub fn report(&self, file: &FleetFile) -> Result<String, Error> {
         let named = file.robots.iter().enumerate().filter(|(_, r)| r.state != RobotState::Usual);
-        self.page(file, format!("Fleet of {}", file.robot_type), self.overview(file), named.map(|(r, _)| self.section(file, r)).collect())
+        let sections = named.map(|(r, _)| self.section(file, r)).collect();
+        let headline = (file.headline.clone(), file.status.into());
+        self.page(file, format!("Fleet of {}", file.robot_type), headline, self.overview(file), sections)
     }
 
     /// Names and pages of the robots that have changed or stand out, and of those that are asked for.
@@ -55,7 +57,12 @@ impl FleetResult {
         pages
             .map(|(r, robot)| {
                 let title = format!("{} of the fleet of {}", robot.name, file.robot_type);
-                Ok((robot.name.clone(), self.page(file, title, self.values(file, r), vec![self.section(file, r)])?))
+                let section = self.section(file, r);
+                let headline = (headline(robot), section.status);
+                Ok((
+                    robot.name.clone(),
+                    self.page(file, title, headline, self.values(file, r), vec![section])?,
+                ))
             })
             .collect()
     }
@@ -64,6 +71,7 @@ impl FleetResult {
         &self,
         file: &FleetFile,
         title: String,
+        (headline, status): (String, report::Status),
         overview: report::JointSection,
         joints: Vec<report::JointSection>,
     ) -> Result<String, Error> {
@@ -71,21 +79,25 @@ impl FleetResult {
         crate::fault::page(report::render_joints(&report::JointsReport {
             kind: "Fleet".to_owned(),
             title,
-            verdict: report::Verdict {
-                status: file.status.into(),
-                headline: file.headline.clone(),
-                ..report::Verdict::default()
-            },
-            warnings: file.warnings.iter().map(|w| report::Warning { message: w.clone(), hint: String::new() }).collect(),
+            verdict: report::Verdict { status, headline, ..report::Verdict::default() },
+            warnings: file
+                .warnings
+                .iter()
+                .map(|w| report::Warning { message: w.clone(), hint: String::new() })
+                .collect(),
             robot: report::Robot { name: file.robot_type.clone(), ..report::Robot::default() },
             introduction: introduction(),
             overview: Some(overview),
             joints,
+            counted: Some(format!("{} robots, {} logs", file.robots.len(), self.fleet.logs.len())),
             provenance: report::Provenance {
                 version: p.version.clone(),
                 inputs: Vec::new(),
                 seed: None,
-                settings: settings_table(&p.settings, &serde_json::to_value(super::FleetSettings::default()).unwrap_or_default()),
+                settings: settings_table(
+                    &p.settings,
+                    &serde_json::to_value(super::FleetSettings::default()).unwrap_or_default(),
+                ),
             },
         }))
     }
@@ -108,7 +120,12 @@ impl FleetResult {
             .filter(|p| p.between_robots.is_none() && p.between_logs.is_none())
             .map(|p| {
                 let seen = if p.seen { "seen" } else { "not seen" };
-                vec![text(p.name.clone()), text(format!("{} ± {}", short(p.value), short(p.sd))), text(p.unit.clone()), text(seen)]
+                vec![
+                    text(p.name.clone()),
+                    text(format!("{} ± {}", short(p.value), short(p.sd))),
+                    text(p.unit.clone()),
+                    text(seen),
+                ]
             })
             .collect();
         let changes = (file.robots.iter())
@@ -128,30 +145,72 @@ impl FleetResult {
             .collect();
         let outliers = (file.robots.iter())
             .flat_map(|r| r.stands_out.iter().map(move |o| (r, o)))
-            .map(|(r, o)| vec![text(r.name.clone()), text(o.parameter.clone()), Value::from(o.deviation), Value::from(o.weight)])
+            .map(|(r, o)| {
+                vec![
+                    text(r.name.clone()),
+                    text(o.parameter.clone()),
+                    Value::from(o.deviation),
+                    Value::from(o.weight),
+                ]
+            })
             .collect();
         let logs = (file.logs_to_look_at.iter())
             .map(|l| {
-                let where_: Vec<String> = l.parameters.iter().take(4).map(|p| format!("{} by {:+.1} sd", p.parameter, p.deviation)).collect();
+                let where_: Vec<String> = l
+                    .parameters
+                    .iter()
+                    .take(4)
+                    .map(|p| format!("{} by {:+.1} sd", p.parameter, p.deviation))
+                    .collect();
                 vec![text(l.log.clone()), text(l.robot.clone()), text(where_.join(", "))]
             })
             .collect();
         let slopes = (file.covariates.iter())
             .flat_map(|c| c.slopes.iter().map(move |s| (c, s)))
-            .map(|(c, s)| vec![text(c.name.clone()), text(s.parameter.clone()), text(format!("{} ± {}", short(s.value), short(s.sd)))])
+            .map(|(c, s)| {
+                vec![
+                    text(c.name.clone()),
+                    text(s.parameter.clone()),
+                    text(format!("{} ± {}", short(s.value), short(s.sd))),
+                ]
+            })
             .collect();
-        let events = file.events.iter().map(|e| vec![text(e.text.clone()), text(e.robots.join(", "))]).collect();
+        let events =
+            file.events.iter().map(|e| vec![text(e.text.clone()), text(e.robots.join(", "))]).collect();
         let failures = (file.failures.iter().take(LISTED))
-            .map(|f| vec![text(f.log.clone()), text(f.robot.clone()), text(f.code.word()), text(f.message.clone())])
+            .map(|f| {
+                vec![text(f.log.clone()), text(f.robot.clone()), text(f.code.word()), text(f.message.clone())]
+            })
             .collect();
         let tables = [
-            table("Changes with time", &["Robot", "Parameter", "Kind", "Size at the last log", "When (interval), UTC", "Evidence", "p", "Points to"], changes),
+            table(
+                "Changes with time",
+                &[
+                    "Robot",
+                    "Parameter",
+                    "Kind",
+                    "Size at the last log",
+                    "When (interval), UTC",
+                    "Evidence",
+                    "p",
+                    "Points to",
+                ],
+                changes,
+            ),
             table("Changes of many robots at once", &["When, UTC", "Robots"], events),
-            table("Robots out of the spread of the fleet", &["Robot", "Parameter", "Deviation, sd between robots", "Weight"], outliers),
+            table(
+                "Robots out of the spread of the fleet",
+                &["Robot", "Parameter", "Deviation, sd between robots", "Weight"],
+                outliers,
+            ),
             table("Logs to look at", &["Log", "Robot", "Stands out in"], logs),
             table("Logs that failed", &["Log", "Robot", "Code", "What is wrong"], failures),
             self.map(file),
-            table("Parameters that vary", &["Parameter", "Type", "Unit", "sd between robots", "sd between logs"], spreads),
+            table(
+                "Parameters that vary",
+                &["Parameter", "Type", "Unit", "sd between robots", "sd between logs"],
+                spreads,
+            ),
             table("What parameters follow, per unit", &["Covariate", "Parameter", "Slope"], slopes),
             table("Parameters that all robots share", &["Parameter", "Type", "Unit", "Told by logs"], shared),
         ];
@@ -176,8 +235,16 @@ impl FleetResult {
         let mut heading = vec!["Robot".to_owned(), "State".to_owned(), "Logs".to_owned()];
         heading.extend((0..self.fleet.varying.len()).map(|k| self.name(k)));
         let row = |r: &RobotRecord| {
-            let mut row = vec![text(r.name.clone()), text(r.state.word().replace('_', " ")), Value::Count(r.logs as u64)];
-            row.extend(r.parameters.iter().map(|p| p.deviation.map_or(Value::Undefined, |d| text(format!("{d:+.1}")))));
+            let mut row = vec![
+                text(r.name.clone()),
+                text(r.state.word().replace('_', " ")),
+                Value::Count(r.logs as u64),
+            ];
+            row.extend(
+                r.parameters
+                    .iter()
+                    .map(|p| p.deviation.map_or(Value::Undefined, |d| text(format!("{d:+.1}")))),
+            );
             row
         };
         StudyTable {
@@ -195,7 +262,12 @@ impl FleetResult {
                 vec![
                     text(p.name.clone()),
                     Value::from(p.value),
-                    text(format!("{} to {}{}", short(p.interval.0), short(p.interval.1), if p.cut_at_zero { ", cut at zero" } else { "" })),
+                    text(format!(
+                        "{} to {}{}",
+                        short(p.interval.0),
+                        short(p.interval.1),
+                        if p.cut_at_zero { ", cut at zero" } else { "" }
+                    )),
                     text(self.unit(k)),
                     p.deviation.map_or(Value::Undefined, |d| text(format!("{d:+.1}"))),
                     Value::from(p.detectable),
@@ -207,7 +279,14 @@ impl FleetResult {
             status: file.status.into(),
             tables: vec![table(
                 "Parameters of the robot at the mean of the covariates",
-                &["Parameter", "Value", "95 % interval", "Unit", "Deviation, sd between robots", "Smallest step that would be found"],
+                &[
+                    "Parameter",
+                    "Value",
+                    "95 % interval",
+                    "Unit",
+                    "Deviation, sd between robots",
+                    "Smallest step that would be found",
+                ],
                 rows,
             )],
             ..report::JointSection::default()
@@ -217,9 +296,17 @@ impl FleetResult {
     /// A robot's state and time lines of what has changed or stands out; of the most deviating parameter otherwise.
     fn section(&self, file: &FleetFile, r: usize) -> report::JointSection {
         let robot = &file.robots[r];
-        let mut shown: Vec<String> = robot.changes.iter().map(|c| c.parameter.clone()).chain(robot.stands_out.iter().map(|o| o.parameter.clone())).collect();
+        let mut shown: Vec<String> = robot
+            .changes
+            .iter()
+            .map(|c| c.parameter.clone())
+            .chain(robot.stands_out.iter().map(|o| o.parameter.clone()))
+            .collect();
         if shown.is_empty() {
-            let most = robot.parameters.iter().max_by(|a, b| a.deviation.unwrap_or(0.0).abs().total_cmp(&b.deviation.unwrap_or(0.0).abs()));
+            let most = robot
+                .parameters
+                .iter()
+                .max_by(|a, b| a.deviation.unwrap_or(0.0).abs().total_cmp(&b.deviation.unwrap_or(0.0).abs()));
             shown.extend(most.map(|p| p.name.clone()));
         }
         let mut seen = std::collections::BTreeSet::new();
@@ -236,7 +323,11 @@ impl FleetResult {
                 ]
             })
             .collect::<Vec<_>>();
-        let tables = vec![table("Changes", &["Parameter", "Kind", "Size at the last log", "When (interval), UTC", "p", "Points to"], changes)];
+        let tables = vec![table(
+            "Changes",
+            &["Parameter", "Kind", "Size at the last log", "When (interval), UTC", "p", "Points to"],
+            changes,
+        )];
         let charts = shown.iter().take(4).filter_map(|name| self.time_line(r, name)).collect();
         report::JointSection {
             name: robot.name.clone(),
@@ -244,7 +335,11 @@ impl FleetResult {
             state: robot.state.word().replace('_', " "),
             facts: vec![
                 Fact::new("logs", Value::Count(robot.logs as u64), ""),
-                Fact::new("p of no change", robot.p.map_or(text("history too short, or no dates"), |p| text(format!("{p:.1e}"))), ""),
+                Fact::new(
+                    "p of no change",
+                    robot.p.map_or(text("history too short, or no dates"), |p| text(format!("{p:.1e}"))),
+                    "",
+                ),
             ],
             tables: tables.into_iter().filter(|t| !t.rows.is_empty()).collect(),
             charts,
@@ -258,10 +353,12 @@ impl FleetResult {
         let column = self.fleet.varying[k].column;
         let level = self.fit.robots[r].as_ref()?.values[column];
         let dated = self.drift.is_some();
-        let mut logs: Vec<usize> = (0..self.fleet.logs.len()).filter(|l| self.fleet.logs[*l].robot == r).collect();
+        let mut logs: Vec<usize> =
+            (0..self.fleet.logs.len()).filter(|l| self.fleet.logs[*l].robot == r).collect();
         logs.sort_by(|a, b| self.fleet.logs[*a].time_s.total_cmp(&self.fleet.logs[*b].time_s));
         let first = self.fleet.logs[*logs.first()?].time_s;
-        let x = |at: usize, l: usize| if dated { (self.fleet.logs[l].time_s - first) / DAY } else { at as f64 };
+        let x =
+            |at: usize, l: usize| if dated { (self.fleet.logs[l].time_s - first) / DAY } else { at as f64 };
         let points = |of: &dyn Fn(usize) -> f64| -> Vec<[f64; 2]> {
             logs.iter().enumerate().map(|(at, l)| [x(at, *l), of(*l)]).collect()
         };
@@ -284,6 +381,26 @@ impl FleetResult {
                 curve("log", CurveStyle::Dots, points(&value)),
             ],
         })
+    }
+}
+
+/// A robot in a sentence.
+fn headline(robot: &RobotRecord) -> String {
+    let changes = robot.changes.iter().map(|c| format!("{} by {} ({})", c.parameter, short(c.size), c.kind));
+    let outliers = robot
+        .stands_out
+        .iter()
+        .map(|o| format!("{} by {:+.1} standard deviations", o.parameter, o.deviation));
+    let list = |words: Vec<String>| words.join(", ");
+    match robot.state {
+        RobotState::Usual => format!("{}: like the others; no change was found.", robot.name),
+        RobotState::StandsOut => {
+            format!("{}: out of the spread of the fleet: {}.", robot.name, list(outliers.collect()))
+        }
+        RobotState::Changed => format!("{}: has changed: {}.", robot.name, list(changes.collect())),
+        RobotState::SiteEvent => {
+            format!("{}: has changed with many others at once: {}.", robot.name, list(changes.collect()))
+        }
     }
 }
 

@@ -74,7 +74,9 @@ impl FailureCode {
         use crate::reduce::ReductionError as Reduction;
         match error {
             Error::Read { .. } => FailureCode::Unreadable,
-            Error::Reduction(Reduction::Rate { .. } | Reduction::NotLogged { .. }) => FailureCode::RecipeMismatch,
+            Error::Reduction(Reduction::Rate { .. } | Reduction::NotLogged { .. }) => {
+                FailureCode::RecipeMismatch
+            }
             Error::Reduction(Reduction::NoRows { .. }) => FailureCode::NoRows,
             Error::PreflightFault(_) => FailureCode::Preflight,
             _ => FailureCode::Malformed,
@@ -132,10 +134,18 @@ impl FactorStore {
             dynid_io::output::write_atomically(&at, &Reduction::without_logs(recipe.clone()).to_bytes())?;
         }
         // Settings as text: the same for the same settings, whatever order they were given in.
-        let side = serde_json::to_string(&reading.motor_side).unwrap_or_else(|e| unreachable!("plain data: {e}"));
-        let columns = serde_json::to_string(&reading.columns).unwrap_or_else(|e| unreachable!("plain data: {e}"));
+        let side =
+            serde_json::to_string(&reading.motor_side).unwrap_or_else(|e| unreachable!("plain data: {e}"));
+        let columns =
+            serde_json::to_string(&reading.columns).unwrap_or_else(|e| unreachable!("plain data: {e}"));
         let salt = format!("{recipe_sha256}\n{NUMERICS}\n{}\n{columns}\n{side}\n", env!("CARGO_PKG_VERSION"));
-        Ok(FactorStore { folder: folder.to_owned(), reducer: recipe.reducer()?, recipe_sha256, reading, salt })
+        Ok(FactorStore {
+            folder: folder.to_owned(),
+            reducer: recipe.reducer()?,
+            recipe_sha256,
+            reading,
+            salt,
+        })
     }
 
     /// Reduces logs that are not there yet, several at a time; `progress` hears of every log as it is done, in any order.
@@ -173,7 +183,8 @@ impl FactorStore {
         let origin = serde_json::to_string(&entry.origin).unwrap_or_else(|e| unreachable!("plain data: {e}"));
         let name = sha256(format!("{source}\n{origin}\n{}", self.salt).as_bytes())[..32].to_owned();
         let folder = self.folder.join(&name[..2]);
-        let (reduced, refused) = (folder.join(format!("{name}.{REDUCED}")), folder.join(format!("{name}.{FAILED}")));
+        let (reduced, refused) =
+            (folder.join(format!("{name}.{REDUCED}")), folder.join(format!("{name}.{FAILED}")));
         if let Ok(bytes) = fs::read(&reduced)
             && self.read_log(&bytes, &reduced).is_ok()
         {
@@ -192,7 +203,8 @@ impl FactorStore {
             }
             Err(error) => {
                 let failure = failed(&error);
-                let text = serde_json::to_string_pretty(&failure).unwrap_or_else(|e| unreachable!("plain data: {e}"));
+                let text = serde_json::to_string_pretty(&failure)
+                    .unwrap_or_else(|e| unreachable!("plain data: {e}"));
                 dynid_io::output::write_atomically(&refused, text.as_bytes())?;
                 Ok(Outcome::Failed(failure))
             }
@@ -269,6 +281,8 @@ pub struct StoreContent {
     pub failures: Vec<Failure>,
     /// Logs that were there again under another name.
     pub repeated: usize,
+    /// Logs that are stated several times with different dates or numbers; the first by name was taken.
+    pub contradicting: usize,
 }
 
 /// Reads folders of factors by one recipe.
@@ -286,7 +300,9 @@ pub fn read(folders: &[PathBuf]) -> Result<StoreContent, Error> {
         match &recipe {
             Some((_, expected)) if *expected != hash => {
                 let folder = folder.display().to_string();
-                return Err(FleetFault::OtherRecipe { folder, expected: expected.clone(), found: hash }.into());
+                return Err(
+                    FleetFault::OtherRecipe { folder, expected: expected.clone(), found: hash }.into()
+                );
             }
             Some(_) => {}
             None => recipe = Some((own, hash)),
@@ -327,17 +343,17 @@ pub fn read(folders: &[PathBuf]) -> Result<StoreContent, Error> {
             Err(failure) => failures.push(failure),
         }
     }
-    let repeated = once(&mut logs, &mut failures);
+    let (repeated, contradicting) = once(&mut logs, &mut failures);
     failures.sort_by(|a, b| (&a.robot, &a.log, &a.message).cmp(&(&b.robot, &b.log, &b.message)));
-    Ok(StoreContent { recipe, logs, failures, repeated })
+    Ok(StoreContent { recipe, logs, failures, repeated, contradicting })
 }
 
-/// Leaves every log once, in the order of the keys; those of two robots become failures.
-fn once(logs: &mut Vec<ReducedLog>, failures: &mut Vec<Failure>) -> usize {
+/// Leaves every log once, in the order of the keys; those of two robots become failures. How many were there again, and contradict themselves.
+fn once(logs: &mut Vec<ReducedLog>, failures: &mut Vec<Failure>) -> (usize, usize) {
     logs.sort_by(|a, b| (&a.key, &a.facts.name).cmp(&(&b.key, &b.facts.name)));
     let robot = |log: &ReducedLog| log.facts.origin.as_ref().map(|o| o.robot.clone()).unwrap_or_default();
     let mut out: Vec<ReducedLog> = Vec::with_capacity(logs.len());
-    let mut repeated = 0;
+    let (mut repeated, mut contradicting) = (0, 0);
     let mut rest = std::mem::take(logs).into_iter().peekable();
     while let Some(log) = rest.next() {
         let mut same = vec![log];
@@ -354,16 +370,19 @@ fn once(logs: &mut Vec<ReducedLog>, failures: &mut Vec<Failure>) -> usize {
                     robot: robot(log),
                     code: FailureCode::TwoRobots,
                     message: format!("the same log is stated for {}", robots.join(" and ")),
-                    hint: Some("state in the manifest whose log it is, and reduce into a new folder".to_owned()),
+                    hint: Some(
+                        "state in the manifest whose log it is, and reduce into a new folder".to_owned(),
+                    ),
                 });
             }
             continue;
         }
         repeated += same.len() - 1;
+        contradicting += usize::from(same.iter().any(|log| log.facts.origin != same[0].facts.origin));
         out.push(same.swap_remove(0));
     }
     *logs = out;
-    repeated
+    (repeated, contradicting)
 }
 
 /// Files of a store.

@@ -43,6 +43,7 @@ impl FrictionIdentification {
                 ..report::Robot::default()
             },
             introduction: introduction(),
+            counted: None,
             overview: None,
             joints: self.joints.iter().zip(&model.joints).map(|(j, record)| self.test(j, record)).collect(),
             provenance: report::Provenance {

@@ -54,6 +54,7 @@ impl ServoResult {
                 ..report::Robot::default()
             },
             introduction: introduction(),
+            counted: None,
             overview: Some(whole(file)),
             joints: sections,
             provenance: report::Provenance {

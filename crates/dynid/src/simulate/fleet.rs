@@ -79,7 +79,12 @@ impl FleetTable {
         let counts = [
             ("fleet.robots", self.robots >= 1, "at least 1", self.robots),
             ("fleet.logs", self.logs >= 1, "at least 1", self.logs),
-            ("fleet.outliers", special <= self.robots, "as many robots as outliers, wear and faults need", special),
+            (
+                "fleet.outliers",
+                special <= self.robots,
+                "as many robots as outliers, wear and faults need",
+                special,
+            ),
         ];
         for (name, good, expected, found) in counts {
             if !good {
@@ -87,7 +92,8 @@ impl FleetTable {
             }
         }
         let spreads = self.between_robots.values().chain(self.between_logs.values());
-        let numbers = [("fleet.days", self.days, self.days > 0.0), ("fleet.season", self.season, self.season >= 0.0)];
+        let numbers =
+            [("fleet.days", self.days, self.days > 0.0), ("fleet.season", self.season, self.season >= 0.0)];
         let shares = [("fleet.broken", self.broken, (0.0..=1.0).contains(&self.broken))];
         let spreads = spreads.map(|x| ("fleet.between_robots", *x, *x >= 0.0));
         let slopes = self.per_kelvin.values().map(|x| ("fleet.per_kelvin", *x, true));
@@ -175,7 +181,9 @@ impl VirtualFleet {
             return Err(Error::setting("mode", "inverse dynamics for a fleet", "closed_loop"));
         }
         let nominal = nominal(robot, settings)?;
-        for symbol in table.between_robots.keys().chain(table.between_logs.keys()).chain(table.per_kelvin.keys()) {
+        for symbol in
+            table.between_robots.keys().chain(table.between_logs.keys()).chain(table.per_kelvin.keys())
+        {
             if !nominal.iter().any(|(parameter, _)| parts(parameter).1 == symbol) {
                 // What is there by default may be lacking in the robot.
                 let usual = FleetTable::default();
@@ -245,10 +253,17 @@ impl VirtualFleet {
             let at = if step { rng.random_range(0.25..0.75) } else { rng.random_range(0.2..0.7) };
             let size = sign * share * self.size(&parameter);
             let kind = if step { "step" } else { "ramp" };
-            self.changes.push(PlannedChange { robot, parameter, kind, size, date_s: FIRST_DAY + DAY * table.days * at });
+            self.changes.push(PlannedChange {
+                robot,
+                parameter,
+                kind,
+                size,
+                date_s: FIRST_DAY + DAY * table.days * at,
+            });
         }
         for r in 0..table.robots {
-            let odd = outliers.iter().find(|(robot, _)| *robot == r).map(|(_, joint)| joints[*joint].as_str());
+            let odd =
+                outliers.iter().find(|(robot, _)| *robot == r).map(|(_, joint)| joints[*joint].as_str());
             let mut own = BTreeMap::new();
             for (parameter, value) in &self.nominal {
                 let (joint, symbol) = parts(parameter);
@@ -287,7 +302,9 @@ impl VirtualFleet {
         let start_s = (FIRST_DAY + DAY * self.table.days * at).round();
         let year = (start_s - FIRST_DAY) / (365.0 * DAY);
         let season = self.table.season;
-        let temperature = ((TEMPERATURE + season * (std::f64::consts::TAU * year).sin() + normal(&mut rng)) * 10.0).round() / 10.0;
+        let temperature =
+            ((TEMPERATURE + season * (std::f64::consts::TAU * year).sin() + normal(&mut rng)) * 10.0).round()
+                / 10.0;
         let joints = self.joints();
         let hit = rng.random_range(0.0..1.0) < self.table.broken && !joints.is_empty();
         let broken = hit.then(|| joints[rng.random_range(0..joints.len())].clone());
@@ -302,12 +319,15 @@ impl VirtualFleet {
                 change += spread * size * draw;
             }
             if season > 0.0 {
-                change += self.table.per_kelvin.get(symbol).copied().unwrap_or(0.0) * size * (temperature - TEMPERATURE);
+                change += self.table.per_kelvin.get(symbol).copied().unwrap_or(0.0)
+                    * size
+                    * (temperature - TEMPERATURE);
             }
             for planned in self.changes.iter().filter(|c| c.robot == robot && c.parameter == *parameter) {
                 let end = FIRST_DAY + DAY * self.table.days;
                 let ramp = ((start_s - planned.date_s) / (end - planned.date_s)).max(0.0);
-                change += planned.size * if planned.kind == "step" { f64::from(start_s >= planned.date_s) } else { ramp };
+                change += planned.size
+                    * if planned.kind == "step" { f64::from(start_s >= planned.date_s) } else { ramp };
             }
             if change != 0.0 {
                 *parameters.entry(parameter.clone()).or_insert_with(|| self.value(parameter)) += change;

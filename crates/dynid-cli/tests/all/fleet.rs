@@ -1,0 +1,251 @@
+//! `dynid simulate --fleet`, `dynid reduce --manifest`, `dynid fleet`: from virtual robots to what has changed in them, however the work was cut.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests outside of test functions")]
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use crate::support::{TWO_LINKS, dynid, run};
+use serde_json::Value;
+use tempfile::TempDir;
+
+const SETTINGS: &str =
+    "duration_s = 8\nrate_hz = 100\n[fleet]\nrobots = 12\nlogs = 12\nfaults = 1\nwear = 1\noutliers = 1\n";
+
+/// A fleet with its recipe and factors.
+fn prepared() -> &'static Path {
+    static FOLDER: OnceLock<TempDir> = OnceLock::new();
+    let make = || {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        std::fs::write(at.join("arm.urdf"), TWO_LINKS).unwrap();
+        std::fs::write(at.join("fleet.toml"), SETTINGS).unwrap();
+        run(
+            at,
+            &["simulate", "arm.urdf", "--config", "fleet.toml", "--seed", "5", "--out", "made", "--quiet"],
+            0,
+        );
+        let logs = ["--log", "made/logs/r001-001.csv.gz", "--log", "made/logs/r004-001.csv.gz"];
+        run(at, &[&["reduce", "arm.urdf", "--out", "type.factors", "--quiet"], &logs[..]].concat(), 0);
+        run(
+            at,
+            &["reduce", "type.factors", "--manifest", "made/manifest.csv", "--out", "factors", "--quiet"],
+            0,
+        );
+        run(at, &["fleet", "factors", "--out", "whole", "--quiet"], 0);
+        folder
+    };
+    FOLDER.get_or_init(make).path()
+}
+
+fn read(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// What a fleet says, without the command line.
+fn result(folder: &str) -> Value {
+    let mut value = read(&prepared().join(folder).join("fleet.json"));
+    value["provenance"]["command_line"] = Value::Null;
+    value
+}
+
+#[test]
+fn what_was_put_in_is_found() {
+    let found = result("whole");
+    let truth = read(&prepared().join("made/truth.json"));
+    let robots = found["robots"].as_array().unwrap();
+    for change in truth["changes"].as_array().unwrap() {
+        let robot = robots.iter().find(|r| r["name"] == change["robot"]).unwrap();
+        let told = &robot["changes"][0];
+        assert_eq!(told["parameter"], change["parameter"], "{robot}");
+        let (size, sd) = (told["size"].as_f64().unwrap(), told["sd"].as_f64().unwrap());
+        assert!((size - change["size"].as_f64().unwrap()).abs() < 4.0 * sd, "{told} {change}");
+        assert_eq!(robot["state"], "changed");
+    }
+    for outlier in truth["outliers"].as_array().unwrap() {
+        let robot = robots.iter().find(|r| r["name"] == *outlier).unwrap();
+        assert!(!robot["stands_out"].as_array().unwrap().is_empty(), "{robot}");
+    }
+    // Parameters that all share come out of 144 logs near the truth.
+    let kept = ["forearm.Iyy", "forearm.mz"];
+    for parameter in found["parameters"].as_array().unwrap() {
+        let name = parameter["name"].as_str().unwrap();
+        let shared = name.contains("arm.") || name.ends_with(".Ia");
+        assert_eq!(parameter["between_robots"].is_null(), shared, "{name}");
+        assert_eq!(parameter["seen"], true, "{name}");
+    }
+    assert!(
+        kept.iter().all(|name| found["parameters"].as_array().unwrap().iter().any(|p| p["name"] == *name))
+    );
+    let page = std::fs::read_to_string(prepared().join("whole/report.html")).unwrap();
+    assert!(page.contains("Changes with time") && page.contains("12 robots"));
+    let changed = truth["changes"][0]["robot"].as_str().unwrap();
+    assert!(prepared().join(format!("whole/robots/{changed}.html")).is_file());
+}
+
+#[test]
+fn shards_orders_and_kills_change_nothing() {
+    let at = prepared();
+    let manifest = std::fs::read_to_string(at.join("made/manifest.csv")).unwrap();
+    let (head, lines) = manifest.split_once('\n').unwrap();
+    let backwards: Vec<&str> = lines.lines().rev().collect();
+    std::fs::write(at.join("made/backwards.csv"), format!("{head}\n{}\n", backwards.join("\n"))).unwrap();
+    // A process that is killed at any time leaves what it had finished, and nothing else that counts.
+    for delay_ms in [30, 120, 300] {
+        let mut child = std::process::Command::new(dynid().get_program())
+            .current_dir(at)
+            .args([
+                "reduce",
+                "type.factors",
+                "--manifest",
+                "made/backwards.csv",
+                "--out",
+                "shards",
+                "--quiet",
+            ])
+            .stdout(std::process::Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(delay_ms));
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    for shard in ["3/3", "1/3", "2/3"] {
+        let args = [
+            "reduce",
+            "type.factors",
+            "--manifest",
+            "made/backwards.csv",
+            "--shard",
+            shard,
+            "--out",
+            "shards",
+            "--quiet",
+        ];
+        run(at, &args, 0);
+    }
+    let again = run(
+        at,
+        &[
+            "reduce",
+            "type.factors",
+            "--manifest",
+            "made/manifest.csv",
+            "--out",
+            "shards",
+            "--json",
+            "--quiet",
+        ],
+        0,
+    );
+    let again: Value = serde_json::from_slice(&again.stdout).unwrap();
+    assert_eq!((&again["known"], &again["reduced"]), (&144.into(), &0.into()));
+    run(at, &["fleet", "shards", "--out", "again", "--quiet"], 0);
+    assert_eq!(result("again"), result("whole"));
+    let threads = dynid()
+        .current_dir(at)
+        .env("RAYON_NUM_THREADS", "1")
+        .args(["fleet", "factors", "--out", "one", "--quiet"])
+        .output()
+        .unwrap();
+    assert!(threads.status.success());
+    assert_eq!(result("one"), result("whole"));
+}
+
+#[test]
+fn broken_logs_are_named_and_change_nothing() {
+    let at = prepared();
+    std::fs::write(at.join("made/logs/empty.csv"), "").unwrap();
+    let log = std::fs::read(at.join("made/logs/r001-001.csv.gz")).unwrap();
+    std::fs::write(at.join("made/logs/cut.csv.gz"), &log[..log.len() / 2]).unwrap();
+    std::fs::write(
+        at.join("made/logs/short.csv"),
+        "t,q_shoulder,q_elbow,tau_shoulder,tau_elbow\n0,0,0,0,0\n0.01,0,0,0,0\n",
+    )
+    .unwrap();
+    let mut manifest = std::fs::read_to_string(at.join("made/manifest.csv")).unwrap();
+    for file in ["empty.csv", "cut.csv.gz", "short.csv", "none.csv"] {
+        manifest += &format!("logs/{file},r002,1780000000,20\n");
+    }
+    // The same log under another name counts once.
+    std::fs::copy(at.join("made/logs/r003-002.csv.gz"), at.join("made/logs/copy.csv.gz")).unwrap();
+    let line = manifest.lines().find(|line| line.contains("r003-002")).unwrap().replace("r003-002", "copy");
+    manifest += &(line.clone() + "\n");
+    std::fs::write(at.join("made/more.csv"), manifest).unwrap();
+    let out = run(
+        at,
+        &["reduce", "type.factors", "--manifest", "made/more.csv", "--out", "broken", "--json", "--quiet"],
+        0,
+    );
+    let out: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let failed: Vec<&str> =
+        out["failures"].as_array().unwrap().iter().map(|f| f["log"].as_str().unwrap()).collect();
+    assert_eq!(failed, ["logs/empty.csv", "logs/cut.csv.gz", "logs/short.csv", "logs/none.csv"]);
+    run(at, &["fleet", "broken", "factors", "--out", "named", "--quiet"], 0);
+    let (named, whole) = (result("named"), result("whole"));
+    assert_eq!(named["failures"].as_array().unwrap().len(), 3, "what was never read is told by `reduce`");
+    assert_eq!(named["repeated"], 144);
+    for key in ["parameters", "robots", "noise", "covariates", "logs_to_look_at"] {
+        assert_eq!(named[key], whole[key], "{key}");
+    }
+    // Two dates of one log are one too many.
+    std::fs::write(
+        at.join("made/when.csv"),
+        format!("log,robot,start,temperature\n{}\n", line.replace(",r003,", ",r003,1")),
+    )
+    .unwrap();
+    run(at, &["reduce", "type.factors", "--manifest", "made/when.csv", "--out", "when", "--quiet"], 0);
+    run(at, &["fleet", "when", "factors", "--out", "named", "--quiet"], 0);
+    let warnings = result("named")["warnings"].to_string();
+    assert!(warnings.contains("1 log is stated with different dates or numbers"), "{warnings}");
+    // A log that is said to be of two robots is of none.
+    let manifest = std::fs::read_to_string(at.join("made/more.csv")).unwrap();
+    let line = manifest.lines().find(|line| line.contains("r003-002")).unwrap().replace("r003,", "r004,");
+    std::fs::write(at.join("made/two.csv"), format!("log,robot,start,temperature\n{line}\n")).unwrap();
+    run(at, &["reduce", "type.factors", "--manifest", "made/two.csv", "--out", "broken", "--quiet"], 0);
+    run(at, &["fleet", "broken", "--out", "named", "--quiet"], 0);
+    let twice = result("named");
+    let two: Vec<&Value> =
+        twice["failures"].as_array().unwrap().iter().filter(|f| f["code"] == "two_robots").collect();
+    assert_eq!(two.len(), 2, "{two:?}");
+    // A file that was damaged in the folder is named too.
+    let part = std::fs::read_dir(at.join("broken"))
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .find(|p| p.is_dir())
+        .unwrap();
+    let file = std::fs::read_dir(part)
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .find(|p| p.to_string_lossy().ends_with(".factors"))
+        .unwrap();
+    let bytes = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &bytes[..bytes.len() - 9]).unwrap();
+    run(at, &["fleet", "broken", "--out", "named", "--quiet"], 0);
+    let damaged =
+        result("named")["failures"].as_array().unwrap().iter().filter(|f| f["code"] == "damaged").count();
+    assert_eq!(damaged, 1);
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let at = prepared();
+    let refused = |args: &[&str], part: &str| {
+        let output = run(at, args, 2);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(text.contains(part), "{text}");
+    };
+    refused(&["fleet", "made"], "recipe.factors");
+    refused(&["fleet", "factors", "--covariates", "load", "--out", "x"], "covariates");
+    refused(&["fleet", "factors", "--between-robots", "fq", "--out", "x"], "fq");
+    refused(&["fleet", "factors", "--robot", "r999", "--out", "x"], "r999");
+    refused(&["reduce", "arm.urdf", "--manifest", "made/manifest.csv", "--out", "x"], "factor file");
+    refused(&["reduce", "type.factors", "--manifest", "arm.urdf", "--out", "x"], "column `log`");
+    let logs = ["--log", "made/logs/r002-001.csv.gz"];
+    run(at, &[&["reduce", "arm.urdf", "--out", "other.factors", "--quiet"], &logs[..]].concat(), 0);
+    refused(&["reduce", "other.factors", "--manifest", "made/manifest.csv", "--out", "factors"], "recipe");
+    let one = "log,robot\nmade/logs/r001-001.csv.gz,r001\nmade/logs/r001-002.csv.gz,r001\n";
+    std::fs::write(at.join("one.csv"), one).unwrap();
+    run(at, &["reduce", "type.factors", "--manifest", "one.csv", "--out", "alone", "--quiet"], 0);
+    refused(&["fleet", "alone", "--out", "x"], "robots with logs");
+}
