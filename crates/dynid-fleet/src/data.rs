@@ -210,6 +210,14 @@ impl Fleet {
         out
     }
 
+    /// Logs in an order that is the fleet's own, whatever order they came in: by the keys of robots, then by their own.
+    pub fn ordered(&self) -> Vec<usize> {
+        let by_robot = self.by_robot();
+        let mut robots: Vec<usize> = (0..self.robots.len()).collect();
+        robots.sort_unstable_by_key(|r| self.robots[*r]);
+        robots.into_iter().flat_map(|r| by_robot[r].iter().copied()).collect()
+    }
+
     /// Columns that all robots share, ascending.
     pub fn shared(&self) -> Vec<usize> {
         (0..self.columns).filter(|c| self.varying.iter().all(|v| v.column != *c)).collect()

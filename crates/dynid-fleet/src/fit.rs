@@ -15,6 +15,12 @@ use crate::variances::{LEFT_OUT, Settled, VarianceSettings, Variances, maximise}
 
 /// Relative spread at the start, between robots and between logs.
 const START: (f64, f64) = (0.2, 0.05);
+/// Sweeps of the rounds in which the colour of the noise settles ...
+const ROUGH_PASSES: usize = 4;
+/// ... and change at which they, and the search for outliers, end: weights need no more.
+const ROUGH: f64 = 0.03;
+/// The scale of Student's t with four degrees of freedom is that of normal deviations over about the root of this.
+const NORMAL: f64 = 1.4;
 /// A parameter starts with the spread that it had if its size were this share of what would explain all efforts alone.
 const LEAST_SIZE: f64 = 0.05;
 
@@ -122,7 +128,11 @@ pub struct FleetFit {
 pub fn fit(fleet: &Fleet, settings: &FitSettings) -> Result<FleetFit, FleetError> {
     fleet.check()?;
     let mut noise = Noise::of(fleet);
-    let heavy = VarianceSettings { freedom: Some(settings.freedom), ..settings.variances.clone() };
+    let heavy = VarianceSettings {
+        freedom: Some(settings.freedom),
+        tolerance: settings.variances.tolerance.max(ROUGH),
+        ..settings.variances.clone()
+    };
     let sample = sample(fleet, settings.colour_robots);
     let (colours, from) = coloured(sample.as_ref().unwrap_or(fleet), settings, &heavy)?;
     noise.colours = colours;
@@ -142,7 +152,8 @@ pub fn fit(fleet: &Fleet, settings: &FitSettings) -> Result<FleetFit, FleetError
             &robust.log_weights,
             if fleet.logs.len() < FEW { 0.0 } else { settings.log_weight },
         ),
-        ..robust.clone()
+        robots: robust.robots.iter().map(|v| NORMAL * v).collect(),
+        logs: robust.logs.iter().map(|v| NORMAL * v).collect(),
     };
     let normal = VarianceSettings { freedom: None, ..settings.variances.clone() };
     let (variances, settled) = maximise(fleet, &splits, (&start, without), &normal, prior.as_ref())?;
@@ -170,7 +181,8 @@ fn coloured(
         if round > 0 {
             splits = Splits::new(fleet, &noise);
         }
-        (robust, _) = maximise(fleet, &splits, (&start, robust), heavy, prior.as_ref())?;
+        let rough = VarianceSettings { passes: ROUGH_PASSES, ..heavy.clone() };
+        (robust, _) = maximise(fleet, &splits, (&start, robust), &rough, prior.as_ref())?;
         noise.colours = colours(fleet, &noise, &Sweep::new(&splits, &robust, prior.as_ref())?);
     }
     Ok((noise.colours, Coloured { start, robust }))

@@ -31,14 +31,15 @@ impl Noise {
     /// A log with few rows leans on the channel's variance in other logs, as if that had been seen in 30 rows less its own. A channel that
     /// has no row beyond its rank in any log tells no noise: its efforts count as noise of their own size.
     pub fn of(fleet: &Fleet) -> Noise {
-        let ranks: Vec<usize> = (0..fleet.channels).into_par_iter().map(|c| rank(fleet, c)).collect();
+        let order = fleet.ordered();
+        let ranks: Vec<usize> = (0..fleet.channels).into_par_iter().map(|c| rank(fleet, &order, c)).collect();
         let own = |channel: &ChannelFactor| {
             let freedom = channel.factor.rows() as f64 - ranks[channel.channel] as f64;
             (freedom.max(0.0), squares([channel.factor.rho()]))
         };
         let mut seen: Vec<Vec<(f64, f64)>> = vec![Vec::new(); fleet.channels];
         let mut power = vec![(0.0, 0.0); fleet.channels];
-        for channel in fleet.logs.iter().flat_map(|log| &log.channels) {
+        for channel in order.iter().flat_map(|k| &fleet.logs[*k].channels) {
             seen[channel.channel].push(own(channel));
             let (sum, rows) = &mut power[channel.channel];
             *sum += squares([channel.factor.effort_norm()]);
@@ -78,8 +79,8 @@ impl Noise {
 }
 
 /// Rank of a channel's own columns: a property of its equations, told by the logs of the fleet together.
-fn rank(fleet: &Fleet, channel: usize) -> usize {
-    let all = || fleet.logs.iter().flat_map(|log| &log.channels).filter(|c| c.channel == channel);
+fn rank(fleet: &Fleet, order: &[usize], channel: usize) -> usize {
+    let all = || order.iter().flat_map(|k| &fleet.logs[*k].channels).filter(|c| c.channel == channel);
     let step = all().count().div_ceil(RANK_LOGS).max(1);
     let factors: Vec<Factor> =
         all().step_by(step).map(|c| c.factor.embed(fleet.columns, &c.columns)).collect();

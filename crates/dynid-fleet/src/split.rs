@@ -32,6 +32,8 @@ pub(crate) struct Splits {
     pub(crate) lower: Vec<Option<Mat>>,
     /// Robots that have logs, by key.
     pub(crate) robots: Vec<(u64, usize)>,
+    /// Logs in the fleet's own order.
+    pub(crate) ordered: Vec<usize>,
 }
 
 impl Splits {
@@ -57,7 +59,16 @@ impl Splits {
         let mut robots: Vec<(u64, usize)> =
             (0..by_robot.len()).filter(|r| !by_robot[*r].is_empty()).map(|r| (fleet.robots[r], r)).collect();
         robots.sort_unstable();
-        Splits { order, q, covariates: fleet.covariates, logs, by_robot, lower, robots }
+        Splits {
+            order,
+            q,
+            covariates: fleet.covariates,
+            logs,
+            by_robot,
+            lower,
+            robots,
+            ordered: fleet.ordered(),
+        }
     }
 
     /// Parameters of the type: those that vary, their slopes over the covariates, those that are shared.
@@ -78,9 +89,10 @@ impl Splits {
 
 /// Mean of every covariate over the logs.
 pub(crate) fn means(fleet: &Fleet) -> Vec<f64> {
-    let count = fleet.logs.len().max(1) as f64;
+    let order = fleet.ordered();
+    let count = order.len().max(1) as f64;
     (0..fleet.covariates)
-        .map(|c| fleet.logs.iter().map(|log| log.covariates[c]).sum::<f64>() / count)
+        .map(|c| order.iter().map(|k| fleet.logs[*k].covariates[c]).sum::<f64>() / count)
         .collect()
 }
 

@@ -79,7 +79,8 @@ impl<'a> Sweep<'a> {
         let (logs, of_logs): (Vec<Mat>, Vec<f64>) = splits.logs.par_iter().enumerate().map(up).unzip();
         let robots: Vec<(Mat, Mat, f64)> =
             (0..splits.by_robot.len()).into_par_iter().map(|r| robot(splits, variances, &logs, r)).collect();
-        let of_robots: f64 = robots.iter().map(|(_, _, logdet)| logdet).sum();
+        let of_robots: f64 = splits.robots.iter().map(|(_, r)| robots[*r].2).sum();
+        let of_logs: f64 = splits.ordered.iter().map(|k| of_logs[*k]).sum();
         let (tops, mut factors): (Vec<Mat>, Vec<Mat>) =
             robots.into_iter().map(|(top, factor, _)| (top, factor)).unzip();
         let factors: Vec<(u64, Mat)> = splits
@@ -100,7 +101,7 @@ impl<'a> Sweep<'a> {
         let theta = times(&root, &z);
         let covariance = root.view() * root.transpose();
         let logdet: f64 = (0..p).map(|i| 2.0 * factor[(i, i)].ln()).sum();
-        let m2l = of_logs.iter().sum::<f64>() + of_robots + logdet + squares([factor[(p, p)]]);
+        let m2l = of_logs + of_robots + logdet + squares([factor[(p, p)]]);
         Ok(Sweep { splits, variances, logs, robots: tops, factors, theta, covariance, m2l })
     }
 

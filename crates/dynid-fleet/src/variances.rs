@@ -137,6 +137,7 @@ impl Moments {
 /// One step of EM.
 struct Maximisation<'a> {
     fleet: &'a Fleet,
+    splits: &'a Splits,
     settings: &'a VarianceSettings,
     /// Variances at the start, the scale of coordinates.
     start: &'a Variances,
@@ -150,21 +151,38 @@ impl Maximisation<'_> {
             renew(&mut next.robot_weights, &moments.robots, &now.robots, freedom);
             renew(&mut next.log_weights, &moments.logs, &now.logs, freedom);
         }
-        next.robots = self.level(&now.robots, &self.start.robots, &moments.robots, &next.robot_weights);
-        next.logs = self.level(&now.logs, &self.start.logs, &moments.logs, &next.log_weights);
+        let robots = self
+            .splits
+            .robots
+            .iter()
+            .map(|(_, r)| (moments.robots[*r].as_slice(), next.robot_weights[*r].as_slice()));
+        next.robots = self.level(&now.robots, &self.start.robots, robots);
+        let logs = self
+            .splits
+            .ordered
+            .iter()
+            .map(|k| (moments.logs[*k].as_slice(), next.log_weights[*k].as_slice()));
+        next.logs = self.level(&now.logs, &self.start.logs, logs);
         next
     }
 
-    fn level(&self, now: &[f64], start: &[f64], moments: &[Vec<f64>], weights: &[Vec<f64>]) -> Vec<f64> {
-        let sum = |k: usize| {
-            let of_unit = |(unit, weight): (&Vec<f64>, &Vec<f64>)| {
-                unit.get(k).filter(|_| weight[k] > LEFT_OUT).map(|moment| weight[k] * moment / start[k])
-            };
-            moments.iter().zip(weights).filter_map(of_unit).fold((0.0, 0.0), |(sum, n), x| (sum + x, n + 1.0))
-        };
+    /// Variances of one level from moments and weights of its units, in an order that is the fleet's own.
+    fn level<'a>(
+        &self,
+        now: &[f64],
+        start: &[f64],
+        units: impl Iterator<Item = (&'a [f64], &'a [f64])>,
+    ) -> Vec<f64> {
+        let mut sums = vec![(0.0, 0.0); now.len()];
+        for (moments, weights) in units {
+            let of_unit = sums.iter_mut().zip(moments).zip(weights).zip(start.iter().zip(now));
+            for (((sum, moment), weight), (start, now)) in of_unit {
+                if *weight > LEFT_OUT && *now > 0.0 {
+                    *sum = (sum.0 + weight * moment / start, sum.1 + 1.0);
+                }
+            }
+        }
         let varying = &self.fleet.varying;
-        let sums: Vec<(f64, f64)> =
-            (0..now.len()).map(|k| if now[k] > 0.0 { sum(k) } else { (0.0, 0.0) }).collect();
         let few = self.settings.few as f64;
         let variance = |k: usize| {
             let (mut total, mut count) = sums[k];
@@ -204,7 +222,7 @@ pub(crate) fn maximise(
     settings: &VarianceSettings,
     prior: Option<&Mat>,
 ) -> Result<(Variances, Settled), FleetError> {
-    let step = Maximisation { fleet, settings, start };
+    let step = Maximisation { fleet, splits, settings, start };
     let mut now = from;
     let mut passes = 0;
     let mut change = f64::INFINITY;

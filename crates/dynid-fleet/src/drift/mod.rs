@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use crate::data::{Fleet, FleetError};
 use crate::fit::FleetFit;
 use crate::noise::median;
+use crate::outliers::largest_discovery;
 use crate::sweep::Sweep;
 use history::Logs;
 use pattern::{AS_GOOD, of_background};
@@ -186,7 +187,8 @@ pub fn drift(fleet: &Fleet, fit: &FleetFit, settings: &DriftSettings) -> Result<
     let best: Vec<Option<Best>> = (0..fleet.robots.len()).into_par_iter().map(first).collect();
     let p = |(r, best): (usize, &Option<Best>)| Some(tests(r).p(best.as_ref()?.evidence));
     let first: Vec<Option<f64>> = best.iter().enumerate().map(p).collect();
-    let threshold = threshold(&first, settings.false_discoveries);
+    let told_of: Vec<f64> = first.iter().flatten().copied().collect();
+    let threshold = largest_discovery(told_of.clone(), told_of.len(), settings.false_discoveries);
     let told = |(r, best)| tests(r).history(fleet, best, threshold, settings);
     let robots: Vec<RobotHistory> = best.into_par_iter().enumerate().map(told).collect();
     let events = events(&robots, settings);
@@ -426,15 +428,6 @@ fn slope_variances<'a>(
         (squares - added).clamp(0.0, fit.slopes[c][k].powi(2))
     };
     (0..covariates).map(|c| (0..q).map(|k| variance(c, k)).collect()).collect()
-}
-
-/// The largest probability that is named: Benjamini and Hochberg 1995; 0 where none is.
-fn threshold(probabilities: &[Option<f64>], rate: f64) -> f64 {
-    let mut p: Vec<f64> = probabilities.iter().flatten().copied().collect();
-    p.sort_by(f64::total_cmp);
-    let count = p.len() as f64;
-    let below = |(i, p): (usize, &f64)| *p <= rate * (i + 1) as f64 / count;
-    p.iter().enumerate().filter(|(i, p)| below((*i, p))).map(|(_, p)| *p).fold(0.0, f64::max)
 }
 
 /// Times within which so many robots step that the cause is not in the robots.

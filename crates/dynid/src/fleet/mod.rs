@@ -37,7 +37,7 @@ pub struct FleetSettings {
     pub between_logs: Option<Vec<String>>,
     /// Numbers of the manifest that parameters follow; absent: all that every log states and that vary.
     pub covariates: Option<Vec<String>>,
-    /// Share of the robots with a change that may have none.
+    /// Share of the robots that are named for a change that may have none; of robots and logs that are named as outliers alike.
     pub false_discoveries: f64,
 }
 
@@ -149,6 +149,8 @@ pub struct FleetResult {
     pub drift: Option<Drift>,
     /// Logs that could not be reduced or read.
     pub failures: Vec<Failure>,
+    robot_outliers: Vec<Outlier>,
+    log_outliers: Vec<Outlier>,
     built: Built,
     repeated: usize,
     settings: FleetSettings,
@@ -184,6 +186,8 @@ pub fn fleet(
         changes = Some(drift(&fleet, &found, &how).map_err(told)?);
     }
     Ok(FleetResult {
+        robot_outliers: found.robot_outliers(settings.false_discoveries),
+        log_outliers: found.log_outliers(settings.false_discoveries),
         fit: found,
         drift: changes,
         recipe,

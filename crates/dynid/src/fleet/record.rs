@@ -1,8 +1,10 @@
 //! `fleet.json`.
 
+use std::collections::BTreeMap;
+
 use dynid_estimate::distribution::t_quantile;
+use dynid_fleet::FEW;
 use dynid_fleet::drift::{History, Kind};
-use dynid_fleet::{FEW, LEFT_OUT};
 use dynid_record::{Outcome, words};
 use serde::{Deserialize, Serialize};
 
@@ -202,8 +204,8 @@ pub struct OutlierRecord {
     pub parameter: String,
     /// Deviation from the type over the spread between robots.
     pub deviation: f64,
-    /// Weight by Student's t, about 1 for a robot like the others.
-    pub weight: f64,
+    /// Probability of that in a robot like the others.
+    pub p: f64,
 }
 
 /// A change of a parameter.
@@ -258,8 +260,8 @@ pub struct LogDeviation {
     pub parameter: String,
     /// Deviation from the robot over the scatter between logs.
     pub deviation: f64,
-    /// Weight by Student's t.
-    pub weight: f64,
+    /// Probability of that in a log like the others.
+    pub p: f64,
 }
 
 /// A change of many robots at once.
@@ -426,13 +428,13 @@ impl FleetResult {
                 detectable: history.and_then(|h| h.detectable.get(k).copied()).filter(|d| d.is_finite()),
             }
         };
-        let named = |k: &usize| fit.variances.robot_weights[r][*k] <= LEFT_OUT;
-        let mut stands_out: Vec<OutlierRecord> = (robot.into_iter())
-            .flat_map(|x| (0..q).filter(named).map(move |k| (x, k)))
-            .map(|(x, k)| OutlierRecord {
-                parameter: self.name(k),
-                deviation: spread(k).map_or(0.0, |sd| x.deviation[k] / sd),
-                weight: x.weights[k],
+        let mut stands_out: Vec<OutlierRecord> = (self.robot_outliers.iter().filter(|o| o.unit == r))
+            .map(|o| OutlierRecord {
+                parameter: self.name(o.coordinate),
+                deviation: robot
+                    .zip(spread(o.coordinate))
+                    .map_or(o.z, |(x, sd)| x.deviation[o.coordinate] / sd),
+                p: o.p,
             })
             .collect();
         stands_out.sort_by(|a, b| b.deviation.abs().total_cmp(&a.deviation.abs()));
@@ -506,26 +508,21 @@ impl FleetResult {
             let history = self.drift.as_ref().map(|d| &d.robots[r].history);
             matches!(history, Some(History::Changed { changes, .. }) if changes.iter().any(|c| c.coordinate == k))
         };
-        let mut out = Vec::new();
-        for (l, (log, found)) in self.fleet.logs.iter().zip(&fit.logs).enumerate() {
-            let named = |k: &usize| fit.variances.log_weights[l][*k] <= LEFT_OUT && !changed(log.robot, *k);
-            let mut parameters: Vec<LogDeviation> = (0..self.fleet.varying.len())
-                .filter(named)
-                .map(|k| LogDeviation {
-                    parameter: self.name(k),
-                    deviation: found.deviation[k] / fit.variances.logs[k].sqrt().max(f64::MIN_POSITIVE),
-                    weight: found.weights[k],
-                })
-                .collect();
-            parameters.sort_by(|a, b| b.deviation.abs().total_cmp(&a.deviation.abs()));
-            if !parameters.is_empty() {
-                out.push(LogRecord {
-                    log: self.built.logs[l].clone(),
-                    robot: self.built.robots[log.robot].clone(),
-                    parameters,
-                });
+        let mut by_log: BTreeMap<usize, Vec<LogDeviation>> = BTreeMap::new();
+        for o in &self.log_outliers {
+            if !changed(self.fleet.logs[o.unit].robot, o.coordinate) {
+                let sd = fit.variances.logs[o.coordinate].sqrt();
+                let deviation = fit.logs[o.unit].deviation[o.coordinate] / sd.max(f64::MIN_POSITIVE);
+                let parameter = self.name(o.coordinate);
+                by_log.entry(o.unit).or_default().push(LogDeviation { parameter, deviation, p: o.p });
             }
         }
+        let record = |(l, mut parameters): (usize, Vec<LogDeviation>)| {
+            parameters.sort_by(|a, b| b.deviation.abs().total_cmp(&a.deviation.abs()));
+            let robot = self.built.robots[self.fleet.logs[l].robot].clone();
+            LogRecord { log: self.built.logs[l].clone(), robot, parameters }
+        };
+        let mut out: Vec<LogRecord> = by_log.into_iter().map(record).collect();
         out.sort_by(|a, b| b.parameters[0].deviation.abs().total_cmp(&a.parameters[0].deviation.abs()));
         out
     }

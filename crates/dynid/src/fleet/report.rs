@@ -200,7 +200,7 @@ impl FleetResult {
             table("Changes of many robots at once", &["When, UTC", "Robots"], events),
             table(
                 "Robots out of the spread of the fleet",
-                &["Robot", "Parameter", "Deviation, sd between robots", "Weight"],
+                &["Robot", "Parameter", "Deviation, sd between robots", "p"],
                 outliers,
             ),
             table("Logs to look at", &["Log", "Robot", "Stands out in"], logs),
