@@ -10,8 +10,9 @@ use crate::data::{FEW, Fleet, FleetError, FleetLog};
 use crate::jackknife;
 use crate::noise::Noise;
 use crate::split::{Splits, means, places};
+use crate::spread::{LEFT_OUT, Variances};
 use crate::sweep::{RobotState, Sweep};
-use crate::variances::{LEFT_OUT, Settled, VarianceSettings, Variances, maximise};
+use crate::variances::{Settled, VarianceSettings, maximise};
 
 /// Relative spread at the start, between robots and between logs.
 const START: (f64, f64) = (0.2, 0.05);

@@ -1,5 +1,18 @@
 //! Many robots of one type from the factors of their logs: what they share, how each differs, which logs and robots stand out, and what
 //! changes with time.
+//!
+//! Rows of log `l` of robot `r`: `y = W_f (f + b_r + c_l + Γ u_l) + W_β β + e` with `b_r ~ N(0, D_b)`, `c_l ~ N(0, D_c)`, covariates `u_l`.
+//!
+//! | question | item |
+//! |---|---|
+//! | logs as factors, robots, what varies | [`Fleet`] |
+//! | parameters of type, robots and logs, with spreads | [`fit()`], [`FleetFit`] |
+//! | what is known of a robot before its first log | [`FleetFit::new_robot`] |
+//! | robots and logs out of the spread | [`FleetFit::robot_outliers`], [`FleetFit::log_outliers`] |
+//! | changes with dates | [`drift()`](drift::drift) |
+//! | parts merged to the same bits in any order | [`tree`] |
+//!
+//! The result depends on the set of logs only: not on their order, nor on the number of threads.
 
 mod colour;
 mod data;
@@ -9,6 +22,7 @@ mod jackknife;
 mod noise;
 mod outliers;
 mod split;
+mod spread;
 mod sweep;
 pub mod tree;
 mod triangle;
@@ -18,4 +32,5 @@ pub use data::{ChannelFactor, Coordinate, FEW, Fleet, FleetError, FleetLog};
 pub use fit::{Expected, FitSettings, FleetFit, LogFit, RobotFit, fit, fit_at, variances_at};
 pub use noise::Noise;
 pub use outliers::Outlier;
-pub use variances::{LEFT_OUT, Settled, VarianceSettings, Variances};
+pub use spread::{LEFT_OUT, Variances};
+pub use variances::{Settled, VarianceSettings};

@@ -3,7 +3,7 @@
 use dynid_estimate::distribution::t_exceedance;
 
 use crate::fit::FleetFit;
-use crate::variances::LEFT_OUT;
+use crate::spread::LEFT_OUT;
 
 /// A coordinate of a robot or log that is out of the spread.
 #[derive(Debug, Clone, Copy, PartialEq)]

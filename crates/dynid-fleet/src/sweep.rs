@@ -13,9 +13,9 @@ use rayon::prelude::*;
 
 use crate::data::FleetError;
 use crate::split::Splits;
+use crate::spread::Variances;
 use crate::tree;
 use crate::triangle::{behind, corner, head, of_stacked, squares, times, triangle};
-use crate::variances::Variances;
 
 /// A pivot below this share of its column's norm says that no log tells the column.
 const EXCITED: f64 = 1e-10;

@@ -27,6 +27,7 @@ pub fn all() -> Vec<ResultSchema> {
         schema::<crate::design::DesignRecord>("design", "`design.json`"),
         schema::<crate::diff::ModelDiff>("diff", "`dynid diff --json`"),
         schema::<Estimate>("estimate", "`estimate.json` of `dynid identify` and `dynid solve`"),
+        schema::<crate::fleet::FleetFile>("fleet", "`fleet.json`"),
         schema::<crate::FrictionModel>("friction", "`friction.json`"),
         schema::<crate::gains::GainsFile>("gains", "`dynid gains --json`"),
         schema::<crate::inspect::Inspection>("inspect", "`dynid inspect --json`"),

@@ -5,6 +5,7 @@ mod clearance;
 mod closed_loop;
 mod elastic;
 mod fleet;
+mod fleet_table;
 mod settings;
 mod trajectory;
 
@@ -21,7 +22,8 @@ use crate::elements::{ElementPlan, LOAD, REACTION_FRICTION};
 use crate::nominal::{nominal_parameters, with_nominal_shape};
 use crate::robot::{Robot, refuse_elastic, refuse_internal_load, refuse_loops};
 pub use clearance::{ClearanceSummary, JournalSummary};
-pub use fleet::{FleetTable, PlannedChange, VirtualFleet, VirtualLog};
+pub use fleet::{PlannedChange, VirtualFleet, VirtualLog};
+pub use fleet_table::FleetTable;
 pub use settings::{
     ControlTable, ImperfectionTable, PlantTable, SeriesSettings, SimulateMode, SimulateSettings,
 };

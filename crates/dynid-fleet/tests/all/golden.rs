@@ -1,6 +1,8 @@
 //! Against a prototype written elsewhere: `spec/golden/fleet_mixed.json`, `fleet_drift.json`.
 
+use dynid_estimate::distribution::chi_squared_exceedance;
 use dynid_factor::Factor;
+use dynid_fleet::drift::{Pattern, Series, candidates, probability};
 use dynid_fleet::{
     ChannelFactor, Coordinate, Fleet, FleetLog, Noise, VarianceSettings, Variances, fit_at, tree,
     variances_at,
@@ -135,4 +137,37 @@ fn the_tree_agrees_in_any_order() {
     let parts: Vec<(u64, &Mat)> = keys.iter().copied().zip(&matrices).collect();
     close_matrix(&tree::merge(&parts).expect("parts"), &tree_of["merged"], 1e-12, "merged");
     assert!(tree::merge(&[]).is_none());
+}
+
+/// One coordinate of one robot: values with variances, and a covariate whose slope differs from the fleet's.
+#[test]
+fn patterns_of_change_agree() {
+    let Some(golden) = dynid_testing::golden("fleet_drift.json") else { return };
+    let (times, covariate, y, v) =
+        (list(&golden["t"]), list(&golden["T"]), list(&golden["y"]), list(&golden["v"]));
+    let g = number(&golden["g"]);
+    let information: Vec<Mat> = v.iter().map(|v| Mat::from_fn(1, 1, |_, _| 1.0 / v)).collect();
+    let moment = (0..y.len()).map(|l| vec![(y[l] - g * covariate[l]) / v[l]]).collect();
+    let covariates = covariate.iter().map(|t| vec![*t]).collect();
+    let series = Series { times, covariates, information, moment };
+    let precision = vec![vec![1.0 / number(&golden["sT"])]];
+    let stated = golden["candidates"].as_array().expect("candidates");
+    let pattern = |c: &Value| match c["first_after"].as_u64() {
+        Some(first) => Pattern::Step { first: first as usize },
+        None => Pattern::Ramp { onset: number(&c["onset"]) },
+    };
+    let patterns: Vec<Pattern> = stated.iter().map(pattern).collect();
+    let found = candidates(&series, &precision, 0, &patterns);
+    for (found, stated) in found.iter().zip(stated) {
+        let expected = [&stated["size"], &stated["sd"], &stated["stat"]].map(number);
+        close(&[found.size, found.sd, found.statistic], &expected, 1e-8, "candidate");
+    }
+    let best =
+        (0..found.len()).max_by(|a, b| found[*a].statistic.total_cmp(&found[*b].statistic)).expect("some");
+    assert_eq!(best as u64, golden["best"].as_u64().expect("a number"));
+    // The prototype pays six times for the search, we pay for the number of logs.
+    let single = chi_squared_exceedance(found[best].statistic, 1.0).expect("a probability");
+    close(&[6.0 * single], &[number(&golden["p"])], 1e-8, "p");
+    let ours = probability(found[best].statistic, series.len());
+    close(&[ours], &[1.4 * 14.0_f64.ln().powi(2) * single], 1e-12, "p for 14 logs");
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
-use super::fleet::FleetTable;
+use super::fleet_table::FleetTable;
 use crate::Error;
 use crate::config::{PerJoint, toml_file};
 
