@@ -13,7 +13,7 @@ mod store;
 use std::path::PathBuf;
 
 use dynid_fleet::drift::{Drift, DriftSettings, drift};
-use dynid_fleet::{FitSettings, Fleet, FleetError, FleetFit, fit};
+use dynid_fleet::{FitSettings, Fleet, FleetError, FleetFit, Outlier, fit};
 
 pub use manifest::{Entry, manifest};
 pub use record::{

@@ -150,7 +150,7 @@ impl FleetResult {
                     text(r.name.clone()),
                     text(o.parameter.clone()),
                     Value::from(o.deviation),
-                    Value::from(o.weight),
+                    text(format!("{:.1e}", o.p)),
                 ]
             })
             .collect();
