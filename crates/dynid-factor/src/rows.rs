@@ -132,9 +132,25 @@ impl BlockReducer {
         }
     }
 
-    /// Factors of all time blocks of a group; blocks without rows are empty.
+    /// Merges time blocks in pairs, the one at hand too: block `b` is `b / 2` from here on.
+    pub fn pair(&mut self) {
+        if !self.done.len().is_multiple_of(2)
+            && let Some(last) = self.done.pop()
+        {
+            self.builder.push_factor(&last);
+        }
+        self.done = self.done.chunks(2).map(|pair| Factor::merge(&pair.iter().collect::<Vec<_>>())).collect();
+    }
+
+    /// Factors of all time blocks of a group; blocks without rows are empty, and rows behind the last one belong to it.
     #[must_use]
     pub fn finish(mut self, shape: &GroupShape) -> ReducedGroup {
+        if self.done.len() == shape.blocks
+            && self.builder.rows() > 0
+            && let Some(last) = self.done.pop()
+        {
+            self.builder.push_factor(&last);
+        }
         self.finish_until(shape.blocks);
         ReducedGroup {
             log: shape.log,

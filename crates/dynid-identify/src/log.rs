@@ -7,7 +7,7 @@ use dynid_io::{ColumnMapping, ReadingNote, Signals, TrajectoryFile};
 use dynid_model::element::{is_temperature, temperature_channel};
 use dynid_model::{EffortModel, Limits, RobotModel};
 use dynid_motion::temperature::{self, TemperatureDoubt};
-use dynid_motion::{Channel, JointSignals};
+use dynid_motion::{Channel, JointSignals, Portion};
 use dynid_rows::conditioning::{ConditioningSettings, PreparedLog, prepare};
 
 use crate::Error;
@@ -203,11 +203,30 @@ pub fn check(signals: &Signals, axes: &[LogAxis], file: &str) -> Result<(), Erro
     check_temperatures(signals, file)
 }
 
+/// Refuses signals of later rows that no joint has; whether positions are degrees is told by the first ones. `before`: rows before these.
+///
+/// # Errors
+/// [`Error::FarPosition`], [`Error::Temperature`].
+pub fn check_behind(signals: &Signals, file: &str, before: usize) -> Result<(), Error> {
+    check_reach(signals, file)?;
+    check_temperatures(signals, file).map_err(|e| match e {
+        Error::Temperature { file, joint, row, found } => {
+            Error::Temperature { file, joint, row: before + row, found }
+        }
+        other => other,
+    })
+}
+
 /// A log of signals.
 ///
 /// # Errors
 /// [`Error::Log`].
 pub fn assemble(file: &str, signals: Signals) -> Result<dynid_motion::Log, Error> {
+    Ok(portion(signals).into_log(file)?)
+}
+
+/// Rows of a log of signals.
+pub fn portion(signals: Signals) -> Portion {
     let Signals { time, joints: names, position, mut velocity, mut effort, temperature, channels, .. } =
         signals;
     let take = |list: &mut Option<Vec<Vec<f64>>>, k: usize| list.as_mut().map(|l| std::mem::take(&mut l[k]));
@@ -221,7 +240,7 @@ pub fn assemble(file: &str, signals: Signals) -> Result<dynid_motion::Log, Error
     let temperatures = temperature.into_iter().flat_map(|list| names.iter().zip(list));
     let measured = temperatures.filter_map(|(joint, values)| Some((temperature_channel(joint), values?)));
     let channels = channels.into_iter().chain(measured).map(|(name, values)| Channel { name, values });
-    Ok(dynid_motion::Log::new(file, time, joints, channels.collect())?)
+    Portion { time, joints, channels: channels.collect() }
 }
 
 /// Refuses temperatures that no joint has.

@@ -57,6 +57,18 @@ pub enum ReductionError {
         /// Joint or motor.
         joint: String,
     },
+    /// A position that was taken for one that counts from zero again after a turn, and then is none.
+    #[error(
+        "{log}, row {row}: the position of `{joint}` jumps by a full turn in rows before, and here by what is none, or leaves the turn"
+    )]
+    Turns {
+        /// Log.
+        log: String,
+        /// Row, from 1.
+        row: usize,
+        /// Joint or motor.
+        joint: String,
+    },
     /// A log without rows.
     #[error("{log}: {seconds:.2} s leave no row behind kernel, mask and edges")]
     NoRows {
@@ -88,6 +100,9 @@ impl ReductionError {
                 "resample the log, or learn a recipe of its own for logs of this rate"
             }
             ReductionError::NotLogged { .. } => "log the joint, or learn a recipe on logs without it",
+            ReductionError::Turns { .. } => {
+                "log the position so that turns are kept apart, or take the rows before this one: `rows = [1, 1000]` in the `[[log]]`"
+            }
             ReductionError::NoRows { .. } => "take a longer log, or a recipe with a higher `kernel_hz`",
         };
         Some(words.to_owned())

@@ -1,5 +1,7 @@
 //! What is known of a training log without its samples, and how well its rows are explained.
 
+use std::ops::Range;
+
 use dynid_rows::conditioning::PreparedLog;
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +35,21 @@ pub struct TrainedLog {
 }
 
 impl TrainedLog {
+    /// Rate, noise and motion of a log, without what its samples tell otherwise.
+    pub(crate) fn of_moves(log: &PreparedLog) -> Self {
+        TrainedLog {
+            name: log.name.clone(),
+            samples: log.samples(),
+            duration_s: log.duration(),
+            rate_hz: log.rate_hz,
+            position_noise: log.position_noise.iter().map(|noise| noise.sigma).collect(),
+            effort_noise: log.effort_noise.iter().map(|noise| noise.sigma).collect(),
+            moves: log.moves.clone(),
+            velocities: vec![None; log.moves.len()],
+            channels: Vec::new(),
+        }
+    }
+
     pub(crate) fn of(log: &PreparedLog) -> Self {
         let range = |values: &[f64]| {
             let (low, high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -43,15 +60,9 @@ impl TrainedLog {
             (c.name.clone(), low, high)
         });
         TrainedLog {
-            name: log.name.clone(),
-            samples: log.samples(),
-            duration_s: log.duration(),
-            rate_hz: log.rate_hz,
-            position_noise: log.position_noise.iter().map(|noise| noise.sigma).collect(),
-            effort_noise: log.effort_noise.iter().map(|noise| noise.sigma).collect(),
-            moves: log.moves.clone(),
             velocities: (0..log.moves.len()).map(|output| velocities(log, output)).collect(),
             channels: channels.filter(|(_, low, high)| low <= high).collect(),
+            ..TrainedLog::of_moves(log)
         }
     }
 }
@@ -69,16 +80,19 @@ pub struct RowFit {
 
 /// Least and greatest mean velocity of an output over [`SPEED_SPAN_S`], with rest; `None` if it does not move.
 fn velocities(log: &PreparedLog, output: usize) -> Option<(f64, f64)> {
-    if !log.moves[output] {
-        return None;
-    }
+    log.moves[output].then(|| velocities_in(log, output, 0..log.samples()))?
+}
+
+/// Least and greatest mean velocity over [`SPEED_SPAN_S`] that ends in a run of samples, with rest; `None` if none does.
+pub(crate) fn velocities_in(log: &PreparedLog, output: usize, samples: Range<usize>) -> Option<(f64, f64)> {
     let position = &log.position[output];
     let span = ((SPEED_SPAN_S * log.rate_hz).ceil() as usize).max(1);
     let mut range: Option<(f64, f64)> = None;
     let mut sound = 0;
-    for (k, usable) in log.usable.iter().enumerate() {
+    let from = samples.start.saturating_sub(span + 1);
+    for (k, usable) in log.usable.iter().enumerate().take(samples.end).skip(from) {
         sound = if *usable { sound + 1 } else { 0 };
-        if sound > span {
+        if sound > span && k >= samples.start {
             let v = (position[k] - position[k - span]) * log.rate_hz / span as f64;
             let (low, high) = range.unwrap_or((0.0, 0.0));
             range = Some((low.min(v), high.max(v)));

@@ -41,5 +41,5 @@ pub mod velocity;
 
 pub use clock::{ClockError, ClockReport, ClockSettings, UniformLog};
 pub use kernel::Kernel;
-pub use log::{Channel, JointSignals, Log, LogError};
+pub use log::{Channel, JointSignals, Log, LogError, Portion};
 pub use signal::SignalError;

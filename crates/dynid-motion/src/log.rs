@@ -57,6 +57,18 @@ pub enum LogError {
         /// The repeated name.
         name: String,
     },
+    /// Rows with other signals than those before.
+    #[error("{log}, behind row {row}: expected signals of {}, found {}", expected.join(", "), found.join(", "))]
+    OtherSignals {
+        /// Name of the log.
+        log: String,
+        /// Rows before.
+        row: usize,
+        /// Joints and channels of the rows before.
+        expected: Vec<String>,
+        /// Joints and channels of these.
+        found: Vec<String>,
+    },
     /// A slice asks for rows that do not exist.
     #[error("{log}: rows {start}..{end} asked for, the log has {rows}")]
     Range {
@@ -88,11 +100,7 @@ impl JointSignals {
     /// Whether the joint moves: its peak-to-peak position exceeds both 4 resolution steps (smallest non-zero
     /// change between rows) and 12 standard deviations of the white noise seen in second differences.
     pub fn moves(&self) -> bool {
-        let (low, high) = extremes(&self.position);
-        let bend: Vec<f64> = self.position.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]).abs()).collect();
-        // The second difference of white noise of sd s has sd sqrt(6) s; 1.4826 turns a median into an sd.
-        let noise = 1.4826 / 6f64.sqrt() * median(&bend).unwrap_or(0.0);
-        high - low > (4.0 * quantum(&self.position)).max(12.0 * noise)
+        moves(&self.position)
     }
 
     /// Whether the effort never changes.
@@ -131,6 +139,113 @@ impl Channel {
     /// Whether the channel never changes.
     pub fn is_constant(&self) -> bool {
         is_constant(&self.values)
+    }
+}
+
+/// Consecutive rows of a log, which may be longer than memory. Nothing is checked before it is used.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Portion {
+    /// Time stamps, s.
+    pub time: Vec<f64>,
+    /// Joint signals, one value per row.
+    pub joints: Vec<JointSignals>,
+    /// Further channels, one value per row.
+    pub channels: Vec<Channel>,
+}
+
+impl Portion {
+    /// All rows of a log.
+    pub fn of(log: Log) -> Self {
+        let (time, joints, channels) = log.into_parts();
+        Portion { time, joints, channels }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.time.len()
+    }
+
+    /// The rows as a log, checked.
+    ///
+    /// # Errors
+    /// As [`Log::new`].
+    pub fn into_log(self, name: impl Into<String>) -> Result<Log, LogError> {
+        Log::new(name, self.time, self.joints, self.channels)
+    }
+
+    /// Refuses rows that are not such as follow others, and numbers that are not finite. `row`: rows before these, for messages.
+    ///
+    /// # Errors
+    /// [`LogError::OtherSignals`], [`LogError::Length`], [`LogError::NotFinite`].
+    pub fn check_behind(&self, earlier: &Portion, log: &str, row: usize) -> Result<(), LogError> {
+        let names = |portion: &Portion| -> Vec<String> {
+            let joints = portion.joints.iter().map(|j| (&j.name, j.velocity.is_some()));
+            let joints = joints
+                .map(|(name, velocity)| format!("{name}{}", if velocity { " with velocity" } else { "" }));
+            joints.chain(portion.channels.iter().map(|c| c.name.clone())).collect()
+        };
+        let (expected, found) = (names(earlier), names(self));
+        if expected != found {
+            return Err(LogError::OtherSignals { log: log.to_owned(), row, expected, found });
+        }
+        let of_joints = self.joints.iter().flat_map(|joint| {
+            joint.signals().map(|(kind, values)| (format!("{kind} of {}", joint.name), values))
+        });
+        let of_channels = self.channels.iter().map(|c| (c.name.clone(), c.values.as_slice()));
+        for (signal, values) in
+            [("time".to_owned(), self.time.as_slice())].into_iter().chain(of_joints).chain(of_channels)
+        {
+            if values.len() != self.rows() {
+                let (log, expected, found) = (log.to_owned(), self.rows(), values.len());
+                return Err(LogError::Length { log, signal, expected, found });
+            }
+            if let Some(k) = values.iter().position(|x| !x.is_finite()) {
+                return Err(LogError::NotFinite {
+                    log: log.to_owned(),
+                    signal,
+                    sample: row + k,
+                    found: values[k],
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Appends rows of the same signals.
+    ///
+    /// # Panics
+    /// If there are other signals.
+    pub fn append(&mut self, more: &Portion) {
+        assert_eq!(
+            (self.joints.len(), self.channels.len()),
+            (more.joints.len(), more.channels.len()),
+            "the same signals"
+        );
+        self.time.extend_from_slice(&more.time);
+        for (joint, more) in self.joints.iter_mut().zip(&more.joints) {
+            joint.position.extend_from_slice(&more.position);
+            joint.effort.extend_from_slice(&more.effort);
+            if let (Some(own), Some(more)) = (&mut joint.velocity, &more.velocity) {
+                own.extend_from_slice(more);
+            }
+        }
+        for (channel, more) in self.channels.iter_mut().zip(&more.channels) {
+            channel.values.extend_from_slice(&more.values);
+        }
+    }
+
+    /// Copy of a run of rows.
+    ///
+    /// # Panics
+    /// If the run leaves the rows.
+    #[must_use]
+    pub fn part(&self, rows: Range<usize>) -> Portion {
+        let channel = |c: &Channel| Channel { name: c.name.clone(), values: c.values[rows.clone()].to_vec() };
+        Portion {
+            time: self.time[rows.clone()].to_vec(),
+            joints: self.joints.iter().map(|j| j.slice(rows.clone())).collect(),
+            channels: self.channels.iter().map(channel).collect(),
+        }
     }
 }
 
@@ -280,6 +395,15 @@ impl Log {
             None => Ok(()),
         }
     }
+}
+
+/// Whether a position moves; see [`JointSignals::moves`].
+pub fn moves(position: &[f64]) -> bool {
+    let (low, high) = extremes(position);
+    let bend: Vec<f64> = position.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]).abs()).collect();
+    // The second difference of white noise of sd s has sd sqrt(6) s; 1.4826 turns a median into an sd.
+    let noise = 1.4826 / 6f64.sqrt() * median(&bend).unwrap_or(0.0);
+    high - low > (4.0 * quantum(position)).max(12.0 * noise)
 }
 
 fn check_distinct<'a>(log: &str, names: impl Iterator<Item = &'a str>) -> Result<(), LogError> {

@@ -57,6 +57,27 @@ pub struct SpikeReport {
     pub residual_sd: f64,
 }
 
+/// What a part of a signal tells of the spikes of the whole.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpikeLevel {
+    /// Robust standard deviation of the residual against the running median, in the signal's unit; 0 for a part that is constant.
+    pub residual_sd: f64,
+    /// More samples stick out than the cap allows: it is noise or chatter, and nothing is replaced.
+    pub chatter: bool,
+}
+
+impl SpikeLevel {
+    /// At which nothing is replaced.
+    pub const NONE: SpikeLevel = SpikeLevel { residual_sd: 0.0, chatter: false };
+}
+
+impl SpikeReport {
+    /// What the signal tells of a longer one that it is a part of.
+    pub fn level(&self) -> SpikeLevel {
+        SpikeLevel { residual_sd: self.residual_sd, chatter: !self.removed && !self.flagged.is_empty() }
+    }
+}
+
 /// Finds spikes and replaces them in `signal` by the running median.
 ///
 /// With the residual `r` against the running median and `s = 1.4826 median |r|`, a run of at most `longest_run`
@@ -84,6 +105,94 @@ pub fn remove(signal: &mut [f64], settings: &SpikeSettings) -> Result<SpikeRepor
         }
     }
     Ok(SpikeReport { flagged, removed, residual_sd })
+}
+
+/// [`remove`] in a stretch of a signal of which a part was looked at before: samples that were replaced, ascending.
+///
+/// With the level of the very same signal it replaces what [`remove`] does. A sample is judged by at most
+/// `window + neighbours + longest_run` samples on either side.
+///
+/// # Errors
+/// As [`remove`].
+pub fn remove_at(
+    signal: &mut [f64],
+    level: SpikeLevel,
+    settings: &SpikeSettings,
+) -> Result<Vec<usize>, SignalError> {
+    check_finite(signal)?;
+    check_positive("threshold", settings.threshold)?;
+    check_positive("isolation", settings.isolation)?;
+    let limit = settings.threshold * level.residual_sd;
+    if level.chatter || limit <= 0.0 || settings.window < 2 {
+        return Ok(Vec::new());
+    }
+    let far = far_from_median(signal, settings.window / 2, limit);
+    let reach = settings.neighbours.max(settings.level_samples) + settings.window;
+    let mut replaced: Vec<(usize, f64)> = Vec::new();
+    for run in far.chunk_by(|a, b| a + 1 == *b).filter(|run| run.len() <= settings.longest_run) {
+        // The run with all that it is judged by.
+        let from = run[0].saturating_sub(reach);
+        let end = (run[0] + run.len() + reach).min(signal.len());
+        let around = &signal[from..end];
+        let smooth = running_median(around, settings.window);
+        let residual: Vec<f64> = around.iter().zip(&smooth).map(|(x, m)| (x - m).abs()).collect();
+        let place = run[0] - from..run[0] - from + run.len();
+        if is_spike(around, &residual, &place, settings) {
+            replaced.extend(place.map(|k| (from + k, smooth[k])));
+        }
+    }
+    for (sample, value) in &replaced {
+        signal[*sample] = *value;
+    }
+    Ok(replaced.into_iter().map(|(sample, _)| sample).collect())
+}
+
+/// Samples further than a limit from the median of `half` samples on either side of them, told without forming medians: more than half of the
+/// window lies further off on the same side.
+fn far_from_median(signal: &[f64], half: usize, limit: f64) -> Vec<usize> {
+    const AT_ONCE: usize = 256;
+    let n = signal.len();
+    let inside = half.min(n)..n.saturating_sub(half).max(half.min(n));
+    let mut out = Vec::new();
+    // At the ends the window keeps the samples that exist.
+    let ends = |range: Run, out: &mut Vec<usize>| {
+        let (from, end) = (range.start.saturating_sub(half), (range.end + half).min(n));
+        let smooth = running_median(&signal[from..end], 2 * half + 1);
+        out.extend(range.filter(|k| (signal[*k] - smooth[*k - from]).abs() > limit));
+    };
+    ends(0..inside.start, &mut out);
+    let is_far = |k: usize| {
+        let window = &signal[k - half..=k + half];
+        let count = |far: &dyn Fn(f64) -> bool| window.iter().filter(|y| far(**y)).count();
+        count(&|y| signal[k] - y > limit).max(count(&|y| y - signal[k] > limit)) > half
+    };
+    let (mut low, mut high) = (Vec::new(), Vec::new());
+    for start in inside.clone().step_by(AT_ONCE) {
+        let end = (start + AT_ONCE).min(inside.end);
+        // Extremes of `half` samples from each on; where all on one side are near enough, so is the median.
+        let runs = &signal[start - half..end + half];
+        let count = end - start + half + 1;
+        low.clear();
+        low.extend_from_slice(&runs[..count]);
+        high.clear();
+        high.extend_from_slice(&runs[..count]);
+        for shift in 1..half {
+            for ((low, high), y) in low.iter_mut().zip(&mut high).zip(&runs[shift..]) {
+                *low = if *y < *low { *y } else { *low };
+                *high = if *y > *high { *y } else { *high };
+            }
+        }
+        let near_enough = |(place, x): (usize, &f64)| {
+            let (before, after) = (place, place + half + 1);
+            (x - low[before] <= limit || x - low[after] <= limit)
+                && (high[before] - x <= limit || high[after] - x <= limit)
+        };
+        let own = signal[start..end].iter().enumerate();
+        let doubtful = own.filter(|sample| !near_enough(*sample)).map(|(place, _)| start + place);
+        out.extend(doubtful.filter(|k| is_far(*k)));
+    }
+    ends(inside.end..n, &mut out);
+    out
 }
 
 type Run = std::ops::Range<usize>;
@@ -191,6 +300,26 @@ mod tests {
         position[2100] += 0.01;
         let report = remove(&mut position, &SpikeSettings::position()).unwrap();
         assert_eq!(report.flagged, [2100]);
+    }
+
+    #[test]
+    fn a_known_level_replaces_what_the_whole_signal_does() {
+        let mut spiky = noise(3000);
+        for (place, size) in [(3, 40.0), (7, -30.0), (300, 30.0), (701, -25.0), (702, -25.0), (2995, 50.0)] {
+            spiky[place] += size;
+        }
+        for x in &mut spiky[1000..] {
+            *x += 40.0;
+        }
+        let mut chatter = noise(3000);
+        chatter.iter_mut().step_by(50).for_each(|x| *x += 50.0);
+        for signal in [spiky, chatter, noise(40), vec![1.0; 30], vec![0.0, 1.0], Vec::new()] {
+            let (mut whole, mut known) = (signal.clone(), signal);
+            let report = remove(&mut whole, &SpikeSettings::default()).unwrap();
+            let replaced = remove_at(&mut known, report.level(), &SpikeSettings::default()).unwrap();
+            assert_eq!(known, whole);
+            assert_eq!(replaced, if report.removed { report.flagged } else { Vec::new() });
+        }
     }
 
     #[test]

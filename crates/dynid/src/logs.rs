@@ -4,12 +4,15 @@ use std::path::Path;
 
 use dynid_io::columns::{ColumnNames, FullSignal, SignalSpec};
 use dynid_io::log::LogFile;
-use dynid_io::{ColumnMapping, MappingSpec, ReadingNote, Signals, SourceFile, TrajectoryFile};
+use dynid_io::{ColumnMapping, MappingError, MappingSpec, ReadingNote, Signals, SourceFile, TrajectoryFile};
 use dynid_motion::temperature::{self, TemperatureDoubt};
 use sha2::{Digest, Sha256};
 
 mod known_motion;
+mod long;
 mod reading;
+
+pub(crate) use long::{Opened, open};
 
 pub(crate) use reading::map_columns;
 pub use reading::{WholeTable, table};
@@ -69,8 +72,7 @@ pub(crate) fn recorded(
     columns: &MappingSpec,
 ) -> Result<(Signals, Vec<ReadingNote>), Error> {
     let mut understood = reading::understand(config, axes, columns, false)?;
-    let file = config.path.display().to_string();
-    let signals = understood.signals().map_err(|source| Error::Columns { file, source: Box::new(source) })?;
+    let signals = understood.signals().map_err(|source| columns_error(config, source))?;
     Ok((signals, understood.notes))
 }
 
@@ -92,12 +94,27 @@ fn read(
     run_columns: &MappingSpec,
     motor_side: Option<&MotorSide>,
 ) -> Result<Read, Error> {
-    let file = config.path.display().to_string();
     let spec = config.columns.as_ref().unwrap_or(run_columns);
-    let joints = names(axes);
     let mut understood = reading::understand(config, axes, spec, motor_side.is_some())?;
-    let named = |source| Error::Columns { file: file.clone(), source: Box::new(source) };
-    let mut signals = understood.signals().map_err(named)?;
+    let signals = understood.signals().map_err(|source| columns_error(config, source))?;
+    of_signals(config, axes, spec, motor_side, understood, signals)
+}
+
+fn columns_error(config: &LogConfig, source: MappingError) -> Error {
+    Error::Columns { file: config.path.display().to_string(), source: Box::new(source) }
+}
+
+/// A file whose signals are those of its columns.
+fn of_signals(
+    config: &LogConfig,
+    axes: &[LogAxis],
+    spec: &MappingSpec,
+    motor_side: Option<&MotorSide>,
+    understood: reading::Understood,
+    mut signals: Signals,
+) -> Result<Read, Error> {
+    let file = config.path.display().to_string();
+    let joints = names(axes);
     let reading::Understood { table, mapping, notes } = understood;
     let source = SourceFile { path: file, sha256: table.sha256 };
     let mut unwrapped = Vec::new();

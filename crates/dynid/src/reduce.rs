@@ -6,6 +6,7 @@ use dynid_io::MappingSpec;
 
 pub use dynid_identify::reduction::{
     Column, FactorFileFault, LogFacts, Recipe, ReducedLog, Reducer, Reduction, ReductionError, VERSION,
+    WindowSettings,
 };
 
 use crate::Error;
@@ -40,7 +41,7 @@ pub fn learn(config: &Config, progress: &mut dyn FnMut(Step)) -> Result<Learned,
     Ok(Learned { reduction: Reduction::of(&reducer, logs)?, estimate })
 }
 
-/// Reduces logs by a recipe.
+/// Reduces logs by a recipe, long ones in one pass and in memory that does not grow with them ([`Reducer::reduce_blocks`]).
 ///
 /// # Errors
 /// As [`logs::load`] and [`Reducer::reduce`].
@@ -55,10 +56,39 @@ pub fn reduce(
     let mut reduced = Vec::new();
     for log in logs {
         progress(Step::Read(log.path.display().to_string()));
-        reduced
-            .push(Reduction::of(&reducer, [logs::load(log, &reducer.robot().axes, columns, motor_side)?])?);
+        reduced.push(reduce_log(&reducer, log, columns, motor_side)?);
     }
-    Ok(Reduction::merge(reduced)?)
+    match reduced.is_empty() {
+        true => Err(ReductionError::Nothing.into()),
+        false => Ok(Reduction::of_reduced(&reducer, reduced)),
+    }
+}
+
+/// Reduces a log of any length.
+///
+/// # Errors
+/// As [`reduce`].
+pub fn reduce_log(
+    reducer: &Reducer,
+    log: &LogConfig,
+    columns: &MappingSpec,
+    motor_side: Option<&MotorSide>,
+) -> Result<ReducedLog, Error> {
+    let axes = &reducer.robot().axes;
+    if !reducer.in_windows(&log.settings()) {
+        return reducer.reduce(logs::load(log, axes, columns, motor_side)?);
+    }
+    match logs::open(log, axes, columns, motor_side, reducer.windows().part_rows)? {
+        logs::Opened::Whole(log) => reducer.reduce(*log),
+        logs::Opened::Long(mut first, mut rest) => {
+            // What jumps is told of the whole log.
+            first.unwrapped.clear();
+            let mut reduced = reducer.reduce_blocks(*first, &mut *rest)?;
+            reduced.facts.inputs = rest.inputs();
+            reduced.facts.tell_unwrapped(&rest.unwrapped());
+            Ok(reduced)
+        }
+    }
 }
 
 /// Reads a factor file.

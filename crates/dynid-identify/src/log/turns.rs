@@ -47,16 +47,114 @@ pub fn unwrap(signals: &mut Signals, axes: &[LogAxis]) -> Vec<Unwrapped> {
     out
 }
 
+/// Unwraps the positions of a log that comes in parts, as [`unwrap`] does those of a whole one.
+#[derive(Debug, Clone)]
+pub struct Unwrapper {
+    joints: Vec<Followed>,
+}
+
+/// What of a position was seen.
+#[derive(Debug, Clone)]
+struct Followed {
+    joint: String,
+    /// It slides, or moved as no wrapped position does.
+    is_plain: bool,
+    low: f64,
+    high: f64,
+    last: f64,
+    turns: f64,
+    jumps: usize,
+    rows: usize,
+}
+
+impl Unwrapper {
+    /// Behind the first rows of a log, as they were recorded, which [`unwrap`] unwraps.
+    pub fn behind(first: &Signals, axes: &[LogAxis]) -> Self {
+        let followed = |((position, index), joint): ((&Vec<f64>, &usize), &String)| {
+            let slides = axes.get(*index).is_some_and(|axis| axis.slides);
+            let (low, high) = extremes(position);
+            let found = position.windows(2).filter(jumps).count();
+            let is_plain = slides || (found > 0 && !is_wrapped(position, high - low));
+            let turns = position.windows(2).filter(jumps).map(|w| -(w[1] - w[0]).signum()).sum();
+            Followed {
+                joint: joint.clone(),
+                is_plain,
+                low,
+                high,
+                last: position.last().copied().unwrap_or(0.0),
+                turns: if is_plain { 0.0 } else { turns },
+                jumps: if is_plain { 0 } else { found },
+                rows: position.len(),
+            }
+        };
+        let joints = first.position.iter().zip(&first.indices).zip(&first.joints);
+        Unwrapper { joints: joints.map(followed).collect() }
+    }
+
+    /// Unwraps the next rows.
+    ///
+    /// # Errors
+    /// Joint and row (from 1) at which a position that was unwrapped before moves as no wrapped one does.
+    pub fn unwrap(&mut self, signals: &mut Signals) -> Result<(), (String, usize)> {
+        for (position, followed) in signals.position.iter_mut().zip(&mut self.joints) {
+            for x in position.iter_mut() {
+                followed.follow(x)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Positions that were unwrapped so far.
+    pub fn unwrapped(&self) -> Vec<Unwrapped> {
+        let jumped = self.joints.iter().filter(|followed| followed.jumps > 0);
+        jumped.map(|followed| Unwrapped { joint: followed.joint.clone(), jumps: followed.jumps }).collect()
+    }
+}
+
+impl Followed {
+    fn follow(&mut self, x: &mut f64) -> Result<(), (String, usize)> {
+        self.rows += 1;
+        if self.is_plain {
+            return Ok(());
+        }
+        let step = *x - std::mem::replace(&mut self.last, *x);
+        (self.low, self.high) = (self.low.min(*x), self.high.max(*x));
+        let jumps = step.abs() > PI;
+        if self.high - self.low > WITHIN || (jumps && (step.abs() - TURN).abs() >= BESIDE) {
+            if self.jumps > 0 {
+                return Err((self.joint.clone(), self.rows));
+            }
+            self.is_plain = true;
+            return Ok(());
+        }
+        if jumps {
+            self.turns -= step.signum();
+            self.jumps += 1;
+        }
+        *x += self.turns * TURN;
+        Ok(())
+    }
+}
+
+fn extremes(position: &[f64]) -> (f64, f64) {
+    position.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)))
+}
+
+fn jumps(w: &&[f64]) -> bool {
+    (w[1] - w[0]).abs() > PI
+}
+
+/// Whether a position of this range that jumps is wrapped. What is not finite is not.
+fn is_wrapped(position: &[f64], range: f64) -> bool {
+    let is_turn = |w: &[f64]| ((w[1] - w[0]).abs() - TURN).abs() < BESIDE;
+    !range.is_nan() && range <= WITHIN && position.windows(2).filter(jumps).all(is_turn)
+}
+
 /// Unwraps a position, rad; the number of jumps taken out.
 fn unwrap_signal(position: &mut [f64]) -> usize {
-    let (low, high) =
-        position.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
-    let jumps = |w: &&[f64]| (w[1] - w[0]).abs() > PI;
-    let is_turn = |w: &[f64]| ((w[1] - w[0]).abs() - TURN).abs() < BESIDE;
+    let (low, high) = extremes(position);
     let found = position.windows(2).filter(jumps).count();
-    // What is not finite stays as it is.
-    let range = high - low;
-    if found == 0 || range.is_nan() || range > WITHIN || !position.windows(2).filter(jumps).all(is_turn) {
+    if found == 0 || !is_wrapped(position, high - low) {
         return 0;
     }
     let (mut turns, mut before) = (0.0, position[0]);
@@ -86,6 +184,40 @@ mod tests {
         assert!(unwrap_signal(&mut position) > 2);
         let offset = position[0] - true_one[0];
         assert!(position.iter().zip(&true_one).all(|(a, b)| (a - b - offset).abs() < 1e-12));
+    }
+
+    #[test]
+    fn parts_are_unwrapped_as_the_whole() {
+        let axes: [LogAxis; 0] = [];
+        let signals = |position: &[f64]| Signals {
+            joints: vec!["j".to_owned()],
+            indices: vec![0],
+            position: vec![position.to_vec()],
+            ..Signals::default()
+        };
+        let turning: Vec<f64> =
+            (0..4000).map(|k| wrapped(3.0 + 5.0 * (f64::from(k) * 0.004).sin())).collect();
+        let far: Vec<f64> = (0..4000).map(|k| 0.01 * f64::from(k)).collect();
+        for recorded in [turning, far] {
+            for first in [2, 700, 1500, 3999] {
+                let mut whole = signals(&recorded);
+                let found = unwrap(&mut whole, &axes);
+                let mut parts = signals(&recorded[..first]);
+                let mut unwrapper = Unwrapper::behind(&parts, &axes);
+                unwrap(&mut parts, &axes);
+                for rest in recorded[first..].chunks(37) {
+                    let mut rest = signals(rest);
+                    unwrapper.unwrap(&mut rest).unwrap();
+                    parts.position[0].extend_from_slice(&rest.position[0]);
+                }
+                assert!(parts.position[0].iter().zip(&whole.position[0]).all(|(a, b)| (a - b).abs() < 1e-12));
+                assert_eq!(unwrapper.unwrapped(), found);
+            }
+        }
+        let mut jumping = signals(&[3.1, -3.1]);
+        let mut unwrapper = Unwrapper::behind(&jumping, &axes);
+        unwrap(&mut jumping, &axes);
+        assert_eq!(unwrapper.unwrap(&mut signals(&[-3.0, 1.0])), Err(("j".to_owned(), 4)));
     }
 
     #[test]

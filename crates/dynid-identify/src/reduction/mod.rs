@@ -27,6 +27,8 @@ mod file;
 mod recipe;
 mod reduce;
 mod solve;
+mod stream;
+mod windows;
 
 use std::collections::BTreeMap;
 
@@ -43,7 +45,7 @@ pub use crate::reduction_error::{FactorFileFault, ReductionError};
 pub use crate::trained_log::{RowFit, TrainedLog};
 pub use file::VERSION;
 pub use recipe::{Blocks, Choices, Column, Output, Recipe};
-pub use reduce::Reducer;
+pub use reduce::{Reducer, WindowSettings};
 
 /// What is left of a log: its factors, and what has to be known of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -152,6 +154,11 @@ impl Reduction {
     /// A recipe alone, for a place where its logs lie beside it.
     pub fn without_logs(recipe: Recipe) -> Reduction {
         Reduction { recipe, logs: Vec::new() }
+    }
+
+    /// Logs that were reduced by the recipe of a reducer.
+    pub fn of_reduced(reducer: &Reducer, logs: Vec<ReducedLog>) -> Reduction {
+        Reduction::new(reducer.recipe().clone(), logs)
     }
 
     fn new(recipe: Recipe, mut logs: Vec<ReducedLog>) -> Reduction {

@@ -3,7 +3,7 @@
 use dynid_factor::FactorError;
 use dynid_factor::groups::ReducedGroup;
 use dynid_factor::rows::{BlockReducer, RowSource, RowVisitor, Rows, visit_all};
-use dynid_rows::conditioning::{ConditioningSettings, LogRows};
+use dynid_rows::conditioning::{Conditioning, ConditioningSettings, LogRows, PreparedLog};
 
 use super::file::key;
 use super::{LogFacts, Recipe, ReducedFinding, ReducedLog, ReductionError, RowSums};
@@ -23,9 +23,26 @@ const FASTER: f64 = 0.25;
 /// Reduces logs by a recipe.
 #[derive(Debug)]
 pub struct Reducer {
-    recipe: Recipe,
+    pub(super) recipe: Recipe,
     hash: String,
-    problem: Problem,
+    pub(super) problem: Problem,
+    pub(super) windows: WindowSettings,
+}
+
+/// How logs are reduced that are longer than memory need be.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WindowSettings {
+    /// Rows of the part of a log that tells what its own samples decide; logs without more are looked at as a whole. At least 64.
+    /// Default 131072 (two minutes at 1 kHz).
+    pub part_rows: usize,
+    /// Samples of a window. Default 65536.
+    pub samples: usize,
+}
+
+impl Default for WindowSettings {
+    fn default() -> Self {
+        WindowSettings { part_rows: 1 << 17, samples: 1 << 16 }
+    }
 }
 
 impl Recipe {
@@ -35,11 +52,42 @@ impl Recipe {
     /// [`ReductionError::Contradiction`].
     pub fn reducer(self) -> Result<Reducer, Error> {
         let (problem, _) = self.problem()?;
-        Ok(Reducer { hash: self.hash(), problem, recipe: self })
+        Ok(Reducer { hash: self.hash(), problem, recipe: self, windows: WindowSettings::default() })
     }
 }
 
+/// A log that was examined and conditioned.
+pub(super) struct Examined {
+    pub(super) name: String,
+    pub(super) log: Log,
+    pub(super) findings: Vec<ReducedFinding>,
+    pub(super) prepared: PreparedLog,
+    pub(super) conditioned: ConditioningSettings,
+    pub(super) choices: Conditioning,
+}
+
+/// What is left of the rows of a log, and what is known of its samples.
+pub(super) struct Rest {
+    pub(super) groups: Vec<ReducedGroup>,
+    pub(super) efforts: Vec<RowSums>,
+    pub(super) trained: TrainedLog,
+}
+
 impl Reducer {
+    /// Returns the reducer with other windows for long logs. Factors of such logs depend on them.
+    #[must_use]
+    pub fn with_windows(self, windows: WindowSettings) -> Self {
+        Reducer {
+            windows: WindowSettings { part_rows: windows.part_rows.max(64), samples: windows.samples.max(1) },
+            ..self
+        }
+    }
+
+    /// The windows of long logs.
+    pub fn windows(&self) -> &WindowSettings {
+        &self.windows
+    }
+
     /// The recipe.
     pub fn recipe(&self) -> &Recipe {
         &self.recipe
@@ -50,13 +98,34 @@ impl Reducer {
         &self.problem.robot
     }
 
-    /// Examines a log as an identification does, conditions it as the recipe says, and reduces its rows.
+    /// Examines a log as an identification does, conditions it as the recipe says, and reduces its rows; a log of more than
+    /// [`WindowSettings::part_rows`] as [`Reducer::reduce_blocks`] does.
     ///
     /// # Errors
     /// [`Error::Reduction`]: another sample rate, a joint without a column, no rows; [`Error::PreflightFault`] for a log of which nonsense
     /// would come; settings of the log that no recipe knows; what conditioning refuses.
     pub fn reduce(&self, log: Log) -> Result<ReducedLog, Error> {
-        let Problem { robot, model, structure, settings, .. } = &self.problem;
+        if self.in_windows(&log.settings) && log.log.rows() > self.windows.part_rows {
+            return self.reduce_blocks(log, std::iter::empty());
+        }
+        self.reduce_whole(log)
+    }
+
+    /// [`Reducer::reduce`] of a log as a whole.
+    pub(super) fn reduce_whole(&self, log: Log) -> Result<ReducedLog, Error> {
+        let Examined { name, log, findings, prepared, conditioned, choices } = self.examine(log)?;
+        let Problem { model, structure, .. } = &self.problem;
+        let logs = std::slice::from_ref(&prepared);
+        let rows = LogRows::new(model, &structure.shape, &structure.base.kept, logs, &choices, &conditioned)?;
+        let (groups, efforts) = reduced(&rows, self.recipe.outputs.len(), self.recipe.blocks.merged)?;
+        drop(rows);
+        let rest = Rest { groups, efforts, trained: TrainedLog::of(&prepared) };
+        self.finish(name, log, findings, &prepared, rest)
+    }
+
+    /// Checks a log, looks at it before anything is made of it, and prepares it.
+    pub(super) fn examine(&self, log: Log) -> Result<Examined, Error> {
+        let Problem { robot, model, settings, .. } = &self.problem;
         check_settings(&log.settings)?;
         let name = labels(std::iter::once((&log.settings, log.log.name()))).remove(0);
         if let Some(joint) = log.not_logged(&robot.axes).into_iter().next() {
@@ -77,24 +146,32 @@ impl Reducer {
         }
         settings.check_cutoffs(&prepared.name, prepared.rate_hz)?;
         let choices = self.recipe.conditioning(&[prepared.rate_hz]);
-        let logs = std::slice::from_ref(&prepared);
-        let (shape, kept) = (&structure.shape, &structure.base.kept);
-        let rows = LogRows::new(model, shape, kept, logs, &choices, &conditioned)?;
-        let (groups, efforts) = reduced(&rows, self.recipe.outputs.len(), self.recipe.blocks.merged)?;
+        let findings = findings.iter().map(ReducedFinding::of).collect();
+        Ok(Examined { name, log, findings, prepared, conditioned, choices })
+    }
+
+    /// The log as what is left of it. `prepared`: its clock, its motion and its channels count.
+    pub(super) fn finish(
+        &self,
+        name: String,
+        log: Log,
+        findings: Vec<ReducedFinding>,
+        prepared: &PreparedLog,
+        rest: Rest,
+    ) -> Result<ReducedLog, Error> {
+        let Rest { groups, efforts, trained } = rest;
         if groups.iter().all(|g| g.rows() == 0) {
-            let seconds = prepared.duration();
-            return Err(ReductionError::NoRows { log: prepared.name, seconds }.into());
+            let (log, seconds) = (prepared.name.clone(), trained.duration_s);
+            return Err(ReductionError::NoRows { log, seconds }.into());
         }
-        let trained = TrainedLog::of(&prepared);
         let of_reading = log.warnings().into_iter().map(|message| {
             let remedy = "columns and units are stated under `[columns]`, before the log is reduced";
             Caution::warn(caution::LOG, message, remedy)
         });
         let mut cautions: Vec<Caution> = of_reading.collect();
-        cautions.extend(log_cautions(model, logs));
-        cautions.extend(self.beyond(&name, &prepared));
+        cautions.extend(log_cautions(&self.problem.model, std::slice::from_ref(prepared)));
+        cautions.extend(self.beyond(&name, prepared));
         cautions.extend(self.faster(&name, &trained));
-        let findings = findings.iter().map(ReducedFinding::of).collect();
         let facts = LogFacts {
             name,
             log: trained,
@@ -129,7 +206,7 @@ impl Reducer {
     }
 
     /// Temperatures beyond the range of known friction.
-    fn beyond(&self, name: &str, log: &dynid_rows::conditioning::PreparedLog) -> Vec<Caution> {
+    fn beyond(&self, name: &str, log: &PreparedLog) -> Vec<Caution> {
         let doubts = crate::pipeline::known::logged_beyond(&self.problem.plan.known, log);
         let remedy = "leave the log out, or learn the friction at its temperatures";
         let caution =
@@ -196,7 +273,7 @@ impl RowSums {
     /// Of no rows.
     pub const NONE: RowSums = RowSums { rows: 0, sum: 0.0, squares: 0.0, least: 0.0, greatest: 0.0 };
 
-    fn add(&mut self, effort: f64) {
+    pub(super) fn add(&mut self, effort: f64) {
         let (least, greatest) = if self.rows == 0 { (effort, effort) } else { (self.least, self.greatest) };
         *self = RowSums {
             rows: self.rows + 1,

@@ -40,6 +40,15 @@ pub struct Signals {
     pub sparse: Sparse,
 }
 
+/// Where the time of a log begins, for rows that come in blocks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ClockStart {
+    /// First stamps of the time columns as they stand in the file, and the time that is subtracted, s.
+    first: Option<(Vec<f64>, f64)>,
+    /// Rows so far.
+    rows: usize,
+}
+
 impl ColumnMapping {
     /// Takes the signals out of a table, converted to SI.
     ///
@@ -47,6 +56,14 @@ impl ColumnMapping {
     /// [`MappingError::UnknownColumn`] if the mapping was made for another header, [`MappingError::Overflow`] if a
     /// conversion leaves the range of numbers, [`MappingError::Sparse`] if hardly any row has all signals.
     pub fn extract(&self, table: &Table) -> Result<Signals, MappingError> {
+        self.extract_block(table, &mut ClockStart::default())
+    }
+
+    /// [`ColumnMapping::extract`] of the next rows of a log, whose clock counts from its first row. `start`: as the block before left it.
+    ///
+    /// # Errors
+    /// As [`ColumnMapping::extract`], whose share of rows with all signals is that of the block.
+    pub fn extract_block(&self, table: &Table, start: &mut ClockStart) -> Result<Signals, MappingError> {
         let mut filled;
         let whole = if self.has_gaps(table) {
             filled = table.clone();
@@ -65,7 +82,7 @@ impl ColumnMapping {
             Some((table, kept)) => (table, Some(kept)),
             None => (table, None),
         };
-        let (time, time_origin) = self.time(table)?;
+        let (time, time_origin) = self.time(table, start)?;
         let indices: Vec<usize> =
             self.position.iter().enumerate().filter(|(_, p)| p.is_some()).map(|(k, _)| k).collect();
         let optional = |signal, columns: &Option<Vec<Option<ColumnUse>>>| {
@@ -108,26 +125,37 @@ impl ColumnMapping {
         Ok(Some(efforts.into_iter().flatten().collect()))
     }
 
-    fn time(&self, table: &Table) -> Result<(Vec<f64>, f64), MappingError> {
+    fn time(&self, table: &Table, clock: &mut ClockStart) -> Result<(Vec<f64>, f64), MappingError> {
+        let before = clock.rows;
+        clock.rows += table.rows;
         match &self.time {
-            TimeSource::Rate(rate) => Ok(((0..table.rows).map(|k| k as f64 / rate).collect(), 0.0)),
+            TimeSource::Rate(rate) => {
+                Ok(((0..table.rows).map(|k| (before + k) as f64 / rate).collect(), 0.0))
+            }
             TimeSource::Columns(time) => {
-                let mut start = 0.0;
-                for part in &time.parts {
-                    let (raw, origin) = raw_column(table, "time", part)?;
-                    start +=
-                        part.factor * (raw.first().copied().unwrap_or(0.0) + origin as f64) + part.offset;
-                }
+                let (first, start) = match &clock.first {
+                    Some(known) => known,
+                    None => {
+                        let mut start = 0.0;
+                        let mut stamps = Vec::with_capacity(time.parts.len());
+                        for part in &time.parts {
+                            let (raw, origin) = raw_column(table, "time", part)?;
+                            let first = raw.first().copied().unwrap_or(0.0);
+                            start += part.factor * (first + origin as f64) + part.offset;
+                            stamps.push(first);
+                        }
+                        &*clock.first.insert((stamps, start))
+                    }
+                };
                 if let ([column], true) = (time.parts.as_slice(), start.abs() <= EPOCH_CLOCK) {
                     return Ok((convert(table, "time", column)?, 0.0));
                 }
                 let mut out = vec![0.0; table.rows];
-                for part in &time.parts {
+                for (part, first) in time.parts.iter().zip(first) {
                     let (raw, _) = raw_column(table, "time", part)?;
-                    let first = raw.first().copied().unwrap_or(0.0);
                     out.iter_mut().zip(raw).for_each(|(t, x)| *t += scaled(x - first, part.factor));
                 }
-                Ok((out, start))
+                Ok((out, *start))
             }
         }
     }

@@ -15,7 +15,7 @@ pub use crate::signal::{Signal, is_held, is_time_name, signal_of_name};
 pub use clock::TimeReading;
 pub use degrees::{DegreesEvidence, degrees_suspected};
 pub use error::{MappingError, holds_currents};
-pub use extract::Signals;
+pub use extract::{ClockStart, Signals};
 pub use guess::GuessOptions;
 pub use missing::Sparse;
 pub use spec::{ChannelSpec, ColumnNames, FullSignal, MappingSpec, PerJoint, SignalSpec, Units};

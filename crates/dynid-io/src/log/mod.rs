@@ -108,6 +108,49 @@ pub trait LogSource {
     /// # Errors
     /// [`LogFileError`], the first fault met.
     fn read(self: Box<Self>, wanted: &Wanted) -> Result<(Table, Vec<ReadingNote>), LogFileError>;
+
+    /// Reads columns as [`LogSource::read`] does, so many rows at a time where the format allows it (text); other formats give all rows at once.
+    ///
+    /// # Errors
+    /// [`LogFileError`], the first fault met; later ones come with the rows.
+    fn blocks(self: Box<Self>, wanted: &Wanted, rows: usize) -> Result<Box<dyn TableBlocks>, LogFileError> {
+        let _ = rows;
+        let (mut table, notes) = self.read(wanted)?;
+        let sha256 = std::mem::take(&mut table.sha256);
+        Ok(Box::new(OneBlock { table: Some(table), sha256, notes }))
+    }
+}
+
+/// Rows of a log, block by block.
+pub trait TableBlocks: Send {
+    /// The next rows, without a digest; `None` behind the last ones.
+    ///
+    /// # Errors
+    /// [`LogFileError`], the first fault met.
+    fn next_block(&mut self) -> Result<Option<Table>, LogFileError>;
+
+    /// SHA-256 of all bytes of the file, hexadecimal, and what was found out by reading.
+    ///
+    /// # Errors
+    /// [`LogFileError::Unreadable`].
+    fn finish(self: Box<Self>) -> Result<(String, Vec<ReadingNote>), LogFileError>;
+}
+
+/// All rows at once.
+struct OneBlock {
+    table: Option<Table>,
+    sha256: String,
+    notes: Vec<ReadingNote>,
+}
+
+impl TableBlocks for OneBlock {
+    fn next_block(&mut self) -> Result<Option<Table>, LogFileError> {
+        Ok(self.table.take())
+    }
+
+    fn finish(self: Box<Self>) -> Result<(String, Vec<ReadingNote>), LogFileError> {
+        Ok((self.sha256, self.notes))
+    }
 }
 
 /// Settings of [`open`].

@@ -1,8 +1,10 @@
 //! The clock of a log: rows that step back, sample rate, jitter, gaps, and the uniform grid.
 
 mod error;
+mod row_by_row;
 
 pub use error::ClockError;
+pub use row_by_row::{GridRows, GridSamples};
 
 use crate::log::{Channel, JointSignals, Log};
 use crate::median::median;
@@ -274,6 +276,9 @@ impl Place {
     }
 }
 
+/// A grid sample this close to a row (in samples) is that row.
+const SAME: f64 = 1e-6;
+
 fn lay_grid(
     log: &Log,
     kept: &[usize],
@@ -281,8 +286,6 @@ fn lay_grid(
     clock: &ClockReport,
     settings: &ClockSettings,
 ) -> Result<Vec<Place>, ClockError> {
-    // A grid sample this close to a row (in samples) is that row.
-    const SAME: f64 = 1e-6;
     let rate = clock.rate_hz;
     let start = time[0];
     let wanted = (time[time.len() - 1] - start) * rate + 1.0;

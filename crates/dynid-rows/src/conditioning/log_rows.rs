@@ -21,6 +21,12 @@ pub fn most_blocks(logs: usize) -> usize {
     (MOST_BLOCKS / logs.max(1)).clamp(1, MAX_BLOCKS)
 }
 
+/// Least length of a time block, samples: the stated one, and five times `1 / kernel_hz`.
+pub fn least_block_samples(kernel_hz: f64, rate_hz: f64, settings: &ConditioningSettings) -> usize {
+    let longest = (settings.block_s * rate_hz).max(5.0 * rate_hz / kernel_hz);
+    (longest.ceil() as usize).max(1)
+}
+
 /// Rows of prepared logs with the choices made, one group per log, output and kernel scale, in that order.
 ///
 /// States of all logs are held; regressors and kernels are computed again on every pass. Where the rows fit in memory,
@@ -71,9 +77,9 @@ impl<'a> ConditionedLog<'a> {
             .into_par_iter()
             .map(|e| Ok(shift::shift(&e, -choices.delay.samples)?.values))
             .collect::<Result<Vec<Vec<f64>>, ConditioningError>>()?;
-        let longest = (settings.block_s * log.rate_hz).max(5.0 * log.rate_hz / choices.kernel_hz);
         let most = settings.most_blocks.unwrap_or_else(|| most_blocks(choices.state_hz.len()));
-        let block_length = (longest.ceil() as usize).max(log.samples().div_ceil(most)).max(1);
+        let least = least_block_samples(choices.kernel_hz, log.rate_hz, settings);
+        let block_length = least.max(log.samples().div_ceil(most));
         let blocks = (log.samples() / block_length).max(1);
         Ok(ConditionedLog { log, states, instruments: None, masks, kernels, efforts, block_length, blocks })
     }

@@ -9,7 +9,8 @@ use std::sync::Arc;
 use dynid_model::EffortModel;
 use dynid_motion::clock::{self, ClockReport};
 use dynid_motion::spectrum::{EffortNoise, PositionNoise, effort_noise, position_noise};
-use dynid_motion::{Channel, Log, spikes};
+use dynid_motion::spikes::{self, SpikeLevel};
+use dynid_motion::{Channel, Log};
 use rayon::prelude::*;
 
 use super::{ConditioningError, ConditioningSettings};
@@ -37,8 +38,12 @@ pub struct PreparedLog {
     pub effort_noise: Vec<EffortNoise>,
     /// Per output: spikes removed from position and effort.
     pub spikes: Vec<(usize, usize)>,
+    /// Per output: what position and effort tell of the spikes of a longer record.
+    pub spike_levels: Vec<[SpikeLevel; 2]>,
     /// Per output: whether the joint moves in this log.
     pub moves: Vec<bool>,
+    /// Per output: root mean squares of its reversal speeds behind the masks; `None`: those of the samples at hand.
+    pub speed_rms: Option<Arc<Vec<Vec<f64>>>>,
     /// What was found about the clock.
     pub clock: ClockReport,
     /// Motion of a known period, if one was stated; states then come from it.
@@ -116,15 +121,17 @@ pub fn prepare(
         .map(|mut joint| {
             let moves = joint.moves();
             let mut counts = (0, 0);
+            let mut levels = [SpikeLevel::NONE; 2];
             if settings.remove_spikes {
                 let p = spikes::remove(&mut joint.position, &settings.position_spikes)?;
                 let e = spikes::remove(&mut joint.effort, &settings.effort_spikes)?;
                 let count = |r: &spikes::SpikeReport| if r.removed { r.flagged.len() } else { 0 };
                 counts = (count(&p), count(&e));
+                levels = [p.level(), e.level()];
             }
             let position = position_noise(&joint.position, rate_hz, &settings.noise)?;
             let effort = effort_noise(&joint.effort, rate_hz, &settings.noise)?;
-            Ok((joint, moves, counts, position, effort))
+            Ok((joint, moves, counts, levels, position, effort))
         })
         .collect::<Result<_, ConditioningError>>()?;
     let mut out = PreparedLog {
@@ -138,15 +145,18 @@ pub fn prepare(
         position_noise: Vec::new(),
         effort_noise: Vec::new(),
         spikes: Vec::new(),
+        spike_levels: Vec::new(),
         moves: Vec::new(),
+        speed_rms: None,
         clock: uniform.report,
         periodic: None,
         averaged: None,
     };
-    for (joint, moves, counts, position, effort) in done {
+    for (joint, moves, counts, levels, position, effort) in done {
         out.position.push(joint.position);
         out.effort.push(Arc::new(joint.effort));
         out.spikes.push(counts);
+        out.spike_levels.push(levels);
         out.moves.push(moves);
         out.position_noise.push(position);
         out.effort_noise.push(effort);

@@ -59,6 +59,19 @@ impl Kernels {
         Ok(Kernels { kernels, outer: reach(1.0) + extra_reach, inner: reach(0.5) })
     }
 
+    /// Kernels alone, for a sample rate.
+    pub(crate) fn of_rate(scales_hz: &[f64], rate_hz: f64) -> Result<Self, SignalError> {
+        let kernels = scales_hz.iter().map(|f| Kernel::new(*f, rate_hz)).collect::<Result<Vec<_>, _>>()?;
+        Ok(Kernels { kernels, outer: 0, inner: 0 })
+    }
+
+    /// Half width of the widest kernel, and the least distance of samples at which rows of all kernels are centred.
+    pub(crate) fn reach_and_grid(&self) -> (usize, usize) {
+        let reach = self.kernels.iter().map(Kernel::half_width).max().unwrap_or(0);
+        let grid = self.kernels.iter().map(Kernel::spacing).fold(1, least_common_multiple);
+        (reach, grid)
+    }
+
     /// Rungs at which the row of a scale is used at a centre: usable there, and no wider kernel is.
     fn used(&self, masks: &Masks, scale: usize, centre: usize) -> u8 {
         let bits = |k: usize| masks.usable(centre, self.kernels[k].half_width(), self.outer, self.inner);
@@ -81,6 +94,14 @@ impl Kernels {
         }
         counts.iter().map(|c| *c as f64 / probes.max(1) as f64).collect()
     }
+}
+
+fn least_common_multiple(a: usize, b: usize) -> usize {
+    let (mut x, mut y) = (a, b);
+    while y != 0 {
+        (x, y) = (y, x % y);
+    }
+    a / x * b
 }
 
 /// A batch of rows of one output at one scale.

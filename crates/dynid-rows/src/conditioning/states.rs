@@ -271,7 +271,7 @@ impl States {
     }
 
     /// A combination of rates and the standard deviation of its noise.
-    fn combined(&self, speed: &[(usize, f64)]) -> (Vec<f64>, f64) {
+    pub(super) fn combined(&self, speed: &[(usize, f64)]) -> (Vec<f64>, f64) {
         let mut v = vec![0.0; self.samples];
         let mut variance = 0.0;
         for (rate, factor) in speed {
@@ -376,8 +376,13 @@ impl Masks {
         let speeds: Vec<(Vec<f64>, f64)> =
             model.reversal_speeds(output).iter().map(|speed| states.combined(speed)).collect();
         // What does not change with the rung: the rms speed, and where the sign changes.
-        let speeds: Vec<(&Vec<f64>, f64, f64, Vec<bool>)> =
-            speeds.iter().map(|(v, sigma)| (v, *sigma, rms(v), near_reversal(v, 0.0))).collect();
+        let known = log.speed_rms.as_ref().map(|of_outputs| &of_outputs[output]);
+        let rms_of = |k: usize, v: &[f64]| known.map_or_else(|| rms(v), |known| known[k]);
+        let speeds: Vec<(&Vec<f64>, f64, f64, Vec<bool>)> = speeds
+            .iter()
+            .enumerate()
+            .map(|(k, (v, sigma))| (v, *sigma, rms_of(k, v), near_reversal(v, 0.0)))
+            .collect();
         let mut reversal = vec![None];
         for level in &settings.ladder {
             let mut bad = vec![false; states.samples];

@@ -23,8 +23,7 @@ use super::FleetFault;
 use super::manifest::Entry;
 use crate::Error;
 use crate::config::{LogConfig, MotorSide};
-use crate::logs;
-use crate::reduce::Recipe;
+use crate::reduce::{Recipe, reduce_log};
 
 /// Raised whenever the bits of a reduction change, so that factors of before are made anew.
 pub const NUMERICS: u32 = 1;
@@ -229,8 +228,8 @@ impl FactorStore {
     fn reduced(&self, entry: &Entry) -> Result<ReducedLog, Error> {
         let config = LogConfig { path: entry.path.clone(), ..LogConfig::default() };
         let StoreReading { columns, motor_side } = &self.reading;
-        let log = logs::load(&config, &self.reducer.robot().axes, columns, motor_side.as_ref())?;
-        let mut log = self.reducer.reduce(log)?.in_one_block();
+        let log = reduce_log(&self.reducer, &config, columns, motor_side.as_ref())?;
+        let mut log = log.in_one_block();
         log.facts.origin = Some(entry.origin.clone());
         // Names as the manifest has them: the same bytes wherever the logs lie.
         log.facts.log.name.clone_from(&entry.log);

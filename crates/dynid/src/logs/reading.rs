@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
-use dynid_io::columns::{ChannelSpec, EffortColumn, columns_of_unnamed, is_time_name};
-use dynid_io::log::{self, LogFormat, Missing, Wanted};
-use dynid_io::{ColumnMapping, LogHeader, MappingError, MappingSpec, ReadingNote, Signals, Table};
+use dynid_io::columns::{ChannelSpec, ClockStart, EffortColumn, columns_of_unnamed, is_time_name};
+use dynid_io::log::{self, LogFormat, Missing, TableBlocks, Wanted};
+use dynid_io::{
+    ColumnMapping, LogHeader, LogOptions, LogSource, MappingError, MappingSpec, ReadingNote, Signals, Table,
+};
 
 use dynid_model::journal_channels;
 
@@ -28,8 +30,52 @@ pub(crate) fn understand(
     spec: &MappingSpec,
     motors: bool,
 ) -> Result<Understood, Error> {
+    let Assigned { text, mapping, unnamed } = assigned(log, axes, spec, &spec.options(log.rows))?;
+    let (table, mut notes) = text.read(&mapping.wanted())?;
+    notes.extend(unnamed);
+    Understood::new(log, axes, table, mapping, notes, motors)
+}
+
+/// A log that is read so many rows at a time, whatever its length.
+pub(super) struct InBlocks {
+    pub(super) blocks: Box<dyn TableBlocks>,
+    pub(super) mapping: ColumnMapping,
+    /// What was found out before a row was read.
+    pub(super) notes: Vec<ReadingNote>,
+}
+
+/// Opens the columns of a log that its robot needs.
+pub(super) fn in_blocks(
+    log: &LogConfig,
+    axes: &[LogAxis],
+    spec: &MappingSpec,
+    rows: usize,
+) -> Result<InBlocks, Error> {
+    let mut options = spec.options(log.rows);
+    // What is not held needs no bound; how hard it is compressed keeps its own.
+    options.read.max_bytes = u64::MAX;
+    let Assigned { text, mapping, unnamed } = assigned(log, axes, spec, &options)?;
+    let notes = text.notes().iter().cloned().chain(unnamed).collect();
+    let blocks = text.blocks(&mapping.wanted(), rows)?;
+    Ok(InBlocks { blocks, mapping, notes })
+}
+
+/// A log whose columns are assigned, before its rows are read.
+struct Assigned {
+    text: Box<dyn LogSource>,
+    mapping: ColumnMapping,
+    /// How columns without names were told.
+    unnamed: Option<ReadingNote>,
+}
+
+fn assigned(
+    log: &LogConfig,
+    axes: &[LogAxis],
+    spec: &MappingSpec,
+    options: &LogOptions,
+) -> Result<Assigned, Error> {
     let named = |source| columns_error(&log.path, source);
-    let text = log::open(&log.path, &spec.options(log.rows))?;
+    let text = log::open(&log.path, options)?;
     let header = text.header();
     let (mut spec, text, unnamed) = match of_unnamed(log, &header, axes, spec)? {
         Some((found, note)) => (found, text, Some(note)),
@@ -41,12 +87,7 @@ pub(crate) fn understand(
         super::check_surplus(&mapping, &names(axes), &header.names, &log.path.display().to_string())?;
     }
     super::check_gains(&spec, axes.len())?;
-    let wanted = mapping.wanted();
-    let (table, mut notes) = text.read(&wanted)?;
-    notes.extend(unnamed);
-    let mut understood = Understood { table, mapping, notes };
-    understood.settle(motors || axes.iter().any(|a| a.motor)).map_err(named)?;
-    Ok(understood)
+    Ok(Assigned { text, mapping, unnamed })
 }
 
 /// Offsets of journals are known by the names of their channels ([`journal_channels`]).
@@ -60,6 +101,21 @@ fn add_probes(spec: &mut MappingSpec, header: &LogHeader, axes: &[LogAxis]) {
 }
 
 impl Understood {
+    /// Of a table that was read, whose time is in the unit that it must be.
+    pub(super) fn new(
+        log: &LogConfig,
+        axes: &[LogAxis],
+        table: Table,
+        mapping: ColumnMapping,
+        notes: Vec<ReadingNote>,
+        motors: bool,
+    ) -> Result<Self, Error> {
+        let mut understood = Understood { table, mapping, notes };
+        let settled = understood.settle(motors || axes.iter().any(|a| a.motor));
+        settled.map_err(|source| columns_error(&log.path, source))?;
+        Ok(understood)
+    }
+
     /// Finds the unit of the time.
     fn settle(&mut self, motors: bool) -> Result<(), MappingError> {
         if let Some(found) = self.mapping.settle_time(&self.table, motors)? {
@@ -78,7 +134,12 @@ impl Understood {
 
     /// Signals of the log, and what became of rows without a value.
     pub(crate) fn signals(&mut self) -> Result<Signals, MappingError> {
-        let signals = self.mapping.extract(&self.table)?;
+        self.first_signals(&mut ClockStart::default())
+    }
+
+    /// [`Understood::signals`] of the first rows of a log, where its clock starts.
+    pub(super) fn first_signals(&mut self, start: &mut ClockStart) -> Result<Signals, MappingError> {
+        let signals = self.mapping.extract_block(&self.table, start)?;
         let sparse = &signals.sparse;
         if !sparse.columns.is_empty() {
             let most = sparse.columns.iter().max_by_key(|(_, count)| *count);
@@ -104,6 +165,9 @@ impl Understood {
     }
 }
 
+/// Rows of a file without a header that tell its columns.
+const ROWS_THAT_TELL: usize = 1 << 17;
+
 /// Columns of a file without a header, where its numbers tell them.
 fn of_unnamed(
     log: &LogConfig,
@@ -116,7 +180,8 @@ fn of_unnamed(
         return Ok(None);
     }
     let all = Wanted { columns: None, time: vec![0], missing: Missing::Error };
-    let (table, _) = log::open(&log.path, &spec.options(log.rows))?.read(&all)?;
+    let mut rows = log::open(&log.path, &spec.options(log.rows))?.blocks(&all, ROWS_THAT_TELL)?;
+    let Some(table) = rows.next_block()? else { return Ok(None) };
     let found = columns_of_unnamed(&table, axes.len()).map_err(|e| columns_error(&log.path, e))?;
     let merged = MappingSpec {
         time: found.time.clone(),

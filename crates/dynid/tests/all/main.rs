@@ -35,6 +35,7 @@ mod preflight_causes;
 mod reaction_friction;
 mod recorded_logs;
 mod reduce;
+mod reduce_long;
 mod report_page;
 mod safe_designs;
 mod servo;

@@ -21,7 +21,7 @@ fn example(name: &str) -> PathBuf {
 }
 
 /// Two parts of the example's log, and its other log.
-fn parts() -> [LogConfig; 3] {
+pub(crate) fn parts() -> [LogConfig; 3] {
     let part = |path: &str, part| LogConfig { path: example(path), part, ..LogConfig::default() };
     [
         part("train.csv.gz", Some((0.0, 0.6))),
@@ -31,7 +31,7 @@ fn parts() -> [LogConfig; 3] {
 }
 
 /// What the first two parts teach.
-fn learned() -> &'static Learned {
+pub(crate) fn learned() -> &'static Learned {
     static LEARNED: OnceLock<Learned> = OnceLock::new();
     LEARNED.get_or_init(|| {
         let [first, second, _] = parts();
@@ -45,7 +45,7 @@ fn reduced(logs: &[LogConfig]) -> Reduction {
     reduce(recipe, logs, &MappingSpec::default(), None, &mut |_| {}).unwrap()
 }
 
-fn load(log: &LogConfig) -> Log {
+pub(crate) fn load(log: &LogConfig) -> Log {
     let robot = learned().reduction.recipe().clone().reducer().unwrap().robot().clone();
     dynid::logs::load(log, &robot.axes, &MappingSpec::default(), None).unwrap()
 }

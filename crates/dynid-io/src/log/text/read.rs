@@ -11,7 +11,7 @@ use crate::csv::lines::Lines;
 use crate::csv::{Delimiter, LogFileError, Table, number, split};
 use crate::input::Opened;
 use crate::log::header::LogHeader;
-use crate::log::{LogOptions, LogSource, Missing, ReadingNote, Wanted, places_of};
+use crate::log::{LogOptions, LogSource, Missing, ReadingNote, TableBlocks, Wanted, places_of};
 
 /// Lines that are looked at before anything is read.
 const SAMPLE_LINES: usize = 64;
@@ -206,50 +206,109 @@ impl LogSource for LogText {
     }
 
     /// What follows the last row asked for is hashed and not looked at.
-    fn read(mut self: Box<Self>, wanted: &Wanted) -> Result<(Table, Vec<ReadingNote>), LogFileError> {
-        let (columns, time) = places_of(&self.layout.header, &self.header(), wanted);
-        let mut rows = self.rows(columns, &time, wanted.missing != Missing::Error);
-        let (first, last) = self.options.read.rows.unwrap_or((1, usize::MAX));
-        let mut row = 0;
-        while row < last
-            && let Some((line, text)) = self.held.pop_front()
+    fn read(self: Box<Self>, wanted: &Wanted) -> Result<(Table, Vec<ReadingNote>), LogFileError> {
+        let mut blocks = Box::new(TextBlocks::new(*self, wanted, usize::MAX));
+        let table = blocks.next_block()?;
+        let (sha256, notes) = blocks.finish()?;
+        let table = table.unwrap_or_else(|| unreachable!("a log without rows is refused"));
+        Ok((Table { sha256, ..table }, notes))
+    }
+
+    fn blocks(self: Box<Self>, wanted: &Wanted, rows: usize) -> Result<Box<dyn TableBlocks>, LogFileError> {
+        Ok(Box::new(TextBlocks::new(*self, wanted, rows)))
+    }
+}
+
+/// The rows of a log, so many at a time.
+struct TextBlocks {
+    text: LogText,
+    rows: Rows,
+    /// First and last data row that are asked for.
+    range: (usize, usize),
+    per_block: usize,
+    /// Data rows that were passed.
+    row: usize,
+    ended: bool,
+}
+
+impl TextBlocks {
+    fn new(text: LogText, wanted: &Wanted, per_block: usize) -> Self {
+        let (columns, time) = places_of(&text.layout.header, &text.header(), wanted);
+        let rows = text.rows(columns, &time, wanted.missing != Missing::Error);
+        let range = text.options.read.rows.unwrap_or((1, usize::MAX));
+        TextBlocks { text, rows, range, per_block: per_block.max(1), row: 0, ended: false }
+    }
+
+    /// Refuses a log that ended before the rows that are asked for.
+    fn check_end(&self) -> Result<(), LogFileError> {
+        let (file, (first, last)) = (|| self.text.file.clone(), self.range);
+        if self.row == 0 {
+            return Err(LogFileError::NoRows { file: file(), line: self.text.header_line });
+        }
+        if self.row < first || (self.text.options.read.rows.is_some() && self.row < last) {
+            let found = format!("{} rows", self.row);
+            return Err(LogFileError::RowRange { file: file(), first, last, found });
+        }
+        Ok(())
+    }
+}
+
+impl TableBlocks for TextBlocks {
+    fn next_block(&mut self) -> Result<Option<Table>, LogFileError> {
+        if self.ended {
+            return Ok(None);
+        }
+        let (first, last) = self.range;
+        let begin = first.max(self.row + 1);
+        let end = last.min((begin - 1).saturating_add(self.per_block));
+        while self.row < end
+            && let Some((line, text)) = self.text.held.pop_front()
         {
-            rows.take(&mut row, first, line, &text, &self)?;
+            self.rows.take(&mut self.row, first, line, &text, &self.text)?;
         }
-        while row < last {
-            // What is said of a faulty row needs the whole of `self`, which lines are borrowed from.
-            let taken = match self.lines.next()? {
-                None => break,
-                Some(text) => rows.parse(row + 1 >= first, text),
+        while self.row < end {
+            // What is said of a faulty row needs the whole of the text, which lines are borrowed from.
+            let taken = match self.text.lines.next()? {
+                None => {
+                    self.ended = true;
+                    break;
+                }
+                Some(text) => self.rows.parse(self.row + 1 >= first, text),
             };
-            let line = self.lines.number();
-            rows.settle(taken, &mut row, line, &self)?;
+            let line = self.text.lines.number();
+            self.rows.settle(taken, &mut self.row, line, &self.text)?;
         }
-        if row == 0 {
-            return Err(LogFileError::NoRows { file: self.file, line: self.header_line });
+        self.ended |= self.row == last;
+        if self.ended {
+            self.check_end()?;
         }
-        if row < first || (self.options.read.rows.is_some() && row < last) {
-            let found = format!("{row} rows");
-            return Err(LogFileError::RowRange { file: self.file, first, last, found });
+        let count = (self.row + 1).saturating_sub(begin);
+        if count == 0 {
+            return Ok(None);
         }
-        let mut notes = self.layout.notes;
-        if let LineParser::Echo(echo) = &rows.parser
+        let rows = &mut self.rows;
+        let next = if self.ended { 0 } else { count };
+        let columns = rows.values_of.iter_mut();
+        Ok(Some(Table {
+            source: self.text.file.clone(),
+            header: rows.columns.iter().map(|k| self.text.layout.header.names[*k].clone()).collect(),
+            origin: rows.columns.iter().map(|k| rows.origin[*k]).collect(),
+            columns: columns.map(|c| std::mem::replace(c, Vec::with_capacity(next))).collect(),
+            rows: count,
+            first_row: begin,
+            sha256: String::new(),
+        }))
+    }
+
+    fn finish(self: Box<Self>) -> Result<(String, Vec<ReadingNote>), LogFileError> {
+        let mut notes = self.text.layout.notes;
+        if let LineParser::Echo(echo) = &self.rows.parser
             && echo.remarks > 0
         {
             let reason = "the recorder says that it lost some; the clock takes them for gaps";
             notes.push(ReadingNote::new("lost messages", echo.remarks.to_string(), reason));
         }
-        let header = rows.columns.iter().map(|k| self.layout.header.names[*k].clone()).collect();
-        let table = Table {
-            source: self.file,
-            header,
-            origin: rows.columns.iter().map(|k| rows.origin[*k]).collect(),
-            columns: rows.values_of,
-            rows: row + 1 - first,
-            first_row: first,
-            sha256: self.lines.digest()?,
-        };
-        Ok((table, notes))
+        Ok((self.text.lines.digest()?, notes))
     }
 }
 
