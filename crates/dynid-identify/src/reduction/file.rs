@@ -4,7 +4,7 @@
 //! |---|---|
 //! | line | `dynid factors 1` and a line feed: what it is, and its version |
 //! | `u64` | length of the description, little-endian like all numbers |
-//! | description | JSON: `recipe` (absent where it lies beside), `recipe_sha256`, and per log `key`, its facts, and how many bytes its factors take |
+//! | description | JSON: `recipe` (absent where it lies beside), `recipe_sha256`, and per log `key`, its facts, how many bytes its factors take and their SHA-256 |
 //! | factors | of one log after the other, as [`dynid_factor::wire`] writes them |
 //! | 32 bytes | SHA-256 of all before |
 //!
@@ -36,6 +36,8 @@ struct LogEntry {
     key: String,
     facts: LogFacts,
     bytes: u64,
+    /// SHA-256 of these bytes.
+    sha256: String,
 }
 
 /// Key of a log: what it contributes by a recipe, however it is cut into time blocks.
@@ -114,7 +116,8 @@ fn written(recipe: Option<&Recipe>, recipe_sha256: &str, reduced: &[ReducedLog])
         let before = factors.len();
         write_groups(&log.groups, &mut factors);
         let bytes = (factors.len() - before) as u64;
-        logs.push(LogEntry { key: log.key.clone(), facts: log.facts.clone(), bytes });
+        let sha256 = dynid_io::digest::sha256(&factors[before..]);
+        logs.push(LogEntry { key: log.key.clone(), facts: log.facts.clone(), bytes, sha256 });
     }
     let description = Description { recipe: recipe.cloned(), recipe_sha256: recipe_sha256.to_owned(), logs };
     let text = plain(&description);
@@ -170,12 +173,15 @@ fn read(bytes: &[u8], known: Option<(&Recipe, &str)>) -> Result<(Option<Recipe>,
     let (outputs, scales) = (by.outputs.len(), by.choices.scales_hz.len());
     let columns = by.columns.len();
     let mut out: Vec<ReducedLog> = Vec::new();
-    for LogEntry { key: expected, facts, bytes } in logs {
+    for LogEntry { key: expected, facts, bytes, sha256 } in logs {
         let (own, others) = factors.split_at(bytes as usize);
         factors = others;
         let named = |fault| Fault::Factors { log: facts.name.clone(), fault };
         let groups = read_groups(own, 0, columns).map_err(named)?;
         let wrong = |what: &str| Err(Fault::Log { log: facts.name.clone(), what: what.to_owned() });
+        if dynid_io::digest::sha256(own) != sha256 {
+            return wrong("its factors are not those that were written");
+        }
         if expected.len() != 2 * DIGEST || !expected.bytes().all(|b| b.is_ascii_hexdigit()) {
             return wrong("its key is no SHA-256");
         }
