@@ -235,6 +235,14 @@ fn prepared() -> tempfile::TempDir {
     write("two.toml", "name = \"two\"\nurdf = \"arm.urdf\"\n");
     write("servo-here.toml", "robot = \"two.toml\"\n[[log]]\npath = \"told.csv\"\n[servo]\nlaw = []\n");
     write("servo.toml", "robot = \"arm.urdf\"\n[[log]]\npath = \"told.csv\"\n[servo]\nlaw = []\n");
+    let fleet = ["simulate", "arm.urdf", "--fleet", "3x7", "--duration", "6", "--rate-hz", "100", "--seed", "3", "--out", "made", "--quiet"];
+    run(at, &fleet, 0);
+    run(at, &["reduce", "cell.factors", "--manifest", "made/manifest.csv", "--out", "factors", "--quiet"], 0);
+    let manifest = std::fs::read_to_string(at.join("made/manifest.csv")).unwrap();
+    write("made/few.csv", &manifest.lines().take(9).map(|line| format!("{line}\n")).collect::<String>());
+    std::fs::create_dir_all(at.join("mine")).unwrap();
+    write("mine/report.html", "not of this program\n");
+    write("virtual.toml", "rate_hz = 100\nduration_s = 5\n[fleet]\nrobots = 2\nlogs = 2\n");
     for mine in ["report.html", "payload.html", "dynid.1"] {
         write(mine, "not of this program\n");
     }
@@ -246,7 +254,29 @@ fn cases() -> Vec<Case> {
     let refused = |flag, after, words| Case { flag, before: "inspect arm.urdf", after, refused: Some(words) };
     let mut out = Vec::new();
     out.push(case("servo --log", "servo servo.toml --out s", "servo arm.urdf --log half-told.csv --out s"));
+    out.push(case(
+        "reduce --manifest",
+        "reduce cell.factors --log log.csv --out f.factors",
+        "reduce cell.factors --manifest made/few.csv --out few",
+    ));
+    out.push(case(
+        "reduce --shard",
+        "reduce cell.factors --manifest made/few.csv --out few --json",
+        "reduce cell.factors --manifest made/few.csv --out few --json --shard 2/3",
+    ));
+    out.push(case(
+        "simulate --fleet",
+        "simulate arm.urdf --config virtual.toml --out virtual",
+        "simulate arm.urdf --config virtual.toml --out virtual --fleet 2x3",
+    ));
     let plain: &[(&str, &str, &[&str])] = &[
+        (
+            "fleet",
+            "fleet factors --out f",
+            &["--between-robots fc", "--between-logs fv", "--false-discoveries 0.3", "--robot r002", "--json"],
+        ),
+        ("fleet", "fleet factors --out f --between-robots fc --between-logs fc", &["--covariates temperature", "--quiet"]),
+        ("fleet", "fleet factors --out mine", &["--force"]),
         (
             "inspect",
             "inspect arm.urdf",

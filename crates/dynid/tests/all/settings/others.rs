@@ -7,7 +7,7 @@ use dynid::design::{DesignConfig, design};
 use dynid::io::csv::{ReadOptions, read};
 use dynid::online::Session;
 use dynid::servo::{ServoConfig, identify_servo};
-use dynid::simulate::{SimulateSettings, simulate};
+use dynid::simulate::{SimulateSettings, VirtualFleet, simulate};
 use dynid::{Config, FrictionConfig, Robot, RobotOptions, identify_friction};
 
 use super::identification::{ARM, folder};
@@ -36,6 +36,13 @@ fn simulated(text: &Text) -> Result<String, String> {
         _ => ARM,
     };
     let robot = Robot::parse(arm, Path::new("arm.toml"), &RobotOptions::default()).unwrap();
+    if let Some(settings) = settings.as_ref().ok().filter(|settings| settings.fleet.is_some()) {
+        let told = |fleet: VirtualFleet| {
+            let logs = (0..fleet.len()).map(|k| fleet.about(k));
+            format!("{:?} {:?} {:?}", fleet.changes, fleet.outliers, logs.collect::<Vec<_>>())
+        };
+        return VirtualFleet::new(&robot, settings).map(told).map_err(|e| e.to_string());
+    }
     let log = settings.and_then(|settings| simulate(&robot, &settings));
     log.map(|log| format!("{log:?}")).map_err(|e| e.to_string())
 }
@@ -79,6 +86,20 @@ fn every_key_of_a_virtual_log_takes_effect_or_is_refused() {
         table("trajectory.offset", "[trajectory.j1]\noffset = 0.3", Changes),
         table("trajectory.sine", "[trajectory.j1]\nsine = [0.3]\ncosine = [0.0]", Changes),
         table("trajectory.cosine", "[trajectory.j1]\nsine = [0.0]\ncosine = [0.3]", Changes),
+        beside("fleet.robots", "[fleet]", "[fleet]\nrobots = 3", Changes),
+        beside("fleet.logs", "[fleet]", "[fleet]\nlogs = 3", Changes),
+        beside("fleet.days", "[fleet]", "[fleet]\ndays = 30", Changes),
+        beside("fleet.between_robots", "[fleet]", "[fleet]\nbetween_robots = { fv = 0.5 }", Changes),
+        beside("fleet.between_robots", "[fleet]", "[fleet]\nbetween_robots = { fq = 0.5 }", Refused("symbols")),
+        beside("fleet.between_logs", "[fleet]", "[fleet]\nbetween_logs = { fv = 0.5 }", Changes),
+        beside("fleet.season", "[fleet]", "[fleet]\nseason = 2", Changes),
+        beside("fleet.per_kelvin", "[fleet]", "[fleet]\nper_kelvin = { fc = 0.1 }", Changes),
+        beside("fleet.outliers", "[fleet]", "[fleet]\noutliers = 1", Changes),
+        beside("fleet.wear", "[fleet]", "[fleet]\nwear = 1", Changes),
+        beside("fleet.wear", "[fleet]", "[fleet]\nwear = 99", Refused("as many robots")),
+        beside("fleet.faults", "[fleet]", "[fleet]\nfaults = 1", Changes),
+        beside("fleet.broken", "[fleet]", "[fleet]\nbroken = 0.3", Changes),
+        both("fleet.robots", [CLOSED, ""], [CLOSED, "[fleet]\nrobots = 3"], Refused("inverse dynamics")),
         top("follow", "follow = \"none.json\"", Refused("none.json")),
         top("follow", "follow = \"none.json\"\nshare = 0.3", Refused("follow")),
         top("settle_s", "settle_s = 0.2", Refused("clearance")),
