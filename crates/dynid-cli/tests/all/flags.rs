@@ -42,7 +42,8 @@ fn flags() -> BTreeSet<String> {
 }
 
 /// Flags of which another test, or nothing, can show the effect.
-const ELSEWHERE: [(&str, &str); 32] = [
+const ELSEWHERE: [(&str, &str); 33] = [
+    ("fleet --false-discoveries", "needs robots in which something changes: `fleet`"),
     ("init ", "writes a configuration: `logs_of_tools`"),
     ("backlash --missing", "columns are read alike by all commands: `logs_of_tools`"),
     ("backlash --names", "columns are read alike by all commands: `logs_of_tools`"),
@@ -88,10 +89,7 @@ struct Case {
 /// What a command printed and wrote, times and provenance left out.
 fn outcome(files: &Path, line: &str) -> (Option<i32>, String) {
     let folder = tempfile::tempdir().unwrap();
-    for entry in std::fs::read_dir(files).unwrap() {
-        let path = entry.unwrap().path();
-        std::fs::copy(&path, folder.path().join(path.file_name().unwrap())).unwrap();
-    }
+    copy(files, folder.path());
     let before: BTreeSet<String> = names(folder.path());
     let output = dynid().current_dir(folder.path()).args(line.split(' ')).output().unwrap();
     let mut text = format!(
@@ -100,18 +98,23 @@ fn outcome(files: &Path, line: &str) -> (Option<i32>, String) {
         without_clock(&String::from_utf8_lossy(&output.stderr))
     );
     for name in names(folder.path()).difference(&before) {
-        let path = folder.path().join(name);
         text += name;
-        if path.is_dir() {
-            for inner in names(&path) {
-                text += &inner;
-                text += &written(&path.join(inner));
-            }
-        } else {
-            text += &written(&path);
-        }
+        text += &written(&folder.path().join(name));
     }
     (output.status.code(), text)
+}
+
+/// Copies what a folder holds.
+fn copy(from: &Path, to: &Path) {
+    for name in names(from) {
+        let (source, target) = (from.join(&name), to.join(&name));
+        if source.is_dir() {
+            std::fs::create_dir(&target).unwrap();
+            copy(&source, &target);
+        } else {
+            std::fs::copy(source, target).unwrap();
+        }
+    }
 }
 
 fn names(folder: &Path) -> BTreeSet<String> {
@@ -121,7 +124,11 @@ fn names(folder: &Path) -> BTreeSet<String> {
         .collect()
 }
 
+/// What a file says, or the files of a folder with their names.
 fn written(path: &Path) -> String {
+    if path.is_dir() {
+        return names(path).iter().map(|name| name.clone() + &written(&path.join(name))).collect();
+    }
     let bytes = std::fs::read(path).unwrap();
     let Ok(serde_json::Value::Object(mut map)) = serde_json::from_slice(&bytes) else {
         // A page says which command made it.
@@ -235,10 +242,30 @@ fn prepared() -> tempfile::TempDir {
     write("two.toml", "name = \"two\"\nurdf = \"arm.urdf\"\n");
     write("servo-here.toml", "robot = \"two.toml\"\n[[log]]\npath = \"told.csv\"\n[servo]\nlaw = []\n");
     write("servo.toml", "robot = \"arm.urdf\"\n[[log]]\npath = \"told.csv\"\n[servo]\nlaw = []\n");
-    let fleet = ["simulate", "arm.urdf", "--fleet", "3x7", "--duration", "6", "--rate-hz", "100", "--seed", "3", "--out", "made", "--quiet"];
+    let fleet = [
+        "simulate",
+        "arm.urdf",
+        "--fleet",
+        "3x7",
+        "--duration",
+        "6",
+        "--rate-hz",
+        "100",
+        "--seed",
+        "3",
+        "--out",
+        "made",
+        "--quiet",
+    ];
     run(at, &fleet, 0);
-    run(at, &["reduce", "cell.factors", "--manifest", "made/manifest.csv", "--out", "factors", "--quiet"], 0);
     let manifest = std::fs::read_to_string(at.join("made/manifest.csv")).unwrap();
+    let load = |(k, line): (usize, &str)| match k {
+        0 => format!("{line},load\n"),
+        _ => format!("{line},{}\n", k % 4),
+    };
+    let manifest: String = manifest.lines().enumerate().map(load).collect();
+    write("made/manifest.csv", &manifest);
+    run(at, &["reduce", "cell.factors", "--manifest", "made/manifest.csv", "--out", "factors", "--quiet"], 0);
     write("made/few.csv", &manifest.lines().take(9).map(|line| format!("{line}\n")).collect::<String>());
     std::fs::create_dir_all(at.join("mine")).unwrap();
     write("mine/report.html", "not of this program\n");
@@ -254,6 +281,7 @@ fn cases() -> Vec<Case> {
     let refused = |flag, after, words| Case { flag, before: "inspect arm.urdf", after, refused: Some(words) };
     let mut out = Vec::new();
     out.push(case("servo --log", "servo servo.toml --out s", "servo arm.urdf --log half-told.csv --out s"));
+    out.push(case("fleet --out", "fleet factors --out f", "fleet factors --out g"));
     out.push(case(
         "reduce --manifest",
         "reduce cell.factors --log log.csv --out f.factors",
@@ -273,9 +301,13 @@ fn cases() -> Vec<Case> {
         (
             "fleet",
             "fleet factors --out f",
-            &["--between-robots fc", "--between-logs fv", "--false-discoveries 0.3", "--robot r002", "--json"],
+            &["--between-robots fc", "--between-logs fv", "--robot r002", "--json"],
         ),
-        ("fleet", "fleet factors --out f --between-robots fc --between-logs fc", &["--covariates temperature", "--quiet"]),
+        (
+            "fleet",
+            "fleet factors --out f --between-robots fc --between-logs fc",
+            &["--covariates temperature", "--quiet"],
+        ),
         ("fleet", "fleet factors --out mine", &["--force"]),
         (
             "inspect",

@@ -83,6 +83,22 @@ fn what_was_put_in_is_found() {
     assert!(prepared().join(format!("whole/robots/{changed}.html")).is_file());
 }
 
+/// Who bears more false alarms is told of more robots.
+#[test]
+fn the_rate_of_false_discoveries_decides_who_is_named() {
+    run(prepared(), &["fleet", "factors", "--false-discoveries", "0.9", "--out", "loose", "--quiet"], 0);
+    let changed = |folder: &str| {
+        let found = result(folder);
+        found["robots"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter(|r| r["changes"] != Value::Array(Vec::new()))
+            .count()
+    };
+    assert!(changed("loose") > changed("whole"));
+}
+
 #[test]
 fn shards_orders_and_kills_change_nothing() {
     let at = prepared();

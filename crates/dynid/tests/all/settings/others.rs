@@ -90,7 +90,12 @@ fn every_key_of_a_virtual_log_takes_effect_or_is_refused() {
         beside("fleet.logs", "[fleet]", "[fleet]\nlogs = 3", Changes),
         beside("fleet.days", "[fleet]", "[fleet]\ndays = 30", Changes),
         beside("fleet.between_robots", "[fleet]", "[fleet]\nbetween_robots = { fv = 0.5 }", Changes),
-        beside("fleet.between_robots", "[fleet]", "[fleet]\nbetween_robots = { fq = 0.5 }", Refused("symbols")),
+        beside(
+            "fleet.between_robots",
+            "[fleet]",
+            "[fleet]\nbetween_robots = { fq = 0.5 }",
+            Refused("symbols"),
+        ),
         beside("fleet.between_logs", "[fleet]", "[fleet]\nbetween_logs = { fv = 0.5 }", Changes),
         beside("fleet.season", "[fleet]", "[fleet]\nseason = 2", Changes),
         beside("fleet.per_kelvin", "[fleet]", "[fleet]\nper_kelvin = { fc = 0.1 }", Changes),
