@@ -64,11 +64,7 @@ impl Progress {
 
     /// A step of a fleet.
     pub fn fleet(&self, step: FleetStep) {
-        self.doing(match step {
-            FleetStep::Read => "reading factors",
-            FleetStep::Fit => "fitting the fleet",
-            FleetStep::Drift => "looking for changes",
-        });
+        self.doing(step.to_string());
     }
 
     /// A step of a servo identification.

@@ -76,6 +76,9 @@ pub struct LogFacts {
     /// Where the log comes from, in a fleet.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<Origin>,
+    /// Which log this is, by which recipe and how read: the name of its file in a store of factors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub id: Option<String>,
 }
 
 /// Which robot of its type a log is of, and what is known of the log as a whole.

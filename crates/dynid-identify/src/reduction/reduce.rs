@@ -180,6 +180,7 @@ impl Reducer {
             cautions,
             inputs: log.source.inputs,
             origin: None,
+            id: None,
         };
         Ok(ReducedLog { key: key(&self.hash, &groups), facts, groups })
     }

@@ -56,7 +56,7 @@ fn entries(bytes: &[u8], file: &str, folder: &Path) -> Result<Vec<Entry>, FleetF
     let column = |name: &str| names.iter().position(|n| n == name);
     let needed = |name: &str| {
         let there = names.iter().collect::<Vec<_>>().join(", ");
-        column(name).ok_or_else(|| fault(1, name, "this column", format!("{there}")))
+        column(name).ok_or_else(|| fault(1, name, "this column", there))
     };
     let (log, robot, start) = (needed("log")?, needed("robot")?, column("start"));
     let mut out = Vec::new();
@@ -98,8 +98,8 @@ fn entries(bytes: &[u8], file: &str, folder: &Path) -> Result<Vec<Entry>, FleetF
     }
 }
 
-/// Seconds since 1970 of a date.
-fn date(text: &str) -> Option<f64> {
+/// Seconds since 1970 of a date as the column `start` of a manifest states it.
+pub fn date(text: &str) -> Option<f64> {
     if let Ok(seconds) = text.parse::<f64>() {
         return seconds.is_finite().then_some(seconds);
     }

@@ -1,11 +1,14 @@
 //! Fleets: logs of many robots reduced by one recipe, and what they say together.
 //!
-//! [`manifest()`] tells whose logs they are, [`FactorStore`] reduces them into a folder, [`fleet`] fits the folder's logs
-//! ([`dynid_fleet`]): what robots of the type share, how each differs, which robots and logs stand out, what changed when. [`FleetFile`] is what
+//! [`manifest()`] tells whose logs they are, [`FactorStore`] reduces them into a folder, or keeps the bytes that a [`LogReducer`] made of single logs
+//! elsewhere, [`fleet`] fits the folder's logs ([`dynid_fleet`]): what robots of the type share, how each differs, which robots and logs stand out, what changed when. [`FleetFile`] is what
 //! it leaves behind, beside a page.
 
 mod build;
+mod failure;
 mod manifest;
+mod one_log;
+mod read;
 mod record;
 mod report;
 mod store;
@@ -15,13 +18,18 @@ use std::path::PathBuf;
 use dynid_fleet::drift::{Drift, DriftSettings, drift};
 use dynid_fleet::{FitSettings, Fleet, FleetError, FleetFit, Outlier, fit};
 
-pub use manifest::{Entry, manifest};
+pub use dynid_identify::reduction::Origin;
+
+pub use failure::{Failure, FailureCode};
+pub use manifest::{Entry, date, manifest};
+pub use one_log::{LogReducer, Made, NUMERICS, StoreReading};
+pub use read::{StoreContent, read};
 pub use record::{
     ChangeKind, ChangeRecord, ChannelRecord, CovariateRecord, DatedRecord, EventRecord, FleetFile,
     FleetParameter, LogDeviation, LogRecord, OutlierRecord, RobotParameter, RobotRecord, RobotState,
     SlopeRecord,
 };
-pub use store::{FactorStore, Failure, FailureCode, NUMERICS, Outcome, StoreContent, StoreReading, read};
+pub use store::{FactorStore, Outcome};
 
 use crate::reduce::Recipe;
 use crate::{Error, Fault};
@@ -59,6 +67,16 @@ pub enum FleetStep {
     Drift,
 }
 
+impl std::fmt::Display for FleetStep {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            FleetStep::Read => "reading factors",
+            FleetStep::Fit => "fitting the fleet",
+            FleetStep::Drift => "looking for changes",
+        })
+    }
+}
+
 /// Faults of fleets.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -87,6 +105,14 @@ pub enum FleetFault {
         /// Hash of the other.
         found: String,
     },
+    /// Bytes that are neither the factors of a log nor a failure.
+    #[error("bytes to be kept: expected {expected}, found {found}")]
+    Kept {
+        /// What is expected.
+        expected: &'static str,
+        /// What they are.
+        found: String,
+    },
     /// No folder of factors.
     #[error("no folder of factors: expected one at least")]
     NoFolder,
@@ -112,6 +138,7 @@ impl Fault for FleetFault {
                 "a manifest is a table: `log,robot,start,temperature` and a line such as `day1/a.csv,r17,2026-03-01T12:00:00Z,31.5`".to_owned()
             }
             FleetFault::OtherRecipe { .. } => "reduce logs of another recipe into a folder of their own".to_owned(),
+            FleetFault::Kept { .. } => "put what was made of one log: `LogReducer`, in Python `reduce_log`".to_owned(),
             FleetFault::NoFolder => {
                 "`dynid reduce TYPE.factors --manifest logs.csv --store FOLDER` fills a folder".to_owned()
             }

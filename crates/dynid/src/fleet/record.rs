@@ -8,7 +8,7 @@ use dynid_fleet::drift::{History, Kind};
 use dynid_record::{Outcome, words};
 use serde::{Deserialize, Serialize};
 
-use super::store::Failure;
+use super::failure::Failure;
 use super::{FleetResult, manifest};
 use crate::estimate::{Provenance, SCHEMA};
 

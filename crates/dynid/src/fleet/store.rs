@@ -12,76 +12,18 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use dynid_identify::reduction::{ReducedLog, Reducer, Reduction};
-use dynid_io::MappingSpec;
+use dynid_identify::reduction::{ReducedLog, Reduction};
 use dynid_io::digest::sha256;
-use dynid_record::words;
+use dynid_io::output::write_atomically;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::FleetFault;
+use super::failure::{Failure, FailureCode};
 use super::manifest::Entry;
+use super::one_log::{LogReducer, Made, StoreReading, is_id};
+use super::read::{FAILED, RECIPE, REDUCED, listed};
 use crate::Error;
-use crate::config::{LogConfig, MotorSide};
-use crate::reduce::{Recipe, reduce_log};
-
-/// Raised whenever the bits of a reduction change, so that factors of before are made anew.
-pub const NUMERICS: u32 = 1;
-
-const RECIPE: &str = "recipe.factors";
-const REDUCED: &str = "factors";
-const FAILED: &str = "failed.json";
-
-/// A log that could not be reduced.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct Failure {
-    /// The log, as the manifest states it.
-    pub log: String,
-    /// Its robot.
-    pub robot: String,
-    /// Which kind of fault.
-    pub code: FailureCode,
-    /// What is wrong.
-    pub message: String,
-    /// What can be done about it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub hint: Option<String>,
-}
-
-words! {
-    /// Kinds of faults of logs.
-    FailureCode {
-        /// The file is not there, or cannot be opened.
-        Unreadable = "unreadable",
-        /// Columns, units or numbers are not what a log has.
-        Malformed = "malformed",
-        /// The pre-flight refuses the log: nonsense would come of it.
-        Preflight = "preflight",
-        /// Another sample rate, or a joint without a column: not a log of this recipe.
-        RecipeMismatch = "recipe_mismatch",
-        /// Nothing is left of the log behind kernel and mask.
-        NoRows = "no_rows",
-        /// The factors of the log cannot be read.
-        Damaged = "damaged",
-        /// The same log is stated for several robots.
-        TwoRobots = "two_robots",
-    }
-}
-
-impl FailureCode {
-    fn of(error: &Error) -> FailureCode {
-        use crate::reduce::ReductionError as Reduction;
-        match error {
-            Error::Read { .. } => FailureCode::Unreadable,
-            Error::Reduction(Reduction::Rate { .. } | Reduction::NotLogged { .. }) => {
-                FailureCode::RecipeMismatch
-            }
-            Error::Reduction(Reduction::NoRows { .. }) => FailureCode::NoRows,
-            Error::PreflightFault(_) => FailureCode::Preflight,
-            _ => FailureCode::Malformed,
-        }
-    }
-}
+use crate::reduce::Recipe;
 
 /// What became of a log.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,24 +36,17 @@ pub enum Outcome {
     Failed(Failure),
 }
 
-/// How logs of a manifest are read.
-#[derive(Debug, Clone, Default)]
-pub struct StoreReading {
-    /// Columns.
-    pub columns: MappingSpec,
-    /// Where efforts are those of motors.
-    pub motor_side: Option<MotorSide>,
-}
-
 /// A folder of factors by one recipe.
 #[derive(Debug)]
 pub struct FactorStore {
     folder: PathBuf,
-    reducer: Reducer,
-    recipe_sha256: String,
-    reading: StoreReading,
-    /// What enters the name of every file beside log and origin.
-    salt: String,
+    reducer: LogReducer,
+}
+
+/// Files of a log, of which one is there at most.
+struct Place {
+    reduced: PathBuf,
+    refused: PathBuf,
 }
 
 impl FactorStore {
@@ -120,31 +55,42 @@ impl FactorStore {
     /// # Errors
     /// [`FleetFault::OtherRecipe`] if the folder holds factors of another recipe; [`Error::Output`]; as [`Recipe::reducer`].
     pub fn create(folder: &Path, recipe: Recipe, reading: StoreReading) -> Result<FactorStore, Error> {
-        let recipe_sha256 = recipe.hash();
         let at = folder.join(RECIPE);
         if at.exists() {
-            let found = crate::reduce::read(&at)?.recipe().hash();
-            if found != recipe_sha256 {
+            let (expected, found) = (crate::reduce::read(&at)?.recipe().hash(), recipe.hash());
+            if found != expected {
                 let folder = folder.display().to_string();
-                return Err(FleetFault::OtherRecipe { folder, expected: found, found: recipe_sha256 }.into());
+                return Err(FleetFault::OtherRecipe { folder, expected, found }.into());
             }
         } else {
             make_folder(folder)?;
-            dynid_io::output::write_atomically(&at, &Reduction::without_logs(recipe.clone()).to_bytes())?;
+            write_atomically(&at, &Reduction::without_logs(recipe.clone()).to_bytes())?;
         }
-        // Settings as text: the same for the same settings, whatever order they were given in.
-        let side =
-            serde_json::to_string(&reading.motor_side).unwrap_or_else(|e| unreachable!("plain data: {e}"));
-        let columns =
-            serde_json::to_string(&reading.columns).unwrap_or_else(|e| unreachable!("plain data: {e}"));
-        let salt = format!("{recipe_sha256}\n{NUMERICS}\n{}\n{columns}\n{side}\n", env!("CARGO_PKG_VERSION"));
-        Ok(FactorStore {
-            folder: folder.to_owned(),
-            reducer: recipe.reducer()?,
-            recipe_sha256,
-            reading,
-            salt,
-        })
+        Ok(FactorStore { folder: folder.to_owned(), reducer: LogReducer::new(recipe, reading)? })
+    }
+
+    /// Opens a folder that is there; logs are read as those that taught its recipe.
+    ///
+    /// # Errors
+    /// [`Error::Read`] where there is no such folder or no recipe in it; as [`Recipe::reducer`].
+    pub fn open(folder: &Path) -> Result<FactorStore, Error> {
+        let recipe = crate::reduce::read(&folder.join(RECIPE))?.recipe().clone();
+        let reading = StoreReading::of(&recipe);
+        Ok(FactorStore { folder: folder.to_owned(), reducer: LogReducer::new(recipe, reading)? })
+    }
+
+    /// What reduces single logs.
+    pub fn reducer(&self) -> &LogReducer {
+        &self.reducer
+    }
+
+    /// Number of logs whose factors are there.
+    ///
+    /// # Errors
+    /// [`Error::Read`].
+    pub fn count(&self) -> Result<usize, Error> {
+        let files = listed(&self.folder)?;
+        Ok(files.iter().filter(|file| file.extension().is_some_and(|e| e == REDUCED)).count())
     }
 
     /// Reduces logs that are not there yet, several at a time; `progress` hears of every log as it is done, in any order.
@@ -167,241 +113,106 @@ impl FactorStore {
     }
 
     fn reduce_one(&self, entry: &Entry) -> Result<Outcome, Error> {
-        let failed = |error: &Error| Failure {
-            log: entry.log.clone(),
-            robot: entry.origin.robot.clone(),
-            code: FailureCode::of(error),
-            message: error.to_string(),
-            hint: error.hint(),
-        };
-        let source = match self.digest(entry) {
-            Ok(source) => source,
+        let id = match self.reducer.id(entry) {
+            Ok(id) => id,
             // What was not there may come: nothing is kept.
-            Err(error) => return Ok(Outcome::Failed(failed(&error))),
+            Err(failure) => return Ok(Outcome::Failed(*failure)),
         };
-        let origin = serde_json::to_string(&entry.origin).unwrap_or_else(|e| unreachable!("plain data: {e}"));
-        let name = sha256(format!("{source}\n{origin}\n{}", self.salt).as_bytes())[..32].to_owned();
-        let folder = self.folder.join(&name[..2]);
-        let (reduced, refused) =
-            (folder.join(format!("{name}.{REDUCED}")), folder.join(format!("{name}.{FAILED}")));
-        if let Ok(bytes) = fs::read(&reduced)
-            && self.read_log(&bytes, &reduced).is_ok()
-        {
+        let place = self.place(&id);
+        if self.holds(&place) {
             return Ok(Outcome::Known);
         }
-        if let Ok(bytes) = fs::read(&refused)
+        if let Ok(bytes) = fs::read(&place.refused)
             && let Ok(failure) = serde_json::from_slice(&bytes)
         {
             return Ok(Outcome::Failed(failure));
         }
-        make_folder(&folder)?;
-        match self.reduced(entry) {
-            Ok(log) => {
-                dynid_io::output::write_atomically(&reduced, &log.to_bytes(&self.recipe_sha256))?;
-                Ok(Outcome::Reduced)
-            }
-            Err(error) => {
-                let failure = failed(&error);
-                let text = serde_json::to_string_pretty(&failure)
-                    .unwrap_or_else(|e| unreachable!("plain data: {e}"));
-                dynid_io::output::write_atomically(&refused, text.as_bytes())?;
-                Ok(Outcome::Failed(failure))
-            }
-        }
+        let made = self.reducer.identified(entry, id);
+        self.write(&place, &made)
     }
 
-    /// Hash of the bytes of a log, and of which part of the file it is.
-    fn digest(&self, entry: &Entry) -> Result<String, Error> {
-        let file = dynid_io::log::LogFile::of(&entry.path);
-        let unreadable = |source| Error::Read { file: entry.log.clone().into(), source };
-        let hash = match file.path.is_dir() {
-            true => folder_digest(&file.path),
-            false => dynid_io::digest::sha256_of_file(&file.path),
+    /// Keeps what a [`LogReducer`] of the same recipe made of a log, by its bytes. What is there already is left as it is.
+    ///
+    /// Of a log that could not be opened nothing is kept: it may come.
+    ///
+    /// # Errors
+    /// [`FleetFault::Kept`] for other bytes; as [`ReducedLog::from_bytes`]; [`Error::Output`].
+    pub fn put(&self, bytes: &[u8]) -> Result<Outcome, Error> {
+        let other =
+            |found: String| FleetFault::Kept { expected: "the factors of a log, or a failure", found };
+        if bytes.first() == Some(&b'{') {
+            let failure: Failure = serde_json::from_slice(bytes).map_err(|e| other(e.to_string()))?;
+            let place = match &failure.id {
+                Some(id) if is_id(id) => self.place(id),
+                Some(id) => return Err(other(format!("a failure with the id `{id}`")).into()),
+                None if failure.code == FailureCode::Unreadable => return Ok(Outcome::Failed(failure)),
+                None => self.unidentified(&failure),
+            };
+            if self.holds(&place) {
+                return Ok(Outcome::Known);
+            }
+            return self.write(&place, &Made::Failure(failure));
+        }
+        let log: ReducedLog = self.reducer.read(bytes, "bytes to be kept")?;
+        let id = log.facts.id.as_deref().filter(|id| is_id(id) && log.facts.origin.is_some());
+        let id = id.ok_or_else(|| other(format!("factors of {} without robot and id", log.facts.name)))?;
+        let place = self.place(id);
+        if self.holds(&place) {
+            return Ok(Outcome::Known);
+        }
+        self.write(&place, &Made::Factors(Box::new(log)))
+    }
+
+    /// Keeps a log as failed whose process ended without a result when it had that log alone. It is forgotten once the log was reduced.
+    ///
+    /// # Errors
+    /// [`Error::Output`].
+    pub fn fail(&self, log: &str, robot: &str, message: &str) -> Result<Failure, Error> {
+        let failure = Failure {
+            log: log.to_owned(),
+            robot: robot.to_owned(),
+            code: FailureCode::WorkerLost,
+            message: message.to_owned(),
+            hint: Some("reduce this log alone: `dynid reduce --log`".to_owned()),
+            id: None,
         };
-        let hash = hash.map_err(unreadable)?;
-        Ok(match file.member {
-            Some(member) => format!("{hash}#{member}"),
-            None => hash,
-        })
+        self.write(&self.unidentified(&failure), &Made::Failure(failure.clone()))?;
+        Ok(failure)
     }
 
-    fn reduced(&self, entry: &Entry) -> Result<ReducedLog, Error> {
-        let config = LogConfig { path: entry.path.clone(), ..LogConfig::default() };
-        let StoreReading { columns, motor_side } = &self.reading;
-        let log = reduce_log(&self.reducer, &config, columns, motor_side.as_ref())?;
-        let mut log = log.in_one_block();
-        log.facts.origin = Some(entry.origin.clone());
-        // Names as the manifest has them: the same bytes wherever the logs lie.
-        log.facts.log.name.clone_from(&entry.log);
-        log.facts.inputs.iter_mut().for_each(|input| input.path.clone_from(&entry.log));
-        Ok(log)
-    }
-
-    fn read_log(&self, bytes: &[u8], path: &Path) -> Result<ReducedLog, Error> {
-        let by = (self.reducer.recipe(), self.recipe_sha256.as_str());
-        Ok(ReducedLog::from_bytes(bytes, &path.display().to_string(), by)?)
-    }
-}
-
-/// Hash of names, sizes and times of the files of a dataset: weaker than one of their bytes, which may be many.
-fn folder_digest(folder: &Path) -> std::io::Result<String> {
-    let mut out = Vec::new();
-    let mut left = vec![folder.to_owned()];
-    while let Some(next) = left.pop() {
-        for entry in fs::read_dir(next)? {
-            let path = entry?.path();
-            let about = fs::metadata(&path)?;
-            if about.is_dir() {
-                left.push(path);
-            } else {
-                let name = path.strip_prefix(folder).unwrap_or(&path).display().to_string();
-                out.push(format!("{name} {} {:?}", about.len(), about.modified()?));
-            }
+    /// Where a log is kept.
+    fn place(&self, id: &str) -> Place {
+        let folder = self.folder.join(&id[..2]);
+        Place {
+            reduced: folder.join(format!("{id}.{REDUCED}")),
+            refused: folder.join(format!("{id}.{FAILED}")),
         }
     }
-    out.sort();
-    Ok(sha256(out.join("\n").as_bytes()))
+
+    /// Where a failure is kept of a log that is known by its name alone.
+    fn unidentified(&self, failure: &Failure) -> Place {
+        self.place(&sha256(format!("by name\n{}\n{}", failure.log, failure.robot).as_bytes())[..32])
+    }
+
+    /// Whether the factors of a log are there and whole.
+    fn holds(&self, place: &Place) -> bool {
+        fs::read(&place.reduced)
+            .is_ok_and(|bytes| self.reducer.read(&bytes, &place.reduced.display().to_string()).is_ok())
+    }
+
+    fn write(&self, place: &Place, made: &Made) -> Result<Outcome, Error> {
+        let (path, outcome) = match made {
+            Made::Factors(_) => (&place.reduced, Outcome::Reduced),
+            Made::Failure(failure) => (&place.refused, Outcome::Failed(failure.clone())),
+        };
+        make_folder(path.parent().unwrap_or(&self.folder))?;
+        write_atomically(path, &self.reducer.to_bytes(made))?;
+        Ok(outcome)
+    }
 }
 
 fn make_folder(folder: &Path) -> Result<(), Error> {
     fs::create_dir_all(folder).map_err(|error| {
         Error::Output(dynid_io::OutputError::Unwritable { file: folder.display().to_string(), error })
     })
-}
-
-/// What a folder of factors holds.
-#[derive(Debug)]
-pub struct StoreContent {
-    /// The recipe.
-    pub recipe: Recipe,
-    /// Logs in the order of their keys, each once.
-    pub logs: Vec<ReducedLog>,
-    /// Logs that could not be reduced, by robot and name, and files that cannot be read.
-    pub failures: Vec<Failure>,
-    /// Logs that were there again under another name.
-    pub repeated: usize,
-    /// Logs that are stated several times with different dates or numbers; the first by name was taken.
-    pub contradicting: usize,
-}
-
-/// Reads folders of factors by one recipe.
-///
-/// Files that are damaged are failures, and so are logs that are stated for two robots: neither copy is counted.
-///
-/// # Errors
-/// [`Error::Read`] where there is no such folder or no recipe in it; [`FleetFault::OtherRecipe`].
-pub fn read(folders: &[PathBuf]) -> Result<StoreContent, Error> {
-    let mut recipe: Option<(Recipe, String)> = None;
-    let mut files = Vec::new();
-    for folder in folders {
-        let own = crate::reduce::read(&folder.join(RECIPE))?.recipe().clone();
-        let hash = own.hash();
-        match &recipe {
-            Some((_, expected)) if *expected != hash => {
-                let folder = folder.display().to_string();
-                return Err(
-                    FleetFault::OtherRecipe { folder, expected: expected.clone(), found: hash }.into()
-                );
-            }
-            Some(_) => {}
-            None => recipe = Some((own, hash)),
-        }
-        files.extend(listed(folder)?);
-    }
-    let Some((recipe, hash)) = recipe else {
-        return Err(FleetFault::NoFolder.into());
-    };
-    files.sort();
-    let read = |path: &PathBuf| -> Result<Result<ReducedLog, Failure>, Error> {
-        let bytes = fs::read(path).map_err(|source| Error::Read { file: path.clone(), source })?;
-        let name = path.display().to_string();
-        let damaged = |message: String, hint: Option<String>| Failure {
-            log: name.clone(),
-            robot: String::new(),
-            code: FailureCode::Damaged,
-            message,
-            hint,
-        };
-        if name.ends_with(FAILED) {
-            return Ok(Err(serde_json::from_slice(&bytes).unwrap_or_else(|e| damaged(e.to_string(), None))));
-        }
-        Ok(match ReducedLog::from_bytes(&bytes, &name, (&recipe, &hash)) {
-            Ok(log) if log.facts.origin.is_some() => Ok(log),
-            Ok(_) => Err(damaged(format!("{name}: the log states no robot"), None)),
-            Err(error) => {
-                let hint = "remove the file and reduce the log again: what is there is not made twice";
-                Err(damaged(error.to_string(), Some(hint.to_owned())))
-            }
-        })
-    };
-    let found: Vec<Result<ReducedLog, Failure>> = files.par_iter().map(read).collect::<Result<_, Error>>()?;
-    let (mut logs, mut failures) = (Vec::new(), Vec::new());
-    for one in found {
-        match one {
-            Ok(log) => logs.push(log),
-            Err(failure) => failures.push(failure),
-        }
-    }
-    let (repeated, contradicting) = once(&mut logs, &mut failures);
-    failures.sort_by(|a, b| (&a.robot, &a.log, &a.message).cmp(&(&b.robot, &b.log, &b.message)));
-    Ok(StoreContent { recipe, logs, failures, repeated, contradicting })
-}
-
-/// Leaves every log once, in the order of the keys; those of two robots become failures. How many were there again, and contradict themselves.
-fn once(logs: &mut Vec<ReducedLog>, failures: &mut Vec<Failure>) -> (usize, usize) {
-    logs.sort_by(|a, b| (&a.key, &a.facts.name).cmp(&(&b.key, &b.facts.name)));
-    let robot = |log: &ReducedLog| log.facts.origin.as_ref().map(|o| o.robot.clone()).unwrap_or_default();
-    let mut out: Vec<ReducedLog> = Vec::with_capacity(logs.len());
-    let (mut repeated, mut contradicting) = (0, 0);
-    let mut rest = std::mem::take(logs).into_iter().peekable();
-    while let Some(log) = rest.next() {
-        let mut same = vec![log];
-        while let Some(next) = rest.next_if(|next| next.key == same[0].key) {
-            same.push(next);
-        }
-        let mut robots: Vec<String> = same.iter().map(robot).collect();
-        robots.sort();
-        robots.dedup();
-        if robots.len() > 1 {
-            for log in &same {
-                failures.push(Failure {
-                    log: log.facts.log.name.clone(),
-                    robot: robot(log),
-                    code: FailureCode::TwoRobots,
-                    message: format!("the same log is stated for {}", robots.join(" and ")),
-                    hint: Some(
-                        "state in the manifest whose log it is, and reduce into a new folder".to_owned(),
-                    ),
-                });
-            }
-            continue;
-        }
-        repeated += same.len() - 1;
-        contradicting += usize::from(same.iter().any(|log| log.facts.origin != same[0].facts.origin));
-        out.push(same.swap_remove(0));
-    }
-    *logs = out;
-    (repeated, contradicting)
-}
-
-/// Files of a store.
-fn listed(folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let unreadable = |path: &Path, source| Error::Read { file: path.into(), source };
-    let mut out = Vec::new();
-    let entries = |path: &Path| -> Result<Vec<PathBuf>, Error> {
-        let found = fs::read_dir(path).and_then(|found| found.map(|e| e.map(|e| e.path())).collect());
-        found.map_err(|source| unreadable(path, source))
-    };
-    for part in entries(folder)? {
-        let named = part.file_name().is_some_and(|name| name.len() == 2);
-        if !named || !part.is_dir() {
-            continue;
-        }
-        let kept = |path: &PathBuf| {
-            let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-            !name.starts_with('.') && (name.ends_with(FAILED) || name.ends_with(REDUCED))
-        };
-        out.extend(entries(&part)?.into_iter().filter(kept));
-    }
-    Ok(out)
 }
