@@ -7,6 +7,7 @@ mod commands;
 mod error;
 mod estimate;
 mod factor;
+mod fleet;
 mod log;
 mod robot;
 mod settings;
@@ -29,6 +30,8 @@ mod _native {
     use super::estimate::{Estimate, identify, identify_file};
     #[pymodule_export]
     use super::factor::Factor;
+    #[pymodule_export]
+    use super::fleet::{FactorStore, Fleet, LogReducer, date, fleet, read_manifest};
     #[pymodule_export]
     use super::log::{Log, find_logs, read_columns, simulate};
     #[pymodule_export]

@@ -47,7 +47,7 @@ pub(crate) fn run<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<Bound<'_, PyAny>>,
     threads: usize,
-    work: impl FnOnce(&mut dyn FnMut(String)) -> Result<T, dynid::Error> + Send + 'static,
+    work: impl FnOnce(&mut (dyn FnMut(String) + Send)) -> Result<T, dynid::Error> + Send + 'static,
 ) -> PyResult<T> {
     let (to, news) = channel();
     let stop = Arc::new(AtomicBool::new(false));

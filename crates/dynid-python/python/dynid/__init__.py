@@ -16,6 +16,7 @@ order of `Robot.joints`; one state may be given without the axis of samples, and
 from . import examples
 from ._commands import Design, Online, check, design
 from ._estimate import Estimate, Factor, identify, identify_file
+from ._fleet import FactorStore, Fleet, ManifestRow, fleet, read_manifest, reduce_log
 from ._log import Log, Simulation, find_logs, read_columns, simulate
 from ._native import (
     DynidError,
@@ -37,8 +38,11 @@ __all__ = [
     "Estimate",
     "EstimateError",
     "Factor",
+    "FactorStore",
+    "Fleet",
     "Log",
     "LogError",
+    "ManifestRow",
     "Online",
     "Robot",
     "RobotError",
@@ -51,8 +55,11 @@ __all__ = [
     "design",
     "examples",
     "find_logs",
+    "fleet",
     "identify",
     "identify_file",
     "read_columns",
+    "read_manifest",
+    "reduce_log",
     "simulate",
 ]
