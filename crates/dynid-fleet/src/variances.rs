@@ -57,6 +57,9 @@ pub struct Settled {
     pub converged: bool,
 }
 
+/// Second moments of a robot, and of its logs by their indices.
+type OfRobot = (Vec<f64>, Vec<(usize, Vec<f64>)>);
+
 /// Second moments of the deviations of single robots and logs; empty for a robot without logs.
 pub(crate) struct Moments {
     pub(crate) robots: Vec<Vec<f64>>,
@@ -79,8 +82,7 @@ impl Moments {
                 of_robot.iter().map(|k| (*k, second(&sweep.log(*k, &state)))).collect();
             (second(&state.deviation), logs)
         };
-        let found: Vec<(Vec<f64>, Vec<(usize, Vec<f64>)>)> =
-            (0..splits.by_robot.len()).into_par_iter().map(of).collect();
+        let found: Vec<OfRobot> = (0..splits.by_robot.len()).into_par_iter().map(of).collect();
         let mut logs = vec![Vec::new(); splits.logs.len()];
         let mut robots = Vec::new();
         for (robot, own) in found {

@@ -279,24 +279,25 @@ fn prepared() -> tempfile::TempDir {
 fn cases() -> Vec<Case> {
     let case = |flag, before, after| Case { flag, before, after, refused: None };
     let refused = |flag, after, words| Case { flag, before: "inspect arm.urdf", after, refused: Some(words) };
-    let mut out = Vec::new();
-    out.push(case("servo --log", "servo servo.toml --out s", "servo arm.urdf --log half-told.csv --out s"));
-    out.push(case("fleet --out", "fleet factors --out f", "fleet factors --out g"));
-    out.push(case(
-        "reduce --manifest",
-        "reduce cell.factors --log log.csv --out f.factors",
-        "reduce cell.factors --manifest made/few.csv --out few",
-    ));
-    out.push(case(
-        "reduce --shard",
-        "reduce cell.factors --manifest made/few.csv --out few --json",
-        "reduce cell.factors --manifest made/few.csv --out few --json --shard 2/3",
-    ));
-    out.push(case(
-        "simulate --fleet",
-        "simulate arm.urdf --config virtual.toml --out virtual",
-        "simulate arm.urdf --config virtual.toml --out virtual --fleet 2x3",
-    ));
+    let mut out = vec![
+        case("servo --log", "servo servo.toml --out s", "servo arm.urdf --log half-told.csv --out s"),
+        case("fleet --out", "fleet factors --out f", "fleet factors --out g"),
+        case(
+            "reduce --manifest",
+            "reduce cell.factors --log log.csv --out f.factors",
+            "reduce cell.factors --manifest made/few.csv --out few",
+        ),
+        case(
+            "reduce --shard",
+            "reduce cell.factors --manifest made/few.csv --out few --json",
+            "reduce cell.factors --manifest made/few.csv --out few --json --shard 2/3",
+        ),
+        case(
+            "simulate --fleet",
+            "simulate arm.urdf --config virtual.toml --out virtual",
+            "simulate arm.urdf --config virtual.toml --out virtual --fleet 2x3",
+        ),
+    ];
     let plain: &[(&str, &str, &[&str])] = &[
         (
             "fleet",

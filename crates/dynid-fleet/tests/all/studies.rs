@@ -1,6 +1,7 @@
 //! What a fleet gains, whether its intervals hold, which changes are found.
 //!
-//! `DYNID_FLEETS=12` makes the fleets of the tests large and so many; `DYNID_ROBOTS=1000` runs and times one of so many robots.
+//! `DYNID_FLEETS=12` makes the fleets of the tests large and so many. Those that take minutes are ignored unless asked for (`--ignored`).
+#![expect(clippy::print_stdout, reason = "studies say what they found")]
 
 use std::time::Instant;
 
@@ -223,13 +224,10 @@ impl Tally {
     }
 
     fn print(&self) {
-        let groups: [(&str, &dyn Fn(&&Found) -> bool); 3] = [
-            ("faults", &|f| f.step),
-            ("wear of lambda >= 36", &|f| !f.step && f.lambda >= 36.0),
-            ("wear", &|f| !f.step),
-        ];
-        for (name, of) in groups {
-            let rows: Vec<&Found> = self.changes.iter().filter(of).collect();
+        let steps: Vec<&Found> = self.changes.iter().filter(|f| f.step).collect();
+        let ramps: Vec<&Found> = self.changes.iter().filter(|f| !f.step).collect();
+        let strong = ramps.iter().copied().filter(|f| f.lambda >= 36.0).collect();
+        for (name, rows) in [("faults", steps), ("wear of lambda >= 36", strong), ("wear", ramps)] {
             let share = |of: &dyn Fn(&Found) -> bool| {
                 100.0 * rows.iter().filter(|r| of(r)).count() as f64 / rows.len().max(1) as f64
             };
@@ -287,8 +285,9 @@ fn changes_are_found_and_dated() {
 
 /// Temperature and load that nobody states look like changes.
 #[test]
+#[ignore = "takes a minute a fleet"]
 fn covariates_keep_false_alarms_away() {
-    let Some(count) = fleets() else { return };
+    let count = fleets().unwrap_or(2);
     let (mut with, mut without) = (Tally::default(), Tally::default());
     for seed in 0..count {
         let mut made = simulate(&Plan { seed: 300 + seed, wear: 0, faults: 0, ..FULL });
@@ -327,7 +326,7 @@ fn few_robots_and_single_logs_are_fitted() {
     let three = fit(&alone(&made.fleet, &[1, 4, 6]), &FitSettings::default()).expect("three robots");
     assert!(three.variances.robots.iter().all(|v| v.is_finite() && *v > 0.0));
     let mut single = made.fleet.clone();
-    let mut seen = vec![false; 8];
+    let mut seen = [false; 8];
     single.logs.retain(|log| !std::mem::replace(&mut seen[log.robot], true));
     let single = fit(&single, &FitSettings::default()).expect("one log a robot");
     assert!(single.variances.logs.iter().all(|v| *v == 0.0), "robots and logs cannot be told apart");
@@ -338,9 +337,11 @@ fn few_robots_and_single_logs_are_fitted() {
     assert!(fit(&same, &FitSettings::default()).is_err());
 }
 
+/// Times a fleet of 1000 robots, or of `DYNID_ROBOTS`.
 #[test]
+#[ignore = "takes minutes and 2 GB"]
 fn large_fleet() {
-    let Ok(robots) = std::env::var("DYNID_ROBOTS").map(|n| n.parse().expect("a number")) else { return };
+    let robots = std::env::var("DYNID_ROBOTS").map_or(1000, |n| n.parse().expect("a number"));
     let made = simulate(&Plan { robots, logs: 20, covariates: true, ..PLAIN });
     let started = Instant::now();
     let found = fit(&made.fleet, &FitSettings::default()).expect("fits");
