@@ -243,6 +243,28 @@ fn broken_logs_are_named_and_change_nothing() {
     assert_eq!(damaged, 1);
 }
 
+/// A recipe without friction: the fleet shares all there is, and the result says that nothing can change.
+#[test]
+fn a_fleet_in_which_nothing_varies_is_fitted() {
+    let at = prepared();
+    let config = "robot = \"arm.urdf\"\npreflight = \"off\"\n[elements]\ndefault = []\n[[log]]\npath = \"made/logs/r001-001.csv.gz\"\n";
+    std::fs::write(at.join("bare.toml"), config).unwrap();
+    dynid()
+        .current_dir(at)
+        .args(["reduce", "bare.toml", "--out", "bare.factors", "--quiet"])
+        .output()
+        .unwrap();
+    run(at, &["reduce", "bare.factors", "--manifest", "made/manifest.csv", "--out", "bare", "--quiet"], 0);
+    run(at, &["fleet", "bare", "--out", "shared", "--quiet"], 0);
+    let found = result("shared");
+    assert!(
+        found["warnings"].to_string().contains("nothing can stand out or change"),
+        "{}",
+        found["warnings"]
+    );
+    assert!(found["robots"].as_array().unwrap().iter().all(|r| r["state"] == "usual"));
+}
+
 #[test]
 fn what_does_not_fit_is_refused() {
     let at = prepared();

@@ -186,9 +186,9 @@ pub fn drift(fleet: &Fleet, fit: &FleetFit, settings: &DriftSettings) -> Result<
     };
     let best: Vec<Option<Best>> = (0..fleet.robots.len()).into_par_iter().map(first).collect();
     let p = |(r, best): (usize, &Option<Best>)| Some(tests(r).p(best.as_ref()?.evidence));
-    let first: Vec<Option<f64>> = best.iter().enumerate().map(p).collect();
-    let told_of: Vec<f64> = first.iter().flatten().copied().collect();
-    let threshold = largest_discovery(told_of.clone(), told_of.len(), settings.false_discoveries);
+    let p: Vec<f64> = best.iter().enumerate().filter_map(p).collect();
+    let tested = p.len();
+    let threshold = largest_discovery(p, tested, settings.false_discoveries);
     let told = |(r, best)| tests(r).history(fleet, best, threshold, settings);
     let robots: Vec<RobotHistory> = best.into_par_iter().enumerate().map(told).collect();
     let events = events(&robots, settings);
@@ -219,12 +219,13 @@ struct Tests<'a> {
 
 impl Tests<'_> {
     fn told(&self, settings: &DriftSettings) -> bool {
-        self.logs.index.len() >= settings.least_logs && self.logs.span_s > 0.0
+        self.logs.index.len() >= settings.least_logs && self.logs.span_s > 0.0 && self.logs.coordinates() > 0
     }
 
     /// `p` of the evidence for one coordinate of several: Bonferroni over them.
     fn p(&self, evidence: f64) -> f64 {
-        (self.logs.coordinates() as f64 * probability(evidence.max(0.0), self.logs.index.len())).min(1.0)
+        let single = probability(evidence.max(0.0), self.logs.index.len());
+        (self.logs.coordinates() as f64 * single).min(1.0)
     }
 
     /// Weights of the logs beside patterns, from some to start with, and the misfit that is left.
@@ -317,7 +318,10 @@ impl Tests<'_> {
     ) -> RobotHistory {
         let logs = self.logs.index.clone();
         let Some(mut best) = best else {
-            let history = History::TooShort { logs: logs.len() };
+            let history = match self.logs.coordinates() {
+                0 => History::Unchanged { p: 1.0 },
+                _ => History::TooShort { logs: logs.len() },
+            };
             return RobotHistory { history, detectable: Vec::new(), statistics: Vec::new(), logs };
         };
         let series = self.logs.series(&self.logs.weights());

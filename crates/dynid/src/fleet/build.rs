@@ -82,6 +82,12 @@ pub(super) fn fleet(
         logs,
     };
     warnings.extend(same_motion(&fleet, &robots));
+    if fleet.varying.is_empty() {
+        warnings.push(
+            "no parameter of the recipe differs between robots or logs: nothing can stand out or change"
+                .to_owned(),
+        );
+    }
     if undated > 0 {
         warnings.push(format!(
             "{undated} of {} logs state no start: changes with time were not looked for",

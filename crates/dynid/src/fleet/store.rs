@@ -173,7 +173,10 @@ impl FactorStore {
             robot: robot.to_owned(),
             code: FailureCode::WorkerLost,
             message: message.to_owned(),
-            hint: Some("reduce this log alone: `dynid reduce --log`".to_owned()),
+            hint: Some(
+                "reduce this log alone to see why: `dynid reduce TYPE.factors --log LOG --out one.factors`"
+                    .to_owned(),
+            ),
             id: None,
         };
         self.write(&self.unidentified(&failure), &Made::Failure(failure.clone()))?;
