@@ -85,6 +85,7 @@ fn intervals_hold() {
         mean(&scatters)
     );
     assert!((93.0..=97.0).contains(&robots.percent()));
+    // 108 shared intervals and 54 of new robots: three standard deviations of their counts below 95 %.
     assert!(jackknife.percent() > 88.0 && new.percent() > 85.0);
     assert!((mean(&spreads) - 1.0).abs() < 0.1 && (mean(&scatters) - 1.0).abs() < 0.1);
 }
@@ -279,7 +280,7 @@ fn changes_are_found_and_dated() {
     let healthy = tally.healthy as f64;
     assert!(tally.false_robots as f64 <= 1.0 + 0.01 * healthy);
     assert!(tally.missed_outliers == 0 && tally.missed_logs == 0);
-    assert!(tally.false_outliers as f64 <= 3.0 + 0.01 * healthy);
+    assert!(tally.false_outliers as f64 <= 1.0 + 0.01 * healthy);
     assert!(tally.false_logs as f64 <= 2.0 + 0.1 * tally.broken as f64);
 }
 
