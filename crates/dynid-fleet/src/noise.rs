@@ -26,6 +26,9 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// Variance of a channel whose efforts are zero in all logs: it tells nothing.
+    pub const SILENT: f64 = 1e150;
+
     /// White noise, its variances from the residuals that no parameter explains: `σ² = ρ²/(N - rank)` of each log and channel.
     ///
     /// A log with few rows leans on the channel's variance in other logs, as if that had been seen in 30 rows less its own. A channel that
@@ -59,7 +62,9 @@ impl Noise {
                 () if freedom > 0.0 => rss / freedom,
                 () => power,
             };
-            (found, (EXACT * power).max(f64::MIN_POSITIVE.sqrt()))
+            // Efforts that are zero in all logs are no measurement without noise, but none at all.
+            let least = if power > 0.0 { EXACT * power } else { Noise::SILENT };
+            (found, least)
         };
         let usual: Vec<(f64, f64)> = seen.into_iter().zip(power).map(usual).collect();
         let variance = |channel: &ChannelFactor| {

@@ -302,6 +302,35 @@ fn small_fleets_raise_no_more_false_alarms() {
     assert!(named <= 5, "{named} of {fleets}");
 }
 
+/// A joint that logs zeros for efforts must not outweigh the others.
+#[test]
+fn efforts_that_are_zero_tell_nothing() {
+    let made = simulate(&Plan { robots: 6, logs: 4, ..PLAIN });
+    let mut silent = made.fleet.clone();
+    for channel in silent.logs.iter_mut().flat_map(|log| &mut log.channels).filter(|c| c.channel == 1) {
+        let x = vec![0.0; channel.columns.len()];
+        let zeros = dynid_factor::Factor::from_triangle(
+            x.len(),
+            |i, j| if j < x.len() { channel.factor.r(i, j) } else { 0.0 },
+            0.0,
+            channel.factor.rows(),
+        );
+        channel.factor = zeros;
+    }
+    // What this joint alone tells is held by a prior, as a job has it.
+    let p = silent.columns;
+    let prior = dynid_linalg::Mat::from_fn(p, p + 1, |i, j| if i == j { 1e-2 } else { 0.0 });
+    let found = fit(&silent, &FitSettings { prior: Some(prior), ..FitSettings::default() }).expect("fits");
+    // Friction of the first joint is told by its own efforts.
+    for c in &made.arm.varying[..2] {
+        let (value, truth) = (found.values[*c], made.theta[*c]);
+        assert!((value - truth).abs() < 0.5 * truth, "{value} against {truth}");
+    }
+    // Nothing is said of that of the second, whose logs are silent.
+    let c = made.arm.varying[3];
+    assert!(found.covariance[(c, c)].sqrt() > made.theta[c], "{}", found.covariance[(c, c)].sqrt());
+}
+
 /// A fleet in which nothing varies is fitted, and nothing changes in it.
 #[test]
 fn nothing_varies() {

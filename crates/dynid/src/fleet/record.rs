@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use dynid_estimate::distribution::t_quantile;
-use dynid_fleet::FEW;
 use dynid_fleet::drift::{History, Kind};
+use dynid_fleet::{FEW, Noise};
 use dynid_record::{Outcome, words};
 use serde::{Deserialize, Serialize};
 
@@ -388,7 +388,8 @@ impl FleetResult {
         let noise = &self.fit.noise;
         let mut sds: Vec<Vec<f64>> = vec![Vec::new(); self.fleet.channels];
         for (log, variances) in self.fleet.logs.iter().zip(&noise.variances) {
-            log.channels.iter().zip(variances).for_each(|(c, v)| sds[c.channel].push(v.sqrt()));
+            let told = log.channels.iter().zip(variances).filter(|(_, v)| **v < Noise::SILENT);
+            told.for_each(|(c, v)| sds[c.channel].push(v.sqrt()));
         }
         let of = |(channel, mut sds): (usize, Vec<f64>)| {
             sds.sort_by(f64::total_cmp);
@@ -561,7 +562,11 @@ impl FleetResult {
                 unseen.join(", ")
             ));
         }
-        for channel in self.noise().iter().filter(|c| c.colour > COLOURED) {
+        let told = self.noise();
+        for output in self.recipe.outputs.iter().filter(|o| told.iter().all(|c| c.output != o.name)) {
+            out.push(format!("efforts of {} are zero in all logs: they tell nothing", output.name));
+        }
+        for channel in told.iter().filter(|c| c.colour > COLOURED) {
             out.push(format!(
                 "{} ({:.1} Hz): residuals hold {:.0} times as much of what the motion can explain as noise would: the model lacks something there",
                 channel.output, channel.kernel_hz, channel.colour
