@@ -276,8 +276,27 @@ fn parts_follow_each_other_within_limits_and_brakes_act() {
         }
     }
     assert!(braked > 1000);
-    // A controlled robot follows as well.
-    run(at, &[&simulate[..4], &["--closed-loop", "--out", "driven.csv", "--rate-hz", "250"]].concat(), 0);
+}
+
+#[test]
+fn a_controlled_robot_follows_a_motion() {
+    let warm_up = ALL.split("[[part]]\npause_s").next().unwrap().replace("repeat = 3", "repeat = 1");
+    let load = "[[load]]\njoint = \"j1\"\nbrake = true\nby_part = [5]\n";
+    let folder = folder(&[("motion.toml", &(warm_up + load)), ("braked.toml", &braked())]);
+    let at = folder.path();
+    run(at, &["motion", "motion.toml", "--out", "out"], 0);
+    let simulate = ["simulate", "braked.toml", "--follow", "out/trajectory.csv", "--closed-loop"];
+    run(at, &[&simulate[..], &["--out", "driven.csv", "--rate-hz", "250"]].concat(), 0);
+    let (wanted, driven) = (samples(at, "out/trajectory.csv"), samples(at, "driven.csv"));
+    let time = driven.column("t").unwrap();
+    assert!((time[time.len() - 1] - (wanted.rows - 1) as f64 / 250.0).abs() < 0.1);
+    for joint in ["q_j1", "q_j2", "q_j3"] {
+        let [wanted, driven] = [&wanted, &driven].map(|table| table.column(joint).unwrap());
+        // Rows of the log jitter, and some are lost.
+        let row = |t: f64| ((t * 250.0).round().max(0.0) as usize).min(wanted.len() - 1);
+        let off = time.iter().zip(driven).map(|(t, q)| (wanted[row(*t)] - q).abs()).fold(0.0, f64::max);
+        assert!(off < 0.1, "{joint} is {off} rad off its path");
+    }
 }
 
 #[test]

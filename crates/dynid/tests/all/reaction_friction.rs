@@ -177,6 +177,7 @@ fn sliders_of_a_parallel_machine() {
 /// Fast motion has few such samples: each slider by itself has static coefficient and Stribeck speed on a ridge, which a tie
 /// of the sliders, which are of one make, does away with.
 #[test]
+#[ignore = "a quarter of a minute; the ordinary run takes the slow machine"]
 fn sliders_of_a_fast_parallel_machine() {
     of_sliders("prr3-fast", SimulateSettings::default().acceleration);
 }
@@ -264,6 +265,7 @@ fn feet_and_pins_of_a_scissor_lift() {
 
 /// Friction of the bearings of the arms, and of the universal joints at the elbows, which nothing drives.
 #[test]
+#[ignore = "a quarter of a minute; the ordinary run takes sliders, feet and pins"]
 fn bearings_and_universal_joints_of_a_delta() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/delta.toml");
     let mut robot = std::fs::read_to_string(path).unwrap();

@@ -358,6 +358,7 @@ fn poses_of_the_capsules_are_given_for_pictures() {
 }
 
 #[test]
+#[ignore = "a dozen seconds; the ordinary run keeps open robots apart, and closed ones in `dynid-excitation`"]
 fn drives_of_a_parallel_machine_stay_away_from_singular_poses_and_limits_of_joints_that_follow() {
     let text = std::fs::read_to_string(robots().join("prr3.toml")).unwrap();
     // A leg may turn by a third of a turn about its home, and no faster than 2 rad/s.
