@@ -186,6 +186,11 @@ pub fn residuals(source: &dyn RowSource, estimate: &LinearEstimate) -> Result<Ro
 }
 
 impl RowResiduals {
+    /// Log, output and residuals of rows.
+    pub(crate) fn of(groups: Vec<(usize, usize, GroupResiduals)>) -> Self {
+        RowResiduals { groups }
+    }
+
     /// Of rows that are gone.
     pub(crate) fn none() -> Self {
         RowResiduals { groups: Vec::new() }

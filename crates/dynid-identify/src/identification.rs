@@ -14,6 +14,7 @@ use crate::Error;
 use crate::agreement::{self, Agreement, Alignment};
 use crate::caution::Caution;
 use crate::check::CheckResult;
+use crate::closed_loop::{Comparison, LoopRun};
 use crate::consistency::Consistent;
 use crate::effort_scale::{self, EffortScale, WeighedMass};
 use crate::elements::ElementPlan;
@@ -21,7 +22,6 @@ use crate::estimate::LogFit;
 use crate::finding::Finding;
 use crate::fitting::Fitted;
 use crate::friction_power::FrictionPower;
-use crate::instruments::{Comparison, InstrumentRun};
 use crate::joint_stiffness::JointStiffness;
 use crate::journal_doubt::JournalSeen;
 use crate::load_rounds::LoadRounds;
@@ -142,8 +142,8 @@ pub struct Identification {
     pub conditioning_settings: ConditioningSettings,
     /// Settings of the identification.
     pub settings: Settings,
-    /// How the instruments of the fit came about; `None` for other estimators.
-    pub instruments: Option<InstrumentRun>,
+    /// How the simulations of the fit went; `None` for estimators that simulate nothing.
+    pub simulations: Option<LoopRun>,
     /// Least squares against instruments; `None` if the configuration says nothing about the closed loop, or what was identified is not
     /// simulated in closed loop, which is then a warning.
     pub comparison: Option<Comparison>,

@@ -19,6 +19,7 @@ pub mod agreement;
 pub mod bounds;
 pub mod caution;
 mod check;
+pub mod closed_loop;
 pub mod commands;
 pub mod consistency;
 pub mod effort_scale;
@@ -30,7 +31,7 @@ pub mod fitting;
 mod friction_power;
 mod identification;
 mod input_record;
-pub mod instruments;
+
 mod joint_stiffness;
 mod journal_doubt;
 pub mod known_friction;

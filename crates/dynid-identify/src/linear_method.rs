@@ -25,8 +25,8 @@ pub(crate) fn method(
     let config = &settings.estimator;
     Ok(match config.method {
         Method::Ols => LinearMethod::Ols,
-        // Instruments start from weighted least squares.
-        Method::Wls | Method::Iv => LinearMethod::Wls,
+        // Simulations start from weighted least squares.
+        Method::Wls | Method::Iv | Method::Didim | Method::Cloe => LinearMethod::Wls,
         Method::Huber => LinearMethod::Huber,
         Method::Tukey => LinearMethod::Tukey,
         Method::Ridge => LinearMethod::Ridge {

@@ -22,6 +22,7 @@ use dynid_rows::conditioning::{PreparedLog, ReducedGroup};
 
 use crate::caution::{self, Caution};
 use crate::check::CheckName;
+use crate::closed_loop::{self, Comparison, Loop};
 use crate::effort_scale::{self, EffortScale};
 use crate::elements::ElementPlan;
 use crate::estimate::log_fit;
@@ -29,7 +30,6 @@ use crate::finding::{Finding, Severity};
 use crate::fitting::RowResiduals;
 pub use crate::identification::Identification;
 use crate::input_record::{InputRecord, short_name};
-use crate::instruments::{self, Comparison, Loop};
 use crate::joint_stiffness::{self, JointStiffness};
 use crate::journal_doubt;
 use crate::load_doubt::{Doubted, LoadDoubt};
@@ -216,7 +216,7 @@ pub(crate) fn assemble(
         conditioning,
         friction,
         shapes,
-        instruments,
+        simulations,
         residuals,
         fitted,
         groups,
@@ -301,7 +301,7 @@ pub(crate) fn assemble(
         shapes,
         nonlinear: None,
         alone: None,
-        instruments,
+        simulations,
         comparison,
         loads,
         tie_test: None,
@@ -326,7 +326,7 @@ impl Identification {
             prior: &self.prior,
             fitted: &self.fitted,
             consistent: &self.consistent,
-            rows: &figures::fit_rows(self.fit(), self.conditioning.as_ref(), self.kernel_hz),
+            rows: &figures::fit_rows(self.fit(), &self.row_rms, self.conditioning.as_ref(), self.kernel_hz),
             explained: &self.explained,
             power: &self.power,
             doubts: &doubts,
@@ -390,7 +390,7 @@ fn compared(
         conditioning: fit.conditioning.as_ref(),
         power: &fit.power,
     };
-    match instruments::compare(&closed, fit.fitted.merged_blocks) {
+    match closed_loop::compare(&closed, fit.fitted.merged_blocks) {
         Ok(found) => Ok((Some(found), None)),
         Err(Error::Unsupported(why)) => {
             let message = format!("least squares was not compared with instruments: {why}");

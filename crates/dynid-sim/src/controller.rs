@@ -130,6 +130,11 @@ impl<'a> Controller<'a> {
         Controller { nominal, settings, gains, passive, limits, share, seen: None, saturated: 0 }
     }
 
+    /// Position and velocity gain of every drive.
+    pub(crate) fn gains(&self) -> &[(f64, f64)] {
+        &self.gains
+    }
+
     /// Effort of the drives for a tick at a time.
     ///
     /// # Errors

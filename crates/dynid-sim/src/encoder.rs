@@ -10,7 +10,8 @@ use crate::streams::{Cause, generator, normal};
 pub(crate) struct Encoders {
     /// Distance between readings, rad or m; 0: exact.
     steps: Vec<f64>,
-    noise: f64,
+    /// Standard deviation per joint.
+    noise: Vec<f64>,
     at_ticks: ChaCha8Rng,
     between: ChaCha8Rng,
 }
@@ -18,6 +19,8 @@ pub(crate) struct Encoders {
 impl Encoders {
     /// `slides`: for every joint, whether it does.
     pub(crate) fn new(slides: &[bool], imperfections: &Imperfections, seed: u64) -> Self {
+        let own = |j: usize| imperfections.joint_encoder_noise.get(j).copied();
+        let noise = (0..slides.len()).map(|j| own(j).unwrap_or(imperfections.encoder_noise)).collect();
         let steps = slides
             .iter()
             .map(|slides| match imperfections.encoder_bits {
@@ -30,7 +33,7 @@ impl Encoders {
             .collect();
         Encoders {
             steps,
-            noise: imperfections.encoder_noise,
+            noise,
             at_ticks: generator(seed, Cause::Encoder),
             between: generator(seed, Cause::EncoderBetween),
         }
@@ -38,19 +41,19 @@ impl Encoders {
 
     /// Reading of the controller.
     pub(crate) fn at_tick(&mut self, q: &[f64]) -> Vec<f64> {
-        read(&self.steps, self.noise, &mut self.at_ticks, q)
+        read(&self.steps, &self.noise, &mut self.at_ticks, q)
     }
 
     /// Reading of a logger that samples between ticks.
     pub(crate) fn between_ticks(&mut self, q: &[f64]) -> Vec<f64> {
-        read(&self.steps, self.noise, &mut self.between, q)
+        read(&self.steps, &self.noise, &mut self.between, q)
     }
 }
 
-fn read(steps: &[f64], noise: f64, rng: &mut ChaCha8Rng, q: &[f64]) -> Vec<f64> {
+fn read(steps: &[f64], noise: &[f64], rng: &mut ChaCha8Rng, q: &[f64]) -> Vec<f64> {
     q.iter()
-        .zip(steps)
-        .map(|(q, step)| {
+        .zip(steps.iter().zip(noise))
+        .map(|(q, (step, noise))| {
             let read = q + noise * normal(rng);
             if *step > 0.0 { (read / step).round() * step } else { read }
         })

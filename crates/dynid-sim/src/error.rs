@@ -52,6 +52,14 @@ pub enum SimError {
         /// Name of the coordinate.
         name: String,
     },
+    /// Positions of a controlled robot have no slopes: some joint has neither inertia nor damping nor gain.
+    #[error(
+        "the slopes of the positions are not determined from row {row} on: a joint has neither inertia nor damping nor gain"
+    )]
+    NoSlopes {
+        /// Row of the motion.
+        row: usize,
+    },
     /// A spring that softens cannot carry a torque.
     #[error("the transmission of `{joint}` cannot carry {torque} (N m or N): its spring softens before")]
     Overloaded {

@@ -90,6 +90,8 @@ pub struct ExperimentResult {
     pub energy: EnergyBalance,
     /// Work of the integrator.
     pub integration: IntegrationCount,
+    /// Position and velocity gain of every drive, as stated or chosen: N m/rad and N m s/rad, or N/m and N s/m.
+    pub gains: Vec<(f64, f64)>,
     /// Ticks of the controller.
     pub ticks: usize,
     /// Ticks at which some effort was cut off at its limit.
@@ -333,6 +335,7 @@ impl Prepared {
             log: run.recording.finish(settings),
             imperfections: settings.imperfections.active(),
             ripple: self.ripple,
+            gains: controller.gains().to_vec(),
             ticks,
             saturated_ticks: controller.saturated,
         })

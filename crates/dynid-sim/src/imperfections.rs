@@ -11,6 +11,8 @@ pub struct Imperfections {
     pub encoder_bits: u32,
     /// Standard deviation of encoder noise before rounding, rad or m. Default 5e-6.
     pub encoder_noise: f64,
+    /// The same joint by joint, in place of it; joints past its end have the common one. Default: none.
+    pub joint_encoder_noise: Vec<f64>,
     /// Standard deviation of noise of the logged velocity, rad/s or m/s. Default 1e-3. It matters only where velocity is
     /// logged.
     pub velocity_noise: f64,
@@ -44,6 +46,7 @@ impl Default for Imperfections {
         Imperfections {
             encoder_bits: 18,
             encoder_noise: 5e-6,
+            joint_encoder_noise: Vec::new(),
             velocity_noise: 1e-3,
             effort_noise_share: 0.02,
             effort_noise: Vec::new(),
@@ -65,6 +68,7 @@ impl Imperfections {
         Imperfections {
             encoder_bits: 0,
             encoder_noise: 0.0,
+            joint_encoder_noise: Vec::new(),
             velocity_noise: 0.0,
             effort_noise_share: 0.0,
             effort_noise: Vec::new(),
@@ -83,7 +87,7 @@ impl Imperfections {
     pub fn active(&self) -> Vec<&'static str> {
         [
             ("encoder_bits", self.encoder_bits > 0),
-            ("encoder_noise", self.encoder_noise > 0.0),
+            ("encoder_noise", self.encoder_noise > 0.0 || self.joint_encoder_noise.iter().any(|s| *s > 0.0)),
             ("velocity_noise", self.velocity_noise > 0.0),
             ("effort_noise_share", self.effort_noise_share > 0.0),
             ("effort_noise", self.effort_noise.iter().any(|s| *s > 0.0)),
@@ -122,6 +126,9 @@ impl Imperfections {
             ("clock_jitter_s", self.clock_jitter_s),
         ] {
             demand(x.is_finite() && x >= 0.0, name, "a finite number, not negative", x)?;
+        }
+        for x in &self.joint_encoder_noise {
+            demand(x.is_finite() && *x >= 0.0, "joint_encoder_noise", "a finite number, not negative", x)?;
         }
         for x in &self.effort_noise {
             demand(x.is_finite() && *x >= 0.0, "effort_noise", "a finite number, not negative", x)?;

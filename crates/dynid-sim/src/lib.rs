@@ -32,6 +32,7 @@ mod plant;
 pub mod presliding;
 mod profile;
 mod rosenbrock;
+mod slopes;
 pub mod streams;
 
 pub use closed::{ClosedIntegrator, ClosedPlant, ClosedWorkspace, Stepping};
@@ -47,3 +48,4 @@ pub use integrator::{Integrator, PlantState};
 pub use plant::{Plant, PlantEnergy, PlantWorkspace, Ripple};
 pub use profile::Profile;
 pub use rosenbrock::IntegrationCount;
+pub use slopes::{DrivenMotion, position_slopes};

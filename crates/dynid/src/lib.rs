@@ -40,9 +40,9 @@ pub mod validate;
 
 pub use dynid_identify::{Error, Estimate, Fault, Identification, Robot, RobotOptions, Step, VERSION};
 pub use dynid_identify::{
-    advice, agreement, bounds, caution, commands, consistency, effort_scale, elements, estimate, fitting,
-    instruments, known_friction, log, log_agreement, log_terms, overlap, passivity, pipeline, preflight,
-    prior, robot, searches, settings, shape, stiffness, trust, verdict,
+    advice, agreement, bounds, caution, closed_loop, commands, consistency, effort_scale, elements, estimate,
+    fitting, known_friction, log, log_agreement, log_terms, overlap, passivity, pipeline, preflight, prior,
+    robot, searches, settings, shape, stiffness, trust, verdict,
 };
 
 pub use config::Config;

@@ -125,6 +125,15 @@ impl Shown<'_> {
                             "instrumental variables from simulations, residual variances found along the way"
                         }
                         Method::Iv => "weighted least squares, since no instruments came about",
+                        Method::Didim if self.fit().method == LinearMethod::Didim => {
+                            "DIDIM: efforts on the regressor of simulations of the closed loop"
+                        }
+                        Method::Cloe if self.fit().method == LinearMethod::Cloe => {
+                            "closed-loop output error: positions on their slopes along simulations"
+                        }
+                        Method::Didim | Method::Cloe => {
+                            "weighted least squares, since the simulation diverged"
+                        }
                     }),
                     "",
                 ),

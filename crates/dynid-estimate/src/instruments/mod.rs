@@ -14,10 +14,11 @@
 //! |---|---|
 //! | one estimate from given instruments, weights found along the way | [`instrumental`] |
 //! | simulate, estimate, simulate again until estimates settle | [`iterate`] |
+//! | one step of DIDIM or of closed-loop output error, on rows of a simulated motion | [`along_simulation`] |
 //! | is least squares biased, by how much (Durbin, Wu, Hausman) | [`exogeneity()`] |
 //!
-//! Source: Janot, Vandanjon & Gautier 2014, *A generic instrumental variable approach for industrial robot identification*; 2016 for the
-//! test.
+//! Sources: Janot, Vandanjon & Gautier 2014, *A generic instrumental variable approach for industrial robot identification*; 2016 for the
+//! test; Gautier, Janot & Vandanjon 2013, *A new closed-loop output error method for parameter identification of robot dynamics* (DIDIM).
 
 mod estimate;
 mod exogeneity;
@@ -25,6 +26,6 @@ mod iterate;
 
 pub use estimate::{InstrumentSettings, InstrumentalEstimate, Strength, instrumental};
 pub use exogeneity::{Effect, Exogeneity, ExogeneitySettings, ExogeneityVerdict, FTest, exogeneity};
-pub use iterate::{Iteration, IterationEnd, Simulated, iterate};
+pub use iterate::{Iteration, IterationEnd, Simulated, along_simulation, iterate};
 
-pub use crate::oblique::{crossed, half, measured, paired_columns};
+pub use crate::oblique::{crossed, half, measured, paired_columns, simulated};

@@ -51,7 +51,9 @@ pub fn estimate(
         }
         LinearMethod::Tls(noise) => total_least_squares(groups, &factors, total, noise, start, settings),
         LinearMethod::Own(own) => by_own(own, groups, total, start),
-        LinearMethod::Instrumental => Err(LinearError::NeedsInstruments),
+        LinearMethod::Instrumental | LinearMethod::Didim | LinearMethod::Cloe => {
+            Err(LinearError::NeedsSimulation)
+        }
         LinearMethod::Huber | LinearMethod::Tukey => {
             let source = rows.ok_or(LinearError::NeedsRows)?;
             check_rows(groups, source)?;

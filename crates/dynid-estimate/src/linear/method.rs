@@ -32,6 +32,12 @@ pub enum LinearMethod {
     /// Instrumental variables, weighted as [`LinearMethod::Wls`]: [`crate::instruments::instrumental`] makes such estimates from
     /// paired rows, [`super::estimate`] does not.
     Instrumental,
+    /// Direct and inverse dynamic identification model, weighted as [`LinearMethod::Wls`]: measured efforts on the regressor of a simulated
+    /// motion; [`crate::instruments::along_simulation`] makes such estimates, [`super::estimate`] does not.
+    Didim,
+    /// Closed-loop output error, weighted as [`LinearMethod::Wls`]: measured less simulated positions on their slopes;
+    /// [`crate::instruments::along_simulation`] makes such estimates, [`super::estimate`] does not.
+    Cloe,
     /// A program's own.
     Own(super::own::OwnEstimator),
 }
@@ -125,9 +131,9 @@ pub enum LinearError {
     /// A robust loss looks at single rows, and there is no source of them.
     #[error("a robust loss needs the rows themselves, found factors only")]
     NeedsRows,
-    /// Instrumental variables need rows paired with instruments.
-    #[error("instrumental variables need rows paired with instruments, found measured rows only")]
-    NeedsInstruments,
+    /// Instrumental variables, DIDIM and CLOE need rows of a simulated motion.
+    #[error("this estimator needs rows of a simulated motion, found measured rows only")]
+    NeedsSimulation,
     /// The source of rows does not hold the groups given.
     #[error(
         "rows of other groups: expected the {expected} groups of the factors in their order, found {found}"

@@ -2,7 +2,7 @@
 
 mod paired;
 
-pub use paired::{crossed, half, measured, paired_columns};
+pub use paired::{crossed, half, measured, paired_columns, simulated};
 
 use dynid_linalg::Mat;
 

@@ -22,6 +22,21 @@ pub fn measured(paired: &[ReducedGroup]) -> Vec<ReducedGroup> {
         .collect()
 }
 
+/// The simulated part `[Z | y]` of paired groups: regressors of the motion that the model makes, efforts as measured.
+///
+/// Panics if a group has an odd number of columns.
+pub fn simulated(paired: &[ReducedGroup]) -> Vec<ReducedGroup> {
+    paired
+        .iter()
+        .map(|group| {
+            let own = base_columns(group);
+            let of_z: Vec<usize> = (0..own.len()).collect();
+            let blocks = group.blocks.iter().map(|b| b.select(&of_z)).collect();
+            ReducedGroup { columns: own.to_vec(), blocks, ..*group }
+        })
+        .collect()
+}
+
 /// Base columns of a paired group.
 fn base_columns(group: &ReducedGroup) -> &[usize] {
     assert!(group.columns.len().is_multiple_of(2), "paired rows have an instrument per column");

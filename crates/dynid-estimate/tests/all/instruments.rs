@@ -204,7 +204,7 @@ fn instruments_that_see_nothing_of_a_column_are_told() {
     assert_eq!(test.unwrap().verdict, ExogeneityVerdict::Weak);
     assert_eq!(instrumental(&[], TOTAL, &InstrumentSettings::default()).unwrap_err(), LinearError::NoGroups);
     let plain = estimate(&reduced(&rows), None, 2 * TOTAL, &LinearMethod::Instrumental, &Default::default());
-    assert_eq!(plain.unwrap_err(), LinearError::NeedsInstruments);
+    assert_eq!(plain.unwrap_err(), LinearError::NeedsSimulation);
 }
 
 #[test]
@@ -240,21 +240,31 @@ fn halves_and_crossed_groups_hold_every_block_once() {
 fn rounds_end_when_estimates_settle_and_tell_a_diverged_simulation() {
     let paired = reduced(&rows(9, 0.2));
     let settings = InstrumentSettings::default();
-    let outcome = iterate(&[0.0; TOTAL], &[1e-3; TOTAL], (1e-4, 10), &settings, |_| {
-        Ok::<_, LinearError>(Simulated::Rows(paired.clone()))
-    });
+    let outcome = iterate(
+        &[0.0; TOTAL],
+        &[1e-3; TOTAL],
+        (1e-4, 10),
+        |_| Ok::<_, LinearError>(Simulated::Rows(paired.clone())),
+        |rows| instrumental(rows, TOTAL, &settings),
+    );
     let found = outcome.unwrap();
     assert_eq!((found.rounds, &found.end), (2, &IterationEnd::Settled));
     assert!(found.changes[0] > 0.5 && found.changes[1] == 0.0, "{:?}", found.changes);
     let mut calls = 0;
-    let found = iterate(&[0.0; TOTAL], &[1e-3; TOTAL], (1e-4, 10), &settings, |before| {
-        calls += 1;
-        assert_eq!(before.is_some(), calls > 1);
-        Ok::<_, LinearError>(match calls {
-            1 => Simulated::Rows(paired.clone()),
-            _ => Simulated::Diverged { distance: 0.7, log: 0, output: 1 },
-        })
-    });
+    let found = iterate(
+        &[0.0; TOTAL],
+        &[1e-3; TOTAL],
+        (1e-4, 10),
+        |before| {
+            calls += 1;
+            assert_eq!(before.is_some(), calls > 1);
+            Ok::<_, LinearError>(match calls {
+                1 => Simulated::Rows(paired.clone()),
+                _ => Simulated::Diverged { distance: 0.7, log: 0, output: 1 },
+            })
+        },
+        |rows| instrumental(rows, TOTAL, &settings),
+    );
     let found = found.unwrap();
     assert!(found.estimate.is_some());
     assert_eq!(found.end, IterationEnd::Diverged { distance: 0.7, log: 0, output: 1 });

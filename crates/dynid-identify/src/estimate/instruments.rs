@@ -83,7 +83,7 @@ pub struct EffectRecord {
     pub unexplained: f64,
 }
 
-/// How the instruments of a fit came about.
+/// How the simulations of a fit went.
 #[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct InstrumentRecord {
     /// Simulations made.
@@ -92,6 +92,13 @@ pub struct InstrumentRecord {
     pub end: InstrumentEnd,
     /// Largest change of a parameter in the last round.
     pub last_change: Option<f64>,
-    /// Smallest singular value of `Q_ZᵀQ_W`.
+    /// Of instruments: smallest singular value of `Q_ZᵀQ_W`.
     pub strength: Option<f64>,
+    /// Of `didim` and `cloe`, worst output: what they leave of the efforts along the measured motion, in parts of what weighted least squares
+    /// leaves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub residual_ratio: Option<f64>,
+    /// Of the same output: how much more that is, as a share of the effort (root of the difference of mean squares).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub effort_share: Option<f64>,
 }

@@ -1,6 +1,6 @@
 //! Figures of a fit, output by output.
 
-use dynid_estimate::linear::LinearEstimate;
+use dynid_estimate::linear::{LinearEstimate, LinearMethod};
 use dynid_rows::conditioning::{Conditioning, ReducedGroup};
 
 use crate::advice::FitRows;
@@ -39,10 +39,19 @@ fn held_out_share(consistent: &Consistent, output: usize) -> Option<f64> {
 }
 
 /// How the fit counts rows, for motions that are proposed.
-pub(super) fn fit_rows(fit: &LinearEstimate, conditioning: Option<&Conditioning>, kernel_hz: f64) -> FitRows {
+pub(super) fn fit_rows(
+    fit: &LinearEstimate,
+    row_rms: &[Option<f64>],
+    conditioning: Option<&Conditioning>,
+    kernel_hz: f64,
+) -> FitRows {
     let outputs = fit.groups.iter().map(|g| g.output + 1).max().unwrap_or(0);
     let sigma = (0..outputs)
         .map(|output| {
+            if fit.method == LinearMethod::Cloe {
+                // Its groups are those of positions.
+                return row_rms.get(output).copied().flatten();
+            }
             // Of several logs the noisiest decides.
             let own = fit.groups.iter().filter(|g| g.output == output && g.scale == 0 && g.rows > 0);
             own.map(|g| g.variance.sqrt()).reduce(f64::max)
@@ -52,6 +61,17 @@ pub(super) fn fit_rows(fit: &LinearEstimate, conditioning: Option<&Conditioning>
         scales_hz: conditioning.map_or_else(|| vec![kernel_hz], |c| c.scales_hz.clone()),
         mask: conditioning.map_or_else(|| vec![None; outputs], |c| c.mask.clone()),
         sigma,
+    }
+}
+
+/// Residual variances of groups of measured rows: those of the fit, or of what it leaves where it is one of other rows.
+fn effort_variances(groups: &[ReducedGroup], fit: &LinearEstimate) -> Vec<f64> {
+    match fit.method {
+        LinearMethod::Cloe => {
+            let of = |g: &ReducedGroup| g.merged(fit.x.len()).rss(&fit.x) / g.rows().max(1) as f64;
+            groups.iter().map(of).collect()
+        }
+        _ => fit.groups.iter().map(|g| g.variance).collect(),
     }
 }
 
@@ -77,18 +97,19 @@ pub(super) fn residual_ratios(
 ) -> Vec<Option<f64>> {
     let outputs = groups.iter().map(|g| g.output + 1).max().unwrap_or(0);
     let spread = 0.265 / kernel_hz;
+    let variances = effort_variances(groups, fit);
     (0..outputs)
         .map(|output| {
             let (mut found, mut expected) = (0.0, 0.0);
             for (k, group) in groups.iter().enumerate() {
-                if group.output != output || group.scale != 0 || fit.groups.len() != groups.len() {
+                if group.output != output || group.scale != 0 || variances.len() != groups.len() {
                     continue;
                 }
                 let log = &logs[group.log];
                 let noise = log.effort_noise[output];
                 let passed = 1.0 / (2.0 * std::f64::consts::PI.sqrt() * spread * log.rate_hz);
                 let rows = group.rows() as f64;
-                found += rows * fit.groups[k].variance;
+                found += rows * variances[k];
                 expected += rows * noise * noise * passed;
             }
             // A pre-smoothed effort has no noise floor to compare with.

@@ -6,13 +6,13 @@ use dynid_rows::conditioning::{Conditioning, JointFriction, ReducedGroup};
 use super::Step;
 use super::shapes::{self, Before, Shaped};
 use crate::Error;
+use crate::closed_loop::{self, Loop, LoopFit, LoopRun};
 use crate::consistency::{self, Consistent};
 use crate::fitting::{self, Fitted, RowResiduals};
 use crate::friction_power::{self, FrictionPower};
-use crate::instruments::{self, InstrumentRun, Loop};
 use crate::load_rounds::LoadRounds;
 use crate::problem::Problem;
-use crate::settings::{Method, Settings};
+use crate::settings::Settings;
 use crate::shape::{self, ShapeFit};
 
 /// What a fit found. The model, plan and structure that it ended with are those of its problem.
@@ -24,12 +24,12 @@ pub struct ModelFit {
     pub friction: Vec<JointFriction>,
     /// Shape parameters as found.
     pub shapes: Option<ShapeFit>,
-    /// How instruments came about, for the estimator that uses them.
-    pub instruments: Option<InstrumentRun>,
+    /// How the simulations went, for estimators that simulate the closed loop.
+    pub simulations: Option<LoopRun>,
     pub(crate) residuals: RowResiduals,
     /// The fit in the base columns.
     pub fitted: Fitted,
-    /// Rows of the fit, reduced.
+    /// Rows of the measured motion, reduced.
     pub groups: Vec<ReducedGroup>,
     /// Standard parameters.
     pub consistent: Consistent,
@@ -62,32 +62,33 @@ impl Problem {
         let base = self.structure.base.len();
         let source = fitting::rows(&self, conditioning.as_ref())?;
         let (fit, groups) = fitting::fit(&self.settings, base, &self.structure.method, &*source)?;
-        let (fit, instruments) = match self.settings.estimator.method {
-            Method::Iv => {
-                progress(Step::Instruments);
-                let closed = Loop {
-                    problem: &self,
-                    shapes: shapes.as_ref(),
-                    conditioning: conditioning.as_ref(),
-                    power: &power,
-                };
-                let (fit, run) = instruments::fit(&closed, fit)?;
-                (fit, Some(run))
-            }
-            _ => (fit, None),
-        };
-        let residuals = fitting::residuals(&*source, &fit)?;
+        let LoopFit { estimate, run, groups: simulated, residuals } =
+            match self.settings.estimator.method.simulates() {
+                true => {
+                    progress(Step::Instruments);
+                    let closed = Loop {
+                        problem: &self,
+                        shapes: shapes.as_ref(),
+                        conditioning: conditioning.as_ref(),
+                        power: &power,
+                    };
+                    closed_loop::fit(&closed, fit)?
+                }
+                false => LoopFit::without_simulation(fit),
+            };
+        let measured = fitting::residuals(&*source, &estimate)?;
         drop(source);
         let fixed = self.settings.conditioning.block_s.is_some();
-        let fitted = fitting::with_precision(fit, &residuals, &self.logs, fixed);
+        let fitted =
+            fitting::with_precision(estimate, residuals.as_ref().unwrap_or(&measured), &self.logs, fixed);
         progress(Step::Consistency);
-        let consistent = consistency::consistent(&self, &fitted, &groups)?;
+        let consistent = consistency::consistent(&self, &fitted, simulated.as_ref().unwrap_or(&groups))?;
         let fit = ModelFit {
             conditioning,
             friction,
             shapes,
-            instruments,
-            residuals,
+            simulations: run,
+            residuals: measured,
             fitted,
             groups,
             consistent,

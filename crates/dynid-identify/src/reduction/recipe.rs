@@ -197,7 +197,7 @@ impl Identification {
             return Err(not_reduced("the textbook route", "leave out `route`"));
         };
         match self.settings.estimator.method {
-            Method::Huber | Method::Tukey | Method::Iv => {
+            Method::Huber | Method::Tukey | Method::Iv | Method::Didim | Method::Cloe => {
                 return Err(not_reduced(
                     "estimators that look at single rows",
                     "take `method = \"wls\"`, the default",

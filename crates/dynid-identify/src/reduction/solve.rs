@@ -54,7 +54,7 @@ impl Reduction {
             conditioning: Some(self.recipe.conditioning(&rates)),
             friction: Vec::new(),
             shapes,
-            instruments: None,
+            simulations: None,
             residuals: RowResiduals::none(),
             fitted,
             groups,

@@ -3,9 +3,9 @@
 use dynid_estimate::instruments::{ExogeneityVerdict, IterationEnd};
 use dynid_model::EffortModel;
 
+use crate::closed_loop::LoopRun;
 use crate::estimate::{BiasVerdict, EffectRecord, ExogeneityRecord, InstrumentEnd, InstrumentRecord};
 use crate::identification::Identification;
-use crate::instruments::InstrumentRun;
 use crate::verdict;
 
 impl Identification {
@@ -45,7 +45,9 @@ impl Identification {
                     unexplained: *unexplained,
                 })
                 .collect(),
-            fit: self.instruments.as_ref().map(|run| InstrumentRecord {
+            fit: self.simulations.as_ref().map(|run| InstrumentRecord {
+                residual_ratio: run.mismatch.map(|m| m.of_residual),
+                effort_share: run.mismatch.map(|m| m.of_effort),
                 rounds: run.rounds,
                 end: match run.end {
                     IterationEnd::Settled => InstrumentEnd::Settled,
@@ -60,7 +62,7 @@ impl Identification {
 }
 
 /// How far a simulation was off its reference when it diverged.
-fn distance(run: &InstrumentRun) -> Option<f64> {
+fn distance(run: &LoopRun) -> Option<f64> {
     match run.end {
         IterationEnd::Diverged { distance, .. } => Some(distance).filter(|d| d.is_finite()),
         _ => None,

@@ -16,7 +16,7 @@ pub enum NominalModel {
     Identified,
 }
 
-/// The closed loop that logs were recorded in, as a noise-free simulation runs it once more ([`crate::instruments`]). Its reference goes with
+/// The closed loop that logs were recorded in, as a noise-free simulation runs it once more ([`crate::closed_loop`]). Its reference goes with
 /// the logs: channels called `reference_<joint>`, or a trajectory.
 #[derive(Debug, Clone, Serialize, PartialEq)]
 pub struct ClosedLoop {

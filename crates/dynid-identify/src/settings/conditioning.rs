@@ -221,7 +221,7 @@ impl Settings {
     pub fn conditioning_settings(&self) -> ConditioningSettings {
         let c = &self.conditioning;
         let defaults = ConditioningSettings::default();
-        let instruments = self.estimator.method == Method::Iv;
+        let instruments = matches!(self.estimator.method, Method::Iv | Method::Didim);
         ConditioningSettings {
             kernel_hz: c.kernel_hz,
             state_hz: c.state_hz,

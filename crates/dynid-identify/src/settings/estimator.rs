@@ -31,6 +31,19 @@ pub enum Method {
     Tls,
     /// Instrumental variables from simulations of the closed loop, weighted as `wls`; needs the closed loop (`[instruments]`).
     Iv,
+    /// Direct and inverse dynamic identification model: efforts on the regressor of simulations of the closed loop, weighted as `wls`; needs the
+    /// closed loop (`[instruments]`), which must be the one that the log was recorded in.
+    Didim,
+    /// Closed-loop output error: positions on their slopes along simulations of the closed loop, weighted as `wls`; needs the closed loop as
+    /// `didim` does.
+    Cloe,
+}
+
+impl Method {
+    /// Whether it simulates the closed loop.
+    pub fn simulates(self) -> bool {
+        matches!(self, Method::Iv | Method::Didim | Method::Cloe)
+    }
 }
 
 /// Which rows share a residual variance.
@@ -207,8 +220,9 @@ impl Settings {
                 "`none`",
             ));
         }
-        if e.method == Method::Iv && self.closed_loop.is_none() {
-            let expected = "a table with reference and controller, which `method = \"iv\"` simulates";
+        if e.method.simulates() && self.closed_loop.is_none() {
+            let expected =
+                "a table with reference and controller, which the methods `iv`, `didim` and `cloe` simulate";
             return Err(Error::setting("instruments", expected, "none"));
         }
         self.bound.iter().try_for_each(BoundConfig::check)

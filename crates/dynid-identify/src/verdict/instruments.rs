@@ -6,21 +6,28 @@ use dynid_model::EffortModel;
 
 use super::{Status, check};
 use crate::check::{CheckName, CheckResult};
+use crate::closed_loop::{LoopRun, Mismatch};
 use crate::identification::Identification;
-use crate::instruments::InstrumentRun;
+use crate::settings::Method;
 
 /// Level of the test that is spoken of.
 const LEVEL: f64 = 0.05;
 
-/// How the instruments of an instrumental-variable fit came about.
+/// Efforts along the measured motion are left this many times as large as by least squares, and this share of the effort more: the loop is
+/// another one.
+const OTHER_LOOP: (f64, f64) = (2.0, 0.002);
+/// The same of a loop that may be another one. Noise of the positions makes the residual of least squares too small.
+const DOUBTFUL_LOOP: (f64, f64) = (1.25, 0.005);
+
+/// How the simulations of a fit went.
 pub(super) fn instruments(id: &Identification) -> Option<CheckResult> {
-    let run = id.instruments.as_ref()?;
+    let run = id.simulations.as_ref()?;
+    if matches!(id.settings.estimator.method, Method::Didim | Method::Cloe) {
+        return Some(simulated_motion(id, run));
+    }
     let cosine = run.strength.map(|(_, cosine)| cosine);
     let (status, meaning) = match (&run.end, run.strength) {
-        (IterationEnd::Diverged { .. }, _) | (_, None) => (
-            Status::Fail,
-            format!("{}: the parameters shown are those of weighted least squares", diverged(id, run)),
-        ),
+        (IterationEnd::Diverged { .. }, _) | (_, None) => not_simulated(id, run),
         (_, Some((Strength::Blind, _))) => (
             Status::Warn,
             "the simulated motion does not excite all that the measured one does: parameters are left out".to_owned(),
@@ -31,7 +38,62 @@ pub(super) fn instruments(id: &Identification) -> Option<CheckResult> {
              deviations too small"
                 .to_owned(),
         ),
-        (IterationEnd::Limit, _) => (
+        _ => settled(run),
+    };
+    let limit = "settled, smallest cosine between instruments and regressors at least 0.1";
+    Some(check(status, CheckName::Instruments, cosine, "", limit, meaning))
+}
+
+/// Whether the motion that DIDIM or CLOE simulated is the measured one.
+fn simulated_motion(id: &Identification, run: &LoopRun) -> CheckResult {
+    let (status, meaning) = match (&run.end, run.mismatch) {
+        (IterationEnd::Diverged { .. }, _) | (_, None) => not_simulated(id, run),
+        (_, Some(found)) if beyond(&found, OTHER_LOOP) => (
+            Status::Fail,
+            format!(
+                "{}; reference, gains or delay of `[instruments]` are not those of the log, and these parameters make up for it",
+                left(id, &found)
+            ),
+        ),
+        (_, Some(found)) if beyond(&found, DOUBTFUL_LOOP) => (
+            Status::Warn,
+            format!(
+                "{}: noise of the positions that least squares fitted, or a loop that is not quite that of the log (gains, delay, low \
+                 pass on velocities, order of the reference)",
+                left(id, &found)
+            ),
+        ),
+        _ => settled(run),
+    };
+    let limit = "settled, efforts along the measured motion explained as by least squares: residual at most 1.25 times, or 0.5 % of the effort more";
+    let ratio = run.mismatch.map(|m| m.of_residual);
+    check(status, CheckName::Instruments, ratio, "", limit, meaning)
+}
+
+fn beyond(found: &Mismatch, (of_residual, of_effort): (f64, f64)) -> bool {
+    found.of_residual > of_residual && found.of_effort > of_effort
+}
+
+fn left(id: &Identification, found: &Mismatch) -> String {
+    format!(
+        "of the measured effort of `{}` these parameters leave {:.1} times as much as least squares, {:.1} % of the effort more",
+        id.model.outputs()[found.output].name,
+        found.of_residual,
+        100.0 * found.of_effort
+    )
+}
+
+fn not_simulated(id: &Identification, run: &LoopRun) -> (Status, String) {
+    let why = diverged(id, run);
+    (Status::Fail, format!("{why}: the parameters shown are those of weighted least squares"))
+}
+
+fn settled(run: &LoopRun) -> (Status, String) {
+    match run.end {
+        IterationEnd::Settled => {
+            (Status::Ok, format!("parameters and simulated motion settled after {} simulations", run.rounds))
+        }
+        _ => (
             Status::Warn,
             format!(
                 "parameters still moved by {:.1e} after {} simulations",
@@ -39,13 +101,7 @@ pub(super) fn instruments(id: &Identification) -> Option<CheckResult> {
                 run.rounds
             ),
         ),
-        (IterationEnd::Settled, _) => (
-            Status::Ok,
-            format!("parameters and simulated motion settled after {} simulations", run.rounds),
-        ),
-    };
-    let limit = "settled, smallest cosine between instruments and regressors at least 0.1";
-    Some(check(status, CheckName::Instruments, cosine, "", limit, meaning))
+    }
 }
 
 /// Size of the difference between least squares and instruments.
@@ -53,9 +109,11 @@ pub(super) fn closed_loop_bias(id: &Identification) -> Option<CheckResult> {
     let comparison = id.comparison.as_ref()?;
     let found = comparison.exogeneity.as_ref();
     let by_instruments = id.fit().method == LinearMethod::Instrumental;
+    // The comparison is between least squares and instruments: DIDIM and CLOE have a check of their own.
+    let by_simulation = matches!(id.fit().method, LinearMethod::Didim | LinearMethod::Cloe);
     let status = match found.map(|f| f.verdict) {
         Some(ExogeneityVerdict::Exogenous | ExogeneityVerdict::Harmless) => Status::Ok,
-        Some(ExogeneityVerdict::Material) if by_instruments => Status::Ok,
+        Some(ExogeneityVerdict::Material) if by_instruments || by_simulation => Status::Ok,
         _ => Status::Warn,
     };
     let worst = found.and_then(Exogeneity::worst).map(|e| e.ratio()).filter(|r| r.is_finite());
@@ -113,6 +171,9 @@ pub(crate) fn in_words(id: &Identification) -> Option<String> {
             let more = found.effects.iter().filter(|e| e.ratio() > 1.0).count();
             let cure = match id.fit().method {
                 LinearMethod::Instrumental => "the parameters shown are those of instruments",
+                LinearMethod::Didim | LinearMethod::Cloe => {
+                    "the parameters shown are those of simulations, which know nothing of the former"
+                }
                 _ => "a lower cut-off or `method = \"iv\"` helps against the former",
             };
             format!(
@@ -136,7 +197,7 @@ fn signs_in_doubt(id: &Identification) -> bool {
     (0..id.model.outputs().len()).any(|o| without(o) && !id.model.reversal_speeds(o).is_empty())
 }
 
-fn diverged(id: &Identification, run: &InstrumentRun) -> String {
+fn diverged(id: &Identification, run: &LoopRun) -> String {
     match run.end {
         IterationEnd::Diverged { distance, log, output } if distance.is_finite() => format!(
             "the simulation of {} left its reference by {distance:.2} (rad or m) at `{}` in round {}",

@@ -21,6 +21,19 @@ pub fn most_blocks(logs: usize) -> usize {
     (MOST_BLOCKS / logs.max(1)).clamp(1, MAX_BLOCKS)
 }
 
+/// Length, samples, and number of the time blocks of one of so many logs; the last one takes the rest.
+pub fn time_blocks(
+    log: &PreparedLog,
+    kernel_hz: f64,
+    logs: usize,
+    settings: &ConditioningSettings,
+) -> (usize, usize) {
+    let most = settings.most_blocks.unwrap_or_else(|| most_blocks(logs));
+    let least = least_block_samples(kernel_hz, log.rate_hz, settings);
+    let length = least.max(log.samples().div_ceil(most));
+    (length, (log.samples() / length).max(1))
+}
+
 /// Least length of a time block, samples: the stated one, and five times `1 / kernel_hz`.
 pub fn least_block_samples(kernel_hz: f64, rate_hz: f64, settings: &ConditioningSettings) -> usize {
     let longest = (settings.block_s * rate_hz).max(5.0 * rate_hz / kernel_hz);
@@ -77,10 +90,7 @@ impl<'a> ConditionedLog<'a> {
             .into_par_iter()
             .map(|e| Ok(shift::shift(&e, -choices.delay.samples)?.values))
             .collect::<Result<Vec<Vec<f64>>, ConditioningError>>()?;
-        let most = settings.most_blocks.unwrap_or_else(|| most_blocks(choices.state_hz.len()));
-        let least = least_block_samples(choices.kernel_hz, log.rate_hz, settings);
-        let block_length = least.max(log.samples().div_ceil(most));
-        let blocks = (log.samples() / block_length).max(1);
+        let (block_length, blocks) = time_blocks(log, choices.kernel_hz, choices.state_hz.len(), settings);
         Ok(ConditionedLog { log, states, instruments: None, masks, kernels, efforts, block_length, blocks })
     }
 }

@@ -8,3 +8,4 @@ mod experiment;
 mod integration;
 mod pointing;
 mod presliding;
+mod slopes;

@@ -55,6 +55,12 @@ pub(super) fn contestants(asked: &Settings, problem: &Problem) -> Vec<Contestant
     }
     if asked.closed_loop.is_some() {
         out.push(with("iv", "instruments simulated in closed loop", &method(Method::Iv)));
+        out.push(with(
+            "didim",
+            "efforts on the regressor of simulations in closed loop",
+            &method(Method::Didim),
+        ));
+        out.push(with("cloe", "positions along simulations in closed loop", &method(Method::Cloe)));
     }
     if auto || !free {
         let shapes = |c: &mut Settings| {

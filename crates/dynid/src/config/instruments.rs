@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::LogConfig;
 use crate::Error;
-use crate::instruments::reference_channel;
+use crate::closed_loop::reference_channel;
 use crate::settings::{ClosedLoop, Given, NominalModel, refuse};
 
 /// Columns of the reference.
@@ -24,7 +24,7 @@ pub enum ReferenceColumns {
     Table(BTreeMap<String, String>),
 }
 
-/// The closed loop that logs were recorded in, as a noise-free simulation runs it once more ([`crate::instruments`]).
+/// The closed loop that logs were recorded in, as a noise-free simulation runs it once more ([`crate::closed_loop`]).
 #[derive(Debug, Clone, Deserialize, Serialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct InstrumentsConfig {

@@ -48,8 +48,8 @@ pub(super) fn text(name: Name) -> Text {
             "dynid check LOG --robot ROBOT",
         ),
         Name::Instruments => Text(
-            "Instrumental variables come from a simulation of the closed loop. The check says whether the simulation settled and resembles the \
-             measured motion.",
+            "The estimators `iv`, `didim` and `cloe` simulate the closed loop. The check says whether the simulations settled, whether instruments \
+             resemble the measured motion, and whether the parameters of the other two explain the measured efforts as least squares does.",
             "Put right the reference, the controller or the model in the configuration.",
             "[instruments]\nreference = \"q_ref_{joint}\"\nbandwidth_hz = 5.0",
         ),

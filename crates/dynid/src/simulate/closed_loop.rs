@@ -158,6 +158,7 @@ fn imperfections(settings: &SimulateSettings, joints: &[String]) -> Result<Imper
     Ok(Imperfections {
         encoder_bits: settings.encoder_bits,
         encoder_noise: table.encoder_noise,
+        joint_encoder_noise: Vec::new(),
         velocity_noise: table.velocity_noise,
         effort_noise_share: settings.effort_noise,
         effort_noise: noise.into_iter().map(|x| x.unwrap_or(0.0)).collect(),

@@ -66,7 +66,7 @@ const TRAJECTORY: &str = r#"{"schema": "dynid-trajectory/1", "form": "plain", "b
 /// Gains of the loop, and its rate.
 const LOOP: &str = "position_gain = [2500, 3000, 700]\nvelocity_gain = [120, 150, 35]\nrate_hz = 500\n";
 
-fn log_of(folder: &Path, seed: u64, encoder_noise: f64) -> SimulatedLog {
+pub(super) fn log_of(folder: &Path, seed: u64, encoder_noise: f64) -> SimulatedLog {
     std::fs::write(folder.join("arm.toml"), ARM).unwrap();
     std::fs::write(folder.join("motion.json"), TRAJECTORY).unwrap();
     let robot = Robot::load(&folder.join("arm.toml"), &RobotOptions::default()).unwrap();
@@ -80,7 +80,7 @@ fn log_of(folder: &Path, seed: u64, encoder_noise: f64) -> SimulatedLog {
 }
 
 /// A kernel that lets noise of the positions through; a command held over a sample leads the motion by half of it.
-fn config(folder: &Path, method: &str, instruments: &str) -> Config {
+pub(super) fn config(folder: &Path, method: &str, instruments: &str) -> Config {
     let text = format!(
         "robot = {:?}\n[conditioning]\nkernel_hz = 30\nstate_hz = 75\ndelay_samples = 0.5\n[elements]\nfriction = \"given\"\n\
          [estimator]\nmethod = \"{method}\"\n{instruments}[[log]]\npath = {:?}\n",
@@ -90,11 +90,11 @@ fn config(folder: &Path, method: &str, instruments: &str) -> Config {
     Config::parse(&text, "test").unwrap()
 }
 
-fn instruments(folder: &Path) -> String {
+pub(super) fn instruments(folder: &Path) -> String {
     format!("[instruments]\ntrajectory = {:?}\n{LOOP}", folder.join("motion.json"))
 }
 
-fn truth_of(id: &Run, log: &SimulatedLog) -> Vec<f64> {
+pub(super) fn truth_of(id: &Run, log: &SimulatedLog) -> Vec<f64> {
     let table = id.model.parameters();
     let mut values = vec![0.0; table.linear.len()];
     for (name, value) in &log.truth {
@@ -117,7 +117,7 @@ fn bias_of_an_arm_in_closed_loop_falls_to_a_fifth() {
         let truth = truth_of(&id, &log);
         let comparison = id.comparison.as_ref().unwrap();
         let found = comparison.exogeneity.as_ref().unwrap();
-        let run = id.instruments.as_ref().unwrap();
+        let run = id.simulations.as_ref().unwrap();
         println!(
             "seed {seed}: {} rounds ({:?}), strength {:.2}, p {:.1e}, {} blocks, worst {:.1} limits",
             run.rounds,
@@ -184,7 +184,7 @@ fn check_record(id: &Run, estimate: &Estimate) {
 }
 
 /// A pendulum in a position loop, its reference in the log.
-struct Pendulum {
+pub(super) struct Pendulum {
     folder: tempfile::TempDir,
 }
 
@@ -210,9 +210,9 @@ phi = [2.0, 0.3, 0.02, 0.0, 0.01, 0.0, 0.0, 0.06, 0.0, 0.06]
 "#;
     const MOTION: &str = r#"{"schema": "dynid-trajectory/1", "form": "plain", "base_frequency_rad_s": 0.8975979010256552, "periods": 3,
 "joints": [{"name": "j1", "q0": 0.1, "a": [0.4, -0.2, 0.15], "b": [0.2, 0.1, -0.1]}]}"#;
-    const LOOP: &str = "position_gain = [80]\nvelocity_gain = [4]\nrate_hz = 500\n";
+    pub(super) const LOOP: &str = "position_gain = [80]\nvelocity_gain = [4]\nrate_hz = 500\n";
 
-    fn new(encoder_noise: f64) -> Self {
+    pub(super) fn new(encoder_noise: f64) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         std::fs::write(at("robot.toml"), Self::ROBOT).unwrap();
@@ -256,14 +256,14 @@ phi = [2.0, 0.3, 0.02, 0.0, 0.01, 0.0, 0.0, 0.06, 0.0, 0.06]
         Config::parse(&text, "test").map_err(|e| e.to_string())
     }
 
-    fn identify(&self, more: &str) -> (Config, Run) {
+    pub(super) fn identify(&self, more: &str) -> (Config, Run) {
         let config = self.config(more).unwrap();
         let id = identify(&config, &mut |_| {}).unwrap();
         (config, id)
     }
 }
 
-fn check_of<'a>(estimate: &'a Estimate, name: &str) -> &'a dynid::estimate::CheckResult {
+pub(super) fn check_of<'a>(estimate: &'a Estimate, name: &str) -> &'a dynid::estimate::CheckResult {
     estimate.verdict.checks.iter().find(|c| c.name.word() == name).unwrap()
 }
 
@@ -279,7 +279,7 @@ fn columns_of_the_reference_serve_as_its_trajectory_file_does() {
     let file = format!("trajectory = {:?}", pendulum.folder.path().join("motion.json"));
     let (_, by_file) = pendulum.identify(&table(&file));
     let (config, by_columns) = pendulum.identify(&table("reference = \"goal{}\"\nreference_scale = 0.01"));
-    assert_eq!(by_columns.instruments.as_ref().unwrap().end, IterationEnd::Settled);
+    assert_eq!(by_columns.simulations.as_ref().unwrap().end, IterationEnd::Settled);
     for (a, b) in by_file.fit().x.iter().zip(&by_columns.fit().x) {
         assert!((a - b).abs() < 1e-4 * a.abs(), "{a} {b}");
     }
@@ -315,7 +315,7 @@ fn periodic_logs_and_friction_with_shapes_are_simulated_too() {
     let (_, shaped) = pendulum.identify(&iv("arctangent", columns));
     assert!(shaped.shapes.is_some());
     for (name, id) in [("periodic", &periodic), ("feed-forward", &forward), ("shaped", &shaped)] {
-        let run = id.instruments.as_ref().unwrap();
+        let run = id.simulations.as_ref().unwrap();
         let inertia = id.base.kept.iter().position(|c| id.model.parameters().linear[*c].name == "link1.Izz");
         let found = id.fit().x[inertia.unwrap()];
         println!(
@@ -363,7 +363,7 @@ fn a_simulation_that_diverges_is_told_and_least_squares_stays() {
         [("velocity_gain = [4]\neffort_limit = [0.2]\n", true), ("velocity_gain = [400]\n", false)]
     {
         let (_, id) = pendulum.identify(&format!("{GIVEN}{WIDE}[estimator]\nmethod = \"iv\"\n{table}{gain}"));
-        let run = id.instruments.as_ref().unwrap();
+        let run = id.simulations.as_ref().unwrap();
         assert!(!run.succeeded() && matches!(run.end, IterationEnd::Diverged { .. }), "{run:?}");
         assert_eq!(id.fit().method, LinearMethod::Wls);
         let estimate = id.estimate();
@@ -419,7 +419,7 @@ velocity_gain = [8557.426]
 effort_limit = [351.5]
 "#;
 
-fn emps(robot: &Path, method: &str, route: &str) -> Option<Run> {
+pub(super) fn emps(robot: &Path, method: &str, route: &str) -> Option<Run> {
     let data = data()?;
     let text = format!(
         "robot = {robot:?}\n[columns]\nposition = [\"qm\"]\neffort = {{ columns = [\"vir\"], scale = 35.15065188 }}\n[elements]\n\
@@ -431,7 +431,7 @@ fn emps(robot: &Path, method: &str, route: &str) -> Option<Run> {
 }
 
 /// Published IDIM-LS values and their standard deviations.
-const EMPS: [(&str, f64, f64); 4] = [
+pub(super) const EMPS: [(&str, f64, f64); 4] = [
     ("carriage.m", 95.1089, 0.1085),
     ("x.fv", 203.5034, 1.1460),
     ("x.fc", 20.3935, 0.1012),
@@ -447,7 +447,7 @@ fn instruments_of_the_recorded_emps_agree_with_least_squares_and_with_the_publis
     for (name, route) in [("textbook route", textbook), ("compact route", "")] {
         let Some(ls) = emps(robot.path(), "ols", route) else { return };
         let iv = emps(robot.path(), "iv", route).unwrap();
-        let run = iv.instruments.as_ref().unwrap();
+        let run = iv.simulations.as_ref().unwrap();
         let found = ls.comparison.as_ref().unwrap().exogeneity.as_ref().unwrap();
         println!(
             "{name}: {} rounds ({:?}), strength {:.3}; p {:.2e}, naive {:.2e}, {:?}, {} blocks, V/W {:.4?}",

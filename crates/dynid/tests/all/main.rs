@@ -40,6 +40,7 @@ mod report_page;
 mod safe_designs;
 mod servo;
 mod settings;
+mod simulated_loops;
 mod stiffness;
 mod support;
 mod ties;

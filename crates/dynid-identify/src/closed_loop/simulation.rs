@@ -9,7 +9,9 @@ use dynid_factor::groups::ReducedGroup;
 use dynid_factor::rows::{RowSource, reduce_rows};
 use dynid_model::{EffortModel, RobotModel};
 use dynid_rows::conditioning::{LogRows, paired_textbook_rows};
-use dynid_sim::{ControlSettings, ExperimentSettings, Imperfections, Plant, Profile, SimError, Wanted, run};
+use dynid_sim::{
+    ControlSettings, ExperimentSettings, Imperfections, Plant, Profile, SimError, Truth, Wanted, run,
+};
 
 use super::Loop;
 use super::reference::Reference;
@@ -27,23 +29,36 @@ const LEAST_CONTROL_RATE: f64 = 1000.0;
 /// Pull of the prior on the simulated parameters: that of a Gaussian prior.
 const PRIOR_WEIGHT: f64 = 1.0;
 
-/// Positions of every log and output.
-type Motions = Vec<Vec<Vec<f64>>>;
+/// A simulation of all logs.
+pub(super) struct Driven {
+    /// Parameters of the model of the fit that were simulated.
+    pub(super) values: Vec<f64>,
+    pub(super) logs: Vec<Moved>,
+}
+
+/// The motion of one log, signals by output.
+pub(super) struct Moved {
+    pub(super) q: Vec<Vec<f64>>,
+    pub(super) dq: Vec<Vec<f64>>,
+    pub(super) ddq: Vec<Vec<f64>>,
+    /// Position and velocity gains of the controller.
+    pub(super) gains: Vec<(f64, f64)>,
+}
 
 /// Everything that a simulation of the logs takes.
 pub(super) struct Bench<'a> {
-    table: &'a ClosedLoop,
-    closed: &'a Loop<'a>,
+    pub(super) table: &'a ClosedLoop,
+    pub(super) closed: &'a Loop<'a>,
     references: Vec<Reference>,
     bounds: Vec<bodies::Bound>,
-    shape: Vec<f64>,
+    pub(super) shape: Vec<f64>,
 }
 
 impl<'a> Bench<'a> {
     /// # Errors
     /// [`Error::Unsupported`] for robots that are not simulated in closed loop, and those of references.
     pub(super) fn new(table: &'a ClosedLoop, closed: &'a Loop<'a>) -> Result<Self, Error> {
-        let what = "simulated for instruments";
+        let what = "simulated in closed loop";
         let Problem { robot, plan, model, logs, training, settings, .. } = closed.problem;
         refuse_elastic(robot, what)?;
         if plan.has_journals() {
@@ -86,31 +101,50 @@ impl<'a> Bench<'a> {
 
     /// Rows paired with the regressor of a simulation with the parameters that a factor of base columns determines.
     pub(super) fn simulated(&self, factor: &Factor) -> Result<Simulated, Error> {
-        match self.motions(factor)? {
-            Ok(motions) => Ok(Simulated::Rows(self.paired(&motions)?)),
-            Err(Diverged { log, output, distance }) => Ok(Simulated::Diverged { distance, log, output }),
+        match self.moved(factor)? {
+            Ok(driven) => Ok(Simulated::Rows(self.paired(driven)?)),
+            Err(diverged) => Ok(diverged.into()),
         }
     }
 
-    fn paired(&self, motions: &Motions) -> Result<Vec<ReducedGroup>, Error> {
+    fn paired(&self, driven: Driven) -> Result<Vec<ReducedGroup>, Error> {
+        let motions: Vec<Vec<Vec<f64>>> = driven.logs.into_iter().map(|log| log.q).collect();
         let Problem { model, structure, logs, settings, .. } = self.closed.problem;
         let (kept, conditioned) = (&structure.base.kept, settings.conditioning_settings());
         let rows: Box<dyn RowSource> = match self.closed.conditioning {
             Some(found) => {
                 let rows = LogRows::new(model, &self.shape, kept, logs, found, &conditioned)?;
-                Box::new(rows.with_instruments(motions, &conditioned)?)
+                Box::new(rows.with_instruments(&motions, &conditioned)?)
             }
             None => {
                 let route = settings.textbook_route();
-                Box::new(paired_textbook_rows(model, &self.shape, kept, logs, &route, motions, &conditioned)?)
+                Box::new(paired_textbook_rows(
+                    model,
+                    &self.shape,
+                    kept,
+                    logs,
+                    &route,
+                    &motions,
+                    &conditioned,
+                )?)
             }
         };
         reduce_rows(&*rows).map_err(|e| fitting::conditioning_fault(&*rows, e))
     }
 
-    fn motions(&self, factor: &Factor) -> Result<Result<Motions, Diverged>, Error> {
-        let values = self.possible(factor)?;
-        let (model, values) = self.unfolded(&values)?;
+    /// Simulates all logs with the parameters that a factor of base columns determines.
+    pub(super) fn moved(&self, factor: &Factor) -> Result<Result<Driven, Diverged>, Error> {
+        self.moved_with(factor, None)
+    }
+
+    /// The same; `noise`: seed of encoder noise as large as that of the logs.
+    pub(super) fn moved_with(
+        &self,
+        factor: &Factor,
+        noise: Option<u64>,
+    ) -> Result<Result<Driven, Diverged>, Error> {
+        let of_fit = self.possible(factor)?;
+        let (model, values) = self.unfolded(&of_fit)?;
         let model = Arc::new(model);
         let nominal = match self.table.nominal {
             NominalModel::Identified => values.clone(),
@@ -120,23 +154,31 @@ impl<'a> Bench<'a> {
         let plant =
             |values: Vec<f64>| Plant::new(model.clone(), values, shape.clone(), self.table.sign_width);
         let (mut moved, believed) = (plant(values)?, plant(nominal)?);
-        let mut motions = Vec::with_capacity(self.references.len());
+        let mut logs = Vec::with_capacity(self.references.len());
         for (log, reference) in self.references.iter().enumerate() {
-            let experiment = self.experiment(&model, log)?;
+            let mut experiment = self.experiment(&model, log)?;
+            if let Some(seed) = noise {
+                let sigma = self.closed.problem.logs[log].position_noise.iter().map(|n| n.sigma);
+                experiment.imperfections.joint_encoder_noise = sigma.collect();
+                experiment.seed = seed;
+            }
             let wanted = |time: f64| self.wanted(reference, time);
             let found = match run(&mut moved, &believed, &wanted, &experiment) {
-                Ok(result) => result.log.truth.q,
+                Ok(result) => {
+                    let Truth { q, dq, ddq, .. } = result.log.truth;
+                    Moved { q, dq, ddq, gains: result.gains }
+                }
                 Err(SimError::TooFast { .. } | SimError::Inertia { .. }) => {
                     return Ok(Err(Diverged { log, output: 0, distance: f64::INFINITY }));
                 }
                 Err(other) => return Err(other.into()),
             };
-            match self.diverged(log, reference, &found) {
+            match self.diverged(log, reference, &found.q) {
                 Some(diverged) => return Ok(Err(diverged)),
-                None => motions.push(found),
+                None => logs.push(found),
             }
         }
-        Ok(Ok(motions))
+        Ok(Ok(Driven { values: of_fit, logs }))
     }
 
     /// What the controller is told to follow.
@@ -227,8 +269,14 @@ impl<'a> Bench<'a> {
 }
 
 /// A simulation that left its reference.
-struct Diverged {
+pub(super) struct Diverged {
     log: usize,
     output: usize,
     distance: f64,
+}
+
+impl From<Diverged> for Simulated {
+    fn from(Diverged { log, output, distance }: Diverged) -> Self {
+        Simulated::Diverged { distance, log, output }
+    }
 }
