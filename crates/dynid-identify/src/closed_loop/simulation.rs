@@ -18,12 +18,15 @@ use super::reference::Reference;
 use crate::elements::{LOAD, REACTION_FRICTION};
 use crate::problem::Problem;
 use crate::robot::{refuse_elastic, refuse_loops};
-use crate::settings::{ClosedLoop, NominalModel};
+use crate::settings::{ClosedLoop, Method, NominalModel};
 use crate::structure::Structure;
 use crate::{Error, bounds, consistency, fitting, shape};
 
-/// Local error of the integration.
-const TOLERANCE: f64 = 1e-8;
+/// Largest local error of the integration ...
+const TOLERANCE: f64 = 1e-6;
+/// ... and, where positions are what is fitted, as a share of their noise, down to the least.
+const TOLERANCE_OF_NOISE: f64 = 0.03;
+const LEAST_TOLERANCE: f64 = 1e-8;
 /// Least control rate that is chosen where none is stated, Hz.
 const LEAST_CONTROL_RATE: f64 = 1000.0;
 /// Pull of the prior on the simulated parameters: that of a Gaussian prior.
@@ -213,6 +216,13 @@ impl<'a> Bench<'a> {
         let table = self.table;
         let wanted =
             table.rate_hz.unwrap_or(log.rate_hz * (LEAST_CONTROL_RATE / log.rate_hz).ceil().max(1.0));
+        let tolerance = match self.closed.problem.settings.estimator.method {
+            Method::Cloe => {
+                let finest = log.position_noise.iter().map(|n| n.sigma).fold(f64::INFINITY, f64::min);
+                (TOLERANCE_OF_NOISE * finest).clamp(LEAST_TOLERANCE, TOLERANCE)
+            }
+            _ => TOLERANCE,
+        };
         let channels = model.channels().iter().map(|name| {
             let values = log.channels.iter().find(|c| c.name == *name).map_or(&[][..], |c| &c.values);
             let points = values.iter().enumerate().map(|(k, x)| (k as f64 / log.rate_hz, *x));
@@ -221,7 +231,7 @@ impl<'a> Bench<'a> {
         Ok(ExperimentSettings {
             duration_s: (log.samples() - 1) as f64 / log.rate_hz,
             log_rate_hz: log.rate_hz,
-            tolerance: TOLERANCE,
+            tolerance,
             control: ControlSettings {
                 // Ticks fall on samples.
                 rate_hz: log.rate_hz * (wanted / log.rate_hz).round().max(1.0),
