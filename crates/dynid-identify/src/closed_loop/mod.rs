@@ -52,12 +52,11 @@ pub struct LoopRun {
     pub last_change: Option<f64>,
     /// Of instruments: strength and smallest singular value of `Q_ZᵀQ_W`; `None` without an estimate.
     pub strength: Option<(Strength, f64)>,
-    /// Of DIDIM and CLOE: what they leave of the measured efforts; `None` without an estimate.
-    pub mismatch: Option<Mismatch>,
+    /// Of DIDIM and CLOE, output by output: what they leave of the measured efforts; empty without an estimate.
+    pub mismatch: Vec<Mismatch>,
 }
 
-/// What a fit by simulations leaves of the measured efforts along the measured motion, beside what weighted least squares leaves: of the worst
-/// output.
+/// What a fit by simulations leaves of the measured efforts of an output along the measured motion, beside what weighted least squares leaves.
 ///
 /// A loop that is not that of the log makes a simulated motion that is not the measured one, for which the parameters make up: the residual of
 /// the fit itself need not show it, efforts along the measured motion do.
@@ -72,9 +71,9 @@ pub struct Mismatch {
 }
 
 impl Mismatch {
-    /// Of measured rows and two estimates; `None` without rows.
-    fn of(measured: &[ReducedGroup], x: &[f64], least_squares: &[f64]) -> Option<Self> {
-        let outputs = measured.iter().map(|g| g.output + 1).max()?;
+    /// Of measured rows and two estimates; outputs without rows or effort are left out.
+    fn of(measured: &[ReducedGroup], x: &[f64], least_squares: &[f64]) -> Vec<Self> {
+        let outputs = measured.iter().map(|g| g.output + 1).max().unwrap_or(0);
         let left = |output: usize, x: &[f64]| -> f64 {
             let own = measured.iter().filter(|g| g.output == output && g.scale == 0);
             own.map(|g| g.merged(x.len()).rss(x)).sum()
@@ -88,8 +87,12 @@ impl Mismatch {
                 of_effort: ((of_x - of_ls).max(0.0) / all).sqrt(),
             }
         };
-        let found = (0..outputs).map(of_output).filter(|m| m.of_effort.is_finite());
-        found.max_by(|a, b| a.of_residual.total_cmp(&b.of_residual))
+        (0..outputs).map(of_output).filter(|m| m.of_effort.is_finite() && m.of_residual.is_finite()).collect()
+    }
+
+    /// The output whose residual exceeds that of least squares by the largest ratio.
+    pub fn worst(all: &[Self]) -> Option<&Self> {
+        all.iter().max_by(|a, b| a.of_residual.total_cmp(&b.of_residual))
     }
 }
 
@@ -100,7 +103,7 @@ impl LoopRun {
             end: found.end.clone(),
             last_change: found.changes.last().copied(),
             strength: None,
-            mismatch: None,
+            mismatch: Vec::new(),
         }
     }
 
@@ -194,10 +197,15 @@ fn by_simulation(bench: &Bench<'_>, start: LinearEstimate, method: LinearMethod)
     let mut found = settled_rows(bench, &start, &method, &|factor| rows(factor, None))?;
     let mut shake = None;
     if let (false, Some(estimate)) = (didim, &found.estimate) {
-        shake = bench.shake(&estimate.factor)?;
         let rounds = found.rounds;
-        found = settled_rows(bench, estimate, &method, &|factor| rows(factor, shake.as_ref()))?;
-        found.rounds += rounds;
+        match bench.shake(&estimate.factor)? {
+            Ok(displaced) => {
+                shake = Some(displaced);
+                found = settled_rows(bench, estimate, &method, &|factor| rows(factor, shake.as_ref()))?;
+                found.rounds += rounds;
+            }
+            Err(diverged) => found.end = diverged.into(),
+        }
     }
     let mut run = LoopRun::of(&found);
     let Some(estimate) = found.estimate.filter(|_| run.succeeded()) else {

@@ -8,7 +8,7 @@ use dynid_rows::conditioning::{ConditioningError, time_blocks};
 use dynid_sim::{DrivenMotion, position_slopes};
 use rayon::prelude::*;
 
-use super::simulation::{Bench, Driven, Moved};
+use super::simulation::{Bench, Diverged, Driven, Moved};
 use crate::Error;
 use crate::fitting::RowResiduals;
 
@@ -29,14 +29,20 @@ pub(super) type Shake = Vec<Vec<Vec<f64>>>;
 impl Bench<'_> {
     /// The mean displacement by noise as large as that of the logs. It would be zero in a linear loop; a joint that is shaken slips more
     /// easily through its friction.
-    pub(super) fn shake(&self, factor: &Factor) -> Result<Option<Shake>, Error> {
-        let Ok(calm) = self.moved(factor)? else { return Ok(None) };
+    pub(super) fn shake(&self, factor: &Factor) -> Result<Result<Shake, Diverged>, Error> {
+        let calm = match self.moved(factor)? {
+            Ok(calm) => calm,
+            Err(diverged) => return Ok(Err(diverged)),
+        };
         let seeds: Vec<u64> = (1..=SHAKEN).collect();
         let runs: Vec<_> = seeds.into_par_iter().map(|seed| self.moved_with(factor, Some(seed))).collect();
         let mut mean: Shake =
             calm.logs.iter().map(|l| l.q.iter().map(|q| vec![0.0; q.len()]).collect()).collect();
         for run in runs {
-            let Ok(shaken) = run? else { return Ok(None) };
+            let shaken = match run? {
+                Ok(shaken) => shaken,
+                Err(diverged) => return Ok(Err(diverged)),
+            };
             for ((mean, shaken), calm) in mean.iter_mut().zip(&shaken.logs).zip(&calm.logs) {
                 for ((mean, shaken), calm) in mean.iter_mut().zip(&shaken.q).zip(&calm.q) {
                     for ((m, s), c) in mean.iter_mut().zip(shaken).zip(calm) {
@@ -45,7 +51,7 @@ impl Bench<'_> {
                 }
             }
         }
-        Ok(Some(mean))
+        Ok(Ok(mean))
     }
 
     /// Rows `K_p S x = K_p (q - q_s + S x_s)` of all samples, one factor per log, output and time block, for the parameters `x_s` that a factor

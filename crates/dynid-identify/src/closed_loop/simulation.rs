@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dynid_estimate::consistent as bodies;
-use dynid_estimate::instruments::Simulated;
+use dynid_estimate::instruments::{IterationEnd, Simulated};
 use dynid_factor::Factor;
 use dynid_factor::groups::ReducedGroup;
 use dynid_factor::rows::{RowSource, reduce_rows};
@@ -283,6 +283,12 @@ pub(super) struct Diverged {
     log: usize,
     output: usize,
     distance: f64,
+}
+
+impl From<Diverged> for IterationEnd {
+    fn from(Diverged { log, output, distance }: Diverged) -> Self {
+        IterationEnd::Diverged { distance, log, output }
+    }
 }
 
 impl From<Diverged> for Simulated {

@@ -3,7 +3,7 @@
 use dynid_estimate::instruments::{ExogeneityVerdict, IterationEnd};
 use dynid_model::EffortModel;
 
-use crate::closed_loop::LoopRun;
+use crate::closed_loop::{LoopRun, Mismatch};
 use crate::estimate::{BiasVerdict, EffectRecord, ExogeneityRecord, InstrumentEnd, InstrumentRecord};
 use crate::identification::Identification;
 use crate::verdict;
@@ -46,8 +46,8 @@ impl Identification {
                 })
                 .collect(),
             fit: self.simulations.as_ref().map(|run| InstrumentRecord {
-                residual_ratio: run.mismatch.map(|m| m.of_residual),
-                effort_share: run.mismatch.map(|m| m.of_effort),
+                residual_ratio: Mismatch::worst(&run.mismatch).map(|m| m.of_residual),
+                effort_share: Mismatch::worst(&run.mismatch).map(|m| m.of_effort),
                 rounds: run.rounds,
                 end: match run.end {
                     IterationEnd::Settled => InstrumentEnd::Settled,

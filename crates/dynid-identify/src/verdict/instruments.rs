@@ -17,7 +17,7 @@ const LEVEL: f64 = 0.05;
 /// another one.
 const OTHER_LOOP: (f64, f64) = (2.0, 0.002);
 /// The same of a loop that may be another one. Noise of the positions makes the residual of least squares too small.
-const DOUBTFUL_LOOP: (f64, f64) = (1.25, 0.005);
+const DOUBTFUL_LOOP: (f64, f64) = (1.1, 0.002);
 
 /// How the simulations of a fit went.
 pub(super) fn instruments(id: &Identification) -> Option<CheckResult> {
@@ -46,32 +46,32 @@ pub(super) fn instruments(id: &Identification) -> Option<CheckResult> {
 
 /// Whether the motion that DIDIM or CLOE simulated is the measured one.
 fn simulated_motion(id: &Identification, run: &LoopRun) -> CheckResult {
-    let (status, meaning) = match (&run.end, run.mismatch) {
-        (IterationEnd::Diverged { .. }, _) | (_, None) => not_simulated(id, run),
-        (_, Some(found)) if beyond(&found, OTHER_LOOP) => (
+    let beyond = |(of_residual, of_effort): (f64, f64)| {
+        let found = run.mismatch.iter().filter(|m| m.of_residual > of_residual && m.of_effort > of_effort);
+        found.max_by(|a, b| a.of_effort.total_cmp(&b.of_effort))
+    };
+    let (status, meaning) = match (&run.end, beyond(OTHER_LOOP), beyond(DOUBTFUL_LOOP)) {
+        (IterationEnd::Diverged { .. }, ..) => not_simulated(id, run),
+        (_, Some(found), _) => (
             Status::Fail,
             format!(
                 "{}; reference, gains or delay of `[instruments]` are not those of the log, and these parameters make up for it",
-                left(id, &found)
+                left(id, found)
             ),
         ),
-        (_, Some(found)) if beyond(&found, DOUBTFUL_LOOP) => (
+        (_, None, Some(found)) => (
             Status::Warn,
             format!(
                 "{}: noise of the positions that least squares fitted, or a loop that is not quite that of the log (gains, delay, low \
                  pass on velocities, order of the reference)",
-                left(id, &found)
+                left(id, found)
             ),
         ),
         _ => settled(run),
     };
-    let limit = "settled, efforts along the measured motion explained as by least squares: residual at most 1.25 times, or 0.5 % of the effort more";
-    let ratio = run.mismatch.map(|m| m.of_residual);
+    let limit = "settled, efforts along the measured motion explained as by least squares: residual at most 1.1 times, or 0.2 % of the effort more";
+    let ratio = Mismatch::worst(&run.mismatch).map(|m| m.of_residual);
     check(status, CheckName::Instruments, ratio, "", limit, meaning)
-}
-
-fn beyond(found: &Mismatch, (of_residual, of_effort): (f64, f64)) -> bool {
-    found.of_residual > of_residual && found.of_effort > of_effort
 }
 
 fn left(id: &Identification, found: &Mismatch) -> String {

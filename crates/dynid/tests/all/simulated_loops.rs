@@ -7,6 +7,7 @@
 )]
 
 use dynid::Identification as Run;
+use dynid::closed_loop::Mismatch;
 use dynid::estimators::instruments::IterationEnd;
 use dynid::estimators::linear::LinearMethod;
 use dynid::identify;
@@ -41,7 +42,7 @@ fn an_arm(seeds: u64, noise: f64) -> [f64; 5] {
         let of_methods = found.each_ref().map(|id| errors(id, &truth));
         for (k, id) in found.iter().enumerate().skip(1) {
             let run = id.simulations.as_ref().unwrap();
-            let mismatch = run.mismatch.unwrap();
+            let mismatch = Mismatch::worst(&run.mismatch).unwrap();
             println!(
                 "  {:?}: {} rounds, {:?}, more by {:.4} of the effort, {:.2} of the residual of least squares, verdict {}",
                 id.fit().method,
