@@ -65,7 +65,7 @@ fn machine() -> Plant {
     plant(arm(), elements, &values, 1e-3)
 }
 
-fn reference(t: f64) -> Vec<Wanted> {
+pub(super) fn reference(t: f64) -> Vec<Wanted> {
     (0..3)
         .map(|j| {
             let (w, phase) = (1.7 + 0.6 * j as f64, j as f64);

@@ -1,6 +1,7 @@
 //! Slopes of controlled positions against differences between simulations.
 
 use crate::arm::{arm, plant};
+use crate::experiment::reference;
 use dynid_model::EffortModel;
 use dynid_model::element::{Coulomb, JointElement, RotorInertia, Viscous};
 use dynid_sim::*;
@@ -31,20 +32,11 @@ fn settings() -> ExperimentSettings {
     ExperimentSettings { duration_s: 1.6, log_rate_hz: 500.0, control, imperfections, ..Default::default() }
 }
 
-fn wanted(t: f64) -> Vec<Wanted> {
-    let of = |j: usize| {
-        let (w, phase) = (1.7 + 0.6 * j as f64, j as f64);
-        let (s, c) = (w * t + phase).sin_cos();
-        [0.2 + 0.7 * s, 0.7 * w * c, -0.7 * w * w * s]
-    };
-    (0..3).map(of).collect()
-}
-
 #[test]
 fn they_are_those_of_two_simulations_through_every_reversal() {
     let mut settings = settings();
     let nominal = machine();
-    let found = run(&mut machine(), &nominal, &wanted, &settings).unwrap();
+    let found = run(&mut machine(), &nominal, &reference, &settings).unwrap();
     let [position_gain, velocity_gain]: [Vec<f64>; 2] =
         [found.gains.iter().map(|g| g.0).collect(), found.gains.iter().map(|g| g.1).collect()];
     settings.control.position_gain = Some(position_gain.clone());
@@ -83,7 +75,7 @@ fn they_are_those_of_two_simulations_through_every_reversal() {
             let mut linear = nominal.linear().to_vec();
             linear[c] += sign * step;
             let mut plant = machine().with_linear(linear).ok()?;
-            Some(run(&mut plant, &nominal, &wanted, &settings).ok()?.log.truth.q)
+            Some(run(&mut plant, &nominal, &reference, &settings).ok()?.log.truth.q)
         };
         // Bodies that no mass distribution has are not simulated.
         let (Some(up), Some(down)) = (moved(1.0), moved(-1.0)) else { continue };

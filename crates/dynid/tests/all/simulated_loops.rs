@@ -121,6 +121,36 @@ fn a_loop_that_is_not_that_of_the_log_fails() {
     }
 }
 
+/// Gains that are wrong by any factor: no estimate is far from the truth, in its own deviations and in per cent, and `ok` at once.
+#[test]
+fn no_gain_makes_an_estimate_wrong_and_sure() {
+    let pendulum = Pendulum::new(2e-5);
+    let truth = [("link1.mx", 0.3), ("link1.Izz", 0.06), ("j1.fc", 0.4), ("j1.fv", 0.3)];
+    for method in ["didim", "cloe"] {
+        for factor in [0.7, 0.9, 0.97, 1.0, 1.03, 1.1, 1.4] {
+            let (_, id) = pendulum.identify(&format!(
+                "[elements]\nfriction = \"given\"\n[estimator]\nmethod = \"{method}\"\n[instruments]\nreference = \"goal{{}}\"\n\
+                 reference_scale = 0.01\nrate_hz = 500\nposition_gain = [{}]\nvelocity_gain = [{}]\n",
+                80.0 * factor,
+                4.0 * factor
+            ));
+            let estimate = id.estimate();
+            let check = check_of(&estimate, "instruments");
+            let std = id.standard_deviations();
+            let off = truth.map(|(name, truth)| {
+                let column = id.model.parameters().column(name).unwrap();
+                let k = id.base.kept.binary_search(&column).unwrap();
+                let error = (id.fit().x[k] - truth).abs();
+                (error / std[k].0.unwrap(), error / truth)
+            });
+            println!("{method} {factor}: {} {off:.3?}", check.status.word());
+            let wrong = off.iter().any(|(deviations, share)| *deviations > 4.0 && *share > 0.02);
+            assert!(!(wrong && check.status.word() == "ok"), "{method} {factor}: {off:?}");
+            assert!(factor != 1.0 || check.status.word() == "ok", "{}", check.meaning);
+        }
+    }
+}
+
 #[test]
 fn the_same_bits_come_out_of_one_thread() {
     let pendulum = Pendulum::new(2e-5);
