@@ -174,6 +174,17 @@ impl Problem {
                 not_negative("weight of the smallest singular value", *smallest)?;
                 positive("weights of the criterion, sum", condition + smallest)
             }
+            Measure::Largest { of, order } => {
+                count("columns of the combinations", columns, of.ncols())?;
+                if of.nrows() == 0 {
+                    return Err(value("combinations", "at least one", 0.0));
+                }
+                of.col_iter().flatten().try_for_each(|x| finite("entry of a combination", *x))?;
+                match *order >= 1.0 && order.is_finite() {
+                    true => Ok(()),
+                    false => Err(value("order of the largest deviation", "a finite number of at least 1", *order)),
+                }
+            }
             Measure::Condition | Measure::Smallest | Measure::Determinant => Ok(()),
         }
     }

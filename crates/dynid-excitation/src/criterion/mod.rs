@@ -31,6 +31,16 @@ pub enum Measure {
     ///
     /// With `C = diag(1/βᵢ²)` it is the mean square of relative standard deviations.
     Trace(Vec<f64>),
+    /// Largest deviation of some combinations of the parameters: `1/s ln Σ_i (f_i M_f⁻¹ f_iᵀ)ˢ`, a smooth stand-in for
+    /// `ln max_i f_i M_f⁻¹ f_iᵀ` that is at most `ln(k)/s` above it.
+    ///
+    /// With `f_i` a parameter in units of the deviation that is wanted of it, the measure is negative only where all are met.
+    Largest {
+        /// `f_i`, one row per combination, one entry per column.
+        of: Mat,
+        /// `s`, at least 1, where it is the trace.
+        order: f64,
+    },
 }
 
 /// What columns are divided by before the measure is taken.
@@ -77,7 +87,7 @@ impl Criterion {
 
     /// Whether the extremes of the spectrum decide, so that it is not differentiable where they meet.
     pub(crate) fn is_extremal(&self) -> bool {
-        !matches!(self.measure, Measure::Determinant | Measure::Trace(_))
+        !matches!(self.measure, Measure::Determinant | Measure::Trace(_) | Measure::Largest { .. })
     }
 
     /// Value for a triangle; `None` if it is singular or not finite.
@@ -92,6 +102,9 @@ impl Criterion {
                 -2.0 * (0..scaled.nrows()).map(|i| scaled[(i, i)].abs().ln()).sum::<f64>()
             }
             Measure::Trace(weights) => weighted_trace(&inverse(&scaled)?, weights).ln(),
+            Measure::Largest { of, order } => {
+                PowerSum::of(&variances(&(of * &inverse(&scaled)?)), *order).logarithm
+            }
             _ => {
                 let (sigma, _) = singular_values(&scaled, false)?;
                 Spectral::new(&sigma, smoothing)?.value(&self.measure)
@@ -116,6 +129,16 @@ impl Criterion {
                 let n = covariance.nrows();
                 let left = Mat::from_fn(n, n, |i, j| covariance[(i, j)] * weights[j]);
                 (trace.ln(), GramSensitivity::Full((left * &covariance) * (-2.0 / trace)))
+            }
+            Measure::Largest { of, order } => {
+                let inverse = inverse(&scaled)?;
+                let rows = of * &inverse;
+                let PowerSum { logarithm, slopes } = PowerSum::of(&variances(&rows), *order);
+                // Rows of `F M⁻¹`: d(f M⁻¹ fᵀ) = -f M⁻¹ dM M⁻¹ fᵀ.
+                let images = rows * inverse.transpose();
+                let n = images.ncols();
+                let left = Mat::from_fn(n, images.nrows(), |j, i| -2.0 * slopes[i] * images[(i, j)]);
+                (logarithm, GramSensitivity::Full(left * images))
             }
             _ => {
                 let (sigma, v) = singular_values(&scaled, true)?;
@@ -180,6 +203,29 @@ fn weighted_trace(inverse: &Mat, weights: &[f64]) -> f64 {
         .sum()
 }
 
+/// Squared lengths of rows.
+fn variances(rows: &Mat) -> Vec<f64> {
+    (0..rows.nrows()).map(|i| (0..rows.ncols()).map(|j| rows[(i, j)].powi(2)).sum()).collect()
+}
+
+/// `1/s ln Σ xˢ` of positive numbers with its slopes.
+struct PowerSum {
+    logarithm: f64,
+    slopes: Vec<f64>,
+}
+
+impl PowerSum {
+    fn of(x: &[f64], order: f64) -> Self {
+        // Relative to the largest: powers of the numbers themselves may overflow.
+        let largest = x.iter().copied().fold(0.0, f64::max);
+        let sum: f64 = x.iter().map(|x| (x / largest).powf(order)).sum();
+        PowerSum {
+            logarithm: largest.ln() + sum.ln() / order,
+            slopes: x.iter().map(|x| (x / largest).powf(order - 1.0) / (largest * sum)).collect(),
+        }
+    }
+}
+
 impl GramSensitivity {
     /// More than a few outer products are cheaper as one matrix.
     fn condensed(self, n: usize) -> Self {
@@ -240,7 +286,7 @@ impl<'a> Spectral<'a> {
                 (condition * self.largest.exp() + smallest).ln() + self.reciprocal
             }
             Measure::Smallest => 2.0 * self.reciprocal,
-            Measure::Determinant | Measure::Trace(_) => f64::NAN,
+            Measure::Determinant | Measure::Trace(_) | Measure::Largest { .. } => f64::NAN,
         }
     }
 
@@ -253,7 +299,7 @@ impl<'a> Spectral<'a> {
                 (term / (term + smallest), 1.0)
             }
             Measure::Smallest => (0.0, 2.0),
-            Measure::Determinant | Measure::Trace(_) => (0.0, 0.0),
+            Measure::Determinant | Measure::Trace(_) | Measure::Largest { .. } => (0.0, 0.0),
         };
         let (n, first, last) = (self.sigma.len(), self.sigma[0], self.sigma[self.sigma.len() - 1]);
         (0..n)
@@ -355,7 +401,8 @@ mod tests {
         let mut triangle = triangle_of(&matrices()[0]);
         triangle[(6, 6)] = 0.0;
         let trace = Measure::Trace(vec![1.0; 7]);
-        for measure in measures().into_iter().chain([Measure::Determinant, trace]) {
+        let largest = Measure::Largest { of: Mat::identity(7, 7), order: 4.0 };
+        for measure in measures().into_iter().chain([Measure::Determinant, trace, largest]) {
             for broken in [0.0, f64::NAN] {
                 triangle[(6, 6)] = broken;
                 let criterion = Criterion::raw(measure.clone());

@@ -6,6 +6,7 @@ use crate::problems;
 use crate::support::*;
 use dynid_excitation::criterion::{ColumnScaling, Criterion, Measure};
 use dynid_excitation::*;
+use dynid_linalg::Mat;
 use serde_json::Value;
 
 const PI: f64 = std::f64::consts::PI;
@@ -98,6 +99,38 @@ fn difference(problem: &Problem, at: &[Vec<f64>], joint: usize, k: usize, sample
     (8.0 * (value(1.0) - value(-1.0)) - (value(2.0) - value(-2.0))) / (12.0 * h)
 }
 
+/// Three combinations of all columns.
+fn combinations(columns: usize, spread: &[f64]) -> Mat {
+    Mat::from_fn(3, columns, |i, j| (1.0 + i as f64 + 2.0 * j as f64).cos() * spread[(i + j) % columns])
+}
+
+/// Of single columns at order 1 the measure is the weighted trace; at a high order it is the largest variance.
+#[test]
+fn largest_deviations_lie_between_the_largest_and_the_trace() {
+    let weights = numbers(&serde_json::json!([1.0, 1.0, 1.0, 1.0, 1.0, 1.0]));
+    let columns = problem("indy7", weights.clone(), Criterion::raw(Measure::Determinant), 40)
+        .map(|p| p.model.columns().len());
+    let Some(columns) = columns else { return };
+    let coefficients: Vec<Vec<f64>> =
+        (0..6).map(|j| (0..11).map(|k| 0.3 * (1.0 + 3.0 * j as f64 + 7.0 * k as f64).sin()).collect()).collect();
+    let value = |measure: Measure| {
+        let problem = problem("indy7", weights.clone(), Criterion::raw(measure), 40).unwrap();
+        criterion_gradient(&problem, &coefficients, 40).unwrap().0
+    };
+    let single = |column: usize| {
+        value(Measure::Trace((0..columns).map(|k| if k == column { 1.0 } else { 0.0 }).collect()))
+    };
+    let chosen = [2, 7, 11];
+    let of = Mat::from_fn(3, columns, |i, j| if j == chosen[i] { 1.0 } else { 0.0 });
+    let trace = value(Measure::Trace((0..columns).map(|k| f64::from(chosen.contains(&k))).collect()));
+    let largest = chosen.map(single).into_iter().fold(f64::NEG_INFINITY, f64::max);
+    assert!((value(Measure::Largest { of: of.clone(), order: 1.0 }) - trace).abs() < 1e-9);
+    for order in [4.0, 40.0, 400.0] {
+        let found = value(Measure::Largest { of: of.clone(), order });
+        assert!(found >= largest - 1e-9 && found <= largest + 3_f64.ln() / order + 1e-9, "{order}: {found} {largest}");
+    }
+}
+
 #[test]
 fn every_criterion_agrees_with_differences() {
     let Some(golden) = reference("golden/excitation_gradient.json") else { return };
@@ -114,6 +147,8 @@ fn every_criterion_agrees_with_differences() {
             Measure::Smallest,
             Measure::Determinant,
             Measure::Trace(spread.clone()),
+            Measure::Largest { of: combinations(columns, &spread), order: 1.0 },
+            Measure::Largest { of: combinations(columns, &spread), order: 6.0 },
         ];
         for measure in measures {
             for scaling in [ColumnScaling::Raw, ColumnScaling::UnitNorm, ColumnScaling::Given(spread.clone())]

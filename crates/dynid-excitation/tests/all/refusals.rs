@@ -97,6 +97,33 @@ fn sizes_and_numbers() {
             }),
         ),
         (
+            "columns of the combinations",
+            Box::new(|p| {
+                p.criterion = Criterion::raw(Measure::Largest { of: Mat::zeros(1, 1), order: 4.0 });
+            }),
+        ),
+        (
+            "entry of a combination",
+            Box::new(move |p| {
+                let of = Mat::from_fn(1, p.model.columns().len(), |_, _| nan);
+                p.criterion = Criterion::raw(Measure::Largest { of, order: 4.0 });
+            }),
+        ),
+        (
+            "combinations",
+            Box::new(|p| {
+                let of = Mat::zeros(0, p.model.columns().len());
+                p.criterion = Criterion::raw(Measure::Largest { of, order: 4.0 });
+            }),
+        ),
+        (
+            "order of the largest deviation",
+            Box::new(|p| {
+                let of = Mat::zeros(1, p.model.columns().len());
+                p.criterion = Criterion::raw(Measure::Largest { of, order: 0.5 });
+            }),
+        ),
+        (
             "column scale",
             Box::new(|p| {
                 let scale = vec![0.0; p.model.columns().len()];
