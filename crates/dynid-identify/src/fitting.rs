@@ -81,27 +81,31 @@ impl Fitted {
 
     /// Weighted factor of groups of rows as the fit had them, in whatever columns, deflated as [`Fitted::information`] says.
     pub(crate) fn deflated(&self, groups: &[ReducedGroup], total: usize, explained: &[bool]) -> Factor {
+        let inflation = self.row_inflation(explained);
+        let parts: Vec<Factor> = groups
+            .iter()
+            .zip(self.estimate.weights())
+            .map(|(group, weight)| group.merged(total).scaled(weight / inflation[group.output].sqrt()))
+            .collect();
+        Factor::merge(&parts.iter().collect::<Vec<_>>())
+    }
+
+    /// Per output: what the variances of its rows count for, beyond those of white residuals. Joint by joint where joints differ, scaled so
+    /// that together they make up the inflation found for all; of outputs that the model does not explain a huge one.
+    pub(crate) fn row_inflation(&self, explained: &[bool]) -> Vec<f64> {
         let known: Vec<f64> = self.inflation_per_output.iter().flatten().copied().collect();
         let least = known.iter().copied().fold(f64::INFINITY, f64::min);
         let most = known.iter().copied().fold(1.0, f64::max);
         let equal = known.len() < 2 || most <= UNEQUAL * least;
-        // Joint by joint, scaled so that together they make up the inflation found for all.
         let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
-        let inflation = |output: usize| -> f64 {
-            if !explained[output] {
-                return TRACE;
-            }
-            match self.inflation_per_output[output].filter(|_| !equal) {
+        let of_output = |(output, explained): (usize, &bool)| match explained {
+            false => TRACE,
+            true => match self.inflation_per_output.get(output).copied().flatten().filter(|_| !equal) {
                 Some(own) => (own * self.inflation / mean).max(1.0),
                 None => self.inflation,
-            }
+            },
         };
-        let parts: Vec<Factor> = groups
-            .iter()
-            .zip(self.estimate.weights())
-            .map(|(group, weight)| group.merged(total).scaled(weight / inflation(group.output).sqrt()))
-            .collect();
-        Factor::merge(&parts.iter().collect::<Vec<_>>())
+        explained.iter().enumerate().map(of_output).collect()
     }
 }
 

@@ -35,6 +35,7 @@ mod input_record;
 mod joint_stiffness;
 mod journal_doubt;
 pub mod known_friction;
+pub mod knowledge;
 mod linear_method;
 mod load_doubt;
 mod load_rounds;

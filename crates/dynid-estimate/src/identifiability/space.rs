@@ -101,6 +101,20 @@ impl VisibleSpace {
         &self.base_std
     }
 
+    /// The prior of the base parameters as rows of information `P`, one column per base parameter: `PᵀP = (K C0 Kᵀ)⁻¹`.
+    pub fn prior_information(&self) -> Mat {
+        dynid_linalg::triangular::inverse(&self.triangle).transpose().to_mat()
+    }
+
+    /// What base parameters tell of standard parameter `j`: `E[x_j | β] = c β` (about the prior) with `c = (C0 Kᵀ (K C0 Kᵀ)⁻¹)_j`. With the
+    /// covariance `(RᵀR + (K C0 Kᵀ)⁻¹)⁻¹` of the base parameters the posterior variance is `c (RᵀR + (K C0 Kᵀ)⁻¹)⁻¹ cᵀ` and what stays
+    /// hidden, [`Assessment::hidden`] `σ0_j²`.
+    pub fn seen_through(&self, parameter: usize) -> Vec<f64> {
+        let r = self.base_std.len();
+        let row = Mat::from_fn(r, 1, |k, _| self.prior_std[parameter] * self.visible[(parameter, k)]);
+        dynid_linalg::triangular::solve_upper(&self.triangle, &row).col(0).to_vec()
+    }
+
     fn parameter_shares(&self, excitation: &Excitation) -> Vec<Shares> {
         let rotated = &self.visible * &excitation.directions;
         (0..self.prior_std.len()).map(|j| excitation.shares(|k| rotated[(j, k)])).collect()

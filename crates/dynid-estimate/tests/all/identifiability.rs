@@ -273,3 +273,28 @@ fn a_combination_names_its_largest_terms() {
     assert_eq!(largest.constants(&lengths), ["0.45 = distance joint 2-3"]);
     assert!(visible_combinations(&k, &[1.0; 5], &[0, 3], 4).len() == 1);
 }
+
+/// Variances of standard parameters by way of the base parameters are those of the assessment.
+#[test]
+fn base_parameters_tell_what_is_known_of_standard_ones() {
+    let mut rng = ChaCha8Rng::seed_from_u64(12);
+    for _ in 0..50 {
+        let r = rng.random_range(1..10);
+        let p = r + rng.random_range(0..10);
+        let k = random_regrouping(&mut rng, r, p);
+        let std: Vec<f64> = (0..p).map(|_| 10f64.powf(rng.random_range(-2.0..1.0))).collect();
+        let log = random_log(&mut rng, r, 3 * r, &[], false);
+        let space = VisibleSpace::new(&k, &std);
+        let (prior, information) = (space.prior_information(), log.r_matrix());
+        let sum = prior.transpose() * &prior + information.transpose() * &information;
+        let covariance = sum.lu().inverse();
+        for (j, assessed) in space.assess(&log, 1.0).parameters.iter().enumerate() {
+            let c = Mat::column(&space.seen_through(j));
+            let seen = (c.transpose() * &covariance * &c)[(0, 0)];
+            let found = (seen + assessed.hidden * std[j].powi(2)).sqrt();
+            let wanted = assessed.posterior_std;
+            // The inverse of the normal matrix is good to its condition number.
+            assert!((found - wanted).abs() < 1e-6 * std[j].max(wanted), "{j}: {found} against {wanted}");
+        }
+    }
+}
